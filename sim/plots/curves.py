@@ -359,7 +359,7 @@ def over(dataset: xr.Dataset, name: str) -> Scene:
     ValueError
         If there is no such variable, with those there are.
     """
-    swept = [dim for dim in sweep_dims(dataset) if dataset.sizes[dim] > 1]
+    swept = style.swept(dataset)
     keys = [dim for dim in swept if dim == name.replace(".", "_") or dim.endswith(f"_{name}")]
     name = _PLAIN.get(name, name)
     if name == "speed":
@@ -476,20 +476,14 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
     values = scene.all(*(f"{name}_mean" for name, *_ in shown))
     factor = style.in_unit(panel.yaxis, "energy per area", values, "J/m^2")
     for name, text, colour, dashes in shown:
-        _energies(panel, scene, name, factor, colour, dashes)
+        same = not scene.width and _same([scene.values(f"{name}_mean", line) for line in scene.lines])
         colour = colour if scene.single else style.REFERENCE
+        for line in scene.lines[:1] if same else scene.lines:
+            curve(panel, scene, name, line, factor, colour if same or scene.single else line.colour, dashes)
         panel.plot([], [], color=colour, label=text, **line_style(scene, dashes))
     if np.any(values <= 0.0):
         panel.axhline(0.0, **style.GUIDE)
     style.legend(panel)
-
-
-def _energies(panel: Axes, scene: Scene, name: str, factor: float, colour: str, dashes: str) -> None:
-    """Draw the curves of an energy: a single one in its colour, one grey line if all are the same."""
-    same = not scene.width and _same([scene.values(f"{name}_mean", line) for line in scene.lines])
-    for line in scene.lines[:1] if same else scene.lines:
-        shade = colour if scene.single else style.REFERENCE if same else line.colour
-        curve(panel, scene, name, line, factor, shade, dashes)
 
 
 def _small_fluctuations(scene: Scene) -> bool:
@@ -498,14 +492,6 @@ def _small_fluctuations(scene: Scene) -> bool:
         float(np.max(np.nan_to_num(scene.all(f"{n}_mean")))) for n in ("fluctuation_energy", "work_of_adhesion")
     )
     return 0.0 < most < _SMALL * work and scene.varies("fluctuation_energy")
-
-
-def _fluctuation_panel(panel: Axes, scene: Scene) -> None:
-    """Draw a fluctuation energy that is small."""
-    energies = scene.all("fluctuation_energy_mean")
-    factor = style.in_unit(panel.yaxis, r"fluctuations $\Delta\Gamma$", energies, "J/m^2")
-    _energies(panel, scene, "fluctuation_energy", factor, style.FLUCTUATIONS, "--")
-    panel.set_ylim(bottom=0.0)
 
 
 def share_panel(panel: Axes, scene: Scene) -> None:
@@ -573,7 +559,7 @@ def further_panels(scene: Scene) -> list[tuple[float, Panel]]:
     if scene.varies("work_of_adhesion") or scene.varies("fluctuation_energy"):
         panels.append((1.6, energy_panel))
         if _small_fluctuations(scene):
-            panels.append((1.2, _fluctuation_panel))
+            panels.append((1.2, series("fluctuation_energy", r"fluctuations $\Delta\Gamma$", "J/m^2")))
     if scene.varies("friction_force"):
         panels.append((1.2, friction_panel))
     return panels

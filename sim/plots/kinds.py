@@ -4,7 +4,7 @@ import contextlib
 import inspect
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import xarray as xr
@@ -19,9 +19,6 @@ from sim.plots.measured import Measured
 from sim.plots.style import STYLE, recorded, swept_value
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
-
-if TYPE_CHECKING:
-    from sim.scenario.scenario import Scenario
 
 
 class Choices(NamedTuple):
@@ -94,7 +91,7 @@ class Kind(NamedTuple):
 
     draw: Callable[..., Figure]
     needs: Callable[[xr.Dataset], object] = lambda dataset: None
-    fits: Callable[[xr.Dataset], bool] = lambda dataset: False
+    fits: Callable[[xr.Dataset], bool] = lambda dataset: True
     reads: tuple[str, ...] = ()
 
     @property
@@ -113,31 +110,21 @@ class Kind(NamedTuple):
         return tuple(inspect.signature(self.draw).parameters)[1:]
 
 
-def _always(dataset: xr.Dataset) -> bool:
-    return True
-
-
-def _rests(dataset: xr.Dataset) -> bool:
-    return curves.rest_of(dataset) is not None
-
-
-def _rises(dataset: xr.Dataset) -> bool:
-    return not curves.turns(dataset)
-
-
 _OF_THEORY = ("shear_stress", "contact_area")
 _OF_CURVE = ("speed", "contact_area", "jkr_radius", "hertz_radius")
 #: All figures, by name. The default of a dataset is the first kind that fits it.
 KINDS: dict[str, Kind] = {
-    "loop": Kind(theories.loop_figure, theories.needs_course, _always, ("normal_load", "displacement")),
+    "loop": Kind(theories.loop_figure, theories.needs_course, reads=("normal_load", "displacement")),
     "theories": Kind(theories.theories_figure, theories.case_of, theories.sweeps_theories, _OF_THEORY),
-    "stress": Kind(slider.stress_figure, slider.needs_stress, _rests, ("speed",)),
-    "stability": Kind(slider.stability_figure, slider.needs_map, _always, ("spring_force",)),
-    "creep": Kind(slider.creep_figure, slider.needs_force, _always, ("slider_position", "speed")),
+    "stress": Kind(
+        slider.stress_figure, slider.needs_stress, lambda dataset: curves.rest_of(dataset) is not None, ("speed",)
+    ),
+    "stability": Kind(slider.stability_figure, slider.needs_map, reads=("spring_force",)),
+    "creep": Kind(slider.creep_figure, slider.needs_force, reads=("slider_position", "speed")),
     "friction": Kind(curves.friction_figure, curves.needs_friction, curves.turns, ("speed",)),
-    "curve": Kind(curves.curve_figure, curves.needs_speeds, _rises, _OF_CURVE),
-    "sweep": Kind(curves.sweep_figure, curves.needs_sweep, _always),
-    "time": Kind(curves.time_figure, fits=_always),
+    "curve": Kind(curves.curve_figure, curves.needs_speeds, lambda dataset: not curves.turns(dataset), _OF_CURVE),
+    "sweep": Kind(curves.sweep_figure, curves.needs_sweep),
+    "time": Kind(curves.time_figure),
     "incipient": Kind(slider.incipient_figure, slider.needs_pull, reads=("spring_force", "contact_area")),
     "map": Kind(field.map_figure, field.needs_maps),
     "spectrum": Kind(field.spectrum_figure, field.needs_maps),
@@ -257,16 +244,11 @@ def planned(source: Path, kind: str | None, path: Path | None, replace: bool, ch
         raise BadInput([f"{source}: {fault}; name the dataset that `sim run` writes"])
     claim_file(target, replace, files_read(scene))
     try:
-        save(spectrum_of(scene), target)
+        with mpl.rc_context(STYLE):
+            save(field.density_figure(scene), target)
     except ValueError as lack:
         raise BadInput([f"{source}: {lack}"]) from None
     return target
-
-
-def spectrum_of(scene: "Scenario") -> Figure:
-    """Return the figure of the spectral density of a scene before any run."""
-    with mpl.rc_context(STYLE):
-        return field.density_figure(scene)
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -179,9 +179,7 @@ def stability_figure(dataset: xr.Dataset) -> Figure:
         style.across(panel, pace.factor * edges, pace.label("speed of the stage $V$"), "log")
         style.legend(panel, words)
     axes[0].set_ylabel(hard.label("stiffness of the spring $K$"))
-    bar = figure.colorbar(mesh, ax=axes, label="swing of the force over its largest", pad=0.02)
-    if bar.solids is not None:
-        bar.solids.set_rasterized(True)
+    figure.colorbar(mesh, ax=axes, label="swing of the force over its largest", pad=0.02)
     return figure
 
 
@@ -358,13 +356,10 @@ def maximum_of(speed: np.ndarray, stress: np.ndarray) -> int | None:
     >>> maximum_of(np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 4.0])) is None
     True
     """
-    known = np.isfinite(stress)
-    if not np.any(known):
+    if not np.any(np.isfinite(stress)):
         return None
-    at = int(np.nanargmax(np.abs(stress)))
-    size = np.abs(speed)
-    inside = np.min(size[known]) < size[at] < np.max(size[known])
-    return at if inside else None
+    at, size = int(np.nanargmax(np.abs(stress))), np.where(np.isfinite(stress), np.abs(speed), np.nan)
+    return at if np.nanmin(size) < size[at] < np.nanmax(size) else None
 
 
 def _marked(panel: Axes, scene: Scene, factor: float) -> list[Line]:

@@ -352,9 +352,6 @@ _GRIPS = 5.0 / 9.0
 #: Line width of the cycles after the first.
 _LATER = 0.6
 
-#: Height of a name, in that of the panel.
-_NAME = 0.1
-
 #: Axis of each control, in words and as a symbol; the indentation where no stiffness is between.
 _DISPLACEMENTS = {"displacement": ("displacement", r"\Delta"), "": ("displacement, or indentation,", r"\Delta")}
 
@@ -477,21 +474,14 @@ def _equilibria(panels: list[Axes], scene: Scene, theories: list[Theory], factor
 def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
     """Draw the loads at which a dead load and fixed grips lose JKR's contact, with their names if all are the same."""
     pulls = {factor * float(jkr.pull_off_load(*theory[:2])) for theory in theories if theory.work > 0.0}
-    for pull in pulls:
-        for share in (1.0, _GRIPS):
-            panel.axhline(share * pull, **style.GUIDE)
-    if len(pulls) != 1:
-        return
-    (pull,) = pulls
     panel.margins(y=0.15)  # a name stands below the lowest line
-    dead, grips = r"$-\frac{3}{2}\pi wR$", r"$-\frac{5}{6}\pi wR$"
-    low, high = panel.get_ylim()
-    near = -_GRIPS * pull < _NAME * (high - low)
-    names = [(1.0, f"{grips}, {dead}", "top")] if near else [(1.0, dead, "top"), (_GRIPS, grips, "bottom")]
-    look: Any = {"textcoords": "offset points", "ha": "left", "color": style.REFERENCE, "fontsize": 7}
-    for share, text, side in names:  # on the left, where spheres are open
-        at, off = (0.0, share * pull), (3, 1.5 if side == "bottom" else -1.5)
-        panel.annotate(text, at, off, va=side, xycoords=panel.get_yaxis_transform(), **look)
+    dead, grips = (0.01, 1.0, r"$-\frac{3}{2}\pi wR$"), (0.99, _GRIPS, r"$-\frac{5}{6}\pi wR$")
+    for pull in pulls:
+        for (x, share, text), ha, va in ((dead, "left", "top"), (grips, "right", "bottom")):
+            panel.axhline(share * pull, **style.GUIDE)
+            if len(pulls) == 1:
+                place: Any = {"transform": panel.get_yaxis_transform(), "ha": ha, "va": va}
+                panel.text(x, share * pull, text, color=style.REFERENCE, fontsize=7, **place)
 
 
 def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]:

@@ -129,7 +129,7 @@ ANISOTROPIC = {"model": "anisotropic_gaussian", "rms": "100 kPa", "length_x": "1
 
 def before(**spectrum):
     """The figure of a scene that has not run."""
-    return plots.spectrum_of(load(SCENE | {"shear": {"model": "mean", "spectrum": spectrum}}))
+    return field_figures.density_figure(load(SCENE | {"shear": {"model": "mean", "spectrum": spectrum}}))
 
 
 def test_a_spectrum_is_drawn_before_any_run(tmp_path, monkeypatch):

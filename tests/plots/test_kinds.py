@@ -141,7 +141,7 @@ def test_a_fluctuation_energy_too_small_to_see_has_a_panel_of_its_own(ramp):
     small = simulated(shear=field(spectrum=Band(rms=10e3, longest=60e-6, shortest=16e-6)))
     panels = plots.draw(small, "curve").axes
     assert panels[2].get_ylabel().startswith(r"fluctuations $\Delta\Gamma$") and len(panels) == 4
-    _, energy = drawn(panels[2], pictures.FLUCTUATIONS, "--")
+    _, energy = drawn(panels[2], pictures.BOTH)
     found = analysis.statistics(small)["fluctuation_energy_mean"]
     assert_allclose(energy / energy[-1], found / found[-1], rtol=1e-13)
     assert len(plots.draw(ramp, "curve").axes) == 3
