@@ -131,7 +131,7 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tu
         raise ValueError("a ripple is a single wave and has no spectral density to compare; draw its map")
     amplitude = TypeAdapter(Amplitude).validate_python(shear["amplitude"])
     if amplitude.relaxing or amplitude.remembers:  # the amplitude has a past: only the shape can be compared
-        grid = _grid_of(stress)
+        grid = cast(Grid, _lattice_of(stress))
         cells = modes(spectrum, grid.cell, grid.points)
         return spectrum, float(np.mean(stress.to_numpy() ** 2) / np.sum(cells.variance)), "target, scaled"
     factor = amplitude.factor(*(_then(dataset, name, at, stress) for name in ("speed", "shear_stress")))
@@ -142,11 +142,6 @@ def _lattice_of(stress: xr.DataArray) -> Grid | Rectangle:
     shape = stress.sizes["x"], stress.sizes["y"]
     sides = (float(stress[axis][1] - stress[axis][0]) * points for axis, points in zip("xy", shape, strict=True))
     return lattice_of(cast(tuple[float, float], tuple(sides)), shape)
-
-
-def _grid_of(stress: xr.DataArray) -> Grid:
-    points = stress.sizes["x"]
-    return Grid(float(stress["x"][1] - stress["x"][0]) * points, points)
 
 
 def mode_density(cells: Modes, grid: Grid) -> np.ndarray:
@@ -169,7 +164,7 @@ def spectrum_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
         raise ValueError("the field that bonds make follows them, without a spectrum of its own; draw the kind map")
     if word(dataset, "shear.field.file", ""):
         raise ValueError("a measured map has no spectrum to follow; `sim plot` of the scenario draws its own")
-    (spectrum, raised, name), grid = _target(dataset, stress, where), _grid_of(stress)
+    (spectrum, raised, name), grid = _target(dataset, stress, where), cast(Grid, _lattice_of(stress))
     expected = raised * radial_average(mode_density(modes(spectrum, grid.cell, grid.points), grid), grid).density
     rings = [radial_average(density, grid) for density in periodogram(stress.to_numpy(), grid.cell)]
     fine = np.geomspace(0.4 * rings[0].q[0], rings[0].q[-1], 2000)

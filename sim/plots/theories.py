@@ -507,8 +507,8 @@ def _labelled(scene: Scene, symbol: str, spent: xr.DataArray, loop: xr.DataArray
     labelled = []
     for line in scene.lines:
         known = {words: unit.factor * style.number_at(values, line.point) for words, values in energies.items()}
-        known = {words: value for words, value in known.items() if value != 0.0}
-        parts = [f"{words} = {value:.3g} {unit.name}" for words, value in known.items() if np.isfinite(value)]
+        known = {words: value for words, value in known.items() if value != 0.0 and np.isfinite(value)}
+        parts = [f"{words} = {value:.3g} {unit.name}" for words, value in known.items()]
         label = ": ".join(filter(None, [line.label, ", ".join(parts).replace("-", "−")])) if line.label else ""
         labelled.append(line._replace(label=label))
     return labelled
