@@ -170,7 +170,16 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
         judged += _judged(base, [row for row in settings if row.part == part], until, left_out)
     means = [row for row in judged if row.part == "bonds" and "sites" not in _table(row.scenario.bonds)]
     judged += _judged_steps(written, [written, *means][-1], accepted, end)
-    return _dataset(scenario, judged, accepted, left_out)
+    dims, variables = ("row", "quantity", "statistic"), dict[str, Any]()
+    for name, (unit, text) in _DESCRIBED.items():
+        values = np.array([getattr(row, name) for row in judged])
+        variables[name] = (dims[: values.ndim], values, {"long_name": text} | ({"units": unit} if unit else {}))
+    coordinates = {"row": [row.label for row in judged], "quantity": [*QUANTITIES], "statistic": [*STATISTICS]}
+    return xr.Dataset(variables, coordinates, {
+        "Conventions": "CF-1.11", "title": f"speed against error: {scenario.name}",
+        "sim_version": importlib.metadata.version("sliding-sim"), "seed": str(scenario.seed), "tolerance": accepted,
+        "swept": ", ".join(key for axis in scenario.sweep for key in axis.keys), "left_out": "\n".join(left_out),
+    })  # fmt: skip
 
 
 def _table(part: object) -> dict[str, Any]:
@@ -534,21 +543,6 @@ def _off(choice: Choice) -> str:
     """Return the largest error of a combination in words."""
     size, quantity, statistic = _worst(choice.error, choice.standard_error)
     return f"off by {size} % ({STATISTICS[statistic]} of {[*_WORDS.values()][quantity]})" if size != "0" else "exact"
-
-
-def _dataset(scenario: Scenario, settings: list[Setting], tolerance: float, left_out: list[str]) -> xr.Dataset:
-    """Return the settings with units and long names."""
-    dims, variables = ("row", "quantity", "statistic"), dict[str, Any]()
-    for name, (unit, text) in _DESCRIBED.items():
-        values = np.array([getattr(row, name) for row in settings])
-        variables[name] = (dims[: values.ndim], values, {"long_name": text} | ({"units": unit} if unit else {}))
-    coordinates = {"row": [row.label for row in settings], "quantity": [*QUANTITIES], "statistic": [*STATISTICS]}
-    swept = [key for axis in scenario.sweep for key in axis.keys]
-    return xr.Dataset(variables, coordinates, {
-        "Conventions": "CF-1.11", "title": f"speed against error: {scenario.name}",
-        "sim_version": importlib.metadata.version("sliding-sim"), "seed": str(scenario.seed),
-        "tolerance": tolerance, "swept": ", ".join(swept), "left_out": "\n".join(left_out),
-    })  # fmt: skip
 
 
 def figure(dataset: xr.Dataset) -> Figure:

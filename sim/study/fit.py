@@ -312,12 +312,18 @@ def carried_out(
 ) -> tuple[Fit, list[Shown]]:  # fmt: skip
     """Fit, compare mechanisms if wanted, write the files, and return the tables to print.
 
-    Arguments are those of ``sim.study.fit.fit``, with ``common`` as texts ``"COLUMN=2 %"``, of ``claim`` and of the
-    figure.
+    Arguments are those of ``sim.study.fit.fit``, with ``common`` as texts ``"COLUMN=2 %"``, and the ``units`` of the
+    figure. The files are ``<stem>_fit.toml``, ``.json`` and ``.png``. Older ones are refused unless ``replace`` is
+    True; a scenario is replaced only if a fit has written it.
     """
     pairs = [pair.partition("=")[::2] for pair in common]
     sizes = {name: read_option(size, f"--common {name}", "1", above=0, below=1) for name, size in pairs}
-    outputs = claim(scenario, data, stem, replace)
+    toml, *others = outputs = [stem.with_name(f"{stem.name}_fit.{ending}") for ending in ("toml", "json", "png")]
+    inputs = [*files_read(scenario), *data]
+    is_replaced = replace and toml.is_file() and _MADE.encode() in toml.read_bytes()
+    is_input = toml.resolve() in [path.resolve() for path in inputs]
+    for path in others if is_replaced and not is_input else outputs:
+        files.claim(path, replace, inputs)
     tables = [likelihood.read(path, scenario) for path in data]
     try:
         with in_units(units):  # before anything is fitted
@@ -332,7 +338,7 @@ def carried_out(
     with in_units(units):
         figure(result.problem, result.best).savefig(picture, format="png")
     numbers = json.dumps(document(result, data, verdict), indent=2, allow_nan=False) + "\n"
-    texts = scenario_text(scenario, result, outputs[0].parent).encode(), numbers.encode(), picture.getvalue()
+    texts = scenario_text(scenario, result, toml.parent).encode(), numbers.encode(), picture.getvalue()
     for path, content in zip(outputs, texts, strict=True):
         with files.output(path) as beside:
             beside.write_bytes(content)
@@ -341,20 +347,6 @@ def carried_out(
         doubt = "; but even the scenario as it is lies off: perhaps none of these is true"
         shown.append((_comparison(verdict), f"\n{verdict.words}{doubt if result.p_value <= POOR else ''}\n"))
     return result, [*shown, ([], "\n".join(map(str, outputs)))]
-
-
-def claim(scenario: Scenario, data: Sequence[Path], stem: Path, replace: bool) -> list[Path]:
-    """Return the files to be written, ``<stem>_fit.toml`` and so on; refuse older ones unless they are replaced.
-
-    A scenario is replaced only if a fit has written it.
-    """
-    toml, *others = outputs = [stem.with_name(f"{stem.name}_fit.{ending}") for ending in ("toml", "json", "png")]
-    inputs = [*files_read(scenario), *data]
-    is_replaced = replace and toml.is_file() and _MADE.encode() in toml.read_bytes()
-    is_input = toml.resolve() in [path.resolve() for path in inputs]
-    for path in others if is_replaced and not is_input else outputs:
-        files.claim(path, replace, inputs)
-    return outputs
 
 
 def _table(fit: Fit) -> list[dict[str, str]]:
@@ -402,9 +394,7 @@ def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[st
     """Return all numbers of a fit [SI]; those that are not known are None."""
     shares = fit.best.x[len(fit.numbers) :]
     result: dict[str, Any] = {
-        "scenario": fit.scenario.source.path,
-        "data": [str(path) for path in data],
-        "level": LEVEL,
+        "scenario": fit.scenario.source.path, "data": [str(path) for path in data], "level": LEVEL,
         "numbers": {
             item.free.key: {
                 "value": item.value, "unit": item.free.quantity.unit, "standard_error": item.error,
@@ -414,12 +404,8 @@ def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[st
         },
         "correlations": {"keys": [item.free.key for item in fit.numbers], "matrix": fit.correlations.tolist()},
         "common_errors": {name: size * x for (name, size), x in zip(fit.problem.common.items(), shares, strict=True)},
-        "chi_square": fit.best.chi_square,
-        "degrees_of_freedom": fit.problem.freedom,
-        "p_value": fit.p_value,
-        "aicc": fit.aicc,
-        "converged": fit.converged,
-        "remarks": fit.remarks,
+        "chi_square": fit.best.chi_square, "degrees_of_freedom": fit.problem.freedom, "p_value": fit.p_value,
+        "aicc": fit.aicc, "converged": fit.converged, "remarks": fit.remarks,
     }  # fmt: skip
     if verdict is not None:
         judged = [item._asdict() for item in verdict.judged]

@@ -121,11 +121,9 @@ def _faults(scenario: Scenario, conditions: dict[str, Array], curves: tuple[Curv
     """Yield the faults of a table: missing conditions, curves without information and opposite signs."""
     if not curves:
         yield 'no column was measured; name one as a variable of a dataset, such as "contact_area [mm^2]"'
-    drive, contact = scenario.drive, scenario.contact
-    if drive.solves_motion:
-        varies = not {"drive.stage", "drive.force"} & quantities(scenario).keys()
-    else:
-        varies = drive.model != "steady" and "speed" not in conditions
+    drive, contact, known = scenario.drive, scenario.contact, quantities(scenario)
+    steady = {"drive.stage", "drive.force"} & known.keys() if drive.solves_motion else {"speed"} & conditions.keys()
+    varies = not steady and drive.model != "steady"
     if "t" in conditions and len(conditions.keys() & {"speed", "held"}):
         yield "the scenario has the speed and the load at each time; leave out t, or the columns of these"
     elif "t" not in conditions and (not conditions or varies or ("held" not in conditions and contact.changes)):
@@ -236,24 +234,20 @@ def by_steady_sliding(group: Group, values: Values, names: list[str], theory: st
     """Variables at the rows of a group with some numbers changed, in steady sliding.
 
     ``theory`` is the name of a theory of ``sim.laws.theories`` that gives the radius in place of the contact's balance,
-    at the stress of the bonds; its numbers ``"alpha"`` and ``"lambda"`` are among the ``values``.
+    at the stress of the bonds and the full work of adhesion. Its numbers ``"alpha"`` and ``"lambda"`` are among the
+    ``values``.
     """
     scenario = changed(group.scenario, {key: value for key, value in values.items() if "." in key})
     course = steady_course(scenario, group.time, group.speed)
     if theory:
-        course = course._replace(radius=_radius_by(theory, scenario, course, values))
+        load, base, _ = scenario.contact.control(course.time, scenario.clock.duration).mount
+        at_load = scenario.contact.kind == "load"
+        compare: Callable[..., dict[str, Array]] = compare_at_load if at_load else compare_at_indentation
+        numbers = {"reversible": values.get("alpha", 0.0), "mixity": values.get("lambda", 0.5)}
+        rest = scenario.adhesion.work, *scenario.bodies
+        radii = compare(np.abs(course.stress), load if at_load else base, *rest, **numbers)
+        course = course._replace(radius=radii[theory])
     return {name: np.broadcast_to(_READ[name](scenario, course), group.speed.shape)[:, 0] for name in names}
-
-
-def _radius_by(theory: str, scenario: Scenario, course: Trajectory, values: Values) -> Array:
-    """Contact radius by a theory, at the stress that the bonds bear and the full work of adhesion."""
-    control = scenario.contact.control(course.time, scenario.clock.duration)
-    load, base, _ = control.mount
-    at_load = scenario.contact.kind == "load"
-    compare: Callable[..., dict[str, Array]] = compare_at_load if at_load else compare_at_indentation
-    numbers = {"reversible": values.get("alpha", 0.0), "mixity": values.get("lambda", 0.5)}
-    rest = scenario.adhesion.work, *scenario.bodies
-    return compare(np.abs(course.stress), load if at_load else base, *rest, **numbers)[theory]
 
 
 def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool) -> dict[str, Array]:
