@@ -192,10 +192,6 @@ class Scene(NamedTuple):
         """True if the observable is known and changes along the axis or between the curves."""
         return _changes(self.all(f"{name}_mean"))
 
-    def moves(self, name: str) -> bool:
-        """True if the observable changes along the axis."""
-        return any(_changes(values) for values in self.all(f"{name}_mean"))
-
 
 def _changes(values: np.ndarray) -> bool:
     known = values[np.isfinite(values)]
@@ -305,15 +301,12 @@ def contact_curves(panel: Axes, scene: Scene, name: str, factor: float) -> None:
 def beside(panel: Axes, scene: Scene, name: str, factor: float) -> None:
     """Draw measured points beside the curves of a variable, if there are any."""
     if scene.measured:
-        curves = [_compared(scene, name, line, factor) for line in scene.lines]
+        curves = []
+        for line in scene.lines:
+            mean, error = (factor * values for values in scene.drawn(name, line)[:2])
+            full = np.pi * scene.values("jkr_radius_mean", line) ** 2
+            curves.append(Compared(line.number, line.point, line.colour, scene.x[line.number], mean, error, full))
         scene.measured.draw(panel, (scene.over, scene.unit.factor), (name, factor), curves, scene.scale == "log")
-
-
-def _compared(scene: Scene, name: str, line: Line, factor: float) -> Compared:
-    """Return a curve for the comparison with measured points."""
-    mean, error = (factor * values for values in scene.drawn(name, line)[:2])
-    full = np.pi * scene.values("jkr_radius_mean", line) ** 2
-    return Compared(line.number, line.point, line.colour, scene.x[line.number], mean, error, full)
 
 
 def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float, labelled: bool = True) -> None:
@@ -598,7 +591,8 @@ def time_figure(
     scene = (over(dataset, x) if x else over_time(dataset))._replace(measured=data)
     scene = scene._replace(heading="; ".join(filter(None, [scene.title, coarse_slips(dataset)])))
     moved = not bool(stays_held(dataset).all())
-    shown = [name for name in _DRIVEN if scene.moves(name) and (name != "displacement" or moved) and name != scene.over]
+    shown = [name for name in _DRIVEN if (name != "displacement" or moved) and name != scene.over]
+    shown = [name for name in shown if any(_changes(values) for values in scene.all(f"{name}_mean"))]
     driven = [(0.8, series(name, *_DRIVEN[name])) for name in shown]
     first = area_panel if absolute else radius_panel
     return stacked(scene, [(1.6, first), *further_panels(scene), *driven], ax=ax)[0]
