@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from sim.engine import march, trajectory_of
+from sim.ensemble.variables import VARIABLES
 from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
@@ -136,6 +138,15 @@ def scene(members=3, steps=8, **parts):
         ensemble=Ensemble(members=members),
         **parts,
     )
+
+
+READ = {variable.name: variable.read for variable in VARIABLES}
+
+
+def records(scenario, *names):
+    """Recorded quantities of all members at every step, each of shape (steps + 1, members or 1)."""
+    states = [trajectory_of(scenario, state) for state in march(scenario, np.arange(scenario.ensemble.members))]
+    return [np.array([np.atleast_1d(READ[name](scenario, state)[0]) for state in states]) for name in names]
 
 
 #: Sweeps of one axis and of two.

@@ -76,22 +76,19 @@ def test_the_radius_closes_the_balance_in_fifty_digits():
                     assert_allclose(computed, float(exact), rtol=1e-12, atol=0)
 
 
-#: Law, control, level, lambda, and radius and force at the end of its branch.
-FOLDS = [
-    ("scaled_angle", True, 1.0, 0.2, 1.34802289496, 7.17595030009),
-    ("scaled_angle", True, 1.0, 0.5, 1.53887977112, 3.86459513208),
-    ("scaled_tangent", True, -1.0, 0.5, 1.15000201199, 2.55910723392),
-    ("shear_share", True, 1.0, 0.2, 4.0 ** (1 / 3), 7.07106781187),
-    ("shear_share", True, 1.0, 0.5, 4.0 ** (1 / 3), 4.472135955),
-    ("scaled_angle", False, 1.65429912029112, 0.2, 1.33719207122, 9.46740735087),
-    ("scaled_angle", False, 1.65429912029112, 0.5, 1.56813713305, 4.58120835551),
-    ("shear_share", False, 1.65429912029112, 0.2, 1.63701359433, 8.16091481802),
-    ("shear_share", False, 1.65429912029112, 0.5, 1.63701359433, 5.16141572311),
-]
-
-
 def test_a_branch_ends_at_its_fold_in_a_jump_or_reaches_hertz_smoothly():
-    for name, at_load, level, mixity, last, force in FOLDS:
+    # Law, control, level, lambda, and radius and force at the end of its branch.
+    for name, at_load, level, mixity, last, force in [
+        ("scaled_angle", True, 1.0, 0.2, 1.34802289496, 7.17595030009),
+        ("scaled_angle", True, 1.0, 0.5, 1.53887977112, 3.86459513208),
+        ("scaled_tangent", True, -1.0, 0.5, 1.15000201199, 2.55910723392),
+        ("shear_share", True, 1.0, 0.2, 4.0 ** (1 / 3), 7.07106781187),
+        ("shear_share", True, 1.0, 0.5, 4.0 ** (1 / 3), 4.472135955),
+        ("scaled_angle", False, 1.65429912029112, 0.2, 1.33719207122, 9.46740735087),
+        ("scaled_angle", False, 1.65429912029112, 0.5, 1.56813713305, 4.58120835551),
+        ("shear_share", False, 1.65429912029112, 0.2, 1.63701359433, 8.16091481802),
+        ("shear_share", False, 1.65429912029112, 0.5, 1.63701359433, 5.16141572311),
+    ]:
         after = radius(name, level, force * (1.0 + 1e-10), mixity, at_load)
         hertz = jkr.hertz_radius_at_load(level, 1.0, MODULUS) if at_load else math.sqrt(level)
         assert after == hertz if level > 0.0 else math.isnan(after)

@@ -109,14 +109,12 @@ def test_the_surface_is_continuous_follows_the_sphere_inside_and_feels_the_load_
 
 def test_the_work_of_the_pressure_is_the_elastic_energy():
     radius, indentation = lens_contact()
-    energy = over_the_contact(
-        lambda r: (
-            0.5
-            * halfspace.pressure(r, radius, indentation, **LENS)
-            * halfspace.normal_displacement(r, radius, indentation, 2e-3)
-        ),
-        radius,
-    )
+
+    def density(r):
+        moved = halfspace.normal_displacement(r, radius, indentation, 2e-3)
+        return 0.5 * halfspace.pressure(r, radius, indentation, **LENS) * moved
+
+    energy = over_the_contact(density, radius)
     exact = jkr.potential_at_indentation(-indentation, 0.0, radius, 0.0, **LENS)
     # four parts of alternating sign, each below ten times the sum
     assert_allclose(energy, exact, rtol=1e-13, atol=0)

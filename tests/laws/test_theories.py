@@ -210,8 +210,7 @@ def test_savkoor_briggs_closes_its_own_balance_ends_at_its_limit_and_shrinks_by_
     a = theories.savkoor_briggs_at_load(load, work, force, sphere_radius, modulus)
     shear = 3.0 * force**2 / (16.0 * math.pi * modulus * a**3)
     # G and shear are parts of w; G is the square of a difference of a third of its terms
-    normal = jkr.energy_release_rate(a, load, sphere_radius, modulus)
-    assert_allclose(normal + shear, work, rtol=60 * U, atol=0)
+    assert_allclose(jkr.energy_release_rate(a, load, sphere_radius, modulus) + shear, work, rtol=60 * U, atol=0)
     last = float(theories.savkoor_briggs_at_load(load, work, limit, sphere_radius, modulus))
     assert_allclose(modulus * last**3 / (0.75 * sphere_radius), load + 2.0 * pull, rtol=12 * U, atol=0)
     after = theories.savkoor_briggs_at_load(load, work, np.nextafter(limit, 1.0), sphere_radius, modulus)
@@ -282,7 +281,7 @@ def test_held_forces_give_the_radii_of_their_stresses_and_sahlis_is_never_below_
     assert np.isnan(theories.sahli_at_load(5.0, 1.0, 1.0, math.nan, 1.0, 4.0))
 
 
-def test_energy_of_the_mean_stress_per_new_area_is_the_work_along_the_edge():
+def test_the_energy_of_the_mean_stress_has_its_minimum_and_slope_at_the_reversible_contact():
     for poisson_ratio in [0.0, 0.3, 0.5]:
         radius, stress, shear_modulus = np.array([1e-6, 1.2e-4, 3.0]), 3e5, 1.6e6
         modulus = halfspace.contact_modulus(shear_modulus, poisson_ratio)
@@ -292,9 +291,6 @@ def test_energy_of_the_mean_stress_per_new_area_is_the_work_along_the_edge():
         # and two thirds of it, over the whole disc, what the disc stores
         stored = halfspace.disc_tangential_energy(radius, stress, shear_modulus, poisson_ratio)
         assert_allclose(2.0 / 3.0 * energy * math.pi * radius**2, stored, rtol=1e-14, atol=0)
-
-
-def test_the_reversible_contact_sits_in_a_minimum_of_the_energy_that_pulling_changes():
     load = np.array([-1.5, -0.5, 0.0, 5.0])
     radius = reversible.radius_at_load_reversible(load, 1.0, 1.0, 0.3, 1.0, 4.0)
     factor = np.array([[1.0], [0.98], [0.999], [1.001], [1.02]])
@@ -312,8 +308,7 @@ def test_the_reversible_contact_sits_in_a_minimum_of_the_energy_that_pulling_cha
         return jkr.load_at_radius(a, work, 1.0, e), jkr.indentation_at_radius(a, work, 1.0, e)
 
     def energy(a):
-        indentation = branch(a)[1]
-        return jkr.potential_at_indentation(-indentation, 0.0, a, 1.0, 1.0, e) + share * 4.0 * stress**2 * a**3 / e
+        return jkr.potential_at_indentation(-branch(a)[1], 0.0, a, 1.0, 1.0, e) + share * 4.0 * stress**2 * a**3 / e
 
     a = low + 0.5 * (top - low) * (nodes + 1.0)
     b = share * 6.0 * stress**2 / (math.pi * e)
@@ -325,7 +320,7 @@ def test_the_reversible_contact_sits_in_a_minimum_of_the_energy_that_pulling_cha
     assert_allclose(lifted, a, rtol=1e-13, atol=0)
 
 
-def test_nothing_reversible_is_jkr_bit_for_bit():
+def test_nothing_reversible_is_jkr_bit_for_bit_and_without_adhesion_all_but_the_uncorrected_hertz():
     for at_load, law in CONTROLS:
         level, work, stress, _, sphere_radius, modulus, poisson_ratio = random_states(20000, 43, at_load, decades=20.0)
         work[::7] *= -1.0
@@ -335,14 +330,20 @@ def test_nothing_reversible_is_jkr_bit_for_bit():
         assert np.isnan(exact).any() and np.isfinite(exact).sum() > 10000
         assert_array_equal(law(level, work, stress, 0.0, sphere_radius, modulus, poisson_ratio), exact)
         assert_array_equal(law(level, work, 0.0, 0.5, sphere_radius, modulus, poisson_ratio), exact)
+    radii = theories.compare_at_load(STRESSES, [[0.0], [5.0]], -0.1, 1.0, 4.0, shrinkage=0.01)
+    for name in radii.keys() - {"uncorrected"}:
+        assert_array_equal(radii[name], radii["hertz"])
+    assert np.all(radii["uncorrected"] >= radii["hertz"])
+    # no contact is left, or a negative share has no answer
+    assert np.all(np.isnan(reversible.radius_at_load_reversible([-1.0, 5.0], [-0.1, 1.0], 1.0, [0.5, -0.1], 1.0, 4.0)))
+    assert np.isnan(reversible.radius_at_indentation_reversible(1.0, 1.0, 1.0, -0.1, 1.0, 4.0))
 
 
 def assert_sound(at_load, law, states):
     """Between Hertz and JKR, on the rising branch, and off only where no wider state balances."""
     level, work, stress, share, sphere_radius, modulus, poisson_ratio = states
     a = law(*states)
-    plain = jkr.radius_at_load if at_load else jkr.radius_at_indentation
-    widest = plain(level, work, sphere_radius, modulus)
+    widest = (jkr.radius_at_load if at_load else jkr.radius_at_indentation)(level, work, sphere_radius, modulus)
     pressed = level >= 0.0
     hertz = (
         jkr.hertz_radius_at_load(level, sphere_radius, modulus)
@@ -402,13 +403,3 @@ def test_no_input_raises_or_hangs_and_no_contact_is_narrower_than_hertz(count):
         # cube roots differ by a rounding; a denormal work has too few digits for a fold to be measured from
         floor = np.where(work == 5e-324, 0.0, (1.0 - 4 * U) * hertz["indentation" in law.__name__])
         assert not np.any(radii < floor)
-
-
-def test_without_adhesion_every_theory_but_the_uncorrected_is_hertz():
-    radii = theories.compare_at_load(STRESSES, [[0.0], [5.0]], -0.1, 1.0, 4.0, shrinkage=0.01)
-    for name in radii.keys() - {"uncorrected"}:
-        assert_array_equal(radii[name], radii["hertz"])
-    assert np.all(radii["uncorrected"] >= radii["hertz"])
-    # no contact is left, or a negative share has no answer
-    assert np.all(np.isnan(reversible.radius_at_load_reversible([-1.0, 5.0], [-0.1, 1.0], 1.0, [0.5, -0.1], 1.0, 4.0)))
-    assert np.isnan(reversible.radius_at_indentation_reversible(1.0, 1.0, 1.0, -0.1, 1.0, 4.0))

@@ -48,8 +48,7 @@ def test_the_hat_of_the_rejection_lies_above_the_chances_and_its_core_below():
             # a number is floor of G(u) = (2a/(1/2 − |u|) + b) u + c, its share f(k) G'(u) / (most α)
             trials = math.ceil(mean / chance)
             chance = mean / trials
-            spread = math.sqrt(mean * (1.0 - chance))
-            a, b, size, sure = hat(spread, chance)
+            a, b, size, sure = hat(math.sqrt(mean * (1.0 - chance)), chance)
             u = np.linspace(-0.5, 0.5, 200_003)[1:-1]
             room = 0.5 - np.abs(u)
             k = np.floor((2.0 * a / room + b) * u + mean + 0.5)
@@ -72,8 +71,7 @@ def test_bounds_of_the_chances_beside_the_largest_hold():
             k = np.arange(most, min(most + int(0.5 * variance) + 1, trials) + 1.0)
             above = np.cumsum(np.log((trials - k) * chance / ((k + 1.0) * (1.0 - chance))))
             k = np.arange(most, max(most - int(0.5 * variance) - 1, 0), -1.0)
-            below = np.cumsum(np.log(k * (1.0 - chance) / ((trials - k + 1.0) * chance)))
-            for exact in (above, below):
+            for exact in (above, np.cumsum(np.log(k * (1.0 - chance) / ((trials - k + 1.0) * chance)))):
                 off = np.arange(1.0, len(exact) + 1)
                 some = off < 0.5 * variance - 1.0
                 doubt = ((off * (off / 3 + 0.625) + 1 / 6) / variance + 0.5) * off / variance
@@ -100,21 +98,15 @@ def test_many_numbers_have_the_binomial_law_to_its_tails(trials, chance, draws):
     assert abs(sample.mean() - law.mean()) < 5.0 * law.std() / math.sqrt(draws)
 
 
-def test_certain_and_empty_draws():
+def test_certain_and_empty_draws_and_any_batch_or_small_change_of_the_chance():
     for trials, chance, number in ((0.0, 0.5, 0.0), (5.0, 0.0, 0.0), (5.0, -1.0, 0.0), (5.0, 1.0, 5.0), (5.0, 2, 5.0)):
         assert np.all(drawn(trials, chance, 100) == number)
     for trials, chance in ((np.nan, 0.5), (5.0, np.nan)):
         assert np.all(np.isnan(drawn(trials, chance, 100)))
-
-
-def test_a_small_change_of_the_chance_changes_few_numbers():
     # members share their noise across the values of a sweep; the first number of each stream
     for trials, chance in ((1e4, 0.3), (50.0, 0.1)):
         before, after = (drawn(trials, p, 10_000)[::100] for p in (chance, chance * 1.001))
         assert np.var(after - before) < 0.1 * np.var(before)
-
-
-def test_a_number_does_not_depend_on_its_batch():
     batch = binomials(1e6, 0.3, Noise(2, "bonds", np.arange(64)).at(3))
     alone = [binomials(1e6, 0.3, Noise(2, "bonds", np.array([m])).at(3)) for m in range(64)]
     assert np.array_equal(np.vstack(alone), batch)

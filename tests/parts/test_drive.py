@@ -19,7 +19,7 @@ def speed(drive, time):
     return drive.motion(1, time, time, DURATION).speed[0]
 
 
-def test_the_slip_of_a_step_is_the_integral_of_the_speed():
+def test_the_slip_of_a_step_is_the_integral_of_the_speed_and_those_of_many_add_up():
     for name in PRESCRIBED:
         drive, (first, last) = DRIVES[name], (0.0011, 0.0175)
         motion = drive.motion(1, first, last, DURATION)
@@ -28,9 +28,6 @@ def test_the_slip_of_a_step_is_the_integral_of_the_speed():
         path, _ = quad(lambda t, drive=drive: abs(speed(drive, t)), first, last, **keys)
         assert_allclose([motion.slip[0], motion.path[0]], [slip, path], rtol=1e-11, atol=1e-25, err_msg=name)
         assert_allclose(motion.speed[0], speed(drive, last), rtol=1e-12, atol=0, err_msg=name)
-
-
-def test_the_slips_of_many_steps_add_up():
     times = np.linspace(0.0, DURATION, 1001)
     for name in PRESCRIBED:
         parts = [DRIVES[name].motion(1, a, b, DURATION) for a, b in itertools.pairwise(times)]
@@ -39,37 +36,27 @@ def test_the_slips_of_many_steps_add_up():
         assert_allclose(sum(part.path[0] for part in parts), whole.path[0], rtol=1e-12, atol=1e-22, err_msg=name)
 
 
-def test_a_ramp_through_zero_counts_the_path_of_both_directions():
+def test_ramps_count_the_path_of_both_directions_and_tables_jump_between_steps():
     motion = Ramp(start=-1.0, stop=3.0).motion(1, 0.0, 4.0, 4.0)
     assert_allclose([motion.slip[0], motion.path[0]], [4.0, 5.0], rtol=1e-15)
-
-
-def test_a_ramp_between_equal_speeds_and_a_table_of_one_speed_are_steady():
     steady = Steady(speed=2e-3).motion(1, 0.1, 0.7, 1.0)
     ramps = (Ramp(start=2e-3, stop=2e-3, scale=scale) for scale in ("linear", "log"))
     for drive in (*ramps, Table(time=(0.0, 0.5, 1.0), speed=(2e-3,) * 3)):
         motion = drive.motion(1, 0.1, 0.7, 1.0)
-        rows = ([one.slip[0], one.path[0], one.speed[0]] for one in (motion, steady))
-        assert_allclose(*rows, rtol=1e-14)
-
-
-def test_a_jump_of_the_table_lies_between_two_steps():
+        assert_allclose(*([one.slip[0], one.path[0], one.speed[0]] for one in (motion, steady)), rtol=1e-14)
     table = Table(time=(0.0, 1.0, 1.0, 2.0), speed=(1.0, 1.0, 5.0, 5.0))
     before, after = table.motion(1, 0.5, 1.0, 2.0), table.motion(2, 1.0, 1.5, 2.0)
     assert_allclose([before.slip[0], after.slip[0]], [0.5, 2.5], rtol=1e-15)
     assert_allclose([before.speed[0], after.speed[0]], [1.0, 5.0], rtol=1e-15)
 
 
-def test_a_start_rests_and_slides_at_once():
+def test_a_start_rests_and_slides_at_once_and_impossible_drives_are_refused():
     start = Start(rest=0.5, speed=-3.0)
     before, within, after = (start.motion(1, a, b, 2.0) for a, b in ((0.1, 0.4), (0.3, 1.0), (1.0, 2.0)))
     assert [part.slip[0] for part in (before, within, after)] == [0.0, -1.5, -3.0]
     assert [part.path[0] for part in (before, within, after)] == [0.0, 1.5, 3.0]
     ends = [(part.first[0], part.speed[0]) for part in (before, within, after)]
     assert ends == [(0.0, 0.0), (0.0, -3.0), (-3.0, -3.0)]
-
-
-def test_a_clock_time_meant_to_be_the_end_of_the_rest_is_it():
     # 0.3 of a run is 3 of 10 steps but for rounding: not a bit of sliding comes before it
     start, times = Start(rest=0.3, speed=1.0), [k * 0.1 for k in range(11)]
     assert times[3] != 0.3
@@ -77,16 +64,10 @@ def test_a_clock_time_meant_to_be_the_end_of_the_rest_is_it():
     assert [step.speed[0] for step in steps] == [0.0] * 3 + [1.0] * 7
     assert steps[2].slip[0] == 0.0 and steps[3].first[0] == 1.0
     assert_allclose(steps[3].slip, 0.1, rtol=1e-14)
-
-
-def test_a_start_without_rest_is_steady_and_one_that_outlasts_the_run_stays_at_rest():
     moving, still = (Start(rest=rest, speed=2e-3).motion(1, 0.0, 5.0, 10.0) for rest in (0.0, 20.0))
     steady = Steady(speed=2e-3).motion(1, 0.0, 5.0, 10.0)
     assert [moving.slip[0], moving.first[0]] == [steady.slip[0], steady.first[0]]
     assert [still.slip[0], still.path[0], still.first[0], still.speed[0]] == [0.0] * 4
-
-
-def test_impossible_drives_are_refused():
     for make, word in (
         (lambda: Ramp(start=-1.0, stop=1.0, scale="log"), "logarithmic"),
         (lambda: Table(time=(0.0,), speed=(1.0,)), "two rows"),

@@ -37,32 +37,35 @@ def stress(*course):
     return followed(*course).stress
 
 
-def test_a_parabola_is_found_between_its_samples():
+def test_parabolas_and_cubics_of_known_slopes_are_found_between_their_samples():
     top, where = np.array([3.0, 7.0]), np.array([1.2, 2.9])
     times = 0.5 * np.arange(9)
     maxima = stress([top - 0.1 * (t - where) ** 2 for t in times])
     assert_allclose(extremes.column("largest", maxima), top, rtol=1e-14)
     assert_allclose(extremes.column("time", maxima), where, rtol=1e-12)
-
-
-def test_a_cubic_is_found_between_its_samples_by_values_and_slopes():
     top, where = np.array([2.0, 7.0]), np.array([1.6, 2.9])
     away = [t - where for t in 0.5 * np.arange(7)]
     maxima = stress([top - 0.05 * u**2 * (1.5 - u) for u in away], 0.5, [0.15 * u * (u - 1.0) for u in away])
     assert_allclose(extremes.column("largest", maxima), top, rtol=1e-14)
     assert_allclose(extremes.column("time", maxima), where, rtol=1e-12)
+    # Hermite's cubic from 0 with slope 1 to 0.3 with slope −0.01, of either sign.
+    sign, t = np.array([1.0, -1.0]), np.linspace(0.0, 1.0, 100_001)
+    maxima = stress([np.zeros(2), 0.3 * sign], 1.0, [sign, -0.01 * sign])
+    cubic = 0.3 * t**2 * (3.0 - 2.0 * t) + t * (1.0 - t) ** 2 - 0.01 * t**2 * (t - 1.0)
+    assert_allclose(extremes.column("largest", maxima), cubic.max(), rtol=1e-9)
 
 
-def test_a_jump_keeps_its_sample():
+def test_a_jump_keeps_its_sample_and_nothing_is_larger_than_nan():
     for samples in ([0.0, 0.0, 5.0, 4.9], [4.0, 4.9, 5.0, 0.0, 1.0], [1.0, 5.0]):
         maxima = stress([np.array([value]) for value in samples])
         assert extremes.column("largest", maxima)[0] == 5.0
         assert extremes.column("time", maxima)[0] == 0.5 * samples.index(5.0)
-
-
-def test_nothing_is_larger_than_nan():
     maxima = stress([np.array([np.nan]), np.array([2.0]), np.array([np.nan])])
     assert extremes.column("largest", maxima)[0] == 2.0
+    maxima = stress([np.zeros(1), np.ones(1)], 1.0, [np.full(1, 30.0), np.full(1, -1.0)])
+    assert extremes.column("largest", maxima)[0] == 1.0
+    samples = [np.array([1.0]), np.array([2.0]), np.array([1.5])]
+    assert_array_equal(np.repeat(stress(samples), 3, axis=0), stress([np.repeat(values, 3) for values in samples]))
 
 
 def peak_errors(counts, known):
@@ -82,25 +85,6 @@ def test_the_error_is_of_third_order_in_the_step_and_of_fourth_with_slopes():
     counts = np.array([10, 20, 40, 80])
     errors = peak_errors(counts, known=True)
     assert np.all(errors < (3.0 / counts) ** 4 / 90.0) and errors[-1] < errors[0] / 100.0  # h⁴ f⁗/384, f⁗ = 4 f
-
-
-def test_a_peak_within_the_first_step_from_zero_is_found():
-    """Hermite's cubic from 0 with slope 1 to 0.3 with slope −0.01, of either sign."""
-    sign, t = np.array([1.0, -1.0]), np.linspace(0.0, 1.0, 100_001)
-    maxima = stress([np.zeros(2), 0.3 * sign], 1.0, [sign, -0.01 * sign])
-    cubic = 0.3 * t**2 * (3.0 - 2.0 * t) + t * (1.0 - t) ** 2 - 0.01 * t**2 * (t - 1.0)
-    assert_allclose(extremes.column("largest", maxima), cubic.max(), rtol=1e-9)
-
-
-def test_slopes_that_no_cubic_could_follow_leave_the_sample():
-    maxima = stress([np.zeros(1), np.ones(1)], 1.0, [np.full(1, 30.0), np.full(1, -1.0)])
-    assert extremes.column("largest", maxima)[0] == 1.0
-
-
-def test_one_row_for_all_members_is_each_members_own():
-    samples = [np.array([1.0]), np.array([2.0]), np.array([1.5])]
-    wide = [np.repeat(values, 3) for values in samples]
-    assert_array_equal(np.repeat(stress(samples), 3, axis=0), stress(wide))
 
 
 def test_friction_grows_with_the_area_within_a_step():

@@ -9,17 +9,8 @@ from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 from scipy import integrate
 
-from sim.spectrum.families import (
-    AnisotropicGaussian,
-    Band,
-    Gaussian,
-    Measured,
-    Ripple,
-    SelfAffine,
-    Spectrum,
-    Tabulated,
-    VonKarman,
-)
+from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Spectrum, VonKarman
+from sim.spectrum.measured import Measured, Tabulated
 
 TURN = 2 * math.pi
 
@@ -74,12 +65,12 @@ def angular_mean(spectrum, power, weight):
     return np.mean([weight(t) * along_ray(spectrum, t, power) for t in angles])
 
 
-def test_variance_is_the_integral_of_the_density():
+def test_variance_and_energy_are_the_integrals_of_the_density_and_the_square_of_the_rms():
     for spectrum in WITH_DENSITY.values():
         assert_allclose(spectrum.variance, angular_mean(spectrum, 1, np.ones_like) / TURN, rtol=1e-9, atol=0)
-
-
-def test_energy_in_closed_form_is_the_quadrature_of_the_compliance():
+    for spectrum in [s for s in ALL.values() if s.model != "tabulated" and s.model != "measured"]:
+        exact = spectrum.amplitude**2 / 2 if spectrum.model == "ripple" else spectrum.rms**2
+        assert_allclose(spectrum.variance, exact, rtol=2e-15, atol=0)  # a few roundings
     for poisson_ratio in [0.5, 0.3, 0.0]:
         for spectrum in WITH_DENSITY.values():
             modulus = 1.7
@@ -89,13 +80,7 @@ def test_energy_in_closed_form_is_the_quadrature_of_the_compliance():
             )
 
 
-def test_variance_is_the_square_of_the_rms():
-    for spectrum in [s for s in ALL.values() if s.model != "tabulated" and s.model != "measured"]:
-        exact = spectrum.amplitude**2 / 2 if spectrum.model == "ripple" else spectrum.rms**2
-        assert_allclose(spectrum.variance, exact, rtol=2e-15, atol=0)  # a few roundings
-
-
-def test_variance_within_a_circle_grows_as_the_density_says():
+def test_variance_within_a_circle_grows_as_the_density_says_between_the_cut_offs():
     for spectrum in ISOTROPIC.values():
         low, high = spectrum.support
         q = np.geomspace(max(low, 1e-2), min(high, 1e2), 23)[1:-1]
@@ -104,20 +89,12 @@ def test_variance_within_a_circle_grows_as_the_density_says():
         slope = (spectrum.cumulative(q * (1 + step)) - spectrum.cumulative(q * (1 - step))) / (2 * step * q)
         # central differences: second order, a few 1e-8 times the second derivative of a steep piece,
         # and rounding of the difference 1e-16 variance / (step q² C)
-        expected = q * spectrum.radial_density(q) / TURN
-        assert_allclose(slope, expected, rtol=1e-6, atol=1e-11 * spectrum.variance)
-
-
-def test_within_and_beyond_share_the_variance():
+        assert_allclose(slope, q * spectrum.radial_density(q) / TURN, rtol=1e-6, atol=1e-11 * spectrum.variance)
     for spectrum in ISOTROPIC.values():
         q = np.concatenate([[0.0], np.geomspace(1e-3, 1e3, 61), spectrum.breaks])
-        total = spectrum.cumulative(q) + spectrum.beyond(q)
-        assert_allclose(total, spectrum.variance, rtol=1e-14, atol=0)
+        assert_allclose(spectrum.cumulative(q) + spectrum.beyond(q), spectrum.variance, rtol=1e-14, atol=0)
         assert spectrum.cumulative(0.0) == 0.0
         assert np.all(np.diff(spectrum.cumulative(np.sort(q))) >= 0.0)
-
-
-def test_nothing_lies_outside_the_cut_offs():
     for name in ["band", "self_affine", "tabulated"]:
         spectrum = ISOTROPIC[name]
         low, high = spectrum.support
@@ -127,7 +104,7 @@ def test_nothing_lies_outside_the_cut_offs():
         assert spectrum.beyond(high) == 0.0
 
 
-def test_density_broadcasts_and_is_even():
+def test_density_broadcasts_is_even_and_has_an_anisotropic_first_length_along_the_angle():
     qx, qy = np.linspace(-3, 3, 5)[:, None], np.linspace(-2, 2, 4)
     for spectrum in WITH_DENSITY.values():
         density = spectrum.density(qx, qy)
@@ -136,9 +113,6 @@ def test_density_broadcasts_and_is_even():
         energies = spectrum.surface_energy(np.array([1.0, 2.0])[:, None], np.array([0.0, 0.3, 0.5]))
         assert energies.shape == (2, 3)
         assert_allclose(energies[0], 2 * energies[1], rtol=1e-15, atol=0)
-
-
-def test_an_anisotropic_gaussian_has_its_first_length_along_the_angle_or_is_isotropic():
     a, b, angle, q = 0.5, 2.0, 0.4, np.array([0.3, 1.0, 2.0])
     spectrum = AnisotropicGaussian(1.3, a, b, angle)
     for direction, length in [(angle, a), (angle + math.pi / 2, b)]:
@@ -150,7 +124,7 @@ def test_an_anisotropic_gaussian_has_its_first_length_along_the_angle_or_is_isot
     assert_allclose(equal.density(1.0, 2.0), isotropic.density(1.0, 2.0), rtol=1e-14, atol=0)
 
 
-def test_energy_at_poisson_one_half_has_the_known_coefficient():
+def test_energy_at_poisson_one_half_has_the_known_coefficient_and_falls_along_sliding_alone():
     for spectrum, exact in [
         (Gaussian(1.0, 1.0), 0.33233509704478426),
         (Gaussian(1.0, math.sqrt(2.0)), 0.4699928014933126),
@@ -161,9 +135,14 @@ def test_energy_at_poisson_one_half_has_the_known_coefficient():
         (Ripple(1.0, TURN, 0.7), (1 + math.sin(0.7) ** 2) / 8),
     ]:
         assert_allclose(spectrum.surface_energy(1.0), exact, rtol=1e-15, atol=0)
+    for angle, exact in [(0.0, 0.7), (math.pi / 2, 1.0)]:
+        energy = Ripple(2.0, 3.0, angle).surface_energy(1.5, 0.3)
+        assert_allclose(energy, exact * 4.0 / (4 * 1.5 * TURN / 3.0), rtol=1e-15, atol=0)
+    with pytest.raises(ValueError, match="no density"):
+        Ripple(1.0, 1.0).density(0.0, 0.0)
 
 
-def test_self_affine_energy_is_the_textbook_quotient():
+def test_self_affine_energy_is_the_textbook_quotient_with_its_limits():
     for hurst in [0.3, 0.8, 1.0]:
         longest, rolloff, shortest = 60e-6, 24e-6, 1e-6
         ratio, reach, q = rolloff / longest, rolloff / shortest, TURN / rolloff
@@ -173,38 +152,21 @@ def test_self_affine_energy_is_the_textbook_quotient():
         energy = SelfAffine(150e3, hurst, longest, rolloff, shortest).surface_energy(1.6e6)
         assert_allclose(energy, exact, rtol=1e-14, atol=0)
 
-
-def test_hurst_zero_is_the_limit_of_small_hurst():
     def energy(hurst):
         return SelfAffine(1.0, hurst, 5.0, 2.0, 0.1).surface_energy(1.0)
 
     rises = [energy(h) - energy(0.0) for h in (1e-6, 1e-8)]
     assert_allclose(rises[0] / rises[1], 100.0, rtol=1e-4, atol=0)  # linear in H; 1e-16 / 1e-8 of rounding
     assert_allclose(energy(1e-15), energy(0.0), rtol=1e-13, atol=0)
-
-
-def test_hurst_one_half_has_the_exponential_density():
     q = np.array([0.0, 0.5, 3.0, 100.0])
     exact = TURN * 0.8**2 * 1.3**2 * (1 + (0.8 * q) ** 2) ** -1.5
     assert_allclose(ISOTROPIC["exponential"].radial_density(q), exact, rtol=1e-14, atol=0)
 
 
-def test_endless_streaks_store_energy_as_the_logarithm_of_their_length():
+def test_a_narrow_band_is_a_ring_and_endless_streaks_store_the_logarithm_of_their_length():
+    assert_allclose(Band(1.0, TURN / 2.0, TURN / 2.0002).surface_energy(1.0), 3 / (8 * 2.0001), rtol=1e-11, atol=0)
     energies = [AnisotropicGaussian(1.0, 1.0, b).surface_energy(1.0) for b in (1e4, 1e6, 1e8)]
     assert_allclose(np.diff(energies)[1], np.diff(energies)[0], rtol=1e-6, atol=0)
-
-
-def test_energy_of_a_ripple_falls_with_poisson_ratio_only_along_sliding():
-    for angle, exact in [(0.0, 0.7), (math.pi / 2, 1.0)]:
-        energy = Ripple(2.0, 3.0, angle).surface_energy(1.5, 0.3)
-        assert_allclose(energy, exact * 4.0 / (4 * 1.5 * TURN / 3.0), rtol=1e-15, atol=0)
-    with pytest.raises(ValueError, match="no density"):
-        Ripple(1.0, 1.0).density(0.0, 0.0)
-
-
-def test_a_narrow_band_is_a_ring():
-    band = Band(1.0, TURN / 2.0, TURN / 2.0002)
-    assert_allclose(band.surface_energy(1.0), 3 / (8 * 2.0001), rtol=1e-11, atol=0)
 
 
 def test_a_spectrum_survives_dumping_and_reading():

@@ -46,14 +46,7 @@ def overlap_integral(correlation, radius, nu=0.5, marginal=False, panels=400):
     phi = edge[:-1, None] + half * (1.0 + NODES)
     t = np.sin(phi)
     area = np.arccos(t) - (0.0 if marginal else t * np.cos(phi))
-    return (
-        (2.0 - nu)
-        / 4.0
-        * 4.0
-        * radius
-        / np.pi
-        * np.sum(half * WEIGHTS * np.cos(phi) * area * correlation(2 * radius * t))
-    )
+    return (2.0 - nu) * radius / np.pi * np.sum(half * WEIGHTS * np.cos(phi) * area * correlation(2 * radius * t))
 
 
 def jinc_correlation(band):
@@ -91,7 +84,7 @@ def test_factors_are_the_bessel_integrals_of_the_overlap():
             assert_allclose(factors(x), [float(mean), float(skew)], rtol=3e-14, atol=0)
 
 
-def test_gaussian_and_exponential_fields_obey_the_overlap_integral():
+def test_gaussian_exponential_and_band_fields_obey_the_overlap_integral():
     for xi in [0.01, 0.1, 1.0, 30.0]:
         for nu in RATIOS:
             gaussian, exponential = Gaussian(1.0, xi), VonKarman(1.0, xi, 0.5)
@@ -100,9 +93,6 @@ def test_gaussian_and_exponential_fields_obey_the_overlap_integral():
                 assert_allclose(energy(gaussian, 1.0, 1.0, nu), exact, rtol=1e-12, atol=0)
                 exact = overlap_integral(lambda s: np.exp(-s / xi), 1.0, nu, marginal)
                 assert_allclose(energy(exponential, 1.0, 1.0, nu), exact, rtol=1e-11, atol=0)
-
-
-def test_bands_obey_the_overlap_integral():
     for waves in [(50.0, 20.0), (1.0, 0.5), (0.1, 0.09), (0.02, 0.015), (0.002, 0.0018)]:
         band = Band(1.0, *waves)
         for marginal, energy in ((False, disc_energy), (True, marginal_energy)):
@@ -110,22 +100,7 @@ def test_bands_obey_the_overlap_integral():
             assert_allclose(energy(band, 1.0, 1.0), exact, rtol=1e-11, atol=0)
 
 
-def test_a_self_affine_field_is_the_sum_of_its_bands():
-    spectrum = SelfAffine(1.0, 0.8, 0.8, 0.3, 0.01)
-    q1, q2 = spectrum.support
-    edge = np.geomspace(q1, q2, 4001)
-    inner = np.sqrt(edge[1:] * edge[:-1])
-    waves = Ripple(1.0, 1.0)
-    ratio = halfspace.disc_ripple_energy(1.0, inner, 0.0, 1.0, 1.0) + halfspace.disc_ripple_energy(
-        1.0, inner, math.pi / 2, 1.0, 1.0
-    )
-    # a ring's energy is the mean of its two principal waves; variance of each ring from the closed form
-    rings = np.diff(spectrum.cumulative(edge)) * ratio / (2 * waves.variance)
-    # 4000 rings a step of 1.5e-3 wide: the oscillation sin(x)/x^2, x up to 1200, turns by 0.1 to 1 rad a ring
-    assert_allclose(disc_energy(spectrum, 1.0, 1.0), np.sum(rings), rtol=1e-5, atol=0)
-
-
-def test_streaks_obey_the_overlap_integral_in_two_dimensions():
+def test_streaks_obey_the_overlap_integral_and_a_self_affine_field_is_the_sum_of_its_bands():
     for angle in [0.0, 0.6, math.pi / 2]:
         for nu in [0.0, 0.4]:
             spectrum = AnisotropicGaussian(1.0, 0.2, 0.7, angle)
@@ -142,17 +117,21 @@ def test_streaks_obey_the_overlap_integral_in_two_dimensions():
                 area = (np.pi / 2 - phi) - (0.0 if marginal else np.sin(phi) * np.cos(phi))
                 exact = 0.5 * (2 / np.pi) * 2.0 * 2 * np.pi * np.sum(weight * area * around)
                 assert_allclose(energy(spectrum, 1.0, 1.0, nu), exact, rtol=1e-11, atol=0)
+    spectrum = SelfAffine(1.0, 0.8, 0.8, 0.3, 0.01)
+    q1, q2 = spectrum.support
+    edge = np.geomspace(q1, q2, 4001)
+    inner = np.sqrt(edge[1:] * edge[:-1])
+    waves = Ripple(1.0, 1.0)
+    ratio = halfspace.disc_ripple_energy(1.0, inner, 0.0, 1.0, 1.0) + halfspace.disc_ripple_energy(
+        1.0, inner, math.pi / 2, 1.0, 1.0
+    )
+    # a ring's energy is the mean of its two principal waves; variance of each ring from the closed form
+    rings = np.diff(spectrum.cumulative(edge)) * ratio / (2 * waves.variance)
+    # 4000 rings a step of 1.5e-3 wide: the oscillation sin(x)/x^2, x up to 1200, turns by 0.1 to 1 rad a ring
+    assert_allclose(disc_energy(spectrum, 1.0, 1.0), np.sum(rings), rtol=1e-5, atol=0)
 
 
-def test_a_gaussian_field_lacks_its_share_at_the_edge():
-    spectrum = Gaussian(1.0, 1e-3)
-    plane, deficit = spectrum.surface_energy(1.0), 2 / np.pi * 1e-3 / math.sqrt(math.pi)
-    # 1 - (2/pi) xi/(sqrt(pi) a), and half of it for the margin; the next term is cubic in xi/a
-    assert_allclose(1 - disc_energy(spectrum, 1.0, 1.0) / plane, deficit, rtol=2e-6, atol=0)
-    assert_allclose(1 - marginal_energy(spectrum, 1.0, 1.0) / plane, deficit / 2, rtol=2e-6, atol=0)
-
-
-def test_a_disc_of_many_waves_is_the_infinite_plane():
+def test_a_disc_of_many_waves_is_the_infinite_plane_but_for_its_edge():
     for spectrum in SPECTRA:
         for nu in RATIOS:
             plane = spectrum.surface_energy(1.6e6, nu)
@@ -161,6 +140,11 @@ def test_a_disc_of_many_waves_is_the_infinite_plane():
                 assert_allclose(energy(spectrum, 1e6, 1.6e6, nu), plane, rtol=1e-6, atol=0)
                 assert_allclose(energy(spectrum, np.inf, 1.6e6, nu), plane, rtol=1e-14, atol=0)
                 assert energy(spectrum, 0.0, 1.6e6, nu) == 0.0
+    spectrum = Gaussian(1.0, 1e-3)
+    plane, deficit = spectrum.surface_energy(1.0), 2 / np.pi * 1e-3 / math.sqrt(math.pi)
+    # 1 - (2/pi) xi/(sqrt(pi) a), and half of it for the margin; the next term is cubic in xi/a
+    assert_allclose(1 - disc_energy(spectrum, 1.0, 1.0) / plane, deficit, rtol=2e-6, atol=0)
+    assert_allclose(1 - marginal_energy(spectrum, 1.0, 1.0) / plane, deficit / 2, rtol=2e-6, atol=0)
 
 
 def test_on_a_disc_below_every_wavelength_the_stress_is_uniform():
@@ -186,7 +170,7 @@ def test_marginal_energy_is_the_derivative_of_the_energy():
         assert_allclose(slope, marginal_energy(spectrum, a, 1.0, 0.3), rtol=2e-7, atol=0, err_msg=spectrum.model)
 
 
-def test_energies_broadcast_scale_with_the_modulus_and_are_linear_in_the_poisson_ratio():
+def test_energies_broadcast_scale_with_the_modulus_and_a_radius_that_is_no_length_is_refused():
     radius, modulus = np.array([[0.1], [1.0]]), np.array([1.0, 2.0, 4.0])
     for spectrum in SPECTRA:
         energy = disc_energy(spectrum, radius, modulus, 0.2)
@@ -194,9 +178,6 @@ def test_energies_broadcast_scale_with_the_modulus_and_are_linear_in_the_poisson
         assert_allclose(energy[1], disc_energy(spectrum, 1.0, 1.0, 0.2) / modulus, rtol=1e-14, atol=0)
         low, middle, high = (marginal_energy(spectrum, 1.0, 1.0, nu) for nu in (0.1, 0.25, 0.4))
         assert_allclose(middle, (low + high) / 2, rtol=1e-13, atol=0)
-
-
-def test_a_radius_that_is_no_length_or_beyond_the_cell_is_refused():
     for spectrum in (Gaussian(1.0, 1.0), Ripple(1.0, 1.0)):
         with pytest.raises(ValueError, match="at least zero"):
             disc_energy(spectrum, np.nan, 1.0)
@@ -221,11 +202,10 @@ def test_the_map_of_a_wave_converges_to_the_table_in_second_order():
         assert_allclose(energy, exact, rtol=0.3 * 3 * (2 / 160 / 0.77) ** 2, atol=0)
     # the disc has no images of itself: the cell around it does not matter
     small = halfspace.disc_energy_of_map(np.ones((40, 40)), 1.0, 0.5, 1.0)
-    large = halfspace.disc_energy_of_map(np.ones((120, 120)), 3.0, 0.5, 1.0)
-    assert_allclose(small, large, rtol=1e-13, atol=0)
+    assert_allclose(small, halfspace.disc_energy_of_map(np.ones((120, 120)), 3.0, 0.5, 1.0), rtol=1e-13, atol=0)
 
 
-def test_samples_weigh_the_whole_disc_and_its_second_moment():
+def test_samples_weigh_the_whole_disc_and_a_uniform_map_stores_its_energy():
     for points, r in [(16, 8.0), (17, 5.27), (9, 0.18)]:
         _, _, weight = halfspace._coverage(points, r)
         assert_allclose(weight.sum(), np.pi * r**2, rtol=1e-12, atol=0)
@@ -236,9 +216,6 @@ def test_samples_weigh_the_whole_disc_and_its_second_moment():
         _, position, weight = halfspace._coverage(64, r)
         excess.append((weight * position**2).sum() / (np.pi * r**4 / 4) - 1)
     assert abs(np.mean(excess)) < 0.01 / (3 * 20.0**2)
-
-
-def test_a_uniform_map_stores_the_energy_of_a_uniform_disc():
     for nu in RATIOS:
         points, a = 96, 0.83
         exact = halfspace.disc_tangential_energy(a, 3.0, 2.0, nu) / (np.pi * a**2)
@@ -254,17 +231,6 @@ def wave_maps(points, k, angle, cell=2.0):
     x = (np.arange(points) - points / 2) * cell / points
     phase = np.pi * k * (x[:, None] * math.cos(angle) + x * math.sin(angle))
     return np.stack([np.cos(phase), np.sin(phase)])
-
-
-def test_energies_of_a_sum_are_a_square_with_the_cross_energy_in_it():
-    # (tau0 + tau1): E = E0 + cross + E1; the cross term by displacement and by convolution differ at the edge only
-    field = gaussian_maps(1, 96, 2.0, 0.3, seed=5)[0]
-    a, tau0 = 0.9, 0.7
-    fluctuation = halfspace.disc_energy_of_map(field, 2.0, a, 1.0)
-    mean = halfspace.disc_energy_of_map(np.full_like(field, tau0), 2.0, a, 1.0)
-    cross = halfspace.disc_energy_of_map(field + tau0, 2.0, a, 1.0) - fluctuation - mean
-    direct = halfspace.cross_energy_of_map(field, 2.0, a, tau0, 1.0)
-    assert abs(cross - direct) < 0.3 * (2 / 96 / a) ** 2 * 2 * math.sqrt(fluctuation * mean)
 
 
 def gaussian_maps(members, points, cell, xi, seed):
@@ -283,7 +249,7 @@ def five_sigma_of_spread(sample):
     return 5 * sample.std() * math.sqrt((fourth - 1) / (4 * len(sample)))
 
 
-def test_the_expected_energy_of_sampled_discs_is_the_overlap_integral():
+def test_discs_of_random_maps_average_to_the_overlap_integral_that_is_expected():
     for points in [60, 120]:
         # the sum that the maps' energy is on the mean: kernel x correlation x overlap of the sampled disc with itself
         pixel, xi = 3.0 / points, 0.15
@@ -295,9 +261,6 @@ def test_the_expected_energy_of_sampled_discs_is_the_overlap_integral():
         energy = 0.5 * pixel**3 / np.pi * np.sum(np.fft.irfft2(kernel, s=(grid.points,) * 2) * correlation * overlap)
         # the edge: as of waves of length 4 xi, three to a diameter, 0.2 k (pixel/a)^2
         assert_allclose(energy, disc_energy(Gaussian(1.0, xi), 1.0, 1.0), rtol=0.6 * pixel**2, atol=0)
-
-
-def test_discs_of_random_maps_average_to_the_overlap_integral():
     # a cell of 3 a: the ends of the disc are 1 a apart through the border, correlated by e^-44
     xi, members, pixel = 0.15, 2000, 0.05
     energy = halfspace.disc_energy_of_map(gaussian_maps(members, 60, 3.0, xi, seed=11), 3.0, 1.0, 1.0)
@@ -311,7 +274,7 @@ def test_discs_of_random_maps_average_to_the_overlap_integral():
     assert_allclose(exact / plane, 0.939, rtol=0.01, atol=0)
 
 
-def test_the_cross_energy_has_zero_mean_and_the_size_of_the_energy():
+def test_the_cross_energy_belongs_to_the_square_of_a_sum_with_zero_mean_and_the_size_of_the_energy():
     xi, members, cell = 0.1, 2000, 2.4
     cross = halfspace.cross_energy_of_map(gaussian_maps(members, 48, cell, xi, seed=12), cell, 1.0, 2.0, 1.0)
     assert abs(cross.mean()) < 5 * cross.std() / math.sqrt(members)
@@ -330,6 +293,14 @@ def test_the_cross_energy_has_zero_mean_and_the_size_of_the_energy():
     assert_allclose(flat / Gaussian(1.0, xi).surface_energy(1.0) / 2.0, 1.93, rtol=0.005 / 1.93, atol=0)
     # the rim, where patches stick out of the disc, takes some of it
     assert 0.9 * flat < spread < flat
+    # (tau0 + tau1): E = E0 + cross + E1; the cross term by displacement and by convolution differ at the edge only
+    field = gaussian_maps(1, 96, 2.0, 0.3, seed=5)[0]
+    a, tau0 = 0.9, 0.7
+    fluctuation = halfspace.disc_energy_of_map(field, 2.0, a, 1.0)
+    mean = halfspace.disc_energy_of_map(np.full_like(field, tau0), 2.0, a, 1.0)
+    cross = halfspace.disc_energy_of_map(field + tau0, 2.0, a, 1.0) - fluctuation - mean
+    direct = halfspace.cross_energy_of_map(field, 2.0, a, tau0, 1.0)
+    assert abs(cross - direct) < 0.3 * (2 / 96 / a) ** 2 * 2 * math.sqrt(fluctuation * mean)
 
 
 def test_a_map_has_the_same_energy_alone_and_in_a_batch():

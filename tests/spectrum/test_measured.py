@@ -10,8 +10,7 @@ from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
 from sim.numerics.grid import Grid, Rectangle
-from sim.spectrum.families import Band, SelfAffine, Spectrum
-from sim.spectrum.measured import Measured, Tabulated, periodogram, radial_average
+from sim.spectrum import Band, Measured, SelfAffine, Spectrum, Tabulated, periodogram, radial_average
 
 TURN = 2 * math.pi
 
@@ -49,44 +48,48 @@ def white_map(points, level, cell, seed=1):
     return field_of(grid, half)
 
 
-WRONG_TABLES = [
-    ("q [rad/m], C [Pa^2 m^2]\n1, 2\n", "at least two rows"),
-    ("q [rad/m], C [Pa^2 m^2]\n3, 1\n1, 1\n2, 1", "row 3 .* sort"),
-    ("q [rad/m], C [Pa^2 m^2]\n1, 0\n2, 0\n", "every density is zero"),
-    ("q [rad/m], C [Pa^2 m^2]\n1, 0\n2, 1\n3, 0\n4, 1\n5, 0", "row 3 is zero"),
-    ("q [1/um], C [Pa^2 m^2]\n1, 1\n2, 1\n", 'psd.csv: line 1: column "q" .* "rad/um"'),
-    ("q [rad/m], C [um^4]\n1, 1\n2, 1\n", 'column "C" .* spectrum of heights'),
-    ("q [rad/m], C [kPa^2 um]\n1, 1\n2, 1\n", "spectrum of a line"),
-    ("1 1\n2 1\n", "psd.csv: .* no header; .* header ="),
-    ("q [rad/m], C [Pa^2 m^2]\n1, 1\n2, nan\n", "line 3: C must be finite"),
-    ("q [rad/m], C [Pa^2 m^2]\n0, 1\n2, 0\n", "psd.csv: line 2: q must be above 0"),
-    ("q [rad/m], C [Pa^2]\n1, 1\n2, 0\n", 'line 1: column "C" .* not a unit'),
-    ("k, S\n1, 1\n2, 0\n", 'psd.csv: line 1: column "q" is missing'),
-]
-
-
-def test_a_table_in_persson_s_convention_is_four_pi_squared_larger():
+def test_a_table_in_persson_s_convention_is_four_pi_squared_larger_and_may_fall():
     rows = (1.0, 2.0, 4.0), (3.0, 2.0, 0.5)
     plain, persson = Tabulated(*rows), Tabulated(*rows, normalization="in_density")
     factor = 4 * math.pi**2
     assert_allclose(persson.radial_density(1.7), factor * plain.radial_density(1.7), rtol=1e-15, atol=0)
     assert_allclose(persson.variance, factor * plain.variance, rtol=1e-15, atol=0)
     assert_allclose(persson.surface_energy(1.0), factor * plain.surface_energy(1.0), rtol=1e-15, atol=0)
+    rows = np.array([1.0, 2.0, 4.0]), np.array([3.0, 2.0, 0.5])
+    rising, falling = Tabulated(*rows), Tabulated(rows[0][::-1], rows[1][::-1])
+    q = np.geomspace(1.0, 4.0, 9)
+    assert np.array_equal(rising.radial_density(q), falling.radial_density(q))
+    assert (rising.support, rising.variance) == (falling.support, falling.variance)
 
 
-def test_a_table_is_read_from_csv_with_its_units(files):
+def test_a_table_is_read_from_csv_with_its_units_or_a_header_that_is_given(files):
     (files.folder / "psd.csv").write_text("# rubber\nq [rad/mm], C [kPa^2 um^2]\n1, 2\n3, 4\n", encoding="utf-8")
     table = read(files, model="tabulated", file="psd.csv", normalization="in_density")
     assert_allclose(table.wavenumbers, [1e3, 3e3], rtol=1e-15, atol=0)
     assert_allclose(table.densities, [2e-6, 4e-6], rtol=1e-15, atol=0)
     assert_allclose(table.radial_density(3e3), 4e-6 * 4 * math.pi**2, rtol=1e-13, atol=0)
-    again = read(files, **TypeAdapter(Tabulated).dump_python(table))
-    assert again == table
+    assert read(files, **TypeAdapter(Tabulated).dump_python(table)) == table
     assert files.reads == 1  # what was read is not read again
+    q, density = np.geomspace(1.0, 4.0, 5), np.array([2.0, 1.0, 0.5, 0.2, 0.1])
+    np.savetxt(files.folder / "psd.txt", np.c_[q, density], header="wavevector, density")
+    result = read(files, model="tabulated", file="psd.txt", header="q [cycles/um], C [kPa^2 um^2]")
+    assert_allclose(result.wavenumbers, q * TURN * 1e6, rtol=1e-15, atol=0)
+    assert_allclose(result.densities, density * 1e-6, rtol=1e-15, atol=0)
 
 
 def test_a_wrong_table_is_refused_with_file_line_and_cure(files):
-    for text, fault in WRONG_TABLES:
+    for text, fault in [
+        ("q [rad/m], C [Pa^2 m^2]\n1, 2\n", "at least two rows"),
+        ("q [rad/m], C [Pa^2 m^2]\n3, 1\n1, 1\n2, 1", "row 3 .* sort"),
+        ("q [rad/m], C [Pa^2 m^2]\n1, 0\n2, 0\n", "every density is zero"),
+        ("q [rad/m], C [Pa^2 m^2]\n1, 0\n2, 1\n3, 0\n4, 1\n5, 0", "row 3 is zero"),
+        ("q [1/um], C [Pa^2 m^2]\n1, 1\n2, 1\n", 'psd.csv: line 1: column "q" .* "rad/um"'),
+        ("q [rad/m], C [um^4]\n1, 1\n2, 1\n", 'column "C" .* spectrum of heights'),
+        ("q [rad/m], C [kPa^2 um]\n1, 1\n2, 1\n", "spectrum of a line"),
+        ("q [rad/m], C [Pa^2 m^2]\n1, 1\n2, nan\n", "line 3: C must be finite"),
+        ("q [rad/m], C [Pa^2 m^2]\n0, 1\n2, 0\n", "psd.csv: line 2: q must be above 0"),
+        ("k, S\n1, 1\n2, 0\n", 'psd.csv: line 1: column "q" is missing'),
+    ]:
         (files.folder / "psd.csv").write_text(text)
         with pytest.raises(ValidationError, match=fault):
             read(files, model="tabulated", file="psd.csv")
@@ -111,7 +114,7 @@ def test_a_table_between_its_rows_is_a_power_law_or_linear_next_to_a_zero():
     assert 0.0 < Tabulated((1e-3, 1.0, 1e3), (1e-300, 1e59, 1e-300)).variance < math.inf
 
 
-def test_periodogram_sums_to_the_mean_square_and_knows_its_windows():
+def test_periodogram_sums_to_the_mean_square_is_flat_for_white_noise_and_a_ripple_at_its_wavevector():
     for points in [15, 16]:
         field = np.random.default_rng(2).normal(size=(3, points, points)) + 7.0
         grid = Grid(2.0, points)
@@ -119,9 +122,12 @@ def test_periodogram_sums_to_the_mean_square_and_knows_its_windows():
         assert_allclose(total, np.var(field, axis=(1, 2)), rtol=1e-13, atol=0)
     with pytest.raises(ValueError, match='"none" or "hann"'):
         periodogram(np.ones((8, 8)), 1.0, "box")
-
-
-def test_periodogram_of_white_noise_is_flat_on_average():
+    grid = Grid(2.0, 16)
+    x, y = grid.position[:, None], grid.position
+    density = periodogram(np.cos(TURN * (3 * x - 2 * y) / 2.0), 2.0)
+    place = np.unravel_index(np.argmax(density), density.shape)
+    assert place == (16 - 3, 2)
+    assert_allclose(density[place], 2.0**2 / 4, rtol=1e-13, atol=0)
     for points in [15, 16]:
         for window in ["none", "hann"]:
             cell, count = 3.0, 400
@@ -137,16 +143,7 @@ def test_periodogram_of_white_noise_is_flat_on_average():
             assert density[0, 0] == 0.0
 
 
-def test_a_ripple_stands_where_its_wavevector_is():
-    grid = Grid(2.0, 16)
-    x, y = grid.position[:, None], grid.position
-    density = periodogram(np.cos(TURN * (3 * x - 2 * y) / 2.0), 2.0)
-    place = np.unravel_index(np.argmax(density), density.shape)
-    assert place == (16 - 3, 2)
-    assert_allclose(density[place], 2.0**2 / 4, rtol=1e-13, atol=0)
-
-
-def test_rings_hold_every_mode_below_nyquist_once():
+def test_rings_hold_every_mode_once_with_the_standard_error_of_exponential_scatter():
     for points in [15, 16]:
         grid = Grid(2.0, points)
         ring = radial_average(np.ones((points, points // 2 + 1)), grid)
@@ -160,12 +157,8 @@ def test_rings_hold_every_mode_below_nyquist_once():
         assert len(ring.q) == reach
         assert_allclose(ring.density, 1.0, rtol=1e-14, atol=0)
         assert np.max(ring.standard_error) < 1e-15
-
-
-def test_the_standard_error_of_a_ring_is_that_of_exponential_scatter():
     grid = Grid(1.0, 101)
-    field = np.random.default_rng(3).normal(size=(101, 101))
-    ring = radial_average(periodogram(field, 1.0), grid)
+    ring = radial_average(periodogram(np.random.default_rng(3).normal(size=(101, 101)), 1.0), grid)
     ratio = (ring.standard_error * np.sqrt(ring.pairs) / ring.density)[20:]  # one for an exponential law
     # scatter over mean of n exponential numbers has variance (2 + 1 - 2)/n: that of s, of m, their covariance
     error = 1 / math.sqrt(np.sum(ring.pairs[20:]))
@@ -177,8 +170,7 @@ def test_the_standard_error_of_a_ring_is_that_of_exponential_scatter():
 @pytest.mark.parametrize("points", [31, 32])
 def test_a_measured_map_is_a_table_of_its_own_density(files, points):
     level, spacing = 2.5, 0.1
-    cell = points * spacing
-    np.savetxt(files.folder / "map.csv", white_map(points, level, cell), delimiter=",", header="Pa")
+    np.savetxt(files.folder / "map.csv", white_map(points, level, points * spacing), delimiter=",", header="Pa")
     result = read(files, model="measured", file="map.csv", spacing="10 cm")
     assert_allclose(result.densities, level, rtol=1e-10, atol=0)
     low, high = result.support
@@ -249,22 +241,6 @@ def test_a_table_of_a_file_remarks_on_the_other_normalization_and_on_a_plateau(f
     assert Tabulated((1.0, 2.0), (1.0, 1.0)).remarks == ()
 
 
-def test_a_falling_table_is_the_rising_one():
-    rows = np.array([1.0, 2.0, 4.0]), np.array([3.0, 2.0, 0.5])
-    rising, falling = Tabulated(*rows), Tabulated(rows[0][::-1], rows[1][::-1])
-    q = np.geomspace(1.0, 4.0, 9)
-    assert np.array_equal(rising.radial_density(q), falling.radial_density(q))
-    assert (rising.support, rising.variance) == (falling.support, falling.variance)
-
-
-def test_what_numpy_saves_as_text_is_read_by_a_header_that_is_given(files):
-    q, density = np.geomspace(1.0, 4.0, 5), np.array([2.0, 1.0, 0.5, 0.2, 0.1])
-    np.savetxt(files.folder / "psd.txt", np.c_[q, density], header="wavevector, density")
-    result = read(files, model="tabulated", file="psd.txt", header="q [cycles/um], C [kPa^2 um^2]")
-    assert_allclose(result.wavenumbers, q * TURN * 1e6, rtol=1e-15, atol=0)
-    assert_allclose(result.densities, density * 1e-6, rtol=1e-15, atol=0)
-
-
 def dataset(fields, spacing, units="Pa", metre=1.0, unit="m", dims=("member", "x", "y")):
     position = np.arange(fields.shape[-1]) * spacing / metre
     data = xr.DataArray(fields, dims=dims, attrs={"units": units})
@@ -272,20 +248,16 @@ def dataset(fields, spacing, units="Pa", metre=1.0, unit="m", dims=("member", "x
     return xr.Dataset({"shear_map": data}).assign_coords(coordinates)
 
 
-def test_netcdf_maps_give_units_spacing_and_average_over_members(files):
+def test_netcdf_maps_give_units_spacing_or_take_that_of_the_key_and_average_over_members(files):
     fields = np.stack([white_map(16, level, 1.6, seed=int(level)) for level in (1.0, 3.0)])
     dataset(fields * 1e-3, 0.1, "kPa", 1e-3, "mm").to_netcdf(files.folder / "maps.nc")
     result = read(files, model="measured", file="maps.nc")
     assert_allclose(result.spacing, 0.1, rtol=1e-12, atol=0)
     assert_allclose(result.densities, 2.0, rtol=1e-10, atol=0)
     assert read(files, **TypeAdapter(Measured).dump_python(result)) == result
-
-
-def test_netcdf_without_coordinates_takes_the_spacing_of_the_key(files):
     xr.Dataset({"tau": (("row", "column"), white_map(16, 1.0, 1.6))}).to_netcdf(files.folder / "maps.nc")
     keys = {"model": "measured", "file": "maps.nc"}
-    spectrum = read(files, **keys, variable="tau", spacing="10 cm")
-    assert_allclose(spectrum.densities, 1.0, rtol=1e-10, atol=0)
+    assert_allclose(read(files, **keys, variable="tau", spacing="10 cm").densities, 1.0, rtol=1e-10, atol=0)
     with pytest.raises(ValidationError, match="give spacing"):
         read(files, **keys, variable="tau")
     with pytest.raises(ValidationError, match='no variable "tua"'):
@@ -303,17 +275,6 @@ WRONG_DATASETS = [
 ]
 
 
-WRONG_KEYS = [
-    ({"file": "a.csv"}, "give spacing"),
-    ({"file": "missing.csv", "spacing": 1}, "missing.csv: cannot be read"),
-    ({"file": "a.nc", "spacing": 1}, "a.nc: "),
-    ({"file": "bad.csv", "spacing": 1}, "bad.csv: line 1: value is not a number"),
-    ({"file": "a.csv", "spacing": "-1 m"}, "above 0"),
-    ({"file": "a.csv", "spacing": 1, "window": "box"}, "'none' or 'hann'"),
-    ({"spacing": 1}, "file"),
-]
-
-
 def test_a_wrong_map_is_refused_with_the_cure(files):
     whole = dataset(white_map(16, 1.0, 1.6)[None], 0.1)
     for number, (change, fault) in enumerate(WRONG_DATASETS):
@@ -323,7 +284,14 @@ def test_a_wrong_map_is_refused_with_the_cure(files):
     np.savetxt(files.folder / "a.csv", white_map(8, 1.0, 1.0), delimiter=",")
     (files.folder / "a.nc").write_text("no netCDF")
     (files.folder / "bad.csv").write_text("x,y\n1,2\n")
-    for keys, fault in WRONG_KEYS:
+    for keys, fault in [
+        ({"file": "a.csv"}, "give spacing"),
+        ({"file": "missing.csv", "spacing": 1}, "missing.csv: cannot be read"),
+        ({"file": "a.nc", "spacing": 1}, "a.nc: "),
+        ({"file": "bad.csv", "spacing": 1}, "bad.csv: line 1: value is not a number"),
+        ({"file": "a.csv", "spacing": "-1 m"}, "above 0"),
+        ({"file": "a.csv", "spacing": 1, "window": "box"}, "'none' or 'hann'"),
+    ]:
         with pytest.raises(ValidationError, match=fault):
             read(files, model="measured", **keys)
 
@@ -344,8 +312,7 @@ def test_a_hann_window_keeps_the_border_of_a_steep_map_from_leaking():
     rings = slice(11, 23)
     ratio = {}
     for window in ("none", "hann"):
-        mean = np.mean(periodogram(fields, part.cell, window), axis=0)
-        ring = radial_average(mean / density_of_part, part)
+        ring = radial_average(np.mean(periodogram(fields, part.cell, window), axis=0) / density_of_part, part)
         ratio[window] = np.average(ring.density[rings], weights=ring.pairs[rings])
         pairs = np.sum(ring.pairs[rings])
     error = math.sqrt(4 / (count * pairs))  # about four neighbours share their numbers under Hann
@@ -357,8 +324,7 @@ def test_the_estimate_of_a_realisation_has_its_variance_and_energy():
     grid = Grid(1.0, 64)
     band = Band(1.0, longest=1 / 5, shortest=1 / 20)
     white = grid.forward(np.random.default_rng(9).normal(size=(64, 64))) / grid.spacing
-    half = white * np.sqrt(band.density(*grid.wavevectors))
-    ring = radial_average(periodogram(field_of(grid, half), 1.0), grid)
+    ring = radial_average(periodogram(field_of(grid, white * np.sqrt(band.density(*grid.wavevectors))), 1.0), grid)
     result = Tabulated(ring.q, ring.density)
     modes = math.pi * (20**2 - 5**2) / 2
     # one realisation scatters by 1/sqrt(modes); a row at the cut-off smears it by half a ring, 5 %

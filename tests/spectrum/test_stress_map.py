@@ -11,12 +11,7 @@ from helpers.cases import posix
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
-from sim.laws.halfspace import (
-    disc_ripple_energy as ripple_energy,
-    disc_tangential_energy,
-    free_energy_of_map,
-    surface_energy,
-)
+from sim.laws import halfspace
 from sim.spectrum.stress_map import StressMap
 from tests.spectrum.test_measured import Files
 
@@ -52,14 +47,13 @@ def written(files, name, field=FIELD):
 def test_the_energy_of_a_map_is_that_of_its_file(files, name):
     keys = {} if name.endswith(".nc") else {"pixel": "5 um", "pixel_y": "7 um"}
     result = read(files, file=written(files, name), **keys)
-    exact = surface_energy(FIELD, (24 * PIXEL, 16 * PIXEL_Y), G, NU)
+    exact = halfspace.surface_energy(FIELD, (24 * PIXEL, 16 * PIXEL_Y), G, NU)
     assert_allclose(result.surface_energy(G, NU), exact, rtol=1e-12)
     assert_allclose(result.mean, FIELD.mean(), rtol=1e-12)
     assert_allclose(result.rms, FIELD.std(), rtol=1e-12)
     assert_allclose(result.field, FIELD - FIELD.mean(), rtol=0.0, atol=1e-9)
     turned = read(files, file=name, rows="x", **keys)  # which exchanges x and y, where the file does not name them
-    shape = (24, 16) if name.endswith(".nc") else (16, 24)
-    assert turned.shape == shape
+    assert turned.shape == ((24, 16) if name.endswith(".nc") else (16, 24))
     again = TypeAdapter(StressMap).validate_python(TypeAdapter(StressMap).dump_python(result))
     assert again == result and hash(again) == hash(result)
     assert len(TypeAdapter(StressMap).dump_python(result, mode="json")["values"]) == 64  # a digest, not the numbers
@@ -73,8 +67,8 @@ def test_a_window_keeps_the_rms_and_takes_the_seam(files):
     )
     weight = (1 - np.cos(2 * np.pi * x))[:, None] * (1 - np.cos(2 * np.pi * x))
     exact = (ramp - np.mean(ramp * weight)) * weight / math.sqrt(np.mean(weight**2))
-    assert_allclose(hann.surface_energy(G), surface_energy(exact, 64e-6, G), rtol=1e-12)
-    assert_allclose(plain.surface_energy(G), surface_energy(ramp, 64e-6, G), rtol=1e-12)
+    assert_allclose(hann.surface_energy(G), halfspace.surface_energy(exact, 64e-6, G), rtol=1e-12)
+    assert_allclose(plain.surface_energy(G), halfspace.surface_energy(ramp, 64e-6, G), rtol=1e-12)
     assert_allclose(hann.mean, plain.mean, rtol=1e-12)
 
 
@@ -92,7 +86,7 @@ def test_the_stress_of_a_contact_in_a_mask_is_that_of_a_free_disc(files, pixels)
         assert np.all(result.field[~inside] == 0.0)
         energy.append(result.surface_energy(1.0, NU))
     # pixels at the edge are inside or not: that shifts it by less than a fifth of a pixel, and E goes as a to 3 at most
-    exact = ripple_energy(1.0, 3.831705970207512, 0.0, 1.0, 1.0, NU)
+    exact = halfspace.disc_ripple_energy(1.0, 3.831705970207512, 0.0, 1.0, 1.0, NU)
     assert_allclose(np.mean(energy), exact, rtol=3 * 0.2 / pixels)
 
 
@@ -101,21 +95,17 @@ def test_a_uniform_disc_stores_the_closed_form():
     for pixels in (20, 80):
         x = (np.arange(-2 * pixels, 2 * pixels) + 0.5) / pixels
         disc = (np.hypot(x[:, None], x) < 1.0).astype(float)
-        result = free_energy_of_map(3.0 * disc, 2e-3 / pixels, G) * (8e-3) ** 2
-        error.append(result / disc_tangential_energy(2e-3, 3.0, G) - 1.0)
+        result = halfspace.free_energy_of_map(3.0 * disc, 2e-3 / pixels, G) * (8e-3) ** 2
+        error.append(result / halfspace.disc_tangential_energy(2e-3, 3.0, G) - 1.0)
     assert abs(error[0]) < 3 * 0.2 / 20
     assert abs(error[1]) < 3 * 0.2 / 80
 
 
-def test_the_noise_of_a_map_is_reported(files):
+def test_the_noise_and_the_radial_spectrum_of_a_map_are_reported(files):
     result = read(files, file=written(files, "map.csv"), pixel="5 um", noise="2 kPa")
     exact = 3 * math.asinh(1.0) / (4 * math.pi) * 2e3**2 * 5e-6 / G
     assert_allclose(result.noise_energy(G), exact, rtol=1e-14)
-    quiet = read(files, file="map.csv", pixel="5 um")
-    assert quiet.surface_energy(G) == result.surface_energy(G)
-
-
-def test_the_radial_spectrum_of_a_map_is_that_of_the_measured_one(files):
+    assert read(files, file="map.csv", pixel="5 um").surface_energy(G) == result.surface_energy(G)
     from sim.spectrum.measured import Measured
 
     name = written(files, "map.csv")
@@ -157,30 +147,6 @@ def test_an_array_that_is_no_map_is_refused_and_nothing_in_it_is_executed(files,
         assert not (files.folder / "was-executed").exists()
 
 
-WRONG_KEYS = [  # field, keys, fault
-    (FIELD, {}, "give pixel"),
-    (FIELD, {"pixel": "0 um"}, "above 0"),
-    (FIELD, {"pixel": 1e-6, "window": "box"}, "'none' or 'hann'"),
-    (np.where(FIELD < 0.0, np.nan, FIELD), {"pixel": 1e-6}, "gaps .* mask = true"),
-    (FIELD, {"pixel": 1e-6, "mask": True, "window": "hann"}, "leave it out beside mask"),
-    (FIELD, {"pixel": 1e-6, "mask": True, "pixel_y": 2e-6}, "square pixels"),
-    (FIELD * np.inf, {"pixel": 1e-6, "mask": True}, "finite"),
-    (FIELD * 0.0 + 3.0, {"pixel": 1e-6}, "the same everywhere"),
-    (FIELD[:7], {"pixel": 1e-6}, "too small"),
-    (FIELD, {"pixel": 1e-6, "values": "YQ=="}, "values .* leave it out"),
-]
-
-
-WRONG_DATASETS = [  # change, keys, fault
-    (lambda data: data.rename(shear_map="heights"), {}, 'no variable "shear_map"'),
-    (lambda data: data.assign(shear_map=data.shear_map.assign_attrs(units="m")), {}, "not a unit of Pa"),
-    (lambda data: data.expand_dims(member=2), {}, "2 maps"),
-    (lambda data: data, {"pixel": "6 um"}, "5e-06 m apart, not 6e-06 m"),
-    (lambda data: data.assign_coords(x=data.x**2), {}, "not spaced by one step"),
-    (lambda data: data.isel(x=0), {}, "no two dimensions"),
-]
-
-
 @posix
 def test_a_pipe_is_not_waited_for(files):
     os.mkfifo(files.folder / "pipe.npy")
@@ -189,11 +155,26 @@ def test_a_pipe_is_not_waited_for(files):
 
 
 def test_a_map_that_cannot_be_the_field_is_refused_with_the_cure(files):
-    for field, keys, fault in WRONG_KEYS:
+    for field, keys, fault in [  # field, keys, fault
+        (FIELD, {}, "give pixel"),
+        (FIELD, {"pixel": "0 um"}, "above 0"),
+        (FIELD, {"pixel": 1e-6, "window": "box"}, "'none' or 'hann'"),
+        (np.where(FIELD < 0.0, np.nan, FIELD), {"pixel": 1e-6}, "gaps .* mask = true"),
+        (FIELD, {"pixel": 1e-6, "mask": True, "window": "hann"}, "leave it out beside mask"),
+        (FIELD, {"pixel": 1e-6, "mask": True, "pixel_y": 2e-6}, "square pixels"),
+        (FIELD * np.inf, {"pixel": 1e-6, "mask": True}, "finite"),
+        (FIELD * 0.0 + 3.0, {"pixel": 1e-6}, "the same everywhere"),
+        (FIELD[:7], {"pixel": 1e-6}, "too small"),
+        (FIELD, {"pixel": 1e-6, "values": "YQ=="}, "values .* leave it out"),
+    ]:
         with pytest.raises(ValidationError, match=fault):
             read(files, file=written(files, "map.csv", field), **keys)
     whole = xr.load_dataset(files.folder / written(files, "map.nc"))
-    for change, keys, fault in WRONG_DATASETS:
+    for change, keys, fault in [  # change, keys, fault
+        (lambda data: data.rename(shear_map="heights"), {}, 'no variable "shear_map"'),
+        (lambda data: data.expand_dims(member=2), {}, "2 maps"),
+        (lambda data: data, {"pixel": "6 um"}, "5e-06 m apart, not 6e-06 m"),
+    ]:
         change(whole).to_netcdf(files.folder / "changed.nc")
         with pytest.raises(ValidationError, match=fault):
             read(files, file="changed.nc", **keys)

@@ -4,16 +4,12 @@ from copy import deepcopy
 from itertools import product
 
 import numpy as np
-from helpers.scenes import BELL, BONDS, CONTACTS, CUT_OFF, SHEARS, STRETCHED, one_step, scene
+from helpers.scenes import BELL, BONDS, CONTACTS, CUT_OFF, SHEARS, STRETCHED, drive, march, one_step, records, scene
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.engine import march, trajectory_of
-from sim.ensemble.variables import VARIABLES
 from sim.numerics.noise import Noise
-from sim.parts import drive
 from sim.parts.bonds import models as bonds
 
-READ = {variable.name: variable.read for variable in VARIABLES}
 MOTIONS = {
     "through zero": ((0.0, 16e-3), (-1e-3, 5e-3)),
     "forth and back": ((0.0, 4e-3, 4e-3, 8e-3, 8e-3, 12e-3, 12e-3, 16e-3), 2 * (2e-3, 2e-3, -2e-3, -2e-3)),
@@ -27,10 +23,8 @@ def motion(name, sense=1.0):
     return drive.Table(time=time, speed=tuple(sense * value for value in speed))
 
 
-def records(names, members=3, steps=16, **parts):
-    scenario = scene(members, steps, **parts)
-    states = list(march(scenario, np.arange(members)))
-    return [np.array([READ[name](scenario, trajectory_of(scenario, state))[0] for state in states]) for name in names]
+def recorded(names, members=3, steps=16, **parts):
+    return records(scene(members, steps, **parts), *names)
 
 
 def test_friction_is_odd_and_energies_are_even_in_the_speed():
@@ -38,7 +32,7 @@ def test_friction_is_odd_and_energies_are_even_in_the_speed():
     signs = dict.fromkeys(["shear_stress", "friction_force"], -1.0)
     signs |= dict.fromkeys(["bond_fraction", "fluctuation_energy", "contact_radius"], 1.0)
     for name, part in product(MOTIONS, BONDS.values()):
-        forward, mirrored = (records(signs, bonds=part, drive=motion(name, sense), **parts) for sense in (1.0, -1.0))
+        forward, mirrored = (recorded(signs, bonds=part, drive=motion(name, sense), **parts) for sense in (1.0, -1.0))
         assert np.any(forward[0] != 0.0)
         # mirrored arithmetic is the same, but cohorts are merged on a lattice that starts elsewhere
         off = part.tolerance if part.model == "cohort" else 1e-11
@@ -51,14 +45,14 @@ def test_a_friction_loop_takes_work():
         # the trapezoidal sum over the second cycle; 200 members where bonds are counted or tracked
         members = 200 if part.model in ("counted", "tracked", "auto") else 1
         names = ["friction_force", "slider_position"]
-        force, position = records(names, members, bonds=part, drive=motion("forth and back"))
+        force, position = recorded(names, members, bonds=part, drive=motion("forth and back"))
         assert_allclose(position[16], position[8], atol=1e-18)
         assert np.trapezoid(force[8:].mean(axis=1), position[8:, 0]) > 0.0
 
 
-def test_bonds_without_a_stretch_bear_the_sign_of_the_last_slip():
+def test_bonds_without_a_stretch_bear_the_sign_of_the_last_slip_and_all_that_of_a_steady_speed():
     def signs(part, motion, steps=16):
-        stress, speed = records(["shear_stress", "speed"], 1, steps, bonds=part, drive=motion)
+        stress, speed = recorded(["shear_stress", "speed"], 1, steps, bonds=part, drive=motion)
         return np.sign(stress[:, 0]).astype(int).tolist(), speed[:, 0]
 
     for part in (BONDS[name] for name in ("none", "steady", "rate", "counted")):
@@ -71,6 +65,13 @@ def test_bonds_without_a_stretch_bear_the_sign_of_the_last_slip():
         # a step that ends at rest: the sign of its slip
         halting = drive.Table(time=(0.0, 1e-3, 1e-3, 2e-3), speed=(3e-3, 3e-3, -3e-3, 0.0))
         assert signs(part, halting, 2)[0] == [1, 1, -1]
+    speeds = np.array([-2e-3, 0.0, 2e-3])
+    for part in (BONDS[name] for name in ("none", "steady", "rate", "counted", "rate, bell", "cohort", "tracked")):
+        result = part.steady(speeds)
+        assert_array_equal(np.sign(result.stress), [-1.0, 0.0, 1.0])
+        assert_allclose(result.strength * np.sign(speeds), result.stress, rtol=1e-15)
+        assert np.all(result.strength >= 0.0)
+    assert bonds.Unbroken(stress=2e5).steady(speeds[1:2]).strength == 2e5  # at rest they bear up to their strength
 
 
 def rate_of_stress(name, speed, slip, duration):
@@ -84,15 +85,12 @@ def rate_of_stress(name, speed, slip, duration):
     return state.bonding, after.stress - state.bonding.stress
 
 
-def test_the_stiffness_is_the_slope_of_the_stress_over_slip_at_frozen_time():
+def test_stiffness_and_relaxation_are_the_slopes_of_the_stress_over_slip_and_time():
     for name, speed in product([name for name in BONDS if name not in ("steady", "cohort, cut-off")], [4e-3, -4e-3]):
         # 0.1 nm within 1 as: rounding of the difference and the curvature over 1e-10/20e-6 of the cut-off
         slip = np.copysign(1e-10, speed)
         bonding, change = rate_of_stress(name, speed, slip, 1e-18)
         assert_allclose(np.broadcast_to(bonding.stiffness, change.shape), change / slip, rtol=3e-5)
-
-
-def test_the_relaxation_is_the_rate_of_the_stress_at_frozen_slip():
     for name in ["rate, bell", "rate, cut-off, carried", "cohort", "cohort, cut-off", "cohort, carried"]:
         # 1 ns: of the lives that rupture leaves, some 1e-6 pass, and rounding of the difference is below 1e-10
         bonding, change = rate_of_stress(name, 4e-3, 0.0, 1e-9)
@@ -112,21 +110,11 @@ def test_cohorts_at_a_cut_off_lose_stiffness_to_the_bonds_that_break():
         )
 
 
-def test_the_steady_state_has_the_sign_of_its_speed():
-    speeds = np.array([-2e-3, 0.0, 2e-3])
-    for part in (BONDS[name] for name in ("none", "steady", "rate", "counted", "rate, bell", "cohort", "tracked")):
-        result = part.steady(speeds)
-        assert_array_equal(np.sign(result.stress), [-1.0, 0.0, 1.0])
-        assert_allclose(result.strength * np.sign(speeds), result.stress, rtol=1e-15)
-        assert np.all(result.strength >= 0.0)
-    assert bonds.Unbroken(stress=2e5).steady(speeds[1:2]).strength == 2e5  # at rest they bear up to their strength
-
-
 def test_bonds_carried_with_the_area_need_the_contact_of_the_step_before_and_others_do_not():
     # under another load the bonds differ if and only if they feed back
     for name, part in (BONDS | {"cohort, bell": bonds.Cohort(rupture=BELL, **STRETCHED)}).items():
         at_load, at_indentation = (
-            records(["bond_fraction"], bonds=part, contact=contact, shear=SHEARS["modal, time, constant"])[0]
+            recorded(["bond_fraction"], bonds=part, contact=contact, shear=SHEARS["modal, time, constant"])[0]
             for contact in (CONTACTS["load"], CONTACTS["indentation"])
         )
         assert np.array_equal(at_load, at_indentation) != scene(bonds=part).population.feeds_back, name

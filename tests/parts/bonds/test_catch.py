@@ -6,16 +6,12 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
-from helpers.scenes import STRETCHED, scene
+from helpers.scenes import STRETCHED, Clock, bonds, drive, march, scene
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
-from sim.engine import march
 from sim.laws.schallamach import bell_moments, catch_lives, catch_moments, constant_moments
-from sim.parts import drive
-from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Catch, fresh_integral, growth, hazard_integral, hazard_time
-from sim.scenario.clock import Clock
 
 #: Half of the bonds of rest are bound; force holds them up to some 12 pN and breaks them beyond.
 CATCH = Catch(catch_rate=200.0, catch_force=3e-12, slip_rate=5.0, slip_force=6e-12)
@@ -48,36 +44,27 @@ def by_quadrature(speed):
     return np.array([life, pull * lag, pull**2 * square]) / cycle
 
 
-def test_the_law_is_the_renewal_integral():
+def test_the_law_is_the_renewal_integral_with_bells_and_the_constant_rate_as_limits():
     for speed in SPEEDS:
         assert_allclose(np.array(catch_moments(speed, *RATES, STIFFNESS, BINDING)), by_quadrature(speed), rtol=1e-10)
         assert_allclose(CATCH.closed_form(speed, STIFFNESS, BINDING), by_quadrature(speed), rtol=1e-10)
-
-
-def test_the_law_has_bells_and_the_constant_rate_as_limits():
     speeds = np.array([0.0, *SPEEDS])
     bell = bell_moments(speeds, 5.0, 6e-12, STIFFNESS, BINDING)
     assert_allclose(catch_moments(speeds, 0.0, 3e-12, 5.0, 6e-12, STIFFNESS, BINDING), bell, rtol=1e-11)
     result = catch_moments(speeds, 200.0, math.inf, 5.0, math.inf, STIFFNESS, BINDING)
     assert_allclose(result, constant_moments(speeds, 205.0, STIFFNESS, BINDING), rtol=1e-11)
     assert catch_lives(speeds, *RATES, STIFFNESS).mean.shape == speeds.shape
-
-
-def test_force_holds_catch_bonds_before_it_breaks_them():
     bound = catch_moments(np.array([0.0, 2e-3, 1.0]), *RATES, STIFFNESS, BINDING).bound
     assert bound[1] > 1.1 * bound[0] and bound[2] < 0.5 * bound[0]
 
 
-def test_cohorts_in_steady_sliding_obey_the_law():
+def test_cohorts_in_steady_sliding_obey_the_law_and_do_not_depend_on_the_clock_step():
     for speed, tolerance in product(SPEEDS, [1e-3, 1e-5]):
         part = bonds.Cohort(rupture=CATCH, **STRETCHED, tolerance=tolerance)
         result, (bound, force, square) = part.steady(np.array([speed])), by_quadrature(speed)
         assert_allclose(result.fraction * part.bound_at_rest, bound, rtol=tolerance)
         assert_allclose(result.stress, STRETCHED["site_density"] * force, rtol=tolerance)
         assert_allclose(result.frozen + result.varying, STRETCHED["site_density"] * square, rtol=10.0 * tolerance)
-
-
-def test_cohorts_do_not_depend_on_the_clock_step():
     part = bonds.Cohort(rupture=CATCH, **STRETCHED, tolerance=1e-5)
     turning = drive.Table(time=(0.0, 4e-3, 4e-3, 8e-3), speed=(8e-3, 8e-3, -6e-3, -6e-3))
     scenes = (scene(bonds=part, drive=turning, clock=Clock(duration=8e-3, step=8e-3 / n)) for n in (8, 80))
@@ -89,8 +76,7 @@ def test_cohorts_do_not_depend_on_the_clock_step():
 def test_the_device_functions_are_the_integral_of_the_rate_and_its_inverse():
     for stretch, speed in list(product([-1.7, -0.3, 0.0, 0.2, 2.1], [-3.0, -0.4, 0.0, 0.7, 2.5])):
         time = 0.013
-        crossing = -stretch / speed if speed else 0.5 * time
-        cuts = sorted({0.0, min(max(crossing, 0.0), time), time})
+        cuts = sorted({0.0, min(max(-stretch / speed if speed else 0.5 * time, 0.0), time), time})
 
         def rate(t, start=stretch, speed=speed):
             x = abs(start + speed * t)
@@ -104,12 +90,8 @@ def test_the_device_functions_are_the_integral_of_the_rate_and_its_inverse():
         assert growth(stretch, speed, LAW) == 0.0  # no factor for all motions, unlike Bell's
 
 
-def test_models_with_one_clock_for_all_bonds_refuse_catch_bonds():
+def test_models_with_one_clock_for_all_bonds_refuse_catch_bonds_and_auto_takes_cohorts():
     for model in [bonds.FirstMoment, functools.partial(bonds.Tracked, sites=10)]:
         with pytest.raises(ValueError, match=r'"catch" needs .*"cohort"'):
             model(rupture=CATCH, **STRETCHED)
-
-
-def test_bonds_left_open_are_cohorts_however_few():
-    few = bonds.Auto(rupture=CATCH, **STRETCHED, sites=20)
-    assert scene(bonds=few).population.model == "cohort"
+    assert scene(bonds=bonds.Auto(rupture=CATCH, **STRETCHED, sites=20)).population.model == "cohort"

@@ -60,16 +60,10 @@ def worst(result, exact):
     return np.max(np.abs(result / exact - 1.0))
 
 
-# ---- steady sliding
-
-
-def test_the_steady_state_has_the_moments_of_renewal_theory():
+def test_the_steady_state_has_the_moments_of_renewal_theory_and_marching_from_rest_ends_in_it():
     # merging keeps these moments
     for beta, eps in product([0.1, 1.0, 10.0], [0.01, 1.0, 10.0, 1000.0]):
         assert_allclose(moments(steady(BELL, beta, eps, 1e-4)), renewal(beta, eps), rtol=1e-10, atol=0)
-
-
-def test_marching_from_rest_ends_in_the_steady_state():
     for beta, eps in product([0.01, 1.0, 1000.0], [1e-3, 1e-2, 0.1, 1.0, 10.0, 1e2, 1e4]):
         # a start-up of Bell bonds rings down like a renewal process: 40 lives are enough below 1e-6 where CV > 0.15
         duration, exact = life_of(eps) * 0.23, renewal(beta, eps)
@@ -86,9 +80,6 @@ def test_steady_start_stays_steady_for_any_clock_step():
                 assert worst(out, moments(start)) < tolerance, (eps, lives)
 
 
-# ---- start-up
-
-
 def test_start_up_peak_without_rebinding_is_the_lambert_formula():
     for eps in [1.0, 10.0, 100.0, 1e4]:
         w = lambertw(eps).real
@@ -102,29 +93,23 @@ def test_start_up_peak_without_rebinding_is_the_lambert_formula():
 
 def test_births_are_third_order_down_to_1e_9_where_merging_is_exact():
     beta, speed, end, errors = 2.0, 0.7, 1.0, []
-    decay = math.exp(-(1.0 + beta) * end)
-    number = beta / (1.0 + beta) * (1.0 - decay)  # from no bond at all
+    number = beta / (1.0 + beta) * (1.0 - math.exp(-(1.0 + beta) * end))  # from no bond at all
     for steps in (4, 8, 16, 32, 512):
         out, _ = march(empty(CONSTANT, 0.1), [speed], end, CONSTANT, beta, 0.1, largest=1.0001 * end / steps)
         errors.append(abs(out[-1, 0] / number - 1.0))
-    orders = np.log2(np.divide(errors[:3], errors[1:4]))
-    assert np.all(orders > 2.5)
+    assert np.all(np.log2(np.divide(errors[:3], errors[1:4])) > 2.5)
     assert errors[-1] < 1e-9
 
 
 def test_constant_rupture_follows_the_exact_moments():
     for tolerance in [1e-3, 1e-5, 1e-7]:
         # a step h errs by h^3/72 of the moments, h = (7 tolerance)^(1/3): a tenth of the tolerance
-        start = resting(CONSTANT, 2.0, tolerance)
-        out, last = march(start, [0.7] * 20, 0.25, CONSTANT, 2.0, tolerance)
+        out, last = march(resting(CONSTANT, 2.0, tolerance), [0.7] * 20, 0.25, CONSTANT, 2.0, tolerance)
         time = 0.25 * np.arange(1.0, 21.0)
         second = 2.0 * 0.7**2 * (1.0 - np.exp(-time) * (1.0 + time))
         exact = 2.0 / 3.0 * np.array([np.ones(20), 0.7 * -np.expm1(-time), second])
         assert_allclose(out.T, exact, rtol=tolerance, atol=0)
         assert np.count_nonzero(last.weight) < 20
-
-
-# ---- a hard cut-off
 
 
 def cut_off_exact(u, m):
@@ -135,7 +120,7 @@ def cut_off_exact(u, m):
     return np.array([life, u * (1.0 - (1.0 + 1.0 / u) * decay), u * u * square]) / (life + m)
 
 
-def test_cut_off_bonds_slide_by_their_closed_form():
+def test_cut_off_bonds_slide_by_their_closed_form_and_without_a_rate_break_at_once():
     for tolerance in [1e-3, 1e-4]:
         rupture = RuptureRate(rate=1.0, softness=0.0, limit=1.0)
         for u, m in product((0.1, 0.730401, 5.0, 1e3), (0.1, 1.0, 10.0)):
@@ -143,9 +128,6 @@ def test_cut_off_bonds_slide_by_their_closed_form():
             assert_allclose(moments(start), exact, rtol=1e-9, atol=0)
             out, _ = march(start, [u] * 50, 0.11 * min(1.0, 1.0 / u), rupture, 1.0 / m, tolerance)
             assert_allclose(out, np.tile(exact, (50, 1)), rtol=tolerance, atol=0)
-
-
-def test_bonds_that_break_only_by_stretch_all_break_at_once():
     rupture = RuptureRate(rate=0.0, softness=0.0, limit=1.0)
     start = resting(rupture, 2.0, 1e-4)
     out, _ = march(start, [1.0] * 30, 0.07, rupture, 2.0, 1e-4)
@@ -155,9 +137,6 @@ def test_bonds_that_break_only_by_stretch_all_break_at_once():
     after = after[after < 0.98]
     # all sites are free at slip 1: N = 1 - e^(-k_on t), the cut-off far from the new ones
     assert_allclose(out[14 : 14 + len(after), 0], -np.expm1(-2.0 * after), rtol=1e-4, atol=0)
-
-
-# ---- jumps, reversal, rest
 
 
 def test_jumps_of_speed_keep_the_number_and_forget_the_clock_step():
@@ -178,21 +157,15 @@ def test_jumps_of_speed_keep_the_number_and_forget_the_clock_step():
         assert 0.0 <= state.weight.sum() <= 1.0 + 1e-12
 
 
-def test_ageing_at_rest_is_an_exponential():
+def test_ageing_at_rest_is_an_exponential_dilution_frees_sites_and_no_duration_only_stretches():
     out, _ = march(empty(BELL, 1e-5), [0.0] * 40, 0.1, BELL, 2.0, 1e-5)
     time = 0.1 * np.arange(1, 41)
     assert_allclose(out[:, 0], 2.0 / 3.0 * -np.expm1(-3.0 * time), rtol=1e-5, atol=0)
     assert np.all(out[:, 1:] == 0.0)
-
-
-def test_a_step_without_duration_only_stretches():
     start = steady(BELL, 1.0, 1.0, 1e-4)
     moved = advance(start, np.array([0.5]), 0.0, BELL, 1.0, 1e-4)
     number, first, second = moments(start)
     assert_allclose(moments(moved), [number, first + 0.5 * number, second + first + 0.25 * number], rtol=1e-14, atol=0)
-
-
-def test_dilution_frees_sites_that_bind_anew():
     out, _ = march(resting(BELL, 1.0, 1e-4), [0.0], 1.0, BELL, 1.0, 1e-4, share=np.array([0.5]))
     assert_allclose(out[0, 0], 0.5 - 0.25 * math.exp(-2.0), rtol=1e-4, atol=0)
 
@@ -224,14 +197,10 @@ def test_steps_of_extreme_length_have_their_limits():
     for fast, bind in product([1e-9, 1e9], [1e-9, 1e9]):
         rupture = RuptureRate(fast, 1.0, math.inf)
         result = advance(empty(rupture, 1e-4), np.array([1.0]), 1.0, rupture, bind, 1e-4).weight.sum()
-        grown = -math.expm1(-bind) if fast < 1.0 else bind / (bind + fast)
-        assert_allclose(result, grown, rtol=1e-4, atol=0)
+        assert_allclose(result, -math.expm1(-bind) if fast < 1.0 else bind / (bind + fast), rtol=1e-4, atol=0)
 
 
-# ---- cost, rows
-
-
-def test_cohorts_stay_few_for_ever():
+def test_cohorts_stay_few_for_ever_and_merging_keeps_four_moments():
     tolerance, rng = 1e-3, np.random.default_rng(4)
     state = resting(BELL, 1.0, tolerance)
     capacity, most = state.weight.shape[1], 0
@@ -240,21 +209,6 @@ def test_cohorts_stay_few_for_ever():
         most = max(most, np.count_nonzero(state.weight))
     assert most < capacity
     assert state.weight.shape[1] == capacity
-
-
-@pytest.mark.verify
-def test_a_long_run_does_not_drift():
-    state = steady(BELL, 1.0, 10.0, 1e-3)
-    exact, slip, most = moments(state), np.array([0.1]), 0
-    for i in range(100_000):
-        state = advance(state, slip, 0.01, BELL, 1.0, 1e-3)
-        if i % 1000 == 999:
-            most = max(most, np.count_nonzero(state.weight))
-            assert worst(moments(state), exact) < 1e-3
-    assert most < state.weight.shape[1]
-
-
-def test_merging_keeps_four_moments():
     # without rupture to speak of nothing breaks; every birth is where it was made but for merging
     slow = RuptureRate(1e-12, 1.0, math.inf)
     state = empty(slow, 1e-2)
@@ -267,6 +221,18 @@ def test_merging_keeps_four_moments():
         # Radau's rule is exact for squares and errs by h^4/36 x^-3 of a cube, 1e-8 of the whole here; free sites
         # are 1 to 1e-16, of which 300 steps bind 3e-3
         assert_allclose(np.sum(w * x**power), exact, rtol=1e-10 if power < 3 else 1e-7, atol=0)
+
+
+@pytest.mark.verify
+def test_a_long_run_does_not_drift():
+    state = steady(BELL, 1.0, 10.0, 1e-3)
+    exact, slip, most = moments(state), np.array([0.1]), 0
+    for i in range(100_000):
+        state = advance(state, slip, 0.01, BELL, 1.0, 1e-3)
+        if i % 1000 == 999:
+            most = max(most, np.count_nonzero(state.weight))
+            assert worst(moments(state), exact) < 1e-3
+    assert most < state.weight.shape[1]
 
 
 def test_what_is_not_built_is_refused():

@@ -42,9 +42,6 @@ def slide(state, speed, duration, rupture, rebinding, pieces=1):
     return state
 
 
-# --- linear: constant rate and cut-off
-
-
 @functools.cache
 def propagator(slip, binding, breaking, displacement):
     """The matrix exponential of d(N, M, 1)/dt over a step as the unit of time, with 60 digits."""
@@ -57,7 +54,7 @@ def propagator(slip, binding, breaking, displacement):
 LINEAR = list(product((0.0, 1e-9, 1e-3, 30.0, 1e9), (0.0, 1e-9, 1e-3, 0.02, 0.7, 1e9), (0.0, 1e-9, 0.7, 1e9)))
 
 
-def test_a_linear_step_is_the_matrix_exponential():
+def test_a_linear_step_is_the_matrix_exponential_and_binds_no_more_than_all_sites():
     for start in [(0.0, 0.0), (0.6, 0.3), (1.0, 0.0), (1e-12, 1e-13)]:
         for rate, rebinding, displacement in LINEAR:
             slip = 0.37
@@ -72,28 +69,17 @@ def test_a_linear_step_is_the_matrix_exponential():
                     assert_allclose(value[0], truth, rtol=ULP * (16.0 + 2.0 * exponent), atol=0)
                 else:
                     assert 0.0 <= value[0] < 1e-289
-
-
-def test_no_more_than_all_sites_are_bound():
     for exponent in np.linspace(0.01, 40.0, 3000):
         assert advance(1.0, 0.0, 0.1, 0.1, 1.0, RuptureRate(0.0, 0.0, math.inf), exponent)[0] <= 1.0
 
 
-def test_path_that_leads_back_breaks_bonds_of_a_cut_off_but_stretches_none():
-    bound, moment = advance(1.0, 1e-9, 0.0, 4e-9, 0.0, RuptureRate(0.0, 0.0, 2e-9), 5.0)
-    assert_allclose([bound[0], moment[0]], [math.exp(-2.0), 1e-9 * math.exp(-4.0)], rtol=4 * ULP, atol=0)
-
-
-def test_steady_stress_of_a_cut_off_is_that_of_its_renewal():
+def test_friction_of_a_cut_off_is_that_of_its_renewal_and_does_not_end_at_rest():
     # each bond lives l/V and carries l/2 on average, each free site waits 1/k_on
     limit, rebinding, speed = 2e-9, 50.0, np.array([1e-15, 1e-9, 1e-7, 1e-5])
     bound, moment = steady(speed, RuptureRate(0.0, 0.0, limit), rebinding)
     share = (limit / speed) / (limit / speed + 1.0 / rebinding)
     assert_allclose(bound, share, rtol=4 * ULP, atol=0)
     assert_allclose(moment, 0.5 * limit * share, rtol=4 * ULP, atol=0)
-
-
-def test_friction_of_a_cut_off_does_not_end_at_rest():
     rupture, speed = RuptureRate(0.0, 0.0, 2e-9), 1e-7
     state = slide(resting(rupture, 50.0), speed, 1.0, rupture, 50.0)
     held = slide(state, 0.0, 1e6, rupture, 50.0)
@@ -101,19 +87,26 @@ def test_friction_of_a_cut_off_does_not_end_at_rest():
     assert_allclose(held[0], 1.0, rtol=ULP, atol=0)
     assert_allclose(slide(held, -1e-15, 1e9, rupture, 50.0)[1], -1e-9, rtol=1e-7, atol=0)
     assert steady(0.0, rupture, 50.0)[1] == 0.0
+    bound, moment = advance(1.0, 1e-9, 0.0, 4e-9, 0.0, RuptureRate(0.0, 0.0, 2e-9), 5.0)
+    assert_allclose([bound[0], moment[0]], [math.exp(-2.0), 1e-9 * math.exp(-4.0)], rtol=4 * ULP, atol=0)
 
 
-# --- Bell: steady states
-
-
-def test_marching_comes_to_the_steady_state():
+def test_marching_comes_to_the_steady_state_which_is_a_fixed_point_of_any_step():
     for eps, beta in product([0.01, 1.0, 10.0, 1000.0], [0.1, 1.0, 10.0]):
         bound, moment = steady(eps, BELL, beta)
-        empty = np.zeros(1), np.zeros(1)
         for first, (duration, pieces) in product(
-            [empty, resting(BELL, beta), (bound, -moment)], [(100.0, 1), (60.0, 300), (1e9, 1)]
+            [(np.zeros(1), np.zeros(1)), resting(BELL, beta), (bound, -moment)], [(100.0, 1), (60.0, 300), (1e9, 1)]
         ):
             assert_allclose(slide(first, eps, duration, BELL, beta, pieces), [bound, moment], rtol=1e-10, atol=0)
+    for duration, beta in product([1e-9, 1e-3, 1.0, 1e3, 1e9], [1e-6, 1.0, 1e6]):
+        eps = np.array([0.0, 1e-12, 9e-11, 1.1e-10, 1e-6, 0.1, 4.0, 1e3, 1e8, -1e-3, -30.0])
+        state = steady(eps, BELL, beta)
+        # a stretch W known to one ulp leaves the rate e^W an error of W ulp
+        stretch = np.max(lambertw(np.abs(eps)).real)
+        assert_allclose(slide(state, eps, duration, BELL, beta), state, rtol=8.0 * ULP * (1.0 + stretch), atol=0)
+    for rupture in (BELL, RuptureRate(1.0, 0.0, math.inf), RuptureRate(0.0, 0.0, 1.0)):
+        assert_array_equal(steady([0.0, 1.0, -2.0], rupture, 0.0), np.zeros((2, 3)))
+        assert_array_equal(slide((np.zeros(1), np.zeros(1)), 2.0, 5.0, rupture, 0.0), np.zeros((2, 1)))
 
 
 def test_steady_sliding_under_bell_s_rate_is_lambert_s_w_over_twenty_four_decades():
@@ -125,24 +118,6 @@ def test_steady_sliding_under_bell_s_rate_is_lambert_s_w_over_twenty_four_decade
             exact = [[float(n), float(n * x)] for n, x in zip(shares, stretches, strict=True)]
             bound, moment = steady(eps * rate / softness, RuptureRate(rate, softness, math.inf), beta * rate)
             assert_allclose(np.transpose([bound, softness * moment]), exact, rtol=1e-13, atol=0)
-
-
-def test_a_steady_state_is_a_fixed_point_of_any_step():
-    for duration, beta in product([1e-9, 1e-3, 1.0, 1e3, 1e9], [1e-6, 1.0, 1e6]):
-        eps = np.array([0.0, 1e-12, 9e-11, 1.1e-10, 1e-6, 0.1, 4.0, 1e3, 1e8, -1e-3, -30.0])
-        state = steady(eps, BELL, beta)
-        # a stretch W known to one ulp leaves the rate e^W an error of W ulp
-        stretch = np.max(lambertw(np.abs(eps)).real)
-        assert_allclose(slide(state, eps, duration, BELL, beta), state, rtol=8.0 * ULP * (1.0 + stretch), atol=0)
-
-
-def test_no_bonds_without_rebinding():
-    for rupture in (BELL, RuptureRate(1.0, 0.0, math.inf), RuptureRate(0.0, 0.0, 1.0)):
-        assert_array_equal(steady([0.0, 1.0, -2.0], rupture, 0.0), np.zeros((2, 3)))
-        assert_array_equal(slide((np.zeros(1), np.zeros(1)), 2.0, 5.0, rupture, 0.0), np.zeros((2, 1)))
-
-
-# --- Bell: transients
 
 
 def reference(bound, moment, speed, duration, beta):
@@ -166,29 +141,23 @@ def reference(bound, moment, speed, duration, beta):
     return math.exp(state[0]), math.exp(state[0]) * state[1]
 
 
-TRANSIENTS = [
-    ("resting", 0.0, 10.0, 1.0, 1.0),
-    ("resting", 0.0, 1e3, 1.0, 0.01),
-    ("resting", 0.0, 1e6, 0.1, 2e-5),
-    ("steady", 1e-3, 1e3, 1.0, 0.02),
-    ("steady", 1e3, 1e-3, 1.0, 0.5),
-    ("steady", 1e3, 0.0, 10.0, 2.0),
-    ("steady", 30.0, -30.0, 3.0, 0.5),
-    ("steady", 1e4, -0.01, 1.0, 3.0),
-    ("steady", 0.1, -1e4, 1.0, 1e-3),
-]
-
-
-def test_transients_are_those_of_an_integrator_of_another_form():
-    for start, before, speed, beta, duration in TRANSIENTS:
+def test_transients_are_those_of_an_integrator_of_another_form_from_the_first_bonds_on():
+    for start, before, speed, beta, duration in [
+        ("resting", 0.0, 10.0, 1.0, 1.0),
+        ("resting", 0.0, 1e3, 1.0, 0.01),
+        ("resting", 0.0, 1e6, 0.1, 2e-5),
+        ("steady", 1e-3, 1e3, 1.0, 0.02),
+        ("steady", 1e3, 1e-3, 1.0, 0.5),
+        ("steady", 1e3, 0.0, 10.0, 2.0),
+        ("steady", 30.0, -30.0, 3.0, 0.5),
+        ("steady", 1e4, -0.01, 1.0, 3.0),
+        ("steady", 0.1, -1e4, 1.0, 1e-3),
+    ]:
         first = steady(before, BELL, beta) if start == "steady" else resting(BELL, beta)
         for share in (0.1, 1.0):
             exact = reference(first[0][0], first[1][0], speed, share * duration, beta)
             result = slide(first, speed, share * duration, BELL, beta)
             assert_allclose([result[0][0], result[1][0]], exact, rtol=TRANSIENT, atol=0)
-
-
-def test_the_first_bonds_of_an_empty_contact():
     for eps in [1e-3, 1.0, 1e4]:
         beta = 2.0
         first = 1e-6 / math.sqrt(1.0 + eps)  # both series to a relative error of (1 + eps) first²
@@ -201,9 +170,6 @@ def test_the_first_bonds_of_an_empty_contact():
         assert_allclose([result[0][0], result[1][0]], exact, rtol=TRANSIENT, atol=0)
         begun = slide(empty, eps, first, BELL, beta)
         assert_allclose([begun[0][0], begun[1][0]], [bound, moment], rtol=2.0 * (beta + 2.0) ** 2 * 1e-12, atol=0)
-
-
-def test_the_start_without_rebinding_has_a_closed_form_peak():
     # N = exp(-(e^{eps t} - 1)/eps) N0: the peak of the force is W exp(1/eps - 1/W) at t = W/eps
     for eps, peak in ((1.0, 0.26438044734963434), (10.0, 1.0878078601534826), (1e4, 6.298534919025461)):
         time = float(lambertw(eps).real) / eps
@@ -237,10 +203,7 @@ def test_hardly_any_softness_is_the_constant_rate():
         assert_allclose(near, constant, rtol=1e-13, atol=0)
 
 
-# --- the method
-
-
-def test_the_method_is_of_fifth_order_and_its_error_estimate_of_fourth():
+def test_the_method_is_of_fifth_order_and_forgets_the_start_in_an_endless_step():
     exact, errors, estimates = reference(0.5, 0.2, 10.0, 0.4, 2.0), [], []
     for count in (8, 16, 32):
         work, state, estimate = np.empty((8, 2)), (0.5, 0.2), 0.0
@@ -252,9 +215,6 @@ def test_the_method_is_of_fifth_order_and_its_error_estimate_of_fourth():
     # slopes approach 5 with the step; the next term changes them by a part that halves each time
     for sizes in (errors, estimates):
         assert_allclose(np.log2(np.divide(sizes[1], sizes[2])), 5.0, rtol=0.08, atol=0)
-
-
-def test_the_method_forgets_the_start_in_an_endless_step():
     # N' = k_on (1 - N) - k N with a stretch too small to matter: what is left of the start goes as 1/step
     result = [_rosenbrock(0.9, 1e-30, step, 0.0, 1.0, 3.0, np.empty((8, 2)))[:2] for step in (1e4, 1e7)]
     left = np.array(result) - [0.75, 0.0]
@@ -262,28 +222,16 @@ def test_the_method_forgets_the_start_in_an_endless_step():
     assert np.max(np.abs(left[1] / [0.15, 1e-30])) < 1e-5
 
 
-# --- rows and bad numbers
-
-
-def test_one_entry_serves_all_rows():
+def test_one_entry_serves_all_rows_and_what_has_no_answer_is_nan_or_refused():
     slip = np.array([0.1, 0.2, -5.0])
     spread = advance(np.full(3, 0.4), np.full(3, 0.1), slip, np.abs(slip), 0.3, BELL, 2.0)
     assert_array_equal(advance(0.4, 0.1, slip, np.abs(slip), 0.3, BELL, 2.0), spread)
     assert advance(0.4, 0.1, 0.2, 0.2, 0.3, BELL, 2.0)[0].shape == (1,)
     with pytest.raises(ValueError, match="one entry"):
         advance(np.ones(2), np.zeros(3), 0.1, 0.1, 0.3, BELL, 2.0)
-
-
-def test_a_step_of_no_duration_stretches_and_breaks_nothing():
     assert_array_equal(advance(0.5, 0.1, 0.2, 0.2, 0.0, BELL, 2.0), [[0.5], [0.2]])
-
-
-def test_what_has_no_answer_is_nan_and_does_not_hang():
     for bound, moment, slip in ((math.nan, 0.0, 1.0), (0.5, math.nan, 1.0), (0.5, 0.1, math.inf), (0.5, 500.0, 1.0)):
         assert np.all(np.isnan(advance(bound, moment, slip, 1.0, 1.0, BELL, 1.0)))
-
-
-def test_softness_and_a_limit_together_are_refused():
     softness_and_limit = RuptureRate(1.0, 1.0, 1.0)
     with pytest.raises(ValueError, match="use one of them"):
         advance(0.5, 0.1, 0.1, 0.1, 1.0, softness_and_limit, 1.0)

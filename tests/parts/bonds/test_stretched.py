@@ -1,30 +1,22 @@
 """Bonds with a stretch in whole scenes: static peaks, ageing, reversal, area, and the field that they make."""
 
 import contextlib
+import functools
 import math
 from itertools import product
 
 import numpy as np
 import pytest
-from helpers.fields import complex_amplitudes
-from helpers.renewal import volterra
-from helpers.scenes import BELL, BONDS, CELL, STRETCHED, one_step, scene
+from helpers.scenes import BELL, BONDS, CELL, STRETCHED, Time, bonds, drive, march, one_step, records, scene, shear
 from numpy.testing import assert_allclose
 
-from sim.engine import march, trajectory_of
-from sim.ensemble.variables import VARIABLES
 from sim.laws.schallamach import bell_lives, bell_moments, start_up_force, start_up_peak
 from sim.numerics.noise import Noise
-from sim.parts import drive
-from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Constant
-from sim.parts.shear import models as shear
-from sim.parts.shear.process import Time
 from sim.scenario.clock import Clock
 from sim.spectrum.families import Band, BondMade
 from sim.units.errors import BadInput
 
-READ = {variable.name: variable.read for variable in VARIABLES}
 RATES = BELL.zero_force_rate, BELL.bell_force, STRETCHED["bond_stiffness"]
 SITES, BINDING = STRETCHED["site_density"], STRETCHED["rebinding_rate"]
 REST = BINDING / (BINDING + BELL.zero_force_rate)
@@ -34,12 +26,26 @@ FIELD = BondMade(footprint=1e-5)
 CELLED = {"spectrum": FIELD, "cell": CELL, "points": 32, "correlation": Time(time=2e-3)}
 
 
-def marched(name, members=1, **parts):
-    """One record of a scene, shape (steps + 1, members or 1)."""
-    scenario = scene(members, **parts)
-    return np.array(
-        [READ[name](scenario, trajectory_of(scenario, state))[0] for state in march(scenario, np.arange(members))]
-    )
+@functools.cache
+def volterra(first, beta, eps, end, points):
+    """Share bound and stretch per site at ``end`` after a start with a share ``first`` bound, unstretched.
+
+    F = 1 - first S - beta ∫F S, times in 1/k0, by the trapezoidal rule, Richardson-extrapolated twice.
+    """
+
+    def solve(n):
+        age = np.linspace(0.0, end, n + 1)
+        alive, h = np.exp(-np.expm1(eps * age) / eps), end / n
+        free = np.empty(n + 1)
+        free[0] = 1.0 - first
+        for i in range(1, n + 1):
+            past = 0.5 * free[0] * alive[i] + np.dot(free[1:i], alive[i - 1 : 0 : -1])
+            free[i] = (1.0 - first * alive[i] - beta * h * past) / (1.0 + 0.5 * beta * h)
+        young = np.dot(free[1:-1], (age * alive)[-2:0:-1]) + 0.5 * free[0] * age[-1] * alive[-1]
+        return np.array([1.0 - free[-1], eps * (first * end * alive[-1] + beta * h * young)])
+
+    coarse, middle, fine = (solve(points * k) for k in (1, 2, 4))
+    return (16 * (4 * fine - middle) / 3 - (4 * middle - coarse) / 3) / 15
 
 
 def last(members=1, **parts):
@@ -48,21 +54,14 @@ def last(members=1, **parts):
     return scenario, state
 
 
-# --- static peaks and ageing
-
-
 def test_the_start_of_a_rested_contact_is_the_closed_form_plus_what_rebinds():
     for eps in [3.0, 100.0, 1e4]:
         # fewer than k_on sites bind a second, and each bears the force of its age: k_on kappa V <T^2>/2 at the most
         speed = eps * PACE
         times = start_up_peak(speed, *RATES).time * np.arange(41) / 20.0
         rested = bonds.Cohort(rupture=BELL, **STRETCHED, start_from="bonded")
-        stress = marched(
-            "shear_stress",
-            bonds=rested,
-            drive=drive.Steady(speed=speed),
-            clock=Clock(duration=times[-1], step=times[1]),
-        )[:, 0]
+        parts = {"drive": drive.Steady(speed=speed), "clock": Clock(duration=times[-1], step=times[1])}
+        stress = records(scene(1, bonds=rested, **parts), "shear_stress")[0][:, 0]
         held = SITES * REST * start_up_force(times, speed, *RATES)
         reborn = SITES * BINDING * STRETCHED["bond_stiffness"] * speed * bell_lives(speed, *RATES).half_square
         assert np.all(stress >= held * (1.0 - 1e-4))
@@ -81,7 +80,7 @@ def test_static_friction_ages_as_the_bonds_of_an_empty_contact_come_and_saturate
         steps = round((rest + sliding) / 0.25e-3)
         parts = {"bonds": empty, "drive": drive.Start(rest=rest, speed=speed)}
         parts["clock"] = Clock(duration=rest + sliding, step=(rest + sliding) / steps)
-        fraction, stress = (marched(name, **parts)[:, 0] for name in ("bond_fraction", "shear_stress"))
+        fraction, stress = np.array(records(scene(1, **parts), "bond_fraction", "shear_stress"))[..., 0]
         started = steps - 4
         aged = -math.expm1(-(BINDING + BELL.zero_force_rate) * rest)
         assert_allclose(fraction[started], aged, rtol=1e-4)
@@ -90,8 +89,6 @@ def test_static_friction_ages_as_the_bonds_of_an_empty_contact_come_and_saturate
             exact = volterra(REST * aged, BINDING / RATES[0], 10.0, RATES[0] * k * 0.25e-3, 400)[1]
             assert_allclose(stress[started + k], SITES * BELL.bell_force * exact, rtol=1e-4)
 
-
-# --- bonds and the area
 
 DEAD = Constant(rate=1e-9)
 LASTING = STRETCHED | {"rebinding_rate": 1e-9}
@@ -135,8 +132,7 @@ def test_in_a_contact_that_breathes_the_bonds_thin_with_every_amplitude():
         breathing = shear.Modal(
             spectrum=Band(rms=50e3, longest=120e-6, shortest=60e-6), cell=CELL, correlation=Time(time=2e-3)
         )
-        scenario = scene(5, steps=12, bonds=part, shear=breathing)
-        states = list(march(scenario, np.arange(5)))
+        states = list(march(scene(5, steps=12, bonds=part, shear=breathing), np.arange(5)))
         radii = np.array([state.contact.radius for state in states])
         assert np.sum(np.diff(radii, axis=0) > 1e-8) > 10
         grown = np.maximum(radii[1:-1] / radii[:-2], 1.0)
@@ -148,14 +144,14 @@ def test_in_a_contact_that_breathes_the_bonds_thin_with_every_amplitude():
         assert_allclose(fraction, expected, rtol=1e-10)
 
 
-# --- the field that bonds make
-
-
-def test_the_mean_energy_of_the_bonds_field_follows_their_force_squared():
+def test_a_few_bonds_give_each_member_its_own_field_and_the_mean_energy_follows_their_force_squared():
     states = march(scene(bonds=COHORT, shear=shear.Mean(spectrum=FIELD), drive=drive.Steady(speed=PACE)), np.arange(1))
-    square = bell_moments(PACE, *RATES, BINDING).force_square
-    exact = SITES * square / (math.pi**2 * 1.6e6 * 1e-5)
+    exact = SITES * bell_moments(PACE, *RATES, BINDING).force_square / (math.pi**2 * 1.6e6 * 1e-5)
     assert_allclose([state.shear.energy[0] for state in states], exact, rtol=1e-4)
+    scenario, state = last(4, bonds=BONDS["tracked"], shear=shear.Mean(spectrum=FIELD), drive=drive.Steady(speed=PACE))
+    assert scenario.varies["shear"] and len(np.unique(state.shear.energy)) == 4
+    bonding = state.bonding
+    assert_allclose(state.shear.energy, (bonding.frozen + bonding.varying) * FIELD.surface_energy(1.6e6), rtol=1e-14)
 
 
 def test_the_members_mean_energy_is_that_of_the_mean_on_their_own_cell():
@@ -175,35 +171,10 @@ def test_the_members_mean_energy_is_that_of_the_mean_on_their_own_cell():
         assert abs(state.shear.energy.std() / spread - 1.0) < 5.0 * math.sqrt((2.0 + kurtosis) / (4.0 * members))
 
 
-def test_sites_of_the_slider_keep_a_pattern_and_forget_what_differs():
-    # eight correlations: e^-8 of the differences is left, so the pattern correlates by n f²/(n f² + n Var f)
-    members, steady = 400, {"bonds": COHORT, "drive": drive.Steady(speed=2.0 * PACE)}
-    scenario = scene(members, steps=16, shear=shear.Modal(**CELLED), **steady)
-    states = list(march(scenario, np.arange(members)))
-    first, then = (complex_amplitudes(scenario.process, states[k].shear) for k in (0, 16))
-    correlation = np.real(np.mean(first * then.conj(), axis=None)) / np.mean(np.abs(first) ** 2)
-    _, force, square = bell_moments(2.0 * PACE, *RATES, BINDING)
-    frozen = force**2 / square
-    assert 0.1 < frozen < 0.9
-    power = np.abs(first) ** 2
-    effective = np.sum(power) ** 2 / np.sum(power**2)
-    assert abs(correlation - frozen - (1.0 - frozen) * math.exp(-8.0)) < 5.0 / math.sqrt(effective)
-
-
-def test_a_few_bonds_give_each_member_its_own_field():
-    scenario, state = last(4, bonds=BONDS["tracked"], shear=shear.Mean(spectrum=FIELD), drive=drive.Steady(speed=PACE))
-    assert scenario.varies["shear"] and len(np.unique(state.shear.energy)) == 4
-    bonding = state.bonding
-    assert_allclose(state.shear.energy, (bonding.frozen + bonding.varying) * FIELD.surface_energy(1.6e6), rtol=1e-14)
-
-
-def test_a_field_of_bonds_without_forces_is_refused():
+def test_a_field_of_bonds_without_forces_or_stiffer_than_the_half_space_is_refused():
     for name in ("none", "rate", "counted", "rate, bell"):
         with pytest.raises(BadInput, match="force of each bond"):
             scene(bonds=BONDS[name], shear=shear.Mean(spectrum=FIELD))
-
-
-def test_a_bond_stiffer_than_the_half_space_under_it_is_refused():
     limit = 0.5 * math.pi**2 * 1.6e6 * 1e-9
     for stiffness, expected in (
         (limit, contextlib.nullcontext()),

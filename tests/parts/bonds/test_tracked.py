@@ -124,7 +124,7 @@ FORWARD = 10.0 ** np.linspace(-1, 1.5, 30)
 BACK_AND_FORTH = 6.0 * np.sin(np.arange(40)) * (np.arange(40) % 7 > 0)
 
 
-def test_the_same_motion_in_other_steps_gives_the_same_lives():
+def test_the_same_motion_in_other_steps_or_a_bell_force_beyond_all_stretches_gives_the_same_lives():
     cases = [(law, speeds, 1.0, (2, 8, 16)) for law, speeds in product(LAWS.values(), [FORWARD, BACK_AND_FORTH])]
     cases.append((BELL, np.full(12, 200.0), 9.0, (16,)))  # bonds asked singly, and bonds that follow
     for law, speeds, rebinding, finer in cases:
@@ -132,6 +132,9 @@ def test_the_same_motion_in_other_steps_gives_the_same_lives():
         assert coarse[-1][2].mean() > 2.5  # sites have lived on
         for pieces in finer:
             same_lives(coarse, ramp(law, pieces, speeds, rebinding=rebinding))
+    soft = ramp(RuptureRate(1.0, 1e-12, math.inf), 1, FORWARD)
+    same_lives(soft, ramp(CONSTANT, 1, FORWARD))
+    assert not np.array_equal(soft[-1][2], ramp(BELL, 1, FORWARD)[-1][2])  # whose lives are others
 
 
 def test_rows_ask_singly_after_a_reversal_until_all_bonds_follow():
@@ -165,8 +168,7 @@ def test_reversals_and_rests_have_the_law_of_the_renewal_equation():
     """Forth, rest, back through zero: against a trapezoid rule, whose error of some h² (k/2)² is below 2e-4."""
     step, rebinding, sites = 2.5e-3, 2.0, 100_000
     speeds = np.repeat([3.0, 0.0, -4.0, 0.5], 160)
-    position = np.concatenate([[0.0], np.cumsum(speeds * step)])
-    exact = volterra(BELL, rebinding, position, step)
+    exact = volterra(BELL, rebinding, np.concatenate([[0.0], np.cumsum(speeds * step)]), step)
     tracks = begin(BELL, sites, how="empty", rebinding=rebinding)
     for n in range(0, len(speeds), 40):
         tracks = go(tracks, speeds[n] * 40 * step, 40 * step, BELL, rebinding)
@@ -238,13 +240,7 @@ def test_the_words_of_a_life_are_philoxs_at_its_address():
     assert_allclose([tracks.birth[0, site], -tracks.due[0, site]], [threshold, wait / 2.0], rtol=1e-14, atol=0)
 
 
-def test_a_bell_force_beyond_all_stretches_makes_the_rupture_constant():
-    soft = ramp(RuptureRate(1.0, 1e-12, math.inf), 1, FORWARD)
-    same_lives(soft, ramp(CONSTANT, 1, FORWARD))
-    assert not np.array_equal(soft[-1][2], ramp(BELL, 1, FORWARD)[-1][2])  # whose lives are others
-
-
-def test_a_step_of_very_many_lives_ends_in_the_steady_law_of_its_speed():
+def test_a_step_of_very_many_lives_ends_in_the_steady_law_of_its_speed_for_its_members_alone():
     for duration in [500.0, 1e6, 1e300]:
         tracks = begin(BELL, 10_000, 10, 1.0)
         lives = tracks.life.copy()
@@ -254,9 +250,6 @@ def test_a_step_of_very_many_lives_ends_in_the_steady_law_of_its_speed():
         assert np.all(after.life == lives + 1)
         assert np.nanmax(stretches(after)) <= 0.0
         has_the_law(go(after, speed * 1e-9, 1e-9, BELL), [fraction, -first, second, fourth])
-
-
-def test_only_the_members_whose_step_is_long_are_drawn_anew():
     tracks = begin(BELL, 500, 2, 1.0)
     plain = go(copy.deepcopy(tracks), 1.0, 5.0, BELL, 1e3)
     mixed = go(tracks, np.array([1.0, 1e9]), 5.0, BELL, 1e3)
@@ -265,7 +258,7 @@ def test_only_the_members_whose_step_is_long_are_drawn_anew():
     go(mixed, 1.0, 1.0, BELL, 1e3)
 
 
-def test_no_numbers_make_a_step_endless():
+def test_no_numbers_make_a_step_endless_and_a_motion_without_an_end_is_refused():
     laws = *LAWS.values(), UNBREAKING, RuptureRate(1e308, 1e300, 1e-300), RuptureRate(5e-324, 1.0, 5e-324)
     slips, durations = [0.0, 5e-324, 1e-300, -1e-12, 1e3, -1e300, 1.7e308], [5e-324, 1e-300, 1.0, 1e300]
     for law, slip, duration, rebinding in product(laws, slips, durations, [0.0, 5e-324, 1.0, 1e300]):
@@ -276,24 +269,18 @@ def test_no_numbers_make_a_step_endless():
             assert "stationary" in str(refusal) or "finite" in str(refusal)
             continue
         assert 0.0 <= bound(tracks)[0] <= 33.0
-
-
-def test_a_motion_without_an_end_is_refused():
     with pytest.raises(ValueError, match="finite"):
         go(begin(BELL, 10), math.nan, 1.0, BELL)
     with pytest.raises(ValueError, match="never break"):
         begin(UNBREAKING, 10, speed=1.0)
 
 
-def test_the_mean_life_is_the_integral_of_the_survival():
+def test_the_mean_life_is_the_integral_of_the_survival_and_ends_at_the_limit():
     for speed in (1e-12, 1e-3, 0.0199, 0.0201, 0.5, 10.0, 1e4, 1e8, 1e200):
         with mpmath.workdps(40):
             z = 1 / mpmath.mpf(speed)
             exact = z * mpmath.exp(z) * mpmath.e1(z) if speed > 1e-6 else 1 - 1 / z
         assert_allclose(mean_life(np.array([-speed]), BELL), float(exact), rtol=1e-12, atol=0)
-
-
-def test_the_mean_life_ends_at_the_limit():
     law = RuptureRate(0.7, 0.0, 2.0)
     assert_allclose(mean_life(np.array([3.0]), law), -math.expm1(-1.4 / 3.0) / 0.7, rtol=1e-14, atol=0)
     assert_allclose(mean_life(np.array([3.0]), RuptureRate(0.0, 1.0, 2.0)), 2.0 / 3.0, rtol=1e-15, atol=0)
@@ -304,7 +291,7 @@ def test_the_mean_life_ends_at_the_limit():
     assert_allclose(nearly, mean_life(np.array([3.0]), law), rtol=1e-8, atol=0)
 
 
-def test_the_kept_sums_are_those_of_the_sites():
+def test_the_kept_sums_are_those_of_the_sites_of_less_than_25_bytes():
     for sites in [1, 15, 16, 17, 1000]:
         tracks = begin(BELL, sites, 3, 2.0)
         for _ in range(300):
@@ -313,9 +300,6 @@ def test_the_kept_sums_are_those_of_the_sites():
             assert np.array_equal(bound(tracks), np.sum(~np.isnan(stretch), axis=1))
             assert_allclose(mean_stretch(tracks), np.nansum(stretch, axis=1) / sites, rtol=0, atol=1e-12)
             assert_allclose(mean_square_stretch(tracks), np.nansum(stretch**2, axis=1) / sites, rtol=0, atol=1e-11)
-
-
-def test_the_state_takes_less_than_25_bytes_a_site():
     tracks = begin(BELL, 10**6)
     assert sum(array.nbytes for array in tracks) < 25e6
     assert tracks.frame[0, BOUND] == bound(tracks)[0]

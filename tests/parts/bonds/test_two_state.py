@@ -7,16 +7,10 @@ from itertools import product
 import numpy as np
 import pytest
 from helpers.draws import fits
-from helpers.scenes import BELL, STRETCHED, scene
+from helpers.scenes import BELL, STRETCHED, Clock, Constant, bonds, drive, march, scene, shear
 from numpy.testing import assert_allclose
 from scipy.stats import binom
 
-from sim.engine import march
-from sim.parts import drive
-from sim.parts.bonds import models as bonds
-from sim.parts.bonds.rupture import Constant
-from sim.parts.shear import models as shear
-from sim.scenario.clock import Clock
 from sim.spectrum.families import BondMade
 
 STEPPED = drive.Table(time=(0.0, 0.7, 0.7, 1.4, 1.4, 2.1), speed=(1e-5, 1e-5, 8e-2, 8e-2, 2e-3, 2e-3))
@@ -30,17 +24,13 @@ def fractions(population, motion, steps, members=1, seed=5, duration=2.1):
     return np.concatenate(marched, axis=1)
 
 
-def test_the_rate_equation_has_no_step_error():
+def test_the_rate_equation_has_no_step_error_at_steady_speeds_and_one_of_second_order_under_a_ramp():
     for motion, start in product([drive.Steady(speed=3e-3), STEPPED], ["steady", "bonded", "empty"]):
         rate = bonds.Rate(critical_speed=1e-2, rebinding_rate=3.0, start_from=start)
         coarse, fine = fractions(rate, motion, 21), fractions(rate, motion, 147)
         assert_allclose(fine[::7], coarse, rtol=1e-12, atol=0)
-
-
-def test_the_rate_equation_is_second_order_under_a_ramp():
     rate, ramp = bonds.Rate(critical_speed=1e-2, rebinding_rate=3.0), drive.Ramp(start=1e-3, stop=5e-2)
-    ends = [fractions(rate, ramp, steps)[-1, 0] for steps in (32, 64, 128, 256)]
-    steps = np.diff(ends)
+    steps = np.diff([fractions(rate, ramp, steps)[-1, 0] for steps in (32, 64, 128, 256)])
     assert_allclose(np.log2(steps[:-1] / steps[1:]), 2.0, atol=0.1)
 
 
@@ -69,19 +59,6 @@ def test_counted_bonds_remember_with_the_rate_of_the_population():
     assert abs(np.corrcoef(values[1], values[2])[0, 1] - expected) < 5.0 * (1.0 - expected**2) / np.sqrt(members)
 
 
-def test_counted_bonds_serve_one_bond_and_a_hundred_million():
-    for sites in [1, 10**8]:
-        counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=3.0, sites=sites)
-        values = fractions(counted, drive.Steady(speed=1e-2), 4, 500)
-        spread = np.sqrt(0.25 / sites)
-        assert np.all((values >= 0.0) & (values <= 1.0))
-        assert np.all(np.abs(values.mean(axis=1) - 0.5) < 5.0 * spread / np.sqrt(500))
-        assert np.all(np.abs(values.std(axis=1) / spread - 1.0) < 5.0 / np.sqrt(2 * 500) + 1e-3)
-        assert_allclose(values * sites, np.rint(values * sites), rtol=1e-12, atol=1e-6)
-
-
-# --- the choice of the depth
-
 LINEAR = {"critical_speed": 1e-2, "rebinding_rate": 3.0}
 FIELD = shear.Mean(spectrum=BondMade(footprint=1e-5))
 
@@ -108,16 +85,13 @@ def test_the_depth_left_open_is_chosen_by_noise_and_rupture():
     assert type(scene(bonds=read, shear=FIELD).population) is bonds.Cohort
 
 
-def test_the_number_of_sites_is_given_or_that_of_the_contact_at_rest():
+def test_the_number_of_sites_is_given_or_that_of_the_contact_and_cohorts_are_finer_than_its_noise():
     area = math.pi * scene().rest_radius ** 2
     by_density = bonds.Auto(rupture=BELL, **STRETCHED | {"site_density": 1e11})
     assert by_density.number(area) == scene(bonds=by_density).population.sites == round(1e11 * area)
     assert bonds.Auto(rupture=BELL, **STRETCHED, sites=12).number(area) == 12
     assert by_density.number(1e-15) == 1.0  # the smallest contact holds one
     assert by_density.number(0.0) == by_density.number(math.nan) == bonds.Auto(**LINEAR).number(area) == math.inf
-
-
-def test_cohorts_chosen_are_finer_than_the_noise_left_out():
     for tolerance, cohorts in [(0.5, 1e-4), (1e-2, 1e-4), (1e-4, 1e-5)]:
         auto = bonds.Auto(rupture=BELL, **STRETCHED, tolerance=tolerance)
         assert_allclose(scene(bonds=auto).population.tolerance, cohorts, rtol=1e-15)

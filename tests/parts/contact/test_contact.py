@@ -6,27 +6,17 @@ from itertools import product
 
 import numpy as np
 import pytest
-from helpers.scenes import scene
+from helpers.scenes import Adhesion, Clock, Onset, Scenario, Solid, Sphere, bonds, drive, march, records, scene, shear
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import brentq
 
-from sim.engine import march, trajectory_of
-from sim.ensemble.variables import VARIABLES
 from sim.laws import jkr
-from sim.parts import drive
-from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium, RateDependent, front
 from sim.parts.contact.balance import elastic_energy
-from sim.parts.contact.models import Adhesion, Solid, Sphere
-from sim.parts.shear import models as shear
-from sim.parts.shear.process import Onset
-from sim.scenario.clock import Clock
-from sim.scenario.scenario import Scenario
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman
 from sim.spectrum.radial import Margin, disc_energy, marginal_energy
 
 WORK = 1.0 / math.pi
-GAUGE = {variable.name: variable for variable in VARIABLES}
 
 
 def maugis(contact, steps=100, duration=1.0, **parts):
@@ -43,14 +33,8 @@ def maugis(contact, steps=100, duration=1.0, **parts):
 
 def course(scenario, *names):
     """Recorded quantities of the first member at every step."""
-    states = list(march(scenario, np.arange(scenario.ensemble.members)))
-    return [
-        np.array([np.ravel(GAUGE[name].read(scenario, trajectory_of(scenario, state)))[0] for state in states])
-        for name in names
-    ]
+    return [values[:, 0] for values in records(scenario, *names)]
 
-
-# --- the control in time ---
 
 HELD = {
     "load": ({}, "normal_load"),
@@ -70,9 +54,6 @@ def test_the_control_takes_the_values_of_its_course_at_the_clock_times():
     for (control, (more, variable)), (held, steps, exact) in product(HELD.items(), courses):
         (values,) = course(maugis(Equilibrium(**{control: held}, **more), steps), variable)
         assert_allclose(values, exact, rtol=1e-14, atol=0)
-
-
-# --- pull-off ---
 
 
 def on_the_branch(a, stiffness):
@@ -109,13 +90,11 @@ def test_the_contact_opens_between_the_last_step_before_the_limit_and_the_next()
         assert np.all(when[first_open:] == scenario.clock.time(first_open))
 
 
-# --- what follows a detachment ---
-
 #: Exact in binary at 128 steps; zero on the way back comes after 24 and 56 of 64.
 BACK = {"from": 1.0, "to": -3.0, "cycles": 2}
 
 
-def test_a_free_sphere_jumps_into_contact_where_it_touches():
+def test_cycles_through_pull_off_are_alike_and_a_free_sphere_jumps_in_where_it_touches():
     for held, radius in [
         ({"indentation": BACK}, (8.0 / 3.0) ** (1.0 / 3.0)),
         ({"load": BACK}, 6.0 ** (1.0 / 3.0)),
@@ -127,9 +106,6 @@ def test_a_free_sphere_jumps_into_contact_where_it_touches():
         assert returns.tolist() == [56, 120]
         assert_allclose(recorded[returns], radius or touching(2.0), rtol=1e-13)
         assert len(set(when[~np.isnan(when)])) == 2
-
-
-def test_a_hundred_cycles_through_pull_off_are_all_alike():
     for policy, cycles in [("stay_open", 8), ("reattach", 128), ("stop", 8)]:
         held = {"indentation": {"from": 1.0, "to": -2.0, "cycles": cycles}}
         scenario = maugis(Equilibrium(**held, after_pull_off=policy), cycles * 32)
@@ -155,9 +131,6 @@ def test_a_contact_that_begins_out_of_touch_jumps_in_whatever_follows_a_pull_off
         assert np.isnan(when[:49]).all()
         assert np.isfinite(when[-1])
         assert_array_equal(np.isnan(radius[56:]), policy == "stop")
-
-
-# --- dissipation ---
 
 
 def touching(stiffness):
@@ -202,8 +175,7 @@ def test_a_partly_reversible_contact_comes_off_at_its_own_fold_and_keeps_the_ene
         values = {"load": 2.0 * 0.75 * a * (depth - a**2 / 3.0), "indentation": depth}[control]
         place = int(np.argmin(values))
         ends = {"from": values[place] + 6e-8, "to": values[place] - 6e-8}
-        contact = Equilibrium(**{control: ends}, reversible=alpha)
-        scenario = maugis(contact, 12, bonds=bonds.Unbroken(stress=tau))
+        scenario = maugis(Equilibrium(**{control: ends}, reversible=alpha), 12, bonds=bonds.Unbroken(stress=tau))
         names = "contact_radius", "work_of_adhesion", "normal_load", "dissipated_energy"
         radius, work, load, lost = course(scenario, *names)
         assert_array_equal(radius[8:], 0.0)
@@ -218,17 +190,7 @@ def test_a_partly_reversible_contact_comes_off_at_its_own_fold_and_keeps_the_ene
             assert_allclose(lost[-1], exact, rtol=2e-5)
 
 
-def test_what_a_free_sphere_dissipates_as_it_jumps_in_at_a_load():
-    """w A + P delta less the elastic energy, of the contact of no load: a = 6^(1/3), delta = 6^(2/3)/3."""
-    a, depth = 6.0 ** (1.0 / 3.0), 6.0 ** (2.0 / 3.0) / 3.0
-    exact = a**2 - elastic_energy(a, depth, maugis(Equilibrium(load=1.0)).bodies)
-    table = {"time": [0.0, 0.3, 0.6, 1.0], "value": [0.0, -2.0, 0.0, 0.0]}
-    scenario = maugis(Equilibrium(load=table, after_pull_off="reattach"), 10)
-    lost = course(scenario, "dissipated_energy")[0]
-    assert_allclose(lost[-1] - lost[5], exact, rtol=1e-12)
-
-
-def test_a_fast_edge_jumps_in_where_equilibrium_does_and_dissipates_the_same():
+def test_a_fast_edge_or_a_free_sphere_jumps_in_where_equilibrium_does_and_dissipates_the_same():
     back = {"from": 1.0, "to": -3.0, "cycles": 1}
     names = "contact_radius", "detachment_time", "dissipated_energy"
 
@@ -249,6 +211,12 @@ def test_a_fast_edge_jumps_in_where_equilibrium_does_and_dissipates_the_same():
     # within two steps' work of the pull-off load at most; the edge itself loses little
     assert_allclose(fast[2][-1], settled[2][-1], rtol=0.0, atol=2.0 * 1.5 * 8.0 / 800)
     assert_allclose(fast[1][-1], settled[1][-1], rtol=0.0, atol=2.0 / 800)
+    # w A + P delta less the elastic energy, of the contact of no load: a = 6^(1/3), delta = 6^(2/3)/3.
+    a, depth = 6.0 ** (1.0 / 3.0), 6.0 ** (2.0 / 3.0) / 3.0
+    exact = a**2 - elastic_energy(a, depth, maugis(Equilibrium(load=1.0)).bodies)
+    table = {"time": [0.0, 0.3, 0.6, 1.0], "value": [0.0, -2.0, 0.0, 0.0]}
+    lost = course(maugis(Equilibrium(load=table, after_pull_off="reattach"), 10), "dissipated_energy")[0]
+    assert_allclose(lost[-1] - lost[5], exact, rtol=1e-12)
 
 
 KNOTS = {
@@ -260,7 +228,7 @@ KNOTS = {
 }
 
 
-def test_an_edge_follows_turns_of_its_control_within_a_clock_step():
+def test_an_edge_follows_turns_of_its_control_and_opens_at_a_time_of_its_own_within_a_clock_step():
     for knots in KNOTS.values():
         # the edge is good to some 1e-8 of the radius, whatever the step
         contact = RateDependent(**knots, front_speed=5.0, heal_speed=2.0, heal_exponent=0.5)
@@ -270,6 +238,9 @@ def test_an_edge_follows_turns_of_its_control_within_a_clock_step():
         assert np.ptp(coarse) > 0.1
         assert_allclose(coarse, fine[::10], rtol=1e-6)
         assert_allclose(lost, fine_lost[::10], rtol=1e-6, atol=1e-9)
+    contact = RateDependent(load={"from": 1.0, "to": -3.0}, front_speed=5.0)
+    few, many = (course(maugis(contact, steps), "detachment_time")[0][-1] for steps in (5, 500))
+    assert_allclose(few, many, rtol=1e-6)
 
 
 def test_all_that_is_stored_is_dissipated_once_an_edge_is_open_or_at_rest():
@@ -294,12 +265,6 @@ def test_all_that_is_stored_is_dissipated_once_an_edge_is_open_or_at_rest():
         assert_allclose(lost[-1], stored if opens else -stored, rtol=1e-7)
 
 
-def test_an_edge_opens_at_a_time_of_its_own_within_a_clock_step():
-    contact = RateDependent(load={"from": 1.0, "to": -3.0}, front_speed=5.0)
-    few, many = (course(maugis(contact, steps), "detachment_time")[0][-1] for steps in (5, 500))
-    assert_allclose(few, many, rtol=1e-6)
-
-
 def test_a_fast_edge_stays_in_equilibrium_with_the_share_of_the_mean_stress():
     parts = {"bonds": bonds.Unbroken(stress=2e5), "drive": drive.Steady(speed=1e-3)}
     still, fast = Equilibrium(load=4e-3, reversible=0.02), RateDependent(load=4e-3, reversible=0.02, front_speed=1e3)
@@ -308,22 +273,15 @@ def test_a_fast_edge_stays_in_equilibrium_with_the_share_of_the_mean_stress():
     assert_allclose(edge, settled, rtol=1e-7)
 
 
-# --- masking ---
-
-
 def pulse(contact, paid=1.0, steps=400, on="plane"):
     """The lens with fluctuations that grow beyond what adhesion can pay, and fall back."""
-    part = shear.Mean(
-        spectrum=Gaussian(rms=3e5, length=24e-6),
-        amplitude=Onset(speed=5e-2, width=0.5),
-        paid_by_adhesion=paid,
-        contact=on,
-    )
+    field = {"spectrum": Gaussian(rms=3e5, length=24e-6), "amplitude": Onset(speed=5e-2, width=0.5)}
+    part = shear.Mean(**field, paid_by_adhesion=paid, contact=on)
     table = drive.Table(time=(0.0, 0.5e-3 * steps, 1e-3 * steps), speed=(1e-5, 1e-1, 1e-5))
     return scene(1, steps, shear=part, drive=table, contact=contact)
 
 
-def test_work_that_falls_through_zero_leaves_hertz_and_comes_back():
+def test_work_that_falls_through_zero_leaves_hertz_or_opens_a_lifted_contact():
     for held in [{"load": 4e-3}, {"indentation": 2e-6}, {"displacement": 2e-6, "stiffness": 2e3}]:
         scenario = pulse(Equilibrium(**held))
         radius, work, masked = course(scenario, "contact_radius", "work_of_adhesion", "masked")
@@ -335,12 +293,8 @@ def test_work_that_falls_through_zero_leaves_hertz_and_comes_back():
         assert np.all(radius[work > 0.0] >= hertz)
         # continuous in the work: near Hertz's radius it grows like its root, a - a_H <= C sqrt(w) with C at 42 mJ/m^2
         wide = scenario.contact.control(0.0, 1.0).radius(np.array([0.042]), np.zeros(1), 0.0, bodies)[0]
-        over = np.maximum(work, 0.0)
-        assert np.all(radius - hertz <= 1.5 * (wide - hertz) * np.sqrt(over / 0.042) + 1e-18)
+        assert np.all(radius - hertz <= 1.5 * (wide - hertz) * np.sqrt(np.maximum(work, 0.0) / 0.042) + 1e-18)
         assert radius[0] == radius[-1] > 1.2 * hertz
-
-
-def test_a_lifted_contact_opens_where_no_work_is_left():
     radius, work, masked = course(pulse(Equilibrium(indentation=-1e-8)), "contact_radius", "work_of_adhesion", "masked")
     assert np.all(radius[np.argmax(work <= 0.0) :] == 0.0)
     assert_array_equal(masked, 0.0)  # an open contact is not Hertz's
@@ -356,8 +310,6 @@ def test_a_sphere_laid_down_without_adhesion_makes_hertzs_contact():
     assert np.all(radius[~pressed] < 1e-6)
     assert np.isfinite(when[-1])
 
-
-# --- discs ---
 
 #: With how far the spline over ln a may be off: smooth spectra are smooth there, too; a wave's share oscillates
 #: with the number of waves in the contact, faster than any spline follows.
@@ -420,8 +372,7 @@ def test_what_a_rate_dependent_edge_dissipates_under_a_load_is_no_matter_of_the_
     result = []
     for spot in (1e-3, 1e-2):
         monkeypatch.setattr(front, "_SPOT", spot)
-        scenario = scene(1, steps, contact=pulled)
-        *_, last = march(scenario, np.arange(1))
+        *_, last = march(scene(1, steps, contact=pulled), np.arange(1))
         assert np.isnan(last.contact.radius[0])
         result.append(last.contact.dissipated[0])
     assert_allclose(result[0], result[1], rtol=1e-12)
@@ -434,8 +385,7 @@ def test_a_contact_that_closes_again_starts_without_the_bonds_it_carried():
         displacement={"from": 1e-6, "to": -1.6e-5, "cycles": 2}, stiffness=340.0, after_pull_off="reattach"
     )
     sites = bonds.Rate(critical_speed=1e-2, rebinding_rate=2.0, area="carried")
-    scenario = scene(1, 2000, contact=held, bonds=sites)
-    states = list(march(scenario, np.arange(1)))
+    states = list(march(scene(1, 2000, contact=held, bonds=sites), np.arange(1)))
     radius = np.array([state.contact.radius[0] for state in states])
     fraction = np.array([state.bonding.fraction[0] for state in states])
     closing = np.flatnonzero(np.isnan(radius[:-1]) & ~np.isnan(radius[1:])) + 1
@@ -443,9 +393,6 @@ def test_a_contact_that_closes_again_starts_without_the_bonds_it_carried():
     # one step of healing from nothing, and nothing again once the area is seen
     assert np.all(fraction[closing] <= 2.0 * 1e-3 * (1.0 + 1e-9))
     assert np.all(radius[closing] < 0.5 * np.nanmax(radius))
-
-
-# --- remarks ---
 
 
 def test_a_contact_remarks_on_a_start_out_of_touch_and_on_a_large_area():

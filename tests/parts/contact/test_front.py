@@ -9,22 +9,64 @@ edge forgets errors, so that whole trajectories are good to some 1e-8.
 import itertools
 import math
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import pytest
-from helpers.edges import Hold, advance
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad, solve_ivp
 
 from sim.laws import jkr
+from sim.numerics.jit import kernel
 from sim.parts.contact import front
-from sim.parts.contact.front import Kinetics
+from sim.parts.contact.front import Kinetics, moved_edge
 
 W = 1.0 / math.pi
 REST = 6.0 ** (1.0 / 3.0)
 EDGE = Kinetics(W, 1.0, 0.6, 1.0, 0.6)
 SPHERE = {"sphere_radius": 1.0, "modulus": 0.75}
 ONE = np.ones(1)
+
+
+class Hold(NamedTuple):
+    """Control during a clock step, each number linear in time: P = load + stiffness (displacement - delta)."""
+
+    load_before: float | np.ndarray = 0.0
+    load_after: float | np.ndarray = 0.0
+    displacement_before: float | np.ndarray = 0.0
+    displacement_after: float | np.ndarray = 0.0
+    stiffness: float | np.ndarray = 0.0
+
+
+class Advance(NamedTuple):
+    """Radius [m], time of detachment [s] and dissipated energy [J] of each member, see ``moved_edge``."""
+
+    radius: np.ndarray
+    detached_at: np.ndarray
+    dissipated: np.ndarray
+
+
+@kernel("void(float64[:,::1], float64[:,::1])")
+def _advance(rows, out):
+    for m in range(rows.shape[0]):
+        a, w0, w1, load0, load1, base0, base1, stiffness = rows[m, :8]
+        duration, scale, speed, exponent, heal_speed, heal_exponent, sphere_radius, modulus, least = rows[m, 8:]
+        kinetics, bodies = (scale, speed, exponent, heal_speed, heal_exponent), (sphere_radius, modulus)
+        out[m, 0], out[m, 1], out[m, 2] = moved_edge(
+            a, (w0, w1), (load0, load1), (base0, base1), stiffness, duration, kinetics, bodies, least
+        )
+
+
+def advance(radius, work, hold, kinetics, duration, sphere_radius, modulus, detached_below=0.0):
+    """Move the edge of each member's contact over one clock step; all broadcast against the radius."""
+    radius = np.asarray(radius, dtype=float)
+    columns = (radius, *work, *hold, duration, *kinetics, sphere_radius, modulus, detached_below)
+    rows = np.empty((radius.size, len(columns)))
+    for row, column in zip(rows.T, columns, strict=True):
+        row[:] = column
+    out = np.empty((radius.size, 3))
+    _advance(rows, out)
+    return Advance(*out.T.copy())
 
 
 def at_load(load):
@@ -69,17 +111,10 @@ def release(a, hold):
     return 0.75 * (delta - a * a) ** 2 / (2.0 * math.pi * a)
 
 
-def test_a_fixed_control_takes_the_time_of_its_quadrature():
-    for (hold, low), exponent in product(
-        [
-            (at_load(-1.2), 1.5),
-            (at_load(-2.0), 1e-6),
-            (Hold(0.0, 0.0, -4.0, -4.0, 3.0), 1e-6),
-            (Hold(-0.5, -0.5, -1.0, -1.0, 1e3), 1.0),
-            (at_indentation(-2.0), 1e-6),
-        ],
-        [0.2, 0.6, 1.0],
-    ):
+def test_a_fixed_control_takes_the_time_of_its_quadrature_and_ramps_that_of_another_integrator():
+    holds = (at_load(-1.2), 1.5), (at_load(-2.0), 1e-6), (at_indentation(-2.0), 1e-6)
+    machines = (Hold(0.0, 0.0, -4.0, -4.0, 3.0), 1e-6), (Hold(-0.5, -0.5, -1.0, -1.0, 1e3), 1.0)
+    for (hold, low), exponent in product(holds + machines, [0.2, 0.6, 1.0]):
 
         def pace(x, hold=hold, exponent=exponent):
             a = math.exp(x)
@@ -93,14 +128,11 @@ def test_a_fixed_control_takes_the_time_of_its_quadrature():
         out = advance(REST * ONE, (W, W), hold, edge, time, **SPHERE, detached_below=0.5 * low)
         assert_allclose(out.radius if low > 1e-3 else low, low, rtol=1e-7, atol=0)
 
-
-def test_ramps_of_load_displacement_and_work_agree_with_another_integrator():
     def hold(t0, t1):
         return Hold(0.3 * t0, 0.3 * t1, 0.2 - 0.5 * t0, 0.2 - 0.5 * t1, 0.7)
 
     def rate(t, y):
-        at = Hold(0.3 * t, 0.0, 0.2 - 0.5 * t, 0.0, 0.7)
-        s = release(y[0], at) * math.pi - (1.0 - 0.4 * t)
+        s = release(y[0], Hold(0.3 * t, 0.0, 0.2 - 0.5 * t, 0.0, 0.7)) * math.pi - (1.0 - 0.4 * t)
         return [-math.copysign(abs(s) ** (1.0 / (0.6 if s > 0 else 0.4)), s) * (1.0 if s > 0 else 0.3)]
 
     edge = Kinetics(W, 1.0, 0.6, 0.3, 0.4)
@@ -125,8 +157,7 @@ def test_pull_off_force_grows_with_the_speed_of_a_hard_machine():
             loads.append(jkr.load_under_indentation(a[0], after, **SPHERE))
         # the lowest of samples is at most 1/8 of their second difference above the least value
         low = int(np.argmin(loads))
-        bend = np.diff(loads[low - 1 : low + 2], 2)[0]
-        assert lowest - 1e-6 < loads[low] < lowest + bend / 8.0 + 1e-6
+        assert lowest - 1e-6 < loads[low] < lowest + np.diff(loads[low - 1 : low + 2], 2)[0] / 8.0 + 1e-6
 
 
 def test_one_inner_step_is_of_order_five_per_unit_time():
@@ -147,7 +178,7 @@ def test_one_inner_step_is_of_order_five_per_unit_time():
     assert min(orders) > 4.5, orders
 
 
-def test_what_the_potential_loses_at_a_fixed_control_is_dissipated():
+def test_energy_is_balanced_at_a_fixed_control_and_along_ramps_of_displacement_and_work():
     for stiffness in [0.0, 0.02, 1.0, 50.0, math.inf]:
         for load, displacement, start in ((-0.8, -0.6, 2.5), (0.5, 0.7, 0.9), (-0.1, 0.1, REST)):
             load = 0.0 if stiffness == math.inf else load
@@ -157,8 +188,6 @@ def test_what_the_potential_loses_at_a_fixed_control_is_dissipated():
                 before, after = (potential(a, load, displacement, stiffness) for a in (start, radius))
                 assert_allclose(energy, before - after, rtol=1e-7, atol=1e-14)
 
-
-def test_energy_is_balanced_along_ramps_of_displacement_and_work():
     def displacement(t):
         return 0.5 - 1.2 * t
 
@@ -182,7 +211,7 @@ def test_energy_is_balanced_along_ramps_of_displacement_and_work():
     assert_allclose(energy, supplied - last + first, rtol=1e-7, atol=0)
 
 
-def test_an_infinitely_fast_edge_is_the_jkr_equilibrium():
+def test_an_infinitely_fast_edge_is_the_jkr_equilibrium_and_lets_go_beyond_the_fold():
     for speed in [1e12, math.inf]:
         rng = np.random.default_rng(51)
         work = W * 10.0 ** rng.uniform(-1.0, 1.0, 300)
@@ -194,18 +223,12 @@ def test_an_infinitely_fast_edge_is_the_jkr_equilibrium():
         displacement = rng.uniform(-3.0, 0.99, 300) * jkr.pull_off_indentation(work, **SPHERE)
         out = advance(np.full(300, start), (work, work), at_indentation(displacement), edge, 1.0, **SPHERE)
         assert_allclose(out.radius, jkr.radius_at_indentation(displacement, work, **SPHERE), rtol=1e-9, atol=0)
-
-
-def test_an_infinitely_fast_edge_lets_go_beyond_the_fold():
     edge = Kinetics(W, math.inf, 0.6, math.inf, 0.6)
     gone = advance(REST * ONE, (W, W), at_load(-1.5001), edge, 1.0, **SPHERE)
     assert np.isnan(gone.radius[0])
     assert gone.detached_at[0] < 1e-9
     ramp = advance(REST * ONE, (W, W), Hold(0.0, -3.0), edge, 1.0, **SPHERE, detached_below=0.05)
     assert_allclose(ramp.detached_at, 0.5, rtol=1e-9, atol=0)
-
-
-def test_behind_a_machine_a_fast_edge_ends_where_load_and_indentation_agree():
     for stiffness in [0.1, 5.0, 100.0]:
         edge = Kinetics(W, 1e12, 0.6, 1e12, 0.6)
         a = advance(REST * ONE, (W, W), Hold(0.0, 0.0, -0.3, -0.3, stiffness), edge, 1.0, **SPHERE).radius[0]
@@ -213,25 +236,21 @@ def test_behind_a_machine_a_fast_edge_ends_where_load_and_indentation_agree():
         assert_allclose(jkr.load_at_radius(a, W, **SPHERE), stiffness * (-0.3 - delta), rtol=1e-8, atol=0)
 
 
-def test_a_frozen_edge_stays():
+def test_lag_fades_as_the_edge_speeds_up_and_a_frozen_edge_stays():
+    lags = []
+    for speed in 10.0 ** np.arange(0.0, 9.0):
+        radius, _, _ = marched(lambda t0, t1: Hold(-t0, -t1), 1.0, 10, REST, Kinetics(W, speed, 0.6, speed, 0.6))
+        lags.append(radius - jkr.radius_at_load(-1.0, W, **SPHERE))
+    ratios = np.array(lags[:-1]) / lags[1:]
+    # a steady lag grows like (ramp/speed)^exponent
+    assert_allclose(ratios[3:], 10.0**0.6, rtol=0.03, atol=0)
     for speed in (0.0, 1e-30):
         out = advance(REST * ONE, (W, 0.5 * W), Hold(0.0, -9.0), Kinetics(W, speed, 0.6, speed, 0.6), 1.0, **SPHERE)
         assert_array_equal(out.radius, REST)
         assert np.isnan(out.detached_at[0])
 
 
-def test_lag_fades_as_the_edge_speeds_up():
-    lags = []
-    for speed in 10.0 ** np.arange(0.0, 9.0):
-        edge = Kinetics(W, speed, 0.6, speed, 0.6)
-        radius, _, _ = marched(lambda t0, t1: Hold(-t0, -t1), 1.0, 10, REST, edge)
-        lags.append(radius - jkr.radius_at_load(-1.0, W, **SPHERE))
-    ratios = np.array(lags[:-1]) / lags[1:]
-    # a steady lag grows like (ramp/speed)^exponent
-    assert_allclose(ratios[3:], 10.0**0.6, rtol=0.03, atol=0)
-
-
-def test_without_adhesion_an_edge_opens_down_to_hertz_and_stops_there():
+def test_an_edge_stops_at_hertz_when_it_arrives_and_pressing_carries_it_along():
     edge = Kinetics(W, 1.0, 0.6, 1.0, 0.6)
     for work in (-W, -1e-3 * W):
         for hold, hertz in ((at_load(0.7), 0.7 ** (1 / 3)), (at_indentation(0.7), 0.7**0.5)):
@@ -240,9 +259,6 @@ def test_without_adhesion_an_edge_opens_down_to_hertz_and_stops_there():
             assert np.isnan(out.detached_at[0])
     gone = advance(REST * ONE, (-W, -W), at_load(-0.1), edge, 1e4, **SPHERE)
     assert np.isnan(gone.radius[0]) and gone.detached_at[0] > 0.0
-
-
-def test_pressing_carries_a_slow_edge_along_with_hertz():
     slow = Kinetics(W, 1e-9, 0.6, 1e-9, 0.6)
     out = advance(np.full(1, 0.2), (W, W), Hold(0.1, 8.0), slow, 1.0, **SPHERE)
     assert_allclose(out.radius, 2.0, rtol=1e-12, atol=0)
@@ -252,18 +268,6 @@ def test_pressing_carries_a_slow_edge_along_with_hertz():
     assert_array_equal(masked.dissipated, 0.0)
     back = advance(masked.radius, (-W, -W), Hold(8.0, 0.1), slow, 1.0, **SPHERE)
     assert_allclose(back.radius, 2.0, rtol=1e-6, atol=0)
-
-
-def test_a_narrow_contact_closes_to_the_equilibrium():
-    for hold in (at_load(1.0), Hold(0.0, 0.0, 0.4, 0.4, 1.0), at_indentation(0.3)):
-        narrow, wide = (marched(lambda *_, h=hold: h, 1e6, 1, start)[0] for start in (0.3, 4.0))
-        assert_allclose(narrow, wide, rtol=1e-7, atol=0)
-    # a neck narrower than the unstable equilibrium cannot be saved
-    neck = advance(np.full(1, 0.1), (W, W), at_indentation(-0.6), EDGE, 1e3, **SPHERE)
-    assert np.isnan(neck.radius[0])
-
-
-def test_the_stop_at_hertz_comes_when_the_edge_arrives():
     hold, hertz, works = at_indentation(0.7), 0.7**0.5, (-0.5 * W, -0.5 * W)
     pace = quad(lambda a: 1.0 / (release(a, hold) / W + 0.5) ** (1 / 0.6), hertz, REST, epsrel=1e-12)[0]
     before, after = (advance(REST * ONE, works, hold, EDGE, share * pace, **SPHERE) for share in (0.999, 1.001))
@@ -273,12 +277,24 @@ def test_the_stop_at_hertz_comes_when_the_edge_arrives():
     assert_allclose(after.dissipated, start - end, rtol=1e-7, atol=0)
 
 
+def test_a_narrow_contact_closes_to_the_equilibrium_and_an_open_one_stays_open():
+    for hold in (at_load(1.0), Hold(0.0, 0.0, 0.4, 0.4, 1.0), at_indentation(0.3)):
+        narrow, wide = (marched(lambda *_, h=hold: h, 1e6, 1, start)[0] for start in (0.3, 4.0))
+        assert_allclose(narrow, wide, rtol=1e-7, atol=0)
+    # a neck narrower than the unstable equilibrium cannot be saved
+    assert np.isnan(advance(np.full(1, 0.1), (W, W), at_indentation(-0.6), EDGE, 1e3, **SPHERE).radius[0])
+    out = advance(np.array([math.nan, REST, 0.0]), (W, W), at_load(-1.0), EDGE, 1.0, **SPHERE)
+    assert_array_equal(np.isnan(out.radius), [True, False, True])
+    assert np.isnan(out.detached_at).all()
+    assert_array_equal(out.dissipated[[0, 2]], 0.0)
+    assert_array_equal(out.radius[1], advance(REST * ONE, (W, W), at_load(-1.0), EDGE, 1.0, **SPHERE).radius[0])
+
+
 def test_one_clock_step_does_the_work_of_many():
     # each of some tens of inner steps may err by 1e-8 of the radius, or 1e-11 of the clock step in time
     rng, size = np.random.default_rng(54), 600
     start, stiffness = 10.0 ** rng.uniform(-0.3, 0.5, size), rng.choice([0.0, 0.1, 1.0, 10.0, math.inf], size)
-    ranges = (-0.5, 2.0), (-2.0, 3.0), (-0.8, 1.0)
-    work, load, displacement = (rng.uniform(*ends, (2, size)) for ends in ranges)
+    work, load, displacement = (rng.uniform(*ends, (2, size)) for ends in ((-0.5, 2.0), (-2.0, 3.0), (-0.8, 1.0)))
     speed, exponent = 10.0 ** rng.uniform(-2, 6, (2, size)), rng.uniform(0.1, 1.0, (2, size))
     edge = Kinetics(W, speed[0], exponent[0], speed[1], exponent[1])
 
@@ -333,12 +349,3 @@ def test_any_numbers_end_in_a_radius_an_opening_or_nan(draws):
         good &= (rows[:, [7, 10, 12, 16]] >= 0.0).all(axis=1) & ((positive > 1e-20) & (positive < 1e20)).all(axis=1)
         assert (np.isnan(out.radius[good]) == gone[good]).all()
         assert np.isfinite(out.dissipated[good]).all()
-
-
-def test_an_open_contact_stays_open_and_others_do_not_mind():
-    a = np.array([math.nan, REST, 0.0])
-    out = advance(a, (W, W), at_load(-1.0), EDGE, 1.0, **SPHERE)
-    assert_array_equal(np.isnan(out.radius), [True, False, True])
-    assert np.isnan(out.detached_at).all()
-    assert_array_equal(out.dissipated[[0, 2]], 0.0)
-    assert_array_equal(out.radius[1], advance(REST * ONE, (W, W), at_load(-1.0), EDGE, 1.0, **SPHERE).radius[0])

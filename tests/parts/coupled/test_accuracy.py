@@ -4,10 +4,9 @@ import functools
 
 import numpy as np
 import pytest
-from helpers.driven import DENSITY, KAPPA, STRETCH, UNIT, scenario, spring
+from helpers.driven import DENSITY, KAPPA, STRETCH, UNIT, MemberNoise, follow, scenario, spring
 from numpy.testing import assert_allclose
 
-from sim.engine import MemberNoise, follow
 from sim.laws.schallamach import Body, first_moment_amplitude, first_moment_onset, first_moment_stress
 from sim.parts.bonds import Cohort, FirstMoment, Tracked
 from sim.parts.coupled import radau
@@ -21,17 +20,6 @@ def followed(scene, every=1):
     """Return the course of a single member at some of its clock steps, and the readings of its drive by name."""
     course = follow(scene, MemberNoise.of(scene.seed, np.arange(1)), None, range(0, scene.times.steps + 1, every))[1]
     return course, dict(zip(READINGS, course.driven[:, 0].T, strict=True))
-
-
-def test_the_matrices_of_radau_split_its_rates_and_its_polynomials_are_exact():
-    turning = np.array([[radau.TURNING.real, -radau.TURNING.imag], [radau.TURNING.imag, radau.TURNING.real]])
-    modes = np.block([[np.full((1, 1), radau.PACE), np.zeros((1, 2))], [np.zeros((2, 1)), turning]])
-    assert_allclose(radau.FORTH @ radau.BACK, np.eye(3), atol=1e-14)
-    assert_allclose(radau.FORTH @ modes @ radau.BACK, radau.RATES, rtol=0, atol=1e-13)
-    places, powers = np.append(radau.NODES, 0.0), np.arange(4)[:, np.newaxis]
-    assert_allclose(places**powers @ radau.VALUES, radau.BETWEEN ** np.arange(4.0), rtol=1e-13)
-    slopes = np.arange(4.0) * radau.BETWEEN ** np.array([0.0, 0.0, 1.0, 2.0])
-    assert_allclose(places**powers @ radau.SLOPES, slopes, rtol=0, atol=1e-14)
 
 
 BODY = {"mass": 1e-3, "damping": 1e-3}
@@ -55,7 +43,7 @@ def test_the_energies_stay_balanced_over_many_steps(make, keys, steps, tolerance
     assert np.all(np.abs(read["energy_residual"]) <= 10.0 * tolerance * read["drive_work"][-1])
 
 
-def test_smooth_motion_is_followed_to_order_five():
+def test_radau_splits_its_rates_is_exact_for_polynomials_and_follows_smooth_motion_to_order_five():
     for keys in [{}, {"damping": 0.05}, {"mass": 0.05, "damping": 0.05}]:
 
         def position(steps, tolerance):
@@ -70,6 +58,14 @@ def test_smooth_motion_is_followed_to_order_five():
             assert substeps < steps + 8  # the first clock step finds its length, all others are one sub-step each
             off.append(abs(last - exact))
         assert np.log(off[0] / off[1]) / np.log(8.0) > 4.5
+    turning = np.array([[radau.TURNING.real, -radau.TURNING.imag], [radau.TURNING.imag, radau.TURNING.real]])
+    modes = np.block([[np.full((1, 1), radau.PACE), np.zeros((1, 2))], [np.zeros((2, 1)), turning]])
+    assert_allclose(radau.FORTH @ radau.BACK, np.eye(3), atol=1e-14)
+    assert_allclose(radau.FORTH @ modes @ radau.BACK, radau.RATES, rtol=0, atol=1e-13)
+    places, powers = np.append(radau.NODES, 0.0), np.arange(4)[:, np.newaxis]
+    assert_allclose(places**powers @ radau.VALUES, radau.BETWEEN ** np.arange(4.0), rtol=1e-13)
+    slopes = np.arange(4.0) * radau.BETWEEN ** np.array([0.0, 0.0, 1.0, 2.0])
+    assert_allclose(places**powers @ radau.SLOPES, slopes, rtol=0, atol=1e-14)
 
 
 def jump(before, after, step, duration):
@@ -103,8 +99,7 @@ def test_a_large_step_of_the_speed_overshoots_behind_a_stiff_spring_as_without_o
         course = stepped(before, after, 100, time)
         assert_allclose(course[[0, -1]], (start, top), rtol=1e-7)
         times, speeds = jump(before, after, time / 100, time)
-        stage = {"time": times, "value": speeds}
-        drive = spring(4e3, stage, start="steady", tolerance=1e-9)
+        drive = spring(4e3, {"time": times, "value": speeds}, start="steady", tolerance=1e-9)
         force = followed(scenario(times[-1], 101, drive, start="steady"))[1]["spring_force"][1:] / UNIT
         assert np.max(np.abs(force - course)) < 10.0 / (4e3 / 0.0390213) * top
 
@@ -116,14 +111,11 @@ def cycle(speed, share, duration, step, tolerance=1e-9):
     return read["spring_force"] / UNIT / first_moment_stress(speed, *UNITS[:5])
 
 
-def test_oscillations_live_beside_stable_sliding_where_they_set_in_suddenly():
+def test_oscillations_set_in_suddenly_beside_stable_sliding_or_with_the_root_of_the_distance():
     # at 10 and equal rates: alive at 1.01 of the onset's stiffness, dead at 1.02
     below, alive, dead = (np.ptp(cycle(10.0, share, 400.0, 0.04)[-500:]) for share in (0.998, 1.01, 1.02))
     assert alive > 0.9 * below
     assert dead < 0.01 * below
-
-
-def test_oscillations_grow_with_the_root_of_the_distance_where_they_set_in_gradually():
     exact = first_moment_amplitude(100.0, *UNITS[:4])
     far, near = (
         0.5 * np.ptp(cycle(100.0, 1.0 - d, 0.4 / d, 0.05, 1e-11)[-4000:]) / d**0.5 for d in (4e-4, 2e-4)

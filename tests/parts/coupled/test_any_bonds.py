@@ -6,12 +6,10 @@ import math
 import numpy as np
 import pytest
 from helpers import driven
-from helpers.driven import STRETCH, force, marched, pulled, residual, scenario, spring, stuck
+from helpers.driven import STRETCH, force, jkr, march, marched, pulled, residual, scenario, spring, stuck
 from numpy.testing import assert_allclose
 
 import sim
-from sim.engine import march
-from sim.laws import jkr
 from sim.parts.bonds import Cohort, FirstMoment, Rate, Tracked
 from sim.parts.drive import Steady as AtSpeed
 from sim.units.errors import BadInput
@@ -132,8 +130,7 @@ def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_
 def test_a_contact_that_pays_for_its_mean_stress_shrinks_to_that_of_hertz_within_the_sub_steps(make, keys):
     # strong bonds: at their peak the whole energy of the mean stress is more than adhesion can pay
     strong = {"make": lambda **recipe: make(**(recipe | {"site_density": 100.0 * driven.DENSITY})), "share": 0.5}
-    scene = scenario(4.0, 80, spring(2.0, **keys), reversible=1.0, **strong)
-    states, read = marched(scene)
+    states, read = marched(scenario(4.0, 80, spring(2.0, **keys), reversible=1.0, **strong))
     radii = np.array([state.contact.radius[0] for state in states[1:]])
     assert_allclose([state.drive.radius[0] for state in states[1:]], radii, rtol=1e-12)
     hertz = jkr.radius_at_load(driven.LOAD, 0.0, driven.R, driven.MODULUS)
@@ -172,7 +169,7 @@ def test_bonds_that_break_ever_faster_slip_at_once_which_is_the_limit_of_little_
 STICKING = Rate(critical_speed=0.5 * STRETCH, rebinding_rate=2.0, stress=1e5)
 
 
-def test_a_check_shows_below_which_spring_the_slider_oscillates_if_damping_does_not_keep_it_stable():
+def test_a_check_shows_below_which_spring_the_slider_oscillates_and_a_study_of_it_is_refused():
     for scene, onset, frequency in (
         (scenario(1.0, 4, spring(1.0)), 0.0390213 * driven.STIFF, 4.691569),
         (scenario(1.0, 4, spring(1.0), make=COHORTS), 0.0295565 * driven.STIFF, 4.25784),
@@ -183,8 +180,5 @@ def test_a_check_shows_below_which_spring_the_slider_oscillates_if_damping_does_
         assert f"{onset:.4g} N/m" in row
         assert f"{frequency / (2.0 * math.pi):.3g} Hz" in row
     assert "oscillates below" not in sim.check(stuck(1.0, 4, STICKING, pulled(1.0, 1.0, damping=10.0)))
-
-
-def test_a_study_of_a_drive_that_feels_its_noise_is_refused():
     with pytest.raises(BadInput, match=r"drive\.model"):
         sim.converge(scenario(1.0, 4, spring(1.0)))

@@ -7,16 +7,14 @@ import numpy as np
 import pytest
 from helpers import driven
 from helpers.cases import some
-from helpers.driven import COULOMB, HELD, STRETCH, marched, pulled, residual, stuck
+from helpers.driven import COULOMB, HELD, STRETCH, Force, MemberNoise, follow, march, marched, pulled, residual, stuck
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from sim.engine import MemberNoise, follow, march
 from sim.laws.reversible import radius_at_load_reversible
 from sim.laws.schallamach import linear_onset
 from sim.parts.bonds import Counted, Rate, Steady, Unbroken
-from sim.parts.drive import Force
 
 #: Rate at which free sites bind, and critical speed in stretches a second.
 BINDING, CRITICAL = 2.0, 0.5
@@ -90,8 +88,7 @@ def test_disturbances_neither_grow_nor_fade_at_the_onset_and_do_so_on_its_sides(
     steps, step = 200, 2.0 * math.pi / frequency / 25.0
 
     def growth(stiffness):
-        stage = driven.jolted(1.0, step, 1.00001)
-        drive = pulled(stiffness, stage, mass, damping, start="steady", tolerance=1e-11)
+        drive = pulled(stiffness, driven.jolted(1.0, step, 1.00001), mass, damping, start="steady", tolerance=1e-11)
         scene = stuck(steps * step, steps, renewed("steady"), drive)
         passed = follow(scene, MemberNoise.of(scene.seed, np.arange(1)), None, range(steps + 1))[1]
         return driven.mode_of(passed.fraction[steps // 3 :, 0], step, frequency, 3 if mass else 2)
@@ -133,8 +130,7 @@ def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip():
 
 def test_a_stage_that_turns_pulls_the_body_both_ways_and_leaves_it_at_rest():
     turns = {"time": (0.0, 4.0, 4.0, 8.0, 8.0, 99.0), "value": tuple(v * STRETCH for v in (1.0, 1.0, -2.0, -2.0, 0, 0))}
-    scene = stuck(12.0, 48, renewed(), pulled(1.0, turns, damping=0.1))
-    states, read = marched(scene)
+    states, read = marched(stuck(12.0, 48, renewed(), pulled(1.0, turns, damping=0.1)))
     ways = reached(states)
     assert ways[16, 2] > 0.0 > ways[32, 2]
     assert np.all(ways[40:, 2] == 0.0)
@@ -150,8 +146,7 @@ def test_a_contact_that_pays_for_its_mean_stress_follows_it_within_the_sub_steps
         share = 6.0 * COULOMB**2 * math.sqrt(driven.AREA / math.pi) / (math.pi * driven.MODULUS) / driven.WORK
         missing = []
         for tolerance in (1e-5, 1e-8):
-            drive = pulled(1.0, 0.3, tolerance=tolerance, **keys)
-            scene = stuck(12.0, 240, bonds, drive, reversible=0.3 / share)
+            scene = stuck(12.0, 240, bonds, pulled(1.0, 0.3, tolerance=tolerance, **keys), reversible=0.3 / share)
             states, read = marched(scene)
             radii = np.array([state.contact.radius[0] for state in states[1:]])
             assert_allclose([state.drive.radius[0] for state in states[1:]], radii, rtol=1e-9)
@@ -202,8 +197,7 @@ def test_counted_bonds_of_a_slider_fluctuate_as_independent_sites_in_steady_slid
     scene = stuck(20.0, 200, counted(sites, "steady"), pulled(50.0, 1.0, damping=50.0, start="steady"))
     passed = follow(scene, MemberNoise.of(scene.seed, np.arange(members)), None, range(201))[1]
     share, bound = 1.0 / 3.0, passed.fraction[100:]
-    error = math.sqrt(share * (1.0 - share) / sites / members)
-    assert abs(np.mean(bound[-1]) - share) < 4.0 * error
+    assert abs(np.mean(bound[-1]) - share) < 4.0 * math.sqrt(share * (1.0 - share) / sites / members)
     assert_allclose(np.var(bound[-1]), share * (1.0 - share) / sites, rtol=4.0 * math.sqrt(2.0 / members))
 
 

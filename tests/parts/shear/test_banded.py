@@ -11,27 +11,21 @@ from itertools import product
 
 import numpy as np
 import pytest
-from helpers.scenes import CELL, SPECTRUM, advanced, scene
+from helpers.draws import FIVE_SIGMA
+from helpers.scenes import CELL, SPECTRUM, Clock, advanced, bonds, drive, march, scene, shear
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 from scipy.stats import chi2, kstest, ncx2
 
-from sim.engine import march
 from sim.numerics.noise import Noise
-from sim.parts import drive
-from sim.parts.bonds import models as bonds
 from sim.parts.exchange import Bonding
-from sim.parts.shear import models as shear
 from sim.parts.shear.bands import BandedProcess, Bands
 from sim.parts.shear.modes import modes
 from sim.parts.shear.process import Constant, Diffusion, Fluctuation, Onset, Slip, Stress, Time, Wave
-from sim.scenario.clock import Clock
 from sim.spectrum.families import AnisotropicGaussian, Gaussian, Ripple, SelfAffine, VonKarman
 
 G, MEMBERS = 1.6e6, 400
 UNLOADED = Bonding(np.ones(1), np.zeros(1), np.zeros(1))
-#: Two-sided probability of five standard deviations.
-FIVE_SIGMA = 5.7e-7
 
 SPECTRA = {
     "band": (SPECTRUM, None, 0.5),
@@ -44,14 +38,8 @@ SPECTRA = {
 def process_of(name, correlation=None, tolerance=0.01, amplitude=None):
     """The banded process of a spectrum, and the weights [J/m^2] and wavenumbers of all modes it stands for."""
     spectrum, points, poisson_ratio = SPECTRA[name]
-    recipe = shear.Banded(
-        spectrum=spectrum,
-        correlation=correlation or Slip(length=1.0),
-        amplitude=amplitude or Constant(),
-        cell=CELL,
-        points=points,
-        tolerance=tolerance,
-    )
+    laws = {"correlation": correlation or Slip(length=1.0), "amplitude": amplitude or Constant()}
+    recipe = shear.Banded(spectrum=spectrum, **laws, cell=CELL, points=points, tolerance=tolerance)
     pairs = modes(spectrum, CELL, points)
     return recipe.process(G, poisson_ratio, 1.0), pairs.energies(G, poisson_ratio), np.hypot(pairs.qx, pairs.qy)
 
@@ -77,8 +65,7 @@ def distribution(weights, shapes, at):
     logarithm = np.zeros(half.size, dtype=complex)
     for weight, shape in zip(weights, shapes, strict=True):
         logarithm -= shape * np.log(1.0 - 1j * weight * step * half)
-    turned = np.exp(logarithm - 1j * np.multiply.outer(at, step * half))
-    return 0.5 - np.sum(turned.imag / half, axis=1) / math.pi
+    return 0.5 - np.sum(np.exp(logarithm - 1j * np.multiply.outer(at, step * half)).imag / half, axis=1) / math.pi
 
 
 def law_of(weights, shapes=1.0):
@@ -94,8 +81,7 @@ def test_the_inverted_characteristic_function_is_the_hypoexponential_law():
     # P(X > x) = Σ e^(−x/w_i) Π_j≠i w_i/(w_i − w_j) for distinct weights
     beyond = np.zeros_like(at)
     for i, weight in enumerate(weights):
-        others = np.delete(weights, i)
-        beyond += np.exp(-at / weight) * np.prod(weight / (weight - others))
+        beyond += np.exp(-at / weight) * np.prod(weight / (weight - np.delete(weights, i)))
     assert_allclose(distribution(weights, 1.0, at), 1.0 - beyond, rtol=0, atol=1e-11)
     # degrees of freedom that are no whole number: chi-square
     assert_allclose(distribution(np.full(1, 0.5), 8.3, at), chi2(16.6).cdf(4.0 * at), rtol=0, atol=1e-11)
@@ -147,14 +133,11 @@ def stepped(process, start, durations, seed=1):
     return state.values.ravel()
 
 
-def test_any_division_of_a_step_gives_the_noncentral_chi_square_law():
+def test_a_step_of_any_length_or_division_has_the_noncentral_chi_square_law_and_its_moments():
     for durations, start, freedom in product([(0.4,), (0.2, 0.2), (0.01, 0.09, 0.3)], [0.0, 30.0], [2.0, 2.7, 40.3]):
         keep, renewed = math.exp(-2.0 * 0.4), -math.expm1(-2.0 * 0.4)
         sample = stepped(lone(freedom), start, durations) / renewed
         assert kstest(sample, ncx2.cdf, args=(freedom, keep * start / renewed)).pvalue > FIVE_SIGMA
-
-
-def test_a_step_of_any_length_has_the_exact_moments():
     for ratio, freedom in product([1e-12, 1e-6, 1e-3, 1.0, 1e3, 1e6], [2.0, 7.3, 1e5]):
         start = 1.5 * freedom
         keep, renewed = math.exp(-2.0 * ratio), -math.expm1(-2.0 * ratio)
@@ -173,8 +156,7 @@ def two_times(process, step_of, draws, seed=6, members=MEMBERS):
     noise, energies = Noise(seed, "shear", np.arange(members)), []
     for pair in range(draws // members):
         before = process.start(moved(2 * pair), UNLOADED, noise)
-        after = advanced(process, before, step_of(2 * pair + 1), UNLOADED, noise)
-        energies.append((before.energy, after.energy))
+        energies.append((before.energy, advanced(process, before, step_of(2 * pair + 1), UNLOADED, noise).energy))
     return np.concatenate(energies, axis=1)
 
 
@@ -242,7 +224,7 @@ def relaxing(amplitude, motion, times):
     return weights, np.concatenate(energies, axis=1)
 
 
-def test_relaxing_amplitude_follows_the_law_of_all_modes_after_a_jump():
+def test_relaxing_amplitude_follows_all_modes_after_a_jump_and_the_mean_of_the_ends_of_a_step():
     # g is constant after the jump: equal rates keep the unit field's law, times g0² e^(−2s) + g1² (1 − e^(−2s))
     times = (0.0, 1e-3, 1.2e-3, 1.7e-3, 9e-3)
     jump = drive.Table(time=(0.0, 1e-3, 1e-3, 1.0), speed=(1e-5, 1e-5, 1.0, 1.0))
@@ -253,17 +235,13 @@ def test_relaxing_amplitude_follows_the_law_of_all_modes_after_a_jump():
         size = 0.25 * left + 1.0 * (1.0 - left)
         assert abs(sample.mean() - size * weights.sum()) < 5.0 * size * np.sqrt(np.sum(weights**2) / sample.size)
         assert kstest(sample / size, law).pvalue > FIVE_SIGMA
-
-
-def test_relaxing_amplitude_renews_with_the_mean_variance_of_the_ends_of_a_step():
     amplitude = Onset(speed=2e-3, width=0.5, floor=0.1, relaxing=True)
     ramp, times = drive.Ramp(start=5e-4, stop=2e-2), np.linspace(0.0, 4e-3, 4)
     weights, samples = relaxing(amplitude, ramp, times)
     squares = [amplitude.factor(ramp.motion(1, time, time, 4e-3).speed, 0.0)[0] ** 2 for time in times]
     sizes = [squares[0]]
     for before, after in itertools.pairwise(squares):
-        renewed = -math.expm1(-2.0 * times[1] / 1e-3)
-        sizes.append(sizes[-1] + renewed * (0.5 * (before + after) - sizes[-1]))
+        sizes.append(sizes[-1] + (-math.expm1(-2.0 * times[1] / 1e-3)) * (0.5 * (before + after) - sizes[-1]))
     for size, sample in zip(sizes, samples, strict=True):
         assert abs(sample.mean() - size * weights.sum()) < 5.0 * size * np.sqrt(np.sum(weights**2) / sample.size)
 
@@ -290,13 +268,10 @@ def test_bands_are_grouped_once_for_all_sizes_and_moduli_and_kept_for_a_whole_sw
     assert len(calls) == 40
 
 
-def test_a_contact_at_rest_keeps_its_energy_to_the_last_bit():
+def test_a_contact_at_rest_keeps_its_energy_to_the_last_bit_and_a_ripple_of_no_amplitude_stores_none():
     part = shear.Banded(spectrum=SPECTRUM, cell=CELL, correlation=Wave(waves=1.0))
     _, energies = march_energies(part, drive.Steady(speed=0.0))
     assert np.all(energies == energies[0])
-
-
-def test_a_ripple_of_no_amplitude_stores_nothing():
     part = shear.Banded(spectrum=Ripple(amplitude=0.0, wavelength=24e-6), cell=CELL, correlation=Slip(length=1e-6))
     assert np.all(march_energies(part, drive.Steady(speed=1e-3))[1] == 0.0)
 

@@ -20,16 +20,7 @@ from sim.parts.shear import models as shear
 from sim.parts.shear.bands import Pairs, cell_pairs, group
 from sim.parts.shear.modes import modes
 from sim.parts.shear.process import Diffusion, Slip, Time, Wave
-from sim.spectrum.families import (
-    AnisotropicGaussian,
-    Band,
-    Gaussian,
-    Measured,
-    Ripple,
-    SelfAffine,
-    Tabulated,
-    VonKarman,
-)
+from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Measured, Ripple, SelfAffine, Tabulated, VonKarman
 
 G, CELL, RMS = 1.6e6, 100e-6, 150e3
 FAMILIES = {
@@ -176,16 +167,13 @@ def test_any_pairs_are_grouped_within_the_tolerance(seed):
         )
 
 
-def test_one_ripple_is_one_band_of_two_degrees_without_error():
+def test_equal_pairs_are_one_band_a_ripple_one_of_two_degrees_and_any_within_a_tolerance_of_zero_single():
     for correlation, _ in MEMORIES.values():
         process = shear.Banded(spectrum=FAMILIES["ripple"], correlation=correlation, cell=CELL).process(G, 0.5, 1.0)
         assert process.bands.freedom.tolist() == [2.0]
         assert set(process.bands.errors.values()) == {0.0}
         assert_allclose(process.bands.weight, FAMILIES["ripple"].surface_energy(G), rtol=1e-14, atol=0)
         assert_allclose(process.bands.wavenumber, 2 * np.pi / 20e-6, rtol=1e-14, atol=0)
-
-
-def test_equal_pairs_are_one_band_without_error():
     many = Pairs(np.full(700, 3e-7), np.full(700, 2e5), np.ones(700))
     counted = Pairs(np.array([3e-7]), np.array([2e5]), np.array([700.0]))
     for power in (0, 1, 2):
@@ -195,9 +183,6 @@ def test_equal_pairs_are_one_band_without_error():
             assert_allclose(bands.weight, [3e-7], rtol=1e-13, atol=0)
             # one less a ratio of sums: a few roundings
             assert max(bands.errors.values()) < 1e-14
-
-
-def test_a_tolerance_below_all_differences_leaves_every_pair_single():
     weights, wavenumbers = np.array([1e-7, 2e-7, 4e-7]), np.array([1e5, 2e5, 3e5])
     bands = group(Pairs(weights, wavenumbers, np.ones(3)), 1, 1e-9)
     assert bands.freedom.tolist() == [2.0, 2.0, 2.0]
@@ -250,8 +235,7 @@ def test_counted_cells_have_the_mean_and_variance_of_all_modes(name, points):
     off = counted_and_listed(COUNTED[name](CELL / ((points - 1) // 2 - 0.6)), points)
     assert np.all(np.abs(off[:2]) < (5e-9, 3e-7))
     # w varies within a block; a band a few pixels wide has pairs at its ends that hold any share of a full one
-    allowed = {"narrow high band": 0.1, "high band": 1e-2, "wide band": 1e-5}.get(name, 1e-6)
-    assert np.all(np.abs(off[2:]) < allowed)
+    assert np.all(np.abs(off[2:]) < {"narrow high band": 0.1, "high band": 1e-2, "wide band": 1e-5}.get(name, 1e-6))
     assert np.all(off[2:4] < 1e-6)  # and like banding, blocks can but lower κ3 and κ4
 
 
@@ -296,17 +280,7 @@ def test_far_from_the_origin_a_band_holds_the_energy_of_the_infinite_plane(waves
     assert_allclose(pairs.count.sum(), 0.5 * np.pi * (waves[1] ** 2 - waves[0] ** 2), rtol=5e-3, atol=0)
 
 
-def test_a_cell_without_modes_says_what_to_do():
-    for spectrum, points, cure in (
-        (Band(RMS, 300e-6, 250e-6), None, "make the cell longer"),
-        (Band(RMS, 50e-6, 7e-6), 20, "give more points"),
-        (Gaussian(RMS, 8e-6), None, "give points"),
-    ):
-        with pytest.raises(PydanticCustomError, match=cure):
-            cell_pairs(spectrum, CELL, points, G, 0.5)
-
-
-def test_a_longest_wave_beyond_the_cell_costs_what_the_cells_error_tells():
+def test_a_longest_wave_beyond_the_cell_costs_the_cells_error_and_a_cell_without_modes_is_refused():
     spectrum = Band(RMS, longest=4 * CELL, shortest=10e-6)
     recipe = functools.partial(shear.Banded, spectrum=spectrum, correlation=Slip(length=1e-6))
     short, long = (recipe(cell=side).process(G, 0.5, 1.0) for side in (CELL, 40 * CELL))
@@ -314,6 +288,13 @@ def test_a_longest_wave_beyond_the_cell_costs_what_the_cells_error_tells():
     errors = [process.known_errors()["cell_error_energy"] for process in (short, long)]
     assert_allclose(errors, [process.bands.mean / exact - 1.0 for process in (short, long)], rtol=1e-9, atol=0)
     assert errors[0] < -0.01 and abs(errors[1]) < 1e-4
+    for spectrum, points, cure in (
+        (Band(RMS, 300e-6, 250e-6), None, "make the cell longer"),
+        (Band(RMS, 50e-6, 7e-6), 20, "give more points"),
+        (Gaussian(RMS, 8e-6), None, "give points"),
+    ):
+        with pytest.raises(PydanticCustomError, match=cure):
+            cell_pairs(spectrum, CELL, points, G, 0.5)
 
 
 def test_bands_from_the_disk_are_those_grouped_anew(tmp_path, monkeypatch):

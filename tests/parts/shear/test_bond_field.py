@@ -38,7 +38,7 @@ def process():
     return SiteModes(modes(SPECTRUM, CELL, POINTS), G, 0.5, Time(time=1.0), Constant())
 
 
-def test_the_energy_of_discs_is_the_published_closed_form():
+def test_energy_variance_and_line_integral_of_discs_are_those_of_the_density_and_published():
     for poisson_ratio in [0.5, 0.3]:
         # the half-space's compliance under each bond: twice the energy of one disc of unit force
         exact = (2.0 - poisson_ratio) / (1.5 * math.pi**2 * G * B)
@@ -48,9 +48,6 @@ def test_the_energy_of_discs_is_the_published_closed_form():
         # work of a unit force on its own mean displacement, ½ f u = ½ f²/stiffest
         assert_allclose(0.5 / SPECTRUM.stiffest(G, poisson_ratio), exact, rtol=1e-14)
     assert_allclose(BondMade(footprint=1e-9).stiffest(1.6e6), 7.8957e-3, rtol=1e-4)  # half of π² G b
-
-
-def test_variance_and_energy_are_the_integrals_of_the_density():
     edges = np.linspace(0.0, 400.0, 801) / B
     radial = sum(quad(lambda q: q * SPECTRUM.radial_density(q), a, b)[0] for a, b in itertools.pairwise(edges))
     assert_allclose(radial / (2 * math.pi), SPECTRUM.cumulative(edges[-1]), rtol=1e-9)
@@ -61,11 +58,7 @@ def test_variance_and_energy_are_the_integrals_of_the_density():
     slope = (SPECTRUM.cumulative(q * 1.0001) - SPECTRUM.cumulative(q / 1.0001)) / (q * (1.0001 - 1 / 1.0001))
     low = q * B < 1.0
     assert_allclose(slope[low], (q * SPECTRUM.radial_density(q) / (2 * math.pi))[low], rtol=1e-6)
-
-
-def test_the_mean_follows_both_moments_of_the_force():
-    mean = SiteMean(SPECTRUM.surface_energy(G), Constant())
-    state = mean.start(moved(0), bonding(3.0, 2.0), None)
+    state = SiteMean(SPECTRUM.surface_energy(G), Constant()).start(moved(0), bonding(3.0, 2.0), None)
     assert_allclose(state.energy, 13.0 / (math.pi**2 * G * B), rtol=1e-14)
 
 
@@ -92,14 +85,11 @@ def test_forces_that_differ_are_forgotten_and_the_pattern_of_the_mean_force_is_n
     assert abs(correlation - (0.64 + 0.36 * math.exp(-1.0))) < 5.0 / math.sqrt(before.size)
 
 
-def test_the_sign_of_the_mean_force_turns_the_frozen_pattern():
+def test_the_sign_of_the_mean_force_turns_the_frozen_pattern_whose_map_has_the_energy_of_its_modes():
     field, noise = process(), Noise(2, "shear", np.arange(3))
     first = field.start(moved(0), bonding(0.8, 0.0), noise)
     back = advanced(field, first, moved(1, 1.0), bonding(-0.8, 0.0), noise)
     assert_allclose(complex_amplitudes(field, back), -complex_amplitudes(field, first), rtol=1e-14)
-
-
-def test_a_map_of_the_bonds_field_has_the_energy_of_its_modes():
     field, noise = process(), Noise(3, "shear", np.arange(2))
     state = field.start(moved(0), bonding(0.8, 0.6), noise)
     maps = field.maps(state, np.zeros(1), 2)

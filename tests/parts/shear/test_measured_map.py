@@ -5,27 +5,17 @@ import math
 import numpy as np
 import pytest
 from helpers.commands import LENS, sim as command
-from helpers.scenes import BONDS, DRIVES, scene
+from helpers.scenes import BONDS, DRIVES, Band, Onset, RateDependent, Slip, Stress, drive, scene
 from numpy.testing import assert_allclose
 
 import sim
 from sim.engine import MemberNoise, follow, march
-from sim.laws import jkr
-from sim.laws.halfspace import (
-    disc_ripple_energy as ripple_energy,
-    disc_tangential_energy,
-    ripple_marginal_energy,
-    surface_energy,
-)
+from sim.laws import halfspace, jkr
 from sim.numerics.grid import Grid
-from sim.parts import drive
 from sim.parts.bonds.models import Counted, Unbroken
-from sim.parts.contact import RateDependent
 from sim.parts.shear import Carried, Mapped
 from sim.parts.shear.maps import Passing
-from sim.parts.shear.process import Onset, Slip, Stress
 from sim.scenario.clock import Record
-from sim.spectrum.families import Band
 from sim.spectrum.stress_map import StressMap
 from sim.study.converge import converge
 from sim.units.errors import BadInput
@@ -55,15 +45,22 @@ def sliding(shear, steps=40, speed=1e-3, **parts):
     return scene(members=parts.pop("members", 1), steps=steps, shear=shear, **parts)
 
 
-def test_the_field_on_the_plane_has_the_energy_of_the_file_at_every_step():
+def test_the_field_on_the_plane_has_the_energy_of_the_file_times_the_amplitude_at_every_step():
     field = patchy()
     dataset = sim.run(sliding(measured(field)))
-    exact = surface_energy(field, (64 * 6e-6, 48 * 6e-6), G)
+    exact = halfspace.surface_energy(field, (64 * 6e-6, 48 * 6e-6), G)
     assert_allclose(dataset["fluctuation_energy"], exact, rtol=1e-12)
     assert_allclose(dataset["contact_radius"], jkr.radius_at_load(4e-3, 42e-3 - exact, 2e-3, 4 * G), rtol=1e-12)
+    parts = {"drive": drive.Ramp(start=1e-4, stop=1e-2), "record": Record(maps=(20e-3,))}
+    whole = sim.run(sliding(measured(), **parts))
+    law = Onset(speed=2e-3, width=0.3, floor=0.1)
+    dataset = sim.run(sliding(measured(amplitude=law), **parts))
+    factor = law.factor(dataset["speed"].values, np.zeros(1))
+    assert_allclose(dataset["fluctuation_energy"], factor**2 * whole["fluctuation_energy"], rtol=1e-13)
+    assert_allclose(dataset["shear_map"], factor[20] * whole["shear_map"], rtol=1e-13)
 
 
-def test_the_map_moves_with_the_slider():
+def test_a_map_moves_with_the_slider_and_its_shares_go_smoothly_from_pixel_to_pixel():
     field, pixel = patchy() + 2e5 + np.random.default_rng(4).normal(scale=1e4, size=(64, 48)), 6e-6
     record = Record(maps=(0.0, 12e-3, 15e-3))
     maps = sim.run(sliding(measured(field), record=record, speed=2.5 * pixel / 1e-3))["shear_map"].values[0]
@@ -74,16 +71,14 @@ def test_the_map_moves_with_the_slider():
     half[32] = half[32].real
     moved = np.fft.ifft(np.fft.fft(np.roll(maps[0], 37, axis=0), axis=0) * half, axis=0).real
     assert_allclose(maps[2], moved, rtol=0.0, atol=1e-9 * 1e5)
-
-
-def test_the_amplitude_multiplies_the_map():
-    parts = {"drive": drive.Ramp(start=1e-4, stop=1e-2), "record": Record(maps=(20e-3,))}
-    whole = sim.run(sliding(measured(), **parts))
-    law = Onset(speed=2e-3, width=0.3, floor=0.1)
-    dataset = sim.run(sliding(measured(amplitude=law), **parts))
-    factor = law.factor(dataset["speed"].values, np.zeros(1))
-    assert_allclose(dataset["fluctuation_energy"], factor**2 * whole["fluctuation_energy"], rtol=1e-13)
-    assert_allclose(dataset["shear_map"], factor[20] * whole["shear_map"], rtol=1e-13)
+    shares = passing(patchy(), 20.0)
+    radius = np.array([12.0])
+    at = {x: shares.at(np.full((1, 1), x))(radius)[0, 0] for x in (0.0, 1.0, 1.0 + 1e-9, 1.5, 2.0)}
+    assert_allclose(at[1.0], at[1.0 + 1e-9], rtol=1e-7)
+    moved = passing(np.roll(patchy(), 1, axis=0), 20.0)  # the pattern one pixel further
+    assert_allclose(at[1.0], moved(radius)[0], rtol=0.05)  # but for what came in at the end of the map
+    shifted = np.fft.irfft2(np.fft.rfft2(patchy()) * np.exp(-2j * np.pi * np.fft.fftfreq(64) * 1.5)[:, None], (64, 48))
+    assert_allclose(at[1.5], passing(shifted, 20.0)(radius)[0], rtol=0.05)
 
 
 def test_a_map_that_was_drawn_saved_and_read_back_gives_the_same_trajectory(tmp_path):
@@ -91,8 +86,7 @@ def test_a_map_that_was_drawn_saved_and_read_back_gives_the_same_trajectory(tmp_
     parts = {"record": Record(maps=(0.0, 30e-3)), "bonds": Unbroken(stress=3e5)}
     drawn = sim.run(sliding(random, **parts))
     drawn[["shear_map"]].isel(map_time=[0]).to_netcdf(tmp_path / "drawn.nc")
-    field = StressMap(file=str(tmp_path / "drawn.nc"))
-    carried = sim.run(sliding(Carried(field=field), **parts))
+    carried = sim.run(sliding(Carried(field=StressMap(file=str(tmp_path / "drawn.nc"))), **parts))
     for name in ("fluctuation_energy", "work_of_adhesion", "contact_radius", "friction_force"):
         assert_allclose(carried[name], np.squeeze(drawn[name].values), rtol=1e-11)
     assert_allclose(carried["shear_map"], drawn["shear_map"], rtol=0.0, atol=1e-9 * 1e5)
@@ -102,22 +96,19 @@ def passing(field, widest, pixel=1.0, nu=0.5, **keys):
     return Passing(map_of(field, pixel, **keys), nu, widest, np.zeros(1))
 
 
-def test_a_uniform_stress_on_a_disc_stores_the_closed_form():
+def test_uniform_stress_and_passing_waves_store_the_closed_forms_as_new_contact_adds_up():
     # half of the map is +1 and half -1, so that no mean is taken off; the disc stands on the first
     field = np.where(np.arange(64) < 16, -1.0, np.where(np.arange(64) < 48, 1.0, -1.0)) * np.ones((40, 1))
     shares = passing(3.0 * field, 15.0)
     radius = np.array([6.0, 8.5, 11.5])
     whole = shares.field.surface_energy(1.0)
-    exact = disc_tangential_energy(radius, 3.0, 1.0) / (math.pi * radius**2)
+    exact = halfspace.disc_tangential_energy(radius, 3.0, 1.0) / (math.pi * radius**2)
     # what the soft edge costs falls as (pixel/a)²
     assert_allclose(whole * shares.mean(radius), exact, rtol=0.2 / 6.0**2)
     assert_allclose(whole * shares(radius), 1.5 * exact, rtol=0.2 / 6.0**2)
     small = np.array([0.0, 0.5, 2.0])
     assert_allclose(shares.mean(small), shares.mean(np.array([5.0])) * small / 5.0, rtol=1e-12)
     assert np.isnan(shares(np.array([np.nan, 3.0]))).tolist() == [True, False]
-
-
-def test_a_wave_that_passes_pays_on_average_what_the_closed_form_has():
     for angle in [0.0, 0.5 * math.pi]:
         waves = np.cos(2 * math.pi / 12 * np.arange(96))
         field = waves[:, None] * np.ones(96) if angle == 0.0 else waves * np.ones((96, 1))
@@ -132,11 +123,8 @@ def test_a_wave_that_passes_pays_on_average_what_the_closed_form_has():
         whole = passing(field, 25.0).field.surface_energy(1.0)
         # the soft edge costs 0.65 (pixel/a)² for each wave on the diameter at most
         lost = 0.7 * np.max(2 * radius / 12 / radius**2)
-        assert_allclose(whole * mean, ripple_energy(1.0, q, angle, radius, 1.0), rtol=lost)
-        assert_allclose(whole * new, ripple_marginal_energy(1.0, q, angle, radius, 1.0), rtol=lost)
-
-
-def test_what_new_contact_pays_adds_up_to_the_energy():
+        assert_allclose(whole * mean, halfspace.disc_ripple_energy(1.0, q, angle, radius, 1.0), rtol=lost)
+        assert_allclose(whole * new, halfspace.ripple_marginal_energy(1.0, q, angle, radius, 1.0), rtol=lost)
     shares = passing(patchy(), 20.0).at(np.array([[0.0], [2.3]]))
     nodes, weights = np.polynomial.legendre.leggauss(400)
     ends = 5.0, 19.0
@@ -147,32 +135,17 @@ def test_what_new_contact_pays_adds_up_to_the_energy():
     assert_allclose(grown, whole[1] - whole[0], rtol=1e-5)
 
 
-def test_the_shares_go_smoothly_from_pixel_to_pixel():
-    shares = passing(patchy(), 20.0)
-    radius = np.array([12.0])
-    at = {x: shares.at(np.full((1, 1), x))(radius)[0, 0] for x in (0.0, 1.0, 1.0 + 1e-9, 1.5, 2.0)}
-    assert_allclose(at[1.0], at[1.0 + 1e-9], rtol=1e-7)
-    moved = passing(np.roll(patchy(), 1, axis=0), 20.0)  # the pattern one pixel further
-    assert_allclose(at[1.0], moved(radius)[0], rtol=0.05)  # but for what came in at the end of the map
-    shifted = np.fft.irfft2(np.fft.rfft2(patchy()) * np.exp(-2j * np.pi * np.fft.fftfreq(64) * 1.5)[:, None], (64, 48))
-    assert_allclose(at[1.5], passing(shifted, 20.0)(radius)[0], rtol=0.05)
-
-
-def test_a_contact_feels_the_pattern_that_passes_under_it():
+def test_a_contact_feels_the_pattern_under_it_and_grows_where_new_contact_gives_energy_back():
     field = patchy(rms=4e4)
     shear = measured(field, "disc", keys={"start": 240e-6})
     dataset = sim.run(sliding(shear, steps=80, record=Record(maps=(0.0, 80e-3))))
-    assert dataset["fluctuation_energy"].std() > 0.02 * surface_energy(field, (64 * 6e-6, 48 * 6e-6), G)
+    assert dataset["fluctuation_energy"].std() > 0.02 * halfspace.surface_energy(field, (64 * 6e-6, 48 * 6e-6), G)
     # the equilibrium holds at the edge: G = w - dE/dA of the pattern there, w of the dataset
     radius, work = dataset["contact_radius"].values, dataset["work_of_adhesion"].values
     assert_allclose(jkr.energy_release_rate(radius, 4e-3, 2e-3, 4 * G), work, rtol=1e-9)
     assert np.ptp(radius) > 1e-3 * radius.mean()
     # and the maps, which stand with the contact in the middle, store what is recorded
-    energies = dataset["fluctuation_energy"].isel(t=[0, 80])
-    assert_allclose(dataset["disc_energy"].values[0], energies, rtol=0.01)
-
-
-def test_a_contact_grows_where_new_contact_gives_energy_back():
+    assert_allclose(dataset["disc_energy"].values[0], dataset["fluctuation_energy"].isel(t=[0, 80]), rtol=0.01)
     x = 6e-6 * np.arange(-32, 32)
     radius = np.hypot(x[:, None], x)
     field = np.where(radius < 110e-6, 8e4, np.where(radius < 170e-6, -8e4, 0.0))  # an edge against its core
@@ -197,7 +170,7 @@ def test_batches_blocks_and_restarts_agree_under_a_measured_map():
         assert ("member" in energy.dims) == (shear.contact == "disc" or shear.reads_stress)
 
 
-def test_a_scene_that_leaves_the_map_is_refused_with_the_cure():
+def test_a_scene_that_leaves_the_map_or_asks_for_a_correlation_or_convergence_is_refused():
     for keys, parts, cure in (
         ({"keys": {"start": 150e-6}}, {"speed": 3e-3}, "start"),
         ({}, {"speed": 1e-2}, "slip"),
@@ -211,6 +184,11 @@ def test_a_scene_that_leaves_the_map_is_refused_with_the_cure():
             sliding(measured(**({"contact": "disc"} | keys)), **({"speed": 1e-3} | parts))
     on_the_plane = sliding(measured(), drive=DRIVES["spring"], bonds=BONDS["rate, bell"])
     assert np.all(sim.run(on_the_plane)["contact_radius"] > 0)
+    with pytest.raises(BadInput, match=r"^shear\.field: "):
+        converge(sliding(measured()), 1.0)
+    table = {"model": "mapped", "field": {"file": "map.npy"}, "correlation": {"model": "time", "time": 1.0}}
+    with pytest.raises(BadInput, match="correlation"):
+        sim.load({"shear": table, "clock": {"duration": 1.0, "step": 0.1}})
 
 
 def test_a_rate_dependent_edge_follows_the_pattern():
@@ -233,21 +211,18 @@ field = {{ file = "map.csv", pixel = "6 um", noise = "1 kPa" }}
 """
 
 
-def test_check_prints_the_energy_of_the_map_beside_that_of_its_spectrum(tmp_path, monkeypatch):
+def test_check_prints_the_energy_of_a_map_and_run_refuses_a_bad_one_and_writes_nothing(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(TOML)
     field = patchy() - patchy().mean()
     np.savetxt(tmp_path / "map.csv", field.T + 5e4, delimiter=",")
     answer = command("check", "scene.toml", "--members", "5")
     assert answer.exit_code == 0
-    energy = surface_energy(field, (64 * 6e-6, 48 * 6e-6), G)
+    energy = halfspace.surface_energy(field, (64 * 6e-6, 48 * 6e-6), G)
     radial = float(map_of(field).spectrum.surface_energy(G))
     numbers = f"{energy:.4g} J/m^2", f"{100 * abs(energy / radial - 1):.2g} %", f"{np.sqrt(np.mean(field**2)):.4g} Pa"
     assert [number for number in (*numbers, "64 × 48 points of 6e-06 m") if number not in answer.stdout] == []
     assert "one member is enough" in answer.stdout
-
-
-def test_a_bad_map_ends_in_one_message_and_nothing_is_written(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(TOML)
     (tmp_path / "map.csv").write_text("1, 2\n3\n")
@@ -255,11 +230,3 @@ def test_a_bad_map_ends_in_one_message_and_nothing_is_written(tmp_path, monkeypa
     assert answer.exit_code == 2 and not answer.stdout
     assert answer.stderr.startswith("scene.toml: shear.field: map.csv: ")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["map.csv", "scene.toml"]
-
-
-def test_a_map_has_no_convergence_to_study_and_no_correlation():
-    with pytest.raises(BadInput, match=r"^shear\.field: "):
-        converge(sliding(measured()), 1.0)
-    table = {"model": "mapped", "field": {"file": "map.npy"}, "correlation": {"model": "time", "time": 1.0}}
-    with pytest.raises(BadInput, match="correlation"):
-        sim.load({"shear": table, "clock": {"duration": 1.0, "step": 0.1}})

@@ -77,15 +77,12 @@ def test_a_pixel_cut_by_the_cut_offs_has_the_integral_of_the_density(name, pixel
     assert_allclose(variances, exact, rtol=1e-9, atol=1e-13 * CUT_OFF[name].variance)
 
 
-def test_a_pixel_of_a_smooth_spectrum_has_the_integral_of_the_density():
+def test_a_pixel_of_a_smooth_spectrum_near_or_far_has_the_integral_of_the_density():
     pixels = [(0, 0), (1, 0), (-1, 1), (0, 2), (-3, 2), (7, 7), (-7, 6)]
     ix, iy = np.transpose(pixels)
     for spectrum in SMOOTH.values():
         exact = [pixel_by_quadrature(spectrum, *pixel) for pixel in pixels]
         assert_allclose(spectrum.pixels(TURN, 7)[7 + ix, iy], exact, rtol=1e-9, atol=1e-14 * spectrum.variance)
-
-
-def test_pixels_of_an_isotropic_gaussian_are_products_of_error_functions():
     for length in [0.03, 0.3, 1.0, 3.0, 30.0]:
         reach = 6
         pixels = Gaussian(1.3, length).pixels(TURN, reach)
@@ -96,6 +93,14 @@ def test_pixels_of_an_isotropic_gaussian_are_products_of_error_functions():
         # where erfc keeps its digits: sums differ by 2e-16 of the variance from halved ones
         positive = edges[:-1] > 0
         assert_allclose(pixels[positive], exact[positive], rtol=1e-11, atol=1e-18)
+    for name in ["gaussian", "von_karman"]:
+        spectrum, reach = SMOOTH[name], 60
+        pixels = spectrum.pixels(TURN, reach)
+        node, weight = np.polynomial.legendre.leggauss(20)
+        for ix, iy in [(20, 5), (30, 0)]:
+            x, y = TURN * (ix + node[:, None] / 2), TURN * (iy + node / 2)
+            exact = weight @ spectrum.density(x, y) @ weight / 4
+            assert_allclose(pixels[reach + ix, iy], exact, rtol=1e-11, atol=0)
 
 
 def whole_plane(pixels):
@@ -110,43 +115,44 @@ def test_all_pixels_together_hold_the_variance_or_that_of_the_large_pixel_that_t
         assert_allclose(whole_plane(spectrum.pixels(TURN, 4)), large, rtol=1e-12, atol=0)
 
 
-def test_far_pixels_keep_their_relative_accuracy():
-    for name in ["gaussian", "von_karman"]:
-        spectrum, reach = SMOOTH[name], 60
-        pixels = spectrum.pixels(TURN, reach)
-        node, weight = np.polynomial.legendre.leggauss(20)
-        for ix, iy in [(20, 5), (30, 0)]:
-            x, y = TURN * (ix + node[:, None] / 2), TURN * (iy + node / 2)
-            exact = weight @ spectrum.density(x, y) @ weight / 4
-            assert_allclose(pixels[reach + ix, iy], exact, rtol=1e-11, atol=0)
-
-
-def test_modes_are_one_of_each_pair_of_pixels_that_meet_the_annulus_sorted_by_length():
+def test_modes_are_one_of_each_pair_of_pixels_that_meet_the_annulus_without_nyquist_and_zero():
     pairs = modes(AFFINE, 1.0)
     lattice = list(zip(pairs.ix.tolist(), pairs.iy.tolist(), strict=True))
     low, high = AFFINE.support[0] / TURN, AFFINE.support[1] / TURN
     meeting = set()
     for ix, iy in itertools.product(range(-11, 12), range(12)):
         nearest = math.hypot(max(abs(ix) - 0.5, 0), max(iy - 0.5, 0))
-        farthest = math.hypot(abs(ix) + 0.5, iy + 0.5)
-        if nearest < high and farthest > low and (iy > 0 or ix > 0):
+        if nearest < high and math.hypot(abs(ix) + 0.5, iy + 0.5) > low and (iy > 0 or ix > 0):
             meeting.add((ix, iy))
     assert sorted(lattice) == sorted(meeting)
     assert np.all(np.diff(pairs.ix**2 + pairs.iy**2) >= 0)
     assert_allclose(np.hypot(pairs.qx, pairs.qy), TURN * np.hypot(pairs.ix, pairs.iy), rtol=1e-15, atol=0)
     assert np.all(pairs.variance > 0.0)
+    for points in [16, 17]:
+        pairs = modes(VonKarman(1.0, 0.2, 0.5), 1.0, points)
+        reach = (points - 1) // 2
+        assert len(pairs.ix) == ((2 * reach + 1) ** 2 - 1) // 2
+        assert np.max(np.abs(pairs.ix)) == np.max(pairs.iy) == reach
+    corner = math.hypot(1.5, 0.5)  # of pixel (1, 0)
+    touched = modes(Band(1.0, longest=1 / corner, shortest=1 / 4.5), 1.0)
+    assert touched.points == 10
+    assert np.max(touched.iy) == 4
+    assert (1, 0) not in zip(touched.ix, touched.iy, strict=True)
+    assert (1, 1) in zip(touched.ix, touched.iy, strict=True)
+    for name in ["self_affine", "h0", "wider_than_the_cell"]:
+        spectrum = CUT_OFF[name]
+        waves = spectrum.longest, spectrum.rolloff, spectrum.shortest
+        small, large = (modes(SelfAffine(rms, spectrum.hurst, *waves), 1.0) for rms in (1e-6, 1e9))
+        assert np.array_equal(small.ix, large.ix)
+        assert_allclose(small.variance, large.variance * 1e-30, rtol=1e-11, atol=0)
 
 
-def test_variance_of_a_cell_lacks_only_the_pixel_around_zero():
-    spectrum = Gaussian(2.0, 0.1)
-    pairs = modes(spectrum, 1.0, 64)
+def test_variance_lacks_the_pixel_around_zero_and_energies_are_compliance_times_density():
+    pairs = modes(Gaussian(2.0, 0.1), 1.0, 64)
     lost = special.erf(math.pi * 0.1 / 2) ** 2
     assert_allclose(pairs.errors()["cell_error_variance"], -lost, rtol=1e-12, atol=0)
-    inside = modes(AFFINE, 1.0)
-    assert abs(inside.errors()["cell_error_variance"]) < 1e-14
-
-
-def test_energies_of_pairs_are_compliance_times_density_over_area():
+    assert abs(modes(AFFINE, 1.0).errors()["cell_error_variance"]) < 1e-14
+    assert_allclose(_spread(np.full(10, 0.3)), 1 / math.sqrt(10), rtol=1e-15, atol=0)
     pairs = modes(Band(1.3, longest=1 / 4, shortest=1 / 12), 2.5)
     nu, modulus = 0.3, 1.7
     inside = np.hypot(pairs.ix, pairs.iy) / 2.5
@@ -157,7 +163,7 @@ def test_energies_of_pairs_are_compliance_times_density_over_area():
     assert_allclose(pairs.energies(modulus, nu)[inside], exact[inside], rtol=1e-11, atol=0)
 
 
-def test_a_smooth_spectrum_loses_the_energy_around_zero():
+def test_energy_of_a_spectrum_converges_with_the_cell_and_loses_that_around_zero():
     # -(2 - ν)/(8π) 3.900265 C(0)/(G L); the pixel's curvature adds a term in 1/L²
     beta = (mpmath.zeta(0.5, 0.25) - mpmath.zeta(0.5, 0.75)) / 2
     constant = float(-4 * mpmath.zeta(0.5) * beta)  # minus the lattice sum of 1/|n|
@@ -171,9 +177,6 @@ def test_a_smooth_spectrum_loses_the_energy_around_zero():
             rest.append(error + deficit / cell)
             assert abs(rest[-1]) < 0.05 * deficit / cell * (40.0 / cell)
         assert 3.5 < rest[0] / rest[1] < 4.5  # second order
-
-
-def test_energy_of_a_spectrum_with_cut_offs_converges_with_the_cell():
     spectrum = SelfAffine(1.3, 0.8, longest=1.0, rolloff=0.5, shortest=0.1)
     errors = [abs(modes(spectrum, cell).errors()["cell_error_energy"]) for cell in (2.0, 8.0)]
     assert errors[1] < errors[0] / 8  # second order would be 16, less the lattice's own irregularity
@@ -194,45 +197,15 @@ def test_a_ripple_is_one_pair_with_the_energy_of_the_ripple_whether_it_fits_or_n
         assert_allclose(pairs.qx**2 + pairs.qy**2, (TURN / wavelength) ** 2, rtol=1e-14, atol=0)
 
 
-def test_without_points_the_grid_is_the_smallest_even_one_that_holds_the_spectrum():
+def test_the_smallest_even_grid_holds_the_spectrum_and_a_cell_without_modes_is_refused():
     for spectrum in [AFFINE, Band(1.0, 1 / 2, 1 / 8), Ripple(1.0, 0.25)]:
         pairs = modes(spectrum, 1.0)
         assert pairs.points % 2 == 0
-        reach = max(np.max(np.abs(pairs.ix)), np.max(pairs.iy))
-        assert reach == pairs.points // 2 - 1
+        assert max(np.max(np.abs(pairs.ix)), np.max(pairs.iy)) == pairs.points // 2 - 1
         smaller = modes(spectrum, 1.0, pairs.points - 1)  # odd, and just as far
         assert np.array_equal(smaller.variance, pairs.variance)
         with pytest.raises(ValueError, match=f"at least {pairs.points - 1} points"):
             modes(spectrum, 1.0, pairs.points - 2)
-
-
-def test_nyquist_and_zero_are_left_out():
-    for points in [16, 17]:
-        pairs = modes(VonKarman(1.0, 0.2, 0.5), 1.0, points)
-        reach = (points - 1) // 2
-        assert len(pairs.ix) == ((2 * reach + 1) ** 2 - 1) // 2
-        assert np.max(np.abs(pairs.ix)) == np.max(pairs.iy) == reach
-
-
-def test_the_set_of_modes_does_not_depend_on_the_rms():
-    for name in ["self_affine", "h0", "wider_than_the_cell"]:
-        spectrum = CUT_OFF[name]
-        waves = spectrum.longest, spectrum.rolloff, spectrum.shortest
-        small, large = (modes(SelfAffine(rms, spectrum.hurst, *waves), 1.0) for rms in (1e-6, 1e9))
-        assert np.array_equal(small.ix, large.ix)
-        assert_allclose(small.variance, large.variance * 1e-30, rtol=1e-11, atol=0)
-
-
-def test_a_circle_that_only_touches_pixels_adds_none():
-    corner = math.hypot(1.5, 0.5)  # of pixel (1, 0)
-    touched = modes(Band(1.0, longest=1 / corner, shortest=1 / 4.5), 1.0)
-    assert touched.points == 10
-    assert np.max(touched.iy) == 4
-    assert (1, 0) not in zip(touched.ix, touched.iy, strict=True)
-    assert (1, 1) in zip(touched.ix, touched.iy, strict=True)
-
-
-def test_a_cell_without_modes_is_refused_with_the_cure():
     for spectrum, cell, points, cure in (
         (Gaussian(1.0, 0.1), 1.0, None, "give points"),
         (Band(1.0, longest=9.0, shortest=8.0), 1.0, None, "make the cell longer"),
@@ -242,7 +215,3 @@ def test_a_cell_without_modes_is_refused_with_the_cure():
     ):
         with pytest.raises(ValueError, match=cure):
             modes(spectrum, cell, points)
-
-
-def test_the_spread_is_that_of_the_number_of_equal_pairs():
-    assert_allclose(_spread(np.full(10, 0.3)), 1 / math.sqrt(10), rtol=1e-15, atol=0)

@@ -5,17 +5,11 @@ from itertools import product
 import numpy as np
 import pytest
 from helpers.fields import complex_amplitudes
-from helpers.scenes import CELL, SPECTRUM, scene
+from helpers.scenes import CELL, ON_CELL, SPECTRUM, Clock, Ripple, bonds, drive, march, scene, shear
 from numpy.testing import assert_allclose
 
-from sim.engine import march
 from sim.laws import halfspace
-from sim.parts import drive
-from sim.parts.bonds import models as bonds
-from sim.parts.shear import models as shear
 from sim.parts.shear.process import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
-from sim.scenario.clock import Clock
-from sim.spectrum.families import Ripple
 
 G = 1.6e6
 MEMORIES = {
@@ -37,19 +31,15 @@ def energies(*arguments):
     return scenario.process, np.array([state.shear.energy for state in course])
 
 
-def test_modes_are_stationary_for_any_step():
+def test_modes_are_stationary_for_any_step_and_forget_with_twice_the_rate_of_the_amplitudes():
     for ratio, name in product([1e-6, 1e-3, 1.0, 1e3, 1e6], MEMORIES):
         step, members = ratio * 1e-3, 400
         part = shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=MEMORIES[name])
         process, energy = energies(part, members, Clock(duration=4 * step, step=step))
         pairs = process.modes.energies(G)
-        error = np.sqrt(np.sum(pairs**2) / members)
-        assert np.all(np.abs(energy.mean(axis=1) - pairs.sum()) < 5.0 * error)
+        assert np.all(np.abs(energy.mean(axis=1) - pairs.sum()) < 5.0 * np.sqrt(np.sum(pairs**2) / members))
         # the relative error of a variance of these sums of exponentials is below sqrt((kurtosis - 1)/members)
         assert np.all(np.abs(energy.var(axis=1) / np.sum(pairs**2) - 1.0) < 5.0 * np.sqrt(8.0 / members))
-
-
-def test_the_energy_forgets_with_twice_the_rate_of_the_amplitudes():
     for name in MEMORIES:
         members, step = 4000, 0.4e-3
         part = shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=MEMORIES[name])
@@ -67,23 +57,20 @@ def test_the_energy_forgets_with_twice_the_rate_of_the_amplitudes():
             assert abs(products.mean() - expected) < 5.0 * products.std() / np.sqrt(members)
 
 
-def test_a_contact_at_rest_keeps_its_pattern_under_slip_memory():
+def test_a_contact_at_rest_keeps_its_pattern_and_the_floor_of_its_amplitude():
     part = shear.Mapped(spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=1e-6))
     scenario, course = states(part, 2, Clock(duration=3e-3, step=1e-3), drive.Steady(speed=0.0))
     first, last = (scenario.process.maps(s.shear, s.drive.position, 2) for s in (course[0], course[-1]))
     assert np.array_equal(first, last)
+    for amplitude, floor in ((Onset(speed=1e-3, width=0.3, floor=0.05), 0.05), (Constant(), 1.0)):
+        assert_allclose(amplitude.factor(np.zeros(1), np.zeros(1)), floor, rtol=1e-15)
+    assert Stress(reference=1e5).factor(np.zeros(1), np.zeros(1)) == 0.0
 
 
 def test_a_map_is_the_sum_of_its_waves_and_stores_the_energy_by_the_greens_function():
     for points, amplitudes in product([12, 13], ["gaussian", "fixed"]):
-        part = shear.Mapped(
-            spectrum=SPECTRUM,
-            cell=CELL,
-            points=points,
-            correlation=Slip(length=3e-6),
-            amplitude=Onset(speed=2e-3, width=0.3),
-            mode_amplitudes=amplitudes,
-        )
+        recipe = {"correlation": Slip(length=3e-6), "amplitude": Onset(speed=2e-3, width=0.3)}
+        part = shear.Mapped(**ON_CELL, **recipe, points=points, mode_amplitudes=amplitudes)
         scenario, course = states(part, 2, Clock(duration=4e-3, step=1e-3), drive.Ramp(start=1e-3, stop=5e-3))
         process, position = scenario.process, np.array([0.37, -5.3]) * CELL
         x = np.arange(points) * CELL / points
@@ -107,36 +94,25 @@ def test_mapped_and_modal_give_the_same_energy_number_for_number():
     assert np.array_equal(modal, mapped)
 
 
-def test_a_ripple_of_fixed_amplitude_stores_the_papers_energy():
+def test_a_ripple_of_fixed_amplitude_stores_the_papers_energy_and_fixed_phases_diffuse():
     wavelength, amplitude = 24e-6, 375.158e3
     for angle, share in ((0.0, 1.0), (np.pi / 2, 2.0)):
-        part = shear.Modal(
-            spectrum=Ripple(amplitude=amplitude, wavelength=wavelength, angle=angle),
-            correlation=Slip(length=1e-6),
-            mode_amplitudes="fixed",
-        )
+        ripple = Ripple(amplitude=amplitude, wavelength=wavelength, angle=angle)
+        part = shear.Modal(spectrum=ripple, correlation=Slip(length=1e-6), mode_amplitudes="fixed")
         _, energy = energies(part, 2, Clock(duration=3e-3, step=1e-3))
         exact = share * amplitude**2 * wavelength / (16.0 * np.pi * G)
         assert energy.shape[1] == 1
         assert_allclose(energy, exact, rtol=1e-12)
-
-
-def test_fixed_phases_diffuse_by_twice_the_exponent():
     part = shear.Mapped(spectrum=SPECTRUM, cell=CELL, correlation=Time(time=1e-3), mode_amplitudes="fixed")
-    members = 200
-    _, course = states(part, members, Clock(duration=1e-3, step=0.5e-3))
+    _, course = states(part, 200, Clock(duration=1e-3, step=0.5e-3))
     turns = course[1].shear.values - course[0].shear.values
     assert abs(turns.var() - 1.0) < 5.0 * np.sqrt(2.0 / turns.size)
 
 
 def test_relaxing_amplitude_follows_the_exact_second_moment():
     # with g constant after a jump of the speed, the mean energy relaxes as 1 + (g^2 - 1) (1 - exp(-2 t/t_m))
-    part = shear.Modal(
-        spectrum=SPECTRUM,
-        cell=CELL,
-        correlation=Time(time=1e-3),
-        amplitude=Onset(speed=1e-3, width=0.05, floor=0.5, relaxing=True),
-    )
+    onset = Onset(speed=1e-3, width=0.05, floor=0.5, relaxing=True)
+    part = shear.Modal(**ON_CELL, correlation=Time(time=1e-3), amplitude=onset)
     motion = drive.Table(time=(0.0, 0.5e-3, 0.5e-3, 2.5e-3), speed=(1e-5, 1e-5, 1.0, 1.0))
     members, step = 3000, 0.5e-3
     process, energy = energies(part, members, Clock(duration=5 * step, step=step), motion)
@@ -158,9 +134,3 @@ def test_depths_that_do_not_go_together_are_refused():
     ):
         with pytest.raises(ValueError, match=cure):
             make()
-
-
-def test_amplitude_at_rest_is_its_floor():
-    for amplitude, floor in ((Onset(speed=1e-3, width=0.3, floor=0.05), 0.05), (Constant(), 1.0)):
-        assert_allclose(amplitude.factor(np.zeros(1), np.zeros(1)), floor, rtol=1e-15)
-    assert Stress(reference=1e5).factor(np.zeros(1), np.zeros(1)) == 0.0

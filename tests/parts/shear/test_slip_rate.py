@@ -5,18 +5,14 @@ from itertools import product
 
 import numpy as np
 import pytest
-from helpers.scenes import CELL, SPECTRUM, scene
+from helpers.scenes import CELL, SPECTRUM, Clock, Gaussian, Slip, SlipRate, Wave, march, scene
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
-from sim.engine import march
 from sim.parts.bonds import Unbroken
 from sim.parts.drive import Ramp, Spring, Steady, Table
 from sim.parts.exchange import Motion, Motions
 from sim.parts.shear import Banded, Mean
-from sim.parts.shear.process import Slip, SlipRate, Wave
-from sim.scenario.clock import Clock
-from sim.spectrum import Gaussian
 from sim.units.errors import BadInput
 
 SPEED, PERIOD, STEPS = 2e-3, 1e-2, 40
@@ -57,26 +53,22 @@ def wave(mean, swing):
     return np.diff(path), np.diff(square)
 
 
-def test_a_modulated_speed_gives_half_the_square_of_its_swing_over_the_mean_square():
+def test_modulation_gives_half_its_square_over_the_mean_square_and_stick_slip_the_share_at_rest():
     for floor, swing in product([0.0, 0.3], [0.0, 0.1, 0.7, 1.0]):
         (last,) = amplitudes(law(floor=floor), moved(*wave(SPEED, swing * SPEED)))[-1:]
         unsteady = 0.5 * swing**2 / (1.0 + 0.5 * swing**2)
         assert_allclose(last**2, floor**2 + (1.0 - floor**2) * unsteady, rtol=2.0 * SHORT, atol=1e-14)
         if swing == 1.0:
             assert_allclose(unsteady, 1.0 / 3.0, rtol=1e-15)
-
-
-def test_stick_slip_at_one_speed_has_the_share_of_the_time_at_rest():
     for share in [0.1, 0.5]:
-        moves = np.tile(np.arange(STEPS) < share * STEPS, 3)
-        path = np.where(moves, SPEED * PERIOD / STEPS, 0.0)
+        path = np.where(np.tile(np.arange(STEPS) < share * STEPS, 3), SPEED * PERIOD / STEPS, 0.0)
         motions = moved(path, path**2 / (PERIOD / STEPS))
         ends = amplitudes(law(), motions, moved(path[:1], path[:1] ** 2 / (PERIOD / STEPS)))
         moving = 3 * round(share * STEPS) + 1  # with the step that resumes the sliding
         assert_allclose(ends[-1] ** 2, 1.0 - moving / (3 * STEPS + 1), rtol=6.0 * SHORT)
 
 
-def test_rest_holds_the_amplitude_and_counts_once_sliding_resumes():
+def test_rest_holds_the_amplitude_and_sliding_at_one_speed_has_the_floor():
     path, square = wave(SPEED, 0.5 * SPEED)
     still = np.zeros(200)
     ends = amplitudes(law(), moved(path, square), moved(still, still), moved(path[:1], square[:1]))
@@ -86,9 +78,6 @@ def test_rest_holds_the_amplitude_and_counts_once_sliding_resumes():
     # and a rest before any sliding is no part of the past
     rested = amplitudes(law(), moved(still, still), moved(path, square))
     assert np.all(rested[len(still) :] == amplitudes(law(), moved(path, square)))
-
-
-def test_sliding_at_one_speed_has_the_floor_from_the_first_step_on():
     for floor in (0.0, 0.2):
         shear = Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=law(1e-6, floor))
         for drive in (Steady(speed=SPEED), Table(time=(0.0, 0.003, 0.003, 1.0), speed=(0.0, 0.0, SPEED, SPEED))):
@@ -96,7 +85,7 @@ def test_sliding_at_one_speed_has_the_floor_from_the_first_step_on():
                 assert_allclose(state.shear.amplitude, floor, rtol=1e-14, atol=1e-15)
 
 
-def test_a_step_of_the_speed_is_forgotten_with_the_slip():
+def test_a_step_of_the_speed_is_forgotten_with_the_slip_and_errors_fall_with_its_square():
     # from speed v to r v at once: with w = e^(−s/l), A0 = (w + (1 − w)/r) l/v, A1 = l, A2 = (w + (1 − w) r) l v
     length, ratio, slip = 1e-6, 8.0, np.array([0.1, 0.5, 1.0, 3.0, 9.0]) * 1e-6
     speed, paths = ratio * SPEED, np.diff(slip, prepend=0.0)
@@ -104,9 +93,6 @@ def test_a_step_of_the_speed_is_forgotten_with_the_slip():
     left = np.exp(-slip / length)
     exact = 1.0 - 1.0 / ((left + (1.0 - left) / ratio) * (left + (1.0 - left) * ratio))
     assert_allclose(ends**2, exact, rtol=1e-12)
-
-
-def test_the_error_of_a_step_falls_with_its_square():
     # a speed that rises from v to 5 v in T: A_j = ∫ e^(−(p(T) − p(t))/l) v^j dt, and what was before counts e^(−p(T)/l)
     length, duration, first, last = 3e-6, 2e-3, 1e-3, 5e-3
 
