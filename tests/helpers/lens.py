@@ -2,23 +2,11 @@
 
 import functools
 
-from helpers.scenes import (
-    Adhesion,
-    Band,
-    Clock,
-    Ensemble,
-    Equilibrium,
-    Onset,
-    Scenario,
-    Solid,
-    Sphere,
-    Time,
-    bonds,
-    drive,
-    shear,
-)
+from helpers.scenes import Adhesion, Clock, Ensemble, Equilibrium, Onset, Scenario, Solid, Sphere, bonds, drive, shear
 
 from sim.ensemble.simulate import run
+from sim.parts.shear.process import Time
+from sim.spectrum.families import Band
 
 RADIUS, WORK, MODULUS, LOAD = 2e-3, 42e-3, 6.4e6, 4e-3
 FIELD = {"spectrum": Band(rms=150e3, longest=60e-6, shortest=24e-6), "cell": 0.24e-3, "points": 32}

@@ -112,16 +112,7 @@ def test_a_branch_ends_at_its_fold_in_a_jump_or_reaches_hertz_smoothly():
     assert np.isnan(theories.scaled_angle_limit(-1.6, WORK, 0.5, 1.0))
 
 
-def test_the_scaled_tangent_keeps_its_share_of_adhesion_under_any_force():
-    load = np.array([-0.7, 0.0, 1.0, 40.0])
-    # what is left falls as 1/T^2
-    computed = radius("scaled_tangent", load, 1e7, 0.5)
-    assert_allclose(computed, jkr.radius_at_load(load, 0.5 * WORK, 1.0, MODULUS), rtol=1e-12, atol=0)
-    assert np.isnan(radius("scaled_tangent", -0.76, 1e7, 0.5)) and radius("scaled_tangent", -0.76, 0.1, 0.5) > 1.0
-    assert np.all(computed[1:] > np.cbrt(load[1:]))
-
-
-def test_limits_of_the_mixity():
+def test_limits_of_the_mixity_and_the_share_of_adhesion_that_the_scaled_tangent_keeps():
     for at_load in [True, False]:
         for name in LAWS:
             rng = np.random.default_rng(71)
@@ -151,6 +142,12 @@ def test_limits_of_the_mixity():
                 assert_allclose(share, exact, rtol=1e-7, atol=0)
                 assert np.nanmedian(np.abs(share / exact - 1.0)) < 1e-14
                 assert 20 < np.sum(exact > np.fmax(plain(level, 0.0, *rest), 0.0)) < 400
+    load = np.array([-0.7, 0.0, 1.0, 40.0])
+    # what is left falls as 1/T^2
+    computed = radius("scaled_tangent", load, 1e7, 0.5)
+    assert_allclose(computed, jkr.radius_at_load(load, 0.5 * WORK, 1.0, MODULUS), rtol=1e-12, atol=0)
+    assert np.isnan(radius("scaled_tangent", -0.76, 1e7, 0.5)) and radius("scaled_tangent", -0.76, 0.1, 0.5) > 1.0
+    assert np.all(computed[1:] > np.cbrt(load[1:]))
 
 
 def test_a_small_force_costs_its_share_of_savkoor_briggs_loss_and_no_mixity_more():

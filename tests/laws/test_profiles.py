@@ -26,7 +26,7 @@ def over_the_contact(values_of, radius, points=64):
     return 0.25 * math.pi * np.sum(weights * 2.0 * math.pi * r * radius * np.cos(t) * values_of(r))
 
 
-def test_the_pressure_carries_the_load_and_hertzs_is_johnsons():
+def test_the_pressure_carries_the_load_works_as_the_elastic_energy_and_hertzs_is_johnsons():
     for radius, indentation in STATES:
         load = over_the_contact(lambda r: halfspace.pressure(r, radius, indentation, **LENS), radius)
         exact = jkr.load_under_indentation(radius, indentation, **LENS)
@@ -40,6 +40,16 @@ def test_the_pressure_carries_the_load_and_hertzs_is_johnsons():
     # the indentation a^2/R is rounded: that leaves a punch of a few 1e-16 of Hertz's, 7 times larger at 0.99
     computed = halfspace.pressure(r, radius, radius**2 / LENS["sphere_radius"], **LENS)
     assert_allclose(computed, exact, rtol=1e-13, atol=0)
+    radius, indentation = lens_contact()
+
+    def density(r):
+        moved = halfspace.normal_displacement(r, radius, indentation, 2e-3)
+        return 0.5 * halfspace.pressure(r, radius, indentation, **LENS) * moved
+
+    energy = over_the_contact(density, radius)
+    exact = jkr.potential_at_indentation(-indentation, 0.0, radius, 0.0, **LENS)
+    # four parts of alternating sign, each below ten times the sum
+    assert_allclose(energy, exact, rtol=1e-13, atol=0)
 
 
 def test_the_edge_pulls_with_the_intensity_of_the_work_and_hertz_has_no_tension():
@@ -105,19 +115,6 @@ def test_the_surface_is_continuous_follows_the_sphere_inside_and_feels_the_load_
     far = float(halfspace.normal_displacement(r, radius, indentation, 2e-3))
     # the next term of the expansion is of relative order (a/r)^2 = 1e-8
     assert_allclose(far, 4e-3 / (math.pi * LENS["modulus"] * r), rtol=1e-7, atol=0)
-
-
-def test_the_work_of_the_pressure_is_the_elastic_energy():
-    radius, indentation = lens_contact()
-
-    def density(r):
-        moved = halfspace.normal_displacement(r, radius, indentation, 2e-3)
-        return 0.5 * halfspace.pressure(r, radius, indentation, **LENS) * moved
-
-    energy = over_the_contact(density, radius)
-    exact = jkr.potential_at_indentation(-indentation, 0.0, radius, 0.0, **LENS)
-    # four parts of alternating sign, each below ten times the sum
-    assert_allclose(energy, exact, rtol=1e-13, atol=0)
 
 
 def test_profiles_and_map_of_the_shear_are_the_displacement_of_the_disc():

@@ -37,7 +37,7 @@ def stress(*course):
     return followed(*course).stress
 
 
-def test_parabolas_and_cubics_of_known_slopes_are_found_between_their_samples():
+def test_parabolas_and_cubics_are_found_between_samples_and_friction_over_a_growing_area():
     top, where = np.array([3.0, 7.0]), np.array([1.2, 2.9])
     times = 0.5 * np.arange(9)
     maxima = stress([top - 0.1 * (t - where) ** 2 for t in times])
@@ -53,6 +53,12 @@ def test_parabolas_and_cubics_of_known_slopes_are_found_between_their_samples():
     maxima = stress([np.zeros(2), 0.3 * sign], 1.0, [sign, -0.01 * sign])
     cubic = 0.3 * t**2 * (3.0 - 2.0 * t) + t * (1.0 - t) ** 2 - 0.01 * t**2 * (t - 1.0)
     assert_allclose(extremes.column("largest", maxima), cubic.max(), rtol=1e-9)
+    # Stress 1 − (t − 1/2)² over an area that doubles in a step of 1: cubic, (1 + t)(3/4 + t − t²).
+    values, slopes = [np.array([0.75]), np.array([0.75])], [np.array([1.0]), np.array([-1.0])]
+    maxima = followed(values, 1.0, slopes, (ONE, np.sqrt(2.0) * ONE))
+    top = 0.5 * np.sqrt(7.0 / 3.0)  # where 7/4 − 3 t² is 0: 0.76
+    assert_allclose(maxima.stress[0, 2:], [1.0, 0.5], rtol=1e-14)
+    assert_allclose(maxima.friction[0, 2:], [(1.0 + top) * (0.75 + top - top**2), top], rtol=1e-14)
 
 
 def test_a_jump_keeps_its_sample_and_nothing_is_larger_than_nan():
@@ -85,12 +91,3 @@ def test_the_error_is_of_third_order_in_the_step_and_of_fourth_with_slopes():
     counts = np.array([10, 20, 40, 80])
     errors = peak_errors(counts, known=True)
     assert np.all(errors < (3.0 / counts) ** 4 / 90.0) and errors[-1] < errors[0] / 100.0  # h⁴ f⁗/384, f⁗ = 4 f
-
-
-def test_friction_grows_with_the_area_within_a_step():
-    """Stress 1 − (t − 1/2)² over an area that doubles in a step of 1: cubic, (1 + t)(3/4 + t − t²)."""
-    values, slopes = [np.array([0.75]), np.array([0.75])], [np.array([1.0]), np.array([-1.0])]
-    maxima = followed(values, 1.0, slopes, (ONE, np.sqrt(2.0) * ONE))
-    top = 0.5 * np.sqrt(7.0 / 3.0)  # where 7/4 − 3 t² is 0: 0.76
-    assert_allclose(maxima.stress[0, 2:], [1.0, 0.5], rtol=1e-14)
-    assert_allclose(maxima.friction[0, 2:], [(1.0 + top) * (0.75 + top - top**2), top], rtol=1e-14)

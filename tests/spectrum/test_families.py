@@ -124,7 +124,7 @@ def test_density_broadcasts_is_even_and_has_an_anisotropic_first_length_along_th
     assert_allclose(equal.density(1.0, 2.0), isotropic.density(1.0, 2.0), rtol=1e-14, atol=0)
 
 
-def test_energy_at_poisson_one_half_has_the_known_coefficient_and_falls_along_sliding_alone():
+def test_energies_have_their_known_coefficients_and_textbook_limits():
     for spectrum, exact in [
         (Gaussian(1.0, 1.0), 0.33233509704478426),
         (Gaussian(1.0, math.sqrt(2.0)), 0.4699928014933126),
@@ -140,9 +140,6 @@ def test_energy_at_poisson_one_half_has_the_known_coefficient_and_falls_along_sl
         assert_allclose(energy, exact * 4.0 / (4 * 1.5 * TURN / 3.0), rtol=1e-15, atol=0)
     with pytest.raises(ValueError, match="no density"):
         Ripple(1.0, 1.0).density(0.0, 0.0)
-
-
-def test_self_affine_energy_is_the_textbook_quotient_with_its_limits():
     for hurst in [0.3, 0.8, 1.0]:
         longest, rolloff, shortest = 60e-6, 24e-6, 1e-6
         ratio, reach, q = rolloff / longest, rolloff / shortest, TURN / rolloff
@@ -161,9 +158,6 @@ def test_self_affine_energy_is_the_textbook_quotient_with_its_limits():
     q = np.array([0.0, 0.5, 3.0, 100.0])
     exact = TURN * 0.8**2 * 1.3**2 * (1 + (0.8 * q) ** 2) ** -1.5
     assert_allclose(ISOTROPIC["exponential"].radial_density(q), exact, rtol=1e-14, atol=0)
-
-
-def test_a_narrow_band_is_a_ring_and_endless_streaks_store_the_logarithm_of_their_length():
     assert_allclose(Band(1.0, TURN / 2.0, TURN / 2.0002).surface_energy(1.0), 3 / (8 * 2.0001), rtol=1e-11, atol=0)
     energies = [AnisotropicGaussian(1.0, 1.0, b).surface_energy(1.0) for b in (1e4, 1e6, 1e8)]
     assert_allclose(np.diff(energies)[1], np.diff(energies)[0], rtol=1e-6, atol=0)

@@ -27,7 +27,7 @@ def recorded(names, members=3, steps=16, **parts):
     return records(scene(members, steps, **parts), *names)
 
 
-def test_friction_is_odd_and_energies_are_even_in_the_speed():
+def test_friction_is_odd_and_takes_work_and_energies_are_even_in_the_speed():
     parts = {"shear": SHEARS["modal, wave, relaxing stress"], "contact": CONTACTS["partly reversible"]}
     signs = dict.fromkeys(["shear_stress", "friction_force"], -1.0)
     signs |= dict.fromkeys(["bond_fraction", "fluctuation_energy", "contact_radius"], 1.0)
@@ -38,9 +38,6 @@ def test_friction_is_odd_and_energies_are_even_in_the_speed():
         off = part.tolerance if part.model == "cohort" else 1e-11
         for sign, there, back in zip(signs.values(), forward, mirrored, strict=True):
             assert_allclose(back, sign * there, rtol=1e-11, atol=off * np.abs(there).max())
-
-
-def test_a_friction_loop_takes_work():
     for part in BONDS.values():
         # the trapezoidal sum over the second cycle; 200 members where bonds are counted or tracked
         members = 200 if part.model in ("counted", "tracked", "auto") else 1

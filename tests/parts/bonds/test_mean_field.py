@@ -91,7 +91,7 @@ def test_friction_of_a_cut_off_is_that_of_its_renewal_and_does_not_end_at_rest()
     assert_allclose([bound[0], moment[0]], [math.exp(-2.0), 1e-9 * math.exp(-4.0)], rtol=4 * ULP, atol=0)
 
 
-def test_marching_comes_to_the_steady_state_which_is_a_fixed_point_of_any_step():
+def test_marching_comes_to_the_steady_state_of_lambert_s_w_which_any_step_keeps():
     for eps, beta in product([0.01, 1.0, 10.0, 1000.0], [0.1, 1.0, 10.0]):
         bound, moment = steady(eps, BELL, beta)
         for first, (duration, pieces) in product(
@@ -107,9 +107,6 @@ def test_marching_comes_to_the_steady_state_which_is_a_fixed_point_of_any_step()
     for rupture in (BELL, RuptureRate(1.0, 0.0, math.inf), RuptureRate(0.0, 0.0, 1.0)):
         assert_array_equal(steady([0.0, 1.0, -2.0], rupture, 0.0), np.zeros((2, 3)))
         assert_array_equal(slide((np.zeros(1), np.zeros(1)), 2.0, 5.0, rupture, 0.0), np.zeros((2, 1)))
-
-
-def test_steady_sliding_under_bell_s_rate_is_lambert_s_w_over_twenty_four_decades():
     eps, rate, softness = np.concatenate([[0.0], 10.0 ** np.arange(-12.0, 13.0)]), 3.0, 2e9
     with mpmath.workdps(40):
         stretches = [mpmath.lambertw(mpmath.mpf(value)).real for value in eps.tolist()]
@@ -179,7 +176,7 @@ def test_transients_are_those_of_an_integrator_of_another_form_from_the_first_bo
         assert slide((np.ones(1), np.zeros(1)), eps, 1.01 * time, BELL, 0.0)[1] < moment
 
 
-def test_a_step_in_two_unequal_parts_is_the_step_whatever_the_numbers():
+def test_a_step_in_two_unequal_parts_is_the_step_and_hardly_any_softness_the_constant_rate():
     random = np.random.default_rng(4)
     for _ in range(400):
         before, speed = 10.0 ** random.uniform(-12, 8, 2) * random.choice([-1.0, 1.0], 2)
@@ -193,9 +190,6 @@ def test_a_step_in_two_unequal_parts_is_the_step_whatever_the_numbers():
         parts = slide(slide(first, speed, 0.3 * duration, BELL, beta), speed, 0.7 * duration, BELL, beta)
         assert 0.0 <= whole[0][0] <= 1.0
         assert_allclose(parts, whole, rtol=TRANSIENT, atol=0, err_msg=f"{kind} {before} {speed} {beta} {duration}")
-
-
-def test_hardly_any_softness_is_the_constant_rate():
     first, speed = (np.full(1, 0.2), np.full(1, -0.3)), 2.0
     constant = slide(first, speed, 1.5, RuptureRate(1.0, 0.0, math.inf), 0.7)
     for softness in (1e-14, 1e-300):

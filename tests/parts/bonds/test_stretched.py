@@ -106,7 +106,7 @@ def over(part, state, radius):
     return part.advance(state, motions, np.array([radius]), Noise(5, "bonds", np.arange(1)))[0]
 
 
-def test_amplitude_dilutes_bonds_and_shrinkage_takes_them_along():
+def test_bonds_thin_with_every_growth_of_the_contact_and_shrinkage_takes_them_along():
     for name in CARRIED:
         part = CARRIED[name]
         _, state = last(1, steps=1, bonds=part, drive=drive.Steady(speed=1e-3))
@@ -123,9 +123,6 @@ def test_amplitude_dilutes_bonds_and_shrinkage_takes_them_along():
         opened = over(part, shrunk, np.nan)
         assert part.bonding(opened).fraction == 0.0  # an open contact has no bonds
         assert part.bonding(over(part, opened, 1e-4)).fraction == 0.0
-
-
-def test_in_a_contact_that_breathes_the_bonds_thin_with_every_amplitude():
     for name in [*CARRIED, "present"]:
         # nothing binds or breaks: the share that is left is that of all growths, which follow the radius by one step
         part = CARRIED.get(name, bonds.FirstMoment(rupture=DEAD, **LASTING, start_from="bonded"))

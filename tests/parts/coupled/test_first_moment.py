@@ -215,7 +215,7 @@ def test_a_run_records_the_drive_of_each_member_and_ends_those_that_run_away():
     assert any("2 of 2 trajectories end in a runaway" in line for line in notes(dataset, [], []))
 
 
-def test_a_force_is_a_soft_spring_that_is_pulled_from_afar():
+def test_a_force_is_a_soft_spring_pulled_from_afar_and_holds_below_the_strength_of_friction():
     # K V stays as K falls: the force of the spring is that ramp but for what the body gives way
     ramp = {"from": 0.0, "to": 0.2 * UNIT}
     given = list(march(scenario(1.0, 10, Force(force=ramp, contact_stiffness="rigid")), np.arange(1)))[-1]
@@ -224,6 +224,20 @@ def test_a_force_is_a_soft_spring_that_is_pulled_from_afar():
         last = list(march(scenario(1.0, 10, spring(stiffness, 0.2 / stiffness)), np.arange(1)))[-1]
         errors.append(abs(last.drive.position[0] / given.drive.position[0] - 1.0))
     assert_allclose(np.divide(errors[:-1], errors[1:]), 10.0, rtol=0.02)
+    for mass in [0.0, 0.05]:
+        stiff, bonds = HELD / STRETCH, Steady(critical_speed=STRETCH, stress=driven.COULOMB)
+        for load in (0.9, -0.9, 1.3, -1.3):
+            keys = {"mass": mass * stiff, "damping": 0.5 * stiff, "contact_stiffness": "rigid"}
+            states, read = marched(stuck(40.0, 8, bonds, Force(force=load * HELD, **keys)))
+            speed = abs(states[-1].drive.speed[0]) / STRETCH
+            if abs(load) < 1.0:
+                assert speed == states[-1].drive.position[0] == 0.0
+                assert_allclose(states[-1].bonding.stress[0], load * driven.COULOMB, rtol=1e-14)
+                assert states[-1].bonds.bound[0] == 1.0
+            else:
+                assert_allclose(0.5 * speed + 1.0 / (1.0 + speed), 1.3, rtol=1e-9)
+                assert states[-1].drive.speed[0] * load > 0.0
+                assert residual(read) < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -244,7 +258,7 @@ def test_bonds_that_follow_the_speed_at_once_make_the_relaxation_cycles_of_their
     assert max(state.bonding.stress[0] for state in states) <= driven.COULOMB * (1.0 + 1e-12)
 
 
-def test_coulomb_friction_with_a_mass_touches_rest_once_a_period_and_never_sticks():
+def test_coulomb_friction_touches_rest_once_a_period_and_falling_friction_is_stable_if_damped_enough():
     mass, speed, time = 0.01, 0.3, 10.3
     drive = pulled(speed=speed, mass=mass, tolerance=1e-10)
     states, read = marched(stuck(1.0 / speed + time, 7, Unbroken(stress=driven.COULOMB), drive))
@@ -253,26 +267,6 @@ def test_coulomb_friction_with_a_mass_touches_rest_once_a_period_and_never_stick
     assert_allclose(read["spring_force"][-1] / HELD, 1.0 + speed * math.sqrt(mass) * math.sin(turn), rtol=1e-6)
     assert residual(read) < 1e-8
     assert_allclose(read["dissipated_by_rupture"][-1], HELD * states[-1].drive.position[0], rtol=1e-10)
-
-
-def test_a_force_holds_below_the_strength_and_above_it_makes_the_speed_that_friction_and_damping_bear():
-    for mass in [0.0, 0.05]:
-        stiff, bonds = HELD / STRETCH, Steady(critical_speed=STRETCH, stress=driven.COULOMB)
-        for load in (0.9, -0.9, 1.3, -1.3):
-            keys = {"mass": mass * stiff, "damping": 0.5 * stiff, "contact_stiffness": "rigid"}
-            states, read = marched(stuck(40.0, 8, bonds, Force(force=load * HELD, **keys)))
-            speed = abs(states[-1].drive.speed[0]) / STRETCH
-            if abs(load) < 1.0:
-                assert speed == states[-1].drive.position[0] == 0.0
-                assert_allclose(states[-1].bonding.stress[0], load * driven.COULOMB, rtol=1e-14)
-                assert states[-1].bonds.bound[0] == 1.0
-            else:
-                assert_allclose(0.5 * speed + 1.0 / (1.0 + speed), 1.3, rtol=1e-9)
-                assert states[-1].drive.speed[0] * load > 0.0
-                assert residual(read) < 1e-6
-
-
-def test_steady_sliding_on_falling_friction_is_stable_where_damping_outweighs_the_fall():
     for stiffness in [0.1, 10.0]:
         # m v'' + (c + F') v' + K v = 0 with F' = -V_c/(V_c + V)^2
         fall, mass, step = 1.0 / 4.0, 1.0, 0.05

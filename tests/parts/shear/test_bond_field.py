@@ -38,7 +38,7 @@ def process():
     return SiteModes(modes(SPECTRUM, CELL, POINTS), G, 0.5, Time(time=1.0), Constant())
 
 
-def test_energy_variance_and_line_integral_of_discs_are_those_of_the_density_and_published():
+def test_energy_variance_map_and_sign_of_the_field_of_discs():
     for poisson_ratio in [0.5, 0.3]:
         # the half-space's compliance under each bond: twice the energy of one disc of unit force
         exact = (2.0 - poisson_ratio) / (1.5 * math.pi**2 * G * B)
@@ -60,6 +60,14 @@ def test_energy_variance_and_line_integral_of_discs_are_those_of_the_density_and
     assert_allclose(slope[low], (q * SPECTRUM.radial_density(q) / (2 * math.pi))[low], rtol=1e-6)
     state = SiteMean(SPECTRUM.surface_energy(G), Constant()).start(moved(0), bonding(3.0, 2.0), None)
     assert_allclose(state.energy, 13.0 / (math.pi**2 * G * B), rtol=1e-14)
+    field, noise = process(), Noise(2, "shear", np.arange(3))
+    first = field.start(moved(0), bonding(0.8, 0.0), noise)
+    back = advanced(field, first, moved(1, 1.0), bonding(-0.8, 0.0), noise)
+    assert_allclose(complex_amplitudes(field, back), -complex_amplitudes(field, first), rtol=1e-14)
+    field, noise = process(), Noise(3, "shear", np.arange(2))
+    state = field.start(moved(0), bonding(0.8, 0.6), noise)
+    maps = field.maps(state, np.zeros(1), 2)
+    assert_allclose([surface_energy(field_map, CELL, G) for field_map in maps], state.energy, rtol=1e-12)
 
 
 @pytest.mark.parametrize("members", MEMBERS)
@@ -83,14 +91,3 @@ def test_forces_that_differ_are_forgotten_and_the_pattern_of_the_mean_force_is_n
     before, after = (complex_amplitudes(field, state) for state in (first, then))
     correlation = np.real(np.mean(before * after.conj())) / np.mean(np.abs(before) ** 2)
     assert abs(correlation - (0.64 + 0.36 * math.exp(-1.0))) < 5.0 / math.sqrt(before.size)
-
-
-def test_the_sign_of_the_mean_force_turns_the_frozen_pattern_whose_map_has_the_energy_of_its_modes():
-    field, noise = process(), Noise(2, "shear", np.arange(3))
-    first = field.start(moved(0), bonding(0.8, 0.0), noise)
-    back = advanced(field, first, moved(1, 1.0), bonding(-0.8, 0.0), noise)
-    assert_allclose(complex_amplitudes(field, back), -complex_amplitudes(field, first), rtol=1e-14)
-    field, noise = process(), Noise(3, "shear", np.arange(2))
-    state = field.start(moved(0), bonding(0.8, 0.6), noise)
-    maps = field.maps(state, np.zeros(1), 2)
-    assert_allclose([surface_energy(field_map, CELL, G) for field_map in maps], state.energy, rtol=1e-12)

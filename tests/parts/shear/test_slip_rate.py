@@ -53,7 +53,7 @@ def wave(mean, swing):
     return np.diff(path), np.diff(square)
 
 
-def test_modulation_gives_half_its_square_over_the_mean_square_and_stick_slip_the_share_at_rest():
+def test_unsteady_speeds_have_half_their_square_over_the_mean_square_even_on_coulomb_friction():
     for floor, swing in product([0.0, 0.3], [0.0, 0.1, 0.7, 1.0]):
         (last,) = amplitudes(law(floor=floor), moved(*wave(SPEED, swing * SPEED)))[-1:]
         unsteady = 0.5 * swing**2 / (1.0 + 0.5 * swing**2)
@@ -66,6 +66,18 @@ def test_modulation_gives_half_its_square_over_the_mean_square_and_stick_slip_th
         ends = amplitudes(law(), motions, moved(path[:1], path[:1] ** 2 / (PERIOD / STEPS)))
         moving = 3 * round(share * STEPS) + 1  # with the step that resumes the sliding
         assert_allclose(ends[-1] ** 2, 1.0 - moving / (3 * STEPS + 1), rtol=6.0 * SHORT)
+    # from rest it moves with V (1 − cos ωt), whose unsteadiness over whole periods is a third
+    mass, stiffness, stage, strength = 1e-3, 1e3, 1e-3, 1e-3
+    period, begins = 2.0 * math.pi * math.sqrt(mass / stiffness), strength / (stiffness * stage)
+    drive = Spring(stage=stage, stiffness=stiffness, mass=mass, contact_stiffness="rigid", tolerance=1e-10)
+    shear = Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=law(1e3), paid_by_adhesion=0.0)
+    bonds = Unbroken(stress=strength / scene(1).contact_area)
+    duration = begins + 2.0 * period
+    clock = Clock(duration=duration, step=duration / 7)
+    states = list(march(scene(1, clock=clock, drive=drive, bonds=bonds, shear=shear), np.arange(1)))
+    weight, mean, spread, _ = states[-1].shear.past[0]
+    slip = 2.0 * period * stage
+    assert_allclose([weight * mean, spread + weight * mean**2], [slip, 1.5 * stage * slip], rtol=1e-8)
 
 
 def test_rest_holds_the_amplitude_and_sliding_at_one_speed_has_the_floor():
@@ -116,21 +128,6 @@ def test_a_step_of_the_speed_is_forgotten_with_the_slip_and_errors_fall_with_its
         errors.append(state.shear.amplitude[0] ** 2 - exact)
     assert_allclose([errors[0] / errors[1], errors[1] / errors[2]], 4.0, rtol=0.02)
     assert abs(errors[-1]) < 1e-3 * exact
-
-
-def test_a_mass_behind_a_spring_on_coulomb_friction_has_three_halves_of_the_square_of_its_mean_speed():
-    # from rest it moves with V (1 − cos ωt), whose unsteadiness over whole periods is a third
-    mass, stiffness, stage, strength = 1e-3, 1e3, 1e-3, 1e-3
-    period, begins = 2.0 * math.pi * math.sqrt(mass / stiffness), strength / (stiffness * stage)
-    drive = Spring(stage=stage, stiffness=stiffness, mass=mass, contact_stiffness="rigid", tolerance=1e-10)
-    shear = Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=law(1e3), paid_by_adhesion=0.0)
-    bonds = Unbroken(stress=strength / scene(1).contact_area)
-    duration = begins + 2.0 * period
-    clock = Clock(duration=duration, step=duration / 7)
-    states = list(march(scene(1, clock=clock, drive=drive, bonds=bonds, shear=shear), np.arange(1)))
-    weight, mean, spread, _ = states[-1].shear.past[0]
-    slip = 2.0 * period * stage
-    assert_allclose([weight * mean, spread + weight * mean**2], [slip, 1.5 * stage * slip], rtol=1e-8)
 
 
 def test_a_field_without_a_length_of_its_own_needs_that_of_its_memory():
