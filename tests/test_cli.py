@@ -62,8 +62,7 @@ def test_help_check_and_a_run_without_its_table_import_only_what_they_need(here)
     heavy = {"pandas", "scipy.stats", "dask"} | figures
     assert not loaded("check", LENS) & heavy
     assert not loaded("run", "scene.toml", "--no-table", "--quiet") & heavy
-    assert Path("outputs/scene.nc").exists()
-    assert "xarray" in (table := loaded("stats", "outputs/scene.nc"))
+    assert Path("outputs/scene.nc").exists() and "xarray" in (table := loaded("stats", "outputs/scene.nc"))
     assert not table & {"pint", "dask.array", "matplotlib", "scipy.stats"}  # xarray would, to compare types with theirs
 
 
@@ -146,8 +145,8 @@ def test_stages_of_a_long_run_and_the_first_compilation_have_their_line(capsys, 
             for notice in list(jit.on_compiling):
                 notice("sim.laws.jkr.pull_off_load")
         assert capsys.readouterr().err.count("compiling") == (not quiet)
-    monkeypatch.setattr(terminal, "_SLOW", 0.0)
     for quiet in (False, True):
+        monkeypatch.setattr(terminal, "_SLOW", 0.0)
         with terminal.slow_stage("making modes", quiet):
             time.sleep(0.1)
         assert capsys.readouterr().err == ("" if quiet else "making modes\n")
@@ -168,17 +167,15 @@ def test_stages_of_a_long_run_and_the_first_compilation_have_their_line(capsys, 
     assert "simulating" in printed and "30%" in printed
 
 
-def test_an_output_that_exists_is_refused_before_anything_is_computed(here, monkeypatch):
+def test_an_existing_output_is_refused_before_anything_is_computed_unless_asked(here, monkeypatch):
     sim("run", "scene.toml", "-o", "x.nc", "--quiet")
     content = Path("x.nc").read_bytes()
     other = ["run", "scene.toml", "-o", "x.nc", "--set", 'contact.load="1 mN"']
     with monkeypatch.context() as patched:
         patched.setattr("sim.ensemble.simulate.run", None)  # computing would fail
         done = sim(*other)
-    assert done.exit_code == 73 and "--force" in done.stderr
-    assert Path("x.nc").read_bytes() == content
-    assert sim(*other, "--force", "--quiet").exit_code == 0
-    assert Path("x.nc").read_bytes() != content
+    assert done.exit_code == 73 and "--force" in done.stderr and Path("x.nc").read_bytes() == content
+    assert sim(*other, "--force", "--quiet").exit_code == 0 and Path("x.nc").read_bytes() != content
 
 
 def test_a_run_that_cannot_begin_names_the_fault_with_its_code_and_writes_nothing(here, monkeypatch):
@@ -188,14 +185,11 @@ def test_a_run_that_cannot_begin_names_the_fault_with_its_code_and_writes_nothin
         Path("loop.nc").symlink_to("loop.nc")
     before = sorted(here.iterdir())
     for arguments, code, message in (
-        *(of_posix if os.name == "posix" else ()),
-        (["-o", "."], 2, ". is a folder"),
+        *(of_posix if os.name == "posix" else ()), (["-o", "."], 2, ". is a folder"),
         (["-o", "scene.toml", "--force"], 2, "scene.toml: the command reads"),
-        (["-o", "scene.toml/x.nc"], 74, "scene.toml"),
-        (["--set", "contact"], 2, "--set takes TABLE.KEY=VALUE"),
-        (["--set", "contact.lod=3"], 2, 'did you mean "load"?'),
-        (["--members", "0"], 2, "'--members'"),
-    ):
+        (["-o", "scene.toml/x.nc"], 74, "scene.toml"), (["--set", "contact"], 2, "--set takes TABLE.KEY=VALUE"),
+        (["--set", "contact.lod=3"], 2, 'did you mean "load"?'), (["--members", "0"], 2, "'--members'"),
+    ):  # fmt: skip
         done = sim("run", "scene.toml", *arguments)
         assert (done.exit_code, message in done.stderr, "Traceback" in done.output) == (code, True, False), arguments
         assert sorted(here.iterdir()) == before
@@ -239,33 +233,32 @@ def test_nothing_after_the_rename_makes_a_failure_of_a_run(here, monkeypatch):
             patched.setattr(name, broken(getattr(os, name.partition(".")[2])))
         patched.setattr("sim.analysis.table", broken(lambda *_: done.append("read")))
         found = sim("run", "scene.toml", "-o", "x.nc")
-    assert found.exit_code == 0
-    assert "note: x.nc.log was not written: " in found.stderr
+    assert found.exit_code == 0 and "note: x.nc.log was not written: " in found.stderr
     assert "the output is complete; its table could not be made: [Errno 5]" in found.stdout
     assert sim("stats", "x.nc").exit_code == 0
 
 
-@pytest.mark.parametrize(
-    ("name", "fault", "code", "start"),
-    [
+def test_trouble_of_the_system_has_its_code_and_place_and_a_fault_of_our_own_is_not_hidden(here, monkeypatch):
+    for name, fault, code, start in (
         ("pathlib.Path.mkdir", PermissionError(13, "Permission denied", "outputs"), 74, "outputs: "),
         ("numpy.savez", OSError(28, "No space left on device"), 74, "outputs/scene.nc.parts: "),
         ("sim.ensemble.simulate.run", MemoryError(), 1, "there is not enough memory; "),
-    ],
-)
-def test_trouble_of_the_system_has_its_code_and_names_the_place(here, monkeypatch, name, fault, code, start):
-    monkeypatch.setattr(name, Mock(side_effect=fault))
-    done = sim("run", "scene.toml")
-    assert done.exit_code == code and done.stderr.startswith(start)
-    assert not Path("outputs/scene.nc").exists()
-
-
-def test_a_fault_of_our_own_is_not_hidden(here, monkeypatch):
+    ):
+        with monkeypatch.context() as patched:
+            patched.setattr(name, Mock(side_effect=fault))
+            done = sim("run", "scene.toml")
+        assert done.exit_code == code and done.stderr.startswith(start)
+        assert not Path("outputs/scene.nc").exists()
     monkeypatch.setattr("sim.ensemble.simulate.run", Mock(side_effect=RuntimeError("ours")))
     assert isinstance(sim("run", "scene.toml").exception, RuntimeError)
 
 
-def test_a_value_of_set_is_toml_or_else_text():
+def test_check_prints_and_writes_nothing_and_a_value_of_set_is_toml_or_else_text(here):
+    done = sim("check", "scene.toml")
+    assert done.exit_code == 0 and done.stdout.startswith("a scene\n")
+    changed = sim("check", "scene.toml", "--set", 'bonds={ model = "none" }', "--set", 'drive.from="2 mm/s"')
+    assert re.search("bonds +none +changed", changed.stdout) and sim("check", "nope.toml").exit_code == 2
+    assert sorted(path.name for path in here.iterdir()) == ["scene.toml"]
     for text, value in (
         ("3", 3), ("true", True), ('"2 mN"', "2 mN"), ("2 mN", "2 mN"), ("", ""), ('{ model = "a" }', {"model": "a"}),
         ('["1 mN", "2 mN"]', ["1 mN", "2 mN"]), ("1\nother = 2", "1\nother = 2"), ("[" * 5000, "[" * 5000),
@@ -273,26 +266,13 @@ def test_a_value_of_set_is_toml_or_else_text():
         assert cli._values((f"contact.load={text}",), "--set") == {"contact.load": value}
 
 
-def test_check_prints_and_writes_nothing(here):
-    done = sim("check", "scene.toml")
-    assert done.exit_code == 0 and done.stdout.startswith("a scene\n")
-    changed = sim("check", "scene.toml", "--set", 'bonds={ model = "none" }', "--set", 'drive.from="2 mm/s"')
-    assert re.search("bonds +none +changed", changed.stdout)
-    assert sim("check", "nope.toml").exit_code == 2
-    assert sorted(path.name for path in here.iterdir()) == ["scene.toml"]
-
-
-def test_new_writes_a_scenario_that_runs(here):
-    done = sim("new", "mine")
-    assert done.exit_code == 0 and done.stdout.startswith("mine.toml: ")
-    assert sim("run", "mine.toml", "--quiet", "--members", 2).exit_code == 0
-    assert sim("new").stdout.startswith("first.toml: ")
-    for name, code in (("mine.toml", 73), ("no/where.toml", 74)):
-        again = sim("new", name)
-        assert again.exit_code == code and again.stderr.startswith(name)
-
-
-def test_paper_ends_with_1_if_anything_fails(monkeypatch):
+def test_a_wrong_command_ends_with_2_the_schema_is_json_and_paper_ends_with_1_if_anything_fails(monkeypatch):
+    for arguments in ([], ["nope"], ["run"], ["run", "--nope"]):
+        done = sim(*arguments)
+        assert (done.exit_code, "Traceback" in done.output) == (2, False)
+    assert sim("--version").stdout.startswith("sim, version ")
+    required = json.loads(sim("schema").stdout)["required"]
+    assert set(required) == {"clock", "solid", "sphere", "adhesion", "contact"}
     line = paper.Check("a", "1", computed=1.0, expected=1.0, error=0.0, tolerance=1e-12)
     for lines, code, last in (
         ([line], 0, "1 of 1 hold"),
@@ -303,15 +283,6 @@ def test_paper_ends_with_1_if_anything_fails(monkeypatch):
         assert (done.exit_code, done.stdout.splitlines()[-1], "FAILS" in done.stdout) == (code, last, code == 1)
 
 
-def test_a_wrong_command_ends_with_2_and_the_schema_is_json():
-    for arguments in ([], ["nope"], ["run"], ["run", "--nope"]):
-        done = sim(*arguments)
-        assert (done.exit_code, "Traceback" in done.output) == (2, False)
-    assert sim("--version").stdout.startswith("sim, version ")
-    required = json.loads(sim("schema").stdout)["required"]
-    assert set(required) == {"clock", "solid", "sphere", "adhesion", "contact"}
-
-
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory):
     """A finished run."""
@@ -319,13 +290,6 @@ def dataset(tmp_path_factory):
     (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
     assert sim("run", folder / "scene.toml", "-o", folder / "x.nc", "--quiet").exit_code == 0
     return folder / "x.nc"
-
-
-def test_no_number_of_a_table_is_cut_short(capsys):
-    cli.print_rows([{"a long heading": "1.23456789(12)" * 9, "[mm/s]": "[bold]2[/bold]"}] * 2)
-    printed = capsys.readouterr().out
-    assert printed.count("1.23456789(12)" * 9) == 2 and "[mm/s]" in printed and "[bold]2[/bold]" in printed
-    cli.print_rows([])
 
 
 @pytest.fixture
@@ -340,23 +304,6 @@ def made(dataset, here):
 
 def content(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
-
-
-def test_an_existing_file_is_replaced_only_if_asked(made, monkeypatch):
-    monkeypatch.setattr("sim.study.converge.converge", None)  # computing would fail
-    for arguments, file in (
-        (["stats", "x.nc", "--csv", "x.csv"], "x.csv"),
-        (["plot", "x.nc"], "x.png"),
-        (["converge", "scene.toml", "-o", "new.nc"], "new.nc"),
-        (["converge", "scene.toml", "-o", "new"], "new.png"),
-    ):
-        before = content(made)
-        done = sim(*arguments)
-        assert done.exit_code == 73 and done.stderr.startswith(file) and "--force" in done.stderr
-        assert content(made) == before
-        if arguments[0] != "converge":
-            assert sim(*arguments, "--force").exit_code == 0
-            assert {name for name, now in content(made).items() if now != before.get(name)} == {file}
 
 
 def test_a_scenario_its_tables_and_datasets_are_never_replaced(made):
@@ -377,18 +324,30 @@ def test_a_scenario_its_tables_and_datasets_are_never_replaced(made):
         assert content(made) == before
 
 
-def test_an_older_picture_stays_whole_if_the_new_one_fails(made, monkeypatch):
-    def full(*arguments, **options):
-        Path(arguments[1]).write_bytes(b"torn")
+def test_an_older_file_is_replaced_only_if_asked_and_stays_whole_if_the_new_one_fails(made, monkeypatch):
+    monkeypatch.setattr("sim.study.converge.converge", None)  # computing would fail
+    for arguments, file in (
+        (["stats", "x.nc", "--csv", "x.csv"], "x.csv"), (["plot", "x.nc"], "x.png"),
+        (["converge", "scene.toml", "-o", "new.nc"], "new.nc"), (["converge", "scene.toml", "-o", "new"], "new.png"),
+    ):  # fmt: skip
+        before = content(made)
+        done = sim(*arguments)
+        assert done.exit_code == 73 and done.stderr.startswith(file) and "--force" in done.stderr
+        assert content(made) == before
+        if arguments[0] != "converge":
+            assert sim(*arguments, "--force").exit_code == 0
+            assert {name for name, now in content(made).items() if now != before.get(name)} == {file}
+
+    def full(figure, path, **options):
+        Path(path).write_bytes(b"torn")
         raise OSError(28, "No space left on device")
 
     before = content(made)
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", full)
-    assert sim("plot", "x.nc", "--force").exit_code == 74
-    assert content(made) == before
+    assert sim("plot", "x.nc", "--force").exit_code == 74 and content(made) == before
 
 
-def test_stats_writes_a_table_and_plot_a_picture_beside_the_dataset_or_where_asked(dataset, here):
+def test_stats_and_plot_write_beside_the_dataset_or_where_asked_or_refuse_in_one_line(dataset, here):
     done = sim("stats", dataset, "--csv", "new/table.csv")
     assert (done.exit_code, done.stdout.splitlines()[-1]) == (0, "new/table.csv")
     header, *rows = csv.reader(Path("new/table.csv").read_text(encoding="utf-8").splitlines())
@@ -399,23 +358,24 @@ def test_stats_writes_a_table_and_plot_a_picture_beside_the_dataset_or_where_ask
     assert Path("new/picture.svg").read_text(encoding="utf-8").startswith("<?xml")
     assert sim("plot", dataset).stdout.strip() == str(dataset.with_suffix(".png"))
     assert dataset.with_suffix(".png").exists()
-
-
-def test_a_figure_or_a_table_that_cannot_be_made_is_refused_in_one_line(dataset, here):
     for arguments, code, message in (
-        (["plot", dataset, "banana"], 2, "known: "),
-        (["plot", dataset, "map"], 2, "x.nc: "),
+        (["plot", dataset, "banana"], 2, "known: "), (["plot", dataset, "map"], 2, "x.nc: "),
         (["plot", dataset, "-o", "picture.xyz"], 2, "xyz"),
-        (["plot", dataset, "-o", "scene.toml/picture.png"], 74, "scene.toml"),
-        (["stats", "nope.nc"], 2, "nope.nc: "),
-        (["plot", "."], 2, ".: "),
-        (["stats", "scene.toml"], 2, "`sim run`"),
-    ):
+        (["plot", dataset, "-o", "scene.toml/picture.png"], 74, "scene.toml"), (["stats", "nope.nc"], 2, "nope.nc: "),
+        (["plot", "."], 2, ".: "), (["stats", "scene.toml"], 2, "`sim run`"),
+    ):  # fmt: skip
         done = sim(*arguments)
         assert (done.exit_code, message in done.stderr, len(done.stderr.splitlines())) == (code, True, 1)
 
 
-def test_converge_prints_a_table_a_recommendation_and_its_files(here):
+def test_new_writes_a_scenario_that_runs_and_converge_prints_a_table_a_recommendation_and_its_files(here):
+    done = sim("new", "mine")
+    assert done.exit_code == 0 and done.stdout.startswith("mine.toml: ")
+    assert sim("run", "mine.toml", "--quiet", "--members", 2).exit_code == 0
+    assert sim("new").stdout.startswith("first.toml: ")
+    for name, code in (("mine.toml", 73), ("no/where.toml", 74)):
+        again = sim("new", name)
+        assert again.exit_code == code and again.stderr.startswith(name)
     starter = (Path(cli.__file__).parent / "starter.toml").read_text(encoding="utf-8")
     Path("scene.toml").write_text(starter.replace('duration = "2 s"', 'duration = "0.2 s"'), encoding="utf-8")
     done = sim("converge", "scene.toml", "--budget", "0.5 s", "--tolerance", "2 %")
@@ -439,22 +399,7 @@ def test_a_reduced_file_has_a_table_and_names_what_a_figure_misses(here):
 MARKS = "\x1b]0;x\x07\x9b31m\u202e\u2066"
 
 
-def test_a_terminal_without_utf_8_gets_replacements(here, monkeypatch):
-    Path("scene.toml").write_text(SCENE.replace("a scene", "τ1 → ∮"), encoding="utf-8")
-    command = [sys.executable, "-m", "sim", "check", "scene.toml"]
-    environment = os.environ | {"PYTHONIOENCODING": "cp1252"}
-    done = subprocess.run(command, env=environment, capture_output=True, timeout=120, check=False)
-    assert (done.returncode, complaints(done.stderr.decode())) == (0, [])
-    assert b"?" in done.stdout
-    screen = io.TextIOWrapper(io.BytesIO(), encoding="ascii")  # and so does a table
-    monkeypatch.setattr(sys, "stdout", screen)
-    monkeypatch.setattr(cli.cli, "main", lambda **how: cli.print_rows([{"τ": "→"}]))
-    cli.main()
-    screen.flush()
-    assert screen.buffer.getvalue() == b"?\n?\n"
-
-
-def test_no_control_character_of_a_scenario_or_a_dataset_reaches_the_terminal(dataset, here):
+def test_no_control_character_reaches_the_terminal_and_one_without_utf_8_gets_replacements(dataset, here, monkeypatch):
     name = json.dumps(MARKS)
     text = SCENE.replace('"a scene"', name)
     Path("scene.toml").write_text(text + f'[sweep]\n"contact.load" = [1, {name}]\n', encoding="utf-8")
@@ -469,12 +414,27 @@ def test_no_control_character_of_a_scenario_or_a_dataset_reaches_the_terminal(da
     for done in shown:
         assert done.output
         assert done.output.replace("\n", "").isprintable(), done.output
+    Path("scene.toml").write_text(SCENE.replace("a scene", "τ1 → ∮"), encoding="utf-8")
+    command = [sys.executable, "-m", "sim", "check", "scene.toml"]
+    environment = os.environ | {"PYTHONIOENCODING": "cp1252"}
+    done = subprocess.run(command, env=environment, capture_output=True, timeout=120, check=False)
+    assert (done.returncode, complaints(done.stderr.decode())) == (0, []) and b"?" in done.stdout
+    screen = io.TextIOWrapper(io.BytesIO(), encoding="ascii")  # and so does a table
+    monkeypatch.setattr(sys, "stdout", screen)
+    monkeypatch.setattr(cli.cli, "main", lambda **how: cli.print_rows([{"τ": "→"}]))
+    cli.main()
+    screen.flush()
+    assert screen.buffer.getvalue() == b"?\n?\n"
 
 
-def test_everything_is_printed_by_one_function():
+def test_everything_is_printed_by_one_function_and_no_number_is_cut_short(capsys):
     folder = Path(cli.__file__).parent
     texts = {path.name: path.read_text(encoding="utf-8") for path in folder.rglob("*.py")}
     assert [name for name, text in texts.items() if "click.echo(" in text] == ["terminal.py"]
+    cli.print_rows([{"a long heading": "1.23456789(12)" * 9, "[mm/s]": "[bold]2[/bold]"}] * 2)
+    printed = capsys.readouterr().out
+    assert printed.count("1.23456789(12)" * 9) == 2 and "[mm/s]" in printed and "[bold]2[/bold]" in printed
+    cli.print_rows([])
 
 
 def test_max_memory_is_honoured_and_refused_with_the_least_where_it_is_too_little(here, monkeypatch):

@@ -97,7 +97,7 @@ def flipped(path, name):
         yield Path("flipped.nc")
 
 
-def test_a_changed_byte_of_a_checksummed_variable_is_named_and_never_read(folder):
+def test_a_changed_byte_of_a_checksummed_variable_or_map_is_named_and_never_read(folder):
     with package.open("out.nc") as dataset:
         checked = {name: {"fletcher32": True, "zlib": True} for name in ("contact_area", "contact_radius")}
         dataset.load().to_netcdf("checked.nc", encoding=checked)
@@ -109,9 +109,6 @@ def test_a_changed_byte_of_a_checksummed_variable_is_named_and_never_read(folder
     done = sim("stats", "flipped.nc")
     assert (done.exit_code, done.stdout) == (2, "")
     assert done.stderr.startswith("flipped.nc: variable contact_area is damaged") and done.stderr.count("\n") == 1
-
-
-def test_a_changed_byte_of_a_checksummed_map_is_a_fault_of_the_scenario(folder):
     noise = np.random.Generator(np.random.Philox(key=1)).standard_normal((16, 16))
     maps = xr.Dataset({"shear_map": (("row", "column"), noise)})
     maps.to_netcdf("sound.nc", encoding={"shear_map": {"fletcher32": True, "zlib": True}})
@@ -136,7 +133,7 @@ def test_maps_of_netcdf_in_its_formats_are_read_and_other_files_are_refused(fold
     assert "map.nc: is not a netCDF file" in sim("check", "mapped.toml").stderr
 
 
-def test_a_dataset_of_an_older_version_says_once_which_statements_it_lacks(folder):
+def test_a_dataset_of_an_older_version_says_what_it_lacks_and_none_makes_a_figure_read_a_file(folder):
     with package.open("out.nc") as dataset:
         dataset.load().drop_vars(["peak_friction", "bonds_radius"]).to_netcdf("old.nc")
     for command in (["stats"], ["plot", "time"]):
@@ -145,10 +142,6 @@ def test_a_dataset_of_an_older_version_says_once_which_statements_it_lacks(folde
         assert all(words in done.stderr for words in ("old.nc", "lost to bonds", "peak of friction"))
         assert "masked" not in done.stderr
     assert sim("stats", "out.nc").stderr == ""
-
-
-def test_a_dataset_makes_no_figure_read_a_file_it_names():
-    """A spectrum in the scenario of a dataset may name a file; its rows must be in the dataset."""
     for model in ("tabulated", "measured"):
         scenario = {"shear": {"spectrum": {"model": model, "file": "secret.csv"}, "amplitude": {}}}
         dataset = xr.Dataset(attrs={"scenario_resolved": json.dumps(scenario)})
@@ -169,12 +162,3 @@ def test_no_message_shows_what_stands_in_a_file_elsewhere(folder, text):
             scenario.write_text(head + drive.format(name) + rest, encoding="utf-8")
             message = sim("check", scenario).stderr.replace(str(folder), "")
             assert message and not any(word in message for word in ("alice", "hunter2", "swordfish", "31415"))
-
-
-def test_names_of_columns_are_shown_of_a_table_beside_the_scenario(folder):
-    Path("v.csv").write_text("time [s], sped [m/s], x=3\n0,1,2\n", encoding="utf-8")
-    Path("scene.toml").write_text(
-        SCENE.replace('model = "ramp"\nfrom = "1 mm/s"\nto = "20 mm/s"', 'model = "table"\nfile = "v.csv"'),
-        encoding="utf-8",
-    )
-    assert 'column "speed" is missing' in sim("check", "scene.toml").stderr

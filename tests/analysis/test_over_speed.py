@@ -7,17 +7,25 @@ import pytest
 import xarray as xr
 from helpers import lens
 from helpers.lens import LOAD, MODULUS, RADIUS, WORK, scene
+from helpers.parts import (
+    Adhesion,
+    Band,
+    Clock,
+    Equilibrium,
+    RateDependent,
+    Record,
+    analysis,
+    bonds,
+    drive,
+    jkr,
+    run,
+    shear,
+)
+from numpy.testing import assert_allclose, assert_array_equal
 
-from sim import analysis
 from sim.analysis import dataset as dataset_module, over_speed
 from sim.analysis.observables import charges, observables
-from sim.ensemble.simulate import run
-from sim.laws import jkr
-from sim.parts import drive
-from sim.parts.bonds import models as bonds
-from sim.parts.contact import Equilibrium
-from sim.parts.shear import models as shear
-from sim.scenario.clock import Clock, Record
+from sim.laws import reversible
 
 SPEEDS = np.geomspace(1e-3, 1e3, 61)
 NAMES = ("speed_at_5_percent_lost", "speed_at_50_percent_lost", "speed_halfway_to_hertz")
@@ -26,15 +34,6 @@ NAMES = ("speed_at_5_percent_lost", "speed_at_50_percent_lost", "speed_halfway_t
 def falling(speeds):
     """Falls by half at speed 1; straight lines over the speed's logarithm are off by far less than errors."""
     return 1.0 / (1.0 + speeds)
-
-
-def test_a_crossing_is_exact_on_straight_lines_over_the_logarithm():
-    curve = 1.0 - 0.1 * np.log(SPEEDS / SPEEDS[0])
-    result = analysis.crossing(SPEEDS, curve[None], np.ones(1), 0.55)
-    np.testing.assert_allclose(result.speed, SPEEDS[0] * math.exp(4.5), rtol=1e-12)
-    assert math.isnan(result.low) and math.isnan(result.high)
-    for level in (1.5, -1.0):  # there from the lowest speed on; never there
-        assert math.isnan(analysis.crossing(SPEEDS, curve[None], np.ones(1), level).speed)
 
 
 @pytest.mark.parametrize(("count", "spread"), [(61, 0.03), (1201, 0.1)], ids=["below the steps", "above the steps"])
@@ -63,57 +62,45 @@ def speed_of_loss(loss):
     return 1e-2 * (WORK / work - 1.0)
 
 
-@pytest.mark.parametrize("swept", [True, False], ids=["sweep", "ramp"])
-def test_speeds_of_bonds_that_break_are_those_of_the_law(swept):
-    quiet = {"bonds": bonds.Steady(critical_speed=1e-2, stress=3e5), "shear": shear.Uniform()}
-    if swept:
-        speeds = {"drive.speed": list(np.geomspace(1e-4, 1.0, 161)), "contact.load": [LOAD, 2 * LOAD]}
-        clock = Clock(duration=0.02, step=0.01)
-        result = analysis.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2), sweep=speeds, clock=clock, **quiet)))
-        result = result.isel(contact_load=0)
-    else:
-        result = analysis.loss_speeds(
-            run(
-                scene(
-                    drive=drive.Ramp(start=1e-4, stop=1.0, scale="log"), clock=Clock(duration=1.6, step=0.01), **quiet
-                )
-            )
-        )
-    hertz = jkr_area(0.0) / jkr_area(WORK)
-    for name, loss in ((NAMES[0], 0.05), (NAMES[2], 0.5 * (1.0 - hertz))):
-        # the largest curvature of the loss over log V is below one: (log step)^2/8 of it between speeds
-        np.testing.assert_allclose(result[name], speed_of_loss(loss), rtol=2e-2)
-    assert math.isnan(result[NAMES[1]])  # Hertz's area is two thirds
-    assert result[NAMES[0]].attrs["units"] == "m/s"
+def test_speeds_and_curves_of_bonds_that_break_are_those_of_the_law():
+    for swept in [True, False]:
+        quiet = {"bonds": bonds.Steady(critical_speed=1e-2, stress=3e5), "shear": shear.Uniform()}
+        if swept:
+            speeds = {"drive.speed": list(np.geomspace(1e-4, 1.0, 161)), "contact.load": [LOAD, 2 * LOAD]}
+            clock = Clock(duration=0.02, step=0.01)
+            dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep=speeds, clock=clock, **quiet))
+            result = analysis.loss_speeds(dataset).isel(contact_load=0)
+        else:
+            ramp = {"drive": drive.Ramp(start=1e-4, stop=1.0, scale="log"), "clock": Clock(duration=1.6, step=0.01)}
+            result = analysis.loss_speeds(run(scene(**ramp, **quiet)))
+        hertz = jkr_area(0.0) / jkr_area(WORK)
+        for name, loss in ((NAMES[0], 0.05), (NAMES[2], 0.5 * (1.0 - hertz))):
+            # the largest curvature of the loss over log V is below one: (log step)^2/8 of it between speeds
+            assert_allclose(result[name], speed_of_loss(loss), rtol=2e-2)
+        assert math.isnan(result[NAMES[1]])  # Hertz's area is two thirds
+        assert result[NAMES[0]].attrs["units"] == "m/s"
+    for swept in [True, False]:
+        quiet = {"bonds": bonds.Steady(critical_speed=1e-2, stress=3e5), "clock": Clock(duration=0.4, step=0.01)}
+        if swept:
+            moved = {"drive": drive.Steady(speed=1e-2), "sweep": {"drive.speed": [1e-4, 1e-3, 1e-2]}}
+        else:
+            moved = {"drive": drive.Ramp(start=1e-4, stop=1e-2), "sweep": {"contact.load": [LOAD, 2.0 * LOAD]}}
+        result = analysis.speed_curves(run(scene(**moved, **quiet)))
+        assert result["contact_area_mean"].dims == (("speed",) if swept else ("contact_load", "speed"))
+        assert result["speed"].attrs["units"] == "m/s" and float(result["speed"][-1]) == 1e-2
+        law = 3e5 / (1.0 + result["speed"] / 1e-2)
+        assert_allclose(result["shear_stress_mean"], law.broadcast_like(result["shear_stress_mean"]), rtol=1e-12)
+        assert_allclose(result["friction_force_mean"], result["contact_area_mean"] * law, rtol=1e-12)
+        assert float(result["contact_area_sem"].max()) > 0.0 and bool((result["friction_force_low"] > 0.0).all())
 
 
-@pytest.mark.parametrize("swept", [True, False], ids=["sweep", "ramp"])
-def test_curves_over_the_speed_are_those_of_the_law(swept):
-    """Steady bonds: the stress is 0.3 MPa/(1 + V/V_c), and friction is stress times area."""
-    quiet = {"bonds": bonds.Steady(critical_speed=1e-2, stress=3e5), "clock": Clock(duration=0.4, step=0.01)}
-    if swept:
-        moved = {"drive": drive.Steady(speed=1e-2), "sweep": {"drive.speed": [1e-4, 1e-3, 1e-2]}}
-    else:
-        moved = {"drive": drive.Ramp(start=1e-4, stop=1e-2), "sweep": {"contact.load": [LOAD, 2.0 * LOAD]}}
-    result = analysis.speed_curves(run(scene(**moved, **quiet)))
-    assert result["contact_area_mean"].dims == (("speed",) if swept else ("contact_load", "speed"))
-    assert result["speed"].attrs["units"] == "m/s" and float(result["speed"][-1]) == 1e-2
-    law = 3e5 / (1.0 + result["speed"] / 1e-2)
-    np.testing.assert_allclose(result["shear_stress_mean"], law.broadcast_like(result["shear_stress_mean"]), rtol=1e-12)
-    np.testing.assert_allclose(result["friction_force_mean"], result["contact_area_mean"] * law, rtol=1e-12)
-    assert float(result["contact_area_sem"].max()) > 0.0 and bool((result["friction_force_low"] > 0.0).all())
-
-
-def test_curves_over_a_speed_that_stays_are_refused_and_those_of_what_is_missing_named():
-    with pytest.raises(ValueError, match="nor is swept"):
-        analysis.speed_curves(run(scene(drive=drive.Steady(speed=1e-2))))
-    with pytest.raises(ValueError, match='add "friction_force" to record'):
-        analysis.speed_curves(run(scene(record=Record(quantities=["speed", "contact_area"]))))
-    (share,) = analysis.speed_curves(lens.ramp(), "lost_to_bonds")[["lost_to_bonds_mean"]].values()
-    assert share.dims == ("speed",) and 0.0 < float(share[-1]) < 1.0
-
-
-def test_a_ramp_is_read_in_pieces_of_its_time(monkeypatch):
+def test_crossings_are_exact_on_straight_lines_and_a_ramp_is_read_in_pieces(monkeypatch):
+    curve = 1.0 - 0.1 * np.log(SPEEDS / SPEEDS[0])
+    result = analysis.crossing(SPEEDS, curve[None], np.ones(1), 0.55)
+    assert_allclose(result.speed, SPEEDS[0] * math.exp(4.5), rtol=1e-12)
+    assert math.isnan(result.low) and math.isnan(result.high)
+    for level in (1.5, -1.0):  # there from the lowest speed on; never there
+        assert math.isnan(analysis.crossing(SPEEDS, curve[None], np.ones(1), level).speed)
     ramp, read = lens.ramp().isel(member=[0]), []
     whole = analysis.loss_speeds(ramp)
     monkeypatch.setattr(dataset_module, "ROOM", 500)
@@ -122,49 +109,215 @@ def test_a_ramp_is_read_in_pieces_of_its_time(monkeypatch):
     assert len(read) > 1 and sum(read) == ramp.sizes["t"] and math.isfinite(whole[NAMES[0]])
 
 
-def test_speeds_of_fluctuating_members_have_an_error_and_statistics_alone_none():
+def test_the_order_of_charging_changes_no_sum_and_fluctuations_alone_leave_the_area_of_their_work():
+    for contact in [
+        Equilibrium(load=LOAD), Equilibrium(indentation=1e-6), Equilibrium(displacement=2e-6, stiffness=2e3),
+        Equilibrium(load=LOAD, reversible=0.2),
+    ]:  # fmt: skip
+        dataset = run(scene(contact=contact))
+        shares = charges(dataset)
+        bonds_first = shares["lost_to_bonds"] + shares["lost_to_fluctuations"]
+        fluctuations_first = shares["lost_to_fluctuations_first"] + shares["lost_to_bonds_last"]
+        assert_allclose(fluctuations_first - bonds_first, 0.0, rtol=0, atol=1e-14)
+        assert float(abs(shares["order_of_charging"]).max()) > 1e-3
+    shared, charged = analysis.shares(lens.ramp()), charges(lens.ramp())
+    apart = np.hypot(shared["lost_to_fluctuations_sem"], shared["lost_to_fluctuations_first_sem"])
+    differ = float(charged["order_of_charging"].isel(t=-8).std("member", ddof=1)) / math.sqrt(6.0)
+    assert_allclose(shared["order_of_charging_sem"][-8], differ, rtol=1e-9)
+    assert differ < 0.9 * float(apart[-8])
+    dataset = lens.ramp()
+    left = jkr_area(WORK - dataset["fluctuation_energy"].to_numpy())
+    result = charges(dataset)["lost_to_fluctuations_first"]
+    assert_allclose(result, 1.0 - left / jkr_area(WORK), rtol=0, atol=1e-14)
+    unbroken = run(scene(bonds=bonds.Unbroken()))
+    assert_allclose(charges(unbroken)["order_of_charging"], 0.0, atol=1e-14)
+
+
+def test_curves_and_speeds_of_loss_of_what_stays_or_is_missing_are_refused_or_left_out():
+    with pytest.raises(ValueError, match="nor is swept"):
+        analysis.speed_curves(run(scene(drive=drive.Steady(speed=1e-2))))
+    with pytest.raises(ValueError, match='add "friction_force" to record'):
+        analysis.speed_curves(run(scene(record=Record(quantities=["speed", "contact_area"]))))
+    (share,) = analysis.speed_curves(lens.ramp(), "lost_to_bonds")[["lost_to_bonds_mean"]].values()
+    assert share.dims == ("speed",) and 0.0 < float(share[-1]) < 1.0
     result = analysis.loss_speeds(lens.ramp())
     low, at, high = (float(result[NAMES[0] + end]) for end in ("_low", "", "_high"))
     assert 1e-5 < low < at < high < 1e-1
     assert not analysis.loss_speeds(run(scene(record=Record(per_member=False))))
     assert not analysis.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2))))
-
-
-@pytest.mark.parametrize(
-    "contact",
-    [
-        Equilibrium(load=LOAD),
-        Equilibrium(indentation=1e-6),
-        Equilibrium(displacement=2e-6, stiffness=2e3),
-        Equilibrium(load=LOAD, reversible=0.2),
-    ],
-    ids=["load", "indentation", "displacement", "reversible"],
-)
-def test_both_orders_of_charging_add_up_to_the_same_loss(contact):
-    dataset = run(scene(contact=contact))
-    shares = charges(dataset)
-    bonds_first = shares["lost_to_bonds"] + shares["lost_to_fluctuations"]
-    fluctuations_first = shares["lost_to_fluctuations_first"] + shares["lost_to_bonds_last"]
-    np.testing.assert_allclose(fluctuations_first - bonds_first, 0.0, rtol=0, atol=1e-14)
-    assert float(abs(shares["order_of_charging"]).max()) > 1e-3
-
-
-def test_fluctuations_alone_leave_the_area_of_their_work():
-    dataset = lens.ramp()
-    left = jkr_area(WORK - dataset["fluctuation_energy"].to_numpy())
-    result = charges(dataset)["lost_to_fluctuations_first"]
-    np.testing.assert_allclose(result, 1.0 - left / jkr_area(WORK), rtol=0, atol=1e-14)
-    unbroken = run(scene(bonds=bonds.Unbroken()))
-    np.testing.assert_allclose(charges(unbroken)["order_of_charging"], 0.0, atol=1e-14)
-
-
-def test_the_error_of_the_difference_of_orders_is_that_of_what_members_share():
-    shared, charged = analysis.shares(lens.ramp()), charges(lens.ramp())
-    apart = np.hypot(shared["lost_to_fluctuations_sem"], shared["lost_to_fluctuations_first_sem"])
-    differ = float(charged["order_of_charging"].isel(t=-8).std("member", ddof=1)) / math.sqrt(6.0)
-    np.testing.assert_allclose(shared["order_of_charging_sem"][-8], differ, rtol=1e-9)
-    assert differ < 0.9 * float(apart[-8])
-
-
-def test_where_the_other_order_is_not_known_it_is_left_out():
     assert "order_of_charging_mean" not in analysis.shares(run(scene(record=Record(per_member=False))))
+
+
+def test_shares_of_a_sweep_are_those_of_its_points():
+    for sweep in (
+        {"contact.load": [1e-3, 1.6e-2]},
+        [{"sphere.radius": 1e-3, "contact.load": 1e-3}, {"sphere.radius": 4e-3, "contact.load": 8e-3}],
+        {"adhesion.work": [2e-2, 8e-2], "adhesion.bond_share": [0.3, 1.0]},
+        {"contact": [{"model": "rate_dependent", "indentation": 1e-6, "front_speed": 1.0},
+                     {"model": "equilibrium", "load": {"from": 4e-3, "to": 1e-3}, "reversible": 0.02}]},
+    ):  # fmt: skip
+        swept = scene(sweep=sweep)
+        dataset = run(swept)
+        together, ratio = analysis.share_observables(dataset), analysis.observables(dataset)["area_ratio"]
+        dims = [name for name in ratio.dims if name not in ("member", "t")]
+        for k, point in enumerate(swept.points()):
+            place = dict(zip(dims, np.unravel_index(k, [ratio.sizes[name] for name in dims]), strict=True))
+            alone = run(point)
+            assert_array_equal(ratio.isel(place), analysis.observables(alone)["area_ratio"])
+            shares = analysis.share_observables(alone)
+            for name in together:  # a mechanism that a point lacks takes nothing there
+                assert_array_equal(together[name].isel(place) - shares.get(name, 0.0), 0.0)
+
+
+def test_shares_and_what_is_left_add_up_to_one_and_are_unknown_without_contact_or_members(ramp):
+    lost, left = analysis.share_observables(ramp), analysis.observables(ramp)["area_ratio"]
+    total = lost["lost_to_bonds"] + lost["lost_to_fluctuations"] + left
+    assert_allclose(total, 1.0, rtol=1e-15)
+    assert lost["lost_to_fluctuations"].dims == ("member", "t")
+    shares, lost = analysis.shares(ramp), analysis.share_observables(ramp)["lost_to_fluctuations"].to_numpy()
+    assert_allclose(shares["lost_to_fluctuations_sem"], lost.std(axis=0, ddof=1) / math.sqrt(6), rtol=1e-10)
+    # a mean-field population does not fluctuate: nothing but rounding is left
+    assert_allclose(shares["lost_to_bonds_sem"], 0.0, rtol=0, atol=1e-15)
+    lifted = Equilibrium(load=1.5 * float(jkr.pull_off_load(WORK, RADIUS)))
+    shares = analysis.shares(run(scene(contact=lifted, shear=shear.Uniform())))
+    assert bool(shares["lost_to_bonds_mean"].isnull().all()) and math.isnan(shares["area_ratio_hertz"])
+    for parts in (
+        {"bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=100)},
+        {"contact": Equilibrium(load=LOAD, reversible=0.02)},
+        {"contact": RateDependent(load=LOAD, front_speed=1e-3)},
+    ):
+        with pytest.raises(ValueError, match="per_member = true"):
+            analysis.shares(run(scene(record=Record(per_member=False), **parts)))
+
+
+def test_bonds_fluctuations_and_mean_stress_take_what_their_laws_say():
+    shares = analysis.shares(run(scene(shear=shear.Uniform(), bonds=bonds.Steady(critical_speed=1e-2))))
+    speed = np.geomspace(1e-5, 1e-1, 21)
+    area = [jkr.radius_at_load(LOAD, w, RADIUS, MODULUS) ** 2 for w in (WORK, WORK / (1.0 + speed / 1e-2))]
+    # the loss is a difference of areas: its rounding is that of one
+    assert_allclose(shares["lost_to_bonds_mean"], 1.0 - area[1] / area[0], rtol=1e-12, atol=1e-15)
+    assert_array_equal(shares["lost_to_fluctuations_mean"], 0.0)
+    masking = shear.Mean(spectrum=Band(rms=1e6, longest=60e-6, shortest=24e-6))
+    shares = analysis.shares(run(scene(adhesion=Adhesion(work=WORK, bond_share=0.0), shear=masking)))
+    hertz, full = jkr.hertz_radius_at_load(LOAD, RADIUS, MODULUS), jkr.radius_at_load(LOAD, WORK, RADIUS, MODULUS)
+    assert_allclose(shares["lost_to_bonds_mean"], 0.0, rtol=0, atol=1e-15)
+    assert_allclose(shares["lost_to_fluctuations_mean"], 1.0 - (hertz / full) ** 2, rtol=1e-13)
+    assert_allclose(shares["area_ratio_hertz"], (hertz / full) ** 2, rtol=1e-13)
+    assert_allclose([shares["radius_jkr"], shares["radius_hertz"]], [full, hertz], rtol=1e-13)
+    part = Equilibrium(load=LOAD, reversible=0.02)
+    shares = analysis.shares(run(scene(contact=part, bonds=bonds.Unbroken(stress=3e5), shear=shear.Uniform())))
+    full = jkr.radius_at_load(LOAD, WORK, RADIUS, MODULUS)
+    left = reversible.radius_at_load_reversible(LOAD, WORK, 3e5, 0.02, RADIUS, MODULUS)
+    assert_allclose(shares["lost_to_mean_stress_mean"], 1.0 - (left / full) ** 2, rtol=1e-11)
+    for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean"):
+        assert_allclose(shares[name], 0.0, rtol=0, atol=1e-13)
+    for control, radius in (
+        ({"load": LOAD}, lambda w: jkr.radius_at_load(LOAD, w, RADIUS, MODULUS)),
+        ({"indentation": 2e-6}, lambda w: jkr.radius_at_indentation(2e-6, w, RADIUS, MODULUS)),
+    ):
+        field = shear.Mean(spectrum=Band(rms=80e3, longest=60e-6, shortest=24e-6))
+        population = bonds.Steady(critical_speed=1e-2, stress=1e5)
+        dataset = run(scene(contact=Equilibrium(**control, reversible=0.03), bonds=population, shear=field))
+        shares = analysis.shares(dataset)
+        bonded = WORK / (1.0 + np.geomspace(1e-5, 1e-1, 21) / 1e-2)
+        areas = [radius(w) ** 2 for w in (np.full(21, WORK), bonded, bonded - dataset["fluctuation_energy"].to_numpy())]
+        areas.append((dataset["contact_radius"].to_numpy()) ** 2)
+        names = ("lost_to_bonds", "lost_to_fluctuations", "lost_to_mean_stress")
+        for name, before, after in zip(names, areas[:-1], areas[1:], strict=True):
+            # the work is put together again from its parts, near the fluctuations' onset of masking to 1e-12 of itself
+            assert_allclose(shares[f"{name}_mean"], (before - after) / areas[0], rtol=1e-9, atol=1e-12)
+        assert 0.01 < float(shares["lost_to_mean_stress_mean"].max()) < 0.5
+
+
+def test_a_lagging_edge_loses_nothing_that_it_has_still_to_lose_and_has_its_own_equilibrium():
+    # A jump of the speed breaks half of the bonds at once; the edge follows within a few records.
+    jump = drive.Table(time=(0.0, 0.1, 0.1, 0.4), speed=(0.0, 0.0, 1e-2, 1e-2))
+    part = RateDependent(load=LOAD, front_speed=1e-4)
+    population = bonds.Steady(critical_speed=1e-2)
+    shares = analysis.shares(run(scene(contact=part, drive=jump, bonds=population, shear=shear.Uniform())))
+    assert_allclose(shares["lost_to_fluctuations_mean"], 0.0, rtol=0, atol=1e-13)
+    lag, lost = shares["lost_to_lag_mean"].to_numpy(), shares["lost_to_bonds_mean"].to_numpy()
+    assert_allclose(lag[:5], 0.0, rtol=0, atol=1e-13)
+    assert lag.min() < -0.3 * lost[-1]  # the area is still there that the bonds no longer pay for
+    assert np.all(np.diff(lag[6:]) > 0.0)
+    assert "lost_to_lag_mean" not in analysis.shares(run(scene(shear=shear.Uniform())))
+    down = RateDependent(indentation={"from": -1e-5, "to": 1e-5}, front_speed=1e-3)
+    dataset = run(scene(contact=down, bonds=bonds.Unbroken(), shear=shear.Uniform(), clock=Clock(0.4, 0.02)))
+    assert dataset["in_contact"].to_numpy()[9:12].tolist() == [0, 0, 1]
+    lost = analysis.share_observables(dataset)
+    assert_array_equal(lost["lost_to_lag"].isnull(), np.arange(21) < 10)
+    assert float(lost["lost_to_lag"][10]) == 1.0
+    assert_array_equal(lost["lost_to_fluctuations"][10:], 0.0)
+    control = {"load": {"from": 4e-3, "to": 20e-3}, "reversible": 0.02}
+    parts = {"bonds": bonds.Unbroken(stress=1e5), "shear": shear.Uniform()}
+    lagging = run(scene(contact=RateDependent(front_speed=1e-7, **control), **parts))
+    settled = run(scene(contact=Equilibrium(**control), **parts))
+    assert_allclose(lagging["equilibrium_radius"], settled["contact_radius"], rtol=1e-14)
+    assert float(lagging["contact_radius"][-1]) < 0.99 * float(settled["contact_radius"][-1])
+
+
+MOVED = {
+    "load": {"load": {"from": 1e-3, "to": 8e-3, "scale": "log", "cycles": 2}},
+    "load in a table": {"load": {"time": [0.0, 0.1, 0.4], "value": [1e-3, 8e-3, -0.2e-3]}},
+    "indentation": {"indentation": {"from": 2e-6, "to": -0.4e-6, "cycles": 1}},
+    "displacement": {"displacement": {"from": 3e-6, "to": -0.5e-6, "cycles": 3}, "stiffness": 2e3},
+}
+
+
+@pytest.mark.parametrize("control", MOVED)
+@pytest.mark.parametrize("records", [(0, 10, 17), pytest.param((0, 3, 10, 17, 20), marks=pytest.mark.verify)])
+def test_shares_of_a_moved_sphere_are_those_at_its_present_place(records, control):
+    """Each record of a course is the same as a run at its value: the parts react at once."""
+    parts = {"bonds": bonds.Steady(critical_speed=1e-2), "drive": drive.Steady(speed=3e-3)}
+    parts["shear"] = shear.Mean(spectrum=Band(rms=60e3, longest=60e-6, shortest=24e-6))
+    moving = Equilibrium(**MOVED[control])
+    dataset = run(scene(contact=moving, **parts))
+    moved = analysis.share_observables(dataset)
+    kind = next(name for name in ("load", "indentation", "displacement") if name in MOVED[control])
+    held = MOVED[control] | {kind: moving.course.at(dataset["t"].to_numpy(), 0.4).tolist()}
+    for at in records:
+        still = run(scene(contact=Equilibrium(**(held | {kind: float(held[kind][at])})), **parts))
+        lost = analysis.share_observables(still)
+        for name in ("lost_to_bonds", "lost_to_fluctuations"):
+            assert_allclose(moved[name][at], lost[name][0], rtol=1e-11, atol=1e-14)
+        moving_ratio, ratio = (analysis.observables(each)["area_ratio"] for each in (dataset, still))
+        assert_allclose(moving_ratio[at], ratio[0], rtol=1e-12)
+
+
+def test_a_moved_sphere_loses_nothing_but_to_its_bonds_and_comes_off_by_its_policy():
+    for control in MOVED:
+        dataset = run(scene(contact=Equilibrium(**MOVED[control]), bonds=bonds.Unbroken(), shear=shear.Uniform()))
+        assert np.ptp(dataset["contact_area"].to_numpy()) > 0.5 * float(dataset["contact_area"].max())
+        assert_allclose(analysis.observables(dataset)["area_ratio"], 1.0, rtol=1e-13)
+        shares = analysis.shares(dataset)
+        for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean"):
+            assert_allclose(shares[name], 0.0, rtol=0, atol=1e-13)
+        assert_allclose(shares["radius_jkr"], dataset["contact_radius"], rtol=1e-13)
+    pulled = Equilibrium(load={"from": -0.1e-3, "to": -0.3e-3})
+    for record in (Record(), Record(per_member=False)):
+        parts = {"bonds": bonds.Steady(critical_speed=1e-2), "shear": shear.Uniform(), "record": record}
+        dataset = run(scene(contact=pulled, **parts))
+        assert dataset["in_contact"].to_numpy()[[0, -1]].tolist() == [1, 0]
+        assert_allclose(dataset["applied_load"], np.linspace(-0.1e-3, -0.3e-3, 21), rtol=1e-12)
+        rows = analysis.table(dataset, 3)
+        (name,) = (name for name in rows[0] if name.startswith("P\n"))
+        assert [float(row[name]) for row in rows] == [-100.0, -200.0, -300.0]
+    dataset = run(scene(contact=pulled, **(parts | {"record": Record()})))
+    assert float(analysis.shares(dataset)["lost_to_bonds_mean"][-1]) == 1.0
+    assert float(analysis.observables(dataset)["area_ratio"][-1]) == 0.0
+    course = {"from": 2e-6, "to": -3e-6, "cycles": 1}
+    for policy, closes in (("stay_open", False), ("reattach", True), ("stop", False)):
+        part = Equilibrium(indentation=course, after_pull_off=policy)
+        dataset = run(scene(contact=part, bonds=bonds.Unbroken(), shear=shear.Uniform()))
+        reference = analysis.reference_radii(dataset)["radius_jkr"].to_numpy()
+        recorded = dataset["contact_radius"].to_numpy()
+        assert_array_equal(np.isnan(reference), ~(recorded > 0.0))
+        assert (reference[-1] > 0.0) == closes and np.isnan(reference[10])
+        assert_allclose(reference[reference > 0.0], recorded[recorded > 0.0], rtol=1e-13)
+    part = Equilibrium(indentation={"from": 1e-6, "to": -0.7e-6}, after_pull_off="stop")
+    dataset = run(scene(contact=part, drive=drive.Steady(speed=3e-3)))
+    gone = dataset["contact_area"].isnull()
+    assert 0 < int(gone.sum()) < gone.size
+    lost = analysis.share_observables(dataset)
+    for name in lost:
+        assert_array_equal(lost[name].isnull(), gone | analysis.reference_radii(dataset)["radius_jkr"].isnull())

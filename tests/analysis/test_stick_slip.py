@@ -6,16 +6,11 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.parts import Adhesion, Bell, Clock, Force, Spring, analysis, run
 from helpers.scenes import scene
 from numpy.testing import assert_allclose
 
-from sim import analysis
-from sim.ensemble.simulate import run
 from sim.parts.bonds import FirstMoment, Steady, Unbroken
-from sim.parts.bonds.rupture import Bell
-from sim.parts.contact.models import Adhesion
-from sim.parts.drive import Force, Spring
-from sim.scenario.clock import Clock
 
 #: Relaxation cycles of bonds N0/(1 + V/Vc), damping 0.04, stiffness 1, speed 1, in units of 5 mN and 5 um.
 FORCE, LENGTH, RECORD = 5e-3, 5e-6, 4e-3
@@ -43,7 +38,7 @@ def with_force(force, stage=1.0, step=1.0):
     return dataset.assign({name: (("member", "t"), values[np.newaxis]) for name, values in series.items()})
 
 
-def test_stick_and_slip_are_those_of_the_closed_cycle_to_a_record():
+def test_stick_slip_mean_force_statistics_and_tables_are_those_of_the_closed_cycle_to_a_record():
     result = analysis.slips(cycles())
     first, twice = 1.0, 2.0 * RECORD
     period, count = STICKS + SLIPS, 6
@@ -61,9 +56,6 @@ def test_stick_and_slip_are_those_of_the_closed_cycle_to_a_record():
     moved = drop + result["slip_duration"]
     assert_allclose(result["slip_amplitude"] / LENGTH, moved, rtol=1e-6)
     assert_allclose(result["slip_speed"], LENGTH, rtol=1e-14)
-
-
-def test_the_work_of_the_stage_over_its_way_is_the_mean_force_of_the_cycle():
     result = analysis.stick_slip(cycles())
     begins = 1.0 + (STICKS + SLIPS) * np.arange(6)
     late = begins[begins >= 2.5]
@@ -72,18 +64,12 @@ def test_the_work_of_the_stage_over_its_way_is_the_mean_force_of_the_cycle():
     error = 2.0 * RECORD / (late[-1] - late[0])
     assert_allclose(result["kinetic_friction"] / FORCE, MEAN, atol=error, rtol=0)
     assert_allclose(result["recurrence_time"], STICKS + SLIPS, atol=2.0 * RECORD / (late.size - 1), rtol=0)
-
-
-def test_statistics_and_the_table_show_stick_and_slip_behind_a_spring():
     result = analysis.statistics(cycles())
     assert_allclose(result["static_friction_mean"] / FORCE, 1.0, atol=2.0 * RECORD)
     assert result["static_friction_mean"].attrs["units"] == "N"
     (row,) = analysis.highlights(cycles())
     cells = {" ".join(heading.split()): cell for heading, cell in row.items()}
     assert cells["slips"].startswith("3") and cells["kinetic friction (mN)"].startswith("3.3")
-
-
-def test_the_table_has_the_speed_of_the_stage_beside_that_of_the_slider_where_it_changes():
     faster = cycles().assign(stage_speed=cycles()["stage_speed"] * (1.0 + cycles()["t"]))
     rows = analysis.table(faster)
     (stage,) = (heading for heading in rows[0] if heading.startswith("stage"))
@@ -93,7 +79,7 @@ def test_the_table_has_the_speed_of_the_stage_beside_that_of_the_slider_where_it
         assert any(heading.startswith("kinetic") for row in analysis.highlights(dataset) for heading in row) is is_shown
 
 
-def test_the_mean_speed_is_that_of_the_way_as_slips_come_and_go_between_records():
+def test_the_mean_speed_is_that_of_the_way_and_without_slips_there_is_kinetic_friction_alone():
     dataset = cycles().isel(t=slice(0, None, 20))
     result = analysis.distribution(dataset)
     way, t = dataset["slider_position"], dataset["t"]
@@ -101,9 +87,6 @@ def test_the_mean_speed_is_that_of_the_way_as_slips_come_and_go_between_records(
     exact = ((way[:, -1] - way[:, late]) / (t[-1] - t[late])).mean()
     assert_allclose(result["speed_mean"], exact, rtol=1e-12)
     assert result["speed_low"] < LENGTH < result["speed_high"]
-
-
-def test_sliding_without_slips_has_a_kinetic_friction_alone():
     area = scene(1).contact_area
     drive = Spring(stage=LENGTH, stiffness=1e3, damping=1.0, contact_stiffness="rigid")
     dataset = run(scene(1, steps=400, clock=Clock(duration=4.0, step=0.02), drive=drive,
@@ -113,7 +96,7 @@ def test_sliding_without_slips_has_a_kinetic_friction_alone():
     assert_allclose(result["kinetic_friction"], FORCE + LENGTH, rtol=1e-6)
 
 
-def test_slips_follow_the_sense_of_the_stage_and_reversals_are_none():
+def test_slips_follow_the_sense_of_the_stage_and_their_sizes_are_shared_out_over_all_members():
     saw = np.tile([0.0, 1.0, 2.0, 3.0, 4.0, 1.0], 3)  # falls by three after each four
     for sense in (1.0, -1.0):
         result = analysis.slips(with_force(sense * saw, sense))
@@ -121,23 +104,18 @@ def test_slips_follow_the_sense_of_the_stage_and_reversals_are_none():
         assert_allclose(result["static_friction"], 4.0, rtol=1e-14)
         assert_allclose(result["slip_amplitude"], 6.0, rtol=1e-14)  # the stage moves two meanwhile
         assert_allclose(result["stress_drop"], 8.0, rtol=1e-14)
-    result = analysis.stick_slip(
-        with_force(saw, np.where(np.arange(18) < 9, 1.0, -1.0)).assign(drive_work=("t", 3.0 * np.arange(18.0)))
-    )
+    turned = with_force(saw, np.where(np.arange(18) < 9, 1.0, -1.0))
+    result = analysis.stick_slip(turned.assign(drive_work=("t", 3.0 * np.arange(18.0))))
     assert_allclose(result["kinetic_friction"], 3.0, rtol=1e-14)  # over the path of the stage, not over its way
     # there and back: the force falls from 3 to -3 as the stage turns, and nothing slips
     there_and_back = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 1.0, -1.0, -3.0, -3.0])
     assert analysis.slips(with_force(there_and_back, np.where(np.arange(9) < 5, 1.0, -1.0))).sizes["slip"] == 0
-
-
-def test_sizes_of_slips_are_shared_out_over_all_members():
     saw = np.array([0.0, 4.0, 1.0, 4.0, 2.0, 4.0, 3.0, 4.0, 1.0, 2.0])
     forward, backward = (
         with_force(sense * saw, sense * np.linspace(1.0, 1.1, 10)) for sense in (1.0, -1.0)
     )  # no slip is left out
-    members = xr.concat(
-        [forward, backward], "member", data_vars="minimal", coords="minimal", compat="override", join="override"
-    )
+    how = {"data_vars": "minimal", "coords": "minimal", "compat": "override", "join": "override"}
+    members = xr.concat([forward, backward], "member", **how)
     result = analysis.slip_sizes(members, "force_drop")
     assert_allclose(result["force_drop"], np.repeat([1.0, 2.0, 3.0], [2, 2, 4]), rtol=1e-14)
     assert_allclose(result["share_as_large"], 1.0 - np.arange(8) / 8.0, rtol=1e-14)
@@ -149,16 +127,7 @@ def test_sizes_of_slips_are_shared_out_over_all_members():
     assert len(cells) == 1
 
 
-def test_what_falls_by_less_than_the_least_is_no_slip():
-    saw = np.array([0.0, 2.0, 4.0, 3.95, 4.0, 3.0, 4.0, 3.5, 4.2])
-    assert analysis.slips(with_force(saw, 0.01)).sizes["slip"] == 2
-    assert analysis.slips(with_force(saw, 0.01), least=0.01).sizes["slip"] == 3
-    assert analysis.slips(with_force(saw, 0.01), least=0.2).sizes["slip"] == 1
-    # a slip that lasts beyond the end of the run is not counted
-    assert analysis.slips(with_force([0.0, 2.0, 4.0, 3.0, 2.0])).sizes["slip"] == 0
-
-
-def test_a_slip_after_a_slow_fall_begins_at_the_last_maximum_and_onset_and_end_need_two():
+def test_what_is_a_slip_falls_by_the_least_after_its_last_maximum_without_ringing():
     slow = [0.0, 2.0, *np.linspace(4.0, 3.6, 9), 3.65]
     up = np.array([*slow, 1.0, 2.0, 4.0, 1.0, 2.0])
     first = analysis.slips(with_force(up)).isel(member=0, slip=0)
@@ -174,14 +143,14 @@ def test_a_slip_after_a_slow_fall_begins_at_the_last_maximum_and_onset_and_end_n
     lone = analysis.stick_slip(with_force(up[:14], speed[:14]))
     assert lone["slip_count"].item() == 1.0 and np.isnan(lone["slips_from"]).all()  # friction beyond its maximum
     assert "slips_from" not in analysis.stick_slip(with_force(up))
-
-
-def test_a_slider_that_only_stretches_its_spring_has_no_kinetic_friction():
+    saw = np.array([0.0, 2.0, 4.0, 3.95, 4.0, 3.0, 4.0, 3.5, 4.2])
+    assert analysis.slips(with_force(saw, 0.01)).sizes["slip"] == 2
+    assert analysis.slips(with_force(saw, 0.01), least=0.01).sizes["slip"] == 3
+    assert analysis.slips(with_force(saw, 0.01), least=0.2).sizes["slip"] == 1
+    # a slip that lasts beyond the end of the run is not counted
+    assert analysis.slips(with_force([0.0, 2.0, 4.0, 3.0, 2.0])).sizes["slip"] == 0
     assert np.isnan(analysis.stick_slip(with_force(np.arange(10.0)))["kinetic_friction"]).all()
     assert np.all(analysis.stick_slip(with_force(np.ones(10)))["kinetic_friction"] == 0.0)  # at no work of the stage
-
-
-def test_a_body_that_rings_or_slows_down_does_not_slip():
     saw = np.array([0.0, 2.0, 4.0, 3.0, 2.0, 3.0, 4.0, 3.0, 2.0, 3.0])
     assert analysis.slips(with_force(saw)).sizes["slip"] == 2  # the slider goes twice as far as the stage
     assert analysis.slips(with_force(saw, 1.6)).sizes["slip"] == 0  # 1.625 times, less than 1 + 2/pi
@@ -190,12 +159,11 @@ def test_a_body_that_rings_or_slows_down_does_not_slip():
     assert analysis.slips(rings).sizes["slip"] == 0
 
 
-def test_a_runaway_has_its_time_and_the_force_of_that_time():
+def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused():
     # bonds that none rebinds under a rising force: who is strong enough is held to the end
     area = scene(1).contact_area
-    bonds = FirstMoment(
-        rupture=Bell(zero_force_rate=1.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=1.0, site_density=1e15
-    )
+    rupture = Bell(zero_force_rate=1.0, bell_force=4e-12)
+    bonds = FirstMoment(rupture, bond_stiffness=4e-4, rebinding_rate=1.0, site_density=1e15)
     force = 1e15 * 4e-12 * area
     ramp = {"time": [0.0, 1.0, 20.0], "value": [0.1 * force, 0.2 * force, 2.0 * force]}
     drive = Force(force=ramp, contact_stiffness="rigid")
@@ -212,9 +180,6 @@ def test_a_runaway_has_its_time_and_the_force_of_that_time():
     cells = {" ".join(heading.split()): cell for heading, cell in analysis.highlights(dataset)[0].items()}
     assert cells["ran away, of members (%)"] == "100"
     assert not any("ran away" in heading for row in analysis.highlights(held) for heading in row)
-
-
-def test_slips_of_other_drives_and_of_statistics_are_refused():
     dataset = cycles().drop_vars(["stage_speed", "runaway_time"])
     with pytest.raises(ValueError, match="spring"):
         analysis.slips(dataset)

@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 import re
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -11,39 +12,10 @@ import pytest
 from helpers import lens
 from helpers.cases import posix
 from helpers.lens import scene
+from helpers.parts import Clock, Ensemble, Equilibrium, Record, analysis, bonds, drive, run, shear
+from numpy.testing import assert_array_equal
 
 import sim
-from sim import analysis
-from sim.ensemble.simulate import run
-from sim.parts import drive
-from sim.parts.bonds import models as bonds
-from sim.parts.contact import Equilibrium
-from sim.parts.shear import models as shear
-from sim.scenario.clock import Clock, Ensemble, Record
-
-
-@pytest.fixture(scope="module", name="ramp")
-def _ramp():
-    return lens.ramp()
-
-
-def test_table_of_a_ramp_has_a_dozen_rows_from_start_to_end(ramp):
-    rows, result = analysis.table(ramp), analysis.statistics(ramp)
-    assert len(rows) == 12 and all(set(row) == set(rows[0]) for row in rows)
-    assert [rows[0]["t\n(ms)"], rows[-1]["t\n(ms)"]] == ["0", "400"]
-    for row, at in ((rows[0], 0), (rows[-1], -1)):
-        mean = float(re.match(r"[\d.]+", row["a\n(µm)"])[0])
-        # half a unit of the fourth digit, the least that is shown
-        np.testing.assert_allclose(mean, 1e6 * float(result["contact_radius_mean"][at]), rtol=5e-4)
-    assert "masked\n(%)" in rows[0] and "open\n(%)" not in rows[0]
-    assert "lost to\nbonds (%)" in rows[0] and "lost to\nfluct. (%)" in rows[0]
-
-
-def test_table_leaves_out_what_tells_nothing():
-    dataset = run(scene(bonds=bonds.Unbroken(), shear=shear.Uniform()))
-    rows = analysis.table(dataset, rows=5)
-    assert len(rows) == 5 and analysis.highlights(dataset) == []
-    assert list(rows[0]) == ["t\n(ms)", "V\n(mm/s)", "w\n(mJ/m²)", "a\n(µm)", "A/A_JKR\n(%)"]
 
 
 @pytest.mark.parametrize("per_member", [True, False])
@@ -62,26 +34,28 @@ def test_a_reduced_dataset_has_the_columns_that_it_can(per_member):
     assert analysis.highlights(alone) == [] and "contact_radius_mean" in sim.stats(alone)
 
 
-@pytest.mark.parametrize(("loads", "shares", "rows"), [(2, 1, 2), (30, 1, 12), (6, 5, 12)])
-def test_table_of_a_steady_sweep_has_a_row_for_each_point(loads, shares, rows):
-    sweep = {
-        "contact.load": list(np.linspace(1e-3, 9e-3, loads)),
-        "adhesion.bond_share": list(np.linspace(0, 1, shares)),
-    }
-    dataset = run(scene(drive=drive.Steady(speed=1e-2), shear=shear.Uniform(), sweep=sweep))
-    table = analysis.table(dataset)
-    assert len(table) == rows
-    assert [row["contact_load\n(mN)"] for row in (table[0], table[-1])] == ["1", "9"]
-    assert not any(heading.startswith("t\n") for heading in table[0])
-
-
-def test_table_of_a_swept_ramp_shows_each_point_in_time():
+def test_tables_have_a_dozen_rows_or_one_for_each_point(ramp):
+    rows, result = analysis.table(ramp), analysis.statistics(ramp)
+    assert len(rows) == 12 and all(set(row) == set(rows[0]) for row in rows)
+    assert [rows[0]["t\n(ms)"], rows[-1]["t\n(ms)"]] == ["0", "400"]
+    for row, at in ((rows[0], 0), (rows[-1], -1)):
+        mean = float(re.match(r"[\d.]+", row["a\n(µm)"])[0])
+        # half a unit of the fourth digit, the least that is shown
+        np.testing.assert_allclose(mean, 1e6 * float(result["contact_radius_mean"][at]), rtol=5e-4)
+    assert "masked\n(%)" in rows[0] and "open\n(%)" not in rows[0]
+    assert "lost to\nbonds (%)" in rows[0] and "lost to\nfluct. (%)" in rows[0]
+    for loads, shares, rows in [(2, 1, 2), (30, 1, 12), (6, 5, 12)]:
+        sweep = {
+            "contact.load": list(np.linspace(1e-3, 9e-3, loads)),
+            "adhesion.bond_share": list(np.linspace(0, 1, shares)),
+        }
+        dataset = run(scene(drive=drive.Steady(speed=1e-2), shear=shear.Uniform(), sweep=sweep))
+        table = analysis.table(dataset)
+        assert len(table) == rows and [row["contact_load\n(mN)"] for row in (table[0], table[-1])] == ["1", "9"]
+        assert not any(heading.startswith("t\n") for heading in table[0])
     rows = analysis.table(run(scene(sweep={"contact.load": ["1 mN", "4 mN"]}, shear=shear.Uniform())))
     points = [(row["contact_load\n(mN)"], row["t\n(ms)"]) for row in rows]
     assert points == list(itertools.product(["1", "4"], ["0", "80", "160", "240", "320", "400"]))
-
-
-def test_table_tells_a_swept_table_by_its_name():
     ripple = {"model": "ripple", "amplitude": 1e5, "wavelength": 24e-6}
     fields = {"shear": [{"model": "uniform"}, {"model": "mean", "spectrum": ripple}]}
     rows = analysis.table(run(scene(drive=drive.Steady(speed=1e-2), sweep=fields)))
@@ -100,32 +74,18 @@ def of(long, quantity):
     return long[long["quantity"] == quantity]
 
 
-def test_csv_reads_back_as_the_statistics(ramp, long):
+def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp_path):
     result, rows = analysis.statistics(ramp), of(long, "contact_radius")
     names = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": "std", "skewness": "skewness"}
-    np.testing.assert_array_equal(rows["t [s]"], ramp["t"])
-    np.testing.assert_array_equal(rows["speed [m/s]"], ramp["speed"])
+    assert_array_equal(rows["t [s]"], ramp["t"])
+    assert_array_equal(rows["speed [m/s]"], ramp["speed"])
     for column, kind in names.items():
-        np.testing.assert_array_equal(rows[column], result[f"contact_radius_{kind}"])
-    np.testing.assert_array_equal(rows["q95"], result["contact_radius_quantile"].sel(quantile=0.95))
-    np.testing.assert_array_equal(rows["q50_low"], result["contact_radius_quantile_low"].sel(quantile=0.5))
+        assert_array_equal(rows[column], result[f"contact_radius_{kind}"])
+    assert_array_equal(rows["q95"], result["contact_radius_quantile"].sel(quantile=0.95))
+    assert_array_equal(rows["q50_low"], result["contact_radius_quantile_low"].sel(quantile=0.5))
     lost = analysis.shares(ramp)["lost_to_fluctuations_first_mean"]
-    np.testing.assert_array_equal(of(long, "lost_to_fluctuations_first")["mean"], lost)
+    assert_array_equal(of(long, "lost_to_fluctuations_first")["mean"], lost)
     assert set(rows["unit"]) == {"m"} and set(rows["over"]) == {"6 members"} and next(iter(long)) == "t [s]"
-
-
-def test_csv_has_a_row_for_each_point_and_time(tmp_path):
-    sweep = {"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 0.5, 1.0]}
-    dataset = run(scene(sweep=sweep, shear=shear.Uniform()))
-    analysis.to_csv(dataset, tmp_path / "out.csv")
-    rows = of(pd.read_csv(tmp_path / "out.csv"), "contact_area")
-    expected = itertools.product([1e-3, 4e-3], [0.0, 0.5, 1.0], dataset["t"].to_numpy())
-    read = rows[["contact_load [N]", "adhesion_bond_share", "t [s]"]].itertuples(index=False, name=None)
-    assert list(read) == list(expected)
-    np.testing.assert_array_equal(rows["mean"], dataset["contact_area"].to_numpy().ravel())
-
-
-def test_csv_holds_what_is_told_once_of_a_run(ramp, long):
     (masked,) = of(long, "time_masked").to_dict("records")
     assert masked["mean"] == float(analysis.statistics(ramp)["time_masked_mean"]) and math.isnan(masked["t [s]"])
     (dissipated,) = of(long, "total_dissipated").to_dict("records")
@@ -133,48 +93,31 @@ def test_csv_holds_what_is_told_once_of_a_run(ramp, long):
     (speed,) = of(long, "speed_at_5_percent_lost").to_dict("records")
     result = analysis.loss_speeds(ramp)["speed_at_5_percent_lost_low"]
     assert speed["low"] == float(result) and speed["unit"] == "m/s"
-
-
-def test_csv_of_a_steady_sweep_holds_members_and_time_together(tmp_path):
+    sweep = {"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 0.5, 1.0]}
+    dataset = run(scene(sweep=sweep, shear=shear.Uniform()))
+    analysis.to_csv(dataset, tmp_path / "out.csv")
+    rows = of(pd.read_csv(tmp_path / "out.csv"), "contact_area")
+    expected = itertools.product([1e-3, 4e-3], [0.0, 0.5, 1.0], dataset["t"].to_numpy())
+    read = rows[["contact_load [N]", "adhesion_bond_share", "t [s]"]].itertuples(index=False, name=None)
+    assert list(read) == list(expected)
+    assert_array_equal(rows["mean"], dataset["contact_area"].to_numpy().ravel())
     speeds = {"drive.speed": [1e-3, 1e-2]}
     dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep=speeds, ensemble=Ensemble(members=2)))
     analysis.to_csv(dataset, tmp_path / "out.csv")
     rows = of(pd.read_csv(tmp_path / "out.csv"), "contact_area")
     late = rows[rows["over"] == "second half of the run and 2 members"]
     assert set(rows["over"]) == {"2 members", *late["over"]} and late["t [s]"].isna().all()
-    np.testing.assert_array_equal(late["speed [m/s]"], [1e-3, 1e-2])
+    assert_array_equal(late["speed [m/s]"], [1e-3, 1e-2])
     result = analysis.distribution(dataset)
-    np.testing.assert_array_equal(late["mean"], result["contact_area_mean"])
-    np.testing.assert_array_equal(late["effective_samples"], result["contact_area_effective_samples"])
+    assert_array_equal(late["mean"], result["contact_area_mean"])
+    assert_array_equal(late["effective_samples"], result["contact_area_effective_samples"])
 
 
-def test_a_steady_run_has_a_table_of_how_each_quantity_is_spread():
-    dataset = run(
-        scene(drive=drive.Steady(speed=4e-3), clock=Clock(duration=0.8, step=2e-3), ensemble=Ensemble(members=20))
-    )
-    result = {row["quantity"].partition(" (")[0]: row for row in analysis.spread(dataset)}
-    assert set(result) == {"ΔΓ", "w", "a", "A/A_JKR", "lost to fluct.", "fluct. first", "F"}
-    energy, law = result["ΔΓ"], analysis.distribution(dataset)
-    assert list(energy) == ["quantity", "mean", "sd", "5 %", "50 %", "95 %", "skewness", "t_c", "free values"]
-    np.testing.assert_allclose(float(energy["sd"]), 1e3 * float(law["fluctuation_energy_std"]), rtol=5e-3)
-    np.testing.assert_allclose(
-        float(energy["free values"]), float(law["fluctuation_energy_effective_samples"]), rtol=5e-3
-    )
-    assert "(" in energy["mean"] and "(" in energy["95 %"] and energy["t_c"].endswith(" ms")
-    assert analysis.spread(lens.ramp()) == []
-
-
-def test_a_table_says_at_which_speeds_area_is_lost():
-    sweep = {"contact.load": [1e-3, 4e-3]}
-    (low, high) = analysis.losses(run(scene(sweep=sweep)))
-    assert low["contact_load\n(mN)"] == "1" and high["contact_load\n(mN)"] == "4"
-    assert float(low["5 % of area\nlost at V (mm/s)"].partition("(")[0]) < float(
-        high["5 % of area\nlost at V (mm/s)"].partition("(")[0]
-    )
-    assert analysis.losses(run(scene(drive=drive.Steady(speed=1e-3)))) == []
-
-
-def test_table_of_a_cycle_tells_what_holds_the_sphere():
+def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_spread():
+    dataset = run(scene(bonds=bonds.Unbroken(), shear=shear.Uniform()))
+    rows = analysis.table(dataset, rows=5)
+    assert len(rows) == 5 and analysis.highlights(dataset) == []
+    assert list(rows[0]) == ["t\n(ms)", "V\n(mm/s)", "w\n(mJ/m²)", "a\n(µm)", "A/A_JKR\n(%)"]
     cycle = Equilibrium(indentation={"from": 1e-6, "to": -2e-6, "cycles": 1}, after_pull_off="reattach")
     still = {"bonds": bonds.Unbroken(), "shear": shear.Uniform(), "drive": drive.Steady(speed=0.0)}
     rows = analysis.table(run(scene(contact=cycle, **still)), rows=5)
@@ -183,16 +126,27 @@ def test_table_of_a_cycle_tells_what_holds_the_sphere():
     pulled = Equilibrium(load={"from": 1e-3, "to": -1e-3})
     rows = analysis.table(run(scene(contact=pulled, **still)), rows=3)
     assert [row["P\n(mN)"] for row in rows] == ["1", "0", "-1"]  # of the free sphere too
+    dataset = run(scene(drive=drive.Steady(speed=4e-3), clock=Clock(0.8, 2e-3), ensemble=Ensemble(members=20)))
+    result = {row["quantity"].partition(" (")[0]: row for row in analysis.spread(dataset)}
+    assert set(result) == {"ΔΓ", "w", "a", "A/A_JKR", "lost to fluct.", "fluct. first", "F"}
+    energy, law = result["ΔΓ"], analysis.distribution(dataset)
+    assert list(energy) == ["quantity", "mean", "sd", "5 %", "50 %", "95 %", "skewness", "t_c", "free values"]
+    np.testing.assert_allclose(float(energy["sd"]), 1e3 * float(law["fluctuation_energy_std"]), rtol=5e-3)
+    free_values = float(law["fluctuation_energy_effective_samples"])
+    np.testing.assert_allclose(float(energy["free values"]), free_values, rtol=5e-3)
+    assert "(" in energy["mean"] and "(" in energy["95 %"] and energy["t_c"].endswith(" ms")
+    assert analysis.spread(lens.ramp()) == []
+    sweep = {"contact.load": [1e-3, 4e-3]}
+    (low, high) = analysis.losses(run(scene(sweep=sweep)))
+    assert low["contact_load\n(mN)"] == "1" and high["contact_load\n(mN)"] == "4"
+    slow, fast = (float(row["5 % of area\nlost at V (mm/s)"].partition("(")[0]) for row in (low, high))
+    assert slow < fast and analysis.losses(run(scene(drive=drive.Steady(speed=1e-3)))) == []
 
 
 def test_csv_in_trouble_leaves_an_older_file_as_it_was(ramp, tmp_path, monkeypatch):
     path = tmp_path / "out.csv"
     path.write_text("older", encoding="utf-8")
-
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("os.replace", full)
+    monkeypatch.setattr("os.replace", Mock(side_effect=OSError(28, "No space left on device")))
     with pytest.raises(OSError, match="No space"):
         analysis.to_csv(ramp, path)
     assert path.read_text(encoding="utf-8") == "older" and [item.name for item in tmp_path.iterdir()] == ["out.csv"]
@@ -200,7 +154,6 @@ def test_csv_in_trouble_leaves_an_older_file_as_it_was(ramp, tmp_path, monkeypat
 
 @posix
 def test_csv_goes_through_a_link_to_where_it_points(ramp, tmp_path):
-    (tmp_path / "far.csv").write_text("older", encoding="utf-8")
     (tmp_path / "out.csv").symlink_to(tmp_path / "far.csv")
     analysis.to_csv(ramp, tmp_path / "out.csv")
     assert (tmp_path / "out.csv").is_symlink()
@@ -213,16 +166,10 @@ def test_notes_say_what_is_averaged_how_many_rows_are_shown_and_what_symbols_mea
     assert "6 members" in lines[0] and "12 of 21" in lines[1] and "--where" in lines[1] and "A/A_JKR: " in lines[2]
     whole = analysis.table(ramp, rows=10**9)
     assert len(whole) == 21 and not any("shown" in line for line in analysis.notes(ramp, whole, []))
-
-
-def test_a_dataset_that_does_not_say_what_it_recorded_has_its_notes(ramp):
     scenario = json.loads(ramp.attrs["scenario_resolved"])
     del scenario["record"]["quantities"]
     older = ramp.assign_attrs(scenario_resolved=json.dumps(scenario))
     assert analysis.notes(older, analysis.table(older), []) == analysis.notes(ramp, analysis.table(ramp), [])
-
-
-def test_steady_sweeps_say_that_the_second_half_counts_and_show_their_speed_once():
     dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep={"drive.speed": list(np.geomspace(1e-4, 1e-1, 16))}))
     rows = analysis.table(dataset)
     assert analysis.notes(dataset, rows, [])[0].startswith("mean over the second half of the run and 6 members")

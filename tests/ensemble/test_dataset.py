@@ -1,32 +1,33 @@
 """From parts to a dataset: names and units, equal bytes, and trouble with the disk."""
 
+import json
 import pickle
+import subprocess
 import sys
 import typing
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.parts import Adhesion, Clock, Record, Slip, load, read_sweep, run, shear
 from helpers.scenes import BONDS, CELL, CONTACTS, DRIVES, SHEARS, SPECTRUM, scene
 from numpy.testing import assert_allclose
+from pydantic import TypeAdapter
 
 import sim
-from sim import cli
 from sim.engine import march, trajectory_of
 from sim.ensemble import dataset as datasets, plan as plans, simulate as ensemble
-from sim.ensemble.dataset import variable_name
+from sim.ensemble.dataset import scenario_json, variable_name
 from sim.ensemble.plan import Plan
 from sim.ensemble.variables import LARGEST, VARIABLES
 from sim.numerics.files import StoreTrouble
 from sim.parts.drive import READINGS
-from sim.parts.shear import models as shear
-from sim.parts.shear.process import Slip
-from sim.scenario.clock import Clock, Record
-from sim.scenario.scenario import Scenario, read_sweep
+from sim.scenario.scenario import Scenario
 from sim.scenario.schema import all_tables, keys, quantities, tables
 from sim.units.notation import Recorded
 
@@ -38,7 +39,11 @@ def sample(**parts):
     return scene(parts.pop("members", 5), parts.pop("steps", 6), **(defaults | parts))
 
 
-def test_the_dataset_is_what_the_engine_marched():
+def swept(sweep, **parts):
+    return replace(sample(**parts), sweep=read_sweep(sweep))
+
+
+def test_the_dataset_is_what_the_engine_marched_or_its_statistics(monkeypatch):
     scenario = sample()
     dataset = ensemble.run(scenario)
     for record, state in enumerate(march(scenario, np.arange(5))):
@@ -46,47 +51,6 @@ def test_the_dataset_is_what_the_engine_marched():
             recorded = np.atleast_1d(dataset[variable.name].isel(t=record).values)
             marched = np.ravel(variable.read(scenario, trajectory_of(scenario, state)))
             np.testing.assert_array_equal(recorded, marched, err_msg=variable.name)
-
-
-def test_every_variable_has_unit_and_long_name_and_stands_on_its_page():
-    scenario = sample(shear=MAPPED, record=Record(maps=(2e-3,)))
-    dataset = ensemble.run(scenario)
-    page = Path(__file__).parents[2].joinpath("docs", "dataset.md").read_text(encoding="utf-8")
-    numbers = {variable_name(key) for key in quantities(scenario)}
-    for name, variable in dataset.variables.items():
-        assert name in numbers or f"| `{name}` |" in page, f"{name}: declare it in sim.ensemble.variables"
-        assert variable.attrs["long_name"], name
-        assert "units" in variable.attrs or "flag_values" in variable.attrs, name
-    assert set(dataset.attrs) >= {"Conventions", "title", "history", "scenario_toml", "seed", "sim_version"}
-
-
-def swept(sweep, **parts):
-    return replace(sample(**parts), sweep=read_sweep(sweep))
-
-
-def test_a_file_written_at_once_or_in_parts_equals_the_run_in_memory(tmp_path, monkeypatch):
-    scenario = swept({"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 1.0]})
-    whole = ensemble.run(scenario)
-    with sim.open(ensemble.run(scenario, tmp_path / "small.nc")) as from_disk:
-        assert from_disk["contact_radius"].dims == ("contact_load", "adhesion_bond_share", "member", "t")
-        assert from_disk["speed"].dims == ("contact_load", "adhesion_bond_share", "t")
-        xr.testing.assert_identical(from_disk.load(), whole)
-    assert [file.name for file in tmp_path.iterdir()] == ["small.nc"]
-    monkeypatch.setattr(datasets, "_IN_MEMORY", 0)
-    monkeypatch.setattr(plans, "_GROUP", 2)
-    monkeypatch.setattr(plans, "_PART_NUMBERS", 60)
-    with sim.open(ensemble.run(scenario, tmp_path / "large.nc")) as large:
-        xr.testing.assert_identical(large.load(), whole)
-
-
-def test_recording_seldom_gives_the_same_numbers():
-    often = ensemble.run(sample(clock=Clock(duration=6e-3, step=1e-3)))
-    seldom = ensemble.run(sample(clock=Clock(duration=6e-3, step=1e-3, record=3e-3)))
-    for variable in Plan.of(sample()).variables:
-        np.testing.assert_array_equal(often[variable.name].isel(t=[0, 3, 6]), seldom[variable.name])
-
-
-def test_statistics_in_place_of_members_are_those_of_the_members(monkeypatch):
     each = ensemble.run(sample())
     monkeypatch.setattr(plans, "_GROUP", 2)
     pooled = ensemble.run(sample(record=Record(per_member=False)))
@@ -100,11 +64,11 @@ def test_statistics_in_place_of_members_are_those_of_the_members(monkeypatch):
     assert "member" not in ensemble.run(sample(members=64, shear=shear.Uniform())).dims  # members do not differ
 
 
-def test_names_that_may_be_recorded_are_the_quantities():
-    assert typing.get_args(Recorded) == tuple(variable.name for variable in VARIABLES + LARGEST)
-
-
-def test_a_quantity_that_is_kept_alone_has_the_bits_of_the_whole_run():
+def test_recording_seldom_or_one_quantity_alone_gives_the_bits_of_the_whole_run():
+    often = ensemble.run(sample(clock=Clock(duration=6e-3, step=1e-3)))
+    seldom = ensemble.run(sample(clock=Clock(duration=6e-3, step=1e-3, record=3e-3)))
+    for variable in Plan.of(sample()).variables:
+        np.testing.assert_array_equal(often[variable.name].isel(t=[0, 3, 6]), seldom[variable.name])
     chosen = ("fluctuation_energy", "jkr_radius", "peak_stress", "applied_load")  # the last is not of this scene
     names = {variable.name for variable in VARIABLES + LARGEST}
     for per_member in (True, False):
@@ -135,18 +99,13 @@ def test_a_detached_contact_is_zero_and_not_in_contact():
     assert np.all(np.isnan(dataset["indentation"]))
 
 
-def test_swept_models_are_labelled():
+def test_swept_models_are_labelled_and_zipped_sweeps_have_one_dimension_and_all_their_coordinates():
     spectrum = {"model": "gaussian", "rms": "1e5 Pa", "length": "5 um"}
     dataset = ensemble.run(swept({"shear": [{"model": "uniform"}, {"model": "mean", "spectrum": spectrum}]}))
     assert list(dataset["shear"].values) == ["uniform", "mean"]
     assert dataset["fluctuation_energy"].isel(shear=0).max() == 0.0 < dataset["fluctuation_energy"].isel(shear=1).min()
-
-
-def test_zipped_sweeps_have_one_dimension_and_all_their_coordinates():
     for radii in ([1e-3, 2e-3], [2e-3, 2e-3]):  # a key may keep one value
-        rows = [
-            {"contact.load": load, "sphere.radius": radius} for load, radius in zip((1e-3, 4e-3), radii, strict=True)
-        ]
+        rows = [{"contact.load": p, "sphere.radius": r} for p, r in zip((1e-3, 4e-3), radii, strict=True)]
         dataset = ensemble.run(swept(rows))
         assert_allclose(dataset["contact_load"], [1e-3, 4e-3])
         assert dataset["contact_radius"].dims == ("contact_load", "member", "t")
@@ -154,37 +113,39 @@ def test_zipped_sweeps_have_one_dimension_and_all_their_coordinates():
         assert_allclose(dataset["sphere_radius"], radii)
 
 
-def test_an_older_output_is_kept_unless_it_is_replaced_by_a_run_that_succeeds(tmp_path, monkeypatch):
+def test_a_file_in_parts_equals_the_run_in_memory_and_an_older_one_survives_a_failure(tmp_path, monkeypatch):
+    scenario = swept({"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 1.0]})
+    whole = ensemble.run(scenario)
+    with sim.open(ensemble.run(scenario, tmp_path / "small.nc")) as from_disk:
+        assert from_disk["contact_radius"].dims == ("contact_load", "adhesion_bond_share", "member", "t")
+        assert from_disk["speed"].dims == ("contact_load", "adhesion_bond_share", "t")
+        xr.testing.assert_identical(from_disk.load(), whole)
+    assert [file.name for file in tmp_path.iterdir()] == ["small.nc"]
+    monkeypatch.setattr(datasets, "_IN_MEMORY", 0)
+    monkeypatch.setattr(plans, "_GROUP", 2)
+    monkeypatch.setattr(plans, "_PART_NUMBERS", 60)
+    with sim.open(ensemble.run(scenario, tmp_path / "large.nc")) as large:
+        xr.testing.assert_identical(large.load(), whole)
+    monkeypatch.undo()
     path = ensemble.run(sample(), tmp_path / "out.nc")
     before = path.read_bytes()
-    with pytest.raises(ensemble.OutputExists):
-        ensemble.run(sample(seed=6), path)
-
-    def broken(*arguments):
-        raise OSError(28, "No space left on device")
-
     with monkeypatch.context() as patched, pytest.raises(StoreTrouble, match="No space left"):
-        patched.setattr(datasets, "_fill", broken)
+        patched.setattr(datasets, "_fill", Mock(side_effect=OSError(28, "No space left on device")))
         ensemble.run(sample(seed=6), path, replace=True)
-    assert path.read_bytes() == before
-    assert not list(tmp_path.glob(".out*"))
-    ensemble.run(sample(seed=6), path, replace=True)
-    with sim.open(path) as dataset:
-        assert dataset.attrs["seed"] == "6"
+    assert path.read_bytes() == before and not list(tmp_path.glob(".out*"))
 
 
-def test_a_full_disk_is_told_with_its_reason(tmp_path, room, monkeypatch, capsys):
-    lens, output = Path(__file__).parents[2] / "scenarios/pdms_lens.toml", tmp_path / "o.nc"
-    monkeypatch.setattr(sys, "argv", ["sim", "run", str(lens), "--members", "2", "-o", str(output), "--quiet"])
-    with room(20_000), pytest.raises(SystemExit) as done:
-        cli.main()
-    message = capsys.readouterr().err
-    assert done.value.code == 74, message
-    assert "File too large" in message and len(message.splitlines()) == 1
-    assert not output.exists()
-
-
-def test_threads_give_the_datasets_of_one_after_the_other_and_datasets_can_be_pickled(tmp_path):
+def test_datasets_can_be_computed_in_threads_pickled_and_joined(tmp_path):
+    scenario = swept({"contact.load": [1e-3, 2e-3, 4e-3]})
+    names, whole = [variable.name for variable in Plan.of(scenario).variables], ensemble.run(scenario)
+    runs = [ensemble.run(point).set_coords("contact_load") for point in scenario.points()]
+    joined = xr.concat(runs, "contact_load", data_vars="minimal")[names]
+    assert joined["speed"].dims == ("t",)  # all runs have the same
+    xr.testing.assert_equal(joined.drop_vars("speed"), whole[names].drop_vars("speed"))
+    two = ensemble.run(swept({"contact.load": [1e-3, 2e-3]}))
+    datasets_to_join = [runs[2][names].expand_dims("contact_load"), two[names]]
+    joined = xr.combine_by_coords(datasets_to_join, combine_attrs="drop_conflicts")
+    xr.testing.assert_equal(joined, whole[names])
     scenarios = [sample(members=2, seed=seed) for seed in range(4)]
     alone = [ensemble.run(scenario) for scenario in scenarios]
 
@@ -203,20 +164,8 @@ def test_threads_give_the_datasets_of_one_after_the_other_and_datasets_can_be_pi
     xr.testing.assert_identical(pickle.loads(pickle.dumps(alone[0])), alone[0])
 
 
-def test_runs_join_along_a_key_by_xarrays_own_means():
-    scenario = swept({"contact.load": [1e-3, 2e-3, 4e-3]})
-    names, whole = [variable.name for variable in Plan.of(scenario).variables], ensemble.run(scenario)
-    runs = [ensemble.run(point).set_coords("contact_load") for point in scenario.points()]
-    joined = xr.concat(runs, "contact_load", data_vars="minimal")[names]
-    assert joined["speed"].dims == ("t",)  # all runs have the same
-    xr.testing.assert_equal(joined.drop_vars("speed"), whole[names].drop_vars("speed"))
-    two = ensemble.run(swept({"contact.load": [1e-3, 2e-3]}))
-    datasets_to_join = [runs[2][names].expand_dims("contact_load"), two[names]]
-    joined = xr.combine_by_coords(datasets_to_join, combine_attrs="drop_conflicts")
-    xr.testing.assert_equal(joined, whole[names])
-
-
-def test_no_variable_that_is_recorded_has_the_name_of_a_key():
+def test_names_that_may_be_recorded_are_the_quantities_and_none_is_that_of_a_key():
+    assert typing.get_args(Recorded) == tuple(variable.name for variable in VARIABLES + LARGEST)
     mapped = sample(shear=MAPPED, record=Record(maps=(2e-3,)))
     numbers = {variable_name(key) for key in quantities(mapped)}
     names = {
@@ -228,7 +177,7 @@ def test_no_variable_that_is_recorded_has_the_name_of_a_key():
     assert len(names) > 50 and not names & (set(ensemble.run(mapped).variables) - numbers)
 
 
-def test_six_digits_are_kept_in_a_plain_file(tmp_path):
+def test_six_digits_are_kept_in_a_plain_file_and_a_flipped_byte_is_an_error(tmp_path):
     def written(compression):
         return ensemble.run(sample(record=Record(compression=compression)), tmp_path / f"{compression}.nc")
 
@@ -245,9 +194,6 @@ def test_six_digits_are_kept_in_a_plain_file(tmp_path):
         assert np.array_equal(file["masked"][:], exact["masked"][:])
         assert np.ptp(file["jkr_radius"][:]) == 0.0  # what is equal stays equal
         assert np.array_equal(file["t"][:], exact["t"][:]) and np.array_equal(file["peak_stress"], exact["peak_stress"])
-
-
-def test_a_flipped_byte_of_any_variable_with_a_dimension_is_an_error(tmp_path):
     path = ensemble.run(sample(record=Record(compression="none")), tmp_path / "out.nc")
     content = path.read_bytes()
     with netCDF4.Dataset(path) as file:
@@ -264,20 +210,95 @@ def test_a_flipped_byte_of_any_variable_with_a_dimension_is_an_error(tmp_path):
             dataset.load()
 
 
-def test_a_variable_is_there_where_its_condition_holds():
+def test_every_variable_has_unit_and_long_name_and_stands_where_its_condition_holds():
+    scenario = sample(shear=MAPPED, record=Record(maps=(2e-3,)))
+    dataset = ensemble.run(scenario)
+    page = Path(__file__).parents[2].joinpath("docs", "dataset.md").read_text(encoding="utf-8")
+    numbers = {variable_name(key) for key in quantities(scenario)}
+    for name, variable in dataset.variables.items():
+        assert name in numbers or f"| `{name}` |" in page, f"{name}: declare it in sim.ensemble.variables"
+        assert variable.attrs["long_name"], name
+        assert "units" in variable.attrs or "flag_values" in variable.attrs, name
+    assert set(dataset.attrs) >= {"Conventions", "title", "history", "scenario_toml", "seed", "sim_version"}
     bell = {"bonds": BONDS["rate, bell"]}
     driven, stage = set(READINGS), {"stage_position", "stage_speed"}
     scenes = [
-        (set(), sample()),
-        ({"fluctuations_radius"}, sample(contact=CONTACTS["partly reversible"])),
+        (set(), sample()), ({"fluctuations_radius"}, sample(contact=CONTACTS["partly reversible"])),
         ({"equilibrium_radius"}, sample(contact=CONTACTS["rate_dependent"])),
         ({"applied_load"}, sample(contact=CONTACTS["load there and back"])),
-        (driven, sample(drive=DRIVES["spring"], **bell)),
-        (driven - stage, sample(drive=DRIVES["force"], **bell)),
-    ]
+        (driven, sample(drive=DRIVES["spring"], **bell)), (driven - stage, sample(drive=DRIVES["force"], **bell)),
+    ]  # fmt: skip
     some = set.union(*(names for names, _ in scenes))
     assert some == {variable.name for variable in VARIABLES if variable.condition}
     for names, scenario in scenes:
         variables = set(ensemble.run(scenario).variables)
         assert variables & some == names
         assert {variable.name for variable in VARIABLES if not variable.condition} <= variables
+
+
+LENS = Path(__file__).parents[2] / "scenarios" / "pdms_lens.toml"
+SHORT = {"clock": {"duration": "2 ms", "step": "1 ms"}, "ensemble.members": 2}
+
+
+def reread(dataset, folder):
+    """The scenario that the text and the overrides of a dataset give."""
+    (folder / "again.toml").write_text(dataset.attrs["scenario_toml"], encoding="utf-8")
+    return load(folder / "again.toml", json.loads(dataset.attrs["scenario_overrides"]))
+
+
+def test_text_and_overrides_or_the_resolved_scenario_give_what_was_run(tmp_path):
+    lens = load(LENS, SHORT)
+    twice = lens.with_values({"contact.load": 1e-3}).with_values({"contact": {"load": 2e-3}})
+    for scenario in (lens, lens.with_values({"adhesion.work": 0.03}), twice):
+        dataset = run(scenario)
+        assert dataset.attrs["scenario_toml"] == LENS.read_text(encoding="utf-8")
+        assert scenario_json(reread(dataset, tmp_path)) == scenario_json(scenario)
+    part_replaced = replace(lens, adhesion=Adhesion(work=0.03))
+    swept = replace(lens, sweep=read_sweep({"contact.load": [1e-3, 2e-3]}))
+    for scenario in (part_replaced.with_values({"contact.load": 1e-3}), swept, scene(members=2)):
+        dataset = run(scenario)
+        assert (dataset.attrs["scenario_toml"], dataset.attrs["scenario_overrides"]) == ("", "{}")
+        again = TypeAdapter(Scenario).validate_python(json.loads(dataset.attrs["scenario_resolved"]))
+        assert again.sweep == scenario.sweep
+        xr.testing.assert_identical(run(again), dataset)
+    swept = load(LENS, SHORT | {"sweep": {"contact.load": ["1 mN", "4 mN"]}})
+    point = swept.points()[1]
+    again = reread(run(point), tmp_path)
+    assert (again.contact.load, again.sweep) == (4e-3, ())
+    rows = [{"contact.load": "1 mN", "sphere.radius": "1 mm"}, {"contact.load": "4 mN", "sphere.radius": "2 mm"}]
+    scenario = replace(scene(members=2), sweep=read_sweep(rows))
+    assert json.loads(scenario_json(scenario))["sweep"] == rows
+
+
+SCENARIOS = sorted((Path(__file__).parents[2] / "scenarios").glob("*.toml"))
+
+
+def check(path):
+    """No remark of the checker but one it must make.
+
+    It takes every coordinate in units of pressure for a height, and recommends (the conventions require
+    nothing there) that heights stand right of the time: a swept stress or modulus stands left of it.
+    """
+    checker = Path(sys.executable).with_name("compliance-checker")
+    done = subprocess.run([checker, "--test=cf:1.11", path], capture_output=True, text=True, timeout=600)
+    assert "IOOS Compliance Checker Report" in done.stdout, done.stderr
+    remarks = [line for line in done.stdout.splitlines() if line.startswith("* ")]
+    assert [line for line in remarks if "recommended order T, Z, Y, X" not in line] == []
+    assert remarks or "All tests passed" in done.stdout
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_every_scenario_gives_a_conforming_dataset(path, tmp_path):
+    check(run(load(path, {"ensemble.members": 2}), tmp_path / "out.nc"))
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("per_member", [True, False])
+def test_maps_labels_and_statistics_conform(per_member, tmp_path):
+    mapped = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))
+    record = Record(maps=(2e-3,), map_members=2, per_member=per_member)
+    scenario = scene(3, shear=mapped, bonds=BONDS["counted"], record=record)
+    tables = [{"model": "none"}, {"model": "steady", "critical_speed": "1 cm/s"}]
+    sweep = read_sweep({"bonds": tables, "contact.load": [1e-3, 2e-3]})
+    check(run(replace(scenario, sweep=sweep), tmp_path / "out.nc"))

@@ -1,5 +1,6 @@
 """Workers that share a run, processes or a dask cluster: the numbers of one process, whatever dies on the way."""
 
+import ast
 import concurrent.futures
 import contextlib
 import functools
@@ -13,14 +14,17 @@ import numpy as np
 import psutil
 import pytest
 import xarray as xr
+from click.testing import CliRunner
 from helpers import deadly, scenes
 from helpers.scenes import LOADS
 
 import sim
-from sim.ensemble import execute, plan as plans, simulate as ensemble
+from sim.cli import cli
+from sim.ensemble import execute, plan as plans, simulate as ensemble, warm
 from sim.ensemble.execute import WorkerDied, compute
 from sim.ensemble.plan import Plan
 from sim.ensemble.store import BlockFiles, MemoryBlocks, Stopped
+from sim.numerics import jit
 from sim.units.errors import BadInput
 
 sample = functools.partial(scenes.sample, sweep=LOADS)
@@ -57,8 +61,7 @@ def workers(parent=None):
 def test_any_number_of_processes_gives_the_same_numbers(tmp_path, many_parts, jobs):
     counted = []
     ensemble.run(sample(), tmp_path / "out.nc", jobs=jobs, progress=counted.append)
-    assert sum(counted) == plans.work(Plan.of(sample()))
-    assert same(tmp_path / "out.nc")
+    assert sum(counted) == plans.work(Plan.of(sample())) and same(tmp_path / "out.nc")
     assert ensemble.run(sample(), jobs=jobs).identical(ensemble.run(sample()))
 
 
@@ -74,13 +77,11 @@ def test_a_worker_that_dies_costs_its_blocks_alone(tmp_path, many_parts):
 
     scenario = sample(members=8, steps=40)
     ensemble.run(scenario, tmp_path / "out.nc", jobs=2, progress=kill)
-    assert len(killed) == 2
-    assert sum(counted) == plans.work(Plan.of(scenario))
-    assert same(tmp_path / "out.nc", scenario)
-    assert not workers()
+    assert len(killed) == 2 and sum(counted) == plans.work(Plan.of(scenario))
+    assert same(tmp_path / "out.nc", scenario) and not workers()
 
 
-def test_a_block_that_breaks_three_pools_is_given_up_and_the_others_are_kept(tmp_path, many_parts):
+def test_a_block_that_raises_or_breaks_three_pools_is_given_up_and_the_others_are_kept(tmp_path, many_parts):
     tasks = [(task, list(range(len(task.names)))) for task in Plan.of(sample()).tasks()]
     blocks, lost = BlockFiles(tmp_path), deadly.DEADLY.partition("-block")[0]
     with pytest.raises(WorkerDied, match=r"members 0 to 1 of point000001; .*--resume"):
@@ -89,9 +90,6 @@ def test_a_block_that_breaks_three_pools_is_given_up_and_the_others_are_kept(tmp
         assert (name in blocks) == (not name.startswith(lost) or name < deadly.DEADLY)
     ensemble.simulate(Plan.of(sample()), blocks)
     assert all(name in blocks for task, _ in tasks for name in task.names)
-
-
-def test_what_a_block_raises_is_raised(tmp_path, many_parts):
     task = next(Plan.of(sample()).tasks())
     with pytest.raises(OSError, match="out"):
         compute(ensemble.advance, BlockFiles(tmp_path / "out"), [(task, [0])] * 2, print, never, 2)
@@ -107,8 +105,7 @@ def test_a_run_that_is_stopped_again_and_again_gives_the_same_numbers(tmp_path, 
             ensemble.run(sample(), path, resume=True, **how)
         except Stopped:
             stops += 1
-    assert stops > 2
-    assert same(path)
+    assert stops > 2 and same(path)
 
 
 SCRIPT = """
@@ -147,25 +144,20 @@ def test_processes_need_no_guard_in_what_starts_them_and_import_nothing_of_the_p
     assert same(path)
 
 
-def test_a_thread_may_start_processes(tmp_path, many_parts):
+def test_any_number_of_processes_gives_the_same_numbers_of_threads_too(tmp_path, many_parts):
     done = []
     thread = threading.Thread(target=lambda: done.append(sim.run(sample(), tmp_path / "out.nc", jobs=2)))
     thread.start()
     thread.join()
-    assert done
-    assert same(tmp_path / "out.nc")
+    assert done and same(tmp_path / "out.nc")
 
 
 @pytest.mark.parametrize("kills", [2, pytest.param(50, marks=pytest.mark.verify)])
 def test_a_run_whose_processes_are_killed_goes_on_to_the_same_numbers_and_leaves_none(tmp_path, many_parts, kills):
     path, scenario, dice = tmp_path / "out.nc", sample(members=8, steps=40 * kills), np.random.default_rng(3)
     for kill in range(kills):
-        run = subprocess.Popen(
-            [sys.executable, "-c", script(path, 8, 40 * kills)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
+        command, how = [sys.executable, "-c", script(path, 8, 40 * kills)], {"stderr": subprocess.DEVNULL, "text": True}
+        run = subprocess.Popen(command, stdout=subprocess.PIPE, **how)
         for _ in range(dice.integers(2, 12)):
             run.stdout.readline()
         started, parent = workers(run.pid), psutil.Process(run.pid)
@@ -192,15 +184,6 @@ def threads():
         yield cluster
 
 
-def test_a_cluster_gives_the_numbers_of_one_process(tmp_path, many_parts, threads):
-    counted = []
-    how = {"scheduler": threads.scheduler_address, "progress": counted.append}
-    ensemble.run(sample(), tmp_path / "out.nc", **how)
-    assert sum(counted) == plans.work(Plan.of(sample()))
-    assert same(tmp_path / "out.nc")
-    assert ensemble.run(sample(), scheduler=threads.scheduler_address).identical(ensemble.run(sample()))
-
-
 def test_a_run_on_a_cluster_is_stopped_and_goes_on_anywhere(tmp_path, many_parts, threads):
     path, stops, scenario = tmp_path / "out.nc", 0, sample(members=7)
     where = itertools.cycle((threads.scheduler_address, ""))
@@ -211,9 +194,7 @@ def test_a_run_on_a_cluster_is_stopped_and_goes_on_anywhere(tmp_path, many_parts
             ensemble.run(scenario, path, resume=True, stop=lambda count=count: next(count) > 4, **how)
         except Stopped:
             stops += 1
-    assert stops > 1
-    assert sum(counted) == plans.work(Plan.of(scenario))
-    assert same(path, scenario)
+    assert stops > 1 and sum(counted) == plans.work(Plan.of(scenario)) and same(path, scenario)
 
 
 def test_what_a_block_raises_on_a_cluster_is_raised_and_what_is_computed_stays(
@@ -237,7 +218,12 @@ def test_workers_of_another_version_and_schedulers_that_do_not_answer_are_told(t
             compute(ensemble.advance, MemoryBlocks(), [], print, never, scheduler=address)
 
 
-def test_scenes_are_mapped_over_a_cluster(threads):
+def test_a_cluster_gives_the_numbers_of_one_process_and_maps_scenes(tmp_path, many_parts, threads):
+    counted = []
+    how = {"scheduler": threads.scheduler_address, "progress": counted.append}
+    ensemble.run(sample(), tmp_path / "out.nc", **how)
+    assert sum(counted) == plans.work(Plan.of(sample())) and same(tmp_path / "out.nc")
+    assert ensemble.run(sample(), scheduler=threads.scheduler_address).identical(ensemble.run(sample()))
     from distributed import Client
 
     scenarios = [sample(seed=seed) for seed in (1, 2, 3)]
@@ -263,8 +249,7 @@ def test_a_cluster_whose_workers_are_killed_gives_the_same_numbers(tmp_path, mon
                 psutil.Process(worker.pid).kill()
 
         ensemble.run(scenario, tmp_path / "out.nc", scheduler=cluster.scheduler_address, progress=kill)
-    assert len(set(killed)) == 3
-    assert same(tmp_path / "out.nc", scenario)
+    assert len(set(killed)) == 3 and same(tmp_path / "out.nc", scenario)
 
 
 @pytest.mark.verify
@@ -280,22 +265,17 @@ def test_a_scheduler_that_goes_away_is_told_and_what_is_computed_stays(tmp_path,
     assert same(path, sample(members=20))
 
 
-def test_a_suspect_runs_alone_so_that_no_other_block_is_blamed():
+def test_a_suspect_runs_alone_and_an_executor_that_does_not_start_is_no_endless_loop(monkeypatch, many_parts):
     chains = execute._Chains([execute._Chain(str(place), None, [0]) for place in range(3)])
     suspect = chains.take([])
     suspect.broken = 2
     chains.put(suspect)
     other = chains.waiting.pop()
-    assert chains.take([other]) is None
-    assert chains.take([]) is suspect
-    assert chains.take([suspect]) is None
+    assert chains.take([other]) is None and chains.take([]) is suspect and chains.take([suspect]) is None
     suspect.broken = 3
     chains.put(suspect)
-    assert chains.lost == [suspect]
-    assert chains.take([other]) is not None
+    assert chains.lost == [suspect] and chains.take([other]) is not None
 
-
-def test_an_executor_that_does_not_start_is_no_endless_loop(monkeypatch, many_parts):
     class Broken(concurrent.futures.Executor):
         def submit(self, *given):
             raise concurrent.futures.BrokenExecutor
@@ -306,3 +286,43 @@ def test_an_executor_that_does_not_start_is_no_endless_loop(monkeypatch, many_pa
     with pytest.raises(WorkerDied):
         compute(ensemble.advance, MemoryBlocks(), tasks, print, never, 2)
     assert len(made) < 100
+
+
+SOME = ["sim.laws.jkr.pull_off_load", "sim.laws.jkr.radius_at_load", "sim.numerics.special.lambert_w"]
+
+
+@pytest.fixture
+def cold(tmp_path, monkeypatch):
+    """An empty cache, into which compilation in other processes goes."""
+    monkeypatch.setenv("SIM_CACHE_DIR", str(tmp_path))
+    jit._cache_folder.cache_clear()
+    yield tmp_path
+    jit._cache_folder.cache_clear()
+
+
+def test_every_kernel_and_law_of_the_sources_is_compiled_once(cold, monkeypatch):
+    decorated = set()
+    for module, text in jit.sources().items():
+        for node in ast.parse(text).body:
+            for mark in getattr(node, "decorator_list", ()):
+                if getattr(mark, "id", getattr(getattr(mark, "func", None), "id", "")) in ("kernel", "law"):
+                    decorated.add(f"{module}.{node.name}")
+    assert set(warm.missing()) == decorated and len(decorated) > 50
+    missing = warm.missing()
+    monkeypatch.setattr(warm, "missing", lambda: [name for name in SOME if not jit.cached(name)])
+    done = CliRunner().invoke(cli, ["warm", "--jobs", "2"])
+    assert done.exit_code == 0 and done.stdout.startswith(f"3 of {len(jit.compiled)} kernels and laws compiled")
+    monkeypatch.undo()
+    monkeypatch.setenv("SIM_CACHE_DIR", str(cold))
+    assert set(missing) - set(warm.missing()) == set(SOME)
+    before = {path: path.stat().st_mtime_ns for path in cold.rglob("*") if path.is_file()}
+    warm.compile_all(SOME, 1, (done := []).append)
+    assert done == [1, 1, 1]
+    assert {path: path.stat().st_mtime_ns for path in cold.rglob("*") if path.is_file()} == before
+
+
+def test_a_cache_that_cannot_be_written_is_no_success(cold, monkeypatch):
+    (cold / "sliding-sim").write_text("no folder", encoding="utf-8")
+    monkeypatch.setattr(warm, "missing", lambda: SOME[:1])
+    done = CliRunner().invoke(cli, ["warm"])
+    assert done.exception.exit_code == 74 and "SIM_CACHE_DIR" in str(done.exception)

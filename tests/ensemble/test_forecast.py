@@ -12,20 +12,17 @@ from types import SimpleNamespace
 import psutil
 import pytest
 from helpers.commands import COUNTED, LENS
+from helpers.parts import Clock, Record, analysis, load, run
 from helpers.scenes import SHEARS, sample
 from numpy.testing import assert_allclose
 
 from benchmarks.timing import child
-from sim import analysis
 from sim.ensemble import plan as plans, preview
 from sim.ensemble.dataset import identity
 from sim.ensemble.plan import Plan
 from sim.ensemble.preview import fitting, forecast, memory, remarks, size
-from sim.ensemble.simulate import run
 from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
-from sim.scenario.clock import Clock, Record
-from sim.scenario.reader import load
 
 
 def test_members_are_pooled_with_a_remark_if_their_file_would_be_too_large(monkeypatch):
@@ -38,8 +35,7 @@ def test_members_are_pooled_with_a_remark_if_their_file_would_be_too_large(monke
         assert sum("record.per_member = true" in text for text in remarks(Plan.of(default))) == (not per_member)
         assert json.loads(dataset.attrs["scenario_resolved"])["record"]["per_member"] is per_member
         assert identity(dataset.attrs) == identity(alike.attrs)  # so that either goes on with the other
-        assert analysis.table(dataset) == analysis.table(alike)
-        assert "member" in run(each).dims
+        assert analysis.table(dataset) == analysis.table(alike) and "member" in run(each).dims
 
 
 def never_begun(done):
@@ -58,8 +54,7 @@ def test_a_run_has_as_many_processes_as_memory_holds_and_is_refused_if_it_holds_
     for to in (None, tmp_path / "x.nc"):
         with pytest.raises(preview.NoRoom, match=f"{size(0.5 * needed[0])} are free") as refused:
             run(plan.scenario, to, jobs=2, progress=never_begun)
-    assert refused.value.exit_code == 1
-    assert not list(tmp_path.iterdir())
+    assert refused.value.exit_code == 1 and not list(tmp_path.iterdir())
     assert size(0.5 * needed[0]) in preview.preview(plan.scenario)
     with pytest.raises(preview.NoRoom):
         fitting(plan, 1, needed[0], in_memory=True)
@@ -79,34 +74,7 @@ def test_the_memory_limit_is_that_of_the_variable_else_of_the_job_else_what_is_f
     assert preview.memory_limit()[0] == 2e9
 
 
-def test_steps_of_a_run_that_are_done_are_not_counted_again(monkeypatch):
-    plan = Plan.of(sample(2000, 50_000, record=Record(per_member=False)))
-    monkeypatch.setattr(preview, "tried", lambda plan, compiling: 1.0)
-    done = {name for task in itertools.islice(plan.tasks(), 3) for name in task.names}
-    left = 1.0 - 3 * plan.group / plan.members
-    whole, rest = (forecast(plan, 2, left=share) for share in (1.0, left))
-    assert rest.cpu < 0.9 * whole.cpu
-    assert preview.processes(plan, 2, math.inf)[1][-1].startswith(preview._times(whole, 2))
-    assert preview.processes(plan, 2, math.inf, parts=done)[1][-1].startswith(preview._times(rest, 2))
-
-
-def test_a_run_whose_parts_and_dataset_the_disk_does_not_hold_is_refused_and_leaves_nothing(monkeypatch, tmp_path):
-    scenario, folder = sample(50, 500), tmp_path / "outputs"
-    needed = forecast(Plan.of(scenario), 1).disk
-    monkeypatch.setattr(shutil, "disk_usage", lambda place: SimpleNamespace(total=10**12, free=0.9 * needed))
-    with pytest.raises(StoreTrouble, match=size(0.9 * needed)) as refused:
-        run(scenario, folder / "x.nc", progress=never_begun)
-    assert refused.value.exit_code == 74
-    assert not list(folder.iterdir())
-    monkeypatch.chdir(tmp_path)
-    assert size(0.9 * needed) in preview.preview(scenario)
-    parts = folder / "x.nc.parts"
-    parts.mkdir()
-    (parts / "manifest.json").write_bytes(bytes(int(0.2 * needed)))  # of an unfinished run
-    preview.refuse_full_disk(Plan.of(scenario), folder / "x.nc")
-
-
-def test_the_room_on_disk_is_that_of_parts_and_dataset(tmp_path, monkeypatch):
+def test_the_room_on_disk_is_that_of_parts_and_dataset_and_too_little_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(plans, "_BLOCK_SECONDS", 2e-3)
     mapped = sample(5, 60, shear=SHEARS["mapped, diffusion, constant"], record=Record(maps=(1e-3, 5e-2)))
     for scenario in (sample(50, 200), sample(50, 200, record=Record(per_member=False)), mapped):
@@ -119,6 +87,18 @@ def test_the_room_on_disk_is_that_of_parts_and_dataset(tmp_path, monkeypatch):
         dataset = run(scenario, tmp_path / "x.nc", replace=True, stage=watch).stat().st_size
         disk = forecast(Plan.of(scenario), 1).disk
         assert disk / 1.5 < sizes["parts"] + dataset < 1.5 * disk
+    scenario, folder = sample(50, 500), tmp_path / "outputs"
+    needed = forecast(Plan.of(scenario), 1).disk
+    monkeypatch.setattr(shutil, "disk_usage", lambda place: SimpleNamespace(total=10**12, free=0.9 * needed))
+    with pytest.raises(StoreTrouble, match=size(0.9 * needed)) as refused:
+        run(scenario, folder / "x.nc", progress=never_begun)
+    assert refused.value.exit_code == 74 and not list(folder.iterdir())
+    monkeypatch.chdir(tmp_path)
+    assert size(0.9 * needed) in preview.preview(scenario)
+    parts = folder / "x.nc.parts"
+    parts.mkdir()
+    (parts / "manifest.json").write_bytes(bytes(int(0.2 * needed)))  # of an unfinished run
+    preview.refuse_full_disk(Plan.of(scenario), folder / "x.nc")
 
 
 def test_the_pace_is_that_of_the_steps_and_nothing_is_compiled_for_it(monkeypatch):
@@ -138,19 +118,23 @@ def test_the_pace_is_that_of_the_steps_and_nothing_is_compiled_for_it(monkeypatc
     calls, notices = [], [lambda name: None]
     monkeypatch.setattr(jit, "on_compiling", notices[:])
     monkeypatch.setattr(preview, "follow", lambda *arguments: calls.append(1) or jit.on_compiling[0]("a kernel"))
-    assert preview.tried(plan) is None
-    assert (jit.on_compiling, calls) == (notices, [1])
+    assert preview.tried(plan) is None and (jit.on_compiling, calls) == (notices, [1])
 
 
-def test_more_members_take_more_time_in_proportion_and_no_more_memory():
+def test_more_members_take_more_time_and_no_more_memory_and_steps_that_are_done_none(monkeypatch):
     record = Record(per_member=True)
     few, many = (Plan.of(sample(members, 20_000, record=record)) for members in (1000, 10_000))
     assert not preview.tabulated(many)
     assert_allclose(forecast(many, 1).cpu, 10 * forecast(few, 1).cpu, rtol=0.1)
     assert_allclose([memory(many, jobs) for jobs in (1, 4)], [memory(few, jobs) for jobs in (1, 4)], rtol=0.1)
-
-
-# --- processes of their own ---
+    plan = Plan.of(sample(2000, 50_000, record=Record(per_member=False)))
+    monkeypatch.setattr(preview, "tried", lambda plan, compiling: 1.0)
+    done = {name for task in itertools.islice(plan.tasks(), 3) for name in task.names}
+    left = 1.0 - 3 * plan.group / plan.members
+    whole, rest = (forecast(plan, 2, left=share) for share in (1.0, left))
+    assert rest.cpu < 0.9 * whole.cpu
+    assert preview.processes(plan, 2, math.inf)[1][-1].startswith(preview._times(whole, 2))
+    assert preview.processes(plan, 2, math.inf, parts=done)[1][-1].startswith(preview._times(rest, 2))
 
 
 def long_scene(steps, record):
@@ -174,8 +158,7 @@ def test_a_member_of_a_hundred_million_steps_is_kept_in_blocks_and_goes_on_from_
     resumed = subprocess.Popen([*command, "--resume"], cwd=tmp_path)
     while resumed.poll() is None and len(list(parts.glob("point*"))) < len(done) + 3:
         time.sleep(0.01)
-    assert {path: path.stat().st_mtime_ns for path in done} == done
-    assert resumed.wait() == 0
+    assert {path: path.stat().st_mtime_ns for path in done} == done and resumed.wait() == 0
 
 
 @pytest.mark.verify

@@ -5,31 +5,23 @@ import math
 import re
 from pathlib import Path
 
+from helpers.parts import Slip, bonds, load, run, shear
 from helpers.scenes import BELL, CELL, CUT_OFF, SHEARS, SPECTRUM, STRETCHED, scene
 from numpy.testing import assert_allclose
 
 from sim.ensemble.plan import Plan
 from sim.ensemble.preview import preview
-from sim.ensemble.simulate import run
 from sim.laws.schallamach import bell_moments
-from sim.parts.bonds import models as bonds
-from sim.parts.shear import models as shear
-from sim.parts.shear.process import Slip
-from sim.scenario.reader import load
 from sim.scenario.schema import quantities
 
 FOLDER = Path(__file__).parents[2] / "scenarios"
 WIDE = {"model": "gaussian", "rms": "10 kPa", "length": "4 mm"}
 NAMES = sorted(path.stem for path in FOLDER.glob("*.toml"))
-
-
 MODAL = {
-    "model": "modal",
-    "cell": "0.24 mm",
-    "points": 32,
+    "model": "modal", "cell": "0.24 mm", "points": 32,
     "spectrum": {"model": "band", "rms": "150 kPa", "longest": "60 um", "shortest": "16 um"},
     "correlation": {"model": "slip", "length": "5 um"},
-}
+}  # fmt: skip
 
 
 def blocks(name, **overrides):
@@ -46,7 +38,7 @@ def row(lines, key):
     return re.split(r" {2,}", line)
 
 
-def test_every_number_of_every_scenario_is_listed_in_si_with_its_unit_in_columns():
+def test_every_number_is_listed_in_si_with_its_unit_in_columns_and_swept_ones_with_their_range():
     for name in NAMES:
         scenario = load(FOLDER / f"{name}.toml", {"sweep": {}})
         lines = blocks(name, sweep={})["quantities in SI"]
@@ -56,22 +48,6 @@ def test_every_number_of_every_scenario_is_listed_in_si_with_its_unit_in_columns
                 assert_allclose(float(number), value, rtol=1e-5, atol=0)
                 assert unit == ("" if quantity.unit == "1" else quantity.unit)
         assert len({re.match(r"(?:\S+ )*\S+ {2,}", line).end() for line in lines}) == 1
-
-
-def test_each_depth_is_listed_with_its_reason():
-    lines = blocks("masking", **{"drive.speed": "2 mm/s"})["models"]
-    assert row(lines, "drive")[1:3] == ["steady", "changed by an override"]
-    assert row(lines, "bonds")[1:3] == ["none", "left out, so the simplest"]
-    assert row(lines, "shear")[1:3] == ["mean", "in the file"]
-    assert row(lines, "contact")[3].startswith("The contact is in JKR equilibrium")
-    swept = blocks("masking", sweep={"bonds": [{"model": "none"}, {"model": "steady", "critical_speed": 0.01}]})[
-        "models"
-    ]
-    assert [line.split()[1] for line in swept if line.startswith("bonds")] == ["none", "steady"]
-    assert all("swept" in line for line in swept if line.startswith("bonds"))
-
-
-def test_swept_quantities_are_listed_with_their_range_and_choices_beside_the_numbers():
     for name, overrides, key, cells in (
         ("uniform_stress", {}, "contact.load", ["-0.0003 to 0.016 N", "normal load, compression positive (5 values)"]),
         ("uniform_stress", {}, "bonds.stress", ["0 to 1e+06 Pa"]),
@@ -84,7 +60,7 @@ def test_swept_quantities_are_listed_with_their_range_and_choices_beside_the_num
     assert not any(line.startswith(("record", "name", "shear.model")) for line in lines)
 
 
-def test_the_contact_at_rest_is_that_of_the_dataset():
+def test_the_contact_at_rest_its_stiffness_and_errors_of_the_cell_are_those_of_the_dataset():
     lines = blocks("afm_tip")["contact at rest"]
     scenario = load(FOLDER / "afm_tip.toml")
     radii = [point.rest_radius for point in scenario.points() if math.isfinite(point.rest_radius)]
@@ -94,9 +70,6 @@ def test_the_contact_at_rest_is_that_of_the_dataset():
     lost = len(scenario.points()) - len(radii)
     assert row(lines, "open")[1] == f"beyond pull-off at {lost} of 61 points"
     assert_allclose(float(row(lines, "pull-off load")[1].split()[0]), -1.5 * math.pi * 0.4 * 100e-9, rtol=1e-3)
-
-
-def test_the_errors_of_the_cell_are_those_of_the_dataset():
     short = {"clock.duration": "10 ms", "clock.step": "10 ms", "ensemble.members": 2}
     lines = blocks("soft_lens", **short)["fluctuations"]
     dataset = run(load(FOLDER / "soft_lens.toml", short))
@@ -105,6 +78,49 @@ def test_the_errors_of_the_cell_are_those_of_the_dataset():
     energies = [float(word) for word in row(lines, "stored energy")[1].split()[::2][:2]]
     assert_allclose(energies[1] / energies[0], (45 / 10) ** 2, rtol=1e-3)
     assert_allclose(float(row(lines, "cell")[1].split()[0]), 4e-3)
+    lines = blocks("stick_slip")["slider"]
+    radius = next(iter(load(FOLDER / "stick_slip.toml").points())).rest_radius
+    firm = float(row(lines, "contact k_t")[1].split()[0])
+    assert_allclose(firm, 3.0 * math.pi**2 * 1.6e6 * radius / (4.0 * 1.5), rtol=1e-3)
+    keys = ("oscillates below", "with mass, damping, viscosity, k_t")
+    alone, delayed = (float(row(lines, key)[1].split()[0]) for key in keys)
+    assert 0.0 < alone < delayed < math.inf  # the compliance of the contact adds to that of the spring
+
+
+def sizes(name, **overrides):
+    """Bytes of the file, as told: packed and before compression."""
+    cell = row(blocks(name, **overrides)["the run"], "file")[1]
+    found = [float(number) * {"kB": 1e3, "MB": 1e6}[unit] for number, unit in re.findall(r"([0-9.]+) (kB|MB)", cell)]
+    return found[0], found[-1]
+
+
+def test_the_run_is_counted_and_its_file_estimated_with_its_maps(tmp_path):
+    lines = blocks("fixed_grips")["the run"]
+    plan = Plan.of(load(FOLDER / "fixed_grips.toml"))
+    clock = plan.points[0].clock
+    assert row(lines, "time")[1] == f"{clock.steps} steps, {clock.records} records"
+    work = len(plan.points) * plan.members * (clock.steps + 1)
+    assert row(lines, "work")[1].startswith(f"{work:,} member-steps, about ")
+    assert row(blocks("uniform_stress")["the run"], "sweep")[1] == "4 bonds.stress × 5 contact.load = 20 points"
+    alone = blocks("masking", **{"ensemble.members": 9})["the run"]
+    assert row(alone, "members")[1] == "9, all alike, so one is computed"
+    scenes = ("fixed_grips", {}), ("soft_lens", {"record.per_member": False})
+    scenes += (("fixed_grips", {"record.quantities": ["speed"]}),)
+    for compression, (name, changes) in itertools.product(("none", "zlib", "digits"), scenes):
+        overrides = changes | {"record.compression": compression}
+        packed, bare = sizes(name, **overrides)
+        size = run(load(FOLDER / f"{name}.toml", overrides), tmp_path / "out.nc", replace=True).stat().st_size
+        assert 0.5 * packed < size < 2.0 * packed
+        assert size < bare + 100e3  # and what HDF5 itself takes
+        assert (packed == bare) == (compression == "none")
+
+    def size(**record):
+        mapped = {**MODAL, "model": "mapped", "points": 64}
+        overrides = {"shear": mapped, "clock": {"duration": "2 s", "step": "1 s"}, "ensemble.members": 9}
+        return sizes("uniform_stress", sweep={}, record=record, **overrides)[1]
+
+    maps = 8 * 9 * 2 * 64**2  # 9 members, 2 times, a grid of 64 points a side
+    assert_allclose(size(maps=["1 s", "2 s"], map_members=9) - size(), maps, rtol=0.1)
 
 
 def test_limits_of_the_theory_and_of_the_cell_are_noted_once():
@@ -117,78 +133,22 @@ def test_limits_of_the_theory_and_of_the_cell_are_noted_once():
     ):
         assert sum(line.startswith(start) for line in blocks(name, **overrides)["notes"]) == 1, start
     assert not {"notes", "fluctuations"} & blocks("uniform_stress", sweep={}).keys()
-
-
-def test_a_slider_is_listed_with_the_stiffness_of_its_contact_and_those_below_which_it_oscillates():
-    lines = blocks("stick_slip")["slider"]
-    radius = next(iter(load(FOLDER / "stick_slip.toml").points())).rest_radius
-    firm = float(row(lines, "contact k_t")[1].split()[0])
-    assert_allclose(firm, 3.0 * math.pi**2 * 1.6e6 * radius / (4.0 * 1.5), rtol=1e-3)
-    alone, delayed = (
-        float(row(lines, key)[1].split()[0]) for key in ("oscillates below", "with mass, damping, viscosity, k_t")
-    )
-    assert 0.0 < alone < delayed < math.inf  # the compliance of the contact adds to that of the spring
-
-
-def test_the_run_is_counted_as_it_will_be():
-    lines = blocks("fixed_grips")["the run"]
-    plan = Plan.of(load(FOLDER / "fixed_grips.toml"))
-    clock = plan.points[0].clock
-    assert row(lines, "time")[1] == f"{clock.steps} steps, {clock.records} records"
-    work = len(plan.points) * plan.members * (clock.steps + 1)
-    assert row(lines, "work")[1].startswith(f"{work:,} member-steps, about ")
-    assert row(blocks("uniform_stress")["the run"], "sweep")[1] == "4 bonds.stress × 5 contact.load = 20 points"
-    alone = blocks("masking", **{"ensemble.members": 9})["the run"]
-    assert row(alone, "members")[1] == "9, all alike, so one is computed"
-
-
-def sizes(name, **overrides):
-    """Bytes of the file, as told: packed and before compression."""
-    cell = row(blocks(name, **overrides)["the run"], "file")[1]
-    found = [float(number) * {"kB": 1e3, "MB": 1e6}[unit] for number, unit in re.findall(r"([0-9.]+) (kB|MB)", cell)]
-    return found[0], found[-1]
-
-
-def test_the_file_is_as_large_as_estimated_and_before_compression_no_larger(tmp_path):
-    scenes = ("fixed_grips", {}), ("soft_lens", {"record.per_member": False})
-    scenes += (("fixed_grips", {"record.quantities": ["speed"]}),)
-    for compression, (name, changes) in itertools.product(("none", "zlib", "digits"), scenes):
-        overrides = changes | {"record.compression": compression}
-        packed, bare = sizes(name, **overrides)
-        size = run(load(FOLDER / f"{name}.toml", overrides), tmp_path / "out.nc", replace=True).stat().st_size
-        assert 0.5 * packed < size < 2.0 * packed
-        assert size < bare + 100e3  # and what HDF5 itself takes
-        assert (packed == bare) == (compression == "none")
-
-
-def test_maps_count_in_the_size_of_the_file():
-    def size(**record):
-        mapped = {**MODAL, "model": "mapped", "points": 64}
-        overrides = {"shear": mapped, "clock": {"duration": "2 s", "step": "1 s"}, "ensemble.members": 9}
-        return sizes("uniform_stress", sweep={}, record=record, **overrides)[1]
-
-    maps = 8 * 9 * 2 * 64**2  # 9 members, 2 times, a grid of 64 points a side
-    assert_allclose(size(maps=["1 s", "2 s"], map_members=9) - size(), maps, rtol=0.1)
-
-
-def test_waves_longer_than_the_cell_are_noted():
     for cell, noted in ((CELL, False), (0.4 * CELL, True)):
         part = shear.Banded(spectrum=SPECTRUM, cell=cell, correlation=Slip(length=1e-6))
         assert ("longer than the cell" in preview(scene(shear=part))) == noted
     assert "longer than the cell" not in preview(scene(shear=SHEARS["modal ripple"]))
 
 
-def test_the_mean_field_of_bell_bonds_is_listed_by_how_much_it_overpredicts():
-    for rebinding, percent in ((1.0, 27), (100.0, 47)):
-        recipe = STRETCHED | {"rebinding_rate": rebinding * BELL.zero_force_rate}
-        text = preview(scene(bonds=bonds.FirstMoment(rupture=BELL, **recipe)))
-        (line,) = (line.strip() for line in text.splitlines() if "overpredicts" in line)
-        assert line.startswith("the mean stretch") and f" overpredicts the friction maximum by {percent}%" in line
-    for silent in (bonds.FirstMoment(rupture=CUT_OFF, **STRETCHED), bonds.Cohort(rupture=BELL, **STRETCHED)):
-        assert "overpredicts" not in preview(scene(bonds=silent))
-
-
-def test_models_chosen_by_the_scene_are_listed_with_their_reason():
+def test_depths_are_listed_with_their_reason_also_if_chosen_by_the_scene():
+    lines = blocks("masking", **{"drive.speed": "2 mm/s"})["models"]
+    assert row(lines, "drive")[1:3] == ["steady", "changed by an override"]
+    assert row(lines, "bonds")[1:3] == ["none", "left out, so the simplest"]
+    assert row(lines, "shear")[1:3] == ["mean", "in the file"]
+    assert row(lines, "contact")[3].startswith("The contact is in JKR equilibrium")
+    tables = [{"model": "none"}, {"model": "steady", "critical_speed": 0.01}]
+    swept = blocks("masking", sweep={"bonds": tables})["models"]
+    assert [line.split()[1] for line in swept if line.startswith("bonds")] == ["none", "steady"]
+    assert all("swept" in line for line in swept if line.startswith("bonds"))
     for part, model, reason in (
         ({"shear": SHEARS["auto with correlation"]}, "banded", "a correlation is given"),
         ({"shear": SHEARS["auto without correlation"]}, "mean", "no correlation is given"),
@@ -201,7 +161,15 @@ def test_models_chosen_by_the_scene_are_listed_with_their_reason():
         assert (mark, chosen) == (f"→ {model}", "chosen") and reason in why
 
 
-def test_energy_under_bonds_that_friction_has_paid_for_is_listed_where_adhesion_pays_again():
+def test_what_bonds_do_to_the_paper_is_listed_with_the_size_of_their_field():
+    for rebinding, percent in ((1.0, 27), (100.0, 47)):
+        recipe = STRETCHED | {"rebinding_rate": rebinding * BELL.zero_force_rate}
+        text = preview(scene(bonds=bonds.FirstMoment(rupture=BELL, **recipe)))
+        (line,) = (line.strip() for line in text.splitlines() if "overpredicts" in line)
+        assert line.startswith("the mean stretch") and f" overpredicts the friction maximum by {percent}%" in line
+    for silent in (bonds.FirstMoment(rupture=CUT_OFF, **STRETCHED), bonds.Cohort(rupture=BELL, **STRETCHED)):
+        assert "overpredicts" not in preview(scene(bonds=silent))
+
     def twice(**overrides):
         lines = blocks("bond_noise", **overrides).get("notes", [])
         return sum(line.startswith("friction has paid for the energy under each bond") for line in lines)
@@ -209,9 +177,6 @@ def test_energy_under_bonds_that_friction_has_paid_for_is_listed_where_adhesion_
     assert twice() == twice(sweep={}) == 1
     assert twice(**{"sweep": {}, "shear.paid_by_adhesion": 0.0}) == twice(sweep={}, shear={"model": "uniform"}) == 0
     assert not any("friction has paid" in line for line in blocks("masking")["notes"])
-
-
-def test_the_size_of_the_bonds_field_is_that_of_steady_sliding_at_the_last_speed():
     lines = blocks("bond_noise")["fluctuations"]
     square = 9e16 * float(bell_moments(0.1, 1e4, 4e-12, 4e-4, 1e5).force_square)
     energy, unit, *when = row(lines, "stored energy")[1].split(" ", 2)

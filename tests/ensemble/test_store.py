@@ -10,6 +10,7 @@ import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ import xarray as xr
 from click.testing import CliRunner
 from helpers import scenes
 from helpers.cases import posix
+from helpers.parts import Clock, Record, Slip, shear
 from helpers.scenes import CELL, LOADS, LOADS_AND_SHARES, SPECTRUM, scene
 
 from sim.cli import cli
@@ -24,9 +26,6 @@ from sim.ensemble import plan as plans, simulate as ensemble, store
 from sim.ensemble.plan import Plan
 from sim.ensemble.store import BlockFiles, OutputBusy, OutputExists, Stopped, Unfinished
 from sim.numerics.files import DiskFull, StoreTrouble
-from sim.parts.shear import models as shear
-from sim.parts.shear.process import Slip
-from sim.scenario.clock import Clock, Record
 from sim.units.errors import BadInput
 
 pytestmark = pytest.mark.usefixtures("many_parts")
@@ -53,7 +52,13 @@ def stopped(path, scenario=None, after=2, **how):
     return path.with_name(f"{path.name}.parts")
 
 
-def test_blocks_hold_every_step_once_and_end_at_records_or_between_them(monkeypatch):
+def test_blocks_hold_every_step_once_even_if_a_record_takes_longer_than_a_block(monkeypatch):
+    scenario = sample(clock=Clock(duration=12e-3, step=1e-4, record=6e-3))
+    many = ensemble.run(scenario)
+    plan = Plan.of(scenario)
+    assert plan.records_of_block(plan.points[0]) == 0 and len(plan.blocks(plan.points[0])) > 4
+    monkeypatch.undo()
+    xr.testing.assert_identical(ensemble.run(scenario), many)
     for stride, most in itertools.product((1, 2, 5, 20), (1, 2, 3, 4, 7, 100)):
         monkeypatch.setattr(Plan, "_pieces", (2, most))
         plan = Plan.of(scene(3, clock=Clock(duration=20e-3, step=1e-3, record=stride * 1e-3)))
@@ -64,16 +69,6 @@ def test_blocks_hold_every_step_once_and_end_at_records_or_between_them(monkeypa
         assert max(block.end - block.start for block in blocks) <= max(most, 1)
         if most >= stride:
             assert all(block.end % stride == 0 for block in blocks)
-
-
-def test_a_record_that_takes_longer_than_a_block_gives_the_same_dataset(monkeypatch):
-    scenario = sample(clock=Clock(duration=12e-3, step=1e-4, record=6e-3))
-    many = ensemble.run(scenario)
-    plan = Plan.of(scenario)
-    assert plan.records_of_block(plan.points[0]) == 0
-    assert len(plan.blocks(plan.points[0])) > 4
-    monkeypatch.undo()
-    xr.testing.assert_identical(ensemble.run(scenario), many)
 
 
 def killed(operation, path, **how):
@@ -147,12 +142,10 @@ def test_blocks_that_are_there_are_not_computed_again(tmp_path, monkeypatch):
 
 MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=2 * CELL, points=24, correlation=Slip(length=3e-6), contact="disc")
 SCENES = {
-    "members": sample(),
-    "pooled": sample(record=Record(per_member=False)),
-    "short runs together": sample(steps=1),
+    "members": sample(), "pooled": sample(record=Record(per_member=False)), "short runs together": sample(steps=1),
     "maps": sample(shear=MAPPED, record=Record(maps=(8e-3, 1e-3), map_members=3)),
     "blocks in a record": sample(clock=Clock(duration=9e-3, step=1e-3, record=9e-3)),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("scenario", SCENES.values(), ids=SCENES)
@@ -171,18 +164,17 @@ def harmed(block, how):
     with np.load(block) as file:
         arrays = dict(file)
     first, state = next(iter(arrays)), next(key for key in arrays if key.startswith("state."))
+    harms = {"cut": content[:-9], "empty": b"", "changed": content[:999] + b"xyz" + content[1002:]}
+    if how in harms:
+        block.write_bytes(harms[how])
+        return
     if how == "shape":
         arrays[first] = arrays[first][..., :-1]
-    elif how in ("name", "state"):
-        del arrays[state if how == "state" else first]
     elif how == "pickle":
         arrays[first] = np.array([{}], object)
-    if how in ("cut", "empty", "changed"):
-        middle = len(content) // 2
-        harms = {"cut": content[:-9], "empty": b""}
-        block.write_bytes(harms.get(how, content[:middle] + b"xyz" + content[middle + 3 :]))
     else:
-        np.savez(block, **arrays)
+        del arrays[{"state": state, "name": first}[how]]
+    np.savez(block, **arrays)
 
 
 @pytest.mark.parametrize("how", ["cut", "empty", "changed", "shape", "name", "state", "pickle"])
@@ -267,23 +259,18 @@ def test_a_file_that_comes_during_a_run_is_not_replaced(tmp_path):
     assert same(path)
 
 
-def test_a_finished_run_is_left_as_it_is(tmp_path):
-    path = ensemble.run(sample(), tmp_path / "out.nc")
-    before = path.stat()
-    assert ensemble.run(sample(), path, resume=True) == path
-    assert path.stat().st_mtime_ns == before.st_mtime_ns
-    with pytest.raises(BadInput, match=r"out.nc is of another run: scenario.seed was 5, is 6"):
-        ensemble.run(sample(seed=6), path, resume=True)
-    assert names(tmp_path) == ["out.nc"]
-
-
-def test_a_run_that_replaces_an_output_and_is_stopped_goes_on_to_replace_it(tmp_path):
+def test_a_run_that_replaces_an_output_and_is_stopped_goes_on_and_a_finished_one_is_left(tmp_path):
     path = ensemble.run(sample(seed=6), tmp_path / "out.nc")
     older = path.read_bytes()
     stopped(path, replace=True)
     assert path.read_bytes() == older
     ensemble.run(sample(), path, resume=True)
     assert same(path)
+    before = path.stat()
+    assert ensemble.run(sample(), path, resume=True) == path and path.stat().st_mtime_ns == before.st_mtime_ns
+    with pytest.raises(BadInput, match=r"out.nc is of another run: scenario.seed was 5, is 6"):
+        ensemble.run(sample(seed=6), path, resume=True)
+    assert names(tmp_path) == ["out.nc"]
 
 
 def test_runs_of_an_older_version_are_named(tmp_path, monkeypatch):
@@ -315,7 +302,7 @@ def test_a_folder_that_no_run_made_is_not_touched(tmp_path):
             other.rename(folder)
 
 
-def test_files_that_others_put_into_the_folder_stay(tmp_path):
+def test_files_and_folders_of_others_stay(tmp_path):
     path = tmp_path / "out.nc"
     folder = stopped(path)
     (folder / "notes.txt").write_text("do not forget", encoding="utf-8")
@@ -323,15 +310,12 @@ def test_files_that_others_put_into_the_folder_stay(tmp_path):
     assert names(folder) == ["notes.txt"]
 
 
-@pytest.mark.parametrize("trouble", [None, errno.ENOSYS, errno.ENOLCK])
+@pytest.mark.parametrize("trouble", [None, OSError(errno.ENOLCK, "no locks")])
 def test_two_runs_do_not_share_an_output_even_on_a_file_system_without_locks(tmp_path, monkeypatch, trouble):
-    def none(*arguments):
-        raise OSError(trouble, os.strerror(trouble))
-
     path = tmp_path / "out.nc"
     with monkeypatch.context() as patched:
         if trouble:
-            patched.setattr("fcntl.flock", none)
+            patched.setattr("fcntl.flock", Mock(side_effect=trouble))
         busy = "another run is writing" if trouble is None else "if that process was killed .*, delete .*shard-1-of-1"
         with pytest.raises(OutputBusy, match=busy):
             ensemble.run(sample(), path, progress=lambda done: ensemble.run(sample(), path, resume=True))
@@ -351,22 +335,18 @@ def test_a_waiter_that_finds_the_folder_gone_begins_anew(tmp_path):
 
     assert folder.publish([], 1, write)
     waiter.join()
-    assert other == [None]
-    assert names(tmp_path) == ["out.nc"]
+    assert other == [None] and names(tmp_path) == ["out.nc"]
 
 
 shared = functools.partial(scenes.sample, members=7, sweep=LOADS_AND_SHARES)
 
 
-@pytest.mark.parametrize("of", [1, 2, 3, 5, 20])
-def test_every_task_is_in_one_shard(of):
-    plan = Plan.of(shared())
-    shares = [[task.names[0] for task in plan.share(number, of)] for number in range(1, of + 1)]
-    assert sorted(itertools.chain(*shares)) == sorted(task.names[0] for task in plan.tasks())
-    assert sum(plans.work(plan, number, of) for number in range(1, of + 1)) == plans.work(plan) == 7 * 10 * 4
-
-
-def test_the_last_shard_that_is_done_publishes_the_numbers_of_an_undivided_run(tmp_path):
+def test_every_task_is_in_one_shard_and_the_last_that_is_done_publishes_the_numbers_of_an_undivided_run(tmp_path):
+    for of in [1, 2, 3, 5, 20]:
+        plan = Plan.of(shared())
+        shares = [[task.names[0] for task in plan.share(number, of)] for number in range(1, of + 1)]
+        assert sorted(itertools.chain(*shares)) == sorted(task.names[0] for task in plan.tasks())
+        assert sum(plans.work(plan, number, of) for number in range(1, of + 1)) == plans.work(plan) == 7 * 10 * 4
     path, done = tmp_path / "out.nc", []
     for number in (3, 1, 2):
         assert not path.exists()
@@ -379,33 +359,29 @@ def test_the_last_shard_that_is_done_publishes_the_numbers_of_an_undivided_run(t
 
 
 def test_a_run_without_shard_computes_what_no_shard_holds_and_names_the_others(tmp_path):
-    path, codes = tmp_path / "out.nc", []
+    path, refused = tmp_path / "out.nc", []
     stopped(path, shared(), after=1, shard=(1, 3))
 
     def others(done):
-        if not codes:
-            with pytest.raises(OutputBusy, match="the shards 2/3 of"):
-                ensemble.run(shared(), path, resume=True)
-            with pytest.raises(OutputBusy, match="another run"):
-                ensemble.run(shared(), path, shard=(2, 3), resume=True)
-            for how in ({"shard": (2, 3)}, {"shard": (1, 2), "replace": True}, {}):
-                with pytest.raises((OutputBusy, OutputExists)):
-                    ensemble.run(shared(), path, **how)
-            codes.append(75)
+        for how, fault in () if refused else (
+            ({"resume": True}, "the shards 2/3 of"), ({"shard": (2, 3), "resume": True}, "another run"),
+            ({"shard": (2, 3)}, None), ({"shard": (1, 2), "replace": True}, None), ({}, None),
+        ):  # fmt: skip
+            with pytest.raises((OutputBusy, OutputExists), match=fault):
+                ensemble.run(shared(), path, **how)
+        refused.append(True)
 
     ensemble.run(shared(), path, shard=(2, 3), progress=others)
-    assert codes
-    assert same(path, shared())
+    assert refused and same(path, shared())
 
 
 def test_a_shard_that_was_stopped_goes_on(tmp_path):
     path = tmp_path / "out.nc"
     folder = stopped(path, shared(), shard=(1, 2))
     ensemble.run(shared(), path, shard=(2, 2))
-    with pytest.raises(OutputExists, match="--resume"):
-        ensemble.run(shared(), path, shard=(1, 2))
-    with pytest.raises(OutputExists, match="--resume"):
-        ensemble.run(shared(seed=6), path, shard=(2, 2))
+    for scenario, number in ((shared(), 1), (shared(seed=6), 2)):
+        with pytest.raises(OutputExists, match="--resume"):
+            ensemble.run(scenario, path, shard=(number, 2))
     with pytest.raises(BadInput, match="shards was 2, is 3"):
         ensemble.run(shared(), path, shard=(1, 3), resume=True)
     first = min(folder.glob("*.npz"))
@@ -420,8 +396,7 @@ def test_the_shards_of_a_large_array_are_computed_some_at_a_time(tmp_path, monke
         ensemble.run(shared(), tmp_path / "out.nc", shard=(number, 5))
     counted = []
     ensemble.run(shared(), tmp_path / "out.nc", resume=True, progress=counted.append)
-    assert sum(counted) == plans.work(Plan.of(shared()))
-    assert same(tmp_path / "out.nc", shared())
+    assert sum(counted) == plans.work(Plan.of(shared())) and same(tmp_path / "out.nc", shared())
 
 
 def test_a_shard_that_replaces_begins_only_its_own_blocks_anew(tmp_path):
@@ -431,7 +406,7 @@ def test_a_shard_that_replaces_begins_only_its_own_blocks_anew(tmp_path):
     assert same(path, shared())
 
 
-@pytest.mark.parametrize("shard", ["0/3", "4/3", "3", "a/b", "1/3/4", "-1/3", "", f"1/{'9' * 5000}", "1/0"])
+@pytest.mark.parametrize("shard", ["0/3", "4/3", "3", "a/b", f"1/{'9' * 5000}"])
 def test_a_wrong_shard_is_told(tmp_path, monkeypatch, shard):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(BadInput, match="--shard"):

@@ -4,22 +4,17 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from helpers.commands import sim as command
+from helpers.parts import Equilibrium, RateDependent, Record, analysis, shear
 from helpers.pictured import STEADY, drawn, field, legend_of, lines_of, mapped, rendered, simulated
 from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 
 import sim
-from sim import analysis
-from sim.parts import drive
-from sim.parts.contact import Equilibrium, RateDependent
-from sim.parts.shear import models as shear
 from sim.plots import Choices, kinds as plots, style as pictures
 from sim.plots.field import PIXELS
-from sim.scenario.clock import Record
 from sim.units.errors import BadInput
 
 LOADS = {"contact.load": [1e-3, 4e-3]}
-REVERSING = drive.Table(time=(0.0, 0.1, 0.1, 0.4), speed=(2e-3, 2e-3, -2e-3, -2e-3))
 
 
 def draw(dataset, kind=None, **choices):
@@ -37,18 +32,7 @@ def loads():
     return simulated(shear=shear.Uniform(), sweep=LOADS)
 
 
-def test_a_member_is_drawn_alone_and_one_that_does_not_exist_is_refused(ramp):
-    figure = rendered(draw(ramp, "time", member=3))
-    radius = ramp["contact_radius"].isel(member=3)
-    assert_allclose(drawn(figure.axes[0], pictures.BOTH)[1], 1e6 * radius, rtol=1e-14)
-    assert figure.get_suptitle() == "member 3"
-    with pytest.raises(ValueError, match="members 0 to 5"):
-        draw(ramp, "time", member=6)
-    with pytest.raises(ValueError, match="per_member = true"):
-        draw(simulated(record=Record(per_member=False)), "time", member=1)
-
-
-def test_the_map_of_a_member_nearest_to_a_time_is_drawn_and_says_when():
+def test_the_map_or_profile_of_a_member_at_a_time_is_drawn_alone_and_what_does_not_exist_is_refused(ramp):
     dataset = simulated(shear=field(shear.Mapped), drive=STEADY, record=Record(maps=(0.2, 0.4), map_members=2))
     for member, at, place in ((0, 0.25, 0), (1, "300.1 ms", 1)):
         figure = draw(dataset, "map", member=member, at=at)
@@ -62,9 +46,14 @@ def test_the_map_of_a_member_nearest_to_a_time_is_drawn_and_says_when():
         assert r"mean $\tau_0$ = " in figure.axes[0].get_title()
     with pytest.raises(ValueError, match="no stress maps"):
         draw(dataset, "map", member=3)
-
-
-def test_the_profile_at_a_time_is_that_of_the_nearest_record():
+    figure = rendered(draw(ramp, "time", member=3))
+    radius = ramp["contact_radius"].isel(member=3)
+    assert_allclose(drawn(figure.axes[0], pictures.BOTH)[1], 1e6 * radius, rtol=1e-14)
+    assert figure.get_suptitle() == "member 3"
+    with pytest.raises(ValueError, match="members 0 to 5"):
+        draw(ramp, "time", member=6)
+    with pytest.raises(ValueError, match="per_member = true"):
+        draw(simulated(record=Record(per_member=False)), "time", member=1)
     dataset = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())
     closed = np.flatnonzero(dataset["in_contact"])
     time = float(dataset["t"][closed[2]])
@@ -76,7 +65,7 @@ def test_the_profile_at_a_time_is_that_of_the_nearest_record():
         draw(dataset, "profile", at="3 mm")
 
 
-def test_curves_are_drawn_over_what_was_chosen():
+def test_axes_are_those_chosen_in_their_units_with_absolute_areas_in_place_of_shares(ramp):
     for x, variable, factor, label in [
         ("time", "t", 1e3, "time $t$ (ms)"),
         ("speed", "speed", 1e3, "sliding speed $V$ (mm/s)"),
@@ -92,31 +81,12 @@ def test_curves_are_drawn_over_what_was_chosen():
         assert_allclose(radius, 1e6 * dataset["contact_radius"], rtol=1e-14)
         assert figure.axes[-1].get_xlabel() == label
         assert plots.draw(dataset, None, Choices(x=x)).axes[-1].get_xlabel() == label
-
-
-def test_a_swept_key_that_is_chosen_goes_along_the_axis_and_the_others_make_curves():
     dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep=LOADS | {"sphere.radius": ["1 mm", "2 mm", "3 mm"]})
     figure = draw(dataset, x="sphere.radius")
     assert figure.axes[-1].get_xlabel() == "radius of the sphere $R$ (mm)"
     x, radius = drawn(figure.axes[0], pictures.LINES[1])
     assert_allclose(x, [1.0, 2.0, 3.0], rtol=1e-14)
     assert_allclose(radius, 1e6 * dataset["contact_radius"].isel(contact_load=1, t=-1), rtol=1e-14)
-
-
-def test_a_choice_that_a_kind_does_not_take_is_refused_with_what_it_takes(ramp):
-    for kind, choices, words in (
-        ("time", {"x": "slider_positon"}, '"slider_position"'),
-        ("time", {"x": "zzz"}, "t, speed, .*contact_radius"),
-        ("profile", {"x": "t"}, "x; it takes: at$"),
-        ("theories", {"data": "x.csv"}, "data; it takes none"),
-        ("curve", {"units": ("mm",)}, '"mm"'),
-        ("curve", {"units": ("parsnip",)}, '"parsnip"'),
-    ):
-        with pytest.raises(ValueError, match=words):
-            draw(ramp, kind, **choices)
-
-
-def test_absolute_areas_stand_in_place_of_shares(ramp):
     found = analysis.statistics(ramp)
     panel = draw(ramp, "curve", absolute=True).axes[0]
     assert panel.get_ylabel() == "contact area $A$ (mm²)"
@@ -124,9 +94,6 @@ def test_absolute_areas_stand_in_place_of_shares(ramp):
     full = 1e6 * np.pi * float(ramp["radius_at_rest"]) ** 2
     assert_allclose(drawn(panel, pictures.REFERENCE, "--")[1], full, rtol=1e-12)
     assert draw(ramp, "time", absolute=True).axes[0].get_ylabel() == "contact area $A$ (mm²)"
-
-
-def test_axes_have_the_units_chosen_for_their_dimension(ramp):
     figure = draw(ramp, "curve", units=("um/s", "kN"), absolute=True)
     area, *_, friction = figure.axes
     assert friction.get_xlabel() == "sliding speed $V$ (µm/s)" and friction.get_ylabel() == "friction $F$ (kN)"
@@ -152,7 +119,16 @@ def points_of(panel):
     return [line.get_data() for line in panel.lines if line.get_marker() == "o" and line.get_mfc() == "white"]
 
 
-def test_measured_points_lie_where_they_were_measured_with_residuals_below(table):
+def test_measured_points_lie_where_they_were_measured_in_curves_and_loops(loads, table):
+    path = table("contact_load [mN], speed [mm/s], contact_radius [um]\n4, 1, 110\n1, 1, 85\n4, 2, 111\n9, 1, 99\n")
+    panel = draw(loads, "curve", data=path, absolute=True).axes[0]
+    areas = [np.pi * np.square(radii) / 1e6 for radii in ([85.0], [110.0, 111.0])]
+    colours = [line.get_color() for line in panel.lines if line.get_mfc() == "white"]
+    assert colours == list(pictures.LINES[:2])
+    for (_, shown), area in zip(points_of(panel), areas, strict=True):
+        assert_allclose(shown, area, rtol=1e-12)
+    one = analysis.where(loads, {"contact.load": "1 mN"})
+    assert_allclose(points_of(draw(one, "curve", data=path).axes[0])[0][0], [1.0], rtol=1e-14)
     dataset = simulated(shear=shear.Uniform())
     path = table(f"{HEADER}\n2, 0.04, 2, 9\n20, 0.03, 2, 4\n500, 0.03, 2, 1\n")
     area, _, friction, residual = rendered(draw(dataset, "curve", data=path)).axes
@@ -173,21 +149,6 @@ def test_measured_points_lie_where_they_were_measured_with_residuals_below(table
     assert_allclose(points_of(absolute)[0][1], [0.04, 0.03, 0.03], rtol=1e-14)
     radius = draw(dataset, "time", x="speed", data=path).axes[0]
     assert_allclose(points_of(radius)[0][1], 1e3 * np.sqrt(np.array([0.04, 0.03, 0.03]) / np.pi), rtol=1e-12)
-
-
-def test_rows_of_a_swept_value_have_the_colour_of_its_curve(loads, table):
-    path = table("contact_load [mN], speed [mm/s], contact_radius [um]\n4, 1, 110\n1, 1, 85\n4, 2, 111\n9, 1, 99\n")
-    panel = draw(loads, "curve", data=path, absolute=True).axes[0]
-    areas = [np.pi * np.square(radii) / 1e6 for radii in ([85.0], [110.0, 111.0])]
-    colours = [line.get_color() for line in panel.lines if line.get_mfc() == "white"]
-    assert colours == list(pictures.LINES[:2])
-    for (_, shown), area in zip(points_of(panel), areas, strict=True):
-        assert_allclose(shown, area, rtol=1e-12)
-    one = analysis.where(loads, {"contact.load": "1 mN"})
-    assert_allclose(points_of(draw(one, "curve", data=path).axes[0])[0][0], [1.0], rtol=1e-14)
-
-
-def test_a_loop_has_measured_points_in_every_panel(table):
     lagging = RateDependent(load={"from": 1e-4, "to": 1e-3, "cycles": 1}, front_speed=1e-5)
     dataset = simulated(contact=lagging, drive=STEADY, shear=shear.Uniform())
     path = table("normal_load [mN], contact_radius [um], contact_radius_error [um]\n0.3, 70, 2\n0.5, 90, 2\n")
@@ -209,7 +170,14 @@ def test_a_loop_has_measured_points_in_every_panel(table):
     assert label.endswith(" of 2")
 
 
-def test_a_table_of_which_nothing_can_be_drawn_is_refused(ramp, table):
+def test_a_table_is_refused_if_nothing_can_be_drawn_and_a_choice_that_a_kind_does_not_take(ramp, table):
+    for kind, choices, words in (
+        ("time", {"x": "slider_positon"}, '"slider_position"'), ("time", {"x": "zzz"}, "t, speed, .*contact_radius"),
+        ("profile", {"x": "t"}, "x; it takes: at$"), ("theories", {"data": "x.csv"}, "data; it takes none"),
+        ("curve", {"units": ("mm",)}, '"mm"'), ("curve", {"units": ("parsnip",)}, '"parsnip"'),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=words):
+            draw(ramp, kind, **choices)
     for text, words in [
         ("contact_area [mm^2]\n0.04\n", '"speed".*--x'),
         ("speed [mm/s], contact_aera [mm^2]\n1, 0.04\n", '"contact_aera".*"contact_area"'),

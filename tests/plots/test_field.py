@@ -5,17 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.commands import sim
+from helpers.parts import Ensemble, Onset, Record, Stress, drive, load
 from helpers.pictured import CELL, STEADY, field, mapped, rendered, simulated
 from matplotlib.patches import Circle
+from numpy.testing import assert_allclose
 
 from sim.numerics.grid import Grid
-from sim.parts import drive
 from sim.parts.shear import Carried, models as shear
 from sim.parts.shear.modes import modes
-from sim.parts.shear.process import Onset, Stress
 from sim.plots import field as field_figures, kinds as plots
-from sim.scenario.clock import Ensemble, Record
-from sim.scenario.reader import load
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple
 from sim.spectrum.measured import Tabulated
 from sim.spectrum.stress_map import StressMap
@@ -23,42 +21,25 @@ from sim.spectrum.stress_map import StressMap
 STARTER = Path(__file__).parents[2] / "sim" / "starter.toml"
 
 
-def test_map_passes_through_every_sample():
-    for points in [32, 33]:
-        dataset = mapped(points=points)
-        panels = plots.draw(dataset, "map").axes
-        stress = dataset["shear_map"][0, 0].to_numpy()
-        shown = panels[0].images[0].get_array().T / 1e-3  # kPa
-        fine = points * -(-field_figures.PIXELS // points) // points
-        half = shown.shape[0] // 2
-        # the middle of the picture is the corner of the cell's array; rounding of the transform of |stress|
-        at = half + fine * np.arange(points // 2)
-        rounding = 1e-13 * np.max(np.abs(stress))
-        np.testing.assert_allclose(shown[np.ix_(at, at)], stress[: points // 2, : points // 2], rtol=0, atol=rounding)
-
-
-def test_map_of_a_ripple_and_its_displacement_have_the_closed_amplitudes():
+def test_a_ripple_and_its_displacement_have_the_closed_amplitudes_and_an_arrow_points_ahead():
     ripple = Ripple(amplitude=3e5, wavelength=24e-6)
     dataset = mapped(spectrum=ripple, mode_amplitudes="fixed", amplitude=Onset(speed=1e-9, width=0.1))
     shown = [panel.images[0] for panel in plots.draw(dataset, "map").axes]
     # 384 pixels to ten waves: the highest pixel is at most half a pixel's phase from the crest
     near = 1.0 - np.cos(np.pi * 10 / field_figures.PIXELS)
-    np.testing.assert_allclose(shown[0].get_array().max(), 300.0, rtol=near)
+    assert_allclose(shown[0].get_array().max(), 300.0, rtol=near)
     compliance = 1.0 / (2.0 * 1.6e6 * 2.0 * np.pi / 24e-6)
-    np.testing.assert_allclose(shown[1].get_array().max(), 1e9 * 3e5 * compliance, rtol=near)
+    assert_allclose(shown[1].get_array().max(), 1e9 * 3e5 * compliance, rtol=near)
     along, across = (np.ptp(shown[0].get_array(), axis=axis).max() for axis in (1, 0))
     assert along > 500.0 and across < 1e-6  # x to the right
-
-
-def test_arrow_points_where_the_slider_goes():
     for speed, text in [(4e-3, r"sliding $\longrightarrow$"), (-4e-3, r"$\longleftarrow$ sliding"), (0.0, "at rest")]:
         parts = {"shear": field(shear.Mapped, amplitude=Stress(reference=3e5)), "record": Record(maps=(0.4,))}
         dataset = simulated(drive=drive.Steady(speed=speed), ensemble=Ensemble(members=1), **parts)
         assert text in [label.get_text() for label in plots.draw(dataset, "map").axes[0].texts]
 
 
-def test_measured_spectrum_is_the_one_asked_for():
-    """Each ring within five of the standard errors that Gaussian modes have, whatever the amplitude."""
+def test_a_measured_spectrum_is_the_one_asked_for_and_modes_on_the_grid_hold_their_variance():
+    # Each ring within five of the standard errors that Gaussian modes have, whatever the amplitude.
     for spectrum, amplitude in [
         (Band(rms=150e3, longest=60e-6, shortest=16e-6), Onset(speed=2.5e-3, width=0.3)),
         (Gaussian(rms=1e5, length=20e-6), Stress(reference=1e5)),
@@ -76,36 +57,28 @@ def test_measured_spectrum_is_the_one_asked_for():
         assert len(q) > 5 and np.all(np.abs(ratio - 1.0) < 5.0 * error)
         fine, asked = above.lines[0].get_data()
         angle = 2 * np.pi * np.arange(360) / 360
-        density = np.mean(
-            spectrum.density(1e6 * fine[:, None] * np.cos(angle), 1e6 * fine[:, None] * np.sin(angle)), axis=1
-        )
+        along, across = (1e6 * fine[:, None] * share for share in (np.cos(angle), np.sin(angle)))
+        density = np.mean(spectrum.density(along, across), axis=1)
         raised = amplitude.factor(np.array([4e-3]), dataset["shear_stress"].to_numpy()[-1:])[0] ** 2
-        np.testing.assert_allclose(np.nan_to_num(asked), raised * density, rtol=1e-9)
-
-
-def test_modes_laid_out_on_the_grid_hold_their_variance_both_ways():
+        assert_allclose(np.nan_to_num(asked), raised * density, rtol=1e-9)
     for points in [32, 33]:
         cells = modes(AnisotropicGaussian(rms=1e5, length_x=15e-6, length_y=25e-6, angle=0.4), CELL, points)
         grid = Grid(CELL, points)
         density = field_figures.mode_density(cells, grid)
-        np.testing.assert_allclose(grid.mode_sum(density) / CELL**2, np.sum(cells.variance), rtol=1e-13)
+        assert_allclose(grid.mode_sum(density) / CELL**2, np.sum(cells.variance), rtol=1e-13)
         np.testing.assert_array_equal(density[1:, 0], density[:0:-1, 0])  # q and -q alike
-
-
-def test_spectrum_of_a_sweep_takes_the_swept_number():
     record = Record(maps=(0.4,))
     dataset = simulated(
         drive=STEADY, shear=field(shear.Mapped), record=record, ensemble=Ensemble(members=1),
         sweep={"shear.spectrum.rms": [50e3, 100e3]},
     )  # fmt: skip
     base, swept = (plots.draw(d, "spectrum").axes[0].lines[0].get_ydata() for d in (mapped(), dataset))
-    np.testing.assert_allclose(np.nanmax(swept), np.nanmax(base) / 9.0, rtol=1e-12)
+    assert_allclose(np.nanmax(swept), np.nanmax(base) / 9.0, rtol=1e-12)
 
 
 def test_maps_and_spectra_that_cannot_be_drawn_say_why():
-    resting = simulated(
-        drive=drive.Steady(), shear=field(shear.Mapped), record=Record(maps=(0.4,)), ensemble=Ensemble(members=1)
-    )
+    parts = {"shear": field(shear.Mapped), "record": Record(maps=(0.4,)), "ensemble": Ensemble(members=1)}
+    resting = simulated(drive=drive.Steady(), **parts)
     for dataset, kind, words in (
         (simulated(), "map", r'\[record\] maps = \["1 s"\]'),
         (simulated(), "spectrum", r'\[record\] maps = \["1 s"\]'),
@@ -118,12 +91,9 @@ def test_maps_and_spectra_that_cannot_be_drawn_say_why():
 
 
 SCENE = {
-    "clock": {"duration": "4 ms", "step": "1 ms"},
-    "solid": {"shear_modulus": "1.6 MPa"},
-    "sphere": {"radius": "2 mm"},
-    "adhesion": {"work": "42 mJ/m^2"},
-    "contact": {"load": "4 mN"},
-}
+    "clock": {"duration": "4 ms", "step": "1 ms"}, "solid": {"shear_modulus": "1.6 MPa"}, "sphere": {"radius": "2 mm"},
+    "adhesion": {"work": "42 mJ/m^2"}, "contact": {"load": "4 mN"},
+}  # fmt: skip
 ANISOTROPIC = {"model": "anisotropic_gaussian", "rms": "100 kPa", "length_x": "12 um", "length_y": "40 um"}
 
 
@@ -132,7 +102,7 @@ def before(**spectrum):
     return field_figures.density_figure(load(SCENE | {"shear": {"model": "mean", "spectrum": spectrum}}))
 
 
-def test_a_spectrum_is_drawn_before_any_run(tmp_path, monkeypatch):
+def test_a_spectrum_is_drawn_before_any_run_also_by_the_command_which_replaces_nothing(tmp_path, monkeypatch):
     q, density = np.geomspace(1e4, 1e6, 9), np.geomspace(1.0, 1e-4, 9)
     monkeypatch.chdir(tmp_path)
     rows = "\n".join(f"{a}; {b}" for a, b in zip(q, density, strict=True))
@@ -140,36 +110,27 @@ def test_a_spectrum_is_drawn_before_any_run(tmp_path, monkeypatch):
     panel, below = before(model="tabulated", file="psd.csv").axes
     line, rows = panel.lines[:2]
     table = Tabulated(q, density)
-    np.testing.assert_allclose(line.get_xdata() * 1e6, np.geomspace(7e3, 1.4e6, 1500), rtol=1e-12)
+    assert_allclose(line.get_xdata() * 1e6, np.geomspace(7e3, 1.4e6, 1500), rtol=1e-12)
     inside = np.isfinite(line.get_ydata())
-    np.testing.assert_allclose(
-        line.get_ydata()[inside], table.radial_density(line.get_xdata()[inside] * 1e6), rtol=1e-9
-    )
-    np.testing.assert_allclose(rows.get_ydata(), density, rtol=1e-9)
+    assert_allclose(line.get_ydata()[inside], table.radial_density(line.get_xdata()[inside] * 1e6), rtol=1e-9)
+    assert_allclose(rows.get_ydata(), density, rtol=1e-9)
     variance = below.lines[
         -2
     ]  # by trapezoids, one of which begins at the jump of the density: half of it counts too much
     exact = table.cumulative(variance.get_xdata() * 1e6) / table.variance
-    np.testing.assert_allclose(variance.get_ydata(), exact, rtol=0, atol=1e-3)
-
-
-def test_a_spectrum_that_differs_along_and_across_is_drawn_twice():
+    assert_allclose(variance.get_ydata(), exact, rtol=0, atol=1e-3)
     along, across = before(**ANISOTROPIC).axes[0].lines[:2]
     assert [line.get_label() for line in (along, across)] == ["along the sliding", "across it"]
     spectrum = AnisotropicGaussian(1e5, 12e-6, 40e-6)
     q = along.get_xdata() * 1e6
-    np.testing.assert_allclose(np.nan_to_num(along.get_ydata()), spectrum.density(q, 0.0), rtol=1e-12)
-    np.testing.assert_allclose(np.nan_to_num(across.get_ydata()), spectrum.density(0.0, q), rtol=1e-12)
-
-
-def test_sim_plot_draws_a_scenario_before_its_run_and_replaces_nothing(tmp_path, monkeypatch):
+    assert_allclose(np.nan_to_num(along.get_ydata()), spectrum.density(q, 0.0), rtol=1e-12)
+    assert_allclose(np.nan_to_num(across.get_ydata()), spectrum.density(0.0, q), rtol=1e-12)
     monkeypatch.chdir(tmp_path)
     Path("scene.toml").write_text(STARTER.read_text(encoding="utf-8"), encoding="utf-8")
     answer = sim("plot", "scene.toml")
     assert (answer.exit_code, answer.stdout) == (0, "outputs/scene-spectrum.png\n")
     made = Path("outputs/scene-spectrum.png").read_bytes()
-    assert made.startswith(b"\x89PNG")
-    assert sim("plot", "scene.toml").exit_code == 73
+    assert made.startswith(b"\x89PNG") and sim("plot", "scene.toml").exit_code == 73
     for arguments, words in (
         (("scene.toml", "curve"), 'before a run only "spectrum"'),
         (("scene.toml", "-o", "scene.toml", "--force"), "reads what it would write"),
@@ -183,7 +144,18 @@ def test_sim_plot_draws_a_scenario_before_its_run_and_replaces_nothing(tmp_path,
     assert sorted(path.name for path in Path("outputs").iterdir()) == ["scene-spectrum.png"]
 
 
-def test_a_measured_map_is_drawn_as_it_is_with_the_contact_in_its_middle():
+def test_a_map_passes_through_every_sample_and_a_measured_one_is_drawn_as_it_is():
+    for points in [32, 33]:
+        dataset = mapped(points=points)
+        panels = plots.draw(dataset, "map").axes
+        stress = dataset["shear_map"][0, 0].to_numpy()
+        shown = panels[0].images[0].get_array().T / 1e-3  # kPa
+        fine = points * -(-field_figures.PIXELS // points) // points
+        half = shown.shape[0] // 2
+        # the middle of the picture is the corner of the cell's array; rounding of the transform of |stress|
+        at = half + fine * np.arange(points // 2)
+        rounding = 1e-13 * np.max(np.abs(stress))
+        assert_allclose(shown[np.ix_(at, at)], stress[: points // 2, : points // 2], rtol=0, atol=rounding)
     values = np.random.default_rng(2).normal(size=(40, 32)) * 1e4
     found = StressMap(file="map.npy", pixel=9e-6, values=values.tobytes(), shape=values.shape)
     dataset = simulated(
@@ -192,9 +164,9 @@ def test_a_measured_map_is_drawn_as_it_is_with_the_contact_in_its_middle():
     )  # fmt: skip
     panel = plots.draw(dataset, "map").axes[0]
     (image,) = panel.images
-    np.testing.assert_allclose(image.get_array().T * 1e3, values - values.mean(), rtol=0, atol=1e-6)
+    assert_allclose(image.get_array().T * 1e3, values - values.mean(), rtol=0, atol=1e-6)
     left, right, low, high = image.get_extent()
-    np.testing.assert_allclose((left, right, low, high), 9.0 * np.array([-20.5, 19.5, -16.5, 15.5]), rtol=1e-12)
+    assert_allclose((left, right, low, high), 9.0 * np.array([-20.5, 19.5, -16.5, 15.5]), rtol=1e-12)
     (circle,) = (patch for patch in panel.patches if isinstance(patch, Circle))
     assert circle.center == (0.0, 0.0)
     with pytest.raises(ValueError, match="measured map has no spectrum to follow"):

@@ -2,18 +2,14 @@
 
 import numpy as np
 import pytest
+from helpers.parts import Clock, Ensemble, Equilibrium, Record, bonds, jkr, shear
 from helpers.pictured import STEADY, drawn, legend_of, lines_of, rendered, simulated
 from numpy.testing import assert_allclose
 
 from sim.analysis import loop_energy
-from sim.laws import jkr
-from sim.parts.bonds import models as bonds
-from sim.parts.contact import Equilibrium
-from sim.parts.shear import models as shear
 from sim.plots import kinds as plots, style as pictures
 from sim.plots.style import recorded
 from sim.plots.theories import lost_energy
-from sim.scenario.clock import Clock, Ensemble, Record
 
 JKR = (42e-3, 2e-3, 6.4e6)
 BACK = {"from": 2e-6, "to": -4e-6, "cycles": 2}
@@ -57,31 +53,6 @@ def thick(panel):
     return np.hstack([first, np.array(later)[:, 1:]])
 
 
-def test_load_and_radius_stand_over_the_indentation_and_each_other_and_break_where_the_contact_is_open(grips):
-    loads, radii, over_load = rendered(plots.draw(grips, "loop")).axes
-    closed = grips["in_contact"].to_numpy() == 1
-    assert radii.get_xlabel() == r"indentation $\delta$ (µm)" and not closed.all()
-    radius = np.where(closed, 1e6 * grips["contact_radius"], np.nan)
-    for panel, x, y in (
-        (loads, "indentation", np.where(closed, 1e6 * grips["normal_load"], np.nan)),
-        (radii, "indentation", radius),
-        (over_load, "normal_load", radius),
-    ):
-        assert_allclose(thick(panel), [1e6 * grips[x], y], rtol=1e-14)
-    (thin,) = (line for line in loads.lines if line.get_linewidth() == 0.4)
-    np.testing.assert_array_equal(thin.get_ydata(), np.where(closed, np.nan, 0.0))
-    load, radius = drawn(over_load, pictures.REFERENCE, "--")
-    assert_allclose(load, 1e6 * jkr.load_at_radius(1e-6 * radius, *JKR), rtol=1e-12, atol=1e-12)
-
-
-def test_behind_a_machine_the_axis_is_its_displacement_and_cycles_after_the_first_are_thin(machine):
-    loads, radii, _ = plots.draw(machine, "loop").axes
-    first, later = (x for x, _ in cycles_of(radii))
-    assert len(first) == len(later) == machine.sizes["t"] // 2 + 1 and first[-1] == later[0]
-    assert radii.get_xlabel() == r"displacement $\Delta$ (µm)"
-    assert_allclose(thick(loads)[0], 1e6 * machine["displacement"], rtol=1e-14)
-
-
 def test_grey_are_all_equilibria_of_jkr_stable_or_not(request):
     for which, stiffness in [("grips", np.inf), ("machine", 340.0)]:
         dataset = request.getfixturevalue(which)
@@ -106,19 +77,12 @@ def test_grey_are_all_equilibria_of_jkr_stable_or_not(request):
         assert_allclose(1e6 * simulated[closed], between, rtol=4e-3)
 
 
-def test_thin_lines_are_the_folds_of_a_dead_load_and_of_fixed_grips(grips):
-    panel = plots.draw(grips, "loop").axes[0]
-    levels = sorted(line.get_ydata()[0] for line in panel.lines if line.get_linewidth() == 0.5)
-    pull = np.pi * 42e-3 * 2e-3
-    assert_allclose(levels, [-1.5e6 * pull, -5.0 / 6.0 * 1e6 * pull], rtol=1e-14)
-    assert [text.get_text() for text in panel.texts if "pi wR" in text.get_text()] == [
-        r"$-\frac{3}{2}\pi wR$", r"$-\frac{5}{6}\pi wR$",
-    ]  # fmt: skip
-    # under fixed grips the loop reaches below the one, and an equilibrium never beyond the other
-    assert -1.5 * pull * (1.0 + 1e-12) <= float(grips["normal_load"].min()) < -5.0 / 6.0 * pull
-
-
-def test_crosses_rings_and_dotted_verticals_tell_where_the_contact_jumps(machine):
+def test_behind_a_machine_cycles_have_crosses_rings_verticals_and_the_energy_of_a_trip(machine):
+    loads, radii, _ = plots.draw(machine, "loop").axes
+    first, later = (x for x, _ in cycles_of(radii))
+    assert len(first) == len(later) == machine.sizes["t"] // 2 + 1 and first[-1] == later[0]
+    assert radii.get_xlabel() == r"displacement $\Delta$ (µm)"
+    assert_allclose(thick(loads)[0], 1e6 * machine["displacement"], rtol=1e-14)
     loads, radii, _ = plots.draw(machine, "loop").axes
     closed = machine["in_contact"].to_numpy().astype(int)
     off, on = np.flatnonzero(np.diff(closed) == -1), np.flatnonzero(np.diff(closed) == 1) + 1
@@ -140,9 +104,6 @@ def test_crosses_rings_and_dotted_verticals_tell_where_the_contact_jumps(machine
     dead = moved(Equilibrium(load={"from": 1e-3, "to": -1e-3, "cycles": 1}), clock=COARSE)
     loads = plots.draw(dead, "loop").axes[0]  # a dead load has no jump to draw, but a cross
     assert not loads.collections and len(marks(loads, "x")) == 1 and not marks(loads, "o")
-
-
-def test_the_legend_tells_the_energy_of_a_trip_and_the_loop(machine):
     spent, loop = lost_energy(machine)
     assert_allclose(spent, machine["dissipated_energy"].isel(t=-1) / 2.0, rtol=1e-14)
     assert_allclose(loop, loop_energy(machine)["loop_energy"].mean(), rtol=1e-14)
@@ -153,9 +114,6 @@ def test_the_legend_tells_the_energy_of_a_trip_and_the_loop(machine):
     assert_allclose(loop, spent, rtol=0, atol=2 * 0.5 * 1.5 * np.pi * 42e-3 * 2e-3 * RECORD)
     (entry,) = plots.draw(machine, "loop").axes[0].get_legend().get_texts()
     assert all(f"{1e12 * float(energy):.3g} pJ" in entry.get_text() for energy in (spent, loop))
-
-
-def test_a_way_without_return_or_that_stops_tells_what_was_lost_in_all():
     for contact in (
         Equilibrium(indentation={"from": 2e-6, "to": -2e-6}),
         Equilibrium(indentation=BACK, after_pull_off="stop"),
@@ -169,19 +127,7 @@ def test_a_way_without_return_or_that_stops_tells_what_was_lost_in_all():
         assert legend.get_title().get_text() == "dissipated in all: $W$"
 
 
-def test_each_value_of_a_sweep_has_its_curve_and_its_own_equilibria():
-    dataset = moved(MACHINE, clock=COARSE, sweep={"contact.stiffness": [100.0, 1e3]})
-    loads, radii, _ = plots.draw(dataset).axes
-    assert [line.get_color() for line in radii.lines if line.get_linestyle() == "--"] == [pictures.REFERENCE] * 2
-    words = [text.get_text() for text in loads.get_legend().get_texts()]
-    assert [text.split(":")[0] for text in words] == ["$k$ = 0.1 kN/m", "$k$ = 1 kN/m"]
-    # of works of adhesion each has its folds, which then no name fits
-    panel = plots.draw(moved(clock=COARSE, sweep={"adhesion.work": [0.0, 21e-3, 42e-3]})).axes[0]
-    assert sum(line.get_linewidth() == 0.5 for line in panel.lines) == 4
-    assert not any("pi" in text.get_text() for text in panel.texts)
-
-
-def test_every_shape_of_dataset_can_be_drawn():
+def test_every_shape_of_dataset_and_each_value_of_a_sweep_has_its_curves():
     sites = bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=50)
     counted = {"ensemble": Ensemble(members=4), "bonds": sites}
     moving = {"model": "equilibrium", "indentation": {"from": "2 um", "to": "-2 um"}}
@@ -198,17 +144,46 @@ def test_every_shape_of_dataset_can_be_drawn():
         assert closed == bool((recorded(dataset, "contact_radius") > 0.0).any())
         base = plots.draw(dataset, "time").axes[-1]
         assert base.get_ylabel().startswith("base") and lines_of(base)
+    dataset = moved(MACHINE, clock=COARSE, sweep={"contact.stiffness": [100.0, 1e3]})
+    loads, radii, _ = plots.draw(dataset).axes
+    assert [line.get_color() for line in radii.lines if line.get_linestyle() == "--"] == [pictures.REFERENCE] * 2
+    words = [text.get_text() for text in loads.get_legend().get_texts()]
+    assert [text.split(":")[0] for text in words] == ["$k$ = 0.1 kN/m", "$k$ = 1 kN/m"]
+    # of works of adhesion each has its folds, which then no name fits
+    panel = plots.draw(moved(clock=COARSE, sweep={"adhesion.work": [0.0, 21e-3, 42e-3]})).axes[0]
+    assert sum(line.get_linewidth() == 0.5 for line in panel.lines) == 4
+    assert not any("pi" in text.get_text() for text in panel.texts)
 
 
-def test_loop_is_what_fits_where_the_sphere_is_moved_and_refused_where_it_stays(grips):
+def test_a_loop_is_what_fits_a_sphere_that_moves_with_load_and_radius_over_the_indentation(grips):
+    loads, radii, over_load = rendered(plots.draw(grips, "loop")).axes
+    closed = grips["in_contact"].to_numpy() == 1
+    assert radii.get_xlabel() == r"indentation $\delta$ (µm)" and not closed.all()
+    radius = np.where(closed, 1e6 * grips["contact_radius"], np.nan)
+    for panel, x, y in (
+        (loads, "indentation", np.where(closed, 1e6 * grips["normal_load"], np.nan)),
+        (radii, "indentation", radius),
+        (over_load, "normal_load", radius),
+    ):
+        assert_allclose(thick(panel), [1e6 * grips[x], y], rtol=1e-14)
+    (thin,) = (line for line in loads.lines if line.get_linewidth() == 0.4)
+    np.testing.assert_array_equal(thin.get_ydata(), np.where(closed, np.nan, 0.0))
+    load, radius = drawn(over_load, pictures.REFERENCE, "--")
+    assert_allclose(load, 1e6 * jkr.load_at_radius(1e-6 * radius, *JKR), rtol=1e-12, atol=1e-12)
+    panel = plots.draw(grips, "loop").axes[0]
+    levels = sorted(line.get_ydata()[0] for line in panel.lines if line.get_linewidth() == 0.5)
+    pull = np.pi * 42e-3 * 2e-3
+    assert_allclose(levels, [-1.5e6 * pull, -5.0 / 6.0 * 1e6 * pull], rtol=1e-14)
+    assert [text.get_text() for text in panel.texts if "pi wR" in text.get_text()] == [
+        r"$-\frac{3}{2}\pi wR$", r"$-\frac{5}{6}\pi wR$",
+    ]  # fmt: skip
+    # under fixed grips the loop reaches below the one, and an equilibrium never beyond the other
+    assert -1.5 * pull * (1.0 + 1e-12) <= float(grips["normal_load"].min()) < -5.0 / 6.0 * pull
     assert plots.default(grips) == "loop"
     stays = moved(Equilibrium(load=4e-3))
     assert "loop" not in plots.drawable(stays) and "loop" in plots.drawable(grips)
     with pytest.raises(ValueError, match=r"\[contact\] indentation = .*drawn as: theories, time"):
         plots.draw(stays, "loop")
-
-
-def test_over_time_the_contacts_of_the_moment_are_drawn_for_a_sphere_that_moves(grips):
     radii, loads, base = plots.draw(grips, "time").axes
     _, hertz = drawn(radii, pictures.REFERENCE, ":")
     pressed = grips["indentation"].to_numpy() > 0.0

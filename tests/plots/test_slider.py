@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers.parts import Adhesion, Bell, Clock, Force, Spring
 from helpers.pictured import legend_of, lines_of, rendered
 from helpers.scenes import scene
 from numpy.testing import assert_allclose
@@ -13,17 +14,11 @@ import sim
 from sim.analysis import slips
 from sim.laws.schallamach import Body, first_moment_onset, first_moment_peak, resolved_onset
 from sim.parts.bonds import Cohort, FirstMoment
-from sim.parts.bonds.rupture import Bell
-from sim.parts.contact.models import Adhesion
-from sim.parts.drive import Force, Spring
 from sim.plots import curves, draw
-from sim.scenario.clock import Clock
 
 #: Bonds of a unit of stretch of 5 µm, and their numbers as the laws take them; the area stays.
 NUMBERS = (25.0, 4e-12, 8e-7, 250.0, 6.5e16)
-BONDS = FirstMoment(
-    rupture=Bell(zero_force_rate=25.0, bell_force=4e-12), bond_stiffness=8e-7, rebinding_rate=250.0, site_density=6.5e16
-)
+BONDS = FirstMoment(Bell(zero_force_rate=25.0, bell_force=4e-12), *NUMBERS[2:])
 
 
 @functools.cache
@@ -44,30 +39,16 @@ def driven(kind):
     return sim.run(scene(2, clock=Clock(duration=duration, step=duration / 400), drive=drive, sweep=sweep, **parts))
 
 
-def test_creep_is_drawn_from_the_first_step_on_and_a_cross_ends_a_runaway():
-    dataset = driven("creep")
-    figure = rendered(draw(dataset))  # the default
-    position, speed = figure.axes
-    slow, fast = lines_of(speed)[:2]
-    assert_allclose(slow[1], 1e3 * dataset["speed"].isel(drive_force=0, member=0, t=slice(1, None)), rtol=1e-12)
-    assert slow[0][0] > 0.0 and position.get_yscale() == position.get_xscale() == "log"
-    last = int(np.isfinite(fast[1]).sum()) - 1
-    crosses = [line for line in speed.lines if line.get_marker() == "x"]
-    assert len(crosses) == 1 and crosses[0].get_xydata().tolist() == [[fast[0][last], fast[1][last]]]
-    assert "runaway" in legend_of(position)[0]
-
-
 def test_slips_that_last_few_records_are_remarked_on_with_the_key_that_shows_them():
     dataset = driven("map").isel(drive_stiffness=[0])
     lasting = float(slips(dataset)["slip_duration"].median() / (dataset["t"][1] - dataset["t"][0]))
     assert lasting < 3.0
     title = draw(dataset, "time").axes[0].get_legend().get_title().get_text()
-    assert "clock.step" in title
-    assert "clock.record" in curves.coarse_slips(dataset.isel(t=slice(None, None, 2)))
+    assert "clock.step" in title and "clock.record" in curves.coarse_slips(dataset.isel(t=slice(None, None, 2)))
     assert curves.coarse_slips(driven("pull")) == ""
 
 
-def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_the_theory():
+def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_its_bonds():
     dataset = driven("map")
     figure = rendered(draw(dataset))
     up, down = figure.axes[:2]
@@ -85,9 +66,6 @@ def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_the_theory():
     slow = first_moment_peak(*NUMBERS).speed
     edges = np.geomspace(1e-3, 3e-2, swings.shape[1] + 1)
     assert np.nanmax(up.collections[0].get_array().reshape(2, -1)[:, edges[1:] < slow]) < 0.1
-
-
-def test_the_boundary_of_a_map_of_cohorts_is_that_of_bonds_resolved_by_stretch():
     bonds = Cohort(BONDS.rupture, BONDS.bond_stiffness, BONDS.rebinding_rate, BONDS.site_density, tolerance=1e-2)
     drive = Spring(stage={"from": 1e-3, "to": 3e-2, "scale": "log"}, stiffness=1e4, damping=1.0, start="steady")
     parts = {"bonds": bonds, "drive": drive, "sweep": {"drive.stiffness": [5e3, 1e4]}, "clock": Clock(2.0, 0.05)}
@@ -99,7 +77,17 @@ def test_the_boundary_of_a_map_of_cohorts_is_that_of_bonds_resolved_by_stretch()
     assert_allclose(stiffness, 1e-3 * exact, rtol=1e-6)
 
 
-def test_the_area_on_the_way_to_sliding_lies_beside_the_law_fitted_to_its_beginning():
+def test_creep_and_the_way_to_sliding_are_drawn_from_the_first_step_beside_the_law_and_a_runaway_ends():
+    dataset = driven("creep")
+    figure = rendered(draw(dataset))  # the default
+    position, speed = figure.axes
+    slow, fast = lines_of(speed)[:2]
+    assert_allclose(slow[1], 1e3 * dataset["speed"].isel(drive_force=0, member=0, t=slice(1, None)), rtol=1e-12)
+    assert slow[0][0] > 0.0 and position.get_yscale() == position.get_xscale() == "log"
+    last = int(np.isfinite(fast[1]).sum()) - 1
+    crosses = [line for line in speed.lines if line.get_marker() == "x"]
+    assert len(crosses) == 1 and crosses[0].get_xydata().tolist() == [[fast[0][last], fast[1][last]]]
+    assert "runaway" in legend_of(position)[0]
     dataset = driven("pull")
     figure = rendered(draw(dataset, "incipient"))
     force, area = (dataset[name].isel(member=0).values for name in ("spring_force", "contact_area"))

@@ -2,17 +2,14 @@
 
 import numpy as np
 import pytest
+from helpers.parts import Clock, Ensemble, Record, bonds, drive, shear
 from helpers.pictured import drawn, legend_of, rendered, simulated
 from numpy.testing import assert_allclose
 
 from sim.laws import schallamach
-from sim.parts import drive
-from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
-from sim.parts.shear import models as shear
 from sim.plots import kinds as plots, slider, style as pictures
 from sim.plots.slider import maximum_of, starts_of
-from sim.scenario.clock import Clock, Ensemble, Record
 
 #: Bonds whose friction is largest at 19.3 zero_force_rate bell_force/bond_stiffness = 1.93 mm/s.
 BELL = {"zero_force_rate": 1e4, "bell_force": 4e-12}
@@ -49,7 +46,7 @@ def starts():
     return started(sweep={"drive.rest": [0.5, 1.0], "drive.speed": [1e-7, 3e-7, 1e-6]})
 
 
-def test_stress_and_bonds_are_drawn_over_the_speed_beside_the_exact_law_and_the_mean_field(ramp):
+def test_stress_and_bonds_are_drawn_over_the_speed_beside_the_law_of_every_rupture(ramp):
     stress, fraction = rendered(plots.draw(ramp, "stress")).axes
     assert_allclose(drawn(stress, pictures.BOTH), [1e6 * ramp["speed"], 1e-3 * ramp["shear_stress"]], rtol=1e-14)
     assert_allclose(drawn(fraction, pictures.BOTH)[1], ramp["bond_fraction"], rtol=1e-14)
@@ -62,9 +59,6 @@ def test_stress_and_bonds_are_drawn_over_the_speed_beside_the_exact_law_and_the_
     speed, exact = drawn(fraction, PALE)
     assert_allclose(exact, schallamach.bell_fraction(1e-6 * speed, *LAW), rtol=1e-12)
     assert_allclose(speed[[0, -1]], [1.0, 1e5], rtol=1e-9)
-
-
-def test_every_rupture_has_its_own_law_at_each_point_of_a_sweep():
     speed, short = np.array([1e-5, 1e-3]), Clock(duration=1.0, step=0.1)
     for rupture, exact in (
         (CutOff(stretch=2e-8, rate=1e4), schallamach.cut_off_stress(speed, 1e4, 2e-8, 4e-4, 1e5, 9e16)),
@@ -81,7 +75,7 @@ def test_every_rupture_has_its_own_law_at_each_point_of_a_sweep():
         assert_allclose(law.stress, schallamach.bell_stress(speed, 1e4, force, 4e-4, 1e5, 9e16), rtol=1e-12)
 
 
-def test_the_maximum_is_marked_and_named(ramp):
+def test_the_maximum_is_marked_and_named_of_each_model_unless_the_stress_only_rises(ramp):
     panel = plots.draw(ramp, "stress").axes[0]
     (ring,) = (line for line in panel.lines if line.get_markerfacecolor() == "none")
     at = int(np.argmax(ramp["shear_stress"].to_numpy()))
@@ -92,12 +86,15 @@ def test_the_maximum_is_marked_and_named(ramp):
     name = f"simulated: {pictures.rounded(float(ramp['shear_stress'][at]), 'Pa')} at 2 mm/s"
     assert legend_of(panel)[0][0] == name
     assert_allclose(float(ramp["shear_stress"][at]), stress, rtol=5e-3)
-
-
-def test_stress_that_only_rises_has_no_maximum():
+    rupture = {"model": "bell", "zero_force_rate": "1e4 1/s", "bell_force": "4 pN"}
+    numbers = {"bond_stiffness": "0.4 mN/m", "rebinding_rate": "1e5 1/s", "site_density": "9e16 1/m^2"}
+    tables = [{"model": model, "rupture": rupture, **numbers} for model in ("rate", "cohort")]
+    dataset = ramped(sweep={"bonds": tables})
+    names = legend_of(plots.draw(dataset, "stress").axes[0])[0]
+    most = [pictures.rounded(float(value), "Pa") for value in dataset["shear_stress"].max("t")]
+    assert names[:2] == [f"rate: {most[0]} at 2 mm/s", f"cohort: {most[1]} at 2 mm/s"]
     speed = np.array([1.0, 2.0, 3.0])
-    assert maximum_of(speed, speed) is None
-    assert maximum_of(speed, speed[::-1]) is None
+    assert maximum_of(speed, speed) is None and maximum_of(speed, speed[::-1]) is None
     assert maximum_of(speed, np.full(3, np.nan)) is None
     assert maximum_of(-speed, np.array([-1.0, -4.0, -2.0])) == 1
     dataset = ramped(drive=drive.Ramp(start=1e-6, stop=1e-4, scale="log"), clock=Clock(duration=1.0, step=0.1))
@@ -108,35 +105,7 @@ def test_stress_that_only_rises_has_no_maximum():
     assert not [line for line in panel.lines if line.get_markerfacecolor() == "none"]
 
 
-def test_models_side_by_side_each_name_their_maximum():
-    rupture = {"model": "bell", "zero_force_rate": "1e4 1/s", "bell_force": "4 pN"}
-    numbers = {"bond_stiffness": "0.4 mN/m", "rebinding_rate": "1e5 1/s", "site_density": "9e16 1/m^2"}
-    tables = [{"model": model, "rupture": rupture, **numbers} for model in ("rate", "cohort")]
-    dataset = ramped(sweep={"bonds": tables})
-    names = legend_of(plots.draw(dataset, "stress").axes[0])[0]
-    most = [pictures.rounded(float(value), "Pa") for value in dataset["shear_stress"].max("t")]
-    assert names[:2] == [f"rate: {most[0]} at 2 mm/s", f"cohort: {most[1]} at 2 mm/s"]
-
-
-def test_every_kind_of_sliding_can_be_drawn():
-    sites = bonds.Tracked(rupture=Bell(**BELL), sites=50, **SITES)
-    tracked = {"bonds": sites, "ensemble": Ensemble(members=3)}
-    for changes in [
-        {"drive": drive.Ramp(start=-1e-3, stop=2e-3)},
-        {"drive": drive.Ramp(start=0.0, stop=1e-2)},
-        {"drive": drive.Table(time=(0.0, 0.5, 1.0), speed=(0.0, 0.02, 0.0))},
-        {"drive": drive.Steady(speed=1e-3), "sweep": {"drive.speed": [1e-4, 1e-3, 1e-2]}},
-        {"bonds": bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=3e5)},
-        {"bonds": bonds.Unbroken(stress=3e5)},
-        tracked,
-        tracked | {"record": Record(per_member=False)},
-    ]:
-        figure = plots.draw(ramped(**({"clock": Clock(duration=1.0, step=0.1)} | changes)), "stress")
-        stress = [line for line in figure.axes[0].lines if np.size(line.get_ydata()) > 2]
-        assert stress and all(np.isfinite(np.asarray(line.get_ydata(), float)).any() for line in stress)
-
-
-def test_stress_is_drawn_since_the_start_at_the_longest_rest(starts):
+def test_peaks_after_rests_are_those_of_steps_beside_the_closed_form_and_hollow_if_not_resolved(starts):
     panel, _ = rendered(plots.draw(starts, "stress")).axes
     slides = starts["t"].to_numpy() > 1.0 + 1e-9
     curves = [line.get_data() for line in panel.lines if line.get_linestyle() == "-"]
@@ -144,9 +113,6 @@ def test_stress_is_drawn_since_the_start_at_the_longest_rest(starts):
         assert_allclose(time, 1e3 * (starts["t"].to_numpy()[slides] - 1.0), rtol=1e-12)
         assert_allclose(stress, 1e-3 * starts["shear_stress"][1, k].to_numpy()[slides], rtol=1e-14)
     assert legend_of(panel) == (["100 nm/s", "300 nm/s", "1 µm/s"], "after 1 s at rest, sliding at")
-
-
-def test_peaks_are_drawn_over_the_speed_one_line_a_rest(starts):
     panel = plots.draw(starts, "stress").axes[1]
     lines = [line.get_data() for line in panel.lines if line.get_linestyle() == "-" and line.get_marker() != "None"]
     assert len(lines) == 2 and panel.get_xscale() == "log"
@@ -156,10 +122,6 @@ def test_peaks_are_drawn_over_the_speed_one_line_a_rest(starts):
         highest = starts["shear_stress"][k].where(starts["t"] > rest).max("t")
         assert np.all(starts["peak_stress"][k] >= highest)  # between two records it is higher
     assert legend_of(panel)[0] == ["500 ms at rest", "1 s at rest", "none rebinds", "steady sliding"]
-
-
-def test_bonds_that_do_not_rebind_have_the_peak_of_the_closed_form(starts):
-    panel = plots.draw(starts, "stress").axes[1]
     dotted = [line.get_data() for line in panel.lines if line.get_linestyle() == ":"]
     for rest, (speed, peak) in zip((0.5, 1.0), dotted, strict=True):
         bound = 0.5 * -np.expm1(-2.0 * rest)  # sites bind and open with 1/s each
@@ -169,31 +131,19 @@ def test_bonds_that_do_not_rebind_have_the_peak_of_the_closed_form(starts):
     (steady,) = (line for line in panel.lines if line.get_linestyle() == "-" and line.get_marker() == "None")
     exact = schallamach.bell_stress(1e-9 * steady.get_xdata(), 1.0, 4e-12, 4e-4, 1.0, 9e16)
     assert_allclose(steady.get_ydata(), 1e-3 * exact, rtol=1e-12)
-
-
-def test_peaks_that_the_run_does_not_resolve_are_hollow():
-    """At 1 µm/s the peak comes 34 ms after the start, within two steps; at 100 nm/s after 190 ms."""
+    # At 1 µm/s the peak comes 34 ms after the start, within two steps; at 100 nm/s after 190 ms.
     coarse = started(clock=Clock(duration=2.0, step=0.02), sweep={"drive.speed": [1e-7, 1e-6]})
     panel = plots.draw(coarse, "stress").axes[1]
-    (hollow,) = (
-        line.get_xdata() for line in panel.lines if line.get_markerfacecolor() == "white" and len(line.get_xdata())
-    )
+    white = [line.get_xdata() for line in panel.lines if line.get_markerfacecolor() == "white"]
+    (hollow,) = (places for places in white if len(places))
     assert_allclose(hollow, [1000.0], rtol=1e-12)
     assert "not resolved" in legend_of(panel)[0]
     (rising,) = starts_of(started(drive=drive.Start(rest=1.9, speed=1e-7)))  # at the end there is no peak yet
     assert not rising.resolved and rising.peak == rising.stress[-1]
-
-
-def test_peaks_do_not_depend_on_the_records(starts):
     seldom = started(clock=Clock(duration=2.0, step=5e-3, record=0.1), sweep={"drive.speed": [1e-7, 3e-7, 1e-6]})
     found = [(start.peak, start.when, start.resolved) for start in starts_of(seldom)]
     often = [start for start in starts_of(starts) if start.rest == 1.0]
-    assert found == [(start.peak, start.when, start.resolved) for start in often] and all(
-        start.resolved for start in often
-    )
-
-
-def test_peaks_of_members_are_those_of_their_mean_and_sliding_back_they_are_negative():
+    assert found == [(start.peak, start.when, True) for start in often]
     sites = bonds.Tracked(rupture=Bell(zero_force_rate=1.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=1.0,
                           site_density=9e16, sites=40)  # fmt: skip
     parts = {"bonds": sites, "drive": drive.Start(rest=0.1, speed=-1e-6), "clock": Clock(duration=0.3, step=5e-3)}
@@ -203,7 +153,19 @@ def test_peaks_of_members_are_those_of_their_mean_and_sliding_back_they_are_nega
     assert start.peak < 0.0
 
 
-def test_a_key_that_is_not_swept_is_no_axis():
+def test_every_kind_of_sliding_can_be_drawn_over_what_is_swept_and_others_are_refused():
+    sites = bonds.Tracked(rupture=Bell(**BELL), sites=50, **SITES)
+    tracked = {"bonds": sites, "ensemble": Ensemble(members=3)}
+    for changes in [
+        {"drive": drive.Ramp(start=-1e-3, stop=2e-3)}, {"drive": drive.Ramp(start=0.0, stop=1e-2)},
+        {"drive": drive.Table(time=(0.0, 0.5, 1.0), speed=(0.0, 0.02, 0.0))},
+        {"drive": drive.Steady(speed=1e-3), "sweep": {"drive.speed": [1e-4, 1e-3, 1e-2]}},
+        {"bonds": bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=3e5)},
+        {"bonds": bonds.Unbroken(stress=3e5)}, tracked, tracked | {"record": Record(per_member=False)},
+    ]:  # fmt: skip
+        figure = plots.draw(ramped(**({"clock": Clock(duration=1.0, step=0.1)} | changes)), "stress")
+        stress = [line for line in figure.axes[0].lines if np.size(line.get_ydata()) > 2]
+        assert stress and all(np.isfinite(np.asarray(line.get_ydata(), float)).any() for line in stress)
     for sweep, words in (
         ({}, ["time since the start (s)"]),
         ({"drive.rest": [0.2, 0.5]}, ["time since the start (s)", "time at rest (ms)"]),
@@ -211,9 +173,6 @@ def test_a_key_that_is_not_swept_is_no_axis():
     ):
         figure = plots.draw(started(sweep=sweep, clock=Clock(duration=2.0, step=0.02)))
         assert [panel.get_xlabel() for panel in figure.axes] == words
-
-
-def test_a_dataset_without_stress_or_speeds_is_refused_with_the_cure():
     short = Clock(duration=0.1, step=0.1)
     for changes, cure in (
         ({"population": bonds.Unbroken()}, r"\[bonds\] stress = .*drawn as: theories, curve, time, profile$"),

@@ -2,20 +2,15 @@
 
 import numpy as np
 import pytest
+from helpers.parts import Adhesion, Clock, Ensemble, Equilibrium, Record, bonds, drive, shear
 from helpers.pictured import RAMP, STEADY, data_of, rendered, simulated
 from matplotlib.patches import Circle
 from numpy.testing import assert_allclose
 
 from sim.analysis import where
 from sim.laws import halfspace, jkr, theories
-from sim.parts import drive
-from sim.parts.bonds import models as bonds
-from sim.parts.contact import Equilibrium
-from sim.parts.contact.models import Adhesion
-from sim.parts.shear import models as shear
 from sim.plots import kinds as plots, style as pictures, theories as rival_figures
 from sim.plots.theories import shapes_of
-from sim.scenario.clock import Clock, Ensemble, Record
 
 NUMBERS = (42e-3, 2e-3, 6.4e6, 0.5, 0.1)
 
@@ -34,7 +29,7 @@ def curve_of(panel, name):
     return data
 
 
-def test_every_theory_is_drawn_as_far_as_adhesion_holds():
+def test_every_theory_is_drawn_as_far_as_adhesion_holds_with_a_dot_at_its_end():
     for contact, law, value in [
         (Equilibrium(load=4e-3), theories.compare_at_load, 4e-3),
         (Equilibrium(indentation=2e-6), theories.compare_at_indentation, 2e-6),
@@ -57,28 +52,21 @@ def test_every_theory_is_drawn_as_far_as_adhesion_holds():
             assert_allclose(again, area, rtol=1e-14)
             newton = {"mN": 1e3, "µN": 1e6}[forces.get_xlabel()[-3:-1]]
             assert_allclose(force[held], newton * factor * stress[held] * area[held] / per_area, rtol=1e-12)
-
-
-def test_a_branch_ends_with_a_dot_where_its_force_is_largest():
     panel = plots.draw(plain(), "theories").axes[1]
     _, colour, _ = rival_figures._THEORIES["savkoor_briggs"]
     (dot,) = (line for line in panel.lines if line.get_color() == colour and line.get_marker() == "o")
     limit = 1e3 * float(theories.savkoor_briggs_limit(4e-3, 42e-3, 2e-3))
     # 1500 stresses over the axis's decades; the force is flat at its largest, so a step costs its square
     assert limit * 0.999 < dot.get_xdata()[0] <= limit * (1.0 + 1e-12)
-
-
-def test_jkr_and_hertz_stand_whatever_the_shear():
     panel = plots.draw(plain(), "theories").axes[0]
-    lines = {
-        line.get_linestyle(): line.get_ydata()[0] for line in panel.lines if line.get_color() == pictures.REFERENCE
-    }
+    grey = [line for line in panel.lines if line.get_color() == pictures.REFERENCE]
+    lines = {line.get_linestyle(): line.get_ydata()[0] for line in grey}
     at = {"--": jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6), ":": jkr.hertz_radius_at_load(4e-3, 2e-3, 6.4e6)}
     for style, radius in at.items():
         assert_allclose(lines[style], 1e6 * np.pi * radius**2, rtol=1e-14)
 
 
-def test_the_datasets_points_are_means_over_members_and_the_second_half():
+def test_points_are_means_over_members_and_the_second_half_and_lie_on_the_theories():
     dataset = plain(sweep={"bonds.stress": [0.0, 1e5, 1e6]})
     stress, area = rival_figures.points_of(dataset)
     assert_allclose(stress, [0.0, 1e5, 1e6], rtol=1e-14)
@@ -86,25 +74,16 @@ def test_the_datasets_points_are_means_over_members_and_the_second_half():
     members = simulated(drive=STEADY, ensemble=Ensemble(members=5))
     late = members["contact_area"].isel(t=slice(members.sizes["t"] // 2, None))
     assert_allclose(rival_figures.points_of(members)[1], [late.mean()], rtol=1e-13)
-
-
-def test_of_swept_loads_one_must_be_chosen():
     dataset = plain(sweep={"contact.load": [-3e-4, 1e-3, 4e-3]})
     with pytest.raises(ValueError, match=r"of one contact.*--where contact_load="):
         plots.draw(dataset, "theories")
     figure = plots.draw(where(dataset, {"load": "4 mN"}), "theories")
     assert "$P$ = 4 mN, $w$ = 42 mJ/m²" in figure.legends[0].get_title().get_text()
-
-
-def test_the_last_record_of_a_run_whose_speed_changes_is_filled():
     dataset = simulated(shear=shear.Uniform())
     panel = plots.draw(dataset, "theories").axes[0]
     (last,) = (line for line in panel.lines if line.get_label() == "simulated, the last record")
     at = [1e-3 * dataset["shear_stress"][-1], 1e6 * dataset["contact_area"][-1]]
     assert_allclose(np.ravel(last.get_data()), at, rtol=1e-14)
-
-
-def test_the_fraction_is_the_datasets_own_and_its_points_lie_on_the_theories():
     contact = Equilibrium(load=4e-3, reversible=0.02)
     dataset = plain(contact=contact, sweep={"contact.reversible": [0.0, 0.02, 1.0], "bonds.stress": [1e4, 3e4]})
     case = rival_figures.case_of(dataset)
@@ -116,7 +95,15 @@ def test_the_fraction_is_the_datasets_own_and_its_points_lie_on_the_theories():
     assert len(stress) == 6
 
 
-def test_what_cannot_be_compared_is_refused_with_the_cure():
+def test_every_scene_at_a_load_can_be_compared_and_others_are_refused_with_the_cure():
+    for changes in [{"drive": RAMP}, {"bonds": bonds.Unbroken()}, {"drive": RAMP, "record": Record(per_member=False)}]:
+        dataset = plain(**changes)
+        for panel in plots.draw(dataset, "theories").axes:
+            stress, area = rival_figures.points_of(dataset)
+            (points,) = (line.get_data() for line in panel.lines if line.get_label() == "simulated")
+            assert len(points[0]) == len(stress) > 0 and np.all((points[0] > 0.0) == (stress > 0.0))
+            assert_allclose(points[1] / points[1][0], area / area[0], rtol=1e-12)
+            assert panel.get_ylim()[0] < points[1].min() and points[1].max() < panel.get_ylim()[1]
     for changes, words in (
         ({"contact": Equilibrium(displacement=1e-6, stiffness=100.0)}, "load = .*indentation; .*drawn as: .*profile"),
         ({"contact": Equilibrium(load={"from": 0.0, "to": 4e-3})}, "load = .*indentation; .*drawn as: .*profile"),
@@ -127,23 +114,12 @@ def test_what_cannot_be_compared_is_refused_with_the_cure():
             plots.draw(plain(**changes), "theories")
 
 
-def test_every_scene_at_a_load_can_be_compared():
-    for changes in [{"drive": RAMP}, {"bonds": bonds.Unbroken()}, {"drive": RAMP, "record": Record(per_member=False)}]:
-        dataset = plain(**changes)
-        for panel in plots.draw(dataset, "theories").axes:
-            stress, area = rival_figures.points_of(dataset)
-            (points,) = (line.get_data() for line in panel.lines if line.get_label() == "simulated")
-            assert len(points[0]) == len(stress) > 0 and np.all((points[0] > 0.0) == (stress > 0.0))
-            assert_allclose(points[1] / points[1][0], area / area[0], rtol=1e-12)
-            assert panel.get_ylim()[0] < points[1].min() and points[1].max() < panel.get_ylim()[1]
-
-
 @pytest.fixture(scope="module")
 def slid():
     return simulated(ensemble=Ensemble(members=2))
 
 
-def test_pressure_is_that_of_the_first_member_at_the_last_time_and_at_rest(slid):
+def test_pressure_surfaces_and_tangential_displacement_are_those_of_the_first_member_at_the_last_time(slid):
     panel = rendered(plots.draw(slid, "profile")).axes[0]
     radius, depth = (float(slid[name][0, -1]) for name in ("contact_radius", "indentation"))
     (x, p), (_, rest) = data_of(panel, pictures.BOTH)[0], data_of(panel, pictures.REFERENCE, "--")[0]
@@ -154,9 +130,6 @@ def test_pressure_is_that_of_the_first_member_at_the_last_time_and_at_rest(slid)
     full = jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6)
     depth = jkr.indentation_at_radius(full, 42e-3, 2e-3, 6.4e6)
     assert_allclose(rest[len(rest) // 2], 1e-3 * halfspace.pressure(0.0, full, depth, 2e-3, 6.4e6), rtol=1e-12)
-
-
-def test_surfaces_touch_inside_and_are_the_gap_apart_outside(slid):
     panel = plots.draw(slid, "profile").axes[1]
     (x, low), (_, high) = data_of(panel, pictures.BOTH)
     radius, depth = (float(slid[name][0, -1]) for name in ("contact_radius", "indentation"))
@@ -166,9 +139,6 @@ def test_surfaces_touch_inside_and_are_the_gap_apart_outside(slid):
     # outside the upper surface is the sphere's own; heights are some micrometres
     out = r > radius
     assert_allclose(high[out], 1e6 * (r[out] ** 2 / 4e-3 - depth), rtol=0, atol=1e-11)
-
-
-def test_tangential_displacement_is_that_of_the_uniform_stress(slid):
     panels = plots.draw(slid, "profile").axes
     radius, stress = float(slid["contact_radius"][0, -1]), float(slid["shear_stress"][-1])
     (x, along), (_, across) = (data_of(panels[2], pictures.BOTH, style)[0] for style in ("-", "--"))
@@ -181,19 +151,7 @@ def test_tangential_displacement_is_that_of_the_uniform_stress(slid):
     assert_allclose(circle.radius, 1e6 * radius, rtol=1e-14)
 
 
-def test_a_contact_that_came_off_is_drawn_as_it_last_was():
-    ramp = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())
-    closed = np.flatnonzero(ramp["in_contact"].to_numpy())
-    assert closed[-1] < ramp.sizes["t"] - 1
-    shown, time, _ = shapes_of(ramp)
-    assert time == float(ramp["t"][closed[-1]])
-    assert shown[0][0].radius == float(ramp["contact_radius"][closed[-1]])
-    plots.draw(ramp, "profile")
-    with pytest.raises(ValueError, match=r"never closed; raise the load.*drawn as: stress, curve, time"):
-        plots.draw(simulated(contact=Equilibrium(load=-1.0), shear=shear.Uniform()), "profile")
-
-
-def test_every_contact_has_profiles():
+def test_every_contact_has_profiles_and_one_that_came_off_is_drawn_as_it_last_was():
     for changes in [
         {"contact": Equilibrium(indentation=-4e-7)},
         {"adhesion": Adhesion(work=0.0)},
@@ -210,3 +168,12 @@ def test_every_contact_has_profiles():
         outside = np.nan_to_num(p[np.abs(x) > 1.001e6 * radius])
         assert np.isfinite(p[inside]).all() and p[inside].any() and not outside.any()
         assert np.all(low[inside] == high[inside]) and np.all(low <= high)
+    ramp = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())
+    closed = np.flatnonzero(ramp["in_contact"].to_numpy())
+    assert closed[-1] < ramp.sizes["t"] - 1
+    shown, time, _ = shapes_of(ramp)
+    assert time == float(ramp["t"][closed[-1]])
+    assert shown[0][0].radius == float(ramp["contact_radius"][closed[-1]])
+    plots.draw(ramp, "profile")
+    with pytest.raises(ValueError, match=r"never closed; raise the load.*drawn as: stress, curve, time"):
+        plots.draw(simulated(contact=Equilibrium(load=-1.0), shear=shear.Uniform()), "profile")

@@ -6,18 +6,14 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.parts import Clock, Equilibrium, RateDependent, bonds, drive, shear
 from helpers.scenes import BELL, BONDS, CELL, CONTACTS, CUT_OFF, DRIVES, SHEARS, SPECTRUM, STRETCHED, scene
 from numpy.testing import assert_allclose
 
 import sim.study.converge as study
 from sim.laws.schallamach import bell_stress, first_moment_stress
-from sim.parts import drive
-from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant
-from sim.parts.contact import Equilibrium, RateDependent
-from sim.parts.shear import models as shear
 from sim.parts.shear.process import Onset, Slip, Stress, Time, Wave
-from sim.scenario.clock import Clock
 from sim.spectrum.families import SelfAffine
 from sim.study.converge import QUANTITIES, STATISTICS, choices, chosen, converge, explanation, recommendation, table
 from sim.units.errors import BadInput
@@ -54,43 +50,6 @@ def of(dataset, row, quantity, statistic="mean", name="error"):
     return float(dataset[name].sel(row=row, quantity=quantity, statistic=statistic))
 
 
-# -- errors of models -----------------------------------------------------------------------------
-
-
-def test_errors_of_bands_are_those_known_before_the_run_and_the_radius_has_none_beyond_its_noise(steady):
-    known = scene(**STEADY).process.bands.errors
-    for statistic, name in (("skewness", "third_cumulant"), ("correlation time", "correlation_time")):
-        error = of(steady, "banded 0.01", "fluctuation_energy", statistic)
-        assert_allclose(error, known[f"banded_error_{name}"], rtol=1e-6)
-    assert of(steady, "banded 0.01", "fluctuation_energy", "spread") < 1e-12
-    assert of(steady, "mean", "fluctuation_energy", "spread") == 1.0
-    radius = steady.sel(quantity="contact_radius", statistic="mean")
-    assert np.all(radius["error"] <= 5.0 * radius["standard_error"] + 2e-4)
-    assert np.all(steady.isel(row=steady["part"] == "step")["error"].fillna(0.0) < 1e-9)
-
-
-def test_the_error_of_a_rate_equation_is_its_closed_form_and_the_coarsest_cohorts_that_keep_it_are_chosen(quick):
-    parts = {"bonds": bonds.Cohort(rupture=BELL, **STRETCHED, tolerance=3e-3), "drive": drive.Steady(speed=5e-3)}
-    dataset = converge(scene(**parts, clock=Clock(duration=0.05, step=1e-3)), 20.0)
-    law = [STRETCHED[key] for key in ("bond_stiffness", "rebinding_rate", "site_density")]
-    exact = bell_stress(5e-3, 200.0, 4e-12, *law)
-    expected = abs(first_moment_stress(5e-3, 200.0, 4e-12, *law) / exact - 1.0)
-    assert_allclose(of(dataset, "rate", "shear_stress"), expected, rtol=3e-3)
-    assert expected > 0.01 and "“cohort 0.01, step 1 ms” is the cheapest" in recommendation(dataset)
-    for tolerance in (0.01, 0.003, 0.001, 0.0001, 1e-05):
-        assert of(dataset, f"cohort {tolerance}", "shear_stress") <= tolerance
-
-
-def test_models_without_sites_lack_the_spread_of_independent_ones(quick):
-    dataset = converge(scene(bonds=BONDS["counted"], drive=drive.Steady(speed=2e-3), steps=40, members=640), 4.0)
-    share = float(BONDS["counted"].steady(np.array([2e-3])).fraction[0])
-    expected = math.sqrt((1.0 - share) / (share * BONDS["counted"].sites))
-    lacking, error = (of(dataset, "rate", "bond_fraction", "spread", name) for name in ("error", "standard_error"))
-    assert abs(lacking - expected) < 5.0 * error < 0.25 * expected
-    assert of(dataset, "counted 40", "bond_fraction", "spread") == 0.0
-    assert "counted 40" in recommendation(dataset) or "It is the cheapest" in recommendation(dataset)
-
-
 @pytest.mark.parametrize("parts", [
     {"shear": SHEARS["modal, slip, onset"], "contact": CONTACTS["tension"]},
     {"shear": SHEARS["modal, time, constant"], "contact": CONTACTS["rate_dependent"]},
@@ -100,19 +59,30 @@ def test_models_without_sites_lack_the_spread_of_independent_ones(quick):
 def test_open_and_lagging_contacts_relaxing_amplitudes_and_carried_areas_have_errors(parts, quick):
     dataset = converge(scene(**parts, drive=DRIVES["linear ramp"]), 4.0)
     known = dataset["error"].sel(quantity=["fluctuation_energy", "contact_radius"], statistic=["mean", "spread"])
-    assert np.all(np.isfinite(known)) and np.all(dataset["members"] >= 1)
-    assert recommendation(dataset)
+    assert np.all(np.isfinite(known)) and np.all(dataset["members"] >= 1) and recommendation(dataset)
 
 
-def test_without_fluctuations_and_memory_every_setting_is_exact(quick):
+def test_errors_of_rates_and_of_missing_sites_are_their_closed_forms_and_the_cheapest_within_is_chosen(quick):
+    parts = {"bonds": bonds.Cohort(rupture=BELL, **STRETCHED, tolerance=3e-3), "drive": drive.Steady(speed=5e-3)}
+    dataset = converge(scene(**parts, clock=Clock(duration=0.05, step=1e-3)), 20.0)
+    law = [STRETCHED[key] for key in ("bond_stiffness", "rebinding_rate", "site_density")]
+    exact = bell_stress(5e-3, 200.0, 4e-12, *law)
+    expected = abs(first_moment_stress(5e-3, 200.0, 4e-12, *law) / exact - 1.0)
+    assert_allclose(of(dataset, "rate", "shear_stress"), expected, rtol=3e-3)
+    assert expected > 0.01 and "“cohort 0.01, step 1 ms” is the cheapest" in recommendation(dataset)
+    for tolerance in (0.01, 0.003, 0.001, 0.0001, 1e-05):
+        assert of(dataset, f"cohort {tolerance}", "shear_stress") <= tolerance
+    dataset = converge(scene(bonds=BONDS["counted"], drive=drive.Steady(speed=2e-3), steps=40, members=640), 4.0)
+    share = float(BONDS["counted"].steady(np.array([2e-3])).fraction[0])
+    expected = math.sqrt((1.0 - share) / (share * BONDS["counted"].sites))
+    lacking, error = (of(dataset, "rate", "bond_fraction", "spread", name) for name in ("error", "standard_error"))
+    assert abs(lacking - expected) < 5.0 * error < 0.25 * expected
+    assert of(dataset, "counted 40", "bond_fraction", "spread") == 0.0
+    assert "counted 40" in recommendation(dataset) or "It is the cheapest" in recommendation(dataset)
     parts = {"shear": shear.Mean(spectrum=SPECTRUM), "bonds": BONDS["steady"], "drive": DRIVES["log ramp"]}
     dataset = converge(scene(**parts), 2.0)
-    assert float(dataset["error"].max()) < 1e-12
-    assert "the scene is exact" in recommendation(dataset)
+    assert float(dataset["error"].max()) < 1e-12 and "the scene is exact" in recommendation(dataset)
     study.figure(dataset)
-
-
-# -- clock steps ----------------------------------------------------------------------------------
 
 
 def run_of(scenario, members=1):
@@ -138,21 +108,16 @@ def test_the_error_of_a_long_step_is_bounded_and_no_more_than_twice_as_large(par
     truth = run_of(scene(**parts, clock=Clock(duration=duration, step=fine, record=record)))[:, 0]
     off = np.abs(run_of(written)[:, 0] - truth).max(axis=1)
     promised = own.error[:, 0] * np.abs(truth).max(axis=1)
-    assert np.all(off <= promised)
-    assert off[0] > 0.5 * promised[0] > 0.0
+    assert np.all(off <= promised) and off[0] > 0.5 * promised[0] > 0.0
 
 
-def test_runs_with_other_steps_have_the_same_fluctuations():
+def test_runs_with_other_steps_have_the_same_fluctuations_and_an_amplitude_the_error_of_its_bonds(quick):
     scenario = scene(shear=SHEARS["modal, slip, onset"], contact=CONTACTS["rate_dependent"], drive=DRIVES["steady"])
     rows = [study._at_step(scenario, ratio) for ratio in (0.5, 1.0)]
     fine, coarse = study._at_steps(rows, 5)
     assert_allclose(fine[2], coarse[2], rtol=1e-12)
-    assert np.array_equal(fine, run_of(rows[0].scenario, 5))
-    assert not np.array_equal(fine[3], coarse[3])
+    assert np.array_equal(fine, run_of(rows[0].scenario, 5)) and not np.array_equal(fine[3], coarse[3])
     assert_allclose(fine[3], coarse[3], rtol=0.1)
-
-
-def test_an_amplitude_that_follows_the_bonds_has_the_error_of_their_step(quick):
     law = shear.Banded(spectrum=ROUGH, cell=CELL, correlation=Time(time=5e-3), amplitude=Stress(reference=1e5))
     parts = JUMP | {"shear": law, "clock": Clock(duration=0.04, step=2e-3)}
     dataset = converge(scene(**parts), 3.0)
@@ -160,9 +125,6 @@ def test_an_amplitude_that_follows_the_bonds_has_the_error_of_their_step(quick):
     # the energy goes with the square of the stress
     assert float(step["error"].sel(quantity="fluctuation_energy")) > float(step["error"].sel(quantity="shear_stress"))
     assert float(step["standard_error"].sel(quantity="fluctuation_energy")) < 0.01
-
-
-# -- noise ----------------------------------------------------------------------------------------
 
 
 def draws(rng, members, known):
@@ -199,9 +161,6 @@ def test_errors_in_units_of_their_standard_errors_are_standard_normal(corrected)
     assert np.all((wide > 0.8) & (wide < 1.25)), wide
 
 
-# -- budget ---------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("budget", [1.5, pytest.param(8.0, marks=pytest.mark.verify)])
 def test_the_budget_is_kept_and_what_does_not_fit_is_named(budget):
     wide = shear.Banded(spectrum=ROUGH, cell=3 * CELL, correlation=Wave(waves=1.0))
@@ -223,9 +182,6 @@ def test_a_scene_that_does_not_fit_into_its_budget_is_refused():
     assert time.process_time() - began < 1.5
 
 
-# -- settings -------------------------------------------------------------------------------------
-
-
 def admitted(**parts):
     """Labels of the settings of a scene, that of the scene marked, and the reasons for those left out."""
     scenario, left_out = scene(**parts), []
@@ -234,7 +190,7 @@ def admitted(**parts):
     return [row.label + "*" * row.own for row in rows], left_out, rows
 
 
-def test_models_tolerances_and_sites_are_tried_if_the_scene_admits_them():
+def test_what_the_scene_admits_is_tried_once_choices_and_sweeps_are_settled(quick):
     labels, left_out, _ = admitted(**STEADY)
     bands = ["banded 0.3", "banded 0.1", "banded 0.03", "banded 0.01*", "banded 0.003"]
     assert labels == ["mean", *bands, "modal"] and not left_out
@@ -250,9 +206,6 @@ def test_models_tolerances_and_sites_are_tried_if_the_scene_admits_them():
     assert labels[-1] == "tracked 30*" and rows[-1].toml == 'model = "tracked"\nsites = 30'
     assert admitted(bonds=BONDS["counted"])[0] == ["steady", "rate", "counted 40*"]
     assert admitted(bonds=BONDS["cohort, carried"])[0][-1] == "cohort 1e-06"
-
-
-def test_a_choice_left_to_the_program_and_a_sweep_are_settled_first(quick):
     parts = {"bonds": BONDS["auto, many sites"], "shear": SHEARS["auto with correlation"]}
     dataset = converge(scene(**parts, drive=DRIVES["steady"], sweep={"contact.load": [1e-3, 4e-3]}), 1.0)
     own = dataset["row"].to_numpy()[dataset["own"] == 1]
@@ -260,10 +213,16 @@ def test_a_choice_left_to_the_program_and_a_sweep_are_settled_first(quick):
     assert "contact.load" in explanation(dataset)
 
 
-# -- what is reported -----------------------------------------------------------------------------
-
-
-def test_dataset_table_and_figure_hold_a_row_for_each_setting(steady, tmp_path):
+def test_errors_of_bands_are_those_known_before_the_run_in_dataset_table_and_figure(steady, tmp_path):
+    known = scene(**STEADY).process.bands.errors
+    for statistic, name in (("skewness", "third_cumulant"), ("correlation time", "correlation_time")):
+        error = of(steady, "banded 0.01", "fluctuation_energy", statistic)
+        assert_allclose(error, known[f"banded_error_{name}"], rtol=1e-6)
+    assert of(steady, "banded 0.01", "fluctuation_energy", "spread") < 1e-12
+    assert of(steady, "mean", "fluctuation_energy", "spread") == 1.0
+    radius = steady.sel(quantity="contact_radius", statistic="mean")
+    assert np.all(radius["error"] <= 5.0 * radius["standard_error"] + 2e-4)
+    assert np.all(steady.isel(row=steady["part"] == "step")["error"].fillna(0.0) < 1e-9)
     assert steady["error"].dims == ("row", "quantity", "statistic")
     assert tuple(steady["statistic"].to_numpy()) == STATISTICS and tuple(steady["quantity"].to_numpy()) == QUANTITIES
     assert all(variable.attrs["long_name"] for variable in steady.data_vars.values())
@@ -292,15 +251,7 @@ def dataset_of(error, cost, part=None, own=None, noise=0.0):
     return xr.Dataset(variables, {"row": [f"row {k}" for k in range(rows)]}, {"tolerance": 0.01})
 
 
-def test_the_cheapest_combination_within_the_tolerance_is_recommended_and_of_equal_ones_the_most_accurate():
-    dataset = dataset_of([0.0, 0.1, 0.008, 0.0], [9.0, 1.0, 2.0, 9.0])
-    assert chosen(choices(dataset), 0.01)[0].rows == (2, 3)
-    assert "“row 2, row 3” is the cheapest" in recommendation(dataset)
-    assert recommendation(dataset).endswith("[shear]\nline = 2")
-    assert chosen(choices(dataset_of([0.0, 0.008, 0.003, 0.0], [9.0, 1.0, 1.04, 9.0])), 0.01)[0].rows == (2, 3)
-
-
-def test_errors_add_up_and_noise_is_added_twice():
+def test_errors_add_up_noise_is_added_twice_and_steps_multiply_times():
     parts = {"part": ["shear", "step", "step"], "own": [1, 1, 0]}
     dataset = dataset_of([0.004, 0.05, 0.004], [1.0, 1.0, 4.0], **parts)
     assert_allclose(choices(dataset)[0].bound, 0.054)
@@ -309,16 +260,15 @@ def test_errors_add_up_and_noise_is_added_twice():
     noisy = dataset_of([0.004, 0.05, 0.004], [1.0, 1.0, 4.0], noise=0.003, **parts)
     assert_allclose(choices(noisy)[1].bound, 0.008 + 2.0 * math.sqrt(2.0) * 0.003)
     assert "larger budget" in recommendation(noisy)
-
-
-def test_times_of_changes_add_up_and_steps_multiply_them():
     parts = {"part": ["shear", "shear", "bonds", "bonds", "step", "step"], "own": [1, 0, 1, 0, 1, 0]}
     dataset = dataset_of([0.0] * 6, [10.0, 4.0, 10.0, 9.0, 10.0, 20.0], **parts)
     times = {choice.rows: choice.time for choice in choices(dataset)}
     assert_allclose([times[0, 2, 4], times[1, 3, 4], times[1, 3, 5]], [10.0, 3.0, 6.0])
-
-
-# -- the promise ----------------------------------------------------------------------------------
+    dataset = dataset_of([0.0, 0.1, 0.008, 0.0], [9.0, 1.0, 2.0, 9.0])
+    assert chosen(choices(dataset), 0.01)[0].rows == (2, 3)
+    assert "“row 2, row 3” is the cheapest" in recommendation(dataset)
+    assert recommendation(dataset).endswith("[shear]\nline = 2")
+    assert chosen(choices(dataset_of([0.0, 0.008, 0.003, 0.0], [9.0, 1.0, 1.04, 9.0])), 0.01)[0].rows == (2, 3)
 
 
 def random_scene(seed):
