@@ -262,20 +262,6 @@ def test_a_contact_of_any_radius_shares_displacement_and_release_rate_with_the_s
     assert_array_equal(jkr.load_under_displacement(np.append(radius, 0.0), -1e-6, 0.0, *rest), 0.0)
 
 
-def test_a_radius_depends_on_neither_batch_nor_shape():
-    states = random_states(9000, seed=14)
-    whole = jkr.radius_at_displacement(*states)
-    for size in [1, 2, 7, 8, 9, 255, 4095, 4096, 4097]:
-        assert_array_equal(jkr.radius_at_displacement(*[value[-size:] for value in states]), whole[-size:])
-    displacement, stiffness = np.linspace(-1e-6, 5e-6, 30).reshape(5, 1, 6), np.logspace(1, 4, 40).reshape(40, 1)
-    radius = jkr.radius_at_displacement(displacement, stiffness, **LENS)
-    assert radius.shape == (5, 40, 6)
-    corner = jkr.radius_at_displacement(displacement[4, 0, 5], stiffness[39, 0], **LENS)
-    assert isinstance(corner, float) and corner == radius[4, 39, 5]
-    with pytest.raises(ValueError, match="shape"):
-        jkr.radius_at_displacement(np.zeros(2), np.zeros(3), **LENS)
-
-
 def wild_inputs(count, seed):
     """Numbers of a laboratory, of the whole range of doubles and of its edges, of either sign."""
     random = np.random.default_rng(seed)

@@ -62,17 +62,6 @@ def test_the_onset_of_mean_field_is_that_of_the_eigenvalues_and_moves_with_mass_
     assert np.isnan(onset(damping=10.0)).all() and np.isnan(onset(viscosity=10.0, contact_stiffness=0.03)).all()
 
 
-def test_the_steady_fraction_is_that_of_the_paper_where_the_rate_vanishes():
-    speed = np.array([1e-3, 1e-2, -1e-2, 0.0, -0.0, np.inf, -np.inf])
-    assert_allclose(law.steady_fraction(speed, 1e-2), [10 / 11, 0.5, 0.5, 1.0, 1.0, 0.0, 0.0], rtol=1e-15, atol=0)
-    assert np.isnan(law.steady_fraction(np.nan, 1e-2))
-    assert law.steady_fraction(1.0, np.inf) == 1.0
-    for speed in [0.0, 1e-5, 1e-2, 10.0]:
-        steady = law.steady_fraction(speed, CRITICAL)
-        flow = HEALING * (1.0 - steady) + HEALING * speed / CRITICAL * steady
-        assert abs(law.fraction_rate(steady, speed, CRITICAL, HEALING)) <= 4e-16 * max(flow, HEALING)
-
-
 def test_a_step_of_any_length_solves_the_rate_equation():
     for speed in [0.0, 3e-3, 0.5]:
         duration = 4e-3
@@ -111,7 +100,7 @@ def test_a_step_of_any_length_solves_the_rate_equation():
     assert np.isnan(law.relax_fraction(np.nan, 1e-5, 1e-3, CRITICAL, HEALING))
 
 
-def test_transitions_are_those_of_the_two_state_generator():
+def test_transitions_are_those_of_the_generator_and_the_steady_fraction_where_the_rate_vanishes():
     path, duration = 3e-5, 2e-3
     closing, opening = HEALING, HEALING * path / duration / CRITICAL
     values, vectors = np.linalg.eig(np.array([[-opening, closing], [opening, -closing]]))
@@ -122,6 +111,14 @@ def test_transitions_are_those_of_the_two_state_generator():
     assert_allclose(0.3 * stay + 0.7 * become, mean, rtol=1e-14, atol=0)
     for probability in law.transition_probabilities(EXPONENTS * CRITICAL, EXPONENTS, CRITICAL, HEALING):
         assert np.all((probability >= 0.0) & (probability <= 1.0))
+    speed = np.array([1e-3, 1e-2, -1e-2, 0.0, -0.0, np.inf, -np.inf])
+    assert_allclose(law.steady_fraction(speed, 1e-2), [10 / 11, 0.5, 0.5, 1.0, 1.0, 0.0, 0.0], rtol=1e-15, atol=0)
+    assert np.isnan(law.steady_fraction(np.nan, 1e-2))
+    assert law.steady_fraction(1.0, np.inf) == 1.0
+    for speed in [0.0, 1e-5, 1e-2, 10.0]:
+        steady = law.steady_fraction(speed, CRITICAL)
+        flow = HEALING * (1.0 - steady) + HEALING * speed / CRITICAL * steady
+        assert abs(law.fraction_rate(steady, speed, CRITICAL, HEALING)) <= 4e-16 * max(flow, HEALING)
 
 
 def test_populations_of_equal_endless_or_no_lives():
@@ -273,7 +270,7 @@ def test_peak_and_half_population_over_all_rebinding_rates_and_mean_fields_large
     assert_allclose(ratio, [1.27, 1.37, 1.47], rtol=0, atol=0.006)
 
 
-def test_cut_off_is_the_law_of_the_paper_and_has_its_limits_and_friction_maximum():
+def test_cut_off_is_the_law_of_the_paper_to_fifty_digits_with_its_limits_and_maximum():
     speed = np.array([0.0, 1e-6, 1e-3, 1e-2, 1.0, math.inf])
     stretch, k_on = 5e-6, 200.0
     paper = law.steady_fraction(speed, stretch * k_on)
@@ -295,9 +292,6 @@ def test_cut_off_is_the_law_of_the_paper_and_has_its_limits_and_friction_maximum
     assert_allclose(stress[1], [0.369018, 0.166299, 0.0275600], rtol=0, atol=5.1e-7)
     assert np.all(stress[[0, 2]] < stress[1])
     assert_allclose(law.cut_off_stress(1e8, 1.0, 1.0, 1.0, math.inf, 1.0), 0.5, rtol=1e-8, atol=0)  # the plateau
-
-
-def test_cut_off_to_fifty_digits():
     for wait in [0.0, 0.1, 1.0, 10.0]:
         for u in np.concatenate([10.0 ** np.arange(-8, 9), [0.2, 0.33, 0.3334, 0.5, 2.0]]):
             with mp.workdps(50):
@@ -454,7 +448,7 @@ def test_the_onset_of_bonds_resolved_by_stretch_is_that_of_the_characteristic_eq
         assert_allclose(scaled.stiffness, exact[0], rtol=5e-6)
 
 
-def test_oscillations_of_bonds_resolved_by_stretch_set_in_beyond_the_maximum_of_friction_alone():
+def test_oscillations_set_in_beyond_the_maximum_of_friction_gradually_or_suddenly():
     speeds = law.bell_peak(1.0, 1.0, 1.0, 1.0, 1.0).speed * np.array([0.0, 0.5, 0.999, 1.001, 2.0])
     stable = np.isnan(law.resolved_onset(speeds, [(1.0, 1.0)], 1.0, 1.0, 1.0, law.Body(1.0)))
     assert np.array_equal(stable, [[True, True, True, False, False]] * 2)
@@ -470,8 +464,6 @@ def test_oscillations_of_bonds_resolved_by_stretch_set_in_beyond_the_maximum_of_
     series = alone.stiffness / (1.0 - alone.stiffness / 0.05)
     assert_allclose(behind.stiffness, (swings + alone.stiffness, swings + series, math.inf), rtol=1e-12)
 
-
-def test_oscillations_set_in_gradually_at_high_speeds_and_suddenly_at_low_ones():
     def amplitude(speed, beta=1.0):
         return law.first_moment_amplitude(speed, 1.0, 1.0, 1.0, beta)
 

@@ -43,7 +43,7 @@ def test_a_half_spectrum_holds_its_field_and_every_wavevector_once_by_the_integr
         assert qy.shape == (1, points // 2 + 1)
 
 
-def test_a_member_has_the_same_bits_alone_and_in_any_batch():
+def test_members_have_the_same_bits_in_any_batch_and_derived_arrays_are_read_only():
     for points in [31, 64]:
         grid = Grid(cell=1.0, points=points)
         batch = fields(points, members=(13,), seed=3)
@@ -54,9 +54,6 @@ def test_a_member_has_the_same_bits_alone_and_in_any_batch():
             assert_array_equal(alone, spectra[member])
             assert grid.mean_square(alone) == squares[member]
         assert_array_equal(grid.mean_square(grid.forward(batch[3:6])), squares[3:6])
-
-
-def test_derived_arrays_are_computed_once_and_an_impossible_grid_is_refused():
     grid = Grid(cell=1.0, points=4)
     assert grid.wavevectors is grid.wavevectors
     for array in (*grid.wavevectors, grid.position, grid.multiplicity):

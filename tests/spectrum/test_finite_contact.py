@@ -131,7 +131,7 @@ def test_streaks_obey_the_overlap_integral_and_a_self_affine_field_is_the_sum_of
     assert_allclose(disc_energy(spectrum, 1.0, 1.0), np.sum(rings), rtol=1e-5, atol=0)
 
 
-def test_a_disc_of_many_waves_is_the_infinite_plane_but_for_its_edge():
+def test_a_disc_of_many_waves_is_the_plane_and_below_every_wavelength_the_stress_is_uniform():
     for spectrum in SPECTRA:
         for nu in RATIOS:
             plane = spectrum.surface_energy(1.6e6, nu)
@@ -145,9 +145,6 @@ def test_a_disc_of_many_waves_is_the_infinite_plane_but_for_its_edge():
     # 1 - (2/pi) xi/(sqrt(pi) a), and half of it for the margin; the next term is cubic in xi/a
     assert_allclose(1 - disc_energy(spectrum, 1.0, 1.0) / plane, deficit, rtol=2e-6, atol=0)
     assert_allclose(1 - marginal_energy(spectrum, 1.0, 1.0) / plane, deficit / 2, rtol=2e-6, atol=0)
-
-
-def test_on_a_disc_below_every_wavelength_the_stress_is_uniform():
     for spectrum in SPECTRA:
         for nu in RATIOS:
             a = 1e-7

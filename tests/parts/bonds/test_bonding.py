@@ -82,7 +82,7 @@ def rate_of_stress(name, speed, slip, duration):
     return state.bonding, after.stress - state.bonding.stress
 
 
-def test_stiffness_and_relaxation_are_the_slopes_of_the_stress_over_slip_and_time():
+def test_stiffness_and_relaxation_are_the_slopes_of_the_stress_less_what_breaks_at_a_cut_off():
     for name, speed in product([name for name in BONDS if name not in ("steady", "cohort, cut-off")], [4e-3, -4e-3]):
         # 0.1 nm within 1 as: rounding of the difference and the curvature over 1e-10/20e-6 of the cut-off
         slip = np.copysign(1e-10, speed)
@@ -92,9 +92,6 @@ def test_stiffness_and_relaxation_are_the_slopes_of_the_stress_over_slip_and_tim
         # 1 ns: of the lives that rupture leaves, some 1e-6 pass, and rounding of the difference is below 1e-10
         bonding, change = rate_of_stress(name, 4e-3, 0.0, 1e-9)
         assert_allclose(np.broadcast_to(bonding.relaxation, change.shape), change / 1e-9, rtol=3e-5)
-
-
-def test_cohorts_at_a_cut_off_lose_stiffness_to_the_bonds_that_break():
     for speed in [1e-3, 4e-3, -4e-3]:
         # steady: a density k_on (1 − N)/V e^(−k x/V) up to the limit l, by its mean over a cell of l/1000
         part, limit = bonds.Cohort(rupture=CUT_OFF, **STRETCHED, tolerance=1e-6), CUT_OFF.stretch

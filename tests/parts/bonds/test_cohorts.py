@@ -71,15 +71,6 @@ def test_the_steady_state_has_the_moments_of_renewal_theory_and_marching_from_re
         assert_allclose(out[-1], exact, rtol=1e-4, atol=0)
 
 
-def test_steady_start_stays_steady_for_any_clock_step():
-    for tolerance in [1e-3, 1e-4]:
-        for eps in (0.01, 1.0, 10.0, 1e4):
-            start = steady(BELL, 1.0, eps, tolerance)
-            for lives in (0.01, 0.1, 0.4, 1.0, 7.0, 1e3):
-                out, _ = march(start, [eps] * 60, life_of(eps) * lives, BELL, 1.0, tolerance)
-                assert worst(out, moments(start)) < tolerance, (eps, lives)
-
-
 def test_start_up_peak_without_rebinding_is_the_lambert_formula():
     for eps in [1.0, 10.0, 100.0, 1e4]:
         w = lambertw(eps).real
@@ -136,7 +127,7 @@ def test_cut_off_bonds_slide_by_their_closed_form_and_without_a_rate_break_at_on
     assert_allclose(out[14 : 14 + len(after), 0], -np.expm1(-2.0 * after), rtol=1e-4, atol=0)
 
 
-def test_jumps_of_speed_keep_the_number_and_forget_the_clock_step():
+def test_jumps_of_speed_and_any_clock_step_keep_the_number_and_the_steady_state():
     for (before, after), beta in product(
         [(1e-3, 1e3), (1e3, 1e-3), (0.0, 1e2), (1e2, 0.0), (3.0, -3.0), (10.0, -1e-4)], [0.1, 100.0]
     ):
@@ -152,6 +143,12 @@ def test_jumps_of_speed_keep_the_number_and_forget_the_clock_step():
             assert np.max(np.abs(out[:, 1] - true[:, 1]) / size) < 1.5 * tolerance
         assert np.all(state.weight >= 0.0)
         assert 0.0 <= state.weight.sum() <= 1.0 + 1e-12
+    for tolerance in [1e-3, 1e-4]:
+        for eps in (0.01, 1.0, 10.0, 1e4):
+            start = steady(BELL, 1.0, eps, tolerance)
+            for lives in (0.01, 0.1, 0.4, 1.0, 7.0, 1e3):
+                out, _ = march(start, [eps] * 60, life_of(eps) * lives, BELL, 1.0, tolerance)
+                assert worst(out, moments(start)) < tolerance, (eps, lives)
 
 
 def test_ageing_at_rest_is_an_exponential_dilution_frees_sites_and_no_duration_only_stretches():
@@ -190,11 +187,17 @@ def test_any_rates_and_slips_give_shares_between_zero_and_one(exponents, kind, s
         assert -1e-12 <= state.weight.sum() <= 1.0 + 1e-12
 
 
-def test_steps_of_extreme_length_have_their_limits():
+def test_steps_of_extreme_length_have_their_limits_and_what_is_not_built_is_refused():
     for fast, bind in product([1e-9, 1e9], [1e-9, 1e9]):
         rupture = RuptureRate(fast, 1.0, math.inf)
         result = advance(empty(rupture, 1e-4), np.array([1.0]), 1.0, rupture, bind, 1e-4).weight.sum()
         assert_allclose(result, -math.expm1(-bind) if fast < 1.0 else bind / (bind + fast), rtol=1e-4, atol=0)
+    with pytest.raises(ValueError, match="leave out one"):
+        empty(RuptureRate(1.0, 1.0, 1.0), 1e-3)
+    with pytest.raises(ValueError, match="out of range"):
+        resting(BELL, 1.0, 0.5)
+    with pytest.raises(ValueError, match="do not fit"):
+        advance(advance(resting(BELL, 1.0, 1e-3), np.zeros(2), 1.0, BELL, 1.0, 1e-3), np.zeros(3), 1.0, BELL, 1.0, 1e-3)
 
 
 def test_cohorts_stay_few_for_ever_and_merging_keeps_four_moments():
@@ -230,12 +233,3 @@ def test_a_long_run_does_not_drift():
             most = max(most, np.count_nonzero(state.weight))
             assert worst(moments(state), exact) < 1e-3
     assert most < state.weight.shape[1]
-
-
-def test_what_is_not_built_is_refused():
-    with pytest.raises(ValueError, match="leave out one"):
-        empty(RuptureRate(1.0, 1.0, 1.0), 1e-3)
-    with pytest.raises(ValueError, match="out of range"):
-        resting(BELL, 1.0, 0.5)
-    with pytest.raises(ValueError, match="do not fit"):
-        advance(advance(resting(BELL, 1.0, 1e-3), np.zeros(2), 1.0, BELL, 1.0, 1e-3), np.zeros(3), 1.0, BELL, 1.0, 1e-3)

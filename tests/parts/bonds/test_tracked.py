@@ -73,7 +73,7 @@ def has_the_law(tracks, exact):
         assert abs(value - mean) < 5.0 * math.sqrt((square - mean**2) / count)
 
 
-def test_steady_sliding_has_the_exact_moments_at_once_and_later():
+def test_steady_sliding_reversals_and_rests_have_the_exact_moments():
     bell = product([BELL], [(0.01, 1.0), (1.0, 0.1), (3.0, 1.0), (10.0, 1.0), (100.0, 10.0), (1000.0, 10.0)])
     for law, (speed, rebinding) in [*bell, *product([CONSTANT, CUT, BOTH], [(1.3, 1.0)])]:
         exact = moments(law, speed, rebinding)
@@ -85,6 +85,18 @@ def test_steady_sliding_has_the_exact_moments_at_once_and_later():
             tracks = go(tracks, speed * 0.05, 0.05, law, rebinding)
         has_the_law(tracks, exact)
         assert np.all(tracks.frame[:, STEPS] == 61)
+    # Forth, rest, back through zero: against a trapezoid rule, whose error of some h² (k/2)² is below 2e-4.
+    step, rebinding, sites = 2.5e-3, 2.0, 100_000
+    speeds = np.repeat([3.0, 0.0, -4.0, 0.5], 160)
+    exact = volterra(BELL, rebinding, np.concatenate([[0.0], np.cumsum(speeds * step)]), step)
+    tracks = begin(BELL, sites, how="empty", rebinding=rebinding)
+    for n in range(0, len(speeds), 40):
+        tracks = go(tracks, speeds[n] * 40 * step, 40 * step, BELL, rebinding)
+        at = n + 40
+        result = bound(tracks)[0] / sites, mean_stretch(tracks)[0], mean_square_stretch(tracks)[0]
+        # no site's stretch exceeds 3 by much: moments per site vary by less than these
+        for value, moment, error in zip(result, exact, (0.5, 1.2, 3.0), strict=True):
+            assert abs(value - moment[at]) < 5.0 * error / math.sqrt(sites) + 2e-4
 
 
 def test_loaded_bonds_break_by_the_law_of_bell_and_evans():
@@ -137,15 +149,6 @@ def test_the_same_motion_in_other_steps_or_a_bell_force_beyond_all_stretches_giv
     assert not np.array_equal(soft[-1][2], ramp(BELL, 1, FORWARD)[-1][2])  # whose lives are others
 
 
-def test_rows_ask_singly_after_a_reversal_until_all_bonds_follow():
-    tracks = go(begin(BELL, 500, speed=1.0), -1e-3, 1e-3, BELL)
-    assert tracks.frame[0, SINGLY] == 1.0
-    for _ in range(400):
-        tracks = go(tracks, -0.1, 0.1, BELL)
-    assert tracks.frame[0, SINGLY] == 0.0
-    assert np.nanmax(stretches(tracks)) <= 0.0
-
-
 def volterra(law, rebinding, position, step):
     """Fraction, mean and mean square stretch in time from all-empty sites, by the renewal equation on a grid."""
     count = len(position)
@@ -162,21 +165,6 @@ def volterra(law, rebinding, position, step):
     born[0] *= 0.5
     stretch = position[np.newaxis, :] - position[:, np.newaxis]
     return [np.sum(born[:, np.newaxis] * survival * stretch**n, axis=0) - 0.5 * (n == 0) * born for n in (0, 1, 2)]
-
-
-def test_reversals_and_rests_have_the_law_of_the_renewal_equation():
-    """Forth, rest, back through zero: against a trapezoid rule, whose error of some h² (k/2)² is below 2e-4."""
-    step, rebinding, sites = 2.5e-3, 2.0, 100_000
-    speeds = np.repeat([3.0, 0.0, -4.0, 0.5], 160)
-    exact = volterra(BELL, rebinding, np.concatenate([[0.0], np.cumsum(speeds * step)]), step)
-    tracks = begin(BELL, sites, how="empty", rebinding=rebinding)
-    for n in range(0, len(speeds), 40):
-        tracks = go(tracks, speeds[n] * 40 * step, 40 * step, BELL, rebinding)
-        at = n + 40
-        result = bound(tracks)[0] / sites, mean_stretch(tracks)[0], mean_square_stretch(tracks)[0]
-        # no site's stretch exceeds 3 by much: moments per site vary by less than these
-        for value, moment, error in zip(result, exact, (0.5, 1.2, 3.0), strict=True):
-            assert abs(value - moment[at]) < 5.0 * error / math.sqrt(sites) + 2e-4
 
 
 def test_a_cluster_that_shares_a_force_lives_as_erdmann_and_schwarz_say():
@@ -204,7 +192,7 @@ def test_a_cluster_that_shares_a_force_lives_as_erdmann_and_schwarz_say():
 LEAPS = np.concatenate([np.full(60, 3.0), [400.0, 2.0], np.full(30, 40.0)])
 
 
-def test_many_steps_at_once_are_the_same_to_the_bit_as_one_after_the_other():
+def test_many_steps_at_once_are_those_one_after_the_other_and_ask_singly_after_a_reversal():
     for name, speeds, shared in product(LAWS, [FORWARD, BACK_AND_FORTH, LEAPS], [True, False]):
         law, members = LAWS[name], np.arange(3)
         duration = np.where(np.arange(len(speeds)) == 17, 700.0, 0.1)  # one of more than 300 lives
@@ -218,6 +206,12 @@ def test_many_steps_at_once_are_the_same_to_the_bit_as_one_after_the_other():
                 assert np.array_equal(after[0], frames[k])
             assert all(np.array_equal(first, second) for first, second in zip(at_once, alone, strict=True))
             assert at_once.life.mean() > 2
+    tracks = go(begin(BELL, 500, speed=1.0), -1e-3, 1e-3, BELL)
+    assert tracks.frame[0, SINGLY] == 1.0
+    for _ in range(400):
+        tracks = go(tracks, -0.1, 0.1, BELL)
+    assert tracks.frame[0, SINGLY] == 0.0
+    assert np.nanmax(stretches(tracks)) <= 0.0
 
 
 def test_a_state_that_has_been_advanced_is_spent_but_keeps_its_moments():

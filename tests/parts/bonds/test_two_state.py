@@ -63,7 +63,7 @@ LINEAR = {"critical_speed": 1e-2, "rebinding_rate": 3.0}
 FIELD = shear.Mean(spectrum=BondMade(footprint=1e-5))
 
 
-def test_the_depth_left_open_is_chosen_by_noise_and_rupture():
+def test_the_depth_left_open_is_chosen_by_noise_rupture_and_the_number_of_sites():
     for auto, depth in [
         (bonds.Auto(**LINEAR), bonds.Rate),
         (bonds.Auto(**LINEAR, sites=9_999), bonds.Counted),
@@ -83,9 +83,6 @@ def test_the_depth_left_open_is_chosen_by_noise_and_rupture():
     assert scene(bonds=bonds.Auto(**LINEAR, area="carried")).population.area == "carried"
     read = bonds.Auto(rupture=Constant(rate=9.0), **STRETCHED)  # at a constant rate, but the force of each is needed
     assert type(scene(bonds=read, shear=FIELD).population) is bonds.Cohort
-
-
-def test_the_number_of_sites_is_given_or_that_of_the_contact_and_cohorts_are_finer_than_its_noise():
     area = math.pi * scene().rest_radius ** 2
     by_density = bonds.Auto(rupture=BELL, **STRETCHED | {"site_density": 1e11})
     assert by_density.number(area) == scene(bonds=by_density).population.sites == round(1e11 * area)

@@ -281,7 +281,7 @@ def pulse(contact, paid=1.0, steps=400, on="plane"):
     return scene(1, steps, shear=part, drive=table, contact=contact)
 
 
-def test_work_that_falls_through_zero_leaves_hertz_or_opens_a_lifted_contact():
+def test_work_that_falls_through_zero_or_none_at_all_makes_hertzs_contact():
     for held in [{"load": 4e-3}, {"indentation": 2e-6}, {"displacement": 2e-6, "stiffness": 2e3}]:
         scenario = pulse(Equilibrium(**held))
         radius, work, masked = course(scenario, "contact_radius", "work_of_adhesion", "masked")
@@ -298,9 +298,6 @@ def test_work_that_falls_through_zero_leaves_hertz_or_opens_a_lifted_contact():
     radius, work, masked = course(pulse(Equilibrium(indentation=-1e-8)), "contact_radius", "work_of_adhesion", "masked")
     assert np.all(radius[np.argmax(work <= 0.0) :] == 0.0)
     assert_array_equal(masked, 0.0)  # an open contact is not Hertz's
-
-
-def test_a_sphere_laid_down_without_adhesion_makes_hertzs_contact():
     back = {"from": 1e-3, "to": -1e-3, "cycles": 1}
     part = shear.Mean(spectrum=Gaussian(rms=1e6, length=24e-6))
     scenario = scene(1, 40, shear=part, contact=Equilibrium(load=back, after_pull_off="reattach"))
@@ -336,7 +333,7 @@ def test_the_share_that_a_disc_pays_is_its_marginal_energy():
         assert_array_equal(margin(np.array([0.0, math.nan])), [0.0, math.nan])
 
 
-def test_a_disc_is_where_its_release_rate_is_the_work_that_its_own_amplitude_leaves():
+def test_a_disc_is_where_its_release_rate_is_the_work_that_its_amplitude_leaves_and_dissipates_that():
     for held, paid in product(
         [{"load": 4e-3}, {"load": -2e-4}, {"indentation": -4e-7}, {"displacement": 1e-6, "stiffness": 2e3}], [1.0, 0.4]
     ):
@@ -349,10 +346,7 @@ def test_a_disc_is_where_its_release_rate_is_the_work_that_its_own_amplitude_lea
         assert_allclose(work[closed], 42e-3 - paid * energy[closed] * scenario.margin(a), rtol=0.0, atol=1e-15)
         rate = jkr.energy_release_rate_at_indentation(a, depth[closed], 2e-3, 6.4e6)
         assert_allclose(rate, work[closed], rtol=1e-12, atol=42e-3 * 1e-12)
-
-
-def test_a_disc_dissipates_at_pull_off_what_its_own_energy_leaves():
-    """-int w dA = -w0 A + DeltaGamma int dE: the mean over the disc, not its edge, enters the energy."""
+    # -int w dA = -w0 A + DeltaGamma int dE: the mean over the disc, not its edge, enters the energy.
     spectrum = Gaussian(rms=0.05, length=0.3)
     plane = float(spectrum.surface_energy(0.1875))
     part = shear.Mean(spectrum=spectrum, contact="disc")

@@ -91,16 +91,13 @@ PAID = {
 }
 
 
-def test_the_work_done_on_a_contact_is_what_it_stores():
+def test_the_work_done_on_a_contact_is_what_it_stores_and_energies_slope_to_the_load():
     for paid, control in product(PAID, CONTROLS):
         # the sum converges like exp(-60 x): to rounding, but for the spline of the disc's share, good to 1e-9
         path = Path(*CONTROLS[control], **PAID[paid])
         gained = path.stored(1.0) - path.stored(0.0)
         assert abs(gained) > 0.01
         assert_allclose(path.spent(), gained, rtol=0.0, atol=1e-8 if "disc" in paid else 1e-10)
-
-
-def test_energies_slope_to_the_load_and_to_the_energy_release_rate():
     for make, (low, _) in CONTROLS.values():
         control = Equilibrium(**make(low)).control(0.0, 1.0)
         a = np.array([1.3])

@@ -119,16 +119,13 @@ def test_the_missing_energy_falls_with_the_tolerance_while_the_area_follows_the_
         assert missing[2] < 0.1 * missing[1] < 0.1 * missing[0]
 
 
-def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip():
+def test_a_member_is_the_same_alone_and_restarted_and_a_stage_that_turns_leaves_it_at_rest():
     for area, keys in itertools.product(("present", "carried"), ({"damping": 0.05}, {"mass": 0.01, "damping": 0.05})):
         scene = stuck(12.0, 240, renewed(area=area), pulled(1.0, 0.3, **keys), share=0.5)
         straight = list(march(scene, np.arange(3)))
         driven.check_members(scene, straight, driven.fastest(straight, 0.3))
         if area == "present":
             driven.check_blocks(scene, straight, 4)
-
-
-def test_a_stage_that_turns_pulls_the_body_both_ways_and_leaves_it_at_rest():
     turns = {"time": (0.0, 4.0, 4.0, 8.0, 8.0, 99.0), "value": tuple(v * STRETCH for v in (1.0, 1.0, -2.0, -2.0, 0, 0))}
     states, read = marched(stuck(12.0, 48, renewed(), pulled(1.0, turns, damping=0.1)))
     ways = reached(states)

@@ -268,15 +268,12 @@ def test_bands_are_grouped_once_for_all_sizes_and_moduli_and_kept_for_a_whole_sw
     assert len(calls) == 40
 
 
-def test_a_contact_at_rest_keeps_its_energy_to_the_last_bit_and_a_ripple_of_no_amplitude_stores_none():
+def test_a_contact_at_rest_keeps_its_energy_and_bad_input_is_refused_at_its_key():
     part = shear.Banded(spectrum=SPECTRUM, cell=CELL, correlation=Wave(waves=1.0))
     _, energies = march_energies(part, drive.Steady(speed=0.0))
     assert np.all(energies == energies[0])
     part = shear.Banded(spectrum=Ripple(amplitude=0.0, wavelength=24e-6), cell=CELL, correlation=Slip(length=1e-6))
     assert np.all(march_energies(part, drive.Steady(speed=1e-3))[1] == 0.0)
-
-
-def test_bad_input_is_refused_at_its_key():
     for keys, key in (
         ({"tolerance": np.nan}, "tolerance"),
         ({"tolerence": 0.1}, "tolerence"),

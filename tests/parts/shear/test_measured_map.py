@@ -135,7 +135,7 @@ def test_uniform_stress_and_passing_waves_store_the_closed_forms_as_new_contact_
     assert_allclose(grown, whole[1] - whole[0], rtol=1e-5)
 
 
-def test_a_contact_feels_the_pattern_under_it_and_grows_where_new_contact_gives_energy_back():
+def test_an_edge_or_equilibrium_follows_the_pattern_and_grows_where_contact_gives_energy_back():
     field = patchy(rms=4e4)
     shear = measured(field, "disc", keys={"start": 240e-6})
     dataset = sim.run(sliding(shear, steps=80, record=Record(maps=(0.0, 80e-3))))
@@ -152,6 +152,13 @@ def test_a_contact_feels_the_pattern_under_it_and_grows_where_new_contact_gives_
     dataset = sim.run(sliding(measured(field, "disc"), steps=1, speed=0.0)).isel(t=0)
     assert float(dataset["work_of_adhesion"]) > 42e-3
     assert float(dataset["contact_radius"]) > 1.005 * float(dataset["jkr_radius"])
+    shear = measured(patchy(rms=4e4), "disc")
+    still = sliding(shear, steps=400, speed=0.0, contact=RateDependent(load=4e-3, front_speed=1e-3))
+    at_rest = sliding(shear, steps=1, speed=0.0)
+    assert_allclose(sim.run(still)["contact_radius"][-1], sim.run(at_rest)["contact_radius"][-1], rtol=1e-6)
+    moving = sim.run(sliding(shear, steps=40, contact=RateDependent(load=4e-3, front_speed=1e-4)))
+    assert np.all(moving["equilibrium_radius"] > 0.0)
+    assert abs(moving["equilibrium_radius"] - moving["contact_radius"]).max() > 1e-8
 
 
 def test_batches_blocks_and_restarts_agree_under_a_measured_map():
@@ -189,16 +196,6 @@ def test_a_scene_that_leaves_the_map_or_asks_for_a_correlation_or_convergence_is
     table = {"model": "mapped", "field": {"file": "map.npy"}, "correlation": {"model": "time", "time": 1.0}}
     with pytest.raises(BadInput, match="correlation"):
         sim.load({"shear": table, "clock": {"duration": 1.0, "step": 0.1}})
-
-
-def test_a_rate_dependent_edge_follows_the_pattern():
-    shear = measured(patchy(rms=4e4), "disc")
-    still = sliding(shear, steps=400, speed=0.0, contact=RateDependent(load=4e-3, front_speed=1e-3))
-    at_rest = sliding(shear, steps=1, speed=0.0)
-    assert_allclose(sim.run(still)["contact_radius"][-1], sim.run(at_rest)["contact_radius"][-1], rtol=1e-6)
-    moving = sim.run(sliding(shear, steps=40, contact=RateDependent(load=4e-3, front_speed=1e-4)))
-    assert np.all(moving["equilibrium_radius"] > 0.0)
-    assert abs(moving["equilibrium_radius"] - moving["contact_radius"]).max() > 1e-8
 
 
 TOML = f"""{LENS}

@@ -107,12 +107,25 @@ def whole_plane(pixels):
     return math.fsum(pixels[:, 1:].ravel()) * 2 + math.fsum(pixels[:, 0])
 
 
-def test_all_pixels_together_hold_the_variance_or_that_of_the_large_pixel_that_they_fill():
+def test_all_pixels_hold_the_variance_but_that_around_zero_and_energies_are_compliance_times_density():
     for spectrum in CUT_OFF.values():
         assert_allclose(whole_plane(spectrum.pixels(TURN, 10)), spectrum.variance, rtol=1e-13, atol=0)
     for spectrum in (CUT_OFF | SMOOTH).values():
         large = spectrum.pixels(TURN * 9, 0)[0, 0]
         assert_allclose(whole_plane(spectrum.pixels(TURN, 4)), large, rtol=1e-12, atol=0)
+    pairs = modes(Gaussian(2.0, 0.1), 1.0, 64)
+    lost = special.erf(math.pi * 0.1 / 2) ** 2
+    assert_allclose(pairs.errors()["cell_error_variance"], -lost, rtol=1e-12, atol=0)
+    assert abs(modes(AFFINE, 1.0).errors()["cell_error_variance"]) < 1e-14
+    assert_allclose(_spread(np.full(10, 0.3)), 1 / math.sqrt(10), rtol=1e-15, atol=0)
+    pairs = modes(Band(1.3, longest=1 / 4, shortest=1 / 12), 2.5)
+    nu, modulus = 0.3, 1.7
+    inside = np.hypot(pairs.ix, pairs.iy) / 2.5
+    inside = (inside > 4.4) & (inside < 11.6)  # pixels of constant density
+    q = np.hypot(pairs.qx, pairs.qy)
+    compliance = (1 - nu + nu * (pairs.qy / q) ** 2) / (modulus * q)
+    exact = compliance * pairs.spectrum.density(pairs.qx, pairs.qy) / 2.5**2
+    assert_allclose(pairs.energies(modulus, nu)[inside], exact[inside], rtol=1e-11, atol=0)
 
 
 def test_modes_are_one_of_each_pair_of_pixels_that_meet_the_annulus_without_nyquist_and_zero():
@@ -145,22 +158,6 @@ def test_modes_are_one_of_each_pair_of_pixels_that_meet_the_annulus_without_nyqu
         small, large = (modes(SelfAffine(rms, spectrum.hurst, *waves), 1.0) for rms in (1e-6, 1e9))
         assert np.array_equal(small.ix, large.ix)
         assert_allclose(small.variance, large.variance * 1e-30, rtol=1e-11, atol=0)
-
-
-def test_variance_lacks_the_pixel_around_zero_and_energies_are_compliance_times_density():
-    pairs = modes(Gaussian(2.0, 0.1), 1.0, 64)
-    lost = special.erf(math.pi * 0.1 / 2) ** 2
-    assert_allclose(pairs.errors()["cell_error_variance"], -lost, rtol=1e-12, atol=0)
-    assert abs(modes(AFFINE, 1.0).errors()["cell_error_variance"]) < 1e-14
-    assert_allclose(_spread(np.full(10, 0.3)), 1 / math.sqrt(10), rtol=1e-15, atol=0)
-    pairs = modes(Band(1.3, longest=1 / 4, shortest=1 / 12), 2.5)
-    nu, modulus = 0.3, 1.7
-    inside = np.hypot(pairs.ix, pairs.iy) / 2.5
-    inside = (inside > 4.4) & (inside < 11.6)  # pixels of constant density
-    q = np.hypot(pairs.qx, pairs.qy)
-    compliance = (1 - nu + nu * (pairs.qy / q) ** 2) / (modulus * q)
-    exact = compliance * pairs.spectrum.density(pairs.qx, pairs.qy) / 2.5**2
-    assert_allclose(pairs.energies(modulus, nu)[inside], exact[inside], rtol=1e-11, atol=0)
 
 
 def test_energy_of_a_spectrum_converges_with_the_cell_and_loses_that_around_zero():

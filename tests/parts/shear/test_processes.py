@@ -67,7 +67,7 @@ def test_a_contact_at_rest_keeps_its_pattern_and_the_floor_of_its_amplitude():
     assert Stress(reference=1e5).factor(np.zeros(1), np.zeros(1)) == 0.0
 
 
-def test_a_map_is_the_sum_of_its_waves_and_stores_the_energy_by_the_greens_function():
+def test_a_map_is_the_sum_of_its_waves_and_stores_the_energy_of_the_modes_by_the_greens_function():
     for points, amplitudes in product([12, 13], ["gaussian", "fixed"]):
         recipe = {"correlation": Slip(length=3e-6), "amplitude": Onset(speed=2e-3, width=0.3)}
         part = shear.Mapped(**ON_CELL, **recipe, points=points, mode_amplitudes=amplitudes)
@@ -84,9 +84,6 @@ def test_a_map_is_the_sum_of_its_waves_and_stores_the_energy_by_the_greens_funct
             assert_allclose(stored, np.broadcast_to(state.shear.energy, 2), rtol=1e-12)
             displacement = halfspace.displacement(maps, CELL, G)
             assert_allclose(0.5 * np.mean(maps * displacement, axis=(1, 2)), stored, rtol=1e-12)
-
-
-def test_mapped_and_modal_give_the_same_energy_number_for_number():
     recipe = {"spectrum": SPECTRUM, "cell": CELL, "points": 12, "correlation": Slip(length=3e-6)}
     clock = Clock(duration=5e-3, step=1e-3)
     _, modal = energies(shear.Modal(**recipe), 3, clock)
