@@ -99,3 +99,11 @@ def test_below_the_onset_period_size_and_peak_of_slips_approach_those_of_the_coh
         assert abs(off[1]) < abs(off[0]) / 4.0 + 3.0 * math.hypot(errors[0] / 4.0, errors[1]), name
     # the sizes of slips spread by one over the root of the number at most
     assert exact["slip_spread"].item() < 0.01 < np.mean(many["slip_spread"]) < 0.5 * np.mean(few["slip_spread"])
+
+
+def test_a_state_that_has_been_advanced_is_not_advanced_again():
+    scene = tracked(1.0, 4, spring(1.0), 10)
+    states = march(scene, np.arange(1), keep=False)
+    first, _ = next(states), next(states)
+    with pytest.raises(RuntimeError, match="advanced already"):
+        list(march(scene, np.arange(1), first))
