@@ -11,6 +11,10 @@ import pytest
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
+#: A module that changes the process that imports it: only processes of ``test_portability.py`` do.
+collect_ignore = ["helpers/elsewhere"]
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _written_at_once(request):
     """Files of tests need not be on the disk, but in ``make verify``: a run waits for the disk ten times."""
