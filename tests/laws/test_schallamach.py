@@ -17,25 +17,19 @@ EXPONENTS = 10.0 ** np.arange(-9, 10)  # rate x duration
 
 
 def test_the_onset_of_mean_field_is_that_of_the_eigenvalues_and_moves_with_mass_yielding_and_damping():
-    for speed, beta, stiffness, frequency in [
-        (10.0, 1.0, 0.0390213, 4.691569),
-        (20.0, 1.0, 0.0515158, 9.999753),
-        (50.0, 10.0, 0.1823410, 24.876979),
+    for speed, beta, stiffness, frequency in (
+        (10.0, 1.0, 0.0390213, 4.691569), (20.0, 1.0, 0.0515158, 9.999753), (50.0, 10.0, 0.1823410, 24.876979),
         (100.0, 1.0, 0.0378665, 46.056227),
-    ]:
+    ):  # fmt: skip
         onset = law.first_moment_onset(speed, 1.0, 1.0, 1.0, beta, 1.0, law.Body(1.0))
         assert_allclose(onset, (stiffness, frequency), rtol=2e-6)
         assert np.isnan(law.first_moment_onset(0.5, 1.0, 1.0, 1.0, beta, 1.0, law.Body(1.0))).all()
-    for body in [
-        law.Body(1.0),
-        law.Body(1.0, area_growth=0.5),
-        law.Body(1.0, mass=1e-2),
-        law.Body(1.0, mass=1e-3, contact_stiffness=0.05),
-        law.Body(1.0, damping=2e-3),
+    for body in (
+        law.Body(1.0), law.Body(1.0, area_growth=0.5), law.Body(1.0, mass=1e-2), law.Body(1.0, damping=2e-3),
+        law.Body(1.0, mass=1e-3, contact_stiffness=0.05), law.Body(2.0, viscosity=5e-4),
         law.Body(1.0, mass=1e-3, damping=1e-3, contact_stiffness=0.05),
-        law.Body(2.0, viscosity=5e-4),
         law.Body(2.0, 0.5, -0.1, 1e-3, 1e-3, 1e-4, 0.5, 0.5),
-    ]:
+    ):  # fmt: skip
         stiffness, frequency = law.first_moment_onset(10.0, 1.0, 1.0, 1.0, 1.0, 1.0, body)
         # bonds N and stretches x of a site, slip and body: small motions of the equations of the closure themselves
         tilt = 1.7455280027406994  # x e^x = 10
@@ -62,7 +56,7 @@ def test_the_onset_of_mean_field_is_that_of_the_eigenvalues_and_moves_with_mass_
     assert np.isnan(onset(damping=10.0)).all() and np.isnan(onset(viscosity=10.0, contact_stiffness=0.03)).all()
 
 
-def test_a_step_of_any_length_solves_the_rate_equation():
+def test_a_step_solves_the_rate_equation_and_transitions_are_those_of_its_generator():
     for speed in [0.0, 3e-3, 0.5]:
         duration = 4e-3
         exact = solve_ivp(
@@ -98,9 +92,6 @@ def test_a_step_of_any_length_solves_the_rate_equation():
     assert_allclose(jump, 0.5 * np.exp(-HEALING * 1e-5 / CRITICAL), rtol=1e-14, atol=0)
     assert law.relax_fraction(0.5, np.inf, 1.0, CRITICAL, HEALING) == 0.0
     assert np.isnan(law.relax_fraction(np.nan, 1e-5, 1e-3, CRITICAL, HEALING))
-
-
-def test_transitions_are_those_of_the_generator_and_the_steady_fraction_where_the_rate_vanishes():
     path, duration = 3e-5, 2e-3
     closing, opening = HEALING, HEALING * path / duration / CRITICAL
     values, vectors = np.linalg.eig(np.array([[-opening, closing], [opening, -closing]]))
@@ -161,7 +152,7 @@ def some_bonds(count=12, seed=41):
     return k0, force, stiffness, k_on, k0 * force / stiffness * 10.0 ** draw(-3, 5, count)
 
 
-def test_bell_lives_are_integrals_of_the_survival():
+def test_bell_lives_integrate_the_survival_and_bonds_have_their_limits_in_force_and_speed():
     k0, force, stiffness, k_on, speed = some_bonds()
     lives = law.bell_lives(speed, k0, force, stiffness)
     for i, of_bond in enumerate(zip(*lives, strict=True)):
@@ -174,9 +165,6 @@ def test_bell_lives_are_integrals_of_the_survival():
             assert_allclose(life * k0[i] ** (n + 1), whole, rtol=1e-11, atol=0)
     moments = law.bell_moments(speed, k0, force, stiffness, k_on)
     assert_allclose(moments, law.renewal(*lives, speed, stiffness, k_on), rtol=1e-14, atol=0)
-
-
-def test_bell_bonds_count_from_rest_and_have_their_limits_in_force_and_speed():
     k0, _, stiffness, k_on, speed = some_bonds()
     constant = law.constant_moments(speed, k0, stiffness, k_on)
     assert_allclose(law.bell_moments(speed, k0, math.inf, stiffness, k_on), constant, rtol=1e-14, atol=0)
@@ -206,7 +194,7 @@ def test_bell_bonds_count_from_rest_and_have_their_limits_in_force_and_speed():
     assert_allclose(law.bell_fraction(1.0, 1.0, 1.0, 1.0, [0.0, math.inf]), [life, 1.0], rtol=1e-14, atol=0)
 
 
-def test_no_speed_has_more_friction_than_the_peak():
+def test_no_speed_has_more_friction_than_the_peak_and_half_the_bonds_are_left_at_the_critical_speed():
     k0, force, stiffness, k_on, _ = some_bonds(6)
     for peak_of, stress_of in ((law.bell_peak, law.bell_stress), (law.first_moment_peak, law.first_moment_stress)):
         peak = peak_of(k0, force, stiffness, k_on, 1e16)
@@ -221,6 +209,17 @@ def test_no_speed_has_more_friction_than_the_peak():
             # a search ends within about the root of the rounding of the top, which leaves the top itself to 1e-12
             assert_allclose(-highest.fun, 1.0, rtol=1e-12, atol=0)
             assert abs(highest.x) < 1e-6
+    beta = np.geomspace(1e-12, 1e12, 49)
+    peak = law.bell_peak(1.0, 1.0, 1.0, beta, 1.0)
+    for factor in (0.9, 1.1):
+        assert np.all(law.bell_stress(factor * peak.speed, 1.0, 1.0, 1.0, beta, 1.0) < peak.stress)
+    critical = law.bell_critical_speed(1.0, 1.0, 1.0, beta)
+    assert_allclose(law.bell_fraction(critical, 1.0, 1.0, 1.0, beta), 0.5, rtol=1e-13, atol=0)
+    assert_array_equal(law.bell_peak(1.0, 1.0, 1.0, [0.0, math.inf], 1.0).stress, [0.0, math.inf])
+    assert law.bell_critical_speed(1.0, 1.0, 1.0, math.inf) == math.inf
+    beta = [1.0, 10.0, 100.0]
+    ratio = law.first_moment_peak(1.0, 1.0, 1.0, beta, 1.0).stress / law.bell_peak(1.0, 1.0, 1.0, beta, 1.0).stress
+    assert_allclose(ratio, [1.27, 1.37, 1.47], rtol=0, atol=0.006)
 
 
 def test_mean_field_is_the_closure_to_fifty_digits_with_its_limits():
@@ -253,21 +252,6 @@ def test_mean_field_is_the_closure_to_fifty_digits_with_its_limits():
     eps = np.array([1e-6, 1e-4])  # mean field and the exact population differ from viscous by 2 eps and 3 eps here
     ratio = law.first_moment_stress(eps, 1.0, 1.0, 1.0, 1.0, 1.0) / law.bell_stress(eps, 1.0, 1.0, 1.0, 1.0, 1.0)
     assert_allclose((ratio - 1.0) / eps, 1.0, rtol=2e-3, atol=0)
-
-
-def test_peak_and_half_population_over_all_rebinding_rates_and_mean_fields_larger_peak():
-    beta = np.geomspace(1e-12, 1e12, 49)
-    peak = law.bell_peak(1.0, 1.0, 1.0, beta, 1.0)
-    for factor in (0.9, 1.1):
-        assert np.all(law.bell_stress(factor * peak.speed, 1.0, 1.0, 1.0, beta, 1.0) < peak.stress)
-    assert_allclose(
-        law.bell_fraction(law.bell_critical_speed(1.0, 1.0, 1.0, beta), 1.0, 1.0, 1.0, beta), 0.5, rtol=1e-13, atol=0
-    )
-    assert_array_equal(law.bell_peak(1.0, 1.0, 1.0, [0.0, math.inf], 1.0).stress, [0.0, math.inf])
-    assert law.bell_critical_speed(1.0, 1.0, 1.0, math.inf) == math.inf
-    beta = [1.0, 10.0, 100.0]
-    ratio = law.first_moment_peak(1.0, 1.0, 1.0, beta, 1.0).stress / law.bell_peak(1.0, 1.0, 1.0, beta, 1.0).stress
-    assert_allclose(ratio, [1.27, 1.37, 1.47], rtol=0, atol=0.006)
 
 
 def test_cut_off_is_the_law_of_the_paper_to_fifty_digits_with_its_limits_and_maximum():
@@ -374,36 +358,32 @@ def test_lifetimes_of_clusters_large_and_small_solve_the_equations_of_first_pass
         assert_allclose(lifetime, exact / 50.0, rtol=3e-14, atol=0)
     n = np.arange(1, 3001)
     assert_allclose(law.cluster_lifetime(3000, 0.0, 1.0, 1.0, 0.0), math.fsum(1 / n), rtol=1e-13, atol=0)
-    assert_allclose(
-        law.cluster_lifetime(3000, 900.0, 1.0, 1.0, 0.0), math.fsum(np.exp(-900 / n) / n), rtol=1e-13, atol=0
-    )
+    pulled = law.cluster_lifetime(3000, 900.0, 1.0, 1.0, 0.0)
+    assert_allclose(pulled, math.fsum(np.exp(-900 / n) / n), rtol=1e-13, atol=0)
     # 2^3000 and more, also where the last bond has no time left
     assert_array_equal(law.cluster_lifetime(3000, [0.0, 800.0], 1.0, 1.0, [1.0, 5.0]), math.inf)
     assert 0.0 < law.cluster_lifetime(3000, 1e5, 1.0, 1.0, 1.0) < 1e-10
     assert np.isnan(law.cluster_lifetime([0.0, -1.0, 2.5, math.inf, math.nan], 0.0, 1.0, 1.0, 1.0)).all()
 
 
-IN_SPEED = {  # sign under reversal, and the law
-    "bell_fraction": (1, lambda v: law.bell_fraction(v, 2.0, 1e-11, 1e-3, 6.0)),
-    "bell_stress": (-1, lambda v: law.bell_stress(v, 2.0, 1e-11, 1e-3, 6.0, 1e16)),
-    "first_moment_fraction": (1, lambda v: law.first_moment_fraction(v, 2.0, 1e-11, 1e-3, 6.0)),
-    "first_moment_stress": (-1, lambda v: law.first_moment_stress(v, 2.0, 1e-11, 1e-3, 6.0, 1e16)),
-    "first_moment_stretch": (-1, lambda v: law.first_moment_stretch(v, 2.0, 1e-11, 1e-3)),
-    "cut_off_fraction": (1, lambda v: law.cut_off_fraction(v, 2.0, 1e-8, 6.0)),
-    "cut_off_stress": (-1, lambda v: law.cut_off_stress(v, 2.0, 1e-8, 1e-3, 6.0, 1e16)),
-    "start_up_force": (-1, lambda v: law.start_up_force(0.1, v, 2.0, 1e-11, 1e-3)),
-    "start_up_peak": (-1, lambda v: law.start_up_peak(v, 2.0, 1e-11, 1e-3).force),
-    "bell_rupture_force": (-1, lambda v: law.bell_rupture_force(1e-3 * v, 2.0, 1e-11)),
-}
-
-
 def test_fractions_are_even_and_forces_odd_in_the_speed_and_arguments_broadcast():
     speed = 10.0 ** np.arange(-12.0, 3.0)
-    for name, (sign, function) in IN_SPEED.items():
+    for sign, function in [  # the sign under reversal, and the law
+        (1, lambda v: law.bell_fraction(v, 2.0, 1e-11, 1e-3, 6.0)),
+        (-1, lambda v: law.bell_stress(v, 2.0, 1e-11, 1e-3, 6.0, 1e16)),
+        (1, lambda v: law.first_moment_fraction(v, 2.0, 1e-11, 1e-3, 6.0)),
+        (-1, lambda v: law.first_moment_stress(v, 2.0, 1e-11, 1e-3, 6.0, 1e16)),
+        (-1, lambda v: law.first_moment_stretch(v, 2.0, 1e-11, 1e-3)),
+        (1, lambda v: law.cut_off_fraction(v, 2.0, 1e-8, 6.0)),
+        (-1, lambda v: law.cut_off_stress(v, 2.0, 1e-8, 1e-3, 6.0, 1e16)),
+        (-1, lambda v: law.start_up_force(0.1, v, 2.0, 1e-11, 1e-3)),
+        (-1, lambda v: law.start_up_peak(v, 2.0, 1e-11, 1e-3).force),
+        (-1, lambda v: law.bell_rupture_force(1e-3 * v, 2.0, 1e-11)),
+    ]:
         forward = function(speed)
-        assert_array_equal(function(-speed), sign * forward, err_msg=name)
-        assert np.all(np.isfinite(forward)) and np.all(forward >= 0.0), name
-        assert function(0.0) == (1.0 if sign == 1 else 0.0), name
+        assert_array_equal(function(-speed), sign * forward)
+        assert np.all(np.isfinite(forward)) and np.all(forward >= 0.0)
+        assert function(0.0) == (1.0 if sign == 1 else 0.0)
     for function, *rest in [
         (law.constant_moments, 2.0, 1e-3, 6.0),
         (law.bell_moments, 2.0, 1e-11, 1e-3, 6.0),
@@ -431,24 +411,17 @@ def test_fractions_are_even_and_forces_odd_in_the_speed_and_arguments_broadcast(
     assert_array_equal(whole, [law.bell_moments(v, 1.0, 1.0, 1.0, 1.0).force for v in (1.0, 10.0)])
 
 
-def test_the_onset_of_bonds_resolved_by_stretch_is_that_of_the_characteristic_equation():
-    for beta, speed, *exact in [
-        (0.1, 5.0, 0.00320497, 2.00008),
-        (0.1, 20.0, 0.00436311, 8.59175),
-        (1.0, 5.0, 0.00559440, 1.08232),
-        (1.0, 10.0, 0.0295565, 4.25784),
-        (1.0, 100.0, 0.0205200, 36.2893),
-        (10.0, 20.0, 0.00714525, 2.71580),
+def test_the_onset_of_resolved_bonds_lies_beyond_the_maximum_of_friction_and_is_gradual_or_sudden():
+    for beta, speed, *exact in (
+        (0.1, 5.0, 0.00320497, 2.00008), (0.1, 20.0, 0.00436311, 8.59175), (1.0, 5.0, 0.00559440, 1.08232),
+        (1.0, 10.0, 0.0295565, 4.25784), (1.0, 100.0, 0.0205200, 36.2893), (10.0, 20.0, 0.00714525, 2.71580),
         (10.0, 1000.0, 0.0408748, 281.987),
-    ]:
+    ):  # fmt: skip
         onset = law.resolved_onset([speed, -speed], [(1.0, 1.0)], 1.0, beta, 1.0, law.Body(1.0))
         assert_allclose(onset, np.transpose([exact] * 2), rtol=5e-6)
         # of rates, forces and sites only ratios count
         scaled = law.resolved_onset(6.0 * speed, [(2.0, 3.0)], 1.0, 2.0 * beta, 5.0, law.Body(0.2))
         assert_allclose(scaled.stiffness, exact[0], rtol=5e-6)
-
-
-def test_oscillations_set_in_beyond_the_maximum_of_friction_gradually_or_suddenly():
     speeds = law.bell_peak(1.0, 1.0, 1.0, 1.0, 1.0).speed * np.array([0.0, 0.5, 0.999, 1.001, 2.0])
     stable = np.isnan(law.resolved_onset(speeds, [(1.0, 1.0)], 1.0, 1.0, 1.0, law.Body(1.0)))
     assert np.array_equal(stable, [[True, True, True, False, False]] * 2)
