@@ -7,25 +7,12 @@ import pytest
 import xarray as xr
 from helpers import lens
 from helpers.lens import LOAD, MODULUS, RADIUS, WORK, scene
-from helpers.parts import (
-    Adhesion,
-    Band,
-    Clock,
-    Equilibrium,
-    RateDependent,
-    Record,
-    analysis,
-    bonds,
-    drive,
-    jkr,
-    run,
-    shear,
-)
+from helpers.parts import Adhesion, Band, Clock, Equilibrium, RateDependent, Record, analysis, bonds, drive, run, shear
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.analysis import dataset as dataset_module, over_speed
 from sim.analysis.observables import charges, observables
-from sim.laws import reversible
+from sim.laws import jkr, reversible
 
 SPEEDS = np.geomspace(1e-3, 1e3, 61)
 NAMES = ("speed_at_5_percent_lost", "speed_at_50_percent_lost", "speed_halfway_to_hertz")
