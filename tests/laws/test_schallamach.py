@@ -112,7 +112,7 @@ def test_a_step_solves_the_rate_equation_and_transitions_are_those_of_its_genera
         assert abs(law.fraction_rate(steady, speed, CRITICAL, HEALING)) <= 4e-16 * max(flow, HEALING)
 
 
-def test_populations_of_equal_endless_or_no_lives():
+def test_populations_have_their_limits_in_lives_force_and_speed_and_bell_lives_integrate_the_survival():
     assert_array_equal(law.rest_share([0.0, 1.0, 3.0, 1.0], [2.0, 0.0, 1.0, math.inf]), [1.0, 0.0, 0.25, 1.0])
     assert_array_equal(law.renewal(math.inf, math.inf, math.inf, 0.0, 1.0, 1.0), [1.0, 0.0, 0.0])
     assert_array_equal(law.renewal(0.0, 0.0, 0.0, math.inf, 1.0, 1.0), [0.0, 0.0, 0.0])
@@ -124,35 +124,6 @@ def test_populations_of_equal_endless_or_no_lives():
     assert_allclose(bound, paper, rtol=1e-15, atol=0)
     assert_allclose(force, stiffness * stretch / 2 * paper, rtol=1e-14, atol=0)
     assert_allclose(square, (stiffness * stretch) ** 2 / 3 * paper, rtol=1e-14, atol=0)
-
-
-@pytest.mark.parametrize("eps", some([1e-6, 1e-3, 0.3, 1.0, 30.0, 1e4, 1e8], 1e-3, 1.0, 1e4))
-def test_bell_lives_to_thirty_digits_and_their_populations(eps):
-    lives = []
-    with mp.workdps(30):
-        z = 1 / mp.mpf(eps)
-        edges = [0, *(mp.mpf(10) ** k for k in range(-8, 0) if z < 1), 1, 4, 12, 30, 70, 150]
-        for order in range(3):
-            # z^(n + 1) int t^n S dt by the time t = ln(1 + w/z), scaled to 1 at rest
-            def density(w, n=order):
-                return (z * mp.log1p(w / z)) ** n * mp.exp(-w) / (1 + w / z)
-
-            lives.append(float(mp.quad(density, edges, method="gauss-legendre")))
-    assert_allclose(law.bell_lives(eps, 1.0, 1.0, 1.0), lives, rtol=1e-12, atol=0)
-    beta = np.array([0.1, 1.0, 10.0])
-    exact = [life * eps**n / (lives[0] + 1 / beta) for n, life in enumerate(lives)]
-    assert_allclose(law.bell_moments(eps, 1.0, 1.0, 1.0, beta), exact, rtol=1e-13, atol=0)
-
-
-def some_bonds(count=12, seed=41):
-    """Bonds in SI, of all kinds: k0 [1/s], f_b [N], kappa [N/m], k_on [1/s], and speeds from slow to fast [m/s]."""
-    draw = np.random.default_rng(seed).uniform
-    k0, force = 10.0 ** draw(-3, 3, count), 10.0 ** draw(-12, -9, count)
-    stiffness, k_on = 10.0 ** draw(-4, 0, count), k0 * 10.0 ** draw(-2, 3, count)
-    return k0, force, stiffness, k_on, k0 * force / stiffness * 10.0 ** draw(-3, 5, count)
-
-
-def test_bell_lives_integrate_the_survival_and_bonds_have_their_limits_in_force_and_speed():
     k0, force, stiffness, k_on, speed = some_bonds()
     lives = law.bell_lives(speed, k0, force, stiffness)
     for i, of_bond in enumerate(zip(*lives, strict=True)):
@@ -192,6 +163,32 @@ def test_bell_lives_integrate_the_survival_and_bonds_have_their_limits_in_force_
     assert_allclose(fraction, bound / law.rest_share(k0, k_on), rtol=1e-14, atol=0)
     life = law.bell_lives(1.0, 1.0, 1.0, 1.0).mean
     assert_allclose(law.bell_fraction(1.0, 1.0, 1.0, 1.0, [0.0, math.inf]), [life, 1.0], rtol=1e-14, atol=0)
+
+
+@pytest.mark.parametrize("eps", some([1e-6, 1e-3, 0.3, 1.0, 30.0, 1e4, 1e8], 1e-3, 1.0, 1e4))
+def test_bell_lives_to_thirty_digits_and_their_populations(eps):
+    lives = []
+    with mp.workdps(30):
+        z = 1 / mp.mpf(eps)
+        edges = [0, *(mp.mpf(10) ** k for k in range(-8, 0) if z < 1), 1, 4, 12, 30, 70, 150]
+        for order in range(3):
+            # z^(n + 1) int t^n S dt by the time t = ln(1 + w/z), scaled to 1 at rest
+            def density(w, n=order):
+                return (z * mp.log1p(w / z)) ** n * mp.exp(-w) / (1 + w / z)
+
+            lives.append(float(mp.quad(density, edges, method="gauss-legendre")))
+    assert_allclose(law.bell_lives(eps, 1.0, 1.0, 1.0), lives, rtol=1e-12, atol=0)
+    beta = np.array([0.1, 1.0, 10.0])
+    exact = [life * eps**n / (lives[0] + 1 / beta) for n, life in enumerate(lives)]
+    assert_allclose(law.bell_moments(eps, 1.0, 1.0, 1.0, beta), exact, rtol=1e-13, atol=0)
+
+
+def some_bonds(count=12, seed=41):
+    """Bonds in SI, of all kinds: k0 [1/s], f_b [N], kappa [N/m], k_on [1/s], and speeds from slow to fast [m/s]."""
+    draw = np.random.default_rng(seed).uniform
+    k0, force = 10.0 ** draw(-3, 3, count), 10.0 ** draw(-12, -9, count)
+    stiffness, k_on = 10.0 ** draw(-4, 0, count), k0 * 10.0 ** draw(-2, 3, count)
+    return k0, force, stiffness, k_on, k0 * force / stiffness * 10.0 ** draw(-3, 5, count)
 
 
 def test_no_speed_has_more_friction_than_the_peak_and_half_the_bonds_are_left_at_the_critical_speed():
@@ -291,7 +288,7 @@ def test_cut_off_is_the_law_of_the_paper_to_fifty_digits_with_its_limits_and_max
             assert_allclose(law.cut_off_fraction(u, 1.0, 1.0, k_on), expected, rtol=1e-14, atol=0)
 
 
-def test_rupture_forces_of_bell_and_evans_and_their_density():
+def test_rupture_forces_have_their_density_and_a_start_its_peak_to_fifty_digits():
     rate = 1.0 / np.array([2.0, 0.1, 1e-3])
     mean = law.bell_rupture_force(rate, 1.0, 1.0)
     assert_allclose(mean, [0.361329, 2.014643, 6.337874], rtol=0, atol=5.1e-7)
@@ -314,9 +311,6 @@ def test_rupture_forces_of_bell_and_evans_and_their_density():
         near = law.bell_rupture_force_density(mode + 1e-13 * np.array([0.0, 1.0]), rate, 2.0, 1e-11)
         assert near[1] < near[0]
         assert_array_equal(law.bell_rupture_force_density([-1e-11, 1e-6, math.inf], rate, 2.0, 1e-11), [0.0, 0.0, 0.0])
-
-
-def test_a_start_is_elastic_first_has_its_peak_to_fifty_digits_and_is_forgotten_last():
     for eps in 10.0 ** np.arange(-6, 9):
         with mp.workdps(50):
             tilt = mp.lambertw(mp.mpf(eps)).real
@@ -395,17 +389,13 @@ def test_fractions_are_even_and_forces_odd_in_the_speed_and_arguments_broadcast(
         assert np.all((bound > 0.0) & (bound <= 0.75 * (1 + 1e-15)))
         assert all(part.shape == (5, 3) for part in function(list(speed.reshape(5, 3)), *rest))
     speed, rate = np.ones((3, 1)), np.ones(4)
-    for function, *arguments in [
-        (law.bell_lives, speed, rate, 1.0, 1.0),
-        (law.bell_moments, speed, 1.0, 1.0, 1.0, rate),
-        (law.constant_moments, speed, 1.0, 1.0, rate),
-        (law.cut_off_moments, speed, 0.0, rate, 1.0, 1.0),
-        (law.start_up_peak, speed, rate, 1.0, 1.0),
-        (law.bell_peak, speed, 1.0, 1.0, rate, 1.0),
-        (law.first_moment_peak, 1.0, 1.0, speed, rate, 1.0),
-        (law.bell_stress, speed, 1.0, 1.0, 1.0, 1.0, rate),
+    for function, *arguments in (
+        (law.bell_lives, speed, rate, 1.0, 1.0), (law.bell_moments, speed, 1.0, 1.0, 1.0, rate),
+        (law.constant_moments, speed, 1.0, 1.0, rate), (law.cut_off_moments, speed, 0.0, rate, 1.0, 1.0),
+        (law.start_up_peak, speed, rate, 1.0, 1.0), (law.bell_peak, speed, 1.0, 1.0, rate, 1.0),
+        (law.first_moment_peak, 1.0, 1.0, speed, rate, 1.0), (law.bell_stress, speed, 1.0, 1.0, 1.0, 1.0, rate),
         (law.cluster_lifetime, 5.0 * speed, rate, 1.0, 1.0, 1.0),
-    ]:
+    ):  # fmt: skip
         assert np.shape(function(*arguments))[-2:] == (3, 4), function
     whole = law.bell_moments([1.0, 10.0], 1.0, 1.0, 1.0, 1.0).force
     assert_array_equal(whole, [law.bell_moments(v, 1.0, 1.0, 1.0, 1.0).force for v in (1.0, 10.0)])

@@ -32,7 +32,7 @@ def loads():
     return simulated(shear=shear.Uniform(), sweep=LOADS)
 
 
-def test_the_map_or_profile_of_a_member_at_a_time_is_drawn_alone_and_what_does_not_exist_is_refused(ramp):
+def test_a_member_a_time_and_axes_are_those_chosen_in_their_units_and_what_does_not_exist_is_refused(ramp):
     dataset = simulated(shear=field(shear.Mapped), drive=STEADY, record=Record(maps=(0.2, 0.4), map_members=2))
     for member, at, place in ((0, 0.25, 0), (1, "300.1 ms", 1)):
         figure = draw(dataset, "map", member=member, at=at)
@@ -63,9 +63,6 @@ def test_the_map_or_profile_of_a_member_at_a_time_is_drawn_alone_and_what_does_n
         draw(dataset, "profile", at="1 h")
     with pytest.raises(ValueError, match=r"^at 3 mm: "):
         draw(dataset, "profile", at="3 mm")
-
-
-def test_axes_are_those_chosen_in_their_units_with_absolute_areas_in_place_of_shares(ramp):
     for x, variable, factor, label in [
         ("time", "t", 1e3, "time $t$ (ms)"),
         ("speed", "speed", 1e3, "sliding speed $V$ (mm/s)"),
@@ -170,7 +167,7 @@ def test_measured_points_lie_where_they_were_measured_in_curves_and_loops(loads,
     assert label.endswith(" of 2")
 
 
-def test_a_table_is_refused_if_nothing_can_be_drawn_and_a_choice_that_a_kind_does_not_take(ramp, table):
+def test_what_cannot_be_drawn_is_refused_and_given_axes_are_drawn_in(ramp, table, loads, tmp_path, monkeypatch):
     for kind, choices, words in (
         ("time", {"x": "slider_positon"}, '"slider_position"'), ("time", {"x": "zzz"}, "t, speed, .*contact_radius"),
         ("profile", {"x": "t"}, "x; it takes: at$"), ("theories", {"data": "x.csv"}, "data; it takes none"),
@@ -187,9 +184,6 @@ def test_a_table_is_refused_if_nothing_can_be_drawn_and_a_choice_that_a_kind_doe
     ]:
         with pytest.raises(ValueError, match=words):
             draw(ramp, "curve", data=table(text))
-
-
-def test_the_first_panel_is_drawn_in_axes_that_are_given(loads, table):
     figure = Figure()
     left, right = figure.subplots(1, 2)
     path = table(f"{HEADER}\n2, 0.04, 2, 9\n")
@@ -202,9 +196,6 @@ def test_the_first_panel_is_drawn_in_axes_that_are_given(loads, table):
         sim.plot(mapped(), "map", ax=left)
     with pytest.raises(BadInput, match="scale: is no choice of a figure; there are: member, at"):
         sim.plot(loads, "curve", scale=2)
-
-
-def test_the_command_takes_the_choices_and_replaces_no_table(loads, table, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     loads.to_netcdf("x.nc")
     path = table(f"{HEADER}\n2, 0.04, 2, 9\n")

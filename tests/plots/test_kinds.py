@@ -19,12 +19,12 @@ def ramp():
     return simulated()
 
 
-@pytest.fixture(scope="module")
-def found(ramp):
-    return analysis.statistics(ramp)
+def swept(**sweep):
+    axes = {key.replace("_", "."): {"from": 1e-3, "to": 2e-3, "count": count} for key, count in sweep.items()}
+    return simulated(drive=STEADY, shear=shear.Uniform(), sweep=axes, clock=Clock(duration=0.04, step=0.02))
 
 
-def test_sweeps_are_shown_against_their_key_with_further_keys_as_curves_and_models_as_marks():
+def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_with_a_colour_bar():
     dataset = simulated(drive=STEADY, sweep={"contact.load": ["1 mN", "4 mN", "16 mN"]})
     figure = plots.draw(dataset)
     found = analysis.summary(analysis.settled(analysis.observables(dataset)))
@@ -34,9 +34,8 @@ def test_sweeps_are_shown_against_their_key_with_further_keys_as_curves_and_mode
     assert_allclose(drawn(figure.axes[0], pictures.REFERENCE, "--")[1], 1e6 * dataset["radius_at_rest"], rtol=1e-14)
     assert figure.axes[-1].get_xlabel() == "normal load $P$ (mN)" and figure.axes[0].get_xscale() == "log"
     tables = [{"model": "none", "stress": "0.3 MPa"}, {"model": "steady", "critical_speed": "10 mm/s"}]
-    dataset = simulated(
-        drive=STEADY, shear=shear.Uniform(), sweep={"bonds": tables, "contact.load": [1e-3, 4e-3]}
-    )  # fmt: skip
+    keys = {"bonds": tables, "contact.load": [1e-3, 4e-3]}
+    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep=keys)
     figure = plots.draw(dataset, "sweep")
     for panel in figure.axes:
         for line in panel.lines:
@@ -66,11 +65,31 @@ def test_sweeps_are_shown_against_their_key_with_further_keys_as_curves_and_mode
     ]  # fmt: skip
     dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep={"contact.reversible": [0.0, 0.1]})
     assert pictures.swept_value(dataset, "contact_reversible", 1) == r"reversible $\alpha$ = 0.1"
+    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep={"contact.load": list(np.linspace(1e-3, 9e-3, 9))})
+    panel, *_, bar = rendered(plots.draw(dataset, "time")).axes
+    assert bar.get_ylabel() == "normal load $P$ (mN)" and not any("$P$" in name for name in legend_of(panel)[0])
+    colours = [line.get_color() for line in panel.lines if line.get_linestyle() == "-"]
+    assert len(colours) == 9 and colours == sorted(colours, key=lambda c: sum(mpl.colors.to_rgb(c)[:2]))
+    dataset = swept(contact_load=41)
+    panel = plots.draw(dataset, "time").axes[0]
+    ends = [line.get_ydata()[0] for line in panel.lines if line.get_linestyle() == "-"]
+    places = np.rint(np.linspace(0, 40, 20)).astype(int)
+    assert_allclose(ends, 1e6 * dataset["contact_radius"].isel(contact_load=places, t=0), rtol=1e-14)
+    assert "20 of 41 curves drawn (--where draws others)" in legend_of(panel)[1].replace("\n", " ")
+    chosen = plots.draw(analysis.where(dataset, {"contact.load": "1 mN"}), "time")
+    assert chosen.get_suptitle() == "$P$ = 1 mN"
+    dataset = swept(contact_load=9, sphere_radius=3)
+    panel = rendered(plots.draw(dataset, "time")).axes[0]
+    ends = [line.get_ydata()[-1] for line in panel.lines if np.size(line.get_ydata()) and line.get_linestyle() == "-"]
+    radii = dataset["contact_radius"].isel(t=-1).stack(point=["contact_load", "sphere_radius"]).to_numpy().ravel()
+    assert_allclose(ends, 1e6 * radii[np.rint(np.linspace(0, 26, 10)).astype(int)], rtol=1e-14)
+    names, title = legend_of(panel)
+    assert "$P$ = 2 mN, $R$ = 2 mm" in names and "10 of 27 curves drawn" in title.replace("\n", " ")
 
 
-def test_curves_show_the_mean_area_and_energies_over_speed_small_ones_in_a_panel_of_their_own(ramp, found):
+def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the_speed_jumps(ramp):
     figure = rendered(plots.draw(ramp, "curve"))
-    shares = analysis.shares(ramp)
+    found, shares = analysis.statistics(ramp), analysis.shares(ramp)
     area, energies, friction = figure.axes
     speed, ratio = drawn(area, pictures.BOTH)
     assert_allclose(speed, 1e3 * ramp["speed"], rtol=1e-14)  # mm/s
@@ -100,37 +119,6 @@ def test_curves_show_the_mean_area_and_energies_over_speed_small_ones_in_a_panel
     found = analysis.statistics(small)["fluctuation_energy_mean"]
     assert_allclose(energy / energy[-1], found / found[-1], rtol=1e-13)
     assert len(plots.draw(ramp, "curve").axes) == 3
-
-
-def swept(**sweep):
-    axes = {key.replace("_", "."): {"from": 1e-3, "to": 2e-3, "count": count} for key, count in sweep.items()}
-    return simulated(drive=STEADY, shear=shear.Uniform(), sweep=axes, clock=Clock(duration=0.04, step=0.02))
-
-
-def test_many_curves_have_a_colour_bar_and_of_more_or_of_two_keys_some_are_drawn():
-    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep={"contact.load": list(np.linspace(1e-3, 9e-3, 9))})
-    panel, *_, bar = rendered(plots.draw(dataset, "time")).axes
-    assert bar.get_ylabel() == "normal load $P$ (mN)" and not any("$P$" in name for name in legend_of(panel)[0])
-    colours = [line.get_color() for line in panel.lines if line.get_linestyle() == "-"]
-    assert len(colours) == 9 and colours == sorted(colours, key=lambda c: sum(mpl.colors.to_rgb(c)[:2]))
-    dataset = swept(contact_load=41)
-    panel = plots.draw(dataset, "time").axes[0]
-    drawn = [line.get_ydata()[0] for line in panel.lines if line.get_linestyle() == "-"]
-    places = np.rint(np.linspace(0, 40, 20)).astype(int)
-    assert_allclose(drawn, 1e6 * dataset["contact_radius"].isel(contact_load=places, t=0), rtol=1e-14)
-    assert "20 of 41 curves drawn (--where draws others)" in legend_of(panel)[1].replace("\n", " ")
-    chosen = plots.draw(analysis.where(dataset, {"contact.load": "1 mN"}), "time")
-    assert chosen.get_suptitle() == "$P$ = 1 mN"
-    dataset = swept(contact_load=9, sphere_radius=3)
-    panel = rendered(plots.draw(dataset, "time")).axes[0]
-    drawn = [line.get_ydata()[-1] for line in panel.lines if np.size(line.get_ydata()) and line.get_linestyle() == "-"]
-    radii = dataset["contact_radius"].isel(t=-1).stack(point=["contact_load", "sphere_radius"]).to_numpy().ravel()
-    assert_allclose(drawn, 1e6 * radii[np.rint(np.linspace(0, 26, 10)).astype(int)], rtol=1e-14)
-    names, title = legend_of(panel)
-    assert "$P$ = 2 mN, $R$ = 2 mm" in names and "10 of 27 curves drawn" in title.replace("\n", " ")
-
-
-def test_lines_break_where_the_contact_is_open_and_the_speed_jumps_and_hertz_begins_at_zero_load():
     dataset = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())
     closed = dataset["in_contact"].to_numpy() == 1
     last = int(np.flatnonzero(closed)[-1])
@@ -158,22 +146,19 @@ def test_lines_break_where_the_contact_is_open_and_the_speed_jumps_and_hertz_beg
                 assert len(x) == len(speeds) and np.all(np.isnan(x) == np.isnan(speeds)), kind
 
 
-THERE_AND_BACK = drive.Table(time=(0.0, 0.2, 0.4), speed=(0.0, 0.02, 0.0))
-WAVES = {"model": "band", "rms": "10 kPa", "longest": "60 um", "shortest": "16 um"}
-SHEARS = [{"model": "uniform"}, {"model": "mean", "spectrum": WAVES}]
-COUNTED = bonds.Counted(critical_speed=1e-2, rebinding_rate=5e2, sites=9)
-CONTACTS = {"contact": [{"model": "equilibrium", "load": 4e-3}, {"model": "equilibrium", "indentation": 1e-6}]}
-
-
-def test_every_shape_of_dataset_can_be_drawn():
+def test_every_shape_of_dataset_is_drawn_as_what_fits_it_and_a_quantity_not_recorded_is_named():
+    waves = {"model": "band", "rms": "10 kPa", "longest": "60 um", "shortest": "16 um"}
+    shears = [{"model": "uniform"}, {"model": "mean", "spectrum": waves}]
+    counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=5e2, sites=9)
+    contacts = [{"model": "equilibrium", "load": 4e-3}, {"model": "equilibrium", "indentation": 1e-6}]
     for changes in [
         {"record": Record(per_member=False)}, {"ensemble": Ensemble(members=1)},
         {"record": Record(precision="float32")}, {"drive": drive.Ramp(start=-2e-3, stop=8e-3)},
-        {"drive": THERE_AND_BACK}, {"contact": Equilibrium(load=-3e-4)},
+        {"drive": drive.Table(time=(0.0, 0.2, 0.4), speed=(0.0, 0.02, 0.0))}, {"contact": Equilibrium(load=-3e-4)},
         {"contact": Equilibrium(load=-1.0), "shear": shear.Uniform()},
-        {"contact": Equilibrium(indentation=1e-6), "bonds": COUNTED, "record": Record(per_member=False)},
-        {"sweep": CONTACTS}, {"sweep": {"contact.load": {"from": "0 mN", "to": "20 mN", "count": 12}}},
-        {"drive": STEADY, "sweep": {"shear": SHEARS, "contact.load": [0.0, 1e-3]}},
+        {"contact": Equilibrium(indentation=1e-6), "bonds": counted, "record": Record(per_member=False)},
+        {"sweep": {"contact": contacts}}, {"sweep": {"contact.load": {"from": "0 mN", "to": "20 mN", "count": 12}}},
+        {"drive": STEADY, "sweep": {"shear": shears, "contact.load": [0.0, 1e-3]}},
         {"shear": shear.Uniform(), "bonds": bonds.Unbroken()},
         {"drive": STEADY, "clock": Clock(duration=0.02, step=0.02)},
     ]:  # fmt: skip
@@ -183,9 +168,6 @@ def test_every_shape_of_dataset_can_be_drawn():
             assert any(panel.get_xlabel() for panel in figure.axes)
             for panel in figure.axes:
                 assert panel.get_ylabel() and (lines_of(panel) or panel.texts or panel.collections)
-
-
-def test_the_default_figure_fits_the_dataset_and_one_of_what_was_not_recorded_names_the_key():
     loads, start = {"contact.load": [1e-3, 4e-3]}, drive.Start(rest=0.1, speed=1e-3)
     moved = {"contact": Equilibrium(load={"from": 0.0, "to": 4e-3}), "sweep": {"sphere.radius": [1e-3, 2e-3]}}
     for changes, kind in (

@@ -234,7 +234,7 @@ BEHIND = LENS | {
 }  # fmt: skip
 
 
-def test_a_driven_slider_is_fitted_to_a_steady_stage_and_a_force_that_rings_and_to_nothing_else(tmp_path):
+def test_a_driven_slider_is_fitted_to_force_and_stage_and_members_shift_the_fit_and_widen_its_errors(tmp_path, truth):
     scene = load(BEHIND).with_values({
         "bonds": {"model": "steady", "critical_speed": 0.01, "stress": 3e5}, "drive.stage": 1e-3, "drive.damping": 5.0,
         "adhesion.bond_share": 0.0, "clock.duration": 0.02,  # damped: steady sliding is stable
@@ -262,9 +262,6 @@ def test_a_driven_slider_is_fitted_to_a_steady_stage_and_a_force_that_rings_and_
         path = table(tmp_path / "one.csv", {column: np.array([0.02, 0.03])}, {"spring_force": np.ones(2)})
         with pytest.raises(BadInput, match=said):
             fit(scene, [path], ["drive.mass"], steady=steady)
-
-
-def test_members_shift_the_fit_and_their_error_joins_the_datas(tmp_path, truth):
     slip = {"model": "slip", "length": "5 um"}
     shear = LENS["shear"] | {"model": "banded", "spectrum": SELF_AFFINE, "cell": "0.12 mm", "correlation": slip}
     scene = load(LENS | {"shear": shear, "ensemble": {"members": 64}, "clock": {"duration": "2 s", "step": "0.1 s"}})
@@ -352,7 +349,7 @@ MECHANISM_KEYS = ["adhesion.bond_share", "bonds.critical_speed", "bonds.stress",
 ONE_ALONE = {"bonds only": {"shear.paid_by_adhesion": 0.0}, "fluctuations only": {"adhesion.bond_share": 0.0}}
 
 
-def test_curves_are_doubted_beyond_errors_and_prefer_the_mechanism_that_made_them(tmp_path, truth, curves):
+def test_curves_are_doubted_beyond_errors_and_the_mechanism_that_made_them_excludes_no_other(tmp_path, truth, curves):
     scene = load(SPRUNG)
     made = drawn_of(scene, 0.01, 3)
     problem = problem_of([made], [likelihood.groups(scene, made)], [calibration._free(scene, "bonds.stress")], {})
@@ -380,8 +377,6 @@ def test_curves_are_doubted_beyond_errors_and_prefer_the_mechanism_that_made_the
     data = Measured(Path("data.csv"), "load", {"held": loads}, (Curve("contact_radius", radii, 0.01 * radii),))
     assert "speed [mm/s]" in judged(still(), data, ["adhesion.work"], 2).words
 
-
-def test_a_sufficient_mechanism_excludes_no_other_and_a_theory_must_fit_better_than_the_scenario():
     def weighed(*others):  # the scenario itself by its AICc of 10, others by name, AICc, p and rejection
         rows = [(mechanisms.WHOLE, 10.0, math.nan, False), *others]
         return mechanisms._verdict([mechanisms.Judged(name, {}, 1.0, *rest) for name, *rest in rows])

@@ -33,7 +33,7 @@ MASSLESS = {
 }
 
 
-def test_a_massless_slider_follows_its_reference_through_a_slip_at_any_tolerance():
+def test_a_slider_without_and_with_mass_and_damping_follows_its_reference_at_any_tolerance():
     for steps in [8, 80]:
         states, read = marched(scenario(4.0, steps, spring(0.02, tolerance=1e-8)))
         for place, exact in MASSLESS.items():
@@ -54,30 +54,25 @@ def test_a_massless_slider_follows_its_reference_through_a_slip_at_any_tolerance
     assert errors[2] < errors[1] < errors[0]
     # of order 5: the error falls with the fifth power of the number of sub-steps, or faster
     assert math.log(errors[0] / errors[2]) / math.log(counts[2] / counts[0]) > 4.5
-
-
-#: X, v, N, M, A/A_rest and work, damping, rupture, area of a body with mass and damping whose area follows its bonds.
-WITH_MASS = {
-    2: (0.6701109338, 1.2259073835, 0.4366280821, 0.1907491406, 0.9669729159)
-    + (0.9452661342, 0.0005249635, 0.0326176631, 0.0006137312),
-    4: (3.2414235908, 5.9325747346, 0.2575936680, 0.3601989198, 0.8700236014)
-    + (3.6234681296, 0.0087401333, 0.5553065048, 0.0142207552),
-    5: (11.0888440083, 33.3879670336, 0.0765254672, 0.2044020447, 0.7651500809)
-    + (5.2703910602, 0.1646970381, 2.3568774747, 0.0473633380),
-    8: (30.4992884103, -0.1735524184, 0.3522898786, 0.1875462974, 0.9220199073)
-    + (6.9555296727, 0.8491728180, 5.1176020214, 0.0400760338),
-}
-
-
-def test_a_body_with_mass_and_damping_follows_its_reference_while_the_area_follows_the_bonds():
+    # X, v, N, M, A/A_rest and work, damping, rupture, area of a body whose area follows its bonds
+    with_mass = {
+        2: (0.6701109338, 1.2259073835, 0.4366280821, 0.1907491406, 0.9669729159)
+        + (0.9452661342, 0.0005249635, 0.0326176631, 0.0006137312),
+        4: (3.2414235908, 5.9325747346, 0.2575936680, 0.3601989198, 0.8700236014)
+        + (3.6234681296, 0.0087401333, 0.5553065048, 0.0142207552),
+        5: (11.0888440083, 33.3879670336, 0.0765254672, 0.2044020447, 0.7651500809)
+        + (5.2703910602, 0.1646970381, 2.3568774747, 0.0473633380),
+        8: (30.4992884103, -0.1735524184, 0.3522898786, 0.1875462974, 0.9220199073)
+        + (6.9555296727, 0.8491728180, 5.1176020214, 0.0400760338),
+    }
     states, read = marched(scenario(4.0, 8, spring(0.02, mass=1e-3, damping=1e-3, tolerance=1e-8), share=0.5))
     parts = ("drive_work", "dissipated_by_damping", "dissipated_by_rupture", "dissipated_by_area")
     found = []
-    for place in WITH_MASS:
+    for place in with_mass:
         bonds = reached([states[place]], "position", "body_speed", "bound", "stretch")[0]
         area = np.pi * states[place].contact.radius[0] ** 2 / AREA
         found.append([*bonds, area, *(read[part][place] / driven.ENERGY for part in parts)])
-    exact = np.array(list(WITH_MASS.values()))
+    exact = np.array(list(with_mass.values()))
     assert np.all(np.abs(np.array(found) - exact) < 1e-6 * np.max(np.abs(exact), axis=0))
     assert residual(read) < 1e-7
 
@@ -121,7 +116,7 @@ def test_the_onset_that_is_shown_is_that_of_the_engine_with_all_that_delays_and_
     assert abs(plain / stiffness - 1.0) > 1e-3  # more than the engine is held to
 
 
-def test_a_force_makes_creep_below_the_threshold_and_above_it_runs_away_in_time():
+def test_a_force_is_a_soft_spring_makes_creep_or_a_runaway_and_shears_a_half_space_and_viscous_bonds():
     for load, share, speed in ((0.2, 0.367052999629, 0.939593030185), (0.27, 0.265980949699, 2.80136714552)):
         states, read = marched(scenario(200.0, 4, driven.force(load)))
         assert_allclose(reached(states[-1:], "bound")[0], share, rtol=1e-10)
@@ -136,9 +131,28 @@ def test_a_force_makes_creep_below_the_threshold_and_above_it_runs_away_in_time(
         assert np.isnan([ended.drive.position, ended.drive.speed]).all()
         assert np.isfinite([ended.bonds.bound, ended.contact.radius]).all()
         driven.check_blocks(scene, states)
-
-
-def test_the_half_space_and_a_viscous_interface_yield_with_the_bonds():
+    # K V stays as K falls: the force of the spring is that ramp but for what the body gives way
+    ramp = {"from": 0.0, "to": 0.2 * UNIT}
+    given = list(march(scenario(1.0, 10, Force(force=ramp, contact_stiffness="rigid")), np.arange(1)))[-1]
+    errors = []
+    for stiffness in (1e-3, 1e-4, 1e-5):
+        last = list(march(scenario(1.0, 10, spring(stiffness, 0.2 / stiffness)), np.arange(1)))[-1]
+        errors.append(abs(last.drive.position[0] / given.drive.position[0] - 1.0))
+    assert_allclose(np.divide(errors[:-1], errors[1:]), 10.0, rtol=0.02)
+    for mass in [0.0, 0.05]:
+        stiff, bonds = HELD / STRETCH, Steady(critical_speed=STRETCH, stress=driven.COULOMB)
+        for load in (0.9, -0.9, 1.3, -1.3):
+            keys = {"mass": mass * stiff, "damping": 0.5 * stiff, "contact_stiffness": "rigid"}
+            states, read = marched(stuck(40.0, 8, bonds, Force(force=load * HELD, **keys)))
+            speed = abs(states[-1].drive.speed[0]) / STRETCH
+            if abs(load) < 1.0:
+                assert speed == states[-1].drive.position[0] == 0.0
+                assert_allclose(states[-1].bonding.stress[0], load * driven.COULOMB, rtol=1e-14)
+                assert states[-1].bonds.bound[0] == 1.0
+            else:
+                assert_allclose(0.5 * speed + 1.0 / (1.0 + speed), 1.3, rtol=1e-9)
+                assert states[-1].drive.speed[0] * load > 0.0
+                assert residual(read) < 1e-6
     # N stays; M' = N v − k M with η v + M = Q
     eta, load = 0.3, 0.2
     drive = driven.force(load, viscosity=eta * driven.DENSITY * driven.KAPPA, tolerance=1e-10)
@@ -160,7 +174,7 @@ def test_the_half_space_and_a_viscous_interface_yield_with_the_bonds():
     assert_allclose(read["stored_energy"][-1], 0.5 * 0.01 * UNIT * states[-1].drive.position[0], rtol=1e-6)
 
 
-def test_a_drive_is_refused_with_bonds_that_it_cannot_be_solved_with():
+def test_a_drive_is_refused_with_bonds_it_cannot_be_solved_with_and_a_run_ends_at_a_runaway():
     lens = {name: getattr(scenario(1.0, 4, spring(1.0)), name) for name in ("clock", "solid", "sphere", "contact")}
     for bonds, keys, place, cure in (
         (Unbroken(stress=1e5), {}, "drive", "mass"),
@@ -172,6 +186,14 @@ def test_a_drive_is_refused_with_bonds_that_it_cannot_be_solved_with():
         assert any(place in problem and cure in problem for problem in refused.value.problems)
     with pytest.raises(BadInput, match=r"contact\.reversible.*mass"):
         scenario(1.0, 4, spring(1.0), reversible=0.01)
+    dataset = sim.run(scenario(12.0, 12, driven.force(0.28), members=2))
+    assert dataset["friction_force"].dims == ("member", "t")
+    assert_allclose(dataset["runaway_time"].isel(t=-1), 11.0634348789, rtol=1e-5)
+    for name in ("slider_position", "speed", "spring_force", "stored_energy", "contact_radius", "bond_fraction"):
+        assert np.isfinite(dataset[name].isel(t=11)).all(), name
+        assert np.isnan(dataset[name].isel(t=12)).all(), name
+    assert "stage_speed" not in dataset
+    assert any("2 of 2 trajectories end in a runaway" in line for line in notes(dataset, [], []))
 
 
 def test_bonds_that_a_stretch_breaks_snap_at_the_fold_of_their_force_again_and_again():
@@ -204,61 +226,19 @@ def test_bonds_that_a_stretch_breaks_snap_at_the_fold_of_their_force_again_and_a
         driven.check_members(scene, straight, 50)
 
 
-def test_a_run_records_the_drive_of_each_member_and_ends_those_that_run_away():
-    dataset = sim.run(scenario(12.0, 12, driven.force(0.28), members=2))
-    assert dataset["friction_force"].dims == ("member", "t")
-    assert_allclose(dataset["runaway_time"].isel(t=-1), 11.0634348789, rtol=1e-5)
-    for name in ("slider_position", "speed", "spring_force", "stored_energy", "contact_radius", "bond_fraction"):
-        assert np.isfinite(dataset[name].isel(t=11)).all(), name
-        assert np.isnan(dataset[name].isel(t=12)).all(), name
-    assert "stage_speed" not in dataset
-    assert any("2 of 2 trajectories end in a runaway" in line for line in notes(dataset, [], []))
-
-
-def test_a_force_is_a_soft_spring_pulled_from_afar_and_holds_below_the_strength_of_friction():
-    # K V stays as K falls: the force of the spring is that ramp but for what the body gives way
-    ramp = {"from": 0.0, "to": 0.2 * UNIT}
-    given = list(march(scenario(1.0, 10, Force(force=ramp, contact_stiffness="rigid")), np.arange(1)))[-1]
-    errors = []
-    for stiffness in (1e-3, 1e-4, 1e-5):
-        last = list(march(scenario(1.0, 10, spring(stiffness, 0.2 / stiffness)), np.arange(1)))[-1]
-        errors.append(abs(last.drive.position[0] / given.drive.position[0] - 1.0))
-    assert_allclose(np.divide(errors[:-1], errors[1:]), 10.0, rtol=0.02)
-    for mass in [0.0, 0.05]:
-        stiff, bonds = HELD / STRETCH, Steady(critical_speed=STRETCH, stress=driven.COULOMB)
-        for load in (0.9, -0.9, 1.3, -1.3):
-            keys = {"mass": mass * stiff, "damping": 0.5 * stiff, "contact_stiffness": "rigid"}
-            states, read = marched(stuck(40.0, 8, bonds, Force(force=load * HELD, **keys)))
-            speed = abs(states[-1].drive.speed[0]) / STRETCH
-            if abs(load) < 1.0:
-                assert speed == states[-1].drive.position[0] == 0.0
-                assert_allclose(states[-1].bonding.stress[0], load * driven.COULOMB, rtol=1e-14)
-                assert states[-1].bonds.bound[0] == 1.0
-            else:
-                assert_allclose(0.5 * speed + 1.0 / (1.0 + speed), 1.3, rtol=1e-9)
-                assert states[-1].drive.speed[0] * load > 0.0
-                assert residual(read) < 1e-6
-
-
-@pytest.mark.parametrize(
-    ("damping", "speed", "sticks", "slips", "least"),
-    [(0.01, 0.5, 1.62, 0.0189864408745, 0.19), (0.04, 1.0, 0.64, 0.0546142733837, 0.36)],
-)
-def test_bonds_that_follow_the_speed_at_once_make_the_relaxation_cycles_of_their_closed_form(
-    damping, speed, sticks, slips, least
-):
+def test_friction_that_follows_the_speed_at_once_makes_cycles_touches_rest_or_is_stable_if_damped():
     bonds = Steady(critical_speed=STRETCH, stress=driven.COULOMB)
-    drive = pulled(speed=speed, damping=damping, tolerance=1e-8)
-    # the first slip begins where the spring has come to the strength, each further one a cycle later
-    for cycles, after, left in ((0, 0.0, 1.0), (0, slips, least), (4, sticks, 1.0), (4, sticks + slips, least)):
-        duration = 1.0 / speed + (slips if cycles else 0.0) + max(0, cycles - 1) * (sticks + slips) + after
-        states, read = marched(stuck(duration, 5, bonds, drive))
-        assert_allclose(read["spring_force"][-1] / HELD, left, rtol=1e-6)
-        assert residual(read) < 1e-7
-    assert max(state.bonding.stress[0] for state in states) <= driven.COULOMB * (1.0 + 1e-12)
-
-
-def test_coulomb_friction_touches_rest_once_a_period_and_falling_friction_is_stable_if_damped_enough():
+    for damping, speed, sticks, slips, least in (
+        (0.01, 0.5, 1.62, 0.0189864408745, 0.19), (0.04, 1.0, 0.64, 0.0546142733837, 0.36),
+    ):  # fmt: skip
+        drive = pulled(speed=speed, damping=damping, tolerance=1e-8)
+        # the first slip begins where the spring has come to the strength, each further one a cycle later
+        for cycles, after, left in ((0, 0.0, 1.0), (0, slips, least), (4, sticks, 1.0), (4, sticks + slips, least)):
+            duration = 1.0 / speed + (slips if cycles else 0.0) + max(0, cycles - 1) * (sticks + slips) + after
+            states, read = marched(stuck(duration, 5, bonds, drive))
+            assert_allclose(read["spring_force"][-1] / HELD, left, rtol=1e-6)
+            assert residual(read) < 1e-7
+        assert max(state.bonding.stress[0] for state in states) <= driven.COULOMB * (1.0 + 1e-12)
     mass, speed, time = 0.01, 0.3, 10.3
     drive = pulled(speed=speed, mass=mass, tolerance=1e-10)
     states, read = marched(stuck(1.0 / speed + time, 7, Unbroken(stress=driven.COULOMB), drive))
