@@ -54,7 +54,7 @@ def complaints(errors):
     return [line for line in lines if not line.startswith(("compiling", "making"))]
 
 
-def test_help_check_and_a_run_without_its_table_import_only_what_they_need(here):
+def test_commands_import_only_what_they_need_and_a_reader_that_leaves_at_once_is_no_error(here):
     figures = {"xarray", "matplotlib", "rich"}
     numbers = {"numpy", "scipy", "numba", "pydantic", "pint", "netCDF4", "tomllib", "json"}
     for command in ("--help",), ("run", "--help"):
@@ -64,6 +64,15 @@ def test_help_check_and_a_run_without_its_table_import_only_what_they_need(here)
     assert not loaded("run", "scene.toml", "--no-table", "--quiet") & heavy
     assert Path("outputs/scene.nc").exists() and "xarray" in (table := loaded("stats", "outputs/scene.nc"))
     assert not table & {"pint", "dask.array", "matplotlib", "scipy.stats"}  # xarray would, to compare types with theirs
+    assert sim("run", "scene.toml", "-o", "x.nc", "--quiet").exit_code == 0
+    for arguments in (["check", LENS], ["stats", "x.nc", "--csv", "x.csv"]):
+        reading, writing = os.pipe()
+        os.close(reading)
+        command = [sys.executable, "-m", "sim", *arguments]
+        done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, timeout=120)
+        os.close(writing)
+        assert (done.returncode, complaints(done.stderr.decode())) == (0, [])
+    assert Path("x.csv").exists()
 
 
 @posix
@@ -96,19 +105,7 @@ def test_an_order_to_stop_keeps_what_is_computed(here, orders):
     assert {part: part.stat().st_mtime_ns for part in parts.glob("*.npz")} == kept
 
 
-def test_a_reader_that_leaves_at_once_is_no_error(here):
-    assert sim("run", "scene.toml", "-o", "x.nc", "--quiet").exit_code == 0
-    for arguments in (["check", LENS], ["stats", "x.nc", "--csv", "x.csv"]):
-        reading, writing = os.pipe()
-        os.close(reading)
-        command = [sys.executable, "-m", "sim", *arguments]
-        done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, timeout=120)
-        os.close(writing)
-        assert (done.returncode, complaints(done.stderr.decode())) == (0, [])
-    assert Path("x.csv").exists()
-
-
-def test_bad_input_ends_with_2_one_line_a_fault_and_nothing_written(here):
+def test_a_run_that_cannot_begin_names_each_fault_in_one_line_with_its_code_and_writes_nothing(here, monkeypatch):
     Path("bad.toml").write_text(SCENE.replace("4 mN", "4 kg").replace("members", "memebrs"), encoding="utf-8")
     before = sorted(here.iterdir())
     done = sim("run", "bad.toml")
@@ -116,9 +113,23 @@ def test_bad_input_ends_with_2_one_line_a_fault_and_nothing_written(here):
     keys = [line.split(": ")[:2] for line in done.stderr.splitlines()]
     assert keys == [["bad.toml", "contact.load"], ["bad.toml", "ensemble.memebrs"]]
     assert sorted(here.iterdir()) == before
+    monkeypatch.setattr("sim.ensemble.simulate.simulate", None)  # computing would fail
+    of_posix = [(["-o", "x" * 250], 74, "xxx"), (["-o", "loop.nc"], 74, "loop.nc"), (["-o", "\udcff.nc"], 2, "UTF-8")]
+    if os.name == "posix":
+        Path("loop.nc").symlink_to("loop.nc")
+    before = sorted(here.iterdir())
+    for arguments, code, message in (
+        *(of_posix if os.name == "posix" else ()), (["-o", "."], 2, ". is a folder"),
+        (["-o", "scene.toml", "--force"], 2, "scene.toml: the command reads"),
+        (["-o", "scene.toml/x.nc"], 74, "scene.toml"), (["--set", "contact"], 2, "--set takes TABLE.KEY=VALUE"),
+        (["--set", "contact.lod=3"], 2, 'did you mean "load"?'), (["--members", "0"], 2, "'--members'"),
+    ):  # fmt: skip
+        done = sim("run", "scene.toml", *arguments)
+        assert (done.exit_code, message in done.stderr, "Traceback" in done.output) == (code, True, False), arguments
+        assert sorted(here.iterdir()) == before
 
 
-def test_run_writes_the_dataset_and_its_log_into_a_new_folder_and_ends_with_its_path(here):
+def test_run_writes_the_dataset_and_its_log_into_a_new_folder_and_never_replaces_one_unasked(here, monkeypatch):
     done = sim("run", "scene.toml", "-o", "new/folder/x.nc", "--seed", 99, "--members", 2, "--set", "contact.load=2 mN")
     assert done.exit_code == 0
     assert done.stdout.splitlines()[-1] == "new/folder/x.nc" and len(done.stdout.splitlines()) > 3
@@ -131,7 +142,12 @@ def test_run_writes_the_dataset_and_its_log_into_a_new_folder_and_ends_with_its_
     assert entry["arguments"][:4] == ["run", "scene.toml", "-o", "new/folder/x.nc"]
     assert list(entry["stages"]) == ["loading", "simulating", "writing", "table"]
     assert 0.0 < sum(entry["stages"].values()) <= entry["seconds"] + 0.05
-    assert sim("run", "scene.toml", "-o", "new/folder/x.nc", "--force", "--no-table").exit_code == 0
+    content, again = Path("new/folder/x.nc").read_bytes(), ["run", "scene.toml", "-o", "new/folder/x.nc", "--no-table"]
+    with monkeypatch.context() as patched:
+        patched.setattr("sim.ensemble.simulate.run", None)  # computing would fail
+        done = sim(*again)
+    assert done.exit_code == 73 and "--force" in done.stderr and Path("new/folder/x.nc").read_bytes() == content
+    assert sim(*again, "--force").exit_code == 0 and Path("new/folder/x.nc").read_bytes() != content
     last = json.loads(Path("new/folder/x.nc.log").read_text(encoding="utf-8").splitlines()[-1])
     assert list(last["stages"]) == ["loading", "simulating", "writing"]
     quiet = sim("run", "scene.toml", "--quiet")
@@ -165,34 +181,6 @@ def test_stages_of_a_long_run_and_the_first_compilation_have_their_line(capsys, 
         shown.advance(30)
     printed = "".join(capsys.readouterr())  # a terminal has a bar
     assert "simulating" in printed and "30%" in printed
-
-
-def test_an_existing_output_is_refused_before_anything_is_computed_unless_asked(here, monkeypatch):
-    sim("run", "scene.toml", "-o", "x.nc", "--quiet")
-    content = Path("x.nc").read_bytes()
-    other = ["run", "scene.toml", "-o", "x.nc", "--set", 'contact.load="1 mN"']
-    with monkeypatch.context() as patched:
-        patched.setattr("sim.ensemble.simulate.run", None)  # computing would fail
-        done = sim(*other)
-    assert done.exit_code == 73 and "--force" in done.stderr and Path("x.nc").read_bytes() == content
-    assert sim(*other, "--force", "--quiet").exit_code == 0 and Path("x.nc").read_bytes() != content
-
-
-def test_a_run_that_cannot_begin_names_the_fault_with_its_code_and_writes_nothing(here, monkeypatch):
-    monkeypatch.setattr("sim.ensemble.simulate.simulate", None)  # computing would fail
-    of_posix = [(["-o", "x" * 250], 74, "xxx"), (["-o", "loop.nc"], 74, "loop.nc"), (["-o", "\udcff.nc"], 2, "UTF-8")]
-    if os.name == "posix":
-        Path("loop.nc").symlink_to("loop.nc")
-    before = sorted(here.iterdir())
-    for arguments, code, message in (
-        *(of_posix if os.name == "posix" else ()), (["-o", "."], 2, ". is a folder"),
-        (["-o", "scene.toml", "--force"], 2, "scene.toml: the command reads"),
-        (["-o", "scene.toml/x.nc"], 74, "scene.toml"), (["--set", "contact"], 2, "--set takes TABLE.KEY=VALUE"),
-        (["--set", "contact.lod=3"], 2, 'did you mean "load"?'), (["--members", "0"], 2, "'--members'"),
-    ):  # fmt: skip
-        done = sim("run", "scene.toml", *arguments)
-        assert (done.exit_code, message in done.stderr, "Traceback" in done.output) == (code, True, False), arguments
-        assert sorted(here.iterdir()) == before
 
 
 @posix
@@ -253,7 +241,7 @@ def test_trouble_of_the_system_has_its_code_and_place_and_a_fault_of_our_own_is_
     assert isinstance(sim("run", "scene.toml").exception, RuntimeError)
 
 
-def test_check_prints_and_writes_nothing_and_a_value_of_set_is_toml_or_else_text(here):
+def test_check_set_schema_and_paper_print_what_they_promise_and_a_wrong_command_ends_with_2(here, monkeypatch):
     done = sim("check", "scene.toml")
     assert done.exit_code == 0 and done.stdout.startswith("a scene\n")
     changed = sim("check", "scene.toml", "--set", 'bonds={ model = "none" }', "--set", 'drive.from="2 mm/s"')
@@ -264,9 +252,6 @@ def test_check_prints_and_writes_nothing_and_a_value_of_set_is_toml_or_else_text
         ('["1 mN", "2 mN"]', ["1 mN", "2 mN"]), ("1\nother = 2", "1\nother = 2"), ("[" * 5000, "[" * 5000),
     ):  # fmt: skip
         assert cli._values((f"contact.load={text}",), "--set") == {"contact.load": value}
-
-
-def test_a_wrong_command_ends_with_2_the_schema_is_json_and_paper_ends_with_1_if_anything_fails(monkeypatch):
     for arguments in ([], ["nope"], ["run"], ["run", "--nope"]):
         done = sim(*arguments)
         assert (done.exit_code, "Traceback" in done.output) == (2, False)
@@ -306,7 +291,7 @@ def content(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def test_a_scenario_its_tables_and_datasets_are_never_replaced(made):
+def test_what_a_command_reads_is_never_replaced_and_an_older_file_only_if_asked_and_as_a_whole(made, monkeypatch):
     Path("copy").write_bytes(Path("scene.toml").read_bytes())
     if os.name == "posix":
         Path("link.png").symlink_to("x.nc")
@@ -322,9 +307,6 @@ def test_a_scenario_its_tables_and_datasets_are_never_replaced(made):
         done = sim(*arguments, "--force")
         assert (done.exit_code, done.stderr.startswith(start)) == (2, True), arguments
         assert content(made) == before
-
-
-def test_an_older_file_is_replaced_only_if_asked_and_stays_whole_if_the_new_one_fails(made, monkeypatch):
     monkeypatch.setattr("sim.study.converge.converge", None)  # computing would fail
     for arguments, file in (
         (["stats", "x.nc", "--csv", "x.csv"], "x.csv"), (["plot", "x.nc"], "x.png"),
@@ -368,7 +350,7 @@ def test_stats_and_plot_write_beside_the_dataset_or_where_asked_or_refuse_in_one
         assert (done.exit_code, message in done.stderr, len(done.stderr.splitlines())) == (code, True, 1)
 
 
-def test_new_writes_a_scenario_that_runs_and_converge_prints_a_table_a_recommendation_and_its_files(here):
+def test_new_converge_and_a_reduced_file_work_and_name_what_a_figure_misses(here):
     done = sim("new", "mine")
     assert done.exit_code == 0 and done.stdout.startswith("mine.toml: ")
     assert sim("run", "mine.toml", "--quiet", "--members", 2).exit_code == 0
@@ -383,9 +365,6 @@ def test_new_writes_a_scenario_that_runs_and_converge_prints_a_table_a_recommend
     assert Path("outputs/scene-converge.nc").exists() and Path("outputs/scene-converge.png").exists()
     refused = sim("converge", "scene.toml", "--budget", "2 kg")
     assert refused.exit_code == 2 and "budget" in refused.stderr
-
-
-def test_a_reduced_file_has_a_table_and_names_what_a_figure_misses(here):
     done = sim("run", "scene.toml", "-o", "out.nc", "--set", 'record.quantities=["speed"]')
     assert done.exit_code == 0 and "V" in done.output and "A/A_JKR" not in done.output
     assert "record.quantities keeps speed" in done.output
