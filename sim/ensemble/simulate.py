@@ -211,6 +211,8 @@ def advance(task: Task, number: int, state: State | None) -> tuple[State, Arrays
     for point in task.points:  # several only if the run is one block
         end, arrays = _record(task, point, state, task.blocks[number])
         recorded.append(arrays)
+    if len(recorded) == 1:  # without a copy, as maps may be large
+        return end, {key: values[np.newaxis] for key, values in recorded[0].items()}
     return end, {key: np.stack([arrays[key] for arrays in recorded]) for key in recorded[0]}
 
 
