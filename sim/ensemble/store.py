@@ -285,8 +285,10 @@ class Unfinished:
             if version:
                 raise OutputExists(_older(self.folder, version))
         inside = os.listdir(self.folder)
-        foreign = [name for name in inside if not _OURS.fullmatch(name)]
-        if self.folder.is_symlink() or (not self._manifest() if _MANIFEST in inside else foreign):
+        foreign = any(not _OURS.fullmatch(name) for name in inside)
+        if _MANIFEST in inside:  # a manifest that is gone by now is of a run that was done meanwhile
+            foreign = not self._manifest() and (self.folder / _MANIFEST).exists()
+        if self.folder.is_symlink() or foreign:
             raise OutputExists(f"{self.folder} is not the folder of a run; move it away or name another output")
 
     def _clean(self) -> None:
@@ -302,8 +304,8 @@ class Unfinished:
         while not lock:
             with explained(self.folder.parent):
                 self.folder.mkdir(parents=True, exist_ok=True)
-            self._refuse_foreign()
             with contextlib.suppress(FileNotFoundError):  # the folder of a run that was done meanwhile
+                self._refuse_foreign()
                 lock = _lock(path, 1.0)
             if not lock and patience is not None and time.monotonic() - began > patience:
                 raise self.refusal()
