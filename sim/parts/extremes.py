@@ -106,20 +106,26 @@ def _follow(stresses, stiffness, relaxation, radii, pulls, first, speed, times, 
             value0, slope0, area0 = _load(k, i, *bonds, _of(first, k, i), radii)
             value1, slope1, area1 = _load(k + 1, i, *bonds, _of(speed, k, i), radii)
             if i < len(stress):
-                _keep(value1, slope0, slope1, time, step, stress[i].view(MAXIMUM)[0])
+                _keep(value1, slope0, slope1, time, step, stress[i])
             growth = (area1 - area0) / step
             rise, slope = area0 * slope0 + growth * value0, area1 * slope1 + growth * value1
-            _keep(value1 * area1, rise, slope, time, step, friction[i].view(MAXIMUM)[0])
+            _keep(value1 * area1, rise, slope, time, step, friction[i])
         for i in range(len(pull)):
-            _keep(_of(pulls, k, i), math.nan, math.nan, time, step, pull[i].view(MAXIMUM)[0])
+            _keep(_of(pulls, k, i), math.nan, math.nan, time, step, pull[i])
 
 
 @device
 def _keep(now, rise, slope, time, step, maximum):
     """Replace a maximum by that after a value ``now`` at ``time``; slopes at both ends of the step, nan if unknown."""
-    before, last, now = maximum.before, maximum.last, 0.0 if math.isnan(now) else now
-    if now > maximum.largest:
-        maximum.largest, maximum.time = now, time
+    before, last, largest, when = (
+        maximum[0],
+        maximum[1],
+        maximum[2],
+        maximum[3],
+    )  # numbers, as a view of a record for each costs twice the time
+    now = 0.0 if math.isnan(now) else now
+    if now > largest:
+        largest, when = now, time
     peak, back = -math.inf, 0.0
     steepest, larger = rise if rise > -slope else -slope, last if last > now else now  # max compiles for long
     if rise > 0.0 > slope and step * steepest < _RESOLVED * larger:
@@ -127,9 +133,9 @@ def _keep(now, rise, slope, time, step, maximum):
     elif math.isnan(rise + slope) and last >= before and last > now and before > 0.5 * last and now > 0.5 * last:
         back = 1.0 - 0.5 * (before - now) / (before - 2.0 * last + now)
         peak = last - 0.25 * (before - now) * (1.0 - back)
-    if peak > maximum.largest:
-        maximum.largest, maximum.time = peak, time - back * step
-    maximum.before, maximum.last = last, now
+    if peak > largest:
+        largest, when = peak, time - back * step
+    maximum[0], maximum[1], maximum[2], maximum[3] = last, now, largest, when
 
 
 @device
