@@ -4,7 +4,6 @@ drive → speed → bonds → fraction, stress → shear → ΔΓ → w = Δγ(f
 """
 
 from collections.abc import Iterator
-from copy import deepcopy
 from typing import NamedTuple, cast, get_type_hints
 
 import numpy as np
@@ -128,37 +127,6 @@ def _trajectory(
     return Trajectory(time, motion.position, motion.speed, *of_bonds, energy, driven, *contact)
 
 
-def march(scenario: Scenario, members: Indices, state: State | None = None, keep: bool = True) -> Iterator[State]:
-    """Advance a batch of members to the end of the run, yielding the state after every step.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        One point; its sweep is not looked at.
-    members : array of int, shape (members,)
-        Absolute numbers of the members, which address their noise.
-    state : State, optional
-        Where to go on from; without it the march starts at t = 0 and yields that state first.
-    keep : bool
-        True if a state stays valid after the next step. If false, large arrays (of tracked bonds) are reused
-        from state to state, which saves a copy at each step.
-
-    Yields
-    ------
-    State
-        The same numbers, bit for bit, for any batch and after any restart.
-    """
-    noise = MemberNoise.of(scenario.seed, members)
-    if state is None:
-        state = start(scenario, noise)
-        yield state
-    while state.step < scenario.times.steps:
-        if keep and scenario.parts.bonds.in_place:
-            state = state._replace(bonds=deepcopy(state.bonds))
-        state, _ = advance(scenario, state, noise, range(state.step + 1, state.step + 2))
-        yield state
-
-
 def follow(scenario: Scenario, noise: MemberNoise, state: State | None, steps: range) -> tuple[State, Trajectory]:
     """Advance a batch of members from a state, or from the start, to the last of some evenly spaced steps.
 
@@ -235,18 +203,11 @@ def unpack(scenario: Scenario, arrays: Arrays) -> State:
     """Return the state of a scenario from the arrays of ``pack``."""
     kinds = {name: part.state_class for name, part in scenario.parts._asdict().items()}
     kinds |= {"bonding": Bonding, "extremes": extremes.Extremes}
-    inner = {name: _assembled(kind, _within(arrays, name)) for name, kind in kinds.items()}
-    return State(*cast(State, (int(arrays["step"]), *(inner[name] for name in State._fields[1:]))))
+    inner = (_assembled(kinds[name], arrays, name) for name in State._fields[1:])
+    return State(*cast(State, (int(arrays["step"]), *inner)))
 
 
-def _assembled(kind: type, arrays: Arrays) -> tuple[object, ...]:
-    """Return the state of a part from its arrays."""
-    inner = {name: (hint, _within(arrays, name)) for name, hint in get_type_hints(kind).items()}
-    values = {name: _assembled(*part) if part[1] else arrays[name] for name, part in inner.items()}
-    state: tuple[object, ...] = kind(**values)
-    return state
-
-
-def _within(arrays: Arrays, name: str) -> Arrays:
-    """Return the arrays under a dotted name."""
-    return {key.removeprefix(f"{name}."): array for key, array in arrays.items() if key.startswith(f"{name}.")}
+def _assembled(kind: type, arrays: Arrays, path: str) -> object:
+    """Return the state whose arrays have names under a dotted path."""
+    hints = {f"{path}.{name}": hint for name, hint in get_type_hints(kind).items()}
+    return kind(*(arrays[key] if key in arrays else _assembled(hint, arrays, key) for key, hint in hints.items()))

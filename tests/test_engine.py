@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from helpers.scenes import BONDS, CONTACTS, DRIVES, SHEARS, go_together, scene
+from helpers.scenes import BONDS, CONTACTS, DRIVES, SHEARS, go_together, march, scene
 from numpy.testing import assert_allclose
 
-from sim.engine import MemberNoise, follow, march, pack, trajectory_of, unpack
+from sim.engine import MemberNoise, follow, pack, trajectory_of, unpack
 from sim.parts import drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Onset, Time

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from helpers import scenes
 
-from sim.engine import march, pack
+from sim.engine import pack
 
 USUAL = {"drive": "log ramp", "bonds": "rate", "shear": "banded, slip, onset", "contact": "load"}
 MODELS = {"drive": scenes.DRIVES, "bonds": scenes.BONDS, "shear": scenes.SHEARS, "contact": scenes.CONTACTS}
@@ -24,7 +24,7 @@ def digests():
     results = {}
     for case in cases:
         case = case if scenes.go_together(case) else case | {"bonds": "rate, bell"}
-        *_, state = march(
+        *_, state = scenes.march(
             scenes.scene(steps=20, **{part: MODELS[part][name] for part, name in case.items()}), np.arange(3)
         )
         text = b"".join(np.ascontiguousarray(array).tobytes() for array in pack(state).values())

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from helpers.parts import Adhesion, Clock, Record, Slip, load, read_sweep, run, shear
-from helpers.scenes import BONDS, CELL, CONTACTS, DRIVES, SHEARS, SPECTRUM, scene
+from helpers.scenes import BONDS, CELL, CONTACTS, DRIVES, SHEARS, SPECTRUM, march, scene
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter
 
 import sim
-from sim.engine import march, trajectory_of
+from sim.engine import trajectory_of
 from sim.ensemble import dataset as datasets, plan as plans, simulate as ensemble
 from sim.ensemble.dataset import scenario_json, variable_name
 from sim.ensemble.plan import Plan

@@ -4,9 +4,10 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from helpers.scenes import march
 from numpy.testing import assert_allclose
 
-from sim.engine import MemberNoise, follow, march, pack, unpack
+from sim.engine import MemberNoise, follow, pack, unpack
 from sim.laws import jkr
 from sim.parts.bonds import FirstMoment
 from sim.parts.bonds.rupture import Bell

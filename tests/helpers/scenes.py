@@ -1,10 +1,11 @@
 """Small scenes for the tests: one builder and the depths of every part."""
 
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
 
-from sim.engine import march, trajectory_of
+from sim.engine import MemberNoise, advance, start, trajectory_of
 from sim.ensemble.variables import VARIABLES
 from sim.parts import drive
 from sim.parts.bonds import models as bonds
@@ -141,6 +142,18 @@ def scene(members=3, steps=8, **parts):
 
 
 READ = {variable.name: variable.read for variable in VARIABLES}
+
+
+def march(scenario, members, state=None, keep=True):
+    """States of members after every step; without ``keep`` the next step may change a state."""
+    noise = MemberNoise.of(scenario.seed, members)
+    if state is None:
+        state = start(scenario, noise)
+        yield state
+    while state.step < scenario.times.steps:
+        before = state._replace(bonds=deepcopy(state.bonds)) if keep else state
+        state, _ = advance(scenario, before, noise, range(state.step + 1, state.step + 2))
+        yield state
 
 
 def records(scenario, *names):

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from helpers import driven
 from helpers.cases import some
-from helpers.driven import AREA, HELD, STRETCH, UNIT, marched, pulled, reached, residual, scenario, spring, stuck
+from helpers.driven import AREA, HELD, STRETCH, UNIT, march, marched, pulled, reached, residual, scenario, spring, stuck
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import sim
 from sim.analysis.tables import notes
-from sim.engine import MemberNoise, follow, march
+from sim.engine import MemberNoise, follow
 from sim.ensemble.preview import slider_body
 from sim.laws.schallamach import Body, first_moment_onset
 from sim.parts.bonds import FirstMoment, Steady, Unbroken

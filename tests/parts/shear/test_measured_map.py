@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 from helpers.commands import LENS, sim as command
-from helpers.scenes import BONDS, DRIVES, Band, Onset, RateDependent, Slip, Stress, drive, scene
+from helpers.scenes import BONDS, DRIVES, Band, Onset, RateDependent, Slip, Stress, drive, march, scene
 from numpy.testing import assert_allclose
 
 import sim
-from sim.engine import MemberNoise, follow, march
+from sim.engine import MemberNoise, follow
 from sim.laws import halfspace, jkr
 from sim.numerics.grid import Grid
 from sim.parts.bonds.models import Counted, Unbroken
