@@ -302,7 +302,7 @@ class _Driven:
 
     def readings(self, state: Driven) -> Array:
         """Recorded quantities of the drive, columns ``READINGS``, as last axis."""
-        work, *spent, stored, first = np.moveaxis(state.energies, -1, 0)
+        work, *spent, stored, first = (state.energies[..., k] for k in range(state.energies.shape[-1]))
         residual = work - (stored - first) - sum(spent)
         stage = state.stage_position, state.stage_speed, state.spring_force
         return np.stack([*stage, work, stored, *spent, residual, state.substeps, state.runaway_time], axis=-1)

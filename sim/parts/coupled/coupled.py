@@ -5,6 +5,7 @@ equilibrium contact follows the bonds within them; the fluctuations ΔΓ, a ``ra
 of ΔΓ stay as they were at the start of the clock step.
 """
 
+import functools
 import math
 from typing import NamedTuple, cast
 
@@ -24,6 +25,9 @@ from sim.parts.exchange import Array, Bonding, Flags, Motions, Mount, Parts, Sli
 
 #: Stretch by which the motion of bonds is measured that neither force nor stretch breaks, in a run without motion [m].
 _STRETCH = 1e-9
+_NAMES = ROW.names or ()
+#: Fields of the state of a slider that are columns of a row.
+_SHARED = [name for name in Driven._fields if name in _NAMES]
 #: Columns of a row that are measured by a stretch.
 _STRETCHED = ["body_speed", "sheared", "moment", "speed", "position", "slip", "path", "acceleration"]
 #: Relative difference up to which two radii are the same equilibrium, found by two methods.
@@ -97,6 +101,17 @@ def _units(drive: Force | Spring, bonds: _Driven, contact: StepContact, step: fl
     return stretch, bears * stretch
 
 
+@functools.lru_cache(maxsize=16)
+def _of_columns(stretch: float, force: float) -> Array:
+    """Return the units of the columns of a row, from those of a stretch [m] and a force [N]."""
+    scales = np.ones(COLUMNS)
+    named = scales.view(ROW)
+    named["spring_force"], named["squared_speed"] = force, stretch**2
+    for name in _STRETCHED:
+        named[name] = stretch
+    return scales
+
+
 def _renewing(bonds: _Driven) -> float:
     """Return the displacement on which sliding renews bonds of the rate equation, V_c/h [m], infinite for others."""
     return bonds.critical_speed / bonds.rebinding_rate if isinstance(bonds, models.Rate) else math.inf
@@ -143,33 +158,30 @@ def advance(
     ends, members = times.at(np.arange(steps.start - 1.0, steps.stop)), len(slider.speed)
     units = _units(drive, bonds, contact, times.step)
     stretch, force = units
-    rows, scales = np.zeros(members, ROW), np.ones(1, ROW)
-    for name in set(ROW.names or ()) & set(Driven._fields):
+    rows = np.zeros(members, ROW)
+    for name in _SHARED:
         rows[name] = getattr(slider, name)
-    settled = _agree(slider.radius, contact.radius)
-    # an equilibrium contact goes on with the radius of the sub-steps
-    rows["radius"] = contact.radius if contact.stays else np.where(settled, slider.radius, contact.radius)
-    scales["spring_force"], scales["squared_speed"] = force, stretch**2
-    for name in _STRETCHED:
-        scales[name] = stretch
+    rows["radius"] = contact.radius
+    if not contact.stays:  # an equilibrium contact goes on with the radius of the sub-steps
+        rows["radius"] = np.where(_agree(slider.radius, contact.radius), slider.radius, contact.radius)
     pieces, duration = drive.driven(ends, times.duration), ends[1:] - ends[:-1]
     scale = 1.0 / (stretch if drive.spring else force)
     course = np.stack([pieces.interval, pieces.stop - pieces.start, *(scale * np.array(pieces[3:6]))], axis=1)
     state, bare = rows.view(float).reshape(members, COLUMNS), contact.bare + np.zeros(members)
     clock, work = _clock(contact, ends), stretch * force
-    inputs = Inputs(state, slider.energies.copy(), bare, course, clock, scales.view(float), work)
+    inputs = Inputs(state, slider.energies.copy(), bare, course, clock, _of_columns(*units), work)
     columns, energies = np.empty((COLUMNS, len(steps), members)), np.empty((len(steps), *slider.energies.shape))
     numbers = _numbers(drive, bonds, contact, units)
     end, bonding = _advanced(bonds, population, contact.radius, inputs, numbers, (columns, energies), noise)
-    reached = dict(zip(ROW.names or (), columns, strict=True))
+    reached = dict(zip(_NAMES, columns, strict=True))
     stage, stage_speed = np.zeros((2, len(steps), members))
     if drive.spring:
         whole = pieces.joined
         stage[:], stage_speed[:] = whole.integral[:, np.newaxis], whole.last[:, np.newaxis]
         stage[0] += slider.stage_position
         np.add.accumulate(stage, out=stage)
-    of_drive = {"stage_position": stage, "stage_speed": stage_speed, "energies": energies}
-    after = Driven(*((reached | of_drive)[name] for name in Driven._fields))
+    shared = {name: reached[name] for name in _SHARED}
+    after = Driven(**shared, stage_position=stage, stage_speed=stage_speed, energies=energies)
     first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
     path, spans = reached["path"], duration[:, np.newaxis]
     unsteady = np.maximum(reached["squared_speed"] - path**2 / spans, 0.0)  # slip at once is spread over the step
@@ -198,7 +210,7 @@ def _advanced(
     step. Bonds without a stretch have the sense of the sliding in its place.
     """
     shape, rows = outputs[0].shape[1:], inputs.rows.view(ROW)[:, 0]
-    reached = dict(zip(ROW.names or (), outputs[0], strict=True))
+    reached = dict(zip(_NAMES, outputs[0], strict=True))
     if isinstance(bonds, models.Cohort):
         ages = cast(models.Ages, population)
         share, area_radius = bonds.diluted(ages.area_radius, radius)
