@@ -19,15 +19,14 @@ import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from sim.analysis import engineering
 from sim.engine import MemberNoise, follow
-from sim.ensemble.plan import together
+from sim.ensemble.plan import seconds_a_step, together
 from sim.ensemble.variables import VARIABLES
 from sim.numerics import files
-from sim.parts.exchange import Bonding, Gammas, Motion, Motions
+from sim.parts.exchange import Array, Bonding, Gammas, Motion, Motions
 from sim.parts.shear.bands import cell_pairs
 from sim.parts.shear.process import Fluctuation
 from sim.plots.style import BONDS, FLUCTUATIONS, LINES, REFERENCE, STYLE, legend, rows
@@ -36,15 +35,13 @@ from sim.scenario.schema import files_read, keys, model, tables
 from sim.units.errors import BadInput
 from sim.units.notation import concise
 
-Array = NDArray[np.float64]
-
 #: A table to print, and the text below it.
 Printed = tuple[list[dict[str, str]], str]
 QUANTITIES = ("shear_stress", "bond_fraction", "fluctuation_energy", "contact_radius")
 STATISTICS = ("mean", "spread", "skewness", "correlation time")
 _ENERGY, _RADIUS = 2, 3
 _WORDS = {"stress": "the shear stress", "bonds": "the bond fraction", "ΔΓ": "ΔΓ", "radius": "the radius"}
-_READ = {variable.name: variable.read for variable in VARIABLES if variable.name in QUANTITIES}
+READ = {variable.name: variable.read for variable in VARIABLES}
 
 _BANDS, _COHORTS = (0.3, 0.1, 0.03, 0.01, 0.003), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
@@ -216,8 +213,7 @@ def _admitted(part: str, changes: dict[str, Any], base: Scenario, left_out: list
     """
     table_now, label = _table(getattr(base, part)), " ".join(f"{value}" for value in changes.values())
     admitted = tables(keys(Scenario)[part].annotation).values()
-    kinds = [keys(kind).keys() for kind in admitted if model(kind) == changes["model"]]
-    declared = max(kinds, key=lambda names: ("rupture" in table_now) == ("rupture" in names))
+    declared = {key for kind in admitted if model(kind) == changes["model"] for key in keys(kind)}
     is_written = table_now.items() >= changes.items()
     try:
         if time.process_time() > end and not is_written:
@@ -249,10 +245,7 @@ def _timed(scenario: Scenario, seconds: float) -> float:
     """Return the CPU time of the scene's run [s], by the last three of the pieces that are run in some seconds."""
     members, last = scenario.ensemble.members if _fluctuates(scenario) else 1, scenario.clock.steps
     full = min(together(scenario), members)
-    batch, began = min(full, _FEWEST), time.process_time()
-    follow(scenario, MemberNoise.of(scenario.seed, np.arange(batch)), None, range(1, 2))
-    if (time.process_time() - began) * full / batch < 0.25 * seconds:
-        batch = full
+    batch = full if seconds_a_step(scenario, full) < 0.25 * seconds else min(full, _FEWEST)
     noise, paces, piece, step, state = MemberNoise.of(scenario.seed, np.arange(batch)), list[float](), 1, 0, None
     began = now = time.process_time()
     while len(paces) < 4 or now < began + seconds:
@@ -271,12 +264,12 @@ def _records(scenario: Scenario) -> range:
     return range(clock.steps % every, clock.steps + 1, every)
 
 
-def _run(scenario: Scenario, count: int, steps: range) -> Array:
-    """Return the ``QUANTITIES`` of the first members at some clock steps, shape (4, members, steps)."""
+def recorded(scenario: Scenario, count: int, steps: range, names: Sequence[str] = QUANTITIES) -> Array:
+    """Return variables of the first members at some clock steps, shape (names, members, steps)."""
     values = list[list[Array]]()
     for members in np.array_split(np.arange(count), -(-count // together(scenario))):
         _, course = follow(scenario, MemberNoise.of(scenario.seed, members), None, steps)
-        read, shape = (_READ[name](scenario, course) for name in QUANTITIES), (len(steps), len(members))
+        read, shape = (READ[name](scenario, course) for name in names), (len(steps), len(members))
         values.append([np.broadcast_to(variable, shape).T for variable in read])
     return np.concatenate(values, axis=1)
 
@@ -357,18 +350,17 @@ def _judged(base: Scenario, settings: list[Setting], end: float, left_out: list[
         _leave_out(fitting.pop(), left_out)
     noisy = sum(row.time for row in fitting if _fluctuates(row.scenario)) / base.ensemble.members
     count = int(np.clip(0.5 * left / max(noisy, 1e-12), _FEWEST, _MOST))
-    fitting, samples = [row for row in settings if row in fitting], dict[str, Array]()
+    fitting, samples = [row for row in settings if row in fitting], list[Array]()
     for row in fitting:
         row.members = count if _fluctuates(row.scenario) else 1
-        samples[row.label] = _run(row.scenario, row.members, steps)
+        samples.append(recorded(row.scenario, row.members, steps))
     has_truth = fitting[0].part == "shear" and part.per_member and not part.amplitude.relaxing
     if has_truth:  # the distribution of ΔΓ by all modes of the cell
         pairs = cell_pairs(part.spectrum, part.side(base.setting.cell), part.points, *base.solid.effective)
-        terms = np.broadcast_arrays(pairs.weight, pairs.count.astype(float), pairs.wavenumber)
-        truth = Gammas(terms[0], terms[1], terms[2])
-    for row in fitting:
+        truth = Gammas(pairs.weight, pairs.count, pairs.wavenumber)
+    for row, sample in zip(fitting, samples, strict=True):
         known = _known_errors(row, truth, part.correlation.power) if has_truth else None
-        row.error, row.standard_error = _errors(samples[row.label], samples[fitting[-1].label], known)
+        row.error, row.standard_error = _errors(sample, samples[-1], known)
     return fitting
 
 
@@ -415,7 +407,7 @@ def _at_steps(rows: Sequence[Setting], count: int) -> list[Array]:
         scenarios[1:] = [scenario.with_values({}) for scenario in others]
         for scenario, row in zip(scenarios[1:], rows[1:], strict=True):
             scenario.__dict__["process"] = _Replayed(row.scenario, unit[:: round(row.ratio / rows[1].ratio)])
-    return [_run(scenario, count, _records(scenario)) for scenario in scenarios]
+    return [recorded(scenario, count, _records(scenario)) for scenario in scenarios]
 
 
 def _judged_steps(written: Setting, finest: Setting, accepted: float, end: float) -> list[Setting]:

@@ -26,6 +26,7 @@ from scipy.special import chdtrc
 
 from sim.ensemble.dataset import scenario_json
 from sim.numerics import files
+from sim.parts.exchange import Array
 from sim.plots.style import BOTH, GUIDE, HOLLOW, REFERENCE, STYLE, Unit, across, axis_scale, in_units, legend, rows
 from sim.scenario.files import parse, written
 from sim.scenario.scenario import Scenario
@@ -37,8 +38,6 @@ from sim.study.mechanisms import WHOLE, Verdict, compare
 from sim.units.errors import BadInput
 from sim.units.notation import concise, engineering, scaled
 from sim.units.quantity import read_option
-
-Array = NDArray[np.float64]
 
 #: Factor by which a number that is fitted in its logarithm may change at most, where no bounds are given.
 _WIDE = 1e4

@@ -20,20 +20,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from sim.engine import MemberNoise, Trajectory, balance, follow
+from sim.engine import Trajectory, balance
 from sim.ensemble.dataset import variable_name
-from sim.ensemble.plan import together
 from sim.ensemble.variables import VARIABLES, Variable
 from sim.laws.theories import compare_at_indentation, compare_at_load
-from sim.parts.exchange import Motion
+from sim.parts.exchange import Array, Motion
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
 from sim.spectrum.family import Family
+from sim.study.converge import READ, recorded
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
 from sim.units.tables import read_measured
-
-Array = NDArray[np.float64]
 
 #: Column of what holds the sphere, by the key of the contact that prescribes it.
 HELD = {"load": "normal_load", "indentation": "indentation", "displacement": "displacement"}
@@ -151,8 +149,6 @@ def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
 #: Values of keys, by their dotted names.
 Values = Mapping[str, float]
 
-_READ = {item.name: item.read for item in VARIABLES}
-
 
 def changed(part: Any, values: Values) -> Any:
     """Return a scenario or a part with some numbers changed within their bounds; unchecked, because this is quick."""
@@ -247,11 +243,11 @@ def by_steady_sliding(group: Group, values: Values, names: list[str], theory: st
         rest = scenario.adhesion.work, *scenario.bodies
         radii = compare(np.abs(course.stress), load if at_load else base, *rest, **numbers)
         course = course._replace(radius=radii[theory])
-    return {name: np.broadcast_to(_READ[name](scenario, course), group.speed.shape)[:, 0] for name in names}
+    return {name: np.broadcast_to(READ[name](scenario, course), group.speed.shape)[:, 0] for name in names}
 
 
-def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool) -> dict[str, Array]:
-    """Return means and standard errors by the scenario's own models, with the noise of its seed, shapes (2, rows).
+def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool) -> Array:
+    """Return means and standard errors by the scenario's own models, with the noise of its seed: (2, names, rows).
 
     Rows with times are read along the scenario's run, and so are rows with speeds alone if the drive passes through
     these. Otherwise each row is a run at a steady speed, or of the steady stage, whose second half counts.
@@ -261,8 +257,7 @@ def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool
     BadInput
         If the run does not reach the speed of a row, or passes it twice.
     """
-    count = sum(len(group.rows) for group in groups)
-    result = {name: np.full((2, count), np.nan) for name in names}
+    result = np.empty((2, len(names), sum(len(group.rows) for group in groups)))
     for group in groups:
         scenario = group.scenario.with_values(dict(values) | {"record": {}})
         drive, runs = scenario.drive, list[tuple[NDArray[np.int64], Scenario, Weights]]()
@@ -271,10 +266,9 @@ def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool
         else:
             runs = [(group.rows[k : k + 1], _still(scenario, group, k), _second_half) for k in range(len(group.rows))]
         for rows, point, weights in runs:
-            for name, members in _members(point, names, weights).items():
-                size = members.shape[1]
-                spread = members.std(axis=1, ddof=1) if size > 1 else 0.0
-                result[name][:, rows] = members.mean(axis=1), np.broadcast_to(spread / math.sqrt(size), len(rows))
+            members = _members(point, names, weights)
+            error = members.std(axis=-1, ddof=min(members.shape[-1] - 1, 1)) / math.sqrt(members.shape[-1])
+            result[..., rows] = members.mean(axis=-1), error
     return result
 
 
@@ -286,26 +280,26 @@ def _still(scenario: Scenario, group: Group, row: int) -> Scenario:
     return scenario.with_values(drive | {f"contact.{scenario.contact.kind}": float(held[0])})
 
 
-#: Weights of the records of a run that make the rows, shape (rows, records).
-Weights = Callable[[Trajectory], Array]
+#: Weights of the records of a run that make the rows, shape (rows, records), from their times and speeds.
+Weights = Callable[[Array, Array], Array]
 
 
-def _second_half(course: Trajectory) -> Array:
-    weights = np.arange(len(course.time)) >= len(course.time) // 2
+def _second_half(time: Array, _: Array) -> Array:
+    weights = np.arange(len(time)) >= len(time) // 2
     return weights[np.newaxis] / weights.sum()
 
 
-def _places(group: Group, by_time: bool, course: Trajectory) -> Array:
+def _places(group: Group, by_time: bool, time: Array, speed: Array) -> Array:
     """Weights of the two records between which a row lies, by its time or by the logarithm of its speed."""
-    along, at = course.time[:, 0], group.time[:, 0]
+    along, at = time, group.time[:, 0]
     if not by_time:
         with np.errstate(divide="ignore"):
-            along, at = np.log(np.abs(course.speed[:, 0])), np.log(np.abs(group.speed[:, 0]))
+            along, at = np.log(np.abs(speed)), np.log(np.abs(group.speed[:, 0]))
     if along[0] > along[-1]:
         along, at = -along, -at
     near = 1e-9 * max(1.0, float(np.ptp(along)))
     if not np.all(np.diff(along) > 0.0) or at.min() < along[0] - near or at.max() > along[-1] + near:
-        ends = (np.abs(course.speed), np.abs(group.speed))
+        ends = (np.abs(speed), np.abs(group.speed))
         run, data = (f"{values.min():.3g} to {values.max():.3g} m/s" for values in ends)
         cure = 'must pass each speed of the data once; widen it, or fit with [drive] model = "steady"'
         raise BadInput([f"drive.speed: the run goes from {run}, the data from {data}; it {cure}"])
@@ -316,19 +310,13 @@ def _places(group: Group, by_time: bool, course: Trajectory) -> Array:
     return weights
 
 
-def _members(point: Scenario, names: list[str], places: Weights) -> dict[str, Array]:
-    """Variables at rows by member, shape (rows, members); one member where none differ."""
+def _members(point: Scenario, names: list[str], weights: Weights) -> Array:
+    """Return variables at rows by member, shape (names, rows, members); one member if none differ."""
     count = point.ensemble.members if any(point.varies.values()) else 1
-    steps, most = range(0, point.clock.steps + 1, point.clock.stride), together(point)
-    columns: dict[str, list[Array]] = {name: [] for name in names}
-    for first in range(0, count, most):
-        members = np.arange(first, min(first + most, count))
-        _, course = follow(point, MemberNoise.of(point.seed, members), None, steps)
-        weights = places(course)
-        for name in names:
-            values = np.broadcast_to(_READ[name](point, course), (len(steps), len(members)))
-            columns[name].append(np.array([[row @ item for item in values.T] for row in weights]))
-    return {name: np.concatenate(batches, axis=1) for name, batches in columns.items()}
+    steps = range(0, point.clock.steps + 1, point.clock.stride)
+    speeds, *values = recorded(point, count, steps, ["speed", *names])
+    rows = weights(point.times.at(np.array(steps)), speeds[0])
+    return np.array([[members @ row for row in rows] for members in values])
 
 
 try:
@@ -437,10 +425,9 @@ class Problem:
 
     def sampled(self, x: Array) -> Array:
         """Return all curves by the scenario's own models and their standard errors, shape (2, numbers)."""
-        result = list[Array]()
-        for table, table_groups in zip(self.tables, self.groups, strict=True):
-            result += by_runs(table_groups, self.numbers(x), table.names, "t" in table.conditions).values()
-        return np.concatenate(result, axis=1)
+        numbers, tables = self.numbers(x), zip(self.tables, self.groups, strict=True)
+        runs = [by_runs(groups, numbers, table.names, "t" in table.conditions) for table, groups in tables]
+        return np.concatenate([rows.reshape(2, -1) for rows in runs], axis=1)
 
     def predicted(self, x: Array) -> Array:
         """All curves, with the shift and the common errors."""

@@ -11,13 +11,11 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sim.parts.exchange import Array
 from sim.scenario.schema import quantities
 from sim.study.likelihood import Free, Minimum, Problem, idle, minimum
 from sim.units.quantity import Quantity
-
-Array = NDArray[np.float64]
 
 #: Most draws of a likelihood ratio; ratios as large as the measured one that are enough (Besag & Clifford 1991);
 #: difference of AICc beyond which none is needed.

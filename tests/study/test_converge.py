@@ -86,7 +86,7 @@ def test_errors_of_rates_and_of_missing_sites_are_their_closed_forms_and_the_che
 
 
 def run_of(scenario, members=1):
-    return study._run(scenario, members, study._records(scenario))
+    return study.recorded(scenario, members, study._records(scenario))
 
 
 #: Bonds that live for half a second, under a jump of the speed and a reversal within 5 ms.
@@ -313,7 +313,7 @@ def test_the_recommended_setting_keeps_its_bound_against_the_finest_models_and_a
     for tables, length in ((parts, step), (finest, step / 100.0)):
         run = scenario.with_values(tables | {"clock": {"duration": 0.04, "step": length, "record": 4e-3}})
         steps = range(0, run.clock.steps + 1, run.clock.stride)
-        runs.append(study._run(run, 256 if study._fluctuates(run) else 1, steps))
+        runs.append(study.recorded(run, 256 if study._fluctuates(run) else 1, steps))
     off, deviation = study._errors(*runs)
     bound = np.fmax(best.error + 2.0 * best.standard_error, tolerance * good)
     assert np.all((off <= bound + 1e-6 + 5.0 * deviation)[:, :2]), (labels, off[:, :2], bound[:, :2])

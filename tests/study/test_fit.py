@@ -112,9 +112,7 @@ def test_steady_sliding_is_what_a_run_ends_in_also_for_rows_of_loads_and_solids_
         made, names = rows_of(scene, speed=SPEEDS[::3])
         (group,) = likelihood.groups(scene, made)
         alone = likelihood.by_steady_sliding(group, {}, names)
-        sampled = likelihood.by_runs([group], {}, names, False)
-        for name in names:
-            mean, error = sampled[name]
+        for name, mean, error in zip(names, *likelihood.by_runs([group], {}, names, False), strict=True):
             assert_allclose(alone[name], mean, rtol=1e-12, atol=0, equal_nan=False, err_msg=label)
             assert np.all(error == 0.0)
     scene = load(LENS)
@@ -269,7 +267,7 @@ def test_a_driven_slider_is_fitted_to_force_and_stage_and_members_shift_the_fit_
     found = fit(scene, [path], ["shear.spectrum.rms", "bonds.stress"])
     (rms, _), noise = found.numbers, found.problem.noise
     assert found.converged and abs(rms.value - rms.steady) > rms.error and np.all(noise[6:9] > 0.0)
-    mean, error = likelihood.by_runs(found.problem.groups[0], found.values, ["contact_area"], False)["contact_area"]
+    mean, error = likelihood.by_runs(found.problem.groups[0], found.values, ["contact_area"], False)[:, 0]
     assert_allclose(found.problem.predicted(found.best.x)[:10], mean, rtol=2e-4)
     assert_allclose(noise[:10], error, rtol=0.05)
 
