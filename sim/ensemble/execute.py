@@ -5,6 +5,7 @@ is given out when the one before is done. A worker keeps its last group in memor
 another worker goes on from the state that was stored with the block before.
 """
 
+import bisect
 import concurrent.futures
 import contextlib
 import functools
@@ -17,7 +18,7 @@ import time
 import uuid
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
@@ -59,36 +60,13 @@ class _Chain:
     task: Task
     missing: list[int]
     state: Arrays | None = None
-    is_known: bool = False
     broken: int = 0
 
     @functools.cached_property
     def pickled(self) -> bytes:
-        return pickle.dumps(self.task)
+        import cloudpickle  # as tables of a scenario have local classes
 
-
-@dataclass
-class _Chains:
-    """The chains of a run that are not given out: waiting, at the last try of a block, given up."""
-
-    waiting: list[_Chain]
-    suspects: list[_Chain] = field(default_factory=list)
-    lost: list[_Chain] = field(default_factory=list)
-
-    def __bool__(self) -> bool:
-        return bool(self.waiting or self.suspects)
-
-    def take(self, running: Iterable[_Chain]) -> _Chain | None:
-        """Return the chain whose block is given out next: a suspect runs alone, so that no other block is blamed."""
-        running = list(running)
-        if any(chain.broken == _TRIES - 1 for chain in running) or (self.suspects and running):
-            return None
-        chains = self.suspects or self.waiting
-        return chains.pop() if chains else None
-
-    def put(self, chain: _Chain) -> None:
-        """Take a chain back."""
-        {_TRIES: self.lost, _TRIES - 1: self.suspects}.get(chain.broken, self.waiting).append(chain)
+        return bytes(cloudpickle.dumps(self.task))
 
 
 @dataclass
@@ -154,29 +132,28 @@ def compute(
         As raised by the first block that fails.
     """
     run = uuid.uuid4().hex
-    chains = _Chains([_Chain(f"{run}-{place}", *each) for place, each in enumerate(tasks)][::-1])
-    for chain in chains.waiting:
-        chain.missing = chain.missing[::-1]
+    chains = [_Chain(f"{run}-{place}", task, missing[::-1]) for place, (task, missing) in enumerate(tasks)]
+    waiting = chains[::-1]
     if scheduler:
         with _cluster(scheduler) as team:
-            _work_off(team, advance, store, chains, progress, stop)
+            _work_off(team, advance, store, waiting, progress, stop)
     elif jobs > 1 and len(tasks) > 1:
-        while chains and not stop():  # a broken pool is replaced
+        while waiting and not stop():  # a broken pool is replaced
             with pool(min(jobs, len(tasks))) as executor:
-                _work_off(_Team(executor, lambda: jobs), advance, store, chains, progress, stop)
+                _work_off(_Team(executor, lambda: jobs), advance, store, waiting, progress, stop)
     else:
         try:
-            _work_off(_Team(_Here(), lambda: 1), advance, store, chains, progress, stop)
+            _work_off(_Team(_Here(), lambda: 1), advance, store, waiting, progress, stop)
         finally:
             _last.__dict__.clear()
-    if chains.lost:
-        names = "; ".join(str(chain.task) for chain in chains.lost)
+    if lost := [chain for chain in chains if chain.broken == _TRIES]:
+        names = "; ".join(str(chain.task) for chain in lost)
         cure = "the likely reason is too little memory; all other blocks are kept, --resume tries these again"
         raise WorkerDied(f"given up after processes died again and again: {names}; {cure}")
 
 
 def _work_off(
-    team: _Team, advance: Advance, store: Blocks, chains: _Chains, progress: Callable[[int], None],
+    team: _Team, advance: Advance, store: Blocks, waiting: list[_Chain], progress: Callable[[int], None],
     stop: Callable[[], bool],
 ) -> None:  # fmt: skip
     """Give out the blocks of chains until none is left, a stop is asked for, or the pool breaks."""
@@ -184,15 +161,15 @@ def _work_off(
     is_broken = False
     try:
         while True:
-            while not is_broken and len(running) < team.room() and not (chains and stop()):
-                if not (chain := chains.take(running.values())):
+            while not is_broken and len(running) < team.room() and not (waiting and stop()):
+                if not (chain := _taken(waiting, running.values())):
                     break
                 try:
                     running[_submitted(team, advance, store, chain)] = chain
                 except concurrent.futures.BrokenExecutor:
                     is_broken = True
                     chain.broken += not running  # the pool broke under this chain, or does not start
-                    chains.put(chain)
+                    _put(waiting, chain)
             if not running:
                 break
             when = concurrent.futures.ALL_COMPLETED if is_broken else concurrent.futures.FIRST_COMPLETED
@@ -201,36 +178,39 @@ def _work_off(
                 try:
                     result = future.result()
                 except concurrent.futures.BrokenExecutor:
-                    is_broken, chain.is_known = True, False
+                    is_broken = True
                     chain.broken += 1
-                    chains.put(chain)
-                    continue
                 except _killed_on_cluster():
-                    chains.lost.append(chain)
-                    continue
-                chain.is_known = result is not None
-                if chain.is_known:
+                    chain.broken = _TRIES
+                else:
                     number, chain.broken = chain.missing.pop(), 0
                     if team.far:
                         arrays, state = result
                         store.save(chain.task.names[number], arrays, state)
                         chain.state = state if number + 1 in chain.missing[-1:] else None
                     progress(chain.task.work[number])
-                if chain.missing:
-                    chains.put(chain)
+                _put(waiting, chain)
     finally:
         for future in running:
             future.cancel()
 
 
+def _taken(waiting: list[_Chain], running: Iterable[_Chain]) -> _Chain | None:
+    """Take the chain whose block is given out next: at its last try a block runs alone, so that no other is blamed."""
+    alone = any(chain.broken == _TRIES - 1 for chain in (*running, *waiting[-1:]))
+    return waiting.pop() if waiting and not (alone and running) else None
+
+
+def _put(waiting: list[_Chain], chain: _Chain) -> None:
+    """Put a chain with missing blocks behind those that broke fewer pools, unless it is given up."""
+    if chain.missing and chain.broken < _TRIES:
+        bisect.insort(waiting, chain, key=lambda each: each.broken)
+
+
 def _submitted(team: _Team, advance: Advance, store: Blocks, chain: _Chain) -> Any:
     """Give out the next block of a chain; return its future."""
     number, state = chain.missing[-1], chain.state
-    task: Task | bytes | None = None
-    if isinstance(team.executor, _Here):
-        task = chain.task
-    elif team.far or not chain.is_known:
-        task = chain.pickled
+    task = chain.task if isinstance(team.executor, _Here) else chain.pickled
     if team.far and number and state is None:
         state = store.state(chain.task.names[number - 1])
     with warnings.catch_warnings():  # of dask: a state may be large
@@ -240,16 +220,14 @@ def _submitted(team: _Team, advance: Advance, store: Blocks, chain: _Chain) -> A
 
 
 def _block(
-    advance: Advance, key: str, task: Task | bytes | None, number: int, state: Arrays | None, store: Blocks | None,
+    advance: Advance, key: str, task: Task | bytes, number: int, state: Arrays | None, store: Blocks | None,
     code: tuple[str, ...],
-) -> tuple[Arrays, Arrays] | bool | None:  # fmt: skip
-    """Compute a block in a worker and save it, or return it if there is no store; None if the task is not known."""
+) -> tuple[Arrays, Arrays] | None:  # fmt: skip
+    """Compute a block in a worker and save it, or return it if there is no store."""
     if code != _code():
         raise BadInput(["a worker has another version of sim, numpy, scipy or numba; install the same"])
     group: _Group | None = _last.__dict__.pop("group", None)
     if group is None or group.key != key:
-        if task is None:
-            return None
         group = _Group(key, pickle.loads(task) if isinstance(task, bytes) else task)
     names, points = group.task.names, group.task.points
     if group.number != number - 1:
@@ -265,7 +243,7 @@ def _block(
             point.release()
     else:
         _last.group = group
-    return (arrays, packed) if store is None else True
+    return (arrays, packed) if store is None else None
 
 
 @functools.cache

@@ -16,7 +16,7 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 from helpers import deadly, scenes
-from helpers.scenes import LOADS
+from helpers.scenes import CONTACTS, LOADS
 
 import sim
 from sim.cli import cli
@@ -62,7 +62,8 @@ def test_any_number_of_processes_gives_the_same_numbers(tmp_path, many_parts, jo
     counted = []
     ensemble.run(sample(), tmp_path / "out.nc", jobs=jobs, progress=counted.append)
     assert sum(counted) == plans.work(Plan.of(sample())) and same(tmp_path / "out.nc")
-    assert ensemble.run(sample(), jobs=jobs).identical(ensemble.run(sample()))
+    scenario = sample(members=5, sweep=None, contact=CONTACTS["load there and back"])  # of classes that are local
+    assert ensemble.run(scenario, jobs=jobs).identical(ensemble.run(scenario))
 
 
 def test_a_worker_that_dies_costs_its_blocks_alone(tmp_path, many_parts):
@@ -266,15 +267,16 @@ def test_a_scheduler_that_goes_away_is_told_and_what_is_computed_stays(tmp_path,
 
 
 def test_a_suspect_runs_alone_and_an_executor_that_does_not_start_is_no_endless_loop(monkeypatch, many_parts):
-    chains = execute._Chains([execute._Chain(str(place), None, [0]) for place in range(3)])
-    suspect = chains.take([])
+    waiting = [execute._Chain(str(place), None, [0]) for place in range(3)]
+    suspect, other = waiting.pop(), waiting.pop()
     suspect.broken = 2
-    chains.put(suspect)
-    other = chains.waiting.pop()
-    assert chains.take([other]) is None and chains.take([]) is suspect and chains.take([suspect]) is None
+    execute._put(waiting, suspect)
+    execute._put(waiting, other)
+    assert execute._taken(waiting, [other]) is None and execute._taken(waiting, []) is suspect
+    assert execute._taken(waiting, [suspect]) is None
     suspect.broken = 3
-    chains.put(suspect)
-    assert chains.lost == [suspect] and chains.take([other]) is not None
+    execute._put(waiting, suspect)
+    assert suspect not in waiting and execute._taken(waiting, [other]) is not None
 
     class Broken(concurrent.futures.Executor):
         def submit(self, *given):
