@@ -73,11 +73,11 @@ class Statistics:
 
     def get(self, name: str) -> xr.DataArray | None:
         """Return a statistic by its name, such as ``contact_radius_mean``; None if it is not known."""
-        stem = name.rpartition("_")[0]
-        if stem.startswith("lost_to") and name not in self._computed and stem not in self.observables:
-            with contextlib.suppress(ValueError), answered():
-                self.observables.update(self._along(share_observables(self.dataset)))
         if name not in self._computed:
+            stem = name.rpartition("_")[0]
+            if stem.startswith("lost_to") and stem not in self.observables:
+                with contextlib.suppress(ValueError), answered():
+                    self.observables.update(self._along(share_observables(self.dataset)))
             recorded = {stem, *(f"{stem}_{kind}" for kind in KEPT)}
             chosen = self.observables[[each for each in self.observables if each in recorded]]
             self._computed |= {name: None} | {str(key): each for key, each in summary(chosen).items()}
@@ -219,7 +219,7 @@ def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], tuple[S
     shades, bar = list(LINES), None
     if len(points) > len(LINES):
         shades = [mpl.colors.to_hex(shade) for shade in _SHADES(np.linspace(0.0, 1.0, len(points)))]
-        if len(varied) == 1 and _is_number(dataset[varied[0]]):
+        if len(varied) == 1 and dataset[varied[0]].dtype.kind in "fi":
             bar, shades = _bar(dataset[varied[0]])
     count = min(len(points), _MOST if bar else _NAMED)
     lines = []
@@ -228,10 +228,6 @@ def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], tuple[S
         lines.append(Line(number, points[k], words, shades[k]))
     left_out = f"{count} of {len(points)} curves drawn (--where draws others)" if count < len(points) else ""
     return lines, bar, left_out
-
-
-def _is_number(key: xr.DataArray) -> bool:
-    return key.dtype.kind in "fi"
 
 
 def choice(dataset: xr.Dataset, dim: str) -> str:
@@ -274,11 +270,9 @@ def curve(
             fill(panel, x, low, high, **shade)
     look: Any = ({"marker": "o", "markersize": 2.6} if scene.marked else {}) | line_style(scene, style)
     panel.plot(x, mean, color=colour, label=label if np.any(np.isfinite(mean)) else "", **look)
-    if not np.any(sem > 0.0):
-        return
-    if scene.over_time:
+    if np.any(sem > 0.0) and scene.over_time:
         fill(panel, x, mean - sem, mean + sem, color=colour, alpha=0.45)
-    else:
+    elif np.any(sem > 0.0):
         panel.errorbar(x, mean, np.nan_to_num(sem), fmt="none", ecolor=colour, elinewidth=0.8, capsize=1.5)
 
 
@@ -325,21 +319,15 @@ def over_speed(dataset: xr.Dataset) -> Scene:
     return scene.placed("speed", speeds, words, "m/s", axis_scale(speeds), broken=scene.over_time)
 
 
-def over_time(dataset: xr.Dataset) -> Scene:
-    """Return statistics over time."""
-    return scene_along(dataset, "t").placed("t", dataset["t"].to_numpy(), "time $t$", "s")
-
-
 def over_key(dataset: xr.Dataset, name: str) -> Scene:
     """Return statistics over a swept key of numbers or categories."""
     key, scene = dataset[name], scene_along(dataset, name)
     words = f"{key.attrs.get('long_name', name).partition(',')[0]} {symbol(key)}".strip()
-    if not _is_number(key):
-        scene = scene.placed(name, np.arange(key.size, dtype=float), words, "1")
+    if key.dtype.kind not in "fi":
         count = len(scene.lines)
         width = _CATEGORY / count
         shift = (np.arange(count) - 0.5 * (count - 1)) * width
-        return scene._replace(x=scene.x + shift[:, None], width=width)
+        return scene.placed(name, np.arange(key.size) + shift[:, None], words, "1")._replace(width=width)
     values = key.to_numpy().astype(float)
     return scene.placed(name, values, words, key.attrs["units"], axis_scale(values))
 
@@ -359,9 +347,9 @@ def over(dataset: xr.Dataset, name: str) -> Scene:
         return over_speed(dataset)
     if len(keys) == 1:
         return over_key(dataset, keys[0])
-    if name == "t":
-        return over_time(dataset)
     scene = scene_along(dataset, "t")
+    if name == "t":
+        return scene.placed("t", dataset["t"].to_numpy(), "time $t$", "s")
     about, mean = (scene.statistics.get(f"{name}_{kind}") for kind in ("std", "mean"))
     if about is None or mean is None:
         known = scene.statistics.names()
@@ -576,7 +564,7 @@ def curve_figure(
     dataset: xr.Dataset, x: str = "", absolute: bool = False, data: Measured | None = None, ax: Axes | None = None
 ) -> Figure:
     """Contact area with what each mechanism takes of it, energies and friction, over speed."""
-    scene = (over(dataset, x) if x else over_speed(dataset))._replace(measured=data)
+    scene = over(dataset, x or "speed")._replace(measured=data)
     return stacked(scene, [(1.9, area_panel if absolute else share_panel), *further_panels(scene)], ax=ax)[0]
 
 
@@ -588,11 +576,11 @@ def time_figure(
     dataset: xr.Dataset, x: str = "", absolute: bool = False, data: Measured | None = None, ax: Axes | None = None
 ) -> Figure:
     """Contact radius, energies, friction, and speed, load and displacement that change, over time."""
-    scene = (over(dataset, x) if x else over_time(dataset))._replace(measured=data)
+    scene = over(dataset, x or "t")._replace(measured=data)
     scene = scene._replace(heading="; ".join(filter(None, [scene.title, coarse_slips(dataset)])))
     moved = not bool(stays_held(dataset).all())
     shown = [name for name in _DRIVEN if (name != "displacement" or moved) and name != scene.over]
-    shown = [name for name in shown if any(_changes(values) for values in scene.all(f"{name}_mean"))]
+    shown = [name for name in shown if any(map(_changes, scene.all(f"{name}_mean")))]
     driven = [(0.8, series(name, *_DRIVEN[name])) for name in shown]
     first = area_panel if absolute else radius_panel
     return stacked(scene, [(1.6, first), *further_panels(scene), *driven], ax=ax)[0]
@@ -624,7 +612,7 @@ def needs_friction(dataset: xr.Dataset) -> None:
 
 def friction_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     """Friction force over time and over the slider's position: the friction loop."""
-    scene = over_time(dataset)._replace(measured=data)
+    scene = over(dataset, "t")._replace(measured=data)
     figure, axes = style.rows([1.7, 2.1], shared=False)
     for panel, name, x, words, si, room in (
         (axes[0], "t", dataset["t"].to_numpy(), "time $t$", "s", 0.0),

@@ -33,26 +33,27 @@ def needs_maps(dataset: xr.Dataset) -> None:
         raise ValueError('there are no stress maps; record some: [shear] model = "mapped" and [record] maps = ["1 s"]')
 
 
-def _maps_of(dataset: xr.Dataset, point: dict[str, int], at: float | None) -> xr.DataArray:
-    """Return the last maps at a point of the sweep, or those nearest to a time [s], of all members that have some."""
-    number = -1 if at is None else int(np.abs(dataset["map_time"].to_numpy() - at).argmin())
-    return dataset["shear_map"].isel(point).isel(map_time=number).transpose("map_member", "x", "y")
+def _maps_of(point: xr.Dataset, at: float | None) -> xr.DataArray:
+    """Return the last maps, or those nearest to a time [s], of all members that have some."""
+    number = -1 if at is None else int(np.abs(point["map_time"].to_numpy() - at).argmin())
+    return point["shear_map"].isel(map_time=number).transpose("map_member", "x", "y")
 
 
 def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     """The last stress map of a member, or that nearest to a time, and the displacement that it makes."""
-    where, point = style.first_point(dataset)
-    stress = _maps_of(dataset, where, at).isel(map_member=0)
+    where, words = style.first_point(dataset)
+    point = dataset.isel(where)
+    stress = _maps_of(point, at).isel(map_member=0)
     sides, measured = _lattice_of(stress).sides, bool(word(dataset, "shear.field.file", ""))
-    modulus, ratio = (style.number_at(dataset[f"effective_{n}"], where) for n in ("shear_modulus", "poisson_ratio"))
-    moved = displacement(stress.to_numpy(), sides, modulus, ratio)
-    radius, speed = (float(_then(dataset, name, where, stress)) for name in ("contact_radius", "speed"))
+    solid = (float(point[f"effective_{name}"]) for name in ("shear_modulus", "poisson_ratio"))
+    moved = displacement(stress.to_numpy(), sides, *solid)
+    radius, speed = (float(_then(point, name, stress)) for name in ("contact_radius", "speed"))
     figure, axes = style.pairs(3.1, shared=True)
     length = style.Unit.of(np.array(sides), "m")
-    sizes = length.factor * sides[0], length.factor * sides[1], length.factor * radius
+    sizes = [length.factor * size for size in (*sides, radius)]
     draw = _draw_measured if measured else _draw_map
-    draw(figure, axes[0], stress.to_numpy(), sizes, ("Pa", r"shear stress $\tau_1$", "RdBu_r"))
-    draw(figure, axes[1], moved, sizes, ("m", "displacement $w_1$", "PuOr_r"))
+    draw(axes[0], stress.to_numpy(), sizes, ("Pa", r"shear stress $\tau_1$", "RdBu_r"))
+    draw(axes[1], moved, sizes, ("m", "displacement $w_1$", "PuOr_r"))
     arrow = {-1.0: r"$\longleftarrow$ sliding", 0.0: "at rest", 1.0: r"sliding $\longrightarrow$"}
     box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.85, "linewidth": 0}
     for panel in axes:
@@ -61,19 +62,18 @@ def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     axes[0].set_ylabel(length.label("$y$"))
     then = f"$t$ = {style.text_of(float(stress['map_time']), 's')}, $V$ = {style.text_of(speed, 'm/s')}"
     with where_recorded():
-        mean = float(_then(dataset, "shear_stress", where, stress))
-        then += rf", mean $\tau_0$ = {style.rounded(mean, 'Pa')}"
-    axes[0].set_title(", ".join(filter(None, [point, then])))
+        then += rf", mean $\tau_0$ = {style.rounded(float(_then(point, 'shear_stress', stress)), 'Pa')}"
+    axes[0].set_title(", ".join(filter(None, [words, then])))
     return figure
 
 
-def _then(dataset: xr.Dataset, name: str, at: dict[str, int], stress: xr.DataArray) -> np.ndarray:
+def _then(point: xr.Dataset, name: str, stress: xr.DataArray) -> np.ndarray:
     """Return a variable at the time of the maps, of the member of a single map."""
-    values = style.recorded(dataset, name).isel(at, missing_dims="ignore").sel(t=stress["map_time"], method="nearest")
+    values = style.recorded(point, name).sel(t=stress["map_time"], method="nearest")
     return (values.sel(member=stress["map_member"]) if "member" in values.dims else values).to_numpy()
 
 
-def _draw_map(figure: Figure, panel: Axes, field: np.ndarray, sizes: tuple, about: tuple) -> None:
+def _draw_map(panel: Axes, field: np.ndarray, sizes: list[float], about: tuple) -> None:
     """Draw a field around the contact, continued periodically if the contact is wider than the cell.
 
     ``sizes`` are the two sides of the cell and the radius of the contact, ``about`` is what is shown.
@@ -88,34 +88,34 @@ def _draw_map(figure: Figure, panel: Axes, field: np.ndarray, sizes: tuple, abou
     half = int(np.ceil(0.5 * side / cell * points))
     index = np.arange(-half, half + 1) % points
     reach = (half + 0.5) * cell / points
-    _image(figure, panel, field[np.ix_(index, index)], (-reach, reach, -reach, reach), about)
+    _image(panel, field[np.ix_(index, index)], (-reach, reach, -reach, reach), about)
     if 0.0 < radius < 1.5 * cell:
         style.contact_circle(panel, radius)
     panel.set(xlim=(-0.5 * side, 0.5 * side), ylim=(-0.5 * side, 0.5 * side))
 
 
-def _draw_measured(figure: Figure, panel: Axes, field: np.ndarray, sizes: tuple, about: tuple) -> None:
+def _draw_measured(panel: Axes, field: np.ndarray, sizes: list[float], about: tuple) -> None:
     """Draw a measured field pixel by pixel, with the contact in its middle."""
     ends = []
     for points, side in zip(field.shape, sizes, strict=False):
         first = -(points // 2 + 0.5) * side / points
         ends += [first, first + side]
-    _image(figure, panel, field, tuple(ends), about)
+    _image(panel, field, tuple(ends), about)
     style.contact_circle(panel, sizes[2])
 
 
-def _image(figure: Figure, panel: Axes, field: np.ndarray, extent: tuple, about: tuple) -> None:
+def _image(panel: Axes, field: np.ndarray, extent: tuple, about: tuple) -> None:
     """Draw a field (x, y) with x to the right, and a colour bar; ``about`` holds its SI unit, words and colour map."""
     si, words, colours = about
     unit = style.Unit.of(field, si)
     most = unit.factor * float(np.max(np.abs(field))) or 1.0
     look: Any = {"cmap": colours, "vmin": -most, "vmax": most, "origin": "lower", "interpolation": "nearest"}
     image = panel.imshow(unit.factor * field.T, extent=extent, **look)
-    figure.colorbar(image, cax=panel.inset_axes((1.03, 0.0, 0.045, 1.0)), label=unit.label(words))
+    panel.figure.colorbar(image, cax=panel.inset_axes((1.03, 0.0, 0.045, 1.0)), label=unit.label(words))
 
 
-def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tuple[Any, float, str]:
-    """Return the spectrum at a point of the sweep, the factor of its density, and its name."""
+def _target(dataset: xr.Dataset, point: xr.Dataset, stress: xr.DataArray) -> tuple[Any, float, str]:
+    """Return the spectrum at a point of a dataset, the factor of its density, and its name."""
     try:
         shear = resolved(dataset, "shear")
     except KeyError:
@@ -123,7 +123,7 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tu
     for table in ("spectrum", "amplitude"):
         for key in shear[table]:
             with contextlib.suppress(KeyError):
-                shear[table][key] = style.number_at(setting(dataset, f"shear.{table}.{key}"), at)
+                shear[table][key] = float(setting(point, f"shear.{table}.{key}"))
     if shear["spectrum"].get("file") and not shear["spectrum"].get("wavenumbers"):
         raise ValueError("the spectrum names a file, whose rows the dataset lacks; run the scenario again")
     spectrum: Any = TypeAdapter(Spectrum).validate_python(shear["spectrum"])
@@ -134,7 +134,7 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tu
         grid = cast(Grid, _lattice_of(stress))
         cells = modes(spectrum, grid.cell, grid.points)
         return spectrum, float(np.mean(stress.to_numpy() ** 2) / np.sum(cells.variance)), "target, scaled"
-    factor = amplitude.factor(*(_then(dataset, name, at, stress) for name in ("speed", "shear_stress")))
+    factor = amplitude.factor(*(_then(point, name, stress) for name in ("speed", "shear_stress")))
     return spectrum, float(np.mean(factor**2)), "target"
 
 
@@ -156,15 +156,16 @@ def mode_density(cells: Modes, grid: Grid) -> np.ndarray:
 
 def spectrum_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     """Power spectrum of the stress maps of one time: target, discretised on the cell, and realised."""
-    where, point = style.first_point(dataset)
-    stress = _maps_of(dataset, where, at)
+    where, words = style.first_point(dataset)
+    point = dataset.isel(where)
+    stress = _maps_of(point, at)
     if not np.any(stress.to_numpy()):
         raise ValueError("the map holds no stress; record one where fluctuations have grown")
     if word(dataset, "shear.spectrum.model", "") == "bonds":
         raise ValueError("the field that bonds make follows them, without a spectrum of its own; draw the kind map")
     if word(dataset, "shear.field.file", ""):
         raise ValueError("a measured map has no spectrum to follow; `sim plot` of the scenario draws its own")
-    (spectrum, raised, name), grid = _target(dataset, stress, where), cast(Grid, _lattice_of(stress))
+    (spectrum, raised, name), grid = _target(dataset, point, stress), cast(Grid, _lattice_of(stress))
     expected = raised * radial_average(mode_density(modes(spectrum, grid.cell, grid.points), grid), grid).density
     rings = [radial_average(density, grid) for density in periodogram(stress.to_numpy(), grid.cell)]
     fine = np.geomspace(0.4 * rings[0].q[0], rings[0].q[-1], 2000)
@@ -190,7 +191,7 @@ def spectrum_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     if np.max(measured) < 100.0 * np.min(measured):
         style.plain_ticks(panel.yaxis)
     then = f"$t$ = {style.text_of(float(stress['map_time']), 's')}"
-    style.legend(panel, ", ".join(filter(None, [point, then])))
+    style.legend(panel, ", ".join(filter(None, [words, then])))
     below.axhline(1.0, color=style.FLUCTUATIONS)
     below.errorbar(q, measured / expected, error / expected, **dots)
     below.set_ylabel("realised/discretised")

@@ -20,9 +20,8 @@ from sim.laws import jkr, schallamach
 from sim.laws.schallamach import Body
 from sim.parts.bonds.rupture import Rupture
 from sim.plots import style
-from sim.plots.curves import Line, Panel, Scene, contact_curves, over_speed, rest_of, scene_along, series, stacked
+from sim.plots.curves import Line, Panel, Scene, contact_curves, over_speed, rest_of, scene_along, stacked
 from sim.plots.measured import Measured
-from sim.plots.style import number_at
 
 _PREFIX = "bonds_rupture_"
 _BONDS = ("bond_stiffness", "rebinding_rate", "site_density")
@@ -60,24 +59,22 @@ class Population(NamedTuple):
         return float(schallamach.rest_share(self.rupture.law(self.stiffness).at_rest, self.rebinding))
 
 
-def population_of(dataset: xr.Dataset, at: dict[str, int]) -> Population | None:
-    """Return the bonds at a point of the sweep; None if they do not stretch or the dataset lacks their numbers."""
-    keys = [str(name) for name in dataset.variables if str(name).startswith(_PREFIX)]
+def population_of(point: xr.Dataset) -> Population | None:
+    """Return the bonds of a dataset without a sweep; None if they do not stretch or it lacks their numbers."""
+    keys = [str(name) for name in point.variables if str(name).startswith(_PREFIX)]
     with contextlib.suppress(KeyError, ValueError):
-        rupture = _RUPTURE.validate_python({key.removeprefix(_PREFIX): number_at(dataset[key], at) for key in keys})
-        return Population(rupture, *(number_at(setting(dataset, f"bonds.{key}"), at) for key in _BONDS))
+        rupture = _RUPTURE.validate_python({key.removeprefix(_PREFIX): float(point[key]) for key in keys})
+        return Population(rupture, *(float(setting(point, f"bonds.{key}")) for key in _BONDS))
     return None
 
 
-def steady_laws(dataset: xr.Dataset, at: dict[str, int], speed: np.ndarray) -> list[Steady]:
+def steady_laws(point: xr.Dataset, speed: np.ndarray) -> list[Steady]:
     """Return closed forms of the dataset's bonds in steady sliding.
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it.
-    at : dict
-        Index of the point along each dimension of the sweep.
+    point : xarray.Dataset
+        As ``sim run`` writes it, at one point of its sweep.
     speed : array
         V [m/s].
 
@@ -86,7 +83,7 @@ def steady_laws(dataset: xr.Dataset, at: dict[str, int], speed: np.ndarray) -> l
     list of Steady
         Exact, and for Bell's rupture the first-moment closure, too. None for bonds without a stretch.
     """
-    bonds = population_of(dataset, at)
+    bonds = population_of(point)
     if bonds is None:
         return []
     bound, force, _ = bonds.rupture.closed_form(speed, bonds.stiffness, bonds.rebinding)
@@ -130,17 +127,17 @@ def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
 
 def _run(name: str, words: str, si: str) -> Panel:
     """Return a panel of a growing quantity, with a cross at the last record before a trajectory ends."""
-    curves = series(name, words, si)
 
     def panel_of(panel: Axes, scene: Scene) -> None:
-        curves(panel, scene)
+        every = scene.all(f"{name}_mean")
+        factor = style.in_unit(panel.yaxis, words, every, si)
+        contact_curves(panel, scene, name, factor)
         panel.set_yscale("log")
-        for k, line in enumerate(scene.lines):
-            values, drawn = scene.values(f"{name}_mean", line), np.asarray(panel.lines[k].get_ydata())
+        for line, values in zip(scene.lines, factor * every, strict=True):
             known = np.flatnonzero(np.isfinite(values))
             if 0 < known.size < values.size:
                 look: Any = {"color": line.colour, "markersize": 4, "label": "runaway"}
-                panel.plot(scene.x[line.number][known[-1]], drawn[known[-1]], "x", **look)
+                panel.plot(scene.x[line.number][known[-1]], values[known[-1]], "x", **look)
         if name == "slider_position":
             style.legend(panel, scene.title)
 
@@ -195,8 +192,8 @@ def _swings(force: np.ndarray, speed: np.ndarray, edges: np.ndarray) -> np.ndarr
 
 def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
     """Return the stiffness below which steady sliding is unstable [N/m], in mean field for ``rate`` bonds; else nan."""
-    at = dict.fromkeys(sweep_dims(dataset), 0)
-    bonds = population_of(dataset, at)
+    point = dataset.isel(dict.fromkeys(sweep_dims(dataset), 0))
+    bonds = population_of(point)
     if bonds is None:
         return np.full(speed.shape, np.nan)
     mean_field = bool(bonds.pathway) and str(word(dataset, "bonds.model", "").item()) == "rate"
@@ -204,30 +201,28 @@ def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
     bound = bonds.rupture.closed_form(speed, bonds.stiffness, bonds.rebinding).bound / bonds.at_rest
     if mean_field:
         bound = np.asarray(schallamach.first_moment_fraction(speed, *bonds.pathway, bonds.rebinding))
-    less, area, more = (_area(dataset, at, bound * share) for share in (1.0 - _LITTLE, 1.0, 1.0 + _LITTLE))
+    less, area, more = (_area(point, bound * share) for share in (1.0 - _LITTLE, 1.0, 1.0 + _LITTLE))
     growth, firm, contact_growth = (more - less) / (2.0 * _LITTLE * area), np.full(speed.shape, math.inf), 0.0
     if str(word(dataset, "drive.contact_stiffness", "half_space").item()) == "half_space":
         contact_growth = 0.5
-        modulus, ratio = (style.number_at(dataset[f"effective_{n}"], at) for n in ("shear_modulus", "poisson_ratio"))
+        modulus, ratio = (float(point[f"effective_{name}"]) for name in ("shear_modulus", "poisson_ratio"))
         firm = 0.75 * math.pi**2 * modulus * np.sqrt(area / math.pi) / (2.0 - ratio)
     with contextlib.suppress(KeyError):
-        firm = np.full(speed.shape, style.number_at(setting(dataset, "drive.contact_stiffness"), at))
-    mass, damping, viscosity = (
-        style.number_at(setting(dataset, f"drive.{key}"), at) for key in ("mass", "damping", "viscosity")
-    )
+        firm = np.full(speed.shape, float(setting(point, "drive.contact_stiffness")))
+    mass, damping, viscosity = (float(setting(point, f"drive.{key}")) for key in ("mass", "damping", "viscosity"))
     body = Body(area, growth, 0.0, mass, damping, viscosity, firm, contact_growth)
     return np.asarray(onset(speed, bonds.stiffness, bonds.rebinding, bonds.density, body).stiffness)
 
 
-def _area(dataset: xr.Dataset, at: dict[str, int], bound: np.ndarray) -> np.ndarray:
+def _area(point: xr.Dataset, bound: np.ndarray) -> np.ndarray:
     """Return the area of an equilibrium contact at a load at these bond fractions [m²]; nan under other controls."""
     try:
         keys = ("contact.load", "sphere.radius", "adhesion.work", "adhesion.bond_share")
-        load, size, work, share = (style.number_at(setting(dataset, key), at) for key in keys)
+        load, size, work, share = (float(setting(point, key)) for key in keys)
     except KeyError:
         return np.full(bound.shape, np.nan)
-    modulus = style.number_at(dataset["contact_modulus"], at)
-    radius = jkr.radius_at_load(load, work * (1.0 - share + share * bound), size, modulus)
+    work_left = work * (1.0 - share + share * bound)
+    radius = jkr.radius_at_load(load, work_left, size, float(point["contact_modulus"]))
     return np.asarray(math.pi * np.square(radius))
 
 
@@ -345,7 +340,7 @@ def _laws_of(dataset: xr.Dataset, scene: Scene, line: Line) -> list[tuple[np.nda
         fine = np.geomspace(low, high, _CURVE)
     elif scene.scale == "symlog":
         fine = np.append(0.0, np.geomspace(np.min(speeds[speeds > 0.0]), high, _CURVE - 1))
-    return [(fine, law) for law in steady_laws(dataset, line.point, fine)]
+    return [(fine, law) for law in steady_laws(dataset.isel(line.point), fine)]
 
 
 def maximum_of(speed: np.ndarray, stress: np.ndarray) -> int | None:
@@ -385,7 +380,7 @@ class Start(NamedTuple):
     ``resolved`` if the stress falls again and more than three steps lead up to it.
     """
 
-    at: dict[str, int]
+    point: xr.Dataset
     rest: float
     speed: float
     fraction: float
@@ -409,25 +404,20 @@ def starts_of(dataset: xr.Dataset) -> list[Start]:
     """
     varied, starts, times = _varied(dataset), [], dataset["t"].to_numpy()
     for where in np.ndindex(*(dataset.sizes[name] for name in varied)):
-        at = dict.fromkeys(sweep_dims(dataset), 0) | dict(zip(varied, where, strict=True))
-        rest, speed = (style.number_at(setting(dataset, f"drive.{key}"), at) for key in ("rest", "speed"))
+        point = dataset.isel(dict.fromkeys(sweep_dims(dataset), 0) | dict(zip(varied, where, strict=True)))
+        rest, speed = (float(setting(point, f"drive.{key}")) for key in ("rest", "speed"))
         first = int(np.searchsorted(times, rest + 1e-9 * times[-1], "right"))
         if first == times.size:
             continue
-        stress, fraction = (
-            style.mean_of(dataset, name).isel(at, missing_dims="ignore").to_numpy()
-            for name in ("shear_stress", "bond_fraction")
-        )
+        stress, fraction = (style.mean_of(point, name).to_numpy() for name in ("shear_stress", "bond_fraction"))
         k = first + int(np.argmax(np.abs(stress[first:])))
         peak, when, step = abs(stress[k]), times[k], times[1] - times[0]
-        if "peak_stress" in dataset and "member" not in dataset["peak_stress"].dims:
-            peak, when, step = (
-                style.number_at(dataset[name], at) for name in ("peak_stress", "peak_time", "clock_step")
-            )
+        if "peak_stress" in point and "member" not in point["peak_stress"].dims:
+            peak, when, step = (float(point[name]) for name in ("peak_stress", "peak_time", "clock_step"))
         resolved = bool(abs(stress[-1]) < peak and when - rest > _STEPS * step)
         bound, peak = float(fraction[max(first - 1, 0)]), float(np.copysign(peak, speed))
         course = times[first:] - rest, stress[first:]
-        starts.append(Start(at, rest, speed, bound, *course, peak, float(when - rest), resolved))
+        starts.append(Start(point, rest, speed, bound, *course, peak, float(when - rest), resolved))
     return sorted(starts, key=lambda start: (start.rest, abs(start.speed)))
 
 
@@ -440,7 +430,7 @@ def start_figure(dataset: xr.Dataset) -> Figure:
     stresses = np.concatenate([start.stress for start in starts])
     factor = style.in_unit(axes[0].yaxis, r"shear stress $\tau_0$", stresses, "Pa")
     for panel in axes[1:]:
-        _peak_panel(panel, dataset, starts, len(speeds - {0.0}) > 1, factor)
+        _peak_panel(panel, starts, len(speeds - {0.0}) > 1, factor)
     _time_panel(axes[0], longest, factor)
     others = [style.swept_value(dataset, name, 0) for name in style.swept(dataset) if name not in _varied(dataset)]
     style.legend(axes[0], ", ".join([*others, f"after {style.text_of(max(rests), 's')} at rest, sliding at"]))
@@ -460,7 +450,7 @@ def _time_panel(panel: Axes, starts: list[Start], factor: float) -> None:
     style.across(panel, length.factor * ends, length.label("time since the start"), scale)
 
 
-def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over_speed: bool, factor: float) -> None:
+def _peak_panel(panel: Axes, starts: list[Start], over_speed: bool, factor: float) -> None:
     """Draw the peak stress over the speed, one line a rest, or over the rest if there is only one speed.
 
     Thin lines over the speed are closed forms: the peak of Bell bonds if none rebinds, and steady sliding.
@@ -481,12 +471,12 @@ def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over_spee
     if not np.all(resolved):
         panel.plot([], [], "o", color=style.REFERENCE, mfc="white", label="not resolved")
     for start in {start.rest: start for start in starts if over_speed}.values():
-        bonds = population_of(dataset, start.at)
+        bonds = population_of(start.point)
         if bonds and bonds.pathway:
             force = np.asarray(schallamach.start_up_peak(fine, *bonds.pathway).force)
             peak = start.fraction * (bonds.density * bonds.at_rest * force)
             panel.plot(pace.factor * fine, factor * peak, linestyle=":", label="none rebinds", **thin)
-    for law in steady_laws(dataset, starts[0].at, fine)[:1] if over_speed else ():
+    for law in steady_laws(starts[0].point, fine)[:1] if over_speed else ():
         panel.plot(pace.factor * fine, factor * law.stress, label="steady sliding", **thin)
     panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
     words = pace.label("sliding speed $V$" if over_speed else "time at rest")

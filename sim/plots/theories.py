@@ -231,23 +231,20 @@ def shapes_of(dataset: xr.Dataset, time: float | None = None) -> tuple[_Shown, f
     ValueError
         If the member is never in contact, or not at that time.
     """
-    at = style.first_point(dataset)[0]
+    point = dataset.isel(style.first_point(dataset)[0] | {"member": 0}, missing_dims="ignore")
     names = ("contact_radius", "indentation", "shear_stress", "speed")
-    first = {"member": 0} | at
-    radius, depth, stress, speed = (
-        style.recorded(dataset, name).isel(first, missing_dims="ignore").to_numpy() for name in names
-    )
+    radius, depth, stress, speed = (style.recorded(point, name).to_numpy() for name in names)
     if not np.any(radius > 0.0):
         raise ValueError("the contact that would be drawn is never closed; raise the load or the indentation")
     k = int(np.flatnonzero(radius > 0.0)[-1] if time is None else np.abs(dataset["t"].to_numpy() - time).argmin())
     if not radius[k] > 0.0:
         when = style.text_of(float(dataset["t"][k]), "s")
         raise ValueError(f"the contact is open at t = {when}; choose another time")
-    sphere, work = (style.number_at(setting(dataset, key), at) for key in ("sphere.radius", "adhesion.work"))
+    sphere, work = (float(setting(point, key)) for key in ("sphere.radius", "adhesion.work"))
     moduli = ("contact_modulus", "effective_shear_modulus", "effective_poisson_ratio")
-    bodies = (sphere, *(style.number_at(dataset[name], at) for name in moduli))
+    bodies = (sphere, *(float(point[name]) for name in moduli))
     last = Shape(float(radius[k]), float(depth[k]), float(stress[k]), *bodies)
-    full = float(np.ravel(dataset["radius_at_rest"].isel(at))[0])
+    full = float(point["radius_at_rest"])
     shown: _Shown = [(last, {"color": style.BOTH})]
     if full > 0.0:
         rest = Shape(full, float(jkr.indentation_at_radius(full, work, sphere, bodies[1])), 0.0, *bodies)

@@ -146,7 +146,7 @@ def test_a_dataset_of_an_older_version_says_what_it_lacks_and_none_makes_a_figur
         scenario = {"shear": {"spectrum": {"model": model, "file": "secret.csv"}, "amplitude": {}}}
         dataset = xr.Dataset(attrs={"scenario_resolved": json.dumps(scenario)})
         with pytest.raises(ValueError, match="names a file"):
-            field._target(dataset, xr.DataArray(), {})
+            field._target(dataset, dataset, xr.DataArray())
 
 
 @pytest.mark.parametrize("text", ["alice,hunter2\nbob,swordfish\n", "time [s], speed [m/s]\n-31415,hunter2\n"])

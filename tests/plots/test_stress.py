@@ -66,12 +66,12 @@ def test_stress_and_bonds_are_drawn_over_the_speed_beside_the_law_of_every_ruptu
         (Constant(rate=1e4), 9e16 * schallamach.constant_moments(speed, 1e4, 4e-4, 1e5).force),
     ):
         dataset = ramped(bonds.FirstMoment(rupture=rupture, **SITES), clock=short)
-        (law,) = slider.steady_laws(dataset, {}, speed)
+        (law,) = slider.steady_laws(dataset, speed)
         assert_allclose(law.stress, exact, rtol=1e-12)
         plots.draw(dataset, "stress")
     dataset = ramped(sweep={"bonds.rupture.bell_force": [4e-12, 8e-12]}, clock=short)
     for k, force in enumerate((4e-12, 8e-12)):
-        law = slider.steady_laws(dataset, {"bonds_rupture_bell_force": k}, speed)[0]
+        law = slider.steady_laws(dataset.isel(bonds_rupture_bell_force=k), speed)[0]
         assert_allclose(law.stress, schallamach.bell_stress(speed, 1e4, force, 4e-4, 1e5, 9e16), rtol=1e-12)
 
 
