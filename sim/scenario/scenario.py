@@ -23,7 +23,7 @@ from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
 from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
-from sim.scenario.checks import CHECKED, faults_across, remarks_between, rest_radius
+from sim.scenario.checks import faults_across, remarks_between
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
@@ -105,8 +105,7 @@ class Scenario:
 
     def _check_across(self, built: bool = True) -> None:
         """Refuse parts that do not go together; without ``built`` the shear part's process is not tried."""
-        parts = {name: getattr(self, name) for name in CHECKED}
-        across = faults_across(parts | {"radius": self.rest_radius}, built)
+        across = faults_across(self, built)
         faults = [InitErrorDetails(type=PydanticCustomError("across", text), loc=at, input=None) for at, text in across]
         if faults:
             raise ValidationError.from_exception_data("Scenario", faults)
@@ -128,7 +127,8 @@ class Scenario:
     @cached_property
     def rest_radius(self) -> float:
         """Return the contact radius at rest, with all bonds and no fluctuation [m]; nan without equilibrium."""
-        return rest_radius(self.solid, self.sphere, self.adhesion, self.contact)
+        work = np.array([self.adhesion.work])
+        return float(self.contact.equilibrium_radius(work, self.sphere.radius, self.solid.contact_modulus)[0])
 
     @cached_property
     def population(self) -> BondModel:
@@ -180,14 +180,17 @@ class Scenario:
         """Return the sphere and the half-space as the contact sees them."""
         return Bodies(self.sphere.radius, self.solid.contact_modulus, self.solid.effective[1])
 
+    @property
+    def widest(self) -> float:
+        """Return the radius that the contact can reach [m]."""
+        return self.contact.largest_radius(self.adhesion.work, self.sphere.radius, self.solid.contact_modulus)
+
     @cached_property
     def margin(self) -> Shares | None:
         """Return the share of ΔΓ that acts on the edge of a finite contact; None if waves are taken as short."""
         if self.fluctuations.contact == "plane":
             return None
-        bodies = self.sphere.radius, self.solid.contact_modulus
-        widest = self.contact.largest_radius(self.adhesion.work, *bodies)
-        return self.fluctuations.margin(self.solid.effective, self.sphere.radius, widest)
+        return self.fluctuations.margin(self.solid.effective, self.sphere.radius, self.widest)
 
     @cached_property
     def times(self) -> Times:
@@ -245,7 +248,7 @@ class Scenario:
     def remarks(self) -> list[str]:
         """Return one sentence for each assumption, error of the cell and implausible value."""
         remarks = [remark for part in self.chosen for remark in part.remarks(self.setting)]
-        remarks += remarks_between(*self.chosen[1:], self.setting, self.speeds(41), self.varies["shear"])
+        remarks += remarks_between(self)
         if self.ensemble.members > 1 and self.fluctuations.measured and not any(self.varies.values()):
             remarks.append(
                 "the map is the same for all members and seeds, and nothing else is random: one member is enough"

@@ -3,7 +3,7 @@
 import functools
 import html
 from collections.abc import Hashable, Iterable, Iterator
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple, cast, get_args
@@ -92,8 +92,8 @@ def entries(part: Any, prefix: str = "") -> Iterator[Entry]:
     for name, key, quantity in _listed(cast(Hashable, type(part))):
         value = getattr(part, name)
         if is_dataclass(value):
-            yield from () if key == "source" else entries(value, f"{prefix}{key}.")
-        elif quantity is not None:
+            yield from entries(value, f"{prefix}{key}.")
+        else:
             number = value[0] if isinstance(value, tuple) and value else value
             number = isinstance(number, int | float) and not isinstance(number, bool)
             yield Entry(prefix + key, value, quantity if number else None)
@@ -111,14 +111,13 @@ def distinct(points: Iterable[Any]) -> Iterator[tuple[str, Any]]:
 
 
 @functools.cache
-def _listed(table: type) -> list[tuple[str, str, Quantity | None]]:
-    """Return name, key and declaration as a number of each field of a table, None for one that no file gives."""
+def _listed(table: type) -> list[tuple[str, str, Quantity]]:
+    """Return name, key and declaration as a number of each field of a table that a file gives."""
     listed = []
-    for item in sorted(fields(table), key=lambda item: item.name != "model"):
-        field = getattr(table, "__pydantic_fields__", {}).get(item.name)
-        meaning = (field and field.description) or item.name.replace("_", " ")
-        quantity = None if field is None or _is_read(field) else declaration(field) or Quantity("1", meaning)
-        listed.append((item.name, (field and field.alias) or item.name, quantity))
+    for name, field in sorted(getattr(table, "__pydantic_fields__", {}).items(), key=lambda item: item[0] != "model"):
+        if (key := field.alias or name) in keys(table):
+            meaning = field.description or name.replace("_", " ")
+            listed.append((name, key, declaration(field) or Quantity("1", meaning)))
     return listed
 
 
@@ -182,15 +181,14 @@ def write_starter(name: Path) -> Path:
 def json_schema(root: type) -> dict[str, Any]:
     """Return the JSON schema of a scenario file; ``root`` is the class of scenarios."""
     schema = TypeAdapter(root).json_schema(by_alias=True, mode="validation")
-    for table in schema["$defs"].values():
-        if "file" in table["properties"] and "file" not in table.get("required", ()):
-            table["anyOf"] = [{"required": ["file"]}, {"required": table.pop("required")}]
     simplest = [field.default_factory or next(iter(tables(field.annotation).values())) for _, field in all_tables(root)]
     optional = [(model(table), keys(table).keys()) for table in simplest if isinstance(table, type)]
-    for name in _in_unions(schema):  # there the model tells the tables apart; only the simplest may leave it out
-        table = schema["$defs"][name]
-        name_of_model = table["properties"].get("model", {}).get("const")
-        if name_of_model is not None and (name_of_model, table["properties"].keys()) not in optional:
+    for table in schema["$defs"].values():
+        properties = table["properties"]
+        if "file" in properties and "file" not in table.get("required", ()):
+            table["anyOf"] = [{"required": ["file"]}, {"required": table.pop("required")}]
+        word = properties.get("model", {}).get("const")
+        if word and (word, properties.keys()) not in optional:  # only the simplest table may leave its model out
             table["required"] = ["model", *table.get("required", ())]
     schema["properties"].pop("source", None)
     schema["properties"]["sweep"] = {
@@ -198,13 +196,3 @@ def json_schema(root: type) -> dict[str, Any]:
         "anyOf": [{"type": "object"}, {"type": "array", "items": {"type": "object"}}],
     }
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "sim scenario"}
-
-
-def _in_unions(node: Any) -> set[str]:
-    """Return the names of the tables that a schema tells apart by their model."""
-    if isinstance(node, list):
-        return set().union(*map(_in_unions, node))
-    if not isinstance(node, dict):
-        return set()
-    options = [option["$ref"] for option in node.get("oneOf", ()) if "$ref" in option]
-    return set().union(*map(_in_unions, node.values())) | {reference.rsplit("/", 1)[-1] for reference in options}
