@@ -85,10 +85,8 @@ def lacking(dataset: xr.Dataset) -> str:
         return ""
     recorded = {re.sub("_(mean|std|sem)$", "", str(name)) for name in dataset.variables}
     lost = [statement for name, statement in _STATEMENTS.items() if name not in recorded]
-    version = dataset.attrs["sim_version"]
-    return (
-        f"made by sim {version}, which did not record all: no {', no '.join(lost)}; run anew for these" if lost else ""
-    )
+    text = f"made by sim {dataset.attrs['sim_version']}, which did not record all"
+    return f"{text}: no {', no '.join(lost)}; run anew for these" if lost else ""
 
 
 def with_trajectories(dataset: xr.Dataset, *names: str) -> xr.Dataset:

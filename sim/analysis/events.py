@@ -215,7 +215,9 @@ def _means(dataset: xr.Dataset, half: float, several_speeds: bool) -> xr.Dataset
     first, last = first.where(has_many, half), last.where(has_many, end)
     path = abs(dataset["stage_position"].diff("t")).cumsum("t").reindex(t=dataset["t"], fill_value=0.0)
     slid = abs(dataset["slider_position"].astype(float).diff("t")).cumsum("t").reindex(t=dataset["t"], fill_value=0.0)
-    work, gone, went = (_between(dataset, values, first, last) for values in (dataset["drive_work"], path, slid))
+    ends = xr.concat([first, last], "end")
+    series = (dataset["drive_work"], path, slid)
+    work, gone, went = (_growth(values, dataset["t"], ends).isel(end=0) for values in series)
     kinetic = labelled(work / gone.where(went > 0.5 * gone), "N", "work of the stage over its path")
     every = means.drop_vars(["slip_time", "slip_speed"]).assign(slip_count=counts, kinetic_friction=kinetic)
     return every.assign(_between_speeds(dataset, each_slip) if several_speeds else {}).map(ordered, keep_attrs=True)
@@ -300,12 +302,10 @@ def runaways(dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset({name: values.drop_vars("t") for name, values in result.items()})
 
 
-def _between(dataset: xr.Dataset, values: xr.DataArray, first: xr.DataArray, last: xr.DataArray) -> xr.DataArray:
-    """Return the growth of a quantity from one time to another."""
-    values = values.astype(float).broadcast_like(dataset["spring_force"])
-    dims: Any = {"input_core_dims": [[], ["t"], ["t"]], "vectorize": True}
-    before, after = (xr.apply_ufunc(np.interp, time, dataset["t"], values, **dims) for time in (first, last))
-    return after - before
+def _growth(series: xr.DataArray, times: xr.DataArray, ends: xr.DataArray) -> xr.DataArray:
+    """Return the growth of a series between neighbouring times ``ends``, which have the dimension ``end``."""
+    dims: Any = {"input_core_dims": [["end"], ["t"], ["t"]], "output_core_dims": [["end"]], "vectorize": True}
+    return xr.apply_ufunc(np.interp, ends, times, series.astype(float), **dims).where(ends.notnull()).diff("end")
 
 
 # --- jumps of the speed, and the way to sliding ---
@@ -421,9 +421,8 @@ def way_to_sliding(dataset: xr.Dataset) -> xr.Dataset:
 
 def _pulled(speed: np.ndarray, force: np.ndarray, area: np.ndarray) -> tuple[float, ...]:
     """Return the numbers of ``way_to_sliding`` of one trajectory."""
-    slowed = np.flatnonzero(np.diff(np.abs(speed)) < 0.0) + 1
-    turned = np.flatnonzero(speed[1:] * speed[:-1] < 0.0) + 1
-    force = np.abs(force[: min([*slowed[:1], *turned[:1], len(force)])])
+    slowed, turned = np.diff(np.abs(speed)) < 0.0, speed[1:] * speed[:-1] < 0.0
+    force = np.abs(force[: 1 + np.argmax(np.append(slowed | turned, True))])
     top, alpha = incipient_law(force, area)
     known = force[0] <= _REST * force[top] and np.nanmin(force[top:]) < (1.0 - _ROUNDING) * force[top]
     if not (known and area[top] < (1.0 - _ROUNDING) * area[0]):
@@ -525,15 +524,10 @@ def _openings(dataset: xr.Dataset) -> xr.Dataset:
     if "detachment_time" not in dataset:
         return xr.Dataset()
     first = dataset["detachment_time"].astype(float).fillna(np.inf).min("t")  # the latest opening so far never falls
-    ever = first < np.inf
-    return xr.Dataset(
-        {
-            "ever_detached": pure(ever.astype(float), "contacts that detached"),
-            "first_detachment": labelled(
-                first.where(ever), "s", "time of the first detachment, of the contacts that detached", "t_d"
-            ),
-        }
-    )
+    ever, text = first < np.inf, "time of the first detachment, of the contacts that detached"
+    result = {"ever_detached": pure(ever.astype(float), "contacts that detached")}
+    result["first_detachment"] = labelled(first.where(ever), "s", text, "t_d")
+    return xr.Dataset(result)
 
 
 def _masks(dataset: xr.Dataset) -> xr.Dataset:
@@ -703,13 +697,13 @@ def _loops(dataset: xr.Dataset, suffix: str, count: int) -> xr.Dataset:
     period = setting(dataset, "clock.duration") / cycles.where(cycles >= 1.0)
     put_in = done.fillna(0.0).cumsum("t")
     rounding = _NOTHING * abs(put_in).max("t")
-    missing = _per_cycle(done.isnull().cumsum("t").astype(float), period, dataset["t"], count)
+    missing = _per_cycle(done.isnull().cumsum("t"), period, dataset["t"], count)
     result = {}
     for name, series, text in (
         ("loop_energy", put_in, "closed integral of the load over the displacement"),
         ("loop_dissipation", dataset[f"dissipated_energy{suffix}"], "energy dissipated by opening and closing"),
     ):
-        values = _per_cycle(series.astype(float), period, dataset["t"], count).where(missing == 0.0)
+        values = _per_cycle(series, period, dataset["t"], count).where(missing == 0.0)
         values = values.where(~(abs(values) < rounding), 0.0)
         result[f"{name}{suffix}"] = values.assign_attrs(units="J", long_name=f"{text}, over a cycle", symbol="")
     return xr.Dataset(result, {"cycle": ("cycle", np.arange(1, count + 1), {"long_name": "number of the cycle"})})
@@ -726,7 +720,5 @@ def _per_cycle(series: xr.DataArray, period: xr.DataArray, times: xr.DataArray, 
     """Return the growth of a series in each cycle; nan beyond the last one."""
     ends = period * xr.DataArray(np.arange(count + 1), dims="end")
     ends = ends.where(ends <= times[-1] + 1e-6 * period)
-    dims: Any = {"input_core_dims": [["end"], ["t"], ["t"]], "output_core_dims": [["end"]]}
-    at = xr.apply_ufunc(np.interp, ends, times, series, vectorize=True, **dims).where(ends.notnull())
-    gained = at.diff("end").rename(end="cycle").assign_coords(cycle=np.arange(1, count + 1))
+    gained = _growth(series, times, ends).rename(end="cycle").assign_coords(cycle=np.arange(1, count + 1))
     return gained.transpose(..., *(name for name in (MEMBERS, "cycle") if name in gained.dims))

@@ -217,10 +217,8 @@ def charges(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dat
         first, later = _charged_first(dataset), shares["lost_to_fluctuations"]
         shares = shares.assign(lost_to_fluctuations_first=first)
         if names is None or not _DIFFERENCES.isdisjoint(names):
-            last = pure(
-                shares["lost_to_bonds"] + later - first,
-                "share of JKR's area lost to broken bonds, after the fluctuations",
-            )
+            last, text = shares["lost_to_bonds"] + later - first, "share of JKR's area lost to broken bonds"
+            last = pure(last, f"{text}, after the fluctuations")
             more = pure(first - later, "what fluctuations take more if they are charged first")
             return shares.assign(lost_to_bonds_last=last, order_of_charging=more)
     return shares

@@ -22,8 +22,8 @@ from sim.analysis.dataset import (
 from sim.analysis.observables import labelled, observables, reference_radii
 from sim.analysis.statistics import LEVEL, of_second_half, over_members
 
-#: Shares of JKR's area whose loss has a speed.
-LOSSES = (0.05, 0.5)
+#: Shares of JKR's area whose loss has a speed [%].
+LOSSES = (5, 50)
 #: Observables whose curves over the speed are wanted, unless others are named.
 _CURVES = ("contact_area", "friction_force", "shear_stress")
 #: Groups of members that are left out in turn, and means of them, at most.
@@ -163,10 +163,7 @@ def loss_speeds(dataset: xr.Dataset) -> xr.Dataset:
         return xr.Dataset()
     radii = reference_radii(dataset)
     hertz = (radii["radius_hertz"] / radii["radius_jkr"]) ** 2
-    levels = [
-        (f"speed_at_{100.0 * loss:.0f}_percent_lost", 1.0 - loss + 0.0 * hertz, f"{100.0 * loss:.0f} % of JKR's")
-        for loss in LOSSES
-    ]
+    levels = [(f"speed_at_{k}_percent_lost", 1.0 - 0.01 * k + 0.0 * hertz, f"{k} % of JKR's") for k in LOSSES]
     levels.append(("speed_halfway_to_hertz", 0.5 * (1.0 + hertz), "half of what it can, down to Hertz's"))
     groups, sizes = _group_means(dataset, along)
     dims, result = [[along], ["group", along], ["group"], [along]], {}

@@ -167,14 +167,7 @@ def covariance_of(values: np.ndarray, mean: np.ndarray | float, free: float) -> 
     return scipy.fft.irfft(total, 2 * length)[:lags] / (free * np.arange(records, records - lags, -1))
 
 
-class Inflation(NamedTuple):
-    """Number of records that count as one independent value, and the degrees of freedom of that estimate."""
-
-    records: float
-    freedom: float
-
-
-def inflation(covariance: np.ndarray, members: int, records: int) -> Inflation:
+def inflation(covariance: np.ndarray, members: int, records: int) -> tuple[float, float]:
     """Return the variance of a mean over correlated records, in that of a mean over as many independent ones.
 
     Parameters
@@ -186,7 +179,7 @@ def inflation(covariance: np.ndarray, members: int, records: int) -> Inflation:
 
     Returns
     -------
-    Inflation
+    records, freedom : float
         ``1 + 2 sum of the autocorrelation`` over records up to Sokal's window (see ``integral_time``), and the degrees
         of freedom of a variance that is estimated with it, ``n/(2W + 1)``; nan where there is no window.
 
@@ -196,15 +189,15 @@ def inflation(covariance: np.ndarray, members: int, records: int) -> Inflation:
     156 (2004) 143).
     """
     if not covariance[0] > 0.0:
-        return Inflation(math.nan, math.nan)
+        return math.nan, math.nan
     sums = 2.0 * np.cumsum(covariance / covariance[0]) - 1.0
     windows = np.flatnonzero(np.arange(len(sums)) >= 0.5 * _WINDOW * sums)
     if len(windows) == 0:
-        return Inflation(math.nan, math.nan)
+        return math.nan, math.nan
     window, free = int(windows[0]), max(members - 1, 1)
     wide = (2.0 * window + 1.0) / records
     ratio = max(float(sums[window]), 1.0 / records) * (1.0 + wide if members == 1 else 1.0)
-    return Inflation(ratio, free / wide)
+    return ratio, free / wide
 
 
 def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
@@ -231,13 +224,10 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
             times[:, *point] = integral_time(values.astype(float, copy=False), step)
     about = "integral correlation time of the fluctuation energy"
     texts = {"": about, "_sem": f"standard error of the {about}", "_below": f"upper limit of the {about}"}
-    described = zip(texts.items(), times, strict=True)
-    return xr.Dataset(
-        {
-            f"correlation_time{suffix}": labelled(sweep.copy(data=numbers), "s", text, "" if suffix else "t_c")
-            for (suffix, text), numbers in described
-        }
-    )
+    result = xr.Dataset()
+    for (suffix, text), numbers in zip(texts.items(), times, strict=True):
+        result[f"correlation_time{suffix}"] = labelled(sweep.copy(data=numbers), "s", text, "" if suffix else "t_c")
+    return result
 
 
 # --- members, at each time and sweep value ---
@@ -309,15 +299,15 @@ def where(dataset: xr.Dataset, chosen: Mapping[str, Any]) -> xr.Dataset:
         if swept.dtype.kind in "fi":
             unit = swept.attrs.get("units", "1")
             wanted = read_option(value, key, unit)
-            near = int(np.abs(swept.to_numpy() - wanted).argmin())
-            is_known = abs(float(swept[near]) - wanted) <= _NEAR * abs(wanted)
+            off = np.abs(swept.to_numpy() - wanted)
+            places = np.flatnonzero(off <= min(off.min(), _NEAR * abs(wanted)))
             known = [engineering(float(f"{number:.4g}"), unit) for number in swept.to_numpy()]
         else:
             known = [str(text) for text in swept.to_numpy()]
-            is_known, near = value in known, known.index(value) if value in known else 0
-        if not is_known:
+            places = np.flatnonzero([text == value for text in known])
+        if not places.size:
             raise BadInput([f"{key} has no value {value}; there are: {', '.join(known)}"])
-        dataset = dataset.isel({name: [near]})
+        dataset = dataset.isel({name: places[:1]})
     return dataset
 
 
@@ -707,20 +697,18 @@ def _errors(
     means : array, shape (quantities, points, members)
     spreads : array, shape (quantities, points)
     inflated : array, shape (quantities, points, 2)
-        See ``Inflation``.
+        See ``inflation``.
     count : array, shape (points,)
         Number of values.
     """
     known, (records, freedom) = np.isfinite(means), np.moveaxis(inflated, -1, 0)
     members = known.sum(axis=-1)
-    if known.all():
-        std = means.std(axis=-1, ddof=1) if means.shape[-1] > 1 else np.full(spreads.shape, np.nan)
-    else:
-        center = np.nansum(means, axis=-1, keepdims=True) / members[..., np.newaxis]
-        std = np.sqrt(np.nansum((means - center) ** 2, axis=-1) / np.where(members > 1, members - 1.0, np.nan))
+    free = np.where(members > 1, members - 1.0, np.nan)
+    center = np.nansum(means, axis=-1, keepdims=True) / members[..., np.newaxis]
+    std = np.sqrt(np.nansum((means - center) ** 2, axis=-1) / free)
     of_series = freedom > members - 1.0
     errors = np.where(of_series, spreads * np.sqrt(records / count * (1.0 + records / count)), std / np.sqrt(members))
-    return errors, np.where(of_series, freedom, np.where(members > 1, members - 1.0, np.nan))
+    return errors, np.where(of_series, freedom, free)
 
 
 def distribution(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
@@ -842,9 +830,7 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
     half = low = high = np.nan
     if np.any(happened) and np.all(np.isfinite(watched)):
         half, low, high = _halves(watched, happened)
-    count, exposure, tail = float(happened.sum()), float(np.sum(watched)), 0.5 - 0.5 * LEVEL
-    if not exposure > 0.0:
-        return Lifetime(half, low, high, np.nan, np.nan, np.nan)
+    count, exposure, tail = float(happened.sum()), float(np.sum(watched)) or np.nan, 0.5 - 0.5 * LEVEL
     least = special.gammaincinv(count, tail) if count else 0.0
     most = special.gammaincinv(count + 1.0, 1.0 - tail)
     return Lifetime(half, low, high, count / exposure, least / exposure, most / exposure)
@@ -882,14 +868,13 @@ def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
     level : float
         In the unit of the observable.
     """
-    above = observable.reset_coords(drop=True).astype(float) - level
+    above = observable.drop_vars("t").reset_coords(drop=True).astype(float) - level
     side = np.sign(above.isel(t=0))
     crossed = (above * side <= 0.0) & (side != 0.0)
     at = crossed.argmax("t")
-    before, after, times = above.isel(t=(at - 1).clip(0)), above.isel(t=at), observable["t"]
-    ends = times.isel(t=(at - 1).clip(0)), times.isel(t=at)
-    share = (before / (before - after).where(before != after)).drop_vars("t", errors="ignore")
-    first, last = (end.drop_vars("t", errors="ignore") for end in ends)
+    times = observable["t"].drop_vars("t")
+    (before, first), (after, last) = ((above.isel(t=k), times.isel(t=k)) for k in ((at - 1).clip(0), at))
+    share = before / (before - after).where(before != after)
     passage = (first + share * (last - first)).where(crossed.any("t"))
     passage = passage.where(side != 0.0, float(times[0]))
     text = f"time at which the {observable.attrs.get('long_name', observable.name)} first crosses {level:.6g}"
@@ -899,12 +884,9 @@ def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
 def half_lives(dataset: xr.Dataset, event_times: xr.Dataset) -> xr.Dataset:
     """Return median times of first detachment and masking from ``events``, and rates if the run is stationary."""
     result = xr.Dataset()
-    for event, name, words in (
-        ("first_detachment", "detached", "detached"),
-        ("first_masked", "masked", "had their adhesion masked"),
-    ):
-        if event in event_times:
-            result.update(lifetimes(dataset, event_times[event], name, words))
+    happened = {"first_detachment": ("detached", "detached"), "first_masked": ("masked", "had their adhesion masked")}
+    for event, words in happened.items():
+        result.update(lifetimes(dataset, event_times[event], *words) if event in event_times else {})
     return result if is_stationary(dataset) else result.drop_vars([name for name in result if "_rate" in str(name)])
 
 

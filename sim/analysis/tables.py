@@ -101,9 +101,7 @@ _EVENTS = (
     _Column("peak_friction", "peak of\nfriction"),
     _Column("peak_friction_speed", "at V ", math.nan),
     _Column("peak_friction_time", "after ", math.nan),
-    _Column(
-        "direct_effect", "direct\neffect", math.nan, meaning="rise of friction at the first jump to a higher speed"
-    ),
+    _Column("direct_effect", "direct\neffect", math.nan, meaning="rise of friction at the first jump of the speed"),
     _Column("step_overshoot", "over-\nshoot", math.nan, meaning="then, over the level at which friction settles"),
     _Column("step_length", "settled\nwithin", math.nan, meaning="sliding distance until 1/e of the overshoot is left"),
     _Column("static_threshold", "static\nthreshold", math.nan, meaning="largest force on the way to sliding"),
@@ -441,9 +439,8 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         as it was before.
     """
     columns, frames = _frames(dataset)
-    units = {str(name): variable.attrs.get("units", "1") for name, variable in dataset.coords.items()} | {
-        "speed": "m/s"
-    }
+    units = {str(name): variable.attrs.get("units", "1") for name, variable in dataset.coords.items()}
+    units["speed"] = "m/s"
     header = [name if units.get(name, "1") == "1" else f"{name} [{units[name]}]" for name in columns]
     with output(Path(path)) as beside, beside.open("w", encoding="utf-8", newline="") as file:
         for names in (header, *[False] * (len(frames) - 1)):
@@ -471,9 +468,7 @@ def _frames(dataset: xr.Dataset) -> tuple[list[str], list[pd.DataFrame]]:
     members, half = (averaging(dataset, late).removeprefix("mean over the ") or "one run" for late in (False, True))
     late = is_stationary(dataset) and "contact_radius" in dataset
     spread = distribution(dataset) if late else xr.Dataset()  # first, as it keeps trajectories until it ends
-    timed = statistics(dataset)
-    groups = [(timed[[name for name in timed if "t" in timed[name].dims]], members), (once(dataset), members)]
-    groups.append((as_means(loss_speeds(dataset)), members))
+    groups = [(over_members(dataset), members), (once(dataset), members), (as_means(loss_speeds(dataset)), members)]
     with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
         groups.append((shares(dataset), members))
     groups.append((spread, half))
@@ -493,10 +488,7 @@ def _long(dataset: xr.Dataset, group: xr.Dataset, key: str, over: str) -> pd.Dat
         speed = speed_of(dataset)
         speed = speed if "t" in dims else speed.isel(t=0, drop=True).where(steady_points(dataset))
         columns |= {"speed": speed} if set(speed.dims) <= set(dims) else {}
-    if dims:
-        rows = xr.Dataset(columns).to_dataframe(dim_order=dims).reset_index()
-    else:
-        rows = pd.DataFrame([{column: float(values) for column, values in columns.items()}])
+    rows = xr.Dataset(columns).expand_dims("row").to_dataframe(dim_order=["row", *dims]).reset_index()
     texts = {"quantity": name, "unit": group[key].attrs.get("units", "1"), "over": over}
     alike = np.zeros(len(rows), int)
     return rows.assign(**{column: pd.Categorical.from_codes(alike, [text]) for column, text in texts.items()})

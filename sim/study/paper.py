@@ -335,8 +335,7 @@ def _masking() -> Iterator[Row]:
         yield f"masking amplitude, L = {length} mm", "Sec. 4", amplitude, closed
         yield "... in kPa, as printed", "Sec. 4", amplitude / 1e3, printed, 0.5 / printed
     across = halfspace.masking_amplitude(WORK, WIDTH / WAVES, SHEAR, math.pi / 2)
-    closed = 4.0 * math.sqrt(np.pi * WAVES * SHEAR * WORK / WIDTH)
-    yield "... of a ripple across, L = 0.24 mm (not in the paper)", "45", across, closed / math.sqrt(2.0)
+    yield "... of a ripple across, L = 0.24 mm (not in the paper)", "45", across, lens / math.sqrt(2.0)
     yield "a masked contact is Hertz's", "47", contact, HERTZ_AT_LOAD
 
 
