@@ -9,7 +9,7 @@ import platform
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, cast
 
@@ -35,7 +35,6 @@ from sim.ensemble.store import (
 from sim.ensemble.variables import DISC_ENERGIES, LARGEST, MAP, VARIABLES, Variable
 from sim.laws.halfspace import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import DiskFull, OutputExists, StoreTrouble, claim, explained
-from sim.numerics.grid import Lattice
 from sim.numerics.hdf5 import located
 from sim.parts.drive import READINGS
 from sim.parts.shear.maps import CarriedProcess
@@ -58,7 +57,6 @@ BESIDE = (".parts", ".log")
 _LOCKS = 100
 #: Steps that are computed together at most, up to the next record.
 _STEPS = 1024
-_LARGEST = {variable.name for variable in LARGEST}
 
 
 def run(
@@ -168,8 +166,8 @@ def _run(
             busy += [number for number in some if number not in numbers]
             for number in numbers if resume else ():
                 for task in tasks[number - 1 :: of]:
-                    for name, shapes in zip(task.names, _shapes(task), strict=True):
-                        folder.blocks.drop_damaged(name, shapes)
+                    for name in task.names:
+                        folder.blocks.drop_damaged(name)
             simulate(plan, folder.blocks, of=of, shards=numbers, **how)
     if busy and (shard != WHOLE or of == 1):
         raise folder.refusal(lock_of(busy[0], of))
@@ -214,26 +212,6 @@ def advance(task: Task, number: int, state: State | None) -> tuple[State, Arrays
     if len(recorded) == 1:  # without a copy, as maps may be large
         return end, {key: values[np.newaxis] for key, values in recorded[0].items()}
     return end, {key: np.stack([arrays[key] for arrays in recorded]) for key in recorded[0]}
-
-
-def _shapes(task: Task) -> Iterator[dict[str, tuple[int, ...]]]:
-    """Yield the names and shapes of what each block of a task records, as ``advance`` makes them."""
-    point, members = task.points[0], len(task.members)
-    rows = {name: ((3 if task.pooled else members) if name in task.each else 1) for name in task.quantities}
-    drawn = int(np.sum(task.members < point.record.map_members))
-    for block in task.blocks:
-        shapes: dict[str, tuple[int, ...]] = {}
-        for name in task.quantities:
-            if name not in _LARGEST:
-                shapes[name] = (len(task.points), rows[name], len(block.records))
-            elif block.end == point.clock.steps:
-                shapes[name] = (len(task.points), rows[name])
-        for place, step in enumerate(snapshots(point)):
-            if drawn and block.start < step <= block.end:
-                shapes[f"{MAP[0]}@{place}"] = (1, drawn, *cast(Lattice, point.map_lattice).shape)
-                if point.margin is not None:
-                    shapes |= {f"{name}@{place}": (1, drawn) for name, *_ in DISC_ENERGIES}
-        yield shapes
 
 
 def _record(task: Task, point: Scenario, state: State | None, block: Block) -> tuple[State, dict[str, np.ndarray]]:

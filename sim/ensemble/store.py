@@ -8,12 +8,13 @@ without a manifest of ours is not touched, nor is any file in it that a run did 
 
 import contextlib
 import errno
+import hashlib
 import json
 import os
 import re
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,18 +27,15 @@ from sim.units.errors import BadInput
 
 Arrays = dict[str, np.ndarray]
 Manifest = dict[str, Any]
-#: Names and shapes of what a block records.
-Shapes = Mapping[str, tuple[int, ...]]
-
 #: Number of a shard, from 1, and how many there are.
 Shard = tuple[int, int]
 WHOLE: Shard = (1, 1)
 
-_MANIFEST, _DATASET, _LOCK, _STATE, _STATES = "manifest.json", "dataset.nc", "output.lock", "state.", "states"
+_MANIFEST, _DATASET, _LOCK, _STATE, _SEAL = "manifest.json", "dataset.nc", "output.lock", "state.", "seal"
 _SHARD = re.compile(r"([1-9][0-9]{0,5})/([1-9][0-9]{0,5})")
 #: Names of the files that a run makes in its folder, whole or on the way.
 _OURS = re.compile(r"manifest\.json|dataset\.nc|.*\.(lock|held)(\..+)?|point\d+-group\d+-block\d+\.npz|\..*\.tmp")
-_FORMAT, _OLDER = "parts of a run of sim, 3", "parts of a run of sim, 2"
+_FORMAT = "parts of a run of sim, 4"
 #: Seconds for which a run that begins waits while another one begins.
 _PATIENCE = 10.0
 _MOST_NAMED, _LONGEST = 5, 40
@@ -90,9 +88,14 @@ class MemoryBlocks(dict[str, Arrays]):
 
 @dataclass(frozen=True)
 class BlockFiles:
-    """Blocks as files of a folder, each with the state at its end."""
+    """Blocks of a run as files of a folder, each with the state at its end.
+
+    A block is sealed by a text of the run and of its names and shapes, because a zip file may lack entries or be that
+    of another run.
+    """
 
     folder: Path
+    run: str = ""
 
     def path(self, name: str) -> Path:
         return self.folder / f"{name}.npz"
@@ -102,45 +105,37 @@ class BlockFiles:
 
     def save(self, name: str, arrays: Arrays, state: Arrays) -> None:
         """Write a block, whole or not at all."""
-        states: dict[str, Any] = {f"{_STATE}{key}": values for key, values in state.items()}
+        content = arrays | {f"{_STATE}{key}": values for key, values in state.items()}
+        sealed: dict[str, Any] = content | {_SEAL: np.array(self._seal(content))}
         with explained(self.folder), whole(self.path(name)) as aside, aside.open("wb") as file:
-            np.savez(file, **{**arrays, **states, _STATES: np.array(len(states))})
+            np.savez(file, **sealed)
+
+    def _seal(self, content: Arrays) -> str:
+        return str([self.run, *sorted((key, values.shape) for key, values in content.items())])
 
     def load(self, name: str) -> Arrays:
         """Return what a block recorded."""
-        return self._read(name, lambda key: key != _STATES and not key.startswith(_STATE))
+        return self._read(name, lambda key: key != _SEAL and not key.startswith(_STATE))
 
     def state(self, name: str) -> Arrays:
         """Return the state at the end of a block."""
         states = self._read(name, lambda key: key.startswith(_STATE))
         return {key.removeprefix(_STATE): values for key, values in states.items()}
 
-    def drop_damaged(self, name: str, shapes: Shapes) -> None:
-        """Remove a block that is not readable to its last byte, or has other names or shapes than those of the plan."""
-        try:
-            with self._opened(name) as file:
-                count = sum(key.startswith(_STATE) for key in file)
-                damaged = file.zip.testzip() is not None or int(file[_STATES]) != count
-            recorded = self.load(name)
-            damaged = damaged or {key: values.shape for key, values in recorded.items()} != dict(shapes)
-        except FileNotFoundError:
-            return
-        except Exception:  # a damaged file raises whatever its reader meets
-            damaged = True
-        if damaged:
-            with explained(self.folder):
-                self.path(name).unlink()
-
-    @contextlib.contextmanager
-    def _opened(self, name: str) -> Iterator[Any]:
-        with self.path(name).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-            yield arrays
+    def drop_damaged(self, name: str) -> None:
+        """Remove a block that is not readable to its last byte, or not as this run has saved it."""
+        with contextlib.suppress(StoreTrouble):
+            content = self._read(name, lambda key: True)
+            if str(content.pop(_SEAL, "")) == self._seal(content):
+                return
+        with explained(self.folder):
+            self.path(name).unlink(missing_ok=True)
 
     def _read(self, name: str, wanted: Callable[[str], bool]) -> Arrays:
         try:
-            with self._opened(name) as file:
-                return {key: file[key] for key in file if wanted(key)}
-        except Exception as trouble:
+            with self.path(name).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+                return {key: arrays[key] for key in arrays if wanted(key)}
+        except Exception as trouble:  # a damaged file raises whatever its reader meets
             cure = "go on with --resume, which computes it anew"
             raise StoreTrouble(f"{self.path(name)} is damaged; {cure}") from trouble
 
@@ -164,8 +159,8 @@ class Unfinished:
     """
 
     def __init__(self, target: Path, run: Manifest, order: list[str], read: Callable[[Path], Manifest]) -> None:
-        self.target, self.folder, self.blocks = target, parts_of(target), BlockFiles(parts_of(target))
-        self.run, self.order, self.read = run, order, read
+        self.target, self.folder, self.run, self.order, self.read = target, parts_of(target), run, order, read
+        self.blocks = BlockFiles(self.folder, hashlib.sha256(json.dumps(run, sort_keys=True).encode()).hexdigest())
 
     def begin(self, shard: Shard, resume: bool, replace: bool, names: Iterable[str]) -> int:
         """Begin a run or take up one; return the number of its shards, 0 if the output is there already.
@@ -185,13 +180,13 @@ class Unfinished:
             older, exists = self._manifest(), self.target.exists()
             finished = self.read(self.target) if resume and exists else {}
             manifest = {"format": _FORMAT, "replace": exists, "shards": shard[1]}
-            manifest |= {"run": self.run, "code": digest().hex(), "sweep": self.order}
+            manifest |= self.run | {"code": digest().hex(), "sweep": self.order}
             if resume and finished == self.run and not older:
                 return 0
             if resume and older:
                 refuse_other(self.folder, older, manifest | ({"shards": older["shards"]} if shard == WHOLE else {}))
             elif resume and exists:
-                refuse_other(self.target, {"run": finished}, {"run": self.run})
+                refuse_other(self.target, finished, self.run)
             joins = shard != WHOLE and older and not _changed(older, manifest)
             if older and not (resume or replace or (joins and not any(name in self.blocks for name in names))):
                 cure = "go on with --resume, or begin anew with --force"
@@ -202,7 +197,7 @@ class Unfinished:
                 for name in names if replace else ():
                     self.blocks.path(name).unlink(missing_ok=True)
                 return int(older["shards"])
-            if older and self._busy(range(1, older["shards"] + 1), older["shards"]):
+            if older and self._busy(older["shards"]):
                 raise self.refusal()
             with explained(self.folder):
                 self._clean()
@@ -229,7 +224,7 @@ class Unfinished:
             manifest = self._manifest()
             if not manifest:
                 return None
-            if not all(name in self.blocks for name in names) or self._busy(range(1, of + 1), of):
+            if not all(name in self.blocks for name in names) or self._busy(of):
                 return False
             dataset = self.folder / _DATASET
             with explained(self.folder), whole(dataset) as aside:
@@ -254,17 +249,15 @@ class Unfinished:
                 text += f"; if that process was killed on another computer, delete {path}"
         return OutputBusy(text)
 
-    def _busy(self, numbers: Iterable[int], of: int) -> list[int]:
-        """Return the numbers of those shards that another process holds."""
-        busy = []
-        for number in numbers:
+    def _busy(self, of: int) -> bool:
+        """True if another process holds a shard."""
+        for number in range(1, of + 1):
             path = self.folder / lock_of(number, of)
             if path.exists():
-                if lock := _lock(path):
-                    lock.release()
-                else:
-                    busy.append(number)
-        return busy
+                if not (lock := _lock(path)):
+                    return True
+                lock.release()
+        return False
 
     def _manifest(self) -> Manifest:
         """Return the manifest of the folder; empty if there is none, or a damaged one."""
@@ -273,17 +266,10 @@ class Unfinished:
         except (FileNotFoundError, RecursionError, ValueError):
             return {}
         known = isinstance(manifest, dict) and manifest.get("format") == _FORMAT
-        return manifest if known and manifest.keys() >= {"run", "shards", "replace"} else {}
+        return manifest if known and manifest.keys() >= {"scenario", "shards", "replace"} else {}
 
     def _refuse_foreign(self) -> None:
-        """Refuse a folder that no run made, or a run of an older version."""
-        for path in (self.folder / _MANIFEST, *self.folder.glob(f"*-of-*/{_MANIFEST}")):
-            version = None
-            with contextlib.suppress(OSError, ValueError, TypeError, LookupError):
-                older = json.loads(read_whole(path))
-                version = older["run"]["version"]["sim"] if older["format"] == _OLDER else None
-            if version:
-                raise OutputExists(_older(self.folder, version))
+        """Refuse a folder that no run made, or a run of another format."""
         inside = os.listdir(self.folder)
         foreign = any(not _OURS.fullmatch(name) for name in inside)
         if _MANIFEST in inside:  # a manifest that is gone by now is of a run that was done meanwhile
@@ -357,7 +343,8 @@ def refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
     """Refuse to go on with another scenario, other versions or other code, naming what differs."""
     changed = _changed(older, wanted)
     if "version.sim" in changed:
-        raise BadInput([_older(path, changed["version.sim"][0])])
+        version = _short(changed["version.sim"][0])
+        raise BadInput([f"{path} was made by sim {version}: finish it there, or move it away and run anew"])
     if changed:
         some = [f"{key} was {_short(was)}, is {_short(now)}" for key, (was, now) in changed.items()]
         more = f" and {len(some) - _MOST_NAMED} more" if len(some) > _MOST_NAMED else ""
@@ -367,15 +354,8 @@ def refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
 
 def _changed(older: Manifest, wanted: Manifest) -> dict[str, tuple[Any, Any]]:
     """Return the entries before and now that differ between two manifests and decide the numbers, by dotted key."""
-    was, now = (
-        _flat(manifest.get("run")) | {key: manifest.get(key) for key in ("code", "shards", "sweep") if key in manifest}
-        for manifest in (older, wanted)
-    )
+    was, now = (_flat(manifest | {"format": "", "replace": ""}) for manifest in (older, wanted))
     return {key: (was.get(key), now.get(key)) for key in sorted({*was, *now}) if was.get(key) != now.get(key)}
-
-
-def _older(path: Path, version: Any) -> str:
-    return f"{path} was made by sim {_short(version)}: finish it there, or move it away and run anew"
 
 
 def _short(value: Any) -> str:

@@ -3,8 +3,8 @@
 import errno
 import functools
 import itertools
-import json
 import os
+import shutil
 import signal
 import sys
 import threading
@@ -18,8 +18,8 @@ import xarray as xr
 from click.testing import CliRunner
 from helpers import scenes
 from helpers.cases import posix
-from helpers.parts import Clock, Record, Slip, shear
-from helpers.scenes import CELL, LOADS, LOADS_AND_SHARES, SPECTRUM, scene
+from helpers.parts import Clock
+from helpers.scenes import LOADS, LOADS_AND_SHARES, scene
 
 from sim.cli import cli
 from sim.ensemble import plan as plans, simulate as ensemble, store
@@ -140,31 +140,18 @@ def test_blocks_that_are_there_are_not_computed_again(tmp_path, monkeypatch):
     assert len(done) == sum(len(task.names) for task in Plan.of(sample()).tasks()) - 3
 
 
-MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=2 * CELL, points=24, correlation=Slip(length=3e-6), contact="disc")
-SCENES = {
-    "members": sample(), "pooled": sample(record=Record(per_member=False)), "short runs together": sample(steps=1),
-    "maps": sample(shear=MAPPED, record=Record(maps=(8e-3, 1e-3), map_members=3)),
-    "blocks in a record": sample(clock=Clock(duration=9e-3, step=1e-3, record=9e-3)),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("scenario", SCENES.values(), ids=SCENES)
-def test_the_plan_knows_names_and_shapes_of_every_block(tmp_path, scenario):
-    blocks = BlockFiles(tmp_path)
-    ensemble.simulate(Plan.of(scenario), blocks)
-    for task in Plan.of(scenario).tasks():
-        for name, shapes in zip(task.names, ensemble._shapes(task), strict=True):
-            blocks.drop_damaged(name, shapes)
-            assert name in blocks
-
-
 def harmed(block, how):
-    """Harm a block: bytes changed or cut, a name or a shape changed, a state lost."""
+    """Harm a block: bytes changed or cut, a name or a shape changed, a state lost, or a block of another run."""
     content = block.read_bytes()
     with np.load(block) as file:
         arrays = dict(file)
     first, state = next(iter(arrays)), next(key for key in arrays if key.startswith("state."))
     harms = {"cut": content[:-9], "empty": b"", "changed": content[:999] + b"xyz" + content[1002:]}
+    if how == "foreign":
+        other = stopped(block.parent.with_name("other.nc"), sample(seed=6))
+        (other / block.name).replace(block)
+        shutil.rmtree(other)
+        return
     if how in harms:
         block.write_bytes(harms[how])
         return
@@ -177,7 +164,7 @@ def harmed(block, how):
     np.savez(block, **arrays)
 
 
-@pytest.mark.parametrize("how", ["cut", "empty", "changed", "shape", "name", "state", "pickle"])
+@pytest.mark.parametrize("how", ["cut", "empty", "changed", "shape", "name", "state", "pickle", "foreign"])
 def test_a_damaged_block_is_computed_anew(tmp_path, how):
     path = tmp_path / "out.nc"
     folder = stopped(path, after=3)
@@ -193,11 +180,11 @@ def test_a_damaged_block_is_computed_anew(tmp_path, how):
 def test_no_flipped_byte_of_a_block_is_silent(tmp_path):
     blocks, task = BlockFiles(tmp_path), next(Plan.of(sample()).tasks())
     ensemble.simulate(Plan.of(sample()), blocks)
-    path, shapes = blocks.path(task.names[0]), next(ensemble._shapes(task))
+    path = blocks.path(task.names[0])
     content, numbers = path.read_bytes(), blocks.load(task.names[0]) | blocks.state(task.names[0])
     for place in range(0, len(content), 23):
         path.write_bytes(content[:place] + bytes([content[place] ^ 1 << place % 8]) + content[place + 1 :])
-        blocks.drop_damaged(task.names[0], shapes)
+        blocks.drop_damaged(task.names[0])
         if task.names[0] in blocks:  # such as a flip in the time of an entry
             read = blocks.load(task.names[0]) | blocks.state(task.names[0])
             assert read.keys() == numbers.keys()
@@ -273,18 +260,18 @@ def test_a_run_that_replaces_an_output_and_is_stopped_goes_on_and_a_finished_one
     assert names(tmp_path) == ["out.nc"]
 
 
-def test_runs_of_an_older_version_are_named(tmp_path, monkeypatch):
+def test_runs_of_an_older_version_are_named_and_folders_of_another_format_stay(tmp_path, monkeypatch):
     path = ensemble.run(sample(), tmp_path / "out.nc")
     with monkeypatch.context() as patched, pytest.raises(BadInput, match=r"made by sim .*: finish it there"):
         patched.setattr("sim.ensemble.dataset._version", lambda name: "9.9")
         ensemble.run(sample(), path, resume=True)
     for folder in ("old.nc.parts", "shards.nc.parts/1-of-2"):
         (tmp_path / folder).mkdir(parents=True)
-        manifest = {"format": store._OLDER, "run": {"version": {"sim": "0.2.0"}}}
-        (tmp_path / folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+        (tmp_path / folder / "manifest.json").write_text('{"format": "another"}', encoding="utf-8")
     for name in ("old.nc", "shards.nc"):
-        with pytest.raises(OutputExists, match=r"made by sim 0.2.0: finish it there"):
-            ensemble.run(sample(), tmp_path / name, resume=True)
+        with pytest.raises(OutputExists, match="is not the folder of a run; move it away"):
+            ensemble.run(sample(), tmp_path / name, replace=True)
+        assert list((tmp_path / f"{name}.parts").rglob("manifest.json"))
 
 
 @posix
