@@ -28,6 +28,8 @@ import pathlib
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from sim.units.errors import BadInput
+
 if TYPE_CHECKING:  # what a function needs is imported where it is called, so that importing the package costs nothing
     import pandas
     import xarray
@@ -38,9 +40,9 @@ if TYPE_CHECKING:  # what a function needs is imported where it is called, so th
     from sim.study.fit import Fit
 
 Path = str | os.PathLike[str]
-_FROM = {"BadInput": "sim.units.errors", "Scenario": "sim.scenario.scenario", "load": "sim.scenario.reader"}
+_FROM = {"Scenario": "sim.scenario.scenario", "load": "sim.scenario.reader"}
 _FOLDERS = ("analysis", "laws", "plots", "report", "spectrum")
-__all__ = sorted([*_FROM, *_FOLDERS, "check", "converge", "fit", "open", "plot", "run", "stats"])
+__all__ = sorted([*_FROM, *_FOLDERS, "BadInput", "check", "converge", "fit", "open", "plot", "run", "stats"])
 
 
 def run(
@@ -82,7 +84,6 @@ def run(
     """
     from sim.ensemble import simulate
     from sim.ensemble.plan import Plan, work
-    from sim.units.errors import BadInput
     from sim.units.terminal import Shown, progress_bar
 
     scene = _scene(scenario)
@@ -164,7 +165,6 @@ def plot(
         The figure, whose ``axes`` are its panels, or the axes given.
     """
     from sim.plots.kinds import Choices, draw, save
-    from sim.units.errors import BadInput
 
     if unknown := choices.keys() - {*Choices._fields}:
         raise BadInput([f"{sorted(unknown)[0]}: is no choice of a figure; there are: {', '.join(Choices._fields)}"])
@@ -235,13 +235,10 @@ def _scene(scenario: "Scenario | Path | dict[str, Any]") -> "Scenario":
 def _plainly(function: Callable[..., Any], dataset: "xarray.Dataset | Path", where: dict[str, Any] | None) -> Any:
     """Return the result of a function of a dataset, or of a file with one; its faults become ``BadInput``."""
     from sim.analysis.statistics import where as chosen
-    from sim.units.errors import BadInput
 
     try:
-        if isinstance(dataset, str | os.PathLike):
-            with open(dataset) as opened:
-                return function(chosen(opened, where or {}))
-        return function(chosen(dataset, where or {}))
+        with open(dataset) if isinstance(dataset, str | os.PathLike) else contextlib.nullcontext(dataset) as opened:
+            return function(chosen(opened, where or {}))
     except BadInput:
         raise
     except ValueError as fault:

@@ -80,11 +80,15 @@ class _Group:
 
 
 class _Team(NamedTuple):
-    """An executor with the number of blocks that it takes at once; ``far`` if it does not reach the store."""
+    """An executor with the number of blocks that it takes at once.
+
+    ``far`` is true if it does not reach the store. It raises ``killed`` for a block whose workers died again and again.
+    """
 
     executor: Any
     room: Callable[[], int]
     far: bool = False
+    killed: tuple[type[Exception], ...] = ()
 
 
 class _Here(concurrent.futures.Executor):
@@ -180,7 +184,7 @@ def _work_off(
                 except concurrent.futures.BrokenExecutor:
                     is_broken = True
                     chain.broken += 1
-                except _killed_on_cluster():
+                except team.killed:
                     chain.broken = _TRIES
                 else:
                     number, chain.broken = chain.missing.pop(), 0
@@ -305,7 +309,7 @@ def _end_with(parent: int) -> None:
 def _cluster(address: str) -> Iterator[_Team]:
     """Give the workers of a dask scheduler; if the scheduler goes away, there is one message."""
     try:
-        from distributed import CancelledError, Client  # slow to import
+        from distributed import CancelledError, Client, KilledWorker  # slow to import
         from distributed.comm import CommClosedError, resolve_address
     except ImportError:
         raise BadInput(["--scheduler needs dask.distributed; install sliding-sim[cluster]"]) from None
@@ -324,15 +328,9 @@ def _cluster(address: str) -> Iterator[_Team]:
 
     with client, client.as_current():
         try:
-            yield _Team(client.get_executor(pure=False), room, far=True)
+            yield _Team(client.get_executor(pure=False), room, far=True, killed=(KilledWorker,))
         except (CancelledError, concurrent.futures.CancelledError, CommClosedError):
             raise lost from None
-
-
-def _killed_on_cluster() -> tuple[type[Exception], ...]:
-    """Return the exception by which dask gives up a block whose workers died again and again, if dask is loaded."""
-    distributed = sys.modules.get("distributed")
-    return (distributed.KilledWorker,) if distributed else ()
 
 
 @contextlib.contextmanager

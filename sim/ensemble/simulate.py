@@ -20,18 +20,7 @@ from sim.ensemble.dataset import attributes, attributes_of, identity, in_memory,
 from sim.ensemble.execute import compute
 from sim.ensemble.plan import Block, Plan, Task, snapshots
 from sim.ensemble.preview import fitting, refuse_full_disk
-from sim.ensemble.store import (
-    WHOLE,
-    Arrays,
-    BlockFiles,
-    Blocks,
-    MemoryBlocks,
-    OutputBusy,
-    Shard,
-    Stopped,
-    Unfinished,
-    lock_of,
-)  # fmt: skip
+from sim.ensemble.store import WHOLE, Arrays, BlockFiles, Blocks, MemoryBlocks, OutputBusy, Shard, Stopped, Unfinished
 from sim.ensemble.variables import DISC_ENERGIES, LARGEST, MAP, VARIABLES, Variable
 from sim.laws.halfspace import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import DiskFull, OutputExists, StoreTrouble, claim, explained
@@ -47,10 +36,6 @@ from sim.units.terminal import note
 Progress = Callable[[int], None]
 
 
-def ignore(done: int) -> None:
-    """No progress is shown."""
-
-
 #: Ends of the names of what a run makes beside its output.
 BESIDE = (".parts", ".log")
 #: Shards of which a run holds the locks at once: systems limit the number of open files.
@@ -61,7 +46,7 @@ _STEPS = 1024
 
 def run(
     scenario: Scenario, to: str | os.PathLike | None = None, *, replace: bool = False, resume: bool = False,
-    jobs: int = 1, progress: Progress = ignore, stage: Callable[[str], None] = lambda name: None,
+    jobs: int = 1, progress: Progress = lambda done: None, stage: Callable[[str], None] = lambda name: None,
     stop: Callable[[], bool] = lambda: False, shard: Shard = WHOLE, scheduler: str = "", memory: float = math.inf,
 ) -> Any:  # fmt: skip
     """Run a scenario with its ensemble and its sweep.
@@ -170,7 +155,7 @@ def _run(
                         folder.blocks.drop_damaged(name)
             simulate(plan, folder.blocks, of=of, shards=numbers, **how)
     if busy and (shard != WHOLE or of == 1):
-        raise folder.refusal(lock_of(busy[0], of))
+        raise folder.refusal(busy[0], of)
     stage("writing")
     is_done = folder.publish(names, of, lambda path: write(outline(plan), folder.blocks, path))
     if is_done is False and shard == WHOLE:
@@ -180,8 +165,8 @@ def _run(
 
 
 def simulate(
-    plan: Plan, blocks: Blocks, progress: Progress = ignore, stop: Callable[[], bool] = lambda: False, jobs: int = 1,
-    scheduler: str = "", shards: Iterable[int] = (1,), of: int = 1,
+    plan: Plan, blocks: Blocks, progress: Progress = lambda done: None, stop: Callable[[], bool] = lambda: False,
+    jobs: int = 1, scheduler: str = "", shards: Iterable[int] = (1,), of: int = 1,
 ) -> None:  # fmt: skip
     """Advance every group of members at every point of the sweep, or those of some shards, and save each block.
 

@@ -241,8 +241,12 @@ class Unfinished:
                 self._clean()
             return True
 
-    def refusal(self, name: str = _LOCK) -> OutputBusy:
-        """Return the error for a lock that another process holds; one that a file stands in for may be abandoned."""
+    def refusal(self, *shard: int) -> OutputBusy:
+        """Return the error if another process holds the lock of the output, or of a shard.
+
+        A lock that a file stands in for may be abandoned.
+        """
+        name = lock_of(*shard) if shard else _LOCK
         text = f"another run is writing {self.target}; wait for it or name another output"
         for path in (self.folder / name, (self.folder / name).with_suffix(".held")):
             if path.exists() and path.stat().st_size:  # such a file names its process

@@ -3,7 +3,6 @@
 import concurrent.futures
 import importlib
 import time
-from collections.abc import Callable
 
 from sim.ensemble.execute import pool
 from sim.numerics import jit
@@ -21,31 +20,26 @@ def missing() -> list[str]:
 
 
 def compile_missing(jobs: int | None) -> str:
-    """Compile what is not in the cache; return a text about it.
+    """Compile what is not in the cache in some processes, by default one a core; return a text about it.
 
     Raises
     ------
     StoreTrouble
         If code could not be stored.
     """
+    import loky  # slow to import
+
     began, lacking = time.monotonic(), missing()
     if lacking:
-        with progress_bar(len(lacking), "kernels") as shown:
-            compile_all(lacking, jobs, shown.advance)
+        processes = min(jobs or loky.cpu_count(), len(lacking))
+        with progress_bar(len(lacking), "kernels") as shown, pool(processes) as executor:
+            for future in concurrent.futures.as_completed([executor.submit(_compile, name) for name in lacking]):
+                future.result()
+                shown.advance(1)
     if left := sum(not jit.cached(name) for name in lacking):
         raise StoreTrouble(f"{left} kernels could not be stored; set SIM_CACHE_DIR to a folder that can be written")
     took = f" in {time.monotonic() - began:.0f} s" if lacking else ""
     return f"{len(lacking)} of {len(jit.compiled)} kernels and laws compiled{took}; the others were there"
-
-
-def compile_all(names: list[str], jobs: int | None, progress: Callable[[int], None]) -> None:
-    """Compile kernels and laws into the cache in some processes, by default one a core."""
-    import loky  # slow to import
-
-    with pool(min(jobs or loky.cpu_count(), len(names))) as executor:
-        for future in concurrent.futures.as_completed([executor.submit(_compile, name) for name in names]):
-            future.result()
-            progress(1)
 
 
 def _compile(name: str) -> None:

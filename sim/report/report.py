@@ -9,7 +9,6 @@ import shlex
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
-from xml.etree import ElementTree as Tree
 
 import matplotlib as mpl
 import numpy as np
@@ -20,19 +19,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.path import Path as Outline
 
-from sim.analysis import (
-    averaging,
-    concise,
-    engineering,
-    highlights,
-    is_stationary,
-    is_steady,
-    notes,
-    setting,
-    speed_of,
-    sweep_dims,
-    table,
-)
+from sim.analysis import averaging, highlights, is_stationary, is_steady, notes, setting, speed_of, sweep_dims, table
 from sim.analysis.dataset import claim, speed_name
 from sim.analysis.statistics import over_members
 from sim.numerics import hdf5
@@ -43,7 +30,7 @@ from sim.plots.measured import Measured, Residuals
 from sim.plots.style import STYLE
 from sim.scenario.files import toml
 from sim.units.errors import BadInput
-from sim.units.notation import scaled
+from sim.units.notation import concise, engineering, scaled
 from sim.units.terminal import plain
 
 #: Measured points: a CSV table, or columns in SI by name.
@@ -73,8 +60,10 @@ _SPEEDS = 4
 _CORNERS = 300
 #: Inks of figures that follow the page from light to dark.
 _INKS = {"#000000": "currentColor", "#ffffff": "var(--paper)"}
-_NUMBER = re.compile(r"\d+\.\d{3,}")
-_REFERENCE = re.compile(r"url\(#([^)]+)\)")
+#: Text of matplotlib's SVG that a page lacks: the head with its namespaces and style, comments, space between elements.
+_LEFT_OUT = {r".*</style>\s*</defs>": "", "<!--.*?-->": "", r">\s+<": "><", r"\s+": " ", "xlink:": ""}
+_COORDINATES, _NUMBER = re.compile(r' (?:d|x|y)="[^"]*"'), re.compile(r"\d+\.\d{3,}")
+_REFERENCE = re.compile(r'(\bid="|href="#|url\(#)')
 
 
 class Drawing(NamedTuple):
@@ -108,9 +97,10 @@ def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
     # is a curve already; only bonds with a rupture law have a maximum of the stress, which transients after steps
     # between few speeds do not show, nor many springs upon each other
     lasts = is_stationary(dataset)
+    has_peak = any(str(name).startswith("bonds_rupture") for name in dataset.variables)
     less = {"sweep": best in ("theories", "curve") or not lasts, "friction": best in ("creep", "stability")}
     less["curve"] = best == "creep"  # whose speed nothing sets
-    less["stress"] = best != "stress" and (best == "stability" or _steps(dataset) or not _rupture(dataset))
+    less["stress"] = best != "stress" and (best == "stability" or _steps(dataset) or not has_peak)
     # time is no more than another axis for a speed that rises or for creep, and nothing happens in it where a run lasts
     less["time"] = best in ("curve", "creep", "stability") or (best != "time" and lasts and "incipient" not in could)
     shown = [best, *(kind for kind in others if not less.get(kind, False))]
@@ -118,14 +108,13 @@ def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
     if data is None or any(each.measured for each in drawings):
         return drawings
     refusals = []
-    for kind in (kind for kind in could if kind not in shown and "data" in kinds.KINDS[kind].takes):
-        try:
-            return [_with_data(dataset, kind, "f-data-", data), *drawings]
-        except ValueError as fault:
-            refusals.append(str(fault))
-    for kind in (kind for kind in shown if "data" in kinds.KINDS[kind].takes):
-        _with_data(dataset, kind, "", data)  # refuses it
-    raise ValueError(refusals[0] if refusals else "no figure of this run can have measured points")
+    for kind in dict.fromkeys([*shown, *could]):
+        if "data" in kinds.KINDS[kind].takes:
+            try:
+                return [_with_data(dataset, kind, "f-data-", data), *drawings]
+            except ValueError as fault:
+                refusals.append(fault)
+    raise refusals[0] if refusals else ValueError("no figure of this run can have measured points")
 
 
 def _drawing(dataset: xr.Dataset, kind: str, prefix: str, data: Data | None) -> Drawing:
@@ -146,10 +135,6 @@ def _with_data(dataset: xr.Dataset, kind: str, prefix: str, data: Data) -> Drawi
     svg = svg_of(kinds.draw(dataset, kind, Choices(data=measured)), prefix)
     hint = f"{HINTS.get(kind, '')} Rings are measured points."
     return Drawing(kind, kinds.KINDS[kind].shows, hint, svg, measured=measured)
-
-
-def _rupture(dataset: xr.Dataset) -> bool:
-    return any(str(name).startswith("bonds_rupture") for name in dataset.variables)
 
 
 def _steps(dataset: xr.Dataset) -> bool:
@@ -174,31 +159,16 @@ def svg_of(figure: Figure, prefix: str) -> str:
     for panel in figure.axes:
         _thin(panel)
     figure.savefig(content, format="svg", transparent=True, dpi=fineness)  # of images within it
-    root = Tree.fromstring(content.getvalue())
-    for parent in list(root.iter()):
-        for child in [child for child in parent if child.tag.endswith(("}metadata", "}style"))]:
-            parent.remove(child)
-    for element in root.iter():
-        element.tag = element.tag.rpartition("}")[2]
-        element.text = element.tail = None
-        for key, value in list(element.attrib.items()):
-            del element.attrib[key]
-            name = key.rpartition("}")[2]
-            if name == "id":
-                value = prefix + value
-            elif name == "href" and value.startswith("#"):
-                value = f"#{prefix}{value[1:]}"
-            elif name in ("d", "x", "y"):
-                value = _NUMBER.sub(lambda match: f"{float(match[0]):.2f}", " ".join(value.split()))
-            elif name in ("style", "clip-path"):
-                value = _REFERENCE.sub(rf"url(#{prefix}\1)", value)
-                for ink, colour in _INKS.items():
-                    value = value.replace(ink, colour)
-            element.set(name, value)
+    text = content.getvalue().decode()
+    for pattern, replacement in _LEFT_OUT.items():
+        text = re.sub(pattern, replacement, text, flags=re.DOTALL)
+    text = _COORDINATES.sub(lambda match: _NUMBER.sub(lambda number: f"{float(number[0]):.2f}", match[0]), text)
+    text = _REFERENCE.sub(rf"\1{prefix}", text)
+    for ink, colour in _INKS.items():
+        text = text.replace(ink, colour)
     width, height = 72.0 * figure.get_size_inches()
-    root.attrib = {"viewBox": f"0 0 {width:g} {height:g}", "role": "img", "fill": "currentColor"}
-    root.set("style", f"min-width: {0.9 * width:.0f}px; max-width: {1.9 * width:.0f}px")
-    return Tree.tostring(root, encoding="unicode")
+    style = f"min-width: {0.9 * width:.0f}px; max-width: {1.9 * width:.0f}px"
+    return f'<svg viewBox="0 0 {width:g} {height:g}" role="img" fill="currentColor" style="{style}">{text}'
 
 
 def _thin(panel: Axes) -> None:

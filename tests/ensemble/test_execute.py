@@ -318,8 +318,8 @@ def test_every_kernel_and_law_of_the_sources_is_compiled_once(cold, monkeypatch)
     monkeypatch.setenv("SIM_CACHE_DIR", str(cold))
     assert set(missing) - set(warm.missing()) == set(SOME)
     before = {path: path.stat().st_mtime_ns for path in cold.rglob("*") if path.is_file()}
-    warm.compile_all(SOME, 1, (done := []).append)
-    assert done == [1, 1, 1]
+    monkeypatch.setattr(warm, "missing", lambda: SOME)
+    warm.compile_missing(1)
     assert {path: path.stat().st_mtime_ns for path in cold.rglob("*") if path.is_file()} == before
 
 
