@@ -113,16 +113,12 @@ def same_unit(first: Any, last: Any) -> tuple[float, float, str | None] | None:
     >>> same_unit("10 um/s", "3 mm/s")
     (10.0, 3000.0, 'um/s')
     """
-    numbers = [float(number) for number in (first, last) if isinstance(number, int | float) and math.isfinite(number)]
-    if len(numbers) == 2:
-        return numbers[0], numbers[1], None
-    parts = [part for text in (first, last) if isinstance(text, str) and (part := _split(text))]
-    if len(parts) < 2 or not all(math.isfinite(number) for number, _ in parts):
-        return None
-    (low, unit), (high, other) = parts
-    with contextlib.suppress(ValueError):
-        scale = 1.0 if unit == other else _scale(other, unit) if unit and other else None
-        return (low, _times(high, scale), unit) if scale else None
+    ends: Any = [_split(end) if isinstance(end, str) else (end, None) for end in (first, last)]
+    with contextlib.suppress(TypeError, ValueError):  # of what is no number, and of an unknown unit
+        (low, unit), (high, other) = ends
+        scale = 1.0 if unit == other else _scale(other, unit)
+        if scale and math.isfinite(low) and math.isfinite(high):
+            return float(low), float(_times(high, scale)), unit
     return None
 
 
@@ -177,8 +173,9 @@ class Quantity:
         number = self._parse(value) if isinstance(value, str) and not self.whole else self._number(value)
         if not self.whole and not math.isfinite(number):
             raise _fault(f"must be finite; write for example {self.example}")
-        for name, bound in self._bounds.items():
-            if not _BOUNDS[name][1](number, bound):
+        for name, (_, holds) in _BOUNDS.items():
+            bound = getattr(self, name)
+            if not holds(number, bound):
                 unit = "" if self.unit == "1" else f" {self.unit}"
                 raise _fault(f"must be {name.replace('_', ' ')} {_digits(bound)}{unit}, not {_digits(number)}{unit}")
         if abs(number) > _LARGEST or (self.above >= 0.0 and number < _SMALLEST):
@@ -189,7 +186,25 @@ class Quantity:
 
     def scaled(self, numbers: Any, unit: str) -> Any:
         """Return numbers, or an array of them, in SI; without a unit they are in SI. Bounds are not checked."""
-        return _times(numbers, self._factor(unit)) if unit else numbers
+        if not unit:
+            return numbers
+        shown, cure = unit[:40], f"write for example {self.example}"
+        try:
+            scale = _scale(unit, self.unit)
+        except ValueError:
+            raise _fault(f'has the unknown unit "{shown}"; {cure}') from None
+        if scale is None:
+            wanted = "a pure number" if self.unit == "1" else self.unit
+            reasons = [f": {reason}" for other, reason in self.mistaken if _scale(unit, other) is not None]
+            reasons.append(f", which is not a unit of {wanted}; {cure}")
+            raise _fault(f'has the unit "{shown}"{reasons[0]}')
+        if self.unit.startswith("rad/") and not _ANGLES.search(unit):
+            length = next(iter(re.findall(r"[A-Za-zµμ]+", unit)), "m")
+            raise _fault(
+                f'has the unit "{shown}", which may count radians or cycles: write "rad/{length}" for 2 pi over the'
+                f' wavelength, "cycles/{length}" for 1 over it'
+            )
+        return _times(numbers, scale)
 
     def _number(self, value: Any) -> float:
         """Return a number that is none of text."""
@@ -214,28 +229,6 @@ class Quantity:
             raise _fault(f"is text without a unit; write for example {self.example}, or a bare number in {self.unit}")
         return self.scaled(number, unit)
 
-    def _factor(self, unit: str) -> float:
-        """Return the factor from a unit to SI."""
-        shown, cure = unit[:40], f"write for example {self.example}"
-        try:
-            scale = _scale(unit, self.unit)
-        except ValueError:
-            raise _fault(f'has the unknown unit "{shown}"; {cure}') from None
-        if scale is None:
-            reasons = [reason for other, reason in self.mistaken if _scale(unit, other) is not None]
-            wanted = "a pure number" if self.unit == "1" else self.unit
-            raise _fault(
-                f'has the unit "{shown}"'
-                + (f": {reasons[0]}" if reasons else f", which is not a unit of {wanted}; {cure}")
-            )
-        if self.unit.startswith("rad/") and not _ANGLES.search(unit):
-            length = next(iter(re.findall(r"[A-Za-zµμ]+", unit)), "m")
-            raise _fault(
-                f'has the unit "{shown}", which may count radians or cycles: write "rad/{length}" for 2 pi over the'
-                f' wavelength, "cycles/{length}" for 1 over it'
-            )
-        return scale
-
     @property
     def example(self) -> str:
         """Return an admissible value as it is written in a scenario file."""
@@ -249,12 +242,8 @@ class Quantity:
         inside = next((number for number in numbers if self._holds(number)), 1.0)
         return f"{inside:g}" if self.unit == "1" else f'"{inside:g} {self.unit}"'
 
-    @functools.cached_property
-    def _bounds(self) -> dict[str, float]:
-        return {name: getattr(self, name) for name in _BOUNDS}
-
     def _holds(self, number: float) -> bool:
-        return all(_BOUNDS[name][1](number, bound) for name, bound in self._bounds.items())
+        return all(holds(number, getattr(self, name)) for name, (_, holds) in _BOUNDS.items())
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         written = core_schema.plain_serializer_function_ser_schema(int if self.whole else float)
@@ -264,7 +253,8 @@ class Quantity:
         described: dict[str, Any] = {"type": ["number", "string"], "description": f"{self.meaning} [{self.unit}]"}
         if self.whole:
             described = {"type": "integer", "description": self.meaning}
-        described |= {_BOUNDS[name][0]: bound for name, bound in self._bounds.items() if math.isfinite(bound)}
+        bounds = {word: getattr(self, name) for name, (word, _) in _BOUNDS.items()}
+        described |= {word: bound for word, bound in bounds.items() if math.isfinite(bound)}
         example: Any = self.example.strip('"')
         return described | {"examples": [64 if self.whole else float(example) if self.unit == "1" else example]}
 

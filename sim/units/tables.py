@@ -176,6 +176,10 @@ def _numbers(
     name: str, table: _Cells, cells: Sequence[str], unit: str, quantity: Quantity, gaps: bool = False
 ) -> Array:
     """Return cells of a table as numbers in SI."""
+
+    def fault(place: int, reason: str) -> TableError:
+        return TableError(f"line {table.lines[place * len(table.lines) // len(cells)]}: {name} {reason}")
+
     if table.comma and any("," in cell for cell in cells):
         if any("." in cell for cell in cells):
             raise TableError(f'{name} has numbers with "." and with ","; write all decimals with a point')
@@ -184,17 +188,12 @@ def _numbers(
         numbers = quantity.scaled(np.fromiter(map(float, cells), float, len(cells)), unit)
     except ValueError:
         place = next(place for place, cell in enumerate(cells) if "," in cell or not _is_number(cell))
-        line = table.lines[place * len(table.lines) // len(cells)]
-        raise TableError(
-            f"line {line}: {name} is not a number; write decimals with a point, or leave the row out"
-        ) from None
+        raise fault(place, "is not a number; write decimals with a point, or leave the row out") from None
     for place in () if gaps else (numbers.argmin(), numbers.argmax()):  # the first nan is both
         try:
             quantity.read(float(numbers[place]))
-        except ValueError as fault:
-            line = table.lines[place * len(table.lines) // len(cells)]
-            reason = re.split("; |, not ", str(fault))[0]  # without the number, as a scenario may name any file
-            raise TableError(f"line {line}: {name} {reason}") from None
+        except ValueError as refusal:  # shown without the number, as a scenario may name any file
+            raise fault(place, re.split("; |, not ", str(refusal))[0]) from None
     return numbers
 
 
@@ -644,15 +643,12 @@ def _measured_columns(text: str, known: Mapping[str, Quantity], outcomes: Mappin
         cure = f'write "{bare[0]} [{wanted[bare[0]].unit}]" if that is its unit'
         raise TableError(f'column "{bare[0]}" has no unit where others have one; {cure}')
     arrays = columns(text, wanted)
-    points = {}
-    for name in (name for name in arrays if name in known):
-        values, errors = arrays[name], arrays.get(name + ERROR)
-        if errors is not None and wanted[name + ERROR].unit != known[name].unit:
-            errors = errors * np.abs(values)  # a share of the value
-        if errors is not None and not np.all(errors > 0.0):
-            raise TableError(f'column "{name}" has a value of 0, whose relative error says nothing; give it in units')
-        points[name] = Points(values, errors)
-    return points
+    for base in (name for name in outcomes if {name, name + ERROR} <= wanted.keys()):
+        if wanted[base + ERROR].unit != outcomes[base].unit:  # a share of the value
+            arrays[base + ERROR] *= np.abs(arrays[base])
+        if not np.all(arrays[base + ERROR] > 0.0):
+            raise TableError(f'column "{base}" has a value of 0, whose relative error says nothing; give it in units')
+    return {name: Points(values, arrays.get(name + ERROR)) for name, values in arrays.items() if name in known}
 
 
 def _unknown(name: str, known: Iterable[str]) -> str:
