@@ -89,7 +89,7 @@ def check_waist(scenario, state, members):
         assert value.shape == ((members,) if scenario.varies[part] else (1,)), part
     work = balance_of(scenario, state)
     assert_allclose(state.contact.work, np.broadcast_to(work, state.contact.work.shape), rtol=1e-13, atol=1e-16)
-    control = scenario.contact.control(scenario.clock.time(state.step), scenario.clock.duration)
+    control = scenario.contact.control(scenario.times.at(state.step), scenario.clock.duration)
     hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, scenario.bodies)
     closed = np.isfinite(state.contact.radius)
     if np.isfinite(hertz[0]):
@@ -136,8 +136,8 @@ def test_every_depth_runs_with_every_depth(name):
 
 def test_time_is_never_accumulated():
     scenario = scene(1, 1000)
-    assert scenario.clock.time(1000) == scenario.clock.duration
-    assert math.isclose(scenario.clock.time(333), 0.333, rel_tol=1e-15)
+    assert scenario.times.at(1000) == scenario.clock.duration
+    assert math.isclose(scenario.times.at(333), 0.333, rel_tol=1e-15)
 
 
 @pytest.mark.parametrize("steps", [1000, pytest.param(1_000_000, marks=pytest.mark.verify)])

@@ -35,7 +35,7 @@ def faults_across(scene: "Scenario", built: bool = True) -> Faults:
     except (PydanticCustomError, ValidationError) as fault:
         yield ("shear",), fault.message() if isinstance(fault, PydanticCustomError) else fault.errors()[0]["msg"]
         return
-    for check in (_too_short, _cannot_be_driven, _no_stress, _no_forces, _implausible, _wrong_maps):
+    for check in (_too_short, _cannot_be_driven, _lacks_bonds, _implausible, _wrong_maps):
         yield from check(scene)
     yield from _shear_faults(scene, built)
     yield from _off_the_map(scene)
@@ -65,25 +65,20 @@ def _cannot_be_driven(scene: "Scenario") -> Faults:
             yield ("bonds", "stress"), "is 0 Pa, so that a drive would feel nothing; give the stress of the bonds"
 
 
-def _no_stress(scene: "Scenario") -> Faults:
-    shear = scene.fluctuations
-    if shear.reads_stress and not scene.population.carries_stress and not shear.spectrum.bond_made:
-        fault = 'amplitude model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
-        yield ("shear", "amplitude"), fault
-
-
-def _no_forces(scene: "Scenario") -> Faults:
-    spectrum, bonds = scene.fluctuations.spectrum, scene.population
-    if not spectrum.bond_made:
-        return
-    if not bonds.knows_forces:
+def _lacks_bonds(scene: "Scenario") -> Faults:
+    shear, bonds = scene.fluctuations, scene.population
+    if not shear.spectrum.bond_made:
+        if shear.reads_stress and not bonds.carries_stress:
+            fault = 'amplitude model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
+            yield ("shear", "amplitude"), fault
+    elif not bonds.knows_forces:
         fault = 'the spectrum that bonds make needs the force of each bond; use bonds.model = "cohort" or "tracked"'
         yield ("shear", "spectrum"), fault
-        return
-    stiffest = cast(BondMade, spectrum).stiffest(*scene.solid.effective)
-    if cast(Cohort | Tracked, bonds).bond_stiffness > stiffest * (1.0 + 1e-9):
-        fault = f"the half-space under a bond of this footprint yields with {stiffest:.3g} N/m, in series with it"
-        yield ("bonds", "bond_stiffness"), f"{fault}: give at most that, or a larger shear.spectrum.footprint"
+    else:
+        stiffest = cast(BondMade, shear.spectrum).stiffest(*scene.solid.effective)
+        if cast(Cohort | Tracked, bonds).bond_stiffness > stiffest * (1.0 + 1e-9):
+            fault = f"the half-space under a bond of this footprint yields with {stiffest:.3g} N/m, in series with it"
+            yield ("bonds", "bond_stiffness"), f"{fault}: give at most that, or a larger shear.spectrum.footprint"
 
 
 def _implausible(scene: "Scenario") -> Faults:
@@ -104,15 +99,14 @@ def _wrong_maps(scene: "Scenario") -> Faults:
     if record.maps and not scene.fluctuations.draws_maps:
         yield ("record", "maps"), 'needs shear.model = "mapped"; choose it or leave the maps out'
     between = clock.step * clock.stride
-    ratios = [time / between for time in record.maps]
-    for time, ratio in zip(record.maps, ratios, strict=True):
-        if time > clock.duration * (1 + 1e-9) or abs(ratio - round(ratio)) > 1e-9 * max(ratio, 1.0):
-            fault = f"{time:g} s is none of the recorded times; choose whole multiples of {between:g} s"
-            yield ("record", "maps"), f"{fault} up to {clock.duration:g} s"
-            break
-    else:
-        if len({*map(round, ratios)}) < len(ratios):
-            yield ("record", "maps"), "names a time twice; give each once"
+    records = {time: time / between for time in record.maps}
+    off = [time for time, number in records.items() if abs(number - round(number)) > 1e-9 * max(number, 1.0)]
+    off += [time for time in record.maps if time > clock.duration * (1 + 1e-9)]
+    if off:
+        fault = f"{off[0]:g} s is none of the recorded times; choose whole multiples of {between:g} s"
+        yield ("record", "maps"), f"{fault} up to {clock.duration:g} s"
+    elif len({*map(round, records.values())}) < len(record.maps):
+        yield ("record", "maps"), "names a time twice; give each once"
     if record.map_members > members:
         fault = f"is more than ensemble.members ({members}); lower it or add members"
         yield ("record", "map_members"), fault
@@ -132,17 +126,15 @@ def _shear_faults(scene: "Scenario", built: bool) -> Faults:
 
 def _off_the_map(scene: "Scenario") -> Faults:
     shear, clock = scene.fluctuations, scene.clock
-    if not shear.passes:
-        return
-    if scene.drive.solves_motion:
+    if shear.passes and scene.drive.solves_motion:
         fault = 'a measured map under a disc needs a slip that is known before: prescribe the speed, or give "plane"'
         yield ("shear", "contact"), fault
-        return
-    ends = np.linspace(0.0, clock.duration, min(clock.steps, _MOST_SLIPS) + 1)
-    positions = np.cumsum(scene.drive.pieces(ends, clock.duration).joined.integral)
-    reach = min(0.0, float(positions.min())), max(0.0, float(positions.max()))
-    faults = shear.off_the_map(reach, scene.widest)
-    yield from ((("shear", "field", *([key] if key else [])), fault) for key, fault in faults)
+    elif shear.passes:
+        ends = np.linspace(0.0, clock.duration, min(clock.steps, _MOST_SLIPS) + 1)
+        positions = np.cumsum(scene.drive.pieces(ends, clock.duration).joined.integral)
+        reach = min(0.0, float(positions.min())), max(0.0, float(positions.max()))
+        faults = shear.off_the_map(reach, scene.widest)
+        yield from ((("shear", "field", *([key] if key else [])), fault) for key, fault in faults)
 
 
 #: Rms of the fluctuations over the mean stress above which a remark is made: some 2 % of the area is reversed.

@@ -55,14 +55,10 @@ class Clock:
         """Return the number of records, with that at t = 0."""
         return self.steps // self.stride + 1
 
-    def time(self, step: int) -> float:
-        """Return the time at the end of a step [s]; it is never accumulated."""
-        return self.duration * (step / self.steps)
-
     @property
     def times(self) -> np.ndarray:
-        """Return the times of the records [s], shape (records,)."""
-        return np.array([self.time(k * self.stride) for k in range(self.records)])
+        """Return the times of the records [s], shape (records,); they are never accumulated."""
+        return self.duration * (self.stride * np.arange(self.records) / self.steps)
 
 
 def _require_multiple(name: str, long: float, other: str, short: float) -> None:

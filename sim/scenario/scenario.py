@@ -317,8 +317,7 @@ class Scenario:
         for key, value in values.items():
             groups.setdefault(key.partition(".")[0], {})[key] = value
         point = object.__new__(Scenario)
-        point.__dict__.update({name: self.__dict__[name] for name in _FIELDS}, sweep=())
-        point.__dict__["source"] = origin.changed(values | {"sweep": {}})
+        point.__dict__.update(self._parts, sweep=(), source=origin.changed(values | {"sweep": {}}))
         for name, changes in groups.items():
             place = (name, *map(id, changes.values()))  # the values live as long as the sweep
             if place not in tables:

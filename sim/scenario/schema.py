@@ -20,12 +20,9 @@ from sim.units.quantity import Quantity
 def keys(table: type) -> dict[str, FieldInfo]:
     """Return the keys of a table as they are written in a file, with their declarations."""
     declared: dict[str, FieldInfo] = getattr(table, "__pydantic_fields__", {})
-    return {field.alias or name: field for name, field in declared.items() if not (field.exclude or _is_read(field))}
-
-
-def _is_read(field: FieldInfo) -> bool:
-    """Return True if a field is read from a file that a table names; it is no key of a scenario."""
-    return any(isinstance(note, cast(type, SkipJsonSchema)) for note in field.metadata)
+    read = cast(type, SkipJsonSchema)  # marks a field that is read from a file that a table names
+    written = {name: field for name, field in declared.items() if not any(isinstance(n, read) for n in field.metadata)}
+    return {field.alias or name: field for name, field in written.items() if not field.exclude}
 
 
 @functools.cache

@@ -541,7 +541,7 @@ def _kind(value: Any) -> str:
 def over_time(unit: Quantity, name: str) -> Any:
     """Return the annotation of a prescribed quantity: a number, a course, or a table whose column has this name."""
 
-    @dataclass(frozen=True, kw_only=True, config={"extra": "forbid", "populate_by_name": True})
+    @dataclass(frozen=True, kw_only=True)
     class _Course(Course):
         """From one value to another over the run, or ``cycles`` times there and back."""
 
@@ -549,7 +549,7 @@ def over_time(unit: Quantity, name: str) -> Any:
         stop: Annotated[float, unit, Field(alias="to")]
         cycles: Annotated[int, _CYCLES] = 0  # type: ignore[misc]
 
-    @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
+    @dataclass(frozen=True, kw_only=True)
     class _Table(Table):
         """A value tabulated over time, linear between the rows; ``file`` names the CSV."""
 

@@ -87,7 +87,7 @@ def test_the_contact_opens_between_the_last_step_before_the_limit_and_the_next()
         assert_allclose(radius[first_open - 1], a, rtol=1e-5)
         assert np.all(radius[first_open:] == 0.0)
         assert np.isnan(when[:first_open]).all()
-        assert np.all(when[first_open:] == scenario.clock.time(first_open))
+        assert np.all(when[first_open:] == scenario.times.at(first_open))
 
 
 #: Exact in binary at 128 steps; zero on the way back comes after 24 and 56 of 64.
