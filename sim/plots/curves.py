@@ -18,7 +18,7 @@ from sim.analysis.events import jumps
 from sim.analysis.observables import KEPT, observables, share_observables
 from sim.analysis.over_speed import speed_dim
 from sim.plots import style
-from sim.plots.measured import Compared, Measured
+from sim.plots.measured import Compared, Line, Measured
 from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, swept_value, symbol
 
 #: Largest number of points of a curve that carry markers.
@@ -41,15 +41,6 @@ _CATEGORY = 0.6
 
 _CROSS: Any = {"marker": "x", "markersize": 4, "linestyle": "none", "zorder": 3}
 _RING: Any = HOLLOW | {"mew": 0.8, "zorder": 3}
-
-
-class Line(NamedTuple):
-    """A curve of a panel: a point of the sweep, its name, "" if a colour bar names it, and its colour."""
-
-    number: int
-    point: dict[str, int]
-    label: str
-    colour: str
 
 
 class Statistics:
@@ -230,12 +221,6 @@ def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], tuple[S
     return lines, bar, left_out
 
 
-def choice(dataset: xr.Dataset, dim: str) -> str:
-    """Return the cure for too many values of a swept key."""
-    value = swept_value(dataset, dim, 0).rpartition("= ")[2].replace("−", "-")
-    return f'choose by --where, such as --where {dim}="{value}"'
-
-
 def _bar(key: xr.DataArray) -> tuple[tuple[ScalarMappable, str], list[str]]:
     """Return a colour bar over the values of a swept number, and their colours."""
     values = key.to_numpy().astype(float)
@@ -299,7 +284,7 @@ def beside(panel: Axes, scene: Scene, name: str, factor: float) -> None:
         for line in scene.lines:
             mean, error = (factor * values for values in scene.drawn(name, line)[:2])
             full = np.pi * scene.values("jkr_radius_mean", line) ** 2
-            curves.append(Compared(line.number, line.point, line.colour, scene.x[line.number], mean, error, full))
+            curves.append(Compared(line, scene.x[line.number], mean, error, full))
         scene.measured.draw(panel, (scene.over, scene.unit.factor), (name, factor), curves, scene.scale == "log")
 
 
@@ -522,7 +507,7 @@ def stacked(
     for panel, (_, drawing) in zip(axes, panels, strict=False):
         drawing(panel, scene)
     if scene.measured and compared:
-        scene.measured.residual_panel(axes[-1], {line.number for line in scene.lines}, scene.over)
+        scene.measured.residual_panel(axes[-1], scene.over)
     edge = 0.03 if scene.marked or scene.measured else 0.0
     style.across(axes[-1], scene.reach, scene.words, scene.scale, edge if room is None else room)
     if ax is not None and (legend := ax.get_legend()):  # above the panel there may be no room
@@ -546,15 +531,8 @@ def further_panels(scene: Scene) -> list[tuple[float, Panel]]:
     return panels
 
 
-def rest_of(dataset: xr.Dataset) -> xr.DataArray | None:
-    """Return the time at rest before a start [s]; None for a drive that does not rest."""
-    with contextlib.suppress(KeyError):
-        return setting(dataset, "drive.rest")
-    return None
-
-
 def needs_speeds(dataset: xr.Dataset) -> None:
-    if rest_of(dataset) is not None:
+    if "drive_rest" in dataset:
         raise ValueError("a rest and a start have two speeds only; draw the kind stress")
     if is_steady(dataset) and speed_dim(dataset) is None:
         raise ValueError('the speed neither changes in time nor is swept; ramp it: [drive] model = "ramp"')
@@ -599,7 +577,7 @@ def coarse_slips(dataset: xr.Dataset) -> str:
 def turns(dataset: xr.Dataset) -> bool:
     """True if the speed both rises and falls in time, so that a curve over it would lie on itself."""
     change = speed_of(dataset).diff("t")
-    return rest_of(dataset) is None and bool(((change > 0.0).any("t") & (change < 0.0).any("t")).any())
+    return "drive_rest" not in dataset and bool(((change > 0.0).any("t") & (change < 0.0).any("t")).any())
 
 
 def needs_friction(dataset: xr.Dataset) -> None:

@@ -18,7 +18,7 @@ from sim.plots import curves, field, slider, style, theories
 from sim.plots.measured import Measured
 from sim.plots.style import STYLE, recorded, swept_value
 from sim.units.errors import BadInput
-from sim.units.quantity import Quantity
+from sim.units.quantity import read_option
 
 
 class Choices(NamedTuple):
@@ -56,10 +56,7 @@ class Choices(NamedTuple):
             words = f"it takes: {', '.join(takes)}" if takes else "it takes none but member and units"
             raise ValueError(f'the figure "{kind}" has no choice of {refused[0]}; {words}')
         if self.at is not None:
-            try:
-                options["at"] = Quantity("s", "time").read(self.at)
-            except ValueError as fault:
-                raise ValueError(f"at {self.at}: {fault}") from None
+            options["at"] = read_option(self.at, "at", "s")
         if self.data is not None:
             options["data"] = self.data if isinstance(self.data, Measured) else Measured(self.data, dataset)
         return options
@@ -116,9 +113,7 @@ _OF_CURVE = ("speed", "contact_area", "jkr_radius", "hertz_radius")
 KINDS: dict[str, Kind] = {
     "loop": Kind(theories.loop_figure, theories.needs_course, reads=("normal_load", "displacement")),
     "theories": Kind(theories.theories_figure, theories.case_of, theories.sweeps_theories, _OF_THEORY),
-    "stress": Kind(
-        slider.stress_figure, slider.needs_stress, lambda dataset: curves.rest_of(dataset) is not None, ("speed",)
-    ),
+    "stress": Kind(slider.stress_figure, slider.needs_stress, lambda dataset: "drive_rest" in dataset, ("speed",)),
     "stability": Kind(slider.stability_figure, slider.needs_map, reads=("spring_force",)),
     "creep": Kind(slider.creep_figure, slider.needs_force, reads=("slider_position", "speed")),
     "friction": Kind(curves.friction_figure, curves.needs_friction, curves.turns, ("speed",)),

@@ -34,16 +34,23 @@ def _names_of(name: str) -> tuple[str, ...]:
     return next((names for names in _SAME if name in names), (name,))
 
 
+class Line(NamedTuple):
+    """A curve of a panel: a point of the sweep, its name, "" if a colour bar names it, and its colour."""
+
+    number: int
+    point: dict[str, int]
+    label: str
+    colour: str
+
+
 class Compared(NamedTuple):
-    """A curve that points may lie on: its number, point of the sweep and colour.
+    """A curve that points may lie on.
 
     Over ``x`` in the unit of the axis it has the mean and its standard error in that of the other axis, and JKR's area
     at the full work of adhesion [m^2].
     """
 
-    number: int
-    point: dict[str, int]
-    colour: str
+    line: Line
     x: np.ndarray
     mean: np.ndarray
     error: np.ndarray
@@ -56,13 +63,13 @@ class Compared(NamedTuple):
         """
         way = np.sign(np.diff(self.x))
         ends = np.flatnonzero(np.diff(way)) + 1
-        branches = [slice(a, b + 1) for a, b in itertools.pairwise([0, *ends, len(way)]) if way[a] != 0.0]
-        values: list[list[np.ndarray]] = [[] for _ in along]
-        for branch in branches:
-            order = np.argsort(self.x[branch])
-            for column, curve in zip(values, along, strict=True):
-                column.append(np.interp(x, self.x[branch][order], curve[branch][order], np.nan, np.nan))
-        return [np.array(column or [np.full(x.shape, np.nan)]) for column in values]
+        spans = [(a, b + 1) for a, b in itertools.pairwise([0, *ends, len(way)]) if way[a] != 0.0]
+        branches = [a + np.argsort(self.x[a:b]) for a, b in spans]
+        none = [np.full(x.shape, np.nan)]
+        return [
+            np.array([np.interp(x, self.x[rows], curve[rows], np.nan, np.nan) for rows in branches] or none)
+            for curve in along
+        ]
 
 
 class Residuals(NamedTuple):
@@ -74,11 +81,9 @@ class Residuals(NamedTuple):
 
     over: str
     name: str
-    number: int
-    colour: str
+    line: Line
     x: np.ndarray
     values: np.ndarray
-    point: dict[str, int]
     branches: int
 
 
@@ -149,29 +154,28 @@ class Measured:
         x, wide = over[1] * across.values, None if across.errors is None else over[1] * across.errors
         assigned = any(name in self.table for name in self.sweep)
         for curve in curves if assigned else curves[:1]:
-            points, rows = self._values(name, curve, x), self._rows_of(curve.point, over[0])
+            points, rows = self._values(name, curve, x), self._rows_of(curve.line.point, over[0])
             if points is None or not np.any(rows):
                 continue
             y, high = factor * points.values[rows], None if points.errors is None else factor * points.errors[rows]
-            colour, label = curve.colour if assigned else BOTH, "measured"
+            line, label = curve.line if assigned else curve.line._replace(colour=BOTH), "measured"
             if high is not None and (assigned or len(curves) == 1):
                 values, branches = _residuals(curve, x[rows], y, high, log)
                 near = np.isfinite(values)
                 if np.any(near):
-                    parts = over[0], name, curve.number, colour, x[rows], values, curve.point, branches
-                    self.residuals.append(Residuals(*parts))
+                    self.residuals.append(Residuals(over[0], name, line, x[rows], values, branches))
                     label += rf", $\chi^2$ = {np.sum(values[near] ** 2):.4g} of {np.sum(near)}"
                     label += " (nearest branch)" * (branches > 1)
-            look: Any = HOLLOW | {"color": colour, "elinewidth": 0.7, "zorder": 3}
+            look: Any = HOLLOW | {"color": line.colour, "elinewidth": 0.7, "zorder": 3}
             panel.errorbar(x[rows], y, high, None if wide is None else wide[rows], label=label, **look)
             self.shown.add(name)
 
-    def residual_panel(self, panel: Axes, numbers: set[int], over: str) -> None:
-        """Draw the residuals from curves of some numbers over a variable."""
-        residuals = [each for each in self.residuals if each.number in numbers and each.over == over]
+    def residual_panel(self, panel: Axes, over: str) -> None:
+        """Draw the residuals from curves over a variable."""
+        residuals = [each for each in self.residuals if each.over == over]
         names = list(dict.fromkeys(each.name for each in residuals))
         for each in residuals:
-            look = HOLLOW | {"marker": _MARKS[names.index(each.name) % len(_MARKS)], "color": each.colour}
+            look = HOLLOW | {"marker": _MARKS[names.index(each.name) % len(_MARKS)], "color": each.line.colour}
             panel.plot(each.x, each.values, label=each.name.replace("_", " ") if len(names) > 1 else "", **look)
         panel.axhline(0.0, **GUIDE)
         panel.margins(y=0.15)

@@ -20,8 +20,8 @@ from sim.laws import jkr, schallamach
 from sim.laws.schallamach import Body
 from sim.parts.bonds.rupture import Rupture
 from sim.plots import style
-from sim.plots.curves import Line, Panel, Scene, contact_curves, over_speed, rest_of, scene_along, stacked
-from sim.plots.measured import Measured
+from sim.plots.curves import Panel, Scene, contact_curves, over_speed, scene_along, stacked
+from sim.plots.measured import Line, Measured
 
 _PREFIX = "bonds_rupture_"
 _BONDS = ("bond_stiffness", "rebinding_rate", "site_density")
@@ -104,12 +104,6 @@ _LITTLE = 1e-4
 _FRAME: Any = {"color": style.BONDS, "linewidth": 1.4}
 
 
-def needs_spring(dataset: xr.Dataset) -> None:
-    """Refuse a dataset without a spring."""
-    if "stage_speed" not in dataset and "stage_speed_mean" not in dataset:
-        raise ValueError('no stage pulls through a spring; let one: [drive] model = "spring"')
-
-
 def needs_force(dataset: xr.Dataset) -> None:
     """Refuse a dataset in which no force is prescribed."""
     if not bool((word(dataset, "drive.model", "") == "force").all()):
@@ -146,7 +140,8 @@ def _run(name: str, words: str, si: str) -> Panel:
 
 def needs_map(dataset: xr.Dataset) -> None:
     """Refuse a dataset that is no sweep of springs over stage speeds."""
-    needs_spring(dataset)
+    if "stage_speed" not in dataset and "stage_speed_mean" not in dataset:
+        raise ValueError('no stage pulls through a spring; let one: [drive] model = "spring"')
     if style.swept(dataset) != ["drive_stiffness"] or not bool((dataset["stage_speed"].isel(t=-1) > 0.0).all()):
         cure = '[sweep] "drive.stiffness" = {from = "10 N/m", to = "1 kN/m", count = 9, scale = "log"}'
         raise ValueError(f"a map needs a sweep of the spring alone under a stage that ramps; {cure}")
@@ -290,7 +285,7 @@ _RING: Any = style.HOLLOW | {"markersize": 5.0, "mfc": "none", "mew": 0.9, "zord
 
 def needs_stress(dataset: xr.Dataset) -> None:
     """Refuse a dataset without shear stress, or with one speed only."""
-    rest = rest_of(dataset)
+    rest = dataset.get("drive_rest")
     if rest is not None and not bool((dataset["t"] > rest).any()):
         raise ValueError("the run ends before the slider starts; make clock.duration longer than drive.rest")
     if not bool((style.recorded(dataset, "shear_stress") != 0.0).any()):
@@ -304,7 +299,7 @@ def needs_stress(dataset: xr.Dataset) -> None:
 
 def stress_figure(dataset: xr.Dataset, data: Measured | None = None, ax: Axes | None = None) -> Figure:
     """Shear stress with its maximum, and bonds, over speed; for a start from rest the static peaks."""
-    if rest_of(dataset) is not None:
+    if "drive_rest" in dataset:
         if data or ax:
             raise ValueError("starts from rest have panels of their own; draw the kind time beside data, or on an ax")
         return start_figure(dataset)

@@ -15,8 +15,8 @@ from sim.analysis.events import cycles_of
 from sim.laws import halfspace, jkr
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.plots import style
-from sim.plots.curves import Line, Scene, beside, choice, colour_bar, mark_jumps, scene_along
-from sim.plots.measured import Measured
+from sim.plots.curves import Scene, beside, colour_bar, mark_jumps, scene_along
+from sim.plots.measured import Line, Measured
 
 #: Name of each theory, its colour and line style.
 _THEORIES: dict[str, tuple[str, str, Any]] = {
@@ -74,15 +74,9 @@ class Case(NamedTuple):
         return float(np.sqrt(np.pi * self.modulus * self.work / (6.0 * radius)))
 
 
-def _fractions(dataset: xr.Dataset) -> np.ndarray:
-    with contextlib.suppress(KeyError):  # the whole table is swept
-        return setting(dataset, "contact.reversible").to_numpy().ravel()
-    return np.empty(0)
-
-
 def sweeps_theories(dataset: xr.Dataset) -> bool:
     """True if the reversible fraction, on which the theories differ, is swept."""
-    return _fractions(dataset).size > 1
+    return np.size(dataset.get("contact_reversible", ())) > 1
 
 
 def case_of(dataset: xr.Dataset) -> Case:
@@ -108,8 +102,12 @@ def case_of(dataset: xr.Dataset) -> Case:
         raise ValueError("there is no contact at rest; raise the load or the indentation")
     for values in settings.values():
         if float(values.min()) < float(values.max()):
-            raise ValueError(f"theories are of one contact; {choice(dataset, str(values.dims[0]))}")
-    shares = [float(share) for share in _fractions(dataset) if 0.0 < share != 1.0]
+            dim = str(values.dims[0])
+            value = style.swept_value(dataset, dim, 0).rpartition("= ")[2].replace("−", "-")
+            cure = f'choose by --where, such as --where {dim}="{value}"'
+            raise ValueError(f"theories are of one contact; {cure}")
+    fractions = np.ravel(dataset.get("contact_reversible", ()))
+    shares = [float(share) for share in fractions if 0.0 < share != 1.0]
     numbers = {key: float(values.max()) for key, values in settings.items()}
     return Case(held, reversible=(shares or [_FRACTION])[0], **numbers)
 
@@ -415,7 +413,7 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
         along = scene if data.column(over) else of_load
         data.refuse_undrawn(along.over)
         for panel in below:
-            data.residual_panel(panel, {line.number for line in along.lines}, along.over)
+            data.residual_panel(panel, along.over)
             style.across(panel, along.reach, along.words, room=0.03)
         style.legend(loaded)
     for panel in (radii, loaded):

@@ -254,7 +254,7 @@ def agreement(dataset: xr.Dataset, drawn: list[Measured], fit: Fit | None = None
 
 def _by_curve(measured: Measured) -> list[Residuals]:
     """Return the residuals of each variable and curve once, for curves of one branch."""
-    residuals = {(each.name, each.number): each for each in reversed(measured.residuals) if each.branches == 1}
+    residuals = {(each.name, each.line.number): each for each in reversed(measured.residuals) if each.branches == 1}
     return list(reversed(residuals.values()))
 
 
@@ -265,7 +265,7 @@ def _count(residuals: Residuals) -> int:
 def _label(dataset: xr.Dataset, residuals: Residuals) -> str:
     """Return a variable with the swept values of its curve."""
     texts = []
-    for name, place in residuals.point.items():
+    for name, place in residuals.line.point.items():
         value = dataset[name][place]
         number = engineering(value.item(), value.attrs.get("units", "1")) if value.dtype.kind in "fi" else value.item()
         texts += [f"{name.replace('_', ' ')} {number}"] if dataset.sizes[name] > 1 else []
