@@ -617,21 +617,18 @@ def _maximum(recorded: xr.Dataset, name: str, ramp: xr.DataArray) -> xr.Dataset:
     def magnitude(piece: xr.Dataset) -> xr.DataArray:
         return abs(piece[name].astype(float)).where(piece["slides"])
 
-    def mean(piece: xr.Dataset) -> xr.Dataset:
-        return xr.Dataset({"mean": magnitude(piece).mean(MEMBERS)})
-
     def largest(piece: xr.Dataset) -> xr.Dataset:
         values = magnitude(piece)
         known, at = values.notnull(), values.fillna(-1.0).argmax("t")
         last = values.sizes["t"] - 1 - known.isel(t=slice(None, None, -1)).argmax("t")
-        result = {"at": at, "size": values.isel(t=at)}
-        result |= {"first": values.isel(t=known.argmax("t")), "last": values.isel(t=last)}
-        result |= {"peak": values.isel(t=piece["top"])} if "top" in piece else {}
-        return xr.Dataset({key: number.drop_vars("t", errors="ignore") for key, number in result.items()})
+        places = {"size": at, "first": known.argmax("t"), "last": last}
+        places |= {"peak": piece["top"]} if "top" in piece else {}
+        return xr.Dataset({key: values.isel(t=place).drop_vars("t") for key, place in places.items()} | {"at": at})
 
     dims, is_ensemble = sweep_dims(recorded), recorded.sizes.get(MEMBERS, 1) > 1
     if is_ensemble:
-        recorded = recorded.assign(top=in_pieces(recorded, ("t",), mean)["mean"].fillna(-1.0).argmax("t"))
+        means = in_pieces(recorded, ("t",), lambda piece: xr.Dataset({"mean": magnitude(piece).mean(MEMBERS)}))
+        recorded = recorded.assign(top=means["mean"].fillna(-1.0).argmax("t"))
     result = in_pieces(recorded, (*dims, MEMBERS), largest)
     ends = result["first"], result["last"]
     above = [result["size"] / (1.0 + _ROUNDING) > end for end in ends]
@@ -690,8 +687,7 @@ def _loops(dataset: xr.Dataset, suffix: str, count: int) -> xr.Dataset:
     """Return ``loop_energy`` and ``loop_dissipation`` in each of ``count`` cycles."""
     cycles = cycles_of(dataset)
     going = dataset[f"contact_radius{suffix}"].notnull()
-    held = dataset[[f"normal_load{suffix}", f"displacement{suffix}"]].astype(float).where(going)
-    load, displacement = held.values()
+    load, displacement = dataset[[f"normal_load{suffix}", f"displacement{suffix}"]].astype(float).where(going).values()
     number = xr.DataArray(np.arange(dataset.sizes["t"]), dims="t")
     done = (0.5 * (load + load.shift(t=1)) * (displacement - displacement.shift(t=1))).where(number > 0, 0.0)
     period = setting(dataset, "clock.duration") / cycles.where(cycles >= 1.0)

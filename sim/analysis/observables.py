@@ -129,9 +129,9 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     levels = [full, *left, area]
     texts = {"lost_to_bonds": "broken bonds, which are charged first"}
     texts |= {name + suffix: text for name, (_, text) in charged.items()}
-    lost = [(before - after) / full for before, after in itertools.pairwise(levels)]
-    words = zip(texts.items(), lost, strict=False)
-    shares = {name: pure(share, f"share of JKR's area lost to {text}") for (name, text), share in words}
+    shares = {}
+    for (name, text), (before, after) in zip(texts.items(), itertools.pairwise(levels), strict=False):
+        shares[name] = pure((before - after) / full, f"share of JKR's area lost to {text}")
     if suffix:  # the bonds are the same for all members, so the spread is the area's
         for kind in ("std", "sem"):
             shares[f"lost_to_fluctuations_{kind}"] = pure(dataset[f"contact_area_{kind}"] / full, "")

@@ -553,7 +553,7 @@ def _shares(
     is not well known. There are none where the mean, which is first in each array, has too few free values for any:
     twice as few where they are estimated by the autocorrelation, which sees a tail seldom.
     """
-    wider = errors * special.stdtrit(freedoms, 0.5 + 0.5 * LEVEL) / special.ndtri(0.5 + 0.5 * LEVEL)
+    wider = errors * special.stdtrit(freedoms, 0.5 + 0.5 * LEVEL) / WIDE
     with np.errstate(divide="ignore", invalid="ignore"):  # what does not spread is known without end
         count = np.fmin(spreads**2 / wider**2, 1e12)
     none = np.isnan(quantile_ranks(surely * count[0], _LEVELS)[0])
@@ -635,11 +635,8 @@ def _over_time(values: np.ndarray, step: float, name: str, differ: bool) -> dict
         effective = np.where(errors[0] > 1e-12 * abs(mean), (spread / errors[0]) ** 2, np.nan)
     ends = np.tile(_LEVELS, (2, points, 1))
     if differ:
-        shares = (
-            _shares(*point, 1.0 if members >= _MANY else 0.5)
-            for point in zip(spreads.T, errors.T, freedoms.T, strict=True)
-        )
-        ends = np.stack(list(shares), axis=1)
+        each_point = zip(spreads.T, errors.T, freedoms.T, strict=True)
+        ends = np.stack([_shares(*numbers, 1.0 if members >= _MANY else 0.5) for numbers in each_point], axis=1)
     else:
         errors[0], low, high = 0.0, mean, mean
     result = {"mean": mean, "std": spread, "sem": errors[0], "low": low, "high": high}

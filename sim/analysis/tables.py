@@ -159,8 +159,7 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
         "lost to bonds" and "lost to fluct." are the shares of JKR's area that each mechanism takes.
     """
     held, steady = bool(stays_held(dataset).all()), is_steady(dataset)
-    stay = [c.name for c in _COLUMNS if c.changing and (steady if c.name == "stage_speed" else held)]
-    columns = [column for column in _COLUMNS if column.name not in stay]
+    columns = [c for c in _COLUMNS if not (c.changing and (steady if c.name == "stage_speed" else held))]
     means, points = _tabulated(dataset, rows, [column.name for column in columns])
     one_row_each = _has_one_row_each(dataset)
     cells = _places(means, {name: index for name, index in points.items() if name != "t" or not one_row_each})
@@ -296,8 +295,7 @@ def _tabulated(dataset: xr.Dataset, rows: int, names: list[str]) -> tuple[xr.Dat
         if counts["t"] < dataset.sizes["t"]:  # of the records only those that are shown, none after all have ended
             dataset = dataset.isel(t=slice(_last(dataset) + 1))
             counts["t"] = min(counts["t"], dataset.sizes["t"])
-            records = _spread(dataset.sizes["t"], counts["t"])
-            dataset = restricted(dataset, names).isel(t=records)
+            dataset = restricted(dataset, names).isel(t=_spread(dataset.sizes["t"], counts["t"]))
         result = over_members(dataset, names, quantiles=False)
         if "applied_load" in dataset and "normal_load_mean" in result:  # it is known of open contacts too
             for kind in ("mean", "low", "high"):
@@ -362,9 +360,8 @@ def spread(dataset: xr.Dataset) -> list[dict[str, str]]:
     fixed = [column for column in _COLUMNS if not column.changing]
     result = distribution(dataset, [column.name for column in fixed]).isel(dict.fromkeys(sweep_dims(dataset), 0))
     fixed = [column for column in fixed if f"{column.name}_std" in result]
-    rough = [_ROUNDING * abs(float(result[f"{column.name}_mean"])) for column in fixed]
-    spreads = zip(fixed, rough, strict=True)
-    return [_spread_of(result, column) for column, least in spreads if float(result[f"{column.name}_std"]) > least]
+    varied = (c for c in fixed if result[f"{c.name}_std"] > _ROUNDING * abs(result[f"{c.name}_mean"]))
+    return [_spread_of(result, column) for column in varied]
 
 
 def _spreads(dataset: xr.Dataset) -> bool:
@@ -420,10 +417,8 @@ def once(dataset: xr.Dataset) -> xr.Dataset:
 
 #: Columns of statistics, and the endings of their names in a dataset in which each quantile is a variable.
 _ENDINGS = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": "std", "skewness": "skewness"}
-_ENDINGS |= {
-    name: name for level in QUANTILES for end in ("", "_low", "_high") for name in [f"q{100 * level:02.0f}{end}"]
-}
-_ENDINGS |= {"effective_samples": "effective_samples", "correlation_time": "correlation_time"}
+_ALIKE = [f"q{100 * level:02.0f}{end}" for level in QUANTILES for end in ("", "_low", "_high")]
+_ENDINGS |= {name: name for name in (*_ALIKE, "effective_samples", "correlation_time")}
 _ENDINGS |= {"correlation_time_error": "correlation_time_sem"}
 
 
@@ -489,9 +484,7 @@ def _long(dataset: xr.Dataset, group: xr.Dataset, key: str, over: str) -> pd.Dat
         speed = speed if "t" in dims else speed.isel(t=0, drop=True).where(steady_points(dataset))
         columns |= {"speed": speed} if set(speed.dims) <= set(dims) else {}
     rows = xr.Dataset(columns).expand_dims("row").to_dataframe(dim_order=["row", *dims]).reset_index()
-    texts = {"quantity": name, "unit": group[key].attrs.get("units", "1"), "over": over}
-    alike = np.zeros(len(rows), int)
-    return rows.assign(**{column: pd.Categorical.from_codes(alike, [text]) for column, text in texts.items()})
+    return rows.assign(quantity=name, unit=group[key].attrs.get("units", "1"), over=over)
 
 
 def frame(dataset: xr.Dataset) -> pd.DataFrame:

@@ -639,8 +639,6 @@ def problem_of(
         cure = "measure more, or free fewer keys"
         raise BadInput([f"{tables[0].path}: measured numbers: {len(values)}, free keys: {len(free)}; {cure}"])
     number = np.repeat(np.arange(len(curves)), [len(curve.values) for curve in curves])
-    guesses = [0.01 * max(float(np.abs(curve.values).max()), 1e-300) for curve in curves]
-    sigma = [np.full_like(curve.values, guess if curve.errors is None else curve.errors)
-             for curve, guess in zip(curves, guesses, strict=True)]  # fmt: skip
+    sigma = [np.full_like(c.values, 0.01 * np.abs(c.values).max()) if c.errors is None else c.errors for c in curves]
     estimated, zero = np.array([curve.errors is None for curve in curves])[number], np.zeros(len(values))
     return Problem(tables, groups, free, common, values, np.concatenate(sigma), number, estimated, zero, zero, {})

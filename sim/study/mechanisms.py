@@ -153,10 +153,8 @@ def _lacking(problem: Problem) -> str:
     all_groups = [group for groups in problem.groups for group in groups]
     if not any(group.scenario.drive.solves_motion or np.any(group.speed) for group in all_groups):
         return 'curves at rest tell no mechanism from another; measure while it slides, with a column "speed [mm/s]"'
-    lacks = (item for item, acts in zip(_TABLES, _acting(problem), strict=True) if not acts)
-    return "\n".join(
-        f"no {name} act in the scenario; to compare with them, add for example {table}" for name, table in lacks
-    )
+    advice = "no {} act in the scenario; to compare with them, add for example {}"
+    return "\n".join(advice.format(*item) for item, acts in zip(_TABLES, _acting(problem), strict=True) if not acts)
 
 
 def _less(problem: Problem, fixed: dict[str, float], *without: str) -> Problem:
