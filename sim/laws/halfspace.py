@@ -754,10 +754,8 @@ def _each(energy, field, cell, radius, poisson_ratio):
     maps = np.broadcast_to(field, shape + field.shape[-2:]).reshape(-1, *field.shape[-2:])
     radii = np.broadcast_to(np.asarray(radius, float), shape).ravel()
     if np.any(2.0 * radii > cell):
-        raise ValueError(
-            f"a disc of radius {np.max(radii):g} m does not fit in a cell of {cell:g} m; "
-            "make the cell at least twice the radius"
-        )
+        message = f"a disc of radius {np.max(radii):g} m does not fit in a cell of {cell:g} m"
+        raise ValueError(f"{message}; make the cell at least twice the radius")
     pixel, nu = cell / field.shape[-1], float(poisson_ratio)
     pairs = zip(maps, radii, strict=True)
     energies = [energy(map_, pixel, a, nu) if a > _LEAST_RADIUS * pixel else 0.0 * a for map_, a in pairs]

@@ -254,13 +254,9 @@ def _stiffest(needed: Callable[[Array], Complex], low: Array, high: Array) -> On
     turns = (tried.imag[..., 1:] < 0.0) != (tried.imag[..., :-1] < 0.0)
     larger = np.maximum(tried.real[..., 1:], tried.real[..., :-1])
     place = np.argmax(np.where(turns, larger, -math.inf), axis=-1)
-    (before, off), (here, now) = (
-        (
-            low * (high / low) ** steps[place + k],
-            np.take_along_axis(tried.imag, (place + k)[..., np.newaxis], -1)[..., 0],
-        )
-        for k in (0, 1)
-    )
+    places = place, place + 1
+    before, here = (low * (high / low) ** steps[k] for k in places)
+    off, now = (np.take_along_axis(tried.imag, k[..., np.newaxis], -1)[..., 0] for k in places)
     with np.errstate(divide="ignore", invalid="ignore"):  # where none turns
         for _ in range(_STEPS):
             guess = here - now * (here - before) / (now - off)
@@ -889,9 +885,8 @@ def first_moment_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebi
     >>> print(f"{first_moment_stress(10.0, 1.0, 1.0, 1.0, 1.0, 1.0):.3f}")
     0.259
     """
-    return np.multiply(
-        site_density, _mean_field_force(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
-    )
+    force = _mean_field_force(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
+    return np.multiply(site_density, force)
 
 
 @law

@@ -161,17 +161,13 @@ def _radius(jkr, hertz, level, work, tangential_force, mixity, which, control, s
 
 
 def _mixed_at_load(which, load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio):
-    jkr = radius_at_load(load, work, sphere_radius, modulus)
-    hertz = hertz_radius_at_load(load, sphere_radius, modulus)
-    rest = (mixity, which, _LOAD, sphere_radius, modulus, poisson_ratio)
-    return _radius(jkr, hertz, load, work, tangential_force, *rest)
+    held = _at_load(load, work, sphere_radius, modulus)
+    return _radius(*held, tangential_force, mixity, which, _LOAD, sphere_radius, modulus, poisson_ratio)
 
 
 def _mixed_at_depth(which, indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio):
-    jkr = radius_at_indentation(indentation, work, sphere_radius, modulus)
-    hertz = hertz_radius_at_indentation(indentation, sphere_radius)
-    rest = (mixity, which, _INDENTATION, sphere_radius, modulus, poisson_ratio)
-    return _radius(jkr, hertz, indentation, work, tangential_force, *rest)
+    held = _at_indentation(indentation, work, sphere_radius, modulus)
+    return _radius(*held, tangential_force, mixity, which, _INDENTATION, sphere_radius, modulus, poisson_ratio)
 
 
 def scaled_angle_at_load(load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):

@@ -143,12 +143,6 @@ class Grid(Lattice):
     cell: float
     points: int
 
-    def __post_init__(self) -> None:
-        if not 0.0 < self.cell < math.inf:
-            raise ValueError(f"cell must be a positive length, not {self.cell!r}")
-        if self.points != int(self.points) or self.points < 1:
-            raise ValueError(f"points must be a whole number, at least 1, not {self.points!r}")
-
     @property
     def spacing(self) -> float:
         """Distance between neighbouring samples [m]."""
