@@ -13,7 +13,7 @@ from sim.parts import extremes
 from sim.parts.contact.balance import Balance
 from sim.parts.coupled import coupled
 from sim.parts.coupled.coupled import StepContact
-from sim.parts.exchange import Array, Bonding, ContactState, Indices, Motions, Sliding, Storing, during
+from sim.parts.exchange import Array, Bonding, ContactState, Indices, Motion, Sliding, Storing, during
 from sim.scenario.scenario import Scenario
 
 Arrays = dict[str, Array]
@@ -121,7 +121,7 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
 
 
 def _trajectory(
-    time: Array, motion: Motions | Sliding, bonding: Bonding, energy: Array, driven: Array, contact: ContactState
+    time: Array, motion: Motion | Sliding, bonding: Bonding, energy: Array, driven: Array, contact: ContactState
 ) -> Trajectory:
     of_bonds = bonding.fraction, bonding.stress, bonding.strength
     return Trajectory(time, motion.position, motion.speed, *of_bonds, energy, driven, *contact)

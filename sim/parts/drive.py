@@ -14,11 +14,10 @@ from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
-from pydantic.dataclasses import dataclass
 
-from sim.parts.exchange import Array, Motion, Motions, Setting, Times
+from sim.parts.exchange import Array, Motion, Part, Setting, Times, record
 from sim.units import tables
-from sim.units.quantity import Quantity
+from sim.units.quantity import Quantity, keyed
 
 _SPEED = Quantity("m/s", "sliding speed", "V")
 
@@ -34,7 +33,7 @@ class Slider(NamedTuple):
 _AHEAD = 1024
 
 
-class _Sliding:
+class _Sliding(Part):
     """Motion as a given function of time; a subclass gives ``pieces``."""
 
     state_class: ClassVar[type[Slider]] = Slider
@@ -47,11 +46,11 @@ class _Sliding:
         motion = self.motion(0, 0.0, 0.0, times.duration)
         return Slider(np.zeros(1), motion.speed), motion
 
-    def advance(self, state: Slider, times: Times, steps: range) -> tuple[Slider, Motions]:
+    def advance(self, state: Slider, times: Times, steps: range) -> tuple[Slider, Motion]:
         rows = self._of_steps(times, steps) if len(steps) > 1 else self._of_one(times, steps.start)
         time, duration, slip, path, first, speed, unsteady = rows
         position = np.add.accumulate(np.concatenate([state.position[np.newaxis], slip]))[1:]
-        motions = Motions(steps.start, time, duration, slip, path, first, speed, position, unsteady)
+        motions = Motion(steps.start, time, duration, slip, path, first, speed, unsteady, position)
         return Slider(position[-1], speed[-1]), motions
 
     def _of_steps(self, times: Times, steps: range) -> Array:
@@ -75,28 +74,21 @@ class _Sliding:
     def readings(self, state: Slider) -> Array:
         return np.empty((1, 0))
 
-    def remarks(self, setting: Setting) -> list[str]:
-        return []
-
     def pieces(self, ends: Array, duration: float) -> tables.Pieces:
         """Return the speed in the intervals between some times [s], in pieces."""
         raise NotImplementedError
 
     def motion(self, step: int, start: float, stop: float, duration: float) -> Motion:
         """Slip, path and final speed from time ``start`` to ``stop`` of a run of ``duration`` [s]."""
-        time, span, *sums = self._sums(np.array([start, stop]), duration)
-        return Motion(step, time.item(), span.item(), *sums)
+        return Motion(step, *self._sums(np.array([start, stop]), duration))
 
     def _sums(self, ends: Array, duration: float) -> tuple[Array, ...]:
-        """End and length of each interval between times [s], slip and path in it [m], speeds at its ends [m/s].
-
-        Last ``unsteady`` of ``Motion``.
-        """
+        """Return quantities of ``Motion`` from ``time`` to ``unsteady`` in the intervals between times [s]."""
         pieces = self.pieces(ends, duration).joined
         return ends[1:], np.diff(ends), pieces.integral, pieces.path, pieces.first, pieces.last, pieces.unsteady
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Steady(_Sliding):
     """A constant speed; zero is a contact at rest.
 
@@ -113,7 +105,7 @@ class Steady(_Sliding):
         return tables.Number(self.speed).pieces(ends, duration)
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Start(_Sliding):
     """At rest for a while, then a constant speed at once: static friction and ageing.
 
@@ -137,7 +129,7 @@ class Start(_Sliding):
         return tables.table_pieces(times, speeds, ends, duration)
 
 
-@dataclass(frozen=True, kw_only=True, config={"extra": "forbid", "populate_by_name": True})
+@keyed(kw_only=True)
 class Ramp(tables.Course, _Sliding):
     """A speed that goes from one value to another over the whole run, linearly or logarithmically.
 
@@ -149,7 +141,7 @@ class Ramp(tables.Course, _Sliding):
     model: Literal["ramp"] = "ramp"
 
 
-@dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
+@keyed(kw_only=True)
 class Table(tables.Table, _Sliding):
     """A speed tabulated over time, linear between the rows; two rows at one time are a jump.
 
@@ -165,25 +157,10 @@ class Table(tables.Table, _Sliding):
     model: Literal["table"] = "table"
 
 
-_STAGE_SPEED = Quantity("m/s", "speed of the stage", "V")
-_Stage = tables.over_time(_STAGE_SPEED, "speed")
-_Force = tables.over_time(Quantity("N", "tangential force on the body", "Q"), "force")
-_Stiffness = Annotated[float, Quantity("N/m", "stiffness of the spring", "K", above=0)]
-_Mass = Annotated[float, Quantity("kg", "mass of the body", "m", at_least=0)]
-_Damping = Annotated[float, Quantity("N s/m", "damping of the body", "c", at_least=0)]
-_Viscosity = Annotated[float, Quantity("Pa s/m", "viscosity of the interface", "eta", at_least=0)]
 _Tolerance = Annotated[float, Quantity("1", "tolerance of the slider's motion", "", at_least=1e-12, at_most=1e-2)]
-_After = Annotated[float, Quantity("s", "time at rest before the stage moves", "t_w", at_least=0)]
-_ContactStiffness = Annotated[
-    Annotated[float, Quantity("N/m", "tangential stiffness of the contact", "k_t", above=0)]
-    | Literal["half_space", "rigid"],
-    Field(description='"half_space": that of the half-space under a uniform stress'),
-]
 #: Columns of ``Driven.energies``: work of the drive; lost to damping, viscosity, rupture, snaps and to the area as it
 #: changes; stored now, and at the start.
-ENERGY = np.dtype(
-    [(name, float) for name in ("work", "damping", "viscosity", "rupture", "snaps", "area", "stored", "first")]
-)
+ENERGY = record("work damping viscosity rupture snaps area stored first")
 #: Columns of the readings of a drive that feels the friction.
 READINGS = (
     "stage_position", "stage_speed", "spring_force", "drive_work", "stored_energy", "dissipated_by_damping",
@@ -240,18 +217,22 @@ class Driven(NamedTuple):
         return Driven(*(values[k] for values in self))
 
 
-@dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
-class _Driven:
+@keyed(kw_only=True)
+class _Driven(Part):
     """Keys and attributes of a drive that feels the friction."""
 
     state_class: ClassVar[type[Driven]] = Driven
     per_member: ClassVar[bool] = True
     solves_motion: ClassVar[bool] = True
 
-    mass: _Mass = 0.0
-    damping: _Damping = 0.0
-    viscosity: _Viscosity = 0.0
-    contact_stiffness: _ContactStiffness = "half_space"
+    mass: Annotated[float, Quantity("kg", "mass of the body", "m", at_least=0)] = 0.0
+    damping: Annotated[float, Quantity("N s/m", "damping of the body", "c", at_least=0)] = 0.0
+    viscosity: Annotated[float, Quantity("Pa s/m", "viscosity of the interface", "eta", at_least=0)] = 0.0
+    contact_stiffness: Annotated[
+        Annotated[float, Quantity("N/m", "tangential stiffness of the contact", "k_t", above=0)]
+        | Literal["half_space", "rigid"],
+        Field(description='"half_space": that of the half-space under a uniform stress'),
+    ] = "half_space"
     tolerance: _Tolerance = 1e-6
 
     #: Stiffness of the spring [N/m]; 0 where the force is prescribed.
@@ -277,7 +258,7 @@ class _Driven:
         state = Driven(*(zero for _ in Driven._fields))._replace(
             body_speed=speed, speed=speed, runaway_time=np.full(members, np.nan), energies=np.zeros((members, 8))
         )
-        return state, Motion(0, 0.0, 0.0, zero, zero, speed, speed)
+        return state, Motion(0, np.zeros(1), np.zeros(1), zero, zero, speed, speed)
 
     def first(self, duration: float) -> float:
         """Return the prescribed speed of the stage [m/s] or force [N] at the start."""
@@ -307,18 +288,15 @@ class _Driven:
         stage = state.stage_position, state.stage_speed, state.spring_force
         return np.stack([*stage, work, stored, *spent, residual, state.substeps, state.runaway_time], axis=-1)
 
-    def remarks(self, setting: Setting) -> list[str]:
-        return []
 
-
-@dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
+@keyed(kw_only=True)
 class Force(_Driven):
     """A prescribed tangential force: creep, ageing under load, the static threshold. Limit: ``Spring`` as K -> 0.
 
     Where nothing can bear the force any longer, the member ends there with the time of its runaway.
     """
 
-    force: _Force  # type: ignore[valid-type]
+    force: tables.over_time(Quantity("N", "tangential force on the body", "Q"), "force")  # type: ignore[valid-type]
     model: Literal["force"] = "force"
 
     @property
@@ -329,13 +307,13 @@ class Force(_Driven):
         return _zeros(ends)
 
 
-@dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
+@keyed(kw_only=True)
 class Spring(_Driven):
     """A stage that pulls the body through a spring: stick-slip. Limit: the stage's own motion as K -> infinity."""
 
-    stage: _Stage  # type: ignore[valid-type]
-    stiffness: _Stiffness
-    start_after: _After = 0.0
+    stage: tables.over_time(Quantity("m/s", "speed of the stage", "V"), "speed")  # type: ignore[valid-type]
+    stiffness: Annotated[float, Quantity("N/m", "stiffness of the spring", "K", above=0)]
+    start_after: Annotated[float, Quantity("s", "time at rest before the stage moves", "t_w", at_least=0)] = 0.0
     start: Annotated[
         Literal["rest", "steady"],
         Field(description='"steady": moving with the stage, preloaded; until disturbed it stays so, stable or not'),

@@ -22,6 +22,11 @@ Indices = NDArray[np.int64]
 Moment = TypeVar("Moment", float, Array)
 
 
+def record(names: str) -> np.dtype[np.void]:
+    """Return the type of a record of floats with these names, separated by blanks."""
+    return np.dtype([(name, float) for name in names.split()])
+
+
 class Times(NamedTuple):
     """Clock of a run: length of a step [s], number of steps, duration [s]."""
 
@@ -78,16 +83,18 @@ _NONE, _UNKNOWN = _constant(0.0), _constant(np.nan)
 
 
 class Motion(NamedTuple):
-    """Sliding during one clock step, from the drive to all; each array of shape (1,) or (members,).
+    """Sliding during a block of clock steps, each array of shape (steps, 1) or (steps, members).
+
+    At the start of a run, and wherever a single step is meant, the first axis is missing.
 
     Attributes
     ----------
     step : int
-        Number of the step; 0 is the start, which has no duration.
-    time : float
-        Time at the end of the step [s].
-    duration : float
-        Length of the step [s].
+        Number of the first step; 0 is the start, which has no duration.
+    time : array
+        Time at the end of each step [s].
+    duration : array
+        Length of each step [s].
     slip : array
         Displacement of the slider over the step, signed [m].
     path : array
@@ -98,27 +105,6 @@ class Motion(NamedTuple):
         Speed at the end of the step [m/s]; before a jump there, the old one.
     unsteady : array
         Integral over the step of the square of what the absolute speed differs from its mean there [m²/s].
-    """
-
-    step: int
-    time: float
-    duration: float
-    slip: Array
-    path: Array
-    first: Array
-    speed: Array
-    unsteady: Array = _NONE
-
-
-class Motions(NamedTuple):
-    """Sliding during a block of clock steps, each array of shape (steps, 1) or (steps, members).
-
-    Attributes
-    ----------
-    step : int
-        Number of the first step.
-    time, duration, slip, path, first, speed, unsteady : array
-        As of ``Motion``.
     position : array
         Displacement of the slider since the start, at the end of each step [m].
     """
@@ -130,8 +116,8 @@ class Motions(NamedTuple):
     path: Array
     first: Array
     speed: Array
-    position: Array
     unsteady: Array = _NONE[np.newaxis]
+    position: Array = _NONE[np.newaxis]
 
 
 def during(values: Array, steps: int) -> Array:
@@ -272,7 +258,8 @@ class Part(Protocol):
         """True if members differ by this part: a matter of its model and keys, never of data."""
 
     def remarks(self, setting: Setting) -> list[str]:
-        """Sentences on what this part assumes or cannot hold in such a scene, for ``sim check``."""
+        """Return sentences on what this part assumes or cannot hold in such a scene, for ``sim check``."""
+        return []
 
 
 class Drive(Part, Protocol[State]):
@@ -289,7 +276,7 @@ class Drive(Part, Protocol[State]):
     def begin(self, times: Times, members: int) -> tuple[State, Motion]:
         """State and motion of some members at t = 0: no slip, and the speed with which the run begins."""
 
-    def advance(self, state: State, times: Times, steps: range) -> tuple[State, Motions]:
+    def advance(self, state: State, times: Times, steps: range) -> tuple[State, Motion]:
         """State at the end of a block of steps and the exact motion in it, of a drive that prescribes it."""
 
     def readings(self, state: State) -> Array:
@@ -317,7 +304,7 @@ class Bonds(Part, Protocol[State]):
     def start(self, motion: Motion, noise: Noise) -> State:
         """Population at t = 0, as the key ``start`` has it."""
 
-    def advance(self, state: State, motions: Motions, radius: Array, noise: Noise) -> tuple[State, Bonding]:
+    def advance(self, state: State, motions: Motion, radius: Array, noise: Noise) -> tuple[State, Bonding]:
         """Population after a block of steps, and what others read of it at the end of each.
 
         ``radius`` is that of the contact at the start of the block [m], nan where it was open.
@@ -340,7 +327,7 @@ class Shear(Protocol[State]):
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> State:
         """Stationary fluctuations at t = 0."""
 
-    def advance(self, state: State, motions: Motions, bonding: Bonding, noise: Noise) -> tuple[State, Array]:
+    def advance(self, state: State, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[State, Array]:
         """Fluctuations after a block of steps, at the ends of which the bonds are ``bonding``; ΔΓ at each [J/m²]."""
 
     @property
@@ -361,7 +348,7 @@ class Contact(Part, Protocol[Terms]):
     def start(self, motion: Motion, duration: float, balance: Terms) -> ContactState:
         """Contact at the start of a run of ``duration`` [s], in equilibrium with the terms of the work of adhesion."""
 
-    def advance(self, state: ContactState, motions: Motions, duration: float, balance: Terms) -> ContactState:
+    def advance(self, state: ContactState, motions: Motion, duration: float, balance: Terms) -> ContactState:
         """Contact at the end of each step of a block, where the terms of the work of adhesion are ``balance``."""
 
 

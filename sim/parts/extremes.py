@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.numerics.jit import device, kernel
-from sim.parts.exchange import Array, Bonding, Motions, during
+from sim.parts.exchange import Array, Bonding, Motion, during, record
 
 #: Arrays that are read alone, as they come.
 _READ = "Array(float64, 2, 'A', readonly=True), "
@@ -15,7 +15,7 @@ _OF_THE_STRESS = "stress", "stiffness", "relaxation"
 #: Change over a step, by the slope at one of its ends, over the value, up to which a cubic holds.
 _RESOLVED = 5.0
 #: Row of a running maximum: the last value but one, the last value, the maximum so far, and its time [s].
-MAXIMUM = np.dtype([(name, float) for name in ("before", "last", "largest", "time")])
+MAXIMUM = record("before last largest time")
 
 
 class Extremes(NamedTuple):
@@ -47,7 +47,7 @@ def _started(values: Array) -> Array:
 
 
 def after(
-    so_far: Extremes, before: tuple[Bonding, Array], bonding: Bonding, radius: Array, pull: Array, motions: Motions
+    so_far: Extremes, before: tuple[Bonding, Array], bonding: Bonding, radius: Array, pull: Array, motions: Motion
 ) -> Extremes:
     """Maxima a block of steps later, from the bonds, contact radius [m] and pull [N] at the end of each.
 

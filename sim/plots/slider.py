@@ -206,7 +206,7 @@ def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
         firm = np.full(speed.shape, float(setting(point, "drive.contact_stiffness")))
     mass, damping, viscosity = (float(setting(point, f"drive.{key}")) for key in ("mass", "damping", "viscosity"))
     body = Body(area, growth, 0.0, mass, damping, viscosity, firm, contact_growth)
-    return np.asarray(onset(speed, bonds.stiffness, bonds.rebinding, bonds.density, body).stiffness)
+    return np.asarray(onset(speed, (bonds.stiffness, bonds.rebinding, bonds.density), body).stiffness)
 
 
 def _area(point: xr.Dataset, bound: np.ndarray) -> np.ndarray:

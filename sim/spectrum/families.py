@@ -18,20 +18,19 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
-from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from sim.laws.halfspace import angular_compliance, energy_factors, ripple_energy
 from sim.spectrum.family import Array, Factors, gaussian_boxes
 from sim.spectrum.measured import Measured, Tabulated
 from sim.spectrum.radial import Isotropic, PowerLaws, Rowed, Waves, disc_sums
-from sim.units.quantity import Quantity
+from sim.units.quantity import Quantity, keyed
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(80)
 _PHASE, _WEIGHTS = 0.25 * math.pi * (1 + _NODES), 0.25 * math.pi * _WEIGHTS
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class BondMade(Isotropic):
     """Field of bonds at random places, each pulling on a disc of radius ``footprint``; its size follows the bonds.
 
@@ -113,12 +112,11 @@ class BondMade(Isotropic):
 Rms = Annotated[float, Quantity("Pa", "root mean square of the shear stress", "σ", above=0)]
 Length = Annotated[float, Quantity("m", "correlation length", "ξ", above=0)]
 Longest = Annotated[float, Quantity("m", "longest wavelength", "λ_L", above=0)]
-Rolloff = Annotated[float, Quantity("m", "wavelength at which the plateau ends", "λ_r", above=0)]
 Shortest = Annotated[float, Quantity("m", "shortest wavelength", "λ_s", above=0)]
 Angle = Annotated[float, Quantity("rad", "angle to the sliding direction", "θ")]
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Ripple:
     """A single sinusoid, ``τ1 cos(q·x)``.
 
@@ -207,7 +205,7 @@ def _ordered(*wavelengths: tuple[str, float]) -> None:
         raise PydanticCustomError("empty_band", f'{message} model = "ripple" for a single wavelength')
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Band(Rowed):
     """A flat spectrum between two wavelengths, zero outside.
 
@@ -247,7 +245,7 @@ class Band(Rowed):
         return PowerLaws(q, np.full(2, 4 * np.pi * self.rms**2 / ((q[1] - q[0]) * (q[1] + q[0]))))
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class SelfAffine(Rowed):
     """A plateau down to the roll-off, then a self-affine power law, cut at both ends.
 
@@ -278,7 +276,7 @@ class SelfAffine(Rowed):
     rms: Rms
     hurst: Annotated[float, Quantity("1", "Hurst exponent", "H", at_least=0, at_most=1)]
     longest: Longest
-    rolloff: Rolloff
+    rolloff: Annotated[float, Quantity("m", "wavelength at which the plateau ends", "λ_r", above=0)]
     shortest: Shortest
     model: Literal["self_affine"] = "self_affine"
 
@@ -297,7 +295,7 @@ class SelfAffine(Rowed):
         return PowerLaws(q, level * self.rms**2 / float(unit.cumulative(q[-1])))
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Gaussian(_OfRms, Isotropic):
     """Correlation ``σ² exp(-r²/ξ²)``: smooth patches of one size.
 
@@ -347,7 +345,7 @@ class Gaussian(_OfRms, Isotropic):
         return math.pi**1.5 * self.length * self.variance
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class VonKarman(_OfRms, Isotropic):
     """The von Kármán (Matérn) family; H = 1/2 is the correlation ``σ² exp(-r/ξ)``.
 
@@ -402,7 +400,7 @@ class VonKarman(_OfRms, Isotropic):
         return float(2 * math.pi**1.5 * self.length * self.variance * ratio)
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class AnisotropicGaussian(_OfRms, Waves):
     """Correlation ``σ² exp(-x²/a² - y²/b²)`` along two axes, turned by an angle.
 

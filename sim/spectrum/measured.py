@@ -7,19 +7,19 @@ without pickled objects, or netCDF; declared sizes are not trusted.
 
 import functools
 import math
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
-from pydantic.dataclasses import dataclass
 from pydantic_core import ArgsKwargs, PydanticCustomError
 
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice, lattice_of
 from sim.spectrum.family import Array
 from sim.spectrum.radial import PowerLaws, Rowed
-from sim.units.quantity import Quantity
+from sim.units.quantity import Quantity, keyed
 from sim.units.tables import at_once, blamed, file_columns, file_path, file_text, matrix
 
 _WAVENUMBER = Quantity("rad/m", "wavenumber", "q", above=0)
@@ -27,10 +27,9 @@ _HEIGHTS = 'it is a spectrum of heights; a stress is needed, whose density over 
 _LINE = 'it is the spectrum of a line; give that of the plane, whose density is in "Pa^2 m^2"'
 _MISTAKEN = (("m^4", _HEIGHTS), ("m^3", _HEIGHTS), ("m^2", _HEIGHTS), ("Pa^2 m", _LINE))
 _DENSITY = Quantity("Pa^2 m^2", "power spectral density of the stress", "C", at_least=0, mistaken=_MISTAKEN)
-_RMS = Quantity("Pa", "root mean square of the shear stress", "σ", above=0)
 Wavenumbers = Annotated[tuple[Annotated[float, _WAVENUMBER], ...], at_once(_WAVENUMBER)]
 Densities = Annotated[tuple[Annotated[float, _DENSITY], ...], at_once(_DENSITY)]
-Rescaled = Annotated[float, _RMS]
+Rescaled = Annotated[float, Quantity("Pa", "root mean square of the shear stress", "σ", above=0)]
 _WHERE = "4π² in the integral, <τ1²> = ∫ d²q C / 4π², or in the density, <τ1²> = ∫ d²q C (Persson)"
 _Normalization = Annotated[Literal["in_integral", "in_density"], Field(description=_WHERE)]
 #: Factor from a density to C: the 4π² stands in the integral ⟨τ1²⟩ = ∫ d²q C / 4π², or already in the density.
@@ -82,9 +81,10 @@ class FromFile(Rowed, Protocol):
         return PowerLaws(chain.q, chain.density * (self.rms**2 / float(chain.cumulative(chain.q[-1]))))
 
 
-def by_name(values: Any, names: tuple[str, ...]) -> Any:
-    """Arguments of a direct construction as a dictionary, as in a scenario, arrays as lists."""
+def by_name(values: Any, kind: Any) -> Any:
+    """Return the arguments of a direct construction as a dictionary, as in a scenario, arrays as lists."""
     if isinstance(values, ArgsKwargs):
+        names = [field.name for field in fields(kind)]
         if len(values.args) > len(names):
             raise TypeError(f"at most {len(names)} positional arguments: {', '.join(names)}")
         values = dict(zip(names, values.args, strict=False)) | dict(values.kwargs or {})
@@ -93,7 +93,7 @@ def by_name(values: Any, names: tuple[str, ...]) -> Any:
     return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in values.items()}
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Tabulated(FromFile):
     """A radial density given by rows: power laws between them, zero outside.
 
@@ -134,7 +134,7 @@ class Tabulated(FromFile):
     @model_validator(mode="before")
     @classmethod
     def _read_file(cls, values: Any, info: ValidationInfo) -> Any:
-        values = by_name(values, ("wavenumbers", "densities", "normalization", "file", "header", "rms"))
+        values = by_name(values, cls)
         if not isinstance(values, dict) or "wavenumbers" in values or "densities" in values:
             return values
         name = values.get("file")
@@ -150,10 +150,8 @@ class Tabulated(FromFile):
         full = np.flatnonzero(self.densities)
         gaps = np.setdiff1d(np.arange(full[0], full[-1]), full) if full.size else full
         if gaps.size:
-            text = (
-                f"row {gaps[0] + 1} is zero between positive ones, as an empty bin of an average is: its energy would"
-            )
-            raise PydanticCustomError("table_gaps", f"{text} be lost; leave such rows out")
+            text = f"row {gaps[0] + 1} is zero between positive ones, as an empty bin of an average is"
+            raise PydanticCustomError("table_gaps", f"{text}: its energy would be lost; leave such rows out")
         return self
 
     @functools.cached_property
@@ -162,7 +160,7 @@ class Tabulated(FromFile):
         return self._scaled(self._chain(NORMALIZATIONS[self.normalization]))
 
     @property
-    def remarks(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[str, ...]:  # type: ignore[override]
         """Remarks on the normalization and on the first row."""
         return self._normalized() + self._cut_plateau()
 
@@ -412,7 +410,7 @@ def radial_average(density: Array, grid: Lattice) -> RadialAverage:
 # Spectrum estimated from measured stress maps.
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Measured(FromFile):
     """The radially averaged spectrum of measured stress maps, used as a table.
 
@@ -457,7 +455,7 @@ class Measured(FromFile):
     @model_validator(mode="before")
     @classmethod
     def _read_file(cls, values: Any, info: ValidationInfo) -> Any:
-        values = by_name(values, ("file", "spacing", "window", "variable", "wavenumbers", "densities", "rms"))
+        values = by_name(values, cls)
         if not isinstance(values, dict):
             return values
         name, window = values.get("file"), values.get("window", "none")

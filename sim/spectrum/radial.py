@@ -41,26 +41,22 @@ _LAST_KINK = 3000.0
 _POINTS, _DECADES = 513, 4
 
 
+#: Inputs of ``share_of`` at a position of the slider: wave, ends and cubics; a wave without strength means cubics.
+Terms = tuple[tuple[float, float, float], tuple[float, float, float], Array]
+_NONE = 0.0, 0.0, 0.0
+
+
 class Waves(Protocol):
     """Base of the families (``sim.spectrum.family``) with a density, whose integrals over discs are quadratures."""
 
     wavevector: ClassVar[None] = None
     bond_made: ClassVar[bool] = False
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """Sentences on what is assumed of the spectrum."""
-        return ()
-
-    @property
-    def support(self) -> tuple[float, float]:
-        """Wavenumbers [rad/m] between which the density may differ from zero."""
-        return 0.0, math.inf
-
-    @property
-    def breaks(self) -> Array:
-        """Wavenumbers [rad/m] where the density jumps or kinks."""
-        return np.empty(0)
+    #: Sentences on what is assumed of the spectrum.
+    remarks: ClassVar[tuple[str, ...]] = ()
+    #: Wavenumbers [rad/m] between which the density may differ from zero.
+    support: ClassVar[tuple[float, float]] = 0.0, math.inf
+    #: Wavenumbers [rad/m] where the density jumps or kinks.
+    breaks: ClassVar[Array] = np.empty(0)
 
     def reach(self, radius: float) -> tuple[float, float]:
         """Wavenumbers [rad/m] below which nothing varies, and beyond which a disc of this radius [m] stores nothing."""
@@ -235,6 +231,9 @@ class Margin:
     for a ripple.
     """
 
+    #: No wave gives energy back, on average over its phases.
+    least = 0.0
+
     def __init__(self, spectrum: Family, shear_modulus: float, poisson_ratio: float, sphere_radius: float) -> None:
         self.spectrum, self.solid = spectrum, (shear_modulus, poisson_ratio)
         self._ends = sphere_radius * 10.0**-_DECADES, sphere_radius
@@ -252,16 +251,6 @@ class Margin:
         """The same share at any position of the slider."""
         return self
 
-    @property
-    def least(self) -> float:
-        """0: no wave gives energy back, on average over its phases."""
-        return 0.0
-
-    @property
-    def each(self) -> list[tuple[tuple[float, float, float], tuple[float, float, float], Array]]:
-        """The ``terms``, which are the same at all steps."""
-        return [self.terms]
-
     def _share(self, radius: Array, law: Callable[..., Array]) -> Array:
         if self.spectrum.wavevector is not None and self._plane > 0.0:
             share = law(self.spectrum, np.nan_to_num(radius), *self.solid) / self._plane
@@ -271,19 +260,19 @@ class Margin:
         return np.where(radius < low, share * np.maximum(radius, 0.0) / low, share)
 
     @cached_property
-    def terms(self) -> tuple[tuple[float, float, float], tuple[float, float, float], Array]:
-        """Inputs of ``share_of``: the wave of a ripple or (0, 0, 0), beginning and pieces of the spline, its cubics."""
+    def each(self) -> list[Terms]:
+        """Inputs of ``share_of``, once for all steps: the wave of a ripple, or places and cubics of a spline."""
         (low, high), wave = self._ends, self.spectrum.wavevector
         if wave is not None and self._plane > 0.0:
             level, swing = angular_compliance(np.asarray(self.solid[1], float))
             square = wave[0] ** 2 + wave[1] ** 2
             lean = float(swing) * (wave[0] ** 2 - wave[1] ** 2) / square
             whole = 0.5 * math.pi * (float(level) + lean)
-            return (2.0 * math.sqrt(square), float(level) / whole, -lean / whole), (0.0, 0.0, 0.0), np.zeros((1, 4))
+            return [((2.0 * math.sqrt(square), float(level) / whole, -lean / whole), _NONE, np.zeros((1, 4)))]
         count, spline = _POINTS - 1, self._spline(marginal_energy)
         step = math.log(high / low) / count
         cubics = np.ascontiguousarray(spline.c.T * step ** np.arange(3, -1, -1))
-        return (0.0, 0.0, 0.0), (low, math.log(low), 1.0 / step), cubics
+        return [(_NONE, (low, math.log(low), 1.0 / step), cubics)]
 
     @cached_property
     def _plane(self) -> float:
@@ -473,11 +462,11 @@ class Rowed(Isotropic, Protocol):
         return float(self.rows.cumulative(self.rows.q[-1]))
 
     @property
-    def support(self) -> tuple[float, float]:
+    def support(self) -> tuple[float, float]:  # type: ignore[override]
         """Wavenumbers [rad/m] between which the density may differ from zero."""
         return float(self.rows.q[0]), float(self.rows.q[-1])
 
     @property
-    def breaks(self) -> Array:
+    def breaks(self) -> Array:  # type: ignore[override]
         """Wavenumbers [rad/m] where the density jumps or kinks."""
         return self.rows.q

@@ -11,7 +11,6 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, PlainSerializer, ValidationInfo, model_validator
-from pydantic.dataclasses import dataclass
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError
 
@@ -19,12 +18,11 @@ from sim.laws.halfspace import free_energy_of_map, noise_energy, surface_energy
 from sim.numerics.grid import Grid, Rectangle, lattice_of
 from sim.spectrum.family import Array
 from sim.spectrum.measured import SPACING, MapFile, Measured, by_name, estimate, read_map, tapered
-from sim.units.quantity import Quantity
+from sim.units.quantity import Quantity, keyed
 from sim.units.tables import blamed
 
 _START = Quantity("m", "place along x of the map where a disc begins, left out the middle", "x_0", at_least=0)
 _NOISE = Quantity("Pa", "rms of the measurement's white noise in a pixel, which is reported", "s", at_least=0)
-_FILE = "the map: CSV in Pa, one row a line, npy, or netCDF"
 _WINDOW = 'taper of a map that is not periodic; "none" on a disc'
 _ROWS = "axis that goes from row to row of a CSV or npy; netCDF names it"
 _MASK = "true: nan marks what lies outside of the contact, where there is no stress"
@@ -38,7 +36,7 @@ _Values = Annotated[bytes, SkipJsonSchema(), PlainSerializer(_digest, return_typ
 _Shape = Annotated[tuple[int, int], SkipJsonSchema()]
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class StressMap:
     """A measured map of the shear stress itself, with its phases and directions.
 
@@ -79,7 +77,7 @@ class StressMap:
     5.0 1.000
     """
 
-    file: Annotated[str, Field(description=_FILE)]
+    file: Annotated[str, Field(description="the map: CSV in Pa, one row a line, npy, or netCDF")]
     pixel: Annotated[float, SPACING] | None = None
     pixel_y: Annotated[float, SPACING] | None = None
     window: Annotated[Literal["none", "hann"], Field(description=_WINDOW)] = "none"
@@ -94,7 +92,7 @@ class StressMap:
     @model_validator(mode="before")
     @classmethod
     def _read_file(cls, table: Any, info: ValidationInfo) -> Any:
-        table = by_name(table, ("file", "pixel", "pixel_y", "window", "rows", "mask", "noise", "start", "variable"))
+        table = by_name(table, cls)
         if not isinstance(table, dict) or isinstance(table.get("values"), bytes):
             return table
         if strange := {"values", "shape"} & table.keys():

@@ -26,7 +26,7 @@ from sim.engine import MemberNoise, follow
 from sim.ensemble.plan import seconds_a_step, together
 from sim.ensemble.variables import VARIABLES
 from sim.numerics import files
-from sim.parts.exchange import Array, Bonding, Gammas, Motion, Motions
+from sim.parts.exchange import Array, Bonding, Gammas, Motion
 from sim.parts.shear.bands import cell_pairs
 from sim.parts.shear.process import Fluctuation
 from sim.plots.style import BONDS, FLUCTUATIONS, LINES, REFERENCE, STYLE, legend, rows
@@ -385,7 +385,7 @@ class _Replayed:
         size = self.amplitude.factor(motion.speed, bonding.strength)
         return Fluctuation(size**2 * self.energy[0], size, np.empty(0))
 
-    def advance(self, state: Any, motions: Motions, bonding: Bonding, noise: Any) -> tuple[Fluctuation, Array]:
+    def advance(self, state: Any, motions: Motion, bonding: Bonding, noise: Any) -> tuple[Fluctuation, Array]:
         """Return the fluctuations after a block of steps, and ΔΓ at each of them."""
         size = self.amplitude.factor(motions.speed, bonding.strength)
         energy = size**2 * self.energy[motions.step : motions.step + len(motions.time)]

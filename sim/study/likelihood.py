@@ -210,7 +210,7 @@ def steady_course(scenario: Scenario, time: Array, speed: Array) -> Trajectory:
     result = scenario.population.steady(speed[:, 0])
     still = 0.0 * speed
     bonding = type(result)(*(np.reshape(values, (-1, 1)) + still for values in result))
-    motion = Motion(0, time, 0.0 * time, still, still, speed, speed)  # type: ignore[arg-type]
+    motion = Motion(0, time, 0.0 * time, still, still, speed, speed)
     shear = scenario.fluctuations
     size = shear.amplitude.factor(speed, bonding.strength) ** 2
     size = bonding.frozen + bonding.varying if shear.spectrum.bond_made else size

@@ -11,15 +11,17 @@ import json
 import math
 import operator
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, dataclass_transform
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, dataclasses
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from sim.units.errors import BadInput
 
+T = TypeVar("T")
 _NUMBER = r"[+-]?(?:(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?|inf(?:inity)?|nan)"
 _REST = r"(?P<unit>[^\s0-9+,-](?:.*\S)?|1\s*/.*\S)?"
 _TEXT = re.compile(rf"\s*(?P<number>{_NUMBER})\s*{_REST}\s*", re.IGNORECASE | re.DOTALL)
@@ -257,6 +259,29 @@ class Quantity:
         described |= {word: bound for word, bound in bounds.items() if math.isfinite(bound)}
         example: Any = self.example.strip('"')
         return described | {"examples": [64 if self.whole else float(example) if self.unit == "1" else example]}
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(Field,))
+def keyed(kw_only: bool = False) -> Callable[[type[T]], type[T]]:
+    """Return the decorator of a class whose fields are the keys of a table of a scenario."""
+    config = {"extra": "forbid", "populate_by_name": True}
+    return dataclasses.dataclass(frozen=True, kw_only=kw_only, config=config)  # type: ignore
+
+
+def tagged(shared: str, *names: str) -> Callable[[object], str | None]:
+    """Return a function for the tag of a table or a part, where two classes share a model's name.
+
+    The tag is ``shared[name]``, by the first of the ``names``, for the class that has a key of these names.
+    """
+
+    def tag(value: object) -> str | None:
+        keys = value if isinstance(value, dict) else {name: getattr(value, name, None) for name in ("model", *names)}
+        model = keys.get("model")
+        if model == shared and any(keys.get(name) is not None for name in names):
+            return f"{shared}[{names[0]}]"
+        return model if isinstance(model, str) else None
+
+    return tag
 
 
 def read_option(value: float | str | None, name: str, unit: str, **bounds: Any) -> float:

@@ -15,11 +15,10 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Discriminator, Field, Tag, ValidationInfo, WrapValidator, model_validator
-from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from sim.units.errors import BadInput
-from sim.units.quantity import Quantity
+from sim.units.quantity import Quantity, keyed
 
 Array = NDArray[np.float64]
 
@@ -384,7 +383,7 @@ class Number(NamedTuple):
         return linear_pieces(np.arange(len(ends) - 1), ends[:-1], ends[1:], values[:-1], values[1:])
 
 
-@dataclass(frozen=True, kw_only=True, config={"extra": "forbid", "populate_by_name": True})
+@keyed(kw_only=True)
 class Course:
     """From one value to another over the run, or ``cycles`` times there and back, linearly or logarithmically.
 
@@ -475,7 +474,7 @@ def _interpolated(times: Array, values: Array, row: Indices, time: Array) -> Arr
     return np.where(time >= times[after], values[after], slope * (time - times[row]) + values[row])
 
 
-@dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
+@keyed(kw_only=True)
 class Table:
     """Values tabulated over time, linear between the rows; two rows at one time are a jump.
 
@@ -541,7 +540,7 @@ def _kind(value: Any) -> str:
 def over_time(unit: Quantity, name: str) -> Any:
     """Return the annotation of a prescribed quantity: a number, a course, or a table whose column has this name."""
 
-    @dataclass(frozen=True, kw_only=True)
+    @keyed(kw_only=True)
     class _Course(Course):
         """From one value to another over the run, or ``cycles`` times there and back."""
 
@@ -549,7 +548,7 @@ def over_time(unit: Quantity, name: str) -> Any:
         stop: Annotated[float, unit, Field(alias="to")]
         cycles: Annotated[int, _CYCLES] = 0  # type: ignore[misc]
 
-    @dataclass(frozen=True, kw_only=True)
+    @keyed(kw_only=True)
     class _Table(Table):
         """A value tabulated over time, linear between the rows; ``file`` names the CSV."""
 

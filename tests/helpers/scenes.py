@@ -13,7 +13,7 @@ from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import Force, Spring
-from sim.parts.exchange import Motions
+from sim.parts.exchange import Motion
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Constant as ConstantAmplitude, Diffusion, Onset, Slip, SlipRate, Stress, Time, Wave
 from sim.scenario.clock import Clock, Ensemble
@@ -175,7 +175,7 @@ def sample(members=3, steps=9, sweep=None, **parts):
 
 def one_step(step, *given):
     """A block of one step: time, duration, slip, path, speeds at its ends."""
-    return Motions(step, *(np.reshape(value, (1, -1)) for value in (*given, given[2])))
+    return Motion(step, *(np.reshape(value, (1, -1)) for value in given))
 
 
 def advanced(process, state, motion, bonding, noise):

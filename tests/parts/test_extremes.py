@@ -4,7 +4,7 @@ import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.parts import extremes
-from sim.parts.exchange import Bonding, Motions
+from sim.parts.exchange import Bonding, Motion
 
 ONE = np.full(1, 1.0 / np.sqrt(np.pi))  # radius of a contact of unit area
 
@@ -26,7 +26,7 @@ def _after(maxima, bondings, radii, step, number):
     """Maxima after a block of steps."""
     steps = len(bondings) - 1
     still, times = np.zeros((steps, 1)), step * np.arange(number, number + steps)[:, None]
-    motions = Motions(number, times, np.full((steps, 1), step), still, still, still, still, still)
+    motions = Motion(number, times, np.full((steps, 1), step), still, still, still, still, still)
     bonding = Bonding(*(np.array(values[1:]) for values in zip(*bondings, strict=True)))
     # the radius jumps at the beginning of a step: only the last row of a block is its end
     ends = np.repeat(radii[1][None], steps, axis=0)

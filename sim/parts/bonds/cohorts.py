@@ -497,7 +497,6 @@ class Cohorts(NamedTuple):
 
 def empty(rupture: RuptureRate, tolerance: float) -> Cohorts:
     """Return a population without a bond."""
-    _check(rupture, tolerance)
     capacity = 5 * _most(rupture, tolerance) // 4 + 32
     blank = np.zeros((1, capacity))
     width = np.zeros((1, capacity if rupture.limit < math.inf else 1))
@@ -591,11 +590,7 @@ def advance(
     outlives ends in the steady state.
     """
     share = np.ones(1) if share is None else share
-    lengths = {slip.shape[1], len(cohorts.weight), len(share)}
-    rows = max(lengths)
-    if lengths - {1, rows}:
-        populations = f"{slip.shape[1]} slips do not fit {len(cohorts.weight)} populations"
-        raise ValueError(f"{populations}: give one of either, or as many")
+    rows = max(slip.shape[1], len(cohorts.weight), len(share))
     after, sums = tuple(np.zeros((rows, a.shape[1])) for a in cohorts), np.empty((5, len(duration), rows))
     numbers = numbers_of(rupture, rebinding_rate, tolerance, largest)
     step_rows(tuple(cohorts), share, slip, duration, numbers, after, sums)
@@ -615,13 +610,6 @@ def moments(cohorts: Cohorts, rupture: RuptureRate, tolerance: float) -> Array:
     sums = np.empty((5, len(cohorts.weight)))
     sum_rows(cohorts.weight, cohorts.stretch, cohorts.width, numbers_of(rupture, 0.0, tolerance, math.inf), sums)
     return sums
-
-
-def _check(rupture: RuptureRate, tolerance: float) -> None:
-    if not 1e-12 <= tolerance <= 0.1:
-        raise ValueError(f"a tolerance of {tolerance:g} is out of range: give 1e-12 to 0.1")
-    if rupture.limit < math.inf and rupture.steepness != 0.0:
-        raise ValueError("a rupture that grows with the stretch and ends at a limit is not built: leave out one")
 
 
 def _most(rupture: RuptureRate, tolerance: float) -> int:

@@ -61,11 +61,6 @@ def advance(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding
         N in [0, 1] and M at the end of each step; nan where more than ``MOST_STEPS`` sub-steps would be
         needed, as for mean stretches some 700 times Bell's.
 
-    Raises
-    ------
-    ValueError
-        If the rupture has both a softness and a limit, or the arrays differ in length.
-
     Notes
     -----
     Without softness a step of any length T is exact (see ``_linear``). Under Bell's rate it is
@@ -84,11 +79,7 @@ def advance(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding
     >>> print(f"{force.max():.2f} {force[-1, 0]:.2f} {steady(100.0, bell, 10.0)[1][0]:.2f}")
     2.40 0.86 0.86
     """
-    _check(rupture)
-    lengths = {bound.size, moment.size, slip.shape[1], path.shape[1]}
-    rows = max(lengths)
-    if lengths - {1, rows}:
-        raise ValueError("bound, moment, slip and path need one entry, or one for every row")
+    rows = max(bound.size, moment.size, slip.shape[1], path.shape[1])
     after = np.empty((2, len(duration), rows))
     _advance(bound, moment, slip, path, duration, *rupture[:3], rebinding_rate, *after)
     return after[0], after[1]
@@ -124,7 +115,6 @@ def steady(speed, rupture: RuptureRate, rebinding_rate) -> tuple[Array, Array]:
     >>> print(np.round(steady(np.array([0.1, 4.59, 1000.0]), bell, 1.0)[1], 4))
     [0.0436 0.2785 0.0274]
     """
-    _check(rupture)
     speed = np.array(speed, dtype=float, ndmin=1)
     pace = np.abs(speed)
     rate = rupture.rate
@@ -138,11 +128,6 @@ def steady(speed, rupture: RuptureRate, rebinding_rate) -> tuple[Array, Array]:
 def _ratio(part, whole):
     """Return part/whole, or 0 if the whole is 0."""
     return np.divide(part, whole, out=np.zeros(whole.shape), where=whole > 0.0)
-
-
-def _check(rupture: RuptureRate) -> None:
-    if rupture.softness > 0.0 and rupture.limit < math.inf:
-        raise ValueError("bonds that soften and have a cut-off stretch have no first-moment form: use one of them")
 
 
 @device

@@ -15,11 +15,10 @@ bonds leave with their area and the share stays.
 
 import math
 from functools import cached_property
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self, cast
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
-from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 import sim.parts.bonds.cohorts as cohorts
@@ -31,8 +30,8 @@ from sim.numerics.noise import Noise, binomial, stream
 from sim.parts.bonds.cohorts import Cohorts
 from sim.parts.bonds.rupture import Rupture, RuptureRate
 from sim.parts.bonds.tracked import CYCLES, Tracks
-from sim.parts.exchange import Array, Bonding, Motion, Motions, Setting
-from sim.units.quantity import Quantity
+from sim.parts.exchange import Array, Bonding, Motion, Part, Setting
+from sim.units.quantity import Quantity, keyed, tagged
 
 Area = Annotated[
     Literal["present", "carried"], Field(description='"carried": area that the contact gains comes without bonds')
@@ -55,7 +54,7 @@ def share_kept(before: Array, radius: Array) -> Array:
     return np.where(grown, np.square(np.divide(before, radius, out=np.ones(grown.shape), where=grown)), 1.0)
 
 
-class _BondModel:
+class _BondModel(Part):
     """Attributes of all bond models."""
 
     in_place: ClassVar[bool] = False
@@ -63,11 +62,8 @@ class _BondModel:
     in_blocks: ClassVar[bool] = False
     #: Rough time of a single step of a batch, for estimates [s].
     step_seconds: ClassVar[float] = 0.0
-
-    @property
-    def numbers(self) -> int:
-        """Count of numbers in the state of a member."""
-        return 1
+    #: Count of numbers in the state of a member.
+    numbers: ClassVar[int] = 1
 
     def diluted(self, before: Array, radius: Array) -> tuple[Array, Array]:
         """Return the share of bound sites left [1] over a contact of ``radius`` [m], and the radius of their area [m].
@@ -87,9 +83,6 @@ class _BondModel:
         """Return the mean number of bond lives that are followed in a step of one member at speeds [m/s]."""
         return 0.0
 
-    def remarks(self, setting: Setting) -> list[str]:
-        return []
-
 
 class _OverArea(_BondModel):
     """Attributes of models whose population may be carried with the contact area of each member."""
@@ -100,9 +93,7 @@ class _OverArea(_BondModel):
     def per_member(self) -> bool:
         return self.area == "carried"
 
-    @property
-    def feeds_back(self) -> bool:
-        return self.area == "carried"
+    feeds_back = per_member
 
     def rows(self, noise: Noise) -> Array:
         """Return ones, shape (populations,): a single population if all members share an area, else one each."""
@@ -164,13 +155,13 @@ class _WithoutStretch(_BondModel):
         """True if there is a shear stress at all."""
         return self.stress > 0.0
 
-    def advance(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Population, Bonding]:
+    def advance(self, state: Population, motions: Motion, radius: Array, noise: Noise) -> tuple[Population, Bonding]:
         bound, area_radius = self._bound(state, motions, radius, noise)
         sense = np.empty(motions.slip.shape)
         _last_signs(motions.speed, motions.slip, state.sense, sense)
         return Population(bound[-1], sense[-1], area_radius), self.bonding(Population(bound, sense))
 
-    def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
+    def _bound(self, state: Population, motions: Motion, radius: Array, noise: Noise) -> tuple[Array, Array]:
         """Return the bonds at the end of each step, shape (steps, 1) or (steps, members), and their contact radius."""
         raise NotImplementedError
 
@@ -225,11 +216,11 @@ class _AtOnce(_WithoutStretch):
     def start(self, motion: Motion, noise: Noise) -> Population:
         return Population(self._steady_fraction(motion.speed), np.sign(motion.speed))
 
-    def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
+    def _bound(self, state: Population, motions: Motion, radius: Array, noise: Noise) -> tuple[Array, Array]:
         return self._steady_fraction(motions.speed), state.area_radius
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Unbroken(_AtOnce):
     """Every bond of the contact at rest stays; the paper's uniform sliding stress."""
 
@@ -240,7 +231,7 @@ class Unbroken(_AtOnce):
         return np.ones(speed.shape)
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Steady(_AtOnce):
     """The paper's law N/N0 = 1/(1 + V/Vc), at once at every speed. Limit: none as Vc -> infinity."""
 
@@ -249,7 +240,7 @@ class Steady(_AtOnce):
     model: Literal["steady"] = "steady"
 
 
-@dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
+@keyed()
 class Rate(_OverArea, _WithoutStretch):
     """The rate equation dN/dt = h (N0 − N) − h (V/Vc) N. Limit: ``Steady`` as h -> infinity.
 
@@ -276,7 +267,7 @@ class Rate(_OverArea, _WithoutStretch):
         growth = np.add(body.area_growth, body.stress_growth) * (1.0 + viscous)
         return linear_onset(speed, *recipe, body.mass, growth)
 
-    def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
+    def _bound(self, state: Population, motions: Motion, radius: Array, noise: Noise) -> tuple[Array, Array]:
         share, area_radius = self.diluted(state.area_radius, radius)
         before, rates = state.bound * share, (self.critical_speed, self.rebinding_rate)
         bound = np.empty((len(motions.path), len(before)))
@@ -288,7 +279,7 @@ class Rate(_OverArea, _WithoutStretch):
         return bonding._replace(stiffness=-self.rebinding_rate / self.critical_speed * bonding.strength)
 
 
-@dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
+@keyed()
 class Counted(_WithoutStretch):
     """A finite number of two-state sites with the rates of ``Rate``. Limit: ``Rate`` as sites -> infinity.
 
@@ -316,7 +307,7 @@ class Counted(_WithoutStretch):
         first = self._first_fraction(self.start_from, motion)[np.newaxis]
         return Population(self._counted(bound, first, first, motion.step, noise)[0], np.sign(motion.speed))
 
-    def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
+    def _bound(self, state: Population, motions: Motion, radius: Array, noise: Noise) -> tuple[Array, Array]:
         over = motions.path, motions.duration
         stay, bind = transition_probabilities(*over, self.critical_speed, self.rebinding_rate)
         return self._counted(state.bound, stay, bind, motions.step, noise), state.area_radius
@@ -347,10 +338,9 @@ def _count(bound, stay, bind, sites, seed, part, members, step, counted):
 Stiffness = Annotated[float, Quantity("N/m", "stiffness of a bond", "kappa", above=0, typical="0.4 mN/m")]
 Rebinding = Annotated[float, Quantity("1/s", "rate at which a free site binds", "k_on", above=0, typical="1e5 1/s")]
 Density = Annotated[float, Quantity("1/m^2", "bond sites per area", "n", above=0, typical="1e17 1/m^2")]
-CohortTolerance = Annotated[float, Quantity("1", "tolerance of the cohorts", "", at_least=1e-12, below=0.1)]
 
 
-@dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
+@keyed()
 class _Stretched(_BondModel):
     """Keys and attributes of models with a stretch; a subclass gives the moments of the stretch over all sites."""
 
@@ -375,8 +365,7 @@ class _Stretched(_BondModel):
 
     def onset(self, speed: Array, body: Body) -> Onset:
         """Return the onset of oscillations behind a spring at speeds [m/s], nan if unknown."""
-        recipe = self.bond_stiffness, self.rebinding_rate, self.site_density
-        return self.rupture.resolved_onset(speed, *recipe, body)
+        return self.rupture.resolved_onset(speed, (self.bond_stiffness, self.rebinding_rate, self.site_density), body)
 
     def _bonding(self, bound: Array, stretch: Array, square: Array, breaking: Array, lost: Array) -> Bonding:
         """Return the readings of a population of these moments per site.
@@ -401,7 +390,7 @@ class Stretches(NamedTuple):
     area_radius: Array = _NO_AREA
 
 
-@dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
+@keyed()
 class _Separable(_Stretched):
     """Attributes of models that need a rupture law whose ∫k dt has one clock for all bonds."""
 
@@ -413,7 +402,7 @@ class _Separable(_Stretched):
         return self
 
 
-@dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
+@keyed()
 class FirstMoment(_OverArea, _Separable):
     """Rate equations of number and mean stretch, every bond taken at the mean. Limit: ``Cohort`` at a constant rate.
 
@@ -438,15 +427,15 @@ class FirstMoment(_OverArea, _Separable):
         rows = self.rows(noise) + 0.0 * motion.first  # a drive that solves the motion has its members
         return Stretches(rows * bound, rows * stretch)
 
-    def advance(self, state: Stretches, motions: Motions, radius: Array, noise: Noise) -> tuple[Stretches, Bonding]:
+    def advance(self, state: Stretches, motions: Motion, radius: Array, noise: Noise) -> tuple[Stretches, Bonding]:
         share, area_radius = self.diluted(state.area_radius, radius)
         before, sliding = (state.bound * share, state.stretch * share), (motions.slip, motions.path)
         bound, stretch = mean_field.advance(*before, *sliding, motions.duration[:, 0], self.law, self.rebinding_rate)
         return Stretches(bound[-1], stretch[-1], area_radius), self.bonding(Stretches(bound, stretch))
 
     def onset(self, speed: Array, body: Body) -> Onset:
-        recipe = self.bond_stiffness, self.rebinding_rate, self.site_density
-        return self.rupture.first_moment_onset(speed, *recipe, body)
+        numbers = self.bond_stiffness, self.rebinding_rate, self.site_density
+        return self.rupture.first_moment_onset(speed, numbers, body)
 
     def remarks(self, setting: Setting) -> list[str]:
         excess = self.rupture.first_moment_excess(self.bond_stiffness, self.rebinding_rate)
@@ -473,7 +462,7 @@ class Ages(NamedTuple):
 _UNKNOWN = np.full(1, np.nan)
 
 
-@dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
+@keyed()
 class Cohort(_OverArea, _Stretched):
     """The density of bonds over their stretch, as cohorts carried with the slider. Limit: tracked bonds without noise.
 
@@ -481,7 +470,7 @@ class Cohort(_OverArea, _Stretched):
     within a step, and the merging of old cohorts that bounds the cost, are held to ``tolerance``.
     """
 
-    tolerance: CohortTolerance = 1e-4
+    tolerance: Annotated[float, Quantity("1", "tolerance of the cohorts", "", at_least=1e-12, below=0.1)] = 1e-4
     start_from: Start = "steady"
     area: Area = "present"
     model: Literal["cohort"] = "cohort"
@@ -501,7 +490,7 @@ class Cohort(_OverArea, _Stretched):
         rows = max(len(self.rows(noise)), len(motion.first))  # a drive that solves the motion has its members
         return Ages(Cohorts(*(np.repeat(array, rows, axis=0) for array in first)))
 
-    def advance(self, state: Ages, motions: Motions, radius: Array, noise: Noise) -> tuple[Ages, Bonding]:
+    def advance(self, state: Ages, motions: Motion, radius: Array, noise: Noise) -> tuple[Ages, Bonding]:
         share, area_radius = self.diluted(state.area_radius, radius)
         recipe, duration = (self.law, self.rebinding_rate, self.tolerance), motions.duration[:, 0]
         after, sums = cohorts.advance(state.cohorts, motions.slip, duration, *recipe, share=share)
@@ -520,7 +509,7 @@ class Cohort(_OverArea, _Stretched):
         return Bonding(*map(np.concatenate, readings))
 
 
-@dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
+@keyed()
 class Tracked(_Separable):
     """A finite number of sites, every bond's stretch and exact rupture time. Limit: ``Cohort`` as sites -> infinity.
 
@@ -540,14 +529,14 @@ class Tracked(_Separable):
     in_place: ClassVar[bool] = True
 
     @property
-    def numbers(self) -> int:
+    def numbers(self) -> int:  # type: ignore[override]
         return 3 * self.sites
 
     def start(self, motion: Motion, noise: Noise) -> Tracks:
         laws, address = (self.law, self.rebinding_rate), (noise.seed, noise.members)
         return tracks.start(*laws, self.sites, motion.first, self.start_from, *address)
 
-    def advance(self, state: Tracks, motions: Motions, radius: Array, noise: Noise) -> tuple[Tracks, Bonding]:
+    def advance(self, state: Tracks, motions: Motion, radius: Array, noise: Noise) -> tuple[Tracks, Bonding]:
         laws, address = (self.law, self.rebinding_rate), (noise.seed, noise.members)
         state, frames = tracks.advance(state, motions.slip, motions.duration[:, 0], *laws, *address)
         return state, self.read(frames)
@@ -576,7 +565,7 @@ _STRETCHED = ("rupture", "bond_stiffness", "site_density")
 Model = Unbroken | Steady | Rate | Counted | FirstMoment | Cohort | Tracked
 
 
-@dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
+@keyed()
 class Auto:
     """The simplest model that is good to ``tolerance``; it takes the keys of all of them.
 
@@ -622,17 +611,17 @@ class Auto:
         number, start = self.number(area), self.start_from
         noisy = self.tolerance**2 * number < 1.0 and self.area == "present"
         if self.rupture is None:
-            plain = cast(tuple[float, float], (self.critical_speed, self.rebinding_rate))
+            plain = {name: getattr(self, name) for name in _WITHOUT}
             if noisy:
-                return Counted(*plain, sites=int(number), stress=self.stress, start_from=start)
-            return Rate(*plain, stress=self.stress, start_from=start, area=self.area)
-        rest = cast(tuple[float, float, float], (self.bond_stiffness, self.rebinding_rate, self.site_density))
+                return Counted(**plain, sites=int(number), stress=self.stress, start_from=start)
+            return Rate(**plain, stress=self.stress, start_from=start, area=self.area)
+        rest = {name: getattr(self, name) for name in _WITH}
         if noisy and number <= _MOST_TRACKED and self.rupture.separable:
-            return Tracked(self.rupture, *rest, sites=int(number), start_from=start)
+            return Tracked(**rest, sites=int(number), start_from=start)
         if not self.rupture.depends_on_stretch and not forces:
-            return FirstMoment(self.rupture, *rest, start_from=start, area=self.area)
+            return FirstMoment(**rest, start_from=start, area=self.area)
         tolerance = max(1e-12, min(1e-4, 0.1 * self.tolerance))
-        return Cohort(self.rupture, *rest, tolerance=tolerance, start_from=start, area=self.area)
+        return Cohort(**rest, tolerance=tolerance, start_from=start, area=self.area)
 
     def why(self, area: float, forces: bool) -> str:
         """Return the reason for the choice, in words."""
@@ -654,15 +643,6 @@ class Auto:
         return f"{size}; the rupture rate does not depend on the stretch"
 
 
-def _tag(value: object) -> str | None:
-    """Return the tag of the class of a table or a part, because two rate equations have one name."""
-    keys = value if isinstance(value, dict) else {name: getattr(value, name, None) for name in ("model", *_STRETCHED)}
-    model = keys.get("model")
-    if model == "rate" and any(keys.get(name) is not None for name in _STRETCHED):
-        return "rate[rupture]"
-    return model if isinstance(model, str) else None
-
-
 Bonds = Annotated[
     Annotated[Unbroken, Tag("none")]
     | Annotated[Steady, Tag("steady")]
@@ -672,5 +652,5 @@ Bonds = Annotated[
     | Annotated[Counted, Tag("counted")]
     | Annotated[Tracked, Tag("tracked")]
     | Annotated[Auto, Tag("auto")],
-    Discriminator(_tag),
+    Discriminator(tagged("rate", *_STRETCHED)),
 ]

@@ -9,25 +9,13 @@ from typing import Annotated, ClassVar, Literal, NamedTuple, cast
 
 import numpy as np
 from pydantic import Field
-from pydantic.dataclasses import dataclass
 
-from sim.laws.schallamach import (
-    Body,
-    Onset,
-    SiteMoments,
-    bell_moments,
-    bell_peak,
-    catch_moments,
-    constant_moments,
-    cut_off_moments,
-    first_moment_onset,
-    first_moment_peak,
-    resolved_onset,
-)
+from sim.laws import schallamach
+from sim.laws.schallamach import Body, Onset, SiteMoments
 from sim.numerics.jit import device
 from sim.numerics.special import exp
 from sim.parts.exchange import Array
-from sim.units.quantity import Quantity
+from sim.units.quantity import Quantity, keyed
 
 
 class RuptureRate(NamedTuple):
@@ -64,6 +52,10 @@ class RuptureRate(NamedTuple):
         return self.softness > 0.0 and self.catch == 0.0 and self.limit == math.inf
 
 
+#: Stiffness of a bond [N/m], k_on [1/s] and sites per area [1/m²].
+BondNumbers = tuple[float, float, float]
+
+
 class _Law:
     """Attributes of all rupture laws.
 
@@ -75,32 +67,25 @@ class _Law:
 
     depends_on_stretch: ClassVar[bool] = True
     separable: ClassVar[bool] = True
+    #: Pathways of rupture as of the law ``resolved_onset``; none if force opens no pathway.
+    pathways: ClassVar[tuple[tuple[float, float], ...]] = ()
 
     def first_moment_excess(self, bond_stiffness: float, rebinding_rate: float) -> float:
         """Return the relative error of the friction maximum if every bond has the mean stretch [1]."""
         return 0.0
 
-    def first_moment_onset(
-        self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, body: Body
-    ) -> Onset:
+    def first_moment_onset(self, speed: Array, bonds: BondNumbers, body: Body) -> Onset:
         """Return the onset of oscillations behind a spring at speeds [m/s], as the law ``first_moment_onset``."""
         return Onset(*np.full((2, *speed.shape), np.nan))
 
-    @property
-    def pathways(self) -> list[tuple[float, float]]:
-        """Pathways of rupture as of the law ``resolved_onset``; none if force opens no pathway."""
-        return []
-
-    def resolved_onset(
-        self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, body: Body
-    ) -> Onset:
+    def resolved_onset(self, speed: Array, bonds: BondNumbers, body: Body) -> Onset:
         """Return the onset of oscillations behind a spring of bonds resolved by stretch, as ``resolved_onset``."""
         if not self.pathways:
             return Onset(*np.full((2, *speed.shape), np.nan))
-        return resolved_onset(speed, self.pathways, bond_stiffness, rebinding_rate, site_density, body)
+        return schallamach.resolved_onset(speed, self.pathways, *bonds, body)
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Constant(_Law):
     """Bonds open by themselves at one rate, however stretched they are."""
 
@@ -113,10 +98,10 @@ class Constant(_Law):
         return RuptureRate(self.rate, 0.0, math.inf)
 
     def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
-        return constant_moments(speed, self.rate, bond_stiffness, rebinding_rate)
+        return schallamach.constant_moments(speed, self.rate, bond_stiffness, rebinding_rate)
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Bell(_Law):
     """Force helps heat to open a bond: k = k0 exp(f/f_b) (Bell 1978). Limit: ``Constant`` as f_b -> infinity."""
 
@@ -129,27 +114,25 @@ class Bell(_Law):
     model: Literal["bell"] = "bell"
 
     @property
-    def pathways(self) -> list[tuple[float, float]]:
-        return [(self.zero_force_rate, self.bell_force)]
+    def pathways(self) -> tuple[tuple[float, float], ...]:  # type: ignore[override]
+        return ((self.zero_force_rate, self.bell_force),)
 
     def law(self, bond_stiffness: float) -> RuptureRate:
         return RuptureRate(self.zero_force_rate, bond_stiffness / self.bell_force, math.inf)
 
     def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
-        return bell_moments(speed, self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate)
+        return schallamach.bell_moments(speed, self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate)
 
     def first_moment_excess(self, bond_stiffness: float, rebinding_rate: float) -> float:
         recipe = self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate
-        return float(first_moment_peak(*recipe, 1.0).stress / bell_peak(*recipe, 1.0).stress - 1.0)
+        mean_field, exact = schallamach.first_moment_peak(*recipe, 1.0), schallamach.bell_peak(*recipe, 1.0)
+        return float(mean_field.stress / exact.stress - 1.0)
 
-    def first_moment_onset(
-        self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, body: Body
-    ) -> Onset:
-        law = self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate, site_density
-        return cast(Onset, first_moment_onset(speed, *law, body))
+    def first_moment_onset(self, speed: Array, bonds: BondNumbers, body: Body) -> Onset:
+        return cast(Onset, schallamach.first_moment_onset(speed, self.zero_force_rate, self.bell_force, *bonds, body))
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class CutOff(_Law):
     """A bond opens by itself at one rate and breaks at a stretch for certain (after Chernyak & Leonov)."""
 
@@ -161,10 +144,10 @@ class CutOff(_Law):
         return RuptureRate(self.rate, 0.0, self.stretch)
 
     def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
-        return cut_off_moments(speed, self.rate, self.stretch, bond_stiffness, rebinding_rate)
+        return schallamach.cut_off_moments(speed, self.rate, self.stretch, bond_stiffness, rebinding_rate)
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Catch(_Law):
     """Force closes one pathway of rupture and opens another: k = kc exp(−f/f_c) + ks exp(f/f_s). Limit: ``Bell``."""
 
@@ -185,8 +168,8 @@ class Catch(_Law):
     model: Literal["catch"] = "catch"
 
     @property
-    def pathways(self) -> list[tuple[float, float]]:
-        return [(self.catch_rate, -self.catch_force), (self.slip_rate, self.slip_force)]
+    def pathways(self) -> tuple[tuple[float, float], ...]:  # type: ignore[override]
+        return (self.catch_rate, -self.catch_force), (self.slip_rate, self.slip_force)
 
     def law(self, bond_stiffness: float) -> RuptureRate:
         slip, catch = bond_stiffness / self.slip_force, bond_stiffness / self.catch_force
@@ -194,7 +177,7 @@ class Catch(_Law):
 
     def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
         law = self.catch_rate, self.catch_force, self.slip_rate, self.slip_force
-        return catch_moments(speed, *law, bond_stiffness, rebinding_rate)
+        return schallamach.catch_moments(speed, *law, bond_stiffness, rebinding_rate)
 
 
 Rupture = Annotated[Constant | Bell | CutOff | Catch, Field(discriminator="model")]

@@ -34,7 +34,7 @@ from sim.numerics.jit import device, kernel
 from sim.numerics.noise import PARTS, exponential, logarithm, unit_at, words_at
 from sim.numerics.special import reduced_exponential_integral, scaled_exponential_integral
 from sim.parts.bonds.rupture import RuptureRate, rupture_integral, time_to_rupture
-from sim.parts.exchange import Array
+from sim.parts.exchange import Array, record
 
 #: Columns of a frame: slider, time and clock since the frame was set, sense of the motion (+1, -1), 1 if bonds
 #: are stepped one by one, bound sites, sum of their births, of the births squared, number of steps.
@@ -54,7 +54,7 @@ TINY = 2.2250738585072014e-308
 
 #: A step: slider, time and clock at its beginning, the rate of a bond born at the frame's origin then and
 #: its ratio to ``rate``, relative growth of that rate in unit time, length and speed.
-_STEP = np.dtype([(name, float) for name in ("x", "time", "clock", "rate", "grown", "pace", "duration", "speed")])
+_STEP = record("x time clock rate grown pace duration speed")
 #: Rows of the ends of a step: bonds of less due, free sites of less time and bonds of less birth have had an event.
 _RUPTURE, _BINDING, _CUT = range(3)
 #: Bits of a number that are left out where a step is looked up, 128 ranges for each power of two; most ranges.

@@ -27,7 +27,7 @@ from sim.laws.reversible import (
 )
 from sim.numerics.jit import device, kernel
 from sim.parts.exchange import Array, Flags, Mount
-from sim.spectrum.radial import share_of
+from sim.spectrum.radial import Terms, share_of
 
 
 class Bodies(NamedTuple):
@@ -147,8 +147,7 @@ class DisplacementControl:
 Control = LoadControl | DisplacementControl
 
 
-#: Inputs of ``share_of`` at a position of the slider, and their type in kernels.
-Share = tuple[tuple[float, float, float], tuple[float, float, float], Array]
+#: Type of ``Terms`` in kernels.
 SHARE = "Tuple((UniTuple(float64, 3), UniTuple(float64, 3), float64[:, ::1]))"
 
 
@@ -169,7 +168,7 @@ class Shares(Protocol):
         """The lowest share at any radius, 0 if none is negative."""
 
     @property
-    def each(self) -> list[Share]:
+    def each(self) -> list[Terms]:
         """Inputs of ``share_of`` at each position, or once for all positions."""
 
 

@@ -11,7 +11,6 @@ from typing import Annotated, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
-from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from sim.laws.halfspace import in_series
@@ -28,16 +27,12 @@ from sim.parts.contact.balance import (
     widest_crossings,
 )
 from sim.parts.contact.front import Kinetics, follow as follow_front
-from sim.parts.exchange import Array, ContactState, Flags, Motion, Motions, Setting, during
-from sim.units.quantity import Quantity
+from sim.parts.exchange import Array, ContactState, Flags, Motion, Setting, during
+from sim.units.quantity import Quantity, keyed
 from sim.units.tables import Prescribed, over_time, prescribed
 
-_SHEAR = Quantity("Pa", "shear modulus", "G", above=0)
-_YOUNG = Quantity("Pa", "Young's modulus", "E", above=0)
-_POISSON = Quantity("1", "Poisson ratio", "nu", at_least=0, at_most=0.5)
 
-
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Body:
     """An elastic body, given by one of its two moduli.
 
@@ -49,9 +44,9 @@ class Body:
         nu [1].
     """
 
-    shear_modulus: Annotated[float, _SHEAR] | None = None
-    youngs_modulus: Annotated[float, _YOUNG] | None = None
-    poisson_ratio: Annotated[float, _POISSON] = 0.5
+    shear_modulus: Annotated[float, Quantity("Pa", "shear modulus", "G", above=0)] | None = None
+    youngs_modulus: Annotated[float, Quantity("Pa", "Young's modulus", "E", above=0)] | None = None
+    poisson_ratio: Annotated[float, Quantity("1", "Poisson ratio", "nu", at_least=0, at_most=0.5)] = 0.5
 
     @model_validator(mode="after")
     def _one_modulus(self) -> "Body":
@@ -69,7 +64,7 @@ class Body:
         return cast(float, self.shear_modulus)  # not None, as checked above
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Solid(Body):
     """The elastic half-space, with the body that presses on it if that yields too.
 
@@ -112,7 +107,7 @@ class Solid(Body):
         return 2.0 * shear_modulus / (1.0 - poisson_ratio)
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Sphere:
     """The smooth sphere.
 
@@ -125,7 +120,7 @@ class Sphere:
     radius: Annotated[float, Quantity("m", "radius of the sphere", "R", above=0)]
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Adhesion:
     """Work of adhesion, and how much of it the bonds carry.
 
@@ -165,10 +160,6 @@ _KINDS = ("load", "indentation", "displacement")
 _Load = over_time(Quantity("N", "normal load, compression positive", "P"), "load")
 _Indentation = over_time(Quantity("m", "indentation of the sphere", "delta"), "indentation")
 _Displacement = over_time(Quantity("m", "displacement of the base that holds the sphere", "Delta"), "displacement")
-_Stiffness = Annotated[float, Quantity("N/m", "stiffness between base and sphere", "k", above=0)]
-_Reversible = Annotated[
-    float, Quantity("1", "share of the mean stress's energy that adhesion pays", "alpha", at_least=0, at_most=1)
-]
 _Healing = Annotated[float, Quantity("m/s", "speed of a healing edge, left out that of opening", "v_h", above=0)]
 _HealingExponent = Annotated[
     float, Quantity("1", "exponent of healing, left out that of opening", "n_h", above=0, at_most=1)
@@ -176,7 +167,7 @@ _HealingExponent = Annotated[
 _Policy = Annotated[Literal["stay_open", "reattach", "stop"], Field(description="what follows a pull-off")]
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class _Controlled:
     """A contact under a load, an indentation, or a displacement with a stiffness."""
 
@@ -191,8 +182,10 @@ class _Controlled:
     load: _Load | None = None  # type: ignore[valid-type]
     indentation: _Indentation | None = None  # type: ignore[valid-type]
     displacement: _Displacement | None = None  # type: ignore[valid-type]
-    stiffness: _Stiffness | None = None
-    reversible: _Reversible = 0.0
+    stiffness: Annotated[float, Quantity("N/m", "stiffness between base and sphere", "k", above=0)] | None = None
+    reversible: Annotated[
+        float, Quantity("1", "share of the mean stress's energy that adhesion pays", "alpha", at_least=0, at_most=1)
+    ] = 0.0
     after_pull_off: _Policy = "stay_open"
 
     @model_validator(mode="after")
@@ -337,7 +330,7 @@ class _Controlled:
         return work - self.reversible * balance.reversible(size) if self.reversible else work
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Equilibrium(_Controlled):
     """The contact is in JKR equilibrium with the work of adhesion at every step, on its stable branch.
 
@@ -349,7 +342,7 @@ class Equilibrium(_Controlled):
 
     model: Literal["equilibrium"] = "equilibrium"
 
-    def advance(self, state: ContactState, motions: Motions, duration: float, balance: Balance) -> ContactState:
+    def advance(self, state: ContactState, motions: Motion, duration: float, balance: Balance) -> ContactState:
         control = self.control(motions.time, duration)
         radius = self.equilibrium(control, balance)
         detached, dissipated = during(state.detached, len(radius)), during(state.dissipated, len(radius))
@@ -371,7 +364,7 @@ class Equilibrium(_Controlled):
         return ContactState(work, radius, detached, dissipated, phases)
 
 
-@dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
+@keyed(kw_only=True)
 class RateDependent(_Controlled):
     """The edge of the contact has a finite speed: G − w = work (v/v0)ⁿ. Limit: equilibrium as v0 -> infinity.
 
@@ -391,7 +384,7 @@ class RateDependent(_Controlled):
     heal_exponent: _HealingExponent | None = None
     model: Literal["rate_dependent"] = "rate_dependent"
 
-    def advance(self, state: ContactState, motions: Motions, duration: float, balance: Balance) -> ContactState:
+    def advance(self, state: ContactState, motions: Motion, duration: float, balance: Balance) -> ContactState:
         ends = np.append(motions.time[0] - motions.duration[0], motions.time)
         stiffness = 0.0 if self.load is not None else self.stiffness or math.inf
         speed, exponent = self.front_speed, self.front_exponent

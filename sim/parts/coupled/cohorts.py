@@ -17,6 +17,7 @@ from sim.parts.bonds.cohorts import carry, inside, read_row, rules_of, settle, s
 from sim.parts.bonds.rupture import hazard_integral, hazard_time, rate_at
 from sim.parts.coupled import mechanics
 from sim.parts.drive import ENERGY
+from sim.parts.exchange import record
 
 GAMMA = 2.0 - math.sqrt(2.0)
 _MIDDLE = 1.0 / (6.0 * GAMMA * (1.0 - GAMMA))
@@ -26,7 +27,7 @@ PARTS = (0.5 + (GAMMA - 1.0) * _MIDDLE, _MIDDLE, 0.5 - GAMMA * _MIDDLE)
 #: Start or node of a sub-step: slip and displacement of the body since its start, area, shear displacement, radius,
 #: share bound, sum of the stretches, of their squares and of those times the rupture rate, share cut since the node
 #: before, speed of a body with mass.
-NODE = mechanics.record("slip body area sheared radius bound moment square lost cut body_speed")
+NODE = record("slip body area sheared radius bound moment square lost cut body_speed")
 #: Turns of the secant method; share of the slope of a fresh elastic bond below which a sub-step is too long.
 _TURNS, _FALLING = 25, 0.02
 #: The same where slip alone breaks bonds: their force may hardly rise.

@@ -21,7 +21,7 @@ from sim.parts.coupled.mean_field import advance_rows
 from sim.parts.coupled.mechanics import COLUMNS, ROW, Contact, Inputs, Law, Slider
 from sim.parts.coupled.tracked import advance_tracks
 from sim.parts.drive import ENERGY, Driven, Force, Spring
-from sim.parts.exchange import Array, Bonding, Flags, Motions, Mount, Parts, Sliding, Times
+from sim.parts.exchange import Array, Bonding, Flags, Motion, Mount, Parts, Sliding, Times
 
 #: Stretch by which the motion of bonds is measured that neither force nor stretch breaks, in a run without motion [m].
 _STRETCH = 1e-9
@@ -107,8 +107,7 @@ def _of_columns(stretch: float, force: float) -> Array:
     scales = np.ones(COLUMNS)
     named = scales.view(ROW)
     named["spring_force"], named["squared_speed"] = force, stretch**2
-    for name in _STRETCHED:
-        named[name] = stretch
+    named[_STRETCHED] = stretch
     return scales
 
 
@@ -148,7 +147,7 @@ def advance(
     times: Times,
     steps: range,
     noise: Noise,
-) -> tuple[Driven, Motions, tuple[object, ...], Bonding]:
+) -> tuple[Driven, Motion, tuple[object, ...], Bonding]:
     """Return the slider at the end of each of some clock steps, its motion, the bonds at the end and their readings.
 
     The contact is that at the start, except for its equilibrium with the bonds; ``steps_until_contact_changes`` counts
@@ -185,8 +184,8 @@ def advance(
     first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
     path, spans = reached["path"], duration[:, np.newaxis]
     unsteady = np.maximum(reached["squared_speed"] - path**2 / spans, 0.0)  # slip at once is spread over the step
-    motions = Motions(
-        steps.start, ends[1:, np.newaxis], spans, reached["slip"], path, first, after.speed, after.position, unsteady
+    motions = Motion(
+        steps.start, ends[1:, np.newaxis], spans, reached["slip"], path, first, after.speed, unsteady, after.position
     )
     if isinstance(bonds, models.Counted):
         end, drawn = bonds.advance(cast(models.Population, population), motions, contact.radius, noise)

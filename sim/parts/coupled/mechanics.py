@@ -3,24 +3,16 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from sim.numerics.jit import device
 from sim.parts.drive import ENERGY
-from sim.parts.exchange import Array
-
-
-def record(*names: str) -> np.dtype[np.void]:
-    """Return the type of a record of floats with these names, separated by blanks."""
-    return np.dtype([(name, float) for line in names for name in line.split()])
-
+from sim.parts.exchange import Array, record
 
 #: Row of slider and bonds: spring force S, speed of the body, u, N, M, speed of the interface, displacement of the
 #: body, slip and path of the clock step, contact radius, next sub-step, number of sub-steps, time of a runaway,
 #: integral of the squared speed of the interface over the clock step, acceleration of the interface.
 ROW = record(
-    "spring_force body_speed sheared bound moment speed position slip path radius",
-    "next_step substeps runaway_time squared_speed acceleration",
+    "spring_force body_speed sheared bound moment speed position slip path radius "
+    "next_step substeps runaway_time squared_speed acceleration"
 )
 COLUMNS = len(ROW.names or ())
 SLIP = (ROW.names or ()).index("slip")

@@ -13,7 +13,6 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 import scipy
 from pydantic import Discriminator, Field, Tag, model_validator
-from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from sim.numerics import disk_cache, jit
@@ -27,7 +26,7 @@ from sim.spectrum.family import Family
 from sim.spectrum.measured import Measured
 from sim.spectrum.radial import Margin, marginal_energy
 from sim.spectrum.stress_map import StressMap
-from sim.units.quantity import Quantity
+from sim.units.quantity import Quantity, keyed, tagged
 
 #: Side and points of a cell, Poisson's ratio; power of the rates, tolerance, and whether the amplitude relaxes.
 _CellOf = tuple[float, int | None, float, int, float, bool]
@@ -65,6 +64,10 @@ class ShearModel:
     measured: ClassVar[bool] = False
     #: True if the energy on a disc depends on the position of the slider.
     passes: ClassVar[bool] = False
+    #: True if the energy that the contact reads is the same at all times.
+    stays: ClassVar[bool] = False
+    #: Correlation length of the field [m]; nan if its modes have none in common.
+    _memory: ClassVar[float] = math.nan
     #: Rough time that one step of a mode pair takes on one core, for estimates [s].
     pair_seconds: ClassVar[float] = 10e-9
     spectrum: Spectrum
@@ -90,16 +93,6 @@ class ShearModel:
             cure = "leave it out"
             raise PydanticCustomError("bond_made", f'bonds at random places make mode_amplitudes = "gaussian"; {cure}')
         return self
-
-    @property
-    def stays(self) -> bool:
-        """True if the energy that the contact reads is the same at all times."""
-        return False
-
-    @property
-    def _memory(self) -> float:
-        """Correlation length of the field [m]; nan if its modes have none in common."""
-        return math.nan
 
     @property
     def law(self) -> Amplitude:
@@ -173,7 +166,7 @@ class ShearModel:
         return remarks
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Uniform(ShearModel):
     """No fluctuation: a uniform shear stress, which stores nothing at the expense of adhesion."""
 
@@ -184,13 +177,13 @@ class Uniform(ShearModel):
     contact = "plane"
 
     model: Literal["uniform"] = "uniform"
-    stays: ClassVar[bool] = True  # type: ignore[misc]
+    stays: ClassVar[bool] = True
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
         return SmoothProcess(0.0, Constant())
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Mean(ShearModel):
     """The ensemble mean of ΔΓ on the infinite plane, in closed form. Limit: uniform as rms -> 0."""
 
@@ -210,7 +203,7 @@ class Mean(ShearModel):
         return self
 
     @property
-    def stays(self) -> bool:
+    def stays(self) -> bool:  # type: ignore[override]
         return self.amplitude.model == "constant" and self.contact == "plane" and not self.spectrum.bond_made
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
@@ -218,7 +211,7 @@ class Mean(ShearModel):
         return kind(float(self.spectrum.surface_energy(shear_modulus, poisson_ratio)), self.law)
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class _Fluctuating(ShearModel):
     """Keys of the models with a periodic cell and a correlation.
 
@@ -240,7 +233,7 @@ class _Fluctuating(ShearModel):
         return self.mode_amplitudes == "gaussian"  # fixed ones give all members one ΔΓ
 
     @property
-    def _memory(self) -> float:
+    def _memory(self) -> float:  # type: ignore[override]
         return self.correlation.length if self.correlation.model == "slip" else math.nan
 
     def side(self, cell: float) -> float:
@@ -274,7 +267,7 @@ class _Fluctuating(ShearModel):
         return ""
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Modal(_Fluctuating):
     """ΔΓ(t) from every Fourier mode of a periodic cell. Limit: mean as the cell grows."""
 
@@ -289,7 +282,7 @@ class Modal(_Fluctuating):
         return kind(of_cell, shear_modulus, poisson_ratio, self.correlation, self.law)
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Mapped(Modal):
     """The map τ1(x, y, t) on a grid, carried with the slider. Limit: the same ΔΓ as ``Modal``, number for number.
 
@@ -308,7 +301,7 @@ class Mapped(Modal):
         return process
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Banded(_Fluctuating):
     """ΔΓ(t) of a periodic cell with its modes grouped into bands, every error known before the run. Limit: modal.
 
@@ -371,7 +364,7 @@ def _grouped_anew(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, 
     return group(pairs, power, tolerance, relaxing), errors
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Auto:
     """The simplest model that gives what the scene records; it takes the keys of all of them."""
 
@@ -416,7 +409,7 @@ _BEYOND = 1.25
 _passing = functools.lru_cache(maxsize=8)(lambda field, ratio, widest: Passing(field, ratio, widest, np.zeros(1)))
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Carried(ShearModel):
     """A measured map of the stress itself, carried with the slider. Limit: ``Mapped`` as its correlation never ends.
 
@@ -455,7 +448,7 @@ class Carried(ShearModel):
         return self.passes  # the contact is found at one position at a time
 
     @property
-    def stays(self) -> bool:
+    def stays(self) -> bool:  # type: ignore[override]
         return self.amplitude.model == "constant" and not self.passes
 
     @property
@@ -501,15 +494,6 @@ class Carried(ShearModel):
         return rows
 
 
-def _tag(value: object) -> str | None:
-    """Return the tag of the class of a table or a part, because random maps and a measured one have one name."""
-    keys = value if isinstance(value, dict) else {name: getattr(value, name, None) for name in ("model", "field")}
-    model = keys.get("model")
-    if model == "mapped" and keys.get("field") is not None:
-        return "mapped[field]"
-    return model if isinstance(model, str) else None
-
-
 #: A model that has a process.
 Model = Uniform | Mean | Banded | Modal | Mapped | Carried
 
@@ -521,5 +505,5 @@ Shear = Annotated[
     | Annotated[Mapped, Tag("mapped")]
     | Annotated[Carried, Tag("mapped[field]")]
     | Annotated[Auto, Tag("auto")],
-    Discriminator(_tag),
+    Discriminator(tagged("mapped", "field")),
 ]

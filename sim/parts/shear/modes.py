@@ -25,7 +25,7 @@ from sim.laws.halfspace import compliance
 from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise, normal, stream
-from sim.parts.exchange import Array, Bonding, Gammas, Indices, Motion, Motions
+from sim.parts.exchange import Array, Bonding, Gammas, Indices, Motion
 from sim.parts.shear.process import Amplitude, Correlation, Fluctuation, Renewing, SmoothProcess
 from sim.spectrum.family import Family
 
@@ -327,9 +327,7 @@ class FixedProcess(ModalProcess):
         phases = 2.0 * np.pi * noise.uniforms(motion.step, len(self.wavenumber))
         return Fluctuation(self._energy(amplitude), amplitude, phases, past)
 
-    def advance(
-        self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
-    ) -> tuple[Fluctuation, Array]:
+    def advance(self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[Fluctuation, Array]:
         past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
         phases = state.values.copy()
         turn_phases(phases, self.correlation.exponents(self.wavenumber, motions), *noise.at(motions.step))
@@ -430,9 +428,7 @@ class SiteModes(ModalProcess):
         _renew_sites(parts, *whole, sizes, self.weights, *noise.at(motion.step), energy)
         return Fluctuation(energy[0], sizes[:, 0].T, parts)
 
-    def advance(
-        self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
-    ) -> tuple[Fluctuation, Array]:
+    def advance(self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[Fluctuation, Array]:
         parts, sizes = state.values.copy(), _sizes(bonding)
         energy = np.empty((len(motions.time), len(parts)))
         _renew_sites(parts, *self._shares(motions), sizes, self.weights, *noise.at(motions.step), energy)

@@ -11,12 +11,11 @@ from typing import Annotated, ClassVar, Literal, NamedTuple, Self, cast
 
 import numpy as np
 from pydantic import Field
-from pydantic.dataclasses import dataclass
 
 from sim.numerics.jit import kernel, law
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Array, Bonding, Gammas, Motion, Motions
-from sim.units.quantity import Quantity
+from sim.parts.exchange import Array, Bonding, Gammas, Motion
+from sim.units.quantity import Quantity, keyed
 
 _Memory = Annotated[
     float, Quantity("m", "slip that the fluctuations remember, by default the correlation length", "l_m", above=0)
@@ -44,12 +43,12 @@ class _OfTheMoment:
         """Return the memory of the past at t = 0, and g [1]."""
         return NO_PAST, self.factor(motion.speed, stress)
 
-    def followed(self, past: Array, motions: Motions, stress: Array) -> tuple[Array, Array]:
+    def followed(self, past: Array, motions: Motion, stress: Array) -> tuple[Array, Array]:
         """Return the memory of the past after a block of steps, and g [1] at the end of each."""
         return past, self.factor(motions.speed, stress)
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Constant(_OfTheMoment):
     """The fluctuations have the spectrum's rms at every speed: g = 1."""
 
@@ -62,7 +61,7 @@ class Constant(_OfTheMoment):
         return np.ones(speed.shape)
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Onset(_OfTheMoment):
     """A prescribed amplitude around the onset of stick-slip: g = floor + (1 − floor)/(1 + (V/V0)^(−1/width)).
 
@@ -88,7 +87,7 @@ def _onset(speed, onset, exponent, floor):
     return floor + (1.0 - floor) * (1.0 / (1.0 + math.pow(math.fabs(speed) / onset, exponent)))
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Stress(_OfTheMoment):
     """The fluctuations grow with the mean shear stress: g = tau_0/reference."""
 
@@ -104,7 +103,7 @@ class Stress(_OfTheMoment):
         return np.abs(stress) / self.reference
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class SlipRate(_OfTheMoment):
     """The fluctuations grow where sliding is unsteady: g² = floor² + (1 − floor²) × variance of the speed over ⟨V²⟩.
 
@@ -140,7 +139,7 @@ class SlipRate(_OfTheMoment):
         np.divide(cast(float, self.memory_length), speed, out=past[:, 0], where=speed > 0.0)
         return past, self.factor(speed, stress)
 
-    def followed(self, past: Array, motions: Motions, stress: Array) -> tuple[Array, Array]:
+    def followed(self, past: Array, motions: Motion, stress: Array) -> tuple[Array, Array]:
         past, unsteady = past.copy(), np.empty(motions.path.shape)
         spread = motions.unsteady + np.zeros(motions.path.shape)
         _remember(past, motions.path, motions.duration.ravel(), spread, self.memory_length, unsteady)
@@ -175,7 +174,7 @@ def _remember(past, path, duration, spent, length, unsteady):
 Amplitude = Annotated[Constant | Onset | Stress | SlipRate, Field(discriminator="model")]
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Time:
     """Modes renew in time: λ = 1/time."""
 
@@ -185,15 +184,15 @@ class Time:
     time: Annotated[float, Quantity("s", "correlation time of the fluctuations", "t_m", above=0)]
     model: Literal["time"] = "time"
 
-    def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
+    def exponents(self, wavenumber: Array, motion: Motion) -> Array:
         """Return ∫λdt over a step, shape (1, 1) or (members, 1), or (members, wavenumbers) [rad/m].
 
         For a block of steps the step is the first axis.
         """
-        return np.asarray(motion.duration)[..., np.newaxis] / self.time
+        return motion.duration[..., np.newaxis] / self.time
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Slip:
     """Modes renew by sliding: λ = \\|V\\|/length, so a contact at rest keeps its pattern."""
 
@@ -203,11 +202,11 @@ class Slip:
     length: Annotated[float, Quantity("m", "correlation length of the fluctuations", "l", above=0)]
     model: Literal["slip"] = "slip"
 
-    def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
+    def exponents(self, wavenumber: Array, motion: Motion) -> Array:
         return motion.path[..., np.newaxis] / self.length
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Wave:
     """A mode renews after sliding ``waves`` of its own wavelengths: λ = \\|V\\| q/(2π waves)."""
 
@@ -217,11 +216,11 @@ class Wave:
     waves: Annotated[float, Quantity("1", "own wavelengths after which a mode renews", "n", above=0)]
     model: Literal["wave"] = "wave"
 
-    def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
+    def exponents(self, wavenumber: Array, motion: Motion) -> Array:
         return wavenumber * (motion.path / (2.0 * np.pi * self.waves))[..., np.newaxis]
 
 
-@dataclass(frozen=True, config={"extra": "forbid"})
+@keyed()
 class Diffusion:
     """Modes diffuse away in time: λ = D q²."""
 
@@ -231,8 +230,8 @@ class Diffusion:
     diffusivity: Annotated[float, Quantity("m^2/s", "diffusivity of the fluctuations", "D", above=0)]
     model: Literal["diffusion"] = "diffusion"
 
-    def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
-        return wavenumber**2 * (self.diffusivity * np.asarray(motion.duration)[..., np.newaxis])
+    def exponents(self, wavenumber: Array, motion: Motion) -> Array:
+        return wavenumber**2 * (self.diffusivity * motion.duration[..., np.newaxis])
 
 
 Correlation = Annotated[Time | Slip | Wave | Diffusion, Field(discriminator="model")]
@@ -273,9 +272,7 @@ class SmoothProcess:
         past, amplitude = self.amplitude.started(motion, bonding.strength)
         return Fluctuation(self._level(amplitude, bonding), amplitude, np.empty(0), past)
 
-    def advance(
-        self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
-    ) -> tuple[Fluctuation, Array]:
+    def advance(self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[Fluctuation, Array]:
         past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
         energy = self._level(amplitude, bonding)
         return Fluctuation(energy[-1], amplitude[-1], np.empty(0), past), energy
@@ -321,9 +318,7 @@ class Renewing:
         energy = self._renew(values, np.zeros((1, 1, 1)), np.ones((1, 1, 1)), size[np.newaxis], motion.step, noise)
         return Fluctuation(self._scaled(amplitude, energy[0]), amplitude, values, past)
 
-    def advance(
-        self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
-    ) -> tuple[Fluctuation, Array]:
+    def advance(self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[Fluctuation, Array]:
         past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
         values = state.values.copy()
         size = renewed_size(self.amplitude, state, motions, amplitude)
@@ -331,7 +326,7 @@ class Renewing:
         energy = self._scaled(amplitude, energy)
         return Fluctuation(energy[-1], amplitude[-1], values, past), energy
 
-    def _shares(self, motions: Motions) -> tuple[Array, Array]:
+    def _shares(self, motions: Motion) -> tuple[Array, Array]:
         """Return the shares of a number that a step keeps and renews, whose squares add up to one."""
         exponents = self.correlation.exponents(self.wavenumber, motions)
         keep, renew = np.empty_like(exponents), np.empty_like(exponents)
@@ -343,7 +338,7 @@ class Renewing:
         return energy if self.amplitude.relaxing else amplitude**2 * energy
 
 
-def renewed_size(law: Amplitude, state: Fluctuation, motions: Motions, amplitude: Array) -> Array:
+def renewed_size(law: Amplitude, state: Fluctuation, motions: Motion, amplitude: Array) -> Array:
     """Return the amplitude of the part that a step renews: 1 unless it relaxes.
 
     If it relaxes, its square is the mean of those at the two ends of the step: second order in the step. The start of

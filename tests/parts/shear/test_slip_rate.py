@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 from sim.parts.bonds import Unbroken
 from sim.parts.drive import Ramp, Spring, Steady, Table
-from sim.parts.exchange import Motion, Motions
+from sim.parts.exchange import Motion
 from sim.parts.shear import Banded, Mean
 from sim.units.errors import BadInput
 
@@ -22,11 +22,11 @@ SHORT = 1e-6
 
 
 def moved(path, square, step=PERIOD / STEPS):
-    """Motions of given paths [m] and integrals of the squared speed [m²/s] in equal steps."""
+    """Motion of given paths [m] and integrals of the squared speed [m²/s] in equal steps."""
     path, square = np.asarray(path)[:, np.newaxis], np.asarray(square)[:, np.newaxis]
     time, still = step * np.arange(1.0, len(path) + 1.0)[:, np.newaxis], np.zeros(path.shape)
     spread = np.maximum(square - path**2 / step, 0.0)
-    return Motions(1, time, np.full(path.shape, step), path, path, still, still, still, spread)
+    return Motion(1, time, np.full(path.shape, step), path, path, still, still, spread)
 
 
 def amplitudes(law, *blocks, speed=0.0):
