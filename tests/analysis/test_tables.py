@@ -67,7 +67,7 @@ def long(ramp, tmp_path_factory):
     """The CSV of the ramp, as whoever has it reads it."""
     path = tmp_path_factory.mktemp("csv") / "out.csv"
     analysis.to_csv(ramp, path)
-    return pd.read_csv(path)
+    return pd.read_csv(path, float_precision="round_trip")
 
 
 def of(long, quantity):
@@ -96,7 +96,7 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
     sweep = {"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 0.5, 1.0]}
     dataset = run(scene(sweep=sweep, shear=shear.Uniform()))
     analysis.to_csv(dataset, tmp_path / "out.csv")
-    rows = of(pd.read_csv(tmp_path / "out.csv"), "contact_area")
+    rows = of(pd.read_csv(tmp_path / "out.csv", float_precision="round_trip"), "contact_area")
     expected = itertools.product([1e-3, 4e-3], [0.0, 0.5, 1.0], dataset["t"].to_numpy())
     read = rows[["contact_load [N]", "adhesion_bond_share", "t [s]"]].itertuples(index=False, name=None)
     assert list(read) == list(expected)
@@ -104,7 +104,7 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
     speeds = {"drive.speed": [1e-3, 1e-2]}
     dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep=speeds, ensemble=Ensemble(members=2)))
     analysis.to_csv(dataset, tmp_path / "out.csv")
-    rows = of(pd.read_csv(tmp_path / "out.csv"), "contact_area")
+    rows = of(pd.read_csv(tmp_path / "out.csv", float_precision="round_trip"), "contact_area")
     late = rows[rows["over"] == "second half of the run and 2 members"]
     assert set(rows["over"]) == {"2 members", *late["over"]} and late["t [s]"].isna().all()
     assert_array_equal(late["speed [m/s]"], [1e-3, 1e-2])
