@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, cast
+from typing import Any, cast
 
 import numpy as np
 from pydantic import ValidationError
@@ -12,9 +12,6 @@ from sim.laws import jkr
 from sim.parts.bonds import Cohort, Tracked
 from sim.spectrum.families import BondMade
 
-if TYPE_CHECKING:
-    from sim.scenario.scenario import Scenario
-
 _STEPS_A_CYCLE = 2
 #: Times between which the slip of a run is looked at.
 _MOST_SLIPS = 2**16
@@ -23,9 +20,11 @@ _WIDEST = 10.0
 _TOO_SHORT = "the table ends at {:g} s, before clock.duration ({:g} s); add rows or shorten the run"
 
 Faults = Iterator[tuple[tuple[str, ...], str]]
+#: A checked scenario; its class imports this module.
+Scene = Any
 
 
-def faults_across(scene: "Scenario", built: bool = True) -> Faults:
+def faults_across(scene: Scene, built: bool = True) -> Faults:
     """Yield the faults between the parts of a scenario, each as (place, fault and cure).
 
     Without ``built`` the process of the shear part is not built.
@@ -41,7 +40,7 @@ def faults_across(scene: "Scenario", built: bool = True) -> Faults:
     yield from _off_the_map(scene)
 
 
-def _too_short(scene: "Scenario") -> Faults:
+def _too_short(scene: Scene) -> Faults:
     clock, contact, end = scene.clock, scene.contact, scene.contact.course.end
     if scene.drive.end < clock.duration * (1 - 1e-9):
         yield ("drive",), _TOO_SHORT.format(scene.drive.end, clock.duration)
@@ -52,7 +51,7 @@ def _too_short(scene: "Scenario") -> Faults:
         yield ("contact", contact.kind, "cycles"), f"{fault}; make fewer cycles or shorter steps"
 
 
-def _cannot_be_driven(scene: "Scenario") -> Faults:
+def _cannot_be_driven(scene: Scene) -> Faults:
     drive, bonds = scene.drive, scene.population
     if drive.solves_motion and not bonds.stretched:
         if drive.contact_stiffness != "rigid":
@@ -65,7 +64,7 @@ def _cannot_be_driven(scene: "Scenario") -> Faults:
             yield ("bonds", "stress"), "is 0 Pa, so that a drive would feel nothing; give the stress of the bonds"
 
 
-def _lacks_bonds(scene: "Scenario") -> Faults:
+def _lacks_bonds(scene: Scene) -> Faults:
     shear, bonds = scene.fluctuations, scene.population
     if not shear.spectrum.bond_made:
         if shear.reads_stress and not bonds.carries_stress:
@@ -81,7 +80,7 @@ def _lacks_bonds(scene: "Scenario") -> Faults:
             yield ("bonds", "bond_stiffness"), f"{fault}: give at most that, or a larger shear.spectrum.footprint"
 
 
-def _implausible(scene: "Scenario") -> Faults:
+def _implausible(scene: Scene) -> Faults:
     drive, contact, radius, size = scene.drive, scene.contact, scene.rest_radius, scene.sphere.radius
     if contact.lags and not scene.adhesion.work > 0.0:
         fault = "a rate-dependent edge measures its drive by the work of adhesion at rest; give a work above zero"
@@ -94,7 +93,7 @@ def _implausible(scene: "Scenario") -> Faults:
         yield ("contact", "reversible"), fault
 
 
-def _wrong_maps(scene: "Scenario") -> Faults:
+def _wrong_maps(scene: Scene) -> Faults:
     record, clock, members = scene.record, scene.clock, scene.ensemble.members
     if record.maps and not scene.fluctuations.draws_maps:
         yield ("record", "maps"), 'needs shear.model = "mapped"; choose it or leave the maps out'
@@ -112,7 +111,7 @@ def _wrong_maps(scene: "Scenario") -> Faults:
         yield ("record", "map_members"), fault
 
 
-def _shear_faults(scene: "Scenario", built: bool) -> Faults:
+def _shear_faults(scene: Scene, built: bool) -> Faults:
     shear, contact, radius = scene.fluctuations, scene.contact, scene.rest_radius
     if not shear.side(math.sqrt(math.pi) * radius) > 0.0:
         pull_off = jkr.pull_off_load(scene.adhesion.work, scene.sphere.radius)
@@ -124,7 +123,7 @@ def _shear_faults(scene: "Scenario", built: bool) -> Faults:
         yield from ((("shear", key) if key else ("shear",), fault) for key, fault in listed)
 
 
-def _off_the_map(scene: "Scenario") -> Faults:
+def _off_the_map(scene: Scene) -> Faults:
     shear, clock = scene.fluctuations, scene.clock
     if shear.passes and scene.drive.solves_motion:
         fault = 'a measured map under a disc needs a slip that is known before: prescribe the speed, or give "plane"'
@@ -142,9 +141,10 @@ _MOST_REVERSED = 0.5
 _LARGEST_STRAIN = 0.3
 
 
-def remarks_between(scene: "Scenario") -> list[str]:
+def remarks_between(scene: Scene) -> list[str]:
     """Return assumptions and limits of the parts together."""
-    bonds, shear, contact, speeds, varies = *scene.chosen[1:], scene.speeds(41), scene.varies["shear"]
+    _, bonds, shear, contact = scene.chosen
+    speeds, varies = scene.speeds(41), scene.varies["shear"]
     remarks = []
     if varies and bonds.feeds_back and not contact.lags:
         remarks.append(

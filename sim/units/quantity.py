@@ -211,11 +211,8 @@ class Quantity:
     def _number(self, value: Any) -> float:
         """Return a number that is none of text."""
         whole = hasattr(value, "__index__") or (isinstance(value, float) and value.is_integer())
-        if (
-            isinstance(value, bool)
-            or getattr(value, "ndim", 0)
-            or not (whole if self.whole else hasattr(value, "__float__"))
-        ):
+        is_scalar = not isinstance(value, bool) and getattr(value, "shape", ()) == ()
+        if not is_scalar or not (whole if self.whole else hasattr(value, "__float__")):
             kind = (
                 "a whole number" if self.whole else "a number" if self.unit == "1" else "a number or text with a unit"
             )

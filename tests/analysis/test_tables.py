@@ -62,12 +62,24 @@ def test_tables_have_a_dozen_rows_or_one_for_each_point(ramp):
     assert [row["shear"] for row in rows] == ["uniform", "mean"]
 
 
+def number(text):
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def numbers_of(path):
+    """Return the table of a CSV, each number by all of its digits: older versions of pandas round the last ones."""
+    return pd.read_csv(path, dtype=str, keep_default_na=False).map(number)
+
+
 @pytest.fixture(scope="module")
 def long(ramp, tmp_path_factory):
     """The CSV of the ramp, as whoever has it reads it."""
     path = tmp_path_factory.mktemp("csv") / "out.csv"
     analysis.to_csv(ramp, path)
-    return pd.read_csv(path, float_precision="round_trip")
+    return numbers_of(path)
 
 
 def of(long, quantity):
@@ -96,7 +108,7 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
     sweep = {"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 0.5, 1.0]}
     dataset = run(scene(sweep=sweep, shear=shear.Uniform()))
     analysis.to_csv(dataset, tmp_path / "out.csv")
-    rows = of(pd.read_csv(tmp_path / "out.csv", float_precision="round_trip"), "contact_area")
+    rows = of(numbers_of(tmp_path / "out.csv"), "contact_area")
     expected = itertools.product([1e-3, 4e-3], [0.0, 0.5, 1.0], dataset["t"].to_numpy())
     read = rows[["contact_load [N]", "adhesion_bond_share", "t [s]"]].itertuples(index=False, name=None)
     assert list(read) == list(expected)
@@ -104,7 +116,7 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
     speeds = {"drive.speed": [1e-3, 1e-2]}
     dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep=speeds, ensemble=Ensemble(members=2)))
     analysis.to_csv(dataset, tmp_path / "out.csv")
-    rows = of(pd.read_csv(tmp_path / "out.csv", float_precision="round_trip"), "contact_area")
+    rows = of(numbers_of(tmp_path / "out.csv"), "contact_area")
     late = rows[rows["over"] == "second half of the run and 2 members"]
     assert set(rows["over"]) == {"2 members", *late["over"]} and late["t [s]"].isna().all()
     assert_array_equal(late["speed [m/s]"], [1e-3, 1e-2])
