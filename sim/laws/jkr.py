@@ -677,10 +677,20 @@ def radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus
             small[row] = value
         _solve(*small.reshape(6, -1))
         return small[5][()]
-    flat = [np.broadcast_to(value, shape).reshape(-1) for value in arguments]
-    starts = range(0, math.prod(shape), _BLOCK)
-    blocks = [radius_at_displacement(*(values[first : first + _BLOCK] for values in flat)) for first in starts]
-    return np.concatenate(blocks).reshape(shape)
+    arrays = [np.asarray(value, dtype=float) for value in arguments]
+    flat = [array if array.size == 1 or array.shape == shape else np.broadcast_to(array, shape) for array in arrays]
+    flat = [array.reshape(-1) for array in flat]
+    radii = np.empty(math.prod(shape))
+    block = np.empty((5, min(radii.size, _BLOCK)))
+    for first in range(0, radii.size, _BLOCK):
+        part = radii[first : first + _BLOCK]
+        for row, array in zip(block, flat, strict=True):
+            if array.size > 1:
+                row[: part.size] = array[first : first + _BLOCK]
+            elif first == 0:
+                row[:] = array
+        _solve(*block[:, : part.size], part)
+    return radii.reshape(shape)[()]
 
 
 # Adhesive contact at a given indentation ("fixed grips").
