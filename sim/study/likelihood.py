@@ -269,6 +269,9 @@ def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool
             members = _members(point, names, weights)
             error = members.std(axis=-1, ddof=min(members.shape[-1] - 1, 1)) / math.sqrt(members.shape[-1])
             result[..., rows] = members.mean(axis=-1), error
+        if not group.scenario.drive.solves_motion:
+            alone = by_steady_sliding(group, values, names)
+            result[0][:, group.rows] += [alone[name] for name in names]
     return result
 
 
@@ -311,11 +314,19 @@ def _places(group: Group, by_time: bool, time: Array, speed: Array) -> Array:
 
 
 def _members(point: Scenario, names: list[str], weights: Weights) -> Array:
-    """Return variables at rows by member, shape (names, rows, members); one member if none differ."""
+    """Return variables at rows by member, shape (names, rows, members); one member if none differ.
+
+    If the speed is prescribed, the variables are the differences from steady sliding. A run that adds nothing has no
+    error between its records.
+    """
     count = point.ensemble.members if any(point.varies.values()) else 1
     steps = range(0, point.clock.steps + 1, point.clock.stride)
     speeds, *values = recorded(point, count, steps, ["speed", *names])
-    rows = weights(point.times.at(np.array(steps)), speeds[0])
+    times = point.times.at(np.array(steps))
+    if not point.drive.solves_motion:
+        alone = steady_course(point, times[:, np.newaxis], speeds[:1].T)
+        values = [members - READ[name](point, alone)[:, 0] for name, members in zip(names, values, strict=True)]
+    rows = weights(times, speeds[0])
     return np.array([[members @ row for row in rows] for members in values])
 
 

@@ -115,6 +115,16 @@ def test_steady_sliding_is_what_a_run_ends_in_also_for_rows_of_loads_and_solids_
         for name, mean, error in zip(names, *likelihood.by_runs([group], {}, names, False), strict=True):
             assert_allclose(alone[name], mean, rtol=1e-12, atol=0, equal_nan=False, err_msg=label)
             assert np.all(error == 0.0)
+    # between the records of a run as well
+    ramp = {"model": "ramp", "from": "10 um/s", "to": "0.1 m/s", "scale": "log"}
+    unloading = {"contact.load": {"from": "4 mN", "to": "0.1 mN"}}
+    for changes, conditions in ({"drive": ramp}, {"speed": SPEEDS}), (unloading, {"t": np.array([0.1, 0.7, 1.6])}):
+        scene = load(LENS).with_values(changes)
+        made, names = rows_of(scene, **conditions)
+        (group,) = likelihood.groups(scene, made)
+        means, _ = likelihood.by_runs([group], {}, names, "t" in conditions)
+        alone = likelihood.by_steady_sliding(group, {}, names)
+        assert_allclose(means, [alone[name] for name in names], rtol=1e-12, atol=0)
     scene = load(LENS)
     loads, moduli = np.array([-1e-4, 0.0, 4e-3, 4e-3]), np.array([1e6, 1e6, 1e6, 2e6])
     made, names = rows_of(scene, held=loads, **{"solid.shear_modulus": moduli})
