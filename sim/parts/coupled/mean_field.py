@@ -115,6 +115,44 @@ _NEXT_TO, _CHANGES = 1e-6, 10_000
 _FEW_TURNS = 20
 
 
+#: Sum of the stretches that is none where a sub-step ends at a change of its sign, over the tolerance and the bonds.
+_NONE = 1e-3
+
+
+@device
+def _at_end(row, nodes, step, law):
+    """Return what may not change its sign in a solved sub-step, positive at its start.
+
+    It is the sum of the stretches, or the speed of bonds without a stretch.
+    """
+    if law.sense == 0.0:
+        return (row.moment + nodes.moment[2]) * math.copysign(1.0, row.moment)
+    return radau.sum_over(radau.RATES, 2, nodes.slip) / step * law.sense
+
+
+@device
+def _to_zero(row, start, step, none, slider, law, contact, nodes):
+    """Shorten a solved sub-step to where ``_at_end`` is zero, but for ``none``; return its length, True if solved."""
+    first = math.fabs(row.moment) if law.sense == 0.0 else row.speed * law.sense
+    near, above, far, below, side = 0.0, first, step, _at_end(row, nodes, step, law), 0
+    for _ in range(100):
+        step = near + (far - near) * (above / (above - below))
+        if not radau.newton(row, start, step, slider, law, contact, nodes):
+            return step, False
+        value = _at_end(row, nodes, step, law)
+        if math.fabs(value) <= none or far - near <= 1e-15 * far:
+            break
+        if value > 0.0:
+            near, above = step, value
+            below *= 0.5 if side > 0 else 1.0
+            side = 1
+        else:
+            far, below = step, value
+            above *= 0.5 if side < 0 else 1.0
+            side = -1
+    return step, True
+
+
 @device
 def _piece(row, slider, law, contact, nodes, energy):
     """Go through one piece of a clock step. Return the time at which it ends or the slider loses stability.
@@ -140,8 +178,17 @@ def _piece(row, slider, law, contact, nodes, energy):
             if brittle and step < _BRIEF * length and slip_event(row, start, NEAR, slider, law, contact, energy):
                 row.next_step, nodes.last_step = 1e-6 * length, 0.0
             continue
-        accept(row, start, step, slider, law, contact, nodes, energy)
         row.next_step = max(row.next_step, step * grows) if step == left else step * grows
+        none = _NONE * slider.tolerance * row.bound
+        turns = law.softness > 0.0 and math.fabs(row.moment) > none and _at_end(row, nodes, step, law) < 0.0
+        if turns:  # there the rupture rate has a kink, which no sub-step leads across
+            step, solved = _to_zero(row, start, step, none, slider, law, contact, nodes)
+            if not solved:
+                row.next_step = 0.5 * step
+                continue
+        accept(row, start, step, slider, law, contact, nodes, energy)
+        if turns:
+            row.moment, nodes.last_step = 0.0, 0.0
         if brittle and slip_event(row, start + step, 0.0, slider, law, contact, energy):
             row.next_step, nodes.last_step = 1e-6 * length, 0.0
         if step == left:
@@ -217,7 +264,7 @@ def _jump(row, time, slider, law, contact):
 @device
 def _slide(row, start, slider, along, contact, nodes, energy):
     """Slip until the speed comes to zero or the piece ends. Return the time reached; negative without a solution."""
-    length, sense = slider.length, along.sense
+    length = slider.length
     for _ in range(mechanics.MOST_STEPS):
         left = length - start
         step = mechanics.next_step(row, left, length, math.inf)
@@ -233,28 +280,12 @@ def _slide(row, start, slider, along, contact, nodes, energy):
         if not accepted:
             row.next_step = step * grows
             continue
-        speed = radau.sum_over(radau.RATES, 2, nodes.slip) / step * sense
-        stops = speed <= 0.0
+        stops = _at_end(row, nodes, step, along) <= 0.0
         if stops and row.speed == 0.0:
             row.next_step = 0.25 * step
             continue
         if stops:
-            near, above, far, below, side = 0.0, row.speed * sense, step, speed, 0
-            for _ in range(100):
-                step = near + (far - near) * (above / (above - below))
-                if not radau.newton(row, start, step, slider, along, contact, nodes):
-                    break
-                speed = radau.sum_over(radau.RATES, 2, nodes.slip) / step * sense
-                if math.fabs(speed) <= 1e-13 * math.fabs(row.speed) or far - near <= 1e-15 * far:
-                    break
-                if speed > 0.0:
-                    near, above = step, speed
-                    below *= 0.5 if side > 0 else 1.0
-                    side = 1
-                else:
-                    far, below = step, speed
-                    above *= 0.5 if side < 0 else 1.0
-                    side = -1
+            step, _ = _to_zero(row, start, step, 1e-13 * math.fabs(row.speed), slider, along, contact, nodes)
         accept(row, start, step, slider, along, contact, nodes, energy)
         row.next_step = max(row.next_step, step * grows) if step == left else step * grows
         start = length if step == left else start + step

@@ -8,7 +8,7 @@ from helpers import driven
 from helpers.cases import some
 from helpers.driven import AREA, HELD, STRETCH, UNIT, march, marched, pulled, reached, residual, scenario, spring, stuck
 from numpy.testing import assert_allclose
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import sim
@@ -75,6 +75,32 @@ def test_a_slider_without_and_with_mass_and_damping_follows_its_reference_at_any
     exact = np.array(list(with_mass.values()))
     assert np.all(np.abs(np.array(found) - exact) < 1e-6 * np.max(np.abs(exact), axis=0))
     assert residual(read) < 1e-7
+
+
+def test_a_mean_stretch_that_changes_its_sign_costs_no_accuracy_at_any_tolerance():
+    # there the rupture rate has a kink: the reference stops at it, and every sub-step errs by its tolerance at the most
+    stiffness, pace, damping, times = 0.5, 10.0, 0.3, (0.0, 3.0, 3.0, 4.0)
+
+    def rates(_, state, stage):
+        bound, stretch, pull = state
+        breaking, speed = math.exp(abs(stretch / bound)), (pull - stretch) / damping
+        return [1.0 - bound - bound * breaking, bound * speed - stretch * breaking, stiffness * (stage - speed)]
+
+    def kink(_, state, stage):
+        return state[1]
+
+    kink.terminal = True
+    exact, begin, fine = [0.5, 0.0, 0.0], 0.0, {"method": "DOP853", "rtol": 1e-13, "atol": 1e-15}
+    for stage, end, events in (pace, 3.0, None), (-pace, 4.0, kink), (-pace, 4.0, None):
+        part = solve_ivp(rates, (begin, end), exact, args=(stage,), events=events, **fine)
+        begin, exact = part.t[-1], part.y[:, -1]
+    assert 3.0 < part.t[0] < 4.0
+    course = {"time": times, "value": tuple(speed * STRETCH for speed in (pace, pace, -pace, -pace))}
+    for tolerance in (1e-6, 1e-8, 1e-9, 1e-10, 1e-12):
+        drive = spring(stiffness, course, damping=damping, tolerance=tolerance)
+        states, read = marched(scenario(4.0, 8, drive))
+        errors = reached(states[-1:], "bound", "stretch")[0] - exact[:2]
+        assert np.max(np.abs(errors)) < read["substeps"][-1] * tolerance
 
 
 MASS, DAMPING, CONTACT = {"mass": 1e-3}, {"damping": 1e-3}, {"contact": 0.05}
