@@ -9,7 +9,7 @@ import scipy
 import xarray as xr
 from scipy import special
 
-from sim.analysis.dataset import MEMBERS, in_pieces, is_stationary, plain, steady_points, sweep_dims
+from sim.analysis.dataset import MEMBERS, in_pieces, is_stationary, plain, steady_points, sweep_dims, with_trajectories
 from sim.analysis.events import events
 from sim.analysis.observables import (
     KEPT,
@@ -806,7 +806,7 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
     times : array, shape (members,)
         When it happened [s]; nan where it did not.
     ends : float or array
-        How long each member was watched [s].
+        How long each member was watched [s]; nan if it could not happen in a member, which then does not count.
 
     Notes
     -----
@@ -822,8 +822,9 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
     >>> print(f"{result.half:.0f} s, {result.rate:.3f} /s, {result.rate_low:.2f} to {result.rate_high:.2f} /s")
     5 s, 0.125 /s, 0.03 to 0.37 /s
     """
-    happened = np.isfinite(times)
-    watched = np.where(happened, times, ends)
+    watched = np.where(np.isfinite(times), times, ends)
+    counts = ~np.isnan(watched)
+    happened, watched = np.isfinite(times)[counts], watched[counts]
     half = low = high = np.nan
     if np.any(happened) and np.all(np.isfinite(watched)):
         half, low, high = _halves(watched, happened)
@@ -903,15 +904,23 @@ def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -
     Returns
     -------
     xarray.Dataset
-        ``half_<name>`` and ``<name>_rate``, with ``…_low`` and ``…_high``; see ``lifetime``. Empty where members do
-        not differ.
+        ``half_<name>`` and ``<name>_rate``, with ``…_low`` and ``…_high``; see ``lifetime``. Members that were never
+        in contact do not count. Empty where members do not differ.
     """
     if MEMBERS not in times.dims:
         return xr.Dataset()
-    watched = float(dataset["t"][-1] - dataset["t"][0])
-    values = np.moveaxis(times.to_numpy() - float(dataset["t"][0]), times.get_axis_num(MEMBERS), -1)
+    duration, dims = float(dataset["t"][-1] - dataset["t"][0]), [name for name in times.dims if name != MEMBERS]
+    values = (times - float(dataset["t"][0])).transpose(..., MEMBERS).to_numpy()
+    watched = np.full(values.shape, duration)
+    if "contact_radius" in dataset and MEMBERS in dataset["contact_radius"].dims:
+        radius = with_trajectories(dataset, "contact_radius")
+        touched = in_pieces(radius, (*dims, MEMBERS), lambda piece: piece[["contact_radius"]].max("t"))[
+            "contact_radius"
+        ]
+        watched = np.where(touched.transpose(*dims, MEMBERS) > 0.0, duration, np.nan)
     first_member, result = times.isel({MEMBERS: 0}, drop=True), {}
-    estimates = iter(np.array([lifetime(members, watched) for members in values.reshape(-1, values.shape[-1])]).T)
+    pairs = zip(*(array.reshape(-1, values.shape[-1]) for array in (values, watched)), strict=True)
+    estimates = iter(np.array([lifetime(*pair) for pair in pairs]).T)
     for key, unit, text in (
         (f"half_{name}", "s", f"time by which half of the members have {words}"),
         (f"{name}_rate", "1/s", f"rate at which members have {words}"),

@@ -8,11 +8,13 @@ import pytest
 import xarray as xr
 from helpers import lens
 from helpers.lens import FIELD, scene
-from helpers.parts import Clock, Ensemble, Time, analysis, drive, run, shear
+from helpers.parts import Adhesion, Clock, Ensemble, Equilibrium, Time, analysis, bonds, drive, run, shear
 from numpy.testing import assert_allclose
 from scipy import special, stats
 
-from sim.analysis.statistics import QUANTILES, autocovariance, quantile_ranks
+from sim.analysis.statistics import QUANTILES, autocovariance, lifetimes, quantile_ranks
+from sim.parts.contact.models import Solid, Sphere
+from sim.spectrum.families import Gaussian
 
 LEVELS = np.array(QUANTILES)
 #: Ensembles that a coverage is counted over, and its bounds; five of its standard errors are 3.4 %.
@@ -302,3 +304,25 @@ def test_censored_lifetimes_have_the_median_of_scipy_and_first_passages_are_betw
     result = analysis.first_passage(paths, 2.0)
     assert_allclose(result, [1.5, 2.0, 0.0, 3.4], rtol=1e-15)
     assert math.isnan(analysis.first_passage(paths, 4.5)[1]) and result.attrs["units"] == "s"
+
+
+def test_members_that_are_never_in_contact_are_no_survivors():
+    # a tension beyond the pull-off of those members whose fluctuations are large at the start
+    field = {"spectrum": Gaussian(rms=63e3, length=15e-6), "points": 64, "correlation": Time(time=10e-3)}
+    parts = {
+        "clock": Clock(duration=0.1, step=2e-3),
+        "solid": Solid(shear_modulus=1.1e6),
+        "sphere": Sphere(radius=1.6e-3),
+    }
+    parts |= {"adhesion": Adhesion(work=35e-3), "drive": drive.Steady(), "bonds": bonds.Unbroken()}
+    contact = Equilibrium(load=-0.19e-3, after_pull_off="stop")
+    dataset = run(scene(**parts, contact=contact, shear=shear.Banded(**field), ensemble=Ensemble(members=100)))
+    closed = (dataset["contact_radius"].isel(t=0) > 0.0).to_numpy()
+    assert 20 < closed.sum() < 80
+    times = analysis.events(dataset)["first_detachment"]
+    every, alone = (
+        lifetimes(dataset.isel(member=who), times.isel(member=who), "detached", "detached")
+        for who in (slice(None), closed)
+    )
+    xr.testing.assert_identical(every, alone)
+    assert every["half_detached"] > 0.0
