@@ -7,7 +7,7 @@ exp(−2∫λdt).
 
 import dataclasses
 import math
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self, cast
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -107,15 +107,15 @@ class Stress(_OfTheMoment):
 class SlipRate(_OfTheMoment):
     """The fluctuations grow where sliding is unsteady: g² = floor² + (1 − floor²) × variance of the speed over ⟨V²⟩.
 
-    Means are over the past with the weight e^(−s/l) for the distance s slid since then, where l is the
+    Means are over the run so far with the weight e^(−s/l) for the distance s slid since then, where l is the
     ``memory_length``. Steady sliding has the floor; stick-slip that slides for the share d of the time has
-    1 − d. Rest changes nothing until sliding resumes, then it counts as part of the past.
+    1 − d. Rest counts as the limit of ever slower sliding.
 
     Notes
     -----
     With A_j = ∫ e^(−s/l) \\|V\\|^j dt, g² = floor² + (1 − floor²)(1 − A1²/(A0 A2)). The memory holds A0, the mean speed
-    A1/A0, A2 − A1²/A0 and the time at rest since the last slip. All sliding within a clock step has the mean of the
-    weight over the step.
+    A1/A0 and A2 − A1²/A0. It begins empty, because steady sliding before the run, of weight l/\\|V\\|, has no limit at
+    rest. All sliding within a clock step has the mean of the weight over the step.
     """
 
     reads_stress: ClassVar[bool] = False
@@ -133,11 +133,7 @@ class SlipRate(_OfTheMoment):
         return np.full(speed.shape, self.floor)
 
     def started(self, motion: Motion, stress: Array) -> tuple[Array, Array]:
-        speed = np.abs(motion.speed)
-        past = np.zeros((len(speed), 4))
-        past[:, 1] = speed
-        np.divide(cast(float, self.memory_length), speed, out=past[:, 0], where=speed > 0.0)
-        return past, self.factor(speed, stress)
+        return np.zeros((len(motion.speed), 3)), self.factor(motion.speed, stress)
 
     def followed(self, past: Array, motions: Motion, stress: Array) -> tuple[Array, Array]:
         past, unsteady = past.copy(), np.empty(motions.path.shape)
@@ -150,25 +146,17 @@ class SlipRate(_OfTheMoment):
 def _remember(past, path, duration, spent, length, unsteady):
     """Update the memory of each row in place, step by step, and write the unsteadiness after each step."""
     for m in range(len(past)):
-        weight, mean, spread, rest = past[m]
+        weight, mean, spread = past[m]
         for s in range(len(duration)):
-            if path[s, m] == 0.0:
-                rest += duration[s] if weight > 0.0 else 0.0
-            else:
-                if rest > 0.0:
-                    spread += weight * rest / (weight + rest) * mean * mean
-                    mean *= weight / (weight + rest)
-                    weight += rest
-                    rest = 0.0
-                renewed = -math.expm1(-path[s, m] / length)
-                share = renewed * length / path[s, m] if renewed > 0.0 else 1.0
-                weight, spread, gained = weight * (1.0 - renewed), spread * (1.0 - renewed), duration[s] * share
-                further = path[s, m] / duration[s] - mean
-                spread += share * spent[s, m] + weight * gained / (weight + gained) * further * further
-                mean += further * gained / (weight + gained)
-                weight += gained
+            renewed = -math.expm1(-path[s, m] / length)
+            share = renewed * length / path[s, m] if renewed > 0.0 else 1.0
+            weight, spread, gained = weight * (1.0 - renewed), spread * (1.0 - renewed), duration[s] * share
+            further = path[s, m] / duration[s] - mean
+            spread += share * spent[s, m] + weight * gained / (weight + gained) * further * further
+            mean += further * gained / (weight + gained)
+            weight += gained
             unsteady[s, m] = spread / (spread + weight * mean * mean) if spread > 0.0 else 0.0
-        past[m, 0], past[m, 1], past[m, 2], past[m, 3] = weight, mean, spread, rest
+        past[m, 0], past[m, 1], past[m, 2] = weight, mean, spread
 
 
 Amplitude = Annotated[Constant | Onset | Stress | SlipRate, Field(discriminator="model")]
@@ -250,7 +238,7 @@ class Fluctuation(NamedTuple):
         Numbers of the process: complex amplitudes (members, 2, pairs) in units of each mode's
         standard deviation, or phases (members, pairs) [rad]; empty for a process without any.
     past : array
-        Memory of earlier sliding in the law of the amplitude, shape (1, 4) or (members, 4); empty without memory.
+        Memory of earlier sliding in the law of the amplitude, shape (1, 3) or (members, 3); empty without memory.
     """
 
     energy: Array
