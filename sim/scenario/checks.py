@@ -66,6 +66,8 @@ def _cannot_be_driven(scene: Scene) -> Faults:
 
 def _lacks_bonds(scene: Scene) -> Faults:
     shear, bonds = scene.fluctuations, scene.population
+    if bonds.stretched and bonds.rebinding_rate == 0.0 and bonds.start_from != "bonded":
+        yield ("bonds", "start"), 'without rebinding no site is ever bound: take "bonded", or a rebinding_rate above 0'
     if not shear.spectrum.bond_made:
         if shear.reads_stress and not bonds.carries_stress:
             fault = 'amplitude model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'

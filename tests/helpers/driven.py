@@ -26,7 +26,7 @@ LOAD = 4e-3
 WORK = LOAD / (math.pi * R)
 
 
-def scenario(duration, steps, drive, share=0.0, start="bonded", members=1, make=FirstMoment, **keys):
+def scenario(duration, steps, drive, share=0.0, start="steady", members=1, make=FirstMoment, **keys):
     """A lens whose bonds, as made of their recipe, carry ``share`` of the work of adhesion."""
     bonds = {"rupture": keys.pop("rupture", BELL), "rebinding_rate": keys.pop("rebinding", 1.0), "start_from": start}
     return Scenario(

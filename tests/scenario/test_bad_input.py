@@ -164,6 +164,7 @@ TOGETHER = [
     (RATE, f"{BELL}critical_speed = 1\n", "bonds.critical_speed", 'choose model = "steady"'),
     (RATE, BELL.replace("cohort", "auto") + 'critical_speed = "1 mm/s"\n', "bonds", "either critical_speed"),
     (RATE, BELL.replace("cohort", "auto") + 'stress = "1 MPa"\n', "bonds", "leave stress out"),
+    (RATE, RATE.replace("500", "0").replace("rate", "auto", 1), "bonds", "rebinding_rate...above 0"),
     (SHEAR, '[shear]\nmodel = "mean"\nspectrum = { model = "bonds", footprint = "10 um" }\n', "shear.spectrum",
      'bonds.model = "cohort" or "tracked"'),
     ("members = 4", 'members = 4\n[shear.amplitude]\nmodel = "stress"\nreference = 1', "shear.amplitude",

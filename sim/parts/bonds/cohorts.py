@@ -503,6 +503,13 @@ def empty(rupture: RuptureRate, tolerance: float) -> Cohorts:
     return Cohorts(blank, blank.copy(), width, np.zeros((1, 2)))
 
 
+def bonded(rupture: RuptureRate, tolerance: float) -> Cohorts:
+    """Return a population with a bond at every site, all unstretched."""
+    full = empty(rupture, tolerance)
+    full.weight[0, 0] = 1.0
+    return full
+
+
 def resting(rupture: RuptureRate, rebinding_rate: float, tolerance: float) -> Cohorts:
     """Return a population after a long rest: the share k_on/(k_on + k0) is bound, all unstretched.
 

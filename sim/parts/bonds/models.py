@@ -118,7 +118,7 @@ CriticalSpeed = Annotated[float, Quantity("m/s", "critical speed of the bonds", 
 RebindingRate = Annotated[float, Quantity("1/s", "rate at which a free site binds", "h", above=0)]
 Start = Annotated[
     Literal["steady", "bonded", "empty"],
-    Field(alias="start", description="bonds at the start, bonded being those of rest"),
+    Field(alias="start", description='bonds at the start; "bonded": at every site, unstretched'),
 ]
 Sites = Annotated[int, Quantity("1", "number of bond sites of the contact", at_least=1, at_most=10**9, whole=True)]
 
@@ -336,7 +336,7 @@ def _count(bound, stay, bind, sites, seed, part, members, step, counted):
 
 
 Stiffness = Annotated[float, Quantity("N/m", "stiffness of a bond", "kappa", above=0, typical="0.4 mN/m")]
-Rebinding = Annotated[float, Quantity("1/s", "rate at which a free site binds", "k_on", above=0, typical="1e5 1/s")]
+Rebinding = Annotated[float, Quantity("1/s", "rate at which a free site binds", "k_on", at_least=0, typical="1e5 1/s")]
 Density = Annotated[float, Quantity("1/m^2", "bond sites per area", "n", above=0, typical="1e17 1/m^2")]
 
 
@@ -360,8 +360,15 @@ class _Stretched(_BondModel):
 
     @property
     def bound_at_rest(self) -> float:
-        """Share of sites that are bound at rest [1]."""
-        return self.rebinding_rate / (self.rebinding_rate + self.law.at_rest)
+        """Share of sites bound at a bond fraction of 1 [1]: that at rest, or all if no bond can form."""
+        return self.rebinding_rate / (self.rebinding_rate + self.law.at_rest) if self.rebinding_rate > 0.0 else 1.0
+
+    def remarks(self, setting: Setting) -> list[str]:
+        number = 1.0 / self.bound_at_rest
+        remark = (
+            f'start = "bonded" binds every site, {number:.3g} times the bonds of rest, for which adhesion.work holds'
+        )
+        return [remark] if self.start_from == "bonded" and number > 1.01 else []
 
     def onset(self, speed: Array, body: Body) -> Onset:
         """Return the onset of oscillations behind a spring at speeds [m/s], nan if unknown."""
@@ -422,7 +429,7 @@ class FirstMoment(_OverArea, _Separable):
         if self.start_from == "steady":
             bound, stretch = mean_field.steady(motion.first, self.law, self.rebinding_rate)
         else:
-            bound = np.full(1, self.bound_at_rest if self.start_from == "bonded" else 0.0)
+            bound = np.full(1, 1.0 if self.start_from == "bonded" else 0.0)
             stretch = np.zeros(1)
         rows = self.rows(noise) + 0.0 * motion.first  # a drive that solves the motion has its members
         return Stretches(rows * bound, rows * stretch)
@@ -438,9 +445,10 @@ class FirstMoment(_OverArea, _Separable):
         return self.rupture.first_moment_onset(speed, numbers, body)
 
     def remarks(self, setting: Setting) -> list[str]:
-        excess = self.rupture.first_moment_excess(self.bond_stiffness, self.rebinding_rate)
+        remarks, rebinding = super().remarks(setting), self.rebinding_rate
+        excess = self.rupture.first_moment_excess(self.bond_stiffness, rebinding) if rebinding > 0.0 else 0.0
         remark = f'the mean stretch overpredicts the friction maximum by {excess:.0%}: bonds.model = "cohort" does not'
-        return [remark] if excess else []
+        return [*remarks, remark] if excess else remarks
 
     def bonding(self, state: Stretches) -> Bonding:
         mean = np.divide(state.stretch, state.bound, out=np.zeros(state.bound.shape), where=state.bound > 0.0)
@@ -484,7 +492,7 @@ class Cohort(_OverArea, _Stretched):
         if self.start_from == "steady":
             first = cohorts.steady(*recipe, float(motion.first[0]), self.tolerance)
         elif self.start_from == "bonded":
-            first = cohorts.resting(*recipe, self.tolerance)
+            first = cohorts.bonded(self.law, self.tolerance)
         else:
             first = cohorts.empty(self.law, self.tolerance)
         rows = max(len(self.rows(noise)), len(motion.first))  # a drive that solves the motion has its members
@@ -542,8 +550,14 @@ class Tracked(_Separable):
         return state, self.read(frames)
 
     def followed(self, speeds: Array, step: float) -> float:
-        lives = step / (tracks.mean_life(speeds, self.law) + 1.0 / self.rebinding_rate)
-        return float(self.sites * np.mean(np.minimum(lives, CYCLES)))
+        wait = 1.0 / self.rebinding_rate if self.rebinding_rate > 0.0 else math.inf
+        return float(self.sites * np.mean(np.minimum(step / (tracks.mean_life(speeds, self.law) + wait), CYCLES)))
+
+    def remarks(self, setting: Setting) -> list[str]:
+        number, remarks = self.site_density * setting.cell**2, super().remarks(setting)
+        numbers = f"{self.sites} sites are followed, site_density times the area at rest is {number:.3g}"
+        remark = f"{numbers} ({number / self.sites:.3g} times as many): the first sets the noise, the second the force"
+        return [*remarks, remark] if abs(number / self.sites - 1.0) > 0.01 else remarks
 
     def bonding(self, state: Tracks) -> Bonding:
         return self.read(state.frame)
@@ -596,6 +610,8 @@ class Auto:
         if missing:
             are = "is" if len(missing) == 1 else "are"
             raise PydanticCustomError("one_kind", f"{' and '.join(missing)} {are} missing, which bonds like these need")
+        if not with_ and self.rebinding_rate == 0.0:
+            raise PydanticCustomError("one_kind", "rebinding_rate must be above 0 1/s for bonds without a rupture")
         if with_ and self.stress:
             raise PydanticCustomError("one_kind", "bonds with a rupture make their own stress; leave stress out")
         return self

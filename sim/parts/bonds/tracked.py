@@ -562,8 +562,8 @@ def start(
     speed : array, shape (1,) or (members,)
         V [m/s], either sign; needed by "steady" only.
     begin : str
-        "steady": the stationary law at that speed. "bonded": a site is bound with the chance of rest,
-        k_on/(k_on + k0), and unstretched. "empty": no site is bound.
+        "steady": the stationary law at that speed. "bonded": every site is bound, unstretched. "empty": no
+        site is bound.
     seed : int
         Seed of the run.
     members : array of int
@@ -714,8 +714,7 @@ def _draw(tracks, chosen, begin, speed, rupture, rebinding_rate, seed, members) 
 
     A site of steady bonds is bound with the chance ⟨T⟩/(⟨T⟩ + 1/k_on), which is 1 for bonds that never break.
     """
-    age, rest = np.zeros(1), 1.0 if rupture.rate == 0.0 else rebinding_rate / (rebinding_rate + rupture.rate)
-    share = np.array([rest if begin == "bonded" else 0.0])
+    age, share = np.zeros(1), np.array([1.0 if begin == "bonded" else 0.0])
     if begin == "steady":
         age = mean_life(speed, rupture)
         if np.any(np.isinf(age) & (speed != 0.0)):

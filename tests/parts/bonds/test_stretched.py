@@ -54,21 +54,21 @@ def last(members=1, **parts):
     return scenario, state
 
 
-def test_the_start_of_a_rested_contact_is_the_closed_form_plus_what_rebinds():
+def test_the_start_of_a_bonded_contact_is_the_closed_form_plus_what_rebinds():
     for eps in [3.0, 100.0, 1e4]:
         # fewer than k_on sites bind a second, and each bears the force of its age: k_on kappa V <T^2>/2 at the most
         speed = eps * PACE
         times = start_up_peak(speed, *RATES).time * np.arange(41) / 20.0
-        rested = bonds.Cohort(rupture=BELL, **STRETCHED, start_from="bonded")
+        whole = bonds.Cohort(rupture=BELL, **STRETCHED, start_from="bonded")
         parts = {"drive": drive.Steady(speed=speed), "clock": Clock(duration=times[-1], step=times[1])}
-        stress = records(scene(1, bonds=rested, **parts), "shear_stress")[0][:, 0]
-        held = SITES * REST * start_up_force(times, speed, *RATES)
+        stress = records(scene(1, bonds=whole, **parts), "shear_stress")[0][:, 0]
+        held = SITES * start_up_force(times, speed, *RATES)
         reborn = SITES * BINDING * STRETCHED["bond_stiffness"] * speed * bell_lives(speed, *RATES).half_square
         assert np.all(stress >= held * (1.0 - 1e-4))
         assert np.all(stress <= (held + reborn) * (1.0 + 1e-4))
         if eps == 1e4:  # where rebinding is negligible, the peak is that of the closed form, and at its time
             assert reborn < 2e-3 * held.max()
-            assert_allclose(stress[20], SITES * REST * start_up_peak(speed, *RATES).force, rtol=2e-3)
+            assert_allclose(stress[20], SITES * start_up_peak(speed, *RATES).force, rtol=2e-3)
             assert abs(np.argmax(stress) - 20) <= 1
 
 
@@ -90,8 +90,42 @@ def test_static_friction_ages_as_the_bonds_of_an_empty_contact_come_and_saturate
             assert_allclose(stress[started + k], SITES * BELL.bell_force * exact, rtol=1e-4)
 
 
+def test_without_rebinding_every_site_starts_bound_and_outlives_a_force_as_of_bell_and_evans():
+    # loaded at the rate κV from zero, a bond outlives the force f with the chance exp(−k0 f_b/(κV) (e^(f/f_b) − 1))
+    eps, sites, members = 30.0, 500, 20
+    times = start_up_peak(eps * PACE, *RATES).time * np.arange(41) / 20.0
+    alive = np.exp(-np.expm1(eps * RATES[0] * times) / eps)
+    force = STRETCHED["bond_stiffness"] * eps * PACE * times
+    parts = {"drive": drive.Steady(speed=eps * PACE), "clock": Clock(duration=times[-1], step=times[1])}
+    for rebinding in (0.0, 1e-9):  # with as good as none a fraction of 1 means the few bonds of rest
+        recipe = {"rupture": BELL, "start_from": "bonded"} | STRETCHED | {"rebinding_rate": rebinding}
+        of_rest = rebinding / (rebinding + RATES[0]) if rebinding else 1.0
+        for part in (bonds.FirstMoment(**recipe), bonds.Cohort(**recipe)):
+            fraction, stress = records(scene(1, bonds=part, **parts), "bond_fraction", "shear_stress")
+            assert_allclose(fraction[:, 0] * of_rest, alive, rtol=1e-6, atol=1e-8)
+            assert_allclose(stress[:, 0], SITES * force * alive, rtol=1e-6, atol=1e-8 * SITES * force[-1])
+        tracked = scene(members, bonds=bonds.Tracked(**recipe, sites=sites), **parts)
+        bound = records(tracked, "bond_fraction")[0].mean(axis=1) * of_rest
+        assert np.all(np.abs(bound - alive) <= 5.0 * np.sqrt(alive * (1.0 - alive) / (members * sites)))
+    with pytest.raises(BadInput, match=r'bonds\.start.*"bonded"'):  # else there is never a bond
+        scene(bonds=bonds.Cohort(rupture=BELL, **STRETCHED | {"rebinding_rate": 0.0}))
+
+
+def test_sites_that_are_followed_are_compared_with_density_times_area():
+    per_site = math.pi * scene().rest_radius ** 2
+    tracked = {"rupture": BELL, "sites": 5} | STRETCHED
+    (remark,) = [
+        text
+        for text in scene(bonds=bonds.Tracked(**tracked | {"site_density": 6.3 / per_site})).remarks()
+        if "sites" in text
+    ]
+    assert all(number in remark for number in ("5 sites", "6.3", "1.26"))
+    equal = scene(bonds=bonds.Tracked(**tracked | {"site_density": 5.0 / per_site})).remarks()
+    assert not any("sites" in text for text in equal)
+
+
 DEAD = Constant(rate=1e-9)
-LASTING = STRETCHED | {"rebinding_rate": 1e-9}
+LASTING = STRETCHED | {"rebinding_rate": 0.0}
 CARRIED = {
     "rate": bonds.Rate(critical_speed=1e9, rebinding_rate=1e-9, stress=2e5, start_from="bonded", area="carried"),
     "first moment": bonds.FirstMoment(rupture=DEAD, **LASTING, start_from="bonded", area="carried"),

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 import sim
 from sim.parts.bonds import Cohort, FirstMoment, Rate, Tracked
-from sim.parts.drive import Steady as AtSpeed
+from sim.parts.drive import Start, Steady as AtSpeed
 from sim.units.errors import BadInput
 
 MOMENT = FirstMoment
@@ -33,7 +33,7 @@ def test_a_stage_that_begins_in_steady_sliding_keeps_the_stress_of_a_prescribed_
 
 @pytest.mark.parametrize("make", [MOMENT, functools.partial(Cohort, tolerance=1e-7)])
 def test_a_stiff_spring_becomes_the_prescribed_drive_as_one_over_its_stiffness(make):
-    prescribed = scenario(1.0, 10, AtSpeed(speed=10.0 * STRETCH), make=make)
+    prescribed = scenario(1.0, 10, Start(rest=1e-12, speed=10.0 * STRETCH), make=make)
     exact, errors = np.array([state.bonding.stress[0] for state in march(prescribed, np.arange(1))]), []
     for stiffness in (40.0, 4e2, 4e3):
         states, _ = marched(scenario(1.0, 10, spring(stiffness, tolerance=1e-8), make=make))
@@ -46,19 +46,13 @@ def test_a_stiff_spring_becomes_the_prescribed_drive_as_one_over_its_stiffness(m
 @pytest.mark.parametrize(("x0", "time", "later"), [(0.5, 0.559773594776, ((5, 0.858292500361), (9, 1.90289022829))),
                                                    (2.0, 0.0489005107, ())])  # fmt: skip
 def test_bonds_that_are_not_remade_share_one_stretch_until_they_run_away(make, x0, time, later):
-    # E1(x(t)) = E1(x0) − k0 t; they are remade so rarely that it does not show
-    scene = scenario(2.0 * time, 20, force(0.5 * x0, tolerance=1e-9), rebinding=1e-13, make=make)
-    first = next(march(scene, np.arange(1)))
-    if make is MOMENT:
-        first = first._replace(bonds=first.bonds._replace(bound=np.full(1, 0.5)))
-    else:
-        first.bonds.cohorts.weight[0, 0] = 0.5
-    states = list(march(scene, np.arange(1), first))
+    # E1(x(t)) = E1(x0) − k0 t
+    scene = scenario(2.0 * time, 20, force(x0, tolerance=1e-9), rebinding=0.0, start="bonded", make=make)
+    states = list(march(scene, np.arange(1)))
     assert_allclose(states[-1].drive.runaway_time, time, rtol=1e-7)
     for place, stretch in later:
-        bonding = states[place - 1].bonding  # the force is constant, so that the stretch is its share per bond
-        share = bonding.fraction[0] * scene.bonds.bound_at_rest
-        assert_allclose(0.5 * x0 / share, stretch, rtol=1e-7)
+        bonding = states[place].bonding  # the force is constant, so that the stretch is its share per bond
+        assert_allclose(x0 / bonding.fraction[0], stretch, rtol=1e-7)
 
 
 @pytest.mark.parametrize("make", [MOMENT, COHORTS])
