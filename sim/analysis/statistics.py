@@ -909,7 +909,7 @@ def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -
     """
     if MEMBERS not in times.dims:
         return xr.Dataset()
-    duration, dims = float(dataset["t"][-1] - dataset["t"][0]), [name for name in times.dims if name != MEMBERS]
+    duration, dims = float(dataset["t"][-1] - dataset["t"][0]), [str(name) for name in times.dims if name != MEMBERS]
     values = (times - float(dataset["t"][0])).transpose(..., MEMBERS).to_numpy()
     watched = np.full(values.shape, duration)
     if "contact_radius" in dataset and MEMBERS in dataset["contact_radius"].dims:

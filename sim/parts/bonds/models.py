@@ -55,8 +55,10 @@ def share_kept(before: Array, radius: Array) -> Array:
 
 
 class _BondModel(Part):
-    """Attributes of all bond models."""
+    """Attributes of all bond models; those with a stretch have a start and a rate of rebinding."""
 
+    start_from: str
+    rebinding_rate: float
     in_place: ClassVar[bool] = False
     #: True if the population is solved through blocks of clock steps.
     in_blocks: ClassVar[bool] = False
