@@ -167,6 +167,11 @@ def covariance_of(values: np.ndarray, mean: np.ndarray | float, free: float) -> 
     return scipy.fft.irfft(total, 2 * length)[:lags] / (free * np.arange(records, records - lags, -1))
 
 
+#: Degrees of freedom below which a single series is too short for its error: it seems to forget faster than it does,
+#: and more than one interval in ten would miss the mean.
+_TOO_FEW = 3.0
+
+
 def inflation(covariance: np.ndarray, members: int, records: int) -> tuple[float, float]:
     """Return the variance of a mean over correlated records, in that of a mean over as many independent ones.
 
@@ -181,7 +186,8 @@ def inflation(covariance: np.ndarray, members: int, records: int) -> tuple[float
     -------
     records, freedom : float
         ``1 + 2 sum of the autocorrelation`` over records up to Sokal's window (see ``integral_time``), and the degrees
-        of freedom of a variance that is estimated with it, ``n/(2W + 1)``; nan where there is no window.
+        of freedom of a variance that is estimated with it, ``n/(2W + 1)``; nan where there is no window, or if a single
+        series spans fewer than three.
 
     Notes
     -----
@@ -196,6 +202,8 @@ def inflation(covariance: np.ndarray, members: int, records: int) -> tuple[float
         return math.nan, math.nan
     window, free = int(windows[0]), max(members - 1, 1)
     wide = (2.0 * window + 1.0) / records
+    if members == 1 and wide * _TOO_FEW > 1.0:
+        return math.nan, math.nan
     ratio = max(float(sums[window]), 1.0 / records) * (1.0 + wide if members == 1 else 1.0)
     return ratio, free / wide
 
@@ -555,7 +563,7 @@ def _shares(
     """
     wider = errors * special.stdtrit(freedoms, 0.5 + 0.5 * LEVEL) / WIDE
     with np.errstate(divide="ignore", invalid="ignore"):  # what does not spread is known without end
-        count = np.fmin(spreads**2 / wider**2, 1e12)
+        count = np.where(np.isnan(wider) & (spreads > 0.0), np.nan, np.fmin(spreads**2 / wider**2, 1e12))
     none = np.isnan(quantile_ranks(surely * count[0], _LEVELS)[0])
     low, high = np.where(none, np.nan, quantile_ranks(count[1:], _LEVELS)) / (count[1:] - 1.0)
     return low, high
