@@ -920,12 +920,11 @@ def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -
     duration, dims = float(dataset["t"][-1] - dataset["t"][0]), [str(name) for name in times.dims if name != MEMBERS]
     values = (times - float(dataset["t"][0])).transpose(..., MEMBERS).to_numpy()
     watched = np.full(values.shape, duration)
-    if "contact_radius" in dataset and MEMBERS in dataset["contact_radius"].dims:
+    if "contact_radius" in dataset and not bool((dataset["contact_radius"].isel(t=0) > 0.0).all()):
         radius = with_trajectories(dataset, "contact_radius")
-        touched = in_pieces(radius, (*dims, MEMBERS), lambda piece: piece[["contact_radius"]].max("t"))[
-            "contact_radius"
-        ]
-        watched = np.where(touched.transpose(*dims, MEMBERS) > 0.0, duration, np.nan)
+        largest = in_pieces(radius, (*dims, MEMBERS), lambda piece: piece["contact_radius"].max("t").to_dataset())
+        touched = largest["contact_radius"].transpose(*dims, MEMBERS) > 0.0
+        watched = np.where(touched, duration, np.nan)
     first_member, result = times.isel({MEMBERS: 0}, drop=True), {}
     pairs = zip(*(array.reshape(-1, values.shape[-1]) for array in (values, watched)), strict=True)
     estimates = iter(np.array([lifetime(*pair) for pair in pairs]).T)
