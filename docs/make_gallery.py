@@ -75,11 +75,10 @@ class Entry(NamedTuple):
             free = "".join(f" --free {key}" for key in self.free)
             return [f"sim fit {path}.toml {path}.csv{free} -o outputs/{self.name}"]
         options = "".join(f" --set '{key}={_toml(value)}'" for key, value in self.changes.items())
-        output = f" -o outputs/{self.name}.nc" if self.changes else ""
+        output = f" -o outputs/{self.name}.nc" if self.name != self.scenario else ""
         chosen = "".join(f" --where '{key}={value}'" for key, value in self.where.items())
         chosen += "".join(f" --units {unit}" for unit in self.units)
-        dataset = self.name if self.changes else self.scenario
-        shown = " ".join(filter(None, ["sim plot", f"outputs/{dataset}.nc", self.kind]))
+        shown = " ".join(filter(None, ["sim plot", f"outputs/{self.name}.nc", self.kind]))
         return [f"sim run {path}.toml{options}{output}", f"{shown}{chosen}"]
 
     def run(self) -> Any:
