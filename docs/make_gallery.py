@@ -370,16 +370,18 @@ def friction_maximum(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "static_peak",
     "How does the peak of static friction grow with the time at rest and the speed of the start?",
-    """With the logarithm of the speed: after {rest:g} s it is {slow:.0f} kPa at {slower:g} µm/s and {fast:.0f}
-    kPa at {faster:g} µm/s. With the time at rest it grows to an end: after {short:g} s it has {share:.0f} % of
+    """Ever closer to the logarithm of the speed: after {rest:g} s it is {slow:.0f} kPa at {slower:g} µm/s and
+    {fast:.0f} kPa at {faster:g} µm/s; it rises by {first:.0f} kPa over the first decade of the speed and by
+    {last:.0f} kPa over the last. With the time at rest it grows to an end: after {short:g} s it has {share:.0f} % of
     that height. One rebinding rate makes no logarithm of time.""",
 )
 def static_peak(dataset: xr.Dataset) -> dict[str, Number]:
     peak, rest, speed = (dataset[name] for name in ("peak_stress", "drive_rest", "drive_speed"))
     longest, shortest = 1e-3 * peak.isel(drive_rest=-1), 1e-3 * peak.isel(drive_rest=0)
+    first, last = (float(longest[k + 2] - longest[k]) for k in (0, -3))  # two speeds a decade
     return {"rest": float(rest[-1]), "short": float(rest[0]), "slower": 1e6 * float(speed[0]),
             "faster": 1e6 * float(speed[-1]), "slow": float(longest[0]), "fast": float(longest[-1]),
-            "share": 100.0 * float(shortest[-1] / longest[-1])}  # fmt: skip
+            "share": 100.0 * float(shortest[-1] / longest[-1]), "first": first, "last": last}  # fmt: skip
 
 
 @asks(
