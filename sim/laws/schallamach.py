@@ -1440,9 +1440,9 @@ def start_up_peak(speed, zero_force_rate, bell_force, bond_stiffness):
     Notes
     -----
     At ``t = W(eps)/(eps k_0)`` with eps = kappa \\|V\\|/(k_0 f_b) and Lambert's W, the force is
-    ``f_b W exp(1/eps - 1/W)``; it grows by
-    ``f_b (1 - exp(-W)) exp(1/eps - 1/W)`` for a factor of e in the speed. The difference in the exponent is ``(e^-W - 1)/W``, which does not cancel. A
-    population with a share phi_rest of its sites bound has phi_rest times this force per site.
+    ``f_b W exp(1/eps - 1/W)``. It grows by ``f_b (1 - exp(-W)) exp(1/eps - 1/W)`` for a factor of e in the speed. The
+    difference in the exponent is ``(e^-W - 1)/W``, which does not cancel. A population with a share phi_rest of its
+    sites bound has phi_rest times this force per site.
 
     Examples
     --------

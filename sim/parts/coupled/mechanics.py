@@ -313,7 +313,7 @@ def _missing_slip(slip, row, time, slider, contact):
 def slip_from(first, row, time, slider, contact):
     """Slip at once ahead of a body that stays, from a first slip on to where forces balance; True if possible.
 
-    Also return the energy that the slip dissipates: that of ever less viscosity.
+    Also return the energy that the slip dissipates, that of ever less viscosity, and the area then.
     """
     sense, low, high, lost = math.copysign(1.0, first), 0.0, math.fabs(first), 0.0
     while sense * _missing_slip(sense * high, row, time, slider, contact)[0] > 0.0:
@@ -322,16 +322,16 @@ def slip_from(first, row, time, slider, contact):
         middle = 0.5 * (low + high)
         goes_on = sense * _missing_slip(sense * middle, row, time, slider, contact)[0] > 0.0
         low, high = (middle, high) if goes_on else (low, middle)
-    _, _, moment, sheared, radius, area = _missing_slip(sense * high, row, time, slider, contact)
+    slip = sense * high
+    _, _, moment, sheared, radius, area = _missing_slip(slip, row, time, slider, contact)
     if not area >= 0.0:
-        return False, 0.0
-    step = sense * high / _PARTS
+        return False, 0.0, area
     for i in range(_PARTS):
-        missing, yields, _, _, _, _ = _missing_slip((i + 0.5) * step, row, time, slider, contact)
-        lost += missing / yields * step
+        missing, yields, _, _, _, _ = _missing_slip((i + 0.5) / _PARTS * slip, row, time, slider, contact)
+        lost += missing / yields * slip / _PARTS
     row.moment, row.sheared, row.radius = moment, sheared, radius
-    displace(row, sense * high, 0.0, slider)
-    return True, lost
+    displace(row, slip, 0.0, slider)
+    return True, lost, area
 
 
 @device
@@ -341,23 +341,21 @@ def snap(row, square, time, slider, contact, energy):
     The area shrinks with the stress down to that of a Hertzian contact, and comes back with less of it. ``square``: sum
     of the squared stretches. No bond breaks in a slip that nothing delays.
     """
-    stretch, (yields, _) = math.fabs(row.moment) / row.bound, compliance(row.radius, slider)
+    here, yields, moment, _, _, area = _missing_slip(0.0, row, time, slider, contact)
+    stretch, stored, slid = moment / row.bound, area * (square + row.sheared * moment), row.slip
     held_back = slider.viscosity == 0.0 and slider.mass + slider.damping > 0.0 and yields > 0.0
-    if not (held_back and contact.stays == 0.0 and contact.mean_stress * stretch > 0.0):
+    if not (held_back and contact.stays == 0.0 and contact.mean_stress * math.fabs(stretch) > 0.0):
         return False
-    _, area, _, _ = contact_area(row.bound, row.moment, time, row.radius, contact)
-    stored, moment, slid = area * (square + row.sheared * row.moment), row.moment, row.slip
-    for sense in (math.copysign(1.0, moment), -math.copysign(1.0, moment)):
-        shift, least = _TRIED * stretch, max(0.0, sense * _missing_slip(0.0, row, time, slider, contact)[0])
-        while shift < _REACH * stretch:
-            if sense * _missing_slip(sense * shift, row, time, slider, contact)[0] > least:
-                slipped, lost = slip_from(sense * shift, row, time, slider, contact)
-                _, area, _, _ = contact_area(row.bound, row.moment, time, row.radius, contact)
+    for sense in (1.0, -1.0):
+        part, least = sense * _TRIED, max(0.0, sense * here / stretch)
+        while math.fabs(part) < _REACH:
+            if sense * _missing_slip(part * stretch, row, time, slider, contact)[0] / stretch > least:
+                slipped, lost, area = slip_from(part * stretch, row, time, slider, contact)
                 square += (row.moment + moment) * (row.slip - slid)
                 energy.snaps += lost
                 energy.area += 0.5 * (stored - area * (square + row.sheared * row.moment)) - lost
                 return slipped
-            shift *= 2.0
+            part *= 2.0
     return False
 
 
