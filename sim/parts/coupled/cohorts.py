@@ -164,7 +164,7 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
     radius, area, _, by_moment = mechanics.contact_area(bound, moment, time, row.radius, contact)
     if not area >= 0.0:
         return math.nan, math.nan, math.nan
-    yields, _ = mechanics.compliance(radius, slider)
+    yields, softer = mechanics.compliance(radius, slider)
     slip = before.slip + shift
     stress = moment + viscosity * (rate * slip - approach.offset)
     force = area * stress
@@ -172,7 +172,7 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
     pull = mechanics.pull_on(time, start, body, row, slider)
     over = force + (damping + mass * rate) * (rate * body - approach.body_offset) - momentum - pull
     grows = area * (bound + viscosity * rate) + by_moment * stress * bound
-    softer = bound * mechanics.softening(radius, by_moment, slider, contact) * force
+    softer = bound * mechanics.softening(softer, radius, by_moment, contact) * force
     loads = stiffness + rate * (damping + mass * rate)
     after.slip, after.body, after.area, after.radius = slip, body, area, radius
     after.sheared = yields * force
@@ -184,7 +184,8 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
     if mass + damping > 0.0:  # what is left of the forces is work on the body, whose displacement may be the longer
         none = min(none, 1e-3 * tolerance * (math.fabs(force) + math.fabs(pull)) / slope)
     roundings = math.fabs(slip) + yields * math.fabs(force) + math.fabs(row.sheared)
-    return over, slope, max(none, 1e-15 * roundings * max(1.0, loads / slope))
+    roundings *= loads / slope if slope < loads else 1.0
+    return over, slope, max(none, 1e-15 * roundings)
 
 
 @device

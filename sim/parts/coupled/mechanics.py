@@ -174,10 +174,9 @@ def compliance(radius, slider):
 
 
 @device
-def softening(radius, by_moment, slider, contact):
-    """Return the slope of 1/k_t over M, of which ``by_moment`` is that of the area."""
-    _, slope = compliance(radius, slider)
-    return slope * by_moment * contact.area / (2.0 * math.pi * radius) if slope < 0.0 else 0.0
+def softening(slope, radius, by_moment, contact):
+    """Return the slope of 1/k_t over M from that over the radius and that of the area."""
+    return slope * by_moment * contact.area / (2.0 * math.pi * radius) if by_moment != 0.0 else 0.0
 
 
 @device
@@ -376,10 +375,10 @@ def elastic(row, time, slider, contact, energy):
         radius, area, _, by_moment = contact_area(bound, moment + bound * slip, time, radius, contact)
         if not area >= 0.0:
             return False
-        yields, _ = compliance(radius, slider)
+        yields, softer = compliance(radius, slider)
         force = area * (moment + bound * slip)
         slope = (area + by_moment * (moment + bound * slip)) * bound
-        softer = bound * softening(radius, by_moment, slider, contact) * force
+        softer = bound * softening(softer, radius, by_moment, contact) * force
         shift = 0.0 if held_back else slip + yields * force - row.sheared
         over = slip + yields * force - row.sheared if held_back else stiffness * shift + force - row.spring_force
         slope = 1.0 + softer + yields * slope if held_back else stiffness * (1.0 + softer + yields * slope) + slope
