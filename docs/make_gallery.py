@@ -75,11 +75,10 @@ class Entry(NamedTuple):
             free = "".join(f" --free {key}" for key in self.free)
             return [f"sim fit {path}.toml {path}.csv{free} -o outputs/{self.name}"]
         options = "".join(f" --set '{key}={_toml(value)}'" for key, value in self.changes.items())
-        output = f" -o outputs/{self.name}.nc" if self.changes else ""
+        output = f" -o outputs/{self.name}.nc" if self.name != self.scenario else ""
         chosen = "".join(f" --where '{key}={value}'" for key, value in self.where.items())
         chosen += "".join(f" --units {unit}" for unit in self.units)
-        dataset = self.name if self.changes else self.scenario
-        shown = " ".join(filter(None, ["sim plot", f"outputs/{dataset}.nc", self.kind]))
+        shown = " ".join(filter(None, ["sim plot", f"outputs/{self.name}.nc", self.kind]))
         return [f"sim run {path}.toml{options}{output}", f"{shown}{chosen}"]
 
     def run(self) -> Any:
@@ -371,16 +370,18 @@ def friction_maximum(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "static_peak",
     "How does the peak of static friction grow with the time at rest and the speed of the start?",
-    """With the logarithm of the speed: after {rest:g} s it is {slow:.0f} kPa at {slower:g} µm/s and {fast:.0f}
-    kPa at {faster:g} µm/s. With the time at rest it grows to an end: after {short:g} s it has {share:.0f} % of
+    """Ever closer to the logarithm of the speed: after {rest:g} s it is {slow:.0f} kPa at {slower:g} µm/s and
+    {fast:.0f} kPa at {faster:g} µm/s; it rises by {first:.0f} kPa over the first decade of the speed and by
+    {last:.0f} kPa over the last. With the time at rest it grows to an end: after {short:g} s it has {share:.0f} % of
     that height. One rebinding rate makes no logarithm of time.""",
 )
 def static_peak(dataset: xr.Dataset) -> dict[str, Number]:
     peak, rest, speed = (dataset[name] for name in ("peak_stress", "drive_rest", "drive_speed"))
     longest, shortest = 1e-3 * peak.isel(drive_rest=-1), 1e-3 * peak.isel(drive_rest=0)
+    first, last = (float(longest[k + 2] - longest[k]) for k in (0, -3))  # two speeds a decade
     return {"rest": float(rest[-1]), "short": float(rest[0]), "slower": 1e6 * float(speed[0]),
             "faster": 1e6 * float(speed[-1]), "slow": float(longest[0]), "fast": float(longest[-1]),
-            "share": 100.0 * float(shortest[-1] / longest[-1])}  # fmt: skip
+            "share": 100.0 * float(shortest[-1] / longest[-1]), "first": first, "last": last}  # fmt: skip
 
 
 @asks(

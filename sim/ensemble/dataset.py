@@ -119,8 +119,8 @@ def outline(plan: Plan) -> Outline:
         content.places[variable.name] = _add_recorded(content, plan, variable)
     if plan.scenario.record.maps:
         _add_maps(content, plan)
-    groups = plan.groups()
-    members = [slice(int(group[0]), int(group[-1]) + 1) for group in groups]
+    groups = plan.groups
+    members = [slice(group.start, group.stop) for group in groups]
     for pack in plan.packs:
         where: tuple[int | slice, ...] = ()
         if plan.scenario.sweep:

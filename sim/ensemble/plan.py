@@ -142,7 +142,7 @@ class Plan:
 
     def worthwhile(self) -> int:
         """Return the number of processes that are worth starting."""
-        return min(len(self.packs) * len(self.groups()), 1 + int(self._seconds(self.group) / _PROCESS_SECONDS))
+        return min(len(self.packs) * len(self.groups), 1 + int(self._seconds(self.group) / _PROCESS_SECONDS))
 
     @property
     def group(self) -> int:
@@ -196,17 +196,18 @@ class Plan:
         for pack in self.packs:
             points = [self.points[number] for number in pack]
             blocks = self.blocks(points[0])
-            for group, members in enumerate(self.groups()):
+            for group, members in enumerate(self.groups):
                 names = [part_name(pack.start, group, index) for index in range(len(blocks))]
-                yield Task(points, members, blocks, names, quantities, each, not self.per_member)
+                yield Task(points, np.array(members), blocks, names, quantities, each, not self.per_member)
 
     def share(self, number: int, of: int) -> Iterator[Task]:
         """Yield the tasks of one shard; the shards take turns."""
         return itertools.islice(self.tasks(), number - 1, None, of)
 
-    def groups(self) -> list[np.ndarray]:
+    @cached_property
+    def groups(self) -> list[range]:
         """Return the members of each group."""
-        return [np.arange(first, min(first + self.group, self.members)) for first in range(0, self.members, self.group)]
+        return [range(first, min(first + self.group, self.members)) for first in range(0, self.members, self.group)]
 
     @cached_property
     def bytes(self) -> float:
@@ -286,7 +287,8 @@ def map_bytes(point: Scenario, members: int) -> float:
 
 def work(plan: Plan, number: int = 1, of: int = 1) -> int:
     """Return the member-steps of a plan, or of one shard of it."""
-    return sum(sum(task.work) for task in plan.share(number, of))
+    steps = (len(pack) * (plan.points[pack.start].clock.steps + 1) for pack in plan.packs)
+    return sum(itertools.islice((one * len(group) for one in steps for group in plan.groups), number - 1, None, of))
 
 
 def part_name(point: int, group: int, block: int) -> str:

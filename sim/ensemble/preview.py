@@ -100,10 +100,10 @@ def spread(points: Sequence[Scenario], most: int = 8) -> list[Scenario]:
 
 def counted(plan: Plan) -> float:
     """Return the counted time of all steps and records on one core [s]."""
-    some, groups = spread(plan.points), plan.groups()
+    some, groups = spread(plan.points), plan.groups
     first, last = (
         sum(counted_block(point, group, Block(-1, point.clock.steps, point.clock.stride)) for point in some)
-        for group in (groups[0], groups[-1])
+        for group in (np.array(groups[0]), np.array(groups[-1]))
     )
     return len(plan.points) * ((len(groups) - 1) * first + last) / len(some)
 
@@ -139,7 +139,7 @@ def _block(plan: Plan, point: Scenario) -> float:
 
 def _parts(plan: Plan) -> float:
     """Return the size of all parts [byte]: records in double precision, and the states between blocks."""
-    first, groups = plan.points[0], len(plan.groups())
+    first, groups = plan.points[0], len(plan.groups)
     blocks, each = len(plan.blocks(first)), plan.members if plan.per_member else 3 * groups
     rows = sum(each if plan.varies(variable) else groups for variable in plan.variables)
     states = (blocks - 1) * plan.members * state_numbers(first)

@@ -1429,14 +1429,15 @@ def start_up_peak(speed, zero_force_rate, bell_force, bond_stiffness):
     Returns
     -------
     StartUpPeak
-        Time of the peak [s] and force per bond of the start [N]: 1/k_0 and 0 at speed 0; grows like the
-        logarithm of the speed.
+        Time of the peak [s] and force per bond of the start [N]: 1/k_0 and 0 at speed 0; at high
+        speeds it grows like the logarithm of the speed.
 
     Notes
     -----
     At ``t = W(eps)/(eps k_0)`` with eps = kappa \\|V\\|/(k_0 f_b) and Lambert's W, the force is
-    ``f_b W exp(1/eps - 1/W)``. The difference in the exponent is ``(e^-W - 1)/W``, which does not cancel. A
-    population with a share phi_rest of its sites bound has phi_rest times this force per site.
+    ``f_b W exp(1/eps - 1/W)``. It grows by ``f_b (1 - exp(-W)) exp(1/eps - 1/W)`` for a factor of e in the speed. The
+    difference in the exponent is ``(e^-W - 1)/W``, which does not cancel. A population with a share phi_rest of its
+    sites bound has phi_rest times this force per site.
 
     Examples
     --------

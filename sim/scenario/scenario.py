@@ -23,7 +23,7 @@ from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
 from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
-from sim.scenario.checks import faults_across, remarks_between
+from sim.scenario.checks import faults_across, remarks_between, remarks_on_force
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
@@ -248,7 +248,7 @@ class Scenario:
     def remarks(self) -> list[str]:
         """Return one sentence for each assumption, error of the cell and implausible value."""
         remarks = [remark for part in self.chosen for remark in part.remarks(self.setting)]
-        remarks += remarks_between(self)
+        remarks += [*remarks_between(self), *remarks_on_force(self)]
         if self.ensemble.members > 1 and self.fluctuations.measured and not any(self.varies.values()):
             remarks.append(
                 "the map is the same for all members and seeds, and nothing else is random: one member is enough"

@@ -165,7 +165,7 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
     radius, area, _, by_moment = mechanics.contact_area(bound, moment, time, row.radius, contact)
     if not area >= 0.0:
         return math.nan, math.nan, math.nan
-    yields, _ = mechanics.compliance(radius, slider)
+    yields, softer = mechanics.compliance(radius, slider)
     slip = before.slip + shift
     stress = moment + viscosity * (rate * slip - approach.offset)
     force = area * stress
@@ -173,6 +173,7 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
     pull = mechanics.pull_on(time, start, body, row, slider)
     over = force + (damping + mass * rate) * (rate * body - approach.body_offset) - momentum - pull
     grows = area * (bound + viscosity * rate) + by_moment * stress * bound
+    softer = bound * mechanics.softening(softer, radius, by_moment, contact) * force
     loads = stiffness + rate * (damping + mass * rate)
     after.slip, after.body, after.area, after.radius = slip, body, area, radius
     after.sheared = yields * force
@@ -180,10 +181,11 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
         after.body_speed = (momentum + pull - force) / (damping + mass * rate)
     firmest, bears = max(stiffness, 1.0 / yields if yields > 0.0 else 0.0), area * (bound + mechanics.SOME)
     firm = firmest / bears if area > 0.0 else 1.0
-    none, slope = 1e-3 * tolerance / max(1.0, firm), grows + loads * (1.0 + yields * grows)
+    none, slope = 1e-3 * tolerance / max(1.0, firm), grows + loads * (1.0 + softer + yields * grows)
     if mass + damping > 0.0:  # what is left of the forces is work on the body, whose displacement may be the longer
         none = min(none, 1e-3 * tolerance * (math.fabs(force) + math.fabs(pull)) / slope)
     roundings = math.fabs(slip) + yields * math.fabs(force) + math.fabs(row.sheared)
+    roundings *= loads / slope if slope < loads else 1.0
     return over, slope, max(none, 1e-15 * roundings)
 
 
@@ -441,6 +443,12 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
             if _break_all(row, pool, start, _BRIEF * length, slider, contact, unit, rules, nodes[0], energy):
                 count = settled = 1
                 travelled += unit * (row.slip - slid)
+            elif rules.limit == math.inf and mechanics.snap(row, nodes[0].square, start, slider, contact, energy):
+                for i in range(count):
+                    pool[1, i] += unit * (row.slip - slid)
+                travelled += unit * (row.slip - slid)
+                sums_at(pool, count, unit, rules, nodes[0])
+                row.acceleration = 0.0
             elif contact.stays > 0.0:
                 return start, count, travelled, settled
             else:

@@ -167,6 +167,8 @@ def _piece(row, slider, law, contact, nodes, energy):
         step = mechanics.next_step(row, left, length, math.inf)
         if not step > mechanics.LEAST * length:
             gone = break_all(row, start, _BRIEF * length, slider, law, contact, energy)
+            if law.cuts == 0.0 and not gone:
+                gone = mechanics.snap(row, row.moment * row.moment / row.bound, start, slider, contact, energy)
             if contact.stays > 0.0 and not gone:
                 return start
             contact, nodes.last_step = (contact, 0.0) if gone else (mechanics.later(contact, 0.0, 1.0), nodes.last_step)

@@ -140,8 +140,9 @@ def contact_area(bound, moment, time, radius, contact):
         if work > 0.0:
             over = 0.5 / math.pi * modulus * missing * missing / a - work + tilt * a
             slope = 0.5 / math.pi * modulus * missing / a * (2.0 * growth - missing / a) + tilt
-            if missing < 0.0:
-                over, slope = missing, growth
+            left = work - tilt * a
+            if missing < 0.0 or over < -0.75 * left:  # next to Hertz's radius the slope vanishes: by the root of both
+                over, slope = missing - math.sqrt(2.0 * math.pi * a * max(left, 0.0) / modulus), growth
         else:
             over, slope = missing, growth
         if not slope > 0.0:
@@ -162,6 +163,12 @@ def compliance(radius, slider):
     if slider.yielding_radius == 0.0 or not radius > 0.0:
         return slider.yielding, 0.0
     return slider.yielding + slider.yielding_radius / radius, -slider.yielding_radius / (radius * radius)
+
+
+@device
+def softening(slope, radius, by_moment, contact):
+    """Return the slope of 1/k_t over M from that over the radius and that of the area."""
+    return slope * by_moment * contact.area / (2.0 * math.pi * radius) if by_moment != 0.0 else 0.0
 
 
 @device
@@ -275,6 +282,74 @@ def area_or_last(bound, moment, time, row, contact):
     return row.radius, math.pi * row.radius * row.radius / contact.area, 0.0, 0.0
 
 
+#: Share of a missing slip that is tried first; shares of the mean stretch within which a force that falls is looked
+#: for; places at which the power of a slip at once is taken.
+_GUESS, _TRIED, _REACH, _PARTS = 1e-6, 1e-7, 1e-3, 128
+
+
+@device
+def _missing_slip(slip, row, time, slider, contact):
+    """Return the force of the contact beyond that of the bonds, times 1/k_t, after a slip at once.
+
+    The body stays and no bond breaks. Also return 1/k_t, the sum of the stretches, u, radius and area then.
+    """
+    moment = row.moment + row.bound * slip
+    radius, area, _, _ = contact_area(row.bound, moment, time, row.radius, contact)
+    yields, _ = compliance(radius, slider)
+    sheared = yields * area * moment
+    return row.sheared - slip - sheared, yields, moment, sheared, radius, area
+
+
+@device
+def slip_from(first, row, time, slider, contact):
+    """Slip at once ahead of a body that stays, from a first slip on to where forces balance; True if possible.
+
+    Also return the energy that the slip dissipates, that of ever less viscosity, and the area then.
+    """
+    sense, low, high, lost = math.copysign(1.0, first), 0.0, math.fabs(first), 0.0
+    while sense * _missing_slip(sense * high, row, time, slider, contact)[0] > 0.0:
+        low, high = high, 2.0 * high
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        goes_on = sense * _missing_slip(sense * middle, row, time, slider, contact)[0] > 0.0
+        low, high = (middle, high) if goes_on else (low, middle)
+    slip = sense * high
+    _, _, moment, sheared, radius, area = _missing_slip(slip, row, time, slider, contact)
+    if not area >= 0.0:
+        return False, 0.0, area
+    for i in range(_PARTS):
+        missing, yields, _, _, _, _ = _missing_slip((i + 0.5) / _PARTS * slip, row, time, slider, contact)
+        lost += missing / yields * slip / _PARTS
+    row.moment, row.sheared, row.radius = moment, sheared, radius
+    displace(row, slip, 0.0, slider)
+    return True, lost, area
+
+
+@device
+def snap(row, square, time, slider, contact, energy):
+    """Slip at once where the force of the bonds is about to fall, as adhesion pays for their stress. True if so.
+
+    The area shrinks with the stress down to that of a Hertzian contact, and comes back with less of it. ``square``: sum
+    of the squared stretches. No bond breaks in a slip that nothing delays.
+    """
+    here, yields, moment, _, _, area = _missing_slip(0.0, row, time, slider, contact)
+    stretch, stored, slid = moment / row.bound, area * (square + row.sheared * moment), row.slip
+    held_back = slider.viscosity == 0.0 and slider.mass + slider.damping > 0.0 and yields > 0.0
+    if not (held_back and contact.stays == 0.0 and contact.mean_stress * math.fabs(stretch) > 0.0):
+        return False
+    for sense in (1.0, -1.0):
+        part, least = sense * _TRIED, max(0.0, sense * here / stretch)
+        while math.fabs(part) < _REACH:
+            if sense * _missing_slip(part * stretch, row, time, slider, contact)[0] / stretch > least:
+                slipped, lost, area = slip_from(part * stretch, row, time, slider, contact)
+                square += (row.moment + moment) * (row.slip - slid)
+                energy.snaps += lost
+                energy.area += 0.5 * (stored - area * (square + row.sheared * row.moment)) - lost
+                return slipped
+            part *= 2.0
+    return False
+
+
 @device
 def elastic(row, time, slider, contact, energy):
     """Slip at once where the area or the force has jumped and neither mass, damping nor viscosity delays it.
@@ -292,14 +367,16 @@ def elastic(row, time, slider, contact, energy):
         radius, area, _, by_moment = contact_area(bound, moment + bound * slip, time, radius, contact)
         if not area >= 0.0:
             return False
-        yields, _ = compliance(radius, slider)
+        yields, softer = compliance(radius, slider)
         force = area * (moment + bound * slip)
         slope = (area + by_moment * (moment + bound * slip)) * bound
+        softer = bound * softening(softer, radius, by_moment, contact) * force
         shift = 0.0 if held_back else slip + yields * force - row.sheared
         over = slip + yields * force - row.sheared if held_back else stiffness * shift + force - row.spring_force
-        slope = 1.0 + yields * slope if held_back else stiffness * (1.0 + yields * slope) + slope
+        slope = 1.0 + softer + yields * slope if held_back else stiffness * (1.0 + softer + yields * slope) + slope
         if not slope > 0.0:
-            return over == 0.0
+            first = _GUESS * _missing_slip(0.0, row, time, slider, contact)[0]
+            return over == 0.0 or (held_back and slip_from(first, row, time, slider, contact)[0])
         slip -= over / slope
         if math.fabs(over / slope) <= 1e-14 * (math.fabs(slip) + math.fabs(moment)):
             break

@@ -355,6 +355,9 @@ def error_of(row, start, step, slider, law, contact, nodes):
     )
     # a mass between stiff springs rings within a small part of a stretch: as a force that is no small part
     yields, _ = compliance(radius, slider)
+    if contact.mean_stress > 0.0:  # in a slip that takes no time u leaves its polynomial first
+        sheared = yields * area * (moment + viscosity * speed)
+        error = max(error, math.fabs(row.sheared + body - slip - sheared) / law.scale)
     stiffest = max(stiffness, 1.0 / yields if yields > 0.0 else 0.0)
     firm = max(1.0, stiffest / (area * (bound + SOME))) if mass > 0.0 and area > 0.0 else 1.0
     # an open contact bears nothing: then what is missing from the spring counts

@@ -184,10 +184,14 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
                 continue
             break
         if not step > mechanics.LEAST * length:
+            slid, row.next_step = row.slip, 0.0
+            if law[2] == math.inf and mechanics.snap(row, first.square, start, slider, contact, energy):
+                _go(tracks, row.slip - slid, _AT_ONCE * length, ground)
+                row.acceleration = 0.0
+                continue
             if contact.stays > 0.0:
                 return start
             contact = mechanics.later(contact, 0.0, 1.0)
-            row.next_step = 0.0
             continue
         accept_nodes(row, nodes, start, step, slider, math.inf, energy)
         row.next_step = max(row.next_step, step * grows) if cut or step == left else step * grows

@@ -6,11 +6,15 @@ import math
 import numpy as np
 import pytest
 from helpers import driven
-from helpers.driven import STRETCH, force, jkr, march, marched, pulled, residual, scenario, spring, stuck
+from helpers.driven import AREA, STRETCH, UNIT, force, jkr, march, marched, pulled, residual, scenario, spring, stuck
 from numpy.testing import assert_allclose
+from scipy.integrate import quad
+from scipy.optimize import brentq, minimize_scalar
 
 import sim
+from sim.laws.reversible import mean_stress_energy, radius_at_load_reversible
 from sim.parts.bonds import Cohort, FirstMoment, Rate, Tracked
+from sim.parts.bonds.rupture import Bell
 from sim.parts.drive import Start, Steady as AtSpeed
 from sim.units.errors import BadInput
 
@@ -176,3 +180,80 @@ def test_a_check_shows_below_which_spring_the_slider_oscillates_and_a_study_of_i
     assert "oscillates below" not in sim.check(stuck(1.0, 4, STICKING, pulled(1.0, 1.0, damping=10.0)))
     with pytest.raises(BadInput, match=r"drive\.model"):
         sim.converge(scenario(1.0, 4, spring(1.0)))
+
+
+#: Stress of a unit of stretch; k_t is a fifth of the stiffness of all bonds, of which next to none break.
+STRESS, SOFT = driven.DENSITY * driven.KAPPA * STRETCH, 5.0
+LASTING = {"rupture": Bell(zero_force_rate=1e-30, bell_force=driven.BELL.bell_force), "reversible": 1.0}
+
+
+def friction(slip, load=driven.LOAD):
+    """Force of lasting bonds after a slip, in their units, where adhesion pays for all of the mean stress."""
+    radius = radius_at_load_reversible(load, driven.WORK, STRESS * slip, 1.0, driven.R, driven.MODULUS)
+    return slip * np.pi * radius**2 / AREA
+
+
+def place(slip, softness=SOFT, load=driven.LOAD):
+    """Place of the body in equilibrium with a slip; of the stage, if the spring is added to the ``softness``."""
+    return slip + softness * friction(slip, load)
+
+
+def cusp(load=driven.LOAD):
+    """Slip from which on the contact is Hertz's."""
+    hertz = jkr.radius_at_load(load, 0.0, driven.R, driven.MODULUS)
+    return math.sqrt(driven.WORK / mean_stress_energy(hertz, STRESS, driven.MODULUS))
+
+
+def held(speeds, make, load=driven.LOAD, **body):
+    """States and readings of lasting bonds while the stage goes at each of four speeds for a second."""
+    stage = {"time": (0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 4.0), "value": tuple(np.repeat(speeds, 2) * STRETCH)}
+    drive = spring(1.0, stage, contact=1.0 / SOFT, tolerance=1e-8, damping=1e-3, **body)
+    return marched(scenario(4.0, 8, drive, make=make, load=load, **LASTING))
+
+
+@pytest.mark.parametrize("make", [MOMENT, FINE, SITES])
+@pytest.mark.parametrize("mass", [0.0, 1e-8])
+def test_the_interface_slips_at_once_to_a_hertzian_contact_and_back_where_adhesion_pays_for_the_stress(make, mass):
+    # while the place rises the slip jumps at its maximum, while it falls at its minimum
+    top, end = minimize_scalar(lambda slip: -place(slip), bounds=(0.0, cusp()), method="bounded").x, 10.0 * cusp()
+    ahead = brentq(lambda slip: place(slip) - place(top), cusp(), end)
+    behind = brentq(lambda slip: place(slip) - place(cusp()), 0.0, top)
+    states, read = held([130.0, 0.0, -70.0, 0.0], make, mass=mass)
+    lost = within = 0.0
+    for k, stage, among, (first, last) in (
+        (4, 130.0, (cusp(), end), (top, ahead)), (8, 60.0, (0.0, top), (cusp(), behind)),
+    ):  # fmt: skip
+        slip = brentq(lambda slip, stage=stage: place(slip, SOFT + 1.0) - stage, *among)
+        assert_allclose(states[k].drive.position / STRETCH, place(slip), rtol=1e-6)
+        assert_allclose(states[k].drive.spring_force / UNIT, friction(slip), rtol=1e-6)
+        # 128 midpoints of the power are off by at most h²/8 times the total variation of its slope
+        slips = np.linspace(first, last, 2001)
+        lost += quad(lambda slip, at=first: (place(at) - place(slip)) / SOFT, first, last, points=[cusp()])[0]
+        bent = np.sum(np.abs(np.diff(np.gradient(place(slips) / SOFT, slips))))
+        within += ((last - first) / 128.0) ** 2 / 8.0 * bent
+        assert_allclose(read["dissipated_by_snaps"][k] / driven.ENERGY, lost, rtol=0.0, atol=within)
+    assert residual(read) < 1e-7
+
+
+@pytest.mark.parametrize("make", [MOMENT, FINE, SITES])
+def test_a_load_that_halves_for_a_while_leaves_a_contact_hertzian(make):
+    whole, half = driven.LOAD, 0.5 * driven.LOAD
+    load = {"time": (0.0, 2.0, 2.0, 3.0, 3.0, 4.0), "value": (whole, whole, half, half, whole, whole)}
+    states, read = held([106.0, 0.0, 0.0, 0.0], make, load)
+    for k, at, low, high in ((3, whole, 0.0, 25.0), (5, half, cusp(half), 1e3), (8, whole, cusp(), 1e3)):
+        slip = brentq(lambda slip, at=at: place(slip, SOFT + 1.0, at) - 106.0, low, high)
+        assert_allclose(states[k].drive.spring_force / UNIT, friction(slip, at), rtol=1e-6)
+    assert residual(read) < 1e-7
+
+
+def test_a_slip_to_a_hertzian_contact_is_the_limit_of_ever_less_viscosity():
+    # force at 89 and 100 ms by an integrator of the equations with viscosities of 10 and 1 Pa s/m, whose difference
+    # falls as the viscosity to the power of 2/3: extrapolated to none
+    rates = {"rupture": {"model": "constant", "rate": "24 1/s"}, "rebinding_rate": "84 1/s"}
+    bonds = {"model": "rate", "bond_stiffness": "0.6 uN/m", "site_density": "3.8e16 1/m^2"} | rates
+    drive = {"model": "spring", "stage": "1.9 mm/s", "stiffness": "96 N/m", "mass": "1.07 g", "tolerance": 1e-9}
+    lens = {"solid": {"shear_modulus": "0.233 MPa"}, "sphere": {"radius": "0.309 mm"}}
+    lens |= {"clock": {"duration": "0.1 s", "step": "1 ms"}, "adhesion": {"work": "32.6 mJ/m^2", "bond_share": 0}}
+    lens |= {"contact": {"load": "33 uN", "reversible": 0.0039}, "drive": drive | {"contact_stiffness": "7.5 N/m"}}
+    force = sim.run(sim.load(lens | {"bonds": bonds}))["friction_force"].isel(member=0, t=[89, 100])
+    assert_allclose(force, [0.7890906e-3, 0.8940730e-3], rtol=1e-7)
