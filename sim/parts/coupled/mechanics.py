@@ -148,8 +148,9 @@ def contact_area(bound, moment, time, radius, contact):
         if work > 0.0:
             over = 0.5 / math.pi * modulus * missing * missing / a - work + tilt * a
             slope = 0.5 / math.pi * modulus * missing / a * (2.0 * growth - missing / a) + tilt
-            if missing < 0.0:
-                over, slope = missing, growth
+            left = work - tilt * a
+            if missing < 0.0 or over < -0.75 * left:  # next to Hertz's radius, where the slope vanishes: by the depths
+                over, slope = missing - math.sqrt(2.0 * math.pi * a * max(left, 0.0) / modulus), growth
         else:
             over, slope = missing, growth
         if not slope > 0.0:

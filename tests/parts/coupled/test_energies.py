@@ -1,0 +1,101 @@
+"""Energy books of a slider where adhesion returns, the area is renewed, a force jumps and an area collapses."""
+
+import functools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.driven import (
+    AREA,
+    ENERGY,
+    LOAD,
+    MODULUS,
+    UNIT,
+    WORK,
+    R,
+    jkr,
+    march,
+    marched,
+    residual,
+    scenario,
+    spring,
+)  # fmt: skip
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+from sim.parts.bonds import Cohort, FirstMoment, Tracked
+from sim.parts.bonds.rupture import Constant
+from sim.parts.coupled import mechanics
+from sim.parts.drive import READINGS
+from sim.parts.shear import Mean
+from sim.spectrum.families import Gaussian
+
+COHORTS = functools.partial(Cohort, tolerance=1e-5)
+SITES = functools.partial(Tracked, sites=36)
+CARRIED = functools.partial(Cohort, tolerance=1e-5, area="carried")
+
+
+def masked(scene, share):
+    """Return the scene with a stress that takes a share of the work of adhesion, by ΔΓ = 3√π/16 σ²ξ/G."""
+    squared = share * WORK * 16.0 / (3.0 * math.sqrt(math.pi)) * MODULUS / 4.0 / 1e-5
+    return replace(scene, shear=Mean(spectrum=Gaussian(rms=math.sqrt(squared), length=1e-5)))
+
+
+def test_the_area_in_the_sub_steps_is_that_of_jkr_also_from_the_radius_of_hertz_on():
+    # there the energy release rate has no slope
+    work, load = np.meshgrid(WORK * np.logspace(-24.0, 0.0, 49), LOAD * np.array([0.01, 1.0, 30.0]))
+    exact, hertz = (jkr.radius_at_load(load, share * work, R, MODULUS) for share in (1.0, 0.0))
+    for shift in (-1e-12, -1e-16, 0.0, 1e-16, 1e-12):
+        radii = [
+            mechanics.contact_area(
+                0.0, 0.0, 0.0, a, mechanics.Contact(w, p, *[0.0] * 7, 1.0 / R, MODULUS, 1.0)
+            )[0]
+            for w, p, a in zip(work.flat, load.flat, (hertz * (1.0 + shift)).flat, strict=True)
+        ]  # fmt: skip
+        assert_allclose(radii, exact.ravel(), rtol=1e-12)
+
+
+@pytest.mark.parametrize("load", [0.2, 1.0])
+def test_adhesion_that_returns_behind_a_spring_widens_the_area_as_independent_equations_have_it(load):
+    # q = M − N X has no rate of the area in it: q' = −N' X − k M, where the spring gives X = V t − A M/K
+    stiffness, speed, share, pace = 0.2, 10.0, 0.3, 2.0
+    back = -math.log1p(-share) / pace  # all bonds of rest carry the whole work of adhesion
+
+    def of(time, q):
+        """Return share bound, area and moment."""
+        bound = -0.5 * np.expm1(-pace * time)
+        work = WORK * np.maximum(2.0 * bound - share, 0.0)
+        area = np.pi * jkr.radius_at_load(load * LOAD, work, R, MODULUS) ** 2 / AREA
+        return bound, area, (q + bound * speed * time) / (1.0 + bound * area / stiffness)
+
+    def change(time, q):
+        _, area, moment = of(time, q)
+        return -np.exp(-pace * time) * (speed * time - area * moment / stiffness) - moment
+
+    course = solve_ivp(change, (0.0, 1.0), [0.0], rtol=1e-10, atol=1e-13, dense_output=True).sol
+    times, dense = np.linspace(0.0, 1.0, 41), back + np.linspace(0.0, math.sqrt(1.0 - back), 4001) ** 2
+    _, areas, moments = of(times, course(times)[0])
+    bound, area, moment = of(dense, course(dense)[0])
+    for make in (FirstMoment, COHORTS, SITES):
+        keys = {"share": 1.0, "start": "empty", "rupture": Constant(rate=1.0), "load": load * LOAD, "make": make}
+        states, read = marched(masked(scenario(1.0, 40, spring(stiffness, speed), **keys), share))
+        assert residual(read) < 1e-5
+        radii = np.array([(state.drive.radius[0], state.contact.radius[0]) for state in states[1:]])
+        assert_allclose(radii[:, 0], radii[:, 1], rtol=1e-9)
+        if make is not SITES:
+            assert_allclose(read["spring_force"] / UNIT, areas * moments, atol=1e-5 * np.max(areas * moments))
+        if make is FirstMoment:
+            gained = np.trapezoid(0.5 * moment**2 / bound, area)
+            assert_allclose(read["dissipated_by_area"][-1] / ENERGY, -gained, rtol=1e-5)
+
+
+def test_members_whose_adhesion_goes_and_returns_again_and_again_have_energies_and_no_large_ones():
+    load, drive = {"from": 0.05 * LOAD, "to": LOAD, "cycles": 1}, spring(0.3, contact="half_space")
+    scene = masked(scenario(8.0, 80, drive, share=1.0, make=SITES, members=60, load=load), 0.7)
+    states = list(march(scene, np.arange(60)))
+    off = np.diff([state.contact.work <= 0.0 for state in states], axis=0)
+    assert np.count_nonzero(np.any(off, axis=0)) > 30
+    readings = np.array([scene.parts.drive.readings(state.drive) for state in states])
+    for member in range(60):
+        assert residual(dict(zip(READINGS, readings[:, member].T, strict=True))) < 1e-5
