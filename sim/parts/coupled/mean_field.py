@@ -17,9 +17,8 @@ _TRIED, NEAR = 1e-7, 1e-3
 def stored_in(row, time, slider, law, contact):
     """Return the elastic and kinetic energy of spring, body, contact and bonds."""
     _, area, _, _ = mechanics.area_or_last(row.bound, row.moment, time, row, contact)
-    stiffness, viscosity = slider.stiffness, slider.viscosity
-    energy = 0.5 * slider.mass * row.body_speed * row.body_speed
-    energy += 0.5 * row.sheared * area * (row.moment + viscosity * row.speed)
+    stiffness = slider.stiffness
+    energy = 0.5 * slider.mass * row.body_speed * row.body_speed + mechanics.contact_energy(row, area, slider)
     if stiffness > 0.0:
         energy += 0.5 * row.spring_force * row.spring_force / stiffness
     if row.bound > 0.0 and law.sense == 0.0:
@@ -119,7 +118,8 @@ _FEW_TURNS = 20
 def _piece(row, slider, law, contact, nodes, energy):
     """Go through one piece of a clock step. Return the time at which it ends or the slider loses stability.
 
-    A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
+    A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step: then the last
+    number returned is 1, else 0.
     """
     start, length = 0.0, slider.length
     yields, _ = mechanics.compliance(row.radius, slider)
@@ -130,7 +130,7 @@ def _piece(row, slider, law, contact, nodes, energy):
         if not step > mechanics.LEAST * length:
             gone = break_all(row, start, _BRIEF * length, slider, law, contact, energy)
             if contact.stays > 0.0 and not gone:
-                return start
+                return start, contact.stays
             contact, nodes.last_step = (contact, 0.0) if gone else (mechanics.later(contact, 0.0, 1.0), nodes.last_step)
             row.next_step = 0.0
             continue
@@ -145,9 +145,9 @@ def _piece(row, slider, law, contact, nodes, energy):
         if brittle and slip_event(row, start + step, 0.0, slider, law, contact, energy):
             row.next_step, nodes.last_step = 1e-6 * length, 0.0
         if step == left:
-            return length
+            return length, contact.stays
         start += step
-    return start
+    return start, contact.stays
 
 
 @device
@@ -301,9 +301,9 @@ def _sticking_piece(row, slider, law, contact, nodes, energy):
 @device
 def _clock_step(row, slider, law, contact, pieces, nodes, energy):
     """Go through a clock step; return the time reached, and False if stability is lost."""
-    is_open, time, worked, going = row.radius == 0.0, 0.0, energy.work, True
+    is_open, time, going, stays = row.radius == 0.0, 0.0, True, contact.stays
     for p in range(len(pieces)):
-        slider = mechanics.slider_in(slider, pieces[p])
+        slider, ahead, reached = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, stays), 0.0
         nodes.last_step = 0.0
         if is_open and law.sense != 0.0 and slider.mass + slider.damping + slider.forced == 0.0:
             # as nothing else holds an open contact, it goes along with the stage
@@ -313,21 +313,24 @@ def _clock_step(row, slider, law, contact, pieces, nodes, energy):
             row.spring_force = 0.0
             if law.slows != 0.0:
                 row.bound = 1.0 / (1.0 + law.slows * math.fabs(row.speed))
-        if p == 0:
+        jumps = mechanics.force_jumps(row, slider)
+        if p == 0 or jumps:
+            unslipped = stored_in(row, 0.0, slider, law, ahead) if jumps else energy.stored
+            before, worked = energy.stored if p == 0 else unslipped, energy.work
             if law.sense == 0.0:
-                going = mechanics.elastic(row, 0.0, slider, contact, energy)
+                going = mechanics.elastic(row, 0.0, slider, ahead, energy)
             elif slider.forced > 0.0:
                 row.spring_force = mechanics.driven(0.0, slider)[1]
-            energy.area += energy.work - worked - stored_in(row, 0.0, slider, law, contact) + energy.stored
-        ahead, reached = mechanics.later(contact, time, contact.stays), 0.0
+            lost = energy.work - worked - stored_in(row, 0.0, slider, law, ahead) + before
+            mechanics.book_slip(lost, before - unslipped, jumps, energy)
         if going and law.sense == 0.0:
-            reached = _piece(row, slider, law, ahead, nodes, energy)
+            reached, stays = _piece(row, slider, law, ahead, nodes, energy)
         elif going:
             reached = _sticking_piece(row, slider, law, ahead, nodes, energy)
         time += reached
         if not (going and reached == slider.length):
             return time, False
-    energy.stored = stored_in(row, time, slider, law, contact)
+    energy.stored = stored_in(row, time, slider, law, mechanics.later(contact, 0.0, stays))
     return time, True
 
 

@@ -285,16 +285,56 @@ def area_or_last(bound, moment, time, row, contact):
 
 
 @device
+def contact_energy(row, area, slider):
+    """Return the elastic energy of a contact of some area.
+
+    With a viscosity it follows from the shear displacement, which a jump of the area leaves as it is; the speed jumps.
+    """
+    yields, _ = compliance(row.radius, slider)
+    if slider.viscosity > 0.0:
+        return 0.5 * row.sheared * row.sheared / yields if yields > 0.0 else 0.0
+    return 0.5 * row.sheared * area * row.moment
+
+
+#: Change of a force over it below which it is rounding.
+_JUMPS = 1e-9
+
+
+@device
+def force_jumps(row, slider):
+    """True if the prescribed force is another at the start of a piece than at the end of that before."""
+    force = driven(0.0, slider)[1]
+    return slider.forced > 0.0 and math.fabs(force - row.spring_force) > _JUMPS * math.fabs(force)
+
+
+@device
+def book_slip(lost, by_area, jumps, energy):
+    """Book energy ``lost`` at the start of a piece: to the area, if the force ``jumps`` no more than ``by_area``."""
+    energy.area += by_area if jumps else lost
+    energy.snaps += lost - by_area if jumps else 0.0
+
+
+@device
 def elastic(row, time, slider, contact, energy):
     """Slip at once where the area or the force has jumped and neither mass, damping nor viscosity delays it.
 
-    Behind a contact that yields the interface alone slips if the body cannot. What the elastic energies do not give
-    back to the drive is booked to the area that has changed.
+    Behind a contact that yields the interface alone slips if the body cannot, and the body alone if viscosity holds the
+    interface.
     """
     stiffness, forced, held_back = slider.stiffness, slider.forced, slider.mass + slider.damping > 0.0
     yields, _ = compliance(row.radius, slider)
     row.spring_force = driven(time, slider)[1] if forced > 0.0 else row.spring_force
-    if (slider.viscosity > 0.0 and row.radius > 0.0) or (held_back and yields == 0.0):
+    if slider.viscosity > 0.0 and row.radius > 0.0:
+        if not held_back and (forced > 0.0 or slider.yielding_radius > 0.0):
+            row.radius, _, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
+            yields, _ = compliance(row.radius, slider)
+            shift = (row.spring_force * yields - row.sheared) / (1.0 + stiffness * yields)
+            row.sheared += shift
+            row.position += shift
+            energy.work += row.spring_force * shift if forced > 0.0 else 0.0
+            row.spring_force -= stiffness * shift
+        return True
+    if held_back and yields == 0.0:
         return True
     slip, bound, moment, shift, radius, area = 0.0, row.bound, row.moment, 0.0, row.radius, 0.0
     for _ in range(40):

@@ -152,14 +152,15 @@ def _after_event(line, time, tracks, slider, contact, ground, energy, nodes):
 def _piece(line, tracks, slider, contact, ground, nodes, energy):
     """Go through one piece of a clock step; return the time of its end or of lost stability.
 
-    A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
+    A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step: then the last
+    number returned is 1, else 0.
     """
     start, length, unit, law = 0.0, slider.length, ground.unit, ground.law
     row, first, last = line[0], nodes[0], nodes[2]
     for _ in range(mechanics.MOST_STEPS):
         left = length - start
         if left <= mechanics.LEAST * length:
-            return length
+            return length, contact.stays
         _sums(tracks, ground, first)
         row.bound, row.moment = first.bound, first.moment
         at_start = begin_sub_step(row, first, start, slider, contact)
@@ -185,7 +186,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
             break
         if not step > mechanics.LEAST * length:
             if contact.stays > 0.0:
-                return start
+                return start, contact.stays
             contact = mechanics.later(contact, 0.0, 1.0)
             row.next_step = 0.0
             continue
@@ -199,34 +200,37 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
         if cut or not _same(first, last.bound, last.moment):
             is_balanced, contact = _after_event(line, start, tracks, slider, contact, ground, energy, nodes)
             if not is_balanced:
-                return start
+                return start, contact.stays
         if start == length:
-            return length
-    return start
+            return length, contact.stays
+    return start, contact.stays
 
 
 @device
 def _through(line, energy, pieces, slider, contact, tracks, ground, nodes):
     """Take a row and its bonds through a clock step; return the time reached, and False if stability is lost."""
-    row, time, first = line[0], 0.0, nodes[0]
+    row, time, first, stays = line[0], 0.0, nodes[0], contact.stays
     for p in range(len(pieces)):
-        slider, from_here = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, contact.stays)
+        slider, from_here = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, stays)
         worked, before, lost = energy.work, energy.stored, energy.rupture
         _sums(tracks, ground, first)
         row.bound, row.moment = first.bound, first.moment
         if p > 0:
             before = stored_energy(row, first.square, 0.0, slider, from_here)
+        jumps = mechanics.force_jumps(row, slider)
+        unslipped = stored_energy(row, first.square, 0.0, slider, from_here) if jumps else before
         if not _rebalance(line, 0.0, tracks, slider, from_here, ground, energy, first):
             return time, False
         after = stored_energy(row, first.square, 0.0, slider, from_here)
-        energy.area += energy.work - worked - after + before - (energy.rupture - lost)
-        reached = _piece(line, tracks, slider, from_here, ground, nodes, energy)
+        slipped = energy.work - worked - after + before - (energy.rupture - lost)
+        mechanics.book_slip(slipped, before - unslipped, jumps, energy)
+        reached, stays = _piece(line, tracks, slider, from_here, ground, nodes, energy)
         time += reached
         if reached != slider.length:
             return time, False
     _sums(tracks, ground, first)
     row.bound, row.moment = first.bound, first.moment
-    energy.stored = stored_energy(row, first.square, time, slider, contact)
+    energy.stored = stored_energy(row, first.square, time, slider, mechanics.later(contact, 0.0, stays))
     return time, True
 
 

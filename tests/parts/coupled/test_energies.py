@@ -8,15 +8,20 @@ import numpy as np
 import pytest
 from helpers.driven import (
     AREA,
+    DENSITY,
     ENERGY,
+    KAPPA,
     LOAD,
     MODULUS,
+    STIFF,
     UNIT,
     WORK,
+    Force,
     R,
     jkr,
     march,
     marched,
+    reached,
     residual,
     scenario,
     spring,
@@ -26,6 +31,7 @@ from scipy.integrate import solve_ivp
 
 from sim.parts.bonds import Cohort, FirstMoment, Tracked
 from sim.parts.bonds.rupture import Constant
+from sim.parts.contact import RateDependent
 from sim.parts.coupled import mechanics
 from sim.parts.drive import READINGS
 from sim.parts.shear import Mean
@@ -99,3 +105,41 @@ def test_members_whose_adhesion_goes_and_returns_again_and_again_have_energies_a
     readings = np.array([scene.parts.drive.readings(state.drive) for state in states])
     for member in range(60):
         assert residual(dict(zip(READINGS, readings[:, member].T, strict=True))) < 1e-5
+
+
+@pytest.mark.parametrize("make", [FirstMoment, COHORTS, SITES, CARRIED])
+@pytest.mark.parametrize("contact", [2.0, "half_space"])
+def test_energy_that_a_renewed_area_takes_along_is_that_stored_in_it_with_any_viscosity(make, contact):
+    for viscosity in (1e-4, 1.0):
+        scene = scenario(1.0, 20, spring(0.5, contact=contact, viscosity=viscosity, tolerance=1e-8), make=make)
+        load = {"from": LOAD, "to": 4.0 * LOAD}
+        if make is CARRIED:
+            scene = replace(scene, contact=replace(scene.contact, load=load))
+        else:
+            scene = replace(scene, contact=RateDependent(load=load, front_speed=1e-4))
+        states, read = marched(scene)
+        assert residual(read) < 1e-5
+        if make is FirstMoment and contact == 2.0:
+            bound, stretch = reached(states, "bound", "stretch")[:-1].T
+            areas = np.array([math.pi * state.contact.radius[0] ** 2 / AREA for state in states[:-1]])
+            gained = np.diff(areas, prepend=areas[0]) * 0.5 * stretch**2 / bound
+            assert np.max(areas) > 1.1
+            assert_allclose(read["dissipated_by_area"][1:] / ENERGY, -np.cumsum(gained), rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("make", [FirstMoment, COHORTS, SITES])
+def test_the_loss_of_a_force_that_jumps_is_half_its_change_times_the_slip_at_once(make):
+    # at the start, within a clock step and between two; half of the sites stay bound: 1/k_t = 2, with bonds 4
+    changes = np.array([0.1, 0.05, -0.2])
+    times, values = (0.0, 0.26, 0.26, 0.5, 0.5, 9.0), np.repeat(np.cumsum(changes), 2) * UNIT
+    delays = ("mass", 0.0, 4.0), ("viscosity", 1e-2 * DENSITY * KAPPA, 2.0), ("damping", 1e-2 * STIFF, 0.0)
+    for name, delay, gives in delays:
+        keys = {"contact_stiffness": 0.5 * STIFF, "tolerance": 1e-8, name: delay}
+        drive = Force(force={"time": times, "value": tuple(values)}, **keys)
+        _, read = marched(scenario(1.0, 10, drive, rupture=Constant(rate=1.0), make=make))
+        assert residual(read) < 1e-5
+        assert np.isnan(read["runaway_time"]).all()
+        assert np.max(np.abs(read["dissipated_by_area"])) < 1e-12 * read["drive_work"][-1]
+        if make is not SITES or name == "viscosity":
+            lost, snaps = np.cumsum(0.5 * gives * changes**2), read["dissipated_by_snaps"][[1, 3, 6]]
+            assert_allclose(snaps / ENERGY, lost, rtol=1e-5, atol=1e-12)  # of the cohorts bound
