@@ -296,6 +296,26 @@ def contact_energy(row, area, slider):
     return 0.5 * row.sheared * area * row.moment
 
 
+@device
+def retained(energy):
+    """Return the work of a clock step less all that is dissipated."""
+    return energy.work - energy.damping - energy.viscosity - energy.rupture - energy.snaps - energy.area
+
+
+#: Share of a clock step below which a sub-step is not cut for its energies.
+_BRIEF = 1e-9
+
+
+@device
+def misses(before, after, retained_before, energy, tolerance, share):
+    """True if a sub-step of a ``share`` of its piece misses more energy than the tolerance of what is stored.
+
+    A stored energy below the tolerance is as good as none: all sites at the unit of stretch store 1/2.
+    """
+    missing = retained(energy) - retained_before - (after - before)
+    return share > _BRIEF and math.fabs(missing) > tolerance * max(before, after, math.fabs(energy.work), tolerance)
+
+
 #: Change of a force over it below which it is rounding.
 _JUMPS = 1e-9
 
@@ -325,10 +345,10 @@ def elastic(row, time, slider, contact, energy):
     yields, _ = compliance(row.radius, slider)
     row.spring_force = driven(time, slider)[1] if forced > 0.0 else row.spring_force
     if slider.viscosity > 0.0 and row.radius > 0.0:
-        if not held_back and (forced > 0.0 or slider.yielding_radius > 0.0):
+        if forced > 0.0 or slider.yielding_radius > 0.0:
             row.radius, _, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
             yields, _ = compliance(row.radius, slider)
-            shift = (row.spring_force * yields - row.sheared) / (1.0 + stiffness * yields)
+            shift = 0.0 if held_back else (row.spring_force * yields - row.sheared) / (1.0 + stiffness * yields)
             row.sheared += shift
             row.position += shift
             energy.work += row.spring_force * shift if forced > 0.0 else 0.0

@@ -18,6 +18,7 @@ from helpers.driven import (
     WORK,
     Force,
     R,
+    Scenario,
     jkr,
     march,
     marched,
@@ -31,10 +32,12 @@ from scipy.integrate import solve_ivp
 
 from sim.parts.bonds import Cohort, FirstMoment, Tracked
 from sim.parts.bonds.rupture import Constant
-from sim.parts.contact import RateDependent
+from sim.parts.contact import Equilibrium, RateDependent
+from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.coupled import mechanics
-from sim.parts.drive import READINGS
+from sim.parts.drive import READINGS, Spring
 from sim.parts.shear import Mean
+from sim.scenario.clock import Clock
 from sim.spectrum.families import Gaussian
 
 COHORTS = functools.partial(Cohort, tolerance=1e-5)
@@ -143,3 +146,23 @@ def test_the_loss_of_a_force_that_jumps_is_half_its_change_times_the_slip_at_onc
         if make is not SITES or name == "viscosity":
             lost, snaps = np.cumsum(0.5 * gives * changes**2), read["dissipated_by_snaps"][[1, 3, 6]]
             assert_allclose(snaps / ENERGY, lost, rtol=1e-5, atol=1e-12)  # of the cohorts bound
+
+
+def test_a_contact_that_viscosity_lets_collapse_keeps_its_energies_to_ten_tolerances():
+    # of a slider that snaps to the area of Hertz; the friction after it by equations solved apart
+    courses = []
+    for viscosity in (100.0, 1e4):
+        scene = Scenario(
+            clock=Clock(duration=0.1, step=1e-3), solid=Solid(shear_modulus=0.233e6), sphere=Sphere(radius=0.309e-3),
+            adhesion=Adhesion(work=32.6e-3, bond_share=0.0), contact=Equilibrium(load=33e-6, reversible=0.0039),
+            drive=Spring(stage=1.9e-3, stiffness=96.0, mass=1.07e-3, contact_stiffness=7.5, viscosity=viscosity),
+            bonds=FirstMoment(
+                rupture=Constant(rate=24.0), bond_stiffness=0.6e-6, rebinding_rate=84.0, site_density=3.8e16
+            ),
+        )  # fmt: skip
+        states, read = marched(scene)
+        assert residual(read) < 10.0 * scene.drive.tolerance
+        friction = [state.bonding.stress[0] * math.pi * state.contact.radius[0] ** 2 for state in states]
+        assert_allclose(np.array(friction)[[89, 100]], [0.78909e-3, 0.8941e-3], rtol=2e-4)
+        courses.append(read["dissipated_by_area"][-1])
+    assert_allclose(*courses, rtol=1e-3)
