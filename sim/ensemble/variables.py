@@ -199,8 +199,8 @@ VARIABLES += (
     _driven("dissipated_by_damping", "J", "energy dissipated by the damping of the body", "W_c"),
     _driven("dissipated_by_viscosity", "J", "energy dissipated by the viscosity of the interface", "W_v"),
     _driven("dissipated_by_rupture", "J", "energy that bonds lose as they break and are made", "W_b"),
-    _driven("dissipated_by_snaps", "J", "energy that avalanches take beside that of their bonds, where nothing delays"
-            " them", "W_s"),
+    _driven("dissipated_by_snaps", "J", "energy that slips without duration take beside that of their bonds:"
+            " avalanches, and where the force jumps", "W_s"),
     _driven("dissipated_by_area", "J", "energy stored in what the area loses less that in what it gains", "W_A"),
     _driven("energy_residual", "J", "work of the drive less the rise of the energy stored and all that is dissipated",
             "W_0"),

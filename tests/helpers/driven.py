@@ -72,8 +72,12 @@ def marched(scene):
 
 
 def residual(read):
-    """Largest energy that is missing, over all the work of the drive."""
-    return np.max(np.abs(read["energy_residual"])) / read["drive_work"][-1]
+    """Largest energy that is missing, over the larger of work and stored energy; no term may exceed ten times that."""
+    work, stored = np.abs(read["drive_work"]), read["stored_energy"]
+    scale = max(np.max(work), np.max(stored))
+    terms = [np.abs(values) for name, values in read.items() if name.startswith("dissipated_by")]
+    assert np.max(terms) <= 10.0 * scale
+    return np.max(np.abs(read["energy_residual"])) / scale
 
 
 def reached(states, *names):

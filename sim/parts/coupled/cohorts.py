@@ -290,10 +290,10 @@ def bend_of(nodes, step, row, slider):
 @device
 def stored_energy(row, square, time, slider, contact):
     """Return the elastic and kinetic energy of spring, body, contact and bonds."""
-    stiffness, mass, viscosity = slider.stiffness, slider.mass, slider.viscosity
+    stiffness, mass = slider.stiffness, slider.mass
     _, area, _, _ = mechanics.area_or_last(row.bound, row.moment, time, row, contact)
     energy = 0.5 * mass * row.body_speed * row.body_speed + 0.5 * area * square
-    energy += 0.5 * row.sheared * area * (row.moment + viscosity * row.speed)
+    energy += mechanics.contact_energy(row, area, slider)
     return energy + 0.5 * row.spring_force * row.spring_force / stiffness if stiffness > 0.0 else energy
 
 
@@ -426,7 +426,8 @@ def _break_all(row, pool, time, brief, slider, contact, unit, rules, node, energ
 def _piece(row, bonds, slider, contact, unit, rules, room, energy):
     """Go through one piece of a clock step; return the time of its end or of lost stability, and the bonds.
 
-    A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
+    A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step: then the last
+    number returned is 1, else 0.
     """
     pool, saved, nodes = room
     count, travelled, settled = bonds
@@ -437,7 +438,7 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
         left = length - start
         step = mechanics.next_step(row, left, length, longest(row, unit, rules))
         if left <= mechanics.LEAST * length:
-            return length, count, travelled, settled
+            return length, count, travelled, settled, contact.stays
         if not step > mechanics.LEAST * length:
             slid, row.next_step = row.slip, 0.0
             if _break_all(row, pool, start, _BRIEF * length, slider, contact, unit, rules, nodes[0], energy):
@@ -450,7 +451,7 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
                 sums_at(pool, count, unit, rules, nodes[0])
                 row.acceleration = 0.0
             elif contact.stays > 0.0:
-                return start, count, travelled, settled
+                return start, count, travelled, settled, contact.stays
             else:
                 contact = mechanics.later(contact, 0.0, 1.0)
             continue
@@ -494,9 +495,9 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
             first.bound, first.moment, first.square, first.lost = last.bound, last.moment, last.square, last.lost
         row.next_step = max(row.next_step, step * grows) if step == left else step * grows
         if step == left:
-            return length, count, travelled, settled
+            return length, count, travelled, settled, contact.stays
         start += step
-    return start, count, travelled, settled
+    return start, count, travelled, settled, contact.stays
 
 
 @device
@@ -504,14 +505,16 @@ def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, ro
     """Take a row and its cohorts through a clock step; return the time reached, and False if stability is lost."""
     (weight, stretch, width, lattice), (pool, _, nodes) = bonds, room
     count = read_row(pool, weight, stretch, width, share)
-    time, going, travelled, settled = 0.0, True, lattice[0], lattice[1]
+    time, going, travelled, settled, stays = 0.0, True, lattice[0], lattice[1], contact.stays
     for p in range(len(pieces)):
-        slider, from_here = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, contact.stays)
+        slider, from_here = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, stays)
         reached, worked, slid, before = 0.0, energy.work, row.slip, energy.stored
         sums_at(pool, count, unit, rules, nodes[0])
         if p > 0:
             before = stored_energy(row, nodes[0].square, 0.0, slider, from_here)
         row.bound, row.moment = nodes[0].bound, nodes[0].moment
+        jumps = mechanics.force_jumps(row, slider)
+        unslipped = stored_energy(row, nodes[0].square, 0.0, slider, from_here) if jumps else before
         going = mechanics.elastic(row, 0.0, slider, from_here, energy)
         if going:
             for i in range(count):
@@ -519,8 +522,8 @@ def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, ro
             travelled += unit * (row.slip - slid)
             sums_at(pool, count, unit, rules, nodes[0])
             left = stored_energy(row, nodes[0].square, 0.0, slider, from_here)
-            energy.area += energy.work - worked - left + before
-            reached, count, travelled, settled = _piece(
+            mechanics.book_slip(energy.work - worked - left + before, before - unslipped, jumps, energy)
+            reached, count, travelled, settled, stays = _piece(
                 row, (count, travelled, settled), slider, from_here, unit, rules, room, energy
             )
         time += reached
@@ -529,7 +532,7 @@ def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, ro
             break
     if going:
         sums_at(pool, count, unit, rules, nodes[0])
-        energy.stored = stored_energy(row, nodes[0].square, time, slider, contact)
+        energy.stored = stored_energy(row, nodes[0].square, time, slider, mechanics.later(contact, 0.0, stays))
     if count > weight.size:
         count = settle(pool[0], pool[1], pool[2], count, 1.0 if row.slip >= 0.0 else -1.0, travelled, rules)
         settled = count

@@ -160,6 +160,8 @@ def advance(
     rows = np.zeros(members, ROW)
     for name in _SHARED:
         rows[name] = getattr(slider, name)
+    if steps.start == 1 and not drive.spring:  # a force acts at once
+        rows["spring_force"] = 0.0
     rows["radius"] = contact.radius
     if not contact.stays:  # an equilibrium contact goes on with the radius of the sub-steps
         rows["radius"] = np.where(_agree(slider.radius, contact.radius), slider.radius, contact.radius)

@@ -17,14 +17,7 @@ _TRIED, NEAR = 1e-7, 1e-3
 def stored_in(row, time, slider, law, contact):
     """Return the elastic and kinetic energy of spring, body, contact and bonds."""
     _, area, _, _ = mechanics.area_or_last(row.bound, row.moment, time, row, contact)
-    stiffness, viscosity = slider.stiffness, slider.viscosity
-    energy = 0.5 * slider.mass * row.body_speed * row.body_speed
-    energy += 0.5 * row.sheared * area * (row.moment + viscosity * row.speed)
-    if stiffness > 0.0:
-        energy += 0.5 * row.spring_force * row.spring_force / stiffness
-    if row.bound > 0.0 and law.sense == 0.0:
-        energy += 0.5 * area * row.moment * row.moment / row.bound
-    return energy
+    return radau.stored_with(row, area, slider, law)
 
 
 @device
@@ -154,12 +147,13 @@ def _to_zero(row, start, step, none, slider, law, contact, nodes):
 
 
 @device
-def _piece(row, slider, law, contact, nodes, energy):
+def _piece(line, slider, law, contact, nodes, books):
     """Go through one piece of a clock step. Return the time at which it ends or the slider loses stability.
 
-    A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
+    A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step: then the last
+    number returned is 1, else 0.
     """
-    start, length = 0.0, slider.length
+    start, length, row, energy = 0.0, slider.length, line[0], books[0]
     yields, _ = mechanics.compliance(row.radius, slider)
     brittle = law.cuts > 0.0 and slider.viscosity == 0.0 and (slider.mass + slider.damping == 0.0 or yields > 0.0)
     for _ in range(mechanics.MOST_STEPS):
@@ -170,7 +164,7 @@ def _piece(row, slider, law, contact, nodes, energy):
             if law.cuts == 0.0 and not gone:
                 gone = mechanics.snap(row, row.moment * row.moment / row.bound, start, slider, contact, energy)
             if contact.stays > 0.0 and not gone:
-                return start
+                return start, contact.stays
             contact, nodes.last_step = (contact, 0.0) if gone else (mechanics.later(contact, 0.0, 1.0), nodes.last_step)
             row.next_step = 0.0
             continue
@@ -180,7 +174,7 @@ def _piece(row, slider, law, contact, nodes, energy):
             if brittle and step < _BRIEF * length and slip_event(row, start, NEAR, slider, law, contact, energy):
                 row.next_step, nodes.last_step = 1e-6 * length, 0.0
             continue
-        row.next_step = max(row.next_step, step * grows) if step == left else step * grows
+        ahead = max(row.next_step, step * grows) if step == left else step * grows
         none = _NONE * slider.tolerance * row.bound
         turns = law.softness > 0.0 and math.fabs(row.moment) > none and _at_end(row, nodes, step, law) < 0.0
         if turns:  # there the rupture rate has a kink, which no sub-step leads across
@@ -188,15 +182,21 @@ def _piece(row, slider, law, contact, nodes, energy):
             if not solved:
                 row.next_step = 0.5 * step
                 continue
-        accept(row, start, step, slider, law, contact, nodes, energy)
+        line[1], books[1], held = row, energy, mechanics.retained(energy)
+        before, after = accept(row, start, step, slider, law, contact, nodes, energy)
+        if mechanics.misses(before, after, held, energy, slider.tolerance, step / length):
+            line[0], books[0], nodes.last_step = line[1], books[1], 0.0
+            row.next_step = 0.25 * step
+            continue
+        row.next_step = ahead
         if turns:
             row.moment, nodes.last_step = 0.0, 0.0
         if brittle and slip_event(row, start + step, 0.0, slider, law, contact, energy):
             row.next_step, nodes.last_step = 1e-6 * length, 0.0
         if step == left:
-            return length
+            return length, contact.stays
         start += step
-    return start
+    return start, contact.stays
 
 
 @device
@@ -332,11 +332,12 @@ def _sticking_piece(row, slider, law, contact, nodes, energy):
 
 
 @device
-def _clock_step(row, slider, law, contact, pieces, nodes, energy):
+def _clock_step(line, slider, law, contact, pieces, nodes, books):
     """Go through a clock step; return the time reached, and False if stability is lost."""
-    is_open, time, worked, going = row.radius == 0.0, 0.0, energy.work, True
+    row, energy = line[0], books[0]
+    is_open, time, going, stays = row.radius == 0.0, 0.0, True, contact.stays
     for p in range(len(pieces)):
-        slider = mechanics.slider_in(slider, pieces[p])
+        slider, ahead, reached = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, stays), 0.0
         nodes.last_step = 0.0
         if is_open and law.sense != 0.0 and slider.mass + slider.damping + slider.forced == 0.0:
             # as nothing else holds an open contact, it goes along with the stage
@@ -346,21 +347,24 @@ def _clock_step(row, slider, law, contact, pieces, nodes, energy):
             row.spring_force = 0.0
             if law.slows != 0.0:
                 row.bound = 1.0 / (1.0 + law.slows * math.fabs(row.speed))
-        if p == 0:
+        jumps = mechanics.force_jumps(row, slider)
+        if p == 0 or jumps:
+            unslipped = stored_in(row, 0.0, slider, law, ahead) if jumps else energy.stored
+            before, worked = energy.stored if p == 0 else unslipped, energy.work
             if law.sense == 0.0:
-                going = mechanics.elastic(row, 0.0, slider, contact, energy)
+                going = mechanics.elastic(row, 0.0, slider, ahead, energy)
             elif slider.forced > 0.0:
                 row.spring_force = mechanics.driven(0.0, slider)[1]
-            energy.area += energy.work - worked - stored_in(row, 0.0, slider, law, contact) + energy.stored
-        ahead, reached = mechanics.later(contact, time, contact.stays), 0.0
+            lost = energy.work - worked - stored_in(row, 0.0, slider, law, ahead) + before
+            mechanics.book_slip(lost, before - unslipped, jumps, energy)
         if going and law.sense == 0.0:
-            reached = _piece(row, slider, law, ahead, nodes, energy)
+            reached, stays = _piece(line, slider, law, ahead, nodes, books)
         elif going:
             reached = _sticking_piece(row, slider, law, ahead, nodes, energy)
         time += reached
         if not (going and reached == slider.length):
             return time, False
-    energy.stored = stored_in(row, time, slider, law, contact)
+    energy.stored = stored_in(row, time, slider, law, mechanics.later(contact, 0.0, stays))
     return time, True
 
 
@@ -375,8 +379,9 @@ def advance_rows(inputs, numbers, outputs):
     rows, energies, bare, pieces, clock, units, work = inputs
     slider, law, contact = mechanics.Slider(*numbers[0]), mechanics.Law(*numbers[1]), mechanics.Contact(*numbers[2])
     reached, spent = outputs
-    columns, booked, nodes = np.empty(mechanics.COLUMNS), np.empty(mechanics.ENERGIES), np.empty(1, radau.NODE_VALUES)
-    row, energy = columns.view(mechanics.ROW)[0], booked.view(ENERGY)[0]
+    both, nodes = (np.empty(2 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES)), np.empty(1, radau.NODE_VALUES)
+    line, books = both[0].view(mechanics.ROW), both[1].view(ENERGY)  # as they are, and before the last sub-step
+    columns, booked, row = both[0][: mechanics.COLUMNS], both[1][: mechanics.ENERGIES], line[0]
     for m in range(len(rows)):
         stop = 0
         for k in range(len(clock)):
@@ -386,7 +391,7 @@ def advance_rows(inputs, numbers, outputs):
                 row.moment = math.copysign(row.bound, row.speed) if row.speed != 0.0 else 0.0
             if math.isnan(row.runaway_time):
                 now = mechanics.contact_at(contact, bare[m], clock[k], row)
-                time, going = _clock_step(row, slider, law, now, pieces[start:stop], nodes[0], energy)
+                time, going = _clock_step(line, slider, law, now, pieces[start:stop], nodes[0], books)
                 if not going:
                     mechanics.run_away(row, booked, clock[k, 0] + time)
             mechanics.from_units(columns, booked, rows[m], energies[m], units, work)

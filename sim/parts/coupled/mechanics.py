@@ -141,7 +141,7 @@ def contact_area(bound, moment, time, radius, contact):
             over = 0.5 / math.pi * modulus * missing * missing / a - work + tilt * a
             slope = 0.5 / math.pi * modulus * missing / a * (2.0 * growth - missing / a) + tilt
             left = work - tilt * a
-            if missing < 0.0 or over < -0.75 * left:  # next to Hertz's radius the slope vanishes: by the root of both
+            if missing < 0.0 or over < -0.75 * left:  # next to Hertz's radius, where the slope vanishes: by the depths
                 over, slope = missing - math.sqrt(2.0 * math.pi * a * max(left, 0.0) / modulus), growth
         else:
             over, slope = missing, growth
@@ -351,16 +351,76 @@ def snap(row, square, time, slider, contact, energy):
 
 
 @device
+def contact_energy(row, area, slider):
+    """Return the elastic energy of a contact of some area.
+
+    With a viscosity it follows from the shear displacement, which a jump of the area leaves as it is; the speed jumps.
+    """
+    yields, _ = compliance(row.radius, slider)
+    if slider.viscosity > 0.0:
+        return 0.5 * row.sheared * row.sheared / yields if yields > 0.0 else 0.0
+    return 0.5 * row.sheared * area * row.moment
+
+
+@device
+def retained(energy):
+    """Return the work of a clock step less all that is dissipated."""
+    return energy.work - energy.damping - energy.viscosity - energy.rupture - energy.snaps - energy.area
+
+
+#: Share of a clock step below which a sub-step is not cut for its energies.
+_BRIEF = 1e-9
+
+
+@device
+def misses(before, after, retained_before, energy, tolerance, share):
+    """True if a sub-step of a ``share`` of its piece misses more energy than the tolerance of what is stored.
+
+    A stored energy below the tolerance is as good as none: all sites at the unit of stretch store 1/2.
+    """
+    missing = retained(energy) - retained_before - (after - before)
+    return share > _BRIEF and math.fabs(missing) > tolerance * max(before, after, math.fabs(energy.work), tolerance)
+
+
+#: Change of a force over it below which it is rounding.
+_JUMPS = 1e-9
+
+
+@device
+def force_jumps(row, slider):
+    """True if the prescribed force is another at the start of a piece than at the end of that before."""
+    force = driven(0.0, slider)[1]
+    return slider.forced > 0.0 and math.fabs(force - row.spring_force) > _JUMPS * math.fabs(force)
+
+
+@device
+def book_slip(lost, by_area, jumps, energy):
+    """Book energy ``lost`` at the start of a piece: to the area, if the force ``jumps`` no more than ``by_area``."""
+    energy.area += by_area if jumps else lost
+    energy.snaps += lost - by_area if jumps else 0.0
+
+
+@device
 def elastic(row, time, slider, contact, energy):
     """Slip at once where the area or the force has jumped and neither mass, damping nor viscosity delays it.
 
-    Behind a contact that yields the interface alone slips if the body cannot. What the elastic energies do not give
-    back to the drive is booked to the area that has changed.
+    Behind a contact that yields the interface alone slips if the body cannot, and the body alone if viscosity holds the
+    interface.
     """
     stiffness, forced, held_back = slider.stiffness, slider.forced, slider.mass + slider.damping > 0.0
     yields, _ = compliance(row.radius, slider)
     row.spring_force = driven(time, slider)[1] if forced > 0.0 else row.spring_force
-    if (slider.viscosity > 0.0 and row.radius > 0.0) or (held_back and yields == 0.0):
+    if slider.viscosity > 0.0 and row.radius > 0.0:
+        if forced > 0.0 or slider.yielding_radius > 0.0:
+            row.radius, _, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
+            yields, _ = compliance(row.radius, slider)
+            shift = 0.0 if held_back else (row.spring_force * yields - row.sheared) / (1.0 + stiffness * yields)
+            row.sheared += shift
+            row.position += shift
+            energy.work += row.spring_force * shift if forced > 0.0 else 0.0
+            row.spring_force -= stiffness * shift
+        return True
+    if held_back and yields == 0.0:
         return True
     slip, bound, moment, shift, radius, area = 0.0, row.bound, row.moment, 0.0, row.radius, 0.0
     for _ in range(40):

@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device, inlined
-from sim.parts.coupled.mechanics import FEW, SOME, compliance, contact_area, driven, pull_on
+from sim.parts.coupled.mechanics import FEW, SOME, compliance, contact_area, contact_energy, driven, pull_on
 
 _S6 = math.sqrt(6.0)
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
@@ -389,9 +389,23 @@ def try_sub_step(row, start, step, slider, law, contact, nodes):
     return min(6.0, max(0.1, grows)), True
 
 
+@device
+def stored_with(row, area, slider, law):
+    """Return the elastic and kinetic energy of spring, body, contact of some area and bonds."""
+    energy = 0.5 * slider.mass * row.body_speed * row.body_speed + contact_energy(row, area, slider)
+    if slider.stiffness > 0.0:
+        energy += 0.5 * row.spring_force * row.spring_force / slider.stiffness
+    if row.bound > 0.0 and law.sense == 0.0:
+        energy += 0.5 * area * row.moment * row.moment / row.bound
+    return energy
+
+
 @inlined
 def accept(row, start, step, slider, law, contact, nodes, energy):
-    """Add an accepted sub-step to the row: integrals of the powers by the method, state at its end."""
+    """Add a sub-step to the row: integrals of the powers by the method, state at its end.
+
+    Return the energy stored before and after it.
+    """
     damping, viscosity = slider.damping, slider.viscosity
     shift, speed, body = 0.0, 0.0, 0.0
     follows = contact.stays == 0.0
@@ -408,6 +422,7 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
             nodes.radii[i], nodes.areas[i], _, _ = contact_area(bound, moment, time, nodes.radii[i], contact)
             yields, _ = compliance(nodes.radii[i], slider)
             nodes.firms[i] = 1.0 / yields if yields > 0.0 else 0.0
+    before = stored_with(row, first, slider, law)
     for i in range(3):
         bound, moment, area = row.bound + nodes.bound[i], row.moment + nodes.moment[i], nodes.areas[i]
         speed, body, spreads, firms = 0.0, 0.0, 0.0, 0.0
@@ -452,3 +467,4 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
         for i in range(3):
             nodes.past[k, i] = nodes.values[k, i]
     nodes.last_step = step
+    return before, stored_with(row, nodes.areas[2], slider, law)

@@ -132,9 +132,13 @@ def _after_event(line, time, tracks, slider, contact, ground, energy, nodes):
     """Balance the forces after a bond has formed or broken; return True if possible, and the contact then."""
     row, node, area_before = line[0], nodes[0], nodes[2].area
     row.acceleration = 0.0
-    _, area, _, _ = mechanics.contact_area(row.bound, row.moment, time, row.radius, contact)
+    radius, area, _, _ = mechanics.contact_area(row.bound, row.moment, time, row.radius, contact)
     area = area if area >= 0.0 else area_before  # else no equilibrium is left
     energy.area -= 0.5 * node.square * (area - area_before)
+    if slider.viscosity > 0.0 and radius > 0.0:  # it holds the shear displacement, not the stiffness of the contact
+        energy.area += mechanics.contact_energy(row, area, slider)
+        row.radius = radius
+        energy.area -= mechanics.contact_energy(row, area, slider)
     before, worked, lost = stored_energy(row, node.square, time, slider, contact), energy.work, energy.rupture
     yields, _ = mechanics.compliance(row.radius, slider)
     if yields > 0.0 and slider.viscosity == 0.0:  # it is sheared as by the bonds before
@@ -149,17 +153,18 @@ def _after_event(line, time, tracks, slider, contact, ground, energy, nodes):
 
 
 @device
-def _piece(line, tracks, slider, contact, ground, nodes, energy):
+def _piece(line, tracks, slider, contact, ground, nodes, books):
     """Go through one piece of a clock step; return the time of its end or of lost stability.
 
-    A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
+    A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step: then the last
+    number returned is 1, else 0.
     """
     start, length, unit, law = 0.0, slider.length, ground.unit, ground.law
-    row, first, last = line[0], nodes[0], nodes[2]
+    row, energy, first, last = line[0], books[0], nodes[0], nodes[2]
     for _ in range(mechanics.MOST_STEPS):
         left = length - start
         if left <= mechanics.LEAST * length:
-            return length
+            return length, contact.stays
         _sums(tracks, ground, first)
         row.bound, row.moment = first.bound, first.moment
         at_start = begin_sub_step(row, first, start, slider, contact)
@@ -190,10 +195,16 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
                 row.acceleration = 0.0
                 continue
             if contact.stays > 0.0:
-                return start
+                return start, contact.stays
             contact = mechanics.later(contact, 0.0, 1.0)
             continue
+        line[1], books[1], held = row, energy, mechanics.retained(energy)
+        before = stored_energy(row, first.square, start, slider, contact)
         accept_nodes(row, nodes, start, step, slider, math.inf, energy)
+        after = stored_energy(row, last.square, start + step, slider, contact)
+        if mechanics.misses(before, after, held, energy, slider.tolerance, step / length):
+            line[0], books[0], row.next_step = line[1], books[1], 0.25 * step
+            continue
         row.next_step = max(row.next_step, step * grows) if cut or step == left else step * grows
         start = length if step == left else start + step
         _go(tracks, last.slip, step, ground)
@@ -203,34 +214,37 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
         if cut or not _same(first, last.bound, last.moment):
             is_balanced, contact = _after_event(line, start, tracks, slider, contact, ground, energy, nodes)
             if not is_balanced:
-                return start
+                return start, contact.stays
         if start == length:
-            return length
-    return start
+            return length, contact.stays
+    return start, contact.stays
 
 
 @device
-def _through(line, energy, pieces, slider, contact, tracks, ground, nodes):
+def _through(line, books, pieces, slider, contact, tracks, ground, nodes):
     """Take a row and its bonds through a clock step; return the time reached, and False if stability is lost."""
-    row, time, first = line[0], 0.0, nodes[0]
+    energy, row, time, first, stays = books[0], line[0], 0.0, nodes[0], contact.stays
     for p in range(len(pieces)):
-        slider, from_here = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, contact.stays)
+        slider, from_here = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, stays)
         worked, before, lost = energy.work, energy.stored, energy.rupture
         _sums(tracks, ground, first)
         row.bound, row.moment = first.bound, first.moment
         if p > 0:
             before = stored_energy(row, first.square, 0.0, slider, from_here)
+        jumps = mechanics.force_jumps(row, slider)
+        unslipped = stored_energy(row, first.square, 0.0, slider, from_here) if jumps else before
         if not _rebalance(line, 0.0, tracks, slider, from_here, ground, energy, first):
             return time, False
         after = stored_energy(row, first.square, 0.0, slider, from_here)
-        energy.area += energy.work - worked - after + before - (energy.rupture - lost)
-        reached = _piece(line, tracks, slider, from_here, ground, nodes, energy)
+        slipped = energy.work - worked - after + before - (energy.rupture - lost)
+        mechanics.book_slip(slipped, before - unslipped, jumps, energy)
+        reached, stays = _piece(line, tracks, slider, from_here, ground, nodes, books)
         time += reached
         if reached != slider.length:
             return time, False
     _sums(tracks, ground, first)
     row.bound, row.moment = first.bound, first.moment
-    energy.stored = stored_energy(row, first.square, time, slider, contact)
+    energy.stored = stored_energy(row, first.square, time, slider, mechanics.later(contact, 0.0, stays))
     return time, True
 
 
@@ -249,8 +263,9 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
         if stamp[m] != np.int64(frame[m, tracked.STEPS]):
             return tracked.SPENT
     space = tracked.room(), np.empty(1), np.empty(1), np.empty(tracked.COLUMNS + 1), np.empty((tracked.COLUMNS, 1))
-    columns, booked, nodes = np.empty(mechanics.COLUMNS), np.empty(mechanics.ENERGIES), np.zeros(3, NODE)
-    line, energy = columns.view(mechanics.ROW), booked.view(ENERGY)[0]
+    both, nodes = (np.empty(2 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES)), np.zeros(3, NODE)
+    line, books = both[0].view(mechanics.ROW), both[1].view(ENERGY)  # as they are, and before the last sub-step
+    columns, booked = both[0][: mechanics.COLUMNS], both[1][: mechanics.ENERGIES]
     for m in range(len(rows)):
         stop, bonds = 0, ((birth[m], due[m], life[m]), soonest[m], frame[m])
         ground = Ground(units[mechanics.SLIP], np.float64(due.shape[1]), law, (seed, members[m]), space)
@@ -259,7 +274,7 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
             if math.isnan(line[0].runaway_time):
                 now = mechanics.contact_at(contact, bare[m], clock[k], line[0])
-                time, going = _through(line, energy, pieces[start:stop], slider, now, bonds, ground, nodes)
+                time, going = _through(line, books, pieces[start:stop], slider, now, bonds, ground, nodes)
                 if not going:
                     mechanics.run_away(line[0], booked, clock[k, 0] + time)
             mechanics.from_units(columns, booked, rows[m], energies[m], units, work)
