@@ -6,27 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.driven import (
-    AREA,
-    DENSITY,
-    ENERGY,
-    KAPPA,
-    LOAD,
-    MODULUS,
-    STIFF,
-    UNIT,
-    WORK,
-    Force,
-    R,
-    Scenario,
-    jkr,
-    march,
-    marched,
-    reached,
-    residual,
-    scenario,
-    spring,
-)  # fmt: skip
+from helpers import driven
+from helpers.driven import AREA, LOAD, MODULUS, STIFF, UNIT, WORK, R, jkr, march, marched, residual, scenario, spring
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
@@ -57,11 +38,9 @@ def test_the_area_in_the_sub_steps_is_that_of_jkr_also_from_the_radius_of_hertz_
     exact, hertz = (jkr.radius_at_load(load, share * work, R, MODULUS) for share in (1.0, 0.0))
     for shift in (-1e-12, -1e-16, 0.0, 1e-16, 1e-12):
         radii = [
-            mechanics.contact_area(
-                0.0, 0.0, 0.0, a, mechanics.Contact(w, p, *[0.0] * 7, 1.0 / R, MODULUS, 1.0)
-            )[0]
+            mechanics.contact_area(0.0, 0.0, 0.0, a, mechanics.Contact(w, p, *[0.0] * 7, 1.0 / R, MODULUS, 1.0))[0]
             for w, p, a in zip(work.flat, load.flat, (hertz * (1.0 + shift)).flat, strict=True)
-        ]  # fmt: skip
+        ]
         assert_allclose(radii, exact.ravel(), rtol=1e-12)
 
 
@@ -96,7 +75,7 @@ def test_adhesion_that_returns_behind_a_spring_widens_the_area_as_independent_eq
             assert_allclose(read["spring_force"] / UNIT, areas * moments, atol=1e-5 * np.max(areas * moments))
         if make is FirstMoment:
             gained = np.trapezoid(0.5 * moment**2 / bound, area)
-            assert_allclose(read["dissipated_by_area"][-1] / ENERGY, -gained, rtol=1e-5)
+            assert_allclose(read["dissipated_by_area"][-1] / driven.ENERGY, -gained, rtol=1e-5)
 
 
 def test_members_whose_adhesion_goes_and_returns_again_and_again_have_energies_and_no_large_ones():
@@ -123,11 +102,11 @@ def test_energy_that_a_renewed_area_takes_along_is_that_stored_in_it_with_any_vi
         states, read = marched(scene)
         assert residual(read) < 1e-5
         if make is FirstMoment and contact == 2.0:
-            bound, stretch = reached(states, "bound", "stretch")[:-1].T
+            bound, stretch = driven.reached(states, "bound", "stretch")[:-1].T
             areas = np.array([math.pi * state.contact.radius[0] ** 2 / AREA for state in states[:-1]])
             gained = np.diff(areas, prepend=areas[0]) * 0.5 * stretch**2 / bound
             assert np.max(areas) > 1.1
-            assert_allclose(read["dissipated_by_area"][1:] / ENERGY, -np.cumsum(gained), rtol=1e-9, atol=1e-15)
+            assert_allclose(read["dissipated_by_area"][1:] / driven.ENERGY, -np.cumsum(gained), rtol=1e-9, atol=1e-15)
 
 
 @pytest.mark.parametrize("make", [FirstMoment, COHORTS, SITES])
@@ -135,24 +114,28 @@ def test_the_loss_of_a_force_that_jumps_is_half_its_change_times_the_slip_at_onc
     # at the start, within a clock step and between two; half of the sites stay bound: 1/k_t = 2, with bonds 4
     changes = np.array([0.1, 0.05, -0.2])
     times, values = (0.0, 0.26, 0.26, 0.5, 0.5, 9.0), np.repeat(np.cumsum(changes), 2) * UNIT
-    delays = ("mass", 0.0, 4.0), ("viscosity", 1e-2 * DENSITY * KAPPA, 2.0), ("damping", 1e-2 * STIFF, 0.0)
+    delays = (
+        ("mass", 0.0, 4.0),
+        ("viscosity", 1e-2 * driven.DENSITY * driven.KAPPA, 2.0),
+        ("damping", 1e-2 * STIFF, 0.0),
+    )
     for name, delay, gives in delays:
         keys = {"contact_stiffness": 0.5 * STIFF, "tolerance": 1e-8, name: delay}
-        drive = Force(force={"time": times, "value": tuple(values)}, **keys)
+        drive = driven.Force(force={"time": times, "value": tuple(values)}, **keys)
         _, read = marched(scenario(1.0, 10, drive, rupture=Constant(rate=1.0), make=make))
         assert residual(read) < 1e-5
         assert np.isnan(read["runaway_time"]).all()
         assert np.max(np.abs(read["dissipated_by_area"])) < 1e-12 * read["drive_work"][-1]
         if make is not SITES or name == "viscosity":
             lost, snaps = np.cumsum(0.5 * gives * changes**2), read["dissipated_by_snaps"][[1, 3, 6]]
-            assert_allclose(snaps / ENERGY, lost, rtol=1e-5, atol=1e-12)  # of the cohorts bound
+            assert_allclose(snaps / driven.ENERGY, lost, rtol=1e-5, atol=1e-12)  # of the cohorts bound
 
 
 def test_a_contact_that_viscosity_lets_collapse_keeps_its_energies_to_ten_tolerances():
     # of a slider that snaps to the area of Hertz; the friction after it by equations solved apart
     courses = []
     for viscosity in (100.0, 1e4):
-        scene = Scenario(
+        scene = driven.Scenario(
             clock=Clock(duration=0.1, step=1e-3), solid=Solid(shear_modulus=0.233e6), sphere=Sphere(radius=0.309e-3),
             adhesion=Adhesion(work=32.6e-3, bond_share=0.0), contact=Equilibrium(load=33e-6, reversible=0.0039),
             drive=Spring(stage=1.9e-3, stiffness=96.0, mass=1.07e-3, contact_stiffness=7.5, viscosity=viscosity),
