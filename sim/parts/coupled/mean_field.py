@@ -134,6 +134,7 @@ def _piece(row, slider, law, contact, nodes, energy):
             contact, nodes.last_step = (contact, 0.0) if gone else (mechanics.later(contact, 0.0, 1.0), nodes.last_step)
             row.next_step = 0.0
             continue
+        contact = mechanics.following(contact, row, start, step)
         grows, accepted = try_sub_step(row, start, step, slider, law, contact, nodes)
         if not accepted:
             row.next_step = step * grows
@@ -187,6 +188,8 @@ def _rest(row, start, settles, slider, law, contact, energy):
         moment = last / area if area > 0.0 else 0.0
     row.spring_force, row.bound, row.radius, row.moment = last, share, radius, moment
     row.speed, row.body_speed = 0.0, 0.0
+    if end > start:
+        mechanics.remember(row, 0.0, 0.0, 0.0, end - start, contact)
     return end
 
 
@@ -229,6 +232,7 @@ def _slide(row, start, slider, along, contact, nodes, energy):
                 contact = mechanics.later(contact, 0.0, 1.0)
                 continue
             return start if slider.mass == 0.0 or row.speed == 0.0 else -1.0
+        contact = mechanics.following(contact, row, start, step)
         grows, accepted = try_sub_step(row, start, step, slider, along, contact, nodes)
         if not accepted:
             row.next_step = step * grows
@@ -273,7 +277,7 @@ def _sticking_piece(row, slider, law, contact, nodes, energy):
     for _ in range(_CHANGES):
         if start >= length:
             return length
-        rests = row.speed == 0.0
+        contact, rests = mechanics.feeling(contact, row), row.speed == 0.0
         if rests:
             before = start
             settles = law.binding > 0.0 and sense * row.spring_force > 0.0
@@ -305,6 +309,7 @@ def _clock_step(row, slider, law, contact, pieces, nodes, energy):
     for p in range(len(pieces)):
         slider = mechanics.slider_in(slider, pieces[p])
         nodes.last_step = 0.0
+        ahead = mechanics.later(mechanics.feeling(contact, row), time, contact.stays)
         if is_open and law.sense != 0.0 and slider.mass + slider.damping + slider.forced == 0.0:
             # as nothing else holds an open contact, it goes along with the stage
             slip, _ = mechanics.free_shifts(row, slider)
@@ -315,11 +320,17 @@ def _clock_step(row, slider, law, contact, pieces, nodes, energy):
                 row.bound = 1.0 / (1.0 + law.slows * math.fabs(row.speed))
         if p == 0:
             if law.sense == 0.0:
-                going = mechanics.elastic(row, 0.0, slider, contact, energy)
+                going = mechanics.elastic(row, 0.0, slider, ahead, energy)
             elif slider.forced > 0.0:
                 row.spring_force = mechanics.driven(0.0, slider)[1]
-            energy.area += energy.work - worked - stored_in(row, 0.0, slider, law, contact) + energy.stored
-        ahead, reached = mechanics.later(contact, time, contact.stays), 0.0
+            if row.felt != row.drawn:  # the answer to what was drawn is no sliding
+                path, row.felt = row.path, row.drawn
+                ahead = mechanics.feeling(ahead, row)
+                if law.sense == 0.0:
+                    going = mechanics.elastic(row, 0.0, slider, ahead, energy)
+                    row.path = path
+            energy.area += energy.work - worked - stored_in(row, 0.0, slider, law, ahead) + energy.stored
+        reached = 0.0
         if going and law.sense == 0.0:
             reached = _piece(row, slider, law, ahead, nodes, energy)
         elif going:
@@ -327,7 +338,8 @@ def _clock_step(row, slider, law, contact, pieces, nodes, energy):
         time += reached
         if not (going and reached == slider.length):
             return time, False
-    energy.stored = stored_in(row, time, slider, law, contact)
+    mechanics.remember_jumps(row, slider, mechanics.feeling(contact, row))
+    energy.stored = stored_in(row, time, slider, law, mechanics.feeling(contact, row))
     return time, True
 
 
@@ -335,12 +347,12 @@ def _clock_step(row, slider, law, contact, pieces, nodes, energy):
 def advance_rows(inputs, numbers, outputs):
     """Advance all rows and their energies through some clock steps, each row by itself.
 
-    ``numbers``: those of ``Slider``, ``Law`` and ``Contact``. ``outputs``: columns and
+    ``numbers``: those of ``Slider``, ``Law``, ``Contact`` and ``FieldLaw``. ``outputs``: columns and
     energies at the end of each step, shape (columns, steps, rows) and (steps, rows, energies). A row that nothing holds
     any longer ends there.
     """
-    rows, energies, bare, pieces, clock, units, work = inputs
-    slider, law, contact = mechanics.Slider(*numbers[0]), mechanics.Law(*numbers[1]), mechanics.Contact(*numbers[2])
+    rows, energies, pieces, clock, units, work = inputs
+    slider, law, contact = mechanics.Slider(*numbers[0]), mechanics.Law(*numbers[1]), mechanics.contact_of(numbers)
     reached, spent = outputs
     columns, booked, nodes = np.empty(mechanics.COLUMNS), np.empty(mechanics.ENERGIES), np.empty(1, radau.NODE_VALUES)
     row, energy = columns.view(mechanics.ROW)[0], booked.view(ENERGY)[0]
@@ -352,7 +364,7 @@ def advance_rows(inputs, numbers, outputs):
             if law.sense != 0.0:
                 row.moment = math.copysign(row.bound, row.speed) if row.speed != 0.0 else 0.0
             if math.isnan(row.runaway_time):
-                now = mechanics.contact_at(contact, bare[m], clock[k], row)
+                now = mechanics.contact_at(contact, clock[k], row)
                 time, going = _clock_step(row, slider, law, now, pieces[start:stop], nodes[0], energy)
                 if not going:
                     mechanics.run_away(row, booked, clock[k, 0] + time)

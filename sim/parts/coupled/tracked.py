@@ -168,12 +168,15 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
         for _ in range(_TRIALS):
             if not step > mechanics.LEAST * length:
                 break
+            contact = mechanics.following(contact, row, start, step)
             if not _try(nodes, at_start, start, step, row, slider, contact):
                 step, cut = 0.25 * step, False
                 continue
+            within = mechanics.within_reach(last.slip, contact)
             bend, error = bend_of(nodes, step, row, slider)
             grows = min(4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else 4.0
-            if not error <= 1.0:
+            grows = min(grows, 0.9 * within)
+            if not (error <= 1.0 and within >= 1.0):
                 step, cut = step * grows, False
                 continue
             whole = step if not cut else whole
@@ -189,7 +192,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
             contact = mechanics.later(contact, 0.0, 1.0)
             row.next_step = 0.0
             continue
-        accept_nodes(row, nodes, start, step, slider, math.inf, energy)
+        accept_nodes(row, nodes, start, step, slider, contact, math.inf, energy)
         row.next_step = max(row.next_step, step * grows) if cut or step == left else step * grows
         start = length if step == left else start + step
         _go(tracks, last.slip, step, ground)
@@ -210,13 +213,20 @@ def _through(line, energy, pieces, slider, contact, tracks, ground, nodes):
     """Take a row and its bonds through a clock step; return the time reached, and False if stability is lost."""
     row, time, first = line[0], 0.0, nodes[0]
     for p in range(len(pieces)):
-        slider, from_here = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, contact.stays)
+        slider = mechanics.slider_in(slider, pieces[p])
+        from_here = mechanics.later(mechanics.feeling(contact, row), time, contact.stays)
         worked, before, lost = energy.work, energy.stored, energy.rupture
         _sums(tracks, ground, first)
         row.bound, row.moment = first.bound, first.moment
         if p > 0:
             before = stored_energy(row, first.square, 0.0, slider, from_here)
-        if not _rebalance(line, 0.0, tracks, slider, from_here, ground, energy, first):
+        going = _rebalance(line, 0.0, tracks, slider, from_here, ground, energy, first)
+        if p == 0 and row.felt != row.drawn:  # the answer to what was drawn is no sliding
+            path, row.felt = row.path, row.drawn
+            from_here = mechanics.feeling(from_here, row)
+            going = _rebalance(line, 0.0, tracks, slider, from_here, ground, energy, first)
+            row.path = path
+        if not going:
             return time, False
         after = stored_energy(row, first.square, 0.0, slider, from_here)
         energy.area += energy.work - worked - after + before - (energy.rupture - lost)
@@ -226,7 +236,8 @@ def _through(line, energy, pieces, slider, contact, tracks, ground, nodes):
             return time, False
     _sums(tracks, ground, first)
     row.bound, row.moment = first.bound, first.moment
-    energy.stored = stored_energy(row, first.square, time, slider, contact)
+    mechanics.remember_jumps(row, slider, mechanics.feeling(contact, row))
+    energy.stored = stored_energy(row, first.square, time, slider, mechanics.feeling(contact, row))
     return time, True
 
 
@@ -238,8 +249,8 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
     rows, columns), get those of the bonds after each step. The rest as in ``mean_field.advance_rows``. The result is
     zero, or ``SPENT`` if the bonds have been advanced already.
     """
-    rows, energies, bare, pieces, clock, units, work = inputs
-    slider, contact, (reached, spent) = mechanics.Slider(*numbers[0]), mechanics.Contact(*numbers[2]), outputs
+    rows, energies, pieces, clock, units, work = inputs
+    slider, contact, (reached, spent) = mechanics.Slider(*numbers[0]), mechanics.contact_of(numbers), outputs
     birth, due, life, soonest, stamp, frame = tracks
     for m in range(len(rows)):
         if stamp[m] != np.int64(frame[m, tracked.STEPS]):
@@ -254,7 +265,7 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
             start, stop = stop, mechanics.pieces_to(k, stop, pieces)
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
             if math.isnan(line[0].runaway_time):
-                now = mechanics.contact_at(contact, bare[m], clock[k], line[0])
+                now = mechanics.contact_at(contact, clock[k], line[0])
                 time, going = _through(line, energy, pieces[start:stop], slider, now, bonds, ground, nodes)
                 if not going:
                     mechanics.run_away(line[0], booked, clock[k, 0] + time)

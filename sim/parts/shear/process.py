@@ -7,15 +7,16 @@ exp(−2∫λdt).
 
 import dataclasses
 import math
+from functools import cached_property
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self, cast
 
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from sim.numerics.jit import kernel, law
+from sim.numerics.jit import device, kernel, law
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Array, Bonding, Gammas, Motion, Motions
+from sim.parts.exchange import Array, Bonding, FieldLaw, Gammas, Memory, Motion, Motions
 from sim.units.quantity import Quantity
 
 _Memory = Annotated[
@@ -23,7 +24,7 @@ _Memory = Annotated[
 ]
 Relaxing = Annotated[bool, Field(description="true: only what the correlation renews has the new size")]
 #: Memory of a law that depends on the moment alone.
-NO_PAST = np.empty(0)
+NO_PAST = Memory()
 
 
 class _OfTheMoment:
@@ -40,13 +41,20 @@ class _OfTheMoment:
         """Return g [1] in steady sliding at a speed [m/s] and mean shear stress [Pa], in the shape of either."""
         raise NotImplementedError
 
-    def started(self, motion: Motion, stress: Array) -> tuple[Array, Array]:
+    def started(self, motion: Motion, stress: Array) -> tuple[Memory, Array]:
         """Return the memory of the past at t = 0, and g [1]."""
         return NO_PAST, self.factor(motion.speed, stress)
 
-    def followed(self, past: Array, motions: Motions, stress: Array) -> tuple[Array, Array]:
+    def followed(self, past: Memory, motions: Motions, stress: Array) -> tuple[Memory, Array]:
         """Return the memory of the past after a block of steps, and g [1] at the end of each."""
         return past, self.factor(motions.speed, stress)
+
+    def field_law(self, energy: float, rates: tuple[float, float] | None = (0.0, 0.0)) -> FieldLaw:
+        """Return the numbers of a field of this mean energy [J/m²], whose ``rates`` are None if each mode has its own.
+
+        The rates are those of ``FieldLaw``.
+        """
+        return FieldLaw()
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -116,7 +124,7 @@ class SlipRate(_OfTheMoment):
     -----
     With A_j = ∫ e^(−s/l) \\|V\\|^j dt, g² = floor² + (1 − floor²)(1 − A1²/(A0 A2)). The memory holds A0, the mean speed
     A1/A0, A2 − A1²/A0 and the time at rest since the last slip. All sliding within a clock step has the mean of the
-    weight over the step.
+    weight over the step. A drive that solves its motion integrates the memory in its sub-steps instead.
     """
 
     reads_stress: ClassVar[bool] = False
@@ -133,43 +141,72 @@ class SlipRate(_OfTheMoment):
     def factor(self, speed: Array, stress: Array) -> Array:
         return np.full(speed.shape, self.floor)
 
-    def started(self, motion: Motion, stress: Array) -> tuple[Array, Array]:
-        speed = np.abs(motion.speed)
-        past = np.zeros((len(speed), 4))
-        past[:, 1] = speed
-        np.divide(cast(float, self.memory_length), speed, out=past[:, 0], where=speed > 0.0)
-        return past, self.factor(speed, stress)
+    def started(self, motion: Motion, stress: Array) -> tuple[Memory, Array]:
+        speed, weight = np.abs(motion.speed), np.zeros(motion.speed.shape)
+        np.divide(cast(float, self.memory_length), speed, out=weight, where=speed > 0.0)
+        none = np.zeros(weight.shape)
+        return Memory(weight, speed, none, none, none), self.factor(motion.speed, stress)
 
-    def followed(self, past: Array, motions: Motions, stress: Array) -> tuple[Array, Array]:
-        past, unsteady = past.copy(), np.empty(motions.path.shape)
-        spread = motions.unsteady + np.zeros(motions.path.shape)
-        _remember(past, motions.path, motions.duration.ravel(), spread, self.memory_length, unsteady)
+    def followed(self, past: Memory, motions: Motions, stress: Array) -> tuple[Memory, Array]:
+        if motions.memory.weight.size:
+            past, unsteady = Memory(*(values[-1] for values in motions.memory)), np.empty(motions.path.shape)
+            _unsteadiness(*motions.memory[:3], unsteady)
+        else:
+            columns, unsteady = np.stack(past[:4], axis=1), np.empty(motions.path.shape)
+            spread = motions.unsteady + np.zeros(motions.path.shape)
+            _remember(columns, motions.path, motions.duration.ravel(), spread, self.memory_length, unsteady)
+            past = past._replace(**dict(zip(Memory._fields, columns.T, strict=False)))
         return past, np.sqrt(self.floor**2 + (1.0 - self.floor**2) * unsteady)
+
+    def field_law(self, energy: float, rates: tuple[float, float] | None = (0.0, 0.0)) -> FieldLaw:
+        memory = cast(float, self.memory_length), self.floor**2
+        if rates is None:
+            return FieldLaw(*memory)
+        return FieldLaw(*memory, *rates, float(self.relaxing and any(rates)), energy, 1.0)
+
+
+@device
+def unsteadiness(weight, mean, spread):
+    """Return 1 − A1²/(A0 A2) of a memory."""
+    return spread / (spread + weight * mean * mean) if spread > 0.0 else 0.0
+
+
+@device
+def remembered(memory, path, duration, unsteady, length):
+    """Return the weight, mean, spread and rest of a memory after a step; ``unsteady`` as of ``Motion``."""
+    weight, mean, spread, rest = memory
+    if path == 0.0:
+        return weight, mean, spread, rest + duration if weight > 0.0 else rest
+    if rest > 0.0:
+        spread += weight * rest / (weight + rest) * mean * mean
+        mean *= weight / (weight + rest)
+        weight += rest
+    renewed = -math.expm1(-path / length)
+    share = renewed * length / path if renewed > 0.0 else 1.0
+    weight, spread, gained = weight * (1.0 - renewed), spread * (1.0 - renewed), duration * share
+    further = path / duration - mean
+    spread += share * unsteady + weight * gained / (weight + gained) * further * further
+    mean += further * gained / (weight + gained)
+    return weight + gained, mean, spread, 0.0
 
 
 @kernel("void(float64[:, ::1], float64[:,:], float64[:], float64[:,:], float64, float64[:, ::1])")
 def _remember(past, path, duration, spent, length, unsteady):
     """Update the memory of each row in place, step by step, and write the unsteadiness after each step."""
     for m in range(len(past)):
-        weight, mean, spread, rest = past[m]
+        memory = past[m, 0], past[m, 1], past[m, 2], past[m, 3]
         for s in range(len(duration)):
-            if path[s, m] == 0.0:
-                rest += duration[s] if weight > 0.0 else 0.0
-            else:
-                if rest > 0.0:
-                    spread += weight * rest / (weight + rest) * mean * mean
-                    mean *= weight / (weight + rest)
-                    weight += rest
-                    rest = 0.0
-                renewed = -math.expm1(-path[s, m] / length)
-                share = renewed * length / path[s, m] if renewed > 0.0 else 1.0
-                weight, spread, gained = weight * (1.0 - renewed), spread * (1.0 - renewed), duration[s] * share
-                further = path[s, m] / duration[s] - mean
-                spread += share * spent[s, m] + weight * gained / (weight + gained) * further * further
-                mean += further * gained / (weight + gained)
-                weight += gained
-            unsteady[s, m] = spread / (spread + weight * mean * mean) if spread > 0.0 else 0.0
-        past[m, 0], past[m, 1], past[m, 2], past[m, 3] = weight, mean, spread, rest
+            memory = remembered(memory, path[s, m], duration[s], spent[s, m], length)
+            unsteady[s, m] = unsteadiness(memory[0], memory[1], memory[2])
+        past[m, 0], past[m, 1], past[m, 2], past[m, 3] = memory
+
+
+@kernel("void(float64[:,:], float64[:,:], float64[:,:], float64[:, ::1])")
+def _unsteadiness(weight, mean, spread, unsteady):
+    """Write the unsteadiness of memories."""
+    for s in range(len(unsteady)):
+        for m in range(unsteady.shape[1]):
+            unsteady[s, m] = unsteadiness(weight[s, m], mean[s, m], spread[s, m])
 
 
 Amplitude = Annotated[Constant | Onset | Stress | SlipRate, Field(discriminator="model")]
@@ -181,9 +218,16 @@ class Time:
 
     #: The rate goes with |q| to this power.
     power: ClassVar[int] = 0
+    #: True if sliding renews the modes.
+    slides: ClassVar[bool] = False
 
     time: Annotated[float, Quantity("s", "correlation time of the fluctuations", "t_m", above=0)]
     model: Literal["time"] = "time"
+
+    @property
+    def rates(self) -> tuple[float, float] | None:
+        """λ over the speed [1/m] and λ at rest [1/s]; None if each mode has its own."""
+        return 0.0, 1.0 / self.time
 
     def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
         """Return ∫λdt over a step, shape (1, 1) or (members, 1), or (members, wavenumbers) [rad/m].
@@ -199,9 +243,14 @@ class Slip:
 
     #: The rate goes with |q| to this power.
     power: ClassVar[int] = 0
+    slides: ClassVar[bool] = True
 
     length: Annotated[float, Quantity("m", "correlation length of the fluctuations", "l", above=0)]
     model: Literal["slip"] = "slip"
+
+    @property
+    def rates(self) -> tuple[float, float] | None:
+        return 1.0 / self.length, 0.0
 
     def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
         return motion.path[..., np.newaxis] / self.length
@@ -213,6 +262,8 @@ class Wave:
 
     #: The rate goes with |q| to this power.
     power: ClassVar[int] = 1
+    slides: ClassVar[bool] = True
+    rates: ClassVar[None] = None
 
     waves: Annotated[float, Quantity("1", "own wavelengths after which a mode renews", "n", above=0)]
     model: Literal["wave"] = "wave"
@@ -227,6 +278,8 @@ class Diffusion:
 
     #: The rate goes with |q| to this power.
     power: ClassVar[int] = 2
+    slides: ClassVar[bool] = False
+    rates: ClassVar[None] = None
 
     diffusivity: Annotated[float, Quantity("m^2/s", "diffusivity of the fluctuations", "D", above=0)]
     model: Literal["diffusion"] = "diffusion"
@@ -250,14 +303,17 @@ class Fluctuation(NamedTuple):
     values : array
         Numbers of the process: complex amplitudes (members, 2, pairs) in units of each mode's
         standard deviation, or phases (members, pairs) [rad]; empty for a process without any.
-    past : array
-        Memory of earlier sliding in the law of the amplitude, shape (1, 4) or (members, 4); empty without memory.
+    past : Memory
+        Memory of earlier sliding in the law of the amplitude.
+    expected : array, shape (1,) or (members,)
+        Mean of ΔΓ at this time before it was drawn [J/m^2]; ΔΓ itself if sliding renews nothing; empty without a draw.
     """
 
     energy: Array
     amplitude: Array
     values: Array
-    past: Array = NO_PAST
+    past: Memory = NO_PAST
+    expected: Array = NO_PAST.energy
 
 
 @dataclasses.dataclass(frozen=True)
@@ -285,6 +341,10 @@ class SmoothProcess:
         return amplitude**2 * self.energy
 
     @property
+    def field_law(self) -> FieldLaw:
+        return self.amplitude.field_law(self.energy)
+
+    @property
     def gammas(self) -> Gammas:
         return Gammas(constant=self.energy)
 
@@ -301,6 +361,20 @@ class Renewing:
     #: Wavenumber of a mode that has the rate of each number of the state [rad/m].
     wavenumber: Array
     state_class: ClassVar[type[Fluctuation]] = Fluctuation
+
+    @property
+    def gammas(self) -> Gammas:
+        """Distribution of ΔΓ at amplitude 1."""
+        raise NotImplementedError
+
+    @cached_property
+    def mean(self) -> float:
+        """Mean of ΔΓ at amplitude 1 [J/m²]."""
+        return float(np.sum(self.gammas.weight * self.gammas.shape))
+
+    @cached_property
+    def field_law(self) -> FieldLaw:
+        return self.amplitude.field_law(self.mean, self.correlation.rates)
 
     def _empty(self, members: int) -> Array:
         """Return the numbers of a state without any fluctuation."""
@@ -319,17 +393,26 @@ class Renewing:
         size = amplitude if self.amplitude.relaxing else np.ones(1)
         values = self._empty(len(noise.members))
         energy = self._renew(values, np.zeros((1, 1, 1)), np.ones((1, 1, 1)), size[np.newaxis], motion.step, noise)
-        return Fluctuation(self._scaled(amplitude, energy[0]), amplitude, values, past)
+        first = self._scaled(amplitude, energy[0])
+        return Fluctuation(first, amplitude, values, past._replace(energy=energy[0]), first)
 
     def advance(
         self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
     ) -> tuple[Fluctuation, Array]:
         past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
         values = state.values.copy()
-        size = renewed_size(self.amplitude, state, motions, amplitude)
-        energy = self._renew(values, *self._shares(motions), size, motions.step, noise)
-        energy = self._scaled(amplitude, energy)
-        return Fluctuation(energy[-1], amplitude[-1], values, past), energy
+        size, (keep, renew) = renewed_size(self.amplitude, state, motions, amplitude), self._shares(motions)
+        if self.amplitude.relaxing and self.field_law.follows and motions.memory.renewed.size:
+            renew, size = np.sqrt(motions.memory.renewed)[..., np.newaxis], np.ones((1, 1))
+            keep, size = keep + np.zeros(renew.shape), size + np.zeros((len(renew), 1))
+        drawn = self._renew(values, keep, renew, size, motions.step, noise)
+        energy = expected = self._scaled(amplitude, drawn)
+        if self.correlation.slides or self.amplitude.remembers:
+            before = drawn[-2] if len(drawn) > 1 else state.past.energy
+            if keep.shape[2] == 1:
+                before = keep[-1, :, 0] ** 2 * before + (renew[-1, :, 0] * size[-1]) ** 2 * self.mean
+            expected = self._scaled(amplitude, before[np.newaxis])
+        return Fluctuation(energy[-1], amplitude[-1], values, past._replace(energy=drawn[-1]), expected[-1]), energy
 
     def _shares(self, motions: Motions) -> tuple[Array, Array]:
         """Return the shares of a number that a step keeps and renews, whose squares add up to one."""
