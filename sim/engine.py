@@ -174,10 +174,8 @@ def _step_contact(scenario: Scenario, touch: ContactState, shear: Storing, steps
     bonded = adhesion.work_of_bonds(1.0) - adhesion.work_of_bonds(0.0)
     area = scenario.contact_area
     stays = contact.lags or not (contact.changes or bonded or contact.reversible)
-    solid = *bodies, scenario.solid.effective[0]
-    return StepContact(
-        touch.radius, bare, paid, shear, bonded, contact.reversible, (first.mount, last.mount), stays, *solid, area
-    )
+    around = (first.mount, last.mount), stays, *bodies, scenario.solid.effective[0], area
+    return StepContact(touch.radius, bare, paid, shear, bonded, contact.reversible, *around)
 
 
 def _pull(scenario: Scenario, time: float | Array, radius: Array) -> Array:

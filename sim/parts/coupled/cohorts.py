@@ -506,12 +506,7 @@ def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, ro
         if p > 0:
             before = stored_energy(row, nodes[0].square, 0.0, slider, from_here)
         row.bound, row.moment = nodes[0].bound, nodes[0].moment
-        going = mechanics.elastic(row, 0.0, slider, from_here, energy)
-        if p == 0 and row.felt != row.drawn:  # the answer to what was drawn is no sliding
-            path, row.felt = row.path, row.drawn
-            from_here = mechanics.feeling(from_here, row)
-            going = mechanics.elastic(row, 0.0, slider, from_here, energy)
-            row.path = path
+        going, from_here = mechanics.answer(row, p, slider, from_here, energy)
         if going:
             for i in range(count):
                 pool[1, i] += unit * (row.slip - slid)
@@ -528,8 +523,7 @@ def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, ro
             break
     if going:
         sums_at(pool, count, unit, rules, nodes[0])
-        mechanics.remember_jumps(row, slider, mechanics.feeling(contact, row))
-        energy.stored = stored_energy(row, nodes[0].square, time, slider, mechanics.feeling(contact, row))
+        energy.stored = stored_energy(row, nodes[0].square, time, slider, mechanics.settled(contact, row, slider))
     if count > weight.size:
         count = settle(pool[0], pool[1], pool[2], count, 1.0 if row.slip >= 0.0 else -1.0, travelled, rules)
         settled = count

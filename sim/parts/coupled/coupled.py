@@ -22,7 +22,7 @@ from sim.parts.coupled.mean_field import advance_rows
 from sim.parts.coupled.mechanics import COLUMNS, ROW, Inputs, Law, Slider
 from sim.parts.coupled.tracked import advance_tracks
 from sim.parts.drive import ENERGY, Driven, Force, Spring
-from sim.parts.exchange import Array, Bonding, FieldLaw, Flags, Memory, Motions, Mount, Parts, Sliding, Storing, Times
+from sim.parts.exchange import Array, Bonding, Flags, Memory, Motions, Mount, Parts, Sliding, Storing, Times
 
 #: Stretch by which the motion of bonds is measured that neither force nor stretch breaks, in a run without motion [m].
 _STRETCH = 1e-9
@@ -177,7 +177,8 @@ def advance(
     course = np.stack([pieces.interval, pieces.stop - pieces.start, *(scale * np.array(pieces[3:6]))], axis=1)
     law, shear = parts.shear.field_law, contact.shear
     rows["paid"], rows["drawn"] = contact.paid, contact.paid * shear.energy
-    rows["felt"] = contact.paid * (shear.expected if shear.expected.size else shear.energy)
+    answers = isinstance(bonds, _WITH_STRETCH) and shear.expected.size  # others hold a contact that is rigid
+    rows["felt"] = contact.paid * (shear.expected if answers else shear.energy)
     if law.length < math.inf:
         for name, values in shear.past._asdict().items():
             rows[name] = values if values.size else law.energy
@@ -185,7 +186,8 @@ def advance(
     clock, work = _clock(contact, ends), stretch * force
     inputs = Inputs(state, slider.energies.copy(), course, clock, _of_columns(*units), work)
     columns, energies = np.empty((COLUMNS, len(steps), members)), np.empty((len(steps), *slider.energies.shape))
-    numbers = *_numbers(drive, bonds, contact, units), tuple(_of_field(law, stretch))
+    law = law._replace(length=law.length / stretch, by_slip=law.by_slip * stretch)
+    numbers = *_numbers(drive, bonds, contact, units), tuple(law)
     end, bonding = _advanced(bonds, population, contact.radius, inputs, numbers, (columns, energies), noise)
     reached = dict(zip(_NAMES, columns, strict=True))
     stage, stage_speed = np.zeros((2, len(steps), members))
@@ -292,11 +294,6 @@ def _numbers(drive: Force | Spring, bonds: _Driven, contact: StepContact, units:
     still = contact.bare, 0.0, 0.0, 0.0, 0.0, float(contact.stays), contact.bonded / of_rest, mean_stress
     solid = contact.mounts[0].stiffness, 1.0 / contact.sphere_radius, contact.modulus, contact.area
     return tuple(slider), tuple(breaking), (*still, *solid)
-
-
-def _of_field(law: FieldLaw, stretch: float) -> FieldLaw:
-    """Return the numbers of the fluctuations with a stretch [m] as the unit of lengths."""
-    return law._replace(length=law.length / stretch, by_slip=law.by_slip * stretch)
 
 
 def _clock(contact: StepContact, ends: Array) -> Array:

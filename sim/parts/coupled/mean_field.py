@@ -320,15 +320,9 @@ def _clock_step(row, slider, law, contact, pieces, nodes, energy):
                 row.bound = 1.0 / (1.0 + law.slows * math.fabs(row.speed))
         if p == 0:
             if law.sense == 0.0:
-                going = mechanics.elastic(row, 0.0, slider, ahead, energy)
+                going, ahead = mechanics.answer(row, p, slider, ahead, energy)
             elif slider.forced > 0.0:
                 row.spring_force = mechanics.driven(0.0, slider)[1]
-            if row.felt != row.drawn:  # the answer to what was drawn is no sliding
-                path, row.felt = row.path, row.drawn
-                ahead = mechanics.feeling(ahead, row)
-                if law.sense == 0.0:
-                    going = mechanics.elastic(row, 0.0, slider, ahead, energy)
-                    row.path = path
             energy.area += energy.work - worked - stored_in(row, 0.0, slider, law, ahead) + energy.stored
         reached = 0.0
         if going and law.sense == 0.0:
@@ -338,8 +332,7 @@ def _clock_step(row, slider, law, contact, pieces, nodes, energy):
         time += reached
         if not (going and reached == slider.length):
             return time, False
-    mechanics.remember_jumps(row, slider, mechanics.feeling(contact, row))
-    energy.stored = stored_in(row, time, slider, law, mechanics.feeling(contact, row))
+    energy.stored = stored_in(row, time, slider, law, mechanics.settled(contact, row, slider))
     return time, True
 
 

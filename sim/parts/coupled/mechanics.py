@@ -154,13 +154,14 @@ def contact_area(bound, moment, time, radius, contact):
         if work > 0.0:
             over = 0.5 / math.pi * modulus * missing * missing / a - work + tilt * a
             slope = 0.5 / math.pi * modulus * missing / a * (2.0 * growth - missing / a) + tilt
-            if missing < 0.0:
-                over, slope = missing, growth
+            left = work - tilt * a
+            if missing < 0.0 or over < -0.75 * left:  # next to Hertz's radius, where the slope vanishes: by the depths
+                over, slope = missing - math.sqrt(2.0 * math.pi * a * max(left, 0.0) / modulus), growth
         else:
             over, slope = missing, growth
-        if not (slope > 0.0 or (slope == 0.0 and missing == 0.0)):
+        if not slope > 0.0:
             return math.nan, math.nan, 0.0, 0.0
-        change = max(min(over / slope, 0.5 * a), -a)  # from Hertz's radius, where the slope is zero, to its double
+        change = min(over / slope, 0.5 * a)
         a -= change
         if math.fabs(change) <= 1e-14 * a:
             break
@@ -298,10 +299,15 @@ def remember(row, slip, first_speed, last_speed, duration, contact):
 
 
 @device
-def remember_jumps(row, slider, contact):
-    """Add slip that took no time at the end of a clock step to the memory, as if it took next to none."""
+def settled(contact, row, slider):
+    """Return the numbers of the contact at the end of a clock step.
+
+    Slip that took no time there is added to the memory of the fluctuations as if it took next to none.
+    """
+    contact = feeling(contact, row)
     if row.path > row.recalled:
         remember(row, 0.0, 0.0, 0.0, _NO_TIME * slider.length, contact)
+    return contact
 
 
 @device
@@ -409,6 +415,21 @@ def elastic(row, time, slider, contact, energy):
     energy.work += row.spring_force * shift if forced > 0.0 else 0.0
     row.spring_force -= 0.0 if forced > 0.0 else stiffness * shift
     return True
+
+
+@device
+def answer(row, piece, slider, contact, energy):
+    """Slip at once at the start of a piece; return True if possible, and the contact then.
+
+    At the start of a clock step ΔΓ has been drawn: the answer to the difference from its mean is no sliding path.
+    """
+    going = elastic(row, 0.0, slider, contact, energy)
+    if piece == 0 and row.felt != row.drawn:
+        path, row.felt = row.path, row.drawn
+        contact = feeling(contact, row)
+        going = elastic(row, 0.0, slider, contact, energy)
+        row.path = path
+    return going, contact
 
 
 @device

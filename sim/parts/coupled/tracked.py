@@ -236,8 +236,7 @@ def _through(line, energy, pieces, slider, contact, tracks, ground, nodes):
             return time, False
     _sums(tracks, ground, first)
     row.bound, row.moment = first.bound, first.moment
-    mechanics.remember_jumps(row, slider, mechanics.feeling(contact, row))
-    energy.stored = stored_energy(row, first.square, time, slider, mechanics.feeling(contact, row))
+    energy.stored = stored_energy(row, first.square, time, slider, mechanics.settled(contact, row, slider))
     return time, True
 
 

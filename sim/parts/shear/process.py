@@ -149,8 +149,8 @@ class SlipRate(_OfTheMoment):
 
     def followed(self, past: Memory, motions: Motions, stress: Array) -> tuple[Memory, Array]:
         if motions.memory.weight.size:
-            past, unsteady = Memory(*(values[-1] for values in motions.memory)), np.empty(motions.path.shape)
-            _unsteadiness(*motions.memory[:3], unsteady)
+            past, (weight, mean, spread, *_) = Memory(*(values[-1] for values in motions.memory)), motions.memory
+            unsteady = np.where(spread > 0.0, spread, 0.0) / np.where(spread > 0.0, spread + weight * mean**2, 1.0)
         else:
             columns, unsteady = np.stack(past[:4], axis=1), np.empty(motions.path.shape)
             spread = motions.unsteady + np.zeros(motions.path.shape)
@@ -201,14 +201,6 @@ def _remember(past, path, duration, spent, length, unsteady):
         past[m, 0], past[m, 1], past[m, 2], past[m, 3] = memory
 
 
-@kernel("void(float64[:,:], float64[:,:], float64[:,:], float64[:, ::1])")
-def _unsteadiness(weight, mean, spread, unsteady):
-    """Write the unsteadiness of memories."""
-    for s in range(len(unsteady)):
-        for m in range(unsteady.shape[1]):
-            unsteady[s, m] = unsteadiness(weight[s, m], mean[s, m], spread[s, m])
-
-
 Amplitude = Annotated[Constant | Onset | Stress | SlipRate, Field(discriminator="model")]
 
 
@@ -218,16 +210,9 @@ class Time:
 
     #: The rate goes with |q| to this power.
     power: ClassVar[int] = 0
-    #: True if sliding renews the modes.
-    slides: ClassVar[bool] = False
 
     time: Annotated[float, Quantity("s", "correlation time of the fluctuations", "t_m", above=0)]
     model: Literal["time"] = "time"
-
-    @property
-    def rates(self) -> tuple[float, float] | None:
-        """λ over the speed [1/m] and λ at rest [1/s]; None if each mode has its own."""
-        return 0.0, 1.0 / self.time
 
     def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
         """Return ∫λdt over a step, shape (1, 1) or (members, 1), or (members, wavenumbers) [rad/m].
@@ -243,14 +228,9 @@ class Slip:
 
     #: The rate goes with |q| to this power.
     power: ClassVar[int] = 0
-    slides: ClassVar[bool] = True
 
     length: Annotated[float, Quantity("m", "correlation length of the fluctuations", "l", above=0)]
     model: Literal["slip"] = "slip"
-
-    @property
-    def rates(self) -> tuple[float, float] | None:
-        return 1.0 / self.length, 0.0
 
     def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
         return motion.path[..., np.newaxis] / self.length
@@ -262,8 +242,6 @@ class Wave:
 
     #: The rate goes with |q| to this power.
     power: ClassVar[int] = 1
-    slides: ClassVar[bool] = True
-    rates: ClassVar[None] = None
 
     waves: Annotated[float, Quantity("1", "own wavelengths after which a mode renews", "n", above=0)]
     model: Literal["wave"] = "wave"
@@ -278,8 +256,6 @@ class Diffusion:
 
     #: The rate goes with |q| to this power.
     power: ClassVar[int] = 2
-    slides: ClassVar[bool] = False
-    rates: ClassVar[None] = None
 
     diffusivity: Annotated[float, Quantity("m^2/s", "diffusivity of the fluctuations", "D", above=0)]
     model: Literal["diffusion"] = "diffusion"
@@ -374,7 +350,10 @@ class Renewing:
 
     @cached_property
     def field_law(self) -> FieldLaw:
-        return self.amplitude.field_law(self.mean, self.correlation.rates)
+        law, rates = self.correlation, None
+        if isinstance(law, Time | Slip):
+            rates = (1.0 / law.length, 0.0) if isinstance(law, Slip) else (0.0, 1.0 / law.time)
+        return self.amplitude.field_law(self.mean, rates)
 
     def _empty(self, members: int) -> Array:
         """Return the numbers of a state without any fluctuation."""
@@ -407,7 +386,7 @@ class Renewing:
             keep, size = keep + np.zeros(renew.shape), size + np.zeros((len(renew), 1))
         drawn = self._renew(values, keep, renew, size, motions.step, noise)
         energy = expected = self._scaled(amplitude, drawn)
-        if self.correlation.slides or self.amplitude.remembers:
+        if isinstance(self.correlation, Slip | Wave) or self.amplitude.remembers:
             before = drawn[-2] if len(drawn) > 1 else state.past.energy
             if keep.shape[2] == 1:
                 before = keep[-1, :, 0] ** 2 * before + (renew[-1, :, 0] * size[-1]) ** 2 * self.mean
