@@ -239,25 +239,31 @@ def feeling(contact, row):
 
 
 @device
-def _size(row, field):
-    """Return g² of the memory of a row."""
-    return field.floor + (1.0 - field.floor) * unsteadiness(row.weight, row.mean, row.spread)
+def _after(row, path, duration, spread, field):
+    """Return the memory of the amplitude after a part of a sub-step, and g² before and after it."""
+    before = row.weight, row.mean, row.spread, row.rest
+    after = remembered(before, path, duration, spread, field.length)
+    first, last = unsteadiness(before[0], before[1], before[2]), unsteadiness(after[0], after[1], after[2])
+    return after, field.floor + (1.0 - field.floor) * first, field.floor + (1.0 - field.floor) * last
 
 
 @device
 def following(contact, row, start, step):
     """Return the numbers of the contact for a sub-step, in which it follows the conditional mean of ΔΓ.
 
-    The energy at the end of the sub-step is estimated by the speed and g² at its start. It is linear in time, so that
-    the slip of the sub-step does not act on it. The next sub-step begins with the estimate and ends with its own, which
-    starts from the mean as integrated: errors do not add up.
+    The energy at the end of the sub-step is estimated by the speed at its start. It is linear in time, so that the slip
+    of the sub-step does not act on it. The next sub-step begins with the estimate and ends with its own, which starts
+    from the mean as integrated: errors do not add up.
     """
     field = contact.field
     if field.follows == 0.0:
         return contact
-    lost, size = -math.expm1(-2.0 * step * (field.by_slip * math.fabs(row.speed) + field.by_time)), _size(row, field)
-    energy = row.energy + lost * ((size if field.relaxing > 0.0 else 1.0) * field.energy - row.energy)
-    rate = (row.paid * (energy if field.relaxing > 0.0 else size * energy) - row.felt) / step
+    path = math.fabs(row.speed) * step
+    lost = -math.expm1(-2.0 * (field.by_slip * path + field.by_time * step))
+    _, first, last = _after(row, path, step, 0.0, field)
+    renewed, scale = (0.5 * (first + last), 1.0) if field.relaxing > 0.0 else (1.0, last)
+    energy = scale * (row.energy + lost * (renewed * field.energy - row.energy))
+    rate = (row.paid * energy - row.felt) / step
     return Contact(*contact[:12], row.felt - rate * start, rate, field)
 
 
@@ -280,19 +286,18 @@ def remember(row, slip, first_speed, last_speed, duration, contact):
     row.felt += contact.fluctuating_rate * duration
     if field.length == math.inf:
         return
-    path, first = row.path - row.recalled, _size(row, field)
+    path = row.path - row.recalled
     change = math.fabs(last_speed) - math.fabs(first_speed)
     bend = 0.5 * (math.fabs(first_speed) + math.fabs(last_speed)) - math.fabs(slip) / duration
     spread = duration * (change * change / 12.0 + bend * bend / 5.0)
-    row.weight, row.mean, row.spread, row.rest = remembered(
-        (row.weight, row.mean, row.spread, row.rest), path, duration, spread, field.length
-    )
+    after, first, last = _after(row, path, duration, spread, field)
+    row.weight, row.mean, row.spread, row.rest = after
     row.recalled = row.path
     exponent = 2.0 * (field.by_slip * path + field.by_time * duration)
     lost = -math.expm1(-exponent)
     size = lost
     if field.relaxing > 0.0:
-        last, of_first = _size(row, field), lost / exponent - (1.0 - lost) if exponent > 0.0 else 0.0
+        of_first = lost / exponent - (1.0 - lost) if exponent > 0.0 else 0.0
         size = first * of_first + last * (lost - of_first)
     row.renewed += size - lost * row.renewed
     row.energy += size * field.energy - lost * row.energy
