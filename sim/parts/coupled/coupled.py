@@ -182,11 +182,11 @@ def advance(
     if law.length < math.inf:
         for name, values in shear.past._asdict().items():
             rows[name] = values if values.size else law.energy
+        law = law._replace(length=law.length / stretch, by_slip=law.by_slip * stretch)
     state = rows.view(float).reshape(members, COLUMNS)
     clock, work = _clock(contact, ends), stretch * force
     inputs = Inputs(state, slider.energies.copy(), course, clock, _of_columns(*units), work)
     columns, energies = np.empty((COLUMNS, len(steps), members)), np.empty((len(steps), *slider.energies.shape))
-    law = law._replace(length=law.length / stretch, by_slip=law.by_slip * stretch)
     numbers = *_numbers(drive, bonds, contact, units), tuple(law)
     end, bonding = _advanced(bonds, population, contact.radius, inputs, numbers, (columns, energies), noise)
     reached = dict(zip(_NAMES, columns, strict=True))
@@ -200,7 +200,7 @@ def advance(
     after = Driven(**shared, stage_position=stage, stage_speed=stage_speed, energies=energies)
     first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
     way = duration[:, np.newaxis], reached["slip"], reached["path"]
-    memory = Memory(*(reached[name] for name in Memory._fields))
+    memory = Memory(*(reached[name] for name in Memory._fields)) if law.length < math.inf else Memory()
     motions = Motions(steps.start, ends[1:, np.newaxis], *way, first, after.speed, after.position, memory=memory)
     if isinstance(bonds, models.Counted):
         end, drawn = bonds.advance(cast(models.Population, population), motions, contact.radius, noise)
