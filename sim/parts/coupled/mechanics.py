@@ -204,6 +204,8 @@ FEW, SOME = 1e-12, 0.1
 LEAST = 1e-13
 #: Slip in a sub-step over the length that fluctuations remember; time of a slip at once, over the piece's.
 _REACH, _NO_TIME = 0.5, 1e-6
+#: Share of the error of the last estimates of ΔΓ that a sub-step corrects, over its part of the memory.
+_CORRECTED = 4.0
 MOST_STEPS = 2_000_000
 
 
@@ -251,19 +253,20 @@ def _after(row, path, duration, spread, field):
 def following(contact, row, start, step):
     """Return the numbers of the contact for a sub-step, in which it follows the conditional mean of ΔΓ.
 
-    The energy at the end of the sub-step is estimated by the speed at its start. It is linear in time, so that the slip
-    of the sub-step does not act on it. The next sub-step begins with the estimate and ends with its own, which starts
-    from the mean as integrated: errors do not add up.
+    Its change in the sub-step is estimated by the speed at the start. It is linear in time, so that the slip of the
+    sub-step does not act on it. The error of the last estimates is corrected by a share that grows with the sub-step:
+    a correction in next to no time would be a jump.
     """
     field = contact.field
     if field.follows == 0.0:
         return contact
     path = math.fabs(row.speed) * step
-    lost = -math.expm1(-2.0 * (field.by_slip * path + field.by_time * step))
+    exponent = 2.0 * (field.by_slip * path + field.by_time * step)
+    lost, share = -math.expm1(-exponent), min(1.0, _CORRECTED * (exponent + path / field.length))
     _, first, last = _after(row, path, step, 0.0, field)
-    renewed, scale = (0.5 * (first + last), 1.0) if field.relaxing > 0.0 else (1.0, last)
-    energy = scale * (row.energy + lost * (renewed * field.energy - row.energy))
-    rate = (row.paid * energy - row.felt) / step
+    renewed, first, last = (0.5 * (first + last), 1.0, 1.0) if field.relaxing > 0.0 else (1.0, first, last)
+    mean, change = row.paid * first * row.energy, lost * (renewed * field.energy - row.energy)
+    rate = (row.paid * last * (row.energy + change) - mean + share * (mean - row.felt)) / step
     return Contact(*contact[:12], row.felt - rate * start, rate, field)
 
 

@@ -72,6 +72,8 @@ def test_the_elastic_answer_to_noise_is_no_path_but_that_to_the_mean_and_to_a_fo
     shear = Banded(**BY_SLIP, amplitude=SlipRate(floor=0.5, relaxing=True), paid_by_adhesion=0.1)
     lens = scene(1, 8, drive=Spring(stage=2e-2, stiffness=100.0), bonds=BONDS[bonds], shear=shear)
     *_, state = march(lens, np.arange(1))
+    read = dict(zip(READINGS, lens.parts.drive.readings(state.drive)[0], strict=True))
+    assert abs(read["energy_residual"]) < 1e-6 * read["drive_work"]
     low, high = state.shear.expected, 2.0 * state.shear.expected
     (_, still), (noisy, none), (slip, path) = (
         at_once(lens, state, *e) for e in ((low, low), (low, high), (high, high))
