@@ -85,7 +85,7 @@ def start(scenario: Scenario, noise: MemberNoise) -> State:
     terms = balance(scenario, bonding.fraction, bonding.strength, shear.energy, slider.position)
     touch = contact.start(motion, scenario.times.duration, terms)
     if drive.solves_motion:
-        around = _step_contact(scenario, touch, shear.energy, range(1, 2))
+        around = _step_contact(scenario, touch, shear, range(1, 2))
         slider = coupled.load(scenario.parts, slider, bonding, around, scenario.times.duration)
     largest = extremes.first(bonding, touch.radius, _pull(scenario, 0.0, touch.radius))
     return State(0, slider, bonds, bonding, shear, touch, largest)
@@ -99,7 +99,7 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
     drive, population, process, contact = scenario.parts
     slider: Sliding
     if drive.solves_motion:
-        around = _step_contact(scenario, state.contact, state.shear.energy, steps)
+        around = _step_contact(scenario, state.contact, state.shear, steps)
         sliders, motions, bonds, bonding = coupled.advance(
             scenario.parts, state.drive, state.bonds, around, scenario.times, steps, noise.bonds
         )
@@ -165,17 +165,17 @@ def balance(scenario: Scenario, fraction: Array, strength: Array, energy: Array,
     return Balance(bonded, fluctuating, strength, margin, scenario.bodies, scenario.adhesion.work)
 
 
-def _step_contact(scenario: Scenario, touch: ContactState, energy: Array, steps: range) -> StepContact:
+def _step_contact(scenario: Scenario, touch: ContactState, shear: Storing, steps: range) -> StepContact:
     """Return contact and half-space at the start of some clock steps, for a drive that feels the friction."""
     contact, bodies, times, adhesion = scenario.contact, scenario.bodies, scenario.times, scenario.adhesion
     first, last = contact.mount_between(times.at(np.arange(steps.start - 1.0, steps.stop)), times.duration)
     share = 1.0 if scenario.margin is None else scenario.margin(np.nan_to_num(touch.radius, nan=0.0))
-    bare = adhesion.work_of_bonds(0.0) - scenario.fluctuations.paid_by_adhesion * share * energy
+    bare, paid = adhesion.work_of_bonds(0.0), scenario.fluctuations.paid_by_adhesion * share
     bonded = adhesion.work_of_bonds(1.0) - adhesion.work_of_bonds(0.0)
     area = scenario.contact_area
     stays = contact.lags or not (contact.changes or bonded or contact.reversible)
-    solid = *bodies, scenario.solid.effective[0]
-    return StepContact(touch.radius, bare, bonded, contact.reversible, (first.mount, last.mount), stays, *solid, area)
+    around = (first.mount, last.mount), stays, *bodies, scenario.solid.effective[0], area
+    return StepContact(touch.radius, bare, paid, shear, bonded, contact.reversible, *around)
 
 
 def _pull(scenario: Scenario, time: float | Array, radius: Array) -> Array:

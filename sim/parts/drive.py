@@ -82,7 +82,7 @@ class _Sliding(Part):
         """Slip, path and final speed from time ``start`` to ``stop`` of a run of ``duration`` [s]."""
         return Motion(step, *self._sums(np.array([start, stop]), duration))
 
-    def _sums(self, ends: Array, duration: float) -> tuple[Array, ...]:
+    def _sums(self, ends: Array, duration: float) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
         """Return quantities of ``Motion`` from ``time`` to ``unsteady`` in the intervals between times [s]."""
         pieces = self.pieces(ends, duration).joined
         return ends[1:], np.diff(ends), pieces.integral, pieces.path, pieces.first, pieces.last, pieces.unsteady

@@ -9,6 +9,7 @@ members agree; a state, and what is of one step, has the member as first axis. T
 in +x is positive.
 """
 
+import math
 from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -79,7 +80,62 @@ def _constant(value: float) -> Array:
     return array
 
 
-_NONE, _UNKNOWN = _constant(0.0), _constant(np.nan)
+_NONE, _UNKNOWN, _EMPTY = _constant(0.0), _constant(np.nan), np.empty(0)
+
+
+class Memory(NamedTuple):
+    """Earlier sliding as the fluctuations remember it: each an array of shape (1,) or (members,), empty if unused.
+
+    Of a block of steps they have the step as first axis. With A_j = ∫ e^(−s/l) |V|^j dt, where s was slid since then,
+    the first three are A0, A1/A0 and A2 − A1²/A0, whose rounding errors do not grow.
+
+    Attributes
+    ----------
+    weight : array
+        Weighted time A0 [s].
+    mean : array
+        Weighted mean of the absolute speed [m/s].
+    spread : array
+        Weighted integral of the squared difference from that mean [m²/s].
+    renewed : array
+        Variance of what was renewed since the last draw, v' = 2λ (g² − v) [1].
+    energy : array
+        Energy of the field [J/m²], conditional mean since the last draw; not scaled by g² unless amplitudes relax.
+    """
+
+    weight: Array = _EMPTY
+    mean: Array = _EMPTY
+    spread: Array = _EMPTY
+    renewed: Array = _EMPTY
+    energy: Array = _EMPTY
+
+
+class FieldLaw(NamedTuple):
+    """Numbers by which a drive that solves its motion follows the memory of the fluctuations in its sub-steps.
+
+    Attributes
+    ----------
+    length : float
+        Distance that the amplitude remembers [m], infinite without a memory.
+    floor : float
+        g² in steady sliding [1].
+    by_slip, by_time : float
+        Rate λ of the amplitudes over the speed [1/m], and at rest [1/s].
+    relaxing : float
+        1 if only what is renewed has the new size, else 0.
+    energy : float
+        Mean of ΔΓ at amplitude 1 [J/m²].
+    follows : float
+        1 if the contact follows the conditional mean of ΔΓ in the sub-steps, 0 if it has that of the last draw.
+    """
+
+    length: float = math.inf
+    floor: float = 0.0
+    by_slip: float = 0.0
+    by_time: float = 0.0
+    relaxing: float = 0.0
+    energy: float = 0.0
+    follows: float = 0.0
 
 
 class Motion(NamedTuple):
@@ -107,6 +163,8 @@ class Motion(NamedTuple):
         Integral over the step of the square of what the absolute speed differs from its mean there [m²/s].
     position : array
         Displacement of the slider since the start, at the end of each step [m].
+    memory : Memory
+        Memory of the fluctuations at the end of each step, if the drive solves its motion.
     """
 
     step: int
@@ -118,6 +176,7 @@ class Motion(NamedTuple):
     speed: Array
     unsteady: Array = _NONE[np.newaxis]
     position: Array = _NONE[np.newaxis]
+    memory: Memory = Memory()
 
 
 def during(values: Array, steps: int) -> Array:
@@ -205,6 +264,14 @@ class Storing(Protocol):
     @property
     def energy(self) -> Array:
         """Elastic energy of the fluctuations per area ΔΓ [J/m²]."""
+
+    @property
+    def expected(self) -> Array:
+        """Mean of ΔΓ at the end of the last step before it was drawn [J/m²]; ΔΓ if the field forgets no slip."""
+
+    @property
+    def past(self) -> Memory:
+        """Memory of earlier sliding."""
 
 
 class Mount(NamedTuple):
@@ -329,6 +396,10 @@ class Shear(Protocol[State]):
 
     def advance(self, state: State, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[State, Array]:
         """Fluctuations after a block of steps, at the ends of which the bonds are ``bonding``; ΔΓ at each [J/m²]."""
+
+    @property
+    def field_law(self) -> FieldLaw:
+        """Numbers by which sub-steps of a drive follow the memory of the fluctuations."""
 
     @property
     def gammas(self) -> Gammas:

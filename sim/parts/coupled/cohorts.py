@@ -228,7 +228,7 @@ def go_to_node(place, nodes, at_start, pool, count, start, step, row, slider, co
 
 
 @device
-def accept_nodes(row, nodes, start, step, slider, limit, energy):
+def accept_nodes(row, nodes, start, step, slider, contact, limit, energy):
     """Add an accepted sub-step to the row: integrals of the powers over it, and the row at its end."""
     damping, viscosity = slider.damping, slider.viscosity
     firms = np.empty(3)
@@ -247,11 +247,11 @@ def accept_nodes(row, nodes, start, step, slider, limit, energy):
         energy.viscosity += share * node.area * viscosity * speeds[i] * speeds[i]
         energy.rupture += share * 0.5 * node.area * node.lost
         energy.area -= share * 0.5 * (node.square * spreads[i] + node.sheared * node.sheared * firmer[i])
-        row.squared_speed += share * speeds[i] * speeds[i]
         if i > 0:
             if node.cut > 0.0:
                 energy.rupture += 0.25 * (nodes[i - 1].area + node.area) * node.cut * limit * limit
-            row.path += math.fabs(node.slip - nodes[i - 1].slip)
+            shift, share = node.slip - nodes[i - 1].slip, PLACES[i] - PLACES[i - 1]
+            mechanics.remember(row, shift, speeds[i - 1], speeds[i], share * step, contact)
     last = nodes[2]
     row.spring_force = mechanics.pull_on(start + step, start, last.body, row, slider)
     row.speed, row.sheared, row.radius = speeds[2], last.sheared, last.radius
@@ -456,7 +456,7 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
                 contact = mechanics.later(contact, 0.0, 1.0)
             continue
         saved[:, :count] = pool[:3, :count]
-        first = nodes[0]
+        first, contact = nodes[0], mechanics.following(contact, row, start, step)
         at_start = begin_sub_step(row, first, start, slider, contact)
         new_count, factor = go_to_node(1, nodes, at_start, pool, count, start, step, row, slider, contact, unit, rules)
         if new_count >= 0:
@@ -465,10 +465,12 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
             )
             factor = min(factor, other)
         shift, bend, error = nodes[2].slip, 0.0, math.inf
+        within = mechanics.within_reach(shift, contact)
         if new_count >= 0:
             bend, error = bend_of(nodes, step, row, slider)
         grows = min(factor, 4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else min(factor, 4.0)
-        if not (error <= 1.0 and factor >= 1.0):
+        grows = min(grows, 0.9 * within)
+        if not (error <= 1.0 and factor >= 1.0 and within >= 1.0):
             pool[:3, :count] = saved[:, :count]
             row.next_step = step * (grows if error < math.inf else 0.25)
             if rules.limit < math.inf and step < _BRIEF * length:
@@ -483,7 +485,7 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
                     count, row.next_step = new_count, 1e-6 * length
                     travelled += unit * (row.slip - slid)
             continue
-        accept_nodes(row, nodes, start, step, slider, rules.limit / unit, energy)
+        accept_nodes(row, nodes, start, step, slider, contact, rules.limit / unit, energy)
         count, row.acceleration = new_count, bend
         travelled += unit * shift
         if count > 1.25 * settled + 16.0 or count + 4 > pool.shape[1]:
@@ -507,15 +509,17 @@ def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, ro
     count = read_row(pool, weight, stretch, width, share)
     time, going, travelled, settled, stays = 0.0, True, lattice[0], lattice[1], contact.stays
     for p in range(len(pieces)):
-        slider, from_here = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, stays)
+        slider = mechanics.slider_in(slider, pieces[p])
+        from_here = mechanics.later(mechanics.feeling(contact, row), time, stays)
         reached, worked, slid, before = 0.0, energy.work, row.slip, energy.stored
         sums_at(pool, count, unit, rules, nodes[0])
         if p > 0:
             before = stored_energy(row, nodes[0].square, 0.0, slider, from_here)
         row.bound, row.moment = nodes[0].bound, nodes[0].moment
-        jumps = mechanics.force_jumps(row, slider)
-        unslipped = stored_energy(row, nodes[0].square, 0.0, slider, from_here) if jumps else before
-        going = mechanics.elastic(row, 0.0, slider, from_here, energy)
+        jumps, unslipped = mechanics.force_jumps(row, slider), before
+        if jumps:
+            unslipped = stored_energy(row, nodes[0].square, 0.0, slider, mechanics.drawn(from_here, row, p))
+        going, from_here = mechanics.answer(row, p, slider, from_here, energy)
         if going:
             for i in range(count):
                 pool[1, i] += unit * (row.slip - slid)
@@ -532,7 +536,8 @@ def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, ro
             break
     if going:
         sums_at(pool, count, unit, rules, nodes[0])
-        energy.stored = stored_energy(row, nodes[0].square, time, slider, mechanics.later(contact, 0.0, stays))
+        contact = mechanics.later(mechanics.settled(contact, row, slider), 0.0, stays)
+        energy.stored = stored_energy(row, nodes[0].square, time, slider, contact)
     if count > weight.size:
         count = settle(pool[0], pool[1], pool[2], count, 1.0 if row.slip >= 0.0 else -1.0, travelled, rules)
         settled = count
@@ -553,8 +558,8 @@ def advance_cohorts(inputs, numbers, outputs, share, rules, weight, stretch, wid
     ``share`` of each row's bonds that is left at the start; ``sums`` get those of the cohorts after each step. The rest
     as in ``mean_field.advance_rows``.
     """
-    rows, energies, bare, pieces, clock, units, work = inputs
-    slider, contact, (reached, spent) = mechanics.Slider(*numbers[0]), mechanics.Contact(*numbers[2]), outputs
+    rows, energies, pieces, clock, units, work = inputs
+    slider, contact, (reached, spent) = mechanics.Slider(*numbers[0]), mechanics.contact_of(numbers), outputs
     rules, most, unit = rules_of(rules), weight.shape[1] + 520, units[mechanics.SLIP]
     columns, booked, nodes = np.empty(mechanics.COLUMNS), np.empty(mechanics.ENERGIES), np.zeros(3, NODE)
     row, energy = columns.view(mechanics.ROW)[0], booked.view(ENERGY)[0]
@@ -566,7 +571,7 @@ def advance_cohorts(inputs, numbers, outputs, share, rules, weight, stretch, wid
             start, stop = stop, mechanics.pieces_to(k, stop, pieces)
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
             if math.isnan(row.runaway_time):
-                now = mechanics.contact_at(contact, bare[m], clock[k], row)
+                now = mechanics.contact_at(contact, clock[k], row)
                 time, going = _through(row, energy, pieces[start:stop], slider, now, unit, left, rules, bonds, room)
                 if not going:
                     mechanics.run_away(row, booked, clock[k, 0] + time)

@@ -1,8 +1,9 @@
 """Drive and bonds inside one clock step, where the friction feeds back into the motion.
 
 The two are solved together in sub-steps (``radau``, ``cohorts``) that depend on the member alone. The radius of an
-equilibrium contact follows the bonds within them; the fluctuations ΔΓ, a ``rate_dependent`` edge and what a disc pays
-of ΔΓ stay as they were at the start of the clock step.
+equilibrium contact follows the bonds within them, and the conditional mean of fluctuations ΔΓ that remember the
+sliding. Other fluctuations, a ``rate_dependent`` edge and the share of ΔΓ that a disc pays stay as they were at the
+start of the clock step.
 """
 
 import functools
@@ -18,10 +19,10 @@ from sim.parts.bonds.cohorts import Cohorts, numbers_of
 from sim.parts.bonds.tracked import AGAIN, Tracks
 from sim.parts.coupled.cohorts import advance_cohorts
 from sim.parts.coupled.mean_field import advance_rows
-from sim.parts.coupled.mechanics import COLUMNS, ROW, Contact, Inputs, Law, Slider
+from sim.parts.coupled.mechanics import COLUMNS, ROW, Inputs, Law, Slider
 from sim.parts.coupled.tracked import advance_tracks
 from sim.parts.drive import ENERGY, Driven, Force, Spring
-from sim.parts.exchange import Array, Bonding, Flags, Motion, Mount, Parts, Sliding, Times
+from sim.parts.exchange import Array, Bonding, Flags, Memory, Motion, Mount, Parts, Sliding, Storing, Times
 
 #: Stretch by which the motion of bonds is measured that neither force nor stretch breaks, in a run without motion [m].
 _STRETCH = 1e-9
@@ -29,11 +30,22 @@ _NAMES = ROW.names or ()
 #: Fields of the state of a slider that are columns of a row.
 _SHARED = [name for name in Driven._fields if name in _NAMES]
 #: Columns of a row that are measured by a stretch.
-_STRETCHED = ["body_speed", "sheared", "moment", "speed", "position", "slip", "path", "acceleration"]
+_STRETCHED = [
+    "body_speed",
+    "sheared",
+    "moment",
+    "speed",
+    "position",
+    "slip",
+    "path",
+    "acceleration",
+    "mean",
+    "recalled",
+]
 #: Relative difference up to which two radii are the same equilibrium, found by two methods.
 _SAME = 1e-9
-#: Numbers of slider, bonds and contact.
-_Numbers = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
+#: Numbers of slider, bonds, contact and fluctuations.
+_Numbers = tuple[tuple[float, ...], ...]
 
 
 class StepContact(NamedTuple):
@@ -43,8 +55,12 @@ class StepContact(NamedTuple):
     ----------
     radius : array
         Contact radius at their start [m], nan where it is open.
-    bare : array
-        Work of adhesion that is left without bonds [J/m²].
+    bare : float
+        Work of adhesion without bonds and fluctuations [J/m²].
+    paid : float or array
+        Share of ΔΓ that adhesion pays [1].
+    shear : Storing
+        Fluctuations.
     bonded : float
         Work of adhesion of the bonds of rest [J/m²].
     reversible : float
@@ -62,7 +78,9 @@ class StepContact(NamedTuple):
     """
 
     radius: Array
-    bare: Array
+    bare: float
+    paid: float | Array
+    shear: Storing
     bonded: float
     reversible: float
     mounts: tuple[Mount, Mount]
@@ -106,7 +124,7 @@ def _of_columns(stretch: float, force: float) -> Array:
     """Return the units of the columns of a row, from those of a stretch [m] and a force [N]."""
     scales = np.ones(COLUMNS)
     named = scales.view(ROW)
-    named["spring_force"], named["squared_speed"] = force, stretch**2
+    named["spring_force"], named["spread"] = force, stretch**2
     named[_STRETCHED] = stretch
     return scales
 
@@ -168,11 +186,19 @@ def advance(
     pieces, duration = drive.driven(ends, times.duration), ends[1:] - ends[:-1]
     scale = 1.0 / (stretch if drive.spring else force)
     course = np.stack([pieces.interval, pieces.stop - pieces.start, *(scale * np.array(pieces[3:6]))], axis=1)
-    state, bare = rows.view(float).reshape(members, COLUMNS), contact.bare + np.zeros(members)
+    law, shear = parts.shear.field_law, contact.shear
+    rows["paid"], rows["drawn"] = contact.paid, contact.paid * shear.energy
+    answers = isinstance(bonds, _WITH_STRETCH) and shear.expected.size  # others hold a contact that is rigid
+    rows["felt"] = contact.paid * (shear.expected if answers else shear.energy)
+    if law.length < math.inf:
+        for name, values in shear.past._asdict().items():
+            rows[name] = values if values.size else law.energy
+        law = law._replace(length=law.length / stretch, by_slip=law.by_slip * stretch)
+    state = rows.view(float).reshape(members, COLUMNS)
     clock, work = _clock(contact, ends), stretch * force
-    inputs = Inputs(state, slider.energies.copy(), bare, course, clock, _of_columns(*units), work)
+    inputs = Inputs(state, slider.energies.copy(), course, clock, _of_columns(*units), work)
     columns, energies = np.empty((COLUMNS, len(steps), members)), np.empty((len(steps), *slider.energies.shape))
-    numbers = _numbers(drive, bonds, contact, units)
+    numbers = *_numbers(drive, bonds, contact, units), tuple(law)
     end, bonding = _advanced(bonds, population, contact.radius, inputs, numbers, (columns, energies), noise)
     reached = dict(zip(_NAMES, columns, strict=True))
     stage, stage_speed = np.zeros((2, len(steps), members))
@@ -184,11 +210,9 @@ def advance(
     shared = {name: reached[name] for name in _SHARED}
     after = Driven(**shared, stage_position=stage, stage_speed=stage_speed, energies=energies)
     first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
-    path, spans = reached["path"], duration[:, np.newaxis]
-    unsteady = np.maximum(reached["squared_speed"] - path**2 / spans, 0.0)  # slip at once is spread over the step
-    motions = Motion(
-        steps.start, ends[1:, np.newaxis], spans, reached["slip"], path, first, after.speed, unsteady, after.position
-    )
+    way, spans = (reached["slip"], reached["path"], first, after.speed), duration[:, np.newaxis]
+    memory = Memory(*(reached[name] for name in Memory._fields)) if law.length < math.inf else Memory()
+    motions = Motion(steps.start, ends[1:, np.newaxis], spans, *way, position=after.position, memory=memory)
     if isinstance(bonds, models.Counted):
         end, drawn = bonds.advance(cast(models.Population, population), motions, contact.radius, noise)
         stress = np.where(after.speed != 0.0, drawn.stress, bonding.stress)
@@ -278,9 +302,9 @@ def _numbers(drive: Force | Spring, bonds: _Driven, contact: StepContact, units:
         mean_stress = contact.reversible * float(
             mean_stress_energy(1.0, stress, contact.modulus, contact.poisson_ratio)
         )
-    still = 0.0, 0.0, 0.0, 0.0, 0.0, float(contact.stays), contact.bonded / of_rest, mean_stress
+    still = contact.bare, 0.0, 0.0, 0.0, 0.0, float(contact.stays), contact.bonded / of_rest, mean_stress
     solid = contact.mounts[0].stiffness, 1.0 / contact.sphere_radius, contact.modulus, contact.area
-    return tuple(slider), tuple(breaking), tuple(Contact(*still, *solid))
+    return tuple(slider), tuple(breaking), (*still, *solid)
 
 
 def _clock(contact: StepContact, ends: Array) -> Array:

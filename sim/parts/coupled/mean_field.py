@@ -168,6 +168,7 @@ def _piece(line, slider, law, contact, nodes, books):
             contact, nodes.last_step = (contact, 0.0) if gone else (mechanics.later(contact, 0.0, 1.0), nodes.last_step)
             row.next_step = 0.0
             continue
+        contact = mechanics.following(contact, row, start, step)
         grows, accepted = try_sub_step(row, start, step, slider, law, contact, nodes)
         if not accepted:
             row.next_step = step * grows
@@ -236,6 +237,8 @@ def _rest(row, start, settles, slider, law, contact, energy):
         moment = last / area if area > 0.0 else 0.0
     row.spring_force, row.bound, row.radius, row.moment = last, share, radius, moment
     row.speed, row.body_speed = 0.0, 0.0
+    if end > start:
+        mechanics.remember(row, 0.0, 0.0, 0.0, end - start, contact)
     return end
 
 
@@ -278,6 +281,7 @@ def _slide(row, start, slider, along, contact, nodes, energy):
                 contact = mechanics.later(contact, 0.0, 1.0)
                 continue
             return start if slider.mass == 0.0 or row.speed == 0.0 else -1.0
+        contact = mechanics.following(contact, row, start, step)
         grows, accepted = try_sub_step(row, start, step, slider, along, contact, nodes)
         if not accepted:
             row.next_step = step * grows
@@ -306,7 +310,7 @@ def _sticking_piece(row, slider, law, contact, nodes, energy):
     for _ in range(_CHANGES):
         if start >= length:
             return length
-        rests = row.speed == 0.0
+        contact, rests = mechanics.feeling(contact, row), row.speed == 0.0
         if rests:
             before = start
             settles = law.binding > 0.0 and sense * row.spring_force > 0.0
@@ -337,8 +341,8 @@ def _clock_step(line, slider, law, contact, pieces, nodes, books):
     row, energy = line[0], books[0]
     is_open, time, going, stays = row.radius == 0.0, 0.0, True, contact.stays
     for p in range(len(pieces)):
-        slider, ahead, reached = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, stays), 0.0
-        nodes.last_step = 0.0
+        slider, reached, nodes.last_step = mechanics.slider_in(slider, pieces[p]), 0.0, 0.0
+        ahead = mechanics.later(mechanics.feeling(contact, row), time, stays)
         if is_open and law.sense != 0.0 and slider.mass + slider.damping + slider.forced == 0.0:
             # as nothing else holds an open contact, it goes along with the stage
             slip, _ = mechanics.free_shifts(row, slider)
@@ -349,10 +353,12 @@ def _clock_step(line, slider, law, contact, pieces, nodes, books):
                 row.bound = 1.0 / (1.0 + law.slows * math.fabs(row.speed))
         jumps = mechanics.force_jumps(row, slider)
         if p == 0 or jumps:
-            unslipped = stored_in(row, 0.0, slider, law, ahead) if jumps else energy.stored
+            unslipped = energy.stored
+            if jumps:
+                unslipped = stored_in(row, 0.0, slider, law, mechanics.drawn(ahead, row, p))
             before, worked = energy.stored if p == 0 else unslipped, energy.work
             if law.sense == 0.0:
-                going = mechanics.elastic(row, 0.0, slider, ahead, energy)
+                going, ahead = mechanics.answer(row, p, slider, ahead, energy)
             elif slider.forced > 0.0:
                 row.spring_force = mechanics.driven(0.0, slider)[1]
             lost = energy.work - worked - stored_in(row, 0.0, slider, law, ahead) + before
@@ -364,7 +370,8 @@ def _clock_step(line, slider, law, contact, pieces, nodes, books):
         time += reached
         if not (going and reached == slider.length):
             return time, False
-    energy.stored = stored_in(row, time, slider, law, mechanics.later(contact, 0.0, stays))
+    contact = mechanics.later(mechanics.settled(contact, row, slider), 0.0, stays)
+    energy.stored = stored_in(row, time, slider, law, contact)
     return time, True
 
 
@@ -372,12 +379,12 @@ def _clock_step(line, slider, law, contact, pieces, nodes, books):
 def advance_rows(inputs, numbers, outputs):
     """Advance all rows and their energies through some clock steps, each row by itself.
 
-    ``numbers``: those of ``Slider``, ``Law`` and ``Contact``. ``outputs``: columns and
+    ``numbers``: those of ``Slider``, ``Law``, ``Contact`` and ``FieldLaw``. ``outputs``: columns and
     energies at the end of each step, shape (columns, steps, rows) and (steps, rows, energies). A row that nothing holds
     any longer ends there.
     """
-    rows, energies, bare, pieces, clock, units, work = inputs
-    slider, law, contact = mechanics.Slider(*numbers[0]), mechanics.Law(*numbers[1]), mechanics.Contact(*numbers[2])
+    rows, energies, pieces, clock, units, work = inputs
+    slider, law, contact = mechanics.Slider(*numbers[0]), mechanics.Law(*numbers[1]), mechanics.contact_of(numbers)
     reached, spent = outputs
     both, nodes = (np.empty(2 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES)), np.empty(1, radau.NODE_VALUES)
     line, books = both[0].view(mechanics.ROW), both[1].view(ENERGY)  # as they are, and before the last sub-step
@@ -390,7 +397,7 @@ def advance_rows(inputs, numbers, outputs):
             if law.sense != 0.0:
                 row.moment = math.copysign(row.bound, row.speed) if row.speed != 0.0 else 0.0
             if math.isnan(row.runaway_time):
-                now = mechanics.contact_at(contact, bare[m], clock[k], row)
+                now = mechanics.contact_at(contact, clock[k], row)
                 time, going = _clock_step(line, slider, law, now, pieces[start:stop], nodes[0], books)
                 if not going:
                     mechanics.run_away(row, booked, clock[k, 0] + time)

@@ -5,23 +5,27 @@ from typing import NamedTuple
 
 from sim.numerics.jit import device
 from sim.parts.drive import ENERGY
-from sim.parts.exchange import Array, record
+from sim.parts.exchange import Array, FieldLaw, record
+from sim.parts.shear.process import remembered, unsteadiness
 
 #: Row of slider and bonds: spring force S, speed of the body, u, N, M, speed of the interface, displacement of the
 #: body, slip and path of the clock step, contact radius, next sub-step, number of sub-steps, time of a runaway,
-#: integral of the squared speed of the interface over the clock step, acceleration of the interface.
+#: acceleration of the interface. Then ``Memory``, and the path of the clock step up to which it reaches; the share of
+#: ΔΓ that adhesion pays, the energy it pays in the sub-steps, and that after the draw at the start of the clock step.
 ROW = record(
     "spring_force body_speed sheared bound moment speed position slip path radius "
-    "next_step substeps runaway_time squared_speed acceleration"
+    "next_step substeps runaway_time acceleration "
+    "weight mean spread renewed energy recalled paid felt drawn"
 )
 COLUMNS = len(ROW.names or ())
 SLIP = (ROW.names or ()).index("slip")
 ENERGIES = len(ENERGY.names or ())
 _STORED = (ENERGY.names or ()).index("stored")
-#: Types of ``Inputs``, of the numbers of slider, bonds and contact, and of rows and energies at the end of each step.
+#: Types of ``Inputs``, of the numbers of slider, bonds, contact and fluctuations, and of rows and energies at the end
+#: of each step.
 ARGUMENTS = (
-    "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64)), "
-    "Tuple((UniTuple(float64, 12), UniTuple(float64, 7), UniTuple(float64, 12))), "
+    "Tuple((float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64)), "
+    "Tuple((UniTuple(float64, 12), UniTuple(float64, 7), UniTuple(float64, 12), UniTuple(float64, 7))), "
     "Tuple((float64[:, :, ::1], float64[:, :, ::1]))"
 )
 
@@ -66,7 +70,7 @@ class Contact(NamedTuple):
     """Numbers of the contact: work of adhesion without bonds; load and base with their rates; 1 if its radius stays.
 
     Then work of adhesion per bond share N; energy that the mean stress takes, over radius and M²; stiffness behind the
-    base; curvature, modulus, reference area.
+    base; curvature, modulus, reference area; energy that fluctuations take, with its rate; numbers of the fluctuations.
     """
 
     bare: float
@@ -81,20 +85,21 @@ class Contact(NamedTuple):
     curvature: float
     modulus: float
     area: float
+    fluctuating: float
+    fluctuating_rate: float
+    field: FieldLaw
 
 
 class Inputs(NamedTuple):
     """State and course of some clock steps, for all rows.
 
-    ``rows`` and ``energies`` have the columns of ``ROW`` and ``ENERGY`` and are advanced in place; ``bare`` is the work
-    of adhesion of each row without bonds. ``pieces``: number of the clock step, then the first four of ``Slider``.
-    ``clock``: beginning of each step, load and its rate, base and its rate. ``units`` of the columns and of ``work``:
-    the equations have none.
+    ``rows`` and ``energies`` have the columns of ``ROW`` and ``ENERGY`` and are advanced in place. ``pieces``: number
+    of the clock step, then the first four of ``Slider``. ``clock``: beginning of each step, load and its rate, base and
+    its rate. ``units`` of the columns and of ``work``: the equations have none.
     """
 
     rows: Array
     energies: Array
-    bare: Array
     pieces: Array
     clock: Array
     units: Array
@@ -123,7 +128,8 @@ def contact_area(bound, moment, time, radius, contact):
     if contact.stays > 0.0:
         return radius, math.pi * radius * radius / contact.area, 0.0, 0.0
     bonded, mean_stress, unit, modulus = contact.bonded, contact.mean_stress, contact.area, contact.modulus
-    work, tilt = contact.bare + bonded * bound, mean_stress * moment * moment
+    fluctuating = contact.fluctuating + contact.fluctuating_rate * time
+    work, tilt = contact.bare - fluctuating + bonded * bound, mean_stress * moment * moment
     load, base = contact.load + contact.load_rate * time, contact.base + contact.base_rate * time
     a, slope = radius, 1.0
     if work > 0.0 and tilt > 0.0 and load + base > 0.0:  # the edge can pull, not push
@@ -194,23 +200,127 @@ def pull_on(time, start, shift, row, slider):
 FEW, SOME = 1e-12, 0.1
 #: Share of a clock step below which a sub-step means that there is no solution to go on with.
 LEAST = 1e-13
+#: Slip in a sub-step over the length that fluctuations remember; time of a slip at once, over the piece's.
+_MOST_SLID, _NO_TIME = 0.5, 1e-6
+#: Share of the error of the last estimates of ΔΓ that a sub-step corrects, over its part of the memory.
+_CORRECTED = 4.0
 MOST_STEPS = 2_000_000
 
 
 @device
-def contact_at(contact, bare, clock, row):
+def contact_of(numbers):
+    """Return the numbers of the contact, without load and base of the mount."""
+    return Contact(*numbers[2], 0.0, 0.0, FieldLaw(*numbers[3]))
+
+
+@device
+def contact_at(contact, clock, row):
     """Return the numbers of the contact from the beginning of a clock step on; an open one stays open during it."""
     is_open = not row.radius > 0.0
     if is_open:
         row.radius = 0.0
-    return Contact(bare, clock[1], clock[2], clock[3], clock[4], 1.0 if is_open else contact.stays, *contact[6:])
+    stays = 1.0 if is_open else contact.stays
+    return Contact(contact.bare, clock[1], clock[2], clock[3], clock[4], stays, *contact[6:])
 
 
 @device
 def later(contact, time, stays):
     """Return the numbers of the contact some time later; its radius is fixed from there on if it ``stays``."""
     load, base = contact.load + contact.load_rate * time, contact.base + contact.base_rate * time
-    return Contact(contact.bare, load, contact.load_rate, base, contact.base_rate, stays, *contact[6:])
+    fluctuating = contact.fluctuating + contact.fluctuating_rate * time
+    of_mount = load, contact.load_rate, base, contact.base_rate
+    return Contact(contact.bare, *of_mount, stays, *contact[6:12], fluctuating, contact.fluctuating_rate, contact.field)
+
+
+@device
+def feeling(contact, row):
+    """Return the numbers of the contact with the energy of the fluctuations that the row has reached."""
+    return Contact(*contact[:12], row.felt, 0.0, contact.field)
+
+
+@device
+def drawn(contact, row, piece):
+    """Return the numbers of the contact at the start of a piece: at that of a clock step ΔΓ has been drawn."""
+    fluctuating = row.drawn if piece == 0 else row.felt
+    return Contact(*contact[:12], fluctuating, 0.0, contact.field)
+
+
+@device
+def _after(row, path, duration, spread, field):
+    """Return the memory of the amplitude after a part of a sub-step, and g² before and after it."""
+    before = row.weight, row.mean, row.spread
+    after = remembered(before, path, duration, spread, field.length)
+    first, last = unsteadiness(before[0], before[1], before[2]), unsteadiness(after[0], after[1], after[2])
+    return after, field.floor + (1.0 - field.floor) * first, field.floor + (1.0 - field.floor) * last
+
+
+@device
+def following(contact, row, start, step):
+    """Return the numbers of the contact for a sub-step, in which it follows the conditional mean of ΔΓ.
+
+    Its change in the sub-step is estimated by the speed at the start. It is linear in time, so that the slip of the
+    sub-step does not act on it. The error of the last estimates is corrected by a share that grows with the sub-step:
+    a correction in next to no time would be a jump.
+    """
+    field = contact.field
+    if field.follows == 0.0:
+        return contact
+    path = math.fabs(row.speed) * step
+    exponent = 2.0 * (field.by_slip * path + field.by_time * step)
+    lost, share = -math.expm1(-exponent), min(1.0, _CORRECTED * (exponent + path / field.length))
+    _, first, last = _after(row, path, step, 0.0, field)
+    renewed, first, last = (0.5 * (first + last), 1.0, 1.0) if field.relaxing > 0.0 else (1.0, first, last)
+    mean, change = row.paid * first * row.energy, lost * (renewed * field.energy - row.energy)
+    rate = (row.paid * last * (row.energy + change) - mean + share * (mean - row.felt)) / step
+    return Contact(*contact[:12], row.felt - rate * start, rate, field)
+
+
+@device
+def within_reach(slip, contact):
+    """Return the slip that a sub-step may have for the memory of the fluctuations, over that which it has."""
+    field, slip = contact.field, math.fabs(slip)
+    return _MOST_SLID / (slip * max(1.0 / field.length, field.by_slip)) if slip > 0.0 else math.inf
+
+
+@device
+def remember(row, slip, first_speed, last_speed, duration, contact):
+    """Add a part of an accepted sub-step, between two of its nodes, to path and memory of the fluctuations.
+
+    In it the speed is a parabola in time, and g² is linear in the path. Slip that took no time since the last part
+    belongs to it.
+    """
+    field = contact.field
+    row.path += math.fabs(slip)
+    row.felt += contact.fluctuating_rate * duration
+    if field.length == math.inf:
+        return
+    path = row.path - row.recalled
+    change = math.fabs(last_speed) - math.fabs(first_speed)
+    bend = 0.5 * (math.fabs(first_speed) + math.fabs(last_speed)) - math.fabs(slip) / duration
+    spread = duration * (change * change / 12.0 + bend * bend / 5.0)
+    after, first, last = _after(row, path, duration, spread, field)
+    row.weight, row.mean, row.spread = after
+    row.recalled = row.path
+    exponent = 2.0 * (field.by_slip * path + field.by_time * duration)
+    lost = -math.expm1(-exponent)
+    size = lost
+    if field.relaxing > 0.0:
+        of_first = lost / exponent - (1.0 - lost) if exponent > 0.0 else 0.0
+        size = first * of_first + last * (lost - of_first)
+    row.renewed += size - lost * row.renewed
+    row.energy += size * field.energy - lost * row.energy
+
+
+@device
+def settled(contact, row, slider):
+    """Return the numbers of the contact at the end of a clock step.
+
+    Slip that took no time there is added to the memory of the fluctuations as if it took next to none.
+    """
+    contact = feeling(contact, row)
+    if row.path > row.recalled:
+        remember(row, 0.0, 0.0, 0.0, _NO_TIME * slider.length, contact)
+    return contact
 
 
 @device
@@ -249,7 +359,7 @@ def to_units(columns, spent, state, totals, units, work):
     """Convert a row and its energies to the units of the equations, at the start of a clock step."""
     columns[:] = state / units
     row = columns.view(ROW)[0]
-    row.position, row.slip, row.path, row.squared_speed, row.substeps = 0.0, 0.0, 0.0, 0.0, 0.0
+    row.position, row.slip, row.path, row.recalled, row.renewed, row.substeps = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     spent[:] = 0.0
     spent[_STORED] = totals[_STORED] / work
 
@@ -448,6 +558,20 @@ def elastic(row, time, slider, contact, energy):
     energy.work += row.spring_force * shift if forced > 0.0 else 0.0
     row.spring_force -= 0.0 if forced > 0.0 else stiffness * shift
     return True
+
+
+@device
+def answer(row, piece, slider, contact, energy):
+    """Slip at once at the start of a piece; return True if possible, and the contact then.
+
+    At the start of a clock step ΔΓ has been drawn: the answer to the difference from its mean is no sliding path.
+    """
+    going = elastic(row, 0.0, slider, contact, energy)
+    if piece == 0 and row.felt != row.drawn:
+        path, row.felt, contact = row.path, row.drawn, drawn(contact, row, piece)
+        going = elastic(row, 0.0, slider, contact, energy)
+        row.path = path
+    return going, contact
 
 
 @device

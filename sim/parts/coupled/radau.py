@@ -18,7 +18,17 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device, inlined
-from sim.parts.coupled.mechanics import FEW, SOME, compliance, contact_area, contact_energy, driven, pull_on
+from sim.parts.coupled.mechanics import (
+    FEW,
+    SOME,
+    compliance,
+    contact_area,
+    contact_energy,
+    driven,
+    pull_on,
+    remember,
+    within_reach,
+)
 
 _S6 = math.sqrt(6.0)
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
@@ -379,6 +389,9 @@ def try_sub_step(row, start, step, slider, law, contact, nodes):
     error *= math.sqrt(error) / slider.tolerance
     if not error < math.inf:
         return 0.25, False
+    within = within_reach(nodes.slip[2], contact)
+    if within < 1.0:
+        return max(0.1, 0.9 * within), False
     root = max(error, 1e-6) ** (1.0 / 6.0)
     if not error <= 1.0:
         return max(0.1, 0.9 / root), False
@@ -386,7 +399,7 @@ def try_sub_step(row, start, step, slider, law, contact, nodes):
     if nodes.last_step > 0.0:
         grows *= min(1.0, step / nodes.last_step * nodes.last_root / root)
     nodes.last_root = max(root, 0.5)
-    return min(6.0, max(0.1, grows)), True
+    return min(6.0, max(0.1, grows), 0.9 * within), True
 
 
 @device
@@ -407,7 +420,7 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
     Return the energy stored before and after it.
     """
     damping, viscosity = slider.damping, slider.viscosity
-    shift, speed, body = 0.0, 0.0, 0.0
+    shift, speed, body, going, passed = 0.0, 0.0, 0.0, row.speed, 0.0
     follows = contact.stays == 0.0
     first, firm = math.pi * row.radius * row.radius / contact.area, 0.0
     if follows:
@@ -448,9 +461,8 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
         if law.sense != 0.0:
             energy.rupture += share * area * moment * speed
         energy.area -= SHARES[i] * 0.5 * (square * spreads + sheared * sheared * firms)
-        row.squared_speed += share * speed * speed
-        row.path += math.fabs(nodes.slip[i] - shift)
-        shift = nodes.slip[i]
+        remember(row, nodes.slip[i] - shift, going, speed, (NODES[i] - passed) * step, contact)
+        shift, going, passed = nodes.slip[i], speed, NODES[i]
     row.spring_force, row.body_speed, row.speed = (
         nodes.pulls[2] - slider.stiffness * (nodes.slip[2] + nodes.sheared[2]),
         body,

@@ -173,12 +173,15 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
         for _ in range(_TRIALS):
             if not step > mechanics.LEAST * length:
                 break
+            contact = mechanics.following(contact, row, start, step)
             if not _try(nodes, at_start, start, step, row, slider, contact):
                 step, cut = 0.25 * step, False
                 continue
+            within = mechanics.within_reach(last.slip, contact)
             bend, error = bend_of(nodes, step, row, slider)
             grows = min(4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else 4.0
-            if not error <= 1.0:
+            grows = min(grows, 0.9 * within)
+            if not (error <= 1.0 and within >= 1.0):
                 step, cut = step * grows, False
                 continue
             whole = step if not cut else whole
@@ -200,7 +203,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
             continue
         line[1], books[1], held = row, energy, mechanics.retained(energy)
         before = stored_energy(row, first.square, start, slider, contact)
-        accept_nodes(row, nodes, start, step, slider, math.inf, energy)
+        accept_nodes(row, nodes, start, step, slider, contact, math.inf, energy)
         after = stored_energy(row, last.square, start + step, slider, contact)
         if mechanics.misses(before, after, held, energy, slider.tolerance, step / length):
             line[0], books[0], row.next_step = line[1], books[1], 0.25 * step
@@ -225,15 +228,22 @@ def _through(line, books, pieces, slider, contact, tracks, ground, nodes):
     """Take a row and its bonds through a clock step; return the time reached, and False if stability is lost."""
     energy, row, time, first, stays = books[0], line[0], 0.0, nodes[0], contact.stays
     for p in range(len(pieces)):
-        slider, from_here = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, stays)
+        slider = mechanics.slider_in(slider, pieces[p])
+        from_here = mechanics.later(mechanics.feeling(contact, row), time, stays)
         worked, before, lost = energy.work, energy.stored, energy.rupture
         _sums(tracks, ground, first)
         row.bound, row.moment = first.bound, first.moment
         if p > 0:
             before = stored_energy(row, first.square, 0.0, slider, from_here)
-        jumps = mechanics.force_jumps(row, slider)
-        unslipped = stored_energy(row, first.square, 0.0, slider, from_here) if jumps else before
-        if not _rebalance(line, 0.0, tracks, slider, from_here, ground, energy, first):
+        jumps, unslipped = mechanics.force_jumps(row, slider), before
+        if jumps:
+            unslipped = stored_energy(row, first.square, 0.0, slider, mechanics.drawn(from_here, row, p))
+        going = _rebalance(line, 0.0, tracks, slider, from_here, ground, energy, first)
+        if p == 0 and row.felt != row.drawn:  # the answer to what was drawn is no sliding
+            path, row.felt, from_here = row.path, row.drawn, mechanics.drawn(from_here, row, p)
+            going = _rebalance(line, 0.0, tracks, slider, from_here, ground, energy, first)
+            row.path = path
+        if not going:
             return time, False
         after = stored_energy(row, first.square, 0.0, slider, from_here)
         slipped = energy.work - worked - after + before - (energy.rupture - lost)
@@ -244,7 +254,8 @@ def _through(line, books, pieces, slider, contact, tracks, ground, nodes):
             return time, False
     _sums(tracks, ground, first)
     row.bound, row.moment = first.bound, first.moment
-    energy.stored = stored_energy(row, first.square, time, slider, mechanics.later(contact, 0.0, stays))
+    contact = mechanics.later(mechanics.settled(contact, row, slider), 0.0, stays)
+    energy.stored = stored_energy(row, first.square, time, slider, contact)
     return time, True
 
 
@@ -256,8 +267,8 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
     rows, columns), get those of the bonds after each step. The rest as in ``mean_field.advance_rows``. The result is
     zero, or ``SPENT`` if the bonds have been advanced already.
     """
-    rows, energies, bare, pieces, clock, units, work = inputs
-    slider, contact, (reached, spent) = mechanics.Slider(*numbers[0]), mechanics.Contact(*numbers[2]), outputs
+    rows, energies, pieces, clock, units, work = inputs
+    slider, contact, (reached, spent) = mechanics.Slider(*numbers[0]), mechanics.contact_of(numbers), outputs
     birth, due, life, soonest, stamp, frame = tracks
     for m in range(len(rows)):
         if stamp[m] != np.int64(frame[m, tracked.STEPS]):
@@ -273,7 +284,7 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
             start, stop = stop, mechanics.pieces_to(k, stop, pieces)
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
             if math.isnan(line[0].runaway_time):
-                now = mechanics.contact_at(contact, bare[m], clock[k], line[0])
+                now = mechanics.contact_at(contact, clock[k], line[0])
                 time, going = _through(line, books, pieces[start:stop], slider, now, bonds, ground, nodes)
                 if not going:
                     mechanics.run_away(line[0], booked, clock[k, 0] + time)

@@ -25,8 +25,8 @@ from sim.laws.halfspace import compliance
 from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise, normal, stream
-from sim.parts.exchange import Array, Bonding, Gammas, Indices, Motion
-from sim.parts.shear.process import Amplitude, Correlation, Fluctuation, Renewing, SmoothProcess
+from sim.parts.exchange import Array, Bonding, FieldLaw, Gammas, Indices, Motion
+from sim.parts.shear.process import Amplitude, Correlation, Fluctuation, Renewing, Slip, SmoothProcess, Wave
 from sim.spectrum.family import Family
 
 #: Pairs below this share of the variance are left out: all of them together would not change a bit.
@@ -334,6 +334,10 @@ class FixedProcess(ModalProcess):
         energy = self._energy(amplitude)
         return Fluctuation(energy[-1], amplitude[-1], phases, past), energy
 
+    @cached_property
+    def field_law(self) -> FieldLaw:
+        return self.amplitude.field_law(2.0 * float(np.sum(self.weights)))
+
     def _energy(self, amplitude: Array) -> Array:
         return amplitude**2 * (2.0 * np.sum(self.weights))
 
@@ -426,13 +430,14 @@ class SiteModes(ModalProcess):
         whole, energy = (np.zeros((1, 1, 1)), np.ones((1, 1, 1))), np.empty((1, len(parts)))
         renew_modes(parts, *whole, np.ones((1, 1)), self.weights, *noise.at(motion.step), 0, energy)
         _renew_sites(parts, *whole, sizes, self.weights, *noise.at(motion.step), energy)
-        return Fluctuation(energy[0], sizes[:, 0].T, parts)
+        return Fluctuation(energy[0], sizes[:, 0].T, parts, expected=energy[0])
 
     def advance(self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[Fluctuation, Array]:
         parts, sizes = state.values.copy(), _sizes(bonding)
         energy = np.empty((len(motions.time), len(parts)))
         _renew_sites(parts, *self._shares(motions), sizes, self.weights, *noise.at(motions.step), energy)
-        return Fluctuation(energy[-1], sizes[:, -1].T, parts), energy
+        expected = state.energy if isinstance(self.correlation, Slip | Wave) else energy[-1]
+        return Fluctuation(energy[-1], sizes[:, -1].T, parts, expected=expected), energy
 
     def _standard(self, state: Fluctuation) -> tuple[Array, Array]:
         frozen, varying = state.amplitude.T[:, :, np.newaxis, np.newaxis]

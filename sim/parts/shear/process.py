@@ -7,14 +7,15 @@ exp(−2∫λdt).
 
 import dataclasses
 import math
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+from functools import cached_property
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self, cast
 
 import numpy as np
 from pydantic import Field
 
-from sim.numerics.jit import kernel, law
+from sim.numerics.jit import device, kernel, law
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Array, Bonding, Gammas, Motion
+from sim.parts.exchange import Array, Bonding, FieldLaw, Gammas, Memory, Motion
 from sim.units.quantity import Quantity, keyed
 
 _Memory = Annotated[
@@ -22,7 +23,7 @@ _Memory = Annotated[
 ]
 Relaxing = Annotated[bool, Field(description="true: only what the correlation renews has the new size")]
 #: Memory of a law that depends on the moment alone.
-NO_PAST = np.empty(0)
+NO_PAST = Memory()
 
 
 class _OfTheMoment:
@@ -39,13 +40,20 @@ class _OfTheMoment:
         """Return g [1] in steady sliding at a speed [m/s] and mean shear stress [Pa], in the shape of either."""
         raise NotImplementedError
 
-    def started(self, motion: Motion, stress: Array) -> tuple[Array, Array]:
+    def started(self, motion: Motion, stress: Array) -> tuple[Memory, Array]:
         """Return the memory of the past at t = 0, and g [1]."""
         return NO_PAST, self.factor(motion.speed, stress)
 
-    def followed(self, past: Array, motions: Motion, stress: Array) -> tuple[Array, Array]:
+    def followed(self, past: Memory, motions: Motion, stress: Array) -> tuple[Memory, Array]:
         """Return the memory of the past after a block of steps, and g [1] at the end of each."""
         return past, self.factor(motions.speed, stress)
+
+    def field_law(self, energy: float, rates: tuple[float, float] | None = (0.0, 0.0)) -> FieldLaw:
+        """Return the numbers of a field of this mean energy [J/m²], whose ``rates`` are None if each mode has its own.
+
+        The rates are those of ``FieldLaw``.
+        """
+        return FieldLaw()
 
 
 @keyed()
@@ -115,7 +123,8 @@ class SlipRate(_OfTheMoment):
     -----
     With A_j = ∫ e^(−s/l) \\|V\\|^j dt, g² = floor² + (1 − floor²)(1 − A1²/(A0 A2)). The memory holds A0, the mean speed
     A1/A0 and A2 − A1²/A0. It begins empty, because steady sliding before the run, of weight l/\\|V\\|, has no limit at
-    rest. All sliding within a clock step has the mean of the weight over the step.
+    rest. All sliding within a clock step has the mean of the weight over the step. A drive that solves its motion
+    integrates the memory in its sub-steps instead.
     """
 
     reads_stress: ClassVar[bool] = False
@@ -132,31 +141,56 @@ class SlipRate(_OfTheMoment):
     def factor(self, speed: Array, stress: Array) -> Array:
         return np.full(speed.shape, self.floor)
 
-    def started(self, motion: Motion, stress: Array) -> tuple[Array, Array]:
-        return np.zeros((len(motion.speed), 3)), self.factor(motion.speed, stress)
+    def started(self, motion: Motion, stress: Array) -> tuple[Memory, Array]:
+        none = np.zeros(motion.speed.shape)
+        return Memory(none, none, none, none), self.factor(motion.speed, stress)
 
-    def followed(self, past: Array, motions: Motion, stress: Array) -> tuple[Array, Array]:
-        past, unsteady = past.copy(), np.empty(motions.path.shape)
-        spread = motions.unsteady + np.zeros(motions.path.shape)
-        _remember(past, motions.path, motions.duration.ravel(), spread, self.memory_length, unsteady)
+    def followed(self, past: Memory, motions: Motion, stress: Array) -> tuple[Memory, Array]:
+        if motions.memory.weight.size:
+            past, (weight, mean, spread, *_) = Memory(*(values[-1] for values in motions.memory)), motions.memory
+            unsteady = np.where(spread > 0.0, spread, 0.0) / np.where(spread > 0.0, spread + weight * mean**2, 1.0)
+        else:
+            columns, unsteady = np.stack(past[:3], axis=1), np.empty(motions.path.shape)
+            spread = motions.unsteady + np.zeros(motions.path.shape)
+            _remember(columns, motions.path, motions.duration.ravel(), spread, self.memory_length, unsteady)
+            past = past._replace(**dict(zip(Memory._fields, columns.T, strict=False)))
         return past, np.sqrt(self.floor**2 + (1.0 - self.floor**2) * unsteady)
+
+    def field_law(self, energy: float, rates: tuple[float, float] | None = (0.0, 0.0)) -> FieldLaw:
+        memory = cast(float, self.memory_length), self.floor**2
+        if rates is None:
+            return FieldLaw(*memory)
+        return FieldLaw(*memory, *rates, float(self.relaxing and any(rates)), energy, 1.0)
+
+
+@device
+def unsteadiness(weight, mean, spread):
+    """Return 1 − A1²/(A0 A2) of a memory."""
+    return spread / (spread + weight * mean * mean) if spread > 0.0 else 0.0
+
+
+@device
+def remembered(memory, path, duration, unsteady, length):
+    """Return the weight, mean and spread of a memory after a step; ``unsteady`` as of ``Motion``."""
+    weight, mean, spread = memory
+    renewed = -math.expm1(-path / length)
+    share = renewed * length / path if renewed > 0.0 else 1.0
+    weight, spread, gained = weight * (1.0 - renewed), spread * (1.0 - renewed), duration * share
+    further = path / duration - mean
+    spread += share * unsteady + weight * gained / (weight + gained) * further * further
+    mean += further * gained / (weight + gained)
+    return weight + gained, mean, spread
 
 
 @kernel("void(float64[:, ::1], float64[:,:], float64[:], float64[:,:], float64, float64[:, ::1])")
 def _remember(past, path, duration, spent, length, unsteady):
     """Update the memory of each row in place, step by step, and write the unsteadiness after each step."""
     for m in range(len(past)):
-        weight, mean, spread = past[m]
+        memory = past[m, 0], past[m, 1], past[m, 2]
         for s in range(len(duration)):
-            renewed = -math.expm1(-path[s, m] / length)
-            share = renewed * length / path[s, m] if renewed > 0.0 else 1.0
-            weight, spread, gained = weight * (1.0 - renewed), spread * (1.0 - renewed), duration[s] * share
-            further = path[s, m] / duration[s] - mean
-            spread += share * spent[s, m] + weight * gained / (weight + gained) * further * further
-            mean += further * gained / (weight + gained)
-            weight += gained
-            unsteady[s, m] = spread / (spread + weight * mean * mean) if spread > 0.0 else 0.0
-        past[m, 0], past[m, 1], past[m, 2] = weight, mean, spread
+            memory = remembered(memory, path[s, m], duration[s], spent[s, m], length)
+            unsteady[s, m] = unsteadiness(*memory)
+        past[m, 0], past[m, 1], past[m, 2] = memory
 
 
 Amplitude = Annotated[Constant | Onset | Stress | SlipRate, Field(discriminator="model")]
@@ -237,14 +271,17 @@ class Fluctuation(NamedTuple):
     values : array
         Numbers of the process: complex amplitudes (members, 2, pairs) in units of each mode's
         standard deviation, or phases (members, pairs) [rad]; empty for a process without any.
-    past : array
-        Memory of earlier sliding in the law of the amplitude, shape (1, 3) or (members, 3); empty without memory.
+    past : Memory
+        Memory of earlier sliding in the law of the amplitude.
+    expected : array, shape (1,) or (members,)
+        Mean of ΔΓ at this time before it was drawn [J/m^2]; ΔΓ itself if sliding renews nothing; empty without a draw.
     """
 
     energy: Array
     amplitude: Array
     values: Array
-    past: Array = NO_PAST
+    past: Memory = NO_PAST
+    expected: Array = NO_PAST.energy
 
 
 @dataclasses.dataclass(frozen=True)
@@ -270,6 +307,10 @@ class SmoothProcess:
         return amplitude**2 * self.energy
 
     @property
+    def field_law(self) -> FieldLaw:
+        return self.amplitude.field_law(self.energy)
+
+    @property
     def gammas(self) -> Gammas:
         return Gammas(constant=self.energy)
 
@@ -286,6 +327,23 @@ class Renewing:
     #: Wavenumber of a mode that has the rate of each number of the state [rad/m].
     wavenumber: Array
     state_class: ClassVar[type[Fluctuation]] = Fluctuation
+
+    @property
+    def gammas(self) -> Gammas:
+        """Distribution of ΔΓ at amplitude 1."""
+        raise NotImplementedError
+
+    @cached_property
+    def mean(self) -> float:
+        """Mean of ΔΓ at amplitude 1 [J/m²]."""
+        return float(np.sum(self.gammas.weight * self.gammas.shape))
+
+    @cached_property
+    def field_law(self) -> FieldLaw:
+        law, rates = self.correlation, None
+        if isinstance(law, Time | Slip):
+            rates = (1.0 / law.length, 0.0) if isinstance(law, Slip) else (0.0, 1.0 / law.time)
+        return self.amplitude.field_law(self.mean, rates)
 
     def _empty(self, members: int) -> Array:
         """Return the numbers of a state without any fluctuation."""
@@ -304,15 +362,24 @@ class Renewing:
         size = amplitude if self.amplitude.relaxing else np.ones(1)
         values = self._empty(len(noise.members))
         energy = self._renew(values, np.zeros((1, 1, 1)), np.ones((1, 1, 1)), size[np.newaxis], motion.step, noise)
-        return Fluctuation(self._scaled(amplitude, energy[0]), amplitude, values, past)
+        first = self._scaled(amplitude, energy[0])
+        return Fluctuation(first, amplitude, values, past._replace(energy=energy[0]), first)
 
     def advance(self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[Fluctuation, Array]:
         past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
         values = state.values.copy()
-        size = renewed_size(self.amplitude, state, motions, amplitude)
-        energy = self._renew(values, *self._shares(motions), size, motions.step, noise)
-        energy = self._scaled(amplitude, energy)
-        return Fluctuation(energy[-1], amplitude[-1], values, past), energy
+        size, (keep, renew) = renewed_size(self.amplitude, state, motions, amplitude), self._shares(motions)
+        if self.amplitude.relaxing and self.field_law.follows and motions.memory.renewed.size:
+            renew, size = np.sqrt(motions.memory.renewed)[..., np.newaxis], np.ones((1, 1))
+            keep, size = keep + np.zeros(renew.shape), size + np.zeros((len(renew), 1))
+        drawn = self._renew(values, keep, renew, size, motions.step, noise)
+        energy = expected = self._scaled(amplitude, drawn)
+        if isinstance(self.correlation, Slip | Wave) or self.amplitude.remembers:
+            before = drawn[-2] if len(drawn) > 1 else state.past.energy
+            if keep.shape[2] == 1:
+                before = keep[-1, :, 0] ** 2 * before + (renew[-1, :, 0] * size[-1]) ** 2 * self.mean
+            expected = self._scaled(amplitude, before[np.newaxis])
+        return Fluctuation(energy[-1], amplitude[-1], values, past._replace(energy=drawn[-1]), expected[-1]), energy
 
     def _shares(self, motions: Motion) -> tuple[Array, Array]:
         """Return the shares of a number that a step keeps and renews, whose squares add up to one."""

@@ -17,6 +17,7 @@ from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.coupled import mechanics
 from sim.parts.drive import READINGS, Spring
+from sim.parts.exchange import FieldLaw
 from sim.parts.shear import Mean
 from sim.scenario.clock import Clock
 from sim.spectrum.families import Gaussian
@@ -37,8 +38,9 @@ def test_the_area_in_the_sub_steps_is_that_of_jkr_also_from_the_radius_of_hertz_
     work, load = np.meshgrid(WORK * np.logspace(-24.0, 0.0, 49), LOAD * np.array([0.01, 1.0, 30.0]))
     exact, hertz = (jkr.radius_at_load(load, share * work, R, MODULUS) for share in (1.0, 0.0))
     for shift in (-1e-12, -1e-16, 0.0, 1e-16, 1e-12):
+        solid = 1.0 / R, MODULUS, 1.0, 0.0, 0.0, FieldLaw()
         radii = [
-            mechanics.contact_area(0.0, 0.0, 0.0, a, mechanics.Contact(w, p, *[0.0] * 7, 1.0 / R, MODULUS, 1.0))[0]
+            mechanics.contact_area(0.0, 0.0, 0.0, a, mechanics.Contact(w, p, *[0.0] * 7, *solid))[0]
             for w, p, a in zip(work.flat, load.flat, (hertz * (1.0 + shift)).flat, strict=True)
         ]
         assert_allclose(radii, exact.ravel(), rtol=1e-12)

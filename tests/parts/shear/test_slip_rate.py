@@ -75,7 +75,7 @@ def test_unsteady_speeds_have_half_their_square_over_the_mean_square_even_on_cou
     duration = begins + 2.0 * period
     clock = Clock(duration=duration, step=duration / 7)
     states = list(march(scene(1, clock=clock, drive=drive, bonds=bonds, shear=shear), np.arange(1)))
-    weight, mean, spread = states[-1].shear.past[0]
+    weight, mean, spread, *_ = (values[0] for values in states[-1].shear.past)
     slip = 2.0 * period * stage
     assert_allclose([weight * mean, spread + weight * mean**2], [slip, 1.5 * stage * slip], rtol=1e-8)
 

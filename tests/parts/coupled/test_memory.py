@@ -1,0 +1,135 @@
+"""Memory of fluctuations in the sub-steps of a slider: its integrals, its path, and no dependence on the clock step."""
+
+import dataclasses
+import functools
+import math
+from copy import deepcopy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import driven
+from helpers.driven import MemberNoise, follow, march
+from helpers.scenes import BONDS, BY_SLIP, CELL, SPECTRUM, scene
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+import sim
+from sim.engine import _step_contact
+from sim.laws import jkr
+from sim.parts.bonds import Cohort, FirstMoment, Tracked
+from sim.parts.coupled import coupled
+from sim.parts.drive import READINGS, Force, Spring
+from sim.parts.exchange import Times
+from sim.parts.shear import Banded, Mean
+from sim.parts.shear.process import Slip, SlipRate, Time
+
+#: Square over 12 of the slip between two nodes, 0.49 of half a memory at most: the error where weights are averaged.
+ERROR = (0.49 * 0.5) ** 2 / 12.0
+LENS = Path(__file__).parents[3] / "scenarios" / "pdms_lens_spring.toml"
+FEW_SITES = functools.partial(Tracked, sites=9)
+
+
+@pytest.mark.parametrize(("make", "correlation", "relaxing"), [(FirstMoment, Slip, True), (Cohort, Time, True),
+                                                               (FEW_SITES, Slip, False)])  # fmt: skip
+def test_the_memory_within_a_clock_step_is_the_integral_along_the_slip(make, correlation, relaxing):
+    # from rest a mass on a spring moves with V (1 − cos ωt), past next to no bonds: 2.5 memories in a clock step
+    speed, turn, memory, floor = 10.0 * driven.STRETCH, 2.0 * math.pi, 2.0 * driven.STRETCH, 0.3
+    law = correlation(1.5 * memory if correlation is Slip else 0.4)
+    amplitude = SlipRate(memory_length=memory, floor=floor, relaxing=relaxing)
+    shear = Banded(spectrum=SPECTRUM, cell=CELL, correlation=law, amplitude=amplitude, paid_by_adhesion=0.0)
+    few = {"make": lambda **keys: make(**(keys | {"site_density": 1e-7 * driven.DENSITY}))}
+    lens = driven.scenario(1.75, 7, driven.spring(1.0, mass=turn**-2, tolerance=1e-8), **few)
+
+    def rates(time, values):
+        (a0, a1, a2, renewed), v = values, speed * (1.0 - math.cos(turn * time))
+        size = floor**2 + (1.0 - floor**2) * (1.0 - a1 * a1 / (a0 * a2)) if relaxing else 1.0
+        rate = 2.0 * v / law.length if correlation is Slip else 2.0 / law.time
+        return 1.0 - v * a0 / memory, v - v * a1 / memory, v * v - v * a2 / memory, rate * (size - renewed)
+
+    begin, bend = 1e-4, 0.5 * speed * turn**2  # V = bend t² at first
+    values = np.array([begin, bend * begin**3 / 3.0, bend**2 * begin**5 / 5.0, 0.0])
+    for state in list(march(dataclasses.replace(lens, shear=shear), np.arange(1)))[1:]:
+        end = lens.times.at(state.step)
+        values = solve_ivp(rates, (begin, end), values, "LSODA", rtol=1e-9, atol=1e-30).y[:, -1]
+        (a0, a1, a2, renewed), past = values, state.shear.past
+        exact = a0, a1 / a0, a2 - a1**2 / a0, renewed
+        assert_allclose(np.concatenate([past.weight, past.mean, past.spread, past.renewed]), exact, rtol=ERROR)
+        begin, values[3] = end, 0.0  # ΔΓ is drawn
+
+
+def at_once(lens, state, expected, drawn):
+    """Slip and path in next to no time, where ΔΓ was ``expected`` and is ``drawn``."""
+    shear = state.shear._replace(energy=drawn, expected=expected, past=state.shear.past._replace(energy=drawn))
+    around = _step_contact(lens, state.contact, shear, range(1, 2))
+    noise, bonds = MemberNoise.of(1, np.arange(1)).bonds, deepcopy(state.bonds)
+    motions = coupled.advance(lens.parts, state.drive, bonds, around, Times(1e-15, 1, 1e-15), range(1, 2), noise)[1]
+    return motions.slip[0, 0], motions.path[0, 0]
+
+
+@pytest.mark.parametrize("bonds", ["rate, bell", "cohort", "tracked"])
+def test_the_elastic_answer_to_noise_is_no_path_but_that_to_the_mean_and_to_a_force_is(bonds):
+    shear = Banded(**BY_SLIP, amplitude=SlipRate(floor=0.5, relaxing=True), paid_by_adhesion=0.1)
+    lens = scene(1, 8, drive=Spring(stage=2e-2, stiffness=100.0), bonds=BONDS[bonds], shear=shear)
+    *_, state = march(lens, np.arange(1))
+    read = dict(zip(READINGS, lens.parts.drive.readings(state.drive)[0], strict=True))
+    assert abs(read["energy_residual"]) < 1e-6 * read["drive_work"]
+    low, high = state.shear.expected, 2.0 * state.shear.expected
+    (_, still), (noisy, none), (slip, path) = (
+        at_once(lens, state, *e) for e in ((low, low), (low, high), (high, high))
+    )
+    assert path > 100.0 * still
+    assert_allclose([noisy, path, none], [slip, slip, still], rtol=1e-6)
+    pushed = scene(1, 8, drive=Force(force=1e-4), bonds=BONDS[bonds], shear=shear)
+    state = next(march(pushed, np.arange(1)))
+    slip, path = at_once(pushed, state, state.shear.energy, state.shear.energy)
+    assert_allclose(path, slip, rtol=1e-6)
+    assert path > 0.0
+
+
+def slipping(step, duration, speed, members=1, **keys):
+    """The spring-driven lens, in clock steps of some ms."""
+    values = {"clock.step": f"{step} ms", "clock.duration": f"{duration} s", "drive.stage": f"{speed} mm/s"}
+    return sim.load(LENS).with_values(values | {"ensemble.members": members} | keys)
+
+
+def losses(lens, first):
+    """Area over JKR's that fluctuations take from each member after a time; energies must be balanced."""
+    members = np.arange(lens.ensemble.members)
+    course = follow(lens, MemberNoise.of(lens.seed, members), None, range(lens.times.steps + 1))[1]
+    read = dict(zip(READINGS, np.moveaxis(course.driven[-1], -1, 0), strict=True))
+    assert np.max(np.abs(read["energy_residual"] / read["drive_work"])) < 1e-6
+    late = course.time.ravel() >= first
+    work = lens.adhesion.work_of_bonds(course.fraction[late])
+    bonded = jkr.radius_at_load(lens.contact.load, work, lens.sphere.radius, lens.bodies.modulus)
+    return np.mean(bonded**2 - course.radius[late] ** 2, axis=0) / lens.rest_radius**2
+
+
+BY_TIME = {"shear.correlation": {"model": "time", "time": "0.1 ms"}, "shear.amplitude.memory_length": "5 um"}
+MEAN = {"shear": Mean(spectrum=sim.load(LENS).shear.spectrum, amplitude=SlipRate(memory_length=5e-6, floor=0.05))}
+
+
+@pytest.mark.parametrize("keys", [{}] + [pytest.param(keys, marks=pytest.mark.verify) for keys in (
+    {"shear.amplitude.relaxing": False}, BY_TIME, MEAN)])  # fmt: skip
+def test_without_noise_a_slip_does_not_depend_on_the_clock_step(keys):
+    coarse, fine = (slipping(step, 1.0, 20, **keys) for step in (1.0, 0.125))
+    for lens in (coarse, fine) if keys is not MEAN else ():  # next to no noise with so many degrees of freedom
+        bands = dataclasses.replace(lens.process.bands, weight=lens.process.bands.weight / 1e12)
+        bands = dataclasses.replace(bands, freedom=1e12 * bands.freedom)
+        lens.__dict__["process"] = dataclasses.replace(lens.process, bands=bands)
+    assert_allclose(losses(coarse, 0.2), losses(fine, 0.2), rtol=3e-3)
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize(("speed", "limit", "step"), [(20, 0.05092, 1.0), (20, 0.05092, 0.0625), (3, 0.05738, 1.0)])
+def test_the_loss_to_fluctuations_is_that_of_two_independent_codes(speed, limit, step):
+    lost = losses(slipping(step, 2.0, speed, members=16), 0.5)
+    assert abs(np.mean(lost) / limit - 1.0) < 2e-3 + 5.0 * np.std(lost, ddof=1) / math.sqrt(len(lost)) / limit
+
+
+def test_a_member_is_the_same_alone_restarted_in_a_slip_and_with_few_records():
+    lens = slipping(1.0, 0.06, 20, members=3)
+    straight = list(march(lens, np.arange(3)))
+    driven.check_members(lens, straight, driven.fastest(straight, 0.02 / driven.STRETCH))
+    course = follow(lens, MemberNoise.of(lens.seed, np.arange(3)), None, range(0, 61, 7))[1]
+    assert np.array_equal(course.energy, [state.shear.energy for state in straight[::7]])
