@@ -160,7 +160,7 @@ def run(
     _announce_compiling(quiet)
     until = time.monotonic() + read_option(max_time, "--max-time", "s", above=0, typical="8 h")
     memory = read_option(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
-    with slow_stage("making modes and bands of the fluctuations", quiet):
+    with slow_stage("loading the scenario", quiet):
         scene = _load(scenario, **overrides)
     if force and resume:
         raise click.UsageError("--resume goes on with an unfinished run, --force throws it away: give one of them")

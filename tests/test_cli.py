@@ -95,6 +95,7 @@ def test_an_order_to_stop_keeps_what_is_computed(here, orders):
     _, errors = run.communicate(timeout=60)
     assert run.returncode == (130 if len(orders) > 1 else 75)
     assert [line.startswith("stop") for line in complaints(errors)] == [True, True] and "--resume" in errors
+    assert "its run is not done: `sim run ... --resume` goes on" in sim("stats", "outputs/scene.nc").stderr
     assert not (here / "outputs" / "scene.nc").exists()
     assert "simulating" in Path("outputs/scene.nc.log").read_text(encoding="utf-8")
     kept = {part: part.stat().st_mtime_ns for part in parts.glob("*.npz")}

@@ -51,7 +51,9 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
     """
     if not os.path.exists(path) or os.path.isdir(path):
         reason = "is a folder" if os.path.isdir(path) else "there is no such file"
-        raise BadInput([f"{path}: {reason}; name a dataset"])
+        unfinished = os.path.isdir(f"{path}.parts")
+        cure = "its run is not done: `sim run ... --resume` goes on" if unfinished else "name a dataset"
+        raise BadInput([f"{path}: {reason}; {cure}"])
     try:
         dataset = open_lazily(path)
     except Refused as fault:

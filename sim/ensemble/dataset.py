@@ -3,13 +3,11 @@
 A file that HDF5 is still writing is lost when the run is killed; a renamed part is not.
 """
 
-import contextlib
 import functools
 import hashlib
 import importlib.metadata
 import json
 import math
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -381,10 +379,8 @@ def pooled(groups: list[np.ndarray]) -> dict[str, np.ndarray]:
 
 def attributes_of(path: Path) -> dict[str, Any]:
     """Return the global attributes of a netCDF file; none if it is no such file or is not read."""
-    # of a reader in another thread; without xarray there is none
-    reading = getattr(sys.modules.get("xarray.backends.netCDF4_"), "NETCDF4_PYTHON_LOCK", contextlib.nullcontext())
     try:
-        with HDF5, reading, opened(path) as file:
+        with HDF5, opened(path) as file:
             return {name: file.getncattr(name) for name in file.ncattrs()}
     except (OSError, RuntimeError, Refused):
         return {}

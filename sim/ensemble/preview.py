@@ -438,7 +438,7 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
         values = [errors[name] for errors in known if name in errors]
         relative = name.startswith(("cell_error", "member_spread", "banded_error"))
         rows[name.replace("_", " ")] = (
-            f"{round(100.0 * max(values, key=abs), 7):+.2g} %" if relative else _span(values, "", ",.0f")
+            f"{round(100.0 * max(values, key=abs), 7) + 0.0:+.2g} %" if relative else _span(values, "", ",.0f")
         )
     # a map that is the field has an rms and an energy of its own
     rows |= dict(detail for point in points[::-1] for detail in point.fluctuations.details(point.setting))

@@ -348,6 +348,9 @@ def refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
     changed = _changed(older, wanted)
     if "version.sim" in changed:
         version = _short(changed["version.sim"][0])
+        if changed["version.sim"][0] is None:
+            fault = "is no netCDF file, is cut short or damaged, or was not written by `sim run`"
+            raise BadInput([f"{path}: {fault}; move it away, or replace it with --force"])
         raise BadInput([f"{path} was made by sim {version}: finish it there, or move it away and run anew"])
     if changed:
         some = [f"{key} was {_short(was)}, is {_short(now)}" for key, (was, now) in changed.items()]

@@ -4,6 +4,7 @@ import contextlib
 import errno
 import os
 import shutil
+import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterable, Iterator
@@ -17,17 +18,30 @@ _WRITE_TROUBLE = (OSError, RuntimeError)
 
 
 class _Lock:
-    """A reentrant lock of the process; pickled it is the lock of the process that reads it."""
+    """A reentrant lock of the process that holds xarray's too; pickled it is the lock of the process that reads it."""
 
     def __init__(self) -> None:
-        lock = threading.RLock()
-        self.acquire, self.release = lock.acquire, lock.release
+        self._lock = threading.RLock()
+        self._entered: list[contextlib.ExitStack] = []
 
-    def __enter__(self) -> bool:
-        return self.acquire()
+    def acquire(self, blocking: bool = True) -> bool:
+        with contextlib.ExitStack() as entered:
+            if not self._lock.acquire(blocking):
+                return False
+            entered.callback(self._lock.release)
+            # xarray's lock is not reentrant, and without xarray there is no other reader
+            module = None if self._entered else sys.modules.get("xarray.backends.netCDF4_")
+            if lock := getattr(module, "NETCDF4_PYTHON_LOCK", None):
+                if not lock.acquire(blocking):
+                    return False
+                entered.callback(lock.release)
+            self._entered.append(entered.pop_all())
+        return True
 
-    def __exit__(self, *trouble: object) -> None:
-        self.release()
+    def release(self, *trouble: object) -> None:
+        self._entered.pop().close()
+
+    __enter__, __exit__ = acquire, release
 
     def __reduce__(self) -> str:
         return "HDF5"

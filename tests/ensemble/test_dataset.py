@@ -5,7 +5,7 @@ import pickle
 import subprocess
 import sys
 import typing
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
 from pathlib import Path
 from unittest.mock import Mock
@@ -25,7 +25,7 @@ from sim.ensemble import dataset as datasets, plan as plans, simulate as ensembl
 from sim.ensemble.dataset import scenario_json, variable_name
 from sim.ensemble.plan import Plan
 from sim.ensemble.variables import LARGEST, VARIABLES
-from sim.numerics.files import StoreTrouble
+from sim.numerics.files import HDF5, StoreTrouble
 from sim.parts.drive import READINGS
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import all_tables, keys, quantities, tables
@@ -162,6 +162,21 @@ def test_datasets_can_be_computed_in_threads_pickled_and_joined(tmp_path):
             for dataset in datasets_of_thread:
                 xr.testing.assert_identical(dataset, expected)
     xr.testing.assert_identical(pickle.loads(pickle.dumps(alone[0])), alone[0])
+
+
+def test_no_file_is_read_or_written_while_another_thread_reads_through_xarray(tmp_path):
+    path, lock = ensemble.run(sample(), tmp_path / "out.nc"), xr.backends.netCDF4_.NETCDF4_PYTHON_LOCK
+    writes = [lambda: ensemble.run(sample(), path, replace=True), lambda: datasets.attributes_of(path)]
+    with ThreadPoolExecutor(1) as pool, sim.open(path) as dataset:
+        for work in (*writes, lambda: sim.open(path).close(), dataset.load):
+            with lock:
+                assert not HDF5.acquire(blocking=False)
+                waiting = pool.submit(work)
+                assert not wait([waiting], 0.3).done
+            waiting.result(60)
+        with HDF5, HDF5:
+            assert lock.locked()
+    assert not lock.locked()
 
 
 def test_names_that_may_be_recorded_are_the_quantities_and_none_is_that_of_a_key():

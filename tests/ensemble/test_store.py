@@ -129,6 +129,11 @@ def test_a_run_goes_on_only_when_asked_and_only_as_it_was_begun(tmp_path, monkey
     assert {block: block.read_bytes() for block in folder.glob("*.npz")} == kept
     ensemble.run(sample(members=4), path, replace=True)
     assert not folder.exists()
+    xr.Dataset({"a": 1.0}).to_netcdf(tmp_path / "foreign.nc")
+    for content in (b"", path.read_bytes()[:3000], (tmp_path / "foreign.nc").read_bytes()):
+        path.write_bytes(content)
+        with pytest.raises(BadInput, match=r"out.nc: is no netCDF .* written by `sim run`; move it away, .*--force$"):
+            ensemble.run(sample(), path, resume=True)
 
 
 def test_blocks_that_are_there_are_not_computed_again(tmp_path, monkeypatch):
