@@ -14,7 +14,7 @@ import os
 import re
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -194,6 +194,8 @@ class Unfinished:
             if exists and finished != self.run and not (replace or older.get("replace")):
                 raise OutputExists(f"{self.target} exists; replace it with --force or name another output")
             if (resume or joins) and older:
+                if replace and self._busy(older["shards"], [shard[0]] if joins else ()):
+                    raise self.refusal(*shard)
                 for name in names if replace else ():
                     self.blocks.path(name).unlink(missing_ok=True)
                 return int(older["shards"])
@@ -253,9 +255,9 @@ class Unfinished:
                 text += f"; if that process was killed on another computer, delete {path}"
         return OutputBusy(text)
 
-    def _busy(self, of: int) -> bool:
-        """True if another process holds a shard."""
-        for number in range(1, of + 1):
+    def _busy(self, of: int, numbers: Sequence[int] = ()) -> bool:
+        """True if another process holds one of some shards, by default of all."""
+        for number in numbers or range(1, of + 1):
             path = self.folder / lock_of(number, of)
             if path.exists():
                 if not (lock := _lock(path)):

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from filelock import FileLock
 from helpers import scenes
 from helpers.cases import posix
 from helpers.parts import Clock
@@ -396,6 +397,17 @@ def test_a_shard_that_replaces_begins_only_its_own_blocks_anew(tmp_path):
     for number in (1, 2, 1, 3):
         ensemble.run(shared(), path, shard=(number, 3), replace=True)
     assert same(path, shared())
+
+
+def test_a_shard_that_another_process_computes_keeps_its_blocks(tmp_path):
+    path = tmp_path / "out.nc"
+    ensemble.run(shared(), path, shard=(1, 3))
+    folder = tmp_path / "out.nc.parts"
+    blocks = set(folder.glob("*.npz"))
+    with FileLock(folder / store.lock_of(1, 3)), pytest.raises(OutputBusy):
+        ensemble.run(shared(), path, shard=(1, 3), replace=True)
+    assert blocks
+    assert blocks == set(folder.glob("*.npz"))
 
 
 @pytest.mark.parametrize("shard", ["0/3", "4/3", "3", "a/b", f"1/{'9' * 5000}"])
