@@ -167,10 +167,13 @@ def run(
 
     from sim.ensemble import plan as plans, preview, simulate
 
+    plan = plans.Plan.of(scene)
+    if not any(plan.share(*share)):
+        say(f"shard {shard} has no work: the run has fewer groups of members than shards")
+        return
     simulate.claim(target, force or resume, simulate.files_read(scene), simulate.BESIDE)
     from sim.ensemble.execute import orders
 
-    plan = plans.Plan.of(scene)
     parts: Any = BlockFiles(parts_of(target)) if resume else ()
     jobs, lines = preview.processes(plan, jobs, memory, share, parts)
     for line in [] if quiet else lines:

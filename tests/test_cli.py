@@ -116,6 +116,7 @@ def test_a_run_that_cannot_begin_names_each_fault_in_one_line_with_its_code_and_
     assert sorted(here.iterdir()) == before
     monkeypatch.setattr("sim.ensemble.simulate.simulate", None)  # computing would fail
     of_posix = [(["-o", "x" * 250], 74, "xxx"), (["-o", "loop.nc"], 74, "loop.nc"), (["-o", "\udcff.nc"], 2, "UTF-8")]
+    of_posix.append((["-o", "a\\b.nc"], 2, "backslash"))
     if os.name == "posix":
         Path("loop.nc").symlink_to("loop.nc")
     before = sorted(here.iterdir())
@@ -148,6 +149,8 @@ def test_run_writes_the_dataset_and_its_log_into_a_new_folder_and_never_replaces
         patched.setattr("sim.ensemble.simulate.run", None)  # computing would fail
         done = sim(*again)
     assert done.exit_code == 73 and "--force" in done.stderr and Path("new/folder/x.nc").read_bytes() == content
+    done = sim(*again, "--shard", "9/9")
+    assert done.exit_code == 0 and "has no work" in done.stdout
     assert sim(*again, "--force").exit_code == 0 and Path("new/folder/x.nc").read_bytes() != content
     last = json.loads(Path("new/folder/x.nc.log").read_text(encoding="utf-8").splitlines()[-1])
     assert list(last["stages"]) == ["loading", "simulating", "writing"]

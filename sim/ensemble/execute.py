@@ -54,13 +54,17 @@ class WorkerDied(RuntimeError):
 
 @dataclass
 class _Chain:
-    """The blocks of a task that are missing, the next one last; ``broken`` counts the pools that broke under it."""
+    """The blocks of a task that are missing, the next one last; ``broken`` counts the pools that broke under it.
+
+    ``fault`` is what a block raised, after which none of the task is missing any more.
+    """
 
     key: str
     task: Task
     missing: list[int]
     state: Arrays | None = None
     broken: int = 0
+    fault: Exception | None = None
 
     @functools.cached_property
     def pickled(self) -> bytes:
@@ -133,9 +137,9 @@ def compute(
     WorkerDied
         If no scheduler answers, or, when all else is done, if processes died again and again at the same block.
     Exception
-        As raised by the first block that fails.
+        As raised by a block: at once if it may concern all (disk, memory, input, cluster), else when all else is done.
     """
-    run = uuid.uuid4().hex
+    run, before = uuid.uuid4().hex, dict(_last.__dict__)
     chains = [_Chain(f"{run}-{place}", task, missing[::-1]) for place, (task, missing) in enumerate(tasks)]
     waiting = chains[::-1]
     if scheduler:
@@ -150,6 +154,11 @@ def compute(
             _work_off(_Team(_Here(), lambda: 1), advance, store, waiting, progress, stop)
         finally:
             _last.__dict__.clear()
+            _last.__dict__.update(before)  # of a run whose ``progress`` runs this one
+    for chain in chains:
+        if chain.fault:
+            chain.fault.add_note(f"in {chain.task}; all other blocks are kept, --resume tries these again")
+            raise chain.fault
     if lost := [chain for chain in chains if chain.broken == _TRIES]:
         names = "; ".join(str(chain.task) for chain in lost)
         cure = "the likely reason is too little memory; all other blocks are kept, --resume tries these again"
@@ -186,6 +195,11 @@ def _work_off(
                     chain.broken += 1
                 except team.killed:
                     chain.broken = _TRIES
+                except (OSError, MemoryError, BadInput, concurrent.futures.CancelledError):
+                    raise
+                except Exception as fault:
+                    chain.fault = fault
+                    chain.missing.clear()
                 else:
                     number, chain.broken = chain.missing.pop(), 0
                     if team.far:

@@ -70,7 +70,8 @@ def run(
     stop : callable
         True if no other block is to be begun.
     shard : (int, int)
-        Number of a share of the run, from 1, and how many there are; the last one to be done makes the file.
+        Number of a share of the run, from 1, and how many there are; the last one to be done makes the file. A share
+        without work, of more shares than groups of members, changes nothing.
     scheduler : str
         Address of a dask scheduler, whose workers take the place of processes.
     memory : float
@@ -99,6 +100,8 @@ def run(
         If processes died again and again at the same block.
     """
     plan = Plan.of(scenario)
+    if to is not None and not any(plan.share(*shard)):
+        return Path(to)
     jobs = fitting(plan, jobs, memory, in_memory=to is None)
     how: dict[str, Any] = {"progress": progress, "stop": stop, "jobs": jobs, "scheduler": scheduler}
     stage("simulating")

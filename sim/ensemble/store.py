@@ -90,8 +90,8 @@ class MemoryBlocks(dict[str, Arrays]):
 class BlockFiles:
     """Blocks of a run as files of a folder, each with the state at its end.
 
-    A block is sealed by a text of the run and of its names and shapes, because a zip file may lack entries or be that
-    of another run.
+    A block is sealed by a text that begins with the run and goes on with its names and shapes, because a zip file may
+    lack entries or be that of another run.
     """
 
     folder: Path
@@ -111,11 +111,11 @@ class BlockFiles:
             np.savez(file, **sealed)
 
     def _seal(self, content: Arrays) -> str:
-        return str([self.run, *sorted((key, values.shape) for key, values in content.items())])
+        return f"{self.run} {sorted((key, values.shape) for key, values in content.items())}"
 
     def load(self, name: str) -> Arrays:
         """Return what a block recorded."""
-        return self._read(name, lambda key: key != _SEAL and not key.startswith(_STATE))
+        return self._read(name, lambda key: not key.startswith(_STATE))
 
     def state(self, name: str) -> Arrays:
         """Return the state at the end of a block."""
@@ -125,16 +125,18 @@ class BlockFiles:
     def drop_damaged(self, name: str) -> None:
         """Remove a block that is not readable to its last byte, or not as this run has saved it."""
         with contextlib.suppress(StoreTrouble):
-            content = self._read(name, lambda key: True)
-            if str(content.pop(_SEAL, "")) == self._seal(content):
-                return
+            self._read(name, lambda key: True, wholly=True)
+            return
         with explained(self.folder):
             self.path(name).unlink(missing_ok=True)
 
-    def _read(self, name: str, wanted: Callable[[str], bool]) -> Arrays:
+    def _read(self, name: str, wanted: Callable[[str], bool], wholly: bool = False) -> Arrays:
         try:
             with self.path(name).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-                return {key: arrays[key] for key in arrays if wanted(key)}
+                content, seal = {key: arrays[key] for key in arrays if key != _SEAL and wanted(key)}, str(arrays[_SEAL])
+                if not (seal == self._seal(content) if wholly else seal.startswith(self.run)):
+                    raise ValueError("another run or another process wrote it")
+                return content
         except Exception as trouble:  # a damaged file raises whatever its reader meets
             cure = "go on with --resume, which computes it anew"
             raise StoreTrouble(f"{self.path(name)} is damaged; {cure}") from trouble
@@ -160,6 +162,7 @@ class Unfinished:
 
     def __init__(self, target: Path, run: Manifest, order: list[str], read: Callable[[Path], Manifest]) -> None:
         self.target, self.folder, self.run, self.order, self.read = target, parts_of(target), run, order, read
+        self._begun: Manifest = {}
         self.blocks = BlockFiles(self.folder, hashlib.sha256(json.dumps(run, sort_keys=True).encode()).hexdigest())
 
     def begin(self, shard: Shard, resume: bool, replace: bool, names: Iterable[str]) -> int:
@@ -198,6 +201,7 @@ class Unfinished:
                     raise self.refusal(*shard)
                 for name in names if replace else ():
                     self.blocks.path(name).unlink(missing_ok=True)
+                self._begun = older
                 return int(older["shards"])
             if older and self._busy(older["shards"]):
                 raise self.refusal()
@@ -205,6 +209,7 @@ class Unfinished:
                 self._clean()
                 with whole(self.folder / _MANIFEST) as aside:
                     aside.write_text(json.dumps(manifest, sort_keys=True, default=str), encoding="utf-8")
+            self._begun = self._manifest()
             return shard[1]
 
     @contextlib.contextmanager
@@ -213,7 +218,7 @@ class Unfinished:
         locks: dict[int, Any] = {}
         with contextlib.ExitStack() as held:
             with self._output_locked(None):
-                gone = not self._manifest()
+                gone = not self._manifest_of_this_run()
                 for number in () if gone else numbers:
                     if lock := _lock(self.folder / lock_of(number, of)):
                         held.callback(self._unlock, lock)
@@ -223,8 +228,7 @@ class Unfinished:
     def publish(self, names: Iterable[str], of: int, write: Callable[[Path], None]) -> bool | None:
         """Make the output; False if blocks are missing or another process holds a shard, None if it did so itself."""
         with self._output_locked(None):
-            manifest = self._manifest()
-            if not manifest:
+            if not (manifest := self._manifest_of_this_run()):
                 return None
             if not all(name in self.blocks for name in names) or self._busy(of):
                 return False
@@ -273,6 +277,12 @@ class Unfinished:
             return {}
         known = isinstance(manifest, dict) and manifest.get("format") == _FORMAT
         return manifest if known and manifest.keys() >= {"scenario", "shards", "replace"} else {}
+
+    def _manifest_of_this_run(self) -> Manifest:
+        """Return the manifest, empty if the run is done; ``BadInput`` if another run has begun in the folder since."""
+        if manifest := self._manifest():
+            refuse_other(self.folder, manifest, self._begun)
+        return manifest
 
     def _refuse_foreign(self) -> None:
         """Refuse a folder that no run made, or a run of another format."""

@@ -29,7 +29,10 @@ def folder() -> Path:
 @functools.cache
 def _private_folder() -> Path:
     """Return a folder of this process alone, because one that others can write may hold their code."""
-    return Path(tempfile.mkdtemp(prefix="sliding-sim-"))
+    try:
+        return Path(tempfile.mkdtemp(prefix="sliding-sim-"))
+    except OSError:  # nothing is written below a device
+        return Path(os.devnull)
 
 
 def read(path: Path) -> bytes | None:

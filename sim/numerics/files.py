@@ -100,6 +100,8 @@ def claim(
         str(path).encode()
         if path.is_dir():
             raise BadInput([f"{path} is a folder; name a file"])
+        if os.sep == "/" and "\\" in str(path.absolute()):  # which HDF5 takes for the sign between folders
+            raise BadInput([f"{path}: datasets cannot be read in a path with a backslash; name another file"])
         names = [path, *(path.with_name(path.name + end) for end in beside)]
         folder = next(folder for folder in path.absolute().parents if folder.exists())
         for name in {*path.parts, *(each.name for each in names)}:

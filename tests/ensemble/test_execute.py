@@ -92,9 +92,28 @@ def test_a_block_that_raises_or_breaks_three_pools_is_given_up_and_the_others_ar
     ensemble.simulate(Plan.of(sample()), blocks)
     assert all(name in blocks for task, _ in tasks for name in task.names)
     task = next(Plan.of(sample()).tasks())
-    with pytest.raises(OSError, match="out"):
+    with pytest.raises(OSError, match="out"):  # which may concern all blocks: the run ends at once
         compute(ensemble.advance, BlockFiles(tmp_path / "out"), [(task, [0])] * 2, print, never, 2)
     assert not workers()
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_what_a_block_raises_is_raised_when_all_other_groups_are_done(tmp_path, many_parts, jobs):
+    tasks = [(task, list(range(len(task.names)))) for task in Plan.of(sample()).tasks()]
+    blocks, lost = BlockFiles(tmp_path), deadly.DEADLY.partition("-block")[0]
+    with pytest.raises(ZeroDivisionError) as raised:
+        compute(deadly.advance_faulty, blocks, tasks, print, never, jobs)
+    assert raised.value.__notes__ == [
+        "in members 0 to 1 of point000001; all other blocks are kept, --resume tries these again"
+    ]
+    for name in (name for task, _ in tasks for name in task.names):
+        assert (name in blocks) == (not name.startswith(lost) or name < deadly.DEADLY)
+
+
+def test_a_run_within_the_progress_of_another_changes_neither(many_parts):
+    inner = []
+    outer = ensemble.run(sample(), progress=lambda done: inner.append(ensemble.run(sample(seed=6))))
+    assert outer.identical(ensemble.run(sample())) and inner[0].identical(ensemble.run(sample(seed=6)))
 
 
 def test_a_run_that_is_stopped_again_and_again_gives_the_same_numbers(tmp_path, many_parts):

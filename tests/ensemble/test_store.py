@@ -280,6 +280,30 @@ def test_runs_of_an_older_version_are_named_and_folders_of_another_format_stay(t
         assert list((tmp_path / f"{name}.parts").rglob("manifest.json"))
 
 
+@pytest.mark.parametrize("method", ["begin", "publish"])
+def test_blocks_of_two_runs_do_not_mix(tmp_path, monkeypatch, method):
+    """Another run replaces a run that has begun, or whose blocks are all there: the first one ends."""
+    path, original = tmp_path / "out.nc", getattr(Unfinished, method)
+
+    def replaced(self, *given):
+        patched.undo()
+        if method == "publish":
+            stopped(path, sample(seed=6), replace=True)
+        result = original(self, *given)
+        if method == "begin":
+            stopped(path, sample(seed=6), replace=True)
+        return result
+
+    with monkeypatch.context() as patched, pytest.raises(BadInput, match=r"is of another run: scenario.seed was 6"):
+        patched.setattr(Unfinished, method, replaced)
+        ensemble.run(sample(), path)
+    block = min((tmp_path / "out.nc.parts").glob("*.npz"))
+    with pytest.raises(StoreTrouble, match="--resume"):
+        BlockFiles(block.parent, "the first run").load(block.stem)
+    ensemble.run(sample(seed=6), path, resume=True)
+    assert same(path, sample(seed=6))
+
+
 @posix
 def test_a_folder_that_no_run_made_is_not_touched(tmp_path):
     other, folder = tmp_path / "precious", tmp_path / "out.nc.parts"
@@ -349,6 +373,10 @@ def test_every_task_is_in_one_shard_and_the_last_that_is_done_publishes_the_numb
     assert same(path, shared())
     for how in ({"shard": (2, 3)}, {}):  # all is done
         assert ensemble.run(shared(), path, resume=True, **how) == path
+    before = path.stat()
+    for target in (path, tmp_path / "folder" / "other.nc"):  # a shard without work changes nothing
+        assert ensemble.run(shared(), target, shard=(999, 999)) == target
+    assert path.stat() == before and names(tmp_path) == ["out.nc"]
 
 
 def test_a_run_without_shard_computes_what_no_shard_holds_and_names_the_others(tmp_path):

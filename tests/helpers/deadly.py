@@ -1,4 +1,4 @@
-"""Work that ends its process, for tests of workers, which import it."""
+"""Work that ends its process or raises, for tests of workers, which import it."""
 
 import os
 
@@ -12,3 +12,7 @@ def advance(task, number, state):
     if task.names[number] == DEADLY:
         os._exit(3)
     return simulate.advance(task, number, state)
+
+
+def advance_faulty(task, number, state):
+    return number / 0 if task.names[number] == DEADLY else simulate.advance(task, number, state)
