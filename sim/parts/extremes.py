@@ -22,18 +22,21 @@ class Extremes(NamedTuple):
     """Running maxima over the clock steps, rows of ``MAXIMUM``; NaN counts as 0; ties keep the first.
 
     ``stress`` is that of the shear stress [Pa] and ``friction`` that of the friction force [N], in magnitude; ``pull``
-    is that of the tensile load of a closed contact [N], followed where the control makes the load.
+    is that of the tensile load of a closed contact [N], followed where the control makes the load. ``path`` is the
+    longest path within a step [m], shape (1,) or (members,).
     """
 
     stress: Array
     friction: Array
     pull: Array
+    path: Array
 
 
 def first(bonding: Bonding, radius: Array, pull: Array) -> Extremes:
     """Maxima at t = 0 of the bonds' stress, of friction over a contact radius [m] and of a pull [N]."""
     stress = np.abs(bonding.stress)
-    return Extremes(*(_started(np.nan_to_num(values)) for values in (stress, stress * (np.pi * radius**2), pull)))
+    maxima = (_started(np.nan_to_num(values)) for values in (stress, stress * (np.pi * radius**2), pull))
+    return Extremes._make([*maxima, np.zeros(1)])
 
 
 def column(name: str, maxima: Array) -> Array:
@@ -70,10 +73,10 @@ def after(
     rows = max(len(so_far.stress), stress.shape[1])
     members = max(rows, len(so_far.friction), radii.shape[1])
     counts = rows, members, max(len(so_far.pull), pull.shape[1])
-    largest = Extremes(*(values + np.zeros((count, 1)) for values, count in zip(so_far, counts, strict=True)))
+    largest = [values + np.zeros((count, 1)) for values, count in zip(so_far[:-1], counts, strict=True)]
     ends = motions.first, motions.speed, motions.time[:, 0], motions.duration[:, 0]
     _follow(stress, stiffness, relaxation, radii, pull, *ends, *largest)
-    return largest
+    return Extremes._make([*largest, np.maximum(so_far.path, motions.path.max(axis=0))])
 
 
 def _with_start(before: Array, values: Array, steps: int) -> Array:

@@ -10,7 +10,9 @@ from pydantic_core import PydanticCustomError
 
 from sim.laws import jkr
 from sim.parts.bonds import Cohort, Tracked
+from sim.parts.exchange import Array
 from sim.spectrum.families import BondMade
+from sim.units.notation import engineering
 
 _STEPS_A_CYCLE = 2
 #: Times between which the slip of a run is looked at.
@@ -163,9 +165,72 @@ def remarks_between(scene: Scene) -> list[str]:
         remarks.append(
             f"the rms of the fluctuations exceeds {_MOST_REVERSED} of the mean stress: patches of reversed friction"
         )
-    if varies and min(contact.course.extremes) < 0.0:
-        remarks.append("under tension detachment is a first passage: take clock steps well below the correlation")
-    return remarks
+    return [*remarks, *_remarks_on_step(scene, np.array([np.abs(speeds).max() * scene.clock.step]))]
+
+
+#: Mean overshoot of a random walk beyond a limit, over the standard deviation of its steps: −ζ(1/2)/√(2π).
+_OVERSHOOT = 0.5826
+#: Share of the variance of ΔΓ that a step may renew: a contact under tension lets go late by a tenth of the scatter of
+#: ΔΓ, and the variance of the radius of a lagging edge is 1 % too large.
+_RENEWED_LATE, _RENEWED_LAGGING = 0.005 / _OVERSHOOT**2, -math.expm1(-math.sqrt(0.12))
+
+
+def feels_steps(scene: Scene) -> bool:
+    """Return True if what ΔΓ does between clock steps matters: to an edge that lags, or to a pull-off."""
+    varies = scene.varies["shear"] and not scene.fluctuations.measured and scene.fluctuations.spectrum.variance > 0.0
+    return varies and (scene.contact.lags or pulled(scene))
+
+
+def pulled(scene: Scene) -> bool:
+    """Return True if the control draws the sphere away at some time."""
+    return bool(min(scene.contact.course.extremes) < 0.0)
+
+
+def renewed(scene: Scene, path: Array) -> Array:
+    """Return the share of the variance of ΔΓ that a clock step with a path [m] renews."""
+    all_of_it = scene.process.change(np.full(1, np.inf), np.inf)
+    return np.asarray((scene.process.change(path, scene.clock.step) / all_of_it) ** 2)
+
+
+def pull_off_error(scene: Scene, path: Array) -> Array:
+    """Return about how much the load at pull-off is off [N], as the contact is seen after clock steps with a path [m].
+
+    The first passage of ΔΓ is seen late by the overshoot of its changes (Siegmund, Sequential Analysis, 1985), 3/2 πR
+    of it as a load, and the load by half of its largest change in a step. The two have opposite signs; this is a bound.
+    """
+    shear, clock, settled = scene.fluctuations, scene.clock, scene.population.steady(path / scene.clock.step)
+    size = np.ones(1) if shear.law.remembers else shear.law.factor(path / clock.step, settled.strength)
+    power = settled.frozen + settled.varying if shear.spectrum.bond_made else size**2
+    late = _OVERSHOOT * shear.paid_by_adhesion * power * scene.process.change(path, clock.step)
+    times = np.linspace(0.0, clock.duration, min(clock.steps, _MOST_SLIPS) + 1)
+    most = np.abs(np.diff(scene.contact.course.at(times, clock.duration))).max() * (len(times) - 1) / clock.steps
+    return np.asarray(1.5 * math.pi * scene.sphere.radius * late + 0.5 * most)
+
+
+def _remarks_on_step(scene: Scene, path: Array) -> list[str]:
+    """Return a remark if a clock step in which a path [m] is slid is too long, with one that is not."""
+    between, slid = scene.clock.step * scene.clock.stride, float(path[0])
+    if feels_steps(scene):
+        gone = -math.log1p(-min(float(renewed(scene, path)[0]), 0.999))
+        share = -math.log1p(-(_RENEWED_LATE if pulled(scene) else _RENEWED_LAGGING)) / max(gone, 1e-300)
+        lost = 0.5 * gone / math.tanh(0.5 * gone) - 1.0 if gone else 0.0
+        error = f"its radius varies by up to {lost:.1%} too much, in variance"
+        if pulled(scene):
+            error = f"its load at pull-off is off by up to {engineering(float(pull_off_error(scene, path)[0]), 'N')}"
+        part = f"a step renews {-math.expm1(-gone):.1%} of its variance"
+        text = f"the contact feels ΔΓ at clock steps alone, and {part}: {error}"
+    elif scene.fluctuations.passes and (scene.contact.lags or pulled(scene)):
+        share = scene.fluctuations.field.pixels[0] / max(slid, 1e-300)
+        text = (
+            f"a clock step slides {engineering(slid, 'm')}, beyond a pixel of the map, of which the contact misses some"
+        )
+    else:
+        return []
+    if share >= 1.0:
+        return []
+    least = scene.clock.stride / share
+    count = next(count for k in range(99) for count in (10**k, 2 * 10**k, 5 * 10**k) if count >= least)
+    return [f'{text}; give clock.step = "{engineering(between / count, "s").replace("µ", "u")}"']
 
 
 #: Speeds among which the largest steady stress of bonds is looked for, and that of a body above which a remark is made

@@ -21,6 +21,7 @@ Recorded = Literal[
     "substeps",
     "runaway_time",
     "peak_stress", "peak_friction", "peak_time", "pull_off_load", "pull_off_time",
+    "step_renewal", "pull_off_error",
 ]  # fmt: skip
 
 

@@ -338,6 +338,16 @@ class Renewing:
         """Mean of ΔΓ at amplitude 1 [J/m²]."""
         return float(np.sum(self.gammas.weight * self.gammas.shape))
 
+    def change(self, path: Array, duration: float) -> Array:
+        """Return the standard deviation of the change of ΔΓ at amplitude 1 [J/m²] over paths [m] in a time [s].
+
+        Where all is renewed it is √2 times that of ΔΓ.
+        """
+        terms, none = self.gammas, np.zeros(path.shape)
+        motion = Motion(0, none, np.full(path.shape, duration), path, path, none, none)
+        renewed = -np.expm1(-2.0 * self.correlation.exponents(terms.wavenumber, motion))
+        return np.asarray(np.sqrt(2.0 * np.sum(terms.shape * terms.weight**2 * renewed, axis=-1)))
+
     @cached_property
     def field_law(self) -> FieldLaw:
         law, rates = self.correlation, None

@@ -1,0 +1,86 @@
+"""Errors by the clock step where the contact feels fluctuations at clock steps alone, and the step that mends them."""
+
+import math
+from copy import deepcopy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import sim
+from sim.engine import MemberNoise, follow
+
+LENS = Path(__file__).parents[2] / "scenarios" / "pdms_lens_spring.toml"
+SPECTRUM = {"model": "self_affine", "rms": "80 kPa", "hurst": 0.8, "longest": "60 um", "rolloff": "30 um"}
+SCENE = {
+    "name": "fluctuations under tension", "seed": 1,
+    "clock": {"duration": "2 s", "step": "2 ms", "record": "100 ms"}, "solid": {"shear_modulus": "1.6 MPa"},
+    "sphere": {"radius": "2 mm"}, "adhesion": {"work": "42 mJ/m^2"}, "drive": {"model": "steady", "speed": "1 mm/s"},
+    "bonds": {"model": "steady", "stress": "0.1 MPa", "critical_speed": "1 m/s"},
+    "shear": {"model": "banded", "spectrum": SPECTRUM | {"shortest": "2 um"},
+              "correlation": {"model": "slip", "length": "20 um"}},
+    "contact": {"load": {"from": "0.2 mN", "to": "-0.5 mN"}, "after_pull_off": "stop"},
+    "ensemble": {"members": 1000},
+}  # fmt: skip
+LAGGING = {"model": "rate_dependent", "load": "4 mN", "front_speed": "100 um/s", "front_exponent": 1.0}
+
+
+def scene(**tables):
+    return sim.load(deepcopy(SCENE) | tables)
+
+
+def clock(step):
+    return SCENE["clock"] | {"step": step}
+
+
+@pytest.mark.parametrize("correlation", [{"model": "slip", "length": "20 um"}, {"model": "wave", "waves": 3}])
+def test_the_change_in_a_step_is_that_of_the_drawn_energies(correlation):
+    lens = scene(shear=SCENE["shear"] | {"correlation": correlation}, contact={"load": "1 mN"})
+    course = follow(lens, MemberNoise.of(1, np.arange(4000)), None, range(4))[1]
+    exact = lens.process.change(np.array([2e-6]), 2e-3)
+    changes = np.diff(course.energy, axis=0)
+    assert_allclose(np.std(changes), exact, rtol=4.0 / math.sqrt(changes.size / 2.0))
+    assert_allclose(np.std(course.energy[0]) * math.sqrt(2.0), lens.process.change(np.array([1.0]), 1.0), rtol=0.1)
+
+
+def test_the_error_of_a_pull_off_load_covers_what_a_finer_step_changes_and_is_no_more_than_twice_that():
+    pulls, errors = [], []
+    for step in ("2 ms", "0.1 ms"):
+        dataset = sim.run(scene(clock=clock(step)))
+        loads = dataset["pull_off_load"].to_numpy().ravel()
+        pulls.append((np.mean(loads), np.var(loads) / loads.size))
+        errors.append(float(dataset["pull_off_error"].max()))
+        assert_allclose(dataset["step_renewal"], -math.expm1(-2.0 * float(step.split()[0]) / 20.0), rtol=1e-9)
+    change, noise = abs(pulls[0][0] - pulls[1][0]), 3.0 * math.sqrt(pulls[0][1] + pulls[1][1])
+    assert 0.5 * (errors[0] - errors[1]) - noise < change < errors[0] + errors[1] + noise
+    assert noise < 0.5 * errors[0]
+
+
+def test_the_radius_of_a_lagging_edge_varies_too_much_by_what_is_said():
+    # an edge much slower than the fluctuations adds them up: held for steps s apart they have s/2 coth s/2 too much
+    spread = []
+    for step in ("2 ms", "20 ms"):
+        lens = scene(clock=SCENE["clock"] | {"step": step, "duration": "6 s"}, contact=LAGGING)
+        radius = sim.run(lens)["contact_radius"].sel(t=slice(1.0, None))
+        spread.append(float(radius.var()))
+        remarks = [text for text in lens.remarks() if "clock step" in text]
+    assert "31.3%" in remarks[0] and remarks[0].endswith('clock.step = "2 ms"')
+    assert_allclose(spread[1] / spread[0], 1.0 / math.tanh(1.0), rtol=0.06)
+
+
+def test_the_step_that_is_given_needs_no_remark_and_a_scene_without_error_has_none():
+    written = next(text for text in scene().remarks() if "at pull-off is off by up to" in text)
+    step = written.rpartition('"')[0].rpartition('"')[2]
+    for lens in (scene(clock=clock(step)), scene(contact={"load": "4 mN"}), scene(shear={"model": "uniform"})):
+        assert not [text for text in lens.remarks() if "clock step" in text]
+    dataset = sim.run(scene(contact={"load": "4 mN"}, ensemble={"members": 2}))
+    assert not {"step_renewal", "pull_off_error"} & {*dataset}
+
+
+def test_behind_a_spring_the_longest_path_of_a_step_counts():
+    keys = {"contact": LAGGING, "ensemble.members": 2, "clock": {"duration": "60 ms", "step": "1 ms"}}
+    lens = sim.load(LENS).with_values(keys)
+    dataset = sim.run(lens)
+    path = dataset["slider_position"].diff("t").max("t")
+    assert_allclose(dataset["step_renewal"], -np.expm1(-2.0 * path / 5e-6), rtol=1e-6)
