@@ -4,6 +4,7 @@ import doctest
 import importlib.util
 import inspect
 import json
+import math
 import re
 import shlex
 from pathlib import Path
@@ -12,6 +13,8 @@ import pytest
 from helpers.cases import posix
 from numpy.testing import assert_allclose
 
+import sim
+from sim import analysis
 from sim.cli import _values, cli
 from sim.plots.kinds import KINDS
 from sim.scenario.reader import load
@@ -121,6 +124,39 @@ def test_an_answer_of_the_gallery_is_computed_again(entry):
     assert numbers.keys() == NUMBERS[entry.name].keys()
     for name, number in numbers.items():
         assert_allclose(number, NUMBERS[entry.name][name], rtol=1e-6, atol=1e-9, err_msg=name)
+
+
+#: What README says of the lens behind a spring: change of the scenario, speed [mm/s], quantity, factor, and its text.
+SLIDING = [
+    ({}, 2, "area_ratio", 100.0, "91.71"), ({}, 3, "area_ratio", 100.0, "88.53(10)"),
+    ({}, 3, "lost_to_fluctuations", 100.0, "5.71(14)"), ({}, 2, "lost_to_fluctuations", 100.0, "0.03"),
+    ({}, 3, "lost_to_bonds", 100.0, "5.76(15)"), ({}, 2, "lost_to_bonds", 100.0, "8.27"),
+    ({}, 20, "lost_to_bonds", 100.0, "12.56(7)"), ({}, 20, "lost_to_fluctuations", 100.0, "5.10(3)"),
+    ({"shear.amplitude.memory_length": "1 mm"}, 3, "area_ratio", 100.0, "83.8(2)"),
+    ({"drive.damping": 0.0}, 3, "friction_force", 1e3, "7.5(2)"),
+    ({"drive.damping": 0.0}, 3, "area_ratio", 100.0, "92.7(2)"),
+    ({"drive.damping": 0.0}, 3, "lost_to_fluctuations", 100.0, "2.08(2)"),
+]  # fmt: skip
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("keys", [{}, {"shear.amplitude.memory_length": "1 mm"}, {"drive.damping": 0.0}], ids=str)
+def test_the_readme_has_the_numbers_of_the_lens_behind_a_spring_at_a_16_times_finer_clock_step(keys):
+    """A mean differs by no more than twice the standard errors of both, or half of its last digit."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    for speed in sorted({row[1] for row in SLIDING if row[0] == keys}):
+        path, values = ROOT / "scenarios" / "pdms_lens_spring.toml", {"sweep": {}, "drive.stage": f"{speed} mm/s"}
+        fine = values | {"clock.step": "62.5 us", "clock.record": "1 ms"} | keys
+        late = analysis.distribution(sim.run(load(path, fine)))
+        for _, _, name, factor, text in (row for row in SLIDING if row[:2] == (keys, speed)):
+            mean, sem = (factor * float(late[f"{name}_{kind}"]) for kind in ("mean", "sem"))
+            value, _, error = text.rstrip(")").partition("(")
+            digit = 10.0 ** -len(value.partition(".")[2])
+            assert text in readme
+            assert abs(mean - float(value)) < 2.0 * math.hypot(sem, digit * float(error or 0)) + 0.5 * digit, (
+                name,
+                mean,
+            )
 
 
 @posix
