@@ -21,6 +21,14 @@ prescribes it: `dataset.contact_area.mean("member").plot(x="speed")`, without th
 `per_member = false` it becomes `<name>_mean`, `<name>_std` and `<name>_sem` instead: mean, standard deviation and
 standard error of the mean over the members.
 
+A member has the same noise at all points of a sweep. So the error of a difference between two points is that of the
+members' differences, often far below the two errors combined:
+
+```python
+change = dataset.contact_area.sel(contact_load=4.2e-3) - dataset.contact_area.sel(contact_load=4e-3)
+mean, error = change.mean("member"), change.std("member", ddof=1) / change.sizes["member"] ** 0.5
+```
+
 Under a drive that feels the friction `drive_work` is the rise of `stored_energy`, the energies `dissipated_by_...` and
 `energy_residual`, the error of the integration. It stays below ten times the largest `tolerance` of the scene, of the
 larger of work and stored energy. With `tracked` bonds, and with a body that rings without damping, it may be larger
