@@ -104,11 +104,6 @@ def test_every_scenario_has_its_question_in_the_gallery():
     assert not missing, "give it an entry in docs/make_gallery.py, then make gallery"
 
 
-def test_no_two_questions_of_the_gallery_write_the_same_file():
-    outputs = [re.findall(r"outputs/[\w.]+", "\n".join(entry.commands)) for entry in GALLERY.ENTRIES]
-    assert len({names[-1] for names in outputs}) == len(outputs)
-
-
 def test_the_gallery_shows_the_numbers_that_were_computed():
     assert GALLERY.PAGE.read_text(encoding="utf-8") == GALLERY.text(NUMBERS), "run make gallery"
     for entry in GALLERY.ENTRIES:  # and no number is typed

@@ -52,12 +52,6 @@ def floor(name):
     return name.split(".")[0]
 
 
-def test_every_module_stands_on_a_floor():
-    assert {floor(name) for name in MODULES} == set(FLOORS)
-    files = {path.name for path in ROOT.iterdir() if path.is_file()}
-    assert files == {"__init__.py", "__main__.py", "cli.py", "engine.py", "starter.toml"}
-
-
 def test_a_module_imports_only_from_floors_below_its_own():
     for name in MODULES:
         for other in imported(name):
@@ -110,7 +104,3 @@ def test_nothing_imports_in_a_circle_benchmarks_and_tests_included():
     graph = {f"sim.{name}": path for name, path in MODULES.items()} | BESIDE
     # raises a CycleError that names the circle
     assert tuple(TopologicalSorter({name: imports(path) for name, path in graph.items()}).static_order())
-
-
-def test_public_names_are_all_there():
-    assert all(getattr(sim, name) is not None for name in sim.__all__)

@@ -54,12 +54,6 @@ def _hats(spread, chance, result):
     result[0], result[1], result[2], result[3] = _hat(spread, chance)
 
 
-@kernel("void(uint64, uint64, uint64[::1], int64, float64[::1])")
-def _tails(seed, part, members, step, drawn):
-    for m in range(members.size):
-        drawn[m], _ = noise._beyond(m % 2 - 1, noise.stream(seed, part, members[m], step, 0))
-
-
 def words_from(states, count):
     """Words drawn from given states of the generator, shape (states, count)."""
     states = np.ascontiguousarray(states, dtype=_U)
@@ -87,13 +81,6 @@ def binomials(trials, chance, address, count=1):
     """Binomial numbers of the first stream of a step, shape (members, count)."""
     drawn = np.empty((len(address[2]), count))
     _binomials(trials, chance, *address, drawn)
-    return drawn
-
-
-def tails(address):
-    """Normals of the tails that the ziggurat draws apart, of both sides in turn, shape (members,)."""
-    drawn = np.empty(len(address[2]))
-    _tails(*address, drawn)
     return drawn
 
 

@@ -32,15 +32,6 @@ def test_a_half_spectrum_holds_its_field_and_every_wavevector_once_by_the_integr
         for i, j in [(0, 0), (1, 2), (points - 2, 3)]:
             phase = np.exp(-1j * (qx[i, 0] * x[:, None] + qy[0, j] * x[None, :]))
             assert_allclose(grid.forward(field)[i, j], np.sum(field * phase) * grid.spacing**2, rtol=1e-12, atol=0)
-    for points in [5, 6]:
-        grid = Grid(cell=2.0 * np.pi, points=points)
-        along = np.cos(2.0 * grid.position)[:, None] * np.ones(points)
-        qx, qy = grid.wavevectors
-        carrying = np.abs(grid.forward(along)) > 1e-9
-        assert_allclose(np.unique(np.abs(np.broadcast_to(qx, carrying.shape)[carrying])), 2.0, rtol=1e-14)
-        assert_array_equal(np.broadcast_to(qy, carrying.shape)[carrying], 0.0)
-        assert qx.shape == (points, 1)
-        assert qy.shape == (1, points // 2 + 1)
 
 
 def test_members_have_the_same_bits_in_any_batch_and_derived_arrays_are_read_only():

@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from helpers.draws import FIVE_SIGMA, fits, states_at, tails, words_from
-from numpy.testing import assert_allclose
-from scipy.stats import binom, kstest, norm, poisson
+from helpers.draws import FIVE_SIGMA, fits, states_at, words_from
+from scipy.stats import kstest, norm, poisson
 
-from sim.numerics import noise
 from sim.numerics.noise import PARTS, Noise
 
 
@@ -71,21 +69,6 @@ def test_the_normals_have_normal_moments_and_no_correlation():
     assert abs(np.mean(correlations**2) * 400 - 1.0) < 5.0 * np.sqrt(2.0 / correlations.size)
 
 
-def test_the_layers_of_the_ziggurat_have_equal_areas_and_what_lies_beyond_the_law_of_a_tail():
-    widths, heights = noise._WIDTHS, noise._HEIGHTS
-    assert len(widths) == 256
-    assert_allclose(heights[1:-1], np.exp(-0.5 * widths[1:] ** 2), rtol=1e-13)
-    area = widths[1] * heights[1] + np.sqrt(2.0 * np.pi) * norm.sf(widths[1])
-    # heights near 1 are good to 1e-16, their differences to 1e-16 of 0.01
-    assert_allclose(widths * np.diff(heights), area, rtol=1e-13)
-    assert heights[0] == 0.0
-    assert heights[-1] == 1.0
-    sample = tails(Noise(5, "shear", np.arange(200_000)).at(1))
-    assert np.all(sample[::2] < 0.0)
-    assert np.all(sample[1::2] > 0.0)
-    assert kstest(norm.sf(np.abs(sample)) / norm.sf(noise._WIDTHS[1]), "uniform").pvalue > FIVE_SIGMA
-
-
 @pytest.mark.parametrize("draws", [4 * 10**6, pytest.param(2 * 10**8, marks=pytest.mark.verify)])
 def test_the_normals_have_the_normal_law_in_fine_bins_and_far_tails(draws):
     edges, source = np.round(np.arange(-6.0, 6.005, 0.01), 2), Noise(5, "shear", np.arange(1000))
@@ -101,56 +84,3 @@ def test_the_normals_have_the_normal_law_in_fine_bins_and_far_tails(draws):
         for count in (counts[first + 1 :].sum(), counts[: len(edges) - first].sum()):
             mean = draws * norm.sf(level)
             assert min(poisson.cdf(count, mean), poisson.sf(count - 1, mean)) > 0.5 * FIVE_SIGMA
-
-
-NEIGHBOURS = {"seed": 0, "part": 1, "member": 2, "step": 3, "lane": 4}
-
-
-@pytest.fixture(params=NEIGHBOURS)
-def neighbours(request):
-    """The first words of streams at addresses that differ by one in turn, shape (streams, words)."""
-    addresses = np.tile(np.array([2026, 2, 7, 100, 0], dtype=np.uint64), (4096, 1))
-    addresses[:, NEIGHBOURS[request.param]] += np.arange(4096, dtype=np.uint64)
-    return words_from(states_at(addresses), 256)
-
-
-@pytest.mark.verify
-def test_bytes_of_neighbouring_streams_are_equally_frequent_and_so_are_pairs(neighbours):
-    for shift in range(0, 64, 8):
-        byte = ((neighbours >> np.uint64(shift)) & np.uint64(255)).astype(int)
-        fits(np.bincount(byte.ravel(), minlength=256), np.full(256, byte.size / 256.0))
-        # serial test: with the next word of the stream, and with the same one of the next stream
-        for first, second in ((byte[:, :-1], byte[:, 1:]), (byte[:-1], byte[1:])):
-            fits(np.bincount((256 * first + second).ravel(), minlength=65536), np.full(65536, first.size / 65536.0))
-
-
-@pytest.mark.verify
-def test_gaps_between_small_words_of_neighbouring_streams_are_geometric(neighbours):
-    for order in (neighbours, neighbours.T):  # along a stream, and across them
-        for high in (np.uint64(61), np.uint64(0)):  # the three highest bits, the three lowest
-            gaps = np.diff(np.flatnonzero(((order.ravel() >> high) & np.uint64(7)) == 0)) - 1
-            chance = 0.125 * 0.875 ** np.arange(gaps.max() + 1)
-            fits(np.bincount(gaps), chance * gaps.size)
-
-
-@pytest.mark.verify
-def test_birthdays_of_neighbouring_streams_have_spacings_that_agree_as_often_as_by_chance(neighbours):
-    # Marsaglia: m birthdays in a year of d days have about m³/4d equal spacings, a Poisson number; here 4096 in 2^32
-    mean = 4096.0**3 / 2.0**34
-    for low in (0, 16, 32):
-        days = np.sort((neighbours >> np.uint64(low)) & np.uint64(2**32 - 1), axis=0)
-        equal = np.sum(np.diff(np.sort(np.diff(days, axis=0), axis=0), axis=0) == 0, axis=0)
-        fits(np.bincount(equal, minlength=30)[:30], neighbours.shape[1] * poisson.pmf(np.arange(30), mean))
-
-
-@pytest.mark.verify
-def test_neighbouring_streams_differ_in_half_of_their_bits(neighbours):
-    for first, second in ((neighbours[:-1], neighbours[1:]), (neighbours[:, :-1], neighbours[:, 1:])):
-        different = np.bitwise_count(first ^ second).ravel()
-        fits(np.bincount(different, minlength=65), different.size * binom.pmf(np.arange(65), 64, 0.5))
-    # each bit of a word against each of the word of the next stream: 4096 correlations
-    some = np.ascontiguousarray(neighbours[:, :32])
-    bits = np.unpackbits(some.view(np.uint8), axis=1).reshape(*some.shape, 64) - 0.5
-    first, second = bits[:-1].reshape(-1, 64), bits[1:].reshape(-1, 64)
-    correlations = 4.0 * (first.T @ second) / len(first)
-    assert np.abs(correlations).max() * np.sqrt(len(first)) < norm.isf(0.5 * FIVE_SIGMA / correlations.size)

@@ -15,14 +15,14 @@ from helpers.draws import FIVE_SIGMA
 from helpers.scenes import CELL, SPECTRUM, Clock, advanced, bonds, drive, march, scene, shear
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
-from scipy.stats import chi2, kstest, ncx2
+from scipy.stats import kstest, ncx2
 
 from sim.numerics.noise import Noise
 from sim.parts.exchange import Bonding
 from sim.parts.shear.bands import BandedProcess, Bands
 from sim.parts.shear.modes import modes
 from sim.parts.shear.process import Constant, Diffusion, Fluctuation, Onset, Slip, Stress, Time, Wave
-from sim.spectrum.families import AnisotropicGaussian, Gaussian, Ripple, SelfAffine, VonKarman
+from sim.spectrum.families import AnisotropicGaussian, Ripple, SelfAffine, VonKarman
 
 G, MEMBERS = 1.6e6, 400
 UNLOADED = Bonding(np.ones(1), np.zeros(1), np.zeros(1))
@@ -73,18 +73,6 @@ def law_of(weights, shapes=1.0):
     mean, deviation = np.sum(weights * shapes), math.sqrt(np.sum(weights**2 * shapes))
     table = np.linspace(0.0, mean + 25.0 * deviation, 1200)
     return CubicSpline(table, distribution(weights, shapes, table))
-
-
-def test_the_inverted_characteristic_function_is_the_hypoexponential_law():
-    weights = np.array([0.3, 0.5, 0.8, 1.1, 1.7, 2.0])
-    at = np.linspace(0.0, 60.0, 200)
-    # P(X > x) = Σ e^(−x/w_i) Π_j≠i w_i/(w_i − w_j) for distinct weights
-    beyond = np.zeros_like(at)
-    for i, weight in enumerate(weights):
-        beyond += np.exp(-at / weight) * np.prod(weight / (weight - np.delete(weights, i)))
-    assert_allclose(distribution(weights, 1.0, at), 1.0 - beyond, rtol=0, atol=1e-11)
-    # degrees of freedom that are no whole number: chi-square
-    assert_allclose(distribution(np.full(1, 0.5), 8.3, at), chi2(16.6).cdf(4.0 * at), rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize("draws", [20_000, pytest.param(100_000, marks=pytest.mark.verify)])
@@ -246,28 +234,6 @@ def test_relaxing_amplitude_follows_all_modes_after_a_jump_and_the_mean_of_the_e
         assert abs(sample.mean() - size * weights.sum()) < 5.0 * size * np.sqrt(np.sum(weights**2) / sample.size)
 
 
-def test_bands_are_grouped_once_for_all_sizes_and_moduli_and_kept_for_a_whole_sweep(monkeypatch):
-    calls, group = [], shear.group
-    monkeypatch.setattr(shear, "group", lambda *arguments: calls.append(arguments) or group(*arguments))
-    shear._grouped.cache_clear()
-
-    def bands(rms=2e5, modulus=1e6, cell=CELL):
-        part = shear.Banded(
-            spectrum=Gaussian(rms=rms, length=1e-5), cell=cell, points=64, correlation=Slip(length=1e-6)
-        )
-        return part.process(modulus, 0.5, cell).bands
-
-    unit = bands()
-    for rms, modulus in itertools.product((1e-3, 3.7e5), (1e6, 5e9)):
-        scaled = bands(rms, modulus)
-        assert_allclose(scaled.weight, unit.weight * (rms / 2e5) ** 2 * (1e6 / modulus), rtol=1e-14)
-        assert (scaled.freedom is unit.freedom, scaled.errors) == (True, unit.errors)
-    assert len(calls) == 1
-    for cell in 2 * [CELL * (1.0 + k / 40.0) for k in range(40)]:
-        bands(cell=cell)
-    assert len(calls) == 40
-
-
 def test_a_contact_at_rest_keeps_its_energy_and_bad_input_is_refused_at_its_key():
     part = shear.Banded(spectrum=SPECTRUM, cell=CELL, correlation=Wave(waves=1.0))
     _, energies = march_energies(part, drive.Steady(speed=0.0))
@@ -281,33 +247,3 @@ def test_a_contact_at_rest_keeps_its_energy_and_bad_input_is_refused_at_its_key(
     ):
         with pytest.raises(ValueError, match=key):
             shear.Banded(spectrum=SPECTRUM, correlation=Slip(length=1e-6), cell=CELL, **keys)
-
-
-@pytest.mark.verify
-@pytest.mark.parametrize("correlation", ["slip", "wave"])
-def test_errors_of_a_thousand_seeds_are_standard_normal(correlation):
-    """z-scores of mean, variance and covariance over 1000 seeds."""
-    process, weights, wavenumbers = process_of(
-        "self-affine", {"slip": Slip(length=2e-6), "wave": Wave(waves=0.1)}[correlation], tolerance=0.001
-    )
-    squared = np.exp(
-        -2e-6 * (wavenumbers / (0.2 * np.pi) if correlation == "wave" else np.full(len(weights), 1 / 2e-6))
-    )
-    draws, mean, variance, covariance = 2000, weights.sum(), np.sum(weights**2), np.sum(weights**2 * squared)
-    # E[x²y²] less σ⁴ + 2 cov² is the joint cumulant Σ w⁴ (4 ρ² + 2 ρ⁴) of two squared moduli of correlation ρ²
-    spreads = {
-        "mean": variance,
-        "variance": 2.0 * variance**2 + np.sum(6.0 * weights**4),
-        "covariance": variance**2 + covariance**2 + np.sum(weights**4 * (4.0 * squared + 2.0 * squared**2)),
-    }
-    scores = {name: [] for name in spreads}
-    for seed in range(1000):
-        before, after = two_times(process, lambda step: moved(step, 1e-6), draws, seed, members=20) - mean
-        samples = {"mean": before, "variance": before**2 - variance, "covariance": before * after - covariance}
-        for name, values in samples.items():
-            scores[name].append(values.mean() / np.sqrt(spreads[name] / draws))
-    for name, values in scores.items():
-        values = np.array(values)
-        assert abs(values.mean()) < 5.0 / np.sqrt(values.size), name
-        assert abs(values.var() - 1.0) < 5.0 * np.sqrt((np.mean(values**4) - 1.0) / values.size), name
-    assert kstest(scores["mean"], "norm").pvalue > FIVE_SIGMA
