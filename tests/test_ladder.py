@@ -4,13 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from helpers.scenes import BELL, BONDS, BY_SLIP, CUT_OFF, SPECTRUM, STRETCHED, Gaussian, drive, march, scene, shear
+from helpers.scenes import BELL, BY_SLIP, CUT_OFF, SPECTRUM, STRETCHED, Gaussian, drive, march, scene, shear
 from numpy.testing import assert_allclose
 
-from sim.laws import jkr
 from sim.parts.bonds import models as bonds, tracked as tracks
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
-from sim.parts.contact import Equilibrium
 from sim.parts.shear.process import Onset, Slip
 from sim.scenario.clock import Record
 
@@ -103,21 +101,6 @@ def test_bonds_that_only_a_stretch_breaks_are_the_papers_steady_law(speed):
         assert_allclose(state.stress, full * steady.bonds.bound, rtol=1e-4)
 
 
-def test_bonds_left_open_are_the_depth_that_is_chosen():
-    linear = {"critical_speed": 1e-2, "rebinding_rate": 5.0, "sites": 30}
-    bell, constant = ({"rupture": rupture, **STRETCHED} for rupture in (BELL, Constant(rate=9.0)))
-    for left_open, chosen in (
-        (BONDS["auto, few sites"], bonds.Tracked(rupture=CUT_OFF, **STRETCHED, sites=20)),
-        (BONDS["auto, many sites"], bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=2e5)),
-        (bonds.Auto(**linear), bonds.Counted(**linear)),
-        (bonds.Auto(**bell), bonds.Cohort(**bell)),
-        (bonds.Auto(**constant), bonds.FirstMoment(**constant)),
-    ):
-        assert scene(bonds=left_open).population == chosen
-        one, other = (last(3, bonds=part).contact.radius for part in (left_open, chosen))
-        assert np.array_equal(one, other)
-
-
 def test_mean_fluctuations_become_uniform_as_their_rms_vanishes():
     recipe = {"amplitude": Onset(speed=2e-3, width=0.3)}
     sizes = [last(shear=shear.Mean(spectrum=Gaussian(rms=rms, length=1e-5), **recipe)) for rms in (1e3, 1e1, 1e-1)]
@@ -141,13 +124,6 @@ def test_modal_fluctuations_become_the_mean_as_the_cell_grows():
     assert np.all(np.diff(spreads) < 0.0)
 
 
-def test_the_ensemble_mean_of_modal_energies_is_the_cells_own():
-    part, members = shear.Modal(**BY_SLIP), 2000
-    state = last(members, shear=part)
-    pairs = scene(shear=part).process.modes.energies(1.6e6)
-    assert abs(state.shear.energy.mean() - pairs.sum()) < 5.0 * np.sqrt(np.sum(pairs**2) / members)
-
-
 def test_auto_is_the_depth_that_it_chooses():
     for auto, chosen in (
         (shear.Auto(spectrum=SPECTRUM), shear.Mean(spectrum=SPECTRUM)),
@@ -166,22 +142,3 @@ def test_modal_with_fixed_amplitudes_is_the_mean_with_the_cells_error():
     error = scene(shear=part).process.known_errors()["cell_error_energy"]
     mean = last(shear=shear.Mean(spectrum=SPECTRUM, amplitude=amplitude)).shear.energy
     assert_allclose(last(shear=part).shear.energy, mean * (1.0 + error), rtol=1e-12)
-
-
-def test_energy_that_adhesion_does_not_pay_leaves_jkr_bit_for_bit():
-    radii = last(4, shear=shear.Modal(**BY_SLIP, paid_by_adhesion=0.0)).contact.radius
-    assert np.array_equal(radii, np.full(4, jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6)))
-
-
-def test_a_uniform_stress_of_any_size_changes_nothing():
-    radii = [last(bonds=bonds.Unbroken(stress=stress)).contact.radius[0] for stress in (0.0, 1e3, 1e9)]
-    assert radii[0] == radii[1] == radii[2] == jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6)
-
-
-def test_a_contact_at_the_indentation_of_a_load_is_the_contact_at_that_load():
-    for load in (-0.35e-3, 0.0, 4e-3):
-        at_load = last(contact=Equilibrium(load=load)).contact.radius
-        depth = jkr.indentation_at_radius(at_load, 42e-3, 2e-3, 6.4e6)[0]
-        radius = last(contact=Equilibrium(indentation=depth)).contact.radius
-        assert_allclose(radius, at_load, rtol=1e-11)
-        assert_allclose(jkr.load_at_radius(radius, 42e-3, 2e-3, 6.4e6), load, rtol=1e-10, atol=1e-14)

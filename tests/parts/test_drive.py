@@ -3,10 +3,8 @@
 import itertools
 
 import numpy as np
-import pytest
 from helpers.scenes import DRIVES
 from numpy.testing import assert_allclose
-from pydantic import ValidationError
 from scipy.integrate import quad
 
 from sim.parts.drive import Ramp, Start, Steady, Table
@@ -50,7 +48,7 @@ def test_ramps_count_the_path_of_both_directions_and_tables_jump_between_steps()
     assert_allclose([before.speed[0], after.speed[0]], [1.0, 5.0], rtol=1e-15)
 
 
-def test_a_start_rests_and_slides_at_once_and_impossible_drives_are_refused():
+def test_a_start_rests_and_slides_at_once():
     start = Start(rest=0.5, speed=-3.0)
     before, within, after = (start.motion(1, a, b, 2.0) for a, b in ((0.1, 0.4), (0.3, 1.0), (1.0, 2.0)))
     assert [part.slip[0] for part in (before, within, after)] == [0.0, -1.5, -3.0]
@@ -68,13 +66,3 @@ def test_a_start_rests_and_slides_at_once_and_impossible_drives_are_refused():
     steady = Steady(speed=2e-3).motion(1, 0.0, 5.0, 10.0)
     assert [moving.slip[0], moving.first[0]] == [steady.slip[0], steady.first[0]]
     assert [still.slip[0], still.path[0], still.first[0], still.speed[0]] == [0.0] * 4
-    for make, word in (
-        (lambda: Ramp(start=-1.0, stop=1.0, scale="log"), "logarithmic"),
-        (lambda: Table(time=(0.0,), speed=(1.0,)), "two rows"),
-        (lambda: Table(time=(0.0, 2.0, 1.0), speed=(1.0, 1.0, 1.0)), "never decrease"),
-        (lambda: Table(time=(0.5, 2.0), speed=(1.0, 1.0)), "start at 0 s"),
-        (lambda: Steady(speed=float("inf")), "finite"),
-        (lambda: Start(rest=-1.0, speed=1.0), "at least 0"),
-    ):
-        with pytest.raises(ValidationError, match=word):
-            make()

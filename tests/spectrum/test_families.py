@@ -173,16 +173,10 @@ def test_a_spectrum_survives_dumping_and_reading_and_a_wrong_one_is_refused():
     ripple = {"model": "ripple", "amplitude": "3 kPa", "wavelength": "2 mm", "angle": "180 deg"}
     assert TypeAdapter(Spectrum).validate_python(ripple) == Ripple(3000.0, 0.002, math.pi)
     self_affine = {"model": "self_affine", "rms": 1, "hurst": 1, "longest": 5, "rolloff": 3, "shortest": 1}
-    gaussian = {"model": "gaussian", "rms": 1, "length": 1}
     for keys, fault in [
         ({"model": "band", "rms": 1, "longest": 1, "shortest": 2}, "longest .* is shorter than shortest"),
-        (self_affine | {"rolloff": 6}, "longest .* is shorter than rolloff"),
         (self_affine | {"shortest": 4}, "rolloff .* is shorter than shortest"),
         (self_affine | {"longest": 1, "rolloff": 1}, "no band"),
-        (self_affine | {"hurst": 1.1}, "at most 1"),
-        (gaussian | {"rms": 0}, "above 0"),
-        (gaussian | {"length": "1 Pa"}, "not a unit of m"),
-        (gaussian | {"lenght": 1}, "lenght"),
     ]:
         with pytest.raises(ValidationError, match=fault):
             TypeAdapter(Spectrum).validate_python(keys)

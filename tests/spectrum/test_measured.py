@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
 from sim.numerics.grid import Grid, Rectangle
-from sim.spectrum import Band, Measured, SelfAffine, Spectrum, Tabulated, periodogram, radial_average
+from sim.spectrum import Measured, SelfAffine, Spectrum, Tabulated, periodogram, radial_average
 
 TURN = 2 * math.pi
 
@@ -86,17 +86,12 @@ def test_a_wrong_table_is_refused_with_file_line_and_cure(files):
         ("q [1/um], C [Pa^2 m^2]\n1, 1\n2, 1\n", 'psd.csv: line 1: column "q" .* "rad/um"'),
         ("q [rad/m], C [um^4]\n1, 1\n2, 1\n", 'column "C" .* spectrum of heights'),
         ("q [rad/m], C [kPa^2 um]\n1, 1\n2, 1\n", "spectrum of a line"),
-        ("q [rad/m], C [Pa^2 m^2]\n1, 1\n2, nan\n", "line 3: C must be finite"),
-        ("q [rad/m], C [Pa^2 m^2]\n0, 1\n2, 0\n", "psd.csv: line 2: q must be above 0"),
-        ("k, S\n1, 1\n2, 0\n", 'psd.csv: line 1: column "q" is missing'),
     ]:
         (files.folder / "psd.csv").write_text(text)
         with pytest.raises(ValidationError, match=fault):
             read(files, model="tabulated", file="psd.csv")
     with pytest.raises(ValidationError, match=r'needs file = "psd.csv"'):
         read(files, model="tabulated")
-    with pytest.raises(ValidationError, match="psd2"):
-        read(files, model="tabulated", file="psd2.csv")
 
 
 def test_a_table_between_its_rows_is_a_power_law_or_linear_next_to_a_zero():
@@ -283,13 +278,9 @@ def test_a_wrong_map_is_refused_with_the_cure(files):
             read(files, model="measured", file=f"{number}.nc", spacing=0.1)
     np.savetxt(files.folder / "a.csv", white_map(8, 1.0, 1.0), delimiter=",")
     (files.folder / "a.nc").write_text("no netCDF")
-    (files.folder / "bad.csv").write_text("x,y\n1,2\n")
     for keys, fault in [
         ({"file": "a.csv"}, "give spacing"),
-        ({"file": "missing.csv", "spacing": 1}, "missing.csv: cannot be read"),
         ({"file": "a.nc", "spacing": 1}, "a.nc: "),
-        ({"file": "bad.csv", "spacing": 1}, "bad.csv: line 1: value is not a number"),
-        ({"file": "a.csv", "spacing": "-1 m"}, "above 0"),
         ({"file": "a.csv", "spacing": 1, "window": "box"}, "'none' or 'hann'"),
     ]:
         with pytest.raises(ValidationError, match=fault):
@@ -318,15 +309,3 @@ def test_a_hann_window_keeps_the_border_of_a_steep_map_from_leaking():
     error = math.sqrt(4 / (count * pairs))  # about four neighbours share their numbers under Hann
     assert abs(ratio["hann"] - 1) < 5 * error + 16 / (6 * 12**2)
     assert ratio["none"] > 1.5
-
-
-def test_the_estimate_of_a_realisation_has_its_variance_and_energy():
-    grid = Grid(1.0, 64)
-    band = Band(1.0, longest=1 / 5, shortest=1 / 20)
-    white = grid.forward(np.random.default_rng(9).normal(size=(64, 64))) / grid.spacing
-    ring = radial_average(periodogram(field_of(grid, white * np.sqrt(band.density(*grid.wavevectors))), 1.0), grid)
-    result = Tabulated(ring.q, ring.density)
-    modes = math.pi * (20**2 - 5**2) / 2
-    # one realisation scatters by 1/sqrt(modes); a row at the cut-off smears it by half a ring, 5 %
-    assert abs(result.variance - 1) < 5 / math.sqrt(modes) + 0.05
-    assert abs(result.surface_energy(1.0) / band.surface_energy(1.0) - 1) < 5 / math.sqrt(modes) + 0.05

@@ -7,7 +7,6 @@ import pickle
 import numpy as np
 import pytest
 import xarray as xr
-from helpers.cases import posix
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
@@ -145,13 +144,6 @@ def test_an_array_that_is_no_map_is_refused_and_nothing_in_it_is_executed(files,
         with pytest.raises(ValidationError, match=kind):
             read(files, file=f"{kind}.npy", pixel=1e-6)
         assert not (files.folder / "was-executed").exists()
-
-
-@posix
-def test_a_pipe_is_not_waited_for(files):
-    os.mkfifo(files.folder / "pipe.npy")
-    with pytest.raises(ValidationError, match="is no plain file"):
-        read(files, file="pipe.npy", pixel=1e-6)
 
 
 def test_a_map_that_cannot_be_the_field_is_refused_with_the_cure(files):

@@ -4,12 +4,12 @@ import math
 from itertools import product
 
 import numpy as np
-import pytest
 from hypothesis import given, settings, strategies as st
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.special import lambertw
 
+from sim.laws.schallamach import bell_moments, cut_off_moments
 from sim.parts.bonds import cohorts as populations
 from sim.parts.bonds.cohorts import empty, resting, steady
 from sim.parts.bonds.rupture import RuptureRate
@@ -35,22 +35,6 @@ def march(cohorts, speeds, duration, rupture, rebinding, tolerance, **more):
     return np.array(out), cohorts
 
 
-def renewal(beta, eps):
-    """Bound share, force and square force per site of a Bell population by adaptive quadrature over ln(age)."""
-
-    def weighted(power):
-        def integrand(log_age):
-            age = math.exp(log_age)
-            return age ** (power + 1) * math.exp(-math.expm1(min(eps * age, 700.0)) / eps)
-
-        last = math.log(math.log1p(750.0 * eps) / eps)
-        return quad(integrand, last - 40.0, last, epsabs=0.0, epsrel=1e-11, limit=500, points=[last - 6, last - 2])[0]
-
-    life, lag, square = weighted(0), weighted(1), weighted(2)
-    free = beta / (1.0 + beta * life)
-    return np.array([free * life, free * eps * lag, free * eps**2 * square])
-
-
 def life_of(eps):
     """Age at which 1/e of fresh Bell bonds are left, in units of 1/k0."""
     return math.log1p(eps) / eps
@@ -63,10 +47,12 @@ def worst(result, exact):
 def test_the_steady_state_has_the_moments_of_renewal_theory_and_marching_from_rest_ends_in_it():
     # merging keeps these moments
     for beta, eps in product([0.1, 1.0, 10.0], [0.01, 1.0, 10.0, 1000.0]):
-        assert_allclose(moments(steady(BELL, beta, eps, 1e-4)), renewal(beta, eps), rtol=1e-10, atol=0)
+        assert_allclose(
+            moments(steady(BELL, beta, eps, 1e-4)), bell_moments(eps, 1.0, 1.0, 1.0, beta), rtol=1e-10, atol=0
+        )
     for beta, eps in product([0.01, 1.0, 1000.0], [1e-3, 1e-2, 0.1, 1.0, 10.0, 1e2, 1e4]):
         # a start-up of Bell bonds rings down like a renewal process: 40 lives are enough below 1e-6 where CV > 0.15
-        duration, exact = life_of(eps) * 0.23, renewal(beta, eps)
+        duration, exact = life_of(eps) * 0.23, bell_moments(eps, 1.0, 1.0, 1.0, beta)
         out, _ = march(resting(BELL, beta, 1e-4), [eps] * 174, duration, BELL, beta, 1e-4)
         assert_allclose(out[-1], exact, rtol=1e-4, atol=0)
 
@@ -100,19 +86,11 @@ def test_constant_rupture_follows_the_exact_moments_and_births_are_third_order()
     assert errors[-1] < 1e-9
 
 
-def cut_off_exact(u, m):
-    """Steady moments of bonds of rate 1 that break for certain at stretch 1, u = speed, m = 1/k_on."""
-    decay = math.exp(-1.0 / u)
-    life = 1.0 - decay
-    square = quad(lambda a: a * a * math.exp(-a), 0.0, 1.0 / u, epsabs=0.0, epsrel=1e-12)[0]
-    return np.array([life, u * (1.0 - (1.0 + 1.0 / u) * decay), u * u * square]) / (life + m)
-
-
 def test_cut_off_bonds_slide_by_their_closed_form_and_without_a_rate_break_at_once():
     for tolerance in [1e-3, 1e-4]:
         rupture = RuptureRate(rate=1.0, softness=0.0, limit=1.0)
         for u, m in product((0.1, 0.730401, 5.0, 1e3), (0.1, 1.0, 10.0)):
-            start, exact = steady(rupture, 1.0 / m, u, tolerance), cut_off_exact(u, m)
+            start, exact = steady(rupture, 1.0 / m, u, tolerance), cut_off_moments(u, 1.0, 1.0, 1.0, 1.0 / m)
             assert_allclose(moments(start), exact, rtol=1e-9, atol=0)
             out, _ = march(start, [u] * 50, 0.11 * min(1.0, 1.0 / u), rupture, 1.0 / m, tolerance)
             assert_allclose(out, np.tile(exact, (50, 1)), rtol=tolerance, atol=0)
@@ -215,15 +193,3 @@ def test_cohorts_stay_few_for_ever_and_merging_keeps_four_moments():
         # Radau's rule is exact for squares and errs by h^4/36 x^-3 of a cube, 1e-8 of the whole here; free sites
         # are 1 to 1e-16, of which 300 steps bind 3e-3
         assert_allclose(np.sum(w * x**power), exact, rtol=1e-10 if power < 3 else 1e-7, atol=0)
-
-
-@pytest.mark.verify
-def test_a_long_run_does_not_drift():
-    state = steady(BELL, 1.0, 10.0, 1e-3)
-    exact, slip, most = moments(state), np.array([0.1]), 0
-    for i in range(100_000):
-        state = advance(state, slip, 0.01, BELL, 1.0, 1e-3)
-        if i % 1000 == 999:
-            most = max(most, np.count_nonzero(state.weight))
-            assert worst(moments(state), exact) < 1e-3
-    assert most < state.weight.shape[1]

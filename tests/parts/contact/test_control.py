@@ -195,13 +195,3 @@ def test_no_number_raises_or_hangs_or_makes_a_contact_smaller_than_hertz():
                     assert np.all(np.isnan(a[:2]))
                 for read in (control.normal_load, control.indentation, control.displacement):
                     assert read(a, MAUGIS).shape == a.shape
-
-
-def test_without_work_a_contact_is_hertz_to_the_bit():
-    for work in (0.0, -0.0, -1e-300, -WORK, -math.inf):
-        state = np.full(1, work), np.ones(1), 0.5, MAUGIS
-        for load in (0.0, 5e-324, 0.3, 7.0):
-            assert LoadControl(load).radius(*state) == jkr.hertz_radius_at_load(load, 1.0, 0.75)
-            assert DisplacementControl(load).radius(*state) == math.sqrt(load)
-            a = DisplacementControl(load, 5.0).radius(*state)[0]
-            assert_allclose(a**2 + a**3 / 5.0, load, rtol=1e-14, atol=0.0)
