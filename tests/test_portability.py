@@ -8,33 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.commands import COUNTED, LENS
 
 on_linux = pytest.mark.skipif(sys.platform != "linux", reason="another system is emulated on Linux alone")
 
 ELSEWHERE = Path(__file__).parent / "helpers" / "elsewhere"
-SCENE = """
-name = "a lens — Größe µ"
-seed = 3
-[clock]
-duration = "40 ms"
-step = "1 ms"
-[solid]
-shear_modulus = "1.6 MPa"
-[sphere]
-radius = "2 mm"
-[adhesion]
-work = "42 mJ/m^2"
-[contact]
-load = "4 mN"
+SCENE = (
+    LENS.replace('"a scene"', '"a lens — Größe µ"\nseed = 3').replace('"1 s"', '"40 ms"').replace('"0.1 s"', '"1 ms"')
+)
+SCENE += f"""
 [drive]
 model = "table"
 file = "Geschwindigkeit à.csv"
-[bonds]
-model = "counted"
-critical_speed = "10 mm/s"
-rebinding_rate = "500 1/s"
-sites = 100
-stress = "0.3 MPa"
+{COUNTED}
 [ensemble]
 members = 40
 [sweep]
@@ -54,7 +40,7 @@ def elsewhere(tmp_path):
     folder.mkdir()
     (folder / "szene µ.toml").write_bytes(SCENE.replace("\n", "\r\n").encode())
     steady = SCENE[: SCENE.index("[sweep]")].replace('"counted"', '"steady"')
-    steady = steady.replace('rebinding_rate = "500 1/s"', "").replace("sites = 100", "")
+    steady = steady.replace('rebinding_rate = "500 1/s"', "").replace("sites = 50", "")
     (folder / "fit.toml").write_text(steady, encoding="utf-8", newline="\r\n")
     (folder / "Geschwindigkeit à.csv").write_bytes(SPEEDS.encode())
     (folder / "curves.csv").write_bytes(CURVES.encode())

@@ -129,18 +129,13 @@ TABLES = [
 VALUES = [
     ('work = "42 mJ/m^2"', 'work = "42 mJ"', "adhesion.work", '"mJ"...J/m^2...for example "42 mJ/m^2"'),
     ('radius = "2 mm"', 'radius = "9.4"', "sphere.radius", "without a unit"),
-    ('radius = "2 mm"', "radius = nan", "sphere.radius", "finite"),
-    ('radius = "2 mm"', "radius = [2]", "sphere.radius", 'must be a number...such as "2 mm"'),
     ('radius = "2 mm"', "radius = 0x" + "1" * 5000, "sphere.radius", "too large"),
     ("members = 4", "members = 4.5", "ensemble.members", "whole number"),
     ("seed = 7", "seed = 18446744073709551616", "seed", "at most 18446744073709551615"),
     ('name = "lens"', "name = 5", "name", "string"),
-    ('name = "lens"', f'name = "{"x" * 201}"', "name", "200"),
     ("members = 4", 'members = 4\n[record]\nmaps = "1 s"', "record.maps", "tuple"),
     ("members = 4", 'members = 4\n[record]\nmaps = ["1 s", "2 kg"]', "record.maps", 'value 2...unit "kg"'),
     ("members = 4", 'members = 4\n[record]\nquantities = ["contact_aria"]', "record.quantities", '"contact_area"'),
-    (LOAD, "displacement = 1\nstiffness = 0", "contact.stiffness", "above 0 N/m"),
-    (LOAD, f"{LOAD}\nreversible = 2", "contact.reversible", "at most 1"),
     (LOAD, 'load = { time = [0, 1], value = [1, "2 kg"] }', "contact.load.value", 'value 2...unit "kg"'),
 ]
 TOGETHER = [
