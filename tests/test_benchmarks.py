@@ -10,7 +10,6 @@ from helpers.cases import some
 
 from benchmarks import page, run, timing
 from benchmarks.compare import interval, slower
-from benchmarks.lines import size
 
 RESULTS = json.loads(run.RESULTS.read_text(encoding="utf-8"))
 
@@ -68,23 +67,3 @@ def test_a_row_is_slower_if_its_median_is_and_its_interval_says_so():
         ([0.5] * 5, False),
     ]:
         assert slower(ratios) is expected
-
-
-def test_lines_of_code_hold_neither_docstrings_nor_comments_nor_blanks():
-    text = '''"""What a module
-is."""
-
-import math  # counts
-
-# does not
-
-
-def area(radius):
-    """Of a disc."""
-    text = """two
-lines"""
-    return (
-        math.pi * radius**2
-    ), text
-'''
-    assert size(text)[0] == 7

@@ -10,10 +10,6 @@ from helpers.scenes import BONDS, CONTACTS, DRIVES, SHEARS, go_together, march, 
 from numpy.testing import assert_allclose
 
 from sim.engine import MemberNoise, follow, pack, trajectory_of, unpack
-from sim.parts import drive
-from sim.parts.shear import models as shear
-from sim.parts.shear.process import Onset, Time
-from sim.spectrum.families import Ripple
 
 DEPTHS = {"drive": DRIVES, "bonds": BONDS, "shear": SHEARS, "contact": CONTACTS}
 
@@ -148,14 +144,3 @@ def test_long_marches_do_not_drift(steps):
     exact = 1.0 / 1.2 + (1.0 - 1.0 / 1.2) * math.exp(-rate * scenario.clock.duration)
     assert_allclose(last.bonds.bound, exact, rtol=1e-12)
     assert_allclose(last.drive.position, 2e-3 * scenario.clock.duration, rtol=1e-16 * steps + 1e-14)
-
-
-def test_a_detached_contact_stays_open():
-    # a ripple that grows past what tension allows and falls back again
-    ripple = {"spectrum": Ripple(amplitude=4e5, wavelength=24e-6), "mode_amplitudes": "fixed"}
-    part = shear.Modal(**ripple, correlation=Time(time=1.0), amplitude=Onset(speed=1e-3, width=0.1))
-    pulse = drive.Table(time=(0.0, 0.003, 0.004, 0.005, 0.1), speed=(1e-5, 1e-5, 1e-1, 1e-5, 1e-5))
-    scenario = scene(1, 8, shear=part, drive=pulse, contact=CONTACTS["tension"])
-    radii = [state.contact.radius[0] for state in march(scenario, np.arange(1))]
-    assert np.isfinite(radii[:4]).all()
-    assert np.isnan(radii[4:]).all()

@@ -36,16 +36,6 @@ def test_the_rate_equation_becomes_the_steady_law_as_rebinding_rate_grows():
         assert_allclose(found.bonds.bound, steady.bonds.bound, rtol=1e-14)
 
 
-def test_counted_bonds_become_the_rate_equation_as_their_number_grows():
-    recipe = {"critical_speed": 1e-2, "rebinding_rate": 300.0, "start_from": "bonded"}
-    exact = last(bonds=bonds.Rate(**recipe)).bonds.bound
-    for sites in (1, 10**2, 10**4, 10**6, 10**8):
-        fraction = last(400, bonds=bonds.Counted(**recipe, sites=sites)).bonds.bound / sites
-        spread = np.sqrt(exact * (1.0 - exact) / sites)
-        assert abs(fraction.mean() - exact) < 5.0 * spread / np.sqrt(400)
-        assert abs(fraction.std() / spread - 1.0) < 5.0 / np.sqrt(2 * 400)
-
-
 STARTED = drive.Start(rest=2e-3, speed=4e-3)
 
 

@@ -29,25 +29,6 @@ def known(ramp):
     )
 
 
-@pytest.mark.parametrize("chunks", [None, (2, 4)])
-@pytest.mark.parametrize("room", [8, 10**6])
-def test_pieces_cover_all_of_a_dataset(monkeypatch, room, chunks):
-    monkeypatch.setattr(dataset_module, "ROOM", room)
-    numbers = xr.Dataset({"x": (("member", "t"), np.arange(7.0 * 23.0).reshape(7, 23))})
-    numbers["x"].encoding["chunksizes"] = chunks
-    lengths = []
-
-    def double(piece):
-        lengths.append(piece.sizes["t"])
-        return 2.0 * piece
-
-    for dims in (("t",), ("member",), ("member", "t")):
-        doubled = dataset_module.in_pieces(numbers, dims, double)
-        xr.testing.assert_equal(doubled, 2.0 * numbers)
-    assert room > 1000 or len(lengths) > 6
-    assert chunks is None or {length % 4 for length in lengths} <= {0, 3}  # cut where chunks end
-
-
 @pytest.mark.verify  # dask comes with its extra
 def test_runs_joined_as_the_page_says_have_the_table_of_a_sweep_and_of_more_members(tmp_path):
     parts = {"drive": Steady(speed=1e-2), "record": Record(quantities=["contact_area"])}

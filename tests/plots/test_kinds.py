@@ -59,12 +59,6 @@ def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_wi
     panel = plots.draw(dataset).axes[0]
     ends = [drawn(panel, colour)[0][-1] for colour in pictures.LINES[:2]]
     assert_allclose(ends, [10.0, 100.0], rtol=1e-12)
-    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep={"contact.load": [4e-6, 1e-3, 4e-3]})
-    assert [pictures.swept_value(dataset, "contact_load", at) for at in range(3)] == [
-        "$P$ = 4 µN", "$P$ = 1 mN", "$P$ = 4 mN",
-    ]  # fmt: skip
-    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep={"contact.reversible": [0.0, 0.1]})
-    assert pictures.swept_value(dataset, "contact_reversible", 1) == r"reversible $\alpha$ = 0.1"
     dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep={"contact.load": list(np.linspace(1e-3, 9e-3, 9))})
     panel, *_, bar = rendered(plots.draw(dataset, "time")).axes
     assert bar.get_ylabel() == "normal load $P$ (mN)" and not any("$P$" in name for name in legend_of(panel)[0])
