@@ -34,6 +34,7 @@ RESTING = {"model": "bell", "zero_force_rate": "25 1/s", "bell_force": "4 pN"}
 CLUTCH = {"rupture": RESTING, "bond_stiffness": "0.8 uN/m", "rebinding_rate": "250 1/s", "site_density": "6.5e16 1/m^2"}
 PULLED = {"model": "spring", "stage": "5 mm/s", "stiffness": "300 N/m"}
 SLIPPING = BANDED | {"amplitude": {"model": "slip_rate", "floor": 0.05}}
+UNFELT = SLIPPING | {"paid_by_adhesion": 0.0}
 SPRINGS = {
     "rate": (16, CLUTCH | {"model": "rate"}),
     "cohort": (2, CLUTCH | {"model": "cohort", "tolerance": 1e-3}),
@@ -50,8 +51,8 @@ STEPS: dict[str, Tables] = {
     "equilibrium step, 64 members": lens(64, 400, drive=RAMP, bonds=RATE, shear=BANDED, contact=MOVED),
     "rate-dependent step, 64 members": lens(64, 400, drive=RAMP, bonds=RATE, shear=BANDED, contact=LAGGING),
 } | {
-    f"spring, {name}{words}": lens(members, 40, drive=PULLED, bonds=bonds, shear=SLIPPING | {"paid_by_adhesion": share})
-    for words, share in (("", 1.0), (", energy not felt", 0.0))
+    f"spring, {name}{words}": lens(members, 40, drive=PULLED, bonds=bonds, shear=shear)
+    for words, shear in (("", SLIPPING), (", energy not felt", UNFELT), (", constant amplitude", BANDED))
     for name, (members, bonds) in SPRINGS.items()
 }
 MAPS = {"maps": [f"{n} ms" for n in range(1, 21)]}

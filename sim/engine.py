@@ -115,7 +115,7 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
     if valid < len(steps):
         return advance(scenario, state, noise, steps[:valid])
     at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
-    largest = extremes.after(state.extremes, at_start, bonding, touch.radius, pull, motions)
+    largest = extremes.after(state.extremes, at_start, bonding, touch.radius, pull, motions, scenario.feels_steps)
     end = State(steps[-1], slider, bonds, bonding.at(-1), shear, touch.at(-1), largest)
     return end, _trajectory(motions.time, motions, bonding, energy, driven, touch)
 

@@ -50,11 +50,12 @@ def _started(values: Array) -> Array:
 
 
 def after(
-    so_far: Extremes, before: tuple[Bonding, Array], bonding: Bonding, radius: Array, pull: Array, motions: Motion
-) -> Extremes:
+    so_far: Extremes, before: tuple[Bonding, Array], bonding: Bonding, radius: Array, pull: Array, motions: Motion,
+    with_path: bool = False,
+) -> Extremes:  # fmt: skip
     """Maxima a block of steps later, from the bonds, contact radius [m] and pull [N] at the end of each.
 
-    ``before`` are bonds and contact radius at its start.
+    ``before`` are bonds and contact radius at its start. The path is followed only ``with_path``.
 
     Notes
     -----
@@ -76,7 +77,8 @@ def after(
     largest = [values + np.zeros((count, 1)) for values, count in zip(so_far[:-1], counts, strict=True)]
     ends = motions.first, motions.speed, motions.time[:, 0], motions.duration[:, 0]
     _follow(stress, stiffness, relaxation, radii, pull, *ends, *largest)
-    return Extremes._make([*largest, np.maximum(so_far.path, motions.path.max(axis=0))])
+    path = np.maximum(so_far.path, motions.path.max(axis=0)) if with_path else so_far.path
+    return Extremes._make([*largest, path])
 
 
 def _with_start(before: Array, values: Array, steps: int) -> Array:

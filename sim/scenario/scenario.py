@@ -23,7 +23,7 @@ from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
 from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
-from sim.scenario.checks import faults_across, remarks_between, remarks_on_force
+from sim.scenario.checks import faults_across, feels_steps, remarks_between, remarks_on_force
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
@@ -233,6 +233,11 @@ class Scenario:
         by_bonds = bonded and (self.fluctuations.reads_stress or self.fluctuations.passes)
         sheared = driven or self.fluctuations.per_member or by_bonds
         return {"drive": driven, "bonds": bonded, "shear": sheared, "contact": bonded or sheared, "control": False}
+
+    @cached_property
+    def feels_steps(self) -> bool:
+        """Return True if what ΔΓ does between clock steps matters to the contact."""
+        return feels_steps(self)
 
     @property
     def by_steps(self) -> bool:

@@ -185,7 +185,8 @@ def advance(
         rows["radius"] = np.where(_agree(slider.radius, contact.radius), slider.radius, contact.radius)
     pieces, duration = drive.driven(ends, times.duration), ends[1:] - ends[:-1]
     scale = 1.0 / (stretch if drive.spring else force)
-    course = np.stack([pieces.interval, pieces.stop - pieces.start, *(scale * np.array(pieces[3:6]))], axis=1)
+    course = np.array([pieces.interval, pieces.stop - pieces.start, *pieces[3:6]])
+    course[2:] *= scale
     law, shear = parts.shear.field_law, contact.shear
     rows["paid"], rows["drawn"] = contact.paid, contact.paid * shear.energy
     answers = isinstance(bonds, _WITH_STRETCH) and shear.expected.size  # others hold a contact that is rigid
@@ -196,11 +197,11 @@ def advance(
         law = law._replace(length=law.length / stretch, by_slip=law.by_slip * stretch)
     state = rows.view(float).reshape(members, COLUMNS)
     clock, work = _clock(contact, ends), stretch * force
-    inputs = Inputs(state, slider.energies.copy(), course, clock, _of_columns(*units), work)
+    inputs = Inputs(state, slider.energies.copy(), np.ascontiguousarray(course.T), clock, _of_columns(*units), work)
     columns, energies = np.empty((COLUMNS, len(steps), members)), np.empty((len(steps), *slider.energies.shape))
     numbers = *_numbers(drive, bonds, contact, units), tuple(law)
-    end, bonding = _advanced(bonds, population, contact.radius, inputs, numbers, (columns, energies), noise)
     reached = dict(zip(_NAMES, columns, strict=True))
+    end, bonding = _advanced(bonds, population, contact.radius, inputs, numbers, (columns, energies), reached, noise)
     stage, stage_speed = np.zeros((2, len(steps), members))
     if drive.spring:
         whole = pieces.joined
@@ -227,15 +228,16 @@ def _advanced(
     inputs: Inputs,
     numbers: _Numbers,
     outputs: tuple[Array, Array],
+    reached: dict[str, Array],
     noise: Noise,
 ) -> tuple[tuple[object, ...], Bonding]:
     """Return the bonds after some clock steps and their readings at each.
 
     ``radius`` of the contact at the start [m]; ``outputs`` are filled with the rows and energies at the end of each
-    step. Bonds without a stretch have the sense of the sliding in its place.
+    step, of which ``reached`` has the columns by name. Bonds without a stretch have the sense of the sliding in its
+    place.
     """
     shape, rows = outputs[0].shape[1:], inputs.rows.view(ROW)[:, 0]
-    reached = dict(zip(_NAMES, outputs[0], strict=True))
     if isinstance(bonds, models.Cohort):
         ages = cast(models.Ages, population)
         share, area_radius = bonds.diluted(ages.area_radius, radius)
@@ -271,6 +273,8 @@ def _advanced(
 
 def steps_until_contact_changes(slider: Driven, radius: Array) -> int:
     """Return the number of clock steps up to the first that ends with another contact radius [m] than its sub-steps."""
+    if len(radius) == 1:
+        return 1
     apart = ~np.all(_agree(slider.radius, radius), axis=1)
     return int(np.argmax(apart)) + 1 if apart[:-1].any() else len(apart)
 

@@ -334,6 +334,10 @@ class Renewing:
         raise NotImplementedError
 
     @cached_property
+    def _forgets_by_slip(self) -> bool:
+        return isinstance(self.correlation, Slip | Wave) or self.amplitude.remembers
+
+    @cached_property
     def mean(self) -> float:
         """Mean of ΔΓ at amplitude 1 [J/m²]."""
         return float(np.sum(self.gammas.weight * self.gammas.shape))
@@ -384,11 +388,11 @@ class Renewing:
             keep, size = keep + np.zeros(renew.shape), size + np.zeros((len(renew), 1))
         drawn = self._renew(values, keep, renew, size, motions.step, noise)
         energy = expected = self._scaled(amplitude, drawn)
-        if isinstance(self.correlation, Slip | Wave) or self.amplitude.remembers:
+        if self._forgets_by_slip:
             before = drawn[-2] if len(drawn) > 1 else state.past.energy
             if keep.shape[2] == 1:
                 before = keep[-1, :, 0] ** 2 * before + (renew[-1, :, 0] * size[-1]) ** 2 * self.mean
-            expected = self._scaled(amplitude, before[np.newaxis])
+            expected = self._scaled(amplitude[-1:], before[np.newaxis])
         return Fluctuation(energy[-1], amplitude[-1], values, past._replace(energy=drawn[-1]), expected[-1]), energy
 
     def _shares(self, motions: Motion) -> tuple[Array, Array]:
