@@ -44,10 +44,8 @@ Printed = tuple[list[dict[str, str]], str]
 QUANTITIES = ("shear_stress", "bond_fraction", "fluctuation_energy", "contact_radius", "friction_force")
 STATISTICS = ("mean", "spread", "skewness", "correlation time")
 _ENERGY, _RADIUS = 2, 3
-_WORDS = {
-    "stress": "the shear stress", "bonds": "the bond fraction", "ΔΓ": "ΔΓ", "radius": "the radius",
-    "friction": "the friction force",
-}  # fmt: skip
+_SHORT = ("stress", "bonds", "ΔΓ", "radius", "friction")
+_WORDS = ("the shear stress", "the bond fraction", "ΔΓ", "the radius", "the friction force")
 READ = {variable.name: variable.read for variable in VARIABLES}
 
 _BANDS, _COHORTS = (0.3, 0.1, 0.03, 0.01, 0.003), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
@@ -55,15 +53,13 @@ _BANDS, _COHORTS = (0.3, 0.1, 0.03, 0.01, 0.003), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 #: Shares of the budget that are spent on times and on clock steps; the rest is spent on models and grids.
 _TIMING, _STEPS = 0.15, 0.3
 #: Records at which runs without noise, and members, are compared; fewest and most members.
-_RECORDS, _TIMES, _FEWEST, _MOST = 1000, 6, 16, 2**14
+_RECORDS, _TIMES, _FEWEST, _MOST = 500, 6, 16, 2**14
 #: Most numbers that are kept of the finest of several clock steps, and most steps that are run at once.
 _NUMBERS, _PIECE = 2**22, 512
 #: Finest clock step over the scene's; share of the tolerance below which an error is small enough.
 _FINEST_STEP, _SMALL = 2.0**-12, 0.1
 #: Least factor by which the change from quarter to quarter of the clock step falls: 4^p with the order p = 1/2.
 _FALL = 2.0
-#: Share of repeated studies whose noise exceeds the bound, on both sides.
-_MISSED = 0.05
 #: Errors below this are roundings.
 _ROUNDING = 1e-9
 
@@ -83,6 +79,7 @@ _DESCRIBED = {
     "error": ("1", "largest error over the run"),
     "standard_error": ("1", "standard error of the error"),
 }
+_COLUMNS = ("part", "own", "time", "members", "error", "standard_error")
 
 
 @dataclass
@@ -152,10 +149,12 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     Under a spring or a force, means over the members and the second half of the run are compared. A member that has
     run away counts as zero there.
 
-    The clock step h is off by at most ``k (|d| + t SE(d))``: d is the difference between h and h/4, paired over the
-    members, SE(d) its standard error, t Student's quantile (two-sided, 95 %), and ``k = 1/(1 − 4^−p) = 2`` for the
-    lowest order, p = 1/2. Finer quarters replace d by the sum of their changes. The result does not converge if |d|
-    exceeds its noise and does not fall from the last quarter but one to the last by more than its standard error.
+    A run with the clock step h is off by at most ``k (|d| + t SE(d))``: d is the difference between h and h/4, paired
+    over the members, SE(d) its standard error, t Student's quantile (two-sided, 95 %), and ``k = 1/(1 − 4^−p) = 2`` for
+    the lowest order, p = 1/2. If the step is quartered more often, the bound is the difference from the finest step
+    and ``1/(4^p − 1) = 1`` times the last |d|, or half of the one before if that is larger; standard errors likewise.
+    A result is shown to converge if the last |d| is within its noise, or smaller than the one before by more than the
+    standard error. Differences below ``drive.tolerance`` are not resolved.
     """
     if scenario.fluctuations.measured:
         raise BadInput(["shear.field: a map has no simpler model; study fields of its spectrum, shear.spectrum"])
@@ -188,10 +187,9 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
         variables[name] = (dims[: values.ndim], values, {"long_name": text} | ({"units": unit} if unit else {}))
     coordinates = {"row": [row.label for row in judged], "quantity": [*QUANTITIES], "statistic": [*STATISTICS]}
     return xr.Dataset(variables, coordinates, {
-        "Conventions": "CF-1.11", "title": f"speed against error: {scenario.name}",
+        "Conventions": "CF-1.11", "title": f"speed against error: {scenario.name}", "not_converging": trend,
         "sim_version": importlib.metadata.version("sliding-sim"), "seed": str(scenario.seed), "tolerance": accepted,
         "swept": ", ".join(key for axis in scenario.sweep for key in axis.keys), "left_out": "\n".join(left_out),
-        "not_converging": trend,
     })  # fmt: skip
 
 
@@ -282,26 +280,23 @@ def _records(scenario: Scenario) -> range:
 
 def recorded(scenario: Scenario, count: int, steps: range, names: Sequence[str] = QUANTITIES) -> Array:
     """Return variables of the first members at some clock steps, shape (names, members, steps)."""
-    return np.concatenate([*_batches(scenario, count, steps, names)], axis=1)
-
-
-def _batches(scenario: Scenario, count: int, steps: range, names: Sequence[str]) -> Iterator[Array]:
-    """Yield variables of batches of members at some clock steps, shape (names, members, steps)."""
+    values = list[list[Array]]()
     for members in np.array_split(np.arange(count), -(-count // together(scenario))):
         _, course = follow(scenario, MemberNoise.of(scenario.seed, members), None, steps)
         read, shape = (READ[name](scenario, course) for name in names), (len(steps), len(members))
-        yield np.array([np.broadcast_to(variable, shape).T for variable in read])
+        values.append([np.broadcast_to(variable, shape).T for variable in read])
+    return np.concatenate(values, axis=1)
 
 
 def compared(scenario: Scenario, count: int, steps: range) -> Array:
     """Return the ``QUANTITIES`` of the first members at some clock steps, shape (quantities, members, times).
 
-    Under a drive that solves for the motion there is a single time: the mean over the second half of the steps.
+    Under a spring or a force the only time is the mean over the second half of the steps, because single paths diverge.
+    A member that has run away has the value zero.
     """
-    if not scenario.drive.solves_motion:
-        return recorded(scenario, count, steps)
-    late = (np.nan_to_num(batch[:, :, len(steps) // 2 :]) for batch in _batches(scenario, count, steps, QUANTITIES))
-    return np.concatenate([batch.mean(axis=2, keepdims=True) for batch in late], axis=1)
+    values = recorded(scenario, count, steps)
+    late = np.nan_to_num(values[:, :, len(steps) // 2 :])
+    return late.mean(axis=2, keepdims=True) if scenario.drive.solves_motion else values
 
 
 def _known_errors(row: Setting, truth: Gammas, power: int) -> Array:
@@ -319,7 +314,7 @@ def _known_errors(row: Setting, truth: Gammas, power: int) -> Array:
     return np.array([value / exact - 1.0 if exact else 0.0 for value, exact in zip(*sums, strict=True)])
 
 
-def _errors(values: Array, reference: Array, known: Array | None = None) -> tuple[Array, Array]:
+def _errors(values: Array, reference: Array, known: Array | None = None) -> Array:
     """Return the largest differences over the run between two settings, and their standard errors.
 
     Parameters
@@ -332,8 +327,9 @@ def _errors(values: Array, reference: Array, known: Array | None = None) -> tupl
 
     Returns
     -------
-    error, standard_error : array, shape (quantities, 4)
-        For each quantity and statistic, in units of the largest mean, for the spread of ΔΓ of its largest spread.
+    array, shape (2, quantities, 4)
+        Error and standard error by quantity and statistic, in units of the largest mean, for the
+        spread of ΔΓ of its largest spread.
     """
     (moments, of_moments), (exact, of_exact) = _moments(values), _moments(reference)
     difference, influence = moments - exact, of_moments - of_exact
@@ -355,7 +351,7 @@ def _errors(values: Array, reference: Array, known: Array | None = None) -> tupl
     result[:, :, :2] = np.divide(at_largest, unit, out=np.zeros(at_largest.shape), where=unit > 0.0)
     if known is not None:
         result[:, _ENERGY] = np.abs(known), np.zeros(4)
-    return result[0], result[1]
+    return result
 
 
 def _moments(sample: Array) -> tuple[Array, Array]:
@@ -380,11 +376,9 @@ def _judged(base: Scenario, settings: list[Setting], end: float, left_out: list[
         _leave_out(fitting.pop(), left_out)
     noisy = sum(row.time for row in fitting if _fluctuates(row.scenario)) / base.ensemble.members
     count = int(np.clip(0.5 * left / max(noisy, 1e-12), _FEWEST, _MOST))
-    fitting, samples = [row for row in settings if row in fitting], list[Array]()
-    for row in fitting:
-        samples.append(compared(row.scenario, count if _fluctuates(row.scenario) else 1, steps))
-    has_truth = fitting[0].part == "shear" and part.per_member and not part.amplitude.relaxing
-    has_truth &= not base.drive.solves_motion  # the amplitude answers to ΔΓ itself
+    fitting = [row for row in settings if row in fitting]
+    samples = [compared(row.scenario, count if _fluctuates(row.scenario) else 1, steps) for row in fitting]
+    has_truth = fitting[0].part == "shear" and part.per_member and not (part.law.relaxing or base.drive.solves_motion)
     if has_truth:  # the distribution of ΔΓ by all modes of the cell
         pairs = cell_pairs(part.spectrum, part.side(base.setting.cell), part.points, *base.solid.effective)
         truth = Gammas(pairs.weight, pairs.count, pairs.wavenumber)
@@ -403,18 +397,16 @@ def _leave_out(row: Setting, left_out: list[str]) -> None:
 
 
 class _Replayed:
-    """A shear process with the fluctuations of a finer run, of which it has the energy at unit amplitude."""
+    """A shear process with the fluctuations of a finer run, of which it has the energy at unit amplitude.
+
+    At the start it draws the same numbers as the finer run.
+    """
 
     def __init__(self, scenario: Scenario, energy: Array) -> None:
         self.process, self.amplitude, self.energy = scenario.process, scenario.fluctuations.law, energy
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.process, name)
-
-    def start(self, motion: Motion, bonding: Bonding, noise: Any) -> Fluctuation:
-        """Return the fluctuations at t = 0."""
-        size = self.amplitude.factor(motion.speed, bonding.strength)
-        return Fluctuation(size**2 * self.energy[0], size, np.empty(0))
 
     def advance(self, state: Any, motions: Motion, bonding: Bonding, noise: Any) -> tuple[Fluctuation, Array]:
         """Return the fluctuations after a block of steps, and ΔΓ at each of them."""
@@ -425,9 +417,8 @@ class _Replayed:
 
 def _replays(scenario: Scenario) -> bool:
     """True if coarser steps can have the fluctuations of a finer run: the fluctuations do not depend on other parts."""
-    part = scenario.fluctuations
-    depends = part.law.relaxing or part.law.remembers or part.spectrum.bond_made or scenario.drive.solves_motion
-    return part.per_member and not depends
+    part, driven = scenario.fluctuations, scenario.drive.solves_motion
+    return part.per_member and not (driven or part.law.relaxing or part.law.remembers or part.spectrum.bond_made)
 
 
 def _at_steps(rows: Sequence[Setting], count: int) -> list[Array]:
@@ -467,22 +458,18 @@ def _judged_steps(written: Setting, finest: Setting, accepted: float, end: float
         runs = _at_steps(rows, count)
         changes = np.array([_errors(longer, shorter) for shorter, longer in itertools.pairwise(runs)])
         changes[:, :, :, 2 - exact.drive.solves_motion :] = 0.0
-        rest, sure = np.zeros(changes[0].shape), students(count)
-        for change in changes[::-1]:  # a change that is small by chance does not hide those before it
-            larger = change[0] + sure * change[1] > (rest[0] + sure * rest[1]) / _FALL
-            rest = np.where(larger, change, rest / _FALL)
+        # a change that is small by chance does not hide those before it
+        sure, rest = students(count), np.max(changes / _FALL ** np.arange(len(changes)).reshape(-1, 1, 1, 1), axis=0)
         now, small = time.process_time(), float(np.max(rest[0] + sure * rest[1])) <= _SMALL * accepted
         more_members = count < most and sure * float(np.max(rest[1])) > float(np.max(rest[0]))
         if small or not (more_members or rows[0].ratio > _FINEST_STEP) or now + 4.2 * (now - began) > end:
             break
-        if more_members:
-            count = min(4 * count, most)
-        else:
-            rows.insert(0, _at_step(exact, 0.25 * rows[0].ratio))
+        count = min(4 * count, most) if more_members else count
+        rows = rows if more_members else [_at_step(exact, 0.25 * rows[0].ratio), *rows]
     for row, run in zip(rows, runs, strict=True):  # the rest of a series that falls by _FALL is its last term here
-        row.error, row.standard_error = np.array(_errors(run, runs[0])) + rest / (_FALL - 1.0)
+        row.error, row.standard_error = _errors(run, runs[0]) + rest / (_FALL - 1.0)
         row.members, row.time = count, written.time / row.ratio
-    return rows[::-1], _trend(changes, runs[0].size / count, count, accepted)
+    return rows[::-1], _trend(changes, 2.0 * runs[0].size / count, count, accepted)
 
 
 def _trend(changes: Array, numbers: float, members: int, accepted: float) -> str:
@@ -491,16 +478,16 @@ def _trend(changes: Array, numbers: float, members: int, accepted: float) -> str
     Noise alone is larger than stated in one study of twenty, though many ``numbers`` are compared.
     """
     (last, noise), (before, noise_before) = changes[:2]
-    shown = (last > students(members, _MISSED / numbers) * noise) & (_FALL * last > _SMALL * accepted)
+    shown = (last > students(members, numbers) * noise) & (_FALL * last > _SMALL * accepted)
     grown = np.where(shown & (before - last <= np.hypot(noise, noise_before)), last, 0.0)
     what, of = divmod(int(grown.argmax()), grown.shape[1])
-    words = f"the {STATISTICS[of]} of {[*_WORDS.values()][what]} changes by"
+    words = f"the {STATISTICS[of]} of {_WORDS[what]} changes by"
     return f"{words} {100.0 * before[what, of]:.2g}, then by {100.0 * last[what, of]:.2g} %" if grown.any() else ""
 
 
-def students(members: int | Array, missed: float = _MISSED) -> Any:
-    """Return Student's two-sided quantile of a mean over some members; by default it misses one mean in twenty."""
-    return special.stdtrit(np.maximum(members - 1.0, 1.0), 1.0 - 0.5 * missed)
+def students(members: int | Array, numbers: float = 1.0) -> Any:
+    """Return Student's two-sided 95 % quantile of a mean over members, or of the largest of some ``numbers``."""
+    return special.stdtrit(np.maximum(members - 1.0, 1.0), 1.0 - 0.025 / numbers)
 
 
 class Choice(NamedTuple):
@@ -522,20 +509,18 @@ def choices(dataset: xr.Dataset) -> list[Choice]:
 
     Errors add up, and so does the time that each change adds to a step; clock steps multiply it.
     """
-    names = ("part", "own", "time", "error", "standard_error", "members")
-    part, is_written, cost, errors, deviations, members = (dataset[name].to_numpy() for name in names)
+    part, is_written, cost, members, errors, deviations = (dataset[name].to_numpy() for name in _COLUMNS)
     noises = students(members)[:, np.newaxis, np.newaxis] * deviations
-    groups = [np.flatnonzero(part == kind) for kind in _PARTS if kind in part]
-    groups = [group[np.argsort(-is_written[group], kind="stable")] for group in groups]
+    groups = [sorted(np.flatnonzero(part == kind), key=lambda row: -is_written[row]) for kind in _PARTS if kind in part]
     reference, combined = float(cost[groups[-1][0]]), list[Choice]()
-    for chosen_rows in itertools.product(*(group.tolist() for group in groups)):
-        place = list(chosen_rows)
+    for chosen_rows in itertools.product(*groups):
+        place = [int(row) for row in chosen_rows]
         *changed, step = cost[place].tolist()
         total = max(reference + sum(each - reference for each in changed), 0.2 * min([reference, *changed]))
         error = np.nan_to_num(errors[place]).sum(axis=0)
         noise = np.sqrt(np.nansum(noises[place] ** 2, axis=0))
         bound = float(np.max(error + noise))
-        combined.append(Choice(chosen_rows, float(f"{total * step / reference:.2g}"), error, noise, bound))
+        combined.append(Choice((*place,), float(f"{total * step / reference:.2g}"), error, noise, bound))
     return combined
 
 
@@ -560,11 +545,11 @@ def _worst(error: Array, deviation: Array) -> tuple[str, int, int]:
 def table(dataset: xr.Dataset) -> list[dict[str, str]]:
     """Return a row for each setting, for the terminal."""
     lines = list[dict[str, str]]()
-    columns = ("row", "part", "own", "time", "members", "error", "standard_error")
-    for name, part, own, cost, members, *errors in zip(*(dataset[of].to_numpy() for of in columns), strict=True):
-        cells = {"changed": str(part), "setting": str(name) + " *" * int(own)}
-        cells["time"] = engineering(float(f"{cost:.2g}"), "s")
-        for symbol, error, deviation in zip(_WORDS, *errors, strict=True):
+    columns = (dataset[name].to_numpy() for name in ("row", *_COLUMNS))
+    for name, part, own, cost, members, *errors in zip(*columns, strict=True):
+        duration = engineering(float(f"{cost:.2g}"), "s")
+        cells = {"changed": str(part), "setting": str(name) + " *" * int(own), "time": duration}
+        for symbol, error, deviation in zip(_SHORT, *errors, strict=True):
             size, _, statistic = _worst(error[np.newaxis], deviation)
             cells[f"{symbol}\n(%)"] = f"{size} {STATISTICS[statistic]}" if statistic and size != "0" else size
         lines.append(cells | {"members": f"{members:,}"})
@@ -588,11 +573,8 @@ def recommendation(dataset: xr.Dataset) -> str:
     Nothing is recommended if the result does not converge as the clock step decreases.
     """
     if trend := dataset.attrs.get("not_converging"):
-        return (
-            "The scene does not converge as the clock step decreases, so no setting is recommended and no error above"
-            f" is a bound.\nFrom quarter to quarter of the step {trend}.\nIf a carried area is the reason, sim check"
-            " names the cure."
-        )
+        text = f"The scene is not shown to converge. From quarter to quarter of the clock step {trend}.\nNo setting is"
+        return f"{text} recommended. With a larger budget it may converge; if it has no limit, sim check may say why."
     tolerance, tried = float(dataset.attrs["tolerance"]), choices(dataset)
     written, (best, good) = tried[0], chosen(tried, tolerance)
     name = "It" if best is written else f"“{', '.join(dataset['row'].values[list(best.rows)])}”"
@@ -601,11 +583,8 @@ def recommendation(dataset: xr.Dataset) -> str:
     lines = [f"As it is written the scene is {_off(written)}."]
     lines.append(f"{name} {verdict} {100.0 * tolerance:.4g} %: {_off(best)}, {cost}.")
     if (factor := (2.0 * float(best.noise.max()) / tolerance) ** 2) > 1.0:
-        members = factor * int(dataset["members"].values[list(best.rows)].max())
-        lines.append(
-            f"The noise falls below half of that with about {float(f'{members:.2g}'):,.0f} members: give a larger"
-            f" budget, about {factor:.2g} times this one."
-        )
+        needed = float(f"{factor * dataset['members'].values[list(best.rows)].max():.2g}")
+        lines.append(f"About {needed:,.0f} members, {factor:.2g} times this budget, reduce the noise to half of that.")
     changed = [dataset.isel(row=row) for row in best.rows if row not in written.rows]
     toml = [f"\n[{_PARTS[str(row['part'].values)][1]}]\n{row['toml'].values}" for row in changed]
     return "\n".join([*lines, *["Write:"] * bool(toml), *toml])
@@ -614,10 +593,9 @@ def recommendation(dataset: xr.Dataset) -> str:
 def _off(choice: Choice) -> str:
     """Return the bound of a combination's error, and the part of it that is noise, in words."""
     size, quantity, statistic = _worst(choice.error + choice.noise, np.zeros(choice.error.shape))
-    noise = 100.0 * float(choice.noise[quantity, statistic])
-    of_noise = f", of which {noise:.2g} % is noise" * (noise > 100.0 * _ROUNDING)
-    of = f"{STATISTICS[statistic]} of {[*_WORDS.values()][quantity]}"
-    return f"off by at most {size} % ({of}{of_noise})" if size != "0" else "exact"
+    share = float(choice.noise[quantity, statistic])
+    noise = f", of which {100.0 * share:.2g} % is noise" * (share > _ROUNDING)
+    return f"off by at most {size} % ({STATISTICS[statistic]} of {_WORDS[quantity]}{noise})" if size != "0" else "exact"
 
 
 def figure(dataset: xr.Dataset) -> Figure:
@@ -626,8 +604,8 @@ def figure(dataset: xr.Dataset) -> Figure:
     Bars are the noise, at 95 %. Exact settings are drawn at a tenth of the smallest error. A ring marks the scene, a
     star the recommended combination, if there is one.
     """
-    names, tolerance = ("part", "own", "time", "error", "standard_error", "members"), float(dataset.attrs["tolerance"])
-    part, is_written, cost, error, deviation, members = (dataset[name].to_numpy() for name in names)
+    part, is_written, cost, members, error, deviation = (dataset[name].to_numpy() for name in _COLUMNS)
+    tolerance = float(dataset.attrs["tolerance"])
     size, best = np.nan_to_num(error).reshape(len(part), -1), chosen(choices(dataset), tolerance)[0]
     at = np.arange(len(part)), size.argmax(axis=1)
     off, bars = size[at], students(members) * np.nan_to_num(deviation).reshape(size.shape)[at]
@@ -636,14 +614,11 @@ def figure(dataset: xr.Dataset) -> Figure:
     with mpl.rc_context(STYLE):
         picture, (panel,) = rows([3.0])
         for name, (words, _, color, marker) in _PARTS.items():
-            look: Any = {"color": color, "marker": marker, "markersize": 3.6, "linewidth": 0.6, "label": words}
             if np.any(here := part == name):
-                panel.errorbar(cost[here], off[here], yerr=bars[here], **look)
-        ring: Any = {"color": "none", "mec": "black", "markersize": 7.5, "label": "as written"}
-        star: Any = {"color": "black", "markersize": 7.0, "zorder": 5, "label": "recommended"}
-        panel.plot(cost[is_written == 1], off[is_written == 1], "o", **ring)
+                panel.errorbar(cost[here], off[here], bars[here], c=color, marker=marker, ms=3.6, lw=0.6, label=words)
+        panel.plot(cost[is_written == 1], off[is_written == 1], "o", c="none", mec="black", ms=7.5, label="as written")
         if not dataset.attrs.get("not_converging"):
-            panel.plot([best.time], [max(best.bound, floor)], "*", **star)
+            panel.plot(best.time, max(best.bound, floor), "*", c="black", ms=7.0, zorder=5, label="recommended")
         panel.axhline(tolerance, color=REFERENCE, linestyle="--", linewidth=0.8, label="accepted")
         panel.set(xscale="log", yscale="log", xlabel="CPU time of the run (s)", ylabel="largest error (bottom: exact)")
         legend(panel)

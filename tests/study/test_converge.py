@@ -261,7 +261,9 @@ def test_errors_add_up_noise_is_added_by_students_quantile_and_steps_multiply_ti
     noisy = dataset_of([0.004, 0.05, 0.004], [1.0, 1.0, 4.0], noise=0.003, **parts)
     quantile = special.stdtrit(99, 0.975)
     assert_allclose(choices(noisy)[1].bound, 0.008 + quantile * math.sqrt(2.0) * 0.003)
-    assert f"with about 280 members" in recommendation(noisy) and "0.84 % is noise" in recommendation(noisy)
+    assert "About 280 members, 2.8 times this budget" in recommendation(noisy) and "0.84 % is noise" in recommendation(
+        noisy
+    )
     parts = {"part": ["shear", "shear", "bonds", "bonds", "step", "step"], "own": [1, 0, 1, 0, 1, 0]}
     dataset = dataset_of([0.0] * 6, [10.0, 4.0, 10.0, 9.0, 10.0, 20.0], **parts)
     times = {choice.rows: choice.time for choice in choices(dataset)}
@@ -315,7 +317,7 @@ def test_the_recommended_setting_keeps_its_bound_against_the_finest_models_and_a
     for tables, length in ((parts, step), (finest, step / 100.0)):
         run = scenario.with_values(tables | {"clock": {"duration": 0.04, "step": length, "record": 4e-3}})
         steps = range(0, run.clock.steps + 1, run.clock.stride)
-        runs.append(study.recorded(run, 256 if study._fluctuates(run) else 1, steps))
+        runs.append(study.compared(run, 256 if study._fluctuates(run) else 1, steps))
     off, deviation = study._errors(*runs)
     bound = np.fmax(best.error + best.noise, tolerance * good)
     assert np.all((off <= bound + 1e-6 + 5.0 * deviation)[:, :2]), (labels, off[:, :2], bound[:, :2])
