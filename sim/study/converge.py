@@ -152,7 +152,8 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     A run with the clock step h is off by at most ``k (|d| + t SE(d))``: d is the difference between h and h/4, paired
     over the members, SE(d) its standard error, t Student's quantile (two-sided, 95 %), and ``k = 1/(1 − 4^−p) = 2`` for
     the lowest order, p = 1/2. If the step is quartered more often, the bound is the difference from the finest step
-    and ``1/(4^p − 1) = 1`` times the last |d|, or half of the one before if that is larger; standard errors likewise.
+    and ``1/(4^p − 1) = 1`` times the last |d|, or a quarter of the one before if that is larger; standard errors
+    likewise.
     A result is shown to converge if the last |d| is within its noise, or smaller than the one before by more than the
     standard error. Differences below ``drive.tolerance`` are not resolved.
     """
@@ -458,8 +459,8 @@ def _judged_steps(written: Setting, finest: Setting, accepted: float, end: float
         runs = _at_steps(rows, count)
         changes = np.array([_errors(longer, shorter) for shorter, longer in itertools.pairwise(runs)])
         changes[:, :, :, 2 - exact.drive.solves_motion :] = 0.0
-        # a change that is small by chance does not hide those before it
-        sure, rest = students(count), np.max(changes / _FALL ** np.arange(len(changes)).reshape(-1, 1, 1, 1), axis=0)
+        # a change that is small by chance does not hide those before it, of first order
+        sure, rest = students(count), np.max(changes / 4.0 ** np.arange(len(changes)).reshape(-1, 1, 1, 1), axis=0)
         now, small = time.process_time(), float(np.max(rest[0] + sure * rest[1])) <= _SMALL * accepted
         more_members = count < most and sure * float(np.max(rest[1])) > float(np.max(rest[0]))
         if small or not (more_members or rows[0].ratio > _FINEST_STEP) or now + 4.2 * (now - began) > end:
