@@ -346,6 +346,9 @@ def converge(
 ) -> None:
     """Speed against error for this scene: models, tolerances and clock steps, and which to choose.
 
+    Behind a spring or under a force, averages over the second half of the run are compared. If the scene is not shown
+    to converge as the clock step decreases, nothing is recommended.
+
     One core is used: settings that run side by side would disturb each other's times.
     """
     from sim.units.quantity import read_option
