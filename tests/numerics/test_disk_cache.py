@@ -6,16 +6,6 @@ from unittest.mock import Mock
 from sim.numerics import disk_cache
 
 
-def test_a_file_is_read_only_as_it_was_stored(tmp_path):
-    path = tmp_path / "new" / "file"
-    assert disk_cache.read(path) is None
-    disk_cache.store(path, b"content")
-    assert disk_cache.read(path) == b"content"
-    assert [entry.name for entry in path.parent.iterdir()] == ["file"]
-    path.write_bytes(path.read_bytes().replace(b"content", b"kontent"))
-    assert disk_cache.read(path) is None
-
-
 def test_a_result_is_cached_for_each_key_and_only_if_it_took_long(tmp_path, monkeypatch):
     monkeypatch.setenv("SIM_CACHE_DIR", str(tmp_path))
     computed = []

@@ -7,29 +7,15 @@ import re
 from pathlib import Path
 
 import pytest
+from helpers import commands
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from sim.scenario.reader import BadInput, load
 from sim.scenario.scenario import Scenario
 
 FOLDER = Path(__file__).parents[2] / "scenarios"
-LENS = """\
-name = "lens"
-seed = 7
-
-[clock]
-duration = "2 s"
-step = "5 ms"
-
-[solid]
-shear_modulus = "1.6 MPa"
-
-[sphere]
-radius = "2 mm"
-
-[adhesion]
-work = "42 mJ/m^2"
-
+LENS = commands.LENS.replace('"a scene"', '"lens"\nseed = 7').replace('"1 s"', '"2 s"').replace('"0.1 s"', '"5 ms"')
+LENS += """\
 [drive]
 model = "ramp"
 from = "10 um/s"
@@ -58,9 +44,6 @@ shortest = "16 um"
 model = "slip"
 length = "5 um"
 
-[contact]
-load = "4 mN"
-
 [ensemble]
 members = 4
 """
@@ -73,7 +56,7 @@ site_density = "1e17 1/m^2"
 #: Lines of the lens that the cases replace.
 RATE = 'model = "rate"\ncritical_speed = "10 mm/s"\nrebinding_rate = "500 1/s"\n'
 RAMP = 'model = "ramp"\nfrom = "10 um/s"\nto = "100 mm/s"\nscale = "log"'
-SHEAR = re.search(r"(?s)\[shear\].*?(?=\[contact\])", LENS)[0]
+SHEAR = re.search(r"(?s)\[shear\].*?(?=\[ensemble\])", LENS)[0]
 SPECTRUM = re.search(r'(?s)model = "self_affine".*?(?=\n\n)', LENS)[0]
 LOAD = 'load = "4 mN"'
 
@@ -258,8 +241,8 @@ def test_a_file_that_is_no_scenario_is_refused_in_one_line(refusal):
         ("# nothing but a question?\n", "`sim new`"),
         (b"\x89HDF\r\n\x1a\n", "dataset"),
         (LENS.encode("utf-16"), "UTF-8"),
-        (LENS.replace('"4 mN"', "4 mN"), "TOML...line 46...in quotes"),
-        (LENS.replace('"rate"', "rate"), "TOML...line 24...in quotes"),
+        (LENS.replace('"4 mN"', "4 mN"), "TOML...line 13...in quotes"),
+        (LENS.replace('"rate"', "rate"), "TOML...line 21...in quotes"),
         (LENS + "[clock]\n", "TOML...twice"),
         (LENS.replace('"lens"', '"lens'), "TOML...quotes"),
         ("a = [1, 2\n", "TOML...bracket"),
@@ -308,7 +291,7 @@ correlation = { model = "wave", waves = 2.0 }
 "shear.spectrum" = { model = "von_karman", rms = "1 kPa", length = "10 um", hurst = 0.5 }
 """
 TEXTS = [path.read_text(encoding="utf-8") for path in sorted(FOLDER.glob("*.toml"))]
-TEXTS.append(re.sub(r"(?s)\[drive\].*?(?=\[contact\])", "", LENS).replace('"2 s"', '"1 s"') + FILES)
+TEXTS.append(re.sub(r"(?s)\[drive\].*?(?=\[ensemble\])", "", LENS).replace('"2 s"', '"1 s"') + FILES)
 VALUE, KEY, TITLE = r"(?m)(?<== )[^\n#]+", r"(?m)^\w+(?= =)", r"(?m)^\[.*\]$"
 NASTY = [
     "nan", "-1", "0", "1e400", "1e-59", "9" * 400, "true", "[]", "{}", '""', '"-1 m"', '"1e300 kg"', '"2 MPa"', "x",

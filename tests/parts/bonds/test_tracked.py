@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import cumulative_trapezoid, quad
-from scipy.stats import kstwo
 
 from sim.laws.schallamach import bell_moments
 from sim.numerics.noise import PARTS
@@ -97,20 +96,6 @@ def test_steady_sliding_reversals_and_rests_have_the_exact_moments():
         # no site's stretch exceeds 3 by much: moments per site vary by less than these
         for value, moment, error in zip(result, exact, (0.5, 1.2, 3.0), strict=True):
             assert abs(value - moment[at]) < 5.0 * error / math.sqrt(sites) + 2e-4
-
-
-def test_loaded_bonds_break_by_the_law_of_bell_and_evans():
-    for speed, sense in product([0.5, 10.0, 1000.0], [1.0, -1.0]):
-        sites = 40_000
-        tracks = begin(UNBREAKING, sites, how="bonded")
-        assert bound(tracks)[0] == sites
-        worst, slid, pull = 0.0, 0.0, math.log1p(3.0 * speed) / 60
-        for _ in range(70):
-            tracks = go(tracks, sense * pull, pull / speed, BELL, 0.0)
-            slid += pull
-            worst = max(worst, abs(bound(tracks)[0] / sites - math.exp(-math.expm1(slid) / speed)))
-        assert worst < kstwo.isf(5.7e-7, sites)
-        assert bound(tracks)[0] < 0.1 * sites
 
 
 def ramp(law, pieces, speeds, sites=600, rebinding=1.0, coarse=0.16, speed=1.0, members=3):
