@@ -135,6 +135,8 @@ _MEMORY = _Column("correlation_time", "t_c", meaning="integral correlation time 
 
 #: Pure numbers that are no shares of something.
 _NO_SHARES = ("bond_fraction", "slip_count")
+#: Shares that are at least 0 and at most 100 %.
+_BOUNDED = ("fraction_detached", "fraction_masked", "time_masked", "ever_detached", "ran_away")
 #: Shares below it are nothing.
 _ROUNDING = 1e-13
 
@@ -184,6 +186,8 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
         phrases.append(f"{gone} of {dataset['runaway_time'].isel(t=-1).size} trajectories end in a runaway: {why}")
     if any("(" in cell for row in rows for cell in row.values()):
         phrases.append("in brackets the standard error in the last digits, wider where members are few")
+    if any(" to " in cell for row in (*rows, *once) for cell in row.values() if "(" in cell):
+        phrases.append("near 0 and 100 % the 95 % interval")
     lines = ["; ".join(phrases)] if phrases else []
     for shown, total in ((rows, points if one_row_each else points * dataset.sizes["t"]), (once, points)):
         if 0 < len(shown) < total:
@@ -270,7 +274,13 @@ def _shown(means: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Col
         if unit == "1" and name not in _NO_SHARES:  # differences of areas leave rounding behind
             unit, mean = "%", np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
         if not np.all((mean == dull) | np.isnan(mean)):
-            cells |= _cells(heading, unit, mean, (high - low) / (2.0 * WIDE))  # of few members above the standard error
+            error = (high - low) / (2.0 * WIDE)  # of few members above the standard error
+            ((heading, texts),) = _cells(heading, unit, mean, error).items()
+            beyond = (name in _BOUNDED) & ((mean - error < 0.0) | (mean + error > 1.0))
+            for row in np.flatnonzero(beyond):  # brackets would leave 0 to 100 %: the 95 % interval, which does not
+                a, m, b = 100.0 * np.clip((low[row], mean[row], high[row]), 0.0, 1.0)
+                texts[row] = f"{m:.3g} ({a:.2g} to {b:.3g})"
+            cells[heading] = texts
     return cells
 
 

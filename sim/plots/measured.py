@@ -73,7 +73,7 @@ class Compared(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """Distances of points from a curve of the variable ``name`` over another, in standard errors of both.
+    """Distances of points of the column ``name`` from a curve over another variable, in standard errors of both.
 
     If the curve has several ``branches``, back and forth, they are those to the nearest one, which underestimates them.
     Branches that are nowhere a hundredth of an error apart count as one.
@@ -144,6 +144,10 @@ class Measured:
         values = factor * source**power
         return Points(values, None if errors is None else power * np.abs(values / source) * errors)
 
+    def _source(self, name: str) -> str:
+        """Return the column that a variable has or follows from."""
+        return next(each for each in (name, *_names_of(name), "contact_area", "contact_radius") if each in self.table)
+
     def draw(
         self, panel: Axes, over: tuple[str, float], shown: tuple[str, float], curves: Sequence[Compared], log: bool
     ) -> None:
@@ -163,7 +167,7 @@ class Measured:
                 values, branches = _residuals(curve, x[rows], y, high, log)
                 near = np.isfinite(values)
                 if np.any(near):
-                    self.residuals.append(Residuals(over[0], name, line, x[rows], values, branches))
+                    self.residuals.append(Residuals(over[0], self._source(name), line, x[rows], values, branches))
                     label += rf", $\chi^2$ = {np.sum(values[near] ** 2):.4g} of {np.sum(near)}"
                     label += " (nearest branch)" * (branches > 1)
             look: Any = HOLLOW | {"color": line.colour, "elinewidth": 0.7, "zorder": 3}

@@ -97,10 +97,12 @@ def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
     # is a curve already; only bonds with a rupture law have a maximum of the stress, which transients after steps
     # between few speeds do not show, nor many springs upon each other
     lasts = is_stationary(dataset)
+    varies = speed_name(dataset) in dataset and not is_steady(dataset)
+    steps = varies and np.unique(speed_of(dataset).to_numpy()).size <= _SPEEDS
     has_peak = any(str(name).startswith("bonds_rupture") for name in dataset.variables)
     less = {"sweep": best in ("theories", "curve") or not lasts, "friction": best in ("creep", "stability")}
     less["curve"] = best == "creep"  # whose speed nothing sets
-    less["stress"] = best != "stress" and (best == "stability" or _steps(dataset) or not has_peak)
+    less["stress"] = best != "stress" and (best == "stability" or steps or not has_peak)
     # time is no more than another axis for a speed that rises or for creep, and nothing happens in it where a run lasts
     less["time"] = best in ("curve", "creep", "stability") or (best != "time" and lasts and "incipient" not in could)
     shown = [best, *(kind for kind in others if not less.get(kind, False))]
@@ -137,12 +139,6 @@ def _with_data(dataset: xr.Dataset, kind: str, prefix: str, data: Data) -> Drawi
     return Drawing(kind, kinds.KINDS[kind].shows, hint, svg, measured=measured)
 
 
-def _steps(dataset: xr.Dataset) -> bool:
-    """True if a run changes between a few speeds."""
-    recorded = speed_name(dataset) in dataset and not is_steady(dataset)
-    return recorded and np.unique(speed_of(dataset).to_numpy()).size <= _SPEEDS
-
-
 def svg_of(figure: Figure, prefix: str) -> str:
     """Return a figure as an SVG element for a page of HTML.
 
@@ -156,8 +152,10 @@ def svg_of(figure: Figure, prefix: str) -> str:
         with mpl.rc_context(STYLE):
             layout.execute(figure)
         figure.set_layout_engine(None)
-    for panel in figure.axes:
-        _thin(panel)
+    for panel in figure.axes:  # matplotlib simplifies lines alone
+        for band in panel.collections:
+            if isinstance(band, PolyCollection):
+                band.set_verts([_thinned(np.asarray(path.vertices), panel) for path in band.get_paths()])
     figure.savefig(content, format="svg", transparent=True, dpi=fineness)  # of images within it
     text = content.getvalue().decode()
     for pattern, replacement in _LEFT_OUT.items():
@@ -169,13 +167,6 @@ def svg_of(figure: Figure, prefix: str) -> str:
     width, height = 72.0 * figure.get_size_inches()
     style = f"min-width: {0.9 * width:.0f}px; max-width: {1.9 * width:.0f}px"
     return f'<svg viewBox="0 0 {width:g} {height:g}" role="img" fill="currentColor" style="{style}">{text}'
-
-
-def _thin(panel: Axes) -> None:
-    """Leave out corners of shaded bands that look the same without them, as matplotlib does for lines alone."""
-    for band in panel.collections:
-        if isinstance(band, PolyCollection):
-            band.set_verts([_thinned(np.asarray(path.vertices), panel) for path in band.get_paths()])
 
 
 def _thinned(corners: np.ndarray, panel: Axes) -> np.ndarray:
@@ -235,7 +226,9 @@ def agreement(dataset: xr.Dataset, drawn: list[Measured], fit: Fit | None = None
         chi^2 sums the squares of the distances in standard errors of point and curve; p is the probability of a chi^2
         at least as large if only these errors separate them.
     """
-    curves = max((_by_curve(measured) for measured in drawn), key=lambda curves: sum(map(_count, curves)))
+    # the residuals of each column and curve once, for curves of one branch
+    once = ({(r.name, r.line.number): r for r in reversed(each.residuals) if r.branches == 1} for each in drawn)
+    curves = max((list(each.values())[::-1] for each in once), key=lambda curves: sum(map(_count, curves)))
     if not curves:
         keys = [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
         lacks = "no curve of the run reaches the measured points, or the curve has several branches"
@@ -252,24 +245,20 @@ def agreement(dataset: xr.Dataset, drawn: list[Measured], fit: Fit | None = None
     return Agreement(rows)
 
 
-def _by_curve(measured: Measured) -> list[Residuals]:
-    """Return the residuals of each variable and curve once, for curves of one branch."""
-    residuals = {(each.name, each.line.number): each for each in reversed(measured.residuals) if each.branches == 1}
-    return list(reversed(residuals.values()))
-
-
 def _count(residuals: Residuals) -> int:
     return int(np.sum(np.isfinite(residuals.values)))
 
 
 def _label(dataset: xr.Dataset, residuals: Residuals) -> str:
-    """Return a variable with the swept values of its curve."""
+    """Return the quantity of a column with the swept values of its curve."""
     texts = []
     for name, place in residuals.line.point.items():
         value = dataset[name][place]
         number = engineering(value.item(), value.attrs.get("units", "1")) if value.dtype.kind in "fi" else value.item()
         texts += [f"{name.replace('_', ' ')} {number}"] if dataset.sizes[name] > 1 else []
-    return residuals.name.replace("_", " ") + (f" ({', '.join(texts)})" if texts else "")
+    known = dataset[residuals.name].attrs if residuals.name in dataset else {}
+    words = known.get("long_name", residuals.name.replace("_", " ")).partition(",")[0]
+    return words + (f" ({', '.join(texts)})" if texts else "")
 
 
 def _row(words: str, curves: list[Residuals], fitted: int = 0) -> dict[str, str]:
@@ -440,8 +429,9 @@ def html(
     rows, whole = table(dataset, _ROWS), highlights(dataset, _ROWS)
     stem = Path(source).stem
     page = Environment(
-        loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, finalize=_cleaned,
-        trim_blocks=True, lstrip_blocks=True,
+        loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined,
+        # values marked as HTML stay as they are, texts lose control characters
+        finalize=lambda value: plain(value) if type(value) is str else value, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     return page.get_template("page.html").render(
         question=question(dataset),
@@ -463,11 +453,6 @@ def html(
         source=str(source),
         saved=f"{stem}.toml" if dataset.attrs.get("scenario_toml") else f"{stem}.json",
     )
-
-
-def _cleaned(value: Any) -> Any:
-    """Return a text without control characters; values marked as HTML stay as they are."""
-    return plain(value) if type(value) is str else value
 
 
 def question(dataset: xr.Dataset) -> Question:

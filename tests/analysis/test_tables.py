@@ -40,7 +40,9 @@ def test_tables_have_a_dozen_rows_or_one_for_each_point(ramp):
         mean = float(re.match(r"[\d.]+", row["a\n(µm)"])[0])
         # half a unit of the fourth digit, the least that is shown
         np.testing.assert_allclose(mean, 1e6 * float(result["contact_radius_mean"][at]), rtol=5e-4)
-    assert "masked\n(%)" in rows[0] and "open\n(%)" not in rows[0]
+    assert "open\n(%)" not in rows[0]
+    # Wilson's bound of none in six: z²/(6 + z²) = 0.390
+    assert {row["masked\n(%)"] for row in rows} == {"0 (0 to 39)", "100 (61 to 100)"}
     assert "lost to\nbonds (%)" in rows[0] and "lost to\nfluct. (%)" in rows[0]
     for loads, shares, rows in [(2, 1, 2), (30, 1, 12), (6, 5, 12)]:
         sweep = {

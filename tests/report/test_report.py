@@ -212,6 +212,10 @@ def test_points_are_compared_by_chi_square_of_which_a_fit_costs_a_degree_of_free
     (row,) = agreement(smooth, [drawing.measured]).rows
     p = special.gammaincc(2.0, 0.5 * square)  # of four degrees of freedom
     assert list(row.values()) == ["area ratio", f"{square:.4g}", "4", f"{p:.2g}", "1"]
+    areas = {name.replace("area_ratio", "contact_area"): 4e-8 * points[name] for name in points if name != "speed"}
+    (drawing,) = report.drawings(smooth, areas | {"speed": points["speed"]})
+    (row,) = agreement(smooth, [drawing.measured]).rows
+    assert row["measured"] == "contact area"  # as the points are, not as the figure is
     del points["area_ratio_error"]
     (drawing,) = report.drawings(smooth, points)
     without = agreement(smooth, [drawing.measured])

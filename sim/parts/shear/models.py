@@ -242,8 +242,10 @@ class _Fluctuating(ShearModel):
     def faults(self, shear_modulus: float, poisson_ratio: float, rest_radius: float) -> list[tuple[str, str]]:
         cell = self.side(math.sqrt(math.pi) * rest_radius)
         if self.contact == "disc" and self.draws_maps and not 2.0 * rest_radius <= cell:
-            contact = f"the contact, which is {2.0 * rest_radius:g} m wide at rest"
-            message = f"the cell of {cell:g} m does not hold {contact}"
+            if math.isnan(rest_radius):
+                message = "the scene has no contact at rest, which the cell must hold"
+                return [("contact", f'{message}; hold the sphere closer by a key of [contact], or give "plane"')]
+            message = f"the cell of {cell:g} m does not hold the contact, which is {2.0 * rest_radius:g} m wide at rest"
             return [("cell", f'{message}; give shear.cell = "{2.2e6 * rest_radius:.3g} um" or more')]
         if too_many := self._too_many_modes(cell):
             return [("", f'{too_many}; take a smaller cell, longer waves or fewer points, or model = "mean"')]

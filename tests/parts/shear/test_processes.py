@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 from helpers.fields import complex_amplitudes
-from helpers.scenes import CELL, ON_CELL, SPECTRUM, Clock, Ripple, bonds, drive, march, scene, shear
+from helpers.scenes import CELL, ON_CELL, SPECTRUM, Clock, Equilibrium, Ripple, bonds, drive, march, scene, shear
 from numpy.testing import assert_allclose
 
 from sim.laws import halfspace
@@ -127,6 +127,10 @@ def test_depths_that_do_not_go_together_are_refused():
     for make, cure in (
         (lambda: shear.Mean(spectrum=SPECTRUM, amplitude=Onset(speed=1.0, width=1.0, relaxing=True)), "modal"),
         (lambda: scene(shear=shear.Mapped(**ripple, points=64)), "whole number of wavelengths"),
+        (
+            lambda: scene(shear=shear.Mapped(**timed, points=12, contact="disc"), contact=Equilibrium(load=-1.0)),
+            r'shear\.contact: .*no contact at rest.*\[contact\].*"plane"',
+        ),
         (lambda: scene(shear=shear.Modal(**timed, amplitude=Stress(reference=1.0)), bonds=bonds.Unbroken()), "stress"),
     ):
         with pytest.raises(ValueError, match=cure):
