@@ -21,7 +21,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from sim.laws.halfspace import angular_compliance, energy_factors, ripple_energy
-from sim.spectrum.family import Array, Factors, gaussian_boxes
+from sim.spectrum.family import Array, Factors, Family, gaussian_boxes
 from sim.spectrum.measured import Measured, Tabulated
 from sim.spectrum.radial import Isotropic, PowerLaws, Rowed, Waves, disc_sums
 from sim.units.quantity import Quantity, keyed
@@ -117,7 +117,7 @@ Angle = Annotated[float, Quantity("rad", "angle to the sliding direction", "θ")
 
 
 @keyed()
-class Ripple:
+class Ripple(Family):
     """A single sinusoid, ``τ1 cos(q·x)``.
 
     Parameters
@@ -142,17 +142,14 @@ class Ripple:
     angle: Angle = 0.0
     model: Literal["ripple"] = "ripple"
 
-    bond_made: ClassVar[bool] = False
-    remarks: ClassVar[tuple[str, ...]] = ()
-
     @property
-    def wavevector(self) -> tuple[float, float]:
+    def wavevector(self) -> tuple[float, float]:  # type: ignore[override]
         """(qx, qy) [rad/m] of the one pair ±q that holds all of the power."""
         q = 2 * math.pi / self.wavelength
         return q * math.cos(self.angle), q * math.sin(self.angle)
 
     @property
-    def support(self) -> tuple[float, float]:
+    def support(self) -> tuple[float, float]:  # type: ignore[override]
         """Its wavenumber [rad/m], twice."""
         q = 2 * math.pi / self.wavelength
         return q, q
@@ -291,8 +288,7 @@ class SelfAffine(Rowed):
         waves = sorted({self.longest, self.rolloff, self.shortest}, reverse=True)
         q = 2 * np.pi / np.array(waves)
         level = np.maximum(q * self.rolloff / (2 * np.pi), 1.0) ** (-2 - 2 * self.hurst)
-        unit = PowerLaws(q, level)
-        return PowerLaws(q, level * self.rms**2 / float(unit.cumulative(q[-1])))
+        return PowerLaws(q, level * self.rms**2 / PowerLaws(q, level).variance)
 
 
 @keyed()

@@ -6,7 +6,7 @@ integrals over pixels lose only the pixel of q = 0.
 
 import math
 from collections.abc import Callable
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,27 +22,23 @@ Factors = Callable[[Array], tuple[Array, Array]]
 class Family(Protocol):
     """Power spectral density C of the fluctuating shear stress [Pa² m²] over wavevectors q [rad/m]; frozen."""
 
-    def __hash__(self) -> int: ...
+    def __hash__(self) -> int:
+        return super().__hash__()
+
+    #: (qx, qy) of the one pair ±q that holds all of the power [rad/m]; None where there is a density.
+    wavevector: ClassVar[tuple[float, float] | None] = None
+    #: True if bonds make the field: C is then that of n <f²> = 1 N²/m², and the bonds set its size.
+    bond_made: ClassVar[bool] = False
+    #: Sentences on what is assumed of the spectrum, for ``sim check``.
+    remarks: ClassVar[tuple[str, ...]] = ()
+    #: Wavenumbers [rad/m] between which the density may differ from zero.
+    support: ClassVar[tuple[float, float]] = 0.0, math.inf
+    #: Wavenumbers [rad/m] where the density jumps or kinks.
+    breaks: ClassVar[Array] = np.empty(0)
 
     @property
     def variance(self) -> float:
         """Mean square of the stress [Pa²]."""
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """Sentences on what is assumed of the spectrum, for ``sim check``."""
-
-    @property
-    def support(self) -> tuple[float, float]:
-        """Wavenumbers between which the density may differ from zero [rad/m]."""
-
-    @property
-    def wavevector(self) -> tuple[float, float] | None:
-        """(qx, qy) of the one pair ±q that holds all of the power [rad/m]; None where there is a density."""
-
-    @property
-    def bond_made(self) -> bool:
-        """True if bonds make the field: C is then that of n <f²> = 1 N²/m², and the bonds set its size."""
 
     def density(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """Power spectral density C at wavevector (qx, qy) [Pa² m²]; raises ValueError for a single wave."""
@@ -69,16 +65,8 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 _MOST_PANELS = 256
 
 
-class Radial(Protocol):
+class Radial(Family, Protocol):
     """An isotropic spectrum by its variance within and beyond a wavenumber q [rad/m]."""
-
-    @property
-    def variance(self) -> float:
-        """Mean square of the stress [Pa²]."""
-
-    @property
-    def breaks(self) -> Array:
-        """Wavenumbers [rad/m] where the density jumps or kinks."""
 
     def cumulative(self, q: ArrayLike) -> Array:
         """Variance within wavenumber q [Pa²]."""

@@ -50,6 +50,11 @@ class FromFile(Rowed, Protocol):
     densities: Densities
     rms: Rescaled | None
 
+    @property
+    def normalization(self) -> str:
+        """Place of the 4π², a key of ``NORMALIZATIONS``."""
+        return "in_integral"
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         """Refuse rows that are no spectrum."""
@@ -69,16 +74,16 @@ class FromFile(Rowed, Protocol):
     def _falling(self) -> bool:
         return len(self.wavenumbers) > 1 and self.wavenumbers[0] > self.wavenumbers[-1]
 
-    def _chain(self, factor: float = 1.0) -> PowerLaws:
+    def _chain(self, factor: float) -> PowerLaws:
         """The rows with a factor of the density as a chain of power laws."""
         order = slice(None, None, -1 if self._falling else 1)
         return PowerLaws(np.array(self.wavenumbers[order]), factor * np.array(self.densities[order]))
 
-    def _scaled(self, chain: PowerLaws) -> PowerLaws:
-        """A chain at the rms that is given."""
-        if self.rms is None:
-            return chain
-        return PowerLaws(chain.q, chain.density * (self.rms**2 / float(chain.cumulative(chain.q[-1]))))
+    @functools.cached_property
+    def rows(self) -> PowerLaws:
+        """The rows as a chain of power laws, with the 4π² in the integral, at the rms that is given."""
+        chain = self._chain(NORMALIZATIONS[self.normalization])
+        return chain if self.rms is None else PowerLaws(chain.q, chain.density * (self.rms**2 / chain.variance))
 
 
 def by_name(values: Any, kind: Any) -> Any:
@@ -154,11 +159,6 @@ class Tabulated(FromFile):
             raise PydanticCustomError("table_gaps", f"{text}: its energy would be lost; leave such rows out")
         return self
 
-    @functools.cached_property
-    def rows(self) -> PowerLaws:
-        """The table as a chain of power laws, with the 4π² in the integral."""
-        return self._scaled(self._chain(NORMALIZATIONS[self.normalization]))
-
     @property
     def remarks(self) -> tuple[str, ...]:  # type: ignore[override]
         """Remarks on the normalization and on the first row."""
@@ -167,7 +167,7 @@ class Tabulated(FromFile):
     def _normalized(self) -> tuple[str, ...]:
         """Remark on the rms that the table has under the other normalization."""
         chains = {where: self._chain(factor) for where, factor in NORMALIZATIONS.items()}
-        rms = {where: math.sqrt(float(chain.cumulative(chain.q[-1]))) for where, chain in chains.items()}
+        rms = {where: math.sqrt(chain.variance) for where, chain in chains.items()}
         other = next(where for where in NORMALIZATIONS if where != self.normalization)
         words = {"in_integral": "in the integral", "in_density": "in the density"}
         if self.rms is not None and abs(math.log(self.rms / rms[other])) < _NEAR:
@@ -253,8 +253,6 @@ def read_map(name: str, context: Any, variable: str, gaps: bool = False) -> MapF
 
 def _from_npy(path: Path) -> Array:
     """Return the numbers of an array that numpy has saved."""
-    if not path.is_file():
-        raise ValueError("it is no plain file")
     values = np.load(path, mmap_mode="r", allow_pickle=False)  # the file holds as many numbers as its header says
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
         raise ValueError("it holds no plain real numbers; save a map of numbers, such as numpy.save of a float array")
@@ -471,11 +469,6 @@ class Measured(FromFile):
             maps = map_file.values.reshape(-1, *map_file.values.shape[-2:])
             q, density = estimate(maps, (maps.shape[1] * spacing, maps.shape[2] * spacing), window)
         return {**values, "spacing": spacing, "wavenumbers": q.tolist(), "densities": density.tolist()}
-
-    @functools.cached_property
-    def rows(self) -> PowerLaws:
-        """The estimate as a chain of power laws."""
-        return self._scaled(self._chain())
 
 
 def _one_spacing(map_file: MapFile, spacing: float | None) -> float:

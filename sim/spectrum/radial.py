@@ -17,7 +17,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import numpy as np
 import scipy
@@ -46,17 +46,8 @@ Terms = tuple[tuple[float, float, float], tuple[float, float, float], Array]
 _NONE = 0.0, 0.0, 0.0
 
 
-class Waves(Protocol):
-    """Base of the families (``sim.spectrum.family``) with a density, whose integrals over discs are quadratures."""
-
-    wavevector: ClassVar[None] = None
-    bond_made: ClassVar[bool] = False
-    #: Sentences on what is assumed of the spectrum.
-    remarks: ClassVar[tuple[str, ...]] = ()
-    #: Wavenumbers [rad/m] between which the density may differ from zero.
-    support: ClassVar[tuple[float, float]] = 0.0, math.inf
-    #: Wavenumbers [rad/m] where the density jumps or kinks.
-    breaks: ClassVar[Array] = np.empty(0)
+class Waves(Family, Protocol):
+    """Base of the families with a density, whose integrals over discs are quadratures."""
 
     def reach(self, radius: float) -> tuple[float, float]:
         """Wavenumbers [rad/m] below which nothing varies, and beyond which a disc of this radius [m] stores nothing."""
@@ -64,9 +55,6 @@ class Waves(Protocol):
 
     def harmonics(self, q: Array) -> tuple[Array, Array]:
         """``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
-
-    def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
-        """Mean elastic energy per area of an infinite half-space [J/m²]."""
 
     def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
         """Integrals over discs, by quadrature over the wavenumbers, see ``Family``."""
@@ -171,7 +159,7 @@ def _on_disc(
 
 
 def disc_sums(spectrum: Waves, radii: Array, integrals: Callable[[float], tuple[float, float]]) -> tuple[Array, Array]:
-    """``∫ C0 P dq`` and ``∫ C2 S dq`` for discs of any radius, by ``one`` for those between 0 and infinity."""
+    """``∫ C0 P dq`` and ``∫ C2 S dq`` for discs of any radius, by ``integrals`` for those between 0 and infinity."""
 
     def sums(radius: float) -> tuple[float, float]:
         if radius == 0.0:
@@ -181,8 +169,8 @@ def disc_sums(spectrum: Waves, radii: Array, integrals: Callable[[float], tuple[
             return at_zero, 2 * at_one - at_zero
         return integrals(radius)
 
-    mean, skew = np.array([sums(radius) for radius in radii.ravel().tolist()]).reshape(-1, 2).T
-    return mean.reshape(radii.shape), skew.reshape(radii.shape)
+    mean, skew = np.vectorize(sums, otypes=[float, float])(radii)
+    return mean, skew
 
 
 def _nodes(spectrum: Waves, radius: float) -> tuple[Array, Array]:
@@ -389,6 +377,11 @@ class PowerLaws:
         """∫ C dq over all q [Pa² m]."""
         return float(np.sum(self._moments(0)))
 
+    @property
+    def variance(self) -> float:
+        """Variance within all rows [Pa²]."""
+        return float(self.cumulative(self.q[-1]))
+
     def _moments(self, power: int) -> Array:
         """∫ q^power C dq of each piece."""
         rows = np.arange(len(self.q) - 1)
@@ -459,7 +452,7 @@ class Rowed(Isotropic, Protocol):
     @property
     def variance(self) -> float:
         """Mean square of the stress [Pa²]."""
-        return float(self.rows.cumulative(self.rows.q[-1]))
+        return self.rows.variance
 
     @property
     def support(self) -> tuple[float, float]:  # type: ignore[override]
