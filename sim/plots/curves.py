@@ -341,10 +341,8 @@ def over(dataset: xr.Dataset, name: str) -> Scene:
         near = difflib.get_close_matches(name, [*known, *swept], 1, 0.6)
         cure = f'did you mean "{near[0]}"?' if near else f"choose of: t, speed, {', '.join([*swept, *known])}"
         raise ValueError(f'nothing can be drawn over "{name[:40]}"; {cure}')
-    words = about.attrs.get("long_name", name).partition(" of ")[2].partition(",")[0]
-    return scene.placed(
-        name, scene.all(f"{name}_mean"), f"{words} {symbol(mean)}".strip(), about.attrs["units"], broken=True
-    )
+    words = f"{about.attrs.get('long_name', name).partition(' of ')[2].partition(',')[0]} {symbol(mean)}".strip()
+    return scene.placed(name, scene.all(f"{name}_mean"), words, about.attrs["units"], broken=True)
 
 
 #: Other words for variables that figures are drawn over.
@@ -454,9 +452,7 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
 
 def _small_fluctuations(scene: Scene) -> bool:
     """True if the fluctuation energy changes, but is much smaller than the work left to the contact."""
-    most, work = (
-        float(np.max(np.nan_to_num(scene.all(f"{n}_mean")))) for n in ("fluctuation_energy", "work_of_adhesion")
-    )
+    most, work = (np.max(np.nan_to_num(scene.all(f"{n}_mean"))) for n in ("fluctuation_energy", "work_of_adhesion"))
     return 0.0 < most < _SMALL * work and scene.varies("fluctuation_energy")
 
 
@@ -499,11 +495,8 @@ def stacked(
     Below them are residuals of measured points, if any. With ``ax`` the first panel alone is drawn, there.
     """
     compared = scene.measured is not None and scene.measured.has_errors and ax is None
-    figure, axes = (
-        style.rows([height for height, _ in panels] + [0.8] * compared)
-        if ax is None
-        else (cast(Figure, ax.figure), [ax])
-    )
+    heights = [height for height, _ in panels] + [0.8] * compared
+    figure, axes = (cast(Figure, ax.figure), [ax]) if ax else style.rows(heights)
     for panel, (_, drawing) in zip(axes, panels, strict=False):
         drawing(panel, scene)
     if scene.measured and compared:
@@ -556,7 +549,7 @@ def time_figure(
     """Contact radius, energies, friction, and speed, load and displacement that change, over time."""
     scene = over(dataset, x or "t")._replace(measured=data)
     scene = scene._replace(heading="; ".join(filter(None, [scene.title, coarse_slips(dataset)])))
-    moved = not bool(stays_held(dataset).all())
+    moved = not stays_held(dataset).all()
     shown = [name for name in _DRIVEN if (name != "displacement" or moved) and name != scene.over]
     shown = [name for name in shown if any(map(_changes, scene.all(f"{name}_mean")))]
     driven = [(0.8, series(name, *_DRIVEN[name])) for name in shown]
@@ -568,7 +561,7 @@ def coarse_slips(dataset: xr.Dataset) -> str:
     """Return a remark on slips that are hardly longer than the time between records, with the cure."""
     with contextlib.suppress(ValueError, KeyError):
         lasting, apart = slips(dataset)["slip_duration"].median(), float(dataset["t"][1] - dataset["t"][0])
-        if float(lasting) < _FINE * apart:
+        if lasting < _FINE * apart:
             key = "step" if apart < 1.5 * float(setting(dataset, "clock.step")) else "record"
             return f"slips last less than {_FINE} records, which miss part of them: a shorter clock.{key} shows them"
     return ""
@@ -582,21 +575,19 @@ def turns(dataset: xr.Dataset) -> bool:
 
 def needs_friction(dataset: xr.Dataset) -> None:
     """Refuse a dataset without friction, or whose slider does not move."""
-    if not bool((style.recorded(dataset, "friction_force") != 0.0).any()):
+    if not (style.recorded(dataset, "friction_force") != 0.0).any():
         raise ValueError('there is no friction; give the bonds a stress, such as [bonds] stress = "0.3 MPa"')
-    if not bool((dataset["slider_position"] != 0.0).any()):
+    if not (dataset["slider_position"] != 0.0).any():
         raise ValueError('the slider does not move; let it: [drive] speed = "1 mm/s"')
 
 
 def friction_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     """Friction force over time and over the slider's position: the friction loop."""
-    scene = over(dataset, "t")._replace(measured=data)
+    scene = over(dataset, "t")._replace(measured=data, broken=True)
+    position = scene.all("slider_position_mean")
+    moved = scene.placed("slider_position", position, "slider position $x$", "m", broken=True)
     figure, axes = style.rows([1.7, 2.1], shared=False)
-    for panel, name, x, words, si, room in (
-        (axes[0], "t", dataset["t"].to_numpy(), "time $t$", "s", 0.0),
-        (axes[1], "slider_position", scene.all("slider_position_mean"), "slider position $x$", "m", 0.03),
-    ):
-        placed = scene.placed(name, x, words, si, broken=True)
+    for panel, placed, room in zip(axes, (scene, moved), (0.0, 0.03), strict=True):
         friction_panel(panel, placed)
         panel.axhline(0.0, **style.GUIDE)
         style.across(panel, placed.reach, placed.words, room=room)
@@ -617,7 +608,7 @@ def sweep_figure(
 ) -> Figure:
     """Contact radius, energies and friction over the first swept key; further keys make curves."""
     scene = (over(dataset, x) if x else over_key(dataset, style.swept(dataset)[0]))._replace(measured=data)
-    room = None if not scene.width else (0.5 * scene.width + 0.1) / max(float(np.ptp(scene.x)), 1.0)
+    room = None if not scene.width else (0.5 * scene.width + 0.1) / max(np.ptp(scene.x), 1.0)
     if not is_stationary(dataset):
         scene = scene._replace(heading=_at_the_end(dataset, scene.title))
     first = area_panel if absolute else radius_panel
@@ -630,9 +621,9 @@ def sweep_figure(
 
 def _at_the_end(dataset: xr.Dataset, averaged: str) -> str:
     """Return words for the last time, the speed then, and the means."""
-    words = [f"at the end: $t$ = {style.text_of(float(dataset['t'][-1]), 's')}"]
+    words = [f"at the end: $t$ = {style.text_of(dataset['t'][-1], 's')}"]
     if "speed" in dataset:
         speed = dataset["speed"].isel(t=-1)
-        ends = dict.fromkeys(style.text_of(float(end), "m/s") for end in (speed.min(), speed.max()))
+        ends = dict.fromkeys(style.text_of(end, "m/s") for end in (speed.min(), speed.max()))
         words.append(f"$V$ = {' to '.join(ends)}")
     return ", ".join(filter(None, [*words, averaged]))

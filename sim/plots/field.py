@@ -44,7 +44,7 @@ def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     where, words = style.first_point(dataset)
     point = dataset.isel(where)
     stress = _maps_of(point, at).isel(map_member=0)
-    sides, measured = _lattice_of(stress).sides, bool(word(dataset, "shear.field.file", ""))
+    sides, measured = _lattice_of(stress).sides, word(dataset, "shear.field.file", "")
     solid = (float(point[f"effective_{name}"]) for name in ("shear_modulus", "poisson_ratio"))
     moved = displacement(stress.to_numpy(), sides, *solid)
     radius, speed = (float(_then(point, name, stress)) for name in ("contact_radius", "speed"))
@@ -60,9 +60,9 @@ def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
         panel.set_xlabel(length.label("$x$"))
         panel.text(0.04, 0.05, arrow[float(np.sign(speed))], transform=panel.transAxes, fontsize=7, bbox=box)
     axes[0].set_ylabel(length.label("$y$"))
-    then = f"$t$ = {style.text_of(float(stress['map_time']), 's')}, $V$ = {style.text_of(speed, 'm/s')}"
+    then = f"$t$ = {style.text_of(stress['map_time'], 's')}, $V$ = {style.text_of(speed, 'm/s')}"
     with where_recorded():
-        then += rf", mean $\tau_0$ = {style.rounded(float(_then(point, 'shear_stress', stress)), 'Pa')}"
+        then += rf", mean $\tau_0$ = {style.rounded(_then(point, 'shear_stress', stress), 'Pa')}"
     axes[0].set_title(", ".join(filter(None, [words, then])))
     return figure
 
@@ -108,7 +108,7 @@ def _image(panel: Axes, field: np.ndarray, extent: tuple, about: tuple) -> None:
     """Draw a field (x, y) with x to the right, and a colour bar; ``about`` holds its SI unit, words and colour map."""
     si, words, colours = about
     unit = style.Unit.of(field, si)
-    most = unit.factor * float(np.max(np.abs(field))) or 1.0
+    most = unit.factor * np.max(np.abs(field)) or 1.0
     look: Any = {"cmap": colours, "vmin": -most, "vmax": most, "origin": "lower", "interpolation": "nearest"}
     image = panel.imshow(unit.factor * field.T, extent=extent, **look)
     panel.figure.colorbar(image, cax=panel.inset_axes((1.03, 0.0, 0.045, 1.0)), label=unit.label(words))
@@ -190,7 +190,7 @@ def spectrum_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     panel.set_ylim(bottom=0.1 * min(np.min(expected), np.min(measured)))  # not down to where a cut-off ends
     if np.max(measured) < 100.0 * np.min(measured):
         style.plain_ticks(panel.yaxis)
-    then = f"$t$ = {style.text_of(float(stress['map_time']), 's')}"
+    then = f"$t$ = {style.text_of(stress['map_time'], 's')}"
     style.legend(panel, ", ".join(filter(None, [words, then])))
     below.axhline(1.0, color=style.FLUCTUATIONS)
     below.errorbar(q, measured / expected, error / expected, **dots)
@@ -225,7 +225,7 @@ def density_figure(scene: "Scenario") -> Figure:
         rows = cast(Rowed, spectrum).rows
         marks: Any = style.HOLLOW | {"markersize": 3.0, "markeredgewidth": 0.6, "color": style.BOTH}
         panel.plot(rows.q / length.factor, np.where(rows.density > 0.0, rows.density, np.nan), label="rows", **marks)
-    most = float(np.max(np.maximum(along, across)))
+    most = np.max(np.maximum(along, across))
     panel.set_ylim(max(0.3 * np.min(along[along > 0.0], initial=most), 1e-9 * most), 3.0 * most)
     sizes = {
         r"$\pi/a$, a wave as wide as the contact": np.pi / radius,

@@ -196,7 +196,7 @@ class Measured:
         """
         if self.column(over) is None:
             raise ValueError(
-                f'{self.source}: no column "{over}", which the figure is drawn over; add it, or choose --x'
+                f'{self.source}: no column "{over}", over which this figure is drawn; add it, or choose --x'
             )
         if not self.shown:
             lack = "no row is of what is drawn: its columns are no variables of this figure, or its conditions differ"

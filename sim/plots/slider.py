@@ -106,7 +106,7 @@ _FRAME: Any = {"color": style.BONDS, "linewidth": 1.4}
 
 def needs_force(dataset: xr.Dataset) -> None:
     """Refuse a dataset in which no force is prescribed."""
-    if not bool((word(dataset, "drive.model", "") == "force").all()):
+    if not (word(dataset, "drive.model", "") == "force").all():
         raise ValueError('no force is prescribed; let one: [drive] model = "force"')
 
 
@@ -142,7 +142,7 @@ def needs_map(dataset: xr.Dataset) -> None:
     """Refuse a dataset that is no sweep of springs over stage speeds."""
     if "stage_speed" not in dataset and "stage_speed_mean" not in dataset:
         raise ValueError('no stage pulls through a spring; let one: [drive] model = "spring"')
-    if style.swept(dataset) != ["drive_stiffness"] or not bool((dataset["stage_speed"].isel(t=-1) > 0.0).all()):
+    if style.swept(dataset) != ["drive_stiffness"] or not (dataset["stage_speed"].isel(t=-1) > 0.0).all():
         cure = '[sweep] "drive.stiffness" = {from = "10 N/m", to = "1 kN/m", count = 9, scale = "log"}'
         raise ValueError(f"a map needs a sweep of the spring alone under a stage that ramps; {cure}")
 
@@ -193,9 +193,7 @@ def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
         return np.full(speed.shape, np.nan)
     mean_field = bool(bonds.pathway) and str(word(dataset, "bonds.model", "").item()) == "rate"
     onset = bonds.rupture.first_moment_onset if mean_field else bonds.rupture.resolved_onset
-    bound = bonds.rupture.closed_form(speed, bonds.stiffness, bonds.rebinding).bound / bonds.at_rest
-    if mean_field:
-        bound = np.asarray(schallamach.first_moment_fraction(speed, *bonds.pathway, bonds.rebinding))
+    bound = steady_laws(point, speed)[mean_field].fraction
     less, area, more = (_area(point, bound * share) for share in (1.0 - _LITTLE, 1.0, 1.0 + _LITTLE))
     growth, firm, contact_growth = (more - less) / (2.0 * _LITTLE * area), np.full(speed.shape, math.inf), 0.0
     if str(word(dataset, "drive.contact_stiffness", "half_space").item()) == "half_space":
@@ -226,7 +224,7 @@ def needs_pull(dataset: xr.Dataset) -> None:
     if "spring_force" not in dataset and "spring_force_mean" not in dataset:
         raise ValueError('nothing pulls the slider; let a spring do it: [drive] model = "spring"')
     force = style.mean_of(dataset, "spring_force")
-    if bool((abs(force.isel(t=0)) > 0.01 * abs(force).max("t")).any()):
+    if (abs(force.isel(t=0)) > 0.01 * abs(force).max("t")).any():
         raise ValueError('the force does not begin at zero; start at rest: [drive] start = "rest"')
 
 
@@ -237,16 +235,15 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     """
     scene = scene_along(dataset, "t")
     force, area = np.abs(scene.all("spring_force_mean")), scene.all("contact_area_mean")
-    tops = [incipient_law(*curve)[0] for curve in zip(force, area, strict=True)]
-    rises = np.arange(force.shape[1]) <= np.array(tops)[:, np.newaxis]
+    tops, alphas = np.transpose([incipient_law(*curve) for curve in zip(force, area, strict=True)])
+    rises = np.arange(force.shape[1]) <= tops[:, np.newaxis]
     unit = style.Unit.of(force, "N")
     figure, axes = style.rows([2.0, 1.8], shared=False)
     axes[0].set_ylabel("contact area $A/A_0$")
     factor = style.in_unit(axes[0].yaxis, "contact area $A$", area, "m^2") if absolute else 1.0
     for line in scene.lines:
-        up = rises[line.number]
+        up, alpha = rises[line.number], alphas[line.number]
         pulled, areas = force[line.number, up], area[line.number, up]
-        _, alpha = incipient_law(pulled, areas)
         law = alpha * pulled**2 / areas[0]
         words = rf"$\alpha$ = {1e6 * alpha:.3g} mm$^2$/N$^2$"
         name = f"{line.label}: {words}" if not scene.single else words
@@ -286,11 +283,11 @@ _RING: Any = style.HOLLOW | {"markersize": 5.0, "mfc": "none", "mew": 0.9, "zord
 def needs_stress(dataset: xr.Dataset) -> None:
     """Refuse a dataset without shear stress, or with one speed only."""
     rest = dataset.get("drive_rest")
-    if rest is not None and not bool((dataset["t"] > rest).any()):
+    if rest is not None and not (dataset["t"] > rest).any():
         raise ValueError("the run ends before the slider starts; make clock.duration longer than drive.rest")
-    if not bool((style.recorded(dataset, "shear_stress") != 0.0).any()):
+    if not (style.recorded(dataset, "shear_stress") != 0.0).any():
         raise ValueError('the bonds bear no shear stress; give them one, such as [bonds] stress = "0.3 MPa"')
-    if bool((word(dataset, "drive.model", "") == "force").any()):
+    if (word(dataset, "drive.model", "") == "force").any():
         raise ValueError("stress is drawn over the speed, and a force is prescribed; see the figure creep")
     if rest is None and is_steady(dataset) and speed_dim(dataset) is None:
         cure = 'ramp it: [drive] model = "ramp", or rest and start: [drive] model = "start"'
@@ -329,7 +326,7 @@ def stress_figure(dataset: xr.Dataset, data: Measured | None = None, ax: Axes | 
 def _laws_of(dataset: xr.Dataset, scene: Scene, line: Line) -> list[tuple[np.ndarray, Steady]]:
     """Return closed forms over the speeds of a curve, each with the speeds [m/s]."""
     speeds = scene.speeds(line)
-    low, high = float(np.min(speeds)), float(np.max(speeds))
+    low, high = np.min(speeds), np.max(speeds)
     fine = np.linspace(low, high, _CURVE)
     if scene.scale == "log":
         fine = np.geomspace(low, high, _CURVE)
@@ -362,7 +359,7 @@ def _marked(panel: Axes, scene: Scene, factor: float) -> list[Line]:
         words = line.label
         if at is not None:
             panel.plot(scene.x[line.number][at], factor * stress[at], color=line.colour, **_RING)
-            most, fast = style.rounded(float(stress[at]), "Pa"), style.rounded(float(speed[at]), "m/s")
+            most, fast = style.rounded(stress[at], "Pa"), style.rounded(speed[at], "m/s")
             words = words and f"{words}: {most} at {fast}"
         labelled.append(line._replace(label=words))
     return labelled

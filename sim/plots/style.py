@@ -148,14 +148,14 @@ def contact_circle(panel: Axes, radius: float) -> None:
     panel.add_patch(circle)
 
 
-def text_of(value: float, unit: str) -> str:
+def text_of(value: Any, unit: str) -> str:
     """Return a number with its unit: ``305.2 kPa``."""
-    return engineering(value, unit).replace("-", "−")
+    return engineering(float(value), unit).replace("-", "−")
 
 
-def rounded(value: float, unit: str) -> str:
+def rounded(value: Any, unit: str) -> str:
     """Return a number with its unit in three digits: ``305 kPa``."""
-    return text_of(float(f"{value:.3g}"), unit)
+    return text_of(f"{value:.3g}", unit)
 
 
 _GREEK = re.compile(r"(?<![A-Za-z])(alpha|beta|tau|nu|chi|delta|sigma|xi|theta|lambda|DeltaGamma)(?![A-Za-z])")
@@ -192,7 +192,7 @@ class Unit(NamedTuple):
         sizes = np.abs(values)
         sizes = sizes[np.isfinite(sizes) & (sizes > 0.0)]
         most = sizes.max(initial=0.0)
-        return cls(*scaled(float(np.sqrt(sizes.min(initial=most) * most) if logarithmic else most), unit))
+        return cls(*scaled(np.sqrt(sizes.min(initial=most) * most) if logarithmic else most, unit))
 
 
 #: Units chosen for the axes of their dimensions, and whether any axis has them.
@@ -215,9 +215,7 @@ def in_units(units: Iterable[str]) -> Iterator[None]:
     finally:
         _CHOSEN.reset(before)
     for name in (name for name, used in chosen.items() if not used):
-        raise ValueError(
-            f'no axis of this figure can be in "{name[:40]}"; choose a unit of one, such as mm/s of a speed'
-        )
+        raise ValueError(f'no axis of this figure can be in "{name[:40]}"; choose a unit of one, such as mm/s of speed')
 
 
 def in_unit(axis: Axis, words: str, values: Any, si: str) -> float:
@@ -237,11 +235,11 @@ def axis_scale(values: np.ndarray) -> str:
     return "symlog" if above.max() >= 100.0 * above.min() else "linear"
 
 
-def legend(panel: Axes, title: str = "", columns: int = 0, handles: Iterable[Any] = ()) -> None:
-    """Draw a legend above the panel, of all labels or of handles, each label once."""
+def legend(panel: Axes, title: str = "", columns: int = 0) -> None:
+    """Draw a legend above the panel, each label once."""
     entries: dict[str, Any] = {}
-    for handle in handles or panel.get_legend_handles_labels()[0]:
-        entries.setdefault(str(handle.get_label()), handle)
+    for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+        entries.setdefault(label, handle)
     if not entries and not title:
         return
     longest = max((len(text.replace("$", "")) for text in entries), default=0)

@@ -96,12 +96,12 @@ def case_of(dataset: xr.Dataset) -> Case:
         raise ValueError(f"theories need a load or an indentation that stays; {cure}")
     settings |= {"work": setting(dataset, "adhesion.work"), "sphere_radius": setting(dataset, "sphere.radius")}
     settings |= {"modulus": dataset["contact_modulus"], "poisson_ratio": dataset["effective_poisson_ratio"]}
-    if not float(settings["work"].max()) > 0.0:
+    if not settings["work"].max() > 0.0:
         raise ValueError("there is no adhesion that theories could differ on; give [adhesion] a work above 0")
-    if not bool((dataset["radius_at_rest"] > 0.0).any()):
+    if not (dataset["radius_at_rest"] > 0.0).any():
         raise ValueError("there is no contact at rest; raise the load or the indentation")
     for values in settings.values():
-        if float(values.min()) < float(values.max()):
+        if values.min() < values.max():
             dim = str(values.dims[0])
             value = style.swept_value(dataset, dim, 0).rpartition("= ")[2].replace("−", "-")
             cure = f'choose by --where, such as --where {dim}="{value}"'
@@ -134,8 +134,8 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
     case = case_of(dataset)
     stress, area = points_of(dataset)
     sheared = stress[stress > 0.0]
-    low, high = 0.1 * case.scale, max(3.0 * case.scale, 1.3 * float(np.max(sheared, initial=0.0)))
-    low = max(0.01 * case.scale, 0.7 * float(np.min(sheared, initial=low / 0.7)))
+    low, high = 0.1 * case.scale, max(3.0 * case.scale, 1.3 * np.max(sheared, initial=0.0))
+    low = max(0.01 * case.scale, 0.7 * np.min(sheared, initial=low / 0.7))
     fine = np.geomspace(low, high, _FINE)
     areas = {name: np.pi * radius**2 for name, radius in case.radii(fine).items()}
     figure, axes = style.pairs(3.3, shared=True)
@@ -151,9 +151,9 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
             panel.plot(x[-1:], factor * area[-1:], label="simulated, the last record", **mark | {"mfc": style.BOTH})
         style.across(panel, unit.factor * np.array([low, high]) * full**power, unit.label(words), "log")
     # heights from Hertz's area, or none, to somewhat above JKR's: the uncorrected theory goes far beyond
-    least = float(np.nan_to_num(areas["hertz"][0]))
-    bottom = min(least - 0.3 * (full - least), float(np.min(area, initial=least)))
-    top = max(_WIDEST * full, 1.05 * float(np.max(area, initial=0.0)))
+    least = np.nan_to_num(areas["hertz"][0])
+    bottom = min(least - 0.3 * (full - least), np.min(area, initial=least))
+    top = max(_WIDEST * full, 1.05 * np.max(area, initial=0.0))
     axes[0].set_ylim(factor * max(bottom, 0.0), factor * top)
     _, symbol, si = _CONTROLS[case.held]
     words = f"{symbol} = {style.text_of(case.value, si)}, $w$ = {style.text_of(case.work, 'J/m^2')}"
@@ -236,7 +236,7 @@ def shapes_of(dataset: xr.Dataset, time: float | None = None) -> tuple[_Shown, f
         raise ValueError("the contact that would be drawn is never closed; raise the load or the indentation")
     k = int(np.flatnonzero(radius > 0.0)[-1] if time is None else np.abs(dataset["t"].to_numpy() - time).argmin())
     if not radius[k] > 0.0:
-        when = style.text_of(float(dataset["t"][k]), "s")
+        when = style.text_of(dataset["t"][k], "s")
         raise ValueError(f"the contact is open at t = {when}; choose another time")
     sphere, work = (float(setting(point, key)) for key in ("sphere.radius", "adhesion.work"))
     moduli = ("contact_modulus", "effective_shear_modulus", "effective_poisson_ratio")
@@ -278,7 +278,7 @@ def profile_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
 
 
 def _pressure_panel(panel: Axes, shown: _Shown, reach: float, length: style.Unit) -> None:
-    middle = max((float(shape.pressure(np.zeros(1))[0]) for shape, _ in shown), key=abs)
+    middle = max((shape.pressure(np.zeros(1))[0] for shape, _ in shown), key=abs)
     factor = style.in_unit(panel.yaxis, "normal pressure $p$", np.array([middle]), "Pa")
     for shape, line in shown:
         x = shape.distances(reach)
@@ -298,9 +298,9 @@ def _surface_panel(panel: Axes, shown: _Shown, reach: float, length: style.Unit)
     for (_, line), place, surfaces in zip(shown, x, heights, strict=True):
         panel.plot(length.factor * place, factor * np.transpose(surfaces), **line)
     low, ball = factor * np.array(heights[0])
-    bottom = float(np.min(ball)) - 0.35 * float(np.ptp(ball))
+    bottom = np.min(ball) - 0.35 * np.ptp(ball)
     panel.fill_between(length.factor * x[0], bottom, low, color=style.LINES[6], alpha=0.18, linewidth=0)
-    panel.set_ylim(bottom, float(np.max(ball)))
+    panel.set_ylim(bottom, np.max(ball))
     panel.text(0.5, 0.8, "sphere", transform=panel.transAxes, ha="center", fontsize=7)
     panel.text(0.5, 0.06, "half-space", transform=panel.transAxes, ha="center", fontsize=7)
 
@@ -368,7 +368,7 @@ class Theory(NamedTuple):
 
 def needs_course(dataset: xr.Dataset) -> None:
     """Refuse a dataset in which the mount of the sphere does not move."""
-    if bool(stays_held(dataset).all()):
+    if stays_held(dataset).all():
         cure = '[contact] indentation = { from = "2 um", to = "-12 um", cycles = 1 }'
         raise ValueError(f"what holds the sphere stays the same, so that there is no loop; move it: {cure}")
 
@@ -397,7 +397,8 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     loaded.set_ylabel(radii.get_ylabel())
     of_load = scene.placed("normal_load", scene.all("normal_load_mean"), "normal load $P$", "N")
     (spent, loop), cycles = lost_energy(dataset), cycles_of(dataset)
-    labelled = scene._replace(lines=_labelled(scene, symbol, spent, loop))
+    integral = rf"$\oint\,P\,\mathrm{{d}}{symbol}$"
+    labelled = scene._replace(lines=_labelled(scene, {"$W$": spent} | ({} if loop is None else {integral: loop})))
     for panel, placed, name, factor in (
         (loads, labelled, "normal_load", force),
         (radii, scene, "contact_radius", length),
@@ -419,12 +420,10 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     for panel in (radii, loaded):
         panel.set_ylim(bottom=0.0)
     loads.sharex(radii)
-    put_in = (
-        rf"$\oint\,P\,\mathrm{{d}}{symbol}$ put in, the area of the loop with each jump a straight line between records"
-    )
+    put_in = f"{integral} put in, the area of the loop with each jump a straight line between records"
     cycled = f"per cycle: $W$ dissipated by opening and closing; {put_in}"
     lost = "dissipated in all: $W$" if loop is None else cycled
-    style.legend(loads, lost if bool((spent != 0.0).any()) else scene.title, columns=1)
+    style.legend(loads, lost if (spent != 0.0).any() else scene.title, columns=1)
     style.legend(radii)
     colour_bar(figure, panels, scene)
     return figure
@@ -455,7 +454,7 @@ def _equilibria(panels: list[Axes], scene: Scene, theories: list[Theory], factor
     """Draw JKR's equilibria up to the largest contact, each different curve once."""
     reached: dict[Theory, float] = {}
     for line, theory in zip(scene.lines, theories, strict=True):
-        most = float(np.nanmax(np.nan_to_num(scene.values("contact_radius_mean", line))))
+        most = np.max(np.nan_to_num(scene.values("contact_radius_mean", line)))
         reached[theory] = max(reached.get(theory, 0.0), most)
     loads, radii, loaded = panels
     for theory, most in reached.items():
@@ -489,16 +488,15 @@ def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]
     spent = spent.isel(t=spent.notnull().cumsum("t").argmax("t")).drop_vars("t")  # the last record of those that stop
     spent = spent.mean("member") if "member" in spent.dims else spent
     cycles = cycles_of(dataset)
-    whole = bool(style.recorded(dataset, "contact_radius").isel(t=-1).notnull().all())
-    if not whole or not bool((cycles >= 1.0).all()):
+    whole = style.recorded(dataset, "contact_radius").isel(t=-1).notnull().all()
+    if not whole or not (cycles >= 1.0).all():
         return spent, None
     return spent / cycles, style.mean_of(loop_energy(dataset), "loop_energy").mean("cycle")
 
 
-def _labelled(scene: Scene, symbol: str, spent: xr.DataArray, loop: xr.DataArray | None) -> list[Line]:
+def _labelled(scene: Scene, energies: dict[str, xr.DataArray]) -> list[Line]:
     """Return the curves, each with its energies in its name."""
-    energies = {"$W$": spent} | ({} if loop is None else {rf"$\oint\,P\,\mathrm{{d}}{symbol}$": loop})
-    unit = style.Unit.of(np.concatenate([np.ravel(values) for values in energies.values()]), "J")
+    unit = style.Unit.of(np.concatenate([*map(np.ravel, energies.values())]), "J")
     labelled = []
     for line in scene.lines:
         known = {words: unit.factor * style.number_at(values, line.point) for words, values in energies.items()}

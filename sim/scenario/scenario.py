@@ -2,7 +2,6 @@
 
 import functools
 import math
-from collections.abc import Hashable
 from dataclasses import fields
 from functools import cache, cached_property
 from pathlib import Path
@@ -41,10 +40,8 @@ _MOST_BUILT = 64
 _MOST_FAULTS = 100
 
 
-@cache
-def _adapter(table: Any) -> TypeAdapter[Any]:
-    """Return the adapter that checks and dumps a table."""
-    return TypeAdapter(table)
+#: Adapter that checks and dumps a table.
+_adapter: Any = cache(TypeAdapter)
 
 
 #: Columns that a part has read from its file, read anew where its table changes but for keys of their use.
@@ -352,7 +349,7 @@ class Scenario:
         document: dict[str, Any] = {}
         for name in {key.partition(".")[0] for key in values if "." in key} & set(_FIELDS):
             part = getattr(self, name)
-            document[name] = _adapter(cast(Hashable, type(part))).dump_python(part, by_alias=True)
+            document[name] = _adapter(type(part)).dump_python(part, by_alias=True)
         for key, value in values.items():
             *above, last = key.split(".")
             set_key(document, [*above, last], value)
