@@ -749,17 +749,16 @@ def _padded_size(radius):
 
 def _each(energy, field, cell, radius, poisson_ratio):
     """An energy of each map on the disc of its radius, at unit modulus; 0 without contact."""
-    field = np.asarray(field, dtype=float)
-    shape = np.broadcast_shapes(field.shape[:-2], np.shape(radius))
-    maps = np.broadcast_to(field, shape + field.shape[-2:]).reshape(-1, *field.shape[-2:])
-    radii = np.broadcast_to(np.asarray(radius, float), shape).ravel()
-    if np.any(2.0 * radii > cell):
-        message = f"a disc of radius {np.max(radii):g} m does not fit in a cell of {cell:g} m"
+    field, radius = np.asarray(field, dtype=float), np.asarray(radius, dtype=float)
+    if np.any(2.0 * radius > cell):
+        message = f"a disc of radius {np.max(radius):g} m does not fit in a cell of {cell:g} m"
         raise ValueError(f"{message}; make the cell at least twice the radius")
     pixel, nu = cell / field.shape[-1], float(poisson_ratio)
-    pairs = zip(maps, radii, strict=True)
-    energies = [energy(map_, pixel, a, nu) if a > _LEAST_RADIUS * pixel else 0.0 * a for map_, a in pairs]
-    return np.reshape(energies, shape)[()]
+
+    def of_one(map_, a):
+        return energy(map_, pixel, a, nu) if a > _LEAST_RADIUS * pixel else 0.0 * a
+
+    return np.vectorize(of_one, otypes=[float], signature="(x,y),()->()")(field, radius)[()]
 
 
 def disc_energy_of_map(field, cell, radius, shear_modulus, poisson_ratio=0.5):

@@ -222,9 +222,7 @@ _LOOKS, _STEPS = 48, 12
 
 def _onset_behind(answer: Answer, speed: ArrayLike, stress: Array, between: tuple[Array, Array], body: Body) -> Onset:
     """Onset of oscillations of a body at a speed [m/s] on bonds of a stress [Pa], ``between`` two frequencies."""
-    area, by_bonds, by_stress, mass, damping, viscosity, firm, firmer = (
-        np.asarray(quantity, dtype=float) for quantity in body
-    )
+    area, by_bonds, by_stress, mass, damping, viscosity, firm, firmer = (np.asarray(each, float) for each in body)
     bears = area * (stress + viscosity * np.abs(speed))
 
     def of_interface(frequency: Array) -> tuple[Complex, Complex]:
@@ -1233,7 +1231,8 @@ def catch_lives(
     """
     pace = bond_stiffness * np.abs(np.asarray(speed, float))[..., np.newaxis]
     easing, growing = pace / catch_force, pace / slip_force
-    longest = _slip_time(_CATCH_END, slip_rate, growing)
+    ratio, slip_time = growing * _CATCH_END / slip_rate, _CATCH_END / slip_rate
+    longest = slip_time * np.divide(np.log1p(ratio), ratio, out=np.ones(ratio.shape), where=ratio > 0.0)
     shortest = 1e-3 / (catch_rate + slip_rate + easing + growing)
     share = np.linspace(0.0, 1.0, 193)
     edges = np.sort(np.concatenate([longest * share, shortest * (longest / shortest) ** share], axis=-1), axis=-1)
@@ -1282,12 +1281,6 @@ def catch_moments(
     """
     lives = catch_lives(speed, catch_rate, catch_force, slip_rate, slip_force, bond_stiffness)
     return renewal(*lives, speed, bond_stiffness, rebinding_rate)
-
-
-def _slip_time(lost: float, rate: float, growing: Array) -> Array:
-    """Age at which the slip pathway alone has lost so much [s]: ln(1 + lost b/rate)/b."""
-    ratio = growing * lost / rate
-    return lost / rate * np.divide(np.log1p(ratio), ratio, out=np.ones(ratio.shape), where=ratio > 0.0)
 
 
 def _mean_exponential(z: Array) -> Array:

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from sim.numerics.files import whole
+
 T = TypeVar("T")
 #: Results that took less time are not stored [s].
 _WORTH = 0.1
@@ -46,14 +48,10 @@ def read(path: Path) -> bytes | None:
 
 def store(path: Path, content: bytes) -> None:
     """Write a file with its checksum, whole or not at all."""
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            part.write_bytes(hashlib.sha256(content).digest() + content)
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
+        with whole(path) as aside:
+            aside.write_bytes(hashlib.sha256(content).digest() + content)
 
 
 @functools.cache

@@ -211,9 +211,8 @@ def law(function: Callable) -> Callable:
     The result keeps name, signature, defaults and docstring; where no answer exists it gives nan
     without a warning.
     """
-    parameters = inspect.signature(function).parameters
-    count = len(parameters)
-
+    declared = inspect.signature(function)
+    count = len(declared.parameters)
     signature = f"float64({', '.join(['float64'] * count)})"
 
     def ufunc_of(library: Any, name: str) -> Callable:
@@ -237,12 +236,10 @@ def law(function: Callable) -> Callable:
             return _public(functools.partial(numba.vectorize, [signature], nopython=True), function)
         return _built(function, make, load)
 
-    bind = inspect.signature(function).bind
-
     @functools.wraps(function)
     def call(*arguments, **keywords):
         if keywords or len(arguments) != count:
-            bound = bind(*arguments, **keywords)
+            bound = declared.bind(*arguments, **keywords)
             bound.apply_defaults()
             arguments = bound.args
         small = all(map(_is_small, arguments))
@@ -260,8 +257,7 @@ def _is_small(argument: Any) -> bool:
 @functools.lru_cache(maxsize=64)  # constants of a scene come back at every step
 def _filled(shape: tuple[int, ...], value: float) -> np.ndarray:
     """Read-only array of one number."""
-    array = np.empty(shape)
-    array.fill(value)
+    array = np.full(shape, value)
     array.flags.writeable = False
     return array
 

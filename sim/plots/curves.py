@@ -610,20 +610,15 @@ def sweep_figure(
     scene = (over(dataset, x) if x else over_key(dataset, style.swept(dataset)[0]))._replace(measured=data)
     room = None if not scene.width else (0.5 * scene.width + 0.1) / max(np.ptp(scene.x), 1.0)
     if not is_stationary(dataset):
-        scene = scene._replace(heading=_at_the_end(dataset, scene.title))
+        words = [f"at the end: $t$ = {style.text_of(dataset['t'][-1], 's')}"]
+        if "speed" in dataset:
+            speed = dataset["speed"].isel(t=-1)
+            ends = dict.fromkeys(style.text_of(end, "m/s") for end in (speed.min(), speed.max()))
+            words.append(f"$V$ = {' to '.join(ends)}")
+        scene = scene._replace(heading=", ".join(filter(None, [*words, scene.title])))
     first = area_panel if absolute else radius_panel
     figure, axes = stacked(scene, [(1.7, first), *further_panels(scene)], room, ax)
     if scene.width:
         names = dataset[scene.over].to_numpy()
         axes[-1].set_xticks(range(names.size), [str(value) for value in names])
     return figure
-
-
-def _at_the_end(dataset: xr.Dataset, averaged: str) -> str:
-    """Return words for the last time, the speed then, and the means."""
-    words = [f"at the end: $t$ = {style.text_of(dataset['t'][-1], 's')}"]
-    if "speed" in dataset:
-        speed = dataset["speed"].isel(t=-1)
-        ends = dict.fromkeys(style.text_of(end, "m/s") for end in (speed.min(), speed.max()))
-        words.append(f"$V$ = {' to '.join(ends)}")
-    return ", ".join(filter(None, [*words, averaged]))

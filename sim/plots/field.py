@@ -4,6 +4,7 @@ import contextlib
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+import scipy
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -78,12 +79,10 @@ def _draw_map(panel: Axes, field: np.ndarray, sizes: list[float], about: tuple) 
 
     ``sizes`` are the two sides of the cell and the radius of the contact, ``about`` is what is shown.
     """
-    from scipy.signal import resample  # heavy: for maps alone
-
     cell, _, radius = sizes
     # between its samples by its own Fourier series: nothing is smoothed
     points = field.shape[0] * -(-PIXELS // field.shape[0])
-    field = resample(resample(field, points, axis=0), points, axis=1)
+    field = scipy.signal.resample(scipy.signal.resample(field, points, axis=0), points, axis=1)
     side = max(cell, 2.3 * radius) if 2.3 * radius < 3.0 * cell else cell
     half = int(np.ceil(0.5 * side / cell * points))
     index = np.arange(-half, half + 1) % points
@@ -227,22 +226,18 @@ def density_figure(scene: "Scenario") -> Figure:
         panel.plot(rows.q / length.factor, np.where(rows.density > 0.0, rows.density, np.nan), label="rows", **marks)
     most = np.max(np.maximum(along, across))
     panel.set_ylim(max(0.3 * np.min(along[along > 0.0], initial=most), 1e-9 * most), 3.0 * most)
-    sizes = {
-        r"$\pi/a$, a wave as wide as the contact": np.pi / radius,
-        "$2\\pi$/cell": 2 * np.pi / shear.side(scene.setting.cell),
-    }
-    for (name, place), look in zip(sizes.items(), (":", "-."), strict=True):
-        if shown[0] < place / length.factor < shown[-1]:
-            panel.axvline(place / length.factor, linestyle=look, **style.GREY, label=name)
-            below.axvline(place / length.factor, linestyle=look, **style.GREY)
-    panel.set_ylabel(
-        r"spectral density $C$ (Pa² m²)" if not spectrum.bond_made else r"$C$ for $n\langle f^2\rangle$ = 1 N²/m²"
-    )
+    wide, cell = np.pi / radius / length.factor, 2 * np.pi / shear.side(scene.setting.cell) / length.factor
+    for place, look, name in ((wide, ":", r"$\pi/a$, a wave as wide as the contact"), (cell, "-.", r"$2\pi$/cell")):
+        if shown[0] < place < shown[-1]:
+            panel.axvline(place, linestyle=look, **style.GREY, label=name)
+            below.axvline(place, linestyle=look, **style.GREY)
+    words = r"$C$ for $n\langle f^2\rangle$ = 1 N²/m²" if spectrum.bond_made else r"spectral density $C$ (Pa² m²)"
+    panel.set_ylabel(words)
     style.legend(panel)
     mean, lean = cast(Waves, spectrum).harmonics(q)
-    level, swing = angular_compliance(np.asarray(scene.solid.effective[1]))
+    level, swing = angular_compliance(scene.solid.effective[1])
     for weight, look, name in ((q * mean, "-", "variance"), (level * mean - swing * lean, "--", "stored energy")):
-        held = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(q) * (weight[1:] + weight[:-1]))])
+        held = scipy.integrate.cumulative_trapezoid(weight, q, initial=0.0)
         below.plot(shown, held / held[-1], look, color=style.BOTH, label=name)
     below.set_ylabel("share of longer waves")
     below.legend(loc="lower right")

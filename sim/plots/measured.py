@@ -195,9 +195,7 @@ class Measured:
             With the axis or the columns that the table lacks.
         """
         if self.column(over) is None:
-            raise ValueError(
-                f'{self.source}: no column "{over}", over which this figure is drawn; add it, or choose --x'
-            )
+            raise ValueError(f'{self.source}: no column "{over}", over which the figure is drawn; add it or choose --x')
         if not self.shown:
             lack = "no row is of what is drawn: its columns are no variables of this figure, or its conditions differ"
             columns = ", ".join(self.table)

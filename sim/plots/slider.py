@@ -204,7 +204,7 @@ def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
         firm = np.full(speed.shape, float(setting(point, "drive.contact_stiffness")))
     mass, damping, viscosity = (float(setting(point, f"drive.{key}")) for key in ("mass", "damping", "viscosity"))
     body = Body(area, growth, 0.0, mass, damping, viscosity, firm, contact_growth)
-    return np.asarray(onset(speed, (bonds.stiffness, bonds.rebinding, bonds.density), body).stiffness)
+    return onset(speed, (bonds.stiffness, bonds.rebinding, bonds.density), body).stiffness
 
 
 def _area(point: xr.Dataset, bound: np.ndarray) -> np.ndarray:
@@ -407,9 +407,9 @@ def starts_of(dataset: xr.Dataset) -> list[Start]:
         if "peak_stress" in point and "member" not in point["peak_stress"].dims:
             peak, when, step = (float(point[name]) for name in ("peak_stress", "peak_time", "clock_step"))
         resolved = bool(abs(stress[-1]) < peak and when - rest > _STEPS * step)
-        bound, peak = float(fraction[max(first - 1, 0)]), float(np.copysign(peak, speed))
+        bound, peak = fraction[max(first - 1, 0)], np.copysign(peak, speed)
         course = times[first:] - rest, stress[first:]
-        starts.append(Start(point, rest, speed, bound, *course, peak, float(when - rest), resolved))
+        starts.append(Start(point, rest, speed, bound, *course, peak, when - rest, resolved))
     return sorted(starts, key=lambda start: (start.rest, abs(start.speed)))
 
 
@@ -465,7 +465,7 @@ def _peak_panel(panel: Axes, starts: list[Start], over_speed: bool, factor: floa
     for start in {start.rest: start for start in starts if over_speed}.values():
         bonds = population_of(start.point)
         if bonds and bonds.pathway:
-            force = np.asarray(schallamach.start_up_peak(fine, *bonds.pathway).force)
+            force = schallamach.start_up_peak(fine, *bonds.pathway).force
             peak = start.fraction * (bonds.density * bonds.at_rest * force)
             panel.plot(pace.factor * fine, factor * peak, linestyle=":", label="none rebinds", **thin)
     for law in steady_laws(starts[0].point, fine)[:1] if over_speed else ():

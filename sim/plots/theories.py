@@ -70,7 +70,7 @@ class Case(NamedTuple):
     @property
     def scale(self) -> float:
         """Stress whose whole energy is the work of adhesion at JKR's radius: sqrt(pi E* w/(6 a)) [Pa]."""
-        radius = float(self.radii(np.zeros(1))["jkr"][0])
+        radius = self.radii(np.zeros(1))["jkr"][0]
         return float(np.sqrt(np.pi * self.modulus * self.work / (6.0 * radius)))
 
 
@@ -204,8 +204,8 @@ class Shape(NamedTuple):
     def surfaces(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the heights of half-space and sphere at distances from the axis [m]."""
         place = r, self.radius, self.indentation, self.sphere_radius
-        low = -np.asarray(halfspace.normal_displacement(*place))
-        return low, low + np.asarray(halfspace.gap(*place))
+        low = -halfspace.normal_displacement(*place)
+        return low, low + halfspace.gap(*place)
 
     def distances(self, reach: float) -> np.ndarray:
         """Return distances on both sides of the axis, dense on both sides of the edge, with the edge itself [m]."""
@@ -241,13 +241,13 @@ def shapes_of(dataset: xr.Dataset, time: float | None = None) -> tuple[_Shown, f
     sphere, work = (float(setting(point, key)) for key in ("sphere.radius", "adhesion.work"))
     moduli = ("contact_modulus", "effective_shear_modulus", "effective_poisson_ratio")
     bodies = (sphere, *(float(point[name]) for name in moduli))
-    last = Shape(float(radius[k]), float(depth[k]), float(stress[k]), *bodies)
+    last = Shape(radius[k], depth[k], stress[k], *bodies)
     full = float(point["radius_at_rest"])
     shown: _Shown = [(last, {"color": style.BOTH})]
     if full > 0.0:
-        rest = Shape(full, float(jkr.indentation_at_radius(full, work, sphere, bodies[1])), 0.0, *bodies)
+        rest = Shape(full, jkr.indentation_at_radius(full, work, sphere, bodies[1]), 0.0, *bodies)
         shown.append((rest, style.GREY | {"linestyle": "--", "label": "at rest (JKR)"}))
-    return shown, float(dataset["t"][k]), float(speed[k])
+    return shown, float(dataset["t"][k]), speed[k]
 
 
 def profile_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
@@ -352,18 +352,12 @@ _DISPLACEMENTS = {"displacement": ("displacement", r"\Delta"), "": ("displacemen
 
 
 class Theory(NamedTuple):
-    """JKR's contact at rest of one curve: its equilibria and the loads of its folds."""
+    """JKR's contact at rest of one curve, behind the stiffness of its mount."""
 
     work: float
     sphere_radius: float
     modulus: float
     stiffness: float
-
-    def equilibria(self, largest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return displacement [m], load [N] and radius [m] of all equilibria up to a radius [m]."""
-        radius = largest * np.linspace(0.0, 1.0, _RADII) ** 2  # dense at small radii, where the slopes are infinite
-        load, depth = (law(radius, *self[:3]) for law in (jkr.load_at_radius, jkr.indentation_at_radius))
-        return depth + load / self.stiffness, load, radius
 
 
 def needs_course(dataset: xr.Dataset) -> None:
@@ -456,18 +450,20 @@ def _equilibria(panels: list[Axes], scene: Scene, theories: list[Theory], factor
     for line, theory in zip(scene.lines, theories, strict=True):
         most = np.max(np.nan_to_num(scene.values("contact_radius_mean", line)))
         reached[theory] = max(reached.get(theory, 0.0), most)
-    loads, radii, loaded = panels
+    (loads, radii, loaded), (along, force, length) = panels, factors
     for theory, most in reached.items():
         if most > 0.0 and not np.isnan(theory.stiffness):
-            x, load, radius = (f * v for f, v in zip(factors, theory.equilibria(most), strict=True))
-            loads.plot(x, load, "--", **style.GREY)
-            radii.plot(x, radius, "--", label="JKR, stable and unstable", **style.GREY)
-            loaded.plot(load, radius, "--", **style.GREY)
+            radius = most * np.linspace(0.0, 1.0, _RADII) ** 2  # dense at small radii, where the slopes are infinite
+            load, depth = (law(radius, *theory[:3]) for law in (jkr.load_at_radius, jkr.indentation_at_radius))
+            displacement = along * (depth + load / theory.stiffness)
+            loads.plot(displacement, force * load, "--", **style.GREY)
+            radii.plot(displacement, length * radius, "--", label="JKR, stable and unstable", **style.GREY)
+            loaded.plot(force * load, length * radius, "--", **style.GREY)
 
 
 def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
     """Draw the loads at which a dead load and fixed grips lose JKR's contact, with their names if all are the same."""
-    pulls = {factor * float(jkr.pull_off_load(*theory[:2])) for theory in theories if theory.work > 0.0}
+    pulls = {factor * jkr.pull_off_load(*theory[:2]) for theory in theories if theory.work > 0.0}
     panel.margins(y=0.15)  # a name stands below the lowest line
     dead, grips = (0.01, 1.0, r"$-\frac{3}{2}\pi wR$"), (0.99, _GRIPS, r"$-\frac{5}{6}\pi wR$")
     for pull in pulls:

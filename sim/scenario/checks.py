@@ -135,7 +135,7 @@ def _off_the_map(scene: Scene) -> Faults:
     elif shear.passes:
         ends = np.linspace(0.0, clock.duration, min(clock.steps, _MOST_SLIPS) + 1)
         positions = np.cumsum(scene.drive.pieces(ends, clock.duration).joined.integral)
-        reach = min(0.0, float(positions.min())), max(0.0, float(positions.max()))
+        reach = min(0.0, positions.min()), max(0.0, positions.max())
         faults = shear.off_the_map(reach, scene.widest)
         yield from ((("shear", "field", *([key] if key else [])), fault) for key, fault in faults)
 
@@ -151,9 +151,7 @@ def remarks_between(scene: Scene) -> list[str]:
     speeds, varies = scene.speeds(41), scene.varies["shear"]
     remarks = []
     if varies and bonds.feeds_back and not contact.lags:
-        remarks.append(
-            'carried area in a contact that fluctuates has no limit of fine steps: take model = "rate_dependent"'
-        )
+        remarks.append('carried area in a fluctuating contact has no limit of fine steps: use model = "rate_dependent"')
     if contact.after_pull_off == "reattach" and bonds.stretched and not bonds.feeds_back:
         remarks.append('bonds go on sliding while the contact is open: bonds.area = "carried" starts without them')
     strength = np.broadcast_to(bonds.steady(speeds).strength, speeds.shape)
@@ -209,21 +207,19 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
 
 def _remarks_on_step(scene: Scene, path: Array) -> list[str]:
     """Return a remark if a clock step in which a path [m] is slid is too long, with one that is not."""
-    between, slid = scene.clock.step * scene.clock.stride, float(path[0])
+    between, slid = scene.clock.step * scene.clock.stride, path[0]
     if feels_steps(scene):
-        gone = -math.log1p(-min(float(renewed(scene, path)[0]), 0.999))
+        gone = -math.log1p(-min(renewed(scene, path)[0], 0.999))
         share = -math.log1p(-(_RENEWED_LATE if pulled(scene) else _RENEWED_LAGGING)) / max(gone, 1e-300)
         lost = 0.5 * gone / math.tanh(0.5 * gone) - 1.0 if gone else 0.0
         error = f"its radius varies by up to {lost:.1%} too much, in variance"
         if pulled(scene):
-            error = f"its load at pull-off is off by up to {engineering(float(pull_off_error(scene, path)[0]), 'N')}"
+            error = f"its load at pull-off is off by up to {engineering(pull_off_error(scene, path)[0], 'N')}"
         part = f"a step renews {-math.expm1(-gone):.1%} of its variance"
         text = f"the contact feels ΔΓ at clock steps alone, and {part}: {error}"
     elif scene.fluctuations.passes and (scene.contact.lags or pulled(scene)):
         share = scene.fluctuations.field.pixels[0] / max(slid, 1e-300)
-        text = (
-            f"a clock step slides {engineering(slid, 'm')}, beyond a pixel of the map, of which the contact misses some"
-        )
+        text = f"a clock step slides {engineering(slid, 'm')}, beyond a pixel of the map: the contact misses some"
     else:
         return []
     if share >= 1.0:
@@ -244,9 +240,9 @@ def remarks_on_force(scene: Scene) -> list[str]:
     if not body.solves_motion or body.spring or body.damping + body.viscosity > 0.0 or body.mass == 0.0:
         return []
     instants = np.linspace(0.0, times.duration, _INSTANTS)
-    strength = scene.contact_area * float(np.max(scene.population.steady(_SPEEDS).strength))
+    strength = scene.contact_area * np.max(scene.population.steady(_SPEEDS).strength)
     excess = np.maximum(np.abs(body.course.at(instants, times.duration)) - strength, 0.0)
-    speed = float(np.mean(excess)) * times.duration / body.mass
+    speed = np.mean(excess) * times.duration / body.mass
     if speed < _FAST:
         return []
     begin = instants[np.argmax(excess > 0.0)]

@@ -36,9 +36,8 @@ def read_text(path: Path) -> str:
     except FileNotFoundError:
         raise _refusal(f"{path}: there is no such file; `sim new` writes a starter") from None
     except (OSError, ValueError) as fault:
-        raise _refusal(
-            f"{path}: cannot be read ({getattr(fault, 'strerror', None) or fault}); name a TOML file"
-        ) from None
+        reason = getattr(fault, "strerror", None) or fault
+        raise _refusal(f"{path}: cannot be read ({reason}); name a TOML file") from None
     if content.startswith((b"\x89HDF", b"CDF")):
         raise _refusal(f"{path}: is a dataset, not a scenario; name the TOML file that it came from")
     if len(content) > _MOST_BYTES:

@@ -146,9 +146,7 @@ def _unknown(root: type, table: _Place, key: str) -> Fault:
     """Return the fault of a key that its table does not have."""
     path = (*table.path, key)
     chosen = {model(option) for option in table.chosen.values()}
-    others = [
-        name for option in table.admitted.values() if key in keys(option) and (name := model(option)) not in chosen
-    ]
+    others = [name for kind in table.admitted.values() if key in keys(kind) and (name := model(kind)) not in chosen]
     if others and len(chosen) == 1:
         return Fault(path, f"is not a key of this model; remove it, or choose model = {_either(others)}")
     if near := difflib.get_close_matches(key, table.keys, 1):

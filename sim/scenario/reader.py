@@ -65,9 +65,8 @@ def load(
     try:
         scene.points()
     except BadInput as fault:
-        raise BadInput(
-            problems((Fault(("sweep",), problem) for problem in fault.problems), file, words, option)
-        ) from None
+        swept = (Fault(("sweep",), problem) for problem in fault.problems)
+        raise BadInput(problems(swept, file, words, option)) from None
     return scene
 
 

@@ -252,9 +252,7 @@ class Scenario:
         remarks = [remark for part in self.chosen for remark in part.remarks(self.setting)]
         remarks += [*remarks_between(self), *remarks_on_force(self)]
         if self.ensemble.members > 1 and self.fluctuations.measured and not any(self.varies.values()):
-            remarks.append(
-                "the map is the same for all members and seeds, and nothing else is random: one member is enough"
-            )
+            remarks.append("all members and seeds have the same map, and nothing else is random: one member is enough")
         if self.solid.poisson_ratio != 0.5:
             remarks.append("poisson_ratio is not 0.5: the normal-tangential coupling is neglected")
         off = (abs(value) for name, value in self.process.known_errors().items() if name.startswith("cell_error"))

@@ -111,9 +111,7 @@ def _require_sweepable(key: str, keys: list[str]) -> None:
     if first in ("seed", "sweep", "source"):
         raise _fault(f"{key}: cannot be swept; members differ in their noise, so raise ensemble.members")
     if first in _SHARED[3:] or key in _SHARED:
-        raise _fault(
-            f"{key}: cannot be swept, since all points of a sweep share it; run the scenario once for each value"
-        )
+        raise _fault(f"{key}: cannot be swept, as all points of a sweep share it; run the scenario once for each value")
     if key.endswith(".model"):
         table = key.removesuffix(".model")
         raise _fault(f'{key}: a model is swept as a whole table: "{table}" = [{{ model = ... }}, {{ model = ... }}]')

@@ -122,14 +122,12 @@ def _edges(spectrum: Radial, step: float, reach: int) -> tuple[Array, Array]:
     """
     bounds = np.concatenate([[0.0], np.arange(reach + 1) + 0.5])
     circles = spectrum.breaks / step
-    lines, starts, ends = [], [], []
+    pieces = []
     for line in np.arange(reach + 1) + 0.5:
         crossings = np.sqrt(np.maximum(circles[circles > line] ** 2 - line**2, 0.0))
         cuts = np.unique(np.concatenate([bounds, crossings[crossings < bounds[-1]]]))
-        lines.append(np.full(len(cuts) - 1, line))
-        starts.append(cuts[:-1])
-        ends.append(cuts[1:])
-    line, start, end = np.concatenate(lines), np.concatenate(starts), np.concatenate(ends)
+        pieces.append(np.stack([np.full(len(cuts) - 1, line), cuts[:-1], cuts[1:]]))
+    line, start, end = np.concatenate(pieces, axis=1)
     values = _integrate(spectrum, step, line, start, end)
     panel = np.minimum(np.searchsorted(bounds, (start + end) / 2) - 1, reach)
     place = (line - 0.5).astype(np.int64) * (reach + 1) + panel
@@ -213,10 +211,10 @@ def gaussian_boxes(form: tuple[float, float, float], x_edges: NDArray, y_edges: 
     if yy < xx:
         return gaussian_boxes((yy, xy, xx), y_edges, x_edges).T
     step, root = np.diff(x_edges), math.sqrt(yy)
-    panels = math.ceil(float(np.max(step)) * math.sqrt(xx) / 2)
+    widest = float(np.max(step)) * math.sqrt(xx)
+    panels = math.ceil(widest / 2)
     if panels > _MOST_PANELS:
-        times = f"{float(np.max(step)) * math.sqrt(xx) / math.pi:.0f}"
-        message = f"the correlation length is {times} times the cell; make the cell longer"
+        message = f"the correlation length is {widest / math.pi:.0f} times the cell; make the cell longer"
         raise PydanticCustomError("cell_too_small", message)
     node, weight = np.polynomial.legendre.leggauss(16)
     node = ((node + 1) / 2 + np.arange(panels)[:, None]).ravel() / panels

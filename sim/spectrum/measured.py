@@ -239,15 +239,15 @@ def read_map(name: str, context: Any, variable: str, gaps: bool = False) -> MapF
         map_file = MapFile(_from_npy(file_path(name, context)))
     else:
         map_file = MapFile(matrix(file_text(name, context), STRESS, gaps))
-    if map_file.values.ndim < 2 or min(map_file.values.shape) < 1:
+    values = map_file.values
+    if values.ndim < 2 or values.size == 0:
         raise ValueError("the map has not two dimensions; give rows and columns")
-    if min(map_file.values.shape[-2:]) < LEAST:
-        points = min(map_file.values.shape[-2:])
+    if (points := min(values.shape[-2:])) < LEAST:
         raise ValueError(f"a map of {points} points along a side is too small; give at least {LEAST}")
-    if not np.all(np.isfinite(map_file.values) | (np.isnan(map_file.values) & gaps)):
+    if not np.all(np.isfinite(values) | (np.isnan(values) & gaps)):
         raise ValueError("the map has gaps (nan or infinite); fill them or crop the map")
-    for value in (np.nanmin(map_file.values), np.nanmax(map_file.values)) if np.isfinite(map_file.values).any() else ():
-        STRESS.read(float(value))
+    for value in (np.nanmin(values), np.nanmax(values)) if np.isfinite(values).any() else ():
+        STRESS.read(value)
     return map_file
 
 
@@ -293,7 +293,7 @@ def _factor(data: Any, quantity: Quantity) -> float:
 
 def _spacing(data: Any, axis: str) -> float | None:
     """Spacing of a coordinate [m]; None without it."""
-    if axis not in data.dims or axis not in data.coords or data.sizes[axis] < 2:
+    if axis not in data.indexes or data.sizes[axis] < 2:
         return None
     steps = np.diff(np.asarray(data[axis], float)) * _factor(data[axis], SPACING)
     step = float(np.mean(steps))
@@ -336,7 +336,7 @@ def periodogram(field: Array, cell: float | tuple[float, float], window: str = "
     lattice = lattice_of(cell, field.shape[-2:])
     transform = lattice.forward(tapered(field, window))
     transform[..., 0, 0] = 0.0  # what rounding left of the mean
-    return np.asarray((transform.real**2 + transform.imag**2) / lattice.area)
+    return (transform.real**2 + transform.imag**2) / lattice.area
 
 
 def tapered(field: Array, window: str) -> Array:
@@ -349,7 +349,7 @@ def tapered(field: Array, window: str) -> Array:
     )
     taper = along[:, None] * across
     mean = np.mean(field * taper, axis=(-2, -1), keepdims=True) / np.mean(taper)
-    return np.asarray((field - mean) * (taper / math.sqrt(np.mean(taper**2))))
+    return (field - mean) * (taper / math.sqrt(np.mean(taper**2)))
 
 
 class RadialAverage(NamedTuple):

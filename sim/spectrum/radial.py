@@ -252,11 +252,11 @@ class Margin:
         """Inputs of ``share_of``, once for all steps: the wave of a ripple, or places and cubics of a spline."""
         (low, high), wave = self._ends, self.spectrum.wavevector
         if wave is not None and self._plane > 0.0:
-            level, swing = angular_compliance(np.asarray(self.solid[1], float))
+            level, swing = angular_compliance(self.solid[1])
             square = wave[0] ** 2 + wave[1] ** 2
-            lean = float(swing) * (wave[0] ** 2 - wave[1] ** 2) / square
-            whole = 0.5 * math.pi * (float(level) + lean)
-            return [((2.0 * math.sqrt(square), float(level) / whole, -lean / whole), _NONE, np.zeros((1, 4)))]
+            lean = swing * (wave[0] ** 2 - wave[1] ** 2) / square
+            whole = 0.5 * math.pi * (level + lean)
+            return [((2.0 * math.sqrt(square), level / whole, -lean / whole), _NONE, np.zeros((1, 4)))]
         count, spline = _POINTS - 1, self._spline(marginal_energy)
         step = math.log(high / low) / count
         cubics = np.ascontiguousarray(spline.c.T * step ** np.arange(3, -1, -1))

@@ -28,11 +28,8 @@ _ROWS = "axis that goes from row to row of a CSV or npy; netCDF names it"
 _MASK = "true: nan marks what lies outside of the contact, where there is no stress"
 
 
-def _digest(values: bytes) -> str:
-    return hashlib.sha256(values).hexdigest()
-
-
-_Values = Annotated[bytes, SkipJsonSchema(), PlainSerializer(_digest, return_type=str, when_used="json")]
+_DIGEST = PlainSerializer(lambda values: hashlib.sha256(values).hexdigest(), return_type=str, when_used="json")
+_Values = Annotated[bytes, SkipJsonSchema(), _DIGEST]
 _Shape = Annotated[tuple[int, int], SkipJsonSchema()]
 
 

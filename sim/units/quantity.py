@@ -181,9 +181,8 @@ class Quantity:
                 unit = "" if self.unit == "1" else f" {self.unit}"
                 raise _fault(f"must be {name.replace('_', ' ')} {_digits(bound)}{unit}, not {_digits(number)}{unit}")
         if abs(number) > _LARGEST or (self.above >= 0.0 and number < _SMALLEST):
-            raise _fault(
-                f"is too {'large' if abs(number) > 1.0 else 'small'} to be real; write for example {self.example}"
-            )
+            size = "large" if abs(number) > 1.0 else "small"
+            raise _fault(f"is too {size} to be real; write for example {self.example}")
         return number
 
     def scaled(self, numbers: Any, unit: str) -> Any:
@@ -213,10 +212,8 @@ class Quantity:
         whole = hasattr(value, "__index__") or (isinstance(value, float) and value.is_integer())
         is_scalar = not isinstance(value, bool) and getattr(value, "shape", ()) == ()
         if not is_scalar or not (whole if self.whole else hasattr(value, "__float__")):
-            kind = (
-                "a whole number" if self.whole else "a number" if self.unit == "1" else "a number or text with a unit"
-            )
-            raise _fault(f"must be {kind} such as {self.example}")
+            kind = "whole number" if self.whole else "number" if self.unit == "1" else "number or text with a unit"
+            raise _fault(f"must be a {kind} such as {self.example}")
         try:
             return int(value) if self.whole else float(value)
         except (OverflowError, TypeError, ValueError):

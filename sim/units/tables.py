@@ -171,9 +171,7 @@ def _headings(place: str, cells: Sequence[str]) -> list[tuple[str, str]]:
     return [(match["name"], match["unit"] or "") for match in matches if match]
 
 
-def _numbers(
-    name: str, table: _Cells, cells: Sequence[str], unit: str, quantity: Quantity, gaps: bool = False
-) -> Array:
+def _numbers(name: str, table: _Cells, cells: list[str], unit: str, quantity: Quantity, gaps: bool = False) -> Array:
     """Return cells of a table as numbers in SI."""
 
     def fault(place: int, reason: str) -> TableError:
@@ -190,7 +188,7 @@ def _numbers(
         raise fault(place, "is not a number; write decimals with a point, or leave the row out") from None
     for place in () if gaps else (numbers.argmin(), numbers.argmax()):  # the first nan is both
         try:
-            quantity.read(float(numbers[place]))
+            quantity.read(numbers[place])
         except ValueError as refusal:  # shown without the number, as a scenario may name any file
             raise fault(place, re.split("; |, not ", str(refusal))[0]) from None
     return numbers
@@ -203,7 +201,7 @@ def at_once(quantity: Quantity) -> WrapValidator:
         if isinstance(values, np.ndarray) and values.dtype == float and values.ndim == 1:
             with contextlib.suppress(ValueError):
                 for extreme in (values.min(), values.max()):  # the first nan is both
-                    quantity.read(float(extreme))
+                    quantity.read(extreme)
                 return tuple(values.tolist())
         return each(values)
 
@@ -243,9 +241,7 @@ def blamed(name: str) -> Iterator[None]:
     except UnicodeDecodeError:
         reason = "is not UTF-8 text; save it as plain CSV in UTF-8"
     except OSError as fault:
-        reason = (
-            f"cannot be read ({fault.strerror or fault}); name a plain file, relative to the scenario that names it"
-        )
+        reason = f"cannot be read ({fault.strerror or fault}); name a plain file, relative to the scenario"
     except (ValueError, RuntimeError, EOFError, MemoryError) as fault:
         reason = str(fault)
     about = {"file": name[:200], "reason": reason.partition("\n")[0]}
@@ -647,7 +643,7 @@ def _measured_columns(text: str, known: Mapping[str, Quantity], outcomes: Mappin
             arrays[base + ERROR] *= np.abs(arrays[base])
         if not np.all(arrays[base + ERROR] > 0.0):
             raise TableError(f'column "{base}" has a value of 0, whose relative error says nothing; give it in units')
-    return {name: Points(values, arrays.get(name + ERROR)) for name, values in arrays.items() if name in known}
+    return measured_points(arrays, known)
 
 
 def _unknown(name: str, known: Iterable[str]) -> str:

@@ -113,9 +113,7 @@ def progress_bar(total: int, what: str = "member-steps") -> Iterator[Shown]:
 
         with Progress(transient=True) as progress:
             task = progress.add_task(what, total=total)
-            yield Shown(
-                lambda done: progress.advance(task, done), lambda stage: progress.update(task, description=stage)
-            )
+            yield Shown(lambda n: progress.advance(task, n), lambda stage: progress.update(task, description=stage))
         return
     finished, began = 0, time.monotonic()
     printed = began
