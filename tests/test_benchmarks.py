@@ -9,7 +9,7 @@ import pytest
 from helpers.cases import some
 
 from benchmarks import page, run, timing
-from benchmarks.compare import interval, slower
+from benchmarks.compare import interval
 
 RESULTS = json.loads(run.RESULTS.read_text(encoding="utf-8"))
 
@@ -55,15 +55,3 @@ def test_the_interval_of_twenty_ratios_reaches_from_the_sixth_to_the_fifteenth()
     assert interval(ratios, confidence=0.88) == (7.0, 14.0)
     assert interval([1.0] * 5) == (-math.inf, math.inf)
     assert interval([3.0, 1.0, 2.0, 5.0, 4.0, 6.0]) == (1.0, 6.0)
-
-
-def test_a_row_is_slower_if_its_median_is_and_its_interval_says_so():
-    for ratios, expected in [
-        ([0.9] * 20, True),
-        ([0.96] * 20, False),
-        ([0.9] * 14 + [1.1] * 6, False),
-        ([0.9] * 15 + [1.1] * 5, True),
-        ([2.0] * 20, False),
-        ([0.5] * 5, False),
-    ]:
-        assert slower(ratios) is expected

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from sim.parts.bonds import models as bonds, tracked as tracks
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
-from sim.parts.shear.process import Onset, Slip
+from sim.parts.shear.process import Onset
 from sim.scenario.clock import Record
 
 RAMP = drive.Ramp(start=1e-4, stop=3e-2, scale="log")
@@ -18,22 +18,6 @@ RAMP = drive.Ramp(start=1e-4, stop=3e-2, scale="log")
 def last(members=1, steps=8, **parts):
     *_, state = march(scene(members, steps, **({"drive": RAMP} | parts)), np.arange(members))
     return state
-
-
-def test_steady_bonds_become_unbroken_as_the_critical_speed_grows():
-    for factor in (1e3, 1e6, 1e12):
-        fraction = last(bonds=bonds.Steady(critical_speed=3e-2 * factor)).bonds.bound
-        assert_allclose(fraction, 1.0, rtol=1.0 / factor + 4e-16, atol=0)
-    assert_allclose(fraction, last(bonds=bonds.Unbroken()).bonds.bound, rtol=1.1e-12)
-
-
-def test_the_rate_equation_becomes_the_steady_law_as_rebinding_rate_grows():
-    # on the step's mean speed; the law at that speed is reached to the last digit
-    steady = last(bonds=bonds.Steady(critical_speed=1e-2), drive=drive.Steady(speed=7e-3))
-    for rebinding_rate in (1e5, 1e9, 1e15):
-        rate = bonds.Rate(critical_speed=1e-2, rebinding_rate=rebinding_rate, start_from="empty")
-        found = last(bonds=rate, drive=drive.Steady(speed=7e-3))
-        assert_allclose(found.bonds.bound, steady.bonds.bound, rtol=1e-14)
 
 
 STARTED = drive.Start(rest=2e-3, speed=4e-3)
@@ -97,21 +81,6 @@ def test_mean_fluctuations_become_uniform_as_their_rms_vanishes():
     energies = np.array([state.shear.energy[0] for state in sizes])
     assert_allclose(energies[:-1] / energies[1:], 1e4, rtol=1e-12)
     assert_allclose(sizes[-1].contact.radius, last(shear=shear.Uniform()).contact.radius, rtol=1e-9)
-
-
-def test_modal_fluctuations_become_the_mean_as_the_cell_grows():
-    # a spectrum smooth through q = 0: the cell lacks 0.23278 C(0)/(G L), and its spread falls with the cell
-    spectrum, shear_modulus = Gaussian(rms=1e5, length=1e-5), 1.6e6
-    infinite = spectrum.surface_energy(shear_modulus)
-    deficits, spreads = [], []
-    for side in (2e-4, 4e-4, 8e-4):
-        part = shear.Modal(spectrum=spectrum, cell=side, points=round(side / 3e-6), correlation=Slip(length=1e-6))
-        errors = scene(shear=part).process.known_errors()
-        deficits.append(-errors["cell_error_energy"])
-        spreads.append(errors["member_spread_energy"])
-        assert_allclose(deficits[-1], 0.2327799 * spectrum.density(0.0, 0.0) / (1.6e6 * side) / infinite, rtol=0.02)
-    assert_allclose(np.divide(deficits[:-1], deficits[1:]), 2.0, rtol=0.02)
-    assert np.all(np.diff(spreads) < 0.0)
 
 
 def test_auto_is_the_depth_that_it_chooses():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from helpers.draws import FIVE_SIGMA, fits, states_at, words_from
-from scipy.stats import kstest, norm, poisson
+from scipy.stats import norm, poisson
 
 from sim.numerics.noise import PARTS, Noise
 
@@ -54,11 +54,8 @@ def test_streams_begin_at_the_words_of_numpys_philox_and_go_on_as_the_authors_pr
         assert words_from([state], 10)[0].tolist() == [int(word, 16) for word in words.split()]
 
 
-def test_the_normals_have_normal_moments_and_no_correlation():
+def test_the_normals_have_no_correlation():
     sample = Noise(5, "shear", np.arange(100)).normals(1, 20_000)
-    assert kstest(sample.ravel(), "norm").pvalue > FIVE_SIGMA
-    for power, moment, spread in ((1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0), (6, 15.0, 10170.0)):
-        assert abs(np.mean(sample**power) - moment) < 5.0 * np.sqrt(spread / sample.size)
     for lag in (1, 2, 3):
         products = sample[:, lag:] * sample[:, :-lag]
         assert abs(products.mean()) < 5.0 / np.sqrt(products.size)

@@ -5,7 +5,7 @@ import sys
 import matplotlib as mpl
 import numpy as np
 import pytest
-from helpers.parts import Band, Clock, Ensemble, Equilibrium, Record, analysis, bonds, drive, shear
+from helpers.parts import Band, Bell, Clock, Ensemble, Equilibrium, Record, analysis, bonds, drive, shear
 from helpers.pictured import STEADY, drawn, field, legend_of, lines_of, mapped, rendered, simulated
 from numpy.testing import assert_allclose
 
@@ -145,6 +145,9 @@ def test_every_shape_of_dataset_is_drawn_as_what_fits_it_and_a_quantity_not_reco
     shears = [{"model": "uniform"}, {"model": "mean", "spectrum": waves}]
     counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=5e2, sites=9)
     contacts = [{"model": "equilibrium", "load": 4e-3}, {"model": "equilibrium", "indentation": 1e-6}]
+    moving = {"model": "equilibrium", "indentation": {"from": "2 um", "to": "-2 um"}}
+    tracked = bonds.Tracked(rupture=Bell(zero_force_rate=1e4, bell_force=4e-12), bond_stiffness=4e-4,
+                            rebinding_rate=1e5, site_density=9e16, sites=50)  # fmt: skip
     for changes in [
         {"record": Record(per_member=False)}, {"ensemble": Ensemble(members=1)},
         {"record": Record(precision="float32")}, {"drive": drive.Ramp(start=-2e-3, stop=8e-3)},
@@ -153,15 +156,16 @@ def test_every_shape_of_dataset_is_drawn_as_what_fits_it_and_a_quantity_not_reco
         {"contact": Equilibrium(indentation=1e-6), "bonds": counted, "record": Record(per_member=False)},
         {"sweep": {"contact": contacts}}, {"sweep": {"contact.load": {"from": "0 mN", "to": "20 mN", "count": 12}}},
         {"drive": STEADY, "sweep": {"shear": shears, "contact.load": [0.0, 1e-3]}},
-        {"shear": shear.Uniform(), "bonds": bonds.Unbroken()},
+        {"shear": shear.Uniform(), "bonds": bonds.Unbroken()}, {"bonds": tracked, "record": Record(per_member=False)},
+        {"contact": Equilibrium(indentation={"from": -4e-6, "to": -2e-6})}, {"sweep": {"contact": [moving, *contacts]}},
         {"drive": STEADY, "clock": Clock(duration=0.02, step=0.02)},
     ]:  # fmt: skip
         dataset = simulated(**changes)
-        for kind in {plots.default(dataset), "time"}:
+        for kind in plots.drawable(dataset):
             figure = plots.draw(dataset, kind)
-            assert any(panel.get_xlabel() for panel in figure.axes)
+            assert any(panel.get_xlabel() for panel in figure.axes) and figure.axes[0].get_ylabel()
             for panel in figure.axes:
-                assert panel.get_ylabel() and (lines_of(panel) or panel.texts or panel.collections)
+                assert lines_of(panel) or panel.texts or panel.collections or panel.images, (changes, kind)
     loads, start = {"contact.load": [1e-3, 4e-3]}, drive.Start(rest=0.1, speed=1e-3)
     moved = {"contact": Equilibrium(load={"from": 0.0, "to": 4e-3}), "sweep": {"sphere.radius": [1e-3, 2e-3]}}
     for changes, kind in (

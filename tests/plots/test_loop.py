@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from helpers.parts import Clock, Ensemble, Equilibrium, Record, bonds, jkr, shear
-from helpers.pictured import STEADY, drawn, legend_of, lines_of, rendered, simulated
+from helpers.parts import Clock, Ensemble, Equilibrium, bonds, jkr, shear
+from helpers.pictured import STEADY, drawn, legend_of, rendered, simulated
 from numpy.testing import assert_allclose
 
 from sim.analysis import loop_energy
 from sim.plots import kinds as plots, style as pictures
-from sim.plots.style import recorded
 from sim.plots.theories import lost_energy
 
 JKR = (42e-3, 2e-3, 6.4e6)
@@ -127,23 +126,7 @@ def test_behind_a_machine_cycles_have_crosses_rings_verticals_and_the_energy_of_
         assert legend.get_title().get_text() == "dissipated in all: $W$"
 
 
-def test_every_shape_of_dataset_and_each_value_of_a_sweep_has_its_curves():
-    sites = bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=50)
-    counted = {"ensemble": Ensemble(members=4), "bonds": sites}
-    moving = {"model": "equilibrium", "indentation": {"from": "2 um", "to": "-2 um"}}
-    for changes in [
-        counted,
-        counted | {"record": Record(per_member=False)},
-        {"contact": Equilibrium(indentation={"from": -4e-6, "to": -2e-6})},
-        {"sweep": {"contact": [moving, {"model": "equilibrium", "load": "1 mN"}]}},
-    ]:
-        dataset = moved(**changes, clock=COARSE)
-        loads, radii, _ = plots.draw(dataset, "loop").axes
-        assert loads.get_ylabel().startswith("normal load") and radii.get_ylabel().startswith("contact radius")
-        closed = any(np.isfinite(y).any() for _, y in lines_of(radii))
-        assert closed == bool((recorded(dataset, "contact_radius") > 0.0).any())
-        base = plots.draw(dataset, "time").axes[-1]
-        assert base.get_ylabel().startswith("base") and lines_of(base)
+def test_each_value_of_a_sweep_has_its_curves():
     dataset = moved(MACHINE, clock=COARSE, sweep={"contact.stiffness": [100.0, 1e3]})
     loads, radii, _ = plots.draw(dataset).axes
     assert [line.get_color() for line in radii.lines if line.get_linestyle() == "--"] == [pictures.REFERENCE] * 2

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.parts import Clock, Ensemble, Record, bonds, drive, shear
+from helpers.parts import Clock, Ensemble, bonds, drive, shear
 from helpers.pictured import drawn, legend_of, rendered, simulated
 from numpy.testing import assert_allclose
 
@@ -154,18 +154,6 @@ def test_peaks_after_rests_are_those_of_steps_beside_the_closed_form_and_hollow_
 
 
 def test_every_kind_of_sliding_can_be_drawn_over_what_is_swept_and_others_are_refused():
-    sites = bonds.Tracked(rupture=Bell(**BELL), sites=50, **SITES)
-    tracked = {"bonds": sites, "ensemble": Ensemble(members=3)}
-    for changes in [
-        {"drive": drive.Ramp(start=-1e-3, stop=2e-3)}, {"drive": drive.Ramp(start=0.0, stop=1e-2)},
-        {"drive": drive.Table(time=(0.0, 0.5, 1.0), speed=(0.0, 0.02, 0.0))},
-        {"drive": drive.Steady(speed=1e-3), "sweep": {"drive.speed": [1e-4, 1e-3, 1e-2]}},
-        {"bonds": bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=3e5)},
-        {"bonds": bonds.Unbroken(stress=3e5)}, tracked, tracked | {"record": Record(per_member=False)},
-    ]:  # fmt: skip
-        figure = plots.draw(ramped(**({"clock": Clock(duration=1.0, step=0.1)} | changes)), "stress")
-        stress = [line for line in figure.axes[0].lines if np.size(line.get_ydata()) > 2]
-        assert stress and all(np.isfinite(np.asarray(line.get_ydata(), float)).any() for line in stress)
     for sweep, words in (
         ({}, ["time since the start (s)"]),
         ({"drive.rest": [0.2, 0.5]}, ["time since the start (s)", "time at rest (ms)"]),
