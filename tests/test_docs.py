@@ -2,7 +2,6 @@
 
 import doctest
 import importlib.util
-import inspect
 import math
 import re
 import shlex
@@ -43,13 +42,6 @@ def test_links_between_pages_lead_to_files():
     for page in PAGES:
         for target in re.findall(r"\]\((?!https?:)([^)#]+)", text_of(page)):
             assert (ROOT / page).parent.joinpath(target).exists(), (page, target)
-
-
-def test_every_law_has_a_unit_on_its_page():
-    api = maker_of("api")
-    for name in (name for name in api.MODULES if name.startswith("sim.laws")):
-        for law, thing in api._public(importlib.import_module(name)):
-            assert inspect.isclass(thing) or api.units(thing), f"{name}.{law}: no unit in Returns or the first line"
 
 
 def test_names_of_code_in_the_pages_exist():

@@ -127,8 +127,6 @@ def test_words_and_settings_are_known_whether_swept_or_not_and_a_run_that_is_sta
     contact = Equilibrium(indentation={"from": 1e-6, "to": 2e-6})
     dataset = run(scene(contact=contact, shear=shear.Uniform(), sweep={"contact.after_pull_off": ["stop", "reattach"]}))
     assert word(dataset, "contact.after_pull_off", "").to_numpy().tolist() == ["stop", "reattach"]
-    assert str(word(dataset, "contact.indentation.scale", "").to_numpy()) == "linear"
-    assert str(word(dataset, "contact.colour", "grey").to_numpy()) == "grey"
     rows = [{"contact.after_pull_off": "reattach", "contact.load": load} for load in (1e-3, 2e-3)]
     dataset = run(scene(shear=shear.Uniform(), sweep=rows))
     assert word(dataset, "contact.after_pull_off", "").to_numpy().tolist() == ["reattach", "reattach"]

@@ -152,8 +152,6 @@ def test_depths_are_listed_with_their_reason_also_if_chosen_by_the_scene():
     for part, model, reason in (
         ({"shear": SHEARS["auto with correlation"]}, "banded", "a correlation is given"),
         ({"shear": SHEARS["auto without correlation"]}, "mean", "no correlation is given"),
-        ({"bonds": bonds.Auto(critical_speed=1.0, rebinding_rate=1.0)}, "rate", "no number of sites is given; the"),
-        ({"bonds": bonds.Auto(rupture=BELL, **STRETCHED, sites=64)}, "tracked", "1/√N of 64 sites is 0.125, above"),
         ({"bonds": bonds.Auto(rupture=BELL, **STRETCHED)}, "cohort", "1/√N of 4,547,221,756 sites is 1.48e-05"),
     ):
         (line,) = (line for line in preview(scene(**part)).splitlines() if "→" in line)

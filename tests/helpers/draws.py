@@ -5,7 +5,7 @@ from scipy.stats import chi2
 
 from sim.numerics import noise
 from sim.numerics.jit import kernel
-from sim.numerics.noise import _hat, _log_chance, binomial
+from sim.numerics.noise import _log_chance, binomial
 
 #: Two-sided probability of five standard deviations.
 FIVE_SIGMA = 5.7e-7
@@ -49,11 +49,6 @@ def _log_chances(number, trials, chance, result):
         result[i] = _log_chance(number[i], trials, chance)
 
 
-@kernel("void(float64, float64, float64[::1])")
-def _hats(spread, chance, result):
-    result[0], result[1], result[2], result[3] = _hat(spread, chance)
-
-
 def words_from(states, count):
     """Words drawn from given states of the generator, shape (states, count)."""
     states = np.ascontiguousarray(states, dtype=_U)
@@ -82,13 +77,6 @@ def binomials(trials, chance, address, count=1):
     drawn = np.empty((len(address[2]), count))
     _binomials(trials, chance, *address, drawn)
     return drawn
-
-
-def hat(spread, chance):
-    """Constants a, b, α and v_r of the rejection of binomials."""
-    result = np.empty(4)
-    _hats(spread, chance, result)
-    return result
 
 
 def log_chances(number, trials, chance):

@@ -1,11 +1,11 @@
-"""Binomial numbers: exact chances, the hat of the rejection, and the law of many draws."""
+"""Binomial numbers: exact chances and the law of many draws."""
 
 import math
 
 import mpmath
 import numpy as np
 import pytest
-from helpers.draws import FIVE_SIGMA, binomials, fits, hat, log_chances
+from helpers.draws import FIVE_SIGMA, binomials, fits, log_chances
 from numpy.testing import assert_allclose
 from scipy.stats import binom, poisson
 
@@ -40,26 +40,6 @@ def test_logarithms_of_chances_to_sixty_digits():
             number = [int(trials * chance + z * spread) for z in (-6, -0.3, 0, 2, 8)]
             exact = [exact_log_chance(k, trials, chance) for k in number]
             assert_allclose(log_chances(number, trials, chance), exact, rtol=0, atol=CLOSE)
-
-
-def test_the_hat_of_the_rejection_lies_above_the_chances_and_its_core_below():
-    for mean in [10.0, 10.01, 10.5, 12.0, 17.0, 30.0, 100.0, 1e4, 1e7]:
-        for chance in [0.5, 0.37, 0.1, 1e-2, 1e-4]:
-            # a number is floor of G(u) = (2a/(1/2 − |u|) + b) u + c, its share f(k) G'(u) / (most α)
-            trials = math.ceil(mean / chance)
-            chance = mean / trials
-            a, b, size, sure = hat(math.sqrt(mean * (1.0 - chance)), chance)
-            u = np.linspace(-0.5, 0.5, 200_003)[1:-1]
-            room = 0.5 - np.abs(u)
-            k = np.floor((2.0 * a / room + b) * u + mean + 0.5)
-            inside = (k >= 0.0) & (k <= trials)
-            assert np.all(inside[room >= 0.07])
-            ends = binom.logpmf(k[inside], trials, chance) - binom.logpmf(
-                math.floor((trials + 1) * chance), trials, chance
-            )
-            share = np.exp(ends) * (a / room[inside] ** 2 + b) / size
-            assert share.max() <= 1.0
-            assert share[room[inside] >= 0.07].min() >= sure
 
 
 LAWS = [(1, 0.5), (7, 0.3), (12, 0.35), (19, 0.5), (20, 0.5), (21, 0.5), (22, 0.53), (1000, 0.0099), (1000, 0.0101)]

@@ -64,8 +64,6 @@ def test_a_member_a_time_and_axes_are_those_chosen_in_their_units_and_what_does_
     with pytest.raises(ValueError, match=r"^at 3 mm: "):
         draw(dataset, "profile", at="3 mm")
     for x, variable, factor, label in [
-        ("time", "t", 1e3, "time $t$ (ms)"),
-        ("speed", "speed", 1e3, "sliding speed $V$ (mm/s)"),
         ("slider_position", "slider_position", 1e3, "displacement of the slider $X$ (mm)"),
         ("shear_stress", "shear_stress", 1e-3, r"mean shear stress at the interface $\tau_{0}$ (kPa)"),
     ]:

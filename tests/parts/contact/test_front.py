@@ -290,33 +290,6 @@ def test_a_narrow_contact_closes_to_the_equilibrium_and_an_open_one_stays_open()
     assert_array_equal(out.radius[1], advance(REST * ONE, (W, W), at_load(-1.0), EDGE, 1.0, **SPHERE).radius[0])
 
 
-def test_one_clock_step_does_the_work_of_many():
-    # each of some tens of inner steps may err by 1e-8 of the radius, or 1e-11 of the clock step in time
-    rng, size = np.random.default_rng(54), 600
-    start, stiffness = 10.0 ** rng.uniform(-0.3, 0.5, size), rng.choice([0.0, 0.1, 1.0, 10.0, math.inf], size)
-    work, load, displacement = (rng.uniform(*ends, (2, size)) for ends in ((-0.5, 2.0), (-2.0, 3.0), (-0.8, 1.0)))
-    speed, exponent = 10.0 ** rng.uniform(-2, 6, (2, size)), rng.uniform(0.1, 1.0, (2, size))
-    edge = Kinetics(W, speed[0], exponent[0], speed[1], exponent[1])
-
-    def end(steps):
-        a, time, energy = start, np.full(size, math.nan), np.zeros(size)
-        for i in range(steps):
-            s = np.array([[i], [i + 1]]) / steps
-            works, loads, displacements = ((1.0 - s) * x[0] + s * x[1] for x in (W * work, load, displacement))
-            hold = Hold(*loads, *displacements, stiffness)
-            out = advance(a, works, hold, edge, 1.0 / steps, **SPHERE, detached_below=0.01)
-            assert (out.dissipated >= 0.0).all()
-            time = np.where(np.isnan(out.detached_at), time, i / steps + out.detached_at)
-            a, energy = out.radius, energy + out.dissipated
-        return a, time, energy
-
-    (a, time, energy), (a_many, time_many, energy_many) = end(1), end(23)
-    assert 50 < np.isnan(a).sum() < 250
-    assert_allclose(a, a_many, rtol=1e-6, atol=0)
-    assert_allclose(time, time_many, rtol=1e-6, atol=1e-10)
-    assert (np.abs(energy - energy_many) < 1e-4 * (energy_many + W)).all()
-
-
 def awkward(rng, size):
     """Rows of all arguments over many decades, with zeros, infinities and nan strewn in."""
     decades = np.zeros((17, 2))
