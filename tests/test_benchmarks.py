@@ -36,17 +36,6 @@ def test_the_page_of_speed_is_that_of_the_results():
     )
 
 
-def test_a_ratio_is_that_of_a_turn_per_call_and_share_of_the_work():
-    clock = lambda program, times=1: program() * times  # noqa: E731
-    other = timing.Beside("other", lambda: 2.0**-9, share=2.0)
-    bound = other._replace(goal=0.5, bound=True)
-    faster, longer = timing.Bench().compare("ours", lambda: 2.0**-11, other, bound, clock=clock)
-    seconds = [2.0**-11, 2.0**-10]
-    assert (faster.kind, faster.result, faster.met) == ("faster", [2.0] * 3, None)
-    assert (longer.kind, longer.result, longer.goal) == ("as long", [0.5] * 3, 0.5)
-    assert faster.seconds == longer.seconds == seconds
-
-
 def test_the_interval_of_twenty_ratios_reaches_from_the_sixth_to_the_fifteenth():
     # 1 - 2 (1 + 20 + 190 + 1140 + 4845 + 15504)/2^20 = 0.9586; one ratio further in it would be 0.8847
     ratios = [float(n) for n in range(1, 21)]

@@ -4,12 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from helpers.scenes import BELL, BY_SLIP, CUT_OFF, SPECTRUM, STRETCHED, Gaussian, drive, march, scene, shear
+from helpers.scenes import BELL, BY_SLIP, CUT_OFF, SPECTRUM, STRETCHED, drive, march, scene, shear
 from numpy.testing import assert_allclose
 
 from sim.parts.bonds import models as bonds, tracked as tracks
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
-from sim.parts.shear.process import Onset
 from sim.scenario.clock import Record
 
 RAMP = drive.Ramp(start=1e-4, stop=3e-2, scale="log")
@@ -75,14 +74,6 @@ def test_bonds_that_only_a_stretch_breaks_are_the_papers_steady_law(speed):
         assert_allclose(state.stress, full * steady.bonds.bound, rtol=1e-4)
 
 
-def test_mean_fluctuations_become_uniform_as_their_rms_vanishes():
-    recipe = {"amplitude": Onset(speed=2e-3, width=0.3)}
-    sizes = [last(shear=shear.Mean(spectrum=Gaussian(rms=rms, length=1e-5), **recipe)) for rms in (1e3, 1e1, 1e-1)]
-    energies = np.array([state.shear.energy[0] for state in sizes])
-    assert_allclose(energies[:-1] / energies[1:], 1e4, rtol=1e-12)
-    assert_allclose(sizes[-1].contact.radius, last(shear=shear.Uniform()).contact.radius, rtol=1e-9)
-
-
 def test_auto_is_the_depth_that_it_chooses():
     for auto, chosen in (
         (shear.Auto(spectrum=SPECTRUM), shear.Mean(spectrum=SPECTRUM)),
@@ -93,11 +84,3 @@ def test_auto_is_the_depth_that_it_chooses():
     mapped = scene(shear=shear.Auto(**BY_SLIP), record=Record(maps=(2e-3,)))
     assert mapped.fluctuations == shear.Mapped(**BY_SLIP)
     assert mapped.process.modes.points > 2
-
-
-def test_modal_with_fixed_amplitudes_is_the_mean_with_the_cells_error():
-    amplitude = Onset(speed=2e-3, width=0.3)
-    part = shear.Modal(**BY_SLIP, amplitude=amplitude, mode_amplitudes="fixed")
-    error = scene(shear=part).process.known_errors()["cell_error_energy"]
-    mean = last(shear=shear.Mean(spectrum=SPECTRUM, amplitude=amplitude)).shear.energy
-    assert_allclose(last(shear=part).shear.energy, mean * (1.0 + error), rtol=1e-12)

@@ -10,7 +10,7 @@ from helpers.parts import Equilibrium, Record, analysis, drive, run, shear
 from numpy.testing import assert_allclose
 
 from sim.analysis import dataset as dataset_module
-from sim.analysis.dataset import resolved, word
+from sim.analysis.dataset import word
 from sim.parts.drive import Steady
 
 
@@ -133,8 +133,6 @@ def test_words_and_settings_are_known_whether_swept_or_not_and_a_run_that_is_sta
     drives = [{"model": "ramp", "from": 1e-5, "to": 1e-2}, {"model": "start", "rest": 0.1, "speed": 1e-2}]
     dataset = run(scene(shear=shear.Uniform(), sweep={"drive": drives}))
     assert word(dataset, "drive.model", "").to_numpy().tolist() == ["ramp", "start"]
-    with pytest.raises(KeyError, match="swept"):
-        resolved(dataset, "drive.model")
     steady = {"drive": drive.Steady(speed=1e-3), "shear": shear.Uniform()}
     assert analysis.is_stationary(run(scene(**steady)))
     ended = run(scene(**steady))

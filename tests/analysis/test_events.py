@@ -10,7 +10,7 @@ from helpers.lens import scene
 from helpers.parts import Bell, Clock, Ensemble, Equilibrium, Record, analysis, bonds, drive, jkr, run, shear
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.analysis.events import incipient_law, speed_step, way_to_sliding
+from sim.analysis.events import speed_step, way_to_sliding
 
 NAN = math.nan
 
@@ -294,5 +294,3 @@ def test_the_way_to_sliding_has_its_threshold_and_the_law_of_the_square_unless_n
         dataset = pulled()
         dataset["stage_speed"] = dataset["stage_speed"] * np.where(np.arange(151) > 100, then, 1.0)
         assert bool(way_to_sliding(dataset).to_dataarray().isnull().all())
-    force = np.array([0.0, 1.0, 2.0, 1.5, 3.0])
-    assert incipient_law(force, 1.0 - 0.01 * force**2)[0] == 2

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import psutil
 import pytest
 from helpers.commands import COUNTED, LENS
-from helpers.parts import Clock, Record, analysis, load, run
+from helpers.parts import Record, analysis, load, run
 from helpers.scenes import SHEARS, sample
 from numpy.testing import assert_allclose
 
@@ -21,7 +21,6 @@ from sim.ensemble import plan as plans, preview
 from sim.ensemble.dataset import identity
 from sim.ensemble.plan import Plan
 from sim.ensemble.preview import fitting, forecast, memory, remarks, size
-from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
 
 
@@ -99,26 +98,6 @@ def test_the_room_on_disk_is_that_of_parts_and_dataset_and_too_little_is_refused
     parts.mkdir()
     (parts / "manifest.json").write_bytes(bytes(int(0.2 * needed)))  # of an unfinished run
     preview.refuse_full_disk(Plan.of(scenario), folder / "x.nc")
-
-
-def test_the_pace_is_that_of_the_steps_and_nothing_is_compiled_for_it(monkeypatch):
-    monkeypatch.setattr(preview, "_WORTH_TRYING", 0.0)
-    plan, clock = Plan.of(sample(20, 3000, clock=Clock(duration=3.0, step=1e-3, record=0.1))), [0.0]
-    follow = preview.follow
-
-    def slow(point, noise, state, steps):
-        before = -1 if state is None else state.step
-        clock[0] += 3.0 * preview.counted_block(point, noise.shear.members, plans.Block(before, steps[-1], 100))
-        return follow(point, noise, state, steps)
-
-    monkeypatch.setattr(preview, "follow", slow)
-    monkeypatch.setattr(time, "perf_counter", lambda: clock[0])
-    assert_allclose(preview.tried(plan), 3.0, rtol=1e-9)
-    assert 0.0 < clock[0] < 0.5
-    calls, notices = [], [lambda name: None]
-    monkeypatch.setattr(jit, "on_compiling", notices[:])
-    monkeypatch.setattr(preview, "follow", lambda *arguments: calls.append(1) or jit.on_compiling[0]("a kernel"))
-    assert preview.tried(plan) is None and (jit.on_compiling, calls) == (notices, [1])
 
 
 def test_more_members_take_more_time_and_no_more_memory_and_steps_that_are_done_none(monkeypatch):

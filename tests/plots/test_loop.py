@@ -115,7 +115,6 @@ def test_behind_a_machine_cycles_have_crosses_rings_verticals_and_the_energy_of_
     assert all(f"{1e12 * float(energy):.3g} pJ" in entry.get_text() for energy in (spent, loop))
     for contact in (
         Equilibrium(indentation={"from": 2e-6, "to": -2e-6}),
-        Equilibrium(indentation=BACK, after_pull_off="stop"),
         Equilibrium(indentation={"time": [0.0, 0.5, 1.0], "value": [2e-6, -2e-6, 1e-6]}),
     ):
         dataset = moved(contact, clock=COARSE)

@@ -153,7 +153,7 @@ def test_peaks_after_rests_are_those_of_steps_beside_the_closed_form_and_hollow_
     assert start.peak < 0.0
 
 
-def test_every_kind_of_sliding_can_be_drawn_over_what_is_swept_and_others_are_refused():
+def test_sliding_without_a_stress_over_speed_or_time_is_refused_with_the_cure():
     short = Clock(duration=0.1, step=0.1)
     for changes, cure in (
         ({"population": bonds.Unbroken()}, r"\[bonds\] stress = .*drawn as: theories, curve, time, profile$"),
