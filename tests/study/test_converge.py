@@ -291,7 +291,10 @@ def scene_of(*names):
 
 
 def held(scenario, budget, parts=("shear", "bonds", "step")):
-    """True for each setting and quantity whose error holds, against other members, finest models and 1/16 a step."""
+    """True for each setting and quantity whose error holds, against other members, finest models and 1/16 a step.
+
+    The first column is True for clock steps.
+    """
     dataset, driven, result = converge(scenario, budget), scenario.drive.solves_motion, []
     bound = (dataset["error"] + study.students(dataset["members"]) * dataset["standard_error"]).fillna(0.0)
     other = scenario.with_values({"seed": 99})
@@ -308,7 +311,8 @@ def held(scenario, budget, parts=("shear", "bonds", "step")):
             samples = [study.compared(row.scenario, 512, steps) for row in rows]
         for row, sample in zip(rows[1:], samples[1:], strict=False):
             off = study._errors(sample, samples[0])[0, :, : 1 if driven else 2] - 1e-6  # the tolerance of sub-steps
-            result += np.all(off <= bound.sel(row=row.label).to_numpy()[:, : off.shape[1]], axis=1).tolist()
+            holds = np.all(off <= bound.sel(row=row.label).to_numpy()[:, : off.shape[1]], axis=1)
+            result += [(part == "step", each) for each in holds.tolist()]
     return [] if dataset.attrs["not_converging"] else result
 
 
@@ -316,12 +320,16 @@ def held(scenario, budget, parts=("shear", "bonds", "step")):
 def test_stated_errors_hold_in_95_of_100_pairs_at_prescribed_speeds_and_behind_springs_and_forces(monkeypatch):
     monkeypatch.setattr(study, "_MOST", 64)  # fewer than in the runs that judge
     pairs = [held(scene_of(*names), 2.0) for names in SCENES]
-    total = np.concatenate(pairs)
-    assert len(total) > 400 and sum(map(bool, pairs)) > 11 and np.mean(total) >= 0.95, pairs
+    of_step, holds = np.array([pair for of_scene in pairs for pair in of_scene]).T
+    print(f"{np.sum(holds)} of {len(holds)} pairs, {np.sum(holds[of_step])} of {np.sum(of_step)} of clock steps")
+    assert len(holds) > 400 and sum(map(bool, pairs)) > 11
+    assert np.mean(holds) >= 0.95 and np.mean(holds[of_step]) >= 0.9  # of few members some spreads are not seen
 
 
 def test_averages_behind_springs_and_under_forces_have_errors_that_hold_and_are_exact_without_noise(quick):
-    assert np.mean(held(scene_of(*SCENES[-2]), 1.5, ["step"])) >= 0.9  # the edge lags: errors of percents
+    assert (
+        np.mean([holds for _, holds in held(scene_of(*SCENES[-2]), 1.5, ["step"])]) >= 0.9
+    )  # the edge lags: errors of percents
     dataset = converge(scene_of("spring with mass", "rate, bell", "uniform", "load"), 1.5)
     assert np.all(dataset["members"] == 1) and float(dataset["standard_error"].max()) == 0.0
     largest = dataset["error"].groupby(dataset["part"]).max(...)
