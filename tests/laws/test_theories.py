@@ -18,8 +18,6 @@ from sim.laws import halfspace, jkr, reversible, theories
 
 U = 2.0**-53
 UNIT = {"work": 1.0, "sphere_radius": 1.0, "modulus": 4.0}
-LENS = {"work": 0.042, "sphere_radius": 2e-3, "modulus": 6.4e6}
-ORDER = ("work", "stress", "reversible", "sphere_radius", "modulus", "poisson_ratio")
 
 
 def shear_coefficient(poisson_ratio):

@@ -57,7 +57,6 @@ site_density = "1e17 1/m^2"
 RATE = 'model = "rate"\ncritical_speed = "10 mm/s"\nrebinding_rate = "500 1/s"\n'
 RAMP = 'model = "ramp"\nfrom = "10 um/s"\nto = "100 mm/s"\nscale = "log"'
 SHEAR = re.search(r"(?s)\[shear\].*?(?=\[ensemble\])", LENS)[0]
-SPECTRUM = re.search(r'(?s)model = "self_affine".*?(?=\n\n)', LENS)[0]
 LOAD = 'load = "4 mN"'
 
 

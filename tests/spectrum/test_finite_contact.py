@@ -167,12 +167,8 @@ def test_marginal_energy_is_the_derivative_of_the_energy():
         assert_allclose(slope, marginal_energy(spectrum, a, 1.0, 0.3), rtol=2e-7, atol=0, err_msg=spectrum.model)
 
 
-def test_energies_broadcast_scale_with_the_modulus_and_a_radius_that_is_no_length_is_refused():
-    radius, modulus = np.array([[0.1], [1.0]]), np.array([1.0, 2.0, 4.0])
+def test_energies_are_linear_in_poissons_ratio_and_a_radius_that_is_no_length_is_refused():
     for spectrum in SPECTRA:
-        energy = disc_energy(spectrum, radius, modulus, 0.2)
-        assert energy.shape == (2, 3)
-        assert_allclose(energy[1], disc_energy(spectrum, 1.0, 1.0, 0.2) / modulus, rtol=1e-14, atol=0)
         low, middle, high = (marginal_energy(spectrum, 1.0, 1.0, nu) for nu in (0.1, 0.25, 0.4))
         assert_allclose(middle, (low + high) / 2, rtol=1e-13, atol=0)
     for spectrum in (Gaussian(1.0, 1.0), Ripple(1.0, 1.0)):

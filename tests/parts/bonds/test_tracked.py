@@ -13,7 +13,7 @@ from sim.laws.schallamach import bell_lives, bell_moments
 from sim.numerics.noise import PARTS
 from sim.parts.bonds import tracked
 from sim.parts.bonds.rupture import RuptureRate
-from sim.parts.bonds.tracked import BLOCK, BOUND, CLOCK, SENSE, SINGLY, SLIDER, STEPS, advance, mean_life, start
+from sim.parts.bonds.tracked import BLOCK, BOUND, SENSE, SINGLY, SLIDER, STEPS, advance, mean_life, start
 
 BELL, CONSTANT, CUT = RuptureRate(1.0, 1.0, math.inf), RuptureRate(1.0, 0.0, math.inf), RuptureRate(0.3, 0.0, 2.0)
 BOTH = RuptureRate(1.0, 1.0, 3.0)
@@ -149,28 +149,6 @@ def volterra(law, rebinding, position, step):
     born[0] *= 0.5
     stretch = position[np.newaxis, :] - position[:, np.newaxis]
     return [np.sum(born[:, np.newaxis] * survival * stretch**n, axis=0) - 0.5 * (n == 0) * born for n in (0, 1, 2)]
-
-
-def test_a_cluster_that_shares_a_force_lives_as_erdmann_and_schwarz_say():
-    for sites, force in [(5, 0.0), (5, 2.0), (10, 5.0)]:
-        rates = [i * math.exp(force / i) for i in range(1, sites + 1)]
-        exact, variance, members = sum(1 / r for r in rates), sum(1 / r**2 for r in rates), 1500
-        if (sites, force) == (5, 0.0):
-            assert_allclose(exact, 2.283333, rtol=1e-6, atol=0)
-        lives = []
-        for member in range(members):
-            number = np.array([member])
-            tracks = start(UNBREAKING, 1.0, sites, np.zeros(1), "bonded", 8, number)
-            time = 0.0
-            for left in range(sites, 0, -1):
-                rate = math.exp(force / left)
-                # as long as it takes to the next rupture, and the least bit more
-                wait = (tracks.soonest[0, 0].min() - tracks.frame[0, CLOCK]) / rate * (1.0 + 1e-12)
-                tracks = go(tracks, 0.0, wait, RuptureRate(rate, 1.0, math.inf), 0.0, 8, number)
-                assert bound(tracks)[0] == left - 1
-                time += wait
-            lives.append(time)
-        assert abs(np.mean(lives) - exact) < 5.0 * math.sqrt(variance / members)
 
 
 LEAPS = np.concatenate([np.full(60, 3.0), [400.0, 2.0], np.full(30, 40.0)])
