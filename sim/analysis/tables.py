@@ -418,8 +418,9 @@ def as_means(speeds: xr.Dataset) -> xr.Dataset:
 def once(dataset: xr.Dataset) -> xr.Dataset:
     """Return statistics of the events of a run."""
     result = events(dataset)
-    once = as_means(half_lives(dataset, result))
-    return summary(result.assign_attrs(dataset.attrs)).merge(once, compat="no_conflicts")
+    return summary(result.assign_attrs(dataset.attrs)).merge(
+        as_means(half_lives(dataset, result)), compat="no_conflicts"
+    )
 
 
 # --- a long table for other programs, and a data frame ---

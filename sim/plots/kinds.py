@@ -150,12 +150,6 @@ def _missing(dataset: xr.Dataset, kind: str) -> str:
     return ""
 
 
-def _drawn_over(dataset: xr.Dataset, x: str) -> str:
-    """Return the kind of figure that is drawn over a variable or swept key, or by default."""
-    swept = {word for dim in style.swept(dataset) for word in (dim, dim.rpartition("_")[2], dim.replace("_", ".", 1))}
-    return {"": default(dataset), "speed": "curve"}.get(x, "sweep" if x in swept else "time")
-
-
 def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None = None) -> Figure:
     """Draw a figure of a dataset.
 
@@ -181,7 +175,10 @@ def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None =
     """
     choices = choices or Choices()
     dataset = choices.of_member(plain(dataset))
-    kind = kind or _drawn_over(dataset, choices.x)
+    if not kind:
+        dims = [(dim, dim.rpartition("_")[2], dim.replace("_", ".", 1)) for dim in style.swept(dataset)]
+        over = "sweep" if any(choices.x in words for words in dims) else "time"
+        kind = {"": default(dataset), "speed": "curve"}.get(choices.x, over)
     if kind not in KINDS:
         raise ValueError(f'there is no figure "{kind}"; known: {", ".join(KINDS)}')
     missing = _missing(dataset, kind)

@@ -144,10 +144,6 @@ class Measured:
         values = factor * source**power
         return Points(values, None if errors is None else power * np.abs(values / source) * errors)
 
-    def _source(self, name: str) -> str:
-        """Return the column that a variable has or follows from."""
-        return next(each for each in (name, *_names_of(name), "contact_area", "contact_radius") if each in self.table)
-
     def draw(
         self, panel: Axes, over: tuple[str, float], shown: tuple[str, float], curves: Sequence[Compared], log: bool
     ) -> None:
@@ -155,6 +151,10 @@ class Measured:
         across, (name, factor) = self.column(over[0]), shown
         if across is None:
             return
+        # the column that the variable has or follows from
+        source = next(
+            (each for each in (name, *_names_of(name), "contact_area", "contact_radius") if each in self.table), ""
+        )
         x, wide = over[1] * across.values, None if across.errors is None else over[1] * across.errors
         assigned = any(name in self.table for name in self.sweep)
         for curve in curves if assigned else curves[:1]:
@@ -167,7 +167,7 @@ class Measured:
                 values, branches = _residuals(curve, x[rows], y, high, log)
                 near = np.isfinite(values)
                 if np.any(near):
-                    self.residuals.append(Residuals(over[0], self._source(name), line, x[rows], values, branches))
+                    self.residuals.append(Residuals(over[0], source, line, x[rows], values, branches))
                     label += rf", $\chi^2$ = {np.sum(values[near] ** 2):.4g} of {np.sum(near)}"
                     label += " (nearest branch)" * (branches > 1)
             look: Any = HOLLOW | {"color": line.colour, "elinewidth": 0.7, "zorder": 3}
