@@ -89,9 +89,10 @@ def run(
     scene = _scene(scenario)
     own_display = contextlib.nullcontext(Shown(progress) if callable(progress) else Shown())
     try:
-        with progress_bar(work(Plan.of(scene))) if progress is True else own_display as shown:
-            how: dict[str, Any] = {"replace": replace, "resume": resume, "jobs": jobs}
-            return simulate.run(scene, to, **how, progress=shown.advance, stage=shown.begin)
+        with progress_bar(work(Plan.of(scene))) if progress is True else own_display as bar:
+            return simulate.run(
+                scene, to, replace=replace, resume=resume, jobs=jobs, progress=bar.advance, stage=bar.begin
+            )
     except Exception as fault:
         message = str(fault).replace("the same command", "the same call")
         message = message.replace("--resume", "resume=True").replace("--force", "replace=True")
@@ -221,8 +222,7 @@ class Text(str):
 
     __slots__ = ()
 
-    def __repr__(self) -> str:
-        return str(self)
+    __repr__ = str.__str__
 
 
 def _scene(scenario: "Scenario | Path | dict[str, Any]") -> "Scenario":

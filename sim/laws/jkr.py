@@ -678,17 +678,13 @@ def radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus
         _solve(*small.reshape(6, -1))
         return small[5][()]
     arrays = [np.asarray(value, dtype=float) for value in arguments]
-    flat = [array if array.size == 1 or array.shape == shape else np.broadcast_to(array, shape) for array in arrays]
-    flat = [array.reshape(-1) for array in flat]
+    flat = [(array if array.size == 1 else np.broadcast_to(array, shape)).reshape(-1) for array in arrays]
     radii = np.empty(math.prod(shape))
     block = np.empty((5, min(radii.size, _BLOCK)))
     for first in range(0, radii.size, _BLOCK):
         part = radii[first : first + _BLOCK]
         for row, array in zip(block, flat, strict=True):
-            if array.size > 1:
-                row[: part.size] = array[first : first + _BLOCK]
-            elif first == 0:
-                row[:] = array
+            row[: part.size] = array if array.size == 1 else array[first : first + _BLOCK]
         _solve(*block[:, : part.size], part)
     return radii.reshape(shape)[()]
 

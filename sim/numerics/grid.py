@@ -47,8 +47,8 @@ class Lattice:
         For an even number of points the Nyquist row carries qx = -pi/spacing and the Nyquist
         column qy = +pi/spacing: only its modulus has a meaning there.
         """
-        along, across = np.arange(self.shape[0]), np.arange(self.shape[1] // 2 + 1)
-        along[along > (self.shape[0] - 1) // 2] -= self.shape[0]
+        along = np.fft.ifftshift(np.arange(self.shape[0]) - self.shape[0] // 2)
+        across = np.arange(self.shape[1] // 2 + 1)
         first, second = (2.0 * math.pi / side for side in self.sides)
         return _read_only(first * along[:, None]), _read_only(second * across[None, :])
 
@@ -60,9 +60,7 @@ class Lattice:
         these hold both signs already.
         """
         count = np.full(self.shape[1] // 2 + 1, 2.0)
-        count[0] = 1.0
-        if self.shape[1] % 2 == 0:
-            count[-1] = 1.0
+        count[[0] if self.shape[1] % 2 else [0, -1]] = 1.0
         return _read_only(count)
 
     def forward(self, field: np.ndarray) -> np.ndarray:

@@ -175,6 +175,17 @@ def _name(function: Callable) -> str:
     return f"{function.__module__}.{function.__qualname__}"
 
 
+def _at_first_call(function: Callable, public: Callable[..., Callable], make: Callable, load: Callable) -> Callable:
+    """Return the function that compiles or loads another one when it is first called, and list it in ``compiled``."""
+
+    @functools.cache
+    def built() -> Callable:
+        return _built(function, make, load) if FAST else _public(public, function)
+
+    compiled[_name(function)] = built
+    return built
+
+
 def kernel(signature: str) -> Callable[[Callable], Callable]:
     """Compile a loop over arrays for one ``signature``, at the first call."""
 
@@ -189,17 +200,12 @@ def kernel(signature: str) -> Callable[[Callable], Callable]:
             dispatcher.disable_compile()
             return dispatcher
 
-        @functools.cache
-        def built() -> Callable:
-            if not FAST:
-                return _public(functools.partial(numba.njit, signature, error_model="numpy"), function)
-            return _built(function, make, load)
+        built = _at_first_call(function, functools.partial(numba.njit, signature, error_model="numpy"), make, load)
 
         @functools.wraps(function)
         def call(*arguments):
             return built()(*arguments)
 
-        compiled[_name(function)] = built
         return call
 
     return decorate
@@ -230,11 +236,7 @@ def law(function: Callable) -> Callable:
     def load(code: Any, name: str) -> Callable:
         return ufunc_of(cpu_target.target_context.codegen().unserialize_library(code), name)
 
-    @functools.cache
-    def built() -> Callable:
-        if not FAST:
-            return _public(functools.partial(numba.vectorize, [signature], nopython=True), function)
-        return _built(function, make, load)
+    built = _at_first_call(function, functools.partial(numba.vectorize, [signature], nopython=True), make, load)
 
     @functools.wraps(function)
     def call(*arguments, **keywords):
@@ -246,7 +248,6 @@ def law(function: Callable) -> Callable:
         with np.errstate(all="ignore"):
             return built()(*arguments) if small else _in_blocks(built(), arguments)
 
-    compiled[_name(function)] = built
     return call
 
 
