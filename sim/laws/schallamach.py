@@ -512,9 +512,8 @@ def transition_probabilities(path, duration, critical_speed, rebinding_rate):
     >>> print("%.3f %.3f" % transition_probabilities(1e-2, 1.0, 1e-2, 200.0))
     0.500 0.500
     """
-    stay_bound = relax_fraction(1.0, path, duration, critical_speed, rebinding_rate)
-    become_bound = relax_fraction(0.0, path, duration, critical_speed, rebinding_rate)
-    return stay_bound, become_bound
+    arguments = path, duration, critical_speed, rebinding_rate
+    return relax_fraction(1.0, *arguments), relax_fraction(0.0, *arguments)
 
 
 # Bonds whose rupture rate grows with force, ``k = k_0 e^(f/f_b)`` (Bell 1978), resolved in stretch: exact.
@@ -1245,14 +1244,9 @@ def catch_lives(
 
 
 def catch_moments(
-    speed: ArrayLike,
-    catch_rate: float,
-    catch_force: float,
-    slip_rate: float,
-    slip_force: float,
-    bond_stiffness: float,
-    rebinding_rate: float,
-) -> SiteMoments:
+    speed: ArrayLike, catch_rate: float, catch_force: float, slip_rate: float, slip_force: float,
+    bond_stiffness: float, rebinding_rate: float,
+) -> SiteMoments:  # fmt: skip
     """Bound share and force moments in steady sliding of catch bonds.
 
     Parameters

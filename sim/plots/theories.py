@@ -331,8 +331,7 @@ def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: 
     panel.clabel(lines, fmt="%g", fontsize=5)
     figure.colorbar(image, ax=panel, pad=0.02).set_label(unit.label("displacement along $x$, $u_x$"))
     style.contact_circle(panel, length.factor * shape.radius)
-    panel.set_xlabel(length.label("$x$"))
-    panel.set_ylabel(length.label("$y$"))
+    panel.set(xlabel=length.label("$x$"), ylabel=length.label("$y$"))
 
 
 # -- loop of a JKR test --------------------------------------------------------------------
