@@ -13,8 +13,6 @@ from pathlib import Path
 from sim.units.errors import BadInput
 
 _FULL = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG") if hasattr(errno, name)}
-# HDF5 reports trouble with its file as a RuntimeError
-_WRITE_TROUBLE = (OSError, RuntimeError)
 
 
 class _Lock:
@@ -173,7 +171,7 @@ def explained(folder: Path) -> Iterator[None]:
         yield
     except StoreTrouble:
         raise
-    except _WRITE_TROUBLE as trouble:
+    except (OSError, RuntimeError) as trouble:  # HDF5 reports trouble with its file as a RuntimeError
         number = trouble.errno if isinstance(trouble, OSError) else None
         reason = trouble.strerror if isinstance(trouble, OSError) and number else str(trouble)
         with contextlib.suppress(OSError):

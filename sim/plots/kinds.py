@@ -181,8 +181,7 @@ def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None =
         kind = {"": default(dataset), "speed": "curve"}.get(choices.x, over)
     if kind not in KINDS:
         raise ValueError(f'there is no figure "{kind}"; known: {", ".join(KINDS)}')
-    missing = _missing(dataset, kind)
-    if missing:
+    if missing := _missing(dataset, kind):
         raise ValueError(f"{missing}; it can be drawn as: {', '.join(drawable(dataset))}")
     options = choices.options(kind, KINDS[kind].takes, dataset)
     look = contextlib.nullcontext() if choices.ax else mpl.rc_context(STYLE)  # axes of somebody else keep their own

@@ -160,9 +160,7 @@ def remarks_between(scene: Scene) -> list[str]:
         remarks.append(f"the mean stress is {strain:.2g} times the shear modulus, beyond linear elasticity")
     rms = math.sqrt(shear.spectrum.variance) * shear.amplitude.factor(speeds, strength)
     if not shear.spectrum.bond_made and np.any((rms > _MOST_REVERSED * strength) & (strength > 0.0)):
-        remarks.append(
-            f"the rms of the fluctuations exceeds {_MOST_REVERSED} of the mean stress: patches of reversed friction"
-        )
+        remarks.append(f"rms fluctuations exceed {_MOST_REVERSED} of the mean stress: patches of reversed friction")
     return [*remarks, *_remarks_on_step(scene, np.array([np.abs(speeds).max() * scene.clock.step]))]
 
 

@@ -169,7 +169,7 @@ class Tabulated(FromFile):
         chains = {where: self._chain(factor) for where, factor in NORMALIZATIONS.items()}
         rms = {where: math.sqrt(chain.variance) for where, chain in chains.items()}
         other = next(where for where in NORMALIZATIONS if where != self.normalization)
-        words = {"in_integral": "in the integral", "in_density": "in the density"}
+        words = {where: where.replace("_", " the ") for where in NORMALIZATIONS}
         if self.rms is not None and abs(math.log(self.rms / rms[other])) < _NEAR:
             text = f"the table has the rms of {self.rms:.3g} Pa with the 4π² {words[other]}, to which it is scaled:"
             return (f'{text} normalization = "{other}" may be meant',)

@@ -259,12 +259,12 @@ def file_text(name: str, context: Any) -> str:
         The validation's context; ``context["files"].text(name)`` reads beside the scenario. Without
         it the path is relative to the current directory.
     """
-    return context["files"].text(name) if context and "files" in context else plain_text(Path(name))
+    return context["files"].text(name) if context else plain_text(Path(name))
 
 
 def file_path(name: str, context: Any) -> Path:
     """Return the path of a plain file that a scenario names; arguments as of ``file_text``."""
-    return _plain(context["files"].path(name) if context and "files" in context else Path(name))
+    return _plain(context["files"].path(name) if context else Path(name))
 
 
 def file_columns(name: str, context: Any, wanted: dict[str, Quantity], header: str | None = None) -> dict[str, Array]:
