@@ -21,13 +21,7 @@ answer is nan.
 
 import math
 
-from sim.laws.jkr import (
-    hertz_radius_at_indentation,
-    hertz_radius_at_load,
-    radius_at_displacement,
-    radius_at_indentation,
-    radius_at_load,
-)
+from sim.laws import jkr
 from sim.numerics.jit import device, law
 
 __all__ = [
@@ -219,9 +213,9 @@ def radius_at_load_reversible(load, work, stress, reversible, sphere_radius, mod
     >>> print("%.3f %.3f" % tuple((a[1:] / a[0]) ** 2))
     0.831 0.662
     """
-    jkr = radius_at_load(load, work, sphere_radius, modulus)
-    hertz = hertz_radius_at_load(load, sphere_radius, modulus)
-    return shrunk_at_load(jkr, hertz, load, work, stress, reversible, 0.0, sphere_radius, modulus, poisson_ratio)
+    adhesive = jkr.radius_at_load(load, work, sphere_radius, modulus)
+    hertz = jkr.hertz_radius_at_load(load, sphere_radius, modulus)
+    return shrunk_at_load(adhesive, hertz, load, work, stress, reversible, 0.0, sphere_radius, modulus, poisson_ratio)
 
 
 def radius_at_indentation_reversible(indentation, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5):
@@ -240,10 +234,10 @@ def radius_at_indentation_reversible(indentation, work, stress, reversible, sphe
     >>> print("%.2e %.2e %.2e" % tuple(a))
     3.44e-05 2.57e-05 nan
     """
-    jkr = radius_at_indentation(indentation, work, sphere_radius, modulus)
-    hertz = hertz_radius_at_indentation(indentation, sphere_radius)
+    adhesive = jkr.radius_at_indentation(indentation, work, sphere_radius, modulus)
+    hertz = jkr.hertz_radius_at_indentation(indentation, sphere_radius)
     rest = (sphere_radius, modulus, poisson_ratio)
-    return shrunk_at_displacement(jkr, hertz, indentation, math.inf, work, stress, reversible, 0.0, *rest)
+    return shrunk_at_displacement(adhesive, hertz, indentation, math.inf, work, stress, reversible, 0.0, *rest)
 
 
 def radius_at_displacement_reversible(
@@ -257,7 +251,7 @@ def radius_at_displacement_reversible(
     >>> print("%.2e %.2e %.2e" % tuple(a))
     3.64e-05 2.76e-05 nan
     """
-    jkr = radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus)
-    hertz = radius_at_displacement(displacement, stiffness, 0.0, sphere_radius, modulus)
+    adhesive = jkr.radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus)
+    hertz = jkr.radius_at_displacement(displacement, stiffness, 0.0, sphere_radius, modulus)
     rest = (sphere_radius, modulus, poisson_ratio)
-    return shrunk_at_displacement(jkr, hertz, displacement, stiffness, work, stress, reversible, 0.0, *rest)
+    return shrunk_at_displacement(adhesive, hertz, displacement, stiffness, work, stress, reversible, 0.0, *rest)

@@ -52,13 +52,8 @@ import math
 
 import numpy as np
 
-from sim.laws.jkr import (
-    hertz_radius_at_indentation,
-    hertz_radius_at_load,
-    radius_at_indentation,
-    radius_at_load,
-    twice_pull_off,
-)
+from sim.laws import jkr
+from sim.laws.jkr import twice_pull_off
 from sim.laws.reversible import (
     compressible,
     crossing_at_displacement,
@@ -236,7 +231,7 @@ def scaled_tangent_at_load(load, work, tangential_force, mixity, sphere_radius, 
     1.7365
     1.6816
     1.5011
-    >>> print(f"{radius_at_load(5.0, 0.5, 1.0, 4.0):.4f}")
+    >>> print(f"{jkr.radius_at_load(5.0, 0.5, 1.0, 4.0):.4f}")
     1.5011
     """
     return _mixed_at_load(_TANGENT, load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio)
@@ -640,14 +635,14 @@ def mixities(shrinkage, load, work, sphere_radius, modulus, poisson_ratio=0.5):
 
 def _at_load(load, work, sphere_radius, modulus):
     """Radii of JKR and Hertz at a load, the load and the work."""
-    jkr = radius_at_load(load, work, sphere_radius, modulus)
-    return jkr, hertz_radius_at_load(load, sphere_radius, modulus), load, work
+    adhesive = jkr.radius_at_load(load, work, sphere_radius, modulus)
+    return adhesive, jkr.hertz_radius_at_load(load, sphere_radius, modulus), load, work
 
 
 def _at_indentation(indentation, work, sphere_radius, modulus):
     """Radii of JKR and Hertz at an indentation, the indentation and the work."""
-    jkr = radius_at_indentation(indentation, work, sphere_radius, modulus)
-    return jkr, hertz_radius_at_indentation(indentation, sphere_radius), indentation, work
+    adhesive = jkr.radius_at_indentation(indentation, work, sphere_radius, modulus)
+    return adhesive, jkr.hertz_radius_at_indentation(indentation, sphere_radius), indentation, work
 
 
 def compare_at_load(
