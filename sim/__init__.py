@@ -82,21 +82,19 @@ def run(
         If the scenario cannot be used, or the file or an unfinished run of it is there and is neither replaced nor gone
         on with.
     """
-    from sim.ensemble import simulate
     from sim.ensemble.plan import Plan, work
+    from sim.ensemble.simulate import OutputExists, run as simulate
     from sim.units.terminal import Shown, progress_bar
 
     scene = _scene(scenario)
     own_display = contextlib.nullcontext(Shown(progress) if callable(progress) else Shown())
     try:
         with progress_bar(work(Plan.of(scene))) if progress is True else own_display as bar:
-            return simulate.run(
-                scene, to, replace=replace, resume=resume, jobs=jobs, progress=bar.advance, stage=bar.begin
-            )
+            return simulate(scene, to, replace=replace, resume=resume, jobs=jobs, progress=bar.advance, stage=bar.begin)
     except Exception as fault:
         message = str(fault).replace("the same command", "the same call")
         message = message.replace("--resume", "resume=True").replace("--force", "replace=True")
-        if isinstance(fault, simulate.OutputExists | BadInput):
+        if isinstance(fault, OutputExists | BadInput):
             raise BadInput([message]) from None
         if message != str(fault):
             fault.args = (message,)

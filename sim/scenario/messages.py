@@ -67,9 +67,7 @@ def faults(root: type, invalid: ValidationError) -> list[Fault]:
     return list({fault.path: fault for fault in reversed(result)}.values())[::-1]
 
 
-def problems(
-    faults: Iterable[Fault], file: str = "", overrides: Iterable[tuple[str, ...]] = (), option: str = ""
-) -> list[str]:
+def problems(faults: Iterable[Fault], file: str = "", overrides: Iterable[Path] = (), option: str = "") -> list[str]:
     """Return a line for each fault: the file or the override that caused it, the key, the fault.
 
     ``option`` is the option of a command that gave the overrides; without it they are an argument.

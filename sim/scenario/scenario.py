@@ -290,7 +290,7 @@ class Scenario:
         if not self.sweep:
             return [self]
         values, origin = rows(self.sweep), self.origin
-        tables: dict[tuple[Any, ...], Any] = {}
+        tables: dict[Any, Any] = {}
         points, faults = [], dict[str, None]()
         for place, row in enumerate(values):
             try:
@@ -309,9 +309,7 @@ class Scenario:
             raise BadInput([f"the points of the sweep would have different maps; {cure}"])
         return points
 
-    def _point(
-        self, values: dict[str, Any], origin: Source, tables: dict[tuple[Any, ...], Any], built: bool
-    ) -> "Scenario":
+    def _point(self, values: dict[str, Any], origin: Source, tables: dict[Any, Any], built: bool) -> "Scenario":
         """Return the scenario with some values; ``tables`` holds those that other points have read."""
         groups: dict[str, dict[str, Any]] = {}
         for key, value in values.items():

@@ -40,9 +40,6 @@ _NEAR = 0.05
 _FLAT, _PART = 0.5, 0.01
 
 
-_COLUMNS = {"q": _WAVENUMBER, "C": _DENSITY}
-
-
 class FromFile(Rowed, Protocol):
     """Base of spectra whose rows may be read from a file."""
 
@@ -146,7 +143,8 @@ class Tabulated(FromFile):
         if not name or not isinstance(name, str):
             raise PydanticCustomError("no_table", 'needs file = "psd.csv" with the columns q [rad/m], C [Pa^2 m^2]', {})
         header = values.get("header", "")
-        table = file_columns(name, info.context, _COLUMNS, header if isinstance(header, str) else "")
+        columns = {"q": _WAVENUMBER, "C": _DENSITY}
+        table = file_columns(name, info.context, columns, header if isinstance(header, str) else "")
         return {**values, "wavenumbers": table["q"], "densities": table["C"]}
 
     @model_validator(mode="after")

@@ -109,8 +109,7 @@ class StressMap:
             if not np.nanmax(values, initial=-math.inf) > np.nanmin(values, initial=math.inf):
                 raise ValueError("the stress is the same everywhere, so that nothing fluctuates; check the file")
             pixel, pixel_y = _pixels(map_file, *keys)
-        about = {"pixel": pixel, "pixel_y": pixel_y, "values": values.tobytes(), "shape": values.shape}
-        return {**table, **about}
+        return {**table, "pixel": pixel, "pixel_y": pixel_y, "values": values.tobytes(), "shape": values.shape}
 
     @model_validator(mode="after")
     def _goes_together(self) -> "StressMap":
