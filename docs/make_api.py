@@ -45,6 +45,9 @@ def text() -> str:
         "| name | unit | meaning |",
         "| --- | --- | --- |",
     ]
+    for text, name in re.findall(r"#: (.+)\n    (\w+): ClassVar", inspect.getsource(Family)):
+        unit = re.search(r"\[(\S+?)\]", text)
+        lines.append(f"| `{name}` | {unit[1] if unit else ''} | {text} |")
     for name, member in vars(Family).items():
         if not name.startswith("_") and (inspect.isfunction(member) or isinstance(member, property)):
             called = f"{name}{_signature(member)}" if inspect.isfunction(member) else name
