@@ -61,7 +61,7 @@ _CORNERS = 300
 #: Inks of figures that follow the page from light to dark.
 _INKS = {"#000000": "currentColor", "#ffffff": "var(--paper)"}
 #: Text of matplotlib's SVG that a page lacks: the head with its namespaces and style, comments, space between elements.
-_LEFT_OUT = {r".*</style>\s*</defs>": "", "<!--.*?-->": "", r">\s+<": "><", r"\s+": " ", "xlink:": ""}
+_LEFT_OUT = {r"\A.*</style>\s*</defs>": "", "<!--.*?-->": "", r">\s+<": "><", r"\s+": " ", "xlink:": ""}
 _COORDINATES, _NUMBER = re.compile(r' (?:d|x|y)="[^"]*"'), re.compile(r"\d+\.\d{3,}")
 _REFERENCE = re.compile(r'(\bid="|href="#|url\(#)')
 
