@@ -20,7 +20,7 @@ from sim.parts.contact.balance import (
 )
 from sim.parts.drive import READINGS
 from sim.parts.extremes import column
-from sim.scenario.checks import feels_steps, pull_off_error, pulled, renewed
+from sim.scenario.checks import pull_off_error, pulled, renewed
 from sim.scenario.scenario import Scenario
 
 
@@ -131,10 +131,11 @@ LARGEST = (
           lambda scene, state: _pulled(state, "time", 1.0),
           lambda scene: scene.contact.makes_load, "a load that changes"),
     Variable("step_renewal", "1", "largest share of the variance of DeltaGamma that a clock step renews", "", "drive",
-          lambda scene, state: renewed(scene, state.extremes.path), feels_steps, "an edge that lags, or tension"),
+          lambda scene, state: renewed(scene, state.extremes.path),
+          lambda scene: scene.feels_steps, "an edge that lags, or tension"),
     Variable("pull_off_error", "N", "systematic error of the load at pull-off by the clock step, at most about", "",
           "drive", lambda scene, state: pull_off_error(scene, state.extremes.path),
-          lambda scene: feels_steps(scene) and pulled(scene) and scene.contact.load is not None,
+          lambda scene: scene.feels_steps and pulled(scene) and scene.contact.load is not None,
           "fluctuations, and a contact.load that pulls"),
 )  # fmt: skip
 

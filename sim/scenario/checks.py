@@ -171,12 +171,6 @@ _OVERSHOOT = 0.5826
 _RENEWED_LATE, _RENEWED_LAGGING = 0.005 / _OVERSHOOT**2, -math.expm1(-math.sqrt(0.12))
 
 
-def feels_steps(scene: Scene) -> bool:
-    """Return True if what ΔΓ does between clock steps matters: to an edge that lags, or to a pull-off."""
-    varies = scene.varies["shear"] and not scene.fluctuations.measured and scene.fluctuations.spectrum.variance > 0.0
-    return varies and (scene.contact.lags or pulled(scene))
-
-
 def pulled(scene: Scene) -> bool:
     """Return True if the control draws the sphere away at some time."""
     return bool(min(scene.contact.course.extremes) < 0.0)
@@ -206,7 +200,7 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
 def _remarks_on_step(scene: Scene, path: Array) -> list[str]:
     """Return a remark if a clock step in which a path [m] is slid is too long, with one that is not."""
     between, slid = scene.clock.step * scene.clock.stride, path[0]
-    if feels_steps(scene):
+    if scene.feels_steps:
         gone = -math.log1p(-min(renewed(scene, path)[0], 0.999))
         share = -math.log1p(-(_RENEWED_LATE if pulled(scene) else _RENEWED_LAGGING)) / max(gone, 1e-300)
         lost = 0.5 * gone / math.tanh(0.5 * gone) - 1.0 if gone else 0.0

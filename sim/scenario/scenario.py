@@ -22,7 +22,7 @@ from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
 from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
-from sim.scenario.checks import faults_across, feels_steps, remarks_between, remarks_on_force
+from sim.scenario.checks import faults_across, pulled, remarks_between, remarks_on_force
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
@@ -233,8 +233,9 @@ class Scenario:
 
     @cached_property
     def feels_steps(self) -> bool:
-        """Return True if what ΔΓ does between clock steps matters to the contact."""
-        return feels_steps(self)
+        """Return True if what ΔΓ does between clock steps matters: to an edge that lags, or to a pull-off."""
+        varies = self.varies["shear"] and not self.fluctuations.measured and self.fluctuations.spectrum.variance > 0.0
+        return varies and (self.contact.lags or pulled(self))
 
     @property
     def by_steps(self) -> bool:
