@@ -1,14 +1,18 @@
 """Random scenes over all parts: energy, missing values, and the same numbers however a run is cut."""
 
+import math
+import os
+
 import numpy as np
+import pytest
 from helpers.random_scenes import random_scene
 
 import sim
 from sim.engine import MemberNoise, follow, pack, unpack
 from sim.parts.drive import READINGS
 
-#: Seeds of the scenes. Left out: 26, whose tracked bonds miss 7e-5 of the energy at their events.
-SEEDS = [seed for seed in range(30) if seed != 26]
+#: Seeds of the scenes: the first thirty, and scenes whose energies, sub-steps or messages have been wrong.
+SEEDS = [*range(30), 45, 59, 75, 214, 266, 310, 319, 689, 730, 1042, 1240, 1293]
 #: Energies of a driven slider, none of which exceeds ten times the larger of work and stored energy.
 ENERGIES = [name for name in READINGS if name.startswith(("dissipated", "stored"))]
 
@@ -29,6 +33,10 @@ def run(scenario, members, steps, state=None):
     return follow(scenario, MemberNoise.of(scenario.seed, np.array(members)), state, steps)
 
 
+def largest_tolerance(scenario):
+    return max(getattr(part, "tolerance", 0.0) for part in (scenario.drive, scenario.population))
+
+
 def column(scenario, course, name):
     """Return a reading of a driven slider at each record, shape (records, members)."""
     return course.driven[..., READINGS.index(name)]
@@ -45,8 +53,10 @@ def ended(scenario, course):
 def check_energy(scenario, course):
     """The residual is at most ten times the largest tolerance of the larger of work and stored energy."""
     work, stored = (column(scenario, course, name) for name in ("drive_work", "stored_energy"))
-    size = np.maximum.accumulate(np.nan_to_num(np.fmax(np.abs(work), stored))) + 1e-30
-    bound = max(1e-6, 10.0 * max(getattr(part, "tolerance", 0.0) for part in (scenario.drive, scenario.population)))
+    path = np.max(np.abs(np.diff(column(scenario, course, "stage_position"), axis=0)))
+    free = 1e-3 * scenario.drive.tolerance * scenario.drive.spring * path**2  # of a slider that nothing holds
+    bound = max(1e-6, 10.0 * largest_tolerance(scenario))
+    size = np.maximum.accumulate(np.nan_to_num(np.fmax(np.abs(work), stored))) + free / bound + 1e-30
     residual = np.nan_to_num(column(scenario, course, "energy_residual"))
     assert np.all(np.abs(residual) <= bound * size), f"energy residual {np.max(np.abs(residual) / size):.1e}"
     for name in ENERGIES:
@@ -80,7 +90,40 @@ def check_cuts(scenario, course, end):
         assert np.array_equal(dense[last % 5 :: 5], thin, equal_nan=True), f"{name} of sparse records"
 
 
-def check_scene(seed):
+def refined(seed, parts, members=1, sharper=1.0):
+    """Return area, ΔΓ, stress and position at ``parts`` of the clock step, shape (values, records, members)."""
+    scene = random_scene(seed)
+    scene["clock"]["step"] /= parts
+    if scene["drive"]["model"] in ("spring", "force"):
+        scene["drive"]["tolerance"] = 1e-6 / sharper
+    scenario = sim.Scenario(**scene)
+    _, course = run(scenario, range(members), range(0, scenario.clock.steps + 1, parts))
+    values = np.pi * course.radius**2, course.energy, course.stress, course.position
+    return np.array([np.nan_to_num(value) + np.zeros((1, members)) for value in values])
+
+
+def check_steps(seed, scenario, course):
+    """A finer clock step is no further from the finest, on average over the run; with noise in the mean of 32 members.
+
+    Noise is looked at from 96 steps on, as errors of a few steps are no small ones, and allowed three standard errors.
+    Left out: runs of more than 20,000 sub-steps, because of the time that they take.
+    """
+    if scenario.drive.solves_motion and np.max(column(scenario, course, "substeps")) > 2e4:
+        return
+    if scenario.population.model in ("counted", "tracked") or scenario.fluctuations.per_member:
+        size = max(1, 96 // scenario.clock.steps)
+        runs = np.array([refined(seed, size * parts, 32).mean(axis=1) for parts in (1, 2, 8)])
+        noise = np.sum(3.0 * runs.std(axis=2), axis=0) / math.sqrt(31.0)
+        coarse, half, finest = runs.mean(axis=2, keepdims=True)
+    else:
+        coarse, half, finest = (refined(seed, parts)[:, :, 0] for parts in (1, 2, 8))
+        noise = 10.0 * np.abs(refined(seed, 8, sharper=100.0)[:, :, 0] - finest).mean(axis=1)
+    farther, nearer = (np.abs(values - finest).mean(axis=1) for values in (coarse, half))
+    bound = farther + noise + 10.0 * max(largest_tolerance(scenario), 1e-9) * np.abs(finest).mean(axis=1)
+    assert np.all(nearer <= bound), f"half a clock step is off by {nearer}, more than {bound}"
+
+
+def check_scene(seed, finer=False):
     """Check all rules on the scene of one seed; return False if the scene is refused."""
     scenario = admitted(seed)
     if scenario is None:
@@ -91,6 +134,8 @@ def check_scene(seed):
         if scenario.drive.solves_motion:
             check_energy(scenario, course)
         check_cuts(scenario, course, end)
+        if finer:
+            check_steps(seed, scenario, course)
     except Exception as fault:
         fault.add_note(f"random_scene({seed})")
         raise
@@ -98,4 +143,11 @@ def check_scene(seed):
 
 
 def test_random_scenes_close_their_energy_and_have_the_same_numbers_however_they_are_cut():
-    assert sum(map(check_scene, SEEDS)) > 0.8 * len(SEEDS)
+    assert sum(check_scene(seed, finer=seed == 59) for seed in SEEDS) > 0.8 * len(SEEDS)
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("seed", range(int(os.environ.get("SCENES", "300"))))
+def test_a_random_scene_keeps_all_rules_also_at_finer_steps(seed):
+    if not check_scene(seed, finer=True):
+        pytest.skip("the scene is refused with a reason")

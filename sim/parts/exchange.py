@@ -364,10 +364,6 @@ class Bonds(Part, Protocol[State]):
     def state_class(self) -> type[State]:
         """Class of the state."""
 
-    @property
-    def in_place(self) -> bool:
-        """True if ``advance`` works in the arrays of the state that it is given, which is spent then."""
-
     def start(self, motion: Motion, noise: Noise) -> State:
         """Population at t = 0, as the key ``start`` has it."""
 

@@ -59,7 +59,6 @@ class _BondModel(Part):
 
     start_from: str
     rebinding_rate: float
-    in_place: ClassVar[bool] = False
     #: True if the population is solved through blocks of clock steps.
     in_blocks: ClassVar[bool] = False
     #: Rough time of a single step of a batch, for estimates [s].
@@ -536,7 +535,6 @@ class Tracked(_Separable):
     state_class: ClassVar[type[Tracks]] = Tracks
     per_member: ClassVar[bool] = True
     feeds_back: ClassVar[bool] = False
-    in_place: ClassVar[bool] = True
 
     @property
     def numbers(self) -> int:  # type: ignore[override]

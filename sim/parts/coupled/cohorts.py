@@ -297,8 +297,8 @@ def stored_energy(row, square, time, slider, contact):
     return energy + 0.5 * row.spring_force * row.spring_force / stiffness if stiffness > 0.0 else energy
 
 
-#: Share of a piece below which a sub-step that fails may be an avalanche; share of a limit that is tried.
-_BRIEF, _TRIED = 1e-9, 1e-7
+#: Share of a limit that is tried.
+_TRIED = 1e-7
 #: Sub-steps within which bonds break that none leads over.
 _AROUND = 8.0
 
@@ -441,7 +441,7 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
             return length, count, travelled, settled, contact.stays
         if not step > mechanics.LEAST * length:
             slid, row.next_step = row.slip, 0.0
-            if _break_all(row, pool, start, _BRIEF * length, slider, contact, unit, rules, nodes[0], energy):
+            if _break_all(row, pool, start, mechanics.BRIEF * length, slider, contact, unit, rules, nodes[0], energy):
                 count = settled = 1
                 travelled += unit * (row.slip - slid)
             elif rules.limit == math.inf and mechanics.snap(row, nodes[0].square, start, slider, contact, energy):
@@ -473,7 +473,7 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
         if not (error <= 1.0 and factor >= 1.0 and within >= 1.0):
             pool[:3, :count] = saved[:, :count]
             row.next_step = step * (grows if error < math.inf else 0.25)
-            if rules.limit < math.inf and step < _BRIEF * length:
+            if rules.limit < math.inf and step < mechanics.BRIEF * length:
                 slid, reach = row.slip, _AROUND * step * math.fabs(row.speed) + _TRIED * rules.limit / unit
                 if brittle:
                     new_count = _slip_event(row, pool, count, start, slider, contact, unit, rules, first, energy)

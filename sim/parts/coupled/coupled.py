@@ -31,17 +31,8 @@ _NAMES = ROW.names or ()
 _SHARED = [name for name in Driven._fields if name in _NAMES]
 #: Columns of a row that are measured by a stretch.
 _STRETCHED = [
-    "body_speed",
-    "sheared",
-    "moment",
-    "speed",
-    "position",
-    "slip",
-    "path",
-    "acceleration",
-    "mean",
-    "recalled",
-]
+    "body_speed", "sheared", "moment", "speed", "position", "slip", "path", "acceleration", "mean", "recalled",
+]  # fmt: skip
 #: Relative difference up to which two radii are the same equilibrium, found by two methods.
 _SAME = 1e-9
 #: Numbers of slider, bonds, contact and fluctuations.

@@ -39,44 +39,47 @@ def _lacking(shift, row, time, slider, law, contact):
 
 
 @device
-def slip_event(row, time, reach, slider, law, contact, energy):
-    """Slip at once to where bonds bear the pull again, if slip breaks more than it stretches. True if so.
+def slip_event(row, time, reach, slider, law, contact, nodes, energy):
+    """Slip at once to where bonds bear the pull again, if slip breaks more than it stretches; return the contact then.
 
-    That counts which does so within a ``reach`` in units of the cut-off stretch.
-
-    The force of such bonds over the slip has one hump, so that there is one such place.
+    The slip may begin within a ``reach`` in units of the cut-off stretch. The force of such bonds over the slip has one
+    hump, so that there is one such place. A contact that loses its equilibrium on the way keeps its radius from there.
     """
     if not slider.stiffness + slider.mass + slider.damping > 0.0:
-        return False
+        return contact
     sense, high, limit = math.copysign(1.0, row.moment), _TRIED / law.cuts, 1.0 / law.cuts
     here, _, _, _, first, _, _ = _lacking(0.0, row, time, slider, law, contact)
     lacks = _lacking(sense * high, row, time, slider, law, contact)[0]
     while not lacks > max(here, 0.0):
         if high > reach * limit:
-            return False
+            return contact
         high *= 2.0
         lacks = _lacking(sense * high, row, time, slider, law, contact)[0]
-    while lacks > 0.0:
-        high *= 2.0
-        lacks = _lacking(sense * high, row, time, slider, law, contact)[0]
-    low = 0.5 * high
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        over = _lacking(sense * middle, row, time, slider, law, contact)[0] > 0.0
-        low, high = (middle, high) if over else (low, middle)
-    _, bound, moment, radius, area, sheared, body = _lacking(sense * high, row, time, slider, law, contact)
-    if not area >= 0.0:
-        return False
+    before = stored_in(row, time, slider, law, contact)
+    for _ in range(2):
+        while lacks > 0.0:
+            high *= 2.0
+            lacks = _lacking(sense * high, row, time, slider, law, contact)[0]
+        low = 0.0
+        for _ in range(64):
+            middle = 0.5 * (low + high)
+            over = _lacking(sense * middle, row, time, slider, law, contact)[0] > 0.0
+            low, high = (middle, high) if over else (low, middle)
+        _, bound, moment, radius, area, sheared, body = _lacking(sense * high, row, time, slider, law, contact)
+        if area >= 0.0:
+            break
+        lacks, _, _, row.radius, _, _, _ = _lacking(sense * low, row, time, slider, law, contact)
+        contact = mechanics.later(contact, 0.0, 1.0)
     # in a slip ds the share ds/l of the bonds breaks, stretched by twice the mean: 3/2 n κ M²/(N l) is lost with it
     left, mean = math.exp(-high * law.cuts), sense * row.moment
     later = mean * left + row.bound * limit * (1.0 - left)
     broken = 0.25 * (first + area) * (1.0 - left) * (mean * mean + mean * later + later * later) / row.bound
-    before = stored_in(row, time, slider, law, contact)
     row.bound, row.moment, row.radius, row.sheared = bound, moment, radius, sheared
     mechanics.displace(row, sense * high, body, slider)
     energy.rupture += broken
     energy.snaps += before - stored_in(row, time, slider, law, contact) - broken
-    return True
+    row.next_step, nodes.last_step = 1e-6 * slider.length, 0.0
+    return contact
 
 
 @device
@@ -97,8 +100,6 @@ def break_all(row, time, brief, slider, law, contact, energy):
     return True
 
 
-#: Share of a piece below which a rejected sub-step means that an avalanche may have begun.
-_BRIEF = 1e-9
 #: Places in a piece at which a slider that sticks is looked at, and halvings that place when it leaves.
 _PLACES, _HALVINGS = 32, 60
 #: Shares of bonds and of a piece beyond which equilibrium is looked for where no sub-step is accepted, and most changes
@@ -160,7 +161,7 @@ def _piece(line, slider, law, contact, nodes, books):
         left = length - start
         step = mechanics.next_step(row, left, length, math.inf)
         if not step > mechanics.LEAST * length:
-            gone = break_all(row, start, _BRIEF * length, slider, law, contact, energy)
+            gone = break_all(row, start, mechanics.BRIEF * length, slider, law, contact, energy)
             if law.cuts == 0.0 and not gone:
                 gone = mechanics.snap(row, row.moment * row.moment / row.bound, start, slider, contact, energy)
             if contact.stays > 0.0 and not gone:
@@ -172,8 +173,8 @@ def _piece(line, slider, law, contact, nodes, books):
         grows, accepted = try_sub_step(row, start, step, slider, law, contact, nodes)
         if not accepted:
             row.next_step = step * grows
-            if brittle and step < _BRIEF * length and slip_event(row, start, NEAR, slider, law, contact, energy):
-                row.next_step, nodes.last_step = 1e-6 * length, 0.0
+            if brittle and step < mechanics.BRIEF * length:
+                contact = slip_event(row, start, NEAR, slider, law, contact, nodes, energy)
             continue
         ahead = max(row.next_step, step * grows) if step == left else step * grows
         none = _NONE * slider.tolerance * row.bound
@@ -183,17 +184,17 @@ def _piece(line, slider, law, contact, nodes, books):
             if not solved:
                 row.next_step = 0.5 * step
                 continue
-        line[1], books[1], held = row, energy, mechanics.retained(energy)
+        line[1], books[1] = row, energy
         before, after = accept(row, start, step, slider, law, contact, nodes, energy)
-        if mechanics.misses(before, after, held, energy, slider.tolerance, step / length):
-            line[0], books[0], nodes.last_step = line[1], books[1], 0.0
-            row.next_step = 0.25 * step
+        if mechanics.misses(before, after, books[1], energy, row, slider, step):
+            line[0], books[0], nodes.last_step, row.next_step = line[1], books[1], 0.0, 0.25 * step
             continue
         row.next_step = ahead
         if turns:
             row.moment, nodes.last_step = 0.0, 0.0
-        if brittle and slip_event(row, start + step, 0.0, slider, law, contact, energy):
-            row.next_step, nodes.last_step = 1e-6 * length, 0.0
+        reach = NEAR if line[1].speed * row.speed < 0.0 else 0.0  # it turns in vain where the force of the bonds falls
+        if brittle:
+            contact = slip_event(row, start + step, reach, slider, law, contact, nodes, energy)
         if step == left:
             return length, contact.stays
         start += step
@@ -267,9 +268,9 @@ def _jump(row, time, slider, law, contact):
 
 
 @device
-def _slide(row, start, slider, along, contact, nodes, energy):
+def _slide(line, start, slider, along, contact, nodes, books):
     """Slip until the speed comes to zero or the piece ends. Return the time reached; negative without a solution."""
-    length = slider.length
+    length, row, energy = slider.length, line[0], books[0]
     for _ in range(mechanics.MOST_STEPS):
         left = length - start
         step = mechanics.next_step(row, left, length, math.inf)
@@ -292,7 +293,11 @@ def _slide(row, start, slider, along, contact, nodes, energy):
             continue
         if stops:
             step, _ = _to_zero(row, start, step, 1e-13 * math.fabs(row.speed), slider, along, contact, nodes)
-        accept(row, start, step, slider, along, contact, nodes, energy)
+        line[1], books[1] = row, energy
+        before, after = accept(row, start, step, slider, along, contact, nodes, energy)
+        if mechanics.misses(before, after, books[1], energy, row, slider, step):
+            line[0], books[0], nodes.last_step, row.next_step = line[1], books[1], 0.0, 0.25 * step
+            continue
         row.next_step = max(row.next_step, step * grows) if step == left else step * grows
         start = length if step == left else start + step
         if stops:
@@ -303,9 +308,9 @@ def _slide(row, start, slider, along, contact, nodes, energy):
 
 
 @device
-def _sticking_piece(row, slider, law, contact, nodes, energy):
+def _sticking_piece(line, slider, law, contact, nodes, books):
     """Go through one piece with bonds that bear any pull up to their strength at rest. Return the time reached."""
-    start, length = 0.0, slider.length
+    start, length, row, energy = 0.0, slider.length, line[0], books[0]
     stuck, sense = 0, 0.0
     for _ in range(_CHANGES):
         if start >= length:
@@ -313,7 +318,7 @@ def _sticking_piece(row, slider, law, contact, nodes, energy):
         contact, rests = mechanics.feeling(contact, row), row.speed == 0.0
         if rests:
             before = start
-            settles = law.binding > 0.0 and sense * row.spring_force > 0.0
+            settles = sense * row.spring_force > 0.0
             start = _rest(row, start, settles, slider, law, contact, energy)
             if start >= length:
                 return length
@@ -327,7 +332,7 @@ def _sticking_piece(row, slider, law, contact, nodes, energy):
             row.speed = row.body_speed = speed
             row.bound *= radau.share_left(speed, along)
             row.moment = sense * row.bound
-        start = _slide(row, start, slider, along, contact, nodes, energy)
+        start = _slide(line, start, slider, along, contact, nodes, books)
         if start < 0.0:
             return 0.0
         if start < length:
@@ -366,7 +371,7 @@ def _clock_step(line, slider, law, contact, pieces, nodes, books):
         if going and law.sense == 0.0:
             reached, stays = _piece(line, slider, law, ahead, nodes, books)
         elif going:
-            reached = _sticking_piece(row, slider, law, ahead, nodes, energy)
+            reached = _sticking_piece(line, slider, law, ahead, nodes, books)
         time += reached
         if not (going and reached == slider.length):
             return time, False

@@ -12,10 +12,11 @@ from sim.parts.shear.process import remembered, unsteadiness
 #: body, slip and path of the clock step, contact radius, next sub-step, number of sub-steps, time of a runaway,
 #: acceleration of the interface. Then ``Memory``, and the path of the clock step up to which it reaches; the share of
 #: ΔΓ that adhesion pays, the energy it pays in the sub-steps, and that after the draw at the start of the clock step.
+#: Last the work since the start of the run, the energy that is missing, and the time: at the start of the clock step.
 ROW = record(
     "spring_force body_speed sheared bound moment speed position slip path radius "
     "next_step substeps runaway_time acceleration "
-    "weight mean spread renewed energy recalled paid felt drawn"
+    "weight mean spread renewed energy recalled paid felt drawn worked missed elapsed"
 )
 COLUMNS = len(ROW.names or ())
 SLIP = (ROW.names or ()).index("slip")
@@ -216,6 +217,7 @@ def contact_of(numbers):
 @device
 def contact_at(contact, clock, row):
     """Return the numbers of the contact from the beginning of a clock step on; an open one stays open during it."""
+    row.elapsed = clock[0]
     is_open = not row.radius > 0.0
     if is_open:
         row.radius = 0.0
@@ -355,6 +357,12 @@ def pieces_to(step, start, pieces):
 
 
 @device
+def retained(energy):
+    """Return the work less all that is dissipated."""
+    return energy.work - energy.damping - energy.viscosity - energy.rupture - energy.snaps - energy.area
+
+
+@device
 def to_units(columns, spent, state, totals, units, work):
     """Convert a row and its energies to the units of the equations, at the start of a clock step."""
     columns[:] = state / units
@@ -362,6 +370,8 @@ def to_units(columns, spent, state, totals, units, work):
     row.position, row.slip, row.path, row.recalled, row.renewed, row.substeps = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     spent[:] = 0.0
     spent[_STORED] = totals[_STORED] / work
+    total = totals.view(ENERGY)[0]
+    row.worked, row.missed = total.work / work, (retained(total) - (total.stored - total.first)) / work
 
 
 @device
@@ -472,24 +482,34 @@ def contact_energy(row, area, slider):
     return 0.5 * row.sheared * area * row.moment
 
 
-@device
-def retained(energy):
-    """Return the work of a clock step less all that is dissipated."""
-    return energy.work - energy.damping - energy.viscosity - energy.rupture - energy.snaps - energy.area
-
-
-#: Share of a clock step below which a sub-step is not cut for its energies.
-_BRIEF = 1e-9
+#: Share of a clock step below which a sub-step is not cut for its energies; energy missing since the start, over the
+#: tolerance of work or stored energy, above which a sub-step adds few; rounding over the energies.
+BRIEF, _MISSED, _FEW, _ROUNDED = 1e-9, 3.0, 1e-2, 1e-14
 
 
 @device
-def misses(before, after, retained_before, energy, tolerance, share):
-    """True if a sub-step of a ``share`` of its piece misses more energy than the tolerance of what is stored.
+def misses(before, after, last, energy, row, slider, step):
+    """True if a sub-step misses more energy than the tolerance of what is stored. ``last``: energies before it.
 
-    A stored energy below the tolerance is as good as none: all sites at the unit of stretch store 1/2.
+    A stored energy below the tolerance is as good as none: all sites at the unit of stretch store 1/2. If much is
+    missing already, the tolerance is of what is dissipated, and of what is stored by the share of the time so far.
     """
-    missing = retained(energy) - retained_before - (after - before)
-    return share > _BRIEF and math.fabs(missing) > tolerance * max(before, after, math.fabs(energy.work), tolerance)
+    tolerance, missing, size = (
+        slider.tolerance,
+        retained(energy) - retained(last) - (after - before),
+        max(before, after),
+    )
+    if step > BRIEF * slider.length and math.fabs(missing) > tolerance * max(size, math.fabs(energy.work), tolerance):
+        return True
+    size, total = max(size, math.fabs(row.worked + energy.work)), row.missed + retained(energy) - after + energy.stored
+    rounding = _ROUNDED * (size + slider.stiffness * row.position * row.position)
+    excess = math.fabs(total) - _MISSED * tolerance * size - rounding
+    if step <= 1e2 * LEAST * slider.length or total * missing <= 0.0 or excess <= 0.0:
+        return False
+    turned = math.fabs(energy.work - last.work - retained(energy) + retained(last))
+    turned += 4.0 * step / (row.elapsed + slider.length) * size
+    room = max(0.0, _MISSED * tolerance * size - excess) * _FEW
+    return math.fabs(missing) > tolerance * turned + room + rounding
 
 
 #: Change of a force over it below which it is rounding.

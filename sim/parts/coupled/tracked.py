@@ -201,11 +201,11 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
                 return start, contact.stays
             contact = mechanics.later(contact, 0.0, 1.0)
             continue
-        line[1], books[1], held = row, energy, mechanics.retained(energy)
+        line[1], books[1] = row, energy
         before = stored_energy(row, first.square, start, slider, contact)
         accept_nodes(row, nodes, start, step, slider, contact, math.inf, energy)
         after = stored_energy(row, last.square, start + step, slider, contact)
-        if mechanics.misses(before, after, held, energy, slider.tolerance, step / length):
+        if mechanics.misses(before, after, books[1], energy, row, slider, step):
             line[0], books[0], row.next_step = line[1], books[1], 0.25 * step
             continue
         row.next_step = max(row.next_step, step * grows) if cut or step == left else step * grows
