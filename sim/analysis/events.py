@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+import scipy  # which imports the slow scipy.signal when slips need it
 import xarray as xr
 
 from sim.analysis.dataset import (
@@ -109,8 +110,6 @@ def slips(dataset: xr.Dataset, least: float = LEAST) -> xr.Dataset:
 
 def _slips(least: float, time: Any, force: Any, position: Any, stage: Any, stress: Any) -> np.ndarray:
     """Return the slips of one member, a row each, columns ``_SLIPS``."""
-    from scipy.signal import find_peaks  # its import is slow, and only springs need it
-
     known = np.isfinite(force) & np.isfinite(position)
     if not np.any(known):
         return np.empty((0, len(_SLIPS)))
@@ -123,7 +122,7 @@ def _slips(least: float, time: Any, force: Any, position: Any, stage: Any, stres
     for start, stop in itertools.pairwise(ends):
         along = sense[start] * force[start:stop]
         moved = sense[start] * (position - _FASTER * pulled)[start:stop]
-        tops = find_peaks(along, prominence=fall)[0] if fall > 0.0 else np.empty(0, int)
+        tops = scipy.signal.find_peaks(along, prominence=fall)[0] if fall > 0.0 else np.empty(0, int)
         until = np.append(tops, stop - start)[1:]
         lows = [top + int(np.argmin(along[top:end])) for top, end in zip(tops, until, strict=True)]
         pairs = [(top, low) for top, low in zip(tops, lows, strict=True) if along[top] - along[low] >= fall]
@@ -150,9 +149,7 @@ def _begin(force: np.ndarray, moved: np.ndarray, top: int, low: int, fall: float
     """
     if moved[low] > moved[top]:
         return top
-    from scipy.signal import find_peaks  # its import is slow, and only springs need it
-
-    later = top + find_peaks(force[top : low + 1])[0]
+    later = top + scipy.signal.find_peaks(force[top : low + 1])[0]
     later = later[force[later] - force[low] >= fall]
     return int(later[-1]) if later.size else top
 
@@ -693,14 +690,16 @@ def _loops(dataset: xr.Dataset, suffix: str, count: int) -> xr.Dataset:
     period = setting(dataset, "clock.duration") / cycles.where(cycles >= 1.0)
     put_in = done.fillna(0.0).cumsum("t")
     rounding = _NOTHING * abs(put_in).max("t")
-    missing = _per_cycle(done.isnull().cumsum("t"), period, dataset["t"], count)
+    ends = period * xr.DataArray(np.arange(count + 1), dims="end")
+    ends = ends.where(ends <= dataset["t"][-1] + 1e-6 * period)
+    series = done.isnull().cumsum("t"), put_in, dataset[f"dissipated_energy{suffix}"]
+    missing, *gained = (_growth(values, dataset["t"], ends).rename(end="cycle") for values in series)
+    texts = {"loop_energy": "closed integral of the load over the displacement"}
+    texts["loop_dissipation"] = "energy dissipated by opening and closing"
     result = {}
-    for name, series, text in (
-        ("loop_energy", put_in, "closed integral of the load over the displacement"),
-        ("loop_dissipation", dataset[f"dissipated_energy{suffix}"], "energy dissipated by opening and closing"),
-    ):
-        values = _per_cycle(series, period, dataset["t"], count).where(missing == 0.0)
-        values = values.where(~(abs(values) < rounding), 0.0)
+    for (name, text), values in zip(texts.items(), gained, strict=True):
+        values = values.where(~(abs(values) < rounding), 0.0).where(missing == 0.0)
+        values = values.transpose(..., MEMBERS, "cycle", missing_dims="ignore")
         result[f"{name}{suffix}"] = values.assign_attrs(units="J", long_name=f"{text}, over a cycle", symbol="")
     return xr.Dataset(result, {"cycle": ("cycle", np.arange(1, count + 1), {"long_name": "number of the cycle"})})
 
@@ -710,11 +709,3 @@ def cycles_of(dataset: xr.Dataset) -> xr.DataArray:
     with contextlib.suppress(KeyError):
         return setting(dataset, f"contact.{control(dataset).kind}.cycles")
     return xr.DataArray(0.0)
-
-
-def _per_cycle(series: xr.DataArray, period: xr.DataArray, times: xr.DataArray, count: int) -> xr.DataArray:
-    """Return the growth of a series in each cycle; nan beyond the last one."""
-    ends = period * xr.DataArray(np.arange(count + 1), dims="end")
-    ends = ends.where(ends <= times[-1] + 1e-6 * period)
-    gained = _growth(series, times, ends).rename(end="cycle").assign_coords(cycle=np.arange(1, count + 1))
-    return gained.transpose(..., *(name for name in (MEMBERS, "cycle") if name in gained.dims))

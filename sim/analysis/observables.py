@@ -48,7 +48,7 @@ _SOURCES_OF_SHARES = ("contact_area", "fluctuation_energy", "applied_load", "ind
 
 def ordered(variable: xr.DataArray) -> xr.DataArray:
     """Return a variable with members and time as its last dimensions."""
-    return variable.transpose(..., *(name for name in (MEMBERS, "t") if name in variable.dims))
+    return variable.transpose(..., MEMBERS, "t", missing_dims="ignore")
 
 
 def labelled(values: xr.DataArray, unit: str, text: str, symbol: str = "") -> xr.DataArray:
@@ -157,10 +157,8 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
     sphere = work, setting(dataset, "sphere.radius"), dataset["contact_modulus"]
     if held.kind == "load":
         radius = xr.apply_ufunc(jkr.radius_at_load, load, *sphere)
-    elif held.kind == "indentation":
-        radius = xr.apply_ufunc(jkr.radius_at_indentation, dataset["indentation"], *sphere)
-    else:
-        radius = xr.apply_ufunc(jkr.radius_at_displacement, dataset["displacement"], held.stiffness, *sphere)
+    else:  # an indentation is a displacement behind an infinite stiffness
+        radius = xr.apply_ufunc(jkr.radius_at_displacement, dataset[held.kind], held.stiffness, *sphere)
     full, alone = full_area(dataset), np.pi * radius.fillna(0.0) ** 2
     if may_stop(dataset):
         alone = alone.where(dataset["contact_area"].notnull())

@@ -634,7 +634,7 @@ def _over_time(values: np.ndarray, step: float, name: str, differ: bool) -> dict
         spread = np.sqrt(_sum(deviations).sum(axis=-1) / total)
         below = [np.sum(values <= levels[:, k, np.newaxis, np.newaxis], axis=-1) / counts for k in range(len(_LEVELS))]
         del deviations, known
-        memory = [_memory(*point, step, members) for point in zip(values, levels, mean, complete, strict=True)]
+        memory = [_memory(*point, step) for point in zip(values, levels, mean, complete, strict=True)]
         inflated, times = (np.array(column) for column in zip(*memory, strict=True))
         spreads = np.array([spread, *np.broadcast_to(np.sqrt(_LEVELS * (1.0 - _LEVELS)), (points, len(_LEVELS))).T])
         errors, freedoms = _errors(np.array([means, *below]), spreads, np.moveaxis(inflated, -1, 0), total)
@@ -651,12 +651,9 @@ def _over_time(values: np.ndarray, step: float, name: str, differ: bool) -> dict
     result |= {"skewness": skewness, "effective_samples": effective}
     if complete.any():
         result |= {"correlation_time": times[:, 0], "correlation_time_sem": times[:, 1]}
-    ranks = ends * (total[:, np.newaxis] - 1.0)
-    ranks[~((ends >= 0.0) & (ends <= 1.0))] = np.nan
-    return result | {
-        "quantile": levels, "quantile_low": values_at_ranks(ordered, ranks[0]),
-        "quantile_high": values_at_ranks(ordered, ranks[1]),
-    }  # fmt: skip
+    ranks = np.where((ends >= 0.0) & (ends <= 1.0), ends * (total[:, np.newaxis] - 1.0), np.nan)
+    lowest, highest = (values_at_ranks(ordered, end) for end in ranks)
+    return result | {"quantile": levels, "quantile_low": lowest, "quantile_high": highest}
 
 
 def _sum(values: np.ndarray) -> np.ndarray:
@@ -666,7 +663,7 @@ def _sum(values: np.ndarray) -> np.ndarray:
 
 
 def _memory(
-    values: np.ndarray, levels: np.ndarray, mean: float, complete: bool, step: float, members: int
+    values: np.ndarray, levels: np.ndarray, mean: float, complete: bool, step: float
 ) -> tuple[np.ndarray, tuple[float, float]]:
     """Return how many records count as one, for the mean and each quantile, with degrees of freedom; and the memory.
 
@@ -675,7 +672,7 @@ def _memory(
     inflated = np.full((2, 1 + len(levels)), np.nan)
     if not complete:
         return inflated, (np.nan, np.nan)
-    records, free = values.shape[-1], max(members - 1, 1)
+    (members, records), free = values.shape, max(len(values) - 1, 1)
     some = members if members < _MANY else members_for_memory(members, records)
     common = values.mean(axis=0) if members > 1 else mean
     covariance = covariance_of(values[:some], common, some * free / members)
@@ -926,14 +923,13 @@ def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -
         touched = largest["contact_radius"].transpose(*dims, MEMBERS) > 0.0
         watched = np.where(touched, duration, np.nan)
     first_member, result = times.isel({MEMBERS: 0}, drop=True), {}
-    pairs = zip(*(array.reshape(-1, values.shape[-1]) for array in (values, watched)), strict=True)
-    estimates = iter(np.array([lifetime(*pair) for pair in pairs]).T)
+    estimates = iter(np.vectorize(lifetime, signature="(n),(n)->(),(),(),(),(),()")(values, watched))
     for key, unit, text in (
         (f"half_{name}", "s", f"time by which half of the members have {words}"),
         (f"{name}_rate", "1/s", f"rate at which members have {words}"),
     ):
         for end in ("", "low", "high"):
             about = f"{end} end of the 95 % interval of the {text}" if end else text
-            numbers = first_member.copy(data=next(estimates).reshape(first_member.shape))
+            numbers = first_member.copy(data=next(estimates))
             result[f"{key}_{end}" if end else key] = labelled(numbers, unit, about)
     return xr.Dataset(result)

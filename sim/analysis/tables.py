@@ -444,14 +444,13 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         The file: a header, then one row for each quantity, sweep value and time. A file is there whole or, in trouble,
         as it was before.
     """
-    columns, frames = _frames(dataset)
-    units = {str(name): variable.attrs.get("units", "1") for name, variable in dataset.coords.items()}
-    units["speed"] = "m/s"
-    header = [name if units.get(name, "1") == "1" else f"{name} [{units[name]}]" for name in columns]
-    with output(Path(path)) as beside, beside.open("w", encoding="utf-8", newline="") as file:
-        for names in (header, *[False] * (len(frames) - 1)):
-            rows = frames.pop(0).reindex(columns=columns)
-            rows.to_csv(file, header=names, index=False, na_rep="nan", lineterminator="\n")
+    rows = tidy(dataset)
+    units = {str(name): variable.attrs.get("units", "1") for name, variable in dataset.coords.items()} | {
+        "speed": "m/s"
+    }
+    header = [name if units.get(name, "1") == "1" else f"{name} [{units[name]}]" for name in rows]
+    with output(Path(path)) as beside:
+        rows.to_csv(beside, header=header, index=False, na_rep="nan", lineterminator="\n")
 
 
 def tidy(dataset: xr.Dataset) -> pd.DataFrame:
@@ -465,12 +464,6 @@ def tidy(dataset: xr.Dataset) -> pd.DataFrame:
         ``low`` and ``high`` (95 % interval) of the mean; ``sd``; ``skewness``; quantiles ``q05``, ``q50``, ``q95`` with
         the ends of their intervals; ``effective_samples``, ``correlation_time`` and ``correlation_time_error`` [s].
     """
-    columns, frames = _frames(dataset)
-    return pd.concat(frames, ignore_index=True)[columns]
-
-
-def _frames(dataset: xr.Dataset) -> tuple[list[str], list[pd.DataFrame]]:
-    """Return the columns of all statistics, and the rows of each quantity."""
     members, half = (averaging(dataset, late).removeprefix("mean over the ") or "one run" for late in (False, True))
     late = is_stationary(dataset) and "contact_radius" in dataset
     spread = distribution(dataset) if late else xr.Dataset()  # first, as it keeps trajectories until it ends
@@ -483,7 +476,8 @@ def _frames(dataset: xr.Dataset) -> tuple[list[str], list[pd.DataFrame]]:
         flat = _flat(group)
         frames += [_long(dataset, flat, str(key), over) for key in flat if str(key).endswith("_mean")]
     columns = [*map(str, dataset["contact_modulus"].coords), "t", "speed", "quantity", "unit", "over", *_ENDINGS]
-    return [name for name in columns if any(name in frame for frame in frames)], frames
+    rows = pd.concat(frames, ignore_index=True)
+    return rows[[name for name in columns if name in rows]]
 
 
 def _long(dataset: xr.Dataset, group: xr.Dataset, key: str, over: str) -> pd.DataFrame:
