@@ -260,18 +260,17 @@ def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool
     result = np.empty((2, len(names), sum(len(group.rows) for group in groups)))
     for group in groups:
         scenario = group.scenario.with_values(dict(values) | {"record": {}})
-        drive, runs = scenario.drive, list[tuple[NDArray[np.int64], Scenario, Weights]]()
+        drive, runs = scenario.drive, list[tuple[NDArray[np.int64], Scenario, Reading]]()
         if by_time or not (drive.solves_motion or drive.model == "steady" or scenario.contact.changes):
-            runs = [(group.rows, scenario, functools.partial(_places, group, by_time))]
+            runs = [(group.rows, scenario, functools.partial(_at_rows, group, by_time))]
         else:
             runs = [(group.rows[k : k + 1], _still(scenario, group, k), _second_half) for k in range(len(group.rows))]
-        for rows, point, weights in runs:
-            members = _members(point, names, weights)
+        for rows, point, read_rows in runs:
+            members = _members(point, names, read_rows)
             error = members.std(axis=-1, ddof=min(members.shape[-1] - 1, 1)) / math.sqrt(members.shape[-1])
             result[..., rows] = members.mean(axis=-1), error
         if not group.scenario.drive.solves_motion:
-            alone = by_steady_sliding(group, values, names)
-            result[0][:, group.rows] += [alone[name] for name in names]
+            result[0][:, group.rows] += [*by_steady_sliding(group, values, names).values()]
     return result
 
 
@@ -283,17 +282,16 @@ def _still(scenario: Scenario, group: Group, row: int) -> Scenario:
     return scenario.with_values(drive | {f"contact.{scenario.contact.kind}": float(held[0])})
 
 
-#: Weights of the records of a run that make the rows, shape (rows, records), from their times and speeds.
-Weights = Callable[[Array, Array], Array]
+#: Values of a run at the rows, shape (rows, members), from times and speeds of its records and values by member.
+Reading = Callable[[Array, Array, Array], Array]
 
 
-def _second_half(time: Array, _: Array) -> Array:
-    weights = np.arange(len(time)) >= len(time) // 2
-    return weights[np.newaxis] / weights.sum()
+def _second_half(time: Array, _: Array, values: Array) -> Array:
+    return values[np.newaxis, :, len(time) // 2 :].mean(axis=-1)
 
 
-def _places(group: Group, by_time: bool, time: Array, speed: Array) -> Array:
-    """Weights of the two records between which a row lies, by its time or by the logarithm of its speed."""
+def _at_rows(group: Group, by_time: bool, time: Array, speed: Array, values: Array) -> Array:
+    """Values between two records, by the time of a row or by the logarithm of its speed."""
     along, at = time, group.time[:, 0]
     if not by_time:
         with np.errstate(divide="ignore"):
@@ -306,14 +304,10 @@ def _places(group: Group, by_time: bool, time: Array, speed: Array) -> Array:
         run, data = (f"{values.min():.3g} to {values.max():.3g} m/s" for values in ends)
         cure = 'must pass each speed of the data once; widen it, or fit with [drive] model = "steady"'
         raise BadInput([f"drive.speed: the run goes from {run}, the data from {data}; it {cure}"])
-    place, rows = np.clip(np.searchsorted(along, at) - 1, 0, len(along) - 2), np.arange(len(at))
-    part = np.clip((at - along[place]) / (along[place + 1] - along[place]), 0.0, 1.0)
-    weights = np.zeros((len(at), len(along)))
-    weights[rows, place], weights[rows, place + 1] = 1.0 - part, part
-    return weights
+    return np.transpose([np.interp(at, along, member) for member in values])
 
 
-def _members(point: Scenario, names: list[str], weights: Weights) -> Array:
+def _members(point: Scenario, names: list[str], read_rows: Reading) -> Array:
     """Return variables at rows by member, shape (names, rows, members); one member if none differ.
 
     If the speed is prescribed, the variables are the differences from steady sliding. A run that adds nothing has no
@@ -326,8 +320,7 @@ def _members(point: Scenario, names: list[str], weights: Weights) -> Array:
     if not point.drive.solves_motion:
         alone = steady_course(point, times[:, np.newaxis], speeds[:1].T)
         values = [members - READ[name](point, alone)[:, 0] for name, members in zip(names, values, strict=True)]
-    rows = weights(times, speeds[0])
-    return np.array([[members @ row for row in rows] for members in values])
+    return np.array([read_rows(times, speeds[0], members) for members in values])
 
 
 try:
@@ -463,7 +456,7 @@ class Problem:
 
     def of(self, name: str) -> NDArray[np.bool_]:
         """Return True at the numbers of a variable."""
-        return np.array([item == name for item in self.names])[self.curve]
+        return np.array(self.names)[self.curve] == name
 
     def place(self, number: int) -> str:
         """Return the variable and the row of one of all numbers."""
@@ -533,7 +526,7 @@ def minimum(
 
 def with_errors(problem: Problem, start: Array) -> tuple[Problem, Minimum]:
     """The minimum, and the problem with errors of the curves that came without: the scatter around it."""
-    for _ in range(_ROUNDS if problem.estimated.any() else 1):
+    for _ in range(_ROUNDS):
         best = minimum(problem, start, errors=True)
         start, off = best.x, problem.values - problem.predicted(best.x)
         if not problem.estimated.any():
