@@ -111,13 +111,8 @@ def _load(scenario: Path, changes: tuple[str, ...], seed: int | None = None, mem
 class _Commands(click.Group):
     """Commands that succeed if the reader of their output stops early."""
 
-    def make_context(self, *arguments: Any, **options: Any) -> click.Context:
-        with while_read():
-            return super().make_context(*arguments, **options)
-
-    def invoke(self, ctx: click.Context) -> Any:
-        with while_read():
-            return super().invoke(ctx)
+    make_context = while_read()(click.Group.make_context)
+    invoke = while_read()(click.Group.invoke)
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})

@@ -81,8 +81,9 @@ class Piece(NamedTuple):
 
 @dataclass
 class Outline:
-    """Everything of a dataset but the numbers of the parts."""
+    """Everything of a dataset but the numbers of the parts; ``sweep`` are the sizes of the sweep's dimensions."""
 
+    sweep: dict[str, int]
     sizes: dict[str, int] = field(default_factory=dict)
     attributes: dict[str, Any] = field(default_factory=dict)
     variables: dict[str, Described] = field(default_factory=dict)
@@ -101,10 +102,10 @@ class Outline:
 
 def outline(plan: Plan) -> Outline:
     """Return the dataset of a plan without the numbers of its parts."""
-    content = Outline(attributes=attributes(plan))
+    sweep = {variable_name(axis.keys[0]): len(axis.values) for axis in plan.scenario.sweep}
+    content, shape = Outline(sweep, {**sweep}, attributes(plan)), tuple(sweep.values())
     for place, axis in enumerate(plan.scenario.sweep):
-        content.sizes[variable_name(axis.keys[0])] = len(axis.values)
-        _add_sweep_coordinates(content, plan, axis, math.prod(_sweep_shape(plan)[place + 1 :]))
+        _add_sweep_coordinates(content, plan, axis, math.prod(shape[place + 1 :]))
     if plan.per_member and any(map(plan.varies, plan.variables)):
         content.sizes["member"] = plan.members
         described = "1", "number of the ensemble member", "", np.arange(plan.members)
@@ -121,21 +122,13 @@ def outline(plan: Plan) -> Outline:
     members = [slice(group.start, group.stop) for group in groups]
     for pack in plan.packs:
         where: tuple[int | slice, ...] = ()
-        if plan.scenario.sweep:
-            *outer, along = map(int, np.unravel_index(pack.start, _sweep_shape(plan)))
+        if sweep:
+            *outer, along = map(int, np.unravel_index(pack.start, shape))
             where = (*outer, slice(along, along + len(pack)))
         for index, block in enumerate(plan.blocks(plan.points[pack.start])):
             names = [part_name(pack.start, group, index) for group in range(len(groups))]
             content.pieces.append(Piece(where, slice(block.records.start, block.records.stop), members, names))
     return content
-
-
-def _sweep_names(plan: Plan) -> tuple[str, ...]:
-    return tuple(variable_name(axis.keys[0]) for axis in plan.scenario.sweep)
-
-
-def _sweep_shape(plan: Plan) -> tuple[int, ...]:
-    return tuple(len(axis.values) for axis in plan.scenario.sweep)
 
 
 def variable_name(key: str) -> str:
@@ -233,15 +226,15 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
         point.release()
     for name, values in derived.items():
         if len(values) == len(plan.points):
-            array = np.reshape(values, _sweep_shape(plan))
-            content.add(name, "f8", _sweep_names(plan), *described_as[name], array)
+            array = np.reshape(values, tuple(content.sweep.values()))
+            content.add(name, "f8", tuple(content.sweep), *described_as[name], array)
             if "error" in name:
                 content.attributes[name] = max(values, key=abs)
 
 
 def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:
     """Add the variables of a quantity that is recorded at each record, or once a run."""
-    record, sweep, name, whole = plan.scenario.record, _sweep_names(plan), recorded.name, recorded in plan.largest
+    record, sweep, name, whole = plan.scenario.record, tuple(content.sweep), recorded.name, recorded in plan.largest
     varies = plan.varies(recorded)
     each = varies and plan.per_member
     dimensions = (*sweep, *(["member"] if each else []), *([] if whole else ["t"]))
@@ -275,7 +268,7 @@ def _add_maps(content: Outline, plan: Plan) -> None:
     for axis, text, side in zip("xy", ("along", "across"), lattice.sides, strict=True):
         positions = np.arange(sizes[axis]) * (side / sizes[axis])
         content.add(axis, "f8", (axis,), "m", f"position {text} the sliding direction", axis, positions)
-    names = (*_sweep_names(plan), "map_member", "map_time", "x", "y")
+    names = (*content.sweep, "map_member", "map_time", "x", "y")
     content.add(MAP[0], "f8", names, *MAP[1:], None, (1,) * (len(names) - 2) + lattice.shape)
     content.places[MAP[0]] = Place({"": MAP[0]})
     for energy in DISC_ENERGIES if all(point.margin is not None for point in plan.points) else ():

@@ -111,7 +111,7 @@ def counted(plan: Plan) -> float:
 def counted_block(point: Scenario, members: np.ndarray, block: Block, speeds: np.ndarray | None = None) -> float:
     """Return the counted time of the steps of a block and of the records and maps in it [s]."""
     steps = block.end - block.start
-    maps = map_bytes(point, int(np.sum(members < point.record.map_members))) if point.record.maps else 0.0
+    maps = map_bytes(point, int(np.sum(members < point.record.map_members)))
     maps *= sum(block.start < step <= block.end for step in snapshots(point)) / max(1, len(point.record.maps))
     records = steps / block.stride * (_RECORD + len(members) * _RECORD_OF_MEMBER)
     return steps * seconds_a_step(point, len(members), speeds) + records + _MAP_BYTE * maps
@@ -337,7 +337,7 @@ def remarks(plan: Plan) -> list[str]:
 
 def _aligned(rows: Rows) -> str:
     """Return rows as text in columns, each as wide as its longest cell."""
-    widths = [max(len(cell) for row in rows for cell in row[place : place + 1]) for place in range(len(rows[0]))]
+    widths = [max(map(len, column)) for column in itertools.zip_longest(*rows, fillvalue="")]
     lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip() for row in rows)
     return "\n".join(f"  {line}" for line in lines)
 
@@ -416,16 +416,12 @@ def _contact(points: Sequence[Scenario]) -> Rows:
 
 def _fluctuations(points: Sequence[Scenario]) -> Rows:
     """Return the size of the fluctuations on the infinite plane, and the errors of the cell."""
-    spectra = [point.fluctuations.spectrum for point in points]
-    if not any(spectrum.variance > 0.0 for spectrum in spectra):
+    fields = [(_power(point), point.fluctuations.spectrum, point.solid.effective) for point in points]
+    if not any(spectrum.variance > 0.0 for _, spectrum, _ in fields):
         return []
-    powers = [_power(point) for point in points]
-    rms = [math.sqrt(power * spectrum.variance) for power, spectrum in zip(powers, spectra, strict=True)]
-    energies = [
-        power * float(spectrum.surface_energy(*point.solid.effective))
-        for power, spectrum, point in zip(powers, spectra, points, strict=True)
-    ]
-    settled = any(spectrum.bond_made for spectrum in spectra)
+    rms = [math.sqrt(power * spectrum.variance) for power, spectrum, _ in fields]
+    energies = [power * float(spectrum.surface_energy(*solid)) for power, spectrum, solid in fields]
+    settled = any(spectrum.bond_made for _, spectrum, _ in fields)
     when = "in steady sliding at the last speed" if settled else "at amplitude 1"
     rows = {"rms of the stress": f"{_span(rms, 'Pa')} {when}"}
     rows["stored energy"] = f"{_span(energies, 'J/m^2')} {when}, on the infinite plane"

@@ -262,9 +262,7 @@ def log(target: Path, began: float, stages: dict[str, float]) -> None:
 
     Trouble with it is a note, as it does not harm the output.
     """
-    when = f"{began:.0f} s after 1970"
-    with contextlib.suppress(ValueError, OverflowError, OSError):  # of a clock that is far off
-        when = datetime.datetime.fromtimestamp(began, datetime.UTC).isoformat(timespec="seconds")
+    when = datetime.datetime.fromtimestamp(began, datetime.UTC).isoformat(timespec="seconds")
     machine = {"host": platform.node(), "platform": platform.platform(), "arguments": sys.argv[1:]}
     entry = {"began": when, "seconds": round(time.time() - began, 2), "stages": stages, **machine}
     path = target.with_name(f"{target.name}.log")

@@ -82,10 +82,6 @@ def _stored(scene: Scenario, course: Trajectory) -> np.ndarray:
     return course.energy * cast(Shares, _terms(scene, course).margin).mean(_radius(scene, course))
 
 
-def _hertz_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
-    return np.nan_to_num(_control(scene, course).radius(np.zeros(1), np.zeros(1), 0.0, scene.bodies))
-
-
 def _where_closed(course: Trajectory, reference: int, radius: np.ndarray) -> np.ndarray:
     """Radius of a reference contact [m], 0 where it is open."""
     return np.where(course.phases[:, : radius.shape[1], reference] == CLOSED, radius, 0.0)
@@ -173,7 +169,8 @@ VARIABLES: tuple[Variable, ...] = (
           " after pull-off; 0 while that contact is open", "a_JKR", "control",
           lambda scene, course: _with_work(scene, course, JKR, np.full(course.time.shape, scene.adhesion.work))),
     Variable("hertz_radius", "m", "radius without adhesion, under the same control; 0 where nothing presses", "a_H",
-          "control", _hertz_radius),
+          "control", lambda scene, course: np.nan_to_num(
+              _control(scene, course).radius(np.zeros(1), np.zeros(1), 0.0, scene.bodies))),
     Variable("bonds_radius", "m", "radius in equilibrium with the work of adhesion of the bonds alone, under the same"
           " control and rule after pull-off; 0 while that contact is open", "a_b", "bonds",
           lambda scene, course: _with_work(scene, course, BONDS_ONLY, _terms(scene, course).bonded)),

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import itertools
 import json
 import math
 import re
@@ -295,7 +296,9 @@ def _read(content: dict[str, Any], dataset: xr.Dataset) -> Fit:
         unit, value, error = str(number["unit"]), float(number["value"]), _known(number["standard_error"])
         factor, shown = scaled(value, unit)
         low, high = (_end(factor * _known(number[end]), bool(number[f"{end}_open"])) for end in ("low", "high"))
-        run = _in_run(dataset, key)
+        run = math.nan
+        with contextlib.suppress(KeyError, ValueError):  # of a scenario that has no such number, or several
+            run = float(setting(dataset, key).item())
         rows.append({
             "key": key,
             "fitted": f"{concise(factor * value, factor * error)} {shown}".rstrip(),
@@ -317,14 +320,6 @@ def _read(content: dict[str, Any], dataset: xr.Dataset) -> Fit:
         raise ValueError
     few = correlations if len(keys) > 1 else []
     return Fit(rows, few, [*notes, *map(str, content["remarks"])], freedom, all(in_run))
-
-
-def _in_run(dataset: xr.Dataset, key: str) -> float:
-    """Return a number of the run's scenario; nan if it has none or several."""
-    try:
-        return float(setting(dataset, key).item())
-    except (KeyError, ValueError):
-        return math.nan
 
 
 def _known(value: Any) -> float:
@@ -458,11 +453,8 @@ def html(
 def question(dataset: xr.Dataset) -> Question:
     """Return the question of a scenario: the first paragraph of its first comment, else its name."""
     text, name = str(dataset.attrs.get("scenario_toml", "")), str(dataset.attrs.get("title", "")) or "A run of sim"
-    lines = []
-    for line in text.splitlines():
-        if not line.startswith("#"):
-            break
-        lines.append(line[1:].strip())
+    comment = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
+    lines = [line[1:].strip() for line in comment]
     question, *more = [" ".join(part.split()) for part in "\n".join(lines).split("\n\n") if part.strip()] or [name]
     return Question(name, question, more)
 
@@ -537,16 +529,15 @@ def _spreads(dataset: xr.Dataset) -> dict[str, str]:
     if "fluctuation_energy" not in dataset or "member" not in dataset["fluctuation_energy"].dims:
         return {}
     energy = dataset["fluctuation_energy"].isel(t=-1).astype(float).transpose(*sweep_dims(dataset), "member").to_numpy()
-    rows = [row for row in energy.reshape(-1, energy.shape[-1]) if len(row) > 2 and np.all(np.isfinite(row))]
-    rows = [row for row in rows if np.mean(row) > 0.0]
+    rows = [row for row in energy.reshape(-1, energy.shape[-1]) if len(row) > 2 and 0.0 < np.mean(row) < np.inf]
     if not rows:
         return {}
     row = max(rows, key=lambda each: np.std(each) / np.mean(each))
-    count, total, squares = len(row), np.sum(row), np.sum(row**2)
+    count, squares = len(row), np.sum(row**2)
     spread = np.std(row, ddof=1) / np.mean(row)
-    means = (total - row) / (count - 1)
+    means = (np.sum(row) - row) / (count - 1)
     each = np.sqrt(np.maximum((squares - row**2) / (count - 1) - means**2, 0.0) * (count - 1) / (count - 2)) / means
-    error = np.sqrt((count - 1) / count * np.sum((each - each.mean()) ** 2))
+    error = math.sqrt(count - 1) * np.std(each)
     return {"spread": _percent(spread, error), "error": _percent(spread / math.sqrt(count), error / math.sqrt(count))}
 
 
