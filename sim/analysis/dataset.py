@@ -211,14 +211,11 @@ def is_stationary(dataset: xr.Dataset) -> bool:
 
     Under a force from which any trajectory runs away nothing is.
     """
-    return (is_steady(dataset) or _is_borne(dataset)) and bool(stays_held(dataset).all())
-
-
-def _is_borne(dataset: xr.Dataset) -> bool:
-    """Return True if one force pulls all the time, and no trajectory ends in a runaway."""
-    if "drive_force" not in dataset or "runaway_time" not in dataset:
-        return False
-    return bool((word(dataset, "drive.model", "") == "force").all() & dataset["runaway_time"].isel(t=-1).isnull().all())
+    is_driven = is_steady(dataset)
+    if not is_driven and {"drive_force", "runaway_time"} <= dataset.variables.keys():
+        borne = dataset["runaway_time"].isel(t=-1).isnull().all()
+        is_driven = bool(borne & (word(dataset, "drive.model", "") == "force").all())
+    return is_driven and bool(stays_held(dataset).all())
 
 
 def setting(dataset: xr.Dataset, key: str) -> xr.DataArray:
@@ -324,10 +321,9 @@ def stays_held(dataset: xr.Dataset) -> xr.DataArray:
     It is not where the scenario gives one course for all points, nor where the contacts with all adhesion and with
     none change, which depend on nothing else.
     """
-    radii, moves = [dataset[name] for name in ("jkr_radius", "hertz_radius") if name in dataset], False
+    still = xr.ones_like(dataset["contact_modulus"], bool)
     with contextlib.suppress(KeyError):
-        moves = isinstance(resolved(dataset, f"contact.{control(dataset).kind}"), dict)
-    still = xr.ones_like(dataset["contact_modulus"], bool) & (not moves)
-    for radius in radii:
-        still = still & (radius == radius.isel(t=0)).all("t")
+        still = still & (not isinstance(resolved(dataset, f"contact.{control(dataset).kind}"), dict))
+    for name in {"jkr_radius", "hertz_radius"} & dataset.keys():
+        still = still & (dataset[name] == dataset[name].isel(t=0)).all("t")
     return still

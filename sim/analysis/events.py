@@ -573,7 +573,10 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
     if not bool((ramp | start).any()):
         return xr.Dataset()
     result, between = {}, float(dataset["t"][-1] - dataset["t"][0]) / max(dataset.sizes["t"] - 1, 1)
-    beginning = _start_of_sliding(dataset)
+    first = (dataset["speed"] != 0.0).argmax("t")
+    beginning = dataset["t"].isel(t=(first - 1).clip(0)).drop_vars("t")  # the last record before the slider moves
+    with contextlib.suppress(KeyError):
+        beginning = setting(dataset, "drive.rest")
     slides = (ramp | start) & (dataset["t"] >= beginning - 1e-6 * between)  # the record of the start counts
     for name, prefix, source, unit in _PEAKS:
         suffix = "" if source in dataset else "_mean"
@@ -594,14 +597,6 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
         for key, (values, *about) in described.items():
             result[key] = labelled(values.where(known).drop_vars("t", errors="ignore"), *about)
     return xr.Dataset(result)
-
-
-def _start_of_sliding(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the time at which sliding starts [s]; if no key states it, the last record before the slider moves."""
-    with contextlib.suppress(KeyError):
-        return setting(dataset, "drive.rest")
-    first = (dataset["speed"] != 0.0).argmax("t")
-    return dataset["t"].isel(t=(first - 1).clip(0)).drop_vars("t")
 
 
 def _maximum(recorded: xr.Dataset, name: str, ramp: xr.DataArray) -> xr.Dataset:

@@ -304,7 +304,6 @@ def _tabulated(dataset: xr.Dataset, rows: int, names: list[str]) -> tuple[xr.Dat
     else:
         if counts["t"] < dataset.sizes["t"]:  # of the records only those that are shown, none after all have ended
             dataset = dataset.isel(t=slice(_last(dataset) + 1))
-            counts["t"] = min(counts["t"], dataset.sizes["t"])
             dataset = restricted(dataset, names).isel(t=_spread(dataset.sizes["t"], counts["t"]))
         result = over_members(dataset, names, quantiles=False)
         if "applied_load" in dataset and "normal_load_mean" in result:  # it is known of open contacts too
@@ -348,7 +347,7 @@ def _thinned(sizes: Mapping[Any, int], rows: int) -> dict[str, int]:
 
 def _spread(size: int, count: int) -> np.ndarray:
     """Return at most ``count`` indices evenly over ``size``, the last included."""
-    count = min(size, max(count, 1))
+    count = min(size, count)
     return np.rint(np.linspace(0 if count > 1 else size - 1, size - 1, count)).astype(int)
 
 

@@ -215,15 +215,15 @@ class Unfinished:
     @contextlib.contextmanager
     def shards_locked(self, numbers: Iterable[int], of: int) -> Iterator[list[int] | None]:
         """Lock those of some shards that no other process holds, and give their numbers; None if the run is done."""
-        locks: dict[int, Any] = {}
+        locked = list[int]()
         with contextlib.ExitStack() as held:
             with self._output_locked(None):
                 gone = not self._manifest_of_this_run()
                 for number in () if gone else numbers:
                     if lock := _lock(self.folder / lock_of(number, of)):
                         held.callback(self._unlock, lock)
-                        locks[number] = lock
-            yield None if gone else list(locks)
+                        locked.append(number)
+            yield None if gone else locked
 
     def publish(self, names: Iterable[str], of: int, write: Callable[[Path], None]) -> bool | None:
         """Make the output; False if blocks are missing or another process holds a shard, None if it did so itself."""

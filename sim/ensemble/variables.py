@@ -188,9 +188,9 @@ VARIABLES: tuple[Variable, ...] = (
 
 def _driven(name: str, unit: str, long_name: str, symbol: str) -> Variable:
     """Return a quantity of a drive that solves the motion of the slider; those of the stage need a spring."""
-    place, sprung = READINGS.index(name), name.startswith("stage_")
+    place = READINGS.index(name)
     described = name, unit, long_name, symbol, "drive", lambda scene, course: course.driven[..., place]
-    if sprung:
+    if name.startswith("stage_"):
         return Variable(*described, lambda scene: scene.drive.model == "spring", 'drive.model = "spring"')
     return Variable(*described, lambda scene: scene.drive.solves_motion, 'drive.model = "spring" or "force"')
 

@@ -504,14 +504,14 @@ def known(dataset: xr.Dataset) -> Iterator[Known]:
     standard error is that of the jackknife over the members.
     """
     count = int(dataset.attrs["members"])
-    measured = _spreads(dataset)
+    spread_measured, error_measured = _spreads(dataset)
     if "member_spread_energy" in dataset:
         spread = float(dataset["member_spread_energy"].max())
-        yield Known("spread of ΔΓ between members, over its mean", _percent(spread), measured.get("spread", "–"))
+        yield Known("spread of ΔΓ between members, over its mean", _percent(spread), spread_measured)
         if count > 1:
             error = spread / math.sqrt(count)
             words = f"standard error of the mean ΔΓ of {count} members, over the mean"
-            yield Known(words, _percent(error), measured.get("error", "–"))
+            yield Known(words, _percent(error), error_measured)
     for name in dataset.data_vars:
         if str(name).startswith(("cell_error_", "banded_error_")):
             variable = dataset[name]
@@ -524,21 +524,21 @@ def known(dataset: xr.Dataset) -> Iterator[Known]:
         yield Known(f"largest standard error of the mean area over JKR's, of {times.size} times", "–", _percent(error))
 
 
-def _spreads(dataset: xr.Dataset) -> dict[str, str]:
+def _spreads(dataset: xr.Dataset) -> tuple[str, str]:
     """Return the largest standard deviation of ΔΓ over its mean in the sweep, and that of the mean."""
     if "fluctuation_energy" not in dataset or "member" not in dataset["fluctuation_energy"].dims:
-        return {}
+        return "–", "–"
     energy = dataset["fluctuation_energy"].isel(t=-1).astype(float).transpose(*sweep_dims(dataset), "member").to_numpy()
     rows = [row for row in energy.reshape(-1, energy.shape[-1]) if len(row) > 2 and 0.0 < np.mean(row) < np.inf]
     if not rows:
-        return {}
+        return "–", "–"
     row = max(rows, key=lambda each: np.std(each) / np.mean(each))
     count, squares = len(row), np.sum(row**2)
     spread = np.std(row, ddof=1) / np.mean(row)
     means = (np.sum(row) - row) / (count - 1)
     each = np.sqrt(np.maximum((squares - row**2) / (count - 1) - means**2, 0.0) * (count - 1) / (count - 2)) / means
     error = math.sqrt(count - 1) * np.std(each)
-    return {"spread": _percent(spread, error), "error": _percent(spread / math.sqrt(count), error / math.sqrt(count))}
+    return _percent(spread, error), _percent(spread / math.sqrt(count), error / math.sqrt(count))
 
 
 def _percent(value: float, error: float = 0.0) -> str:

@@ -489,9 +489,8 @@ class Cohort(_OverArea, _Stretched):
     in_blocks: ClassVar[bool] = True
 
     def start(self, motion: Motion, noise: Noise) -> Ages:
-        recipe = self.law, self.rebinding_rate
         if self.start_from == "steady":
-            first = cohorts.steady(*recipe, float(motion.first[0]), self.tolerance)
+            first = cohorts.steady(self.law, self.rebinding_rate, float(motion.first[0]), self.tolerance)
         elif self.start_from == "bonded":
             first = cohorts.bonded(self.law, self.tolerance)
         else:
