@@ -11,8 +11,8 @@ import sim
 from sim.engine import MemberNoise, follow, pack, unpack
 from sim.parts.drive import READINGS
 
-#: Seeds of the scenes: the first thirty, and scenes whose energies, sub-steps or messages have been wrong.
-SEEDS = [*range(30), 45, 59, 75, 214, 266, 310, 319, 689, 730, 1042, 1240, 1293]
+#: Seeds of the scenes: thirty, and scenes whose energies, sub-steps or messages have been wrong; 26 takes ten seconds.
+SEEDS = [*range(26), *range(27, 31), 45, 59, 75, 214, 266, 310, 319, 689, 730, 1042, 1240, 1293]
 #: Energies of a driven slider, none of which exceeds ten times the larger of work and stored energy.
 ENERGIES = [name for name in READINGS if name.startswith(("dissipated", "stored"))]
 
