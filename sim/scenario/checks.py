@@ -186,7 +186,8 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
     """Return about how much the load at pull-off is off [N], as the contact is seen after clock steps with a path [m].
 
     The first passage of ΔΓ is seen late by the overshoot of its changes (Siegmund, Sequential Analysis, 1985), 3/2 πR
-    of it as a load, and the load by half of its largest change in a step. The two have opposite signs; this is a bound.
+    of it as a load, and a prescribed load by half of its largest change in a step. The two have opposite signs; this
+    is a bound.
     """
     shear, clock, settled = scene.fluctuations, scene.clock, scene.population.steady(path / scene.clock.step)
     size = np.ones(1) if shear.law.remembers else shear.law.factor(path / clock.step, settled.strength)
@@ -194,7 +195,8 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
     late = _OVERSHOOT * shear.paid_by_adhesion * power * scene.process.change(path, clock.step)
     times = np.linspace(0.0, clock.duration, min(clock.steps, _MOST_SLIPS) + 1)
     most = np.abs(np.diff(scene.contact.course.at(times, clock.duration))).max() * (len(times) - 1) / clock.steps
-    return np.asarray(1.5 * math.pi * scene.sphere.radius * late + 0.5 * most)
+    ramp = 0.5 * most if scene.contact.kind == "load" else 0.0  # else the course is no load
+    return np.asarray(1.5 * math.pi * scene.sphere.radius * late + ramp)
 
 
 def _remarks_on_step(scene: Scene, path: Array) -> list[str]:

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 import sim
 from sim.engine import MemberNoise, follow
+from sim.scenario.checks import pull_off_error
 
 LENS = Path(__file__).parents[2] / "scenarios" / "pdms_lens_spring.toml"
 SPECTRUM = {"model": "self_affine", "rms": "80 kPa", "hurst": 0.8, "longest": "60 um", "rolloff": "30 um"}
@@ -76,6 +77,12 @@ def test_the_step_that_is_given_needs_no_remark_and_a_scene_without_error_has_no
         assert not [text for text in lens.remarks() if "clock step" in text]
     dataset = sim.run(scene(contact={"load": "4 mN"}, ensemble={"members": 2}))
     assert not {"step_renewal", "pull_off_error"} & {*dataset}
+
+
+def test_a_course_of_a_displacement_is_no_load():
+    near, far = ({"displacement": {"from": "1 um", "to": to}, "stiffness": "1 kN/m"} for to in ("-9 um", "-9 mm"))
+    path = np.array([2e-6])
+    assert_allclose(*(pull_off_error(scene(contact=contact), path) for contact in (near, far)), rtol=1e-12)
 
 
 def test_behind_a_spring_the_longest_path_of_a_step_counts():
