@@ -198,9 +198,10 @@ def _tables(dataset: Any, most: int = _ROWS) -> tuple[list[list[dict[str, str]]]
     """Return the tables of statistics of a dataset, and notes on their numbers."""
     from sim import analysis
 
-    rows, once = analysis.table(dataset, most), analysis.highlights(dataset, most)
-    further = analysis.losses(dataset, most), analysis.spread(dataset)
-    return [shown for shown in (rows, once, *further) if shown], analysis.notes(dataset, rows, once)
+    stated = analysis.tables.stated(dataset)
+    rows, once = analysis.table(dataset, most, stated), analysis.highlights(dataset, most, stated)
+    further = analysis.losses(dataset, most, stated), analysis.spread(dataset, stated)
+    return [shown for shown in (rows, once, *further) if shown], analysis.notes(dataset, rows, once, stated)
 
 
 def _tables_of(target: Path) -> tuple[list[list[dict[str, str]]], list[str]]:

@@ -10,6 +10,7 @@ from sim.analysis.dataset import Control, control, is_stationary, is_steady, set
 from sim.analysis.events import events, loop_energy, peaks, slip_sizes, slips, stick_slip
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
 from sim.analysis.over_speed import crossing, loss_speeds, speed_curves
+from sim.analysis.statements import Statement, each, statements
 from sim.analysis.statistics import (
     QUANTILES,
     IntegralTime,
@@ -31,12 +32,12 @@ from sim.analysis.tables import highlights, losses, notes, spread, table, tidy, 
 from sim.units.notation import concise, engineering, scaled
 
 __all__ = [
-    "QUANTILES", "Control", "IntegralTime", "Lifetime", "averaging", "bond_work", "concise", "control",
-    "correlation_time", "crossing", "distribution", "engineering", "events", "first_passage", "highlights",
+    "QUANTILES", "Control", "IntegralTime", "Lifetime", "Statement", "averaging", "bond_work", "concise", "control",
+    "correlation_time", "crossing", "distribution", "each", "engineering", "events", "first_passage", "highlights",
     "integral_time", "is_stationary", "is_steady", "lifetime", "loop_energy", "loss_speeds", "losses", "notes",
     "observables", "over_time", "peaks", "reference_radii", "scaled", "setting", "settled", "share_observables",
-    "shares", "skewness_error", "slip_sizes", "slips", "speed_curves", "spread", "statistics", "stick_slip", "summary",
-    "sweep_dims", "table", "tidy", "to_csv", "where",
+    "shares", "skewness_error", "slip_sizes", "slips", "speed_curves", "spread", "statements", "statistics",
+    "stick_slip", "summary", "sweep_dims", "table", "tidy", "to_csv", "where",
 ]  # fmt: skip
 
 

@@ -26,24 +26,13 @@ from sim.analysis.dataset import (
     sweep_dims,
     word,
 )
-from sim.analysis.events import events, varies
+from sim.analysis.events import varies
 from sim.analysis.observables import restricted
 from sim.analysis.over_speed import loss_speeds
-from sim.analysis.statistics import (
-    QUANTILES,
-    WIDE,
-    averaging,
-    correlation_time,
-    distribution,
-    half_lives,
-    of_second_half,
-    over_members,
-    shares,
-    statistics,
-    summary,
-)
+from sim.analysis.statements import as_means, of_events, reasons, statements
+from sim.analysis.statistics import QUANTILES, WIDE, averaging, correlation_time, over_members, shares, statistics
 from sim.numerics.files import output
-from sim.units.notation import concise, scaled
+from sim.units.notation import bounded, concise, scaled
 
 #: Cells of columns by heading.
 Columns = dict[str, list[str]]
@@ -141,13 +130,20 @@ _BOUNDED = ("fraction_detached", "fraction_masked", "time_masked", "ever_detache
 _ROUNDING = 1e-13
 
 
-def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
+def stated(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the statements that the tables print."""
+    return statements(dataset, [column.name for column in _COLUMNS])
+
+
+def table(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None) -> list[dict[str, str]]:
     """Return the statistics in about a dozen rows for the terminal.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         As ``sim run`` writes it.
+    stated : xarray.Dataset, optional
+        Its ``statements``, if they have been computed before.
     rows : int
         How many rows at most (at least one). Where speed and control are steady each point of a sweep has
         one row, its mean over the second half of the run; else rows are spread evenly over time.
@@ -162,7 +158,7 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     """
     held, steady = bool(stays_held(dataset).all()), is_steady(dataset)
     columns = [c for c in _COLUMNS if not (c.changing and (steady if c.name == "stage_speed" else held))]
-    means, points = _tabulated(dataset, rows, [column.name for column in columns])
+    means, points = _tabulated(dataset, rows, [column.name for column in columns], stated)
     one_row_each = _has_one_row_each(dataset)
     cells = _places(means, {name: index for name, index in points.items() if name != "t" or not one_row_each})
     if one_row_each and any(name in points for name in dataset.get("drive_speed", xr.DataArray()).dims):
@@ -175,8 +171,12 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     return _rows(cells)
 
 
-def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, str]]) -> list[str]:
-    """Return notes on the rows of ``table`` and ``highlights``: sample of the means, number of rows, symbols."""
+def notes(
+    dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, str]], stated: xr.Dataset | None = None
+) -> list[str]:
+    """Return notes on the rows of ``table`` and ``highlights``: sample of the means, number of rows, symbols, and the
+    reasons of statements that are missing or no means.
+    """
     one_row_each, points = _has_one_row_each(dataset), dataset["contact_modulus"].size
     phrases = [words] if (words := averaging(dataset, one_row_each)) else []
     if "runaway_time" in dataset and (gone := int(dataset["runaway_time"].isel(t=-1).notnull().sum())):
@@ -196,6 +196,10 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
     with contextlib.suppress(KeyError, TypeError):  # not of every dataset; none where all was recorded
         recorded = ", ".join(resolved(dataset, "record.quantities")) or "contact_radius alone"
         lines.append(f"columns of what was not recorded are left out; record.quantities keeps {recorded}")
+    headed = {c.name: " ".join(c.heading.split()) for c in (*_COLUMNS, *_EVENTS)}
+    for reason, names in reasons(stated or xr.Dataset()).items():
+        if shown_names := [headed[name] for name in names if name in headed]:
+            lines.append(f"* {', '.join(dict.fromkeys(shown_names))}: {reason}")
     known = [c for c in (*_COLUMNS, _MEMORY, *_EVENTS) if c.meaning and c.heading in headings]
     if _spreads(dataset):
         over = averaging(dataset, True).removeprefix("mean over the ")
@@ -204,7 +208,7 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
     return [*dict.fromkeys(lines), *filter(None, [words])]
 
 
-def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
+def highlights(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None) -> list[dict[str, str]]:
     """Return the events of each point of the sweep, in a dozen rows at most; no rows if there are no events.
 
     Parameters
@@ -221,7 +225,7 @@ def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
         (the mean, and the 5 and 95 % quantiles of those that did), what a cycle there and back took and
         how much it dissipated, and the friction peak of a start or a ramp.
     """
-    statistics_once = once(dataset)
+    statistics_once = of_events(dataset) if stated is None else stated
     sizes = dataset["contact_modulus"].sizes
     points = _points(sizes, _thinned(sizes, rows))
     shown = _shown(statistics_once, points, (column for column in _EVENTS if _of_drive(dataset, column.name)))
@@ -273,13 +277,16 @@ def _shown(means: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Col
         unit = means[f"{name}_mean"].attrs.get("units", "1")
         if unit == "1" and name not in _NO_SHARES:  # differences of areas leave rounding behind
             unit, mean = "%", np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
-        if not np.all((mean == dull) | np.isnan(mean)):
+        if not np.all((mean == dull) | (np.isnan(mean) & np.isnan(low) & np.isnan(high))):
             error = (high - low) / (2.0 * WIDE)  # of few members above the standard error
-            ((heading, texts),) = _cells(heading, unit, mean, error).items()
+            ((heading, texts),) = _cells(heading, unit, mean, error, low, high).items()
             beyond = (name in _BOUNDED) & ((mean - error < 0.0) | (mean + error > 1.0))
             for row in np.flatnonzero(beyond):  # brackets would leave 0 to 100 %: the 95 % interval, which does not
                 a, m, b = 100.0 * np.clip((low[row], mean[row], high[row]), 0.0, 1.0)
                 texts[row] = f"{m:.3g} ({a:.2g} to {b:.3g})"
+            if f"{name}_reason" in means:
+                has_reason = _at(means[f"{name}_reason"], points) != ""
+                texts = [f"{text}*" if marked else text for text, marked in zip(texts, has_reason, strict=True)]
             cells[heading] = texts
     return cells
 
@@ -295,12 +302,14 @@ def _rows(cells: Columns) -> list[dict[str, str]]:
     return [dict(zip(cells, row, strict=True)) for row in zip(*cells.values(), strict=True)]
 
 
-def _tabulated(dataset: xr.Dataset, rows: int, names: list[str]) -> tuple[xr.Dataset, Points]:
+def _tabulated(
+    dataset: xr.Dataset, rows: int, names: list[str], stated: xr.Dataset | None
+) -> tuple[xr.Dataset, Points]:
     """Return statistics of observables to tabulate, and the index of each row in every dimension of sweep and time."""
     memory, counts = correlation_time(dataset), _thinned(dataset["contact_modulus"].sizes, rows)
     counts["t"] = max(1, rows // math.prod(counts.values()))
     if _has_one_row_each(dataset):
-        result = of_second_half(dataset, names)
+        result = statements(dataset, names) if stated is None else stated
     else:
         if counts["t"] < dataset.sizes["t"]:  # of the records only those that are shown, none after all have ended
             dataset = dataset.isel(t=slice(_last(dataset) + 1))
@@ -351,23 +360,27 @@ def _spread(size: int, count: int) -> np.ndarray:
     return np.rint(np.linspace(0 if count > 1 else size - 1, size - 1, count)).astype(int)
 
 
-def _cells(heading: str, unit: str, values: np.ndarray, errors: np.ndarray | float = 0.0) -> Columns:
+def _cells(heading: str, unit: str, values: np.ndarray, errors: Any = 0.0, *ends: np.ndarray) -> Columns:
     """Return a column's cells in the unit of its largest value, under its heading with that unit."""
     if values.dtype.kind not in "fi":
         return {heading: [str(value) for value in values]}
-    finite = np.abs(values[np.isfinite(values)])
+    sizes = np.abs(np.concatenate([values, *ends]))
+    if np.any(np.isfinite(values)):
+        sizes = np.abs(values)
+    finite = sizes[np.isfinite(sizes)]
     factor, shown = (100.0, "%") if unit == "%" else scaled(finite.max(initial=0.0), unit)
-    texts = [concise(factor * value, factor * error) for value, error in np.broadcast(values, errors)]
+    texts = [bounded(*(factor * number for number in numbers)) for numbers in np.broadcast(values, errors, *ends)]
     gap = " " if "\n" in heading else "\n"
     return {f"{heading}{gap}({shown})" if shown else heading: texts}
 
 
-def spread(dataset: xr.Dataset) -> list[dict[str, str]]:
+def spread(dataset: xr.Dataset, stated: xr.Dataset | None = None) -> list[dict[str, str]]:
     """Return the spread of each quantity over members and stationary time, a row each; no rows of a sweep."""
     if not _spreads(dataset):
         return []
     fixed = [column for column in _COLUMNS if not column.changing]
-    result = distribution(dataset, [column.name for column in fixed]).isel(dict.fromkeys(sweep_dims(dataset), 0))
+    stated = statements(dataset, [column.name for column in fixed]) if stated is None else stated
+    result = stated.isel(dict.fromkeys(sweep_dims(dataset), 0))
     fixed = [column for column in fixed if f"{column.name}_std" in result]
     varied = (c for c in fixed if result[f"{c.name}_std"] > _ROUNDING * abs(result[f"{c.name}_mean"]))
     return [_spread_of(result, column) for column in varied]
@@ -399,27 +412,14 @@ def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
     return row | {"free values": f"{of('effective_samples'):.3g}"}
 
 
-def losses(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
+def losses(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None) -> list[dict[str, str]]:
     """Return the speeds at which area is lost, a row for each point of the sweep of other keys, if any is lost."""
-    speeds = as_means(loss_speeds(dataset))
+    speeds = as_means(loss_speeds(dataset)) if stated is None else stated
     sizes = {name: size for name, size in dataset["contact_modulus"].sizes.items() if name in speeds.dims}
     points = _points(sizes, _thinned(sizes, rows))
     symbol = "stage" if speed_name(dataset) == "stage_speed" else "V"
     shown = _shown(speeds, points, [column._replace(heading=column.heading.format(symbol)) for column in _LOSSES])
     return _rows(_places(dataset, points) | shown) if shown else []
-
-
-def as_means(speeds: xr.Dataset) -> xr.Dataset:
-    """Return speeds with intervals under names of means."""
-    return speeds.rename({name: f"{name}_mean" for name in speeds if not str(name).endswith(("_low", "_high"))})
-
-
-def once(dataset: xr.Dataset) -> xr.Dataset:
-    """Return statistics of the events of a run."""
-    result = events(dataset)
-    return summary(result.assign_attrs(dataset.attrs)).merge(
-        as_means(half_lives(dataset, result)), compat="no_conflicts"
-    )
 
 
 # --- a long table for other programs, and a data frame ---
@@ -463,17 +463,15 @@ def tidy(dataset: xr.Dataset) -> pd.DataFrame:
         ``low`` and ``high`` (95 % interval) of the mean; ``sd``; ``skewness``; quantiles ``q05``, ``q50``, ``q95`` with
         the ends of their intervals; ``effective_samples``, ``correlation_time`` and ``correlation_time_error`` [s].
     """
-    members, half = (averaging(dataset, late).removeprefix("mean over the ") or "one run" for late in (False, True))
-    late = is_stationary(dataset) and "contact_radius" in dataset
-    spread = distribution(dataset) if late else xr.Dataset()  # first, as it keeps trajectories until it ends
-    groups = [(over_members(dataset), members), (once(dataset), members), (as_means(loss_speeds(dataset)), members)]
+    members = averaging(dataset, False).removeprefix("mean over the ")
+    groups = [(over_members(dataset), members), (statements(dataset), "")]
     with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
         groups.append((shares(dataset), members))
-    groups.append((spread, half))
     frames = []
     for group, over in groups:
         flat = _flat(group)
-        frames += [_long(dataset, flat, str(key), over) for key in flat if str(key).endswith("_mean")]
+        keys = [str(key) for key in flat if str(key).endswith("_mean")]
+        frames += [_long(dataset, flat, key, flat[key].attrs.get("over", over) or "one run") for key in keys]
     columns = [*map(str, dataset["contact_modulus"].coords), "t", "speed", "quantity", "unit", "over", *_ENDINGS]
     rows = pd.concat(frames, ignore_index=True)
     return rows[[name for name in columns if name in rows]]

@@ -20,7 +20,18 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.path import Path as Outline
 
-from sim.analysis import averaging, highlights, is_stationary, is_steady, notes, setting, speed_of, sweep_dims, table
+from sim.analysis import (
+    averaging,
+    highlights,
+    is_stationary,
+    is_steady,
+    notes,
+    setting,
+    speed_of,
+    statements,
+    sweep_dims,
+    table,
+)
 from sim.analysis.dataset import claim, speed_name
 from sim.analysis.statistics import over_members
 from sim.numerics import hdf5
@@ -421,7 +432,8 @@ def html(
     fitted = None if fit is None else fit_of(Path(fit), dataset)
     figures = drawings(dataset, data)
     points = [figure.measured for figure in figures if figure.measured]
-    rows, whole = table(dataset, _ROWS), highlights(dataset, _ROWS)
+    stated = statements(dataset)
+    rows, whole = table(dataset, _ROWS, stated), highlights(dataset, _ROWS, stated)
     stem = Path(source).stem
     page = Environment(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined,
@@ -436,7 +448,7 @@ def html(
         averaged=averaging(dataset, is_stationary(dataset)),
         drawings=figures,
         tables=[rows, whole],
-        notes=notes(dataset, rows, whole),
+        notes=notes(dataset, rows, whole, stated),
         known=list(known(dataset)),
         scenario=scenario(dataset),
         changes=changes(dataset),

@@ -77,3 +77,17 @@ def concise(mean: float, sem: float) -> str:
         places = min(places, last)
     digits = max(places, 0)
     return f"{round(mean, places) + 0.0:.{digits}f}({round(round(sem, places) * 10**digits)})"
+
+
+def bounded(value: float, sem: float, low: float = math.nan, high: float = math.nan) -> str:
+    """Return a value with its standard error, or with the only end of its interval that is known.
+
+    >>> print(bounded(118.2312, 0.0423), bounded(561.0, math.nan, low=446.0), bounded(math.nan, math.nan, low=50.0))
+    118.23(4) 561 (> 446) > 50
+    >>> print(bounded(math.nan, math.nan, high=0.2), bounded(math.nan, math.nan, 0.3, 3.0), bounded(math.nan, math.nan))
+    < 0.2 0.3 to 3 –
+    """
+    ends = [f"{sign} {end:.4g}" for sign, end in ((">", low), ("<", high)) if math.isfinite(end)]
+    if math.isnan(value):
+        return f"{low:.4g} to {high:.4g}" if len(ends) == 2 else ends[0] if ends else "–"
+    return f"{value:.4g} ({ends[0]})" if len(ends) == 1 else concise(value, sem)

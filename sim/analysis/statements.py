@@ -1,0 +1,122 @@
+"""Statements: each value that a person reads of a run, computed once. Tables, CSV, figures and report print them."""
+
+from collections.abc import Collection, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from sim.analysis.dataset import is_stationary, plain
+from sim.analysis.events import events
+from sim.analysis.over_speed import loss_speeds
+from sim.analysis.statistics import averaging, half_lives, of_second_half, summary
+from sim.units.notation import bounded, scaled
+
+#: Endings of the variables of a statement beside its value.
+_BESIDE = ("sem", "low", "high", "reason")
+
+
+class Statement(NamedTuple):
+    """One statement at one point of the sweep, in SI.
+
+    Attributes
+    ----------
+    name, text, unit : str
+        Name of the variable, its meaning, and its unit.
+    value, error, low, high : float
+        Value, standard error, and ends of the 95 % interval; nan if unknown. An end alone is a bound.
+    over : str
+        Sample of the value: members, span, phase; "" of a single run.
+    reason : str
+        The reason if there is no value, or why it is no mean; "" else.
+    at : dict
+        Values of the swept keys.
+    """
+
+    name: str
+    text: str
+    unit: str
+    value: float
+    error: float
+    low: float
+    high: float
+    over: str
+    reason: str
+    at: dict[str, Any]
+
+    def __str__(self) -> str:
+        """Return the value with its error or bounds and unit, and the reason if there is one."""
+        sizes = [abs(size) for size in (self.value, self.low, self.high) if np.isfinite(size)]
+        factor, unit = (100.0, "%") if self.unit == "1" else scaled(max(sizes, default=0.0), self.unit)
+        text = bounded(*(factor * number for number in (self.value, self.error, self.low, self.high)))
+        return "; ".join(filter(None, (f"{text} {unit}".rstrip() if sizes else "", self.reason)))
+
+
+def statements(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
+    """Return the statements of a run over the sweep.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+    names : collection of str, optional
+        Observables of which means are wanted, all by default.
+
+    Returns
+    -------
+    xarray.Dataset
+        For each statement ``<name>_mean``, its value, with the attribute ``over`` that names the sample, and where
+        they are known ``<name>_sem``, ``<name>_low``, ``<name>_high`` and ``<name>_reason``:
+
+        - events of a run (see ``events``), with medians and rates of lifetimes,
+        - speeds at which area is lost (see ``loss_speeds``),
+        - of a stationary run means over its second half (see ``distribution``).
+    """
+    dataset = plain(dataset)
+    groups = [(of_events(dataset), False), (as_means(loss_speeds(dataset)), False)]
+    if is_stationary(dataset):
+        groups.append((of_second_half(dataset, names), True))
+    result = xr.Dataset()
+    for group, late in groups:
+        over = averaging(dataset, late).removeprefix("mean over the ")
+        for key in (key for key in group if str(key).endswith("_mean")):
+            group[key] = group[key].assign_attrs(over=over)
+        result = result.merge(group, compat="no_conflicts")
+    return result
+
+
+def of_events(dataset: xr.Dataset) -> xr.Dataset:
+    """Return statistics of the events of a run over the members, with medians and rates of lifetimes."""
+    result = events(dataset)
+    reasons = result[[name for name in result if str(name).endswith("_reason")]]
+    members = summary(result.drop_vars(reasons).assign_attrs(dataset.attrs))
+    return members.merge(as_means(half_lives(dataset, result)), compat="no_conflicts").merge(reasons)
+
+
+def as_means(values: xr.Dataset) -> xr.Dataset:
+    """Return values with intervals and reasons under names of means."""
+    return values.rename({n: f"{n}_mean" for n in values if not str(n).endswith(tuple(f"_{end}" for end in _BESIDE))})
+
+
+def each(group: xr.Dataset) -> Iterator[Statement]:
+    """Yield the statements of a dataset of ``statements``, one for each point of the sweep."""
+    for key in (str(key) for key in group if str(key).endswith("_mean")):
+        name, values = key.removesuffix("_mean"), group[key]
+        beside = {end: group[f"{name}_{end}"].broadcast_like(values) for end in _BESIDE if f"{name}_{end}" in group}
+        text = str(values.attrs.get("long_name", name)).removeprefix("ensemble mean of ")
+        unit, over = str(values.attrs.get("units", "1")), str(values.attrs.get("over", ""))
+        for place in np.ndindex(*values.shape):
+            index = dict(zip(values.dims, place, strict=True))
+            error, low, high = (float(beside[end][index]) if end in beside else np.nan for end in _BESIDE[:3])
+            reason = str(beside["reason"][index].item()) if "reason" in beside else ""
+            at = {str(dim): values[dim][index[dim]].item() for dim in values.dims if dim in values.coords}
+            yield Statement(name, text, unit, float(values[index]), error, low, high, over, reason, at)
+
+
+def reasons(group: xr.Dataset) -> dict[str, list[str]]:
+    """Return the names of statements by the reason that they have somewhere in the sweep."""
+    result: dict[str, list[str]] = {}
+    for key in (str(key) for key in group if str(key).endswith("_reason")):
+        for reason in filter(None, np.unique(group[key].to_numpy().astype(str))):
+            result.setdefault(str(reason), []).append(key.removesuffix("_reason"))
+    return result
