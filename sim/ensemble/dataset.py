@@ -221,6 +221,9 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
     derived: dict[str, list[float]] = {}
     for point in plan.points:
         numbers = {number.name: number.read(point) for number in NUMBERS if number.applies(point)}
+        for key, (quantity, value) in point.derived.items():
+            described_as[variable_name(key)] = quantity.unit, quantity.meaning, quantity.symbol
+            numbers[variable_name(key)] = value
         for name, value in (numbers | point.process.known_errors()).items():
             derived.setdefault(name, []).append(float(value))
         point.release()

@@ -25,7 +25,7 @@ from sim.parts.exchange import Array, Parts
 from sim.parts.shear.modes import ModalProcess
 from sim.scenario.clock import Record
 from sim.scenario.scenario import Scenario
-from sim.scenario.schema import distinct, entries
+from sim.scenario.schema import Entry, distinct, entries
 from sim.units.quantity import read_option
 from sim.units.terminal import duration
 
@@ -381,7 +381,8 @@ def _quantities(points: Sequence[Scenario]) -> Rows:
     columns: dict[str, tuple[str, str, list[Any]]] = {}
     tables = (entries(part, f"{name}.") for name, part in distinct(points))
     plain = (entry for entry in entries(points[0]) if "." not in entry.key)
-    for key, value, quantity in itertools.chain(*tables, plain):
+    derived = (Entry(key, value, made) for point in points for key, (made, value) in point.derived.items())
+    for key, value, quantity in itertools.chain(*tables, derived, plain):
         unrecorded = key.startswith("record.") and points[0].record == Record()
         if value in (None, "", ()) or key in _ELSEWHERE or unrecorded:
             continue

@@ -706,6 +706,14 @@ def _peak_pace(wait):
     return high
 
 
+class BellNumbers(NamedTuple):
+    """Numbers of Bell bonds: k_0 [1/s], k_on [1/s] and sites per area n [1/m^2]."""
+
+    zero_force_rate: Array
+    rebinding_rate: Array
+    site_density: Array
+
+
 @law
 def _bell_peak_speed(zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
     z = _peak_pace(zero_force_rate / rebinding_rate)
@@ -780,6 +788,44 @@ def bell_critical_speed(zero_force_rate, bell_force, bond_stiffness, rebinding_r
         else:
             high = z
     return zero_force_rate * bell_force / (bond_stiffness * high)
+
+
+def bell_numbers(critical_speed, stress, bell_force, bond_stiffness, rebinding_ratio):
+    """Rates and site density of a Bell population that has a given critical speed and friction maximum.
+
+    Parameters
+    ----------
+    critical_speed : float or array
+        V_c [m/s], above 0: the speed at which half of the bonds are left in steady sliding.
+    stress : float or array
+        tau [Pa], above 0: the largest steady shear stress at any speed.
+    bell_force, bond_stiffness : float or array
+        f_b [N], above 0; kappa [N/m], above 0.
+    rebinding_ratio : float or array
+        beta = k_on/k_0 [1], above 0.
+
+    Returns
+    -------
+    BellNumbers
+        k_0 [1/s] and k_on = beta k_0 [1/s], both proportional to V_c; n [1/m^2], proportional to tau.
+
+    Notes
+    -----
+    At a given beta a population depends on the speed by ``kappa V/(k_0 f_b)`` alone, so both follow from the population
+    of k_0 = 1 and n = 1: ``k_0 = V_c/bell_critical_speed(1, f_b, kappa, beta)``,
+    ``n = tau/bell_peak(1, f_b, kappa, beta, 1).stress``.
+
+    Examples
+    --------
+    >>> numbers = bell_numbers(3e-3, 2e5, 4e-12, 8e-7, 10.0)
+    >>> print("%.2f %.1f %.3e" % numbers)
+    15.77 157.7 5.909e+16
+    >>> print(f"{bell_critical_speed(numbers[0], 4e-12, 8e-7, numbers[1]):.4f}")
+    0.0030
+    """
+    of_one = bell_critical_speed(1.0, bell_force, bond_stiffness, rebinding_ratio)
+    rate, largest = np.divide(critical_speed, of_one), bell_peak(1.0, bell_force, bond_stiffness, rebinding_ratio, 1.0)
+    return BellNumbers(rate, np.multiply(rebinding_ratio, rate), np.divide(stress, largest.stress))
 
 
 # Bell bonds in mean field, every bond at the mean stretch: closed forms by Lambert's W.
@@ -925,6 +971,37 @@ def first_moment_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rat
     """
     arguments = (zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
     return Peak(_mean_field_peak_speed(*arguments), np.multiply(site_density, _mean_field_peak_force(*arguments)))
+
+
+def first_moment_numbers(critical_speed, stress, bell_force, bond_stiffness, rebinding_ratio):
+    """Rates and site density of a mean-field Bell population of a given critical speed and friction maximum.
+
+    Parameters
+    ----------
+    critical_speed, stress, bell_force, bond_stiffness, rebinding_ratio : float or array
+        As in ``bell_numbers``.
+
+    Returns
+    -------
+    BellNumbers
+        k_0 [1/s], k_on [1/s] and n [1/m^2], of the mean field's own fraction and maximum.
+
+    Notes
+    -----
+    Half of the bonds are left where ``e^W = 2 + beta``, so ``k_0 = kappa V_c/(f_b (2 + beta) ln(2 + beta))``. The
+    maximum is that of ``first_moment_peak``, so ``n = tau/(f_b W(beta/e))``.
+
+    Examples
+    --------
+    Fewer sites are needed than in ``bell_numbers``, because mean field has the higher maximum:
+
+    >>> print("%.2f %.1f %.3e" % first_moment_numbers(3e-3, 2e5, 4e-12, 8e-7, 10.0))
+    20.12 201.2 4.322e+16
+    """
+    most = 2.0 + np.asarray(rebinding_ratio)
+    rate = np.divide(np.multiply(bond_stiffness, critical_speed), bell_force * most * np.log(most))
+    largest = first_moment_peak(1.0, bell_force, bond_stiffness, rebinding_ratio, 1.0).stress
+    return BellNumbers(rate, np.multiply(rebinding_ratio, rate), np.divide(stress, largest))
 
 
 def first_moment_onset(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density, body):

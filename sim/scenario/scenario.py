@@ -2,7 +2,7 @@
 
 import functools
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -26,7 +26,7 @@ from sim.scenario.checks import faults_across, pulled, remarks_between, remarks_
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
-from sim.scenario.schema import as_html, entries, with_models
+from sim.scenario.schema import as_html, entries, quantities, with_models
 from sim.scenario.sweep import read_sweep, rows, set_key
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
@@ -131,6 +131,15 @@ class Scenario:
     def population(self) -> BondModel:
         """Return the model of the bonds; model = "auto" is chosen by their number."""
         return self.bonds.chosen(*self._bond_conditions)
+
+    @property
+    def derived(self) -> dict[str, tuple[Quantity, float]]:
+        """Return the numbers of bonds that follow from their critical speed and stress, by key."""
+        given = quantities(self.bonds)
+        derived = quantities(self.population).items() if "rebinding_ratio" in given else ()
+        text = "{}, by critical_speed and stress"
+        named = ((key, replace(made, meaning=text.format(made.meaning)), value) for key, (made, value) in derived)
+        return {f"bonds.{key}": (made, value) for key, made, value in named if key not in given}
 
     @property
     def _bond_conditions(self) -> tuple[float, bool]:
@@ -346,7 +355,7 @@ class Scenario:
         document: dict[str, Any] = {}
         for name in {key.partition(".")[0] for key in values if "." in key} & set(_FIELDS):
             part = getattr(self, name)
-            document[name] = _adapter(type(part)).dump_python(part, by_alias=True)
+            document[name] = _adapter(type(part)).dump_python(part, by_alias=True, exclude_none=True)
         for key, value in values.items():
             *above, last = key.split(".")
             set_key(document, [*above, last], value)

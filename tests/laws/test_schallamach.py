@@ -214,6 +214,36 @@ def test_no_speed_has_more_friction_than_the_peak_and_half_the_bonds_are_left_at
     assert_allclose(ratio, [1.27, 1.37, 1.47], rtol=0, atol=0.006)
 
 
+@pytest.mark.parametrize("beta", [0.1, 10.0, 1e3])
+def test_bonds_of_a_critical_speed_and_a_largest_stress_have_both_to_ten_digits(beta):
+    wanted, force, stiffness = (3e-3, 2e5), 4e-12, 8e-7
+
+    def of_density(z):  # share bound and mean force in units of f_b, by integrals over the age s = k0 t
+        last = z * math.log1p(60.0 / z)
+        life, moment = (
+            quad(
+                lambda s, n=n: s**n * math.exp(-z * math.expm1(s / z)), 0.0, last, epsabs=0.0, epsrel=1e-12, limit=200
+            )[0]
+            for n in (0, 1)
+        )
+        return life / (life + 1.0 / beta), moment / z / (life + 1.0 / beta)
+
+    def of_mean(z):
+        tilt = float(mp.lambertw(1.0 / mp.mpf(z)).real)
+        share = beta / (beta + math.exp(tilt))
+        return share, tilt * share
+
+    for numbers, population in ((law.bell_numbers, of_density), (law.first_moment_numbers, of_mean)):
+        k0, k_on, sites = numbers(*wanted, force, stiffness, beta)
+        z = k0 * force / (stiffness * wanted[0])
+        assert_allclose([k_on / k0, population(z)[0] * (1.0 + beta) / beta], [beta, 0.5], rtol=1e-10)
+        ends = math.log(1e-3 * z), math.log(1e3 * z)
+        top = minimize_scalar(
+            lambda x: -population(math.exp(x))[1], bounds=ends, method="bounded", options={"xatol": 1e-6}
+        )
+        assert_allclose(-top.fun * sites * force, wanted[1], rtol=1e-10)
+
+
 def test_mean_field_is_the_closure_to_fifty_digits_with_its_limits():
     eps, beta = np.array([0.01, 0.1, 1.0, 3.0, 10.0, 100.0, 1e3]), np.array([[0.1], [1.0], [10.0], [100.0]])
     with mp.workdps(50):

@@ -53,6 +53,12 @@ bond_stiffness = "0.4 uN/m"
 rebinding_rate = "400 1/s"
 site_density = "1e17 1/m^2"
 """
+BY_SPEED = """model = "cohort"
+rupture = { model = "bell", bell_force = "4 pN", critical_speed = "3 mm/s", stress = "0.2 MPa" }
+bond_stiffness = "0.8 uN/m"
+rebinding_ratio = 10
+"""
+BY_NONE = BY_SPEED.replace(', critical_speed = "3 mm/s", stress = "0.2 MPa"', "")
 #: Lines of the lens that the cases replace.
 RATE = 'model = "rate"\ncritical_speed = "10 mm/s"\nrebinding_rate = "500 1/s"\n'
 RAMP = 'model = "ramp"\nfrom = "10 um/s"\nto = "100 mm/s"\nscale = "log"'
@@ -139,6 +145,12 @@ TOGETHER = [
     (LOAD, "load = { time = [0, 2, 1], value = [1, 1, 1] }", "contact.load", "times must start at 0 s"),
     (LOAD, "load = { time = [0, 1], value = [0, 0] }", "contact.load", "clock.duration (2 s)"),
     (RATE, f"{BELL}critical_speed = 1\n", "bonds.critical_speed", 'choose model = "steady"'),
+    (RATE, BY_SPEED + 'site_density = "1e17 1/m^2"\n', "bonds", "give either...: remove site_density"),
+    (RATE, BY_SPEED.replace("rebinding_ratio = 10", ""), "bonds", "give either...: add rebinding_ratio"),
+    (RATE, BY_NONE, "bonds", "give either...: add rupture.critical_speed, rupture.stress"),
+    (RATE, BELL + "rebinding_ratio = 10\n", "bonds", "give either...: remove rebinding_ratio"),
+    (RATE, BELL.replace('site_density = "1e17 1/m^2"', ""), "bonds.site_density", "add...1e17 1/m^2"),
+    (RATE, BY_NONE.replace("cohort", "auto").replace("bond_stiff", "#"), "bonds", "bond_stiffness is missing"),
     (RATE, BELL.replace("cohort", "auto") + 'critical_speed = "1 mm/s"\n', "bonds", "either critical_speed"),
     (RATE, BELL.replace("cohort", "auto") + 'stress = "1 MPa"\n', "bonds", "leave stress out"),
     (RATE, RATE.replace("500", "0").replace("rate", "auto", 1), "bonds", "rebinding_rate...above 0"),

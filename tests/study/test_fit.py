@@ -162,6 +162,19 @@ def test_intervals_hold_the_truth_in_95_of_100_fits(truth, monkeypatch, fits, le
     assert np.all((held >= least) & (held <= most)), held
 
 
+def test_the_critical_speed_and_stress_of_bells_bonds_are_fitted_as_they_are_given(tmp_path):
+    rupture = {"model": "bell", "bell_force": 4e-12, "critical_speed": 3e-3, "stress": 2e5}
+    bonds = {"model": "cohort", "rupture": rupture, "bond_stiffness": 8e-7, "rebinding_ratio": 10.0}
+    lens, speeds = load(LENS | {"bonds": bonds}), np.geomspace(1e-5, 1e-1, 9)
+    stress = lens.population.steady(speeds).strength
+    path, rows = tmp_path / "stress.csv", zip(speeds, stress, 0.01 * stress, strict=True)
+    lines = ["speed [m/s],shear_stress [Pa],shear_stress_error [Pa]", *(f"{v},{t},{e}" for v, t, e in rows)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    start, keys = lens.with_values({"bonds.rupture.critical_speed": 1e-3}), ("critical_speed", "stress")
+    result = fit(start, [path], [f"bonds.rupture.{key}" for key in keys], steady=True)
+    assert_allclose([*result.values.values()], [rupture[key] for key in keys], rtol=1e-5)
+
+
 def test_curves_without_errors_are_weighed_by_scatter_and_errors_of_all_areas_widen_what_they_touch(tmp_path, truth):
     drawn = noisy(truth, 0.01, 4)
     path = table(tmp_path / "bare.csv", {"speed [m/s]": SPEEDS}, drawn)

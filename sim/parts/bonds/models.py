@@ -13,22 +13,33 @@ number of bonds is carried. If the contact grows, the share of bound sites falls
 bonds leave with their area and the share stays.
 """
 
+import copy
 import math
 from functools import cached_property
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+from operator import attrgetter
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 import sim.parts.bonds.cohorts as cohorts
 import sim.parts.bonds.mean_field as mean_field
 import sim.parts.bonds.tracked as tracks
-from sim.laws.schallamach import Body, Onset, linear_onset, relaxed, steady_fraction, transition_probabilities
+from sim.laws.schallamach import (
+    Body,
+    Onset,
+    bell_numbers,
+    first_moment_numbers,
+    linear_onset,
+    relaxed,
+    steady_fraction,
+    transition_probabilities,
+)
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise, binomial, stream
 from sim.parts.bonds.cohorts import Cohorts
-from sim.parts.bonds.rupture import Rupture, RuptureRate
+from sim.parts.bonds.rupture import Bell, Derivable, Rupture, RuptureRate
 from sim.parts.bonds.tracked import CYCLES, Tracks
 from sim.parts.exchange import Array, Bonding, Motion, Part, Setting
 from sim.units.quantity import Quantity, keyed, tagged
@@ -339,6 +350,36 @@ def _count(bound, stay, bind, sites, seed, part, members, step, counted):
 Stiffness = Annotated[float, Quantity("N/m", "stiffness of a bond", "kappa", above=0, typical="0.4 mN/m")]
 Rebinding = Annotated[float, Quantity("1/s", "rate at which a free site binds", "k_on", at_least=0, typical="1e5 1/s")]
 Density = Annotated[float, Quantity("1/m^2", "bond sites per area", "n", above=0, typical="1e17 1/m^2")]
+Ratio = Annotated[float, Quantity("1", "rebinding_rate over zero_force_rate", "beta", above=0, typical="10")]
+_BY_SPEED = ("rupture.critical_speed", "rupture.stress", "rebinding_ratio")
+_T = TypeVar("_T")
+
+
+def _filled(part: _T, **values: object) -> _T:
+    """Return a part with some values, unchecked."""
+    result = copy.copy(part)
+    vars(result).update(values)
+    return result
+
+
+def _check_numbers(bonds: "_Stretched | Auto") -> None:
+    """Refuse bonds without the numbers of exactly one way: rates and site density, or critical speed and stress."""
+    is_bell = isinstance(bonds.rupture, Bell)
+    by_rates = (*(("rupture.zero_force_rate",) if is_bell else ()), "rebinding_rate", "site_density")
+    by_speed = _BY_SPEED if is_bell else _BY_SPEED[-1:]
+    missing, wanted = ([key for key in keys if attrgetter(key)(bonds) is None] for keys in (by_rates, by_speed))
+    given = [key for key in by_speed if key not in wanted]
+    if missing and not given:
+        places = [tuple(key.replace("rupture.", "rupture.bell.").split(".")) for key in missing]
+        errors = [InitErrorDetails(type="missing", loc=place, input=None) for place in places]
+        raise ValidationError.from_exception_data("bonds", errors)
+    extra = [key for key in by_rates if key not in missing]
+    if not (missing and is_bell):
+        extra, wanted = given, []
+    if given and (extra or wanted):
+        cures = [f"{verb} {', '.join(keys)}" for verb, keys in (("remove", extra), ("add", wanted)) if keys]
+        ways = f"give either {', '.join(by_rates)} or, of Bell's rupture, {', '.join(_BY_SPEED)}"
+        raise PydanticCustomError("one_way", f"{ways}: {', '.join(cures)}")
 
 
 @keyed()
@@ -351,8 +392,30 @@ class _Stretched(_BondModel):
 
     rupture: Rupture
     bond_stiffness: Stiffness
-    rebinding_rate: Rebinding
-    site_density: Density
+    rebinding_rate: Derivable[Rebinding] = cast(float, None)
+    site_density: Derivable[Density] = cast(float, None)
+    rebinding_ratio: Ratio | None = None
+
+    #: Rates and site density of a critical speed and a stress: those of the exact density over the stretch.
+    numbers_of: ClassVar = staticmethod(bell_numbers)
+    #: True if the friction maximum was given.
+    has_stress: ClassVar[bool] = False
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        _check_numbers(self)
+        return self
+
+    def chosen(self, area: float, forces: bool) -> Self:
+        """Return this model with all of its rates and its site density, for any contact and field."""
+        if self.rebinding_ratio is None:
+            return self
+        bell = cast(Bell, self.rupture)
+        wanted = bell.critical_speed, bell.stress, bell.bell_force, self.bond_stiffness, self.rebinding_ratio
+        rate, rebinding, density = map(float, self.numbers_of(*wanted))
+        rupture = _filled(bell, zero_force_rate=rate, critical_speed=None, stress=None)
+        numbers = {"rebinding_rate": rebinding, "rebinding_ratio": None, "site_density": density}
+        return _filled(self, rupture=rupture, has_stress=True, **numbers)
 
     @cached_property
     def law(self) -> RuptureRate:
@@ -422,6 +485,7 @@ class FirstMoment(_OverArea, _Separable):
     area: Area = "present"
     model: Literal["rate"] = "rate"
 
+    numbers_of: ClassVar = staticmethod(first_moment_numbers)
     state_class: ClassVar[type[Stretches]] = Stretches
     knows_forces: ClassVar[bool] = False
     in_blocks: ClassVar[bool] = True
@@ -449,7 +513,7 @@ class FirstMoment(_OverArea, _Separable):
         remarks, rebinding = super().remarks(setting), self.rebinding_rate
         excess = self.rupture.first_moment_excess(self.bond_stiffness, rebinding) if rebinding > 0.0 else 0.0
         remark = f'the mean stretch overpredicts the friction maximum by {excess:.0%}: bonds.model = "cohort" does not'
-        return [*remarks, remark] if excess else remarks
+        return [*remarks, remark] if excess and not self.has_stress else remarks
 
     def bonding(self, state: Stretches) -> Bonding:
         mean = np.divide(state.stretch, state.bound, out=np.zeros(state.bound.shape), where=state.bound > 0.0)
@@ -527,7 +591,7 @@ class Tracked(_Separable):
 
     sites: Annotated[
         int, Quantity("1", "number of bond sites that are followed", at_least=1, at_most=10**6, whole=True)
-    ]
+    ] = Field(kw_only=True)
     start_from: Start = "steady"
     model: Literal["tracked"] = "tracked"
 
@@ -571,7 +635,8 @@ class Tracked(_Separable):
 
 _MOST_TRACKED = 10**6
 _WITHOUT = ("critical_speed", "rebinding_rate")
-_WITH = ("rupture", "bond_stiffness", "rebinding_rate", "site_density")
+_WITH = ("rupture", "bond_stiffness")
+_NUMBERS = (*_WITH, "rebinding_rate", "rebinding_ratio", "site_density")
 _STRETCHED = ("rupture", "bond_stiffness", "site_density")
 
 #: A model that can be advanced.
@@ -592,6 +657,7 @@ class Auto:
     rupture: Rupture | None = None
     bond_stiffness: Stiffness | None = None
     rebinding_rate: Rebinding | None = None
+    rebinding_ratio: Ratio | None = None
     site_density: Density | None = None
     sites: Sites | None = None
     tolerance: Annotated[float, Quantity("1", "noise of the bonds that may be left out", "", above=0, below=1)] = 0.01
@@ -603,7 +669,7 @@ class Auto:
     def _one_kind(self) -> "Auto":
         with_ = any(getattr(self, name) is not None for name in _STRETCHED)
         if (self.critical_speed is not None) == with_:
-            message = f"give either {' and '.join(_WITHOUT)}, or {', '.join(_WITH[:-1])} and {_WITH[-1]}"
+            message = f"give either {' and '.join(_WITHOUT)}, or {', '.join(_WITH)}, rebinding_rate and site_density"
             raise PydanticCustomError("one_kind", message)
         missing = [name for name in (_WITH if with_ else _WITHOUT) if getattr(self, name) is None]
         if missing:
@@ -613,13 +679,18 @@ class Auto:
             raise PydanticCustomError("one_kind", "rebinding_rate must be above 0 1/s for bonds without a rupture")
         if with_ and self.stress:
             raise PydanticCustomError("one_kind", "bonds with a rupture make their own stress; leave stress out")
+        if with_:
+            _check_numbers(self)
         return self
 
     def number(self, area: float) -> float:
         """Return the sites of a contact of this area [m²]: ``sites``, else by their density, else infinity."""
         if self.sites is not None:
             return self.sites
-        return math.inf if self.site_density is None or not area > 0.0 else max(1.0, round(self.site_density * area))
+        density = self.site_density
+        if self.rebinding_ratio is not None:
+            density = Cohort(**{name: getattr(self, name) for name in _NUMBERS}).chosen(area, False).site_density
+        return math.inf if density is None or not area > 0.0 else max(1.0, round(density * area))
 
     def chosen(self, area: float, forces: bool) -> Model:
         """Return the model for a contact of this ``area`` [m²]; ``forces`` is true if the field reads the forces."""
@@ -630,13 +701,13 @@ class Auto:
             if noisy:
                 return Counted(**plain, sites=int(number), stress=self.stress, start_from=start)
             return Rate(**plain, stress=self.stress, start_from=start, area=self.area)
-        rest = {name: getattr(self, name) for name in _WITH}
+        rest = {name: getattr(self, name) for name in _NUMBERS}
         if noisy and number <= _MOST_TRACKED and self.rupture.separable:
-            return Tracked(**rest, sites=int(number), start_from=start)
+            return Tracked(**rest, sites=int(number), start_from=start).chosen(area, forces)
         if not self.rupture.depends_on_stretch and not forces:
             return FirstMoment(**rest, start_from=start, area=self.area)
         tolerance = max(1e-12, min(1e-4, 0.1 * self.tolerance))
-        return Cohort(**rest, tolerance=tolerance, start_from=start, area=self.area)
+        return Cohort(**rest, tolerance=tolerance, start_from=start, area=self.area).chosen(area, forces)
 
     def why(self, area: float, forces: bool) -> str:
         """Return the reason for the choice, in words."""

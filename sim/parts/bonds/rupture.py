@@ -5,7 +5,7 @@ integral of the rate along a motion, the same of a fresh bond, the time to ruptu
 """
 
 import math
-from typing import Annotated, ClassVar, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple, Optional, TypeVar, cast
 
 import numpy as np
 from pydantic import Field
@@ -51,6 +51,13 @@ class RuptureRate(NamedTuple):
         """True if all rupture is by one pathway that force opens, as Bell's."""
         return self.softness > 0.0 and self.catch == 0.0 and self.limit == math.inf
 
+
+_T = TypeVar("_T")
+#: A number that a scenario may leave out because others determine it. The bonds that are ``chosen`` have it.
+if TYPE_CHECKING:
+    Derivable = Annotated[_T, "derivable"]
+else:
+    Derivable = Optional
 
 #: Stiffness of a bond [N/m], k_on [1/s] and sites per area [1/m²].
 BondNumbers = tuple[float, float, float]
@@ -101,16 +108,27 @@ class Constant(_Law):
         return schallamach.constant_moments(speed, self.rate, bond_stiffness, rebinding_rate)
 
 
+ZeroForceRate = Annotated[
+    float, Quantity("1/s", "rupture rate of an unstretched bond", "k_0", above=0, typical="1e4 1/s")
+]
+HalfSpeed = Annotated[float, Quantity("m/s", "speed at which half of the bonds are left", "V_c", above=0)]
+LargestStress = Annotated[float, Quantity("Pa", "largest shear stress in steady sliding", "tau", above=0)]
+
+
 @keyed()
 class Bell(_Law):
-    """Force helps heat to open a bond: k = k0 exp(f/f_b) (Bell 1978). Limit: ``Constant`` as f_b -> infinity."""
+    """Force helps heat to open a bond: k = k0 exp(f/f_b) (Bell 1978). Limit: ``Constant`` as f_b -> infinity.
 
-    zero_force_rate: Annotated[
-        float, Quantity("1/s", "rupture rate of an unstretched bond", "k_0", above=0, typical="1e4 1/s")
-    ]
+    ``critical_speed`` and ``stress`` beside ``bonds.rebinding_ratio`` take the place of ``zero_force_rate`` beside
+    ``bonds.rebinding_rate`` and ``bonds.site_density``.
+    """
+
     bell_force: Annotated[
         float, Quantity("N", "force that multiplies the rupture rate by e", "f_b", above=0, typical="4 pN")
     ]
+    zero_force_rate: Derivable[ZeroForceRate] = cast(float, None)
+    critical_speed: HalfSpeed | None = None
+    stress: LargestStress | None = None
     model: Literal["bell"] = "bell"
 
     @property

@@ -111,6 +111,28 @@ def test_without_rebinding_every_site_starts_bound_and_outlives_a_force_as_of_be
         scene(bonds=bonds.Cohort(rupture=BELL, **STRETCHED | {"rebinding_rate": 0.0}))
 
 
+@pytest.mark.parametrize(("kind", "more"), [("rate", {}), ("cohort", {"tolerance": 1e-6}), ("tracked", {"sites": 400})])
+def test_bonds_of_a_critical_speed_and_a_stress_lose_half_of_them_there_and_reach_the_stress_on_a_ramp(kind, more):
+    rupture = {"model": "bell", "bell_force": "4 pN", "critical_speed": "3 mm/s", "stress": "0.2 MPa"}
+    table = {"model": kind, "rupture": rupture, "bond_stiffness": "0.8 uN/m", "rebinding_ratio": 10.0} | more
+    slow = Clock(duration=200.0, step=0.5)  # a ramp so slow that its bonds are steady: their memory is below 0.1 s
+    members = 20 if kind == "tracked" else 1
+    lens = scene(members, bonds=table, drive=drive.Steady(speed=3e-3), clock=Clock(duration=2.0, step=0.02))
+    fraction = records(lens, "bond_fraction")[0][50:].mean(axis=0)
+    error = fraction.std() / math.sqrt(members) if members > 1 else 2e-6
+    assert abs(fraction.mean() - 0.5) < 5.0 * error
+    if kind != "tracked":
+        ramp = drive.Ramp(start=2e-4, stop=2e-3, scale="log")
+        stress = records(scene(bonds=table, drive=ramp, clock=slow), "shear_stress")[0]
+        # of two records the nearer lies within 0.0029 of the top in ln V, whose curvature is below 1
+        assert_allclose(stress.max(), 2e5, rtol=2e-4)
+    changed = lens.with_values({"bonds.rupture.critical_speed": 6e-3, "bonds.rupture.stress": 1e5})
+    rates = "bonds.rupture.zero_force_rate", "bonds.rebinding_rate", "bonds.site_density"
+    ratios = [changed.derived[key][1] / lens.derived[key][1] for key in rates]
+    assert_allclose(ratios, [2.0, 2.0, 0.5], rtol=1e-13)  # all rates scale with the speed, the sites with the stress
+    assert not lens.with_values({"bonds": BONDS["rate, bell"]}).derived
+
+
 def test_sites_that_are_followed_are_compared_with_density_times_area():
     per_site = math.pi * scene().rest_radius ** 2
     tracked = {"rupture": BELL, "sites": 5} | STRETCHED
