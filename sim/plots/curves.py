@@ -30,9 +30,6 @@ _NAMED, _MOST = 10, 20
 #: Variables that are zero while the contact is open: lines break there.
 _OF_CONTACT = ("contact_radius", "contact_area", "area_ratio", "friction_force")
 
-#: Colours of many curves, none too light for paper.
-_SHADES = mpl.colors.ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.92, 256)))
-
 #: Markers that stand for line styles where points are not joined.
 _MARKS = {"-": "o", "--": "s", "-.": "^"}
 
@@ -207,11 +204,9 @@ def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], tuple[S
     """
     points = [dict(zip(dims, at, strict=True)) for at in np.ndindex(*(dataset.sizes[name] for name in dims))]
     varied = [name for name in dims if dataset.sizes[name] > 1]
-    shades, bar = list(LINES), None
-    if len(points) > len(LINES):
-        shades = [mpl.colors.to_hex(shade) for shade in _SHADES(np.linspace(0.0, 1.0, len(points)))]
-        if len(varied) == 1 and dataset[varied[0]].dtype.kind in "fi":
-            bar, shades = _bar(dataset[varied[0]])
+    shades, bar = style.shades(len(points)), None
+    if len(points) > len(LINES) and len(varied) == 1 and dataset[varied[0]].dtype.kind in "fi":
+        bar, shades = _bar(dataset[varied[0]])
     count = min(len(points), _MOST if bar else _NAMED)
     lines = []
     for number, k in enumerate(np.rint(np.linspace(0, len(points) - 1, count)).astype(int)):
@@ -228,7 +223,7 @@ def _bar(key: xr.DataArray) -> tuple[tuple[ScalarMappable, str], list[str]]:
     unit = Unit.of(values, key.attrs.get("units", "1"), logarithmic)
     values = unit.factor * values
     norm = (mpl.colors.LogNorm if logarithmic else mpl.colors.Normalize)(values.min(), values.max())
-    colours = ScalarMappable(norm, _SHADES)
+    colours = ScalarMappable(norm, style.SHADES)
     words = f"{key.attrs.get('long_name', key.name).partition(',')[0]} {symbol(key)}".strip()
     return (colours, unit.label(words)), [mpl.colors.to_hex(shade) for shade in colours.to_rgba(values)]
 

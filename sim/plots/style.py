@@ -36,6 +36,9 @@ BONDS, FLUCTUATIONS, BOTH, REFERENCE = "#0072B2", "#D55E00", "#000000", "#777777
 #: Colours of several curves.
 LINES = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
+#: Colours of many curves, none too light for paper.
+SHADES = mpl.colors.ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.92, 256)))
+
 #: A closed form beneath what was simulated, a line that only guides the eye, and a marker with a white face.
 GREY: Any = {"color": REFERENCE, "linewidth": 0.9, "zorder": 1.5}
 GUIDE: Any = {"color": REFERENCE, "linewidth": 0.5, "zorder": 1}
@@ -114,6 +117,12 @@ def swept_value(dataset: xr.Dataset, name: str, at: int) -> str:
     return f"{sign} = {number}"
 
 
+def shades(count: int) -> list[str]:
+    """Return colours of some curves."""
+    many = [mpl.colors.to_hex(shade) for shade in SHADES(np.linspace(0.0, 1.0, count))]
+    return list(LINES[:count]) if count <= len(LINES) else many
+
+
 def swept(dataset: xr.Dataset) -> list[str]:
     """Return the dimensions of the sweep with more than one value."""
     return [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
@@ -158,7 +167,7 @@ def rounded(value: Any, unit: str) -> str:
     return text_of(f"{value:.3g}", unit)
 
 
-_GREEK = re.compile(r"(?<![A-Za-z])(alpha|beta|tau|nu|chi|delta|sigma|xi|theta|lambda|DeltaGamma)(?![A-Za-z])")
+_GREEK = re.compile(r"(?<![A-Za-z])(alpha|beta|tau|nu|chi|delta|sigma|xi|theta|lambda|DeltaGamma|Delta)(?![A-Za-z])")
 
 
 def symbol(variable: xr.DataArray) -> str:

@@ -20,20 +20,22 @@ from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from sim.ensemble.dataset import scenario_json
+from sim.ensemble.dataset import scenario_json, variable_name
 from sim.numerics import files
 from sim.parts.exchange import Array
-from sim.plots.style import BOTH, GUIDE, HOLLOW, REFERENCE, STYLE, Unit, across, axis_scale, in_units, legend, rows
+from sim.plots import style
+from sim.plots.style import BOTH, HOLLOW, Unit, in_units
 from sim.scenario.files import parse, written
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read, quantities
 from sim.scenario.sweep import set_key
 from sim.study import likelihood
-from sim.study.likelihood import HELD, LEVEL, Free, Interval, Measured, Minimum, Problem, idle, with_errors
+from sim.study.likelihood import HELD, LEVEL, Curve, Free, Interval, Measured, Minimum, Problem, idle, with_errors
 from sim.study.mechanisms import WHOLE, Verdict, compare
 from sim.units.errors import BadInput
 from sim.units.notation import concise, engineering, scaled
@@ -244,57 +246,110 @@ def _free(scenario: Scenario, text: str) -> Free:
     return Free(key, quantity, start, low, high)
 
 
-#: Height of a curve's panel and of that of its residuals [in].
-_CURVE, _RESIDUALS = 1.5, 0.8
-#: Words and unit of a condition.
-_ALONG = {"speed": ("sliding speed $V$", "m/s"), "t": ("time $t$", "s")}
+#: Height of a panel of curves and of that of its residuals [in].
+_CURVES, _RESIDUALS = 1.7, 0.8
+#: Relative difference below which conditions are the same, and most of them that the legend names.
+_NEAR, _NAMED = 0.02, 10
+
+
+class Along(NamedTuple):
+    """Condition over which a table is drawn: its key, words, unit, and values at the rows [SI]."""
+
+    key: str
+    words: str
+    unit: str
+    values: Array
 
 
 def figure(problem: Problem, best: Minimum) -> Figure:
-    """Draw each curve over the condition that varies, with error bars and fit, above its residuals in standard errors.
+    """Draw each variable over the condition that varies most, with error bars and fit, above its residuals.
 
-    If only the speed varies, the lines are of many speeds; otherwise they join the rows. Grey is steady sliding alone
-    if the scenario's own models add to it.
+    Residuals are in standard errors. Rows of any table that are alike in all other conditions have one colour, and one
+    curve: it is of many speeds over the speed, else it joins the rows. If the scenario's own models add to steady
+    sliding, that alone is dashed.
     """
     fitted, alone = problem.predicted(best.x), problem.steady(best.x)
     off = (problem.values - fitted) / np.hypot(problem.sigma, problem.noise)
-    curves = [(place, curve) for place, table in enumerate(problem.tables) for curve in table.curves]
-    with mpl.rc_context(STYLE):
-        picture, panels = rows([_CURVE, _RESIDUALS] * len(curves), shared=False)
-        for number, ((place, curve), upper, lower) in enumerate(zip(curves, panels[::2], panels[1::2], strict=True)):
-            here, (words, si, along), measured = problem.curve == number, _along(problem.tables[place]), curve.variable
-            scale, order = axis_scale(along), np.argsort(along, kind="stable")
-            x, y = Unit.of(along, si, logarithmic=scale == "log"), Unit.of(curve.values, measured.unit)
-            bars: Any = HOLLOW | {"color": BOTH, "elinewidth": 0.7, "zorder": 3, "label": "measured"}
-            upper.errorbar(x.factor * along, y.factor * curve.values, yerr=y.factor * problem.sigma[here], **bars)
-            fine, smooth = problem.between(best.x, place, curve.name)
-            lines = [(fitted, BOTH, "fit", 2.0), (alone, REFERENCE, "in steady sliding", 1.8)]
-            for values, color, label, zorder in lines[: 2 if np.any(problem.shift) else 1]:
-                line, over = values[here][order], along[order]
-                if fine.size:  # what is added to steady sliding is known at the rows
-                    line, over = smooth + np.interp(fine, over, line - alone[here][order]), fine
-                look: Any = {"color": color, "label": label, "zorder": zorder, "linewidth": 0.9}
-                upper.plot(x.factor * over, y.factor * line, **look)
-            upper.set_ylabel(y.label(f"{measured.long_name.partition(',')[0]} ${measured.symbol}$"))
+    lines = [(fitted, "fit", "-"), (alone, "in steady sliding", "--")][: 2 if np.any(problem.shift) else 1]
+    along, (conditions, labels) = [_along(table) for table in problem.tables], _alike(problem)
+    colours, panels = style.shades(len(labels)), dict[tuple[str, str], list[tuple[int, int]]]()
+    for number, (place, name) in enumerate((k, name) for k, table in enumerate(problem.tables) for name in table.names):
+        panels.setdefault((name, along[place].key), []).append((number, place))
+    with mpl.rc_context(style.STYLE):
+        picture, axes = style.rows([_CURVES, _RESIDUALS] * len(panels), shared=False)
+        for (name, key), upper, lower in zip(panels, axes[::2], axes[1::2], strict=True):
+            drawn, every = panels[name, key], np.concatenate([along[place].values for _, place in panels[name, key]])
+            scale, (_, words, si, _) = style.axis_scale(every), along[drawn[0][1]]
+            variable = Curve(name, every, None).variable
+            x, y = Unit.of(every, si, scale == "log"), Unit.of(problem.values[problem.of(name)], variable.unit)
+            for (number, place), condition in itertools.product(drawn, range(len(labels))):
+                alike = np.flatnonzero(conditions[place] == condition)
+                if not alike.size:
+                    continue
+                alike, colour = alike[np.argsort(along[place].values[alike], kind="stable")], colours[condition]
+                at, over = np.flatnonzero(problem.curve == number)[alike], along[place].values[alike]
+                bars: Any = HOLLOW | {"color": colour, "elinewidth": 0.7, "zorder": 3}
+                upper.errorbar(x.factor * over, y.factor * problem.values[at], y.factor * problem.sigma[at], **bars)
+                lower.plot(x.factor * over, off[at], color=colour, **HOLLOW)
+                fine, smooth = over, alone[at]
+                if key == "speed" and np.ptp(over) and (between := problem.between(best.x, place, name, alike)):
+                    fine, smooth = between
+                for values, _, dashes in lines:  # what is added to steady sliding is known at the rows
+                    line = y.factor * (smooth + np.interp(fine, over, values[at] - alone[at]))
+                    mark = "" if np.ptp(over) else "x"
+                    upper.plot(x.factor * fine, line, dashes, color=colour, marker=mark, linewidth=0.9, zorder=2)
+            upper.set_ylabel(y.label(f"{variable.long_name.partition(',')[0]} ${variable.symbol}$"))
             upper.tick_params(labelbottom=False)
-            lower.plot(x.factor * along, off[here], color=BOTH, **HOLLOW)
-            lower.axhline(0.0, **GUIDE)
+            lower.axhline(0.0, **style.GUIDE)
             lower.margins(y=0.15)
             lower.set_ylabel("residual ($\\sigma$)")
-            across(upper, x.factor * along, "", scale, 0.05)
-            across(lower, x.factor * along, x.label(words), scale, 0.05)
-        legend(panels[0])
+            style.across(upper, x.factor * every, "", scale, 0.05)
+            style.across(lower, x.factor * every, x.label(words), scale, 0.05)
+        axes[0].plot([], [], label="measured", color=BOTH, **HOLLOW)
+        for _, label, dashes in lines:
+            axes[0].plot([], [], dashes, color=BOTH, label=label, linewidth=0.9)
+        for k in np.unique(np.linspace(0, len(labels) - 1, _NAMED).astype(int)) if len(labels) > 1 else ():
+            axes[0].plot([], [], color=colours[k], label=labels[k])
+        style.legend(axes[0])
     return picture
 
 
-def _along(table: Measured) -> tuple[str, str, Array]:
-    """Return words, unit and values of the condition that varies most from row to row."""
+def _along(table: Measured) -> Along:
+    """Return the condition that varies most from row to row; if two do, the speed."""
     varied = {name: values for name, values in table.conditions.items() if np.ptp(values) > 0.0}
     if not varied:
-        return "row", "1", np.arange(1.0, table.rows + 1.0)
-    name = max(varied, key=lambda name: len(np.unique(varied[name])))
-    held = HELD[table.held].replace("_", " "), "N" if table.held == "load" else "m"
-    return *({"held": held} | _ALONG).get(name, (name, "1")), varied[name]
+        return Along("", "row", "1", np.arange(1.0, table.rows + 1.0))
+    key = max(varied, key=lambda name: (len(_levels(varied[name])[0]), name == "speed"))
+    column, unit, _ = HELD[table.held]
+    known = {"held": (column.replace("_", " "), unit), "speed": ("sliding speed $V$", "m/s"), "t": ("time $t$", "s")}
+    return Along(key, *known.get(key, (key, "1")), varied[key])
+
+
+def _levels(values: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Return the different values in order, nan as the last, and the place of each value among them."""
+    least = list[float]()
+    for value in np.unique(values).tolist():
+        if not least or not value - least[-1] <= _NEAR * abs(least[-1]):
+            least.append(value)
+    level = np.searchsorted(least, values, "right") - 1
+    return np.bincount(level, values) / np.bincount(level), level
+
+
+def _alike(problem: Problem) -> tuple[list[NDArray[np.int64]], list[str]]:
+    """Return for each table the numbers of the conditions of its rows beside that along the axis, and their labels."""
+    along, places = [_along(table) for table in problem.tables], np.cumsum([table.rows for table in problem.tables])
+    numbers, texts = [np.zeros(places[-1], int)], [[""]]
+    for key, (quantity, columns) in problem.conditions().items():
+        kept = [np.where(axis.key == key, np.nan, values) for axis, values in zip(along, columns, strict=True)]
+        means, level = _levels(np.concatenate(kept))
+        name, described = variable_name(key), {"units": quantity.unit, "symbol": quantity.symbol}
+        words = xr.Dataset(coords={name: (name, means[np.isfinite(means)], described)})
+        if words.sizes[name] > 1:
+            numbers.append(level)
+            texts.append([style.swept_value(words, name, k) for k in range(words.sizes[name])] + [""])
+    kinds, number = np.unique(numbers, axis=1, return_inverse=True)
+    labels = [", ".join(filter(None, map(list.__getitem__, texts, column))) for column in kinds.T]
+    return np.split(number.ravel(), places[:-1]), labels
 
 
 #: First words of a line of the scenarios that are written here, by which they may be replaced.
@@ -327,7 +382,7 @@ def carried_out(
     try:
         with in_units(units):  # before anything is fitted
             for table in tables:
-                for unit in (_along(table)[1], *(curve.variable.unit for curve in table.curves)):
+                for unit in (_along(table).unit, *(curve.variable.unit for curve in table.curves)):
                     Unit.of(1.0, unit)
     except ValueError as fault:
         raise BadInput([f"--units: {fault}"]) from None

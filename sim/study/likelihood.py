@@ -31,10 +31,13 @@ from sim.spectrum.family import Family
 from sim.study.converge import READ, recorded
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
-from sim.units.tables import read_measured
+from sim.units.tables import names_of, read_measured
 
-#: Column of what holds the sphere, by the key of the contact that prescribes it.
-HELD = {"load": "normal_load", "indentation": "indentation", "displacement": "displacement"}
+#: Column, unit and symbol of what holds the sphere, by the key of the contact that prescribes it.
+HELD = {
+    "load": ("normal_load", "N", "P"), "indentation": ("indentation", "m", "delta"),
+    "displacement": ("displacement", "m", "Delta"),
+}  # fmt: skip
 #: What is recorded of a history, or is no measured number; and what is measured of a slider that feels its friction.
 _NOT_MEASURED = ("in_contact", "masked", "detachment_time", "dissipated_energy", "applied_load")
 #: Sizes of the contact, which are never below 0.
@@ -125,7 +128,7 @@ def _faults(scenario: Scenario, conditions: dict[str, Array], curves: tuple[Curv
     if "t" in conditions and len(conditions.keys() & {"speed", "held"}):
         yield "the scenario has the speed and the load at each time; leave out t, or the columns of these"
     elif "t" not in conditions and (not conditions or varies or ("held" not in conditions and contact.changes)):
-        yield f'no column has the conditions of each row; add "t [s]", or "speed [mm/s]" and "{HELD[contact.kind]}"'
+        yield f'no column has the conditions of each row; add "t [s]", or "speed [mm/s]" and "{HELD[contact.kind][0]}"'
     for name, values, errors in curves:
         if name in ("friction_force", "shear_stress") and np.all(values * conditions.get("speed", 1.0) < 0.0):
             yield f"{name} has the sign of the speed; turn the sign of one of them"
@@ -138,11 +141,12 @@ def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
     kind = scenario.contact.kind
     result = {variable_name(key): (key, quantity) for key, (quantity, _) in quantities(scenario).items()}
     if not scenario.drive.solves_motion:
-        result["speed"] = result["drive_speed"] = "speed", Quantity("m/s", "sliding speed")
+        result["speed"] = result["drive_speed"] = "speed", Quantity("m/s", "sliding speed", "V")
     elif "drive_stage" in result:
         result["stage_speed"] = result["drive_stage"]
-    held = Quantity("N" if kind == "load" else "m", f"{HELD[kind]} of the sphere, contact.{kind}")
-    result[HELD[kind]] = result[f"contact_{kind}"] = "held", held
+    column, unit, symbol = HELD[kind]
+    held = Quantity(unit, f"{column} of the sphere, contact.{kind}", symbol)
+    result |= dict.fromkeys(names_of(column), ("held", held))
     return result | {"t": ("t", Quantity("s", "time since the start", at_least=0, at_most=scenario.clock.duration))}
 
 
@@ -440,14 +444,34 @@ class Problem:
             result = np.where(self.of(name), result * (1.0 + size * x[len(self.free) + k]), result)
         return result
 
-    def between(self, x: Array, table: int, name: str) -> tuple[Array, Array]:
-        """Return speeds between those of a table and its curve in steady sliding; none if more was varied."""
-        group = self.groups[table][0]
-        if [*self.tables[table].conditions] != ["speed"] or self.by_run or not np.min(group.speed) > 0.0:
-            return np.empty(0), np.empty(0)
-        fine = np.geomspace(np.min(group.speed), np.max(group.speed), _DRAWN)[:, np.newaxis]
-        course = group._replace(rows=np.arange(_DRAWN), time=0.0 * fine, speed=fine)
+    def between(self, x: Array, table: int, name: str, rows: NDArray[np.int64]) -> tuple[Array, Array] | None:
+        """Return speeds between those of rows that differ in nothing else, and their curve in steady sliding.
+
+        There is no curve by runs, or if a row is at rest.
+        """
+        group = next(item for item in self.groups[table] if rows[0] in item.rows)
+        speeds = self.tables[table].conditions["speed"][rows]
+        if self.by_run or not np.min(speeds) > 0.0:
+            return None
+        fine = np.geomspace(np.min(speeds), np.max(speeds), _DRAWN)[:, np.newaxis]
+        time = group.time[group.rows == rows[0]] + 0.0 * fine
+        course = group._replace(rows=np.arange(_DRAWN), time=time, speed=fine)
         return fine[:, 0], by_steady_sliding(course, self.numbers(x), [name], self.theory)[name]
+
+    def conditions(self) -> dict[str, tuple[Quantity, list[Array]]]:
+        """Return the conditions but time that some table names, by key, with the values at the rows of each table.
+
+        They are nan along a run over time, and those of the scenario if a table does not name the condition.
+        """
+        declared, result = dict(_conditions(self.groups[0][0].scenario).values()), dict[str, Any]()
+        for key in (key for table in self.tables for key in table.conditions if key != "t"):
+            result[key] = declared[key], [np.full(table.rows, np.nan) for table in self.tables]
+            for values, table, groups in zip(result[key][1], self.tables, self.groups, strict=True):
+                for group in () if "t" in table.conditions else groups:
+                    course, duration = group.scenario.contact.course, group.scenario.clock.duration
+                    own = {"speed": group.speed[:, 0], "held": course.at(group.time[:, 0], duration)}
+                    values[group.rows] = own[key] if key in own else quantities(group.scenario)[key][1]
+        return result
 
     @property
     def names(self) -> list[str]:

@@ -571,6 +571,20 @@ def prescribed(value: float | Course | Table) -> Prescribed:
 
 #: End of the names of columns with standard errors.
 ERROR = "_error"
+#: Groups of names of one condition: as recorded, as prescribed, and for short.
+_NAMES = (
+    ("speed", "drive_speed"), ("stage_speed", "drive_stage"), ("normal_load", "contact_load", "load"),
+    ("indentation", "contact_indentation"), ("displacement", "contact_displacement"),
+)  # fmt: skip
+
+
+def names_of(name: str) -> tuple[str, ...]:
+    """Return all names that a column of a variable may have.
+
+    >>> names_of("contact_load")
+    ('normal_load', 'contact_load', 'load')
+    """
+    return next((names for names in _NAMES if name in names), (name,))
 
 
 class Points(NamedTuple):
@@ -616,6 +630,8 @@ def measured_points(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -
     for name in arrays:
         if name not in known and not (name.endswith(ERROR) and name.removesuffix(ERROR) in arrays):
             raise ValueError(_unknown(name, known))
+        if len(twice := [other for other in names_of(name) if other in arrays]) > 1:
+            raise ValueError(f'columns "{twice[0]}" and "{twice[1]}" are one condition; leave one of them out')
     if len({values.shape for values in arrays.values()}) != 1 or next(iter(arrays.values())).ndim != 1:
         raise ValueError("measured columns need the same number of rows; give arrays of one length")
     return {name: Points(values, arrays.get(name + ERROR)) for name, values in arrays.items() if name in known}

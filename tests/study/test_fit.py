@@ -295,15 +295,55 @@ def test_a_driven_slider_is_fitted_to_force_and_stage_and_members_shift_the_fit_
     assert_allclose(noise[:10], error, rtol=0.05)
 
 
+def drawn_by_colour(panel):
+    """Measured points and fits of a panel, as places on its axes by colour."""
+    points, fits = {}, {}
+    for line in panel.lines:
+        if len(line.get_xdata()) and line.get_transform() == panel.transData:
+            into = points if line.get_linestyle() == "None" else fits
+            into.setdefault(line.get_color(), []).append(np.array(line.get_data()))
+    return points, fits
+
+
+@pytest.mark.parametrize("unit", [("mm/s", 1e3, "mN", 1e3), ("um/s", 1e6, "N", 1.0)])
+@pytest.mark.parametrize("tables", [[[2e-3, 1e-2]], [[2e-3], [1e-2]], [[1e-3, 2e-3, 5e-3, 1e-2, 2e-2]], [[None]]])
+def test_the_figure_has_one_curve_and_colour_for_each_load_in_one_table_or_in_several(tmp_path, tables, unit):
+    scene, forces, paths, rng = load(LENS), {}, [], np.random.default_rng(5)
+    for loads in tables:
+        for each in loads:
+            under = scene.with_values({"contact.load": each or 4e-3})
+            (group,) = likelihood.groups(under, rows_of(under, speed=SPEEDS)[0])
+            forces[each] = likelihood.by_steady_sliding(group, {}, ["friction_force"])["friction_force"]
+        rows = [(v, each or 4e-3, force) for each in loads for v, force in zip(SPEEDS, forces[each], strict=True)]
+        speed, held, force = rng.permutation(rows).T
+        conditions = {f"speed [{unit[0]}]": unit[1] * speed, f"load [{unit[2]}]": unit[3] * held}
+        conditions = dict(list(conditions.items())[: 1 if loads == [None] else 2])
+        paths.append(table(tmp_path / f"{len(paths)}.csv", conditions, {"friction_force": 1.03 * force}, 0.05))
+    read = [likelihood.read(path, scene) for path in paths]
+    problem = problem_of(read, [likelihood.groups(scene, each) for each in read], [], {})
+    with in_units(["mm/s", "mN"]):
+        upper, lower = figure(problem, likelihood.Minimum(problem.start, 0.0, None, True)).axes
+    (points, fits), (residuals, _) = drawn_by_colour(upper), drawn_by_colour(lower)
+    assert len(points) == len(forces) and points.keys() == fits.keys() == residuals.keys()
+    labels = [text.get_text() for text in upper.get_legend().get_texts()][2:]
+    assert [label.partition("= ")[2] for label in labels] == [f"{1e3 * each:g} mN" for each in forces if each]
+    for force, colour in zip(forces.values(), fits, strict=True):
+        (line,), (measured,), (off,) = fits[colour], points[colour], residuals[colour]
+        assert_allclose(measured, [1e3 * SPEEDS, 1.03e3 * force], rtol=1e-10)
+        # between 200 speeds the curve is straight to a few parts in ten thousand
+        assert_allclose(np.interp(np.log(1e3 * SPEEDS), np.log(line[0]), line[1]), 1e3 * force, rtol=1e-3)
+        assert_allclose(off, [1e3 * SPEEDS, np.full(len(SPEEDS), 0.03 / (0.05 * 1.03))], rtol=1e-8)
+
+
 def test_the_figure_has_its_units_and_keys_that_data_cannot_tell_apart_are_remarked_or_refused(curves, tmp_path, truth):
     result = fit(load(LENS), [curves], KEYS, steady=True)
     problem, fitted = result.problem, result.problem.predicted(result.best.x)
     with in_units(["um/s", "um^2"]):
         upper, lower, *_ = figure(problem, result.best).axes
     assert "(µm²)" in upper.get_ylabel() and "(µm/s)" in lower.get_xlabel()
-    lines = {line.get_label(): line for line in upper.lines}
-    assert_allclose(lines["_nolegend_"].get_ydata(), 1e12 * problem.values[:10], rtol=1e-12)
-    at_rows = np.interp(np.log(1e6 * SPEEDS), np.log(lines["fit"].get_xdata()), lines["fit"].get_ydata())
+    ((points,),), ((line,),) = (lines.values() for lines in drawn_by_colour(upper))
+    assert_allclose(points[1], 1e12 * problem.values[:10], rtol=1e-12)
+    at_rows = np.interp(np.log(1e6 * SPEEDS), np.log(line[0]), line[1])
     # between 200 speeds the curve is straight to a few parts in ten thousand
     assert_allclose(at_rows, 1e12 * fitted[:10], rtol=3e-4)
     assert_allclose(lower.lines[0].get_xdata(), 1e6 * SPEEDS, rtol=1e-11)  # a table of 12 digits
