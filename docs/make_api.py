@@ -11,6 +11,7 @@ from typing import Any
 
 import sim
 from sim.spectrum.family import Family
+from sim.study.fit import Estimate, Fit
 
 TARGET = Path(__file__).with_name("api.md")
 HEAD = """# Public functions and classes
@@ -25,6 +26,8 @@ MODULES = (
     "sim.plots",
     "sim.report",
 )
+#: Numbers that a fit computes of its fields.
+_OF_FIT = ("values", "p_value", "aicc")
 _RETURNS = re.compile(r"^(?:Returns|Yields)\n-+\n(.*?)(?=^\S[^\n]*\n-{3,}|\Z)", re.S | re.M)
 _UNIT = re.compile(r"\[((?:1/)?[A-Za-zµ1][\w µ^/²³().½-]*)\]")
 
@@ -39,6 +42,12 @@ def text() -> str:
             lines += ["\n### Figures\n", "Any takes `where`, `member` and `units`.\n"]
             lines += ["| kind | shows | takes |", "| --- | --- | --- |"]
             lines += [f"| `{k}` | {one.shows} | {', '.join(one.takes)} |" for k, one in sim.plots.KINDS.items()]
+    lines += ["\n## The result of sim.fit\n", "`print` shows the numbers, the chi^2 and p.\n"]
+    lines += ["| name | unit | meaning |", "| --- | --- | --- |"]
+    for fields, prefix in ((Fit, ""), (Estimate, "numbers[i].")):
+        for names, meaning in re.findall(r"^(\w[\w, ]*) : .*\n    (.+)", inspect.getdoc(fields) or "", re.M):
+            lines.append(f"| {', '.join(f'`{prefix}{name}`' for name in names.split(', '))} | | {meaning} |")
+    lines += [f"| `{name}` | {units(vars(Fit)[name])} | {_meaning(vars(Fit)[name])} |" for name in _OF_FIT]
     lines += [
         "\n## A spectrum\n",
         "What each family of `sim.spectrum` has.\n",

@@ -58,7 +58,19 @@ _OTHER = ("clock", "record", "ensemble", "seed")
 
 
 class Estimate(NamedTuple):
-    """Estimate of one free number [SI]: its value, standard error and interval, and its value in steady sliding."""
+    """Estimate of one free number [SI].
+
+    Attributes
+    ----------
+    free : Free
+        Its ``key``, declaration, start and bounds.
+    value, error : float
+        Value and standard error.
+    interval : Interval
+        Ends ``low`` and ``high`` of the 95 % interval; ``low_open``, ``high_open`` are True if a bound set the end.
+    steady : float
+        Value if steady sliding alone were fitted.
+    """
 
     free: Free
     value: float
@@ -66,12 +78,38 @@ class Estimate(NamedTuple):
     interval: Interval
     steady: float
 
+    @property
+    def texts(self) -> tuple[str, str, str, str]:
+        """Return the value, both ends of the interval and their unit as text."""
+        ends, value, error = self.interval, self.value, self.error
+        is_limit = ends.low_open and not ends.high_open and error > abs(value)
+        factor, unit = scaled(ends.high if is_limit else value, self.free.quantity.unit)
+        text = f"below {factor * ends.high:.3g}" if is_limit else concise(factor * value, factor * error)
+        low, high = (
+            f"{factor * end:.4g}{' (bound)' * is_open}" for end, is_open in zip(ends[:2], ends[2:], strict=True)
+        )
+        return text, low, high, unit
+
 
 class Fit(NamedTuple):
-    """A calibrated scenario.
+    """A calibrated scenario. Its text is a line for each number, and the chi^2.
 
-    ``scenario`` has the ``numbers`` found; ``problem`` and ``best`` are the curves and where they agree best;
-    ``correlations`` those of the free numbers; ``remarks`` what to know of them.
+    Attributes
+    ----------
+    scenario : Scenario
+        The scenario with the numbers found.
+    problem : Problem
+        The curves with their errors: ``values``, ``sigma``, ``freedom``, ``predicted``.
+    best : Minimum
+        Place of the best fit and its ``chi_square``.
+    numbers : tuple of Estimate
+        Each free number with ``value``, ``error`` and ``interval``.
+    correlations : array
+        Correlations of the free numbers.
+    converged : bool
+        True if the search has ended at a minimum.
+    remarks : tuple of str
+        Conditions on the numbers, a sentence each.
     """
 
     scenario: Scenario
@@ -81,6 +119,11 @@ class Fit(NamedTuple):
     correlations: Array
     converged: bool
     remarks: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        texts = ((item.free.key, *item.texts) for item in self.numbers)
+        lines = [f"{key} = {value} [{low}, {high}] {unit}".rstrip() for key, value, low, high, unit in texts]
+        return "\n".join([*lines, _quality(self)])
 
     @property
     def aicc(self) -> float:
@@ -407,12 +450,7 @@ def _table(fit: Fit) -> list[dict[str, str]]:
     """Return one row for each estimate, in units that suit it."""
     rows = []
     for item in fit.numbers:
-        ends, si = item.interval, item.free.quantity.unit
-        is_limit = ends.low_open and not ends.high_open and item.error > abs(item.value)
-        factor, unit = scaled(ends.high if is_limit else item.value, si)
-        value = f"below {factor * ends.high:.3g}" if is_limit else concise(factor * item.value, factor * item.error)
-        marks = (" (bound)" if is_open else "" for is_open in ends[2:])
-        low, high = (f"{factor * end:.4g}{mark}" for end, mark in zip(ends[:2], marks, strict=True))
+        (value, low, high, unit), si = item.texts, item.free.quantity.unit
         shift = (item.steady - item.value) / item.error if item.error > 0.0 else math.nan
         alone = engineering(item.steady, si) + (f" ({shift:+.1f} errors)" if abs(shift) > 0.05 else "")
         rows.append({
@@ -422,14 +460,18 @@ def _table(fit: Fit) -> list[dict[str, str]]:
     return rows
 
 
-def _explanation(fit: Fit) -> str:
-    """Return the quality of the fit and the remarks on its numbers."""
+def _quality(fit: Fit) -> str:
+    """Return the chi^2 of the fit and, if it has not converged, the cure."""
     likely = f", p = {fit.p_value:.2g}" if math.isfinite(fit.p_value) else ""
-    chi_square, freedom = fit.best.chi_square, fit.problem.freedom
-    lines = [f"chi^2 {chi_square:.4g} at {freedom} degrees of freedom{likely}, AICc {fit.aicc:.4g}", *fit.remarks]
-    if not fit.converged:
-        lines.append("the fit has not converged: start nearer, give bounds, or free fewer keys")
-    return "\n".join(lines + [f"{table.path}: {table.rows} rows, {table.ranges}" for table in fit.problem.tables])
+    chi_square = f"chi^2 {fit.best.chi_square:.4g} at {fit.problem.freedom} degrees of freedom{likely}"
+    cure = "" if fit.converged else "\nthe fit has not converged: start nearer, give bounds, or free fewer keys"
+    return f"{chi_square}, AICc {fit.aicc:.4g}{cure}"
+
+
+def _explanation(fit: Fit) -> str:
+    """Return the quality of the fit, the remarks on its numbers and its tables."""
+    tables = [f"{table.path}: {table.rows} rows, {table.ranges}" for table in fit.problem.tables]
+    return "\n".join([_quality(fit), *fit.remarks, *tables])
 
 
 def _comparison(verdict: Verdict) -> list[dict[str, str]]:

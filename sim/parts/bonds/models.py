@@ -26,16 +26,8 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 import sim.parts.bonds.cohorts as cohorts
 import sim.parts.bonds.mean_field as mean_field
 import sim.parts.bonds.tracked as tracks
-from sim.laws.schallamach import (
-    Body,
-    Onset,
-    bell_numbers,
-    first_moment_numbers,
-    linear_onset,
-    relaxed,
-    steady_fraction,
-    transition_probabilities,
-)
+from sim.laws import schallamach
+from sim.laws.schallamach import Body, Onset, linear_onset, relaxed, steady_fraction, transition_probabilities
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise, binomial, stream
 from sim.parts.bonds.cohorts import Cohorts
@@ -397,7 +389,7 @@ class _Stretched(_BondModel):
     rebinding_ratio: Ratio | None = None
 
     #: Rates and site density of a critical speed and a stress: those of the exact density over the stretch.
-    numbers_of: ClassVar = staticmethod(bell_numbers)
+    numbers_of: ClassVar = staticmethod(schallamach.bell_numbers)
     #: True if the friction maximum was given.
     has_stress: ClassVar[bool] = False
 
@@ -485,7 +477,7 @@ class FirstMoment(_OverArea, _Separable):
     area: Area = "present"
     model: Literal["rate"] = "rate"
 
-    numbers_of: ClassVar = staticmethod(first_moment_numbers)
+    numbers_of: ClassVar = staticmethod(schallamach.first_moment_numbers)
     state_class: ClassVar[type[Stretches]] = Stretches
     knows_forces: ClassVar[bool] = False
     in_blocks: ClassVar[bool] = True
