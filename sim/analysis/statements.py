@@ -10,10 +10,15 @@ from sim.analysis.dataset import is_stationary, plain
 from sim.analysis.events import events
 from sim.analysis.over_speed import loss_speeds
 from sim.analysis.statistics import averaging, half_lives, of_second_half, summary
-from sim.units.notation import bounded, scaled
+from sim.units.notation import bounded, scaled, share
 
 #: Endings of the variables of a statement beside its value.
 _BESIDE = ("sem", "low", "high", "reason")
+#: Pure numbers that are no shares, so that they are not printed in percent.
+COUNTS = frozenset(("bond_fraction", "slip_count", "slip_count_late", "detachments", "step_renewal"))
+
+#: Shares that are at least 0 and at most 1.
+BOUNDED = frozenset(("fraction_detached", "fraction_masked", "time_masked", "ever_detached", "ran_away"))
 
 
 class Statement(NamedTuple):
@@ -47,8 +52,11 @@ class Statement(NamedTuple):
     def __str__(self) -> str:
         """Return the value with its error or bounds and unit, and the reason if there is one."""
         sizes = [abs(size) for size in (self.value, self.low, self.high) if np.isfinite(size)]
-        factor, unit = (100.0, "%") if self.unit == "1" else scaled(max(sizes, default=0.0), self.unit)
-        text = bounded(*(factor * number for number in (self.value, self.error, self.low, self.high)))
+        is_share = self.unit == "1" and self.name not in COUNTS
+        factor, unit = (100.0, "%") if is_share else scaled(max(sizes, default=0.0), self.unit)
+        numbers = (factor * number for number in (self.value, self.error, self.low, self.high))
+        text = share(self.value, self.low, self.high) if self.name in BOUNDED else ""
+        text = text or bounded(*numbers)
         return "; ".join(filter(None, (f"{text} {unit}".rstrip() if sizes else "", self.reason)))
 
 

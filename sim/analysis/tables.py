@@ -29,10 +29,10 @@ from sim.analysis.dataset import (
 from sim.analysis.events import varies
 from sim.analysis.observables import restricted
 from sim.analysis.over_speed import loss_speeds
-from sim.analysis.statements import as_means, of_events, reasons, statements
+from sim.analysis.statements import BOUNDED, COUNTS, as_means, each, of_events, reasons, statements
 from sim.analysis.statistics import QUANTILES, WIDE, averaging, correlation_time, over_members, shares, statistics
 from sim.numerics.files import output
-from sim.units.notation import bounded, concise, scaled
+from sim.units.notation import bounded, concise, scaled, share
 
 #: Cells of columns by heading.
 Columns = dict[str, list[str]]
@@ -122,10 +122,6 @@ _LOSSES = (
 #: Heading and meaning of the correlation time.
 _MEMORY = _Column("correlation_time", "t_c", meaning="integral correlation time of ΔΓ")
 
-#: Pure numbers that are no shares of something.
-_NO_SHARES = ("bond_fraction", "slip_count")
-#: Shares that are at least 0 and at most 100 %.
-_BOUNDED = ("fraction_detached", "fraction_masked", "time_masked", "ever_detached", "ran_away")
 #: Shares below it are nothing.
 _ROUNDING = 1e-13
 
@@ -237,6 +233,21 @@ def highlights(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = 
     return _rows(cells) if shown else []
 
 
+def key_figures(dataset: xr.Dataset, stated: xr.Dataset) -> list[dict[str, str]]:
+    """Return the statements of a run without a sweep, a row each: symbol, value, and definition with the sample."""
+    columns = {c.name: c for c in (*_COLUMNS, *_EVENTS, *_LOSSES) if not c.changing and _of_drive(dataset, c.name)}
+    rows = []
+    for statement in each(stated):
+        column = columns.get(statement.name)
+        unknown = math.isnan(statement.value) and not statement.reason
+        if column is None or unknown or abs(statement.value - column.dull) < _ROUNDING:
+            continue
+        text, over = column.meaning or statement.text, statement.over and f"; mean over the {statement.over}"
+        heading = " ".join(column.heading.format("V").split())
+        rows.append({"": heading, "value": str(statement), "definition": text[:1].upper() + text[1:] + over})
+    return rows
+
+
 def _of_drive(dataset: xr.Dataset, name: str) -> bool:
     """Return True if an event is shown under this drive: the speed of a peak on a ramp, its time after a start.
 
@@ -247,6 +258,15 @@ def _of_drive(dataset: xr.Dataset, name: str) -> bool:
     drives = {"speed": "ramp", "time": "start"}
     wanted = drives.get(name.rpartition("_")[2]) if name.startswith("peak_") else None
     return wanted is None or bool((word(dataset, "drive.model", "") == wanted).any())
+
+
+def narrow(rows: list[dict[str, str]], keys: int, most: int = 10) -> list[list[dict[str, str]]]:
+    """Return a table as several of at most so many columns, each with the first ``keys`` columns of the table."""
+    headings = list(rows[0]) if rows else []
+    values = headings[keys:]
+    count = math.ceil(len(values) / max(most - keys, 1))
+    parts = [[str(name) for name in part] for part in np.array_split(np.array(values, object), max(count, 1))]
+    return [[{name: row[name] for name in (*headings[:keys], *part)} for row in rows] for part in parts if rows]
 
 
 def _places(places: xr.Dataset, points: Points) -> Columns:
@@ -275,15 +295,13 @@ def _shown(means: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Col
             continue
         mean, low, high = (_at(means.get(f"{name}_{kind}"), points) for kind in ("mean", "low", "high"))
         unit = means[f"{name}_mean"].attrs.get("units", "1")
-        if unit == "1" and name not in _NO_SHARES:  # differences of areas leave rounding behind
+        if unit == "1" and name not in COUNTS:  # differences of areas leave rounding behind
             unit, mean = "%", np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
         if not np.all((mean == dull) | (np.isnan(mean) & np.isnan(low) & np.isnan(high))):
             error = (high - low) / (2.0 * WIDE)  # of few members above the standard error
             ((heading, texts),) = _cells(heading, unit, mean, error, low, high).items()
-            beyond = (name in _BOUNDED) & ((mean - error < 0.0) | (mean + error > 1.0))
-            for row in np.flatnonzero(beyond):  # brackets would leave 0 to 100 %: the 95 % interval, which does not
-                a, m, b = 100.0 * np.clip((low[row], mean[row], high[row]), 0.0, 1.0)
-                texts[row] = f"{m:.3g} ({a:.2g} to {b:.3g})"
+            if name in BOUNDED:
+                texts = [share(*ends) or text for *ends, text in zip(mean, low, high, texts, strict=True)]
             if f"{name}_reason" in means:
                 has_reason = _at(means[f"{name}_reason"], points) != ""
                 texts = [f"{text}*" if marked else text for text, marked in zip(texts, has_reason, strict=True)]
@@ -415,6 +433,7 @@ def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
 def losses(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None) -> list[dict[str, str]]:
     """Return the speeds at which area is lost, a row for each point of the sweep of other keys, if any is lost."""
     speeds = as_means(loss_speeds(dataset)) if stated is None else stated
+    speeds = speeds[[name for name in speeds if str(name).startswith(tuple(column.name for column in _LOSSES))]]
     sizes = {name: size for name, size in dataset["contact_modulus"].sizes.items() if name in speeds.dims}
     points = _points(sizes, _thinned(sizes, rows))
     symbol = "stage" if speed_name(dataset) == "stage_speed" else "V"

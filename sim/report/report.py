@@ -25,6 +25,7 @@ from sim.analysis import (
     highlights,
     is_stationary,
     is_steady,
+    losses,
     notes,
     setting,
     speed_of,
@@ -34,6 +35,7 @@ from sim.analysis import (
 )
 from sim.analysis.dataset import claim, speed_name
 from sim.analysis.statistics import over_members
+from sim.analysis.tables import key_figures, narrow
 from sim.numerics import hdf5
 from sim.numerics.files import output
 from sim.plots import kinds
@@ -432,8 +434,10 @@ def html(
     fitted = None if fit is None else fit_of(Path(fit), dataset)
     figures = drawings(dataset, data)
     points = [figure.measured for figure in figures if figure.measured]
-    stated = statements(dataset)
+    stated, swept = statements(dataset), sweep_dims(dataset)
     rows, whole = table(dataset, _ROWS, stated), highlights(dataset, _ROWS, stated)
+    keys = sum(heading.partition("\n")[0] in (*swept, "t") for heading in (rows or [{}])[0])
+    wide = [rows, *([whole, losses(dataset, _ROWS, stated)] if swept else [])]
     stem = Path(source).stem
     page = Environment(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined,
@@ -447,7 +451,10 @@ def html(
         measured=str(data) if isinstance(data, Path | str) else "the columns given",
         averaged=averaging(dataset, is_stationary(dataset)),
         drawings=figures,
-        tables=[rows, whole],
+        swept=bool(swept),
+        key_figures=[] if swept else key_figures(dataset, stated),
+        tables=[part for each in wide for part in narrow(each, min(keys, 3))],
+        remarks=remarks(dataset),
         notes=notes(dataset, rows, whole, stated),
         known=list(known(dataset)),
         scenario=scenario(dataset),
@@ -469,6 +476,14 @@ def question(dataset: xr.Dataset) -> Question:
     lines = [line[1:].strip() for line in comment]
     question, *more = [" ".join(part.split()) for part in "\n".join(lines).split("\n\n") if part.strip()] or [name]
     return Question(name, question, more)
+
+
+def remarks(dataset: xr.Dataset) -> list[str]:
+    """Return the remarks of `sim check` on the scenario, as the run recorded them."""
+    try:
+        return [str(remark) for remark in json.loads(dataset.attrs["remarks"])]
+    except (LookupError, TypeError, ValueError):
+        return []
 
 
 def changes(dataset: xr.Dataset) -> dict[str, str]:

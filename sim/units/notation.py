@@ -91,3 +91,16 @@ def bounded(value: float, sem: float, low: float = math.nan, high: float = math.
     if math.isnan(value):
         return f"{low:.4g} to {high:.4g}" if len(ends) == 2 else ends[0] if ends else "–"
     return f"{value:.4g} ({ends[0]})" if len(ends) == 1 else concise(value, sem)
+
+
+def share(value: float, low: float, high: float) -> str:
+    """Return a share in percent with its 95 % interval if a standard error would leave 0 to 100 %; "" else.
+
+    >>> print(share(0.0, 0.0, 0.39), share(0.5, 0.4, 0.6) == "")
+    0 (0 to 39) True
+    """
+    error = (high - low) / 3.92
+    if not (value - error < 0.0 or value + error > 1.0):
+        return ""
+    first, middle, last = (100.0 * min(max(number, 0.0), 1.0) for number in (low, value, high))
+    return f"{middle:.3g} ({first:.2g} to {last:.3g})"

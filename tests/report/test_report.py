@@ -270,8 +270,14 @@ def test_a_file_that_is_no_result_of_a_fit_and_hostile_headings_are_refused_in_o
 def test_a_page_has_the_numbers_of_the_statistics_its_question_and_error_estimates(ramp):
     page = harmless(Page(html(ramp)))
     assert [tag for tag, _ in page.elements].count("svg") == len(page.words("b")) == 1
-    for row in (*analysis.table(ramp, 24), *analysis.highlights(ramp, 24)):
+    stated = analysis.statements(ramp)
+    figures = analysis.tables.key_figures(ramp, stated)
+    assert len(figures) > 3 and {"5 % of area lost at V", "first masked"} <= {row[""] for row in figures}
+    for row in (*analysis.table(ramp, 24), *figures):
         assert set(row.values()) <= set(page.words("td"))
+    remarked = ramp.assign_attrs(remarks='["The cell is <b>small</b>."]')
+    assert "The cell is <b>small</b>." in harmless(Page(html(remarked))).words("p")
+    assert report.remarks(ramp.assign_attrs(remarks="{")) == report.remarks(ramp.assign_attrs(remarks=3)) == []
     assert html(ramp) == html(ramp)
     text = "# Why\n# so?\n#\n# Because\n# of that.\n#\n# Really.\nname = 'x'\n# no more\n"
     for toml, question, rest in ((text, "Why so?", ["Because of that.", "Really."]), ("", "x", [])):
