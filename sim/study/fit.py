@@ -85,9 +85,8 @@ class Estimate(NamedTuple):
         is_limit = ends.low_open and not ends.high_open and error > abs(value)
         factor, unit = scaled(ends.high if is_limit else value, self.free.quantity.unit)
         text = f"below {factor * ends.high:.3g}" if is_limit else concise(factor * value, factor * error)
-        low, high = (
-            f"{factor * end:.4g}{' (bound)' * is_open}" for end, is_open in zip(ends[:2], ends[2:], strict=True)
-        )
+        marks = (" (bound)" if is_open else "" for is_open in ends[2:])
+        low, high = (f"{factor * end:.4g}{mark}" for end, mark in zip(ends[:2], marks, strict=True))
         return text, low, high, unit
 
 

@@ -167,12 +167,20 @@ def test_the_critical_speed_and_stress_of_bells_bonds_are_fitted_as_they_are_giv
     bonds = {"model": "cohort", "rupture": rupture, "bond_stiffness": 8e-7, "rebinding_ratio": 10.0}
     lens, speeds = load(LENS | {"bonds": bonds}), np.geomspace(1e-5, 1e-1, 9)
     stress = lens.population.steady(speeds).strength
-    path, rows = tmp_path / "stress.csv", zip(speeds, stress, 0.01 * stress, strict=True)
+    measured = stress * (1.0 + 0.01 * np.random.default_rng(5).standard_normal(9))
+    path, rows = tmp_path / "stress.csv", zip(speeds, measured, 0.01 * stress, strict=True)
     lines = ["speed [m/s],shear_stress [Pa],shear_stress_error [Pa]", *(f"{v},{t},{e}" for v, t, e in rows)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     start, keys = lens.with_values({"bonds.rupture.critical_speed": 1e-3}), ("critical_speed", "stress")
     result = fit(start, [path], [f"bonds.rupture.{key}" for key in keys], steady=True)
-    assert_allclose([*result.values.values()], [rupture[key] for key in keys], rtol=1e-5)
+    assert all(
+        abs(item.value - rupture[key]) < 4.0 * item.error for key, item in zip(keys, result.numbers, strict=True)
+    )
+    speed, largest, chi_square = repr(result).splitlines()  # a line for each number, and the chi^2
+    assert speed.startswith("bonds.rupture.critical_speed = ") and speed.endswith("] mm/s")
+    low, high = map(float, re.findall(r"\[(.*), (.*)\] kPa", largest)[0])
+    assert_allclose([low, high], 1e-3 * np.array(result.numbers[1].interval[:2]), rtol=1e-3)
+    assert f"at 7 degrees of freedom, p = {result.p_value:.2g}" in chi_square
 
 
 def test_curves_without_errors_are_weighed_by_scatter_and_errors_of_all_areas_widen_what_they_touch(tmp_path, truth):
