@@ -621,6 +621,24 @@ def measured_lens(fit: Fit) -> dict[str, Number]:
 
 
 @asks(
+    "jkr_fit",
+    "Which work of adhesion and which modulus does a JKR test give?",
+    """A work of adhesion of {work} mJ/m², with {level:g} % confidence between {least:.1f} and {most:.1f}, and a contact
+    modulus E* of {modulus} MPa, between {softest:.2f} and {stiffest:.2f}. The two go together: their correlation is
+    {together:.2f}. The test, [jkr_fit.csv](../../scenarios/jkr_fit.csv), is made up with 45 mJ/m² and 2 MPa. A table of
+    your own loads and radii (or areas) takes its place.""",
+    free=("adhesion.work", "solid.youngs_modulus"),
+)
+def jkr_fit(fit: Fit) -> dict[str, Number]:
+    work, young = fit.numbers
+    contact = 1e-6 * fit.scenario.solid.contact_modulus / young.value  # MPa for a Pa of Young's modulus
+    return {"work": (1e3 * work.value, 1e3 * work.error), "level": 100.0 * LEVEL,
+            "least": 1e3 * work.interval.low, "most": 1e3 * work.interval.high,
+            "modulus": (contact * young.value, contact * young.error), "softest": contact * young.interval.low,
+            "stiffest": contact * young.interval.high, "together": float(fit.correlations[0, 1])}  # fmt: skip
+
+
+@asks(
     "jkr_test",
     "What work of adhesion does a JKR test read off a contact whose edge lags?",
     """Two, and neither is right. Under {load:g} mN the radius on loading gives {loading:.1f} mJ/m², that on

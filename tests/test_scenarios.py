@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from helpers.parts import analysis, jkr, load, run
 from numpy.testing import assert_allclose
+from scipy.optimize import curve_fit
 
+from sim import fit
 from sim.laws import schallamach as law
 from sim.laws.halfspace import surface_energy
 
@@ -110,6 +112,19 @@ def test_masking_uniform_stress_and_mechanisms_apart_are_the_closed_forms():
     work = dataset["work_of_adhesion"].transpose("adhesion_bond_share", "shear_paid_by_adhesion", "member").values
     assert np.all(work[0, 0] == 42e-3)
     assert_allclose(work[1, 1] - work[0, 0], (work[1, 0] - work[0, 0]) + (work[0, 1] - work[0, 0]), rtol=1e-12)
+
+
+def test_the_made_up_jkr_test_gives_the_work_and_modulus_with_which_it_was_made():
+    found = fit(FOLDER / "jkr_fit.toml", FOLDER / "jkr_fit.csv", ["adhesion.work", "solid.youngs_modulus"], steady=True)
+    loads, radii, _ = np.loadtxt(FOLDER / "jkr_fit.csv", delimiter=",", skiprows=1, unpack=True)
+    radius_at = lambda load, work, modulus: 1e6 * jkr.radius_at_load(1e-3 * load, work, 2e-3, modulus)  # noqa: E731
+    own, covariance = curve_fit(radius_at, loads, radii, [45e-3, 2e6], 0.01 * radii, absolute_sigma=True)
+    for item, scale, value, variance, truth in zip(
+        found.numbers, (1.0, 4.0 / 3.0), own, np.diag(covariance), (45e-3, 2e6), strict=True
+    ):
+        assert_allclose(scale * item.value, value, rtol=1e-4)
+        assert_allclose(scale * item.error, math.sqrt(variance), rtol=0.02)
+        assert item.interval.low < truth / scale < item.interval.high
 
 
 def test_few_waves_spread_as_is_known_beforehand_and_a_jkr_test_reads_two_works_of_adhesion():
