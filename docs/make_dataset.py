@@ -58,6 +58,9 @@ seeds = xarray.open_mfdataset(
 )
 ```
 
+`open_mfdataset` needs dask, which `pip install 'sliding-sim[cluster]'` adds. Without dask, `xarray.concat` joins the
+runs that `[sim.open(path) for path in paths]` has opened, with the same options.
+
 Attributes are those of the first run. `t` counts seconds and is no date: `dataset.resample` needs
 `dataset.assign_coords(t=(1e9 * dataset.t).round().astype("timedelta64[ns]"))`.
 

@@ -142,8 +142,8 @@ class Fit(NamedTuple):
 
 
 def fit(
-    scenario: Scenario, data: Sequence[Path], free: Iterable[str], common: dict[str, float] | None = None,
-    steady: bool = False,
+    scenario: Scenario, data: Sequence[Path | likelihood.Measured], free: Iterable[str],
+    common: dict[str, float] | None = None, steady: bool = False,
 ) -> Fit:  # fmt: skip
     """Find numbers of a scenario from measured curves.
 
@@ -152,7 +152,7 @@ def fit(
     scenario : Scenario
         The search starts at its values; its sweep is left out.
     data : sequence of Path
-        CSV tables (``sim.study.likelihood.read``), all fitted together.
+        CSV tables (``sim.study.likelihood.read``), or what was read of them, all fitted together.
     free : iterable of str
         Keys, each ``"KEY"`` or ``"KEY=LOW:HIGH"`` with bounds such as ``"1 mm/s:100 mm/s"``.
     common : dict, optional
@@ -169,7 +169,7 @@ def fit(
     free_numbers = [_free(base, text) for text in free]
     if len({item.key for item in free_numbers}) < len(free_numbers):
         raise BadInput(["--free: a key is there twice; give each once"])
-    tables = [likelihood.read(path, base) for path in data]
+    tables = [likelihood.read(path, base) if isinstance(path, Path) else path for path in data]
     groups = [likelihood.groups(base, table) for table in tables]
     problem = likelihood.problem_of(tables, groups, free_numbers, common or {})
     drive = base.drive
@@ -428,7 +428,7 @@ def carried_out(
                     Unit.of(1.0, unit)
     except ValueError as fault:
         raise BadInput([f"--units: {fault}"]) from None
-    result = fit(scenario, data, free, sizes, steady)
+    result = fit(scenario, tables, free, sizes, steady)
     verdict = compare(result.problem, result.best, result.scenario.seed) if judged else None
     picture = io.BytesIO()
     with in_units(units):

@@ -71,6 +71,7 @@ def _common_scales() -> dict[str, float | None]:
 @functools.lru_cache(maxsize=1024)
 def _scale(unit: str, target: str) -> float | None:
     """Return the factor from a unit to another; None for another dimension, ValueError for an unknown unit."""
+    unit = unit.translate(_TYPESET)
     if len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(unit):
         raise ValueError(unit)
     written = re.sub(r"^/", "1/", _POWER.sub(r"\1^\2", unit))

@@ -19,11 +19,15 @@ from pydantic_core import PydanticCustomError
 
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity, keyed
+from sim.units.terminal import note
 
 Array = NDArray[np.float64]
 
-_HEADING = re.compile(r"(?P<name>[^\[\]()]+?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]*?)\s*[\])])?")
+#: A name and its unit: "speed [mm/s]", "speed (mm/s)" or "speed in mm/s".
+_HEADING = re.compile(r"(?P<name>[^\[\]()]+?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]*?)\s*[\])]|\sin\s+(?P<other>\S+))?")
 _MOST_BYTES = 2**28
+#: Unknown columns that a message names.
+_MOST_NAMED = 20
 
 
 class TableError(ValueError):
@@ -37,8 +41,9 @@ def columns(text: str, wanted: dict[str, Quantity], header: str | None = None) -
     ----------
     text : str
         Cells with commas, semicolons or tabs between them. The first line that is neither empty nor a ``#``
-        comment names the columns, each with its unit in brackets; a column without brackets is in SI
-        units. Other columns are ignored. Decimal commas are read if semicolons or tabs separate the cells.
+        comment names the columns, each with its unit in brackets; without that line a comment above may do so. A column
+        without brackets has the unit of a comment above, such as ``# stress in kPa``, or is in SI units. Other columns
+        are ignored. Decimal commas are read if semicolons or tabs separate the cells.
     wanted : dict of str to Quantity
         The columns to read, each with its SI unit and bounds.
     header : str, optional
@@ -64,16 +69,16 @@ def columns(text: str, wanted: dict[str, Quantity], header: str | None = None) -
     [0.001, 0.005]
     """
     example = ", ".join(name if wanted[name].unit == "1" else f"{name} [{wanted[name].unit}]" for name in wanted)
-    table, place = _cells(text), "header"
-    if header is None or not all(map(_is_number, table.rows[0])):
-        place = f"line {table.lines[0]}"
-        if header:
-            raise TableError(f"{place}: the columns have a header of their own; leave the key header out")
-        units, table = _headings(place, table.rows[0]), table._replace(lines=table.lines[1:], rows=table.rows[1:])
+    table = _cells(text)
+    if header and table.bare:
+        place, units = "header", _headings("header", header.split(","))
     elif header:
-        units = _headings(place, header.split(","))
+        raise TableError(f"line {table.lines[0]}: the columns have a header of their own; leave the key header out")
     else:
-        raise TableError(f'the columns have no header; add one, or the key header, such as header = "{example}"')
+        place, units, table = _headed(table)
+        if not units:
+            cure = "add one, such as" if header is None else "add one, or the key header, such as header ="
+            raise TableError(f'the columns have no header; {cure} "{example}"')
     if not table.rows:
         raise TableError("no rows follow the header; add rows of numbers below it")
     if len(units) != len(table.rows[0]):
@@ -105,40 +110,68 @@ def headings(text: str) -> dict[str, str]:
     >>> headings("speed (mm/s), share\\n1, 2")
     {'speed': 'mm/s', 'share': ''}
     """
-    table = _cells(text)
-    units = _headings(f"line {table.lines[0]}", table.rows[0])
+    place, units, _ = _headed(_cells(text))
+    if not units:
+        raise TableError("the columns have no header; add one of names and units, such as speed [mm/s]")
     if len(dict(units)) < len(units):
-        raise TableError(f"line {table.lines[0]}: the header has a name twice; name each column once")
+        raise TableError(f"{place}: the header has a name twice; name each column once")
     return dict(units)
 
 
-def matrix(text: str, quantity: Quantity, gaps: bool = False) -> Array:
+def matrix(text: str, quantity: Quantity, gaps: bool = False, unit: str = "") -> Array:
     """Return a plain rectangular block of SI numbers, separated as in ``columns`` or by blanks, shape (rows, columns).
 
-    With ``gaps`` numbers may be nan, and bounds are not checked.
+    With ``gaps`` numbers may be nan, and bounds are not checked. The numbers are in ``unit`` or in that of a comment
+    above, such as ``# stress in kPa``, else in SI units.
 
     Raises
     ------
     TableError
-        If it is empty or ragged, or a cell is no finite number within the bounds.
+        If it is empty or ragged, or a cell is no finite number within the bounds; if ``unit`` and comments disagree.
     """
-    table = _cells(text)
+    table, factors = _cells(text), {}
+    for other in [unit, *(noted for comment in table.comments for _, noted in comment)]:
+        with contextlib.suppress(ValueError):  # of a comment on something else
+            factors[quantity.scaled(1.0, other) if other else None] = other
+    units = [other for other in factors.values() if other]
+    if len(units) > 1:
+        raise TableError(f"the unit is {' and '.join(units)}, by the comments and the key unit; give one of them")
     cells = list(itertools.chain.from_iterable(table.rows))
-    return _numbers("value", table, cells, "", quantity, gaps).reshape(len(table.rows), -1)
+    return _numbers("value", table, cells, "".join(units), quantity, gaps).reshape(len(table.rows), -1)
 
 
 class _Cells(NamedTuple):
-    """Rows of cells with the numbers of their lines; ``comma`` if decimals may have a comma."""
+    """Rows of cells with the numbers of their lines; ``comma`` if decimals may have a comma.
+
+    ``comments`` are those above the first row, each as names and units.
+    """
 
     lines: list[int]
     rows: list[list[str]]
     comma: bool
+    comments: list[list[tuple[str, str]]]
+
+    @property
+    def bare(self) -> bool:
+        """True if the first row is no header."""
+        return all(map(_is_number, self.rows[0]))
+
+
+def _headed(table: _Cells) -> tuple[str, list[tuple[str, str]], _Cells]:
+    """Return the place of a header, its names and units, none without a header, and the table below it."""
+    place = f"line {table.lines[0]}"
+    if table.bare:
+        fitting = [comment for comment in table.comments if len(comment) == len(table.rows[0]) > 1]
+        return f"comment above {place}", fitting[-1] if fitting else [], table
+    noted = {name: unit for comment in table.comments for name, unit in comment if unit}
+    units = [(name, unit or noted.get(name, "")) for name, unit in _headings(place, table.rows[0])]
+    return place, units, table._replace(lines=table.lines[1:], rows=table.rows[1:])
 
 
 def _cells(text: str) -> _Cells:
-    """Return the cells of all lines that are neither empty nor comments."""
-    texts = {number: line.strip(" ") for number, line in enumerate(text.removeprefix("\ufeff").splitlines(), 1)}
-    texts = {number: line for number, line in texts.items() if line.strip() and line[0] != "#"}
+    """Return the cells of all lines that are neither empty nor comments, without columns that are empty."""
+    every = {number: line.strip(" ") for number, line in enumerate(text.removeprefix("\ufeff").splitlines(), 1)}
+    texts = {n: line for n, line in every.items() if line.strip(" \t;,") and not line.startswith(("#", "sep="))}
     if not texts:
         raise TableError("the table is empty; write a header of names and units, then rows of numbers")
     lines, first = list(texts), next(iter(texts.values()))
@@ -152,7 +185,12 @@ def _cells(text: str) -> _Cells:
         if len(row) != len(rows[0]):
             cure = "separate cells by commas, write decimals with a point"
             raise TableError(f"line {line}: {len(row)} cells where the first row has {len(rows[0])}; {cure}")
-    return _Cells(lines, rows, sign in ";\t")
+    if not all(rows[0]):  # a spreadsheet ends each line with separators
+        filled = [k for k in range(len(rows[0])) if any(row[k] for row in rows)]
+        rows = [[row[k] for k in filled] for row in rows]
+    above = [line[:200].strip("# ;,\t") for n, line in every.items() if n < lines[0] and line.startswith("#")]
+    comments = [_named(_HEADING.fullmatch(cell.strip()) for cell in re.split("[;,\t]", line)) for line in above]
+    return _Cells(lines, rows, sign in ";\t", comments)
 
 
 def _is_number(cell: str) -> bool:
@@ -168,7 +206,11 @@ def _headings(place: str, cells: Sequence[str]) -> list[tuple[str, str]]:
     matches = [_HEADING.fullmatch(cell.strip()) for cell in cells]
     if not all(matches):
         raise TableError(f"{place}: a heading cannot be read; write a name and its unit, such as time [s]")
-    return [(match["name"], match["unit"] or "") for match in matches if match]
+    return _named(matches)
+
+
+def _named(matches: Iterable[re.Match[str] | None]) -> list[tuple[str, str]]:
+    return [(match["name"], match["unit"] or match["other"] or "") for match in matches if match]
 
 
 def _numbers(name: str, table: _Cells, cells: list[str], unit: str, quantity: Quantity, gaps: bool = False) -> Array:
@@ -587,6 +629,19 @@ def names_of(name: str) -> tuple[str, ...]:
     return next((names for names in _NAMES if name in names), (name,))
 
 
+#: Names of columns that are proposed for words and symbols, the first one that is known.
+_PROPOSED = {
+    word: names
+    for names, words in (
+        ("speed stage_speed", "V v U velocity speed"), ("contact_area", "A area"),
+        ("contact_radius", "a radius"), ("friction_force spring_force", "F f F_T Ft friction force"),
+        ("shear_stress", "tau τ stress"), ("t", "T time"), ("displacement", "z"),
+        ("normal_load", "P W N L FN Fn F_N load normal"), ("indentation", "d δ delta depth"),
+        ("solid_shear_modulus", "G modulus"), ("sphere_radius", "R"),
+    ) for word in words.split()
+}  # fmt: skip
+
+
 class Points(NamedTuple):
     """Values of a column [SI] with their standard errors, None where unknown."""
 
@@ -595,7 +650,7 @@ class Points(NamedTuple):
 
 
 def read_measured(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity]) -> dict[str, Points]:
-    """Return the columns of a table of measured values.
+    """Return the columns of a table of measured values; a note is printed if it has no units.
 
     Parameters
     ----------
@@ -613,9 +668,13 @@ def read_measured(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[s
     """
     try:
         with blamed(str(path)):
-            return _measured_columns(plain_text(path), known, outcomes)
+            result, bare = _measured_columns(plain_text(path), known, outcomes)
     except PydanticCustomError as fault:
         raise BadInput([str(fault)]) from None
+    if bare:
+        reach = (f"{name} reaches {np.abs(result[name].values).max():.4g} {known[name].unit}" for name in bare)
+        note(f"note: {path}: no units: SI assumed; {', '.join(reach)}")
+    return result
 
 
 def measured_points(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -> dict[str, Points]:
@@ -624,12 +683,11 @@ def measured_points(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -
     Raises
     ------
     ValueError
-        For a name that is not known, or columns of different lengths.
+        For names that are not known, or columns of different lengths.
     """
     arrays = {str(name): np.asarray(values, float) for name, values in columns.items()}
+    _refuse_unknown([name for name in arrays if not _is_known(name, arrays, known, known)], known)
     for name in arrays:
-        if name not in known and not (name.endswith(ERROR) and name.removesuffix(ERROR) in arrays):
-            raise ValueError(_unknown(name, known))
         if len(twice := [other for other in names_of(name) if other in arrays]) > 1:
             raise ValueError(f'columns "{twice[0]}" and "{twice[1]}" are one condition; leave one of them out')
     if len({values.shape for values in arrays.values()}) != 1 or next(iter(arrays.values())).ndim != 1:
@@ -637,18 +695,19 @@ def measured_points(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -
     return {name: Points(values, arrays.get(name + ERROR)) for name, values in arrays.items() if name in known}
 
 
-def _measured_columns(text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity]) -> dict[str, Points]:
+def _measured_columns(
+    text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity]
+) -> tuple[dict[str, Points], list[str]]:
+    """Return the columns, and the names of those that would need a unit if none has one."""
     units = headings(text)
+    _refuse_unknown([name for name in units if not _is_known(name, units, known, outcomes)], known)
     wanted: dict[str, Quantity] = {}
     for name, unit in units.items():
-        base = name.removesuffix(ERROR)
         if name in known:
             wanted[name] = known[name]
-        elif base in outcomes and base in units:
-            relative = unit == "%" and outcomes[base].unit != "1"
-            wanted[name] = Quantity("1" if relative else outcomes[base].unit, name, above=0)
         else:
-            raise TableError(_unknown(name, known))
+            declared = outcomes[name.removesuffix(ERROR)].unit
+            wanted[name] = Quantity("1" if unit == "%" and declared != "1" else declared, name, above=0)
     bare = [name for name, quantity in wanted.items() if not units[name] and quantity.unit != "1"]
     if bare and any(units.values()):
         cure = f'write "{bare[0]} [{wanted[bare[0]].unit}]" if that is its unit'
@@ -659,14 +718,25 @@ def _measured_columns(text: str, known: Mapping[str, Quantity], outcomes: Mappin
             arrays[base + ERROR] *= np.abs(arrays[base])
         if not np.all(arrays[base + ERROR] > 0.0):
             raise TableError(f'column "{base}" has a value of 0, whose relative error says nothing; give it in units')
-    return measured_points(arrays, known)
+    return measured_points(arrays, known), [name for name in bare if name in known]
 
 
-def _unknown(name: str, known: Iterable[str]) -> str:
-    """Return the fault of a column that is neither a condition nor a variable."""
-    shown = name[:40]
-    if name.endswith(ERROR) and name.removesuffix(ERROR) in known:
-        return f'column "{shown}" is the error of a column that is missing; add it, or leave the error out'
-    near = difflib.get_close_matches(shown, [*known], 1, 0.6)
-    cure = f'did you mean "{near[0]}"?' if near else "leave it out, or give it the name of one (docs/dataset.md)"
-    return f'column "{shown}" is neither a variable of a dataset nor a number of the scenario; {cure}'
+def _is_known(name: str, names: Iterable[str], known: Iterable[str], outcomes: Iterable[str]) -> bool:
+    """Return True for a condition or a variable, and for the error of a variable that has a column."""
+    base = name.removesuffix(ERROR)
+    return name in known or (base != name and base in names and base in outcomes)
+
+
+def _refuse_unknown(names: list[str], known: Iterable[str]) -> None:
+    """Refuse columns that are neither conditions nor variables, all at once and with proposals."""
+    texts = []
+    for name in names[:_MOST_NAMED]:
+        base = name.removesuffix(ERROR)
+        near = difflib.get_close_matches(base.lower()[:40], known, 1, 0.75)
+        for word in [base, *re.findall("[^\\W\\d_]+", base.lower())]:
+            near += [each for name in _PROPOSED.get(word, "").split() for each in names_of(name) if each in known]
+        ending = f" → {near[0]}{name[len(base) :]}" if near else ""
+        texts.append(name[:40] + (" (the error of no measured column)" if base in known else ending))
+    if texts:
+        cure = "rename these columns (docs/dataset.md), or leave them out"
+        raise TableError(f"neither variables of a dataset nor numbers of the scenario: {', '.join(texts)}; {cure}")

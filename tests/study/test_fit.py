@@ -512,7 +512,7 @@ def test_a_bad_table_or_unit_is_refused_and_a_fit_without_convergence_exits_1(sc
     path, header = tmp_path / "bad.csv", "speed [mm/s],contact_area [mm^2]"
     for text, cure in {
         "speed [mm/s],contact_area [mm]\n1,2\n3,4\n": "not a unit of m",
-        "speed [mm/s],contact_arae [mm^2]\n1,2\n3,4\n": 'did you mean "contact_area"',
+        "V (mm/s),contact_arae (mm2),speed_error [%]\n1,2,3\n": "V → speed, contact_arae → contact_area, speed_error",
         "speed [mm/s]\n1\n3\n": "no column was measured",
         "contact_area [mm^2]\n0.04\n0.05\n": "add \"t [s]\"",
         f"{header}\n1,0.04\n2,-0.04\n": "line 3: contact_area must be at least 0 m^2",

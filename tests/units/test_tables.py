@@ -1,5 +1,6 @@
 """CSV tables: units in the header, and one clear error for each way to get them wrong."""
 
+import re
 from typing import Annotated
 
 import numpy as np
@@ -9,8 +10,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from sim.scenario.files import Files
 from sim.units import tables
+from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
-from sim.units.tables import TableError, at_once, columns, file_path, file_text, headings, matrix
+from sim.units.tables import TableError, at_once, columns, file_path, file_text, headings, matrix, read_measured
 
 TIME = Quantity("s", "time", at_least=0)
 SPEED = Quantity("m/s", "speed")
@@ -28,6 +30,9 @@ TEXTS = [
     "speed [mm/s]\ttime [s]\t remark\n1\t0\t1.5,\n-2500\t0,25\t-\n",
     "time, speed\n0, 1e-3\n0.25, -2.5",
     "time [s] , speed [cm/s]\n 0 , .1\n 25e-2 , -2_50",
+    '\ufeffsep=;\r\n"time (ms)";"speed (mm/s)";\r\n"0";"1";\r\n"250,0";"-2500,0";\r\n;;\r\n',  # of a spreadsheet
+    "# speed in mm/s;;\r\ntime;speed;\r\n0;0,001e3;\r\n0,25;-2500;\r\n",
+    "# time in ms, speed in mm/s\n0 1\n250 -2.5e3",
 ]
 
 
@@ -57,6 +62,37 @@ def test_units_of_pure_numbers_percents_products_and_angles_are_read():
         with pytest.raises(TableError, match=r'"rad/um" .* "cycles/um"'):
             columns(f"q [{unit}]\n1", q)
     assert headings("speed (mm/s), share\n1, 2") == {"speed": "mm/s", "share": ""}
+
+
+def test_a_map_has_the_unit_of_its_comment_or_key_and_an_area_that_of_a_spreadsheet():
+    for comment, unit, pascals in (
+        ("# stress in kPa", "", 1e3), ("# stress [kPa], 5 um;;", "kPa", 1e3), ("# in June", "", 1.0), ("", "MPa", 1e6),
+    ):  # fmt: skip
+        assert matrix(f"{comment}\n1;2\n3;4", STRESS, unit=unit).tolist() == [
+            [pascals, 2 * pascals],
+            [3 * pascals, 4 * pascals],
+        ]
+    with pytest.raises(TableError, match="MPa and kPa"):
+        matrix("# stress in kPa\n1 2\n3 4", STRESS, unit="MPa")
+    areas = [columns(f"a ({unit})\n2", {"a": Quantity("m^2", "area")})["a"][0] for unit in ("mm2", "mm²", "mm^2")]
+    assert areas == [2e-6] * 3
+
+
+def test_measured_columns_are_all_named_at_once_with_proposals_and_without_units_the_largest_values(tmp_path, capsys):
+    units = {"speed": "m/s", "contact_area": "m^2", "friction_force": "N", "contact_load": "N", "t": "s"}
+    known, path = {name: Quantity(unit, name) for name, unit in units.items()}, tmp_path / "measured.csv"
+    path.write_text("V (mm/s),A (mm2),A_error (%),Load,contact_aera,t_error,x\n1,2,3,4,5,6,7\n", encoding="utf-8")
+    with pytest.raises(BadInput) as fault:
+        read_measured(path, known, known)
+    (line,) = fault.value.problems
+    proposed = {"V": "speed", "A": "contact_area", "A_error": "contact_area_error", "Load": "contact_load"}
+    assert dict(re.findall(r"(\S+) → (\w+)", line)) == proposed | {"contact_aera": "contact_area"}
+    assert all(word in line for word in (str(path), "t_error", " x;"))
+    path.write_bytes("\ufeffspeed;contact_area\r\n50,0;0,2\r\n-60;0,1\r\n".encode())
+    assert read_measured(path, known, known)["speed"].values.tolist() == [50.0, -60.0]
+    assert re.search(r"speed reaches 60 m/s, contact_area reaches 0\.2 m\^2", capsys.readouterr().err)
+    path.write_text("speed [m/s];contact_area [m2]\n50,0;0,2\n", encoding="utf-8")
+    assert read_measured(path, known, known) and capsys.readouterr().err == ""
 
 
 def test_a_wrong_table_is_refused_with_place_and_cure():
