@@ -287,7 +287,10 @@ def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...
         say(str(plots.planned(output, kind, to, force, [*choice.chosen, *chosen])))
         return
     with _opened(output, chosen) as dataset:
-        say(str(plots.drawn(dataset, kind, output, to, force, choice)))
+        target, remark = plots.drawn(dataset, kind, output, to, force, choice)
+        if remark:
+            note(f"note: {choice.data}: {remark}")
+        say(str(target))
 
 
 @cli.command()

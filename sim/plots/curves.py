@@ -13,7 +13,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
 from sim.analysis import averaging, bond_work, is_stationary, is_steady, setting, settled, slips, summary, sweep_dims
-from sim.analysis.dataset import answered, speed_of, stays_held
+from sim.analysis.dataset import answered, speed_name, speed_of, stays_held
 from sim.analysis.events import jumps
 from sim.analysis.observables import KEPT, observables, share_observables
 from sim.analysis.over_speed import speed_dim
@@ -168,7 +168,7 @@ class Scene(NamedTuple):
 
     def parted(self, line: Line, *along: np.ndarray) -> list[np.ndarray]:
         """Return the x values of a curve and values over them, with a nan at each gap of the line."""
-        at = jumps(self.speeds(line), self.over == "speed") if self.broken else ()
+        at = jumps(self.speeds(line), self.over.endswith("speed")) if self.broken else ()
         return [np.insert(values, at, np.nan) for values in (self.x[line.number], *along)]
 
     def speeds(self, line: Line) -> np.ndarray:
@@ -280,7 +280,8 @@ def beside(panel: Axes, scene: Scene, name: str, factor: float) -> None:
             mean, error = (factor * values for values in scene.drawn(name, line)[:2])
             full = np.pi * scene.values("jkr_radius_mean", line) ** 2
             curves.append(Compared(line, scene.x[line.number], mean, error, full))
-        scene.measured.draw(panel, (scene.over, scene.unit.factor), (name, factor), curves, scene.scale == "log")
+        over, at_end = (scene.over, scene.unit.factor), not scene.over_time
+        scene.measured.draw(panel, over, (name, factor), curves, scene.scale == "log", at_end)
 
 
 def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float, labelled: bool = True) -> None:
@@ -296,7 +297,7 @@ def over_speed(dataset: xr.Dataset) -> Scene:
     scene = scene_along(dataset, "t" if not is_steady(dataset) else str(speed_dim(dataset)))
     speeds = np.stack([scene.speeds(line) for line in scene.lines])
     words = "speed of the stage $V$" if "stage_speed" in dataset else "sliding speed $V$"
-    return scene.placed("speed", speeds, words, "m/s", axis_scale(speeds), broken=scene.over_time)
+    return scene.placed(speed_name(dataset), speeds, words, "m/s", axis_scale(speeds), broken=scene.over_time)
 
 
 def over_key(dataset: xr.Dataset, name: str) -> Scene:
@@ -502,7 +503,7 @@ def stacked(
         legend.set_bbox_to_anchor(None)
         legend.set_loc("best")
     if scene.measured:
-        scene.measured.refuse_undrawn(scene.over)
+        scene.measured.finish(figure, scene.over, ax)
     colour_bar(figure, axes, scene)
     return figure, axes
 
@@ -587,7 +588,7 @@ def friction_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure
         panel.axhline(0.0, **style.GUIDE)
         style.across(panel, placed.reach, placed.words, room=room)
     if data:
-        data.refuse_undrawn("t")
+        data.finish(figure, "t")
     style.legend(axes[0], scene.title)
     colour_bar(figure, axes, scene)
     return figure

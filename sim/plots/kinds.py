@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sim.analysis import sweep_dims
-from sim.analysis.dataset import MEMBERS, answered, claim, plain
+from sim.analysis.dataset import MEMBERS, answered, claim, plain, speed_name
 from sim.numerics.files import claim as claim_file, output
 from sim.plots import curves, field, slider, style, theories
 from sim.plots.measured import Measured
@@ -58,8 +58,12 @@ class Choices(NamedTuple):
         if self.at is not None:
             options["at"] = read_option(self.at, "at", "s")
         if self.data is not None:
-            options["data"] = self.data if isinstance(self.data, Measured) else Measured(self.data, dataset)
+            options["data"] = self.measured(dataset)
         return options
+
+    def measured(self, dataset: xr.Dataset) -> Measured | None:
+        """Return the measured points, if there are any."""
+        return self.data if self.data is None or isinstance(self.data, Measured) else Measured(self.data, dataset)
 
     def of_member(self, dataset: xr.Dataset) -> xr.Dataset:
         """Return the dataset of the chosen member, or of all.
@@ -127,10 +131,14 @@ KINDS: dict[str, Kind] = {
 }
 
 
-def default(dataset: xr.Dataset) -> str:
-    """Return the kind of figure that fits a dataset best."""
+def default(dataset: xr.Dataset, data: Measured | None = None) -> str:
+    """Return the kind of figure that fits a dataset best; with measured points one that has a place for them."""
     dataset = plain(dataset)
-    return next(name for name, kind in KINDS.items() if not _missing(dataset, name) and kind.fits(dataset))
+    kinds = (name for name, kind in KINDS.items() if data is None or "data" in kind.takes)
+    result = next(name for name in kinds if not _missing(dataset, name) and KINDS[name].fits(dataset))
+    over = {"curve": speed_name(dataset), "stress": speed_name(dataset), "sweep": next(iter(style.swept(dataset)), "")}
+    timed = data is not None and data.column("t") is not None and data.column(over.get(result, "t")) is None
+    return "time" if timed else result
 
 
 def drawable(dataset: xr.Dataset) -> list[str]:
@@ -176,9 +184,11 @@ def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None =
     choices = choices or Choices()
     dataset = choices.of_member(plain(dataset))
     if not kind:
+        data = choices.measured(dataset)
+        choices = choices._replace(data=data)
         dims = [(dim, dim.rpartition("_")[2], dim.replace("_", ".", 1)) for dim in style.swept(dataset)]
         over = "sweep" if any(choices.x in words for words in dims) else "time"
-        kind = {"": default(dataset), "speed": "curve"}.get(choices.x, over)
+        kind = {"": default(dataset, data), "speed": "curve"}.get(choices.x, over)
     if kind not in KINDS:
         raise ValueError(f'there is no figure "{kind}"; known: {", ".join(KINDS)}')
     if missing := _missing(dataset, kind):
@@ -196,8 +206,8 @@ def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None =
 
 def drawn(
     dataset: xr.Dataset, kind: str | None, source: Path, path: Path | None, replace: bool, choices: Choices
-) -> Path:
-    """Draw the dataset of a file into a picture, by default beside it, and return the path of the picture.
+) -> tuple[Path, str]:
+    """Draw the dataset of a file into a picture, by default beside it; return its path and a remark on measured points.
 
     Raises
     ------
@@ -208,12 +218,13 @@ def drawn(
         target = path or source.with_name(f"{source.stem}{'-' + kind if kind else ''}.png")
         tables = [Path(choices.data)] if isinstance(choices.data, Path | str) else []
         claim(dataset, source, target, replace, *tables)
-        save(draw(dataset, kind, choices), target)
+        figure = draw(dataset, kind, choices)
+        save(figure, target)
     except BadInput:
         raise
     except ValueError as fault:
         raise BadInput([f"{source}: {fault}"]) from None
-    return target
+    return target, " ".join(figure.get_supxlabel().split())
 
 
 def planned(source: Path, kind: str | None, path: Path | None, replace: bool, chosen: Collection[str] = ()) -> Path:

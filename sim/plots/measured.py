@@ -1,6 +1,8 @@
 """Measured points over the curves of a dataset, from a CSV table, and their residuals."""
 
 import itertools
+import textwrap
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -8,18 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from sim.analysis import sweep_dims
-from sim.analysis.dataset import plain
+from sim.analysis.dataset import plain, speed_name, sweep_dims
 from sim.plots.style import BOTH, GUIDE, HOLLOW, legend
+from sim.units.notation import engineering
 from sim.units.quantity import Quantity
-from sim.units.tables import Points, measured_points, read_measured
+from sim.units.tables import Points, measured_points, names_of, read_measured
 
-#: Groups of names of one variable, as prescribed and as recorded.
-_SAME = (
-    ("speed", "drive_speed"), ("normal_load", "contact_load"), ("indentation", "contact_indentation"),
-    ("displacement", "contact_displacement"),
-)  # fmt: skip
 #: Variables that follow from another column: its name, the power of it, and the factor.
 _BY = {"contact_radius": ("contact_area", 0.5, np.pi**-0.5), "contact_area": ("contact_radius", 2.0, np.pi)}
 #: Largest relative difference between a condition of a row and that of its curve.
@@ -27,11 +25,8 @@ _NEAR = 5e-3
 #: Smallest distance between branches of a curve that goes back and forth, in errors.
 _ALIKE = 0.01
 _MARKS = "osD^v"
-
-
-def _names_of(name: str) -> tuple[str, ...]:
-    """Return all names of a variable."""
-    return next((names for names in _SAME if name in names), (name,))
+#: Reason why a row is not drawn, and most values of a condition that are named.
+_NO_CURVE, _MOST = "of no curve that is drawn", 3
 
 
 class Line(NamedTuple):
@@ -91,23 +86,31 @@ class Measured:
     """A table of measured points, a CSV or columns in SI by name, with a record of those that a figure shows.
 
     Its columns are variables of a dataset with their units and errors, as those of ``sim fit``. A column that is a
-    number of the scenario, such as ``contact_load``, assigns a row to a curve of a sweep.
+    number of the scenario, such as ``contact_load``, assigns a row to a curve of a sweep. For each column of which a
+    panel has points, ``left_out`` holds the reason why a row is none of them, and ``apart`` why it has no residual.
     """
 
     def __init__(self, data: Path | str | Mapping[str, Any], dataset: xr.Dataset) -> None:
         self.dataset = plain(dataset)
-        self.sweep = {*sweep_dims(dataset)}
         units = {"area_ratio": "1", "contact_radius": "m", "contact_area": "m^2", "speed": "m/s", "t": "s"}
         for name, variable in self.dataset.variables.items():
             if variable.dtype.kind == "f" and "units" in variable.attrs:
                 units.setdefault(str(name).removesuffix("_mean"), variable.attrs["units"])
-        known = {name: Quantity(unit, name) for name, unit in units.items()}
+        self.units = {each: unit for name, unit in units.items() for each in names_of(name)}
+        known = {name: Quantity(unit, name) for name, unit in self.units.items()}
         if isinstance(data, Path | str):
-            self.source, self.table = str(data), read_measured(Path(data), known, known)
+            self.source, self.table = str(data), read_measured(Path(data), known, known, gaps=True)
         else:
             self.source, self.table = "data", measured_points(data, known)
-        self.shown: set[str] = set()
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget what a figure has shown."""
         self.residuals: list[Residuals] = []
+        self.left_out: dict[str, np.ndarray] = {}
+        self.apart: dict[str, np.ndarray] = {}
+        self.conditions: set[str] = set()
+        self.over: set[str] = set()
 
     @property
     def has_errors(self) -> bool:
@@ -115,17 +118,20 @@ class Measured:
 
     def column(self, name: str) -> Points | None:
         """Return a column by any of the names of its variable."""
-        return next((self.table[each] for each in (name, *_names_of(name)) if each in self.table), None)
+        return next((self.table[each] for each in (name, *names_of(name)) if each in self.table), None)
 
-    def _rows_of(self, point: dict[str, int], over: str) -> np.ndarray:
-        """True for the rows whose conditions are those of a point of the sweep."""
-        rows = np.ones(len(next(iter(self.table.values())).values), bool)
-        for name, points in self.table.items():
-            for each in _names_of(name):
-                number = self.dataset.variables.get(each)
-                if number is not None and {*number.dims} <= self.sweep and over not in _names_of(name):
-                    value = float(number.isel(point, missing_dims="ignore"))
-                    rows &= np.abs(points.values - value) <= _NEAR * abs(value)
+    def _rows_of(self, curve: Compared, over: str, at_end: bool) -> np.ndarray:
+        """True for the rows whose conditions are those all along a curve, of the last record if it is not over time."""
+        rows, sweep = np.ones(len(next(iter(self.table.values())).values), bool), {*sweep_dims(self.dataset)}
+        prescribed = speed_name(self.dataset) if at_end and "drive_force" not in self.dataset else ""
+        for column in self.table:
+            for name in () if over in names_of(column) else names_of(column):
+                number = self.dataset.variables.get(name, xr.Variable("t", [np.nan]))
+                number = number.isel(t=-1) if name == prescribed else number
+                values = number.isel(curve.line.point, missing_dims="ignore").to_numpy()
+                if {*number.dims} <= sweep and np.ptp(values) == 0.0:
+                    rows &= np.abs(self.table[column].values - values.flat[0]) <= _NEAR * np.abs(values.flat[0])
+                    self.conditions.add(column)
         return rows
 
     def _values(self, name: str, curve: Compared, x: np.ndarray) -> Points | None:
@@ -145,34 +151,55 @@ class Measured:
         return Points(values, None if errors is None else power * np.abs(values / source) * errors)
 
     def draw(
-        self, panel: Axes, over: tuple[str, float], shown: tuple[str, float], curves: Sequence[Compared], log: bool
-    ) -> None:
-        """Draw points in a panel of a variable over another, each with its factor from SI, beside the curves."""
+        self, panel: Axes, over: tuple[str, float], shown: tuple[str, float], curves: Sequence[Compared], log: bool,
+        at_end: bool,
+    ) -> None:  # fmt: skip
+        """Draw points in a panel of a variable over another, each with its factor from SI, beside the curves.
+
+        A row of one curve has its colour and a residual. A row of several curves is black if it has one place.
+        """
         across, (name, factor) = self.column(over[0]), shown
-        if across is None:
-            return
         # the column that the variable has or follows from
-        source = next(
-            (each for each in (name, *_names_of(name), "contact_area", "contact_radius") if each in self.table), ""
-        )
+        sizes = (*_BY,) if name in ("area_ratio", *_BY) else ()
+        source = next((each for each in (*names_of(name), *sizes) if each in self.table), "")
+        if across is None or not source:
+            return
+        self.over.add(over[0])
         x, wide = over[1] * across.values, None if across.errors is None else over[1] * across.errors
-        assigned = any(name in self.table for name in self.sweep)
-        for curve in curves if assigned else curves[:1]:
-            points, rows = self._values(name, curve, x), self._rows_of(curve.line.point, over[0])
-            if points is None or not np.any(rows):
+        matches = np.array([self._rows_of(curve, over[0], at_end) for curve in curves])
+        points = [each for curve in curves if (each := self._values(name, curve, x))]
+        places = np.where(matches, factor * np.array([each.values for each in points]), np.nan)
+        first, count = np.argmax(matches, axis=0), matches.sum(axis=0)
+        y = np.take_along_axis(places, first[np.newaxis], 0)[0]
+        differs = np.any(matches & (np.abs(places - y) > 1e-9 * np.abs(y)), axis=0)
+        given = [self.table[each].values for each in (source, *self.conditions)]
+        lacking = [key for key in curves[0].line.point if self.dataset.sizes[key] > 1 and not self.column(key)]
+        several, beyond = f"of several curves (no column {', '.join(lacking)})", "beyond the curve"
+        ends = [np.all(np.isnan(curve.at(x, curve.mean)[0]), axis=0) for curve in curves]
+        reasons = {
+            "with an empty cell": ~np.all(np.isfinite([x, *given]), axis=0), _NO_CURVE: count == 0, several: differs,
+            "at or below 0 on a logarithmic axis": (x <= 0.0) & log, beyond: ~np.isfinite(y),
+        }  # fmt: skip
+        left_out = np.select([*reasons.values()], [*reasons], "")
+        apart = np.select([left_out != "", count > 1, np.all(ends | ~matches, axis=0)], ["", several, beyond], "")
+        for noted, why in ((self.left_out, left_out), (self.apart, apart)):
+            noted[source] = np.where(noted.get(source, why) == "", "", why)
+        for k, curve in enumerate([*curves, curves[0]]):
+            alone, line = k < len(curves), curve.line if k < len(curves) else curve.line._replace(colour=BOTH)
+            rows = (left_out == "") & ((count == 1) & (first == k) if alone else count > 1)
+            if not np.any(rows):
                 continue
-            y, high = factor * points.values[rows], None if points.errors is None else factor * points.errors[rows]
-            line, label = curve.line if assigned else curve.line._replace(colour=BOTH), "measured"
-            if high is not None and (assigned or len(curves) == 1):
-                values, branches = _residuals(curve, x[rows], y, high, log)
+            errors, label = points[min(k, len(curves) - 1)].errors, "measured"
+            high = None if errors is None else factor * errors[rows]
+            if high is not None and alone:
+                values, branches = _residuals(curve, x[rows], y[rows], high, log)
                 near = np.isfinite(values)
                 if np.any(near):
                     self.residuals.append(Residuals(over[0], source, line, x[rows], values, branches))
                     label += rf", $\chi^2$ = {np.sum(values[near] ** 2):.4g} of {np.sum(near)}"
                     label += " (nearest branch)" * (branches > 1)
             look: Any = HOLLOW | {"color": line.colour, "elinewidth": 0.7, "zorder": 3}
-            panel.errorbar(x[rows], y, high, None if wide is None else wide[rows], label=label, **look)
-            self.shown.add(name)
+            panel.errorbar(x[rows], y[rows], high, None if wide is None else wide[rows], label=label, **look)
 
     def residual_panel(self, panel: Axes, over: str) -> None:
         """Draw the residuals from curves over a variable."""
@@ -186,20 +213,49 @@ class Measured:
         panel.set_ylabel(r"residual ($\sigma$)")
         legend(panel)
 
-    def refuse_undrawn(self, over: str) -> None:
-        """Refuse a table of which nothing could be drawn.
+    @property
+    def remark(self) -> str:
+        """Return how many points the figure lacks or does not compare, and why; "" if there are none."""
+        left_out, apart = (
+            Counter(sorted(np.concatenate([*reasons.values(), np.empty(0, str)]).tolist()))
+            for reasons in (self.left_out, self.apart)
+        )
+        total, drawn = left_out.total(), left_out.pop("", 0)
+        listed = ", ".join(f"{count} {reason}{self._values_of(reason)}" for reason, count in left_out.items())
+        alone = ", ".join(f"{count} {reason}" for reason, count in apart.items() if reason)
+        shown = {each for name in (*self.over, *self.left_out, *self.conditions) for each in names_of(name)}
+        idle = ", ".join(name for name in self.table if name not in shown)
+        drawn_of = f"{drawn} of {total} points drawn; left out: "
+        parts = [(drawn_of, listed), ("without a residual: ", alone), ("no panel of ", idle)]
+        return "; ".join(words + text for words, text in parts if text)
+
+    def _values_of(self, reason: str) -> str:
+        """Return the conditions of rows that are of no curve, in brackets."""
+        rows, texts = np.any([each == reason for each in self.left_out.values()], axis=0), []
+        for name in sorted(self.conditions) if reason == _NO_CURVE else ():
+            values = [engineering(each, self.units[name]) for each in np.unique(self.table[name].values[rows])]
+            texts.append(f"{name} {', '.join(values[:_MOST])}" + ", …" * (len(values) > _MOST))
+        return f" ({'; '.join(texts)})" if texts else ""
+
+    def finish(self, figure: Figure, over: str, ax: Axes | None = None) -> None:
+        """Write the remark below a figure, in foreign axes above the legend.
 
         Raises
         ------
         ValueError
-            With the axis or the columns that the table lacks.
+            If nothing could be drawn, with the axis or the columns that the table lacks.
         """
         if self.column(over) is None:
             raise ValueError(f'{self.source}: no column "{over}", over which the figure is drawn; add it or choose --x')
-        if not self.shown:
+        if not any(np.any(reasons == "") for reasons in self.left_out.values()):
             lack = "no row is of what is drawn: its columns are no variables of this figure, or its conditions differ"
-            columns = ", ".join(self.table)
-            raise ValueError(f"{self.source}: {lack} (columns: {columns}); choose another kind, --x or --where")
+            columns = self.remark or f"columns: {', '.join(self.table)}"
+            raise ValueError(f"{self.source}: {lack} ({columns}); choose another kind, --x or --where")
+        text = textwrap.fill(self.remark, 64)
+        if text and ax is None:
+            figure.supxlabel(text, fontsize=7.0)
+        elif text and ax is not None and (entries := ax.get_legend()):
+            entries.set_title(text)
 
 
 def _residuals(curve: Compared, x: np.ndarray, y: np.ndarray, errors: np.ndarray, log: bool) -> tuple[np.ndarray, int]:

@@ -405,7 +405,7 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     _levels(loads, theories, force)
     if data:
         along = scene if data.column(over) else of_load
-        data.refuse_undrawn(along.over)
+        data.finish(figure, along.over)
         for panel in below:
             data.residual_panel(panel, along.over)
             style.across(panel, along.reach, along.words, room=0.03)

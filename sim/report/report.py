@@ -1,6 +1,7 @@
 """One page of HTML of a whole run: its figures as SVG, tables, measured points, a fit, errors, and the scenario."""
 
 import contextlib
+import copy
 import io
 import itertools
 import json
@@ -97,14 +98,15 @@ class Drawing(NamedTuple):
 def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
     """Return the figures of a dataset: the one that fits it best, then others that show more of it.
 
-    Measured points are in those that have their variables; if there is none, in another that has.
+    Measured points are in the one in which ``sim plot`` draws them, and in others that have their variables.
 
     Raises
     ------
     ValueError
-        If measured points cannot be drawn in any figure.
+        If measured points cannot be drawn there.
     """
-    best = kinds.default(dataset)
+    points = None if data is None else Measured(data, dataset)
+    best, of_points = kinds.default(dataset), kinds.default(dataset, points)
     could = kinds.drawable(dataset)
     others = [kind for kind in could if kind in _ALSO or kinds.KINDS[kind].fits(dataset)]
     # theories have an axis of their own; the end of a run that is on its way says little, and over the speed a sweep
@@ -120,37 +122,27 @@ def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
     # time is no more than another axis for a speed that rises or for creep, and nothing happens in it where a run lasts
     less["time"] = best in ("curve", "creep", "stability") or (best != "time" and lasts and "incipient" not in could)
     shown = [best, *(kind for kind in others if not less.get(kind, False))]
-    drawings = [_drawing(dataset, kind, f"f{number}-", data) for number, kind in enumerate(dict.fromkeys(shown))]
-    if data is None or any(each.measured for each in drawings):
-        return drawings
-    refusals = []
-    for kind in dict.fromkeys([*shown, *could]):
-        if "data" in kinds.KINDS[kind].takes:
-            try:
-                return [_with_data(dataset, kind, "f-data-", data), *drawings]
-            except ValueError as fault:
-                refusals.append(fault)
-    raise refusals[0] if refusals else ValueError("no figure of this run can have measured points")
+    if points is not None and of_points not in shown:
+        shown.insert(0, of_points)
+    return [
+        _drawing(dataset, kind, f"f{number}-", points, kind == of_points)
+        for number, kind in enumerate(dict.fromkeys(shown))
+    ]
 
 
-def _drawing(dataset: xr.Dataset, kind: str, prefix: str, data: Data | None) -> Drawing:
-    """Return a figure, with measured points if it can show them."""
-    if data is not None and "data" in kinds.KINDS[kind].takes:
-        with contextlib.suppress(ValueError):
-            return _with_data(dataset, kind, prefix, data)
+def _drawing(dataset: xr.Dataset, kind: str, prefix: str, points: Measured | None, needed: bool) -> Drawing:
+    """Return a figure, with measured points if it can show them; raise ValueError if it cannot and they are needed."""
     drawing = Drawing(kind, kinds.KINDS[kind].shows, HINTS.get(kind, ""))
+    if points is not None and "data" in kinds.KINDS[kind].takes:
+        measured = copy.copy(points)
+        measured.forget()
+        with contextlib.nullcontext() if needed else contextlib.suppress(ValueError):
+            svg = svg_of(kinds.draw(dataset, kind, Choices(data=measured)), prefix)
+            return drawing._replace(hint=f"{drawing.hint} Rings are measured points.", svg=svg, measured=measured)
     try:
         return drawing._replace(svg=svg_of(kinds.draw(dataset, kind), prefix))
     except ValueError as fault:  # a fault that only the drawing of the kind detects
         return drawing._replace(lacks=str(fault))
-
-
-def _with_data(dataset: xr.Dataset, kind: str, prefix: str, data: Data) -> Drawing:
-    """Return a figure with measured points; raise ValueError if it cannot show them."""
-    measured = Measured(data, dataset)
-    svg = svg_of(kinds.draw(dataset, kind, Choices(data=measured)), prefix)
-    hint = f"{HINTS.get(kind, '')} Rings are measured points."
-    return Drawing(kind, kinds.KINDS[kind].shows, hint, svg, measured=measured)
 
 
 def svg_of(figure: Figure, prefix: str) -> str:
@@ -216,10 +208,14 @@ class Fit(NamedTuple):
 
 
 class Agreement(NamedTuple):
-    """Agreement of measured points with a run: one row a curve and one for all, or the reason why there is none."""
+    """Agreement of measured points with a run: one row a curve and one for all, or the reason why there is none.
+
+    The ``remark`` counts points that are left out.
+    """
 
     rows: Rows
     lacks: str = ""
+    remark: str = ""
 
 
 def agreement(dataset: xr.Dataset, drawn: list[Measured], fit: Fit | None = None) -> Agreement:
@@ -241,22 +237,23 @@ def agreement(dataset: xr.Dataset, drawn: list[Measured], fit: Fit | None = None
         at least as large if only these errors separate them.
     """
     # the residuals of each column and curve once, for curves of one branch
-    once = ({(r.name, r.line.number): r for r in reversed(each.residuals) if r.branches == 1} for each in drawn)
-    curves = max((list(each.values())[::-1] for each in once), key=lambda curves: sum(map(_count, curves)))
+    once = [{(r.name, r.line.number): r for r in reversed(each.residuals) if r.branches == 1} for each in drawn]
+    most = max(range(len(drawn)), key=lambda k: sum(map(_count, once[k].values())))
+    measured, curves = drawn[most], list(once[most].values())[::-1]
     if not curves:
         keys = [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
         lacks = "no curve of the run reaches the measured points, or the curve has several branches"
-        if not {*keys} <= {*drawn[0].table}:
+        if not all(map(measured.column, keys)):
             lacks = f"the run has several curves; give the points a column {keys[0]}, or choose one curve by --where"
-        if not drawn[0].has_errors:
+        if not measured.has_errors:
             lacks = "the measured points have no errors; give them in a column such as contact_area_error"
-        return Agreement([], lacks)
+        return Agreement([], lacks, measured.remark)
     rows = [_row(_label(dataset, curve), [curve]) for curve in curves]
     freedom = sum(map(_count, curves))
     fitted = len(fit.rows) if fit and fit.in_run and freedom - len(fit.rows) == fit.freedom else 0
     if len(curves) > 1 or fitted:
         rows.append(_row(f"all, {fitted} numbers fitted" if fitted else "all", curves, fitted))
-    return Agreement(rows)
+    return Agreement(rows, "", measured.remark)
 
 
 def _count(residuals: Residuals) -> int:

@@ -34,7 +34,7 @@ class TableError(ValueError):
     """A table that cannot be read; the message names the line and the cure, not the file nor its content."""
 
 
-def columns(text: str, wanted: dict[str, Quantity], header: str | None = None) -> dict[str, Array]:
+def columns(text: str, wanted: dict[str, Quantity], header: str | None = None, gaps: bool = False) -> dict[str, Array]:
     """Return named columns of a CSV text in SI units.
 
     Parameters
@@ -49,6 +49,8 @@ def columns(text: str, wanted: dict[str, Quantity], header: str | None = None) -
     header : str, optional
         Names of the columns of a text without that line, whose numbers blanks may separate, too. An empty one
         stands for a key ``header`` that would give them.
+    gaps : bool
+        True if cells may be empty, which are then nan.
 
     Returns
     -------
@@ -95,7 +97,11 @@ def columns(text: str, wanted: dict[str, Quantity], header: str | None = None) -
             quantity.scaled(1.0, unit)
         except ValueError as fault:
             raise TableError(f'{place}: column "{name}" {fault}') from None
-        result[name] = _numbers(name, table, [row[places[0]] for row in table.rows], unit, quantity)
+        filled = [k for k, row in enumerate(table.rows) if row[places[0]] or not gaps]
+        result[name] = np.full(len(table.rows), np.nan)
+        if filled:
+            part, cells = [table.lines[k] for k in filled], [table.rows[k][places[0]] for k in filled]
+            result[name][filled] = _numbers(name, table._replace(lines=part), cells, unit, quantity)
     return result
 
 
@@ -649,7 +655,9 @@ class Points(NamedTuple):
     errors: Array | None
 
 
-def read_measured(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity]) -> dict[str, Points]:
+def read_measured(
+    path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity], gaps: bool = False
+) -> dict[str, Points]:
     """Return the columns of a table of measured values; a note is printed if it has no units.
 
     Parameters
@@ -660,6 +668,8 @@ def read_measured(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[s
         All names that a column may have.
     outcomes : dict of str to Quantity
         Those that may have a column of standard errors beside them, in the same dimension or in ``[%]``.
+    gaps : bool
+        True if cells may be empty, which are then nan.
 
     Raises
     ------
@@ -668,11 +678,11 @@ def read_measured(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[s
     """
     try:
         with blamed(str(path)):
-            result, bare = _measured_columns(plain_text(path), known, outcomes)
+            result, bare = _measured_columns(plain_text(path), known, outcomes, gaps)
     except PydanticCustomError as fault:
         raise BadInput([str(fault)]) from None
     if bare:
-        reach = (f"{name} reaches {np.abs(result[name].values).max():.4g} {known[name].unit}" for name in bare)
+        reach = (f"{name} reaches {np.nanmax(np.abs(result[name].values)):.4g} {known[name].unit}" for name in bare)
         note(f"note: {path}: no units: SI assumed; {', '.join(reach)}")
     return result
 
@@ -696,7 +706,7 @@ def measured_points(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -
 
 
 def _measured_columns(
-    text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity]
+    text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity], gaps: bool
 ) -> tuple[dict[str, Points], list[str]]:
     """Return the columns, and the names of those that would need a unit if none has one."""
     units = headings(text)
@@ -712,11 +722,11 @@ def _measured_columns(
     if bare and any(units.values()):
         cure = f'write "{bare[0]} [{wanted[bare[0]].unit}]" if that is its unit'
         raise TableError(f'column "{bare[0]}" has no unit where others have one; {cure}')
-    arrays = columns(text, wanted)
+    arrays = columns(text, wanted, gaps=gaps)
     for base in (name for name in outcomes if {name, name + ERROR} <= wanted.keys()):
         if wanted[base + ERROR].unit != outcomes[base].unit:  # a share of the value
             arrays[base + ERROR] *= np.abs(arrays[base])
-        if not np.all(arrays[base + ERROR] > 0.0):
+        if np.any(arrays[base + ERROR] <= 0.0):
             raise TableError(f'column "{base}" has a value of 0, whose relative error says nothing; give it in units')
     return measured_points(arrays, known), [name for name in bare if name in known]
 

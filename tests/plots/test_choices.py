@@ -1,5 +1,7 @@
 """What is chosen for a figure is what it shows: a member, a time, an axis, units, measured points, axes to draw in."""
 
+import re
+
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from numpy.testing import assert_allclose
 import sim
 from sim.plots import Choices, kinds as plots, style as pictures
 from sim.plots.field import PIXELS
+from sim.report.report import drawings
 from sim.units.errors import BadInput
 
 LOADS = {"contact.load": [1e-3, 4e-3]}
@@ -156,6 +159,44 @@ def test_measured_points_lie_where_they_were_measured_in_curves_and_loops(loads,
     dataset = simulated(contact=there_and_back, drive=STEADY, shear=shear.Uniform())
     (label,) = (one for one in legend_of(draw(dataset, "loop", data=path).axes[2])[0] if one.startswith("measured, $"))
     assert label.endswith(" of 2")
+
+
+@pytest.mark.parametrize("column", ["normal_load [mN]", "load [N]", "contact_load [uN]"])
+@pytest.mark.parametrize("order", [1, -1])
+def test_each_row_of_a_table_is_drawn_once_or_counted_as_left_out(loads, table, column, order):
+    factor = {"mN": 1e3, "N": 1.0, "uN": 1e6}[column.partition("[")[2].rstrip("]")]
+    known = [(load, 10.0**k, 0.03 + 0.001 * k + load) for load in (1e-3, 4e-3) for k in range(-1, 2)]
+    beyond, unknown = (4e-3, 1e6, 0.02), [(9e-3, 1.0, 0.03), (2e-3, 2.0, 0.03), (9e-3, 3.0, 0.03)]
+    every = [*known, beyond, *unknown, (4e-3, 5.0, ""), (1e-3, 0.0, 0.02)][::order]
+    rows = "".join(f"{factor * load}, {speed}, {area}, 1e-3\n" for load, speed, area in every)
+    path = table(f"{column}, speed [mm/s], contact_area [mm^2], contact_area_error [mm^2]\n{rows}")
+    figure = draw(loads, "curve", data=path, absolute=True, units=("mm/s",))
+    first, *others = figure.axes
+    assert not any(map(points_of, others[:-1]))
+    drawn_of = {line.get_color(): line.get_data() for line in first.lines if line.get_mfc() == "white"}
+    for colour, load in zip(pictures.LINES, (1e-3, 4e-3), strict=False):
+        wanted = sorted((speed, area) for each, speed, area in [*known, beyond] if each == load)
+        assert_allclose(sorted(np.transpose(drawn_of[colour]).tolist()), wanted, rtol=1e-12)
+    remark = " ".join(figure.get_supxlabel().split())
+    numbers = re.findall(r"(\d+) (?:of 12|of no|with|at|beyond)", remark)
+    assert [*map(int, numbers)] == [7, 1, 3, 1, 1] and "2 mN, 9 mN" in remark
+    (drawing,) = (each for each in drawings(loads, path) if each.measured)
+    assert drawing.kind == plots.default(loads) and drawing.measured.remark == remark
+
+
+def test_rows_without_a_load_are_of_no_one_curve_and_a_table_without_speeds_is_refused_in_figure_and_report(
+    loads, table
+):
+    path = table("speed [mm/s], contact_area [mm^2], contact_area_error [%]\n1, 0.04, 1\n2, 0.05, 1\n")
+    area, *_ = (figure := draw(loads, "curve", data=path, absolute=True)).axes
+    assert [line.get_color() for line in area.lines if line.get_mfc() == "white"] == [pictures.BOTH]
+    assert "2 of several curves (no column contact_load)" in " ".join(figure.get_supxlabel().split())
+    with pytest.raises(ValueError, match=r"left out: 2 of several curves"):
+        draw(loads, "curve", data=path)  # the area of JKR's contact is not known
+    path = table("contact_load [mN], contact_area [mm^2]\n1, 0.04\n4, 0.05\n")
+    for show in (lambda: draw(loads, data=path), lambda: drawings(loads, path)):
+        with pytest.raises(ValueError, match='no column "speed"'):
+            show()
 
 
 def test_what_cannot_be_drawn_is_refused_and_given_axes_are_drawn_in(ramp, table, loads, tmp_path, monkeypatch):

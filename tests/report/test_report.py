@@ -235,7 +235,7 @@ def test_points_are_compared_by_chi_square_of_which_a_fit_costs_a_degree_of_free
     assert "contact_load" in agreement(dataset, [drawing.measured]).lacks
     time = {"t": ramp["t"].to_numpy()[[5, 9]], "friction_force": [1e-3, 1e-3]}
     first, second = report.drawings(ramp, time)
-    assert (first.kind, second.kind, second.measured) == ("friction", "curve", None)
+    assert (first.kind, second.kind, second.measured) == ("time", "curve", None)
     with pytest.raises(ValueError, match="no column"):
         report.drawings(ramp, {"bond_fraction": [0.5]})
     monkeypatch.chdir(tmp_path)
