@@ -9,7 +9,7 @@ from typing import NamedTuple, cast, get_type_hints
 import numpy as np
 
 from sim.numerics.noise import Noise
-from sim.parts import extremes
+from sim.parts import events
 from sim.parts.contact.balance import Balance
 from sim.parts.coupled import coupled
 from sim.parts.coupled.coupled import StepContact
@@ -36,7 +36,7 @@ class State(NamedTuple):
     bonding: Bonding
     shear: Storing
     contact: ContactState
-    extremes: extremes.Extremes
+    events: events.Events
 
 
 class Trajectory(NamedTuple):
@@ -87,7 +87,7 @@ def start(scenario: Scenario, noise: MemberNoise) -> State:
     if drive.solves_motion:
         around = _step_contact(scenario, touch, shear, range(1, 2))
         slider = coupled.load(scenario.parts, slider, bonding, around, scenario.times.duration)
-    largest = extremes.first(bonding, touch.radius, _pull(scenario, 0.0, touch.radius))
+    largest = events.first(bonding, touch.radius, _pull(scenario, 0.0, touch.radius))
     return State(0, slider, bonds, bonding, shear, touch, largest)
 
 
@@ -115,7 +115,7 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
     if valid < len(steps):
         return advance(scenario, state, noise, steps[:valid])
     at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
-    largest = extremes.after(state.extremes, at_start, bonding, touch.radius, pull, motions, scenario.feels_steps)
+    largest = events.after(state.events, at_start, bonding, touch.radius, pull, motions, scenario.feels_steps)
     end = State(steps[-1], slider, bonds, bonding.at(-1), shear, touch.at(-1), largest)
     return end, _trajectory(motions.time, motions, bonding, energy, driven, touch)
 
@@ -202,7 +202,7 @@ def _named(state: tuple[object, ...]) -> Iterator[tuple[str, Array]]:
 def unpack(scenario: Scenario, arrays: Arrays) -> State:
     """Return the state of a scenario from the arrays of ``pack``."""
     kinds = {name: part.state_class for name, part in scenario.parts._asdict().items()}
-    kinds |= {"bonding": Bonding, "extremes": extremes.Extremes}
+    kinds |= {"bonding": Bonding, "events": events.Events}
     inner = (_assembled(kinds[name], arrays, name) for name in State._fields[1:])
     return State(*cast(State, (int(arrays["step"]), *inner)))
 

@@ -19,7 +19,7 @@ from sim.parts.contact.balance import (
     Shares,
 )
 from sim.parts.drive import READINGS
-from sim.parts.extremes import column
+from sim.parts.events import column
 from sim.scenario.checks import pull_off_error, pulled, renewed
 from sim.scenario.scenario import Scenario
 
@@ -108,18 +108,18 @@ def _equilibrium_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
 
 def _pulled(state: State, name: str, sign: float) -> np.ndarray:
     """Return a column of the largest pull; nan for a contact that was never pulled."""
-    pull = state.extremes.pull
+    pull = state.events.pull
     return np.where(column("largest", pull) > 0.0, sign * column(name, pull), np.nan)
 
 
 #: Quantities of a whole run, read at its end.
 LARGEST = (
     Variable("peak_stress", "Pa", "largest magnitude of the mean shear stress of the run, that of the highest start;"
-          " open contacts count", "tau_p", "bonds", lambda scene, state: column("largest", state.extremes.stress)),
+          " open contacts count", "tau_p", "bonds", lambda scene, state: column("largest", state.events.stress)),
     Variable("peak_friction", "N", "largest magnitude of the friction force of the run, that of the highest start",
-          "F_p", "contact", lambda scene, state: column("largest", state.extremes.friction)),
+          "F_p", "contact", lambda scene, state: column("largest", state.events.friction)),
     Variable("peak_time", "s", "time of the largest shear stress", "t_p", "bonds",
-          lambda scene, state: column("time", state.extremes.stress)),
+          lambda scene, state: column("time", state.events.stress)),
     Variable("pull_off_load", "N", "lowest normal load that the contact bore, a tension; nan without one", "P_min",
           "contact", lambda scene, state: _pulled(state, "largest", -1.0),
           lambda scene: scene.contact.makes_load, "a load that changes"),
@@ -127,10 +127,10 @@ LARGEST = (
           lambda scene, state: _pulled(state, "time", 1.0),
           lambda scene: scene.contact.makes_load, "a load that changes"),
     Variable("step_renewal", "1", "largest share of the variance of DeltaGamma that a clock step renews", "", "drive",
-          lambda scene, state: renewed(scene, state.extremes.path),
+          lambda scene, state: renewed(scene, state.events.path),
           lambda scene: scene.feels_steps, "an edge that lags, or tension"),
     Variable("pull_off_error", "N", "systematic error of the load at pull-off by the clock step, at most about", "",
-          "drive", lambda scene, state: pull_off_error(scene, state.extremes.path),
+          "drive", lambda scene, state: pull_off_error(scene, state.events.path),
           lambda scene: scene.feels_steps and pulled(scene) and scene.contact.load is not None,
           "fluctuations, and a contact.load that pulls"),
 )  # fmt: skip

@@ -18,7 +18,7 @@ _RESOLVED = 5.0
 MAXIMUM = record("before last largest time")
 
 
-class Extremes(NamedTuple):
+class Events(NamedTuple):
     """Running maxima over the clock steps, rows of ``MAXIMUM``; NaN counts as 0; ties keep the first.
 
     ``stress`` is that of the shear stress [Pa] and ``friction`` that of the friction force [N], in magnitude; ``pull``
@@ -32,11 +32,11 @@ class Extremes(NamedTuple):
     path: Array
 
 
-def first(bonding: Bonding, radius: Array, pull: Array) -> Extremes:
+def first(bonding: Bonding, radius: Array, pull: Array) -> Events:
     """Maxima at t = 0 of the bonds' stress, of friction over a contact radius [m] and of a pull [N]."""
     stress = np.abs(bonding.stress)
     maxima = (_started(np.nan_to_num(values)) for values in (stress, stress * (np.pi * radius**2), pull))
-    return Extremes._make([*maxima, np.zeros(1)])
+    return Events._make([*maxima, np.zeros(1)])
 
 
 def column(name: str, maxima: Array) -> Array:
@@ -50,9 +50,9 @@ def _started(values: Array) -> Array:
 
 
 def after(
-    so_far: Extremes, before: tuple[Bonding, Array], bonding: Bonding, radius: Array, pull: Array, motions: Motion,
+    so_far: Events, before: tuple[Bonding, Array], bonding: Bonding, radius: Array, pull: Array, motions: Motion,
     with_path: bool = False,
-) -> Extremes:  # fmt: skip
+) -> Events:  # fmt: skip
     """Maxima a block of steps later, from the bonds, contact radius [m] and pull [N] at the end of each.
 
     ``before`` are bonds and contact radius at its start. The path is followed only ``with_path``.
@@ -78,7 +78,7 @@ def after(
     ends = motions.first, motions.speed, motions.time[:, 0], motions.duration[:, 0]
     _follow(stress, stiffness, relaxation, radii, pull, *ends, *largest)
     path = np.maximum(so_far.path, motions.path.max(axis=0)) if with_path else so_far.path
-    return Extremes._make([*largest, path])
+    return Events._make([*largest, path])
 
 
 def _with_start(before: Array, values: Array, steps: int) -> Array:
