@@ -13,6 +13,7 @@ from sim.parts import events
 from sim.parts.contact.balance import Balance
 from sim.parts.coupled import coupled
 from sim.parts.coupled.coupled import StepContact
+from sim.parts.drive import Driven
 from sim.parts.exchange import Array, Bonding, ContactState, Indices, Motion, Sliding, Storing, during
 from sim.scenario.scenario import Scenario
 
@@ -87,8 +88,9 @@ def start(scenario: Scenario, noise: MemberNoise) -> State:
     if drive.solves_motion:
         around = _step_contact(scenario, touch, shear, range(1, 2))
         slider = coupled.load(scenario.parts, slider, bonding, around, scenario.times.duration)
-    largest = events.first(bonding, touch.radius, _pull(scenario, 0.0, touch.radius))
-    return State(0, slider, bonds, bonding, shear, touch, largest)
+    stage = cast(Driven, slider).stage_position if has_stage(scenario) else np.empty(0)
+    seen = events.first(bonding, touch.radius, _pull(scenario, 0.0, touch.radius), stage)
+    return State(0, slider, bonds, bonding, shear, touch, seen)
 
 
 def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) -> tuple[State, Trajectory]:
@@ -115,9 +117,19 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
     if valid < len(steps):
         return advance(scenario, state, noise, steps[:valid])
     at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
-    largest = events.after(state.events, at_start, bonding, touch.radius, pull, motions, scenario.feels_steps)
-    end = State(steps[-1], slider, bonds, bonding.at(-1), shear, touch.at(-1), largest)
+    seen = events.after(state.events, at_start, bonding, touch.radius, pull, motions, scenario.feels_steps)
+    if has_stage(scenario):
+        stage = sliders.stage_position, sliders.stage_speed
+        of_slider = sliders.spring_force, sliders.position, motions.slip, bonding.stress, sliders.work
+        late = 0.5 * scenario.times.duration
+        seen = seen._replace(slips=seen.slips.after(motions.time[:, 0], stage, of_slider, late))
+    end = State(steps[-1], slider, bonds, bonding.at(-1), shear, touch.at(-1), seen)
     return end, _trajectory(motions.time, motions, bonding, energy, driven, touch)
+
+
+def has_stage(scenario: Scenario) -> bool:
+    """Return True if a stage pulls the slider through a spring."""
+    return scenario.drive.model == "spring"
 
 
 def _trajectory(

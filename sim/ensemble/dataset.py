@@ -45,6 +45,8 @@ _STATISTICS = {
     "std": "standard deviation over the ensemble of",
     "sem": "standard error of the ensemble mean of",
 }
+#: Statistic of quantities of the whole run, which members may lack.
+_COUNT = {"count": "number of members that have a"}
 
 
 class Described(NamedTuple):
@@ -59,11 +61,12 @@ class Described(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Variables of a quantity by statistic, "" for itself, and their axes: of members (``each``), of time."""
+    """Variables of a quantity by statistic, "" for itself, and their axes: of members (``each``), of time, ``axis``."""
 
     names: dict[str, str]
     each: bool = True
     timed: bool = True
+    axis: str = ""
 
     def axes(self, piece: "Piece", rows: slice = slice(None)) -> tuple[int | slice, ...]:
         """Return the index of the numbers of some members in a piece."""
@@ -100,8 +103,8 @@ class Outline:
         self.variables[name] = Described(kind, dimensions, attributes, values, chunks, compression)
 
 
-def outline(plan: Plan) -> Outline:
-    """Return the dataset of a plan without the numbers of its parts."""
+def outline(plan: Plan, parts: Blocks) -> Outline:
+    """Return the dataset of a plan without the numbers of its parts, which say how many slip events there are."""
     sweep = {variable_name(axis.keys[0]): len(axis.values) for axis in plan.scenario.sweep}
     content, shape = Outline(sweep, {**sweep}, attributes(plan)), tuple(sweep.values())
     for place, axis in enumerate(plan.scenario.sweep):
@@ -114,6 +117,8 @@ def outline(plan: Plan) -> Outline:
     content.sizes["t"] = clock.records
     content.add("t", "f8", ("t",), "s", "time since the start", "t", clock.times)
     _add_numbers(content, plan)
+    slips = [variable.name for variable in plan.largest if variable.axis == "slip"]
+    content.sizes |= {"slip": 1} if slips else {}
     for variable in plan.variables + plan.largest:
         content.places[variable.name] = _add_recorded(content, plan, variable)
     if plan.scenario.record.maps:
@@ -128,6 +133,11 @@ def outline(plan: Plan) -> Outline:
         for index, block in enumerate(plan.blocks(plan.points[pack.start])):
             names = [part_name(pack.start, group, index) for group in range(len(groups))]
             content.pieces.append(Piece(where, slice(block.records.start, block.records.stop), members, names))
+            if slips and block.end == clock.steps:
+                content.sizes["slip"] = max(content.sizes["slip"], *(parts.load(n)[slips[0]].shape[-1] for n in names))
+    if slips:
+        numbers = np.arange(1, content.sizes["slip"] + 1)
+        content.add("slip", "i4", ("slip",), "1", "number of the slip event of a member", "", numbers)
     return content
 
 
@@ -241,12 +251,14 @@ def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:
     varies = plan.varies(recorded)
     each = varies and plan.per_member
     dimensions = (*sweep, *(["member"] if each else []), *([] if whole else ["t"]))
+    dimensions += (recorded.axis,) if recorded.axis else ()
     block = {"member": plan.group, "t": max(1, plan.records_of_block(plan.points[0]))}
     block |= dict.fromkeys(sweep[-1:], len(plan.packs[0]))
     chunks = None if whole else tuple(block.get(dimension, 1) for dimension in dimensions)
     prescribed = any(variable.name == SPEED and not plan.varies(variable) for variable in plan.variables)
     names = {}
-    for statistic, of in (_STATISTICS if varies and not each else {"": ""}).items():
+    statistics = _STATISTICS | (_COUNT if whole else {})
+    for statistic, of in (statistics if varies and not each else {"": ""}).items():
         kind = "f4" if record.precision == "float32" and not (statistic or whole) else "f8"
         compression: str = "zlib" if whole else record.compression
         more: dict[str, Any] = {"coordinates": SPEED} if prescribed and not whole and name != SPEED else {}
@@ -256,7 +268,7 @@ def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:
         names[statistic] = "_".join(filter(None, (name, statistic)))
         described = recorded.unit, f"{of} {recorded.long_name}".strip(), recorded.symbol
         content.add(names[statistic], kind, dimensions, *described, None, chunks, compression, **more)
-    return Place(names, each, not whole)
+    return Place(names, each, not whole, recorded.axis)
 
 
 def _add_maps(content: Outline, plan: Plan) -> None:
@@ -340,6 +352,8 @@ def _fill(outline: Outline, parts: Blocks, variables: Mapping[str, Any]) -> None
                 place, values = outline.places.get(name), stored if rank else stored[0]
                 if place is None:
                     continue
+                if place.axis:
+                    values = padded(values, outline.sizes[place.axis])
                 if snapshot:
                     drawn = slice(rows.start, rows.start + values.shape[rank])
                     variables[name][(*piece.where, drawn, int(snapshot))] = values
@@ -349,28 +363,41 @@ def _fill(outline: Outline, parts: Blocks, variables: Mapping[str, Any]) -> None
                     pools.setdefault(name, []).append(np.moveaxis(values, rank, 0))
         for name, groups in pools.items():
             place = outline.places[name]
-            for statistic, values in pooled(groups).items():
-                variables[place.names[statistic]][place.axes(piece)] = values
+            statistics = pooled(groups)
+            for statistic, variable in place.names.items():
+                variables[variable][place.axes(piece)] = statistics[statistic]
 
 
-def moments(values: np.ndarray) -> np.ndarray:
-    """Return count, mean and sum of squared deviations over the first axis, shape (3, records) or (3,)."""
-    mean = np.ascontiguousarray(values.T).mean(axis=-1)
-    squares = np.ascontiguousarray(((values - mean) ** 2).T).sum(axis=-1)
-    return np.stack([np.full_like(mean, len(values)), mean, squares])
+def padded(values: np.ndarray, length: int) -> np.ndarray:
+    """Return values with a last axis of a length, nan beyond their own."""
+    return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, length - values.shape[-1])], constant_values=np.nan)
+
+
+def moments(values: np.ndarray, lacking: bool = False) -> np.ndarray:
+    """Return count, mean and sum of squared deviations over the first axis, shape (3, records) or (3,).
+
+    If members may be ``lacking`` a value, nan, they are those of the others.
+    """
+    rows = np.ascontiguousarray(values.T)
+    known = ~np.isnan(rows) if lacking else np.True_
+    count = np.broadcast_to(known, rows.shape).sum(axis=-1)
+    with np.errstate(invalid="ignore"):
+        mean = rows.sum(axis=-1, where=known) / count
+    squares = np.ascontiguousarray(((values - mean) ** 2).T).sum(axis=-1, where=known)
+    return np.stack([count, mean, squares])
 
 
 def pooled(groups: list[np.ndarray]) -> dict[str, np.ndarray]:
-    """Return mean, standard deviation and standard error from the ``moments`` of groups, pooled in their order."""
+    """Return mean, standard deviation, standard error and count of the ``moments`` of groups, pooled in their order."""
     count, mean, squares = groups[0]
-    for other, other_mean, other_squares in groups[1:]:
-        total, step = count + other, other_mean - mean
-        mean = mean + step * other / total
-        squares = squares + other_squares + step**2 * count * other / total
-        count = total
     with np.errstate(invalid="ignore", divide="ignore"):
+        for other, other_mean, other_squares in groups[1:]:
+            total, step = count + other, np.where(other > 0.0, other_mean - mean, 0.0)
+            mean = np.where(count > 0.0, mean + step * other / total, other_mean)
+            squares = np.where(count > 0.0, squares + other_squares + step**2 * count * other / total, other_squares)
+            count = total
         deviation = np.sqrt(squares / (count - 1.0))
-    return {"mean": mean, "std": deviation, "sem": deviation / np.sqrt(count)}
+        return {"mean": mean, "std": deviation, "sem": deviation / np.sqrt(count), "count": count}
 
 
 def attributes_of(path: Path) -> dict[str, Any]:

@@ -115,8 +115,8 @@ class Plan:
 
     @cached_property
     def largest(self) -> tuple[Variable, ...]:
-        """Return the quantities that are recorded once a run."""
-        return self._recorded(LARGEST)
+        """Return the quantities that are recorded once a run; slip events are those of members."""
+        return tuple(each for each in self._recorded(LARGEST) if each.axis != "slip" or self.per_member)
 
     def _recorded(self, variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
         wanted = (variable for variable in variables if self.scenario.record.keeps(variable.name))

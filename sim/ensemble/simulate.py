@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 
 from sim.engine import MemberNoise, State, Trajectory, follow
-from sim.ensemble.dataset import attributes, attributes_of, identity, in_memory, moments, outline, write
+from sim.ensemble.dataset import attributes, attributes_of, identity, in_memory, moments, outline, padded, write
 from sim.ensemble.execute import compute
 from sim.ensemble.plan import Block, Plan, Task, snapshots
 from sim.ensemble.preview import fitting, refuse_full_disk
@@ -112,7 +112,7 @@ def run(
             blocks = MemoryBlocks() if folder is None else BlockFiles(Path(folder))
             simulate(plan, blocks, **how)
             stage("writing")
-            content = outline(plan)
+            content = outline(plan, blocks)
             return located(xarray.Dataset(in_memory(content, blocks), attrs=content.attributes))
     claim(Path(to), replace or resume, files_read(scenario), BESIDE)
     target = Path(to).resolve() if Path(to).is_symlink() else Path(to)
@@ -160,7 +160,7 @@ def _run(
     if busy and (shard != WHOLE or of == 1):
         raise folder.refusal(busy[0], of)
     stage("writing")
-    is_done = folder.publish(names, of, lambda path: write(outline(plan), folder.blocks, path))
+    is_done = folder.publish(names, of, lambda path: write(outline(plan, folder.blocks), folder.blocks, path))
     if is_done is False and shard == WHOLE:
         shards = ", ".join(f"{number}/{of}" for number in busy) or "some"
         raise OutputBusy(f"other processes run the shards {shards} of {target}; when they are done, --resume goes on")
@@ -199,7 +199,13 @@ def advance(task: Task, number: int, state: State | None) -> tuple[State, Arrays
         recorded.append(arrays)
     if len(recorded) == 1:  # without a copy, as maps may be large
         return end, {key: values[np.newaxis] for key, values in recorded[0].items()}
-    return end, {key: np.stack([arrays[key] for arrays in recorded]) for key in recorded[0]}
+    return end, {key: _stacked([arrays[key] for arrays in recorded]) for key in recorded[0]}
+
+
+def _stacked(arrays: list[np.ndarray]) -> np.ndarray:
+    """Return arrays along a new first axis, each padded by nan to the longest last axis."""
+    longest = max(values.shape[-1] for values in arrays)
+    return np.stack([padded(values, longest) for values in arrays])
 
 
 def _record(task: Task, point: Scenario, state: State | None, block: Block) -> tuple[State, dict[str, np.ndarray]]:
@@ -224,9 +230,11 @@ def _record(task: Task, point: Scenario, state: State | None, block: Block) -> t
     if block.end == clock.steps:
         for largest in LARGEST:
             if largest.name in task.quantities:
-                rows[largest.name] = np.broadcast_to(largest.read(point, end), rows_of[largest.name])
+                values = largest.read(point, end)
+                rows[largest.name] = np.broadcast_to(values, (rows_of[largest.name], *np.shape(values)[1:]))
     if task.pooled:
-        rows |= {name: moments(values) for name, values in rows.items() if name in task.each}
+        whole = {largest.name for largest in LARGEST}
+        rows |= {name: moments(values, name in whole) for name, values in rows.items() if name in task.each}
     return end, rows | maps
 
 

@@ -1,11 +1,12 @@
 """Quantities of a dataset: recorded at each time, known of each scene, drawn as maps; with unit, name and symbol."""
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from sim.engine import State, Trajectory, balance
+from sim.engine import State, Trajectory, balance, has_stage
 from sim.laws import jkr
 from sim.parts.contact.balance import (
     BONDS_ONLY,
@@ -19,7 +20,7 @@ from sim.parts.contact.balance import (
     Shares,
 )
 from sim.parts.drive import READINGS
-from sim.parts.events import column
+from sim.parts.events import LATE, MOMENTS, SLIP, Slips, column
 from sim.scenario.checks import pull_off_error, pulled, renewed
 from sim.scenario.scenario import Scenario
 
@@ -31,7 +32,8 @@ class Variable(NamedTuple):
     ``read`` takes the scenario and what a batch went through, a ``Trajectory``, and gives an array that broadcasts to
     shape (times, members); that of a quantity of the whole run takes the state at its end, that of a number the
     scenario alone.
-    ``applies`` is True for the scenes of which it is recorded, with ``condition`` in words.
+    ``applies`` is True for the scenes of which it is recorded, with ``condition`` in words. A quantity of the whole run
+    may have an ``axis``: a dimension beside that of the members.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Variable(NamedTuple):
     read: Callable[..., Any]
     applies: Callable[[Scenario], bool] = lambda scene: True
     condition: str = ""
+    axis: str = ""
 
 
 def _until_stopped(read: Callable[[Scenario, Trajectory], np.ndarray]) -> Callable[[Scenario, Trajectory], np.ndarray]:
@@ -113,7 +116,7 @@ def _pulled(state: State, name: str, sign: float) -> np.ndarray:
 
 
 #: Quantities of a whole run, read at its end.
-LARGEST = (
+LARGEST: tuple[Variable, ...] = (
     Variable("peak_stress", "Pa", "largest magnitude of the mean shear stress of the run, that of the highest start;"
           " open contacts count", "tau_p", "bonds", lambda scene, state: column("largest", state.events.stress)),
     Variable("peak_friction", "N", "largest magnitude of the friction force of the run, that of the highest start",
@@ -133,6 +136,53 @@ LARGEST = (
           "drive", lambda scene, state: pull_off_error(scene, state.events.path),
           lambda scene: scene.feels_steps and pulled(scene) and scene.contact.load is not None,
           "fluctuations, and a contact.load that pulls"),
+)  # fmt: skip
+
+#: Columns of slip events and moments of late ones: unit, meaning, symbol.
+_SLIPS = {
+    "time": ("s", "time at which a slip event begins, that of the largest spring force", "t_s"),
+    "end": ("s", "time at which a slip event ends, that of the least spring force", ""),
+    "amplitude": ("m", "displacement of the slider in a slip event", "S"),
+    "speed": ("m/s", "speed of the stage at which a slip event begins", ""),
+    "force_before": ("N", "spring force at which a slip event begins, in the sense of the stage", "Q_s"),
+    "force_after": ("N", "spring force at the end of a slip event, in the sense of the stage", ""),
+    "stress_before": ("Pa", "largest shear stress from the slip event before to this one", ""),
+    "stress_after": ("Pa", "least shear stress in a slip event", ""),
+    "force_drop": ("N", "fall of the spring force in a slip event", ""),
+    "recurrence": ("s", "time from the beginning of a slip event to that of the next", ""),
+}
+_MOMENTS = {"mean": "mean", "std": "standard deviation", "least": "least", "largest": "largest"}
+
+
+def _slip(name: str, described: tuple[str, str, str], read: Callable[[Slips], Any], axis: str = "") -> Variable:
+    """Return a quantity of slip events."""
+    about = has_stage, 'drive.model = "spring"', axis
+    return Variable(name, *described, "drive", lambda scene, state: read(state.events.slips), *about)
+
+
+def _late(quantity: str, moment: str) -> Callable[[Slips], Any]:
+    """Return the reading of a moment of late slip events; nan without events enough."""
+
+    def read(slips: Slips) -> np.ndarray:
+        row = slips.late[:, LATE.index(quantity)].view(MOMENTS)[:, 0]
+        with np.errstate(invalid="ignore"):
+            values = np.sqrt(row["squares"] / (row["count"] - 1.0)) if moment == "std" else row[moment]
+        return np.where(row["count"] > (moment == "std"), values, np.nan)
+
+    return read
+
+
+LARGEST += (
+    *(_slip(f"slip_{column}", _SLIPS[column], functools.partial(Slips.column, name=column), "slip")
+      for column in SLIP.names or ()),
+    _slip("slip_count", ("1", "number of slip events", ""), lambda slips: slips.total),
+    _slip("slip_count_late", ("1", "number of slip events that begin in the second half of the run", ""),
+          lambda slips: slips.late[:, 0, 0]),
+    *(_slip(f"late_{name}_{moment}", (_SLIPS[name][0], f"{text} over slip events that begin in the second half of the"
+                                      f" run: {_SLIPS[name][1]}", ""), _late(name, moment))
+      for name in LATE for moment, text in _MOMENTS.items()),
+    _slip("kinetic_friction", ("N", "work of the stage over its path, from the first slip event in the second half of"
+          " the run to the last; without two over the second half", "F_k"), Slips.kinetic_friction),
 )  # fmt: skip
 
 VARIABLES: tuple[Variable, ...] = (

@@ -212,6 +212,11 @@ class Driven(NamedTuple):
     energies: Array
     acceleration: Array
 
+    @property
+    def work(self) -> Array:
+        """Work of the stage or of the force since the start [J]."""
+        return self.energies[..., 0]
+
     def at(self, k: int) -> "Driven":
         """Return the slider at the end of step k of a block."""
         return Driven(*(values[k] for values in self))

@@ -1,4 +1,7 @@
-"""Largest stress, friction and pull of a run so far, followed at every step and refined between steps."""
+"""Events of a run, seen at every clock step: the largest stress, friction and pull, and slip events.
+
+Maxima are refined between steps. Records have no influence on events.
+"""
 
 import math
 from typing import NamedTuple
@@ -18,25 +21,235 @@ _RESOLVED = 5.0
 MAXIMUM = record("before last largest time")
 
 
+#: Fall of the spring force that makes a slip event, and rise that ends it, over the largest force so far.
+FALL, RISE = 0.3, 0.1
+#: Slip of the interface over the slider's advance in a slip event, at least.
+_SLIPPED = 0.5
+#: Slip events of a member that are stored at most.
+MOST_SLIPS = 1000
+#: A slip event: its time (that of the force's maximum) and its end [s], the slider's advance [m], speed of the stage
+#: at its time [m/s], spring force there and at its end [N], largest stress since the event before and least stress in
+#: the event [Pa]. Forces and stresses are in the sense in which the stage moves.
+SLIP = record("time end amplitude speed force_before force_after stress_before stress_after")
+#: Work of the stage [J], path of the stage and of the slider [m], all since the start.
+_GONE = "work", "path", "gone"
+#: State of the detector: sense in which the stage moves and its position, that of the slider, slip of the interface so
+#: far, largest force so far, 1 once the force has fallen far enough; positions of slider and interface at the last
+#: maximum of the force and at its least value since; time of the event before; count of all events. Then the event that
+#: may come, as ``SLIP``. Last ``_GONE`` now, at the last maximum, at half of the run, and at the first and the last of
+#: the late events.
+SLIPPING = record(
+    "sense stage position slid largest falling top top_slid low low_slid before count "
+    + " ".join([*(SLIP.names or ()), *_GONE])
+    + "".join(f" {at}_{name}" for at in ("top", "half", "first", "last") for name in _GONE)
+)
+#: Quantities of late slip events of which moments are kept, and their moments.
+LATE = "force_before", "force_drop", "amplitude", "recurrence"
+MOMENTS = record("count mean squares least largest")
+
+
+class Slips(NamedTuple):
+    """Slip events of members; no rows if no stage pulls.
+
+    Attributes
+    ----------
+    running : array, shape (members, columns)
+        State of the detector, rows of ``SLIPPING``.
+    late : array, shape (members, quantities, 5)
+        Moments of the quantities ``LATE`` of events in the second half of the run, rows of ``MOMENTS``.
+    log : array, shape (members, events, 8)
+        The first events, rows of ``SLIP``, nan beyond the last.
+    """
+
+    running: Array
+    late: Array
+    log: Array
+
+    @classmethod
+    def none(cls, stage: Array) -> "Slips":
+        """Return the slip events before the first sample, for positions of the stage at the start [m]."""
+        columns = (len(kind.names or ()) for kind in (SLIPPING, MOMENTS, SLIP))
+        running, late, log = (
+            np.zeros((len(stage), *rows, count)) for rows, count in zip(((), (len(LATE),), (0,)), columns, strict=True)
+        )
+        running.view(SLIPPING)[:, 0]["stage"] = stage
+        return cls(running, late, log)
+
+    def after(self, time: Array, stage: tuple[Array, Array], slider: tuple[Array, ...], half: float) -> "Slips":
+        """Return the slip events after some more samples.
+
+        Parameters
+        ----------
+        time : array, shape (samples,)
+            Times [s].
+        stage : tuple of arrays, shape (samples, members)
+            Position [m] and speed [m/s] of the stage.
+        slider : tuple of arrays, shape (samples, members)
+            Spring force [N], position of the slider [m], slip of the interface since the sample before [m], shear
+            stress [Pa], and work of the stage since the start [J].
+        half : float
+            Time from which on events are late [s].
+        """
+        samples = time, *stage, *slider, half
+        slips = self._replace(running=self.running.copy(), late=self.late.copy(), log=self.log[:, :0].copy())
+        _follow_slips(*samples, *slips)
+        count = slips.total
+        if np.array_equal(count, self.total):
+            return slips._replace(log=self.log)
+        room = 2 ** math.ceil(math.log2(min(count.max(), MOST_SLIPS)))  # of the count alone, not of the blocks
+        log = np.full((len(count), room, self.log.shape[2]), np.nan)
+        log[:, : self.log.shape[1]] = self.log
+        slips = Slips(self.running.copy(), self.late.copy(), log)
+        _follow_slips(*samples, *slips)
+        return slips
+
+    @property
+    def total(self) -> Array:
+        """Return the number of slip events of each member so far."""
+        counts: Array = self.running.view(SLIPPING)[:, 0]["count"]
+        return counts
+
+    def column(self, name: str) -> Array:
+        """Return a column of the first events by its name in ``SLIP``, shape (members, events)."""
+        return self.log[..., (SLIP.names or ()).index(name)]
+
+    def kinetic_friction(self) -> Array:
+        """Return the work of the stage over its path [N], from the first late event to the last.
+
+        Without two late events the span is the second half of the run. nan if the slider went less than half as far as
+        the stage, which stretches the spring.
+        """
+        state = self.running.view(SLIPPING)[:, 0]
+        slips = self.late[:, 0].view(MOMENTS)[:, 0]["count"] > 1.0
+        between = (state[f"last_{name}"] - state[f"first_{name}"] for name in _GONE)
+        since_half = (state[name] - state[f"half_{name}"] for name in _GONE)
+        work, path, gone = (np.where(slips, *spans) for spans in zip(between, since_half, strict=True))
+        follows = (path > 0.0) & (gone > _SLIPPED * path)
+        friction: Array = np.divide(work, path, out=np.full(len(path), np.nan), where=follows)
+        return friction
+
+
+@device
+def slip_ends(time, stage, speed, force, position, slip, stress, work, state, event):
+    """Take one sample of a slider behind a spring; return True if a slip event has ended, and fill it in.
+
+    Notes
+    -----
+    A slip event is a fall of the spring force by more than ``FALL`` of its largest magnitude so far, from a maximum to
+    the next minimum, during which the interface slips at least half of the slider's advance. The minimum is known once
+    the force has risen again by ``RISE`` of the largest. A stage that stops or turns back ends a fall without an event.
+    """
+    if math.isnan(position):
+        return False
+    sense = 1.0 if stage > state.stage else -1.0 if stage < state.stage else 0.0
+    turns = sense != state.sense
+    state.path += math.fabs(stage - state.stage)
+    state.gone += math.fabs(position - state.position)
+    state.sense, state.stage, state.position, state.work = sense, stage, position, work
+    state.slid += slip
+    if math.fabs(force) > state.largest:
+        state.largest = math.fabs(force)
+    if turns:
+        state.before = math.nan
+    if sense == 0.0:
+        return False
+    pull, bears = sense * force, sense * stress
+    rises = not turns and state.falling > 0.0 and pull - state.force_after > RISE * state.largest
+    slips = False
+    if rises:
+        advance, slid = sense * (state.low - state.top), sense * (state.low_slid - state.top_slid)
+        slips = advance > 0.0 and slid >= _SLIPPED * advance
+        if slips:
+            event.time, event.end, event.amplitude, event.speed = state.time, state.end, advance, state.speed
+            event.force_before, event.force_after = state.force_before, state.force_after
+            event.stress_before, event.stress_after = state.stress_before, state.stress_after
+    if turns or rises:
+        state.falling, state.force_before, state.stress_before = 0.0, -math.inf, bears
+    if bears > state.stress_before:
+        state.stress_before = bears
+    if pull > state.force_before:
+        state.force_before, state.time, state.speed = pull, time, math.fabs(speed)
+        state.top, state.top_slid, state.force_after, state.stress_after = position, state.slid, math.inf, bears
+        state.top_work, state.top_path, state.top_gone = work, state.path, state.gone
+    if bears < state.stress_after:
+        state.stress_after = bears
+    if pull < state.force_after:
+        state.force_after, state.end, state.low, state.low_slid = pull, time, position, state.slid
+    if state.force_before - state.force_after > FALL * state.largest:
+        state.falling = 1.0
+    return slips
+
+
+@device
+def _gather(value, moments):
+    """Add a value to the moments of those before."""
+    row = moments.view(MOMENTS)[0]
+    first = row.count == 0.0
+    row.count += 1.0
+    apart = value - row.mean
+    row.mean += apart / row.count
+    row.squares += apart * (value - row.mean)
+    if first or value < row.least:
+        row.least = value
+    if first or value > row.largest:
+        row.largest = value
+
+
+@kernel(
+    f"void(Array(float64, 1, 'A', readonly=True), {7 * _READ}float64, "
+    "float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1])"
+)
+def _follow_slips(times, stage, speed, force, position, slip, stress, work, half, running, late, log):
+    columns = np.zeros(log.shape[2])
+    event = columns.view(SLIP)[0]
+    for i in range(len(running)):
+        state = running[i].view(SLIPPING)[0]
+        for k in range(len(times)):
+            mark = state.top_work, state.top_path, state.top_gone
+            sample = times[k], stage[k, i], speed[k, i], force[k, i], position[k, i], slip[k, i], stress[k, i]
+            ended = slip_ends(*sample, work[k, i], state, event)
+            if times[k] >= half and state.half_path == 0.0:  # a stage at rest has no path
+                state.half_work, state.half_path, state.half_gone = state.work, state.path, state.gone
+            if not ended:
+                continue
+            if state.count < min(log.shape[1], MOST_SLIPS):
+                log[i, int(state.count)] = columns
+            if event.time >= half:
+                state.last_work, state.last_path, state.last_gone = mark
+                if late[i, 0, 0] == 0.0:
+                    state.first_work, state.first_path, state.first_gone = mark
+                _gather(event.force_before, late[i, 0])
+                _gather(event.force_before - event.force_after, late[i, 1])
+                _gather(event.amplitude, late[i, 2])
+                if state.before >= half:
+                    _gather(event.time - state.before, late[i, 3])
+            state.count += 1.0
+            state.before = event.time
+
+
 class Events(NamedTuple):
     """Running maxima over the clock steps, rows of ``MAXIMUM``; NaN counts as 0; ties keep the first.
 
     ``stress`` is that of the shear stress [Pa] and ``friction`` that of the friction force [N], in magnitude; ``pull``
     is that of the tensile load of a closed contact [N], followed where the control makes the load. ``path`` is the
-    longest path within a step [m], shape (1,) or (members,).
+    longest path within a step [m], shape (1,) or (members,). ``slips`` are the slip events.
     """
 
     stress: Array
     friction: Array
     pull: Array
     path: Array
+    slips: Slips
 
 
-def first(bonding: Bonding, radius: Array, pull: Array) -> Events:
-    """Maxima at t = 0 of the bonds' stress, of friction over a contact radius [m] and of a pull [N]."""
+def first(bonding: Bonding, radius: Array, pull: Array, stage: Array) -> Events:
+    """Maxima at t = 0 of the bonds' stress, of friction over a contact radius [m] and of a pull [N].
+
+    ``stage`` are positions of the stages that pull through a spring [m].
+    """
     stress = np.abs(bonding.stress)
-    maxima = (_started(np.nan_to_num(values)) for values in (stress, stress * (np.pi * radius**2), pull))
-    return Events._make([*maxima, np.zeros(1)])
+    started = (_started(np.nan_to_num(values)) for values in (stress, stress * (np.pi * radius**2), pull))
+    return Events._make([*started, np.zeros(1), Slips.none(stage)])
 
 
 def column(name: str, maxima: Array) -> Array:
@@ -74,11 +287,11 @@ def after(
     rows = max(len(so_far.stress), stress.shape[1])
     members = max(rows, len(so_far.friction), radii.shape[1])
     counts = rows, members, max(len(so_far.pull), pull.shape[1])
-    largest = [values + np.zeros((count, 1)) for values, count in zip(so_far[:-1], counts, strict=True)]
+    largest = [values + np.zeros((count, 1)) for values, count in zip(so_far[:3], counts, strict=True)]
     ends = motions.first, motions.speed, motions.time[:, 0], motions.duration[:, 0]
     _follow(stress, stiffness, relaxation, radii, pull, *ends, *largest)
     path = np.maximum(so_far.path, motions.path.max(axis=0)) if with_path else so_far.path
-    return Events._make([*largest, path])
+    return Events._make([*largest, path, so_far.slips])
 
 
 def _with_start(before: Array, values: Array, steps: int) -> Array:

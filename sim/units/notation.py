@@ -22,6 +22,13 @@ Recorded = Literal[
     "runaway_time",
     "peak_stress", "peak_friction", "peak_time", "pull_off_load", "pull_off_time",
     "step_renewal", "pull_off_error",
+    "slip_time", "slip_end", "slip_amplitude", "slip_speed", "slip_force_before", "slip_force_after",
+    "slip_stress_before", "slip_stress_after", "slip_count", "slip_count_late",
+    "late_force_before_mean", "late_force_before_std", "late_force_before_least", "late_force_before_largest",
+    "late_force_drop_mean", "late_force_drop_std", "late_force_drop_least", "late_force_drop_largest",
+    "late_amplitude_mean", "late_amplitude_std", "late_amplitude_least", "late_amplitude_largest",
+    "late_recurrence_mean", "late_recurrence_std", "late_recurrence_least", "late_recurrence_largest",
+    "kinetic_friction",
 ]  # fmt: skip
 
 

@@ -13,7 +13,7 @@ def followed(samples, step=0.5, slopes=None, radii=(ONE, ONE)):
     """Running maximum of a stress given by its values, slopes where they are known; friction over a growing area."""
     zero, slopes = np.zeros(1), slopes or [np.full(1, np.nan)] * len(samples)
     bondings = [Bonding(zero, np.asarray(one), zero, zero, slope) for one, slope in zip(samples, slopes, strict=True)]
-    maxima = events.first(bondings[0], radii[0], zero)
+    maxima = events.first(bondings[0], radii[0], zero, np.empty(0))
     whole = _after(maxima, bondings, radii, step, 1)
     for number in range(1, len(bondings)):
         maxima = _after(maxima, bondings[number - 1 : number + 1], radii, step, number)
