@@ -37,7 +37,15 @@ No energy exceeds ten times the larger of the two, with this exception: `dissipa
 grows, because bonds that are gained are stretched as the others are (`bonds.area = "present"`). Under a load that
 cycles behind a stage at rest it adds up.
 """,
-    "Numbers of the scene": "Every quantity of the scenario is a variable, too, named as its key with underscores.\n",
+    "Numbers of the scene": """Every quantity of the scenario is a variable, too, named as its key with underscores.
+
+Events are seen by the engine at its clock steps, whatever the records. A *slip event* is a fall of the spring force by
+more than 0.3 of the largest force so far, from its maximum to the next minimum, during which the interface slips at
+least half of the slider's advance. The minimum is known once the force has risen again by 0.1 of the largest. A stage
+that stops or turns back ends a fall without an event. The first 1,000 events of a member are kept one by one, if
+members are; moments are those of all. With `per_member = false` an event has a `<name>_count`, too: the number of
+members that had it, of which the mean and its error are.
+""",
     "Known before the run": "As far as the model of `[shear]` has them. The largest errors are attributes, too.\n",
     "Stress maps": """`dataset.shear_map[0, 0].plot(x="x")` draws a map with the sliding direction across, as
 `sim plot OUT.nc map` does.
@@ -82,6 +90,7 @@ MAPS = "record.maps"
 COORDINATES = (
     ("t", "s", "t", "time since the start", ""),
     ("member", "1", "member", "number of the ensemble member", "members differ and each is kept"),
+    ("slip", "1", "slip", "number of the slip event of a member", 'drive.model = "spring", and each member is kept'),
     ("map_member", "1", "map_member", "member of a map", MAPS),
     ("map_time", "s", "map_time", "time of a map", MAPS),
     ("x", "m", "x", "position along the sliding direction", MAPS),
@@ -97,7 +106,16 @@ def text() -> str:
         ((v.name, v.unit, "*sweep*, t", v.long_name, v.condition) for v in VARIABLES),
         [
             *((n.name, n.unit, "*sweep*", n.long_name, n.condition) for n in NUMBERS),
-            *((one.name, one.unit, "*sweep*, member", one.long_name, one.condition) for one in LARGEST),
+            *(
+                (
+                    one.name,
+                    one.unit,
+                    ", ".join(filter(None, ("*sweep*, member", one.axis))),
+                    one.long_name,
+                    one.condition,
+                )
+                for one in LARGEST
+            ),
         ],
         ((name, "1", "*sweep*", meaning, "") for name, meaning in KNOWN_ERRORS.items()),
         [

@@ -9,6 +9,7 @@ from helpers.random_scenes import random_scene
 
 import sim
 from sim.engine import MemberNoise, follow, pack, unpack
+from sim.ensemble.variables import LARGEST
 from sim.parts.drive import READINGS
 
 #: Seeds of the scenes: thirty, and scenes whose energies, sub-steps or messages have been wrong; 26 takes ten seconds.
@@ -76,17 +77,24 @@ def check_missing(scenario, course):
 
 
 def check_cuts(scenario, course, end):
-    """A member alone, a resumed run and sparse records have the same numbers, bit for bit."""
+    """A member alone, a resumed run and sparse records have the same numbers and events, bit for bit."""
     last = scenario.clock.steps
-    _, alone = run(scenario, [1], range(last + 1))
+    single, alone = run(scenario, [1], range(last + 1))
     middle, _ = run(scenario, range(3), range(last // 3 + 1))
     resumed, _ = run(scenario, range(3), range(last // 3 + 1, last + 1), unpack(scenario, pack(middle)))
-    _, sparse = run(scenario, range(3), range(last % 5, last + 1, 5))
+    seldom, sparse = run(scenario, range(3), range(last % 5, last + 1, 5))
     for name, values in pack(end).items():
         assert np.array_equal(values, pack(resumed)[name], equal_nan=True), f"{name} of a resumed run"
-    for name, dense, single, thin in zip(course._fields, course, alone, sparse, strict=True):
+        assert np.array_equal(values, pack(seldom)[name], equal_nan=True), f"{name} of sparse records"
+    whole = [each for each in LARGEST if each.applies(scenario) and each.name not in ("step_renewal", "pull_off_error")]
+    for largest in whole:
+        dense, single_values = (np.asarray(largest.read(scenario, state)) for state in (end, single))
+        one = dense if len(dense) == 1 else dense[1:2]
+        one = one[:, : single_values.shape[1]] if largest.axis else one  # others may have more slip events
+        assert np.array_equal(one, single_values, equal_nan=True), f"{largest.name} of a member alone"
+    for name, dense, lone, thin in zip(course._fields, course, alone, sparse, strict=True):
         one = dense if name == "time" or dense.shape[1] == 1 else dense[:, 1:2]
-        assert np.array_equal(one, single, equal_nan=True), f"{name} of a member alone"
+        assert np.array_equal(one, lone, equal_nan=True), f"{name} of a member alone"
         assert np.array_equal(dense[last % 5 :: 5], thin, equal_nan=True), f"{name} of sparse records"
 
 

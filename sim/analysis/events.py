@@ -1,12 +1,10 @@
 """Events of a run: slips, jumps of the speed, onset of sliding, detachment, masking, friction peaks, cycles."""
 
 import contextlib
-import itertools
 import math
 from typing import Any
 
 import numpy as np
-import scipy  # which imports the slow scipy.signal when slips need it
 import xarray as xr
 
 from sim.analysis.dataset import (
@@ -25,13 +23,9 @@ from sim.analysis.dataset import (
     with_trajectories,
     word,
 )
-from sim.analysis.observables import KEPT, labelled, masks, ordered, pure
+from sim.analysis.observables import KEPT, labelled, masks, pure
+from sim.parts.events import SLIP
 
-#: Fall of the spring's force over its largest in the run that makes a slip.
-LEAST = 0.02
-
-#: Displacement of the slider over that of the stage above which a fall of the force is a slip.
-_FASTER = 1.0 + 2.0 / math.pi
 #: Speeds of a stage that gets faster or slower between which slips follow each other.
 _ENDS = {
     "slips_from": "lowest speed of the stage, as it gets faster, at which a slip begins that another one follows",
@@ -51,18 +45,22 @@ _SLIPS = {
 }
 #: Relative changes below it are rounding.
 _ROUNDING = 1e-9
-_READ = ("spring_force", "slider_position", "stage_speed", "shear_stress")
+#: Properties of slip events and the quantities of late ones of which the engine records moments.
+_LATE = {
+    "static_friction": "force_before", "force_drop": "force_drop", "slip_amplitude": "amplitude",
+    "recurrence_time": "recurrence",
+}  # fmt: skip
+#: Endings of the names of values of each member, and of statistics.
+_ENDINGS = ("", "_mean", "_std", "_sem")
 
 
-def slips(dataset: xr.Dataset, least: float = LEAST) -> xr.Dataset:
-    """Return the slips of a slider that a stage pulls through a spring, one by one.
+def slips(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the slip events of a slider that a stage pulls through a spring, one by one.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         As ``sim run`` writes it, of a drive ``spring`` with each member recorded.
-    least : float
-        How much the force of the spring falls in a slip at least, over its largest in the run [1].
 
     Returns
     -------
@@ -78,89 +76,25 @@ def slips(dataset: xr.Dataset, least: float = LEAST) -> xr.Dataset:
 
     Notes
     -----
-    In a slip the slider is faster than the stage, so that the spring's force falls: from a maximum to the lowest value
-    before the next. It goes more than 1 + 2/π times as far as the stage, as half a cycle does of a sine that just comes
-    to rest, and the stress falls, too, which it does not where the body rings upon an interface that sticks. Forces and
-    displacements are taken in the sense in which the stage moves, and what its reversal unloads is no slip. Where the
-    force has fallen slowly before, as beyond the maximum of friction, a slip begins at its last maximum. All times are
-    those of records: let a slip last several.
+    The engine sees slip events at its clock steps: a slip event is a fall of the spring force by more than 0.3 of the
+    largest force so far, from its maximum to the next minimum, during which the interface slips at least half of the
+    slider's advance. Ringing upon an interface that sticks is none. Forces and displacements are taken in the sense in
+    which the stage moves. A member has at most 1,000 of them here; ``stick_slip`` counts all.
     """
-    if "stage_speed_mean" in dataset:
+    if "slip_count_mean" in dataset:
         raise ValueError("slips need each member; record them: [record] per_member = true")
-    if "stage_speed" not in dataset:
+    if not bool((word(dataset, "drive.model", "") == "spring").any()):
         raise ValueError('slips need a stage that pulls through a spring: [drive] model = "spring"')
-    outer = [name for name in (*sweep_dims(dataset), MEMBERS) if name in dataset["spring_force"].dims]
-    shape = tuple(dataset.sizes[name] for name in outer)
-    read = [dataset[name].astype(float).broadcast_like(dataset["spring_force"]) for name in _READ]
-    series = [values.transpose(*outer, "t").to_numpy() for values in read]
-    time = dataset["t"].to_numpy()
-    rows = [_slips(least, time, *(values[at] for values in series)) for at in np.ndindex(*shape)]
-    most = max(len(row) for row in rows)
-    table = np.full((len(rows), most, len(_SLIPS)), np.nan)
-    for slots, row in zip(table, rows, strict=True):
-        slots[: len(row)] = row
-    table = table.reshape(*shape, most, len(_SLIPS))
-    described: dict[str, Any] = {
-        name: ((*outer, "slip"), table[..., k], {"units": unit, "long_name": text})
-        for k, (name, (unit, text)) in enumerate(_SLIPS.items())
-    }
-    number = ("slip", np.arange(1, most + 1), {"long_name": "number of the slip"})
-    return xr.Dataset(described, {name: dataset[name] for name in outer} | {"slip": number})
-
-
-def _slips(least: float, time: Any, force: Any, position: Any, stage: Any, stress: Any) -> np.ndarray:
-    """Return the slips of one member, a row each, columns ``_SLIPS``."""
-    known = np.isfinite(force) & np.isfinite(position)
-    if not np.any(known):
-        return np.empty((0, len(_SLIPS)))
-    sense = _sense(stage)
-    turns = np.flatnonzero(np.diff(sense)) + 1
-    ends = np.unique([0, *turns[turns < known.sum()], known.sum()])
-    fall = least * np.max(np.abs(force[known]))
-    pulled = np.concatenate([[0.0], np.cumsum(0.5 * (stage[1:] + stage[:-1]) * np.diff(time))])
-    rows = []
-    for start, stop in itertools.pairwise(ends):
-        along = sense[start] * force[start:stop]
-        moved = sense[start] * (position - _FASTER * pulled)[start:stop]
-        tops = scipy.signal.find_peaks(along, prominence=fall)[0] if fall > 0.0 else np.empty(0, int)
-        until = np.append(tops, stop - start)[1:]
-        lows = [top + int(np.argmin(along[top:end])) for top, end in zip(tops, until, strict=True)]
-        pairs = [(top, low) for top, low in zip(tops, lows, strict=True) if along[top] - along[low] >= fall]
-        if pairs and pairs[-1][1] == stop - start - 1:  # the last one has not ended
-            pairs.pop()
-        pairs = [(_begin(along, moved, top, low, fall), low) for top, low in pairs]
-        top, low = start + np.array(pairs, int).reshape(-1, 2).T
-        ahead, bears = sense[start] * (position[low] - position[top]), sense[start] * stress
-        falls = np.maximum(bears[top], bears[top - 1]) - bears[low]  # as it slips at once, or in the record before
-        slipped = (moved[low - start] > moved[top - start]) & (falls > 0.0)
-        top, low, ahead, falls = top[slipped], low[slipped], ahead[slipped], falls[slipped]
-        after = np.append(time[top], np.nan)[1:]  # when the next one begins
-        rows.append(np.stack([
-            time[top], time[low] - time[top], after - time[low], after - time[top],
-            ahead, np.abs(stage[top]), sense[start] * force[top], sense[start] * (force[top] - force[low]), falls,
-        ], axis=1))  # fmt: skip
-    return np.concatenate(rows)
-
-
-def _begin(force: np.ndarray, moved: np.ndarray, top: int, low: int, fall: float) -> int:
-    """Return the record at which a slip begins: the top, or the last maximum if the force falls slowly from the top.
-
-    ``moved`` grows where the slider is as fast as in a slip.
-    """
-    if moved[low] > moved[top]:
-        return top
-    later = top + scipy.signal.find_peaks(force[top : low + 1])[0]
-    later = later[force[later] - force[low] >= fall]
-    return int(later[-1]) if later.size else top
-
-
-def _sense(stage: np.ndarray) -> np.ndarray:
-    """Return the sense in which the stage moves, 1 or -1; at rest that before it, at the beginning that after it."""
-    moves = np.flatnonzero(np.nan_to_num(stage))
-    if not moves.size:
-        return np.ones(len(stage))
-    last = np.searchsorted(moves, np.arange(len(stage)), "right") - 1
-    return np.sign(stage[moves[np.maximum(last, 0)]])
+    event = {name: dataset[f"slip_{name}"].astype(float) for name in SLIP.names or ()}
+    begins, following = event["time"], event["time"].shift(slip=-1)
+    values = {
+        "slip_time": begins, "slip_duration": event["end"] - begins, "stick_duration": following - event["end"],
+        "recurrence_time": following - begins, "slip_amplitude": event["amplitude"], "slip_speed": event["speed"],
+        "static_friction": event["force_before"], "force_drop": event["force_before"] - event["force_after"],
+        "stress_drop": event["stress_before"] - event["stress_after"],
+    }  # fmt: skip
+    result = xr.Dataset({name: labelled(values[name], *described) for name, described in _SLIPS.items()})
+    return result.transpose(..., "slip")
 
 
 def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
@@ -174,56 +108,42 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Under a stage ``slip_count``, and the means over the slips of what ``slips`` has of each; of a stage at one
-        speed those that begin in the second half of the run. ``slip_spread`` [1]: the standard deviation of their
+        Under a stage ``slip_count``, and the means over the slip events of what ``slips`` has of each; of a stage at
+        one speed those that begin in the second half of the run, with ``…_least`` and ``…_largest`` of
+        ``static_friction``, ``force_drop``, ``slip_amplitude`` and ``recurrence_time``. ``slip_spread`` [1]: the
+        standard deviation of their
         displacements over its mean, see ``slip_sizes``. Of a stage at several speeds ``slips_from`` and
         ``slips_down_to`` [m/s], its lowest speed on the way up at which a slip begins that another one follows, and on
         the way down at which one begins that follows another: a single one is the fall of friction beyond its maximum.
         ``kinetic_friction`` [N] is the work of the stage over its
-        path, from the beginning of the first of these slips to that of the last, without slips over that time;
+        path, from the first late slip event to the last, without two over the second half of the run;
         nan where the slider went less than half as far as the stage, stretching the spring.
-        Under a prescribed force see ``runaways``. Empty for other drives, and where only statistics were recorded.
+        Under a prescribed force see ``runaways``. Empty for other drives. Where only statistics were recorded, those of
+        the means over late slip events.
     """
     if "stage_speed" not in dataset and {"runaway_time", "spring_force"} <= set(dataset):
         return runaways(dataset)
-    read = {*_READ, "drive_work", "stage_position"}
-    if "stage_speed" not in dataset or not read <= set(dataset.variables):
-        return xr.Dataset()
-    half, at_many_speeds = _beginning(dataset), varies(dataset)
-    trajectories = with_trajectories(dataset, *read)
-    return in_pieces(trajectories, (*sweep_dims(dataset), MEMBERS), lambda piece: _means(piece, half, at_many_speeds))
-
-
-def _means(dataset: xr.Dataset, half: float, several_speeds: bool) -> xr.Dataset:
-    """Return the variables of ``stick_slip``, of slips that begin after a time [s]."""
-    each_slip = slips(dataset).pad(slip=(0, 1))  # a mean needs at least one, also if no slip came
-    begins = each_slip["slip_time"]
-    counted = begins >= half
-    means = each_slip.where(counted).mean("slip", keep_attrs=True)
-    apart = (each_slip["slip_amplitude"] - means["slip_amplitude"]).where(counted)
-    beyond_one = (counted.sum("slip") - 1.0).clip(0.0)
-    spread = ((apart**2).sum("slip") / beyond_one.where(beyond_one > 0.0)) ** 0.5
+    late = {"slip_count": "slip_count_late", "kinetic_friction": "kinetic_friction"}
+    late |= {name: f"late_{quantity}_mean" for name, quantity in _LATE.items()}
+    late |= {f"{name}_{kind}": f"late_{of}_{kind}" for name, of in _LATE.items() for kind in ("least", "largest")}
+    named = {name + ending: source + ending for ending in _ENDINGS for name, source in late.items()}
+    result = xr.Dataset({name: dataset[source].astype(float) for name, source in named.items() if source in dataset})
+    if "slip_time" not in dataset or not result:
+        return result
+    if not is_stationary(dataset):
+        count = pure(dataset["slip_count"].astype(float), "number of slip events")
+        return xr.Dataset({"slip_count": count} | (_between_speeds(dataset) if varies(dataset) else {}))
     text = "standard deviation of the displacements in slips over their mean"
-    means["slip_spread"] = pure(spread / means["slip_amplitude"], text)
-    counts = pure(counted.sum("slip").astype(float), "number of slips")
-    first, last = begins.where(counted).min("slip"), begins.where(counted).max("slip")
-    has_many = last > first
-    end = dataset["t"].where(dataset["spring_force"].notnull()).max("t")
-    first, last = first.where(has_many, half), last.where(has_many, end)
-    path = abs(dataset["stage_position"].diff("t")).cumsum("t").reindex(t=dataset["t"], fill_value=0.0)
-    slid = abs(dataset["slider_position"].astype(float).diff("t")).cumsum("t").reindex(t=dataset["t"], fill_value=0.0)
-    ends = xr.concat([first, last], "end")
-    series = (dataset["drive_work"], path, slid)
-    work, gone, went = (_growth(values, dataset["t"], ends).isel(end=0) for values in series)
-    kinetic = labelled(work / gone.where(went > 0.5 * gone), "N", "work of the stage over its path")
-    every = means.drop_vars(["slip_time", "slip_speed"]).assign(slip_count=counts, kinetic_friction=kinetic)
-    return every.assign(_between_speeds(dataset, each_slip) if several_speeds else {}).map(ordered, keep_attrs=True)
+    result["slip_spread"] = pure(dataset["late_amplitude_std"] / dataset["late_amplitude_mean"], text)
+    counted = dataset["slip_time"] >= _beginning(dataset)
+    means = slips(dataset).where(counted).mean("slip", keep_attrs=True)
+    return result.merge(means[["slip_duration", "stick_duration", "stress_drop"]])
 
 
-def _between_speeds(dataset: xr.Dataset, each_slip: xr.Dataset) -> dict[str, xr.DataArray]:
+def _between_speeds(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
     """Return the speeds of a stage between which slips follow each other."""
-    turn, later = abs(dataset["stage_speed"]).idxmax("t"), each_slip["recurrence_time"].notnull()
-    before = each_slip["slip_time"] <= turn
+    turn, each_slip = abs(dataset["stage_speed"]).idxmax("t"), slips(dataset)
+    later, before = each_slip["recurrence_time"].notnull(), each_slip["slip_time"] <= turn
     chosen = later & before, later.shift(slip=1, fill_value=False) & ~before & each_slip["slip_time"].notnull()
     return {
         name: labelled(each_slip["slip_speed"].where(which).min("slip"), "m/s", text)
@@ -237,7 +157,7 @@ def varies(dataset: xr.Dataset) -> bool:
     return bool((stage.max("t") > (1.0 + _ROUNDING) * stage.min("t")).any())
 
 
-def slip_sizes(dataset: xr.Dataset, of: str = "slip_amplitude", least: float = LEAST) -> xr.Dataset:
+def slip_sizes(dataset: xr.Dataset, of: str = "slip_amplitude") -> xr.Dataset:
     """Return the distribution of the sizes of slips of all members together.
 
     Parameters
@@ -245,9 +165,7 @@ def slip_sizes(dataset: xr.Dataset, of: str = "slip_amplitude", least: float = L
     dataset : xarray.Dataset
         As ``sim run`` writes it, of a drive ``spring`` with each member recorded.
     of : str
-        What the size is, as ``slips`` names it: ``"slip_amplitude"``, ``"force_drop"``, ``"recurrence_time"``, ...
-    least : float
-        How much the force of the spring falls in a slip at least, over its largest in the run [1].
+        Name of the size in ``slips``: ``"slip_amplitude"``, ``"force_drop"``, ``"recurrence_time"``, ...
 
     Returns
     -------
@@ -256,7 +174,7 @@ def slip_sizes(dataset: xr.Dataset, of: str = "slip_amplitude", least: float = L
         are), and ``share_as_large`` [1], the share of slips that are as large or larger. Of a stage at one speed those
         that begin in the second half of the run.
     """
-    each_slip = slips(dataset, least)
+    each_slip = slips(dataset)
     sizes = each_slip[of].where(each_slip["slip_time"] >= _beginning(dataset))
     over = [name for name in (MEMBERS, "slip") if name in sizes.dims]
     sizes = sizes.drop_vars(over, errors="ignore").stack(rank=over, create_index=False)
@@ -312,6 +230,8 @@ def _growth(series: xr.DataArray, times: xr.DataArray, ends: xr.DataArray) -> xr
 _JUMP = 4.0
 #: A force begins at zero if it is below this share of its largest.
 _REST = 0.01
+#: Fall of a force over its largest so far with which it has passed its first maximum.
+_FALL = 0.02
 #: Share of the largest force up to which the law of incipient shear is fitted.
 _FITTED = 0.5
 _STEP = {
@@ -436,7 +356,7 @@ def incipient_law(force: np.ndarray, area: np.ndarray) -> tuple[int, float]:
     >>> print(top, round(alpha, 3))
     3 0.1
     """
-    fallen = np.flatnonzero(force < (1.0 - LEAST) * np.fmax.accumulate(force))
+    fallen = np.flatnonzero(force < (1.0 - _FALL) * np.fmax.accumulate(force))
     top = int(np.nanargmax(force[: fallen[0]] if fallen.size else force))
     small = np.flatnonzero(force[:top] <= _FITTED * force[top])
     with np.errstate(invalid="ignore"):  # no force at all

@@ -97,7 +97,7 @@ _EVENTS = (
     _Column("area_at_threshold", "A/A0\nthere", math.nan, meaning="contact area there over that at rest"),
     _Column("area_by_law", "A0 − αQ²\nover A0", math.nan, meaning="there, by a fit up to half of the threshold"),
     _Column("incipient_alpha", "α", math.nan),
-    _Column("slip_count", "slips", meaning="falls of the spring's force by 2 % or more; times are those of records"),
+    _Column("slip_count", "slips", meaning="falls of the spring force by more than 0.3 of its largest so far"),
     _Column("slips_from", "slips\nfrom", math.nan, meaning="speed of the stage at the first slip that another follows"),
     _Column("slips_down_to", "slips\ndown to", math.nan, meaning="as it gets slower, at the last that follows another"),
     _Column("ran_away", "ran away,\nof members"),

@@ -111,7 +111,8 @@ class Slips(NamedTuple):
 
     def column(self, name: str) -> Array:
         """Return a column of the first events by its name in ``SLIP``, shape (members, events)."""
-        return self.log[..., (SLIP.names or ()).index(name)]
+        stored = int(min(self.total.max(initial=0.0), MOST_SLIPS))
+        return self.log[:, :stored, (SLIP.names or ()).index(name)]
 
     def kinetic_friction(self) -> Array:
         """Return the work of the stage over its path [N], from the first late event to the last.

@@ -2,15 +2,41 @@
 
 import functools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
-from helpers.parts import Adhesion, Bell, Clock, Force, Spring, analysis, run
+from helpers.parts import Adhesion, Bell, Clock, Force, Record, Spring, analysis, run
 from helpers.scenes import scene
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
+import sim
+from sim.ensemble.dataset import moments, pooled as pooled_moments
 from sim.parts.bonds import FirstMoment, Steady, Unbroken
+from sim.parts.events import LATE, SLIP, Slips
+
+NAN = math.nan
+#: A slider of 5 g that sticks and slips at four speeds.
+PULLED = {
+    "clock": {"duration": "1.2 s", "step": "0.2 ms"}, "solid": {"shear_modulus": "0.9 MPa"},
+    "sphere": {"radius": "3 mm"}, "adhesion": {"work": "40 mJ/m^2"}, "contact": {"load": "3 mN"},
+    "drive": {"model": "spring", "stage": "2 mm/s", "stiffness": "150 N/m", "mass": "5 g", "damping": "40 mN s/m"},
+    "bonds": {"model": "rate", "rupture": {"model": "bell", "zero_force_rate": "20 1/s", "bell_force": "4 pN"},
+              "bond_stiffness": "0.8 uN/m", "rebinding_rate": "200 1/s", "site_density": "6e16 1/m^2"},
+    "sweep": {"drive.stage": ["2 mm/s", "3 mm/s", "5 mm/s", "10 mm/s"]},
+}  # fmt: skip
+#: Slide, hold for a second, slide.
+HELD = {
+    "clock": {"duration": "3 s", "step": "0.1 ms"}, "solid": {"shear_modulus": "1.6 MPa"}, "sphere": {"radius": "2 mm"},
+    "adhesion": {"work": "42 mJ/m^2", "bond_share": 0.0}, "contact": {"load": "4 mN"},
+    "drive": {"model": "spring", "stiffness": "1 kN/m", "contact_stiffness": "rigid", "stage": {
+        "time": ["0 s", "0.5 s", "0.5 s", "1.5 s", "1.5 s", "3 s"],
+        "value": ["3 um/s", "3 um/s", "0 m/s", "0 m/s", "3 um/s", "3 um/s"]}},
+    "bonds": {"model": "rate", "rupture": {"model": "bell", "zero_force_rate": "1 1/s", "bell_force": "4 pN"},
+              "bond_stiffness": "0.4 mN/m", "rebinding_rate": "1 1/s", "site_density": "1e16 1/m^2",
+              "start": "steady"},
+}  # fmt: skip
 
 #: Relaxation cycles of bonds N0/(1 + V/Vc), damping 0.04, stiffness 1, speed 1, in units of 5 mN and 5 um.
 FORCE, LENGTH, RECORD = 5e-3, 5e-6, 4e-3
@@ -19,23 +45,37 @@ STICKS, SLIPS, LEAST, MEAN = 0.64, 0.0546142733837, 0.36, 0.673327582372
 
 @functools.cache
 def cycles():
-    """A slider that sticks and slips, in units of FORCE, LENGTH and seconds; do not change it."""
+    """Dataset of ``cycled``; do not change it."""
+    return run(cycled())
+
+
+def cycled():
+    """A slider that sticks and slips, in units of FORCE, LENGTH and seconds."""
     area, stiff = scene(1).contact_area, FORCE / LENGTH
     bonds = Steady(critical_speed=LENGTH, stress=FORCE / area)
     drive = Spring(stage=LENGTH, stiffness=stiff, damping=0.04 * stiff, contact_stiffness="rigid")
     same_area = Adhesion(work=42e-3, bond_share=0.0)
-    return run(scene(2, clock=Clock(duration=5.0, step=RECORD), drive=drive, bonds=bonds, adhesion=same_area))
+    return scene(2, clock=Clock(duration=5.0, step=RECORD), drive=drive, bonds=bonds, adhesion=same_area)
 
 
-def with_force(force, stage=1.0, step=1.0):
-    """A dataset of one member with this force of the spring and speed of the stage."""
-    dataset = cycles().isel(t=slice(0, len(force)), member=slice(0, 1))
-    force, stage = np.asarray(force, float), np.broadcast_to(stage, len(force)).astype(float)
-    way = np.concatenate([[0.0], np.cumsum(stage[1:])]) * step
-    series = {"spring_force": force, "stage_speed": stage, "stage_position": way, "slider_position": way - force}
-    series |= {"shear_stress": 2.0 * force, "drive_work": 0.0 * force}
-    dataset = dataset.assign_coords(t=step * np.arange(len(force)))
-    return dataset.assign({name: (("member", "t"), values[np.newaxis]) for name, values in series.items()})
+def detected(force, stage=1.0, slid=1.0, half=0.0):
+    """Slip events of a spring force, a sample a second; the interface slips a share of the slider's advance."""
+    force, speed = np.asarray(force, float)[:, None], np.broadcast_to(stage, len(force)).astype(float)[:, None]
+    way = np.cumsum(speed, axis=0)
+    position = way - force
+    slip = slid * np.diff(position, axis=0, prepend=0.0)
+    slider = force, position, slip, 2.0 * force, 3.0 * np.cumsum(np.abs(speed), axis=0)
+    first = one = Slips.none(way[0] - speed[0])
+    result = first.after(np.arange(1.0 * len(force)), (way, speed), slider, half)
+    for k in range(len(force)):  # sample by sample
+        one = one.after(np.arange(k, k + 1.0), (way[[k]], speed[[k]]), tuple(values[[k]] for values in slider), half)
+    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, result, strict=True))
+    return result
+
+
+def of(result, name):
+    """A column of the slip events of the only member."""
+    return result.column(name)[0, : int(result.total[0])]
 
 
 def test_stick_slip_mean_force_statistics_and_tables_are_those_of_the_closed_cycle_to_a_record():
@@ -96,67 +136,84 @@ def test_the_mean_speed_is_that_of_the_way_and_without_slips_there_is_kinetic_fr
     assert_allclose(result["kinetic_friction"], FORCE + LENGTH, rtol=1e-6)
 
 
-def test_slips_follow_the_sense_of_the_stage_and_their_sizes_are_shared_out_over_all_members():
+def test_slip_events_of_a_saw_tooth_are_exact_in_the_sense_of_the_stage_and_none_is_of_a_reversal_or_a_rest():
     saw = np.tile([0.0, 1.0, 2.0, 3.0, 4.0, 1.0], 3)  # falls by three after each four
     for sense in (1.0, -1.0):
-        result = analysis.slips(with_force(sense * saw, sense))
-        assert_allclose(result["force_drop"], [[4.0, 4.0]], rtol=1e-14)
-        assert_allclose(result["static_friction"], 4.0, rtol=1e-14)
-        assert_allclose(result["slip_amplitude"], 6.0, rtol=1e-14)  # the stage moves two meanwhile
-        assert_allclose(result["stress_drop"], 8.0, rtol=1e-14)
-    turned = with_force(saw, np.where(np.arange(18) < 9, 1.0, -1.0))
-    result = analysis.stick_slip(turned.assign(drive_work=("t", 3.0 * np.arange(18.0))))
-    assert_allclose(result["kinetic_friction"], 3.0, rtol=1e-14)  # over the path of the stage, not over its way
+        result = detected(sense * saw, sense, half=9.0)
+        assert_array_equal(of(result, "time"), [4.0, 10.0, 16.0][:2])
+        assert_array_equal(of(result, "end"), [6.0, 12.0])
+        assert_array_equal(of(result, "force_before"), 4.0)
+        assert_array_equal(of(result, "force_after"), 0.0)
+        assert_array_equal(of(result, "amplitude"), 6.0)  # the stage moves two meanwhile
+        assert_array_equal(of(result, "stress_before"), 8.0)
+        assert_array_equal(of(result, "stress_after"), 0.0)
+        assert_array_equal(result.late[0, :, 0], [1.0, 1.0, 1.0, 0.0])  # one late event, no recurrence
+    late = detected(saw, half=0.0)
+    assert_allclose(late.late[0, :, 1], [4.0, 4.0, 6.0, 6.0], rtol=1e-14)
+    assert_allclose(late.kinetic_friction(), 3.0, rtol=1e-14)
+    turned = np.where(np.arange(18) < 9, 1.0, -1.0)
+    assert_allclose(detected(saw, turned, half=3.0).kinetic_friction(), 3.0, rtol=1e-14)  # over the path of the stage
     # there and back: the force falls from 3 to -3 as the stage turns, and nothing slips
-    there_and_back = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 1.0, -1.0, -3.0, -3.0])
-    assert analysis.slips(with_force(there_and_back, np.where(np.arange(9) < 5, 1.0, -1.0))).sizes["slip"] == 0
-    saw = np.array([0.0, 4.0, 1.0, 4.0, 2.0, 4.0, 3.0, 4.0, 1.0, 2.0])
-    forward, backward = (
-        with_force(sense * saw, sense * np.linspace(1.0, 1.1, 10)) for sense in (1.0, -1.0)
-    )  # no slip is left out
-    how = {"data_vars": "minimal", "coords": "minimal", "compat": "override", "join": "override"}
-    members = xr.concat([forward, backward], "member", **how)
-    result = analysis.slip_sizes(members, "force_drop")
-    assert_allclose(result["force_drop"], np.repeat([1.0, 2.0, 3.0], [2, 2, 4]), rtol=1e-14)
-    assert_allclose(result["share_as_large"], 1.0 - np.arange(8) / 8.0, rtol=1e-14)
-    amplitude = analysis.slips(forward)["slip_amplitude"][0]
-    spread = analysis.stick_slip(forward)["slip_spread"]
-    assert_allclose(spread, np.std(amplitude, ddof=1) / np.mean(amplitude), rtol=1e-12)
-    assert math.isnan(analysis.stick_slip(with_force(saw[:4]))["slip_spread"].item())  # of one slip
-    cells = [cell for cell in analysis.highlights(cycles())[0] if cell.startswith("spread")]
-    assert len(cells) == 1
+    there_and_back = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 1.0, -1.0, -3.0, -3.0, -2.0])
+    assert detected(there_and_back, np.where(np.arange(10) < 5, 1.0, -1.0)).total == 0
+    # as the stage rests the force relaxes, and after it the next event has no recurrence
+    rest = np.array([0.0, 2.0, 4.0, 1.0, 2.0, 4.0, 2.0, 1.0, 1.0, 2.0, 4.0, 1.0, 2.0])
+    result = detected(rest, np.where((np.arange(13) > 5) & (np.arange(13) < 9), 0.0, 1.0))
+    assert_array_equal(of(result, "time"), [2.0, 10.0])
+    assert result.late[0, 3, 0] == 0.0
 
 
-def test_what_is_a_slip_falls_by_the_least_after_its_last_maximum_without_ringing():
-    slow = [0.0, 2.0, *np.linspace(4.0, 3.6, 9), 3.65]
-    up = np.array([*slow, 1.0, 2.0, 4.0, 1.0, 2.0])
-    first = analysis.slips(with_force(up)).isel(member=0, slip=0)
-    begins = [float(first[name]) for name in ("slip_time", "static_friction", "force_drop")]
-    assert_allclose(begins, [11.0, 3.65, 2.65], rtol=1e-12)
-    speed = np.linspace(1.0, 1.1, len(up))
-    back = slice(-2, None, -1)
-    up_and_down = with_force(np.append(up, [*up[[14, 15, 13, 14, 15, 16]], 2.1]), np.append(speed, speed[back][:7]))
-    result, slips = analysis.stick_slip(up_and_down), analysis.slips(up_and_down).isel(member=0)
-    assert slips.sizes["slip"] == 4
-    assert_allclose(result["slips_from"], speed[11], rtol=1e-14)
-    assert_allclose(result["slips_down_to"], slips["slip_speed"][-1], rtol=1e-14)
-    lone = analysis.stick_slip(with_force(up[:14], speed[:14]))
-    assert lone["slip_count"].item() == 1.0 and np.isnan(lone["slips_from"]).all()  # friction beyond its maximum
-    assert "slips_from" not in analysis.stick_slip(with_force(up))
-    saw = np.array([0.0, 2.0, 4.0, 3.95, 4.0, 3.0, 4.0, 3.5, 4.2])
-    assert analysis.slips(with_force(saw, 0.01)).sizes["slip"] == 2
-    assert analysis.slips(with_force(saw, 0.01), least=0.01).sizes["slip"] == 3
-    assert analysis.slips(with_force(saw, 0.01), least=0.2).sizes["slip"] == 1
-    # a slip that lasts beyond the end of the run is not counted
-    assert analysis.slips(with_force([0.0, 2.0, 4.0, 3.0, 2.0])).sizes["slip"] == 0
-    assert np.isnan(analysis.stick_slip(with_force(np.arange(10.0)))["kinetic_friction"]).all()
-    assert np.all(analysis.stick_slip(with_force(np.ones(10)))["kinetic_friction"] == 0.0)  # at no work of the stage
-    saw = np.array([0.0, 2.0, 4.0, 3.0, 2.0, 3.0, 4.0, 3.0, 2.0, 3.0])
-    assert analysis.slips(with_force(saw)).sizes["slip"] == 2  # the slider goes twice as far as the stage
-    assert analysis.slips(with_force(saw, 1.6)).sizes["slip"] == 0  # 1.625 times, less than 1 + 2/pi
-    # upon an interface that sticks the force falls while the body's swing loads the bonds
-    rings = with_force(saw).assign(shear_stress=(("member", "t"), -saw[np.newaxis]))
-    assert analysis.slips(rings).sizes["slip"] == 0
+def test_a_slip_event_falls_by_three_tenths_of_the_largest_force_so_far_and_is_no_ringing():
+    saw = np.array([0.0, 4.0, 1.0, 4.0, 2.7, 3.9, 2.9, 4.0, 1.0, 2.0])
+    result = detected(saw)
+    assert_array_equal(of(result, "time"), [1.0, 3.0, 7.0])  # 1.3 of 4 is more than 0.3, 1.1 is less
+    moments = result.late[0, LATE.index("force_drop")]
+    assert_allclose(moments[1:], [np.mean([3, 1.3, 3]), 3 * np.var([3, 1.3, 3]), 1.3, 3.0], rtol=1e-13)
+    # an oscillator that rings upon an interface that sticks, or slips less than half as far
+    rings = 4.0 + 2.0 * np.cos(np.arange(60.0)) * np.exp(-0.02 * np.arange(60.0))
+    assert [detected(rings, 0.01, slid=share).total[0] for share in (0.0, 0.49, 0.51)] == [
+        0.0,
+        0.0,
+        6.0,
+    ]  # falls of more than 0.3 of 6
+    assert detected([0.0, 2.0, 4.0, 3.0, 2.0]).total == 0  # a slip that lasts beyond the end of the run
+    assert np.isnan(detected(np.arange(10.0)).kinetic_friction())
+    assert_allclose(detected(np.ones(10)).kinetic_friction(), 3.0, rtol=1e-14)
+    many = detected(np.tile([0.0, 4.0], 1101))
+    assert many.total == 1100 and many.log.shape[1] == 1024 and np.isfinite(many.column("time")[0]).sum() == 1000
+
+
+def test_sizes_of_slips_are_shared_out_over_all_members_and_a_stage_at_many_speeds_slips_between_two():
+    times = np.array([[1.0, 3.0, 5.0, NAN], [2.0, 3.0, 4.0, 7.0]])
+    made_up = {f"slip_{name}": (("member", "slip"), times) for name in SLIP.names}
+    dataset = cycles().drop_dims("slip").assign(made_up | {"slip_count": ("member", [3.0, 4.0])})
+    result = analysis.slip_sizes(dataset, "slip_speed")
+    assert_allclose(result["slip_speed"], [3.0, 3.0, 4.0, 5.0, 7.0, NAN][:5] + [NAN] * 3, rtol=1e-14)
+    assert_allclose(result["share_as_large"][:5], 1.0 - np.arange(5) / 5.0, rtol=1e-14)
+    t = dataset["t"]
+    up_and_down = dataset.assign(stage_speed=dataset["stage_speed"] * (1.0 + np.minimum(t, 5.0 - t)))
+    result = analysis.stick_slip(up_and_down)
+    assert_allclose(result["slip_count"], [3.0, 4.0])
+    assert_allclose(result["slips_from"], [1.0, 2.0])
+    assert_allclose(result["slips_down_to"], [3.0, 3.0])
+
+
+def test_the_scene_of_slips_has_the_counts_of_its_hysteresis_whatever_the_records():
+    """Own counts: falls of the spring force, on all clock steps, by 0.2 to 0.4 of its largest value."""
+    scenes = (PULLED | {"clock": PULLED["clock"] | {"record": record}} for record in ("0.2 ms", "3.2 ms", "1.2 s"))
+    results = [run(sim.Scenario(**scene)) for scene in scenes]
+    for result in results:
+        late = 0.5 * (result["slip_time"] + result["slip_end"]) > 0.4
+        assert late.sum("slip").values.ravel().tolist() == [8, 9, 12, 15]
+    for each in results[1:]:
+        xr.testing.assert_identical(analysis.stick_slip(each), analysis.stick_slip(results[0]))
+
+
+def test_slips_after_a_hold_are_told_apart():
+    """Own closed-form run: forces at the first slip, after a hold of a second, and then every 196.9 ms."""
+    result = analysis.slips(run(sim.Scenario(**HELD))).isel(member=0)
+    assert_allclose(1e6 * result["static_friction"], [1255.0, 1158.0, *[475.0] * 5], rtol=6e-4)
+    assert_allclose(1e3 * result["recurrence_time"][2:-1], 196.9, atol=0.11)
 
 
 def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused():
@@ -180,9 +237,22 @@ def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused(
     cells = {" ".join(heading.split()): cell for heading, cell in analysis.highlights(dataset)[0].items()}
     assert cells["ran away, of members (%)"] == "100"
     assert not any("ran away" in heading for row in analysis.highlights(held) for heading in row)
-    dataset = cycles().drop_vars(["stage_speed", "runaway_time"])
     with pytest.raises(ValueError, match="spring"):
         analysis.slips(dataset)
-    assert not analysis.stick_slip(dataset)
+    assert not analysis.stick_slip(dataset.drop_vars("runaway_time"))
+
+
+def test_statistics_alone_have_the_means_of_slip_events_over_the_members_that_slip():
+    pooled, each = run(replace(cycled(), record=Record(per_member=False))), analysis.stick_slip(cycles())
     with pytest.raises(ValueError, match="per_member"):
-        analysis.slips(cycles().rename(stage_speed="stage_speed_mean"))
+        analysis.slips(pooled)
+    result = analysis.stick_slip(pooled)
+    for name in ("slip_count", "static_friction", "recurrence_time_largest", "kinetic_friction"):
+        assert_allclose(result[f"{name}_mean"], each[name].mean(), rtol=1e-12)
+        assert_allclose(result[f"{name}_sem"], each[name].std(ddof=1) / math.sqrt(2.0), rtol=1e-9, atol=1e-18)
+    values = np.array([[1.0, NAN], [2.0, NAN], [NAN, NAN]])
+    groups = [moments(values[:1], True), moments(values[1:], True), moments(values[2:], True)]
+    result = pooled_moments(groups)
+    assert_array_equal(result["count"], [2.0, 0.0])
+    assert_array_equal(result["mean"], [1.5, NAN])
+    assert_allclose(result["sem"], [0.5, NAN], rtol=1e-14)
