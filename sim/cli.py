@@ -271,14 +271,19 @@ class _Plot(click.Command):
 @click.option("--at", metavar="TIME", help="The record or map nearest to this time, such as 1.3 s.")
 @click.option("--x", default="", metavar="NAME", help="What it is drawn over: t, speed, any variable, a swept key.")
 @click.option("--absolute", is_flag=True, help="Areas in place of shares.")
+@click.option("--size", default="", metavar="SIZE", help="Width and height of the picture, such as 3.4x2.6in.")
+@click.option("--xlim", default="", metavar="LOW:HIGH", help="Range of the x axis in its unit, such as 0.1:10.")
+@click.option("--from", "start", metavar="TIME", help="First time of a figure over time, such as 0.2 s.")
+@click.option("--to", "stop", metavar="TIME", help="Last time of a figure over time.")
 @click.option("--units", multiple=True, metavar="UNIT", help="Unit of axes of its dimension, such as mm/s.")
 @click.option("--data", type=_PATH, help="Measured points from a CSV of columns as those of `sim fit`.")
 @_FORCE
 def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...], force: bool, **choices: Any) -> None:
     """Draw a figure: of a KIND, or without one the first of these kinds that fits the dataset.
 
-    Of a scenario, OUTPUT.toml, that of its spectrum before any run. Any kind takes --where, --member and --units, those
-    below what stands beside them.
+    KIND may also be a statement, such as pull_off_load: it is drawn over the swept key. The figure of a scenario,
+    OUTPUT.toml, is that of its spectrum before any run. Any kind takes --where, --member, --units, --size and --xlim,
+    and the options beside its name. --from and --to are for kinds over time.
     """
     from sim.plots import kinds as plots
 

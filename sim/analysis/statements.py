@@ -19,6 +19,11 @@ COUNTS = frozenset(("bond_fraction", "slip_count", "slip_count_late", "detachmen
 
 #: Shares that are at least 0 and at most 1.
 BOUNDED = frozenset(("fraction_detached", "fraction_masked", "time_masked", "ever_detached", "ran_away"))
+#: Quantities that grow with the time, so that no mean over a span says anything.
+_GROWING = (
+    "slider_position", "stage_position", "drive_work", "dissipated_", "energy_residual", "substeps", "detachment_time",
+    "runaway_time",
+)  # fmt: skip
 
 
 class Statement(NamedTuple):
@@ -89,7 +94,8 @@ def statements(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.
         over = averaging(dataset, late).removeprefix("mean over the ")
         for key in (key for key in group if str(key).endswith("_mean")):
             group[key] = group[key].assign_attrs(over=over)
-        result = result.merge(group, compat="no_conflicts")
+        kept = [key for key in group if not str(key).startswith(_GROWING)]
+        result = result.merge(group[kept], compat="no_conflicts", join="outer")
     return result
 
 
@@ -98,7 +104,9 @@ def of_events(dataset: xr.Dataset) -> xr.Dataset:
     result = events(dataset)
     reasons = result[[name for name in result if str(name).endswith("_reason")]]
     members = summary(result.drop_vars(reasons).assign_attrs(dataset.attrs))
-    return members.merge(as_means(half_lives(dataset, result)), compat="no_conflicts").merge(reasons)
+    for further in (as_means(half_lives(dataset, result)), reasons):
+        members = members.merge(further, compat="no_conflicts", join="outer")
+    return members
 
 
 def as_means(values: xr.Dataset) -> xr.Dataset:

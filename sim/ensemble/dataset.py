@@ -141,6 +141,10 @@ def outline(plan: Plan, parts: Blocks) -> Outline:
     return content
 
 
+#: Most letters of a swept course in the long name of its key.
+_WORDS = 90
+
+
 def variable_name(key: str) -> str:
     """Return the variable of a key of the scenario, swept or not, so that runs can be joined along any key."""
     return key.replace(".", "_")
@@ -156,15 +160,31 @@ def _add_sweep_coordinates(content: Outline, plan: Plan, axis: Axis, stride: int
             described = quantity.unit, quantity.meaning, quantity.symbol, [numbers[key][1] for numbers in points]
             content.add(variable_name(key), "f8", along, *described)
         else:
-            labels = [_label(row[position]) for row in axis.values]
+            labels = [_label(key, row[position]) for row in axis.values]
             names = [label if labels.count(label) == 1 else f"{label} {i}" for i, label in enumerate(labels, 1)]
-            content.add(variable_name(key), str, along, "", f"swept {key}", "", np.array(names, object))
+            courses = [(name, row[position]) for name, row in zip(names, axis.values, strict=True)]
+            meanings = [f"{name}: {_course(value)}" for name, value in courses if _is_course(value)]
+            words = ", ".join(filter(None, [f"swept {key}", "; ".join(meanings)]))
+            content.add(variable_name(key), str, along, "", words, "", np.array(names, object))
 
 
-def _label(value: Any) -> str:
-    if isinstance(value, dict):
-        return str(value.get("model") or json.dumps(value, sort_keys=True))
-    return str(value)
+def _is_course(value: Any) -> bool:
+    """True for a course or a table, which is no model and too long for a label."""
+    return isinstance(value, list) or (isinstance(value, dict) and "model" not in value)
+
+
+def _label(key: str, value: Any) -> str:
+    """Return a short name of a swept value that is no number: its model, or the last word of the key."""
+    if _is_course(value):
+        return key.rpartition(".")[2]
+    return str(value["model"] if isinstance(value, dict) else value)
+
+
+def _course(value: Any) -> str:
+    """Return a course or a table in words, shortened."""
+    parts = value.items() if isinstance(value, dict) else [("", value)]
+    words = " ".join(f"{key} {', '.join(map(str, p)) if isinstance(p, list) else p}" for key, p in parts).strip()
+    return words if len(words) <= _WORDS else f"{words[: _WORDS - 1]}…"
 
 
 def scenario_json(scenario: Scenario, per_member: bool | None = None) -> str:

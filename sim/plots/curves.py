@@ -2,6 +2,7 @@
 
 import contextlib
 import difflib
+import textwrap
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, cast
 
@@ -12,7 +13,18 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
-from sim.analysis import averaging, bond_work, is_stationary, is_steady, setting, settled, slips, summary, sweep_dims
+from sim.analysis import (
+    averaging,
+    bond_work,
+    is_stationary,
+    is_steady,
+    setting,
+    settled,
+    slips,
+    statements,
+    summary,
+    sweep_dims,
+)
 from sim.analysis.dataset import answered, speed_name, speed_of, stays_held
 from sim.analysis.events import jumps
 from sim.analysis.observables import KEPT, observables, share_observables
@@ -618,3 +630,54 @@ def sweep_figure(
         names = dataset[scene.over].to_numpy()
         axes[-1].set_xticks(range(names.size), [str(value) for value in names])
     return figure
+
+
+def statement_figure(dataset: xr.Dataset, name: str) -> Figure:
+    """Draw a statement over the first swept key with its 95 % interval; further keys make curves.
+
+    An arrow is a bound: the value lies beyond. Curves are sorted along numbers.
+    """
+    stated = statements(dataset)
+    key, mean = dataset[style.swept(dataset)[0]], stated[f"{name}_mean"]
+    others = [dim for dim in style.swept(dataset) if dim != key.name]
+    lines, bar, left_out = _lines_of(dataset, others)
+    is_number = key.dtype.kind in "fi"
+    x = np.sort(key.to_numpy().astype(float)) if is_number else np.arange(key.size)
+    order = np.argsort(key.to_numpy()) if is_number else x
+    kinds = ("mean", "low", "high")
+    values = [stated.get(f"{name}_{kind}", xr.full_like(mean, np.nan)).broadcast_like(mean) for kind in kinds]
+    unit = Unit.of(x, key.attrs.get("units", "1"), axis_scale(x) == "log") if is_number else Unit(1.0, "")
+    figure, (panel,) = style.rows([2.2])
+    sizes = np.concatenate([each.to_numpy().ravel() for each in values])
+    text = str(mean.attrs.get("long_name", name)).removeprefix("ensemble mean of ").partition(",")[0]
+    factor = style.in_unit(panel.yaxis, "\n".join(textwrap.wrap(text, 44)), sizes, str(mean.attrs.get("units", "1")))
+    for line in lines:
+        points = {dim: at for dim, at in line.point.items() if dim in mean.dims}
+        curves = [factor * np.broadcast_to(each.isel(points).to_numpy(), x.size)[order] for each in values]
+        _interval(panel, unit.factor * x, curves, line.colour if len(lines) > 1 else BOTH, line.label, is_number)
+    scale = axis_scale(x) if is_number else "linear"
+    if axis_scale(np.abs(sizes[np.isfinite(sizes)])) == "log" and np.all(sizes[np.isfinite(sizes)] > 0.0):
+        panel.set_yscale("log")
+    words = f"{key.attrs.get('long_name', key.name).partition(',')[0]} {symbol(key)}".strip()
+    style.across(panel, unit.factor * x, unit.label(words), scale, 0.05)
+    if not is_number:
+        panel.set_xticks(x, [str(label) for label in key.to_numpy()])
+    over = f"mean over the {mean.attrs['over']}, 95 % intervals" if mean.attrs.get("over") else ""
+    style.legend(panel, "; ".join(filter(None, [over, left_out])))
+    if bar:
+        figure.colorbar(bar[0], ax=[panel], label=bar[1], aspect=45, pad=0.02)
+    return figure
+
+
+def _interval(panel: Axes, x: np.ndarray, curves: list[np.ndarray], colour: str, label: str, is_joined: bool) -> None:
+    """Draw values with the ends of their intervals, and arrows where an end is a bound."""
+    mean, low, high = curves
+    look: Any = {"color": colour, "elinewidth": 0.8, "capsize": 1.5, "linestyle": "none"}
+    known = np.isfinite(mean)
+    errors = np.nan_to_num([np.maximum(mean - low, 0.0), np.maximum(high - mean, 0.0)])
+    panel.errorbar(x[known], mean[known], errors[:, known], **look)
+    panel.plot(x, mean, marker="o", markersize=3, color=colour, label=label, linestyle="-" if is_joined else "none")
+    for bound, other, sign in ((low, high, {"lolims": True}), (high, low, {"uplims": True})):
+        alone = ~known & np.isfinite(bound) & ~np.isfinite(other)
+        if alone.any():
+            panel.errorbar(x[alone], bound[alone], 0.1 * np.abs(bound[alone]), **(look | sign))

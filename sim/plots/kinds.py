@@ -2,6 +2,9 @@
 
 import contextlib
 import inspect
+import math
+import re
+import textwrap
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,7 +14,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sim.analysis import sweep_dims
+from sim.analysis import engineering, statements, sweep_dims
 from sim.analysis.dataset import MEMBERS, answered, claim, plain, speed_name
 from sim.numerics.files import claim as claim_file, output
 from sim.plots import curves, field, slider, style, theories
@@ -19,6 +22,11 @@ from sim.plots.measured import Measured
 from sim.plots.style import STYLE, recorded, swept_value
 from sim.units.errors import BadInput
 from sim.units.quantity import read_option
+
+#: Kinds of figures over time, of which a part can be drawn.
+_OVER_TIME = ("time", "friction", "creep", "stress")
+_SIZE = re.compile(r"(?P<width>[\d.]+) *[x×] *(?P<height>[\d.]+) *(?P<unit>in|cm|mm)")
+_INCHES = {"in": 1.0, "cm": 1.0 / 2.54, "mm": 0.1 / 2.54}
 
 
 class Choices(NamedTuple):
@@ -28,6 +36,8 @@ class Choices(NamedTuple):
     parameters take ``at``, the time [s] of the record or map that is drawn; ``x``, the variable or swept key that it is
     drawn over; ``absolute``, areas in place of shares; ``data``, measured points in a CSV table or columns in SI by
     name (``{"speed": [1e-3], "contact_area": [4e-8]}``); ``ax``, the matplotlib axes that its first panel is drawn in.
+    ``size`` is that of the picture, such as ``"3.4x2.6in"``; ``xlim`` the range of the x axis in its unit, such as
+    ``"0.1:10"``; ``start`` and ``stop`` limit the time of figures over time.
     """
 
     member: int | None = None
@@ -37,6 +47,10 @@ class Choices(NamedTuple):
     units: tuple[str, ...] = ()
     data: Path | str | Mapping[str, Any] | Measured | None = None
     ax: Axes | None = None
+    size: str = ""
+    xlim: str = ""
+    start: float | str | None = None
+    stop: float | str | None = None
 
     @property
     def chosen(self) -> dict[str, Any]:
@@ -51,7 +65,8 @@ class Choices(NamedTuple):
         ValueError
             For a choice that the kind does not take, or that cannot be read.
         """
-        options = {name: value for name, value in self.chosen.items() if name not in ("member", "units")}
+        of_all = ("member", "units", "size", "xlim", *(("start", "stop") if kind in _OVER_TIME else ()))
+        options = {name: value for name, value in self.chosen.items() if name not in of_all}
         if refused := [name for name in options if name not in takes]:
             words = f"it takes: {', '.join(takes)}" if takes else "it takes none but member and units"
             raise ValueError(f'the figure "{kind}" has no choice of {refused[0]}; {words}')
@@ -64,6 +79,30 @@ class Choices(NamedTuple):
     def measured(self, dataset: xr.Dataset) -> Measured | None:
         """Return the measured points, if there are any."""
         return self.data if self.data is None or isinstance(self.data, Measured) else Measured(self.data, dataset)
+
+    def between(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Return the dataset between the times ``start`` and ``stop``."""
+        start = -math.inf if self.start is None else read_option(self.start, "--from", "s")
+        cut = dataset.sel(t=slice(start, read_option(self.stop, "--to", "s")))
+        if cut.sizes["t"] < 2:
+            last = engineering(float(dataset["t"][-1]), "s")
+            raise ValueError(f"there are fewer than two records between --from and --to; the run ends at {last}")
+        return cut
+
+    def shape(self, figure: Figure) -> None:
+        """Give a figure the chosen size and range of its x axis."""
+        if self.size:
+            if not (match := _SIZE.fullmatch(self.size)):
+                raise ValueError(f'--size takes width x height with a unit, such as 3.4x2.6in, not "{self.size[:40]}"')
+            width, height = (float(match[name]) * _INCHES[match["unit"]] for name in ("width", "height"))
+            figure.set_size_inches(width, height)
+        if self.xlim:
+            try:
+                low, high = map(float, self.xlim.split(":"))
+            except ValueError:
+                words = f'--xlim takes two numbers in the unit of the axis, such as 0.1:10, not "{self.xlim[:40]}"'
+                raise ValueError(words) from None
+            figure.axes[0].set_xlim(low, high)
 
     def of_member(self, dataset: xr.Dataset) -> xr.Dataset:
         """Return the dataset of the chosen member, or of all.
@@ -189,18 +228,28 @@ def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None =
         dims = [(dim, dim.rpartition("_")[2], dim.replace("_", ".", 1)) for dim in style.swept(dataset)]
         over = "sweep" if any(choices.x in words for words in dims) else "time"
         kind = {"": default(dataset, data), "speed": "curve"}.get(choices.x, over)
-    if kind not in KINDS:
-        raise ValueError(f'there is no figure "{kind}"; known: {", ".join(KINDS)}')
-    if missing := _missing(dataset, kind):
+    of_statement = kind not in KINDS and bool(style.swept(dataset)) and f"{kind}_mean" in statements(dataset)
+    drawing = Kind(lambda run: curves.statement_figure(run, str(kind))) if of_statement else KINDS.get(kind)
+    if drawing is None:
+        raise ValueError(f'there is no figure "{kind}"; known: {", ".join(KINDS)}, and statements of a sweep')
+    if not of_statement and (missing := _missing(dataset, kind)):
         raise ValueError(f"{missing}; it can be drawn as: {', '.join(drawable(dataset))}")
-    options = choices.options(kind, KINDS[kind].takes, dataset)
+    options = choices.options(kind, drawing.takes, dataset)
+    dataset = choices.between(dataset) if kind in _OVER_TIME else dataset
     look = contextlib.nullcontext() if choices.ax else mpl.rc_context(STYLE)  # axes of somebody else keep their own
     with look, answered(), style.in_units(choices.units):
-        figure = KINDS[kind].draw(dataset, **options)
+        figure = drawing.draw(dataset, **options)
         fixed = [swept_value(dataset, name, 0) for name in sweep_dims(dataset) if dataset.sizes[name] == 1]
         fixed += [] if choices.member is None else [f"member {choices.member}"]
         if fixed and not choices.ax:
             figure.suptitle(", ".join(fixed), fontsize=mpl.rcParams["axes.titlesize"])
+        labelled = [dataset[name] for name in style.swept(dataset) if dataset[name].dtype.kind not in "fi"]
+        key = [str(label.attrs.get("long_name", "")).partition(", ")[2] for label in labelled]
+        if any(key) and not choices.ax:
+            texts = filter(None, [*"; ".join(filter(None, key)).split("; "), figure.get_supxlabel()])
+            lines = [textwrap.fill(text, 76, subsequent_indent="   ") for text in texts]
+            figure.supxlabel("\n".join(lines), x=0.02, ha="left", fontsize=0.75 * mpl.rcParams["font.size"])
+        choices.shape(figure)
         return figure
 
 
