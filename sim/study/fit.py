@@ -109,6 +109,8 @@ class Fit(NamedTuple):
         True if the search has ended at a minimum.
     remarks : tuple of str
         Conditions on the numbers, a sentence each.
+    lag : Lag, optional
+        Lag of a scenario's own run behind steady speeds, if it is larger than the errors.
     """
 
     scenario: Scenario
@@ -118,6 +120,7 @@ class Fit(NamedTuple):
     correlations: Array
     converged: bool
     remarks: tuple[str, ...]
+    lag: likelihood.Lag | None = None
 
     def __repr__(self) -> str:
         texts = ((item.free.key, *item.texts) for item in self.numbers)
@@ -229,7 +232,8 @@ def _assembled(scenario: Scenario, problem: Problem, best: Minimum, alone: Minim
     result = Fit(scenario, problem, best, tuple(estimates), alike, known and converged, ())
     if not known:
         return result._replace(remarks=("the errors could not be computed: the data do not hold some of the numbers",))
-    return result._replace(scenario=scenario.with_values(result.values), remarks=tuple(_remarks(result)))
+    result = result._replace(scenario=scenario.with_values(result.values), lag=likelihood.lag(problem, best.x))
+    return result._replace(remarks=tuple(_remarks(result)))
 
 
 def _remarks(result: Fit) -> Iterator[str]:
@@ -246,11 +250,17 @@ def _remarks(result: Fit) -> Iterator[str]:
                 yield f"{item.free.key}: the {word} end of its interval could not be computed"
             elif is_open:
                 yield f"{item.free.key}: the data do not set the {word} end of its interval; its bound is given instead"
-    if result.p_value <= POOR:
+    causes = "the model lacks something, a number that is not free is wrong, or the errors are too small"
+    if lag := result.lag:
+        side = f"{100.0 * abs(lag.share):.2g} % {'above' if lag.share > 0.0 else 'below'} that of a steady speed"
         yield (
-            f"the curves lie further off than their errors (p = {result.p_value:.2g}), so the intervals do not hold: "
-            "the model lacks something, a number that is not free is wrong, or the errors are too small"
+            f"the run lags: at {engineering(lag.speed, 'm/s')} its {lag.name} is {side}, {abs(lag.errors):.2g} errors "
+            "of the point; if steady speeds were measured, choose --steady or a slower ramp"
         )
+        causes = "such a lag is enough for it"
+    if result.p_value <= POOR:
+        far = f"the curves lie further off than their errors (p = {result.p_value:.2g}), so the intervals do not hold"
+        yield f"{far}: {causes}"
     for number, name in enumerate(problem.names):
         here = problem.curve == number
         size, least = float(np.median(np.abs(problem.values[here]))), float(np.median(fitted[here]))
@@ -463,8 +473,9 @@ def _quality(fit: Fit) -> str:
     """Return the chi^2 of the fit and, if it has not converged, the cure."""
     likely = f", p = {fit.p_value:.2g}" if math.isfinite(fit.p_value) else ""
     chi_square = f"chi^2 {fit.best.chi_square:.4g} at {fit.problem.freedom} degrees of freedom{likely}"
-    cure = "" if fit.converged else "\nthe fit has not converged: start nearer, give bounds, or free fewer keys"
-    return f"{chi_square}, AICc {fit.aicc:.4g}{cure}"
+    cure = "choose --steady or a slower ramp" if fit.lag else "start nearer, give bounds, or free fewer keys"
+    ending = "" if fit.converged else f"\nthe fit has not converged: {cure}"
+    return f"{chi_square}, AICc {fit.aicc:.4g}{ending}"
 
 
 def _explanation(fit: Fit) -> str:

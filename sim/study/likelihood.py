@@ -10,6 +10,7 @@ error that curves share is one more number, known to be 0 within its size.
 """
 
 import functools
+import itertools
 import math
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -264,8 +265,8 @@ def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool
     result = np.empty((2, len(names), sum(len(group.rows) for group in groups)))
     for group in groups:
         scenario = group.scenario.with_values(dict(values) | {"record": {}})
-        drive, runs = scenario.drive, list[tuple[NDArray[np.int64], Scenario, Reading]]()
-        if by_time or not (drive.solves_motion or drive.model == "steady" or scenario.contact.changes):
+        runs = list[tuple[NDArray[np.int64], Scenario, Reading]]()
+        if by_time or _by_speed(group):
             runs = [(group.rows, scenario, functools.partial(_at_rows, group, by_time))]
         else:
             runs = [(group.rows[k : k + 1], _still(scenario, group, k), _second_half) for k in range(len(group.rows))]
@@ -276,6 +277,12 @@ def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool
         if not group.scenario.drive.solves_motion:
             result[0][:, group.rows] += [*by_steady_sliding(group, values, names).values()]
     return result
+
+
+def _by_speed(group: Group) -> bool:
+    """Return True if a run passes through the speeds of the rows of a group, unless these have times."""
+    drive = group.scenario.drive
+    return not (drive.solves_motion or drive.model == "steady" or group.scenario.contact.changes)
 
 
 def _still(scenario: Scenario, group: Group, row: int) -> Scenario:
@@ -349,6 +356,8 @@ _DRAWN = 200
 _END, _END_SQUARES, _MOST = 1e-3, 1e-5, 30
 #: Rounds in which errors that nobody gave are found.
 _ROUNDS = 4
+#: Distance of a start from the middle between its bounds, over that of a start from a bound.
+_BESIDE = 1e-3
 #: Most evaluations of a minimum, for each number and one more.
 _EVALUATIONS = 100
 
@@ -482,9 +491,15 @@ class Problem:
         """Return True at the numbers of a variable."""
         return np.array(self.names)[self.curve] == name
 
+    def at(self, number: int) -> tuple[int, str, int]:
+        """Return the table, the variable and the row of one of all numbers."""
+        curve, tables = self.curve[number], [place for place, table in enumerate(self.tables) for _ in table.curves]
+        return tables[curve], self.names[curve], number - int(np.argmax(self.curve == curve))
+
     def place(self, number: int) -> str:
-        """Return the variable and the row of one of all numbers."""
-        return f"{self.names[self.curve[number]]}: row {number - int(np.argmax(self.curve == self.curve[number])) + 1}"
+        """Return the variable and the row of one of all numbers, for people."""
+        _, name, row = self.at(number)
+        return f"{name}: row {row + 1}"
 
     def residuals(self, x: Array) -> Array:
         """Deviations over errors, and the common errors over their sizes."""
@@ -511,6 +526,43 @@ class Problem:
         return replace(self, shift=mean - self.steady(x), noise=noise)
 
 
+class Lag(NamedTuple):
+    """Difference of a variable along a run that passes a speed [m/s] from its steady value, over this and its error."""
+
+    speed: float
+    name: str
+    share: float
+    errors: float
+
+
+def lag(problem: Problem, x: Array) -> Lag | None:
+    """Return the lag of a run that passes the speeds of rows, where it adds most to steady sliding; None within errors.
+
+    It is the difference from a run at that speed, because fluctuations add to steady sliding as well.
+    """
+    if not any(map(_by_speed, itertools.chain(*problem.groups))):
+        return None
+    ramp = problem.steady(x) + problem.shift
+    added = np.abs(ramp - replace(problem, by_run=False).steady(x)) / np.hypot(problem.sigma, problem.noise)
+    for number in np.argsort(-added).tolist():
+        table, name, row = problem.at(number)
+        group = next(item for item in problem.groups[table] if row in item.rows)
+        if "t" in problem.tables[table].conditions or not _by_speed(group):
+            continue
+        (k,) = np.flatnonzero(group.rows == row)
+        speed = float(group.speed[k, 0])
+        still = group.scenario.with_values({"drive": {"model": "steady", "speed": speed}})
+        alone = Group(still, np.zeros(1, int), group.time[[k]], group.speed[[k]])
+        mean, noise = (
+            by_runs([alone], problem.numbers(x), [name], False)[:, 0, 0] if added[number] > 1.0 else (0.0, 0.0)
+        )
+        error = math.hypot(problem.sigma[number], 2.0 * noise, 2.0 * problem.noise[number])
+        if mean != 0.0 and abs(ramp[number] - mean) > error:
+            return Lag(speed, name, ramp[number] / mean - 1.0, (ramp[number] - mean) / problem.sigma[number])
+        return None
+    return None
+
+
 class Minimum(NamedTuple):
     """A minimum of the sum of squares, with the covariance of what is free (None where it was not asked for)."""
 
@@ -529,6 +581,8 @@ def minimum(
     for k, (low, high) in enumerate(problem.bounds):
         room = 1e-3 * (high - low) if math.isfinite(high - low) else 0.0  # at a bound no step has an effect
         value = held[k] if k in held else min(max(start[k], low + room), high - room)
+        if k not in held and abs(value - 0.5 * (low + high)) < _BESIDE * room:  # in the middle its steps are none
+            value = 0.5 * (low + high) + _BESIDE * room
         parameters.add(f"p{k}", value=value, min=low, max=high, vary=k not in held)
 
     def numbers(current: Any) -> Array:

@@ -253,6 +253,32 @@ def test_jkrs_loads_fit_work_and_modulus_and_times_are_read_along_a_run_whose_ed
     assert_allclose([*found.values.values()], [42e-3, 1e-5], rtol=1e-4)
 
 
+def test_a_ramp_that_lags_behind_points_of_steady_speeds_is_named_with_its_size_and_the_cure(tmp_path):
+    rate = {"model": "rate", "critical_speed": 5e-3, "rebinding_rate": 15.0, "stress": 2e5}
+    ramp = {"model": "ramp", "from": 1e-5, "to": 2e-2}
+    fast = load(LENS | {"clock": {"duration": "1 s", "step": "1 ms"}, "drive": ramp, "bonds": rate,
+                        "shear": {"model": "uniform"}})  # fmt: skip
+    slow = fast.with_values({"clock.duration": 2000.0, "clock.step": 1.0})
+    speeds = np.array([1e-3, 3e-3, 1e-2])
+    force = [float(sim.run(fast.with_values({"drive": {"speed": v}})).friction_force[-1]) for v in speeds]
+    path = table(tmp_path / "steady.csv", {"speed [m/s]": speeds}, {"friction_force": np.array(force)}, 0.01)
+    result = fit(fast, [path], ["bonds.critical_speed"])
+    values = {"bonds.critical_speed": result.values["bonds.critical_speed"], "clock.step": 1e-4}
+    passing = sim.run(fast.with_values(values))
+    still = sim.run(fast.with_values(values | {"drive": {"speed": result.lag.speed}})).friction_force[-1]
+    ratio = np.interp(result.lag.speed, passing.speed, passing.friction_force) / float(still)
+    # the clock step of 1 ms is 1.5 % of the bonds' memory
+    assert_allclose(1.0 + result.lag.share, ratio, rtol=5e-3)
+    assert result.lag.speed in speeds and result.lag.share > 0.03 and result.lag.errors > 3.0
+    (remark,) = (text for text in result.remarks if "lags" in text)
+    assert "--steady" in remark and f"{100.0 * result.lag.share:.2g} %" in remark
+    for cure in (repr(result._replace(converged=False)), *result.remarks):
+        assert "fewer keys" not in cure and "the model lacks" not in cure
+    for scene, steady in ((fast, True), (slow, False)):
+        result = fit(scene, [path], ["bonds.critical_speed"], steady=steady)
+        assert result.lag is None and "fewer keys" in repr(result._replace(converged=False))
+
+
 #: A body behind a spring on bonds whose stress is constant, and a stage that is suddenly faster.
 BEHIND = LENS | {
     "clock": {"duration": "0.05 s", "step": "1 ms"}, "shear": {"model": "uniform"},
