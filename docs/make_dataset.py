@@ -19,7 +19,12 @@ prescribes it: `dataset.contact_area.mean("member").plot(x="speed")`, without th
 """,
     "Recorded at each time": """A variable that differs between members has the dimension `member`, too. With
 `per_member = false` it becomes `<name>_mean`, `<name>_std` and `<name>_sem` instead: mean, standard deviation and
-standard error of the mean over the members.
+standard error of the mean over the members, without members of which the value is nan.
+
+Then there is also `late_<name>`, of quantities that have a mean over time. Its dimension `late` has four values. `mean`
+and `sem` are mean and standard error over the members' means over the second half of the run. `drift` and `drift_sem`
+are those of their drift, the mean over the last quarter of the run less that over the third. Radius, area, load and
+friction count while the contact is closed.
 
 A member has the same noise at all points of a sweep. So the error of a difference between two points is that of the
 members' differences, often far below the two errors combined:
@@ -91,6 +96,7 @@ COORDINATES = (
     ("t", "s", "t", "time since the start", ""),
     ("member", "1", "member", "number of the ensemble member", "members differ and each is kept"),
     ("slip", "1", "slip", "number of the slip event of a member", 'drive.model = "spring", and each member is kept'),
+    ("late", "", "late", "statistic of the members' means over the second half of the run", "members are not kept"),
     ("map_member", "1", "map_member", "member of a map", MAPS),
     ("map_time", "s", "map_time", "time of a map", MAPS),
     ("x", "m", "x", "position along the sliding direction", MAPS),

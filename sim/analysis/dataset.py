@@ -315,6 +315,12 @@ def control(dataset: xr.Dataset) -> Control:
     raise KeyError("the dataset does not say what holds the sphere: a load, an indentation or a displacement")
 
 
+def has_noise(dataset: xr.Dataset) -> xr.DataArray:
+    """True at the points of the sweep where something is random; of datasets of older versions everywhere."""
+    known = dataset["has_noise"] if "has_noise" in dataset else xr.DataArray(1.0)
+    return known.broadcast_like(dataset["contact_modulus"]).transpose(*dataset["contact_modulus"].dims) != 0.0
+
+
 def stays_held(dataset: xr.Dataset) -> xr.DataArray:
     """True at the points of the sweep where the control of the contact is constant in time.
 

@@ -15,7 +15,6 @@ from sim.analysis.dataset import (
     MEMBERS,
     answered,
     control,
-    may_stop,
     plain,
     setting,
     stays_held,
@@ -24,6 +23,7 @@ from sim.analysis.dataset import (
     word,
 )
 from sim.laws import jkr
+from sim.units.notation import OF_CONTACT
 
 KEPT = ("mean", "std", "sem")
 #: Endings of a variable of each member, and of those of its recorded statistics.
@@ -39,10 +39,14 @@ _LOSSES = {
 _DIFFERENCES = frozenset(("lost_to_bonds_last", "order_of_charging"))
 #: Radii that others are compared with.
 _REFERENCES = ("jkr_radius", "hertz_radius")
+#: So few closed contacts give no mean if others are open.
+FEW_LEFT = 2
 #: Trajectories from which observables of other names follow; those of shares, beside the radii of their losses.
 _SOURCES = {
     "area_ratio": ("contact_area",), "fraction_detached": ("in_contact",), "fraction_masked": ("masked", "in_contact"),
 }  # fmt: skip
+#: What else only a closed contact has.
+_OF_AREA = ("area_ratio", "lost_to", "order_of", "indentation")
 _SOURCES_OF_SHARES = ("contact_area", "fluctuation_energy", "applied_load", "indentation", "displacement")
 
 
@@ -75,6 +79,39 @@ def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
         radii = radii.isel(t=0, drop=True)
     radii = radii.astype(float, copy=False).map(ordered)
     return radii.assign(radius_jkr=radii["radius_jkr"].where(radii["radius_jkr"] > 0.0))
+
+
+def is_of_contact(name: str) -> bool:
+    """Return True for an observable that only a closed contact has."""
+    return name.startswith((*OF_CONTACT, *_OF_AREA))
+
+
+def closed_only(dataset: xr.Dataset) -> xr.Dataset:
+    """Return radius, area and friction of closed contacts alone: nan while a contact is open.
+
+    Of recorded statistics the moments of the closed members follow from those of all, as an open contact adds zeros.
+    They are nan if some contacts are open and at most two are closed.
+    """
+    names = [name for name in OF_CONTACT if name in dataset]
+    if "in_contact" in dataset:
+        closed = dataset["in_contact"] > 0.0
+        if MEMBERS in closed.dims:
+            count = closed.sum(MEMBERS)
+            closed = closed & ((count > FEW_LEFT) | (count == closed.sizes[MEMBERS]))
+        return dataset.assign({name: dataset[name].astype(float, copy=False).where(closed) for name in names})
+    if "in_contact_mean" not in dataset or bool((dataset["in_contact_mean"] == 1.0).all()):
+        return dataset
+    members, share = float(dataset.attrs["members"]), dataset["in_contact_mean"]
+    stops, count, result = word(dataset, "contact.after_pull_off", "stop") == "stop", (members * share).round(), {}
+    recorded, is_known = count.where(stops, members), (count > FEW_LEFT) | (count == members)
+    for name in (name for name in OF_CONTACT if f"{name}_mean" in dataset):
+        mean, std = (dataset[f"{name}_{kind}"] for kind in ("mean", "std"))
+        squares = (recorded - 1.0) * std**2 + recorded * mean**2
+        mean = (mean * recorded / count).where(is_known)
+        std = ((squares - count * mean**2) / (count - 1.0)).clip(0.0) ** 0.5
+        for kind, values in zip(KEPT, (mean, std, std / count**0.5), strict=True):
+            result[f"{name}_{kind}"] = values.assign_attrs(dataset[f"{name}_{kind}"].attrs)
+    return dataset.assign(result)
 
 
 def full_area(dataset: xr.Dataset) -> xr.DataArray:
@@ -124,8 +161,7 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     if any(radius not in dataset for radius, _ in charged.values()):
         raise ValueError("shares need each member; record them: [record] per_member = true")
     left = [np.pi * dataset[radius].astype(float, copy=False) ** 2 for radius, _ in charged.values()]
-    if may_stop(dataset):
-        left = [level.where(area.notnull()) for level in left]
+    left = [level.where(area.notnull()) for level in left]
     levels = [full, *left, area]
     texts = {"lost_to_bonds": "broken bonds, which are charged first"}
     texts |= {name + suffix: text for name, (_, text) in charged.items()}
@@ -160,8 +196,7 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
     else:  # an indentation is a displacement behind an infinite stiffness
         radius = xr.apply_ufunc(jkr.radius_at_displacement, dataset[held.kind], held.stiffness, *sphere)
     full, alone = full_area(dataset), np.pi * radius.fillna(0.0) ** 2
-    if may_stop(dataset):
-        alone = alone.where(dataset["contact_area"].notnull())
+    alone = alone.where(dataset["contact_area"].notnull())
     return pure((full - alone) / full, "share of JKR's area lost to fluctuations, which are charged first")
 
 
@@ -226,7 +261,7 @@ def restricted(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset
     """Return the dataset without trajectories that the observables ``names`` do not need; None stands for all."""
     if names is None:
         return dataset
-    sources = {source for name in names for source in _SOURCES.get(name, (name,))} | set(_REFERENCES)
+    sources = {source for name in names for source in _SOURCES.get(name, (name,))} | {*_REFERENCES, "in_contact"}
     if _shares_among(names):
         sources |= {*_SOURCES_OF_SHARES, *(radius for radius, _ in _LOSSES.values())}
     return with_trajectories(dataset, *(f"{name}{ending}" for name in sources for ending in _ENDINGS))

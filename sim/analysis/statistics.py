@@ -1,5 +1,6 @@
 """Statistics over members at each time, over members and stationary time, of lifetimes, and correlation times."""
 
+import itertools
 import math
 from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
@@ -9,22 +10,34 @@ import scipy
 import xarray as xr
 from scipy import special
 
-from sim.analysis.dataset import MEMBERS, in_pieces, is_stationary, plain, steady_points, sweep_dims, with_trajectories
+from sim.analysis.dataset import (
+    MEMBERS,
+    has_noise,
+    in_pieces,
+    is_stationary,
+    plain,
+    steady_points,
+    sweep_dims,
+    with_trajectories,
+    word,
+)
 from sim.analysis.events import events
 from sim.analysis.observables import (
+    FEW_LEFT,
     KEPT,
     charges,
     chosen_observables,
+    closed_only,
+    is_of_contact,
     labelled,
     observables,
     pure,
     reference_radii,
     restricted,
-    settled,
     share_observables,
 )
 from sim.units.errors import BadInput
-from sim.units.notation import engineering
+from sim.units.notation import CUMULATIVE, engineering, scaled, second_half
 from sim.units.quantity import read_option
 
 #: How many correlation times the autocorrelation is summed over: what is cut off is e^-6 of it.
@@ -355,14 +368,17 @@ def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
     of n members of a normal law it has the standard error ``skewness_error(n)``.
     """
     result: dict[str, xr.DataArray] = {}
-    members = float(trajectories.attrs.get("members", 1))
+    members: Any = float(trajectories.attrs.get("members", 1))
     for key, variable in trajectories.data_vars.items():
         name = str(key)
         stem, _, kind = name.rpartition("_")
         if kind in KEPT:
             result[name] = variable
             if kind == "mean" and f"{stem}_sem" in trajectories:
-                ends = interval(stem, variable.to_numpy(), trajectories[f"{stem}_sem"].to_numpy(), members)
+                count = members
+                if is_of_contact(stem) and "fraction_detached_mean" in trajectories:
+                    count = np.rint(members * (1.0 - trajectories["fraction_detached_mean"].to_numpy()))
+                ends = interval(stem, variable.to_numpy(), trajectories[f"{stem}_sem"].to_numpy(), count)
                 for end, at in zip(("low", "high"), ends, strict=True):
                     text = f"{_OF[end]} of {variable.attrs.get('long_name', stem).removeprefix(_OF['mean'] + ' of ')}"
                     result[f"{stem}_{end}"] = variable.copy(data=at).assign_attrs(long_name=text)
@@ -426,7 +442,7 @@ def interval(name: str, mean: np.ndarray, sem: np.ndarray, count: np.ndarray | f
     shrunk = 1.0 + WIDE**2 / count
     middle = (mean + 0.5 * WIDE**2 / count) / shrunk
     half = WIDE / shrunk * np.sqrt(np.maximum(mean * (1.0 - mean), 0.0) / count + (0.5 * WIDE / count) ** 2)
-    return middle - half, middle + half
+    return np.maximum(middle - half, 0.0), np.minimum(middle + half, 1.0)
 
 
 def skewness_error(count: float) -> float:
@@ -503,6 +519,7 @@ def over_members(dataset: xr.Dataset, names: Collection[str] | None = None, quan
     """Return the ``summary`` of observables at each sweep value and time, by default of all except shares."""
 
     def reduce(piece: xr.Dataset) -> xr.Dataset:
+        piece = closed_only(piece)
         return summary(observables(piece) if names is None else chosen_observables(piece, names), quantiles)
 
     return in_pieces(restricted(dataset, names), ("t",), reduce)
@@ -538,17 +555,22 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
     radii = reference_radii(dataset)
     ratio = pure((radii["radius_hertz"] / radii["radius_jkr"]) ** 2, "Hertz's contact area over JKR's")
     share_observables(dataset.isel(t=[0]))  # where they are not known it says why
-    lost = in_pieces(restricted(dataset, ["lost_to_bonds"]), ("t",), lambda piece: summary(charges(piece)))
+    lost = in_pieces(restricted(dataset, ["lost_to_bonds"]), ("t",), lambda piece: summary(charges(closed_only(piece))))
     return lost.merge(radii).assign(area_ratio_hertz=ratio)
 
 
 # --- members and the second half of a stationary run ---
 
 
-#: From so many members on the spread of their means gives the error, whatever the correlation in time.
-_MANY = 16
-#: Records of the second half at which the displacement of a slider is read.
-_PLACES = 256
+#: From so many members on the spread of their means gives the error, whatever the correlation in time: of the mean,
+#: for which nothing else is needed of the members, and of the shares under quantiles.
+_SEVERAL, _MANY = 4, 16
+#: Change over the span, as a share of the value, above which a run without noise has not settled.
+_STILL = 1e-3
+#: Share of settled means whose drift is taken for one.
+_FALSE_ALARM = 0.01
+#: Whole cycles that each half of a span needs; share of a span over which its begin and its end are averaged.
+_CYCLES, _ENDS_SHARE = 2, 0.125
 _LEVELS = np.array(QUANTILES)
 
 
@@ -591,10 +613,10 @@ def over_time(values: np.ndarray, step: float = 1.0, name: str = "") -> dict[str
 
     Notes
     -----
-    The error of the mean is that of the members' means in time; of fewer than 16 members that from the autocorrelation,
-    summed over Sokal's window, where it has more degrees of freedom. The interval is Student's. The share of values
-    under a quantile has such an error, too, and as many free values as have it tell between which order statistics the
-    quantile is. Quantiles are exact.
+    The error of the mean is that of the members' means in time; of fewer than four members that from the
+    autocorrelation, summed over Sokal's window, where it has more degrees of freedom. The interval is Student's. The
+    share of values under a quantile has such an error, too, of fewer than 16 members by the autocorrelation, and as
+    many free values as have it tell between which order statistics the quantile is. Quantiles are exact.
 
     Examples
     --------
@@ -608,14 +630,16 @@ def over_time(values: np.ndarray, step: float = 1.0, name: str = "") -> dict[str
     >>> print(50 < result["effective_samples"] < 200, result["low"] < 0.0 < result["high"])
     True True
     """
-    result = _over_time(values[np.newaxis], step, name, True)
+    result, _ = _over_time(values[np.newaxis], step, name, np.array([True]))
     return {kind: numbers[0] if kind.startswith("quantile") else float(numbers[0]) for kind, numbers in result.items()}
 
 
-def _over_time(values: np.ndarray, step: float, name: str, differ: bool) -> dict[str, np.ndarray]:
-    """Return the statistics of ``over_time`` at each point of a sweep, of values of shape (points, members, records).
+def _over_time(
+    values: np.ndarray, step: float, name: str, noisy: np.ndarray
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Return the statistics of ``over_time`` at each point of a sweep, and the degrees of freedom of the error.
 
-    An observable that does not ``differ`` between members has no error.
+    Values have the shape (points, members, records). There are no errors at points that are not ``noisy``.
     """
     points, members, _ = values.shape
     known = np.isfinite(values)
@@ -638,22 +662,22 @@ def _over_time(values: np.ndarray, step: float, name: str, differ: bool) -> dict
         inflated, times = (np.array(column) for column in zip(*memory, strict=True))
         spreads = np.array([spread, *np.broadcast_to(np.sqrt(_LEVELS * (1.0 - _LEVELS)), (points, len(_LEVELS))).T])
         errors, freedoms = _errors(np.array([means, *below]), spreads, np.moveaxis(inflated, -1, 0), total)
-        low, high = interval(name, mean, errors[0], freedoms[0] + 1.0)
         skewness = np.where(spread > 1e-12 * abs(mean), cubes / total / spread**3, np.nan)
         effective = np.where(errors[0] > 1e-12 * abs(mean), (spread / errors[0]) ** 2, np.nan)
-    ends = np.tile(_LEVELS, (2, points, 1))
-    if differ:
         each_point = zip(spreads.T, errors.T, freedoms.T, strict=True)
         ends = np.stack([_shares(*numbers, 1.0 if members >= _MANY else 0.5) for numbers in each_point], axis=1)
-    else:
-        errors[0], low, high = 0.0, mean, mean
-    result = {"mean": mean, "std": spread, "sem": errors[0], "low": low, "high": high}
+        if members >= _SEVERAL:
+            errors, freedoms = _errors(means[np.newaxis], spreads[:1], np.full((1, points, 2), np.nan), total)
+        sem, freedom = np.where(noisy, errors[0], np.nan), freedoms[0]
+        low, high = interval(name, mean, sem, freedom + 1.0)
+    ends[:, ~noisy] = np.nan
+    result = {"mean": mean, "std": spread, "sem": sem, "low": low, "high": high}
     result |= {"skewness": skewness, "effective_samples": effective}
     if complete.any():
         result |= {"correlation_time": times[:, 0], "correlation_time_sem": times[:, 1]}
     ranks = np.where((ends >= 0.0) & (ends <= 1.0), ends * (total[:, np.newaxis] - 1.0), np.nan)
     lowest, highest = (values_at_ranks(ordered, end) for end in ranks)
-    return result | {"quantile": levels, "quantile_low": lowest, "quantile_high": highest}
+    return result | {"quantile": levels, "quantile_low": lowest, "quantile_high": highest}, freedom
 
 
 def _sum(values: np.ndarray) -> np.ndarray:
@@ -713,7 +737,123 @@ def _errors(
     return errors, np.where(of_series, freedom, free)
 
 
-def distribution(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
+class Settlement(NamedTuple):
+    """Answer if a mean over a span is one, with the value of the span and those at its begin and its end.
+
+    ``verdict`` is "" if the values have settled. The value is that at the end, of cycles the mean over whole ones, and
+    the mean over the span if it is too short to tell.
+    """
+
+    verdict: str
+    value: float
+    begin: float
+    end: float
+
+    def reason(self, unit: str, span: str) -> str:
+        """Return why a span gives no mean, with the values at its ends in a unit; "" if it does."""
+        if not self.verdict:
+            return ""
+        factor, shown = scaled(max(abs(self.begin), abs(self.end)), unit)
+        texts = [[f"{factor * value:.{digits}g}" for value in (self.begin, self.end)] for digits in (4, 7)]
+        begin, end = texts[0] if texts[0][0] != texts[0][1] else texts[1]
+        return f"{self.verdict}: {begin} → {end} {shown}".rstrip() + f" over {span}"
+
+
+def settlement(values: np.ndarray, sem: float = math.nan, freedom: float = math.nan, noisy: bool = True) -> Settlement:
+    """Return if values have settled: if their drift over the span is not larger than its error.
+
+    Parameters
+    ----------
+    values : array, shape (members, records)
+        nan where there is none.
+    sem, freedom : float
+        Standard error of the mean over all values and its degrees of freedom, see ``over_time``.
+    noisy : bool
+        False if all members are equal and only cycles fluctuate.
+
+    Notes
+    -----
+    The drift is the mean over the second half of the span less that over the first. Its error is that of the members'
+    drifts; of fewer than four members twice the standard error of the mean, if that has more degrees of freedom.
+    One settled mean of a hundred is taken for one that drifts. Where the values cross their mean often, whole cycles
+    of both halves are compared with the scatter between cycles, too. Without noise values that change by less than
+    0.1 % have settled.
+
+    Examples
+    --------
+    >>> time = np.linspace(0.0, 1.0, 200)
+    >>> settlement(np.exp(-time)[np.newaxis], noisy=False).reason("N", "the second half")
+    'not settled: 1 → 0.3679 N over the second half'
+    >>> settlement((2.0 + np.sin(70.0 * time))[np.newaxis], noisy=False).verdict
+    ''
+    """
+    known = np.isfinite(values)
+    course, half = np.nanmean(values[:, known.any(axis=0)], axis=0), values.shape[1] // 2
+    with np.errstate(invalid="ignore", divide="ignore"):
+        first, second = (_sum(part) / np.isfinite(part).sum(axis=-1) for part in (values[:, :half], values[:, half:]))
+    drifts = (second - first)[np.isfinite(second - first)]
+    error, free = 2.0 * sem, freedom
+    if drifts.size > 1 and not (drifts.size < _SEVERAL and freedom > drifts.size - 1.0):
+        error, free = float(np.std(drifts, ddof=1)) / math.sqrt(drifts.size), drifts.size - 1.0
+    return _settled(course, float(drifts.mean()) if drifts.size else math.nan, error, free, noisy)
+
+
+def _settled(course: np.ndarray, drift: float, error: float, free: float, noisy: bool) -> Settlement:
+    """Return the ``settlement`` of the members' mean over time, with their drift, its error and degrees of freedom."""
+    course = course[np.isfinite(course)]
+    if not course.size:
+        return Settlement("", math.nan, math.nan, math.nan)
+    few = max(1, int(_ENDS_SHARE * course.size)) if noisy else 1
+    begin, end = float(course[:few].mean()), float(course[-few:].mean())
+    mean, change, bound = _cycles(course) or (end, math.inf, 0.0)
+    if course.size == 1 or np.ptp(course) <= (0.0 if noisy else _STILL) * np.max(np.abs(course)):
+        return Settlement("", end, begin, end)
+    limit = error * float(special.stdtrit(free, 1.0 - 0.5 * _FALSE_ALARM)) if noisy else _STILL * abs(mean)
+    is_short = math.isnan(limit)
+    is_still = abs(drift) <= limit if noisy else abs(change) <= limit
+    if not is_short and (is_still or abs(change) <= bound):
+        return Settlement("", mean, begin, end)
+    off = course > course.mean()
+    if is_short or (not noisy and np.count_nonzero(off[1:] > off[:-1]) > 1):
+        return Settlement("too short to tell if it has settled", float(course.mean()), begin, end)
+    return Settlement("not settled", end, begin, end)
+
+
+def _cycles(course: np.ndarray) -> tuple[float, float, float] | None:
+    """Return the mean over whole cycles, its change from the first half to the second, and the 99 % bound of that.
+
+    A cycle is from one rise through the mean to the next; None if either half has fewer than two.
+    """
+    off = course - course.mean()
+    up = np.flatnonzero((off[:-1] < 0.0) & (off[1:] >= 0.0))
+    places = up + off[up] / (off[up] - off[up + 1])
+    sums = np.append(0.0, np.cumsum(0.5 * (off[1:] + off[:-1])))
+    at, middle = np.interp(places, np.arange(off.size), sums), 0.5 * (off.size - 1)
+    means, error = [], 0.0
+    for chosen in (places <= middle, places >= middle):
+        lengths, areas = np.diff(places[chosen]), np.diff(at[chosen])
+        if lengths.size < _CYCLES:
+            return None
+        means.append(areas.sum() / lengths.sum())
+        rest = np.sum((areas - means[-1] * lengths) ** 2) / lengths.sum() ** 2
+        error += rest * lengths.size / (lengths.size - 1.0)
+    bound = float(special.ndtri(1.0 - 0.5 * _FALSE_ALARM)) * math.sqrt(error)
+    mean = course.mean() + (at[-1] - at[0]) / (places[-1] - places[0])
+    return float(mean), float(means[1] - means[0]), bound
+
+
+def _openings(counts: np.ndarray, members: int, again: str, span: str) -> str:
+    """Return why contacts give no mean of what only a closed one has, by their count at each record; "" if they do."""
+    if again or np.any(np.diff(counts) > 0):
+        return f"{again or 'some'} of {members} contacts close again in {span}"
+    if (left := int(counts[-1])) <= FEW_LEFT and left < members:
+        return f"{left or 'none'} of {members} contacts {'are' if left == 2 else 'is'} closed at the end of {span}"
+    return ""
+
+
+def distribution(
+    dataset: xr.Dataset, names: Collection[str] | None = None, span: tuple[float, float] | None = None
+) -> xr.Dataset:
     """Return statistics of observables over the members and the second half of the run, at each point of the sweep.
 
     Parameters
@@ -722,61 +862,152 @@ def distribution(dataset: xr.Dataset, names: Collection[str] | None = None) -> x
         As ``sim run`` writes it, with each member; of a stationary run (see ``is_stationary``).
     names : collection of str, optional
         The observables, all by default.
+    span : (float, float), optional
+        First and last time of another span in which drive and control are constant [s].
 
     Returns
     -------
     xarray.Dataset
         ``…_mean``, ``…_sem``, ``…_low``, ``…_high``, ``…_std``, ``…_skewness``, ``…_effective_samples``,
         and with the dimension ``quantile`` ``…_quantile``, ``…_quantile_low``, ``…_quantile_high``; see ``over_time``.
-        Of what is the same for all members there is no error.
+        What the members have in common, and a run without noise, has no errors. What only a closed contact has (see
+        ``closed_only``) is of the closed contacts.
+
+        ``…_reason`` is "" or the reason why there is no mean. If values have not settled (see ``settlement``), the
+        mean is the value at the end of the span. It is nan if some contacts have opened and at most two are left, or
+        contacts close again. All else is then nan.
     """
     dataset = plain(dataset)
-    dims, late = sweep_dims(dataset), dataset.isel(t=slice(dataset.sizes["t"] // 2, None))
-    step = float(dataset["t"][-1] - dataset["t"][-2]) if dataset.sizes["t"] > 1 else 0.0
+    late, words = _span(dataset, span)
+    dims, step = sweep_dims(dataset), float(late["t"][-1] - late["t"][0]) / max(late.sizes["t"] - 1, 1)
     sweep, result = xr.full_like(dataset["contact_modulus"], np.nan, float), dict[str, xr.DataArray]()
-    for name in chosen_observables(restricted(late, names).isel(t=[-1]), names):
-        variable = _observable(late, str(name))
-        values = _rows(variable, dims)
-        statistics = _over_time(values.reshape(-1, *values.shape[-2:]), step, str(name), MEMBERS in variable.dims)
-        for kind, numbers in statistics.items():
-            shaped = sweep.expand_dims(quantile=list(QUANTILES), axis=-1) if kind.startswith("quantile") else sweep
-            shaped = shaped.copy(data=numbers.reshape(shaped.shape))
-            result[f"{name}_{kind}"] = shaped.assign_attrs(_attributes(kind, variable))
-    if "speed_mean" in result and {"slider_position", "spring_force"} <= set(dataset):  # a slider that may slip
-        mean, error = _mean_speeds(late["slider_position"], dims)
-        known, margin = np.isfinite(mean), WIDE * error
-        for kind, speeds in {"mean": mean, "sem": error, "low": mean - margin, "high": mean + margin}.items():
-            result[f"speed_{kind}"] = result[f"speed_{kind}"].where(~known, speeds)
+    noisy = has_noise(dataset).to_numpy().ravel()
+    openings = [""] * sweep.size
+    if "in_contact" in late:
+        closed = _rows(late["in_contact"].compute(), dims) > 0.0
+        closed = closed.reshape(-1, *closed.shape[-2:])
+        again = (closed[..., 1:] & ~closed[..., :-1]).any(axis=-1).sum(axis=-1)
+        counts = closed.sum(axis=1), itertools.repeat(closed.shape[1]), (str(count or "") for count in again)
+        openings = [_openings(*point, words) for point in zip(*counts, strict=False)]
+    for name in map(str, chosen_observables(restricted(late, names).isel(t=[-1]), names)):
+        if name in CUMULATIVE:
+            continue
+        variable = _observable(late, name)
+        differ, values = noisy & (MEMBERS in variable.dims), _rows(variable, dims)
+        values = values.reshape(-1, *values.shape[-2:])
+        if name == "speed" and {"slider_position", "spring_force"} <= set(late):  # slips come between two records
+            gone = np.diff(_rows(late["slider_position"].compute(), dims)).reshape(*values.shape[:-1], -1)
+            values = gone / step if gone.size else values
+        numbers, freedom = _over_time(values, step, name, differ)
+        known = zip(values, numbers["sem"], freedom, map(bool, differ), strict=True)
+        states = [settlement(*point) for point in known]
+        result |= _described(variable.rename(name), numbers, sweep, states, openings, words, differ)
     return xr.Dataset(result)
 
 
-def _mean_speeds(position: xr.DataArray, dims: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean speed of a slider at each point of the sweep, and its standard error [m/s]; nan after a runaway.
+def _described(
+    variable: xr.DataArray,
+    numbers: dict[str, np.ndarray],
+    sweep: xr.DataArray,
+    states: list[Settlement],
+    openings: list[str],
+    span: str,
+    noisy: np.ndarray,
+) -> dict[str, xr.DataArray]:
+    """Return statistics of an observable over the sweep, with the reasons where there is no mean.
 
-    It is the displacement over the time, because slips come and go between two records. Both ends are anywhere in
-    stick and slip: the spread of the displacement about steady sliding gives the error.
+    ``numbers`` of each statistic have the points of the sweep first.
     """
-    records = np.unique(np.linspace(0, position.sizes["t"] - 1, _PLACES).astype(int))
-    position = position.compute().isel(t=records)
-    time, positions = position["t"].to_numpy() - float(position["t"][0]), _rows(position, dims)
-    speeds = (positions[..., -1] - positions[..., 0]) / time[-1]
-    off = np.std(positions - speeds[..., np.newaxis] * time, axis=-1)
-    error = np.sqrt(2.0 * np.mean(off**2, axis=-1) / off.shape[-1]) / time[-1]
-    return np.where(np.isnan(positions).any(axis=(-2, -1)), np.nan, np.mean(speeds, axis=-1)), error
+    name, unit = str(variable.name), variable.attrs.get("units", "1")
+    opened = np.array(openings if is_of_contact(name) else [""] * sweep.size, object)
+    drifts = np.array([state.reason(unit, span) for state in states], object)
+    reasons = np.where(opened != "", opened, drifts)
+    ends = np.where(opened != "", np.nan, [state.value for state in states])
+    numbers["mean"] = np.where((reasons != "") | ~noisy, ends, numbers["mean"])
+    result: dict[str, xr.DataArray] = {}
+    for kind, values in numbers.items():
+        if kind != "mean":
+            values[reasons != ""] = np.nan
+        shaped = sweep.expand_dims(quantile=list(QUANTILES), axis=-1) if values.ndim > 1 else sweep
+        shaped = shaped.copy(data=values.reshape(shaped.shape))
+        result[f"{name}_{kind}"] = shaped.assign_attrs(_attributes(kind, variable))
+    text = {"long_name": f"reason why there is no {_OF['mean']} of {variable.attrs.get('long_name', name)}"}
+    result[f"{name}_reason"] = xr.DataArray(reasons.reshape(sweep.shape), sweep.coords, sweep.dims, attrs=text)
+    return result
+
+
+def _span(dataset: xr.Dataset, span: tuple[float, float] | None) -> tuple[xr.Dataset, str]:
+    """Return the records of a span, by default of the second half of the run, and words for it."""
+    if span is None:
+        first, _ = second_half(dataset.sizes["t"])
+        return dataset.isel(t=slice(first, None)), "the second half" if first else "the run"
+    rounding = _ROUNDING * float(dataset["t"][-1])
+    chosen = np.flatnonzero(abs(dataset["t"] - 0.5 * sum(span)) <= 0.5 * (span[1] - span[0]) + rounding)
+    begin, end = (engineering(time, "s") for time in span)
+    return dataset.isel(t=chosen), f"{begin} to {end}"
 
 
 def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
-    """Return the ``distribution`` of observables; of recorded statistics, the means over the second half of the run."""
+    """Return the ``distribution`` of observables; of recorded statistics the same means with errors and reasons.
+
+    Of those the engine records the members' means over the second half of the run.
+    """
     if "contact_radius" in dataset:
         return distribution(dataset, names)
-    return summary(settled(chosen_observables(dataset, None)), quantiles=False)
+    dataset = plain(dataset)
+    (late, words), sweep = _span(dataset, None), xr.full_like(dataset["contact_modulus"], np.nan, float)
+    dims, points, members = sweep_dims(dataset), sweep.size, int(dataset.attrs["members"])
+    noisy, counts = has_noise(dataset).to_numpy().ravel(), np.full((points, late.sizes["t"]), members)
+    if "in_contact_mean" in late:
+        counts = np.rint(members * _rows(late["in_contact_mean"], dims).reshape(counts.shape)).astype(int)
+    reattach = (word(dataset, "contact.after_pull_off", "stop") == "reattach").broadcast_like(sweep).to_numpy().ravel()
+    again = np.where(reattach & (counts.min(axis=-1) < members), "some", "")
+    openings = [_openings(count, members, may, words) for count, may in zip(counts, again, strict=True)]
+    courses = chosen_observables(closed_only(late), names)
+    whole, later = (chosen_observables(_as_last(late, with_drift), names) for with_drift in (False, True))
+    result: dict[str, xr.DataArray] = {}
+    for key in (str(key) for key in courses if not str(key).endswith(("_std", "_sem"))):
+        name, differ = key.removesuffix("_mean"), noisy & key.endswith("_mean")
+        if name in CUMULATIVE:
+            continue
+        ends = [key, f"{name}_sem" if key.endswith("_mean") else key]
+        (mean, sem), (after, error) = ([_rows(of[end], dims).ravel() for end in ends] for of in (whole, later))
+        free = (counts if is_of_contact(name) else np.full_like(counts, members)) - 1.0
+        sem = np.where(differ, sem, np.nan)
+        low, high = interval(name, mean, sem, free[:, 0] + 1.0)
+        course = _rows(courses[key], dims).reshape(points, -1)
+        known = zip(course, after - mean, error, free[:, free.shape[1] // 2], map(bool, differ), strict=True)
+        numbers = {"mean": mean, "sem": sem, "low": low, "high": high}
+        states = [_settled(*point) for point in known]
+        result |= _described(courses[key].rename(name), numbers, sweep, states, openings, words, differ)
+    return xr.Dataset(result)
+
+
+def _as_last(late: xr.Dataset, with_drift: bool) -> xr.Dataset:
+    """Return the last record with the recorded statistics of the members' means over the second half of the run.
+
+    ``with_drift`` their drift is added to the means, with its standard error.
+    """
+    last, result = late.isel(t=[-1]), {}
+    names = (str(key).removesuffix("_mean") for key in last if str(key).endswith("_mean"))
+    for name in (name for name in names if f"late_{name}" in last):
+        mean, error, drift, drift_error = (last[f"late_{name}"].isel(late=k, drop=True) for k in range(4))
+        if with_drift:
+            mean, error = mean + drift, drift_error
+        for kind, values in zip(KEPT, (mean, math.nan * error, error), strict=True):
+            result[f"{name}_{kind}"] = values.expand_dims(t=last["t"], axis=-1)
+    return last.assign(result)
 
 
 def _observable(dataset: xr.Dataset, name: str) -> xr.DataArray:
     """Return an observable of a dataset in memory."""
-    if name in dataset:
+    if name in dataset and not is_of_contact(name):
         return dataset[name].compute()  # load would keep each variable in the dataset
-    return in_pieces(restricted(dataset, [name]), ("t",), lambda piece: chosen_observables(piece, [name]))[name]
+
+    def of_piece(piece: xr.Dataset) -> xr.Dataset:
+        return chosen_observables(closed_only(piece), [name])
+
+    return in_pieces(restricted(dataset, [name]), ("t",), of_piece)[name]
 
 
 def _rows(variable: xr.DataArray, dims: tuple[str, ...]) -> np.ndarray:
@@ -803,7 +1034,7 @@ class Lifetime(NamedTuple):
     rate_high: float
 
 
-def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
+def lifetime(times: np.ndarray, ends: np.ndarray | float, begins: np.ndarray | float = 0.0) -> Lifetime:
     """Return the median and the rate of an event that may come after a run's end.
 
     Parameters
@@ -811,13 +1042,15 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
     times : array, shape (members,)
         When it happened [s]; nan where it did not.
     ends : float or array
-        How long each member was watched [s]; nan if it could not happen in a member, which then does not count.
+        Until when each member was watched [s]; nan if it could not happen in a member, which then does not count.
+    begins : float or array
+        From when on it could happen in each member [s], such as the time at which its contact closed; nan as above.
 
     Notes
     -----
-    The median is that of Kaplan and Meier's survival; its interval, after Brookmeyer and Crowley, holds the times at
-    which the log-log interval of the survival has one half. The interval of the rate is that of a Poisson process,
-    from chi-square.
+    Members are at risk from when on it could happen, and count only from then on (left truncation). The median is that
+    of Kaplan and Meier's survival; its interval, after Brookmeyer and Crowley, holds the times at which the log-log
+    interval of the survival has one half. The interval of the rate is that of a Poisson process, from chi-square.
 
     Examples
     --------
@@ -828,26 +1061,30 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
     5 s, 0.125 /s, 0.03 to 0.37 /s
     """
     watched = np.where(np.isfinite(times), times, ends)
-    counts = ~np.isnan(watched)
-    happened, watched = np.isfinite(times)[counts], watched[counts]
+    since = np.broadcast_to(begins, watched.shape)
+    counts = (watched > since) | ((since == 0.0) & ~np.isnan(watched))
+    happened, watched, since = np.isfinite(times)[counts], watched[counts], since[counts]
     half = low = high = np.nan
     if np.any(happened) and np.all(np.isfinite(watched)):
-        half, low, high = _halves(watched, happened)
-    count, exposure, tail = float(happened.sum()), float(np.sum(watched)) or np.nan, 0.5 - 0.5 * LEVEL
+        half, low, high = _halves(watched, happened, since)
+    count, exposure, tail = float(happened.sum()), float(np.sum(watched - since)) or np.nan, 0.5 - 0.5 * LEVEL
     least = special.gammaincinv(count, tail) if count else 0.0
     most = special.gammaincinv(count + 1.0, 1.0 - tail)
     return Lifetime(half, low, high, count / exposure, least / exposure, most / exposure)
 
 
-def _halves(watched: np.ndarray, happened: np.ndarray) -> list[float]:
+def _halves(watched: np.ndarray, happened: np.ndarray, begins: np.ndarray) -> list[float]:
     """Return the times at which a survival, and the ends of its interval, first are one half or less, or nan.
 
     The numbers are those of ``scipy.stats.ecdf``, whose import would make the start of ``sim run`` a quarter longer.
     """
     times, places, counts = np.unique(watched, return_inverse=True, return_counts=True)
     events, at_risk = np.bincount(places, happened), watched.size - np.cumsum(counts) + counts
+    at_risk = at_risk - np.sum((begins > 0.0) & (begins >= times[:, np.newaxis]), axis=1)
     left = at_risk - events
-    survival = left / watched.size if np.all(happened) else np.cumprod(left / at_risk)
+    if np.any(left[:-1] <= 0):  # nobody was watched for a while
+        return [np.nan] * 3
+    survival = left / watched.size if np.all(happened) and not np.any(begins) else np.cumprod(left / at_risk)
     with np.errstate(divide="ignore", invalid="ignore"):  # there is no interval if the survival is 1 or 0
         logarithm = np.log(survival)
         width = WIDE * np.sqrt(np.cumsum(events / (at_risk * left))) / np.abs(logarithm)
@@ -884,6 +1121,14 @@ def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
     return labelled(passage, "s", text)
 
 
+def _first_closed(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the time of the first record at which the contact is closed [s]; nan if it never is."""
+    closed = dataset["contact_radius"] > 0.0
+    return (
+        dataset["t"].isel(t=closed.argmax("t")).drop_vars("t").where(closed.any("t")).to_dataset(name="contact_radius")
+    )
+
+
 def half_lives(dataset: xr.Dataset, event_times: xr.Dataset) -> xr.Dataset:
     """Return median times of first detachment and masking from ``events``, and rates if the run is stationary."""
     result = xr.Dataset()
@@ -909,21 +1154,21 @@ def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -
     Returns
     -------
     xarray.Dataset
-        ``half_<name>`` and ``<name>_rate``, with ``…_low`` and ``…_high``; see ``lifetime``. Members that were never
-        in contact do not count. Empty where members do not differ.
+        ``half_<name>`` and ``<name>_rate``, with ``…_low`` and ``…_high``; see ``lifetime``. Members that are open from
+        the start count from the record at which they are closed, and never if they are never in contact. Empty where
+        members do not differ.
     """
     if MEMBERS not in times.dims:
         return xr.Dataset()
     duration, dims = float(dataset["t"][-1] - dataset["t"][0]), [str(name) for name in times.dims if name != MEMBERS]
     values = (times - float(dataset["t"][0])).transpose(..., MEMBERS).to_numpy()
-    watched = np.full(values.shape, duration)
+    watched, begins = np.full(values.shape, duration), np.zeros(values.shape)
     if "contact_radius" in dataset and not bool((dataset["contact_radius"].isel(t=0) > 0.0).all()):
         radius = with_trajectories(dataset, "contact_radius")
-        largest = in_pieces(radius, (*dims, MEMBERS), lambda piece: piece["contact_radius"].max("t").to_dataset())
-        touched = largest["contact_radius"].transpose(*dims, MEMBERS) > 0.0
-        watched = np.where(touched, duration, np.nan)
+        closed = in_pieces(radius, (*dims, MEMBERS), _first_closed)["contact_radius"].transpose(*dims, MEMBERS)
+        begins = np.maximum(closed.to_numpy() - float(dataset["t"][0]), 0.0)
     first_member, result = times.isel({MEMBERS: 0}, drop=True), {}
-    estimates = iter(np.vectorize(lifetime, signature="(n),(n)->(),(),(),(),(),()")(values, watched))
+    estimates = iter(np.vectorize(lifetime, signature="(n),(n),(n)->(),(),(),(),(),()")(values, watched, begins))
     for key, unit, text in (
         (f"half_{name}", "s", f"time by which half of the members have {words}"),
         (f"{name}_rate", "1/s", f"rate at which members have {words}"),

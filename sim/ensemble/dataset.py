@@ -49,6 +49,11 @@ _STATISTICS = {
 _COUNT = {"count": "number of members that have a"}
 
 
+#: Statistics of the members' means over the second half of the run, and of their drift: of the last quarter less that
+#: over the third. They are recorded if the members are not.
+LATE = ("mean", "sem", "drift", "drift_sem")
+
+
 class Described(NamedTuple):
     """Description of one variable; ``values`` are None if the parts hold them."""
 
@@ -121,6 +126,8 @@ def outline(plan: Plan, parts: Blocks) -> Outline:
     content.sizes |= {"slip": 1} if slips else {}
     for variable in plan.variables + plan.largest:
         content.places[variable.name] = _add_recorded(content, plan, variable)
+        if plan.keeps_late(variable):
+            _add_late(content, variable)
     if plan.scenario.record.maps:
         _add_maps(content, plan)
     groups = plan.groups
@@ -291,6 +298,15 @@ def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:
     return Place(names, each, not whole, recorded.axis)
 
 
+def _add_late(content: Outline, recorded: Variable) -> None:
+    """Add statistics of the members' means over the second half of the run."""
+    content.sizes["late"] = len(LATE)
+    text = "statistic of the members' means over the second half of the run, and of their drift over it"
+    content.add("late", str, ("late",), "", text, "", np.array(LATE, object))
+    about = recorded.unit, f"over the second half of the run: {recorded.long_name}", recorded.symbol
+    content.add(f"late_{recorded.name}", "f8", (*content.sweep, "late"), *about)
+
+
 def _add_maps(content: Outline, plan: Plan) -> None:
     """Add the variables of the stress maps."""
     scene = plan.points[0]
@@ -363,6 +379,7 @@ def _variable(file: netCDF4.Dataset, name: str, described: Described) -> netCDF4
 
 def _fill(outline: Outline, parts: Blocks, variables: Mapping[str, Any]) -> None:
     """Put the numbers of the parts into variables, or into arrays."""
+    sums: dict[tuple[str, int], np.ndarray] = {}
     for piece in outline.pieces:
         pools: dict[str, list[np.ndarray]] = {}
         rank = 1 if piece.where else 0  # the axis of members: without a sweep there is none of its points
@@ -370,6 +387,8 @@ def _fill(outline: Outline, parts: Blocks, variables: Mapping[str, Any]) -> None
             for key, stored in parts.load(part).items():
                 name, _, snapshot = key.partition("@")
                 place, values = outline.places.get(name), stored if rank else stored[0]
+                if name.startswith("late "):
+                    sums[name, rows.start] = sums.get((name, rows.start), 0.0) + np.moveaxis(values, rank, 0)
                 if place is None:
                     continue
                 if place.axis:
@@ -386,6 +405,28 @@ def _fill(outline: Outline, parts: Blocks, variables: Mapping[str, Any]) -> None
             statistics = pooled(groups)
             for statistic, variable in place.names.items():
                 variables[variable][place.axes(piece)] = statistics[statistic]
+        if piece.times.stop == outline.sizes["t"]:
+            _fill_late(piece, sums, variables)
+            sums = {}
+
+
+def _fill_late(piece: Piece, sums: Mapping[tuple[str, int], np.ndarray], variables: Mapping[str, Any]) -> None:
+    """Put the statistics of the members' means over the second half into variables.
+
+    ``sums`` are sums and counts of each member over both halves of it, by variable and group of members.
+    """
+    pools: dict[str, list[np.ndarray]] = {}
+    for (name, _), groups in sums.items():
+        with np.errstate(invalid="ignore", divide="ignore"):  # nan without a value
+            first, last = (groups[..., half, 0] / groups[..., half, 1] for half in (0, 1))
+            whole = groups[..., 0].sum(axis=-1) / groups[..., 1].sum(axis=-1)
+        pools.setdefault(name, []).append(moments(np.stack([whole, last - first], axis=-1).reshape(len(whole), -1)))
+    for name, each in pools.items():
+        statistics = pooled(each)
+        name = name.replace(" ", "_")
+        values = np.stack([statistics["mean"], statistics["sem"]], axis=-1)
+        shape = variables[name][piece.where].shape
+        variables[name][piece.where] = values.reshape(shape)
 
 
 def padded(values: np.ndarray, length: int) -> np.ndarray:
@@ -393,14 +434,14 @@ def padded(values: np.ndarray, length: int) -> np.ndarray:
     return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, length - values.shape[-1])], constant_values=np.nan)
 
 
-def moments(values: np.ndarray, lacking: bool = False) -> np.ndarray:
+def moments(values: np.ndarray) -> np.ndarray:
     """Return count, mean and sum of squared deviations over the first axis, shape (3, records) or (3,).
 
-    If members may be ``lacking`` a value, nan, they are those of the others.
+    They are those of the members that have a value.
     """
     rows = np.ascontiguousarray(values.T)
-    known = ~np.isnan(rows) if lacking else np.True_
-    count = np.broadcast_to(known, rows.shape).sum(axis=-1)
+    known = ~np.isnan(rows)
+    count = known.sum(axis=-1)
     with np.errstate(invalid="ignore"):
         mean = rows.sum(axis=-1, where=known) / count
     squares = np.ascontiguousarray(((values - mean) ** 2).T).sum(axis=-1, where=known)

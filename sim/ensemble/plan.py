@@ -11,6 +11,7 @@ import numpy as np
 
 from sim.ensemble.variables import LARGEST, VARIABLES, Variable
 from sim.scenario.scenario import Scenario
+from sim.units.notation import CUMULATIVE
 
 _GROUP = 256
 _PART_NUMBERS = 2**22
@@ -18,8 +19,9 @@ _STATE_NUMBERS = 2**23
 # Rough costs of one core [s]: a step of a batch, more if it is advanced step by step; of a member, of a counted
 # population, an event of a bond that is followed.
 _STEP, _ALONE, _OF_MEMBER, _COUNTED, _EVENT = 5e-6, 150e-6, 5e-8, 3e-7, 1e-7
-#: A dataset without its trajectories [byte]; number of statistics of each pooled variable.
-_SCENARIO_BYTES, _STATISTICS = 1.2e5, 3
+#: A dataset without its trajectories [byte], and a variable over the sweep alone; number of statistics of each pooled
+#: variable.
+_SCENARIO_BYTES, _VARIABLE_BYTES, _STATISTICS = 1.2e5, 3.6e3, 3
 #: Counted work [s of one core]: of a block at most, of a run that is cut into smaller groups for several cores, and of
 #: one for each process that is worth starting.
 _BLOCK_SECONDS, _SHARED_SECONDS, _PROCESS_SECONDS = 2.0, 20.0, 4.0
@@ -177,6 +179,11 @@ class Plan:
         stops = sorted(ends)
         return [Block(start, end, clock.stride) for start, end in zip([-1, *stops], stops, strict=False)]
 
+    def keeps_late(self, variable: Variable) -> bool:
+        """Return True if statistics of a quantity over the second half of the run are recorded, for want of members."""
+        is_averaged = variable in self.variables and variable.name not in CUMULATIVE
+        return is_averaged and self.varies(variable) and not self.per_member
+
     @cached_property
     def packs(self) -> list[range]:
         """Return ranges of points that are stored in one part: neighbours on the last axis with short runs."""
@@ -212,13 +219,22 @@ class Plan:
     @cached_property
     def bytes(self) -> float:
         """Return the size of the dataset before compression [byte]."""
-        return _SCENARIO_BYTES + self.maps + self.trajectories
+        return self._scenario_bytes + self.maps + self.trajectories
 
     @property
     def file_bytes(self) -> float:
         """Return the rough size of the dataset [byte]."""
         ratio = _PACKED[self.scenario.record.compression]
-        return _SCENARIO_BYTES + _PACKED_MAPS * self.maps + ratio * self.trajectories
+        return self._scenario_bytes + _PACKED_MAPS * self.maps + ratio * self.trajectories
+
+    @property
+    def _scenario_bytes(self) -> float:
+        return _SCENARIO_BYTES + _VARIABLE_BYTES * self.late
+
+    @property
+    def late(self) -> int:
+        """Return the number of quantities of which statistics over the second half of the run are recorded."""
+        return sum(map(self.keeps_late, self.variables))
 
     @property
     def maps(self) -> float:

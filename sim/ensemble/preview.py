@@ -143,8 +143,11 @@ def _parts(plan: Plan) -> float:
     blocks, each = len(plan.blocks(first)), plan.members if plan.per_member else 3 * groups
     rows = sum(each if plan.varies(variable) else groups for variable in plan.variables)
     states = (blocks - 1) * plan.members * state_numbers(first)
-    headers = _HEADER * len(plan.packs) * groups * blocks * len(plan.variables)
-    return plan.maps + headers + 8.0 * len(plan.points) * (rows * first.clock.records + states)
+    late = 0.5 * blocks * plan.late  # sums and counts of each member over two quarters
+    headers = _HEADER * len(plan.packs) * groups * (blocks * len(plan.variables) + late)
+    return (
+        plan.maps + headers + 8.0 * len(plan.points) * (rows * first.clock.records + states + 4 * late * plan.members)
+    )
 
 
 def memory_limit() -> tuple[float, str]:

@@ -2,6 +2,7 @@
 
 import contextlib
 import datetime
+import itertools
 import json
 import math
 import os
@@ -31,6 +32,7 @@ from sim.parts.shear.modes import ModalProcess
 from sim.parts.shear.process import Fluctuation
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read
+from sim.units.notation import CUMULATIVE, OF_CONTACT, second_half
 from sim.units.terminal import note
 
 Progress = Callable[[int], None]
@@ -233,9 +235,27 @@ def _record(task: Task, point: Scenario, state: State | None, block: Block) -> t
                 values = largest.read(point, end)
                 rows[largest.name] = np.broadcast_to(values, (rows_of[largest.name], *np.shape(values)[1:]))
     if task.pooled:
-        whole = {largest.name for largest in LARGEST}
-        rows |= {name: moments(values, name in whole) for name, values in rows.items() if name in task.each}
+        each, late = {name: values for name, values in rows.items() if name in task.each}, {}
+        if records.stop > second_half(clock.records)[0]:
+            averaged = (v.name for v in variables if v.name in task.each and v.name not in CUMULATIVE)
+            late = {f"late {name}": _late_sums(name, rows, records, clock.records) for name in averaged}
+        rows |= {name: moments(values) for name, values in each.items()} | late
     return end, rows | maps
+
+
+def _late_sums(name: str, rows: dict[str, np.ndarray], records: range, count: int) -> np.ndarray:
+    """Return sums and numbers of each member's values over the third and the last quarter of the run, of some records.
+
+    Of ``count`` records these are in ``rows``. Values are nan where there is none, and count where the contact is
+    closed if only then there is something. The shape is (members, quarters, 2).
+    """
+    values = rows[name]
+    if name in OF_CONTACT and "in_contact" in rows:
+        values = np.where(rows["in_contact"] > 0.0, values, np.nan)
+    first, middle = second_half(count)
+    places = np.clip(np.array([first, middle, count]) - records.start, 0, len(records))
+    quarters = [values[:, slice(*ends)] for ends in itertools.pairwise(places)]
+    return np.stack([[np.nansum(part, axis=1), np.isfinite(part).sum(axis=1)] for part in quarters]).transpose(2, 0, 1)
 
 
 def _read(variable: Variable, point: Scenario, course: Trajectory) -> np.ndarray:

@@ -270,6 +270,8 @@ NUMBERS = (
           lambda scene: scene.solid.effective[0]),
     Variable("effective_poisson_ratio", "1", "Poisson ratio of the tangential compliance", "nu", "",
           lambda scene: scene.solid.effective[1]),
+    Variable("has_noise", "1", "whether something in the scene is random, so that members differ by chance", "", "",
+          lambda scene: float(scene.is_random)),
     Variable("radius_at_rest", "m", "JKR radius at the full work of adhesion", "a_0", "",
           lambda scene: scene.rest_radius),
     Variable("radius_without_adhesion", "m", "Hertz radius", "a_H", "", lambda scene: scene.contact.equilibrium_radius(

@@ -240,6 +240,11 @@ class Scenario:
         sheared = driven or self.fluctuations.per_member or by_bonds
         return {"drive": driven, "bonds": bonded, "shear": sheared, "contact": bonded or sheared, "control": False}
 
+    @property
+    def is_random(self) -> bool:
+        """Return True if a part of the scene is random. Members behind a spring differ only then."""
+        return self.population.is_random or self.fluctuations.per_member
+
     @cached_property
     def feels_steps(self) -> bool:
         """Return True if what ΔΓ does between clock steps matters: to an edge that lags, or to a pull-off."""

@@ -32,6 +32,22 @@ Recorded = Literal[
 ]  # fmt: skip
 
 
+#: Quantities that only a closed contact has; they are recorded as 0 while it is open.
+OF_CONTACT = ("contact_radius", "contact_area", "normal_load", "friction_force")
+#: Quantities that grow over a run or are times, of which a mean over time is none.
+CUMULATIVE = (
+    "slider_position", "stage_position", "detachment_time", "dissipated_energy", "drive_work", "dissipated_by_damping",
+    "dissipated_by_viscosity", "dissipated_by_rupture", "dissipated_by_snaps", "dissipated_by_area", "energy_residual",
+    "substeps", "runaway_time",
+)  # fmt: skip
+
+
+def second_half(records: int) -> tuple[int, int]:
+    """Return the first of the records in the second half of a run, all of two, and the first in the half of these."""
+    first = records // 2 if records > 2 else 0
+    return first, first + (records - first) // 2
+
+
 def scaled(magnitude: float, unit: str) -> tuple[float, str]:
     """Return the factor from SI to a unit with a prefix that suits a magnitude, and that unit for people.
 

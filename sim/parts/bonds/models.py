@@ -62,6 +62,8 @@ class _BondModel(Part):
 
     start_from: str
     rebinding_rate: float
+    #: True if bonds break by chance, one by one.
+    is_random: ClassVar[bool] = False
     #: True if the population is solved through blocks of clock steps.
     in_blocks: ClassVar[bool] = False
     #: Rough time of a single step of a batch, for estimates [s].
@@ -301,6 +303,7 @@ class Counted(_WithoutStretch):
     model: Literal["counted"] = "counted"
 
     per_member: ClassVar[bool] = True
+    is_random: ClassVar[bool] = True
     feeds_back: ClassVar[bool] = False
 
     def bonding(self, state: Population) -> Bonding:
@@ -589,6 +592,7 @@ class Tracked(_Separable):
 
     state_class: ClassVar[type[Tracks]] = Tracks
     per_member: ClassVar[bool] = True
+    is_random: ClassVar[bool] = True
     feeds_back: ClassVar[bool] = False
 
     @property

@@ -1,0 +1,120 @@
+"""Means that are means of something: settled or not, of closed contacts, with one standard error."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from helpers.lens import FIELD, scene
+from helpers.parts import Clock, Ensemble, Equilibrium, Record, Time, analysis, bonds, drive, run, shear
+from numpy.testing import assert_allclose
+
+from sim.analysis.statistics import closed_only, of_second_half, settlement
+from sim.ensemble import plan as plans
+from sim.parts.bonds.rupture import Constant
+from sim.parts.contact.models import Adhesion, Solid, Sphere
+
+ENSEMBLES, LEAST, MOST = 1000, 0.92, 0.98
+TIME = np.linspace(0.0, 1.0, 400)
+
+
+def series(rng, members, times):
+    """Gaussian series of five records a correlation time, as in the module of stationary statistics."""
+    keep, values = math.exp(-0.2), np.empty((ENSEMBLES, members, 5 * times))
+    values[..., 0] = rng.normal(size=values.shape[:2])
+    for k in range(1, values.shape[-1]):
+        values[..., k] = keep * values[..., k - 1] + math.sqrt(1.0 - keep**2) * rng.normal(size=values.shape[:2])
+    return values
+
+
+@pytest.mark.parametrize(("members", "times"), [(2, 5), (4, 2), (6, 20), (40, 5)])
+def test_settled_series_are_so_in_99_of_100_cases_and_their_intervals_hold_while_a_drift_is_seen(members, times):
+    values = series(np.random.default_rng(31), members, times)
+    results = [analysis.over_time(each) for each in values]
+    means, lows, highs, errors = (np.array([each[k] for each in results]) for k in ("mean", "low", "high", "sem"))
+    free = math.nan if members < 4 else members - 1.0
+    settled = np.array([settlement(*each, free).verdict == "" for each in zip(values, errors, strict=True)])
+    assert 0.98 < settled.mean() < 1.0
+    assert LEAST < np.mean((lows <= 0.0) & (highs >= 0.0), where=settled) < MOST
+    if members >= 4:  # the error is that of the members' means, however they are recorded
+        assert_allclose(errors, values.mean(axis=-1).std(axis=1, ddof=1) / math.sqrt(members), rtol=1e-12)
+    # a drift that all members share: ten errors of the ensemble's drift are seen by four members and more
+    drift = 10.0 * 2.0 * np.std(means) * np.linspace(-1.0, 1.0, values.shape[-1])
+    drifting = [settlement(each + drift, np.nan).verdict for each in values[:100]]
+    assert members == 2 or drifting.count("not settled") > 90
+
+
+def test_a_run_without_noise_settles_to_the_end_or_to_whole_cycles_without_an_error():
+    relaxing = settlement(153.5e-6 - 40e-6 * np.exp(-3.0 * TIME)[np.newaxis], noisy=False)
+    assert relaxing.reason("m/s", "the second half") == "not settled: 113.5 → 151.5 µm/s over the second half"
+    assert_allclose(relaxing.value, 153.5e-6 - 40e-6 * math.exp(-3.0), rtol=1e-12)
+    assert settlement(1.0 + 0.5e-3 * TIME[np.newaxis], noisy=False) == ("", 1.0005, 1.0, 1.0005)
+    assert settlement(np.zeros((1, 5)), noisy=False).verdict == ""
+    # a saw-tooth of 11.3 cycles has the mean of a whole one, to half a record of its ends
+    saw = (11.3 * TIME) % 1.0
+    cycle = settlement(saw[np.newaxis], noisy=False)
+    assert cycle.verdict == "" and abs(cycle.value - 0.5) < 11.3 / 400 / 11
+    assert settlement((saw + TIME)[np.newaxis], noisy=False).verdict != ""
+    assert settlement(((2.3 * TIME) % 1.0)[np.newaxis], noisy=False).verdict.startswith("too short")
+    one = settlement(np.random.default_rng(3).normal(size=(1, 5)).cumsum()[np.newaxis])
+    assert one.verdict.startswith("too short")
+
+
+PULLED = {
+    "clock": Clock(duration=0.6, step=2e-3), "solid": Solid(shear_modulus=1e6), "sphere": Sphere(radius=5e-6),
+    "adhesion": Adhesion(work=20e-3, bond_share=0.8), "drive": drive.Steady(speed=0.0), "shear": shear.Uniform(),
+    "contact": Equilibrium(load=-250e-9), "ensemble": Ensemble(members=40),
+    "bonds": bonds.Tracked(sites=8, rupture=Constant(rate=20.0), bond_stiffness=1e-3, rebinding_rate=60.0,
+                           site_density=1e13),
+}  # fmt: skip
+FLUCTUATING = {
+    "clock": Clock(duration=0.4, step=4e-3), "drive": drive.Steady(speed=4e-3),
+    "shear": shear.Modal(correlation=Time(time=0.01), **FIELD), "sweep": {"contact.load": [1e-3, 4e-3]},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("parts", [PULLED, FLUCTUATING], ids=["contacts come off", "a sweep"])
+def test_a_mean_has_one_error_with_and_without_members_and_in_any_division_into_blocks(parts, monkeypatch):
+    each = run(scene(**parts))
+    expected = of_second_half(each)
+    monkeypatch.setattr(plans, "_BLOCK_SECONDS", 2e-3)  # blocks that end within the second half
+    monkeypatch.setattr(plans, "_GROUP", 5)
+    pooled = of_second_half(run(scene(**parts, record=Record(per_member=False))))
+    for name in ("contact_area", "area_ratio", "work_of_adhesion", "fraction_detached", "bond_fraction"):
+        for kind in ("mean", "sem", "low", "high"):
+            assert_allclose(pooled[f"{name}_{kind}"], expected[f"{name}_{kind}"], rtol=1e-6, err_msg=name)
+        xr.testing.assert_equal(pooled[f"{name}_reason"], expected[f"{name}_reason"])
+    # by hand: each member's mean while it is closed
+    late = each.isel(t=slice(each.sizes["t"] // 2, None))
+    means = late["contact_area"].where(late["in_contact"] > 0).mean("t")
+    assert_allclose(expected["contact_area_mean"], means.mean("member"), rtol=1e-12)
+    error = means.std("member", ddof=1) / np.sqrt(means.count("member"))
+    assert_allclose(expected["contact_area_sem"], error, rtol=1e-10)
+    at_each_time = [
+        analysis.statistics(dataset) for dataset in (each, run(scene(**parts, record=Record(per_member=False))))
+    ]
+    for kind in ("mean", "sem", "low"):
+        area, area_pooled = (result[f"contact_area_{kind}"] for result in at_each_time)
+        assert_allclose(area_pooled, area, rtol=1e-6)
+
+
+def test_contacts_that_come_off_lose_no_area_to_bonds_and_too_few_or_those_that_close_again_have_no_mean():
+    dataset = run(scene(**PULLED))
+    result = of_second_half(dataset)
+    gone = dataset["in_contact"].to_numpy() == 0
+    assert 10 < gone[:, -1].sum() < 35
+    assert result["fraction_detached_reason"].item().startswith("not settled")
+    assert abs(result["lost_to_bonds_mean"] - 1.0 + result["area_ratio_mean"]) < 1e-12
+    # as the bonds are all there on average, closed contacts have nearly JKR's area
+    assert abs(result["area_ratio_mean"] - 1.0) < 0.1 and 0.0 < result["area_ratio_sem"] < 0.05
+    shares = analysis.shares(dataset)
+    assert_allclose(shares["lost_to_bonds_mean"] + analysis.statistics(closed_only(dataset))["area_ratio_mean"], 1.0)
+    lasting = np.flatnonzero(~gone[:, -1])[:2]
+    few = dataset.isel(member=[*lasting, *np.flatnonzero(gone[:, -1])])
+    result = of_second_half(few)
+    reason = f"2 of {few.sizes['member']} contacts are closed at the end of the second half"
+    assert result["contact_area_reason"] == reason and math.isnan(result["contact_area_mean"])
+    again = dataset["in_contact"].copy()
+    again[0, 200], again[0, 201:] = 0, 1
+    result = of_second_half(dataset.assign(in_contact=again))
+    assert result["friction_force_reason"] == "1 of 40 contacts close again in the second half"
