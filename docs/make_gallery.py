@@ -625,8 +625,8 @@ def measured_lens(fit: Fit) -> dict[str, Number]:
     "Which work of adhesion and which modulus does a JKR test give?",
     """A work of adhesion of {work} mJ/m², with {level:g} % confidence between {least:.1f} and {most:.1f}, and a contact
     modulus E* of {modulus} MPa, between {softest:.2f} and {stiffest:.2f}. The two go together: their correlation is
-    {together:.2f}. The test, [jkr_fit.csv](../../scenarios/jkr_fit.csv), is made up with 45 mJ/m² and 2 MPa. A table of
-    your own loads and radii (or areas) takes its place.""",
+    {together:.2f}. The test, [jkr_fit.csv](../../scenarios/jkr_fit.csv), is made up; the scenario says with which
+    numbers, and the intervals hold both. A table of your own loads and radii (or areas) takes its place.""",
     free=("adhesion.work", "solid.youngs_modulus"),
 )
 def jkr_fit(fit: Fit) -> dict[str, Number]:

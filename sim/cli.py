@@ -23,6 +23,7 @@ _SET = click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE"
 _SEED = click.option("--seed", type=click.IntRange(0, 2**64 - 1), help="Replace the seed.")
 _MEMBERS = click.option("--members", type=click.IntRange(1, 10**7), help="Replace the number of ensemble members.")
 _FORCE = click.option("--force", is_flag=True, help="Replace files that exist.")
+_UNITS = click.option("--units", multiple=True, metavar="UNIT", help="Unit of numbers of its dimension, such as mm/s.")
 _WHERE = click.option("--where", "chosen", multiple=True, metavar="KEY=VALUE", help="Of a swept key this value alone.")
 
 _STOPPED = "stopped; what was computed is kept: the same command with --resume goes on"
@@ -238,15 +239,20 @@ def check(scenario: Path, **overrides: Any) -> None:
 @_WHERE
 @click.option("--all", "whole", is_flag=True, help="Every row: all times and sweep values.")
 @click.option("--csv", type=_PATH, help="Also write every time and sweep value to this CSV file.")
+@click.option("--wide", is_flag=True, help="CSV of a row for each sweep value; with --all of each record.")
+@_UNITS
 @_FORCE
-def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None, force: bool) -> None:
+def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None, force: bool, **form: Any) -> None:
     """Ensemble statistics over time and sweep."""
     from sim import analysis
+    from sim.units.notation import in_units
 
-    with _opened(output, chosen) as dataset:
+    if form["wide"] and csv is None:
+        raise click.UsageError("--wide is a form of --csv FILE, which is missing")
+    with _opened(output, chosen) as dataset, in_units(form["units"]):
         if csv is not None:
             analysis.dataset.claim(dataset, output, csv, force)
-            analysis.to_csv(dataset, csv)  # before any printing, as nobody may read it to its end
+            analysis.to_csv(dataset, csv, form["wide"], whole)  # before any printing, as nobody may read it to its end
         _print_tables(*_tables(dataset, sys.maxsize if whole else _ROWS))
         if csv is not None:
             say(str(csv))
@@ -275,7 +281,7 @@ class _Plot(click.Command):
 @click.option("--xlim", default="", metavar="LOW:HIGH", help="Range of the x axis in its unit, such as 0.1:10.")
 @click.option("--from", "start", metavar="TIME", help="First time of a figure over time, such as 0.2 s.")
 @click.option("--to", "stop", metavar="TIME", help="Last time of a figure over time.")
-@click.option("--units", multiple=True, metavar="UNIT", help="Unit of axes of its dimension, such as mm/s.")
+@_UNITS
 @click.option("--data", type=_PATH, help="Measured points from a CSV of columns as those of `sim fit`.")
 @_FORCE
 def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...], force: bool, **choices: Any) -> None:
@@ -374,7 +380,7 @@ def converge(
 @click.option("--steady", is_flag=True, help="Steady sliding is enough: do not run the scenario's own models.")
 @click.option("--compare", "judged", is_flag=True, help="Also which mechanism or theory is sufficient for the data.")
 @click.option("-o", "--output", type=_PATH, help="STEM of STEM_fit.toml, .json, .png; default the scenario's.")
-@click.option("--units", multiple=True, metavar="UNIT", help="Unit of axes of its dimension in the figure, as um/s.")
+@_UNITS
 @_SET
 @_FORCE
 def fit(scenario: Path, output: Path | None, changes: tuple[str, ...], force: bool, **options: Any) -> None:

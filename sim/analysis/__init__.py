@@ -28,16 +28,16 @@ from sim.analysis.statistics import (
     summary,
     where,
 )
-from sim.analysis.tables import highlights, losses, notes, spread, table, tidy, to_csv
+from sim.analysis.tables import highlights, in_columns, losses, notes, spread, table, tidy, to_csv
 from sim.units.notation import concise, engineering, scaled
 
 __all__ = [
     "QUANTILES", "Control", "IntegralTime", "Lifetime", "Statement", "averaging", "bond_work", "concise", "control",
     "correlation_time", "crossing", "distribution", "each", "engineering", "events", "first_passage", "highlights",
-    "integral_time", "is_stationary", "is_steady", "lifetime", "loop_energy", "loss_speeds", "losses", "notes",
-    "observables", "over_time", "peaks", "reference_radii", "scaled", "setting", "settled", "share_observables",
-    "shares", "skewness_error", "slip_sizes", "slips", "speed_curves", "spread", "statements", "statistics",
-    "stick_slip", "summary", "sweep_dims", "table", "tidy", "to_csv", "where",
+    "in_columns", "integral_time", "is_stationary", "is_steady", "lifetime", "loop_energy", "loss_speeds", "losses",
+    "notes", "observables", "over_time", "peaks", "reference_radii", "scaled", "setting", "settled",
+    "share_observables", "shares", "skewness_error", "slip_sizes", "slips", "speed_curves", "spread", "statements",
+    "statistics", "stick_slip", "summary", "sweep_dims", "table", "tidy", "to_csv", "where",
 ]  # fmt: skip
 
 

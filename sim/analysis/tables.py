@@ -32,7 +32,7 @@ from sim.analysis.over_speed import loss_speeds
 from sim.analysis.statements import BOUNDED, COUNTS, as_means, each, of_events, reasons, statements
 from sim.analysis.statistics import QUANTILES, WIDE, averaging, correlation_time, over_members, shares, statistics
 from sim.numerics.files import output
-from sim.units.notation import bounded, concise, scaled, share
+from sim.units.notation import bounded, chosen_unit, concise, scaled, share
 
 #: Cells of columns by heading.
 Columns = dict[str, list[str]]
@@ -449,10 +449,12 @@ _ENDINGS = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": 
 _ALIKE = [f"q{100 * level:02.0f}{end}" for level in QUANTILES for end in ("", "_low", "_high")]
 _ENDINGS |= {name: name for name in (*_ALIKE, "effective_samples", "correlation_time")}
 _ENDINGS |= {"correlation_time_error": "correlation_time_sem"}
+#: Endings of the variables of statements.
+_STATED = ("_mean", "_sem", "_low", "_high", "_reason")
 
 
-def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
-    """Write all statistics as one long table, as ``tidy`` gives them.
+def to_csv(dataset: xr.Dataset, path: str | os.PathLike, wide: bool = False, every: bool = False) -> None:
+    """Write all statistics as one long table, as ``tidy`` gives them, or as a wide one.
 
     Parameters
     ----------
@@ -461,14 +463,49 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     path : path
         The file: a header, then one row for each quantity, sweep value and time. A file is there whole or, in trouble,
         as it was before.
+    wide : bool
+        True for a row for each point of the sweep, with a column for each statement, its error and its bounds, in the
+        units of ``in_units``, else in SI.
+    every : bool
+        True for a wide table of a row for each record, with all statistics.
     """
-    rows = tidy(dataset)
+    rows = in_columns(dataset, every) if wide else tidy(dataset)
     units = {str(name): variable.attrs.get("units", "1") for name, variable in dataset.coords.items()} | {
         "speed": "m/s"
     }
-    header = [name if units.get(name, "1") == "1" else f"{name} [{units[name]}]" for name in rows]
+    header = list(rows) if wide else [_with_unit(name, units.get(name, "1")) for name in rows]
     with output(Path(path)) as beside:
         rows.to_csv(beside, header=header, index=False, na_rep="nan", lineterminator="\n")
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return name if unit in ("1", "") else f"{name} [{unit}]"
+
+
+def in_columns(dataset: xr.Dataset, every: bool = False) -> pd.DataFrame:
+    """Return the statements of a run, a row for each point of the sweep; with ``every`` all statistics at each record.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A column ``name [unit]`` for each swept key and statement, and if they are known ``name_error``, ``name_low``
+        and ``name_high`` (95 % interval) and ``name_reason``. Units are those of ``in_units``, else SI.
+    """
+    if every:
+        rows = frame(dataset)
+    else:
+        stated = statements(dataset)
+        names = [n for n in map(str, stated) if n.endswith(_STATED) and not re.search("_quantile|_correlation", n)]
+        rows = _framed(dataset, stated[names])
+    units, columns = rows.attrs["units"], {}
+    for name in rows.replace("", np.nan).dropna(axis="columns", how="all"):
+        stem, _, end = name.rpartition("_")
+        exact = 0.0 if end == "sem" else rows.get(f"{stem}_mean") if end in ("low", "high") else None
+        if exact is None or not np.all(rows[name] == exact):  # numbers without noise have no error
+            factor, unit = chosen_unit(units.get(name, "1")) or (1.0, units.get(name, "1"))
+            heading = _with_unit(re.sub("_sem$", "_error", name.removesuffix("_mean")), unit)
+            columns[heading] = rows[name] if factor == 1.0 else factor * rows[name]
+    return pd.DataFrame(columns)
 
 
 def tidy(dataset: xr.Dataset) -> pd.DataFrame:
@@ -513,8 +550,14 @@ def frame(dataset: xr.Dataset) -> pd.DataFrame:
     result = statistics(dataset)
     with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
         result = result.merge(shares(dataset))
-    flat = _flat(result)
-    table = flat.to_dataframe(dim_order=[*sweep_dims(dataset), "t"]).reset_index()
+    return _framed(dataset, result)
+
+
+def _framed(dataset: xr.Dataset, statistics: xr.Dataset) -> pd.DataFrame:
+    """Return a data frame of a row for each point of the sweep and, if statistics have times, each record."""
+    flat = _flat(statistics)
+    dims = [name for name in (*sweep_dims(dataset), "t") if name in flat.dims]
+    table = flat.expand_dims("row").to_dataframe(dim_order=["row", *dims]).reset_index().drop(columns="row")
     table.attrs["units"] = {str(name): variable.attrs.get("units", "1") for name, variable in flat.variables.items()}
     return table
 

@@ -21,6 +21,7 @@ from sim.plots import curves, field, slider, style, theories
 from sim.plots.measured import Measured
 from sim.plots.style import STYLE, recorded, swept_value
 from sim.units.errors import BadInput
+from sim.units.notation import in_units
 from sim.units.quantity import read_option
 
 #: Kinds of figures over time, of which a part can be drawn.
@@ -237,7 +238,7 @@ def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None =
     options = choices.options(kind, drawing.takes, dataset)
     dataset = choices.between(dataset) if kind in _OVER_TIME else dataset
     look = contextlib.nullcontext() if choices.ax else mpl.rc_context(STYLE)  # axes of somebody else keep their own
-    with look, answered(), style.in_units(choices.units):
+    with look, answered(), in_units(choices.units):
         figure = drawing.draw(dataset, **options)
         fixed = [swept_value(dataset, name, 0) for name in sweep_dims(dataset) if dataset.sizes[name] == 1]
         fixed += [] if choices.member is None else [f"member {choices.member}"]

@@ -4,14 +4,11 @@ One colour means one thing throughout: blue what broken bonds do, vermilion what
 do, black the contact with both; grey lines are closed forms, such as JKR's and Hertz's contacts.
 """
 
-import contextlib
 import io
 import itertools
 import re
 import string
 import textwrap
-from collections.abc import Iterable, Iterator
-from contextvars import ContextVar
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
@@ -26,7 +23,6 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from sim.analysis import engineering, scaled, sweep_dims
-from sim.units.quantity import Quantity
 
 COLUMN, WIDE = 3.4, 7.0  # inches: one column, both columns
 _ON_SCREEN = 120  # dots an inch
@@ -192,39 +188,10 @@ class Unit(NamedTuple):
     @classmethod
     def of(cls, values: Any, unit: str, logarithmic: bool = False) -> "Unit":
         """Return the chosen unit, or the unit of the largest value; on a logarithmic axis of their middle."""
-        chosen = _CHOSEN.get({})
-        for name in chosen:
-            with contextlib.suppress(ValueError):
-                size = Quantity(unit, "unit").read(f"1 {name}")
-                chosen[name] = True
-                return cls(1.0 / size, re.sub("^u(?=.)", "µ", name).replace("^2", "²").replace("^3", "³"))
         sizes = np.abs(values)
         sizes = sizes[np.isfinite(sizes) & (sizes > 0.0)]
         most = sizes.max(initial=0.0)
         return cls(*scaled(np.sqrt(sizes.min(initial=most) * most) if logarithmic else most, unit))
-
-
-#: Units chosen for the axes of their dimensions, and whether any axis has them.
-_CHOSEN: ContextVar[dict[str, bool]] = ContextVar("units of axes")
-
-
-@contextlib.contextmanager
-def in_units(units: Iterable[str]) -> Iterator[None]:
-    """Return a context in which axes of their dimension have these units, such as ``"mm/s"``.
-
-    Raises
-    ------
-    ValueError
-        For a unit that no axis can have.
-    """
-    chosen = dict.fromkeys(units, False)
-    before = _CHOSEN.set(chosen)
-    try:
-        yield
-    finally:
-        _CHOSEN.reset(before)
-    for name in (name for name, used in chosen.items() if not used):
-        raise ValueError(f'no axis of this figure can be in "{name[:40]}"; choose a unit of one, such as mm/s of speed')
 
 
 def in_unit(axis: Axis, words: str, values: Any, si: str) -> float:

@@ -29,7 +29,7 @@ from sim.ensemble.dataset import scenario_json, variable_name
 from sim.numerics import files
 from sim.parts.exchange import Array
 from sim.plots import style
-from sim.plots.style import BOTH, HOLLOW, Unit, in_units
+from sim.plots.style import BOTH, HOLLOW, Unit
 from sim.scenario.files import parse, written
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read, quantities
@@ -38,7 +38,7 @@ from sim.study import likelihood
 from sim.study.likelihood import HELD, LEVEL, Curve, Free, Interval, Measured, Minimum, Problem, idle, with_errors
 from sim.study.mechanisms import WHOLE, Verdict, compare
 from sim.units.errors import BadInput
-from sim.units.notation import concise, engineering, scaled
+from sim.units.notation import concise, engineering, in_units, scaled
 from sim.units.quantity import read_option
 
 #: Factor by which a number that is fitted in its logarithm may change at most, where no bounds are given.
@@ -431,13 +431,10 @@ def carried_out(
     for path in others if is_replaced and not is_input else outputs:
         files.claim(path, replace, inputs)
     tables = [likelihood.read(path, scenario) for path in data]
-    try:
-        with in_units(units):  # before anything is fitted
-            for table in tables:
-                for unit in (_along(table).unit, *(curve.variable.unit for curve in table.curves)):
-                    Unit.of(1.0, unit)
-    except ValueError as fault:
-        raise BadInput([f"--units: {fault}"]) from None
+    with in_units(units):  # before anything is fitted
+        for table in tables:
+            for unit in (_along(table).unit, *(curve.variable.unit for curve in table.curves)):
+                scaled(1.0, unit)
     result = fit(scenario, tables, free, sizes, steady)
     verdict = compare(result.problem, result.best, result.scenario.seed) if judged else None
     picture = io.BytesIO()

@@ -1,8 +1,14 @@
 """Numbers as text, with a suitable prefix and their error in the last digits; names of recorded quantities."""
 
+import contextlib
 import math
 import re
+from collections.abc import Iterable, Iterator
+from contextvars import ContextVar
 from typing import Literal
+
+from sim.units.errors import BadInput
+from sim.units.quantity import Quantity
 
 #: Most digits of a mean with its error.
 _MOST_DIGITS = 7
@@ -48,14 +54,51 @@ def second_half(records: int) -> tuple[int, int]:
     return first, first + (records - first) // 2
 
 
+#: Units that a person has chosen for numbers of their dimensions, and whether any number has had them.
+_CHOSEN: ContextVar[dict[str, bool]] = ContextVar("chosen units")
+
+
+@contextlib.contextmanager
+def in_units(units: Iterable[str]) -> Iterator[None]:
+    """Return a context in which numbers of their dimension are shown in these units, such as ``"mm/s"``.
+
+    Raises
+    ------
+    BadInput
+        For a unit that no number in the context can have.
+    """
+    chosen = dict.fromkeys(units, False)
+    before = _CHOSEN.set(chosen)
+    try:
+        yield
+    finally:
+        _CHOSEN.reset(before)
+    for name in (name for name, used in chosen.items() if not used):
+        raise BadInput([f'--units: no number here can be in "{name[:40]}"; choose a unit of one, as mm/s of speed'])
+
+
+def chosen_unit(unit: str) -> tuple[float, str] | None:
+    """Return the factor from SI to the unit chosen for this dimension, and its name; None if there is no choice."""
+    chosen = _CHOSEN.get({})
+    for name in chosen:
+        with contextlib.suppress(ValueError):
+            size = Quantity(unit, "unit").read(f"1 {name}")
+            chosen[name] = True
+            return 1.0 / size, name
+    return None
+
+
 def scaled(magnitude: float, unit: str) -> tuple[float, str]:
     """Return the factor from SI to a unit with a prefix that suits a magnitude, and that unit for people.
+
+    A unit that was chosen with ``in_units`` comes first.
 
     >>> scaled(0.042, "J/m^2")
     (1000.0, 'mJ/m²')
     """
-    match = _PREFIXABLE.fullmatch(unit)
-    shown = unit.replace("^2", "²").replace("^3", "³")
+    if choice := chosen_unit(unit):
+        return choice[0], _typeset(re.sub("^u(?=.)", "µ", choice[1]))
+    match, shown = _PREFIXABLE.fullmatch(unit), _typeset(unit)
     size = abs(float(f"{magnitude:.3e}"))
     if match is None or not (0.0 < size < math.inf):
         return 1.0, "" if unit == "1" else shown
@@ -64,6 +107,10 @@ def scaled(magnitude: float, unit: str) -> tuple[float, str]:
     exponent = 3 * math.floor((math.log10(size) + 2.0 * (power - 1) + 1e-12) / (3 * power))
     exponent = min(max(exponent, -15), 12)
     return 10.0 ** (-exponent * power), _PREFIXES[exponent] + shown
+
+
+def _typeset(unit: str) -> str:
+    return unit.replace("^2", "²").replace("^3", "³")
 
 
 def engineering(value: float, unit: str) -> str:

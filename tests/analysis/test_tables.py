@@ -11,9 +11,11 @@ from helpers import lens
 from helpers.cases import posix
 from helpers.lens import scene
 from helpers.parts import Clock, Ensemble, Equilibrium, Record, analysis, bonds, drive, run, shear
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
+from sim.units.errors import BadInput
+from sim.units.notation import in_units
 
 
 @pytest.mark.parametrize("per_member", [True, False])
@@ -123,6 +125,31 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
     result = analysis.distribution(dataset)
     assert_array_equal(late["mean"], result["contact_area_mean"])
     assert_array_equal(late["effective_samples"], result["contact_area_effective_samples"])
+
+
+def test_a_wide_csv_has_a_row_for_each_point_or_record_in_the_units_that_are_chosen(tmp_path):
+    path, names = (
+        tmp_path / "out.csv",
+        {"contact_area": ("mm^2", 1e6), "friction_force": ("mN", 1e3), "indentation": ("m", 1)},
+    )
+    sweep = {"drive.speed": [1e-3, 1e-2]}
+    dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep=sweep, ensemble=Ensemble(members=2)))
+    for every in (False, True):
+        with in_units(["mm/s", "mm^2", "mN", "ms"]):
+            analysis.to_csv(dataset, path, wide=True, every=every)
+        rows, long = pd.read_csv(path), analysis.tidy(dataset)
+        long = long[long["t"].notna() == every]
+        assert_allclose(np.unique(rows["drive_speed [mm/s]"]), [1.0, 10.0], rtol=1e-15)
+        assert len(rows) == 2 * (dataset.sizes["t"] if every else 1) and any("_q95" in name for name in rows) == every
+        for (name, (unit, factor)), kind in itertools.product(names.items(), ("mean", "error", "low", "high")):
+            column = f"{name}{f'_{kind}' * (kind != 'mean')} [{unit}]"
+            assert_allclose(rows[column], factor * long.loc[long["quantity"] == name, kind], rtol=1e-15, atol=0)
+    assert_allclose(rows["t [ms]"], np.tile(1e3 * dataset["t"], 2), rtol=1e-15)
+    analysis.to_csv(run(scene(shear=shear.Uniform())), path, wide=True)
+    rows = pd.read_csv(path)  # of one run without noise: the statements of its events, without errors
+    assert len(rows) == 1 and "speed_at_5_percent_lost [m/s]" in rows and not any("_error" in name for name in rows)
+    with pytest.raises(BadInput, match=r"--units: .*kg"), in_units(["mm/s", "kg"]):
+        assert {"drive_speed\n(mm/s)", "F\n(mN)"} < set(analysis.table(dataset)[0])
 
 
 def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_spread():

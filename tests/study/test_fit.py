@@ -15,7 +15,6 @@ from scipy import stats
 import sim
 from sim.cli import cli
 from sim.laws import halfspace, jkr, schallamach
-from sim.plots.style import in_units
 from sim.scenario.files import written
 from sim.scenario.reader import load
 from sim.scenario.schema import quantities
@@ -24,6 +23,7 @@ from sim.study.fit import figure, fit
 from sim.study.likelihood import Curve, Measured, minimum, problem_of
 from sim.study.paper import Check, checks
 from sim.units.errors import BadInput
+from sim.units.notation import in_units
 
 SELF_AFFINE = {"model": "self_affine", "rms": "150 kPa", "hurst": 0.8, "longest": "60 um", "shortest": "1 um",
                "rolloff": "24 um"}  # fmt: skip
@@ -557,7 +557,7 @@ def test_a_bad_table_or_unit_is_refused_and_a_fit_without_convergence_exits_1(sc
         patched.setattr(calibration, "fit", None)
         done = command(scenario, curves, "--free", "bonds.stress", "--units", "um/s", "--units", "kPa")
     assert isinstance(done.exception, BadInput)
-    assert '--units: no axis of this figure can be in "kPa"' in str(done.exception)
+    assert '--units: no number here can be in "kPa"' in str(done.exception)
     monkeypatch.setattr(calibration, "with_errors", lambda problem, start: (
         problem, minimum(problem, start, errors=True)._replace(converged=False)))  # fmt: skip
     done = command(scenario, curves, "--free", "bonds.stress", "--steady")

@@ -347,34 +347,32 @@ Rebinding = Annotated[float, Quantity("1/s", "rate at which a free site binds", 
 Density = Annotated[float, Quantity("1/m^2", "bond sites per area", "n", above=0, typical="1e17 1/m^2")]
 Ratio = Annotated[float, Quantity("1", "rebinding_rate over zero_force_rate", "beta", above=0, typical="10")]
 _BY_SPEED = ("rupture.critical_speed", "rupture.stress", "rebinding_ratio")
-_T = TypeVar("_T")
+_T = TypeVar("_T", bound="_Stretched | Auto")
+_Part = TypeVar("_Part")
 
 
-def _filled(part: _T, **values: object) -> _T:
+def _filled(part: _Part, **values: object) -> _Part:
     """Return a part with some values, unchecked."""
     result = copy.copy(part)
     vars(result).update(values)
     return result
 
 
-def _check_numbers(bonds: "_Stretched | Auto") -> None:
-    """Refuse bonds without the numbers of exactly one way: rates and site density, or critical speed and stress."""
+def _one_way(bonds: _T) -> _T:
+    """Return bonds that have either their rates and site density, or a critical speed and a stress; refuse others."""
     is_bell = isinstance(bonds.rupture, Bell)
     by_rates = (*(("rupture.zero_force_rate",) if is_bell else ()), "rebinding_rate", "site_density")
-    by_speed = _BY_SPEED if is_bell else _BY_SPEED[-1:]
-    missing, wanted = ([key for key in keys if attrgetter(key)(bonds) is None] for keys in (by_rates, by_speed))
-    given = [key for key in by_speed if key not in wanted]
-    if missing and not given:
-        places = [tuple(key.replace("rupture.", "rupture.bell.").split(".")) for key in missing]
-        errors = [InitErrorDetails(type="missing", loc=place, input=None) for place in places]
-        raise ValidationError.from_exception_data("bonds", errors)
-    extra = [key for key in by_rates if key not in missing]
-    if not (missing and is_bell):
-        extra, wanted = given, []
-    if given and (extra or wanted):
-        cures = [f"{verb} {', '.join(keys)}" for verb, keys in (("remove", extra), ("add", wanted)) if keys]
+    keys = (*by_rates, *(_BY_SPEED if is_bell else _BY_SPEED[-1:]))
+    given = [key for key in keys if attrgetter(key)(bonds) is not None]
+    if set(given) <= set(by_rates):
+        missing = [key.replace("rupture.", "rupture.bell.").split(".") for key in by_rates if key not in given]
+        if missing:
+            errors = [InitErrorDetails(type="missing", loc=tuple(place), input=None) for place in missing]
+            raise ValidationError.from_exception_data("bonds", errors)
+    elif not is_bell or {*given} != {*_BY_SPEED}:
         ways = f"give either {', '.join(by_rates)} or, of Bell's rupture, {', '.join(_BY_SPEED)}"
-        raise PydanticCustomError("one_way", f"{ways}: {', '.join(cures)}")
+        raise PydanticCustomError("one_way", f"{ways}; given are {', '.join(given)}")
+    return bonds
 
 
 @keyed()
@@ -398,8 +396,7 @@ class _Stretched(_BondModel):
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        _check_numbers(self)
-        return self
+        return _one_way(self)
 
     def chosen(self, area: float, forces: bool) -> Self:
         """Return this model with all of its rates and its site density, for any contact and field."""
@@ -409,8 +406,8 @@ class _Stretched(_BondModel):
         wanted = bell.critical_speed, bell.stress, bell.bell_force, self.bond_stiffness, self.rebinding_ratio
         rate, rebinding, density = map(float, self.numbers_of(*wanted))
         rupture = _filled(bell, zero_force_rate=rate, critical_speed=None, stress=None)
-        numbers = {"rebinding_rate": rebinding, "rebinding_ratio": None, "site_density": density}
-        return _filled(self, rupture=rupture, has_stress=True, **numbers)
+        result = _filled(self, rupture=rupture, rebinding_rate=rebinding, rebinding_ratio=None, site_density=density)
+        return _filled(result, has_stress=True)
 
     @cached_property
     def law(self) -> RuptureRate:
@@ -633,7 +630,7 @@ _MOST_TRACKED = 10**6
 _WITHOUT = ("critical_speed", "rebinding_rate")
 _WITH = ("rupture", "bond_stiffness")
 _NUMBERS = (*_WITH, "rebinding_rate", "rebinding_ratio", "site_density")
-_STRETCHED = ("rupture", "bond_stiffness", "site_density")
+_STRETCHED = ("rupture", "bond_stiffness", "rebinding_ratio", "site_density")
 
 #: A model that can be advanced.
 Model = Unbroken | Steady | Rate | Counted | FirstMoment | Cohort | Tracked
@@ -675,9 +672,7 @@ class Auto:
             raise PydanticCustomError("one_kind", "rebinding_rate must be above 0 1/s for bonds without a rupture")
         if with_ and self.stress:
             raise PydanticCustomError("one_kind", "bonds with a rupture make their own stress; leave stress out")
-        if with_:
-            _check_numbers(self)
-        return self
+        return _one_way(self) if with_ else self
 
     def number(self, area: float) -> float:
         """Return the sites of a contact of this area [m²]: ``sites``, else by their density, else infinity."""
