@@ -25,8 +25,11 @@ _NEAR = 5e-3
 #: Smallest distance between branches of a curve that goes back and forth, in errors.
 _ALIKE = 0.01
 _MARKS = "osD^v"
-#: Reason why a row is not drawn, and most values of a condition that are named.
-_NO_CURVE, _MOST = "of no curve that is drawn", 3
+#: Reasons why a row is not drawn, and why it has no residual.
+_NO_CURVE, _SEVERAL = "of no curve that is drawn", ("of several curves", "of curves with other areas of JKR's contact")
+_APART = (_SEVERAL[0], "beyond the curve", "without an error")
+#: Most values of a condition that are named.
+_MOST = 3
 
 
 class Line(NamedTuple):
@@ -87,7 +90,7 @@ class Measured:
 
     Its columns are variables of a dataset with their units and errors, as those of ``sim fit``. A column that is a
     number of the scenario, such as ``contact_load``, assigns a row to a curve of a sweep. For each column of which a
-    panel has points, ``left_out`` holds the reason why a row is none of them, and ``apart`` why it has no residual.
+    panel has points, ``reasons`` says why a row is none of them or has no residual; "" if neither.
     """
 
     def __init__(self, data: Path | str | Mapping[str, Any], dataset: xr.Dataset) -> None:
@@ -107,8 +110,7 @@ class Measured:
     def forget(self) -> None:
         """Forget what a figure has shown."""
         self.residuals: list[Residuals] = []
-        self.left_out: dict[str, np.ndarray] = {}
-        self.apart: dict[str, np.ndarray] = {}
+        self.reasons: dict[str, np.ndarray] = {}
         self.conditions: set[str] = set()
         self.over: set[str] = set()
 
@@ -173,23 +175,22 @@ class Measured:
         y = np.take_along_axis(places, first[np.newaxis], 0)[0]
         differs = np.any(matches & (np.abs(places - y) > 1e-9 * np.abs(y)), axis=0)
         given = [self.table[each].values for each in (source, *self.conditions)]
-        lacking = [key for key in curves[0].line.point if self.dataset.sizes[key] > 1 and not self.column(key)]
-        several, beyond = f"of several curves (no column {', '.join(lacking)})", "beyond the curve"
         ends = [np.all(np.isnan(curve.at(x, curve.mean)[0]), axis=0) for curve in curves]
-        reasons = {
-            "with an empty cell": ~np.all(np.isfinite([x, *given]), axis=0), _NO_CURVE: count == 0, several: differs,
-            "at or below 0 on a logarithmic axis": (x <= 0.0) & log, beyond: ~np.isfinite(y),
+        errors = self.table[source].errors
+        faults = {
+            "with an empty cell": ~np.all(np.isfinite([x, *given]), axis=0), _NO_CURVE: count == 0,
+            _SEVERAL[1]: differs, "at or below 0 on a logarithmic axis": (x <= 0.0) & log,
+            "without JKR's area": ~np.isfinite(y), _APART[0]: count > 1, _APART[1]: np.all(ends | ~matches, axis=0),
+            _APART[2]: errors is not None and np.isnan(errors),
         }  # fmt: skip
-        left_out = np.select([*reasons.values()], [*reasons], "")
-        apart = np.select([left_out != "", count > 1, np.all(ends | ~matches, axis=0)], ["", several, beyond], "")
-        for noted, why in ((self.left_out, left_out), (self.apart, apart)):
-            noted[source] = np.where(noted.get(source, why) == "", "", why)
+        reasons = np.select([*faults.values()], [*faults], "")
+        self.reasons[source] = np.where(self.reasons.get(source, reasons) == "", "", reasons)
         for k, curve in enumerate([*curves, curves[0]]):
             alone, line = k < len(curves), curve.line if k < len(curves) else curve.line._replace(colour=BOTH)
-            rows = (left_out == "") & ((count == 1) & (first == k) if alone else count > 1)
+            rows = np.isin(reasons, ("", *_APART)) & ((count == 1) & (first == k) if alone else count > 1)
             if not np.any(rows):
                 continue
-            errors, label = points[min(k, len(curves) - 1)].errors, "measured"
+            errors, label = points[k % len(curves)].errors, "measured"
             high = None if errors is None else factor * errors[rows]
             if high is not None and alone:
                 values, branches = _residuals(curve, x[rows], y[rows], high, log)
@@ -216,26 +217,24 @@ class Measured:
     @property
     def remark(self) -> str:
         """Return how many points the figure lacks or does not compare, and why; "" if there are none."""
-        left_out, apart = (
-            Counter(sorted(np.concatenate([*reasons.values(), np.empty(0, str)]).tolist()))
-            for reasons in (self.left_out, self.apart)
-        )
-        total, drawn = left_out.total(), left_out.pop("", 0)
-        listed = ", ".join(f"{count} {reason}{self._values_of(reason)}" for reason, count in left_out.items())
-        alone = ", ".join(f"{count} {reason}" for reason, count in apart.items() if reason)
-        shown = {each for name in (*self.over, *self.left_out, *self.conditions) for each in names_of(name)}
+        counts = Counter(sorted(np.concatenate([*self.reasons.values(), np.empty(0, str)]).tolist()))
+        total, drawn = counts.total(), counts.pop("", 0) + sum(counts[reason] for reason in _APART)
+        apart = ", ".join(f"{counts.pop(reason)} {self._cause(reason)}" for reason in _APART if counts[reason])
+        left_out = ", ".join(f"{count} {self._cause(reason)}" for reason, count in counts.items() if count)
+        shown = {each for name in (*self.over, *self.reasons, *self.conditions) for each in names_of(name)}
         idle = ", ".join(name for name in self.table if name not in shown)
-        drawn_of = f"{drawn} of {total} points drawn; left out: "
-        parts = [(drawn_of, listed), ("without a residual: ", alone), ("no panel of ", idle)]
-        return "; ".join(words + text for words, text in parts if text)
+        parts = [(f"{drawn} of {total} points drawn; left out: ", left_out), ("without a residual: ", apart)]
+        return "; ".join(words + text for words, text in [*parts, ("no panel of ", idle)] if text)
 
-    def _values_of(self, reason: str) -> str:
-        """Return the conditions of rows that are of no curve, in brackets."""
-        rows, texts = np.any([each == reason for each in self.left_out.values()], axis=0), []
+    def _cause(self, reason: str) -> str:
+        """Return a reason with the conditions of rows of no curve, or with the columns that rows of several lack."""
+        rows, texts = np.any([each == reason for each in self.reasons.values()], axis=0), []
         for name in sorted(self.conditions) if reason == _NO_CURVE else ():
             values = [engineering(each, self.units[name]) for each in np.unique(self.table[name].values[rows])]
             texts.append(f"{name} {', '.join(values[:_MOST])}" + ", …" * (len(values) > _MOST))
-        return f" ({'; '.join(texts)})" if texts else ""
+        for key in sweep_dims(self.dataset) if reason in _SEVERAL else ():
+            texts += [f"no column {key}"] if self.dataset.sizes[key] > 1 and not self.column(key) else []
+        return reason + (f" ({'; '.join(texts)})" if texts else "")
 
     def finish(self, figure: Figure, over: str, ax: Axes | None = None) -> None:
         """Write the remark below a figure, in foreign axes above the legend.
@@ -247,7 +246,7 @@ class Measured:
         """
         if self.column(over) is None:
             raise ValueError(f'{self.source}: no column "{over}", over which the figure is drawn; add it or choose --x')
-        if not any(np.any(reasons == "") for reasons in self.left_out.values()):
+        if not any(np.any(np.isin(reasons, ("", *_APART))) for reasons in self.reasons.values()):
             lack = "no row is of what is drawn: its columns are no variables of this figure, or its conditions differ"
             columns = self.remark or f"columns: {', '.join(self.table)}"
             raise ValueError(f"{self.source}: {lack} ({columns}); choose another kind, --x or --where")

@@ -109,8 +109,8 @@ class Fit(NamedTuple):
         True if the search has ended at a minimum.
     remarks : tuple of str
         Conditions on the numbers, a sentence each.
-    lag : Lag, optional
-        Lag of a scenario's own run behind steady speeds, if it is larger than the errors.
+    lag : str
+        Lag of the scenario's own run behind steady speeds, "" if it is within the errors.
     """
 
     scenario: Scenario
@@ -120,7 +120,7 @@ class Fit(NamedTuple):
     correlations: Array
     converged: bool
     remarks: tuple[str, ...]
-    lag: likelihood.Lag | None = None
+    lag: str = ""
 
     def __repr__(self) -> str:
         texts = ((item.free.key, *item.texts) for item in self.numbers)
@@ -251,12 +251,8 @@ def _remarks(result: Fit) -> Iterator[str]:
             elif is_open:
                 yield f"{item.free.key}: the data do not set the {word} end of its interval; its bound is given instead"
     causes = "the model lacks something, a number that is not free is wrong, or the errors are too small"
-    if lag := result.lag:
-        side = f"{100.0 * abs(lag.share):.2g} % {'above' if lag.share > 0.0 else 'below'} that of a steady speed"
-        yield (
-            f"the run lags: at {engineering(lag.speed, 'm/s')} its {lag.name} is {side}, {abs(lag.errors):.2g} errors "
-            "of the point; if steady speeds were measured, choose --steady or a slower ramp"
-        )
+    if result.lag:
+        yield f"{result.lag}; if steady speeds were measured, choose --steady or a slower ramp"
         causes = "such a lag is enough for it"
     if result.p_value <= POOR:
         far = f"the curves lie further off than their errors (p = {result.p_value:.2g}), so the intervals do not hold"
@@ -322,7 +318,8 @@ def figure(problem: Problem, best: Minimum) -> Figure:
     """
     fitted, alone = problem.predicted(best.x), problem.steady(best.x)
     off = (problem.values - fitted) / np.hypot(problem.sigma, problem.noise)
-    lines = [(fitted, "fit", "-"), (alone, "in steady sliding", "--")][: 2 if np.any(problem.shift) else 1]
+    is_shifted = np.any(np.abs(problem.shift) > _STAYS * problem.sigma)
+    lines = [(fitted, "fit", "-"), (alone, "in steady sliding", "--")][: 2 if is_shifted else 1]
     along, (conditions, labels) = [_along(table) for table in problem.tables], _alike(problem)
     colours, panels = style.shades(len(labels)), dict[tuple[str, str], list[tuple[int, int]]]()
     for number, (place, name) in enumerate((k, name) for k, table in enumerate(problem.tables) for name in table.names):

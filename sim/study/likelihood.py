@@ -31,6 +31,7 @@ from sim.scenario.schema import quantities
 from sim.spectrum.family import Family
 from sim.study.converge import READ, recorded
 from sim.units.errors import BadInput
+from sim.units.notation import engineering
 from sim.units.quantity import Quantity
 from sim.units.tables import names_of, read_measured
 
@@ -526,22 +527,13 @@ class Problem:
         return replace(self, shift=mean - self.steady(x), noise=noise)
 
 
-class Lag(NamedTuple):
-    """Difference of a variable along a run that passes a speed [m/s] from its steady value, over this and its error."""
+def lag(problem: Problem, x: Array) -> str:
+    """Return the lag of a run that passes the speeds of rows, in words, "" if it is within the errors.
 
-    speed: float
-    name: str
-    share: float
-    errors: float
-
-
-def lag(problem: Problem, x: Array) -> Lag | None:
-    """Return the lag of a run that passes the speeds of rows, where it adds most to steady sliding; None within errors.
-
-    It is the difference from a run at that speed, because fluctuations add to steady sliding as well.
+    It is that where the run adds most to steady sliding, from a run at this speed: fluctuations add to it as well.
     """
     if not any(map(_by_speed, itertools.chain(*problem.groups))):
-        return None
+        return ""
     ramp = problem.steady(x) + problem.shift
     added = np.abs(ramp - replace(problem, by_run=False).steady(x)) / np.hypot(problem.sigma, problem.noise)
     for number in np.argsort(-added).tolist():
@@ -558,9 +550,13 @@ def lag(problem: Problem, x: Array) -> Lag | None:
         )
         error = math.hypot(problem.sigma[number], 2.0 * noise, 2.0 * problem.noise[number])
         if mean != 0.0 and abs(ramp[number] - mean) > error:
-            return Lag(speed, name, ramp[number] / mean - 1.0, (ramp[number] - mean) / problem.sigma[number])
-        return None
-    return None
+            share, errors = 100.0 * (ramp[number] / mean - 1.0), abs(ramp[number] - mean) / problem.sigma[number]
+            side = f"{abs(share):.2g} % {'above' if share > 0.0 else 'below'} that of a steady speed"
+            return (
+                f"the run lags: at {engineering(speed, 'm/s')} its {name} is {side}, {errors:.2g} errors of the point"
+            )
+        break
+    return ""
 
 
 class Minimum(NamedTuple):

@@ -168,7 +168,7 @@ def test_each_row_of_a_table_is_drawn_once_or_counted_as_left_out(loads, table, 
     known = [(load, 10.0**k, 0.03 + 0.001 * k + load) for load in (1e-3, 4e-3) for k in range(-1, 2)]
     beyond, unknown = (4e-3, 1e6, 0.02), [(9e-3, 1.0, 0.03), (2e-3, 2.0, 0.03), (9e-3, 3.0, 0.03)]
     every = [*known, beyond, *unknown, (4e-3, 5.0, ""), (1e-3, 0.0, 0.02)][::order]
-    rows = "".join(f"{factor * load}, {speed}, {area}, 1e-3\n" for load, speed, area in every)
+    rows = "".join(f"{factor * load}, {v}, {area}, {1e-3 if v + load != 10.001 else ''}\n" for load, v, area in every)
     path = table(f"{column}, speed [mm/s], contact_area [mm^2], contact_area_error [mm^2]\n{rows}")
     figure = draw(loads, "curve", data=path, absolute=True, units=("mm/s",))
     first, *others = figure.axes
@@ -179,7 +179,7 @@ def test_each_row_of_a_table_is_drawn_once_or_counted_as_left_out(loads, table, 
         assert_allclose(sorted(np.transpose(drawn_of[colour]).tolist()), wanted, rtol=1e-12)
     remark = " ".join(figure.get_supxlabel().split())
     numbers = re.findall(r"(\d+) (?:of 12|of no|with|at|beyond)", remark)
-    assert [*map(int, numbers)] == [7, 1, 3, 1, 1] and "2 mN, 9 mN" in remark
+    assert [*map(int, numbers)] == [7, 1, 3, 1, 1, 1] and "2 mN, 9 mN" in remark
     (drawing,) = (each for each in drawings(loads, path) if each.measured)
     assert drawing.kind == plots.default(loads) and drawing.measured.remark == remark
 
@@ -191,7 +191,7 @@ def test_rows_without_a_load_are_of_no_one_curve_and_a_table_without_speeds_is_r
     area, *_ = (figure := draw(loads, "curve", data=path, absolute=True)).axes
     assert [line.get_color() for line in area.lines if line.get_mfc() == "white"] == [pictures.BOTH]
     assert "2 of several curves (no column contact_load)" in " ".join(figure.get_supxlabel().split())
-    with pytest.raises(ValueError, match=r"left out: 2 of several curves"):
+    with pytest.raises(ValueError, match=r"left out: 2 of curves .* \(no column contact_load\)"):
         draw(loads, "curve", data=path)  # the area of JKR's contact is not known
     path = table("contact_load [mN], contact_area [mm^2]\n1, 0.04\n4, 0.05\n")
     for show in (lambda: draw(loads, data=path), lambda: drawings(loads, path)):
