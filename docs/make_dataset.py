@@ -4,7 +4,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from sim.ensemble.variables import DISC_ENERGIES, KNOWN_ERRORS, LARGEST, MAP, NUMBERS, VARIABLES
+from sim.ensemble.variables import DISC_ENERGIES, KNOWN_ERRORS, LARGEST, MAP, NUMBERS, SYSTEMATIC, VARIABLES
 
 TARGET = Path(__file__).with_name("dataset.md")
 HEAD = """# The variables of a dataset
@@ -123,7 +123,10 @@ def text() -> str:
                 for one in LARGEST
             ),
         ],
-        ((name, "1", "*sweep*", meaning, "") for name, meaning in KNOWN_ERRORS.items()),
+        [
+            *((name, "1", "*sweep*", meaning, "") for name, meaning in KNOWN_ERRORS.items()),
+            *((name, unit, "*sweep*", meaning, "a periodic cell") for name, (unit, meaning) in SYSTEMATIC.items()),
+        ],
         [
             (MAP[0], MAP[1], f"{where}, x, y", MAP[2], MAPS),
             *(

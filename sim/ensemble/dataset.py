@@ -17,10 +17,11 @@ import netCDF4
 import numpy as np
 from pydantic import TypeAdapter
 
+from sim.ensemble.diagnosis import cure, diagnosis, remarks, systematic_errors, worst
 from sim.ensemble.execute import pool
 from sim.ensemble.plan import Plan, part_name
 from sim.ensemble.store import Blocks
-from sim.ensemble.variables import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, Variable
+from sim.ensemble.variables import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, SYSTEMATIC, Variable
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice
 from sim.numerics.hdf5 import CHUNK_CACHE, Refused, opened, tables
@@ -122,6 +123,9 @@ def outline(plan: Plan, parts: Blocks) -> Outline:
     content.sizes["t"] = clock.records
     content.add("t", "f8", ("t",), "s", "time since the start", "t", clock.times)
     _add_numbers(content, plan)
+    content.attributes["remarks"] = json.dumps([*remarks(plan), *diagnosis(plan)], ensure_ascii=False)
+    if (most := worst(plan.points)) and "cell_error_area" in content.variables:
+        content.variables["cell_error_area"].attributes["cure"] = cure(*most)
     slips = [variable.name for variable in plan.largest if variable.axis == "slip"]
     content.sizes |= {"slip": 1} if slips else {}
     for variable in plan.variables + plan.largest:
@@ -255,20 +259,21 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
             content.add(variable_name(key), "f8", (), *described)
     described_as = {number.name: (number.unit, number.long_name, number.symbol) for number in NUMBERS}
     described_as |= {name: ("1", text, "") for name, text in KNOWN_ERRORS.items()}
+    described_as |= {name: (*unit_and_text, "") for name, unit_and_text in SYSTEMATIC.items()}
     derived: dict[str, list[float]] = {}
     for point in plan.points:
         numbers = {number.name: number.read(point) for number in NUMBERS if number.applies(point)}
         for key, (quantity, value) in point.derived.items():
             described_as[variable_name(key)] = quantity.unit, quantity.meaning, quantity.symbol
             numbers[variable_name(key)] = value
-        for name, value in (numbers | point.process.known_errors()).items():
+        for name, value in (numbers | point.process.known_errors() | systematic_errors(point)).items():
             derived.setdefault(name, []).append(float(value))
         point.release()
     for name, values in derived.items():
         if len(values) == len(plan.points):
             array = np.reshape(values, tuple(content.sweep.values()))
             content.add(name, "f8", tuple(content.sweep), *described_as[name], array)
-            if "error" in name:
+            if "error" in name and name in KNOWN_ERRORS:
                 content.attributes[name] = max(values, key=abs)
 
 

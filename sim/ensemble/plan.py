@@ -21,7 +21,7 @@ _STATE_NUMBERS = 2**23
 _STEP, _ALONE, _OF_MEMBER, _COUNTED, _EVENT = 5e-6, 150e-6, 5e-8, 3e-7, 1e-7
 #: A dataset without its trajectories [byte], and a variable over the sweep alone; number of statistics of each pooled
 #: variable.
-_SCENARIO_BYTES, _VARIABLE_BYTES, _STATISTICS = 1.2e5, 3.6e3, 3
+_SCENARIO_BYTES, _VARIABLE_BYTES, _STATISTICS = 1.6e5, 3.6e3, 3
 #: Counted work [s of one core]: of a block at most, of a run that is cut into smaller groups for several cores, and of
 #: one for each process that is worth starting.
 _BLOCK_SECONDS, _SHARED_SECONDS, _PROCESS_SECONDS = 2.0, 20.0, 4.0

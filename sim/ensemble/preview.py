@@ -14,14 +14,16 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from sim.engine import MemberNoise, follow
+from sim.ensemble.diagnosis import diagnosis, place as in_words, remarks, slider_body, spread, worst
 from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots, state_numbers, work
+from sim.ensemble.variables import SOURCES
 from sim.laws import jkr
 from sim.laws.schallamach import Body
 from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
 from sim.parts.bonds.models import Cohort, FirstMoment, Rate
 from sim.parts.drive import Spring
-from sim.parts.exchange import Array, Parts
+from sim.parts.exchange import Parts
 from sim.parts.shear.modes import ModalProcess
 from sim.scenario.clock import Record
 from sim.scenario.scenario import Scenario
@@ -45,8 +47,6 @@ _HEADER = 300.0
 _MOST_WORDS = 6
 #: Time for which steps are tried [s]; a run with a shorter estimate [s] is not tried, or not announced.
 _TRIED, _WORTH_TRYING, _LONG = 0.25, 1.0, 10.0
-#: Relative change of bonds and stress in the derivative of the area.
-_LITTLE = 1e-4
 #: Keys that are listed elsewhere than among the quantities.
 _ELSEWHERE = ("name", "sweep", *(f"{part}.model" for part in Parts._fields))
 Rows = list[tuple[str, ...]]
@@ -90,12 +90,6 @@ def forecast(plan: Plan, jobs: int, pace: float = 1.0, shares: int = 1, left: fl
 def tabulated(plan: Plan) -> bool:
     """True if a run ends with a table of its dataset, for which the dataset is read as a whole."""
     return plan.trajectories <= _MOST_TABULATED
-
-
-def spread(points: Sequence[Scenario], most: int = 8) -> list[Scenario]:
-    """Return some of the points, first and last included."""
-    places = np.unique(np.linspace(0, len(points) - 1, min(most, len(points))).round().astype(int))
-    return [points[place] for place in places]
 
 
 def counted(plan: Plan) -> float:
@@ -320,22 +314,13 @@ def preview(scenario: Scenario) -> str:
         "quantities in SI": _quantities(plan.points),
         "contact at rest": _contact(plan.points),
         "fluctuations": _fluctuations(some),
+        "errors of the result": _errors(plan),
         "slider": _slider([point for point in some if point.drive.solves_motion]),
+        "diagnosis": [(text,) for text in diagnosis(plan)],
         "notes": [(text,) for text in [*remarks(plan), *_lacking(plan)]],
         "the run": _run(plan),
     }
     return "\n\n".join([scenario.name, *(f"{title}\n{_aligned(rows)}" for title, rows in blocks.items() if rows)])
-
-
-def remarks(plan: Plan) -> list[str]:
-    """Return the remarks on a run, one sentence each."""
-    texts = [text for point in spread(plan.points) for text in point.remarks()]
-    if plan.scenario.record.per_member is None and not plan.per_member:
-        texts.append(
-            "every member would make a file of more than 20 GB: mean, spread and standard error are kept alone"
-            " (record.per_member = true keeps every member)"
-        )
-    return list(dict.fromkeys(texts))
 
 
 def _aligned(rows: Rows) -> str:
@@ -433,13 +418,6 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
     if sides := [side for side in cells if math.isfinite(side)]:
         ratios = [side / point.rest_radius for side, point in cells.items() if point.rest_radius > 0.0]
         rows["cell"] = _span(sides, "m") + (f", {_span(ratios)} times the JKR radius" if ratios else "")
-    known = [point.process.known_errors() for point in points]
-    for name in dict.fromkeys(itertools.chain(*known)):
-        values = [errors[name] for errors in known if name in errors]
-        relative = name.startswith(("cell_error", "member_spread", "banded_error"))
-        rows[name.replace("_", " ")] = (
-            f"{round(100.0 * max(values, key=abs), 7) + 0.0:+.2g} %" if relative else _span(values, "", ",.0f")
-        )
     # a map that is the field has an rms and an energy of its own
     rows |= dict(detail for point in points[::-1] for detail in point.fluctuations.details(point.setting))
     if modes := [cast(ModalProcess, point.process).modes for point in points if point.fluctuations.keeps_modes]:
@@ -454,6 +432,19 @@ def _power(point: Scenario) -> float:
         return 1.0
     settled = point.population.steady(point.speeds(2)[1:])
     return float(settled.frozen[0] + settled.varying[0])
+
+
+def _errors(plan: Plan) -> Rows:
+    """Return the systematic errors of area and friction where they are largest, beside the standard error."""
+    if not (most := worst(plan.points)):
+        return []
+    (point, errors), rows, members = most, list[tuple[str, ...]](), plan.scenario.ensemble.members
+    for name, words in SOURCES.items():
+        area, friction = (100.0 * errors[f"{name}_error_{of}"] for of in ("area", "friction"))
+        rows.append((words, f"{area:+.2g} points of A/A_JKR, {friction:+.2g} % of the friction"))
+    noise = 100.0 * errors["member_spread_area"] / math.sqrt(members)
+    rows.append(("standard error", f"{noise:.2g} points of A/A_JKR, of {members} members at one time"))
+    return [*rows, ("largest at", in_words(plan, point, errors["error_speed"]))]
 
 
 def _slider(points: Sequence[Scenario]) -> Rows:
@@ -482,24 +473,6 @@ def _slider(points: Sequence[Scenario]) -> Rows:
             stiffness = float(np.nanmax([0.0, *delayed.stiffness]))
             rows.setdefault(("with mass, damping, viscosity, k_t", text), []).append(stiffness)
     return [(name, f"{_span(values)} {text}") for (name, text), values in rows.items()]
-
-
-def slider_body(point: Scenario, speeds: Array) -> Body:
-    """Return the body behind the spring of a scene in steady sliding at speeds [m/s], with the growth of its area."""
-    drive, steady = cast(Spring, point.drive), point.population.steady(speeds)
-    control, (yields, slope) = point.contact.control(0.0, 0.0), drive.yields(*point.solid.effective)
-
-    def area(share: float = 1.0, stress: float = 1.0) -> Array:
-        work_left = point.adhesion.work_of_bonds(steady.fraction * share)
-        terms = steady.strength * stress, point.contact.reversible, point.bodies
-        return np.asarray(np.pi * control.radius(work_left, *terms) ** 2)
-
-    now, few = area(), _LITTLE
-    by_bonds = (area(share=1.0 + few) - area(share=1.0 - few)) / (2.0 * few * now)
-    by_stress = (area(stress=1.0 + few) - area(stress=1.0 - few)) / (2.0 * few * now)
-    firm = 1.0 / (yields + slope / np.sqrt(now / np.pi)) if yields + slope > 0.0 else math.inf
-    power = 0.5 if slope > 0.0 else 0.0
-    return Body(now, by_bonds, by_stress, drive.mass, drive.damping, drive.viscosity, firm, power)
 
 
 def _lacking(plan: Plan) -> list[str]:

@@ -296,6 +296,17 @@ KNOWN_ERRORS = {
     "banded_error_relaxing_mean": "largest error of the mean energy by banding while the amplitude relaxes",
 }
 
+#: What leaves something out, by the first word of its errors.
+SOURCES = {"cell": "cell", "banded": "bands", "step": "clock step"}
+#: Unit and long name of the systematic errors of a run.
+SYSTEMATIC = {
+    f"{name}_error_{of}": ("1", f"{words} by the {source}, where errors of the area are largest")
+    for of, words in (("area", "error of the mean A/A_JKR"), ("friction", "relative error of the mean friction"))
+    for name, source in SOURCES.items()
+}
+SYSTEMATIC["error_speed"] = "m/s", "sliding speed at which systematic errors of the area are largest"
+SYSTEMATIC["member_spread_area"] = "1", "standard deviation of A/A_JKR between members at that speed"
+
 #: Name, unit, long name and symbol of what is recorded with each stress map.
 MAP = ("shear_map", "Pa", "shear-stress fluctuation", "tau_1")
 DISC_ENERGIES = (

@@ -143,6 +143,8 @@ def _off_the_map(scene: Scene) -> Faults:
 #: Rms of the fluctuations over the mean stress above which a remark is made: some 2 % of the area is reversed.
 _MOST_REVERSED = 0.5
 _LARGEST_STRAIN = 0.3
+#: Radius of a sphere that is rather a number whose unit was forgotten [m].
+_LARGEST_SPHERE = 1.0
 
 
 def remarks_between(scene: Scene) -> list[str]:
@@ -150,6 +152,10 @@ def remarks_between(scene: Scene) -> list[str]:
     _, bonds, shear, contact = scene.chosen
     speeds, varies = scene.speeds(41), scene.varies["shear"]
     remarks = []
+    if scene.sphere.radius > _LARGEST_SPHERE:
+        remarks.append(
+            f'sphere.radius is {scene.sphere.radius:g} m: a number without a unit is in metres, write "5 mm"'
+        )
     if varies and bonds.feeds_back and not contact.lags:
         remarks.append('carried area in a fluctuating contact has no limit of fine steps: use model = "rate_dependent"')
     if contact.after_pull_off == "reattach" and bonds.stretched and not bonds.feeds_back:

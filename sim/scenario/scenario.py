@@ -31,8 +31,6 @@ from sim.scenario.sweep import read_sweep, rows, set_key
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
 
-#: Relative error of a cell against the infinite plane that is remarked on.
-_CELL_ERROR = 0.05
 _Title = Annotated[str, Field(max_length=200, description="what the scenario is about, the title of its dataset")]
 #: Points of a sweep whose shear processes are all tried.
 _MOST_BUILT = 64
@@ -270,9 +268,6 @@ class Scenario:
             remarks.append("all members and seeds have the same map, and nothing else is random: one member is enough")
         if self.solid.poisson_ratio != 0.5:
             remarks.append("poisson_ratio is not 0.5: the normal-tangential coupling is neglected")
-        off = (abs(value) for name, value in self.process.known_errors().items() if name.startswith("cell_error"))
-        if max(off, default=0.0) > _CELL_ERROR:
-            remarks.append(f"the cell is off by more than {_CELL_ERROR:.0%}: give a larger cell or more points")
         return list(dict.fromkeys(remarks))
 
     def with_values(self, values: dict[str, Any]) -> "Scenario":

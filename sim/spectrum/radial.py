@@ -17,7 +17,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 import scipy
@@ -33,6 +33,8 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 #: P and S oscillate like cos(x)/x: followed within this distance of x = 0 and of each break of the spectrum, and
 #: faded out beyond over a length so large that nothing of a smooth spectrum is left of the oscillation.
 _FOLLOWED, _FADING = 60.0, 10.0
+#: Octaves below a wavenumber in which a spectrum is integrated one by one.
+_OCTAVES = 64.0
 #: Beyond this x only the two ends of a spectrum are followed, not the kinks of its rows.
 _LAST_KINK = 3000.0
 
@@ -113,6 +115,30 @@ def disc_energy(spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, p
     0.96410
     """
     return _on_disc(energy_factors, spectrum, radius, shear_modulus, poisson_ratio)
+
+
+def share_of_long_waves(spectrum: Family, wavelength: float, poisson_ratio: float = 0.5) -> float:
+    """Return the share of the energy stored on the infinite plane that waves longer than a wavelength [m] store [1].
+
+    Examples
+    --------
+    The share of a Gaussian of length ξ is erf(πξ/λ):
+
+    >>> from sim.spectrum import Gaussian
+    >>> print(f"{share_of_long_waves(Gaussian(rms=1.0, length=1.0), 4.0):.10f} {math.erf(math.pi / 4.0):.10f}")
+    0.7333114256 0.7333114256
+    """
+    end, plane = 2.0 * math.pi / wavelength, float(spectrum.surface_energy(1.0, poisson_ratio))
+    if spectrum.wavevector is not None or plane == 0.0:
+        return float(spectrum.wavevector is not None and math.hypot(*spectrum.wavevector) < end)
+    waves = cast(Waves, spectrum)
+    octaves = end * 2.0 ** -np.arange(_OCTAVES)
+    edge: Array = np.unique(np.concatenate([[0.0], octaves, waves.breaks[waves.breaks < end]]))
+    half = 0.5 * np.diff(edge)[:, None]
+    level, lean = waves.harmonics((edge[:-1, None] + half * (1 + _NODES)).ravel())
+    mean, swing = angular_compliance(np.asarray(poisson_ratio, float))
+    sums = (half * _WEIGHTS).ravel() * (mean * level + swing * lean)
+    return float(np.sum(sums)) / (8 * math.pi**2 * plane)
 
 
 def marginal_energy(

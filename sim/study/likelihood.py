@@ -12,23 +12,22 @@ error that curves share is one more number, known to be 0 within its size.
 import functools
 import itertools
 import math
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from sim.engine import Trajectory, balance
 from sim.ensemble.dataset import variable_name
+from sim.ensemble.steady import Values, changed, steady_course
 from sim.ensemble.variables import VARIABLES, Variable
 from sim.laws.theories import compare_at_indentation, compare_at_load
-from sim.parts.exchange import Array, Motion
+from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
-from sim.spectrum.family import Family
 from sim.study.converge import READ, recorded
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
@@ -152,29 +151,6 @@ def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
     return result | {"t": ("t", Quantity("s", "time since the start", at_least=0, at_most=scenario.clock.duration))}
 
 
-#: Values of keys, by their dotted names.
-Values = Mapping[str, float]
-
-
-def changed(part: Any, values: Values) -> Any:
-    """Return a scenario or a part with some numbers changed within their bounds; unchecked, because this is quick."""
-    names, aliases = _fields(cast(Hashable, type(part)))
-    result = object.__new__(type(part))
-    result.__dict__.update({name: getattr(part, name) for name in names})
-    for key, value in values.items():
-        first, _, rest = key.partition(".")
-        name = aliases.get(first, first)
-        result.__dict__[name] = changed(getattr(result, name), {rest: value}) if rest else value
-    return result
-
-
-@functools.cache
-def _fields(table: Any) -> tuple[list[str], dict[str, str]]:
-    """Return the names of a table's values, and those by the key of a file if the key differs."""
-    declared = getattr(table, "__pydantic_fields__", {})
-    return [item.name for item in fields(table)], {item.alias: name for name, item in declared.items() if item.alias}
-
-
 class Group(NamedTuple):
     """Rows of a table at which keys of the scenario are the same.
 
@@ -209,27 +185,6 @@ def groups(scenario: Scenario, table: Measured) -> list[Group]:
         speed = conditions.get("speed", item.drive.pieces(instants, duration).joined.last[::2])
         result.append(Group(item, rows, time[:, np.newaxis], speed[:, np.newaxis]))
     return result
-
-
-def steady_course(scenario: Scenario, time: Array, speed: Array) -> Trajectory:
-    """Contacts that have slid at speeds [m/s] for ever, held as the scenario has it at times [s]; shapes (rows, 1)."""
-    result = scenario.population.steady(speed[:, 0])
-    still = 0.0 * speed
-    bonding = type(result)(*(np.reshape(values, (-1, 1)) + still for values in result))
-    motion = Motion(0, time, 0.0 * time, still, still, speed, speed)
-    shear = scenario.fluctuations
-    size = shear.amplitude.factor(speed, bonding.strength) ** 2
-    size = bonding.frozen + bonding.varying if shear.spectrum.bond_made else size
-    energy = size * _plane_energy(shear.spectrum, *scenario.solid.effective)
-    terms = balance(scenario, bonding.fraction, bonding.strength, np.broadcast_to(energy, speed.shape), still)
-    touch = scenario.contact.start(motion, scenario.clock.duration, terms)
-    moving = time, still, speed, bonding.fraction, bonding.stress, bonding.strength, energy
-    return Trajectory(*moving, np.empty((len(speed), 1, 0)), *touch)
-
-
-@functools.lru_cache(maxsize=256)  # most numbers that are changed are none of the spectrum's
-def _plane_energy(spectrum: Family, shear_modulus: float, poisson_ratio: float) -> float:
-    return float(spectrum.surface_energy(shear_modulus, poisson_ratio))
 
 
 def by_steady_sliding(group: Group, values: Values, names: list[str], theory: str = "") -> dict[str, Array]:

@@ -45,8 +45,6 @@ _Points = Annotated[int, Quantity("1", "grid points along a side of the cell", a
 #: Mode pairs of a cell beyond which neither time nor memory suffices: those of a grid of 2048 × 2048.
 _MOST_PAIRS = 2**21
 _MOST_WAVES = 1e9
-#: Stored energy over the work of adhesion that is remarked on as implausible.
-_MOST_STORED = 1000.0
 
 Process = SmoothProcess | BandedProcess | ModalProcess
 
@@ -160,9 +158,6 @@ class ShearModel:
         if not spectrum.bond_made and rms > setting.shear_modulus:
             times = f"{rms / setting.shear_modulus:.3g} times the shear modulus"
             remarks.append(f"the rms of the fluctuations is {times}, beyond linear elasticity: check shear.spectrum")
-        if not spectrum.bond_made and plane > _MOST_STORED * setting.work > 0.0:
-            times = f"{plane / setting.work:.2g} times the work of adhesion"
-            remarks.append(f"the stored energy is {times}: check shear.spectrum and adhesion.work")
         return remarks
 
 
@@ -247,7 +242,7 @@ class _Fluctuating(ShearModel):
                 return [("contact", f'{message}; hold the sphere closer by a key of [contact], or give "plane"')]
             message = f"the cell of {cell:g} m does not hold the contact, which is {2.0 * rest_radius:g} m wide at rest"
             return [("cell", f'{message}; give shear.cell = "{2.2e6 * rest_radius:.3g} um" or more')]
-        if too_many := self._too_many_modes(cell):
+        if too_many := self.too_many_modes(cell):
             return [("", f'{too_many}; take a smaller cell, longer waves or fewer points, or model = "mean"')]
         try:
             self.process(shear_modulus, poisson_ratio, cell)
@@ -255,7 +250,7 @@ class _Fluctuating(ShearModel):
             return [("", fault.message())]
         return []
 
-    def _too_many_modes(self, cell: float) -> str:
+    def too_many_modes(self, cell: float) -> str:
         """Return the reason why the grid, or the smallest that holds the spectrum, is too large; empty if it is not."""
         ripple = self.spectrum.wavevector
         waves = (max(map(abs, ripple)) if ripple else self.spectrum.support[1]) * cell / (2.0 * math.pi)

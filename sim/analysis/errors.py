@@ -1,0 +1,54 @@
+"""Systematic errors of a dataset in the unit of its results, and the remarks of ``sim check`` on its scenario."""
+
+import json
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from sim.analysis.dataset import sweep_dims
+from sim.units.notation import engineering
+
+#: Unit and factor of an error by the last word of its name.
+_UNITS = {"area": ("points of A/A_JKR", 100.0), "friction": ("% of the friction", 100.0)}
+
+
+class SystematicError(NamedTuple):
+    """The systematic error of largest size in a sweep: its variable, size and unit, place in words, and its cure."""
+
+    name: str
+    value: float
+    unit: str
+    where: str
+    cure: str
+
+
+def systematic_errors(dataset: xr.Dataset) -> list[SystematicError]:
+    """Return the systematic errors of area, friction and pull-off load that are not 0, as far as they are known.
+
+    The cure of an error of the cell leaves about a tenth of it; it is "" if the error is less than 1 % of the JKR area.
+    """
+    names = [f"{source}_error_{of}" for of in _UNITS for source in ("cell", "banded", "step")]
+    return [
+        _largest(dataset, name)
+        for name in (*names, "pull_off_error")
+        if name in dataset and bool((abs(dataset[name]) > 0.0).any())
+    ]
+
+
+def _largest(dataset: xr.Dataset, name: str) -> SystematicError:
+    variable = dataset[name]
+    size = np.nan_to_num(np.abs(variable.to_numpy()))
+    place = dict(zip(variable.dims, np.unravel_index(np.argmax(size), size.shape), strict=True))
+    point, values = dataset.isel(place), float(variable.isel(place))
+    unit, factor = _UNITS.get(name.rpartition("_")[2], (variable.units, 1.0))
+    swept = [point[dim] for dim in sweep_dims(dataset)]
+    words = [f"{at.name} = {engineering(float(at), at.units) if at.dtype.kind == 'f' else at.item()}" for at in swept]
+    if "error_speed" in point and not {"drive_speed", "drive_stage"} & set(sweep_dims(dataset)) and factor > 1.0:
+        words.append(engineering(float(point["error_speed"]), "m/s"))
+    return SystematicError(name, factor * values, unit, ", ".join(words), variable.attrs.get("cure", ""))
+
+
+def remarks(dataset: xr.Dataset) -> list[str]:
+    """Return the remarks and the diagnosis that ``sim check`` prints for the scenario of a dataset."""
+    return list(map(str, json.loads(dataset.attrs.get("remarks", "[]"))))

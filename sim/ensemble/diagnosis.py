@@ -1,0 +1,289 @@
+"""Judgement of a run before it starts: systematic errors of its results, remarks, and the limits of its contact."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, cast
+
+import numpy as np
+from scipy.special import gammaincinv
+
+from sim.engine import MemberNoise, follow
+from sim.ensemble.plan import Plan
+from sim.ensemble.steady import changed, plane_energy, sensitivities, steady_course
+from sim.ensemble.variables import SYSTEMATIC
+from sim.laws.schallamach import Body
+from sim.parts.bonds import Cohort, FirstMoment, Rate
+from sim.parts.drive import Spring
+from sim.parts.exchange import Array
+from sim.parts.shear import Mean
+from sim.scenario.checks import renewed
+from sim.scenario.scenario import Scenario
+from sim.scenario.schema import quantities
+from sim.spectrum.families import Band
+from sim.spectrum.radial import share_of_long_waves
+from sim.units.notation import engineering
+
+#: Times of a run at which it is judged, energies of a member, steps of a ramp, keys in a sentence.
+_TIMES, _ENERGIES, _STEPS, _KEYS = 21, 64, 1000, 5
+#: Error of A/A_JKR and lag that need a sentence; share of the work of adhesion that nearly masks it.
+_ERROR, _LAG, _MASKING = 0.01, 0.005, 0.9
+#: Points along a side of a cell beyond which no more are proposed; wavelengths of a band over a correlation length.
+_MOST_POINTS, _BAND = 2**14, (0.8, 1.2)
+#: Relative change of bonds and stress in the derivative of the area; duration over that of a ramp that nothing delays.
+_LITTLE, _VERY_SLOW = 1e-4, 1e6
+
+
+def spread(points: Sequence[Scenario], most: int = 8) -> list[Scenario]:
+    """Return some of the points, first and last included."""
+    places = np.unique(np.linspace(0, len(points) - 1, min(most, len(points))).round().astype(int))
+    return [points[place] for place in places]
+
+
+def _along(point: Scenario) -> tuple[Array, Array]:
+    """Return times [s] and absolute speeds [m/s] of a run, shape (times, 1); one of each if all are alike."""
+    times, speeds = np.linspace(0.0, point.times.duration, _TIMES), np.abs(point.speeds(_TIMES))
+    count = None if point.contact.changes or np.ptp(speeds) else 1
+    return times[:count, np.newaxis], speeds[:count, np.newaxis]
+
+
+def _areas(point: Scenario, times: Array, speeds: Array, stored: Array | None = None) -> Array:
+    """Return A/A_JKR in steady sliding, arguments as of ``steady_course``; nan without a contact."""
+    full = _jkr_radius(point, times)
+    return np.asarray((steady_course(point, times, speeds, stored).radius / np.where(full > 0.0, full, np.nan)) ** 2)
+
+
+def _jkr_radius(point: Scenario, times: Array) -> Array:
+    """Return the radius with all adhesion at times [s], shape (times, 1) [m]."""
+    work, control = np.full(times.shape, point.adhesion.work), point.contact.control(times, point.clock.duration)
+    return control.radius(work, np.zeros(1), 0.0, point.bodies)
+
+
+def systematic_errors(point: Scenario) -> dict[str, float]:
+    """Return the systematic errors of area and friction by the names of ``SYSTEMATIC``; none without a cell.
+
+    They are those of the mean over members in steady sliding. The energy of a member is a gamma number with an offset,
+    of the mean, variance and skewness in the cell. The error of the cell is that of this mean against the infinite
+    plane, the error of the bands that of the skewness against all modes. A clock step adds at most the variance of the
+    radius that a lagging edge gains by it. They are nan if the contact opens at some of the energies at all times.
+    """
+    shear, plane = point.fluctuations, plane_energy(point.fluctuations.spectrum, *point.solid.effective)
+    if "cell_error_energy" not in (known := point.process.known_errors()) or not plane > 0.0:
+        return {}
+    weight, shape, _, constant = point.process.gammas
+    mean, sd = float(np.sum(weight * shape)) + constant, math.sqrt(np.sum(weight**2 * shape))
+    skewness = 2.0 * float(np.sum(weight**3 * shape)) / sd**3 if sd else 0.0
+    whole = skewness / (1.0 - known.get("banded_error_third_cumulant", 0.0))
+    scores = sd * _scores(skewness)
+    energies = np.concatenate([mean + scores, plane + scores, mean + sd * _scores(whole)])
+    times, speeds = _along(point)
+    scene = changed(point, {"shear.amplitude.floor": 1.0}) if shear.law.remembers else point
+    rows, stored = np.repeat([times, speeds], energies.size, axis=1), np.tile(energies, len(times))
+    areas = _areas(scene, rows[0], rows[1], stored[:, np.newaxis]).reshape(len(times), 3, -1)
+    (cell, exact, banded), gained = np.mean(areas, axis=-1).T, np.zeros(len(times))
+    if point.contact.lags and point.feels_steps:
+        left = -0.5 * np.log1p(-np.clip(renewed(point, speeds[:, 0] * point.clock.step), 1e-12, 0.999))
+        gained = np.var(np.sqrt(areas[:, 0]), axis=-1) * np.minimum(left / np.tanh(left) - 1.0, 1.0)
+    errors = np.stack([cell - exact, cell - banded, gained])
+    worst = int(np.argmax(np.nan_to_num(np.sum(np.abs(errors), axis=0))))
+    values = (
+        *errors[:, worst],
+        *(errors[:, worst] / (exact[worst] or math.nan)),
+        speeds[worst, 0],
+        np.std(areas[worst, 0]),
+    )
+    return dict(zip(SYSTEMATIC, map(float, values), strict=True))
+
+
+def _scores(skewness: float) -> Array:
+    """Return equally likely values of a gamma number of this skewness, scaled to the mean 0 and the variance 1."""
+    shape = 4.0 / max(skewness, 1e-4) ** 2
+    values = gammaincinv(shape, (np.arange(_ENERGIES) + 0.5) / _ENERGIES)
+    return cast(Array, (values - np.mean(values)) / math.sqrt(shape))
+
+
+def worst(points: Sequence[Scenario]) -> tuple[Scenario, dict[str, float]] | None:
+    """Return the point of a sweep at which the cell changes A/A_JKR most, with its errors; None without a cell."""
+    found = [(point, errors) for point in spread(points) if (errors := systematic_errors(point))]
+    known = [pair for pair in found if math.isfinite(pair[1]["cell_error_area"])]
+    return max(known, key=lambda pair: abs(pair[1]["cell_error_area"]), default=None)
+
+
+def cure(point: Scenario, errors: dict[str, float]) -> str:
+    """Return the keys that reduce the error of the cell to about a tenth; "" if A/A_JKR is off by less than 1 point.
+
+    The error falls with the side of the cell, unless the grid has too few points for the short waves.
+    """
+    if not abs(errors["cell_error_area"]) > _ERROR:
+        return ""
+    shear, solid = cast(Any, point.fluctuations), point.solid.effective
+    side, points, error = (
+        shear.side(point.setting.cell),
+        shear.points,
+        point.process.known_errors()["cell_error_energy"],
+    )
+    decade = 10.0 ** math.floor(math.log10(10.0 * side))
+
+    def lacks(cell: float, share: float) -> bool:
+        return points and 1.0 - share_of_long_waves(shear.spectrum, 2.0 * cell / points, solid[1]) > share * abs(error)
+
+    wide = side if lacks(side, 0.5) else math.ceil(10.0 * side / decade - 0.05) * decade
+    while lacks(wide, 0.02) and points < _MOST_POINTS:
+        points *= 2
+    changes = [f'shear.cell = "{engineering(wide, "m").replace("µ", "u")}"'] if wide > side else []
+    changes += [f"shear.points = {points}"] if points != shear.points else []
+    many = changed(shear, {"cell": wide, "points": points}).too_many_modes(wide)
+    return 'shear.model = "mean"' if many else " and ".join(changes)
+
+
+def place(plan: Plan, point: Scenario, speed: float) -> str:
+    """Return a point of a sweep and a sliding speed [m/s] in words."""
+    swept = [key for axis in plan.scenario.sweep for key in axis.keys if key not in ("drive.speed", "drive.stage")]
+    numbers = quantities(point)
+    words = [f"{key} = {engineering(numbers[key][1], numbers[key][0].unit)}" for key in swept if key in numbers]
+    return ", ".join([*words, engineering(speed, "m/s") if speed else "rest"])
+
+
+def remarks(plan: Plan) -> list[str]:
+    """Return the remarks on a run, one sentence each."""
+    some = spread(plan.points)
+    texts = [text for point in some for text in [*point.remarks(), *_outside(point)]]
+    if (most := worst(plan.points)) and (keys := cure(*most)):
+        point, area, friction = most[0], *(100.0 * most[1][f"cell_error_{of}"] for of in ("area", "friction"))
+        too, at = "large" if area > 0.0 else "small", place(plan, point, most[1]["error_speed"])
+        size = f"{abs(area):.2g} points and the friction {abs(friction):.2g} % too {too}"
+        texts.append(f"the cell makes A/A_JKR up to {size} (at {at}): {keys}")
+    if plan.scenario.record.per_member is None and not plan.per_member:
+        texts.append(
+            "every member would make a file of more than 20 GB: mean, spread and standard error are kept alone"
+            " (record.per_member = true keeps every member)"
+        )
+    return list(dict.fromkeys(texts))
+
+
+def diagnosis(plan: Plan) -> list[str]:
+    """Return what limits the contact at the middle of a sweep and along its run, in sentences."""
+    point = plan.points[len(plan.points) // 2]
+    if not point.rest_radius > 0.0 or point.fluctuations.passes:
+        return []
+    time, speed = np.full((1, 1), 0.5 * point.clock.duration), np.abs(point.speeds(3)[1:2, np.newaxis])
+    at = place(plan, point, float(speed[0, 0]))
+    texts = [*_fluctuating(point), *_mechanisms(point, time, speed, at)] if point.fluctuations.spectrum.variance else []
+    if shown := list(sensitivities(point, float(time[0, 0]), float(speed[0, 0])).items())[:_KEYS]:
+        words = [f"{key} {area:+.2g}" + f"/{force:+.2g}" * bool(force) for key, (area, force) in shown]
+        texts.append(f"area/friction change by these % for 1 % more of a key, at {at}: {', '.join(words)}")
+    return [*texts, *_lagging(point)]
+
+
+def _fluctuating(point: Scenario) -> Iterator[str]:
+    """Yield sentences on the size of the stored energy and on the waves that store it."""
+    shear, spectrum, work = point.fluctuations, point.fluctuations.spectrum, point.adhesion.work
+    course = steady_course(point, *_along(point))
+    most, paid = (
+        float(np.max(course.energy)),
+        float(np.min(shear.paid_by_adhesion * course.energy)) / (work or math.inf),
+    )
+    masked, always = course.work <= 0.0, "at any speed" if shear.amplitude.model == "constant" else "throughout the run"
+    how = f": masked {always}" if paid >= 1.0 else f": nearly masked {always}" if paid > _MASKING else ""
+    if paid < 1.0 and np.any(masked):
+        how = f": masked {'throughout' if np.all(masked) else 'in part of'} the run"
+    share = f"{100.0 * most / (work or math.inf):.2g} % of the work of adhesion"
+    yield f"stored energy in steady sliding {engineering(most, 'J/m^2')}, {share}{how}"
+    long_waves = share_of_long_waves(spectrum, 2.0 * point.rest_radius, point.solid.effective[1])
+    if long_waves > _LAG:
+        yield f"waves longer than the contact store {100.0 * long_waves:.2g} % of the energy"
+    if spectrum.model in ("gaussian", "von_karman"):
+        short, long = (factor * spectrum.length for factor in _BAND)
+        band = Band(rms=spectrum.rms, shortest=short, longest=long)
+        times = plane_energy(spectrum, 1.0, 0.5) / plane_energy(band, 1.0, 0.5)
+        yield (
+            f"shear.spectrum.length is a correlation length: wavelengths from {engineering(short, 'm')} to"
+            f" {engineering(long, 'm')} with the same rms store {times:.2g} times less"
+        )
+
+
+def _mechanisms(point: Scenario, time: Array, speed: Array, at: str) -> Iterator[str]:
+    """Yield the points of A/A_JKR that each mechanism takes, in both orders, and the area without fluctuations."""
+    whole, none = changed(point, {"adhesion.bond_share": 0.0}), np.zeros((1, 1))
+    scenes = (whole, none), (point, none), (whole, None), (point, None)
+    rest, bonds, waves, both = (100.0 * float(_areas(scene, time, speed, stored)[0, 0]) for scene, stored in scenes)
+    if bonds > both:
+        first = f"bonds take {rest - bonds:.2g} points, fluctuations {bonds - both:.2g}"
+        other = f" ({waves - both:.2g} and {rest - waves:.2g} if fluctuations are charged first)"
+        yield f"the mean A/A_JKR at {at} is {both:.3g} %: {first}{other if bonds < rest else ''}"
+        yield f"by the paper's strict balance (shear.paid_by_adhesion = 0) fluctuations take none: {bonds:.3g} %"
+
+
+def lag(point: Scenario, slower: float = 1.0) -> tuple[float, float, float]:
+    """Return how far the mean along a prescribed course of the speed is from that along a very slow one, and where.
+
+    The run is followed in 1000 steps without noise, from steady bonds, ``slower`` by a factor.
+
+    Returns
+    -------
+    area, friction, speed : float
+        Largest differences of A/A_JKR, and of the friction over its largest [1]; the speed at which both together are
+        largest [m/s]. They are nan without a contact.
+    """
+    shear, courses = cast(Any, point.fluctuations), []
+    begin: dict[str, Any] = {"bonds.start": "steady"} if hasattr(point.bonds, "start_from") else {}
+    if not math.isinf(shear.side(point.setting.cell)):
+        begin["shear"] = Mean(shear.spectrum, shear.amplitude, shear.paid_by_adhesion, shear.contact)
+    for factor in (slower, _VERY_SLOW):
+        duration = factor * point.clock.duration
+        scene = changed(point, begin | {"clock.duration": duration, "clock.step": duration / _STEPS})
+        courses.append(follow(scene, MemberNoise.of(0, np.zeros(1, int)), None, range(_STEPS + 1))[1])
+    full = _jkr_radius(scene, courses[1].time) ** 2
+    areas = [course.radius**2 / full for course in courses]
+    friction = [area * course.strength for area, course in zip(areas, courses, strict=True)]
+    gaps = [abs(there - steady) for there, steady in (areas, friction)]
+    gaps[1] /= max(np.max(friction[1]), 1e-300)
+    where = int(np.argmax(gaps[0] + gaps[1]))
+    return float(np.max(gaps[0])), float(np.max(gaps[1])), float(np.abs(courses[0].speed[where, 0]))
+
+
+def _lagging(point: Scenario) -> Iterator[str]:
+    """Yield how far values along a ramp are from steady ones, and how far they would be along a slower ramp.
+
+    Nothing is said of few bonds and of an amplitude that relaxes, which ``lag`` does not follow.
+    """
+    noisy = hasattr(point.population, "sites") or point.fluctuations.law.relaxing
+    if point.drive.model == "ramp" and not noisy and max((behind := lag(point))[:2]) > _LAG:
+        values, longer = [100.0 * value for value in behind[:2] + lag(point, 10.0)[:2]], 10.0 * point.clock.duration
+        yield (
+            f"along the ramp A/A_JKR is up to {values[0]:.2g} points off its steady value, the friction"
+            f" {values[1]:.2g} % of its largest (near {engineering(behind[2], 'm/s')});"
+            f' clock.duration = "{engineering(longer, "s")}" leaves {values[2]:.2g} points and {values[3]:.2g} %'
+        )
+
+
+def slider_body(point: Scenario, speeds: Array) -> Body:
+    """Return the body behind the spring of a scene in steady sliding at speeds [m/s], with the growth of its area."""
+    drive, steady = cast(Spring, point.drive), point.population.steady(speeds)
+    control, (yields, slope) = point.contact.control(0.0, 0.0), drive.yields(*point.solid.effective)
+
+    def area(share: float = 1.0, stress: float = 1.0) -> Array:
+        work_left = point.adhesion.work_of_bonds(steady.fraction * share)
+        terms = steady.strength * stress, point.contact.reversible, point.bodies
+        return np.asarray(np.pi * control.radius(work_left, *terms) ** 2)
+
+    now, few = area(), _LITTLE
+    by_bonds = (area(share=1.0 + few) - area(share=1.0 - few)) / (2.0 * few * now)
+    by_stress = (area(stress=1.0 + few) - area(stress=1.0 - few)) / (2.0 * few * now)
+    firm = 1.0 / (yields + slope / np.sqrt(now / np.pi)) if yields + slope > 0.0 else math.inf
+    power = 0.5 if slope > 0.0 else 0.0
+    return Body(now, by_bonds, by_stress, drive.mass, drive.damping, drive.viscosity, firm, power)
+
+
+def _outside(point: Scenario) -> Iterator[str]:
+    """Yield a remark if sliding is unstable behind the contact's own stiffness: no slider on it is rigid."""
+    if point.drive.model == "spring" and point.drive.contact_stiffness == "half_space":
+        speeds = np.abs(point.speeds(_TIMES))
+        bonds, body = cast(Rate | Cohort | FirstMoment, point.population), slider_body(point, speeds)
+        needed, own = bonds.onset(speeds, Body(*body[:3])).stiffness, np.asarray(body.contact_stiffness, float)
+        if np.any(needed > own):
+            worst = int(np.nanargmax(needed / own))
+            high, low = (engineering(float(values[worst]), "N/m") for values in (needed, own))
+            yield (
+                f"your rig is outside the model of a rigid slider: at {engineering(float(speeds[worst]), 'm/s')} stable"
+                f" sliding needs {high}, and the contact itself has {low}, so that the half-space would oscillate"
+            )

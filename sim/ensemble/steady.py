@@ -1,0 +1,116 @@
+"""Steady sliding in closed form: contacts that have slid at one speed for ever, and the keys that change them most."""
+
+import functools
+import math
+from collections.abc import Hashable, Mapping
+from dataclasses import fields
+from typing import Any, cast
+
+import numpy as np
+
+from sim.engine import Trajectory, balance
+from sim.parts.bonds import Model
+from sim.parts.exchange import Array, Bonding, Motion
+from sim.scenario.scenario import Scenario
+from sim.scenario.schema import quantities
+from sim.spectrum.family import Family
+
+#: Values of keys, by their dotted names.
+Values = Mapping[str, float]
+
+#: Relative step of a sensitivity; sensitivities below this are none.
+_STEP, _NOTHING = 1e-4, 1e-6
+#: Tables whose numbers do not matter to steady sliding at a given speed.
+_NO_PHYSICS = ("clock", "drive", "ensemble", "record", "seed")
+
+
+def changed(part: Any, values: Mapping[str, Any]) -> Any:
+    """Return a scenario or a part with some numbers changed within their bounds; unchecked, because this is quick."""
+    names, aliases = _fields(cast(Hashable, type(part)))
+    result = object.__new__(type(part))
+    result.__dict__.update({name: getattr(part, name) for name in names})
+    for key, value in values.items():
+        first, _, rest = key.partition(".")
+        name = aliases.get(first, first)
+        result.__dict__[name] = changed(getattr(result, name), {rest: value}) if rest else value
+    return result
+
+
+@functools.cache
+def _fields(table: Any) -> tuple[list[str], dict[str, str]]:
+    """Return the names of a table's values, and those by the key of a file if the key differs."""
+    declared = getattr(table, "__pydantic_fields__", {})
+    return [item.name for item in fields(table)], {item.alias: name for name, item in declared.items() if item.alias}
+
+
+def steady_course(scenario: Scenario, time: Array, speed: Array, stored: Array | None = None) -> Trajectory:
+    """Return contacts that have slid at speeds [m/s] for ever, held as the scenario has it at times [s].
+
+    Shapes are (rows, 1). ``stored`` is ΔΓ at amplitude 1 [J/m²], by default its mean on the infinite plane.
+    """
+    result = bonds_at(scenario.population, tuple(speed[:, 0]))
+    still = 0.0 * speed
+    bonding = type(result)(*(np.reshape(values, (-1, 1)) + still for values in result))
+    motion = Motion(0, time, 0.0 * time, still, still, speed, speed)
+    shear = scenario.fluctuations
+    size = shear.amplitude.factor(speed, bonding.strength) ** 2
+    size = bonding.frozen + bonding.varying if shear.spectrum.bond_made else size
+    energy = size * (plane_energy(shear.spectrum, *scenario.solid.effective) if stored is None else stored)
+    terms = balance(scenario, bonding.fraction, bonding.strength, np.broadcast_to(energy, speed.shape), still)
+    touch = scenario.contact.start(motion, scenario.clock.duration, terms)
+    moving = time, still, speed, bonding.fraction, bonding.stress, bonding.strength, energy
+    return Trajectory(*moving, np.empty((len(speed), 1, 0)), *touch)
+
+
+@functools.lru_cache(maxsize=64)  # points of a sweep and shares of the energy have the same bonds at the same speeds
+def bonds_at(population: Model, speeds: tuple[float, ...]) -> Bonding:
+    """Return bonds in steady sliding at speeds [m/s], each distinct speed computed once."""
+    distinct, place = np.unique(speeds, return_inverse=True)
+    return Bonding(*(values[place] if values.size > 1 else values for values in population.steady(distinct)))
+
+
+@functools.lru_cache(maxsize=256)  # most numbers that are changed are none of the spectrum's
+def plane_energy(spectrum: Family, shear_modulus: float, poisson_ratio: float) -> float:
+    """Return the mean ΔΓ of a spectrum on the infinite plane [J/m²]."""
+    return float(spectrum.surface_energy(shear_modulus, poisson_ratio))
+
+
+def sensitivities(scenario: Scenario, time: float, speed: float) -> dict[str, tuple[float, float]]:
+    """Return the sensitivities of contact area and friction in steady sliding to each key, the largest first.
+
+    They are logarithmic derivatives (percent per percent) by differences of the steady laws, central unless the number
+    is at its bound, at a time of the run [s] and a sliding speed [m/s], which counts as the key "speed". Keys that
+    change neither area nor friction are left out, as are numbers that are 0 or whole. There is none if the contact is
+    open.
+
+    Examples
+    --------
+    The area of a JKR contact without load goes with the power 4/3 of the radius:
+
+    >>> from sim.parts.contact import Equilibrium
+    >>> from sim.parts.contact.models import Adhesion, Solid, Sphere
+    >>> from sim.scenario.clock import Clock
+    >>> bodies = Solid(shear_modulus=1e6), Sphere(radius=2e-3), Adhesion(work=0.04)
+    >>> lens = Scenario(Clock(duration=1.0, step=0.1), *bodies, Equilibrium(load=0.0))
+    >>> print(f"{sensitivities(lens, 0.0, 0.0)['sphere.radius'][0]:.5f}")
+    1.33333
+    """
+    result, ends = {}, {"speed": [(scenario, speed * (1.0 + h), h) for h in (-_STEP, _STEP)]} if speed else {}
+    for key, (quantity, value) in quantities(scenario).items():
+        if value and not quantity.whole and key.partition(".")[0] not in _NO_PHYSICS:
+            steps = (-_STEP, _STEP if value * (1.0 + _STEP) < min(quantity.at_most, quantity.below) else 0.0)
+            ends[key] = [(changed(scenario, {key: value * (1.0 + h)}), speed, h) for h in steps]
+    for key, (before, after) in ends.items():
+        rise = _logarithms(*after[:2], time) - _logarithms(*before[:2], time)
+        if np.max(np.abs(rise)) > _NOTHING * _STEP:
+            area, friction = rise / (math.log1p(after[2]) - math.log1p(before[2]))
+            result[key] = float(area), float(friction)
+    return dict(sorted(result.items(), key=lambda item: -max(map(abs, item[1]))))
+
+
+def _logarithms(scenario: Scenario, speed: float, time: float) -> Array:
+    """Return the logarithms of area and friction in steady sliding; nan without a contact, and friction's 0 if none."""
+    course = steady_course(scenario, np.full((1, 1), time), np.full((1, 1), speed))
+    area = 2.0 * math.log(float(course.radius[0, 0])) if course.radius[0, 0] > 0.0 else math.nan
+    stress = float(course.strength[0, 0])
+    return np.array([area, area + math.log(stress) if stress > 0.0 else 0.0])

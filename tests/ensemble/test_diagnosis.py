@@ -1,0 +1,213 @@
+"""Systematic errors of a run, its diagnosis and its remarks, against closed forms and solutions of other codes."""
+
+import itertools
+import json
+import math
+import re
+import tomllib
+
+import numpy as np
+import pytest
+import scipy
+from helpers.parts import analysis, jkr, load, run
+from numpy.testing import assert_allclose
+
+from sim.ensemble.diagnosis import cure, diagnosis, lag, remarks, systematic_errors
+from sim.ensemble.plan import Plan
+from sim.ensemble.preview import preview
+from sim.ensemble.steady import sensitivities
+from sim.parts.shear.modes import modes
+from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine
+from sim.spectrum.radial import share_of_long_waves
+from sim.units.notation import engineering
+
+R, G, W, LOAD = 5e-3, 0.5e6, 45e-3, 1e-3
+GAUSSIAN = {"model": "gaussian", "rms": "80 kPa", "length": "10 um"}
+BASE = f"""
+clock = {{ duration = "1 s", step = "1 ms", record = "0.5 s" }}
+solid.shear_modulus = {G}
+sphere.radius = {R}
+adhesion.work = {W}
+contact.load = {LOAD}
+drive.speed = "1 um/s"
+"""
+LENS = {
+    "model": "banded", "spectrum": GAUSSIAN, "points": 256, "correlation": {"model": "slip", "length": "10 um"},
+}  # fmt: skip
+
+
+@pytest.fixture
+def scene(tmp_path):
+    def made(**overrides):
+        path = tmp_path / "scene.toml"
+        path.write_text(BASE, encoding="utf-8")
+        return load(path, overrides)
+
+    return made
+
+
+def area(work, load=LOAD):
+    return np.pi * jkr.radius_at_load(load, work, R, 4.0 * G) ** 2
+
+
+STORED = 3.0 * math.sqrt(math.pi) / 16.0 * 80e3**2 * 10e-6 / G
+
+
+def test_sensitivities_are_the_exponents_of_the_laws(scene):
+    bonds = {"model": "steady", "critical_speed": "4 um/s", "stress": "0.1 MPa"}
+    parts = {"shear": {"model": "mean", "spectrum": GAUSSIAN}, "bonds": bonds, "adhesion.bond_share": 0.0}
+    found = sensitivities(scene(**parts, **{"contact.load": "0 N"}), 0.5, 1e-6)
+    fluctuating, broken = STORED / (W - STORED), 1.0 / 5.0  # energies over the work that is left; 1 - N/N0
+    for key, of_area, of_strength in (
+        ("sphere.radius", 4 / 3, 0.0),
+        ("adhesion.work", 2 / 3 * W / (W - STORED), 0.0),
+        ("shear.spectrum.rms", -4 / 3 * fluctuating, 0.0),
+        ("shear.spectrum.length", -2 / 3 * fluctuating, 0.0),
+        ("shear.paid_by_adhesion", -2 / 3 * fluctuating, 0.0),
+        ("solid.shear_modulus", -2 / 3 + 2 / 3 * fluctuating, 0.0),
+        ("bonds.stress", 0.0, 1.0),
+        ("speed", 0.0, -broken),
+        ("bonds.critical_speed", 0.0, broken),
+    ):
+        step = 1e-4 * 20 if key == "shear.paid_by_adhesion" else 1e-5  # one-sided at its bound
+        assert_allclose(found.pop(key), [of_area, of_area + of_strength], rtol=step, atol=1e-6)
+    assert found.keys() == {"solid.poisson_ratio"}
+
+
+def test_the_share_of_long_waves_is_the_integral_of_the_spectrum():
+    families = SelfAffine(1e5, 0.3, 60e-6, 24e-6, 1e-6), AnisotropicGaussian(1e5, 3e-6, 9e-6, 0.4), Gaussian(1e5, 5e-6)
+    for family in families:
+        for wavelength, ratio in ((50e-6, 0.5), (20e-6, 0.2), (8e-6, 0.0)):
+
+            def density(angle, q, family=family, ratio=ratio):
+                return family.density(q * math.cos(angle), q * math.sin(angle)) * (1.0 - ratio * math.cos(angle) ** 2)
+
+            ends = [q for q in (0.0, *(2 * math.pi / np.array([60e-6, 24e-6, wavelength]))) if q * wavelength < 6.3]
+            pieces = [scipy.integrate.dblquad(density, *edges, 0, math.pi)[0] for edges in itertools.pairwise(ends)]
+            share = sum(pieces) / (4.0 * math.pi**2) / float(family.surface_energy(1.0, ratio))
+            assert_allclose(share_of_long_waves(family, wavelength, ratio), share, rtol=1e-6, atol=1e-12)
+    assert share_of_long_waves(Band(1.0, 60e-6, 20e-6), 30e-6) == pytest.approx(0.5, abs=1e-12)  # equal steps of q
+    assert [share_of_long_waves(Ripple(1.0, 2.0), end) for end in (1.0, 3.0)] == [1.0, 0.0]
+
+
+def test_the_systematic_error_covers_what_the_cell_leaves_out_and_its_cure_works(scene):
+    lens = scene(shear=LENS, **{"ensemble.members": 64})
+    stated, exact = systematic_errors(lens), float(area(W - STORED) / area(W))
+    assert_allclose(exact, 0.413, atol=5e-4)
+    cell = modes(lens.fluctuations.spectrum, lens.fluctuations.side(lens.setting.cell), 256)
+    weights = cell.energies(G, 0.5)
+    drawn = np.random.default_rng(1).exponential(size=(2000, weights.size)) @ weights
+    draws = (area(W - drawn) - area(W - drawn + np.sum(weights) - STORED)) / area(W)
+    error = draws.std() / math.sqrt(draws.size)
+    assert_allclose(stated["cell_error_area"], draws.mean(), atol=4.0 * error)
+    spread = np.std(area(W - drawn)) / area(W)
+    assert_allclose(stated["member_spread_area"], spread, rtol=4.0 / math.sqrt(2 * draws.size))
+    assert "cell makes A/A_JKR up to 5.1 points and the friction 13 % too large" in "".join(remarks(Plan.of(lens)))
+    cured = lens.with_values(flat(tomllib.loads(cure(lens, stated).replace(" and ", "\n"))))
+    assert cured.fluctuations.cell == 4e-3
+    for scenario in (lens, cured):
+        ratios = np.asarray(run(scenario)["contact_area"].isel(t=-1)) / area(W)
+        known, error = systematic_errors(scenario), ratios.std() / math.sqrt(ratios.size)
+        assert abs(ratios.mean() - exact) < abs(known["cell_error_area"]) + 2.0 * error
+    assert abs(known["cell_error_area"]) < 0.12 * stated["cell_error_area"]
+
+
+def flat(document):
+    return {f"{table}.{key}": value for table, keys in document.items() for key, value in keys.items()}
+
+
+FINE = {"model": "modal", "cell": "0.6 mm", "points": 512, "spectrum": GAUSSIAN | {"length": "4 um", "rms": "126 kPa"}}
+LONG = {"spectrum": GAUSSIAN | {"model": "von_karman", "hurst": 0.5, "rms": "70 kPa"}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "keys"),
+    [({"points": 16}, {"shear.points"}), (LONG, {"shear.cell", "shear.points"}), (FINE, {"shear.model"})],
+)
+def test_a_cure_names_the_key_that_leaves_something_out(scene, changes, keys):
+    lens = scene(shear=LENS | changes)
+    before = systematic_errors(lens)
+    values = flat(tomllib.loads(cure(lens, before).replace(" and ", "\n")))
+    assert values.keys() == keys
+    if keys != {"shear.model"}:
+        after = systematic_errors(lens.with_values(values))
+        assert abs(after["cell_error_area"]) < 0.2 * abs(before["cell_error_area"])
+
+
+def test_the_lag_along_a_ramp_is_that_of_the_rate_equation(scene):
+    # d phi/dt = h (1 - phi) - h V/V_c phi, from 10 um/s to 20 mm/s in a second and in ten
+    rate, critical, ends = 5.0, 5e-3, (10e-6, 20e-3)
+    bonds = {"model": "rate", "critical_speed": critical, "rebinding_rate": rate, "stress": "0.2 MPa"}
+    ramp = {"model": "ramp", "from": ends[0], "to": ends[1]}
+    lens = scene(drive=ramp, bonds=bonds)
+    for slower in (1.0, 10.0):
+        times = np.linspace(0.0, slower, 2001)
+        speeds = ends[0] + (ends[1] - ends[0]) * times / slower
+
+        def slope(time, bound, slower=slower):
+            speed = ends[0] + (ends[1] - ends[0]) * time / slower
+            return rate * (1.0 - bound) - rate * speed / critical * bound
+
+        begin = [1.0 / (1.0 + ends[0] / critical)]
+        bound = scipy.integrate.solve_ivp(slope, (0.0, slower), begin, t_eval=times, rtol=1e-9, atol=1e-12).y[0]
+        steady = 1.0 / (1.0 + speeds / critical)
+        areas = [area(W * fraction) / area(W) for fraction in (bound, steady)]
+        friction = [ratio * fraction for ratio, fraction in zip(areas, (bound, steady), strict=True)]
+        off = np.max(np.abs(areas[0] - areas[1])), np.max(np.abs(friction[0] - friction[1])) / friction[1].max()
+        # run and slow reference are half a step late at the most: 10 um/s of 5 mm/s each
+        assert_allclose(lag(lens, slower)[:2], off, atol=1.0 / 1000 * ends[1] / critical)
+    (line,) = (text for text in diagnosis(Plan.of(lens)) if text.startswith("along the ramp"))
+    said = [float(number) for number in re.findall(r"([0-9.]+) (?:points|%)", line)]
+    first, last = lag(lens), lag(lens, 10.0)
+    assert_allclose(said, 100.0 * np.array([*first[:2], *last[:2]]), rtol=0.05)
+    assert 'clock.duration = "10 s"' in line and first[0] > 3.0 * last[0]
+    calm = scene(drive=ramp, bonds=bonds | {"rebinding_rate": "5000 1/s"})
+    assert not any(text.startswith("along the ramp") for text in diagnosis(Plan.of(calm)))
+
+
+def test_the_diagnosis_has_the_numbers_of_closed_forms_and_goes_with_the_dataset(scene):
+    bonds = {"model": "steady", "critical_speed": "9 um/s", "stress": "0.1 MPa"}
+    calm = GAUSSIAN | {"rms": "60 kPa"}
+    lens = scene(shear=LENS | {"spectrum": calm}, bonds=bonds, sweep={"contact.load": ["1 mN", "5 mN", "20 mN"]})
+    said = diagnosis(plan := Plan.of(lens))
+    stored = STORED * (60 / 80) ** 2
+    full = area(W, 5e-3)
+    rest, bonded, waves, both = (100 * float(area(w, 5e-3) / full) for w in (W, 0.9 * W, W - stored, 0.9 * W - stored))
+    energy, long, length, mechanisms, strict, *_ = said
+    assert energy.startswith(f"stored energy in steady sliding {1e3 * stored:.4g} mJ/m², {100 * stored / W:.2g} % of")
+    radius = math.sqrt(full / math.pi)
+    assert f"store {100 * math.erf(math.pi * 10e-6 / (2 * radius)):.2g} %" in long
+    q = 2 * math.pi / np.array([12e-6, 8e-6])
+    assert f"{math.sqrt(math.pi) / 4 * 10e-6 * q.sum():.2g} times less" in length and "5.8" in length
+    taken = rest - bonded, bonded - both, waves - both, rest - waves
+    assert mechanisms == (
+        f"the mean A/A_JKR at contact.load = 5 mN, 1 µm/s is {both:.3g} %: bonds take {taken[0]:.2g} points,"
+        f" fluctuations {taken[1]:.2g} ({taken[2]:.2g} and {taken[3]:.2g} if fluctuations are charged first)"
+    )
+    assert strict.endswith(f"(shear.paid_by_adhesion = 0) fluctuations take none: {bonded:.3g} %")
+    dataset = run(lens)
+    printed = preview(lens)
+    assert analysis.remarks(dataset) == [*remarks(plan), *said] == json.loads(dataset.attrs["remarks"])
+    assert all(text in printed for text in analysis.remarks(dataset))
+    errors = {each.name: each for each in analysis.systematic_errors(dataset)}
+    most = errors["cell_error_area"]
+    assert_allclose(most.value, 100 * float(dataset["cell_error_area"].max()), rtol=1e-12)
+    assert (most.unit, most.where) == ("points of A/A_JKR", "contact_load = 1 mN, 1 µm/s")
+    assert most.cure == cure(plan.points[0], systematic_errors(plan.points[0])) != ""
+
+
+def test_a_contact_softer_than_the_onset_of_oscillations_lies_outside_the_rigid_slider(scene):
+    spring = {"model": "spring", "stage": "10 mm/s", "stiffness": "100 N/m"}
+    bonds = {"model": "rate", "rupture": {"model": "bell", "zero_force_rate": "20 1/s", "bell_force": "4 pN"}}
+    bonds |= {"bond_stiffness": "0.8 uN/m", "rebinding_rate": "200 1/s", "start": "steady"}
+    for density, outside in ((1e16, False), (4e16, True)):
+        lens = scene(drive=spring, bonds=bonds | {"site_density": density}, **{"adhesion.bond_share": 0.0})
+        x = scipy.optimize.brentq(lambda x: x * math.exp(x) - 10e-3 / 5e-6 / 20.0, 0.0, 9.0)  # V = x k(x)
+        k = 20.0 * math.exp(x)
+        stiffness = density * 0.8e-6 * area(W) * 200.0 / (200.0 + k)
+        needed = stiffness * (x * k - 200.0 - k) / (200.0 + 2.0 * k)
+        own = math.pi**2 / 2 * G * lens.rest_radius
+        assert (needed > own) == outside
+        found = [text for text in remarks(Plan.of(lens)) if "outside the model of a rigid slider" in text]
+        assert bool(found) == outside
+    assert f"needs {engineering(needed, 'N/m')}, and the contact itself has {engineering(own, 'N/m')}" in found[0]
