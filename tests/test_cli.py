@@ -16,11 +16,14 @@ import netCDF4
 import pytest
 import xarray as xr
 from helpers.cases import posix
-from helpers.commands import SCENE, sim
+from helpers.commands import LENS as LENS_TEXT, SCENE, sim
+from helpers.random_scenes import random_scene
 
 from sim import cli
 from sim.ensemble import preview
 from sim.numerics import jit
+from sim.plots.kinds import KINDS
+from sim.scenario.files import written
 from sim.study import paper
 from sim.units import terminal
 
@@ -373,6 +376,39 @@ def test_new_converge_and_a_reduced_file_work_and_name_what_a_figure_misses(here
     drawn = sim("plot", "out.nc", "stress")
     assert drawn.exit_code == cli.BAD_INPUT and "out.nc: shear_stress" in drawn.output
     assert 'add "shear_stress" to record.quantities' in drawn.output
+
+
+#: From rest behind a spring, with a contact that loses no area.
+PULLED = (
+    LENS_TEXT.replace("[contact]", "bond_share = 0.0\n[contact]")
+    + """\
+[drive]
+model = "spring"
+stage = { from = "0 m/s", to = "10 um/s" }
+stiffness = "1 kN/m"
+contact_stiffness = "rigid"
+[bonds]
+model = "rate"
+rupture = { model = "bell", zero_force_rate = "1 1/s", bell_force = "4 pN" }
+bond_stiffness = "0.4 mN/m"
+rebinding_rate = "1 1/s"
+site_density = "1e16 1/m^2"
+"""
+)
+
+
+@pytest.mark.parametrize("scene", [
+    PULLED, *map(random_scene, (1, 9, 21)),  # backward creep, waves of one size at an edge that lags, tension
+    *(pytest.param(random_scene(seed), marks=pytest.mark.verify) for seed in (0, 2, 4, 7, 8, 10, 17, 18, 22, 23)),
+])  # fmt: skip
+def test_no_warning_of_a_library_reaches_the_terminal_in_any_command(scene, here, request):
+    Path("scene.toml").write_text(scene if isinstance(scene, str) else written(scene), encoding="utf-8")
+    kinds = KINDS if request.node.get_closest_marker("verify") else ()
+    commands = ["check scene.toml", "run scene.toml -o x.nc", "stats x.nc --csv x.csv", "report x.nc"]
+    commands += ["plot scene.toml", *(f"plot x.nc {kind} --force" for kind in kinds)]
+    for command in commands:
+        done = sim(*command.split())
+        assert isinstance(done.exception, SystemExit | None) and "Warning" not in done.output, command
 
 
 MARKS = "\x1b]0;x\x07\x9b31m\u202e\u2066"

@@ -137,7 +137,7 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     result["slip_spread"] = pure(dataset["late_amplitude_std"] / dataset["late_amplitude_mean"], text)
     counted = dataset["slip_time"] >= _beginning(dataset)
     means = slips(dataset).where(counted).mean("slip", keep_attrs=True)
-    return result.merge(means[["slip_duration", "stick_duration", "stress_drop"]])
+    return result.merge(means[["slip_duration", "stick_duration", "stress_drop"]], compat="no_conflicts")
 
 
 def _between_speeds(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
@@ -422,10 +422,10 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
     read = ["masked", "in_contact_mean", *(f"masked_{kind}" for kind in KEPT)]
     read += ["contact_area"] if may_stop(dataset) else []
     with where_recorded():
-        result = result.merge(in_pieces(with_trajectories(dataset, *read), dims, _masks))
+        result = result.merge(in_pieces(with_trajectories(dataset, *read), dims, _masks), compat="no_conflicts")
     for part in (peaks, stick_slip, speed_step, way_to_sliding):
         with where_recorded():
-            result = result.merge(part(dataset))
+            result = result.merge(part(dataset), compat="no_conflicts")
     for suffix in ("", "_mean", "_std", "_sem"):
         if f"dissipated_energy{suffix}" in dataset:
             lost = dataset[f"dissipated_energy{suffix}"].isel(t=-1, drop=True).astype(float)
@@ -433,7 +433,7 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
             result[f"total_dissipated{suffix}"] = labelled(lost, "J", text, "W")
     result = result.assign({name: dataset[name].astype(float) for name in dataset if str(name).startswith("pull_off_")})
     with contextlib.suppress(ValueError), answered():
-        result = result.merge(loop_energy(dataset).mean("cycle", keep_attrs=True))
+        result = result.merge(loop_energy(dataset).mean("cycle", keep_attrs=True), compat="no_conflicts")
     return result
 
 

@@ -274,9 +274,9 @@ def chosen_observables(dataset: xr.Dataset, names: Collection[str] | None) -> xr
     """
     result = observables(dataset)
     if names is None:
-        return result.merge(charges(dataset))
+        return result.merge(charges(dataset), compat="no_conflicts")
     if _shares_among(names):
-        result = result.merge(charges(dataset, names))
+        result = result.merge(charges(dataset, names), compat="no_conflicts")
     wanted = {f"{name}{ending}" for name in names for ending in _ENDINGS}
     return result[[name for name in result if name in wanted]]
 

@@ -511,8 +511,8 @@ def statistics(dataset: xr.Dataset) -> xr.Dataset:
         ``sim.analysis.events.events``), and ``correlation_time`` with its standard error. A member whose trajectory
         has stopped is left out from there on; ``fraction_detached`` counts it.
     """
-    result = over_members(dataset)
-    return result.merge(summary(events(dataset).assign_attrs(dataset.attrs))).merge(correlation_time(dataset))
+    each = over_members(dataset), summary(events(dataset).assign_attrs(dataset.attrs)), correlation_time(dataset)
+    return xr.merge(each, compat="no_conflicts", join="outer", combine_attrs="override")
 
 
 def over_members(dataset: xr.Dataset, names: Collection[str] | None = None, quantiles: bool = True) -> xr.Dataset:
@@ -556,7 +556,7 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
     ratio = pure((radii["radius_hertz"] / radii["radius_jkr"]) ** 2, "Hertz's contact area over JKR's")
     share_observables(dataset.isel(t=[0]))  # where they are not known it says why
     lost = in_pieces(restricted(dataset, ["lost_to_bonds"]), ("t",), lambda piece: summary(charges(closed_only(piece))))
-    return lost.merge(radii).assign(area_ratio_hertz=ratio)
+    return lost.merge(radii, compat="no_conflicts").assign(area_ratio_hertz=ratio)
 
 
 # --- members and the second half of a stationary run ---

@@ -336,7 +336,7 @@ def _tabulated(
         if "applied_load" in dataset and "normal_load_mean" in result:  # it is known of open contacts too
             for kind in ("mean", "low", "high"):
                 result[f"normal_load_{kind}"] = dataset["applied_load"].fillna(result[f"normal_load_{kind}"])
-    return result.merge(memory), _points({**result.sizes, "t": result.sizes.get("t", 1)}, counts)
+    return result.merge(memory, compat="no_conflicts"), _points({**result.sizes, "t": result.sizes.get("t", 1)}, counts)
 
 
 def _has_one_row_each(dataset: xr.Dataset) -> bool:
@@ -549,7 +549,7 @@ def frame(dataset: xr.Dataset) -> pd.DataFrame:
     """Return all statistics at all times and sweep values, one row each; ``attrs["units"]`` holds units by column."""
     result = statistics(dataset)
     with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
-        result = result.merge(shares(dataset))
+        result = result.merge(shares(dataset), compat="no_conflicts")
     return _framed(dataset, result)
 
 

@@ -224,11 +224,12 @@ def _onset_behind(answer: Answer, speed: ArrayLike, stress: Array, between: tupl
     """Onset of oscillations of a body at a speed [m/s] on bonds of a stress [Pa], ``between`` two frequencies."""
     area, by_bonds, by_stress, mass, damping, viscosity, firm, firmer = (np.asarray(each, float) for each in body)
     bears = area * (stress + viscosity * np.abs(speed))
+    apart = np.where(stress == 0.0, math.inf, stress)  # an area at rest does not answer to a small stress
 
     def of_interface(frequency: Array) -> tuple[Complex, Complex]:
         """Z, and k_t times the way of the body beyond that of the interface."""
         stretched, bound = answer(frequency)
-        spread = by_bonds * bound + by_stress * stretched / stress
+        spread = by_bonds * bound + by_stress * stretched / apart
         force = area * (stretched + 1j * frequency * viscosity) + bears * spread
         return force, force - bears * firmer * spread
 

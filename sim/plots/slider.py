@@ -126,7 +126,7 @@ def _run(name: str, words: str, si: str) -> Panel:
         every = scene.all(f"{name}_mean")
         factor = style.in_unit(panel.yaxis, words, every, si)
         contact_curves(panel, scene, name, factor)
-        panel.set_yscale("log")
+        style.upward(panel)
         for line, values in zip(scene.lines, factor * every, strict=True):
             known = np.flatnonzero(np.isfinite(values))
             if 0 < known.size < values.size:
@@ -226,6 +226,8 @@ def needs_pull(dataset: xr.Dataset) -> None:
     force = style.mean_of(dataset, "spring_force")
     if (abs(force.isel(t=0)) > 0.01 * abs(force).max("t")).any():
         raise ValueError('the force does not begin at zero; start at rest: [drive] start = "rest"')
+    if not (style.mean_of(dataset, "contact_area").isel(t=0) > 0.0).all():
+        raise ValueError("the contact is open at the start, so that it has no area to lose; begin with a closed one")
 
 
 def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
@@ -254,7 +256,8 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
         axes[1].plot(unit.factor * pulled[1:], 1.0 - areas[1:] / areas[0], color=line.colour)
         axes[1].plot(unit.factor * pulled[1:], law[1:], "--", **look)
     axes[0].plot([], [], "--", label=r"$A_0 - \alpha Q^2$", **style.GREY)
-    axes[1].set(ylabel="lost area $1 - A/A_0$", yscale="log")
+    axes[1].set_ylabel("lost area $1 - A/A_0$")
+    style.upward(axes[1])
     words, known = unit.label("tangential force $Q$"), unit.factor * force[rises]
     style.across(axes[0], known, words)
     style.across(axes[1], known[known > 0.01 * known.max()], words, "log")

@@ -234,6 +234,12 @@ def fill(panel: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray, **look: 
         panel.fill_between(x[part], low[part], high[part], linewidth=0, **look)
 
 
+def upward(panel: Axes) -> None:
+    """Let the y axis be logarithmic if a line has anything above zero."""
+    if any(np.any(np.asarray(line.get_ydata()) > 0.0) for line in panel.lines):
+        panel.set_yscale("log")
+
+
 def across(panel: Axes, x: np.ndarray, words: str, scale: str = "linear", room: float = 0.0) -> None:
     """Set the x axis from the least to the largest value, with some ``room`` for markers at its ends, and its label."""
     known = x[np.isfinite(x) & ((x > 0.0) | (scale != "log"))]

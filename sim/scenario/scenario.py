@@ -246,7 +246,7 @@ class Scenario:
     @cached_property
     def feels_steps(self) -> bool:
         """Return True if what ΔΓ does between clock steps matters: to an edge that lags, or to a pull-off."""
-        varies = self.varies["shear"] and not self.fluctuations.measured and self.fluctuations.spectrum.variance > 0.0
+        varies = self.fluctuations.per_member and self.fluctuations.spectrum.variance > 0.0
         return varies and (self.contact.lags or pulled(self))
 
     @property
