@@ -217,7 +217,7 @@ def go_to_node(place, nodes, at_start, pool, count, start, step, row, slider, co
             slope = (over - last_over) / (shift - last_shift)
         if not slope > (_FALLING if rules.limit == math.inf else _FLAT) * elasticity:
             return -1, 0.0
-        if math.fabs(over / slope) <= none:
+        if math.fabs(over / slope) <= none and (turn > 0 or after.area > 0.0):  # else roundings of open contacts add up
             after.cut = _cut(pool, count, unit * shift, duration, rules) if rules.limit < math.inf else 0.0
             count = carry(pool, count, unit * shift, off, early, late, rules)
             sums_at(pool, count, unit, rules, after)
@@ -465,7 +465,7 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
             )
             factor = min(factor, other)
         shift, bend, error = nodes[2].slip, 0.0, math.inf
-        within = mechanics.within_reach(shift, contact)
+        within = mechanics.within_reach(shift, step, row, contact)
         if new_count >= 0:
             bend, error = bend_of(nodes, step, row, slider)
         grows = min(factor, 4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else min(factor, 4.0)

@@ -329,7 +329,7 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
         along = mechanics.Law(law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows)
         if rests:
             speed = sense * _jump(row, start, slider, along, contact) if slider.mass == 0.0 else 0.0
-            row.speed = row.body_speed = speed
+            row.speed, row.body_speed, nodes.last_step = speed, speed, 0.0  # no guess from the slip before
             row.bound *= radau.share_left(speed, along)
             row.moment = sense * row.bound
         start = _slide(line, start, slider, along, contact, nodes, books)

@@ -201,8 +201,9 @@ def pull_on(time, start, shift, row, slider):
 FEW, SOME = 1e-12, 0.1
 #: Share of a clock step below which a sub-step means that there is no solution to go on with.
 LEAST = 1e-13
-#: Slip in a sub-step over the length that fluctuations remember; time of a slip at once, over the piece's.
-_MOST_SLID, _NO_TIME = 0.5, 1e-6
+#: Slip in a sub-step over the length that fluctuations remember; difference of speeds that are one; time of a slip at
+#: once, over the piece's.
+_MOST_SLID, _STEADY, _NO_TIME = 0.5, 1e-3, 1e-6
 #: Share of the error of the last estimates of ΔΓ that a sub-step corrects, over its part of the memory.
 _CORRECTED = 4.0
 MOST_STEPS = 2_000_000
@@ -278,10 +279,16 @@ def following(contact, row, start, step):
 
 
 @device
-def within_reach(slip, contact):
-    """Return the slip that a sub-step may have for the memory of the fluctuations, over that which it has."""
+def within_reach(slip, step, row, contact):
+    """Return the slip that a sub-step may have for the memory of the fluctuations, over that which it has.
+
+    A memory of one speed alone is exact in a sub-step of that speed, however far it goes.
+    """
     field, slip = contact.field, math.fabs(slip)
-    return _MOST_SLID / (slip * max(1.0 / field.length, field.by_slip)) if slip > 0.0 else math.inf
+    is_steady = unsteadiness(row.weight, row.mean, row.spread) < _STEADY * _STEADY
+    is_steady = is_steady and math.fabs(slip / step - row.mean) < _STEADY * row.mean
+    shortest = max(0.0 if is_steady else 1.0 / field.length, field.by_slip)
+    return _MOST_SLID / (slip * shortest) if slip > 0.0 else math.inf
 
 
 @device

@@ -389,7 +389,7 @@ def try_sub_step(row, start, step, slider, law, contact, nodes):
     error *= math.sqrt(error) / slider.tolerance
     if not error < math.inf:
         return 0.25, False
-    within = within_reach(nodes.slip[2], contact)
+    within = within_reach(nodes.slip[2], step, row, contact)
     if within < 1.0:
         return max(0.1, 0.9 * within), False
     root = max(error, 1e-6) ** (1.0 / 6.0)

@@ -177,7 +177,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
             if not _try(nodes, at_start, start, step, row, slider, contact):
                 step, cut = 0.25 * step, False
                 continue
-            within = mechanics.within_reach(last.slip, contact)
+            within = mechanics.within_reach(last.slip, step, row, contact)
             bend, error = bend_of(nodes, step, row, slider)
             grows = min(4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else 4.0
             grows = min(grows, 0.9 * within)

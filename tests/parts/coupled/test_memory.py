@@ -67,6 +67,19 @@ def at_once(lens, state, expected, drawn):
     return motions.slip[0, 0], motions.path[0, 0]
 
 
+@pytest.mark.parametrize("make", [FirstMoment, Cohort, FEW_SITES])
+def test_sliding_at_one_speed_over_millions_of_memories_needs_few_sub_steps(make):
+    # a force on a viscous contact with next to no bonds: V = Q/(η A), and A0 = l/V
+    memory, few = 1e-7 * driven.STRETCH, {"site_density": 1e-9 * driven.DENSITY}
+    drive = driven.force(1.0, viscosity=driven.DENSITY * driven.KAPPA)
+    lens = driven.scenario(2.0, 2, drive, make=lambda **keys: make(**(keys | few)))
+    shear = Mean(spectrum=SPECTRUM, amplitude=SlipRate(memory_length=memory), paid_by_adhesion=0.0)
+    end = list(march(dataclasses.replace(lens, shear=shear), np.arange(1)))[-1]
+    assert_allclose(end.drive.position, 2.0 * driven.STRETCH, rtol=1e-6)
+    assert_allclose([end.shear.past.weight, end.shear.past.mean], [[1e-7], [driven.STRETCH]], rtol=1e-6)
+    assert end.drive.substeps[0] < 2000.0
+
+
 @pytest.mark.parametrize("bonds", ["rate, bell", "cohort", "tracked"])
 def test_the_elastic_answer_to_noise_is_no_path_but_that_to_the_mean_and_to_a_force_is(bonds):
     shear = Banded(**BY_SLIP, amplitude=SlipRate(floor=0.5, relaxing=True), paid_by_adhesion=0.1)
