@@ -13,7 +13,9 @@ from sim.ensemble.variables import LARGEST
 from sim.parts.drive import READINGS
 
 #: Seeds of the scenes: thirty, and scenes whose energies, sub-steps or messages have been wrong; 26 takes ten seconds.
-SEEDS = [*range(26), *range(27, 31), 45, 59, 75, 214, 266, 310, 319, 689, 730, 1042, 1240, 1293]
+SEEDS = [*range(26), *range(27, 31), 45, 59, 75, 214, 266, 310, 319, 445, 689, 730, 807, 1042, 1240, 1293, 1319]
+#: Those that are looked at with finer steps as well.
+FINER = 59, 445, 807
 #: Energies of a driven slider, none of which exceeds ten times the larger of work and stored energy.
 ENERGIES = [name for name in READINGS if name.startswith(("dissipated", "stored"))]
 
@@ -99,19 +101,29 @@ def check_cuts(scenario, course, end):
 
 
 def refined(seed, parts, members=1, sharper=1.0):
-    """Return area, ΔΓ, stress and position at ``parts`` of the clock step, shape (values, records, members)."""
+    """Return area, ΔΓ, stress and position at ``parts`` of the clock step, shape (values, records, members).
+
+    Records are two clock steps apart, or two over ``parts`` if those are even more.
+    """
     scene = random_scene(seed)
     scene["clock"]["step"] /= parts
+    if scene["drive"]["model"] == "start":  # the error of a jump within a step goes as its distance from the middle
+        scene["drive"]["rest"] = 0.25 * scene["clock"]["duration"]
     if scene["drive"]["model"] in ("spring", "force"):
         scene["drive"]["tolerance"] = 1e-6 / sharper
     scenario = sim.Scenario(**scene)
-    _, course = run(scenario, range(members), range(0, scenario.clock.steps + 1, parts))
+    _, course = run(scenario, range(members), range(0, scenario.clock.steps + 1, round(2 * parts)))
     values = np.pi * course.radius**2, course.energy, course.stress, course.position
     return np.array([np.nan_to_num(value) + np.zeros((1, members)) for value in values])
 
 
 def check_steps(seed, scenario, course):
-    """A finer clock step is no further from the finest, on average over the run; with noise in the mean of 32 members.
+    """Half a clock step is no further from the finest than the larger error of one and two, on average over the run.
+
+    One alone is no measure, as an error a h + b h² may vanish at one length h. At h/2 it is 3/4 of that at h less 1/8
+    of that at 2 h, so at most 7/8 of the larger. An event seen at the end of its step is no later with a half, and one
+    seen at the middle is off by at most h/4 with a half, by as much with h or 2 h. With noise the mean of 32 members
+    counts.
 
     Noise is looked at from 96 steps on, as errors of a few steps are no small ones, and allowed three standard errors.
     Left out: runs of more than 20,000 sub-steps, because of the time that they take.
@@ -120,14 +132,14 @@ def check_steps(seed, scenario, course):
         return
     if scenario.population.model in ("counted", "tracked") or scenario.fluctuations.per_member:
         size = max(1, 96 // scenario.clock.steps)
-        runs = np.array([refined(seed, size * parts, 32).mean(axis=1) for parts in (1, 2, 8)])
+        runs = np.array([refined(seed, size * parts, 32).mean(axis=1) for parts in (0.5, 1, 2, 8)])
         noise = np.sum(3.0 * runs.std(axis=2), axis=0) / math.sqrt(31.0)
-        coarse, half, finest = runs.mean(axis=2, keepdims=True)
+        double, whole, half, finest = runs.mean(axis=2, keepdims=True)
     else:
-        coarse, half, finest = (refined(seed, parts)[:, :, 0] for parts in (1, 2, 8))
+        double, whole, half, finest = (refined(seed, parts)[:, :, 0] for parts in (0.5, 1, 2, 8))
         noise = 10.0 * np.abs(refined(seed, 8, sharper=100.0)[:, :, 0] - finest).mean(axis=1)
-    farther, nearer = (np.abs(values - finest).mean(axis=1) for values in (coarse, half))
-    bound = farther + noise + 10.0 * max(largest_tolerance(scenario), 1e-9) * np.abs(finest).mean(axis=1)
+    *farther, nearer = (np.abs(values - finest).mean(axis=1) for values in (double, whole, half))
+    bound = np.maximum(*farther) + noise + 10.0 * max(largest_tolerance(scenario), 1e-9) * np.abs(finest).mean(axis=1)
     assert np.all(nearer <= bound), f"half a clock step is off by {nearer}, more than {bound}"
 
 
@@ -151,7 +163,7 @@ def check_scene(seed, finer=False):
 
 
 def test_random_scenes_close_their_energy_and_have_the_same_numbers_however_they_are_cut():
-    assert sum(check_scene(seed, finer=seed == 59) for seed in SEEDS) > 0.8 * len(SEEDS)
+    assert sum(check_scene(seed, finer=seed in FINER) for seed in SEEDS) > 0.8 * len(SEEDS)
 
 
 @pytest.mark.verify
