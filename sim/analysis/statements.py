@@ -9,7 +9,7 @@ import xarray as xr
 from sim.analysis.dataset import is_stationary, plain
 from sim.analysis.events import events
 from sim.analysis.over_speed import loss_speeds
-from sim.analysis.statistics import averaging, half_lives, of_second_half, summary
+from sim.analysis.statistics import averaging, ensemble_peaks, half_lives, of_second_half, summary
 from sim.units.notation import bounded, scaled, share
 
 #: Endings of the variables of a statement beside its value.
@@ -106,7 +106,7 @@ def of_events(dataset: xr.Dataset) -> xr.Dataset:
     members = summary(result.drop_vars(reasons).assign_attrs(dataset.attrs))
     for further in (as_means(half_lives(dataset, result)), reasons):
         members = members.merge(further, compat="no_conflicts", join="outer")
-    return members
+    return members.assign(ensemble_peaks(dataset))
 
 
 def as_means(values: xr.Dataset) -> xr.Dataset:
