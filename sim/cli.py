@@ -100,13 +100,18 @@ def _values(pairs: tuple[str, ...], option: str) -> dict[str, Any]:
     return values
 
 
-def _load(scenario: Path, changes: tuple[str, ...], seed: int | None = None, members: int | None = None) -> Any:
-    """Load a scenario with the values of --set, --seed and --members."""
+def _load(
+    scenario: Path, changes: tuple[str, ...], seed: int | None = None, members: int | None = None, quiet: bool = False
+) -> Any:
+    """Load a scenario with the values of --set, --seed and --members; print what they replace."""
     from sim.scenario.reader import load
 
     numbers = {"seed": seed, "ensemble.members": members}
     overrides = _values(changes, "--set") | {key: value for key, value in numbers.items() if value is not None}
-    return load(scenario, overrides, option="--set")
+    scene = load(scenario, overrides, option="--set")
+    for line in () if quiet else scene.source.notes:
+        note(f"note: {line}")
+    return scene
 
 
 class _Commands(click.Group):
@@ -157,7 +162,7 @@ def run(
     until = time.monotonic() + read_option(max_time, "--max-time", "s", above=0, typical="8 h")
     memory = read_option(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
     with slow_stage("loading the scenario", quiet):
-        scene = _load(scenario, **overrides)
+        scene = _load(scenario, **overrides, quiet=quiet)
     if force and resume:
         raise click.UsageError("--resume goes on with an unfinished run, --force throws it away: give one of them")
 

@@ -251,6 +251,10 @@ def test_check_set_schema_and_paper_print_what_they_promise_and_a_wrong_command_
     done = sim("check", "scene.toml")
     assert done.exit_code == 0 and done.stdout.startswith("a scene\n")
     changed = sim("check", "scene.toml", "--set", 'bonds={ model = "none" }', "--set", 'drive.from="2 mm/s"')
+    Path("swept.toml").write_text(f'{SCENE}[sweep]\n"contact.load" = [1e-3, 2e-3]\n', encoding="utf-8")
+    swept = sim("check", "swept.toml", "--set", "contact.load=3e-3")
+    assert [line.split()[:2] for line in complaints(swept.stderr)] == [["note:", "contact.load"]]
+    Path("swept.toml").unlink()
     assert re.search("bonds +none +changed", changed.stdout) and sim("check", "nope.toml").exit_code == 2
     assert sorted(path.name for path in here.iterdir()) == ["scene.toml"]
     for text in ("2 mN", "1\nother = 2", "[" * 5000):  # no text sets another key

@@ -109,7 +109,8 @@ def _key(word: str) -> str:
 class Source:
     """Origin of a scenario: the file's text, what was changed on top, and every file it names.
 
-    ``parts`` are those of the first scenario made from it, the one that text and overrides describe.
+    ``parts`` are those of the first scenario made from it, the one that text and overrides describe; ``notes`` are on
+    what the overrides replaced.
     """
 
     path: str = ""
@@ -117,6 +118,7 @@ class Source:
     overrides: dict[str, Any] = field(default_factory=dict)
     files: dict[str, str] = field(default_factory=dict)
     parts: dict[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def changed(self, values: dict[str, Any]) -> "Source":
         """Return the source with more overrides; they replace those of keys inside their own keys."""

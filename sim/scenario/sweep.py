@@ -78,6 +78,17 @@ def written(axes: tuple[Axis, ...]) -> Any:
     return {axis.keys[0]: [row[0] for row in axis.values] for axis in axes}
 
 
+def without(axes: tuple[Axis, ...], key: str) -> tuple[Axis, ...]:
+    """Return a sweep without a key; points that differ in nothing else are one."""
+    result = []
+    for axis in axes:
+        places = [place for place, other in enumerate(axis.keys) if other != key]
+        values = {str(row): row for row in (tuple(row[place] for place in places) for row in axis.values)}
+        if places:
+            result.append(Axis(tuple(axis.keys[place] for place in places), tuple(values.values())))
+    return tuple(result)
+
+
 def _fault(message: str) -> PydanticCustomError:
     return PydanticCustomError("sweep", "{text}", {"text": message})
 

@@ -31,9 +31,9 @@ from sim.parts.exchange import Array
 from sim.plots import style
 from sim.plots.style import BOTH, HOLLOW, Unit
 from sim.scenario.files import parse, written
+from sim.scenario.reader import override
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read, quantities
-from sim.scenario.sweep import set_key
 from sim.study import likelihood
 from sim.study.likelihood import HELD, LEVEL, Curve, Free, Interval, Measured, Minimum, Problem, idle, with_errors
 from sim.study.mechanisms import WHOLE, Verdict, compare
@@ -526,8 +526,7 @@ def scenario_text(scenario: Scenario, fit: Fit, folder: Path) -> str:
     for item in fit.numbers:
         unit = item.free.quantity.unit
         numbers[item.free.key] = item.value if unit == "1" else f"{item.value:.12g} {unit}"
-    for key, value in (source.overrides | numbers).items():
-        set_key(tables, key.split("."), value)
+    override(tables, source.overrides | numbers)
     above = Path(source.path).parent
     if source.path and above.resolve() != folder.resolve():
         _move(tables, above, folder)

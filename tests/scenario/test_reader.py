@@ -92,6 +92,48 @@ def test_overrides_replace_values_tables_and_what_was_left_out(scene):
     assert changed.source.overrides["contact.load"] == "2 mN"
 
 
+BANDED = """
+[shear]
+model = "banded"
+points = 64
+spectrum = { model = "gaussian", rms = "1 kPa", length = "10 um" }
+correlation = { model = "slip", length = "50 um" }
+"""
+
+
+LOADS = '"contact.load" = ["1 mN", "2 mN"]'
+LEFT_OUT = {"shear.points", "shear.correlation"}
+
+
+@pytest.mark.parametrize(("sweep", "overrides", "points", "named"), [
+    (LOADS, {"contact.load": "3 mN"}, [3e-3], {"contact.load"}),
+    ('contact.load = { from = 1e-3, to = 2e-3, count = 5 }', {"contact": {"load": 3e-3}}, [3e-3], {"contact.load"}),
+    (f'{LOADS}\n"drive.speed" = ["1 mm/s"]', {"drive.speed": 0}, [1e-3, 2e-3], {"drive.speed"}),
+    (LOADS, {"solid.poisson_ratio": 0.4}, [1e-3, 2e-3], set()),
+    ('"shear.points" = [16, 32]', {"shear.model": "mean"}, [4e-3], LEFT_OUT),
+    ('"shear.spectrum.length" = ["1 um", "2 um"]', {"shear.model": "mean"}, [4e-3] * 2, LEFT_OUT),
+])  # fmt: skip
+def test_an_override_replaces_the_sweep_of_its_key_and_the_keys_of_another_model(
+    scene, sweep, overrides, points, named
+):
+    result = scene(f"{BANDED}[sweep]\n{sweep}\n", overrides)
+    assert [point.contact.load for point in result.points()] == points
+    assert {word for line in result.source.notes for word in re.findall(r"[a-z]+\.[a-z]+", line)} == named
+    for key, value in quantities(scene(BANDED, overrides)).items():
+        assert quantities(result)[key] == value
+
+
+def test_rows_of_a_sweep_lose_a_key_that_is_set_and_no_key_is_set_inside_of_a_swept_table(scene):
+    rows = 'sweep = [{ "contact.load" = 1, "drive.speed" = 1 }, { "contact.load" = 1, "drive.speed" = 2 }]\n'
+    for overrides, count in (({"drive.speed": 3}, 1), ({"contact.load": 2e-3}, 2)):
+        assert len(scene(overrides=overrides, base=rows + LENS).points()) == count
+    text = '[sweep]\nbonds = [{ model = "none", stress = "1 kPa" }, { model = "none", stress = "2 kPa" }]\n'
+    with pytest.raises(BadInput, match=r"bonds\.stress.*is inside of bonds"):
+        scene(text, {"bonds.stress": "3 kPa"})
+    with pytest.raises(BadInput, match=r"shear\.points.*not a key of this model"):
+        scene(BANDED, {"shear.model": "mean", "shear.points": 32})
+
+
 def test_an_override_can_set_replace_and_drop_a_sweep(scene):
     text = '[sweep]\n"contact.load" = ["1 mN", "2 mN"]\n'
     assert len(scene(text).points()) == 2
