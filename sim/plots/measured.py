@@ -20,8 +20,8 @@ from sim.units.tables import Points, measured_points, names_of, read_measured
 
 #: Variables that follow from another column: its name, the power of it, and the factor.
 _BY = {"contact_radius": ("contact_area", 0.5, np.pi**-0.5), "contact_area": ("contact_radius", 2.0, np.pi)}
-#: Largest relative difference between a condition of a row and that of its curve.
-_NEAR = 5e-3
+#: Largest relative difference between a condition of a row and that of its curve, and that of equal numbers.
+_NEAR, _ROUNDING = 5e-3, 1e-9
 #: Smallest distance between branches of a curve that goes back and forth, in errors.
 _ALIKE = 0.01
 _MARKS = "osD^v"
@@ -64,8 +64,14 @@ class Compared(NamedTuple):
         spans = [(a, b + 1) for a, b in itertools.pairwise([0, *ends, len(way)]) if way[a] != 0.0]
         branches = [a + np.argsort(self.x[a:b]) for a, b in spans]
         none = [np.full(x.shape, np.nan)]
+        inside = [np.clip(x, self.x[rows[0]], self.x[rows[-1]]) for rows in branches]
+        # rounding puts no point beyond an end
+        placed = [np.where(np.abs(x - at) <= _ROUNDING * np.abs(at), at, x) for at in inside]
         return [
-            np.array([np.interp(x, self.x[rows], curve[rows], np.nan, np.nan) for rows in branches] or none)
+            np.array(
+                [np.interp(at, self.x[r], curve[r], np.nan, np.nan) for at, r in zip(placed, branches, strict=True)]
+                or none
+            )
             for curve in along
         ]
 

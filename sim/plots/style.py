@@ -218,7 +218,7 @@ def legend(panel: Axes, title: str = "", columns: int = 0) -> None:
         entries.setdefault(label, handle)
     if not entries and not title:
         return
-    longest = max((len(text.replace("$", "")) for text in entries), default=0)
+    longest = max((len(re.sub(r"[$^_{}]", "", re.sub(r"\\[A-Za-z]+", "x", text))) for text in entries), default=0)
     panel.legend(
         entries.values(), entries, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
         ncols=columns or (3 if longest <= 16 else 2 if longest <= 28 else 1),

@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 import sim
 from sim.plots import Choices, kinds as plots, style as pictures
 from sim.plots.field import PIXELS
+from sim.plots.measured import Compared, Line
 from sim.report.report import drawings
 from sim.units.errors import BadInput
 
@@ -182,6 +183,13 @@ def test_each_row_of_a_table_is_drawn_once_or_counted_as_left_out(loads, table, 
     assert [*map(int, numbers)] == [7, 1, 3, 1, 1, 1] and "2 mN, 9 mN" in remark
     (drawing,) = (each for each in drawings(loads, path) if each.measured)
     assert drawing.kind == plots.default(loads) and drawing.measured.remark == remark
+
+
+def test_points_at_the_ends_of_a_curve_that_turns_are_on_it_in_spite_of_rounding_and_others_beyond():
+    there = np.array([1.0, 2.0, 3.0, 2.0, 1.0])
+    curve = Compared(Line(0, {}, "", ""), there, there**2, 0.0 * there, 0.0 * there)
+    (values,) = curve.at(np.array([1.0 - 1e-12, 2.5, 3.0 + 1e-12, 0.999, 3.001]), curve.mean)
+    assert_allclose(values, [[1.0, 6.5, 9.0, np.nan, np.nan]] * 2, rtol=1e-11)
 
 
 def test_rows_without_a_load_are_of_no_one_curve_and_a_table_without_speeds_is_refused_in_figure_and_report(
