@@ -26,6 +26,8 @@ _FORCE = click.option("--force", is_flag=True, help="Replace files that exist.")
 _UNITS = click.option("--units", multiple=True, metavar="UNIT", help="Unit of numbers of its dimension, such as mm/s.")
 _WHERE = click.option("--where", "chosen", multiple=True, metavar="KEY=VALUE", help="Of a swept key this value alone.")
 
+_LOST = click.option("--lost", multiple=True, metavar="SHARE", help="The speed at which 10 % of the area is lost.")
+
 _STOPPED = "stopped; what was computed is kept: the same command with --resume goes on"
 _CODES = (
     "Exit codes: 0 done; 1 failed; 2 bad input; 73 the output exists; 74 trouble with disk or files; 75 stopped, to go"
@@ -200,11 +202,11 @@ def run(
         say(str(target) if target.exists() else f"shard {shard} is done; the last shard that is done makes {target}")
 
 
-def _tables(dataset: Any, most: int = _ROWS) -> tuple[list[list[dict[str, str]]], list[str]]:
+def _tables(dataset: Any, most: int = _ROWS, lost: tuple[str, ...] = ()) -> tuple[list[Any], list[str]]:
     """Return the tables of statistics of a dataset, and notes on their numbers."""
     from sim import analysis
 
-    stated = analysis.tables.stated(dataset)
+    stated = analysis.tables.stated(dataset, lost)
     rows, once = analysis.table(dataset, most, stated), analysis.highlights(dataset, most, stated)
     further = analysis.losses(dataset, most, stated), analysis.spread(dataset, stated)
     return [shown for shown in (rows, once, *further) if shown], analysis.notes(dataset, rows, once, stated)
@@ -243,6 +245,7 @@ def check(scenario: Path, **overrides: Any) -> None:
 @click.argument("output", type=_PATH)
 @_WHERE
 @click.option("--all", "whole", is_flag=True, help="Every row: all times and sweep values.")
+@_LOST
 @click.option("--csv", type=_PATH, help="Also write every time and sweep value to this CSV file.")
 @click.option("--wide", is_flag=True, help="CSV of a row for each sweep value; with --all of each record.")
 @_UNITS
@@ -257,8 +260,9 @@ def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None, 
     with _opened(output, chosen) as dataset, in_units(form["units"]):
         if csv is not None:
             analysis.dataset.claim(dataset, output, csv, force)
-            analysis.to_csv(dataset, csv, form["wide"], whole)  # before any printing, as nobody may read it to its end
-        _print_tables(*_tables(dataset, sys.maxsize if whole else _ROWS))
+            # before any printing, as nobody may read it to its end
+            analysis.to_csv(dataset, csv, form["wide"], whole, form["lost"])
+        _print_tables(*_tables(dataset, sys.maxsize if whole else _ROWS, form["lost"]))
         if csv is not None:
             say(str(csv))
 
@@ -315,6 +319,7 @@ def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...
 @_WHERE
 @click.option("--data", type=_PATH, help="Measured points from a CSV, as of `sim plot`, with their chi^2.")
 @click.option("--fit", type=_PATH, help="The result of `sim fit`, STEM_fit.json.")
+@_LOST
 @_FORCE
 def report(output: Path, page: Path | None, chosen: tuple[str, ...], force: bool, **beside: Any) -> None:
     """One page of a run as HTML: question, figures, tables, errors, cost, and how to repeat it."""

@@ -342,6 +342,8 @@ def test_stats_and_plot_write_beside_the_dataset_or_where_asked_or_refuse_in_one
     header, *rows = csv.reader(Path("new/table.csv").read_text(encoding="utf-8").splitlines())
     assert len({len(row) for row in (header, *rows)}) == 1 and sum("contact_area" in row for row in rows) == 11
     assert sim("stats", dataset, "--csv", "scene.toml/table.csv").exit_code == 74
+    assert "10 % of area" in sim("stats", dataset, "--lost", "10 %").stdout  # a bound or a reason, if not a speed
+    assert "lost 10" in sim("stats", dataset, "--lost", "10").stderr
     done = sim("plot", dataset, "time", "-o", "new/picture.svg")
     assert (done.exit_code, done.stdout) == (0, "new/picture.svg\n")
     assert Path("new/picture.svg").read_text(encoding="utf-8").startswith("<?xml")

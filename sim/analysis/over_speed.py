@@ -1,10 +1,15 @@
 """Observables over the sliding speed, and the speeds at which sliding has taken the contact area, with their errors."""
 
+import contextlib
+import itertools
 import math
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
+import scipy  # which imports the slow scipy.interpolate when speeds need it
 import xarray as xr
+from pydantic import TypeAdapter
 from scipy import special
 
 from sim.analysis.dataset import (
@@ -13,25 +18,46 @@ from sim.analysis.dataset import (
     in_pieces,
     is_stationary,
     is_steady,
+    resolved,
+    setting,
     speed_name,
     speed_of,
     stays_held,
     sweep_dims,
-    with_trajectories,
 )
-from sim.analysis.observables import labelled, observables, reference_radii
+from sim.analysis.observables import chosen_observables, labelled, reference_radii, restricted
 from sim.analysis.statistics import LEVEL, of_second_half, over_members
+from sim.laws import schallamach
+from sim.units.errors import BadInput
+from sim.units.notation import engineering
+from sim.units.quantity import read_option
 
 #: Shares of JKR's area whose loss has a speed [%].
 LOSSES = (5, 50)
 #: Observables whose curves over the speed are wanted, unless others are named.
 _CURVES = ("contact_area", "friction_force", "shear_stress")
+#: Shares of a loss, in both orders of charging.
+_CHARGED = (
+    "lost_to_bonds", "lost_to_fluctuations", "lost_to_fluctuations_first", "lost_to_bonds_last", "lost_to_mean_stress",
+    "lost_to_lag",
+)  # fmt: skip
 #: Groups of members that are left out in turn, and means of them, at most.
 _GROUPS, _MOST_MEANS = 64, 2**22
 _ENDS = {"": "", "_low": "lower end of the 95 % interval of the ", "_high": "upper end of the 95 % interval of the "}
 #: Within how many standard errors of a level speeds are near it.
 _NEAR = 4.0
-_READ = {"contact_area", "jkr_radius", "hertz_radius"}
+#: Speeds to each side of a level that its interpolation needs.
+_REACH = 6
+#: Reasons for a bound, by the side on which the level lies.
+_BEYOND = "more is lost at the lowest speed", "less is lost at the highest speed"
+#: Numbers of bonds that stretch, and of a rupture law, in a dataset; speeds at which steady bonds are tabulated.
+_BONDS, _PREFIX, _FINE = ("bond_stiffness", "rebinding_rate", "site_density"), "bonds_rupture_", 600
+#: Names of branches by the sign of the change of the speed.
+_WAYS = {1.0: "increasing speed", -1.0: "decreasing speed"}
+#: Relative lag of a speed below which it is not stated.
+_UNSEEN = 1e-3
+#: Largest relative lag along a course that is stated where there is no speed.
+_LATE = 0.02
 
 
 def speed_curves(dataset: xr.Dataset, *names: str) -> xr.Dataset:
@@ -72,61 +98,113 @@ def speed_curves(dataset: xr.Dataset, *names: str) -> xr.Dataset:
         if bool((speed == speed.isel({name: 0})).all()):
             speed = speed.isel({name: 0}, drop=True)
     curves = curves[chosen].assign_coords(speed=speed)
-    return curves.swap_dims({along: "speed"}) if speed.dims == (along,) else curves
+    curves = curves.swap_dims({along: "speed"}) if speed.dims == (along,) else curves
+    return curves if along == "t" or "speed" not in curves.dims else curves.sortby("speed")
 
 
 class Crossing(NamedTuple):
-    """A speed, and the ends of its 95 % interval; nan what is not known."""
+    """A speed, the ends of its 95 % interval, and the reason if there is no speed.
+
+    Unknown numbers are nan: an end alone is a bound. ``beside`` holds further quantities at that speed, each with the
+    ends of its interval, shape (quantities, 3).
+    """
 
     speed: float
     low: float
     high: float
+    reason: str
+    beside: np.ndarray
 
 
-def crossing(speeds: np.ndarray, groups: np.ndarray, sizes: np.ndarray, level: np.ndarray | float) -> Crossing:
+def crossing(
+    speeds: np.ndarray, groups: np.ndarray, sizes: np.ndarray, level: float, beside: np.ndarray | None = None
+) -> Crossing:
     """Return the speed at which the mean of a falling quantity has first fallen to a level.
 
     Parameters
     ----------
     speeds : array, shape (speeds,)
-        Rising, above 0.
+        In any order; speeds that are not above 0 are left out.
     groups : array, shape (groups, speeds)
         Means over groups of members.
     sizes : array, shape (groups,)
-        How many members each is of.
-    level : float or array
-        The level, of shape (speeds,) where it changes with the speed.
+        Number of members of each group.
+    level : float
+        The level.
+    beside : array, shape (quantities, groups, speeds), optional
+        Further quantities to be read at that speed.
 
     Notes
     -----
-    A straight line over the logarithm of the speed goes through the mean at the speeds about the first one below the
-    level: the two about it, and the next ones as long as they are within four standard errors of the level. The
-    interval is Student's, symmetric in the logarithm, with the error of the jackknife that leaves each group out of
-    the whole curve: so noise that members have in common at different speeds counts as in common.
+    A monotone cubic (PCHIP) over the logarithm of the speed goes through the means. Speeds so close that noise hides
+    the fall between them are first merged into blocks, two of which span four standard errors to both sides of the
+    level; their curvature is corrected.
+
+    The half-width of the interval is the root of the sum of squares of two errors. The statistical one is Student's,
+    with the error of the jackknife that leaves each group out of the whole curve: noise that members have in common at
+    different speeds counts as in common. The interpolation error is that of leaving out every second speed, either
+    half of them, less its noise. The interval ends at the next speeds that are above or below the level for sure,
+    because the curve falls. If it reaches both, or a half ends there, these speeds are all that is known.
+
+    Quantities ``beside`` are interpolated linearly over the fall, so shares of it add up to it; their errors are alike.
     """
-    weights, has_error = sizes / sizes.sum(), len(groups) > 1
-    mean = sum(weight * group for weight, group in zip(weights, groups, strict=True)) - level
+    free = len(groups) - 1.0
+    student = special.stdtrit(free, 0.5 + 0.5 * LEVEL) if free else 0.0
+    curves = np.stack([groups - level, *(beside if beside is not None else ())])
+    none = Crossing(math.nan, math.nan, math.nan, "", np.full((len(curves) - 1, 3), math.nan))
+    speeds, order = np.unique(np.where(np.isfinite(curves[0]).all(axis=0), speeds, 0.0), return_index=True)
+    x, curves = np.log(speeds[speeds > 0.0]), curves[..., order[speeds > 0.0]]
+    if not x.size:
+        return none._replace(reason="no contact with the full work of adhesion")
+    weight = (sizes / sizes.sum())[:, np.newaxis]
+    whole = np.sum(weight * curves, axis=1, keepdims=True)
+    if free:  # in the first row the mean, then those without each group
+        whole = np.concatenate([whole, (whole - weight * curves) / (1.0 - weight)], axis=1)
+
+    def error(rows: np.ndarray) -> np.ndarray:
+        return np.sqrt(free * np.var(rows[1:], axis=0)) if free else np.zeros(rows.shape[1:])
+
+    def half(rows: np.ndarray, *coarser: np.ndarray) -> float:
+        off = (each - rows for each in coarser)
+        return math.hypot(student * error(rows), *(math.sqrt(max(0.0, d[0] ** 2 - error(d) ** 2)) for d in off))
+
+    mean, surely = whole[0, 0], max(_NEAR, student) * error(whole[0])
     first = int(np.argmax(mean <= 0.0))
-    if not mean[0] > 0.0 >= mean[first]:
-        return Crossing(math.nan, math.nan, math.nan)
-    error = float(groups[:, first].std(ddof=1)) / math.sqrt(len(groups)) if has_error else 0.0
-    far = np.flatnonzero(np.abs(mean) > _NEAR * error)
-    window = slice(max(far[far < first - 1], default=-1) + 1, min(far[far > first], default=len(mean)))
-    x, mean = np.log(speeds[window]), mean[window]
-    at = float(_zero(x, mean))
-    if not has_error:
-        return Crossing(math.exp(at), math.nan, math.nan)
-    weight, free = weights[:, None], len(groups) - 1.0
-    above = groups[:, window] - np.broadcast_to(level, speeds.shape)[window]
-    without = _zero(x, (mean - weight * above) / (1.0 - weight))
-    half = special.stdtrit(free, 0.5 + 0.5 * LEVEL) * math.sqrt(free * float(np.var(without)))
-    return Crossing(*map(math.exp, (at, at - half, at + half)))
+    far = np.flatnonzero(np.abs(mean) > surely[first])
+    window = max(far[far < first - 1], default=-1) + 1, min(far[far > first], default=len(mean))
+    block = max(1, (window[1] - window[0]) // 2) if mean[0] > 0.0 >= mean[first] else 1
+    edges = np.unique([0, *range(window[0] % block, len(x), block)])
+    counts, count = np.diff([*edges, len(x)]), len(x)
+    x, whole = np.add.reduceat(x, edges) / counts, np.add.reduceat(whole, edges, axis=-1) / counts
+    if block > 1:
+        whole[..., 1:-1] -= np.diff(whole, 2) / 24.0
+    rows, surely = whole[0], max(_NEAR, student) * error(whole[0])
+    k = int(np.argmax(rows[0] <= 0.0)) if np.any(rows[0] <= 0.0) else len(x)
+    low = max(x[:k][rows[0, :k] > surely[:k]], default=math.nan)
+    high = min(x[k:][rows[0, k:] < -surely[k:]], default=math.nan)
+    bracket = none._replace(low=math.exp(low), high=math.exp(high), reason=f"{count} speeds: add some here")
+    if math.isnan(low) and math.isnan(high):
+        bracket = bracket._replace(reason="hidden by the noise: add members")
+    if not 2 <= k <= len(x) - 2:
+        return bracket._replace(reason=_BEYOND[k > 0]) if k in (0, len(x)) else bracket
+    near = slice(max(k - _REACH, 0), k + _REACH)
+    x, whole, rows, k = x[near], whole[..., near], rows[:, near], k - near.start
+    pchip = scipy.interpolate.PchipInterpolator
+    curve = pchip(x, rows[0])
+    at = next(root for root in curve.solve(extrapolate=False) if root >= x[k - 1])
+    halves = (pchip(x[first::2], rows[:, first::2], axis=1)(at) for first in (0, 1))
+    width = half(pchip(x, rows, axis=1)(at), *halves)
+    above, below = (curve.solve(end, extrapolate=False) for end in (width, -width))
+    ends = np.fmax(low, max(above[above <= at], default=low)), np.fmin(high, min(below[below >= at], default=high))
+    if ends == (low, high) and width > 0.0:
+        return bracket
 
+    def over_the_fall(values: np.ndarray, a: int, b: int) -> np.ndarray:
+        return values[:, a] + rows[:, a] / (rows[:, a] - rows[:, b]) * (values[:, b] - values[:, a])
 
-def _zero(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the zeros of straight lines through the values along the last axis."""
-    aside = x - x.mean()
-    return x.mean() - y.mean(axis=-1) * np.sum(aside**2) / np.sum(aside * y, axis=-1)
+    others = [[over_the_fall(values, k - a, k + b) for a, b in ((1, 0), (2, 0), (1, 1))] for values in whole[1:]]
+    found = [(each[0][0], each[0][0] - half(*each), each[0][0] + half(*each)) for each in others]
+    return Crossing(math.exp(at), math.exp(ends[0]), math.exp(ends[1]), "", np.reshape(found, (-1, 3)))
 
 
 def speed_dim(dataset: xr.Dataset) -> str | None:
@@ -136,65 +214,255 @@ def speed_dim(dataset: xr.Dataset) -> str | None:
     return next(varying, None)
 
 
-def loss_speeds(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the speeds at which the mean area has lost 5 and 50 % of JKR's, and half of the way to Hertz's.
+def extremes(curves: xr.Dataset, name: str, along: str) -> xr.Dataset:
+    """Return where a quantity is largest and least along a sweep, if that is inside: then it is not monotonic.
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it: a ramp of the speed, or a sweep of steady speeds, then of means over the second half
-        of the run.
+    curves : xarray.Dataset
+        As of ``speed_curves`` or ``distribution``, with ``<name>_mean``, ``<name>_low`` and ``<name>_high``.
+    name : str
+        Such as ``"friction_force"``.
+    along : str
+        The dimension, whose coordinate holds numbers.
 
     Returns
     -------
     xarray.Dataset
-        ``speed_at_5_percent_lost``, ``speed_at_50_percent_lost``, ``speed_halfway_to_hertz`` [m/s] with ``…_low`` and
-        ``…_high`` (see ``crossing``), for each point of the sweep of other keys; nan where the area
-        does not get there, or is there from the lowest speed on. Empty where speeds neither rise nor are swept, what
-        holds the sphere changes, or the speed, the area or its references were not recorded.
+        ``<name>_largest`` and ``<name>_least`` with ``…_low`` and ``…_high``; ``<name>_largest_at`` and
+        ``<name>_least_at``, whose ``…_low`` and ``…_high`` are the neighbouring values of the sweep. nan, and
+        ``<name>_largest_reason`` tells it, if the extreme differs from an end of the sweep by less than the errors.
     """
-    if speed_name(dataset) not in dataset or not dataset.keys() >= _READ:
-        return xr.Dataset()
-    speed = speed_of(dataset)
-    along = str(speed_dim(dataset)) if is_steady(dataset) else "t"
-    speed = speed if along == "t" else speed.isel(t=0, drop=True)
-    known = along in speed.dims and bool((speed.diff(along) > 0.0).all()) and bool(stays_held(dataset).all())
-    if not known or bool((speed <= 0.0).any()):
+    curves, result = curves.sortby(along), xr.Dataset()
+    mean, low, high = (curves[f"{name}_{end}"] for end in ("mean", "low", "high"))
+    low, high, last = low.fillna(mean), high.fillna(mean), curves.sizes[along] - 1
+    for word, sign, near, far in (("largest", 1.0, low, high), ("least", -1.0, -high, -low)):
+        index = (sign * mean).fillna(-np.inf).argmax(along)
+        inside = near.isel({along: index}) > far.isel({along: [0, last]}).max(along)
+        for end, step, values in (("", 0, mean), ("_low", -1, low), ("_high", 1, high)):
+            place = curves[along].isel({along: (index + step).clip(0, last)}).where(inside)
+            result[f"{name}_{word}{end}"] = (
+                values.isel({along: index}, drop=True).where(inside).assign_attrs(mean.attrs)
+            )
+            result[f"{name}_{word}_at{end}"] = place.drop_vars(along, errors="ignore").assign_attrs(curves[along].attrs)
+        result[f"{name}_{word}_reason"] = xr.where(inside, "", "at an end of the sweep, within the errors")
+    return result.drop_vars(along, errors="ignore")
+
+
+def _course(dataset: xr.Dataset) -> tuple[str, xr.DataArray]:
+    """Return the dimension along which the area is a curve over the speed, and the speed, in branches if several.
+
+    Raises
+    ------
+    BadInput
+        If there is no such curve.
+    """
+    has_area = bool({"contact_area", "contact_area_mean"} & dataset.keys())
+    if speed_name(dataset) not in dataset or not (has_area and {"jkr_radius", "hertz_radius"} <= dataset.keys()):
+        raise BadInput(["speeds of a loss need speed, contact_area, jkr_radius and hertz_radius in record.quantities"])
+    if not bool(stays_held(dataset).all()):
+        raise BadInput(["the load, indentation or displacement changes in the run; speeds of a loss need it constant"])
+    speed = abs(speed_of(dataset))
+    if is_steady(dataset) and (along := speed_dim(dataset)) is not None:
+        return along, speed.isel(t=0, drop=True)
+    speed = speed.transpose(..., "t")
+    values, branches = speed.to_numpy(), dict[str, np.ndarray]()
+    for point in np.ndindex(values.shape[:-1]):
+        way, number = np.sign(np.nan_to_num(np.diff(values[point]))), {1.0: 0, -1.0: 0}
+        turns = [0, *np.flatnonzero(np.diff(way)) + 1, len(way)]
+        for first, last in itertools.pairwise(turns):
+            if way[first] and (last - first > 1 or len(turns) == 2):
+                number[way[first]] += 1
+                name = f"{_WAYS[way[first]]} {number[way[first]]}".removesuffix(" 1")
+                records = (*point, slice(first, last + 1))
+                branches.setdefault(name, np.full(values.shape, np.nan))[records] = values[records]
+    if not branches:
+        raise BadInput(["the speed neither changes steadily nor is swept; speeds of a loss need one of both"])
+    names = xr.Variable("branch", list(branches), {"long_name": "branch of the course of the speed"})
+    return "t", xr.concat([speed.copy(data=each) for each in branches.values()], names).squeeze(drop=len(branches) == 1)
+
+
+class Population(NamedTuple):
+    """Bonds that stretch: their rupture law, stiffness [N/m], rebinding rate [1/s] and sites per area [1/m^2]."""
+
+    rupture: Any
+    stiffness: float
+    rebinding: float
+    density: float
+
+    @property
+    def pathway(self) -> tuple[float, float, float] | tuple[()]:
+        """Rate [1/s], Bell force [N] and stiffness [N/m] if all rupture is by one pathway that force opens."""
+        law = self.rupture.law(self.stiffness)
+        return (law.rate, self.stiffness / law.softness, self.stiffness) if law.one_pathway else ()
+
+    @property
+    def at_rest(self) -> float:
+        """Share of the sites that are bound at rest."""
+        return float(schallamach.rest_share(self.rupture.law(self.stiffness).at_rest, self.rebinding))
+
+
+def population_of(point: xr.Dataset) -> Population | None:
+    """Return the bonds of a dataset without a sweep; None if they do not stretch or it lacks their numbers."""
+    from sim.parts.bonds.rupture import Rupture  # which takes a while, and few datasets need it
+
+    keys = [str(name) for name in point.variables if str(name).startswith(_PREFIX)]
+    with contextlib.suppress(KeyError, ValueError):
+        numbers = {key.removeprefix(_PREFIX): float(point[key]) for key in keys}
+        rupture = TypeAdapter(get_args(Rupture)[0]).validate_python(numbers)  # any law by its numbers alone
+        return Population(rupture, *(float(setting(point, f"bonds.{key}")) for key in _BONDS))
+    return None
+
+
+def steady_speeds(dataset: xr.Dataset) -> xr.DataArray:
+    """Return the speed at which steady sliding has the bonds of each record, along a course of the speed [m/s].
+
+    If the amplitude of the field relaxes and lags more, it is about that at which the field would be steady: the speed
+    before the memory of its energy, to first order in the rate of the course. nan if a law is not known.
+    """
+    fraction = dataset["bond_fraction" if "bond_fraction" in dataset else "bond_fraction_mean"]
+    fraction = fraction.mean(MEMBERS) if MEMBERS in fraction.dims else fraction
+    speed = (abs(speed_of(dataset)) + 0.0 * dataset["contact_modulus"]).transpose(*sweep_dims(dataset), "t")
+    fraction, result = fraction.broadcast_like(speed).transpose(*speed.dims), speed.copy(deep=True)
+    for place in np.ndindex(speed.shape[:-1] if "bonds_rebinding_rate" in dataset else 0):
+        point = dataset.isel(dict(zip(speed.dims[:-1], place, strict=True)))
+        sizes = speed[place].to_numpy()
+        fine = np.geomspace(1e-3 * np.min(sizes[sizes > 0.0]), 1e3 * np.max(sizes), _FINE)
+        law = np.full(_FINE, math.nan)
+        if bonds := population_of(point):
+            law = bonds.rupture.closed_form(fine, bonds.stiffness, bonds.rebinding).bound / bonds.at_rest
+        elif "bonds_critical_speed" in point:
+            law = schallamach.steady_fraction(fine, float(point["bonds_critical_speed"]))
+        law = law if np.all(np.diff(law) <= 0.0) else math.nan * law  # else one fraction has several speeds
+        result[place] = np.exp(np.interp(-fraction[place], -law, np.log(fine)))
+    with contextlib.suppress(KeyError):
+        if resolved(dataset, "shear.amplitude").get("relaxing"):
+            memory = dataset.get("shear_correlation_time", math.nan * speed)
+            memory = dataset.get("shear_correlation_length", memory * speed) / speed
+            along: Any = {"input_core_dims": [["t"]] * 3, "output_core_dims": [["t"]], "vectorize": True}
+            earlier = (dataset["t"] - 0.5 * memory).broadcast_like(speed)  # energy goes with the square of amplitudes
+            field = xr.apply_ufunc(np.interp, earlier, dataset["t"], speed, **along)
+            result = result.where(abs(np.log(result / speed)) > abs(np.log(field / speed)), field)
+    return result
+
+
+def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.Dataset:
+    """Return the speeds at which the mean area has lost shares of JKR's: by default 5 and 50 %, and half of all it can.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it: courses of the speed, or a sweep of steady speeds, then of means over the second half
+        of the run.
+    levels : sequence of float or str, optional
+        Shares of JKR's area, such as ``["10 %", 0.25]``.
+
+    Returns
+    -------
+    xarray.Dataset
+        For each point of the sweep of other keys ``speed_at_5_percent_lost`` and so on [m/s], by default also
+        ``speed_halfway_to_hertz``, each with ``…_low``, ``…_high`` and ``…_reason`` (see ``crossing``). Branches of a
+        course that rises and falls have the dimension ``branch``. If bonds or field lag behind a course,
+        ``steady_speed_at_5_percent_lost`` is about the speed at which steady sliding loses as much (see
+        ``steady_speeds``). With ``levels`` also the ``charges`` of that loss [1], such as
+        ``lost_to_bonds_at_10_percent_lost``. Without ``levels`` empty if there is no curve of the area over the speed.
+
+    Raises
+    ------
+    BadInput
+        If there is no such curve, with the reason, or a level is no share.
+    """
+    wanted = [read_option(level, "lost", "1", above=0, below=1, typical="10 %") for level in levels]
+    try:
+        along, speed = _course(dataset)
+    except BadInput:
+        if wanted:
+            raise
         return xr.Dataset()
     radii = reference_radii(dataset)
     hertz = (radii["radius_hertz"] / radii["radius_jkr"]) ** 2
-    levels = [(f"speed_at_{k}_percent_lost", 1.0 - 0.01 * k + 0.0 * hertz, f"{k} % of JKR's") for k in LOSSES]
-    levels.append(("speed_halfway_to_hertz", 0.5 * (1.0 + hertz), "half of what it can, down to Hertz's"))
-    groups, sizes = _group_means(dataset, along)
-    dims, result = [[along], ["group", along], ["group"], [along]], {}
-    for name, level, loss in levels:
-        inputs = speed, groups, sizes, level + 0.0 * speed
-        crossings = xr.apply_ufunc(crossing, *inputs, input_core_dims=dims, output_core_dims=[[]] * 3, vectorize=True)
-        for (end, text), speeds in zip(_ENDS.items(), crossings, strict=True):
-            text = f"{text}sliding speed at which the mean contact area has lost {loss}"
-            result[name + end] = labelled(speeds, "m/s", text)
-    return xr.Dataset(result)
+    if along in hertz.dims:
+        hertz = hertz.min(along)
+    left = [(f"at_{100 * k:g}_percent_lost", 1.0 - k + 0.0 * hertz, f"{100 * k:g} % of JKR's") for k in wanted]
+    if not wanted:
+        left = [(f"at_{k}_percent_lost", 1.0 - 0.01 * k + 0.0 * hertz, f"{k} % of JKR's") for k in LOSSES]
+        left.append(("halfway_to_hertz", 0.5 * (1.0 + hertz), "half of what it can, down to Hertz's"))
+    means, sizes, alone = _group_means(dataset, along, bool(wanted))
+    if along == "t" and bool(((steady := steady_speeds(dataset)) != abs(speed_of(dataset))).any()):
+        means["steady_speed"] = np.log(steady.where(steady > 0.0)) + 0.0 * means["area_ratio"]
+    beside, result = means.to_array("quantity").drop_vars("quantity"), xr.Dataset()
+    how: Any = {"input_core_dims": [[along], ["group", along], ["group"], [], ["quantity", "group", along]]}
+    how |= {"output_core_dims": [[], [], [], [], ["quantity", "end"]], "output_dtypes": [*"dddOd"], "vectorize": True}
+    for name, level, loss in left:
+        *ends, reason, others = xr.apply_ufunc(crossing, speed, means["area_ratio"], sizes, level, beside, **how)
+        found, never = ends[0].notnull(), ends[0].isnull() & (level < hertz)
+        reason = _worded(reason, never, "never: at most {:.3g} % can be lost".format, 100.0 * (1.0 - hertz))
+        reason = _worded(reason, found & alone, "one member: the error is unknown".format, 0.0)
+        columns = {f"speed_{name}": (ends, "m/s", f"sliding speed at which the mean contact area has lost {loss}")}
+        for key, numbers in zip(means, others.transpose("quantity", "end", ...), strict=True):
+            text = f"{means[key].attrs.get('long_name', '')}, at the speed at which {loss} is lost"
+            columns[f"{key}_{name}"] = list(numbers), "1", text
+        del columns[f"area_ratio_{name}"]
+        if slow := columns.pop(f"steady_speed_{name}", None):
+            steady, text = np.exp(slow[0][0]), f"sliding speed, about, at which steady sliding loses {loss}"
+            result[f"steady_speed_{name}"] = labelled(steady, "m/s", text)
+            result[f"steady_speed_{name}_reason"] = reason
+            lags = abs(np.log(ends[0] / steady)) > np.fmax(0.5 * np.log(ends[2] / ends[1]), _UNSEEN)
+            reason = _worded(reason, lags, _lag, steady)
+            off = abs(means["steady_speed"].isel(group=0) - np.log(speed.where(speed > 0.0))).max(along) > _LATE
+            reason = reason + xr.where(off & ~found & ~never, "; the course lags", "").astype(object)
+        for key, (numbers, unit, text) in columns.items():
+            for (end, words), values in zip(_ENDS.items(), numbers, strict=True):
+                known = ~never & ~(found & alone) if end else ~never
+                result[f"{key}{end}"] = labelled(values.where(known), unit, words + text)
+            result[f"{key}_reason"] = reason
+    return result
 
 
-def _group_means(dataset: xr.Dataset, along: str) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return means of A/A_JKR over groups of members and, at steady speeds, the second half; and sizes of groups."""
-    areas, outer = with_trajectories(dataset, *_READ), (*sweep_dims(dataset), *(["t"] if along == "t" else []))
-    members = dataset.sizes.get(MEMBERS, 1)
+def _lag(steady: float) -> str:
+    return f"lags: near {engineering(float(f'{steady:.3g}'), 'm/s')} in steady sliding"
+
+
+def _worded(reason: xr.DataArray, chosen: xr.DataArray, words: Callable[[float], str], value: Any) -> xr.DataArray:
+    """Return reasons, where chosen those that words make of a value."""
+
+    def one(text: str, chosen: bool, value: float) -> str:
+        return words(value) if chosen else text
+
+    result = xr.apply_ufunc(one, reason, chosen, value, vectorize=True, output_dtypes=[object])
+    result.attrs.clear()
+    return result
+
+
+def _group_means(dataset: xr.Dataset, along: str, charged: bool) -> tuple[xr.Dataset, xr.DataArray, bool]:
+    """Return means over groups of members and, at steady speeds, the second half; sizes of groups; and if one is alone.
+
+    They are those of ``area_ratio`` and, if ``charged``, of shares of the loss. If only statistics were recorded,
+    groups are made up that have their mean and standard error. A member is alone if its noise compares with no other.
+    """
+    outer, pooled = (*sweep_dims(dataset), *(["t"] if along == "t" else [])), "contact_area_sem" in dataset
+    members = int(dataset.attrs["members"]) if pooled else dataset.sizes.get(MEMBERS, 1)
     count = min(members, _GROUPS, max(2, _MOST_MEANS // math.prod(dataset.sizes[name] for name in outer)))
+    names = ["area_ratio", *(_CHARGED if charged and not pooled else ())]
 
-    def ratios(piece: xr.Dataset) -> xr.Dataset:
-        ratio = observables(piece)[["area_ratio"]]
-        return ratio if along == "t" else ratio.mean("t")
+    def values(piece: xr.Dataset) -> xr.Dataset:
+        result = chosen_observables(piece, names)
+        return result if along == "t" else result.mean("t", keep_attrs=True)
 
-    def means(ratio: xr.Dataset) -> xr.Dataset:
-        ratio = ratio if MEMBERS in ratio.dims else ratio.expand_dims(MEMBERS)
-        groups = [ratio.isel({MEMBERS: slice(first, None, count)}).mean(MEMBERS) for first in range(count)]
-        return xr.concat(groups, "group", coords="minimal", compat="override")
+    def means(piece: xr.Dataset) -> xr.Dataset:
+        if pooled:
+            apart = xr.DataArray(np.linspace(-1.0, 1.0, count), dims="group")
+            apart = apart * piece["area_ratio_sem"] * math.sqrt(count * (count - 1.0) / float((apart**2).sum()))
+            return (piece["area_ratio_mean"] + apart).to_dataset(name="area_ratio")
+        piece = piece if MEMBERS in piece.dims else piece.expand_dims(MEMBERS)
+        groups = [piece.isel({MEMBERS: slice(k, None, count)}).mean(MEMBERS, keep_attrs=True) for k in range(count)]
+        return xr.concat(groups, "group", data_vars="all", coords="minimal", compat="override")
 
+    areas = restricted(dataset, names)
     if along == "t":
-        result = in_pieces(areas, ("t",), lambda piece: means(ratios(piece)))
+        result = in_pieces(areas, ("t",), lambda piece: means(values(piece)))
     else:
         late = areas.isel(t=slice(dataset.sizes["t"] // 2, None))
-        result = means(in_pieces(late, (*outer, MEMBERS), ratios))
-    sizes = np.bincount(np.arange(members) % count).astype(float)
-    return result["area_ratio"].transpose("group", *outer), xr.DataArray(sizes, dims="group")
+        result = means(in_pieces(late, (*outer, MEMBERS), values))
+    sizes = xr.DataArray(np.bincount(np.arange(members) % count).astype(float), dims="group")
+    return result, sizes, members == 1 and MEMBERS in dataset.sizes

@@ -1,6 +1,6 @@
 """Statements: each value that a person reads of a run, computed once. Tables, CSV, figures and report print them."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -65,7 +65,9 @@ class Statement(NamedTuple):
         return "; ".join(filter(None, (f"{text} {unit}".rstrip() if sizes else "", self.reason)))
 
 
-def statements(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
+def statements(
+    dataset: xr.Dataset, names: Collection[str] | None = None, lost: Sequence[float | str] = ()
+) -> xr.Dataset:
     """Return the statements of a run over the sweep.
 
     Parameters
@@ -74,6 +76,8 @@ def statements(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.
         As ``sim run`` writes it.
     names : collection of str, optional
         Observables of which means are wanted, all by default.
+    lost : sequence of float or str, optional
+        Shares of JKR's area whose loss has a speed, in place of 5 and 50 % and half of all: ``["10 %"]``.
 
     Returns
     -------
@@ -86,7 +90,7 @@ def statements(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.
         - of a stationary run means over its second half (see ``distribution``).
     """
     dataset = plain(dataset)
-    groups = [(of_events(dataset), False), (as_means(loss_speeds(dataset)), False)]
+    groups = [(of_events(dataset), False), (as_means(loss_speeds(dataset, lost)), False)]
     if is_stationary(dataset):
         groups.append((of_second_half(dataset, names), True))
     result = xr.Dataset()

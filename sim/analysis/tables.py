@@ -5,7 +5,7 @@ import contextlib
 import math
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -113,11 +113,19 @@ _EVENTS = (
     _Column("recurrence_time", "slip\nevery", math.nan),
 )
 
-_LOSSES = (
-    _Column("speed_at_5_percent_lost", "5 % of area\nlost at {}", math.nan),
-    _Column("speed_at_50_percent_lost", "50 % of area\nlost at {}", math.nan),
-    _Column("speed_halfway_to_hertz", "halfway to\nHertz at {}", math.nan),
-)
+#: Name of such a statement, its kind, and the share.
+_LOSS = re.compile(r"((\w+?)_(?:at_(.+)_percent_lost|halfway_to_hertz))_mean")
+#: Headings of what is known where a share of the area is lost, and meanings.
+_LOSSES = {
+    "speed": ("{long} at {V}", ""),
+    "steady_speed": ("{short}, if\nsteady, at {V}", "about the speed at which steady sliding loses as much"),
+    "lost_to_bonds": ("of {short}:\nbonds", "of that loss, charged first"),
+    "lost_to_fluctuations": ("of {short}:\nfluct.", "of that loss, charged after the bonds"),
+    "lost_to_fluctuations_first": ("of {short}:\nfluct. first", "of that loss, charged before the bonds"),
+    "lost_to_bonds_last": ("of {short}:\nbonds last", "of that loss, charged after the fluctuations"),
+    "lost_to_mean_stress": ("of {short}:\nstress", "of that loss"),
+    "lost_to_lag": ("of {short}:\nlag", "of that loss"),
+}
 
 #: Heading and meaning of the correlation time.
 _MEMORY = _Column("correlation_time", "t_c", meaning="integral correlation time of ΔΓ")
@@ -126,9 +134,21 @@ _MEMORY = _Column("correlation_time", "t_c", meaning="integral correlation time 
 _ROUNDING = 1e-13
 
 
-def stated(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the statements that the tables print."""
-    return statements(dataset, [column.name for column in _COLUMNS])
+def stated(dataset: xr.Dataset, lost: Sequence[str] = ()) -> xr.Dataset:
+    """Return the statements that the tables print, with speeds at which shares of the area are ``lost``."""
+    return statements(dataset, [column.name for column in _COLUMNS], lost)
+
+
+def _of_losses(stated: xr.Dataset, symbol: str = "V") -> list[_Column]:
+    """Return the columns of losses of area."""
+    columns = []
+    for match in filter(None, map(_LOSS.fullmatch, map(str, stated))):
+        name, kind, share = match.groups()
+        heading, meaning = _LOSSES[kind]
+        long, short = (f"{share} % of area\nlost", f"{share} %") if share else ("halfway to\nHertz", "halfway")
+        heading = heading.format(long=long, short=short, V=symbol)
+        columns.append(_Column(name, heading, math.nan if "speed" in kind else 0.0, meaning=meaning))
+    return columns
 
 
 def table(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None) -> list[dict[str, str]]:
@@ -192,7 +212,8 @@ def notes(
     with contextlib.suppress(KeyError, TypeError):  # not of every dataset; none where all was recorded
         recorded = ", ".join(resolved(dataset, "record.quantities")) or "contact_radius alone"
         lines.append(f"columns of what was not recorded are left out; record.quantities keeps {recorded}")
-    headed = {c.name: " ".join(c.heading.split()) for c in (*_COLUMNS, *_EVENTS)}
+    columns = (*_COLUMNS, *_EVENTS, *_of_losses(stated or xr.Dataset()))
+    headed = {c.name: " ".join(c.heading.split()) for c in columns}
     for reason, names in reasons(stated or xr.Dataset()).items():
         if shown_names := [headed[name] for name in names if name in headed]:
             lines.append(f"* {', '.join(dict.fromkeys(shown_names))}: {reason}")
@@ -235,7 +256,8 @@ def highlights(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = 
 
 def key_figures(dataset: xr.Dataset, stated: xr.Dataset) -> list[dict[str, str]]:
     """Return the statements of a run without a sweep, a row each: symbol, value, and definition with the sample."""
-    columns = {c.name: c for c in (*_COLUMNS, *_EVENTS, *_LOSSES) if not c.changing and _of_drive(dataset, c.name)}
+    known = (*_COLUMNS, *_EVENTS, *_of_losses(stated))
+    columns = {c.name: c for c in known if not c.changing and _of_drive(dataset, c.name)}
     rows = []
     for statement in each(stated):
         column = columns.get(statement.name)
@@ -243,7 +265,7 @@ def key_figures(dataset: xr.Dataset, stated: xr.Dataset) -> list[dict[str, str]]
         if column is None or unknown or abs(statement.value - column.dull) < _ROUNDING:
             continue
         text, over = column.meaning or statement.text, statement.over and f"; mean over the {statement.over}"
-        heading = " ".join(column.heading.format("V").split())
+        heading = ", ".join([" ".join(column.heading.split()), *filter(None, [statement.at.get("branch")])])
         rows.append({"": heading, "value": str(statement), "definition": text[:1].upper() + text[1:] + over})
     return rows
 
@@ -433,12 +455,12 @@ def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
 def losses(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None) -> list[dict[str, str]]:
     """Return the speeds at which area is lost, a row for each point of the sweep of other keys, if any is lost."""
     speeds = as_means(loss_speeds(dataset)) if stated is None else stated
-    speeds = speeds[[name for name in speeds if str(name).startswith(tuple(column.name for column in _LOSSES))]]
-    sizes = {name: size for name, size in dataset["contact_modulus"].sizes.items() if name in speeds.dims}
+    columns = _of_losses(speeds, "stage" if speed_name(dataset) == "stage_speed" else "V")
+    speeds = speeds[[name for name in speeds if str(name).startswith(tuple(column.name for column in columns))]]
+    sizes = {str(name): size for name, size in speeds.sizes.items()}
     points = _points(sizes, _thinned(sizes, rows))
-    symbol = "stage" if speed_name(dataset) == "stage_speed" else "V"
-    shown = _shown(speeds, points, [column._replace(heading=column.heading.format(symbol)) for column in _LOSSES])
-    return _rows(_places(dataset, points) | shown) if shown else []
+    shown = _shown(speeds, points, columns)
+    return _rows(_places(speeds, points) | shown) if shown else []
 
 
 # --- a long table for other programs, and a data frame ---
@@ -453,7 +475,9 @@ _ENDINGS |= {"correlation_time_error": "correlation_time_sem"}
 _STATED = ("_mean", "_sem", "_low", "_high", "_reason")
 
 
-def to_csv(dataset: xr.Dataset, path: str | os.PathLike, wide: bool = False, every: bool = False) -> None:
+def to_csv(
+    dataset: xr.Dataset, path: str | os.PathLike, wide: bool = False, every: bool = False, lost: Sequence[str] = ()
+) -> None:
     """Write all statistics as one long table, as ``tidy`` gives them, or as a wide one.
 
     Parameters
@@ -469,7 +493,7 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike, wide: bool = False, eve
     every : bool
         True for a wide table of a row for each record, with all statistics.
     """
-    rows = in_columns(dataset, every) if wide else tidy(dataset)
+    rows = in_columns(dataset, every, lost) if wide else tidy(dataset, lost)
     units = {str(name): variable.attrs.get("units", "1") for name, variable in dataset.coords.items()} | {
         "speed": "m/s"
     }
@@ -482,7 +506,7 @@ def _with_unit(name: str, unit: str) -> str:
     return name if unit in ("1", "") else f"{name} [{unit}]"
 
 
-def in_columns(dataset: xr.Dataset, every: bool = False) -> pd.DataFrame:
+def in_columns(dataset: xr.Dataset, every: bool = False, lost: Sequence[str] = ()) -> pd.DataFrame:
     """Return the statements of a run, a row for each point of the sweep; with ``every`` all statistics at each record.
 
     Returns
@@ -494,7 +518,7 @@ def in_columns(dataset: xr.Dataset, every: bool = False) -> pd.DataFrame:
     if every:
         rows = frame(dataset)
     else:
-        stated = statements(dataset)
+        stated = statements(dataset, lost=lost)
         names = [n for n in map(str, stated) if n.endswith(_STATED) and not re.search("_quantile|_correlation", n)]
         rows = _framed(dataset, stated[names])
     units, columns = rows.attrs["units"], {}
@@ -508,7 +532,7 @@ def in_columns(dataset: xr.Dataset, every: bool = False) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
-def tidy(dataset: xr.Dataset) -> pd.DataFrame:
+def tidy(dataset: xr.Dataset, lost: Sequence[str] = ()) -> pd.DataFrame:
     """Return all statistics, one row for each quantity, sweep value and time, in SI.
 
     Returns
@@ -520,7 +544,7 @@ def tidy(dataset: xr.Dataset) -> pd.DataFrame:
         the ends of their intervals; ``effective_samples``, ``correlation_time`` and ``correlation_time_error`` [s].
     """
     members = averaging(dataset, False).removeprefix("mean over the ")
-    groups = [(over_members(dataset), members), (statements(dataset), "")]
+    groups = [(over_members(dataset), members), (statements(dataset, lost=lost), "")]
     with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
         groups.append((shares(dataset), members))
     frames = []
@@ -528,14 +552,15 @@ def tidy(dataset: xr.Dataset) -> pd.DataFrame:
         flat = _flat(group)
         keys = [str(key) for key in flat if str(key).endswith("_mean")]
         frames += [_long(dataset, flat, key, flat[key].attrs.get("over", over) or "one run") for key in keys]
-    columns = [*map(str, dataset["contact_modulus"].coords), "t", "speed", "quantity", "unit", "over", *_ENDINGS]
+    places = [*map(str, dataset["contact_modulus"].coords), "branch", "t", "speed"]
+    columns = [*places, "quantity", "unit", "over", *_ENDINGS]
     rows = pd.concat(frames, ignore_index=True)
     return rows[[name for name in columns if name in rows]]
 
 
 def _long(dataset: xr.Dataset, group: xr.Dataset, key: str, over: str) -> pd.DataFrame:
     """Return rows of the statistics of a quantity, of which ``key`` is the mean."""
-    name, dims = key.removesuffix("_mean"), [n for n in (*sweep_dims(dataset), "t") if n in group[key].dims]
+    name, dims = key.removesuffix("_mean"), [n for n in (*sweep_dims(dataset), "branch", "t") if n in group[key].dims]
     columns = {column: group[f"{name}_{end}"] for column, end in _ENDINGS.items() if f"{name}_{end}" in group}
     if speed_name(dataset) in dataset:
         speed = speed_of(dataset)
@@ -556,7 +581,7 @@ def frame(dataset: xr.Dataset) -> pd.DataFrame:
 def _framed(dataset: xr.Dataset, statistics: xr.Dataset) -> pd.DataFrame:
     """Return a data frame of a row for each point of the sweep and, if statistics have times, each record."""
     flat = _flat(statistics)
-    dims = [name for name in (*sweep_dims(dataset), "t") if name in flat.dims]
+    dims = [name for name in (*sweep_dims(dataset), "branch", "t") if name in flat.dims]
     table = flat.expand_dims("row").to_dataframe(dim_order=["row", *dims]).reset_index().drop(columns="row")
     table.attrs["units"] = {str(name): variable.attrs.get("units", "1") for name, variable in flat.variables.items()}
     return table

@@ -148,7 +148,7 @@ class Scene(NamedTuple):
 
     def opened(self, line: Line) -> np.ndarray:
         """True where the contacts of all members are open."""
-        return self.values("fraction_detached_mean", line) >= 1.0
+        return self.values("fraction_detached_mean", line.whole) >= 1.0
 
     def openings(self, line: Line) -> tuple[np.ndarray, np.ndarray]:
         """Return the records after which the contact opens, and those at which it has closed again."""
@@ -160,7 +160,8 @@ class Scene(NamedTuple):
         points, known = self.statistics.dataset.sizes[self.statistics.along], self.statistics.get(name)
         if known is None:
             return np.full(points, np.nan)
-        return np.broadcast_to(known.isel(line.point, missing_dims="ignore").to_numpy(), points)
+        values = np.broadcast_to(known.isel(line.point, missing_dims="ignore").to_numpy(), points)
+        return values if line.shown is None else np.where(line.shown, values, np.nan)
 
     def all(self, *names: str) -> np.ndarray:
         """Return statistics of all curves, of shape (statistics * curves, points)."""
@@ -186,7 +187,7 @@ class Scene(NamedTuple):
     def speeds(self, line: Line) -> np.ndarray:
         """Return the prescribed speed along a curve [m/s], of the stage if there is one."""
         staged = self.statistics.get("stage_speed_mean") is not None
-        return self.values("stage_speed_mean" if staged else "speed_mean", line)
+        return self.values("stage_speed_mean" if staged else "speed_mean", line.whole)
 
     def varies(self, name: str) -> bool:
         """True if the observable is known and changes along the axis or between the curves."""
@@ -276,7 +277,7 @@ def line_style(scene: Scene, style: str) -> dict[str, Any]:
 def contact_curves(panel: Axes, scene: Scene, name: str, factor: float) -> None:
     """Draw the curves of a contact: a cross at each pull-off of the last member in contact, a ring at each jump-in."""
     for line in scene.lines:
-        curve(panel, scene, name, line, factor, label=line.label, spread=scene.spread)
+        curve(panel, scene, name, line, factor, style=line.style, label=line.label, spread=scene.spread)
         if name in _OF_CONTACT:
             mark_jumps(panel, scene, name, line, factor)
     beside(panel, scene, name, factor)
@@ -289,7 +290,7 @@ def beside(panel: Axes, scene: Scene, name: str, factor: float) -> None:
     if scene.measured:
         curves = []
         for line in scene.lines:
-            mean, error = (factor * values for values in scene.drawn(name, line)[:2])
+            mean, error = (factor * values for values in scene.drawn(name, line.whole)[:2])
             full = np.pi * scene.values("jkr_radius_mean", line) ** 2
             curves.append(Compared(line, scene.x[line.number], mean, error, full))
         over, at_end = (scene.over, scene.unit.factor), not scene.over_time
@@ -304,16 +305,41 @@ def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float, 
             panel.plot(x[at], mean[at], color=line.colour, label=words if labelled else "", **sign)
 
 
+#: Names of the branches of a course of the speed.
+_WAYS = "increasing speed", "decreasing speed"
+
+
 def over_speed(dataset: xr.Dataset) -> Scene:
-    """Return statistics over the sliding speed, of a ramp or of steady speeds."""
-    scene = scene_along(dataset, "t" if not is_steady(dataset) else str(speed_dim(dataset)))
+    """Return statistics over the sliding speed, of a course in branches or of steady speeds in their order."""
+    along = "t" if not is_steady(dataset) else str(speed_dim(dataset))
+    if along != "t" and (speed := speed_of(dataset).isel(t=0)).dims == (along,):
+        dataset = dataset.isel({along: np.argsort(speed.to_numpy())})
+    scene = scene_along(dataset, along)
+    scene = scene._replace(lines=_branches(scene)) if scene.over_time else scene
     speeds = np.stack([scene.speeds(line) for line in scene.lines])
     words = "speed of the stage $V$" if "stage_speed" in dataset else "sliding speed $V$"
     return scene.placed(speed_name(dataset), speeds, words, "m/s", axis_scale(speeds), broken=scene.over_time)
 
 
+def _branches(scene: Scene) -> list[Line]:
+    """Return the curves of a course of the speed that rises and falls in two parts each, with rests after a part."""
+    lines: list[Line] = []
+    for line in scene.lines:
+        change = np.diff(scene.speeds(line))
+        if min(np.sum(change > 0.0), np.sum(change < 0.0)) < 2:
+            lines.append(line)
+            continue
+        way = np.sign(change)[np.maximum.accumulate(np.where(change != 0.0, np.arange(change.size), 0))]
+        for name, sign, look, colour in zip(_WAYS, (1.0, -1.0), ("-", "--"), LINES, strict=False):
+            label, colour = (name, colour) if scene.single else (f"{line.label}, {name}".lstrip(", "), line.colour)
+            shown = np.append(way == sign, False) | np.append(False, way == sign)
+            lines.append(line._replace(label=label, colour=colour, style=look, shown=shown))
+    return [line._replace(number=number) for number, line in enumerate(lines)]
+
+
 def over_key(dataset: xr.Dataset, name: str) -> Scene:
     """Return statistics over a swept key of numbers or categories."""
+    dataset = dataset.sortby(name) if dataset[name].dtype.kind in "fi" else dataset
     key, scene = dataset[name], scene_along(dataset, name)
     words = f"{key.attrs.get('long_name', name).partition(',')[0]} {symbol(key)}".strip()
     if key.dtype.kind not in "fi":
@@ -391,7 +417,7 @@ def _size_panel(name: str, words: str, si: str, of_radius: Callable[[np.ndarray]
         factor = style.in_unit(panel.yaxis, words, sizes, si)
         contact_curves(panel, scene, name, factor)
         for theory, dashes in (("JKR", "--"), ("Hertz", ":")):
-            radii = [scene.values(f"{theory.lower()}_radius_mean", line) for line in scene.lines]
+            radii = [scene.values(f"{theory.lower()}_radius_mean", line.whole) for line in scene.lines]
             _reference(panel, scene, [factor * of_radius(radius) for radius in radii], dashes, theory)
         style.legend(panel, scene.title)
 
@@ -472,7 +498,7 @@ def share_panel(panel: Axes, scene: Scene) -> None:
     panel.axhline(1.0, linestyle="--", label="JKR", **style.GREY)
     ratios = []
     for line in scene.lines:
-        hertz, jkr = (scene.values(f"{name}_radius_mean", line) for name in ("hertz", "jkr"))
+        hertz, jkr = (scene.values(f"{name}_radius_mean", line.whole) for name in ("hertz", "jkr"))
         ratios.append((hertz / np.where(jkr > 0.0, jkr, np.nan)) ** 2)
     _reference(panel, scene, ratios, ":", "Hertz")
     style.legend(panel, scene.title)

@@ -33,12 +33,21 @@ _MOST = 3
 
 
 class Line(NamedTuple):
-    """A curve of a panel: a point of the sweep, its name, "" if a colour bar names it, and its colour."""
+    """A curve of a panel: a point of the sweep, its name, "" if a colour bar names it, its colour and its style.
+
+    A branch has only the ``shown`` part of the curve.
+    """
 
     number: int
     point: dict[str, int]
     label: str
     colour: str
+    style: str = "-"
+    shown: np.ndarray | None = None
+
+    @property
+    def whole(self) -> "Line":
+        return self._replace(shown=None)
 
 
 class Compared(NamedTuple):

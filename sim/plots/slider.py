@@ -3,31 +3,23 @@
 import contextlib
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from pydantic import TypeAdapter
 
 from sim.analysis import is_steady, setting, sweep_dims
 from sim.analysis.dataset import MEMBERS, word
 from sim.analysis.events import incipient_law, jumps
-from sim.analysis.over_speed import speed_dim
+from sim.analysis.over_speed import population_of, speed_dim
 from sim.laws import jkr, schallamach
 from sim.laws.schallamach import Body
-from sim.parts.bonds.rupture import Rupture
 from sim.plots import style
 from sim.plots.curves import Panel, Scene, contact_curves, over_speed, scene_along, stacked
 from sim.plots.measured import Line, Measured
-
-_PREFIX = "bonds_rupture_"
-_BONDS = ("bond_stiffness", "rebinding_rate", "site_density")
-
-#: Any rupture law by its numbers alone, as a dataset holds them.
-_RUPTURE: TypeAdapter[Rupture] = TypeAdapter(get_args(Rupture)[0])
 
 
 class Steady(NamedTuple):
@@ -37,35 +29,6 @@ class Steady(NamedTuple):
     style: str
     stress: np.ndarray
     fraction: np.ndarray
-
-
-class Population(NamedTuple):
-    """Bonds that stretch: their rupture law, stiffness [N/m], rebinding rate [1/s] and sites per area [1/m^2]."""
-
-    rupture: Rupture
-    stiffness: float
-    rebinding: float
-    density: float
-
-    @property
-    def pathway(self) -> tuple[float, float, float] | tuple[()]:
-        """Rate [1/s], Bell force [N] and stiffness [N/m] if all rupture is by one pathway that force opens."""
-        law = self.rupture.law(self.stiffness)
-        return (law.rate, self.stiffness / law.softness, self.stiffness) if law.one_pathway else ()
-
-    @property
-    def at_rest(self) -> float:
-        """Share of the sites that are bound at rest."""
-        return float(schallamach.rest_share(self.rupture.law(self.stiffness).at_rest, self.rebinding))
-
-
-def population_of(point: xr.Dataset) -> Population | None:
-    """Return the bonds of a dataset without a sweep; None if they do not stretch or it lacks their numbers."""
-    keys = [str(name) for name in point.variables if str(name).startswith(_PREFIX)]
-    with contextlib.suppress(KeyError, ValueError):
-        rupture = _RUPTURE.validate_python({key.removeprefix(_PREFIX): float(point[key]) for key in keys})
-        return Population(rupture, *(float(setting(point, f"bonds.{key}")) for key in _BONDS))
-    return None
 
 
 def steady_laws(point: xr.Dataset, speed: np.ndarray) -> list[Steady]:

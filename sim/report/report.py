@@ -8,7 +8,7 @@ import json
 import math
 import re
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -379,7 +379,7 @@ class Question(NamedTuple):
 
 def written(
     dataset: xr.Dataset, source: Path, path: Path | None, replace: bool,
-    data: Path | None = None, fit: Path | None = None,
+    data: Path | None = None, fit: Path | None = None, lost: Sequence[str] = (),
 ) -> Path:  # fmt: skip
     """Write the page of a dataset, by default beside its file, and return the path of the page.
 
@@ -393,7 +393,7 @@ def written(
     target = path or source.with_suffix(".html")
     claim(dataset, source, target, replace, *filter(None, (data, fit)))
     try:
-        text = html(dataset, source, data, fit)
+        text = html(dataset, source, data, fit, lost)
     except BadInput:
         raise
     except ValueError as fault:
@@ -404,8 +404,9 @@ def written(
 
 
 def html(
-    dataset: xr.Dataset, source: Path | str = "OUT.nc", data: Data | None = None, fit: Path | str | None = None
-) -> str:
+    dataset: xr.Dataset, source: Path | str = "OUT.nc", data: Data | None = None, fit: Path | str | None = None,
+    lost: Sequence[float | str] = (),
+) -> str:  # fmt: skip
     """Return the page of a run as one text of HTML.
 
     Parameters
@@ -418,6 +419,8 @@ def html(
         Measured points, a CSV table or columns in SI by name, as ``sim plot --data`` takes them.
     fit : path, optional
         The result of ``sim fit`` for this scenario, ``<stem>_fit.json``.
+    lost : sequence of float or str, optional
+        Shares of JKR's area whose loss has a speed, such as ``["10 %"]``.
 
     Returns
     -------
@@ -431,7 +434,7 @@ def html(
     fitted = None if fit is None else fit_of(Path(fit), dataset)
     figures = drawings(dataset, data)
     points = [figure.measured for figure in figures if figure.measured]
-    stated, swept = statements(dataset), sweep_dims(dataset)
+    stated, swept = statements(dataset, lost=lost), sweep_dims(dataset)
     rows, whole = table(dataset, _ROWS, stated), highlights(dataset, _ROWS, stated)
     keys = sum(heading.partition("\n")[0] in (*swept, "t") for heading in (rows or [{}])[0])
     wide = [rows, *([whole, losses(dataset, _ROWS, stated)] if swept else [])]

@@ -11,7 +11,7 @@ from helpers.parts import Adhesion, Band, Clock, Equilibrium, RateDependent, Rec
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.analysis import dataset as dataset_module, over_speed
-from sim.analysis.observables import charges, observables
+from sim.analysis.observables import charges, chosen_observables
 from sim.laws import jkr, reversible
 
 SPEEDS = np.geomspace(1e-3, 1e3, 61)
@@ -47,6 +47,91 @@ def speed_of_loss(loss):
     works = np.linspace(0.0, WORK, 200_001)
     work = np.interp(1.0 - loss, jkr_area(works) / jkr_area(WORK), works)
     return 1e-2 * (WORK / work - 1.0)
+
+
+def bonds_alone(speeds):
+    """Share of JKR's area that steady bonds leave."""
+    return jkr_area(WORK / (1.0 + np.asarray(speeds) / 1e-2)) / jkr_area(WORK)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 5e-3])
+@pytest.mark.parametrize("count", [3, 4, 5, 9, 25, 200])
+def test_interpolated_speeds_hold_the_truth_however_many_speeds_there_are(count, noise):
+    rng, hits, widths = np.random.default_rng(28), [], []
+    for _ in range(200):
+        speeds = np.geomspace(1.0, 10.0 ** rng.uniform(1.5, 4.0), count) * 10.0 ** rng.uniform(-5.0, -3.5)
+        loss = rng.uniform(0.01, 0.3)
+        truth, common = speed_of_loss(loss), rng.normal(size=(6, 1))
+        groups = bonds_alone(speeds) + noise * math.sqrt(3.0) * (common + rng.normal(size=(6, count)))
+        mixed = rng.permutation(count)
+        result = analysis.crossing(speeds[mixed], groups[:, mixed], np.ones(6), 1.0 - loss)
+        assert result.reason or np.isfinite(result.speed)
+        hits.append(not (result.low > truth or result.high < truth))
+        widths.append(math.log(result.high / result.low) if np.isfinite(result.speed) else math.nan)
+    assert np.mean(hits) >= 0.92
+    if count == 200 and noise == 0.0:
+        assert np.nanmedian(widths) < 1e-4
+
+
+def test_shares_of_a_loss_add_up_in_both_orders_and_are_those_of_the_laws_there():
+    field = shear.Mean(spectrum=Band(rms=1e5, longest=60e-6, shortest=24e-6))
+    parts = {"bonds": bonds.Steady(critical_speed=1e-2), "shear": field, "clock": Clock(duration=0.02, step=0.01)}
+    dataset = run(
+        scene(drive=drive.Steady(speed=1e-2), sweep={"drive.speed": list(np.geomspace(1e-5, 1.0, 41))}, **parts)
+    )
+    energy = float(dataset["fluctuation_energy"][0, 0])
+    result = analysis.loss_speeds(dataset, ["20 %", 0.9, 1e-3])
+    works = np.linspace(0.0, WORK, 200_001)
+    left = np.interp(0.8, jkr_area(works) / jkr_area(WORK), works)
+    speed = 1e-2 * (WORK / (left + energy) - 1.0)
+    name = "at_20_percent_lost"
+    assert float(result[f"speed_{name}_low"]) <= speed <= float(result[f"speed_{name}_high"])
+    assert_allclose(result[f"speed_{name}"], speed, rtol=1e-3)
+    by_bonds, alone = 1.0 - bonds_alone(speed), 1.0 - jkr_area(WORK - energy) / jkr_area(WORK)
+    law = {"lost_to_bonds": by_bonds, "lost_to_fluctuations": 0.2 - by_bonds}
+    law |= {"lost_to_fluctuations_first": alone, "lost_to_bonds_last": 0.2 - alone}
+    for share, truth in law.items():
+        low, value, high = (float(result[f"{share}_{name}{end}"]) for end in ("_low", "", "_high"))
+        assert low - 1e-12 <= truth <= high + 1e-12 and abs(value - truth) < 1e-3
+    for first, last in (
+        ("lost_to_bonds", "lost_to_fluctuations"),
+        ("lost_to_fluctuations_first", "lost_to_bonds_last"),
+    ):
+        assert_allclose(result[f"{first}_{name}"] + result[f"{last}_{name}"], 0.2, rtol=1e-12)
+    assert "never" in str(result["speed_at_90_percent_lost_reason"].values)
+    assert_allclose([result["speed_at_0.1_percent_lost"], result["speed_at_0.1_percent_lost_high"]], [math.nan, 1e-5])
+
+
+@pytest.mark.parametrize("duration", [2.0, 40.0])
+def test_branches_of_a_course_lag_both_ways_and_the_steady_speed_is_that_of_the_law(duration):
+    """Bonds with a rate of 5 1/s are late; the bonds left tell the speed at which they would be steady."""
+    course = drive.Table(time=(0.0, duration / 2.0, duration), speed=(1e-5, 2e-2, 1e-5))
+    late = bonds.Rate(critical_speed=5e-3, rebinding_rate=5.0)
+    result = analysis.loss_speeds(
+        run(scene(drive=course, bonds=late, shear=shear.Uniform(), clock=Clock(duration, duration / 2000)))
+    )
+    assert result["branch"].values.tolist() == ["increasing speed", "decreasing speed"]
+    hertz = jkr_area(0.0) / jkr_area(WORK)
+    steady = 0.5 * speed_of_loss(0.5 * (1.0 - hertz))
+    up, down = result["speed_halfway_to_hertz"].values
+    assert up > steady > down and up / down - 1.0 > 0.2 / duration
+    assert_allclose(result["steady_speed_halfway_to_hertz"], steady, rtol=1e-3)
+    assert all("lags" in reason for reason in result["speed_halfway_to_hertz_reason"].values)
+    early, at_end = result["speed_at_5_percent_lost_reason"].values
+    assert "lags" in early and "lags" in at_end  # on the way back more is lost at the lowest speed, or at a lower one
+
+
+def test_an_extreme_inside_a_sweep_is_named_and_one_at_its_end_or_within_the_errors_is_not():
+    speeds, force = np.array([0.1, 100.0, 1.0, 10.0]), np.array([0.416, 0.288, 1.034, 0.880])
+    for error, named in ((0.01, True), (0.5, False)):
+        columns = {"F_mean": force, "F_low": force - error, "F_high": force + error}
+        curves = xr.Dataset({name: ("V", values) for name, values in columns.items()}, {"V": speeds})
+        result = analysis.extremes(curves, "F", "V")
+        places = [float(result[f"F_largest_at{end}"]) for end in ("", "_low", "_high")]
+        assert_array_equal(places, [1.0, 0.1, 10.0] if named else [math.nan] * 3)
+        assert_array_equal(result["F_largest"], 1.034 if named else math.nan)
+        assert (str(result["F_largest_reason"].values) == "") == named
+        assert math.isnan(result["F_least"]) and str(result["F_least_reason"].values)  # at the highest speed
 
 
 def test_speeds_and_curves_of_bonds_that_break_are_those_of_the_law():
@@ -85,13 +170,19 @@ def test_crossings_are_exact_on_straight_lines_and_a_ramp_is_read_in_pieces(monk
     curve = 1.0 - 0.1 * np.log(SPEEDS / SPEEDS[0])
     result = analysis.crossing(SPEEDS, curve[None], np.ones(1), 0.55)
     assert_allclose(result.speed, SPEEDS[0] * math.exp(4.5), rtol=1e-12)
-    assert math.isnan(result.low) and math.isnan(result.high)
-    for level in (1.5, -1.0):  # there from the lowest speed on; never there
-        assert math.isnan(analysis.crossing(SPEEDS, curve[None], np.ones(1), level).speed)
+    assert_allclose([result.low, result.high], result.speed, rtol=1e-12)
+    for level, low, high in ((1.5, math.nan, SPEEDS[0]), (-1.0, SPEEDS[-1], math.nan)):
+        result = analysis.crossing(SPEEDS, curve[None], np.ones(1), level)
+        assert math.isnan(result.speed) and result.reason
+        assert_allclose([result.low, result.high], [low, high], rtol=1e-12)
     ramp, read = lens.ramp().isel(member=[0]), []
     whole = analysis.loss_speeds(ramp)
     monkeypatch.setattr(dataset_module, "ROOM", 500)
-    monkeypatch.setattr(over_speed, "observables", lambda some: read.append(some.sizes["t"]) or observables(some))
+    monkeypatch.setattr(
+        over_speed,
+        "chosen_observables",
+        lambda some, names: read.append(some.sizes["t"]) or chosen_observables(some, names),
+    )
     xr.testing.assert_identical(analysis.loss_speeds(ramp), whole)
     assert len(read) > 1 and sum(read) == ramp.sizes["t"] and math.isfinite(whole[NAMES[0]])
 
@@ -130,7 +221,13 @@ def test_curves_and_speeds_of_loss_of_what_stays_or_is_missing_are_refused_or_le
     result = analysis.loss_speeds(lens.ramp())
     low, at, high = (float(result[NAMES[0] + end]) for end in ("_low", "", "_high"))
     assert 1e-5 < low < at < high < 1e-1
-    assert not analysis.loss_speeds(run(scene(record=Record(per_member=False))))
+    pooled = analysis.loss_speeds(run(scene(record=Record(per_member=False))))
+    assert_allclose(pooled[NAMES[0]], at, rtol=1e-3)  # errors of neighbouring records count as in common
+    assert high / low <= float(pooled[NAMES[0] + "_high"] / pooled[NAMES[0] + "_low"]) < (high / low) ** 4
+    with pytest.raises(ValueError, match="nor is swept"):
+        analysis.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2))), ["10 %"])
+    with pytest.raises(ValueError, match="must be below 1"):
+        analysis.loss_speeds(lens.ramp(), ["100 %"])
     assert not analysis.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2))))
     assert "order_of_charging_mean" not in analysis.shares(run(scene(record=Record(per_member=False))))
 

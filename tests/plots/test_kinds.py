@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers.parts import Band, Bell, Clock, Ensemble, Equilibrium, Record, analysis, bonds, drive, shear
 from helpers.pictured import STEADY, drawn, field, legend_of, lines_of, mapped, rendered, simulated
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.plots import kinds as plots, style as pictures
 
@@ -138,6 +138,25 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
                 x = np.asarray(line.get_xdata(), float)
                 speeds = np.insert(speed, np.flatnonzero(np.diff(speed)) + 1, np.nan)
                 assert len(x) == len(speeds) and np.all(np.isnan(x) == np.isnan(speeds)), kind
+
+
+def test_branches_of_a_course_are_apart_and_shuffled_speeds_make_the_same_curves():
+    course = drive.Table(time=(0.0, 0.2, 0.4), speed=(1e-4, 1e-2, 1e-4))
+    dataset = simulated(drive=course, bonds=bonds.Rate(critical_speed=1e-3, rebinding_rate=50.0, stress=1e5))
+    area = rendered(plots.draw(dataset, "curve")).axes[0]
+    ways = [line for line in area.lines if "speed" in str(line.get_label())]
+    assert [line.get_label() for line in ways] == ["increasing speed", "decreasing speed"]
+    parts = [line.get_xdata()[np.isfinite(line.get_ydata())] for line in ways]
+    assert np.all(np.diff(parts[0]) > 0.0) and np.all(np.diff(parts[1]) < 0.0)
+    assert sum(map(len, parts)) == dataset.sizes["t"] + 1  # all records; that of the turn is in both
+    speeds, curves = [3e-3, 3e-4, 1e-3, 1e-2], []
+    for order in (speeds, sorted(speeds)):
+        dataset = simulated(drive=drive.Steady(speed=1e-3), sweep={"drive.speed": order})
+        for kind in ("curve", "sweep"):
+            curves.append([line.get_xydata() for line in plots.draw(dataset, kind).axes[0].lines])
+    for mixed, ordered in zip(curves[:2], curves[2:], strict=True):
+        for one, other in zip(mixed, ordered, strict=True):
+            assert_array_equal(one, other)
 
 
 def test_every_shape_of_dataset_is_drawn_as_what_fits_it_and_a_quantity_not_recorded_is_named():
