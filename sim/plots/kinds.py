@@ -274,7 +274,7 @@ def drawn(
         raise
     except ValueError as fault:
         raise BadInput([f"{source}: {fault}"]) from None
-    return target, " ".join(figure.get_supxlabel().split())
+    return target, " ".join(figure.get_supxlabel().split()) if choices.data is not None else ""
 
 
 def planned(source: Path, kind: str | None, path: Path | None, replace: bool, chosen: Collection[str] = ()) -> Path:
