@@ -16,14 +16,8 @@ from sim.units.notation import bounded, scaled, share
 _BESIDE = ("sem", "low", "high", "reason")
 #: Pure numbers that are no shares, so that they are not printed in percent.
 COUNTS = frozenset(("bond_fraction", "slip_count", "slip_count_late", "detachments", "step_renewal"))
-
 #: Shares that are at least 0 and at most 1.
 BOUNDED = frozenset(("fraction_detached", "fraction_masked", "time_masked", "ever_detached", "ran_away"))
-#: Quantities that grow with the time, so that no mean over a span says anything.
-_GROWING = (
-    "slider_position", "stage_position", "drive_work", "dissipated_", "energy_residual", "substeps", "detachment_time",
-    "runaway_time",
-)  # fmt: skip
 
 
 class Statement(NamedTuple):
@@ -98,8 +92,7 @@ def statements(
         over = averaging(dataset, late).removeprefix("mean over the ")
         for key in (key for key in group if str(key).endswith("_mean")):
             group[key] = group[key].assign_attrs(over=over)
-        kept = [key for key in group if not str(key).startswith(_GROWING)]
-        result = result.merge(group[kept], compat="no_conflicts", join="outer")
+        result = result.merge(group, compat="no_conflicts", join="outer")
     return result
 
 

@@ -29,6 +29,7 @@ from sim.analysis.dataset import answered, speed_name, speed_of, stays_held
 from sim.analysis.events import jumps
 from sim.analysis.observables import KEPT, observables, share_observables
 from sim.analysis.over_speed import speed_dim
+from sim.analysis.statistics import of_second_half
 from sim.plots import style
 from sim.plots.measured import Compared, Line, Measured
 from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, swept_value, symbol
@@ -55,12 +56,13 @@ _RING: Any = HOLLOW | {"mew": 0.8, "zorder": 3}
 class Statistics:
     """Statistics over the members along time (``"t"``) or a dimension of the sweep, each computed when first read.
 
-    Along the sweep they are those of the means over the second half of a stationary run, else of the last record.
+    Along the sweep they are the statements on the second half of a stationary run, else those of the last record.
     """
 
     def __init__(self, dataset: xr.Dataset, along: str) -> None:
         self.dataset, self.along = dataset, along
         self.late = along != "t" and is_stationary(dataset)
+        self.stated = of_second_half(dataset) if self.late else xr.Dataset()
         self.observables = self._along(observables(dataset))
         self._computed: dict[str, xr.DataArray | None] = {}
         with contextlib.suppress(KeyError):
@@ -73,6 +75,8 @@ class Statistics:
 
     def get(self, name: str) -> xr.DataArray | None:
         """Return a statistic by its name, such as ``contact_radius_mean``; None if it is not known."""
+        if name in self.stated:
+            return self.stated[name]
         if name not in self._computed:
             stem = name.rpartition("_")[0]
             if stem.startswith("lost_to") and stem not in self.observables:
@@ -175,7 +179,7 @@ class Scene(NamedTuple):
         mean, error, spread = (self.values(f"{name}_{kind}", line) for kind in ("mean", "sem", "std"))
         low, high = mean - spread, mean + spread
         if (quantiles := self.statistics.get(f"{name}_quantile")) is not None:
-            low, _, high = quantiles.isel(line.point).to_numpy()
+            low, _, high = quantiles.isel(line.point).transpose("quantile", ...).to_numpy()
         gone = self.opened(line) if name in _OF_CONTACT else False
         return [np.where(gone, np.nan, values) for values in (mean, error, low, high)]
 
@@ -207,7 +211,7 @@ def scene_along(dataset: xr.Dataset, along: str) -> Scene:
     if len(lines) == 1:
         lines = [lines[0]._replace(label=words or "simulated", colour=BOTH)]
     spread = "± 1 std. dev. of members" if "contact_radius_std" in dataset else "5–95 % of members"
-    return Scene(statistics, lines, words, f"{spread}' means" if statistics.late else spread, bar)
+    return Scene(statistics, lines, words, f"{spread} and records" if statistics.late else spread, bar)
 
 
 def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], tuple[ScalarMappable, str] | None, str]:
