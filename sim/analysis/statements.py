@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 import xarray as xr
 
 from sim.analysis.dataset import is_stationary, plain
@@ -133,3 +134,61 @@ def reasons(group: xr.Dataset) -> dict[str, list[str]]:
         for reason in filter(None, np.unique(group[key].to_numpy().astype(str))):
             result.setdefault(str(reason), []).append(key.removesuffix("_reason"))
     return result
+
+
+def relaxation(dataset: xr.Dataset, name: str, start: float = 0.0) -> Statement:
+    """Return the time in which a quantity relaxes by a factor of e, as after a start, a step of the speed or a load.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, at one point of its sweep.
+    name : str
+        A recorded variable, such as ``"shear_stress"`` or ``"slider_position"``.
+    start : float
+        Time from which on it relaxes [s].
+
+    Returns
+    -------
+    Statement
+        The time T [s] with its standard error and 95 % interval, both by the jackknife over the members, which holds
+        for noise of any correlation in time; none without noise. Without a value there is the ``reason``.
+
+    Notes
+    -----
+    Least squares of ``end + change e^(-(t - start)/T)`` to the members' mean. The course is no exponential if the fit
+    misses more than 1 % of the change and two standard errors of the mean, root mean squares over time.
+
+    Examples
+    --------
+    >>> time = np.linspace(0.0, 3.0, 301)
+    >>> print(relaxation(xr.Dataset({"shear_stress": ("t", 2.0 + np.exp(-time / 0.63))}, {"t": time}), "shear_stress"))
+    630 ms
+    """
+    after = dataset[name].sel(t=slice(start, None)).transpose(..., "t")
+    time, values = after["t"].to_numpy(), after.to_numpy().reshape(-1, after.sizes["t"])
+    number, mean, past = len(values), values.mean(axis=0), (time - time[0]) / (time[-1] - time[0])
+    text, over, nan = f"time in which {name} relaxes by a factor of e", f"{number} members" * (number > 1), np.nan
+    result = Statement(f"{name}_relaxation_time", text, "s", nan, nan, nan, nan, over, "", {})
+    change, is_noisy = mean[0] - mean[-1], bool(np.ptp(values, axis=0).any())
+    if not (np.isfinite(mean).all() and change != 0.0):
+        return result._replace(reason="it does not change, or is not known at all times")
+    courses = (np.array([mean, *((number * mean - values) / (number - 1) if is_noisy else ())]) - mean[-1]) / change
+
+    def missed(numbers: np.ndarray, course: np.ndarray) -> np.ndarray:
+        return np.asarray(numbers[0] + numbers[1] * np.exp(-past * np.exp(-numbers[2])) - course)
+
+    first = 0.0, 1.0, np.log(past[np.argmax(courses[0] < 0.37)])
+    fits = np.array([scipy.optimize.least_squares(missed, first, args=(course,)).x for course in courses])
+    value = (time[-1] - time[0]) * np.exp(fits[0, 2])
+    _, doubt, spread = np.sqrt((number - 1) * fits[1:].var(axis=0)) if is_noisy else (nan, nan, nan)
+    noise = np.sqrt(np.mean(values.var(axis=0)) / max(number - 1, 1)) / abs(change)
+    off = np.sqrt(np.mean(missed(fits[0], courses[0]) ** 2))
+    if off > 0.01 + 2.0 * noise:
+        return result._replace(reason=f"it is no exponential: the best one misses {off:.1%} of the change")
+    is_long, is_short = value > 0.5 * (time[-1] - time[0]), value < time[1] - time[0]
+    if is_long or is_short or doubt > abs(fits[0, 1]) / 3.0 or spread > 0.5:
+        kind = "too long for the run" if is_long else "too short for its records" if is_short else "not above the noise"
+        return result._replace(reason=f"about {value:.2g} s, {kind}")
+    factor = np.exp(scipy.stats.t.ppf(0.975, number - 1) * spread)
+    return result._replace(value=value, error=value * spread, low=value / factor, high=value * factor)

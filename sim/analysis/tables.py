@@ -471,8 +471,6 @@ _ENDINGS = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": 
 _ALIKE = [f"q{100 * level:02.0f}{end}" for level in QUANTILES for end in ("", "_low", "_high")]
 _ENDINGS |= {name: name for name in (*_ALIKE, "effective_samples", "correlation_time")}
 _ENDINGS |= {"correlation_time_error": "correlation_time_sem"}
-#: Endings of the variables of statements.
-_STATED = ("_mean", "_sem", "_low", "_high", "_reason")
 
 
 def to_csv(
@@ -515,12 +513,9 @@ def in_columns(dataset: xr.Dataset, every: bool = False, lost: Sequence[str] = (
         A column ``name [unit]`` for each swept key and statement, and if they are known ``name_error``, ``name_low``
         and ``name_high`` (95 % interval) and ``name_reason``. Units are those of ``in_units``, else SI.
     """
-    if every:
-        rows = frame(dataset)
-    else:
-        stated = statements(dataset, lost=lost)
-        names = [n for n in map(str, stated) if n.endswith(_STATED) and not re.search("_quantile|_correlation", n)]
-        rows = _framed(dataset, stated[names])
+    stated = xr.Dataset() if every else statements(dataset, lost=lost)
+    kept = re.compile("(?!.*_(quantile|correlation_time)).*_(mean|sem|low|high|reason)")
+    rows = frame(dataset) if every else _framed(dataset, stated[[n for n in stated if kept.fullmatch(str(n))]])
     units, columns = rows.attrs["units"], {}
     for name in rows.replace("", np.nan).dropna(axis="columns", how="all"):
         stem, _, end = name.rpartition("_")

@@ -3,8 +3,10 @@
 import math
 
 import numpy as np
+import xarray as xr
 from helpers.lens import scene
-from helpers.parts import analysis, drive, run, shear
+from helpers.parts import Clock, Ensemble, analysis, bonds, drive, run, shear
+from numpy.testing import assert_allclose
 
 from sim.analysis.statements import Statement, reasons
 
@@ -49,3 +51,38 @@ def test_a_reason_marks_its_cell_and_is_a_note_of_the_table():
     marked = [row["A/A_JKR\n(%)"].endswith("*") for row in rows]
     assert marked == [False, True] and reasons(stated) == {"not settled": ["area_ratio"]}
     assert "* A/A_JKR: not settled" in analysis.notes(dataset, rows, [], stated)
+
+
+def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_members_or_a_reason():
+    rates, still = {"critical_speed": 3e-3, "rebinding_rate": 5.0, "stress": 2e5}, {"shear": shear.Uniform()}
+    lens = still | {"drive": drive.Steady(speed=1e-3), "clock": Clock(duration=2.0, step=0.01)}
+    exact = 1.0 / (5.0 * (1.0 + 1.0 / 3.0))  # dN/dt = h (N0 - N) - h (V/Vc) N
+    found = analysis.relaxation(run(scene(bonds=bonds.Rate(**rates, start_from="empty"), **lens)), "shear_stress")
+    assert_allclose(found.value, exact, rtol=1e-9)
+    assert math.isnan(found.error) and math.isnan(found.low) and not found.reason  # no noise, no interval
+    counted = bonds.Counted(**rates, start_from="empty", sites=50)
+    found = analysis.relaxation(run(scene(bonds=counted, ensemble=Ensemble(members=40), **lens)), "shear_stress")
+    assert found.low < exact < found.high and found.error < 0.1 * exact
+    time, rng, memory = np.linspace(0.0, 5.0, 101), np.random.default_rng(27), math.exp(-0.05 / 0.5)
+
+    def course(mean, members=10):
+        noise = rng.standard_normal((members, time.size))  # of a correlation time of 0.5 s
+        for k in range(1, time.size):
+            noise[:, k] = memory * noise[:, k - 1] + math.sqrt(1.0 - memory**2) * noise[:, k]
+        return xr.Dataset({"x": (("member", "t"), mean + 0.1 * noise)}, {"t": time})
+
+    intervals = [analysis.relaxation(course(1.0 - np.exp(-time / 0.63)), "x") for _ in range(200)]
+    assert 179 <= sum(each.low < 0.63 < each.high for each in intervals) <= 198  # a band of 99.9 %
+    later = analysis.relaxation(
+        xr.Dataset({"x": ("t", np.exp(-np.maximum(time - 1.0, 0.0) / 0.4))}, {"t": time}), "x", 1.0
+    )
+    assert_allclose(later.value, 0.4, rtol=1e-9)
+    cases = {
+        "no exponential": np.exp(-np.sqrt(time)),
+        "too long for the run": np.exp(-time / 8.0),
+        "not change": 0.0 * time,
+    }
+    for words, mean in cases.items():
+        refused = analysis.relaxation(xr.Dataset({"x": ("t", mean)}, {"t": time}), "x")
+        assert words in refused.reason and math.isnan(refused.value)
+    assert sum(not analysis.relaxation(course(0.0 * time), "x").reason for _ in range(50)) <= 2  # of noise alone

@@ -13,8 +13,8 @@ number of bonds is carried. If the contact grows, the share of bound sites falls
 bonds leave with their area and the share stays.
 """
 
-import copy
 import math
+from dataclasses import replace
 from functools import cached_property
 from operator import attrgetter
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self, TypeVar, cast
@@ -348,14 +348,6 @@ Density = Annotated[float, Quantity("1/m^2", "bond sites per area", "n", above=0
 Ratio = Annotated[float, Quantity("1", "rebinding_rate over zero_force_rate", "beta", above=0, typical="10")]
 _BY_SPEED = ("rupture.critical_speed", "rupture.stress", "rebinding_ratio")
 _T = TypeVar("_T", bound="_Stretched | Auto")
-_Part = TypeVar("_Part")
-
-
-def _filled(part: _Part, **values: object) -> _Part:
-    """Return a part with some values, unchecked."""
-    result = copy.copy(part)
-    vars(result).update(values)
-    return result
 
 
 def _one_way(bonds: _T) -> _T:
@@ -405,9 +397,10 @@ class _Stretched(_BondModel):
         bell = cast(Bell, self.rupture)
         wanted = bell.critical_speed, bell.stress, bell.bell_force, self.bond_stiffness, self.rebinding_ratio
         rate, rebinding, density = map(float, self.numbers_of(*wanted))
-        rupture = _filled(bell, zero_force_rate=rate, critical_speed=None, stress=None)
-        result = _filled(self, rupture=rupture, rebinding_rate=rebinding, rebinding_ratio=None, site_density=density)
-        return _filled(result, has_stress=True)
+        rupture = replace(bell, zero_force_rate=rate, critical_speed=None, stress=None)
+        result = replace(self, rupture=rupture, rebinding_rate=rebinding, rebinding_ratio=None, site_density=density)
+        vars(result)["has_stress"] = True
+        return result
 
     @cached_property
     def law(self) -> RuptureRate:
