@@ -30,8 +30,8 @@ A member has the same noise at all points of a sweep. So the error of a differen
 members' differences, often far below the two errors combined:
 
 ```python
-change = dataset.contact_area.sel(contact_load=4.2e-3) - dataset.contact_area.sel(contact_load=4e-3)
-mean, error = change.mean("member"), change.std("member", ddof=1) / change.sizes["member"] ** 0.5
+change = sim.analysis.distribution(dataset, ["contact_area"], minus={"contact.load": "4 mN"})
+change.contact_area_mean, change.contact_area_sem
 ```
 
 Under a drive that feels the friction `drive_work` is the rise of `stored_energy`, the energies `dissipated_by_...` and

@@ -68,7 +68,20 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
         if reason := _fault(dataset):
             raise BadInput([f"{path}: {reason}: it was changed after its run; run the scenario again"])
         refused.pop_all()
-    return hdf5.located(dataset)
+    return hdf5.located(dataset.assign_attrs(_joined(dataset)))
+
+
+def _joined(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return attributes of runs that were joined, or of selected members: their number, and in ``joined`` in words."""
+    recorded, scenario = int(dataset.attrs["members"]), hdf5.tables(dataset.attrs["scenario_resolved"])
+    count, sweep = dataset.sizes.get(MEMBERS, recorded), scenario.get("sweep", {})
+    keys = {key.replace(".", "_") for key in (sweep[0] if isinstance(sweep, list) else sweep)}
+    texts = [f"joined along {name}" for name in sweep_dims(dataset) if name not in keys]
+    if count != recorded:
+        texts.append(
+            f"{count} members" + (f" joined, {recorded} of one run" if count > recorded else f" of {recorded}")
+        )
+    return {"members": np.int32(count), "joined": "; ".join(texts)} if texts else {}
 
 
 def _fault(dataset: xr.Dataset) -> str:

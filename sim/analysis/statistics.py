@@ -386,7 +386,10 @@ def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
                     text = f"{_OF[end]} of {variable.attrs.get('long_name', stem).removeprefix(_OF['mean'] + ' of ')}"
                     result[f"{stem}_{end}"] = variable.copy(data=at).assign_attrs(long_name=text)
             continue
-        for kind, values in _statistics_of(variable.astype(float), quantiles).items():
+        number = variable.astype(float)
+        if variable.attrs.get("units") == "N":
+            number = number.where(~(abs(number) < _NO_FORCE), 0.0)
+        for kind, values in _statistics_of(number, quantiles).items():
             result[f"{name}_{kind}"] = values.assign_attrs(_attributes(kind, variable))
     return xr.Dataset(result)
 
@@ -568,8 +571,11 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
 #: From so many members on the spread of their means gives the error, whatever the correlation in time: of the mean,
 #: for which nothing else is needed of the members, and of the shares under quantiles.
 _SEVERAL, _MANY = 4, 16
-#: Change over the span, as a share of the value, above which a run without noise has not settled.
-_STILL = 1e-3
+#: Change over the span, as a share of the value, above which a run without noise has not settled; and which no digit
+#: that is printed shows.
+_STILL, _UNSEEN = 1e-3, 1e-7
+#: Forces below it are of rounding [N]: a bond bears a million million times as much.
+_NO_FORCE = 1e-24
 #: Share of settled means whose drift is taken for one.
 _FALSE_ALARM = 0.01
 #: Whole cycles that each half of a span needs; share of a span over which its begin and its end are averaged.
@@ -809,7 +815,7 @@ def _settled(course: np.ndarray, drift: float, error: float, free: float, noisy:
     few = max(1, int(_ENDS_SHARE * course.size)) if noisy else 1
     begin, end = float(course[:few].mean()), float(course[-few:].mean())
     mean, change, bound = _cycles(course) or (end, math.inf, 0.0)
-    if course.size == 1 or np.ptp(course) <= (0.0 if noisy else _STILL) * np.max(np.abs(course)):
+    if course.size == 1 or np.ptp(course) <= (_UNSEEN if noisy else _STILL) * np.max(np.abs(course)):
         return Settlement("", end, begin, end)
     limit = error * float(special.stdtrit(free, 1.0 - 0.5 * _FALSE_ALARM)) if noisy else _STILL * abs(mean)
     is_short = math.isnan(limit)
@@ -855,7 +861,10 @@ def _openings(counts: np.ndarray, members: int, again: str, span: str) -> str:
 
 
 def distribution(
-    dataset: xr.Dataset, names: Collection[str] | None = None, span: tuple[float, float] | None = None
+    dataset: xr.Dataset,
+    names: Collection[str] | None = None,
+    span: tuple[float, float] | None = None,
+    minus: Mapping[str, Any] | None = None,
 ) -> xr.Dataset:
     """Return statistics of observables over the members and the second half of the run, at each point of the sweep.
 
@@ -867,6 +876,9 @@ def distribution(
         The observables, all by default.
     span : (float, float), optional
         First and last time of another span in which drive and control are constant [s].
+    minus : dict, optional
+        Values of swept keys, see ``where``: statistics are those of the differences from these points. A member has the
+        same noise at all of them, so the differences are of each member, and their error is often far below the errors.
 
     Returns
     -------
@@ -882,12 +894,14 @@ def distribution(
     """
     dataset = plain(dataset)
     late, words = _span(dataset, span)
-    dims, step = sweep_dims(dataset), float(late["t"][-1] - late["t"][0]) / max(late.sizes["t"] - 1, 1)
+    step = float(late["t"][-1] - late["t"][0]) / max(late.sizes["t"] - 1, 1)
     sweep, result = xr.full_like(dataset["contact_modulus"], np.nan, float), dict[str, xr.DataArray]()
-    noisy = has_noise(dataset).to_numpy().ravel()
+    noisy, base = has_noise(dataset).to_numpy().ravel(), where(late, minus) if minus else None
     openings = [""] * sweep.size
     if "in_contact" in late:
-        closed = _rows(late["in_contact"].compute(), dims) > 0.0
+        closed = _rows(late["in_contact"].compute(), sweep) > 0.0
+        if base is not None:
+            closed = closed & (_rows(base["in_contact"].compute(), base["contact_modulus"]) > 0.0)
         closed = closed.reshape(-1, *closed.shape[-2:])
         again = (closed[..., 1:] & ~closed[..., :-1]).any(axis=-1).sum(axis=-1)
         counts = closed.sum(axis=1), itertools.repeat(closed.shape[1]), (str(count or "") for count in again)
@@ -896,16 +910,23 @@ def distribution(
         if name in CUMULATIVE:
             continue
         variable = _observable(late, name)
-        differ, values = noisy & (MEMBERS in variable.dims), _rows(variable, dims)
+        differ, values = noisy & (MEMBERS in variable.dims), _series(late, name, step)
+        if base is not None:
+            values = values - _series(base, name, step)
         values = values.reshape(-1, *values.shape[-2:])
-        if name == "speed" and {"slider_position", "spring_force"} <= set(late):  # slips come between two records
-            gone = np.diff(_rows(late["slider_position"].compute(), dims)).reshape(*values.shape[:-1], -1)
-            values = gone / step if gone.size else values
         numbers, freedom = _over_time(values, step, name, differ)
         known = zip(values, numbers["sem"], freedom, map(bool, differ), strict=True)
         states = [settlement(*point) for point in known]
         result |= _described(variable.rename(name), numbers, sweep, states, openings, words, differ)
     return xr.Dataset(result)
+
+
+def _series(dataset: xr.Dataset, name: str, step: float) -> np.ndarray:
+    """Return values of an observable, shape (..., members, records); the speed of a slider that may slip by its way."""
+    sweep = dataset["contact_modulus"]
+    if name == "speed" and {"slider_position", "spring_force"} <= set(dataset) and dataset.sizes["t"] > 1:
+        return np.diff(_rows(dataset["slider_position"].compute(), sweep)) / step  # slips come between two records
+    return _rows(_observable(dataset, name), sweep)
 
 
 def _described(
@@ -959,10 +980,10 @@ def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) ->
         return distribution(dataset, names)
     dataset = plain(dataset)
     (late, words), sweep = _span(dataset, None), xr.full_like(dataset["contact_modulus"], np.nan, float)
-    dims, points, members = sweep_dims(dataset), sweep.size, int(dataset.attrs["members"])
+    points, members = sweep.size, int(dataset.attrs["members"])
     noisy, counts = has_noise(dataset).to_numpy().ravel(), np.full((points, late.sizes["t"]), members)
     if "in_contact_mean" in late:
-        counts = np.rint(members * _rows(late["in_contact_mean"], dims).reshape(counts.shape)).astype(int)
+        counts = np.rint(members * _rows(late["in_contact_mean"], sweep).reshape(counts.shape)).astype(int)
     reattach = (word(dataset, "contact.after_pull_off", "stop") == "reattach").broadcast_like(sweep).to_numpy().ravel()
     again = np.where(reattach & (counts.min(axis=-1) < members), "some", "")
     openings = [_openings(count, members, may, words) for count, may in zip(counts, again, strict=True)]
@@ -974,11 +995,11 @@ def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) ->
         if name in CUMULATIVE:
             continue
         ends = [key, f"{name}_sem" if key.endswith("_mean") else key]
-        (mean, sem), (after, error) = ([_rows(of[end], dims).ravel() for end in ends] for of in (whole, later))
+        (mean, sem), (after, error) = ([_rows(of[end], sweep).ravel() for end in ends] for of in (whole, later))
         free = (counts if is_of_contact(name) else np.full_like(counts, members)) - 1.0
         sem = np.where(differ, sem, np.nan)
         low, high = interval(name, mean, sem, free[:, 0] + 1.0)
-        course = _rows(courses[key], dims).reshape(points, -1)
+        course = _rows(courses[key], sweep).reshape(points, -1)
         known = zip(course, after - mean, error, free[:, free.shape[1] // 2], map(bool, differ), strict=True)
         numbers = {"mean": mean, "sem": sem, "low": low, "high": high}
         states = [_settled(*point) for point in known]
@@ -1013,10 +1034,11 @@ def _observable(dataset: xr.Dataset, name: str) -> xr.DataArray:
     return in_pieces(restricted(dataset, [name]), ("t",), of_piece)[name]
 
 
-def _rows(variable: xr.DataArray, dims: tuple[str, ...]) -> np.ndarray:
-    """Return values of an observable with all dimensions of the sweep, shape (..., members, records)."""
-    missing = [name for name in (*dims, MEMBERS) if name not in variable.dims]
-    return variable.expand_dims(missing).transpose(*dims, MEMBERS, "t").to_numpy().astype(float, copy=False)
+def _rows(variable: xr.DataArray, sweep: xr.DataArray) -> np.ndarray:
+    """Return values of an observable at all points of the sweep, shape (..., members, records)."""
+    sizes = {name: sweep.sizes.get(name, 1) for name in (*sweep.dims, MEMBERS) if name not in variable.dims}
+    rows = variable.drop_vars(sizes, errors="ignore").expand_dims(sizes).transpose(*sweep.dims, MEMBERS, "t")
+    return rows.to_numpy().astype(float, copy=False)
 
 
 # --- the peak of an ensemble with noise ---
@@ -1147,7 +1169,7 @@ def ensemble_peaks(dataset: xr.Dataset) -> xr.Dataset:
             continue
         text, is_known = f"peak of the mean of the {source.replace('_', ' ')}", source in dataset
         unit = dataset[source if is_known else f"{source}_mean"].attrs.get("units", "1")
-        values = _rows(_observable(dataset, source), dims) if is_known else np.full((*sweep.shape, 1, 1), np.nan)
+        values = _rows(_observable(dataset, source), sweep) if is_known else np.full((*sweep.shape, 1, 1), np.nan)
         numbers, reasons = np.full((10, *sweep.shape), np.nan), np.empty(sweep.shape, object)
         for point in np.ndindex(*sweep.shape):
             first = int(onset[point])

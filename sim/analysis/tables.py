@@ -177,7 +177,7 @@ def table(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None)
     means, points = _tabulated(dataset, rows, [column.name for column in columns], stated)
     one_row_each = _has_one_row_each(dataset)
     cells = _places(means, {name: index for name, index in points.items() if name != "t" or not one_row_each})
-    if one_row_each and any(name in points for name in dataset.get("drive_speed", xr.DataArray()).dims):
+    if one_row_each and any(name in points for name in dataset.coords.get("drive_speed", xr.DataArray()).dims):
         columns = [column for column in columns if column.name != "speed"]  # V is a column already
     cells |= _shown(means, points, columns)
     times, errors, below = (_at(means[f"correlation_time{kind}"], points) for kind in ("", "_sem", "_below"))

@@ -357,6 +357,7 @@ _ROUNDING = 1e-12
 #: Attributes on where a dataset comes from, in the page's words.
 _PROVENANCE = {
     "source": "written by", "history": "scenario and versions", "seed": "seed", "members": "members",
+    "joined": "of several runs or some members, while the scenario is that of one run",
     "references": "references", "Conventions": "conventions of the file",
 }  # fmt: skip
 

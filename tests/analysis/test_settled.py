@@ -9,6 +9,7 @@ from helpers.lens import FIELD, scene
 from helpers.parts import Bell, Clock, Ensemble, Equilibrium, Record, Time, analysis, bonds, drive, run, shear
 from numpy.testing import assert_allclose
 
+import sim
 from sim.analysis.statistics import closed_only, of_second_half, peak_of_mean, settlement
 from sim.ensemble import plan as plans
 from sim.parts.bonds.rupture import Constant
@@ -154,3 +155,45 @@ def test_the_peak_after_a_rest_does_not_grow_with_the_time_of_sliding():
         results[0]["peak_stress_low"] < 32.1e3 < results[0]["peak_stress_high"]
         and results[0]["peak_stress_reason"] == ""
     )
+
+
+@pytest.mark.parametrize("members", [1, 2, 6])
+def test_a_difference_along_a_sweep_has_the_error_of_the_members_differences(members):
+    loads = {"contact.load": [4e-3, 4.2e-3]}
+    dataset = run(scene(**FLUCTUATING | {"sweep": loads, "clock": Clock(duration=4.0, step=4e-3),
+                                         "ensemble": Ensemble(members=members)}))  # fmt: skip
+    alone, change = of_second_half(dataset), analysis.distribution(dataset, minus={"contact.load": 4e-3})
+    area, late = (of["contact_area_mean"] for of in (change, alone))
+    assert_allclose(area[1], late[1] - late[0], rtol=1e-9)
+    assert area[0] == 0.0 and change["contact_area_reason"][1] == ""
+    apart = math.hypot(*alone["contact_area_sem"])
+    assert 0.0 < change["contact_area_sem"][1] < 0.3 * apart
+    if members > 2:
+        each = dataset["contact_area"].isel(t=slice(dataset.sizes["t"] // 2, None)).mean("t").diff("contact_load")
+        error = each.std("member", ddof=1).item() / math.sqrt(members)
+        assert_allclose(change["contact_area_sem"][1], error, rtol=1e-9)
+
+
+def test_joined_runs_are_described_as_what_they_are(tmp_path):
+    parts = {key: value for key, value in FLUCTUATING.items() if key != "sweep"}
+    several = [run(scene(**parts, contact=Equilibrium(load=load))) for load in (1e-3, 4e-3)]
+    joined = xr.concat([each.set_coords("contact_load") for each in several], "contact_load", data_vars="all")
+    joined.to_netcdf(tmp_path / "loads.nc")
+    swept = run(scene(**FLUCTUATING))
+    with sim.open(tmp_path / "loads.nc") as dataset:
+        assert dataset.attrs["joined"] == "joined along contact_load" and analysis.table(dataset) == analysis.table(
+            swept
+        )
+    seeds = [run(scene(**parts, seed=seed)) for seed in (1, 2)]
+    how = {"data_vars": "minimal", "coords": "minimal", "compat": "override"}
+    xr.concat(seeds, "member", **how).to_netcdf(tmp_path / "seeds.nc")
+    with sim.open(tmp_path / "seeds.nc") as dataset:
+        assert dataset.attrs["members"] == 12 and dataset.attrs["joined"] == "12 members joined, 6 of one run"
+        error = of_second_half(dataset)["contact_area_sem"]
+        halves = (
+            xr.concat(seeds, "member", **how)["contact_area"].isel(t=slice(dataset.sizes["t"] // 2, None)).mean("t")
+        )
+        assert_allclose(error, halves.std("member", ddof=1) / math.sqrt(12.0), rtol=1e-10)
+    run(scene(**parts), to=tmp_path / "one.nc")
+    with sim.open(tmp_path / "one.nc") as dataset:
+        assert "joined" not in dataset.attrs
