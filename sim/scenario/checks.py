@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 from sim.laws import jkr
 from sim.parts.bonds import Cohort, Tracked
 from sim.parts.exchange import Array
-from sim.spectrum.families import BondMade
+from sim.spectrum.families import BondMade, Measured
 from sim.units.notation import engineering
 
 _STEPS_A_CYCLE = 2
@@ -143,6 +143,8 @@ def _off_the_map(scene: Scene) -> Faults:
 #: Rms of the fluctuations over the mean stress above which a remark is made: some 2 % of the area is reversed.
 _MOST_REVERSED = 0.5
 _LARGEST_STRAIN = 0.3
+#: Decades between the stress of a map and that of the bonds from which a factor of 1000 is nearer than none.
+_FAR = 1.5
 #: Radius of a sphere that is rather a number whose unit was forgotten [m].
 _LARGEST_SPHERE = 1.0
 
@@ -164,10 +166,27 @@ def remarks_between(scene: Scene) -> list[str]:
     strain = strength.max() / scene.setting.shear_modulus
     if strain > _LARGEST_STRAIN:
         remarks.append(f"the mean stress is {strain:.2g} times the shear modulus, beyond linear elasticity")
+    remarks += _remark_on_unit(shear, float(strength.max()))
     rms = math.sqrt(shear.spectrum.variance) * shear.amplitude.factor(speeds, strength)
     if not shear.spectrum.bond_made and np.any((rms > _MOST_REVERSED * strength) & (strength > 0.0)):
         remarks.append(f"rms fluctuations exceed {_MOST_REVERSED} of the mean stress: patches of reversed friction")
     return [*remarks, *_remarks_on_step(scene, np.array([np.abs(speeds).max() * scene.clock.step]))]
+
+
+def _remark_on_unit(shear: Any, strength: float) -> list[str]:
+    """Return a remark if the stress of a measured map is nearer to a thousand times that of the bonds, or less."""
+    if shear.measured:
+        key, size, text = "field", max(abs(shear.field.mean), shear.field.rms), f"mean {shear.field.mean:.3g} Pa, "
+        text += f"rms {shear.field.rms:.3g} Pa"
+    elif isinstance(shear.spectrum, Measured) and shear.spectrum.rms is None:
+        key, size = "spectrum", math.sqrt(shear.spectrum.variance)
+        text = f"rms {size:.3g} Pa"
+    else:
+        return []
+    if strength == 0.0 or abs(math.log10(size / strength)) < _FAR:
+        return []
+    return [f"the map ({text}) is {size / strength:.2g} times the stress of the bonds, {strength:.3g} Pa: is"
+            f" shear.{key}.unit right?"]  # fmt: skip
 
 
 #: Mean overshoot of a random walk beyond a limit, over the standard deviation of its steps: −ζ(1/2)/√(2π).

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 from pydantic_core import ArgsKwargs, PydanticCustomError
 
 from sim.numerics.files import HDF5
@@ -212,7 +212,17 @@ class MapFile(NamedTuple):
     spacings: tuple[float | None, float | None] = (None, None)
 
 
-def read_map(name: str, context: Any, variable: str, gaps: bool = False) -> MapFile:
+def checked_unit(unit: str) -> str:
+    """Return a unit of stress, "" for that of the file; raise ValueError for any other."""
+    STRESS.scaled(1.0, str(unit))
+    return unit
+
+
+_UNIT = "unit of a CSV, npy or netCDF file that does not name one; Pa if it is omitted"
+MapUnit = Annotated[str, AfterValidator(checked_unit), Field(description=_UNIT)]
+
+
+def read_map(name: str, context: Any, variable: str, gaps: bool = False, unit: str = "") -> MapFile:
     """Read a map from a file that a scenario names, by the ending of its name.
 
     Parameters
@@ -225,6 +235,8 @@ def read_map(name: str, context: Any, variable: str, gaps: bool = False) -> MapF
         Name of the map in a netCDF file.
     gaps : bool
         Whether points may be nan.
+    unit : str
+        The stresses' unit, if the file names none.
 
     Raises
     ------
@@ -232,11 +244,11 @@ def read_map(name: str, context: Any, variable: str, gaps: bool = False) -> MapF
         If it cannot be read as a map, is too small or has gaps; within ``blamed`` a fault of the file.
     """
     if name.lower().endswith((".nc", ".nc4", ".cdf")):
-        map_file = _from_netcdf(file_path(name, context), variable)
+        map_file = _from_netcdf(file_path(name, context), variable, unit)
     elif name.lower().endswith(".npy"):
-        map_file = MapFile(_from_npy(file_path(name, context)))
+        map_file = MapFile(STRESS.scaled(_from_npy(file_path(name, context)), unit))
     else:
-        map_file = MapFile(matrix(file_text(name, context), STRESS, gaps))
+        map_file = MapFile(matrix(file_text(name, context), STRESS, gaps, unit))
     values = map_file.values
     if values.ndim < 2 or values.size == 0:
         raise ValueError("the map has not two dimensions; give rows and columns")
@@ -259,7 +271,7 @@ def _from_npy(path: Path) -> Array:
     return np.array(values, float)
 
 
-def _from_netcdf(path: Path, variable: str) -> MapFile:
+def _from_netcdf(path: Path, variable: str, unit: str) -> MapFile:
     """Maps and their spacings in a netCDF file."""
     from sim.numerics.lazy import Refused, open_lazily  # imports xarray, which only maps need here
 
@@ -280,24 +292,32 @@ def _from_netcdf(path: Path, variable: str) -> MapFile:
     if has_axes:
         data = data.transpose(..., "x", "y")
     spacings = _spacing(data, "x"), _spacing(data, "y")
-    return MapFile(np.asarray(data, float) * _factor(data, STRESS), has_axes, spacings if has_axes else (None, None))
+    steps = [np.ptp(np.asarray(data[axis], float)) / (data.sizes[axis] - 1) for axis in ("x", "y") if has_axes]
+    if has_axes and None in spacings and not math.isclose(*steps, rel_tol=1e-4):
+        raise ValueError("x and y have other steps but no units; give both coordinates the attribute units, such as um")
+    factor, given = _factor(data, STRESS, unit), STRESS.scaled(1.0, unit)
+    if unit and not math.isclose(factor, given):
+        raise ValueError(
+            f'"{variable}" is in {data.attrs["units"]}, not in {unit} as the key unit has it; leave unit out'
+        )
+    return MapFile(np.asarray(data, float) * factor, has_axes, spacings if has_axes else (None, None))
 
 
-def _factor(data: Any, quantity: Quantity) -> float:
-    """Factor to SI from a netCDF variable's ``units``; without the attribute it is SI."""
-    unit = str(data.attrs.get("units", quantity.unit))
-    return Quantity(quantity.unit, quantity.meaning).read(f"1 {unit}")
+def _factor(data: Any, quantity: Quantity, unit: str = "") -> float:
+    """Factor to SI from a netCDF variable's ``units``; without the attribute from a unit, or it is SI."""
+    written = str(data.attrs.get("units", unit or quantity.unit))
+    return Quantity(quantity.unit, quantity.meaning).read(f"1 {written}")
 
 
 def _spacing(data: Any, axis: str) -> float | None:
-    """Spacing of a coordinate [m]; None without it."""
+    """Spacing of a coordinate [m]; None without it or its unit."""
     if axis not in data.indexes or data.sizes[axis] < 2:
         return None
     steps = np.diff(np.asarray(data[axis], float)) * _factor(data[axis], SPACING)
     step = float(np.mean(steps))
     if not np.allclose(steps, step, rtol=1e-4, atol=0.0):
         raise ValueError(f"the coordinate {axis} is not spaced by one step; interpolate the map onto a square lattice")
-    return abs(step)
+    return abs(step) if "units" in data[axis].attrs else None
 
 
 # Power spectral density of a stress map on a grid, and its radial average.
@@ -422,6 +442,8 @@ class Measured(FromFile):
         "hann" unless the map is periodic: the jump at its borders would leak into all wavenumbers.
     variable : str
         Name in a netCDF file; dimensions before the last two (or beside x, y) are averaged over.
+    unit : str
+        Unit of the numbers of a file that does not name it.
     wavenumbers, densities : tuple of float
         The estimate, filled in on reading and not meant to be given.
     rms : float, optional
@@ -443,6 +465,7 @@ class Measured(FromFile):
         Field(description='taper of the map before its transform; "hann" unless it is periodic'),
     ] = "none"
     variable: Annotated[str, Field(description="name of the map in a netCDF file")] = "shear_map"
+    unit: MapUnit = ""
     wavenumbers: Wavenumbers = ()
     densities: Densities = ()
     rms: Rescaled | None = None
@@ -454,15 +477,16 @@ class Measured(FromFile):
         values = by_name(values, cls)
         if not isinstance(values, dict):
             return values
-        name, window = values.get("file"), values.get("window", "none")
+        name, window, unit = values.get("file"), values.get("window", "none"), values.get("unit", "")
         if values.get("wavenumbers") or not isinstance(name, str) or window not in ("none", "hann"):
             return values
         try:
+            checked_unit(unit)
             spacing = None if values.get("spacing") is None else SPACING.read(values["spacing"])
         except ValueError:
             return values  # refused by the field's own check
         with blamed(name):
-            map_file = read_map(name, info.context, str(values.get("variable", "shear_map")))
+            map_file = read_map(name, info.context, str(values.get("variable", "shear_map")), unit=unit)
             spacing = _one_spacing(map_file, spacing)
             maps = map_file.values.reshape(-1, *map_file.values.shape[-2:])
             q, density = estimate(maps, (maps.shape[1] * spacing, maps.shape[2] * spacing), window)
@@ -477,7 +501,7 @@ def _one_spacing(map_file: MapFile, spacing: float | None) -> float:
             raise ValueError(f"{text}; interpolate the map onto a square lattice")
         spacing = step if spacing is None else spacing
     if spacing is None:
-        raise ValueError('the map has no coordinates; give spacing, such as "0.5 um"')
+        raise ValueError('the map has no coordinates with units; give spacing, such as "0.5 um"')
     return spacing
 
 

@@ -17,7 +17,17 @@ from pydantic_core import PydanticCustomError
 from sim.laws.halfspace import free_energy_of_map, noise_energy, surface_energy
 from sim.numerics.grid import Grid, Rectangle, lattice_of
 from sim.spectrum.family import Array
-from sim.spectrum.measured import SPACING, MapFile, Measured, by_name, estimate, read_map, tapered
+from sim.spectrum.measured import (
+    SPACING,
+    MapFile,
+    MapUnit,
+    Measured,
+    by_name,
+    checked_unit,
+    estimate,
+    read_map,
+    tapered,
+)
 from sim.units.quantity import Quantity, keyed
 from sim.units.tables import blamed
 
@@ -61,6 +71,8 @@ class StressMap:
         with the slider, sliding in +x brings lower x under the disc.
     variable : str
         Name in a netCDF file.
+    unit : str
+        Unit of the numbers of a file that does not name it.
     values, shape : bytes, (int, int)
         The numbers, filled in on reading and not meant to be given.
 
@@ -83,6 +95,7 @@ class StressMap:
     noise: Annotated[float, _NOISE] = 0.0
     start: Annotated[float, _START] | None = None
     variable: Annotated[str, Field(description="name of the map in a netCDF file")] = "shear_map"
+    unit: MapUnit = ""
     values: _Values = Field(default=b"", repr=False)
     shape: _Shape = (0, 0)
 
@@ -95,14 +108,16 @@ class StressMap:
         if strange := {"values", "shape"} & table.keys():
             raise PydanticCustomError("not_given", "{key} is read from the file; leave it out", {"key": strange.pop()})
         name, rows, mask = table.get("file"), table.get("rows", "y"), table.get("mask", False)
+        unit = table.get("unit", "")
         if not isinstance(name, str) or not isinstance(mask, bool) or rows not in ("x", "y"):
             return table
         try:
+            checked_unit(unit)
             keys = [None if table.get(key) is None else SPACING.read(table[key]) for key in ("pixel", "pixel_y")]
         except ValueError:
             return table  # refused by the field's own check
         with blamed(name):
-            map_file = read_map(name, info.context, str(table.get("variable", "shear_map")), gaps=True)
+            map_file = read_map(name, info.context, str(table.get("variable", "shear_map")), gaps=True, unit=unit)
             values = _one_map(map_file, rows)
             if not mask and np.isnan(values).any():
                 raise ValueError("the map has gaps (nan); with mask = true they are what lies outside of the contact")
@@ -214,5 +229,5 @@ def _pixels(map_file: MapFile, pixel: float | None, pixel_y: float | None) -> tu
     along = pixel or map_file.spacings[0]
     across = across or map_file.spacings[1] or along
     if along is None or across is None:
-        raise ValueError('the map has no coordinates; give pixel, such as "0.5 um"')
+        raise ValueError('the map has no coordinates with units; give pixel, such as "0.5 um"')
     return along, across

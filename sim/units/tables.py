@@ -142,6 +142,9 @@ def matrix(text: str, quantity: Quantity, gaps: bool = False, unit: str = "") ->
     units = [other for other in factors.values() if other]
     if len(units) > 1:
         raise TableError(f"the unit is {' and '.join(units)}, by the comments and the key unit; give one of them")
+    for edge in (table.rows[0], [row[0] for row in table.rows]):
+        if len(edge) > 4 and edge[0] in ("0", "1") and edge == [str(k + int(edge[0])) for k in range(len(edge))]:
+            raise TableError("its first row or column only counts the others; leave it out")
     cells = list(itertools.chain.from_iterable(table.rows))
     return _numbers("value", table, cells, "".join(units), quantity, gaps).reshape(len(table.rows), -1)
 

@@ -254,9 +254,18 @@ def test_netcdf_maps_give_units_spacing_or_take_that_of_the_key_and_average_over
         read(files, **keys, variable="tua", spacing=0.1)
 
 
+def rescaled(data, x, y, attrs=None):
+    """A dataset with other coordinates, in metres or without units."""
+    axes = {"x": x * data.x.to_numpy(), "y": y * data.y.to_numpy()}
+    return data.assign_coords(
+        {name: (name, axis, {"units": "m"} if attrs is None else attrs) for name, axis in axes.items()}
+    )
+
+
 WRONG_DATASETS = [
     (lambda data: data.assign_coords(x=data.x.to_numpy() ** 2), "not spaced by one step"),
-    (lambda data: data.assign_coords(x=data.x * 2, y=data.y * 2), "equal in x and y and to the key"),
+    (lambda data: rescaled(data, 2.0, 2.0), "equal in x and y and to the key"),
+    (lambda data: rescaled(data, 2.0, 1.0, {}), "no units"),
     (lambda data: data.where(data.x > 0.05), "gaps"),
     (lambda data: data * 0.0, "every density is zero"),
     (lambda data: data.isel(x=slice(5)), "too small"),

@@ -3,14 +3,17 @@
 import math
 import os
 import pickle
+import tomllib
 
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.commands import LENS
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
 from sim.laws import halfspace
+from sim.scenario.reader import load
 from sim.spectrum.stress_map import StressMap
 from tests.spectrum.test_measured import Files
 
@@ -56,6 +59,52 @@ def test_the_energy_of_a_map_is_that_of_its_file(files, name):
     again = TypeAdapter(StressMap).validate_python(TypeAdapter(StressMap).dump_python(result))
     assert again == result and hash(again) == hash(result)
     assert len(TypeAdapter(StressMap).dump_python(result, mode="json")["values"]) == 64  # a digest, not the numbers
+
+
+def test_a_map_has_the_unit_of_its_file_or_of_the_key_and_axes_without_units_the_pixels_of_the_key(files):
+    kilo = FIELD * 1e-3
+    for name, keys in (
+        ("a.csv", {"unit": "kPa"}),
+        ("a.npy", {"unit": "kPa"}),
+        ("b.csv", {}),
+        ("b.csv", {"unit": "kPa"}),
+    ):
+        written(files, name, kilo)
+        if name == "b.csv":
+            np.savetxt(files.folder / name, kilo.T, delimiter=",", fmt="%.17g", header="stress in kPa")
+        assert_allclose(read(files, file=name, pixel="5 um", pixel_y="7 um", **keys).mean, FIELD.mean(), rtol=1e-12)
+    for keys, fault in (
+        ({"unit": "MPa"}, "MPa and kPa"),
+        ({"unit": "mm"}, "not a unit of Pa"),
+        ({"unit": 3}, "string"),
+    ):
+        with pytest.raises(ValidationError, match=fault):
+            read(files, file="b.csv", pixel=1e-6, **keys)
+    data = xr.load_dataset(files.folder / written(files, "map.nc"))
+    with pytest.raises(ValidationError, match="is in kPa, not in MPa"):
+        read(files, file="map.nc", unit="MPa")
+    data["shear_map"].attrs, axes = {}, {"x": np.arange(24.0), "y": np.arange(16.0)}
+    data.assign_coords(axes).to_netcdf(files.folder / "bare.nc")
+    with pytest.raises(ValidationError, match="no coordinates with units; give pixel"):
+        read(files, file="bare.nc", unit="kPa")
+    result = read(files, file="bare.nc", unit="kPa", pixel=PIXEL, pixel_y=PIXEL_Y)
+    assert_allclose(result.surface_energy(G, NU), read(files, file="map.nc").surface_energy(G, NU), rtol=1e-12)
+    np.savetxt(files.folder / "index.csv", np.c_[np.arange(16), kilo.T], delimiter=",", fmt="%.9g")
+    with pytest.raises(ValidationError, match="only counts"):
+        read(files, file="index.csv", pixel=1e-6)
+
+
+@pytest.mark.parametrize("model", ["mapped", "mean"])
+@pytest.mark.parametrize(("factor", "count"), [(1.0, 0), (1e-3, 1), (1e3, 1)])
+def test_a_map_that_is_a_thousand_times_off_the_stress_of_the_bonds_is_remarked(tmp_path, model, factor, count):
+    np.save(tmp_path / "map.npy", FIELD.T * factor)
+    shear = {"model": model, "paid_by_adhesion": 0.0}
+    if model == "mean":
+        shear |= {"spectrum": {"model": "measured", "file": str(tmp_path / "map.npy"), "spacing": PIXEL}}
+    else:
+        shear |= {"field": {"file": str(tmp_path / "map.npy"), "pixel": PIXEL}}
+    scene = load(tomllib.loads(LENS) | {"bonds": {"model": "none", "stress": "0.1 MPa"}, "shear": shear})
+    assert sum(".unit right?" in remark for remark in scene.remarks()) == count
 
 
 def test_a_window_keeps_the_rms_and_takes_the_seam(files):
