@@ -125,19 +125,19 @@ def check_steps(seed, scenario, course):
     seen at the middle is off by at most h/4 with a half, by as much with h or 2 h. With noise the mean of 32 members
     counts.
 
-    Noise is looked at from 96 steps on, as errors of a few steps are no small ones, and allowed three standard errors.
+    Steps are looked at from 96 on, as errors of a few steps are no small ones; noise is allowed three standard errors.
     Left out: runs of more than 20,000 sub-steps, because of the time that they take.
     """
     if scenario.drive.solves_motion and np.max(column(scenario, course, "substeps")) > 2e4:
         return
+    size = max(1, 96 // scenario.clock.steps)
     if scenario.population.model in ("counted", "tracked") or scenario.fluctuations.per_member:
-        size = max(1, 96 // scenario.clock.steps)
         runs = np.array([refined(seed, size * parts, 32).mean(axis=1) for parts in (0.5, 1, 2, 8)])
         noise = np.sum(3.0 * runs.std(axis=2), axis=0) / math.sqrt(31.0)
         double, whole, half, finest = runs.mean(axis=2, keepdims=True)
     else:
-        double, whole, half, finest = (refined(seed, parts)[:, :, 0] for parts in (0.5, 1, 2, 8))
-        noise = 10.0 * np.abs(refined(seed, 8, sharper=100.0)[:, :, 0] - finest).mean(axis=1)
+        double, whole, half, finest = (refined(seed, size * parts)[:, :, 0] for parts in (0.5, 1, 2, 8))
+        noise = 10.0 * np.abs(refined(seed, size * 8, sharper=100.0)[:, :, 0] - finest).mean(axis=1)
     *farther, nearer = (np.abs(values - finest).mean(axis=1) for values in (double, whole, half))
     bound = np.maximum(*farther) + noise + 10.0 * max(largest_tolerance(scenario), 1e-9) * np.abs(finest).mean(axis=1)
     assert np.all(nearer <= bound), f"half a clock step is off by {nearer}, more than {bound}"

@@ -190,6 +190,8 @@ def _piece(line, slider, law, contact, nodes, books):
             line[0], books[0], nodes.last_step, row.next_step = line[1], books[1], 0.0, 0.25 * step
             continue
         row.next_step = ahead
+        if step <= mechanics.BRIEF * length and contact.stays == 0.0:  # an area that jumps takes what is missing
+            energy.area += mechanics.retained(energy) - mechanics.retained(books[1]) - (after - before)
         if turns:
             row.moment, nodes.last_step = 0.0, 0.0
         reach = NEAR if line[1].speed * row.speed < 0.0 else 0.0  # it turns in vain where the force of the bonds falls

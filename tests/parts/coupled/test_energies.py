@@ -12,14 +12,16 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from sim.parts.bonds import Cohort, FirstMoment, Tracked
-from sim.parts.bonds.rupture import Constant
+from sim.parts.bonds.rupture import Bell, Constant
 from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.coupled import mechanics
 from sim.parts.drive import READINGS, Spring
 from sim.parts.exchange import FieldLaw
-from sim.parts.shear import Mean
+from sim.parts.shear import Banded, Mean
+from sim.parts.shear.process import Slip, SlipRate
 from sim.scenario.clock import Clock
+from sim.scenario.scenario import Scenario
 from sim.spectrum.families import Gaussian
 
 COHORTS = functools.partial(Cohort, tolerance=1e-5)
@@ -151,3 +153,19 @@ def test_a_contact_that_viscosity_lets_collapse_keeps_its_energies_to_ten_tolera
         assert_allclose(np.array(friction)[[89, 100]], [0.78909e-3, 0.8941e-3], rtol=2e-4)
         courses.append(read["dissipated_by_area"][-1])
     assert_allclose(*courses, rtol=1e-3)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
+def test_a_contact_that_becomes_masked_in_a_slip_of_no_time_closes_its_energies(tolerance):
+    # ΔΓ in sliding exceeds the work of adhesion: the area jumps to Hertz's as sliding begins
+    length, bell = 5.61e-6, Bell(zero_force_rate=5.0, bell_force=2.239e-13)
+    field = {"spectrum": Gaussian(rms=3.3e5, length=length), "cell": 8.0 * length, "points": 16, "tolerance": 0.05}
+    field |= {"correlation": Slip(length=length), "amplitude": SlipRate(floor=0.3, memory_length=0.5 * length)}
+    turning = {"time": (0.0, 0.167), "value": (-8.0 * length, 8.0 * length)}
+    scene = Scenario(
+        seed=1, clock=Clock(duration=0.02, step=0.01), solid=Solid(shear_modulus=1e6), sphere=Sphere(radius=1e-3),
+        adhesion=Adhesion(work=0.05, bond_share=1.0), contact=Equilibrium(load=3.05e-6, after_pull_off="reattach"),
+        bonds=FirstMoment(rupture=bell, rebinding_rate=20.0, bond_stiffness=7.98e-7, site_density=1e16),
+        drive=Spring(stage=turning, stiffness=311.0, damping=6.82e-3, tolerance=tolerance), shear=Banded(**field),
+    )  # fmt: skip
+    assert residual(marched(scene)[1]) < max(1e-6, 10.0 * tolerance)
