@@ -24,7 +24,7 @@ from sim.spectrum.radial import share_of_long_waves
 from sim.units.notation import engineering
 
 #: Times of a run at which it is judged, energies of a member, steps of a ramp, keys in a sentence.
-_TIMES, _ENERGIES, _STEPS, _KEYS = 21, 64, 1000, 5
+_TIMES, _ENERGIES, _STEPS, _KEYS = 21, 256, 1000, 5
 #: Error of A/A_JKR and lag that need a sentence; share of the work of adhesion that nearly masks it.
 _ERROR, _LAG, _MASKING = 0.01, 0.005, 0.9
 #: Points along a side of a cell beyond which no more are proposed; wavelengths of a band over a correlation length.
@@ -98,7 +98,7 @@ def _scores(skewness: float) -> Array:
     """Return equally likely values of a gamma number of this skewness, scaled to the mean 0 and the variance 1."""
     shape = 4.0 / max(skewness, 1e-4) ** 2
     values = gammaincinv(shape, (np.arange(_ENERGIES) + 0.5) / _ENERGIES)
-    return cast(Array, (values - np.mean(values)) / math.sqrt(shape))
+    return cast(Array, (values - np.mean(values)) / np.std(values))
 
 
 def worst(points: Sequence[Scenario]) -> tuple[Scenario, dict[str, float]] | None:
