@@ -23,8 +23,8 @@ from sim.spectrum.families import Band
 from sim.spectrum.radial import share_of_long_waves
 from sim.units.notation import engineering
 
-#: Times of a run at which it is judged, energies of a member, steps of a ramp, keys in a sentence.
-_TIMES, _ENERGIES, _STEPS, _KEYS = 21, 256, 1000, 5
+#: Times of a run at which it is judged, steps of a ramp, keys in a sentence; energies of a member, on a disc.
+_TIMES, _STEPS, _KEYS, _ENERGIES, _ON_DISC = 21, 1000, 5, 256, 32
 #: Error of A/A_JKR and lag that need a sentence; share of the work of adhesion that nearly masks it.
 _ERROR, _LAG, _MASKING = 0.01, 0.005, 0.9
 #: Points along a side of a cell beyond which no more are proposed; wavelengths of a band over a correlation length.
@@ -73,8 +73,9 @@ def systematic_errors(point: Scenario) -> dict[str, float]:
     mean, sd = float(np.sum(weight * shape)) + constant, math.sqrt(np.sum(weight**2 * shape))
     skewness = 2.0 * float(np.sum(weight**3 * shape)) / sd**3 if sd else 0.0
     whole = skewness / (1.0 - known.get("banded_error_third_cumulant", 0.0))
-    scores = sd * _scores(skewness)
-    energies = np.concatenate([mean + scores, plane + scores, mean + sd * _scores(whole)])
+    count = _ENERGIES if point.margin is None else _ON_DISC
+    scores = sd * _scores(skewness, count)
+    energies = np.concatenate([mean + scores, plane + scores, mean + sd * _scores(whole, count)])
     times, speeds = _along(point)
     scene = changed(point, {"shear.amplitude.floor": 1.0}) if shear.law.remembers else point
     rows, stored = np.repeat([times, speeds], energies.size, axis=1), np.tile(energies, len(times))
@@ -94,10 +95,10 @@ def systematic_errors(point: Scenario) -> dict[str, float]:
     return dict(zip(SYSTEMATIC, map(float, values), strict=True))
 
 
-def _scores(skewness: float) -> Array:
+def _scores(skewness: float, count: int) -> Array:
     """Return equally likely values of a gamma number of this skewness, scaled to the mean 0 and the variance 1."""
     shape = 4.0 / max(skewness, 1e-4) ** 2
-    values = gammaincinv(shape, (np.arange(_ENERGIES) + 0.5) / _ENERGIES)
+    values = gammaincinv(shape, (np.arange(count) + 0.5) / count)
     return cast(Array, (values - np.mean(values)) / np.std(values))
 
 
@@ -227,7 +228,7 @@ def lag(point: Scenario, slower: float = 1.0) -> tuple[float, float, float]:
     shear, courses = cast(Any, point.fluctuations), []
     begin: dict[str, Any] = {"bonds.start": "steady"} if hasattr(point.bonds, "start_from") else {}
     if not math.isinf(shear.side(point.setting.cell)):
-        begin["shear"] = Mean(shear.spectrum, shear.amplitude, shear.paid_by_adhesion, shear.contact)
+        begin["shear"] = Mean(shear.spectrum, shear.law, shear.paid_by_adhesion, shear.contact)
     for factor in (slower, _VERY_SLOW):
         duration = factor * point.clock.duration
         scene = changed(point, begin | {"clock.duration": duration, "clock.step": duration / _STEPS})
@@ -244,10 +245,11 @@ def lag(point: Scenario, slower: float = 1.0) -> tuple[float, float, float]:
 def _lagging(point: Scenario) -> Iterator[str]:
     """Yield how far values along a ramp are from steady ones, and how far they would be along a slower ramp.
 
-    Nothing is said of few bonds and of an amplitude that relaxes, which ``lag`` does not follow.
+    Nothing is said of few bonds and of an amplitude that relaxes, which ``lag`` does not follow, nor of a part that
+    feeds back, which it follows slowly.
     """
-    noisy = hasattr(point.population, "sites") or point.fluctuations.law.relaxing
-    if point.drive.model == "ramp" and not noisy and max((behind := lag(point))[:2]) > _LAG:
+    left_out = hasattr(point.population, "sites") or point.fluctuations.law.relaxing or point.by_steps
+    if point.drive.model == "ramp" and not left_out and max((behind := lag(point))[:2]) > _LAG:
         values, longer = [100.0 * value for value in behind[:2] + lag(point, 10.0)[:2]], 10.0 * point.clock.duration
         yield (
             f"along the ramp A/A_JKR is up to {values[0]:.2g} points off its steady value, the friction"
@@ -279,7 +281,8 @@ def _outside(point: Scenario) -> Iterator[str]:
     if point.drive.model == "spring" and point.drive.contact_stiffness == "half_space":
         speeds = np.abs(point.speeds(_TIMES))
         bonds, body = cast(Rate | Cohort | FirstMoment, point.population), slider_body(point, speeds)
-        needed, own = bonds.onset(speeds, Body(*body[:3])).stiffness, np.asarray(body.contact_stiffness, float)
+        with np.errstate(all="ignore"):  # of a contact that is open
+            needed, own = bonds.onset(speeds, Body(*body[:3])).stiffness, np.asarray(body.contact_stiffness, float)
         if np.any(needed > own):
             worst = int(np.nanargmax(needed / own))
             high, low = (engineering(float(values[worst]), "N/m") for values in (needed, own))

@@ -215,9 +215,9 @@ class Scenario:
 
     def speeds(self, count: int, share: float = 1.0) -> np.ndarray:
         """Return speeds [m/s] at evenly spaced times of the run, or of a first share of it, with both ends."""
-        duration = self.times.duration
-        instants = np.repeat(np.linspace(0.0, share * duration, count), 2)
-        return self.drive.pieces(instants, duration).joined.last[::2]
+        instants = np.linspace(0.0, share * self.times.duration, count)
+        joined = self.drive.pieces(instants, self.times.duration).joined
+        return np.append(joined.first[:1], joined.last)
 
     @cached_property
     def parts(self) -> Parts:

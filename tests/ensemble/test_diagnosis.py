@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import scipy
 from helpers.parts import analysis, jkr, load, run
+from helpers.scenes import BONDS, CONTACTS, DRIVES, SHEARS, scene as small
 from numpy.testing import assert_allclose
 
 from sim.ensemble.diagnosis import cure, diagnosis, lag, remarks, systematic_errors
@@ -226,3 +227,13 @@ def test_a_contact_softer_than_the_onset_of_oscillations_lies_outside_the_rigid_
         found = [text for text in remarks(Plan.of(lens)) if "outside the model of a rigid slider" in text]
         assert bool(found) == outside
     assert f"needs {engineering(needed, 'N/m')}, and the contact itself has {engineering(own, 'N/m')}" in found[0]
+
+
+@pytest.mark.parametrize("slider", ["spring with mass", "start", "table", "linear ramp", "force"])
+def test_a_run_has_as_many_speeds_as_asked_for_and_each_contact_has_a_diagnosis(slider):
+    contacts, fields = ("load", "lifted", "tension", "rate_dependent"), ("mean, slip rate", "modal, fixed")
+    for contact, field in itertools.product(contacts, fields):
+        parts = {"contact": CONTACTS[contact], "bonds": BONDS["rate, bell"], "shear": SHEARS[field]}
+        plan = Plan.of(small(2, drive=DRIVES[slider], **parts))
+        assert plan.points[0].speeds(5).shape == (5,)
+        assert not any(re.search("nan|inf ", text) for text in [*diagnosis(plan), *remarks(plan)])
