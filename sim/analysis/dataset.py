@@ -68,7 +68,8 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
         if reason := _fault(dataset):
             raise BadInput([f"{path}: {reason}: it was changed after its run; run the scenario again"])
         refused.pop_all()
-    return hdf5.located(dataset.assign_attrs(_joined(dataset)))
+    dataset.attrs |= _joined(dataset)  # a copy would not close the file
+    return hdf5.located(dataset)
 
 
 def _joined(dataset: xr.Dataset) -> dict[str, Any]:

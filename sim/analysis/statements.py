@@ -8,9 +8,10 @@ import scipy
 import xarray as xr
 
 from sim.analysis.dataset import is_stationary, plain
+from sim.analysis.ensemble_peaks import ensemble_peaks
 from sim.analysis.events import events
 from sim.analysis.over_speed import loss_speeds
-from sim.analysis.statistics import averaging, ensemble_peaks, half_lives, of_second_half, summary
+from sim.analysis.statistics import averaging, half_lives, of_second_half, summary
 from sim.units.notation import bounded, scaled, share
 
 #: Endings of the variables of a statement beside its value.
