@@ -25,7 +25,7 @@ from sim.analysis.dataset import (
     stays_held,
     sweep_dims,
 )
-from sim.analysis.observables import chosen_observables, labelled, reference_radii, restricted
+from sim.analysis.observables import chosen_observables, closed_only, labelled, reference_radii, restricted
 from sim.analysis.statistics import LEVEL, of_second_half, over_members
 from sim.laws import schallamach
 from sim.units.errors import BadInput
@@ -48,8 +48,10 @@ _ENDS = {"": "", "_low": "lower end of the 95 % interval of the ", "_high": "upp
 _NEAR = 4.0
 #: Speeds to each side of a level that its interpolation needs.
 _REACH = 6
-#: Reasons for a bound, by the side on which the level lies.
-_BEYOND = "more is lost at the lowest speed", "less is lost at the highest speed"
+#: Reasons for a bound: below the speeds, above them, and above those at which all groups are in contact.
+_BEYOND = (
+    "more is lost at the lowest speed", "less is lost at the highest speed", "less is lost until contacts come off",
+)  # fmt: skip
 #: Numbers of bonds that stretch, and of a rupture law, in a dataset; speeds at which steady bonds are tabulated.
 _BONDS, _PREFIX, _FINE = ("bond_stiffness", "rebinding_rate", "site_density"), "bonds_rupture_", 600
 #: Names of branches by the sign of the change of the speed.
@@ -152,11 +154,14 @@ def crossing(
     student = special.stdtrit(free, 0.5 + 0.5 * LEVEL) if free else 0.0
     curves = np.stack([groups - level, *(beside if beside is not None else ())])
     none = Crossing(math.nan, math.nan, math.nan, "", np.full((len(curves) - 1, 3), math.nan))
+    highest = np.fmax.reduce(speeds)
     speeds, order = np.unique(np.where(np.isfinite(curves[0]).all(axis=0), speeds, 0.0), return_index=True)
     x, curves = np.log(speeds[speeds > 0.0]), curves[..., order[speeds > 0.0]]
     if not x.size:
-        return none._replace(reason="no contact with the full work of adhesion")
+        here = "contacts are open, or would be with the full work of adhesion"
+        return none._replace(reason=here if highest > 0.0 else "the speed does not change here")
     weight = (sizes / sizes.sum())[:, np.newaxis]
+    ends_early = bool(speeds[-1] < highest)
     whole = np.sum(weight * curves, axis=1, keepdims=True)
     if free:  # in the first row the mean, then those without each group
         whole = np.concatenate([whole, (whole - weight * curves) / (1.0 - weight)], axis=1)
@@ -186,7 +191,7 @@ def crossing(
     if math.isnan(low) and math.isnan(high):
         bracket = bracket._replace(reason="hidden by the noise: add members")
     if not 2 <= k <= len(x) - 2:
-        return bracket._replace(reason=_BEYOND[k > 0]) if k in (0, len(x)) else bracket
+        return bracket._replace(reason=_BEYOND[k > 0 and 1 + ends_early]) if k in (0, len(x)) else bracket
     near = slice(max(k - _REACH, 0), k + _REACH)
     x, whole, rows, k = x[near], whole[..., near], rows[:, near], k - near.start
     pchip = scipy.interpolate.PchipInterpolator
@@ -320,14 +325,16 @@ def steady_speeds(dataset: xr.Dataset) -> xr.DataArray:
     If the amplitude of the field relaxes and lags more, it is about that at which the field would be steady: the speed
     before the memory of its energy, to first order in the rate of the course. nan if a law is not known.
     """
-    fraction = dataset["bond_fraction" if "bond_fraction" in dataset else "bond_fraction_mean"]
-    fraction = fraction.mean(MEMBERS) if MEMBERS in fraction.dims else fraction
     speed = (abs(speed_of(dataset)) + 0.0 * dataset["contact_modulus"]).transpose(*sweep_dims(dataset), "t")
+    fraction = dataset.get("bond_fraction", dataset.get("bond_fraction_mean", math.nan * speed))
+    fraction = fraction.mean(MEMBERS) if MEMBERS in fraction.dims else fraction
     fraction, result = fraction.broadcast_like(speed).transpose(*speed.dims), speed.copy(deep=True)
-    for place in np.ndindex(speed.shape[:-1] if "bonds_rebinding_rate" in dataset else 0):
-        point = dataset.isel(dict(zip(speed.dims[:-1], place, strict=True)))
-        sizes = speed[place].to_numpy()
-        fine = np.geomspace(1e-3 * np.min(sizes[sizes > 0.0]), 1e3 * np.max(sizes), _FINE)
+    has_memory = any(str(name).startswith("bonds_rebinding") for name in dataset.variables)
+    for place in np.ndindex(speed.shape[:-1] if has_memory else 0):
+        point, sizes = dataset.isel(dict(zip(speed.dims[:-1], place, strict=True))), speed[place].to_numpy()
+        if not np.any(sizes > 0.0):
+            continue
+        fine = np.geomspace(1e-3 * np.min(sizes[sizes > 0.0]), 1e3 * np.nanmax(sizes), _FINE)
         law = np.full(_FINE, math.nan)
         if bonds := population_of(point):
             law = bonds.rupture.closed_form(fine, bonds.stiffness, bonds.rebinding).bound / bonds.at_rest
@@ -397,7 +404,6 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
         *ends, reason, others = xr.apply_ufunc(crossing, speed, means["area_ratio"], sizes, level, beside, **how)
         found, never = ends[0].notnull(), ends[0].isnull() & (level < hertz)
         reason = _worded(reason, never, "never: at most {:.3g} % can be lost".format, 100.0 * (1.0 - hertz))
-        reason = _worded(reason, found & alone, "one member: the error is unknown".format, 0.0)
         columns = {f"speed_{name}": (ends, "m/s", f"sliding speed at which the mean contact area has lost {loss}")}
         for key, numbers in zip(means, others.transpose("quantity", "end", ...), strict=True):
             text = f"{means[key].attrs.get('long_name', '')}, at the speed at which {loss} is lost"
@@ -410,7 +416,8 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
             lags = abs(np.log(ends[0] / steady)) > np.fmax(0.5 * np.log(ends[2] / ends[1]), _UNSEEN)
             reason = _worded(reason, lags, _lag, steady)
             off = abs(means["steady_speed"].isel(group=0) - np.log(speed.where(speed > 0.0))).max(along) > _LATE
-            reason = reason + xr.where(off & ~found & ~never, "; the course lags", "").astype(object)
+            reason = _worded(reason, off & ~found & ~never, "{}; the course lags".format, reason)
+        reason = _worded(reason, found & alone, _alone, reason)
         for key, (numbers, unit, text) in columns.items():
             for (end, words), values in zip(_ENDS.items(), numbers, strict=True):
                 known = ~never & ~(found & alone) if end else ~never
@@ -423,10 +430,14 @@ def _lag(steady: float) -> str:
     return f"lags: near {engineering(float(f'{steady:.3g}'), 'm/s')} in steady sliding"
 
 
-def _worded(reason: xr.DataArray, chosen: xr.DataArray, words: Callable[[float], str], value: Any) -> xr.DataArray:
+def _alone(reason: str) -> str:
+    return "; ".join(filter(None, [reason, "one member: the error is unknown"]))
+
+
+def _worded(reason: xr.DataArray, chosen: xr.DataArray, words: Callable[[Any], str], value: Any) -> xr.DataArray:
     """Return reasons, where chosen those that words make of a value."""
 
-    def one(text: str, chosen: bool, value: float) -> str:
+    def one(text: str, chosen: bool, value: Any) -> str:
         return words(value) if chosen else text
 
     result = xr.apply_ufunc(one, reason, chosen, value, vectorize=True, output_dtypes=[object])
@@ -446,7 +457,7 @@ def _group_means(dataset: xr.Dataset, along: str, charged: bool) -> tuple[xr.Dat
     names = ["area_ratio", *(_CHARGED if charged and not pooled else ())]
 
     def values(piece: xr.Dataset) -> xr.Dataset:
-        result = chosen_observables(piece, names)
+        result = chosen_observables(closed_only(piece), names)
         return result if along == "t" else result.mean("t", keep_attrs=True)
 
     def means(piece: xr.Dataset) -> xr.Dataset:

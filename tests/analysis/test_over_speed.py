@@ -102,6 +102,17 @@ def test_shares_of_a_loss_add_up_in_both_orders_and_are_those_of_the_laws_there(
     assert_allclose([result["speed_at_0.1_percent_lost"], result["speed_at_0.1_percent_lost_high"]], [math.nan, 1e-5])
 
 
+def test_area_that_a_contact_loses_as_it_comes_off_is_no_loss_to_a_speed():
+    """Steady bonds under tension let go where the pull-off load 3/2 π w R has fallen to it."""
+    pulled = Equilibrium(load=-0.5 * 1.5 * math.pi * WORK * RADIUS, after_pull_off="stay_open")
+    parts = {"bonds": bonds.Steady(critical_speed=1e-2), "shear": shear.Uniform(), "clock": Clock(0.4, 1e-3)}
+    result = analysis.loss_speeds(run(scene(contact=pulled, **parts)), ["10 %", "90 %"])
+    assert math.isfinite(result["speed_at_10_percent_lost"]) and math.isnan(result["speed_at_90_percent_lost"])
+    assert "come off" in str(result["speed_at_90_percent_lost_reason"].values)
+    last = float(result["speed_at_90_percent_lost_low"])  # the pull-off is at the critical speed, where w = W/2
+    assert last <= 1e-2 <= last * math.exp(math.log(1e4) / 400.0 * 1.001)
+
+
 @pytest.mark.parametrize("duration", [2.0, 40.0])
 def test_branches_of_a_course_lag_both_ways_and_the_steady_speed_is_that_of_the_law(duration):
     """Bonds with a rate of 5 1/s are late; the bonds left tell the speed at which they would be steady."""
