@@ -320,12 +320,16 @@ def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...
 @click.option("--data", type=_PATH, help="Measured points from a CSV, as of `sim plot`, with their chi^2.")
 @click.option("--fit", type=_PATH, help="The result of `sim fit`, STEM_fit.json.")
 @_LOST
+@_UNITS
 @_FORCE
-def report(output: Path, page: Path | None, chosen: tuple[str, ...], force: bool, **beside: Any) -> None:
-    """One page of a run as HTML: question, figures, tables, errors, cost, and how to repeat it."""
+def report(
+    output: Path, page: Path | None, chosen: tuple[str, ...], units: tuple[str, ...], force: bool, **beside: Any
+) -> None:
+    """One page of a run as HTML: question, key figures, remarks, figures, errors, and how to repeat it."""
     from sim.report import written
+    from sim.units.notation import in_units
 
-    with _opened(output, chosen) as dataset:
+    with _opened(output, chosen) as dataset, in_units(units):
         say(str(written(dataset, output, page, force, **beside)))
 
 

@@ -62,18 +62,21 @@ _CHOSEN: ContextVar[dict[str, bool]] = ContextVar("chosen units")
 def in_units(units: Iterable[str]) -> Iterator[None]:
     """Return a context in which numbers of their dimension are shown in these units, such as ``"mm/s"``.
 
+    Without any unit those of the context around it stay.
+
     Raises
     ------
     BadInput
         For a unit that no number in the context can have.
     """
-    chosen = dict.fromkeys(units, False)
+    wanted = tuple(units)
+    chosen = dict.fromkeys(wanted, False) or _CHOSEN.get({})
     before = _CHOSEN.set(chosen)
     try:
         yield
     finally:
         _CHOSEN.reset(before)
-    for name in (name for name, used in chosen.items() if not used):
+    for name in (name for name in wanted if not chosen[name]):
         raise BadInput([f'--units: no number here can be in "{name[:40]}"; choose a unit of one, as mm/s of speed'])
 
 

@@ -295,6 +295,15 @@ def test_a_page_has_the_numbers_of_the_statistics_its_question_and_error_estimat
     assert mean.before == f"{5 * float(dataset['member_spread_energy']):.3g} %"  # of 400 members
 
 
+def test_tables_key_figures_and_figures_of_a_page_have_the_chosen_units(here):
+    assert sim("report", "x.nc", "--units", "m/s", "--units", "nm").exit_code == 0
+    page = Page(Path("x.html").read_text(encoding="utf-8"))
+    assert {"V\n(m/s)", "a\n(nm)"} <= set(page.words("th"))
+    assert not [text for text in page.words("td") if text.endswith(("mm/s", "µm"))]
+    refused = sim("report", "x.nc", "--units", "K", "--force")
+    assert refused.exit_code == 2 and "--units" in refused.stderr
+
+
 MARKUP = "</pre></style><script>alert(1)</script><img src=x onerror=alert(1)>{{ 7 * 7 }}\"'&lt;"
 
 
