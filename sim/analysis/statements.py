@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 import xarray as xr
 
-from sim.analysis.dataset import is_stationary, plain
+from sim.analysis.dataset import MEMBERS, is_stationary, plain
 from sim.analysis.ensemble_peaks import ensemble_peaks
 from sim.analysis.events import events
 from sim.analysis.over_speed import loss_speeds
@@ -99,13 +99,22 @@ def statements(
 
 
 def of_events(dataset: xr.Dataset) -> xr.Dataset:
-    """Return statistics of the events of a run over the members, with medians and rates of lifetimes."""
+    """Return statistics of the events of a run over the members, with medians and rates of lifetimes.
+
+    An event that is read off the records has an interval wider by what it changes if every second record is left out.
+    """
     result = events(dataset)
-    reasons = result[[name for name in result if str(name).endswith("_reason")]]
-    members = summary(result.drop_vars(reasons).assign_attrs(dataset.attrs))
-    for further in (as_means(half_lives(dataset, result)), reasons):
+    beside = {end: result[[name for name in result if str(name).endswith(f"_{end}")]] for end in ("reason", "reading")}
+    members = summary(result.drop_vars([*beside["reason"], *beside["reading"]]).assign_attrs(dataset.attrs))
+    for key, reading in beside["reading"].items():
+        name = str(key).removesuffix("_reading")
+        half = reading.mean(MEMBERS) if MEMBERS in reading.dims else reading
+        for end, sign in (("low", -1.0), ("high", 1.0)):
+            known = members[f"{name}_{end}"].fillna(members[f"{name}_mean"])
+            members[f"{name}_{end}"] = (known + sign * half).assign_attrs(members[f"{name}_{end}"].attrs)
+    for further in (as_means(half_lives(dataset, result)), beside["reason"]):
         members = members.merge(further, compat="no_conflicts", join="outer")
-    return members.assign(ensemble_peaks(dataset))
+    return members
 
 
 def as_means(values: xr.Dataset) -> xr.Dataset:
