@@ -571,6 +571,8 @@ _SEVERAL, _MANY = 4, 16
 #: Change over the span, as a share of the value, above which a run without noise has not settled; and which no digit
 #: that is printed shows.
 _STILL, _UNSEEN = 1e-3, 1e-7
+#: Records in which noise of a settled mean turns back: contacts that stay open only add up.
+_ONE_WAY = 20
 #: Forces below it are of rounding [N]: a bond bears a million million times as much.
 _NO_FORCE = 1e-24
 #: Share of settled means whose drift is taken for one.
@@ -782,8 +784,8 @@ def settlement(values: np.ndarray, sem: float = math.nan, freedom: float = math.
     The drift is the mean over the second half of the span less that over the first. Its error is that of the members'
     drifts; of fewer than four members twice the standard error of the mean, if that has more degrees of freedom.
     One settled mean of a hundred is taken for one that drifts. Where the values cross their mean often, whole cycles
-    of both halves are compared with the scatter between cycles, too. Without noise values that change by less than
-    0.1 % have settled.
+    of both halves are compared with the scatter between cycles, too. A mean of 20 records that never turns back has not
+    settled. Without noise values that change by less than 0.1 % have settled.
 
     Examples
     --------
@@ -816,7 +818,9 @@ def _settled(course: np.ndarray, drift: float, error: float, free: float, noisy:
         return Settlement("", end, begin, end)
     limit = error * float(special.stdtrit(free, 1.0 - 0.5 * _FALSE_ALARM)) if noisy else _STILL * abs(mean)
     is_short = math.isnan(limit)
-    is_still = abs(drift) <= limit if noisy else abs(change) <= limit
+    steps = np.diff(course)
+    is_one_way = course.size >= _ONE_WAY and (steps.min() >= 0.0 or steps.max() <= 0.0)
+    is_still = abs(drift) <= limit and not is_one_way if noisy else abs(change) <= limit
     if not is_short and (is_still or abs(change) <= bound):
         return Settlement("", mean, begin, end)
     off = course > course.mean()

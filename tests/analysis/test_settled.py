@@ -58,6 +58,8 @@ def test_a_run_without_noise_settles_to_the_end_or_to_whole_cycles_without_an_er
     assert cycle.verdict == "" and abs(cycle.value - 0.5) < 11.3 / 400 / 11
     assert settlement((saw + TIME)[np.newaxis], noisy=False).verdict != ""
     assert settlement(((2.3 * TIME) % 1.0)[np.newaxis], noisy=False).verdict.startswith("too short")
+    opens = np.where(np.arange(40) < 3, 20 + 10 * np.arange(40), 1000)  # three of forty come off, one by one
+    assert settlement((np.arange(60) >= opens[:, None]).astype(float)).verdict == "not settled"
     one = settlement(np.random.default_rng(3).normal(size=(1, 5)).cumsum()[np.newaxis])
     assert one.verdict.startswith("too short")
 
