@@ -11,6 +11,8 @@ from sim.units.notation import engineering
 
 #: Unit and factor of an error by the last word of its name.
 _UNITS = {"area": ("points of A/A_JKR", 100.0), "friction": ("% of the friction", 100.0)}
+#: Sources of an error by the first word of its name.
+_SOURCES = {"cell": "the cell", "banded": "banding", "step": "the clock step", "pull": "the clock step"}
 
 
 class SystematicError(NamedTuple):
@@ -21,6 +23,18 @@ class SystematicError(NamedTuple):
     unit: str
     where: str
     cure: str
+
+    @property
+    def matters(self) -> bool:
+        """True if the error is a tenth of a point or percent, or of a load."""
+        return abs(self.value) >= 0.1 or not self.unit.startswith(("points", "%"))
+
+    def __str__(self) -> str:
+        """Return the error in words, with its place and cure."""
+        is_relative = self.unit.startswith(("points", "%"))
+        size = f"{self.value:+.2g} {self.unit}" if is_relative else engineering(self.value, self.unit)
+        place, cure = f" at {self.where}" if self.where else "", f"; cure: {self.cure}" if self.cure else ""
+        return f"{_SOURCES[self.name.partition('_')[0]]} adds {size}{place}{cure}"
 
 
 def systematic_errors(dataset: xr.Dataset) -> list[SystematicError]:
@@ -51,4 +65,7 @@ def _largest(dataset: xr.Dataset, name: str) -> SystematicError:
 
 def remarks(dataset: xr.Dataset) -> list[str]:
     """Return the remarks and the diagnosis that ``sim check`` prints for the scenario of a dataset."""
-    return list(map(str, json.loads(dataset.attrs.get("remarks", "[]"))))
+    try:
+        return [str(remark) for remark in json.loads(dataset.attrs["remarks"])]
+    except (LookupError, TypeError, ValueError):
+        return []

@@ -8,7 +8,6 @@ import scipy
 import xarray as xr
 
 from sim.analysis.dataset import MEMBERS, is_stationary, plain
-from sim.analysis.ensemble_peaks import ensemble_peaks
 from sim.analysis.events import events
 from sim.analysis.over_speed import loss_speeds
 from sim.analysis.statistics import averaging, half_lives, of_second_half, summary

@@ -5,7 +5,7 @@ import contextlib
 import math
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,13 +26,14 @@ from sim.analysis.dataset import (
     sweep_dims,
     word,
 )
+from sim.analysis.errors import systematic_errors
 from sim.analysis.events import varies
 from sim.analysis.observables import restricted
-from sim.analysis.over_speed import loss_speeds
+from sim.analysis.over_speed import extremes, loss_speeds
 from sim.analysis.statements import BOUNDED, COUNTS, as_means, each, of_events, reasons, statements
 from sim.analysis.statistics import QUANTILES, WIDE, averaging, correlation_time, over_members, shares, statistics
 from sim.numerics.files import output
-from sim.units.notation import bounded, chosen_unit, concise, scaled, share
+from sim.units.notation import bounded, chosen_unit, concise, engineering, scaled, share
 
 #: Cells of columns by heading.
 Columns = dict[str, list[str]]
@@ -61,7 +62,11 @@ _COLUMNS = (
     _Column("contact_radius", "a", math.nan),
     _Column("area_ratio", "A/A_JKR", meaning="contact area over that with the full work of adhesion"),
     _Column("lost_to_bonds", "lost to\nbonds", meaning="share of A_JKR, bonds charged first"),
-    _Column("lost_to_fluctuations", "lost to\nfluct."),
+    _Column(
+        "lost_to_fluctuations",
+        "lost to\nfluct.",
+        meaning="if adhesion pays for ΔΓ (shear.paid_by_adhesion); by the paper's strict balance there is no such loss",
+    ),
     _Column("lost_to_fluctuations_first", "fluct.\nfirst", meaning="lost to fluctuations if charged before the bonds"),
     _Column("lost_to_mean_stress", "lost to\nstress"),
     _Column("lost_to_lag", "lost to\nlag", meaning="by the edge's lag; negative where it retreats late"),
@@ -130,6 +135,8 @@ _LOSSES = {
 #: Heading and meaning of the correlation time.
 _MEMORY = _Column("correlation_time", "t_c", meaning="integral correlation time of ΔΓ")
 
+#: Values of a sweep from which on an extreme inside is worth a note.
+_TURNS = 3
 #: Shares below it are nothing.
 _ROUNDING = 1e-13
 
@@ -217,12 +224,29 @@ def notes(
     for reason, names in reasons(stated or xr.Dataset()).items():
         if shown_names := [headed[name] for name in names if name in headed]:
             lines.append(f"* {', '.join(dict.fromkeys(shown_names))}: {reason}")
+    lines += [f"systematic error: {error}" for error in systematic_errors(dataset) if error.matters]
+    lines += _turning(dataset, stated) if one_row_each and stated else []
     known = [c for c in (*_COLUMNS, _MEMORY, *_EVENTS) if c.meaning and c.heading in headings]
     if _spreads(dataset):
         over = averaging(dataset, True).removeprefix("mean over the ")
         lines.append(f"by quantity: over the {over}; free values: independent ones that tell as much of the mean")
     words = "; ".join(f"{' '.join(column.heading.split())}: {column.meaning}" for column in known)
     return [*dict.fromkeys(lines), *filter(None, [words])]
+
+
+def _turning(dataset: xr.Dataset, stated: xr.Dataset) -> Iterator[str]:
+    """Yield where area and friction are largest or least inside a sweep of one number: they are not monotonic."""
+    swept = [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
+    if len(swept) != 1 or dataset[swept[0]].dtype.kind not in "fi" or dataset.sizes[swept[0]] < _TURNS:
+        return
+    for name in (name for name in ("contact_area", "friction_force") if f"{name}_mean" in stated):
+        inside = extremes(stated.isel({n: 0 for n in sweep_dims(dataset) if n != swept[0]}), name, swept[0])
+        for extreme in ("largest", "least"):
+            if math.isfinite(value := float(inside[f"{name}_{extreme}"])):
+                places = (inside[f"{name}_{extreme}_at{end}"] for end in ("", "_low", "_high"))
+                at, low, high = (engineering(float(place), place.units) for place in places)
+                size = engineering(value, stated[f"{name}_mean"].attrs["units"])
+                yield f"{name.replace('_', ' ')} is {extreme}, {size}, at {swept[0]} = {at} (between {low} and {high})"
 
 
 def highlights(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None) -> list[dict[str, str]]:

@@ -35,6 +35,7 @@ from sim.analysis import (
     table,
 )
 from sim.analysis.dataset import claim, speed_name
+from sim.analysis.errors import remarks, systematic_errors
 from sim.analysis.statistics import over_members
 from sim.analysis.tables import key_figures, narrow
 from sim.numerics import hdf5
@@ -479,14 +480,6 @@ def question(dataset: xr.Dataset) -> Question:
     return Question(name, question, more)
 
 
-def remarks(dataset: xr.Dataset) -> list[str]:
-    """Return the remarks of `sim check` on the scenario, as the run recorded them."""
-    try:
-        return [str(remark) for remark in json.loads(dataset.attrs["remarks"])]
-    except (LookupError, TypeError, ValueError):
-        return []
-
-
 def changes(dataset: xr.Dataset) -> dict[str, str]:
     """Return the values that replace the scenario's, by key, as TOML."""
     return {key: toml(value) for key, value in hdf5.tables(dataset.attrs.get("scenario_overrides")).items()}
@@ -540,12 +533,7 @@ def known(dataset: xr.Dataset) -> Iterator[Known]:
             error = spread / math.sqrt(count)
             words = f"standard error of the mean ΔΓ of {count} members, over the mean"
             yield Known(words, _percent(error), error_measured)
-    for name in dataset.data_vars:
-        if str(name).startswith(("cell_error_", "banded_error_")):
-            variable = dataset[name]
-            most = float(abs(variable).max())
-            if np.isfinite(most):
-                yield Known(str(variable.attrs.get("long_name", name)), _percent(most))
+    yield from (Known(str(each), "systematic") for each in systematic_errors(dataset))
     times = np.unique(np.linspace(0, dataset.sizes["t"] - 1, _ROWS).round().astype(int))
     ratios = over_members(dataset.isel(t=times), ["area_ratio"], quantiles=False)
     if "area_ratio_sem" in ratios and (error := float(ratios["area_ratio_sem"].max())) > _ROUNDING:

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import xarray as xr
 from helpers.lens import scene
-from helpers.parts import Clock, Ensemble, analysis, bonds, drive, run, shear
+from helpers.parts import Bell, Clock, Ensemble, analysis, bonds, drive, run, shear
 from numpy.testing import assert_allclose
 
+from sim.analysis.errors import SystematicError
 from sim.analysis.statements import Statement, reasons
 
 
@@ -86,3 +87,23 @@ def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_memb
         refused = analysis.relaxation(xr.Dataset({"x": ("t", mean)}, {"t": time}), "x")
         assert words in refused.reason and math.isnan(refused.value)
     assert sum(not analysis.relaxation(course(0.0 * time), "x").reason for _ in range(50)) <= 2  # of noise alone
+
+
+def test_a_maximum_inside_a_sweep_and_a_systematic_error_are_notes():
+    bond = {"rupture": Bell(zero_force_rate=20.0, bell_force=4e-12), "bond_stiffness": 4e-7, "rebinding_rate": 200.0}
+    stretched = bonds.FirstMoment(**bond, site_density=1e16)
+    speeds = ["100 mm/s", "0.1 mm/s", "4 mm/s"]
+    scenario = scene(
+        drive=drive.Steady(speed=1e-3), bonds=stretched, shear=shear.Uniform(), sweep={"drive.speed": speeds}
+    )
+    dataset = run(scenario)
+    friction = dataset["friction_force"].isel(t=-1).to_numpy()
+    assert friction[2] > friction.max(initial=0.0, where=[True, True, False])
+    stated = analysis.statements(dataset)
+    lines = analysis.notes(dataset, analysis.table(dataset, stated=stated), [], stated)
+    (line,) = [line for line in lines if line.startswith("friction force is largest")]
+    assert line.endswith("at drive_speed = 4 mm/s (between 100 µm/s and 100 mm/s)")
+    assert not [line for line in lines if "contact area is" in line]  # it falls all the way
+    error = SystematicError("cell_error_area", 5.13, "points of A/A_JKR", "contact_load = 1 mN", 'shear.cell = "4 mm"')
+    words = 'the cell adds +5.1 points of A/A_JKR at contact_load = 1 mN; cure: shear.cell = "4 mm"'
+    assert str(error) == words and error.matters
