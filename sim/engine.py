@@ -3,6 +3,7 @@
 drive → speed → bonds → fraction, stress → shear → ΔΓ → w = Δγ(fraction) − χ ΔΓ → contact → radius.
 """
 
+import bisect
 from collections.abc import Iterator
 from typing import NamedTuple, cast, get_type_hints
 
@@ -89,12 +90,12 @@ def start(scenario: Scenario, noise: MemberNoise) -> State:
         around = _step_contact(scenario, touch, shear, range(1, 2))
         slider = coupled.load(scenario.parts, slider, bonding, around, scenario.times.duration)
     stage = cast(Driven, slider).stage_position if has_stage(scenario) else np.empty(0)
-    seen = events.first(bonding, touch.radius, _pull(scenario, 0.0, touch.radius), stage)
+    seen = events.first(bonding, touch, _pull(scenario, 0.0, touch.radius), stage)
     return State(0, slider, bonds, bonding, shear, touch, seen)
 
 
 def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) -> tuple[State, Trajectory]:
-    """Return the state after a block of clock steps, and the trajectory in it.
+    """Return the state after a block of clock steps in one phase of the run, and the trajectory in it.
 
     Where a drive feels the friction the block ends, perhaps earlier, where the contact opens or closes.
     """
@@ -117,7 +118,8 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
     if valid < len(steps):
         return advance(scenario, state, noise, steps[:valid])
     at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
-    seen = events.after(state.events, at_start, bonding, touch.radius, pull, motions, scenario.feels_steps)
+    seen = state.events.next_phase() if steps.start in scenario.phases.steps[1:] else state.events
+    seen = events.after(seen, at_start, bonding, touch, pull, motions, scenario.feels_steps)
     if has_stage(scenario):
         stage = sliders.stage_position, sliders.stage_speed
         of_slider = sliders.spring_force, sliders.position, motions.slip, bonding.stress, sliders.work
@@ -155,8 +157,10 @@ def follow(scenario: Scenario, noise: MemberNoise, state: State | None, steps: r
         blocks += [trajectory_of(scenario, state)] if steps.start == 0 else []
     rows, numbers = len(noise.shear.members), 1 + scenario.process.pairs // _MANY_PAIRS
     longest = 1 if scenario.by_steps else max(1, _BLOCK_NUMBERS // (rows * numbers))
+    starts = (*scenario.phases.steps, scenario.times.steps + 1)
     while state.step < steps[-1]:
-        block = range(state.step + 1, min(state.step + longest, steps[-1]) + 1)
+        phase = starts[bisect.bisect_right(starts, state.step + 1)] - 1
+        block = range(state.step + 1, min(state.step + longest, steps[-1], phase) + 1)
         state, trajectory = advance(scenario, state, noise, block)
         wanted = slice((steps.start - block.start) % steps.step, None, steps.step)
         blocks.append(Trajectory(*(values[wanted] for values in trajectory)))

@@ -128,6 +128,8 @@ def outline(plan: Plan, parts: Blocks) -> Outline:
         content.variables["cell_error_area"].attributes["cure"] = cure(*most)
     slips = [variable.name for variable in plan.largest if variable.axis == "slip"]
     content.sizes |= {"slip": 1} if slips else {}
+    if plan.phases > 1:
+        _add_phases(content, plan)
     for variable in plan.variables + plan.largest:
         content.places[variable.name] = _add_recorded(content, plan, variable)
         if plan.keeps_late(variable):
@@ -310,6 +312,22 @@ def _add_late(content: Outline, recorded: Variable) -> None:
     content.add("late", str, ("late",), "", text, "", np.array(LATE, object))
     about = recorded.unit, f"over the second half of the run: {recorded.long_name}", recorded.symbol
     content.add(f"late_{recorded.name}", "f8", (*content.sweep, "late"), *about)
+
+
+def _add_phases(content: Outline, plan: Plan) -> None:
+    """Add the phases of each point: start, end and name."""
+    content.sizes["phase"] = plan.phases
+    content.add("phase", "i4", ("phase",), "1", "number of the phase", "", np.arange(1, plan.phases + 1))
+    shape, dims = (*content.sweep.values(), plan.phases), (*content.sweep, "phase")
+    starts, ends = np.full((2, len(plan.points), plan.phases), np.nan)
+    names = np.full(starts.shape, "", object)
+    for k, point in enumerate(plan.points):
+        count = len(point.phases.starts)
+        starts[k, :count], names[k, :count] = point.phases.starts, point.phases.names
+        ends[k, :count] = [*point.phases.starts[1:], point.clock.duration]
+    content.add("phase_start", "f8", dims, "s", "time at which a phase begins", "", starts.reshape(shape))
+    content.add("phase_end", "f8", dims, "s", "time at which a phase ends", "", ends.reshape(shape))
+    content.add("phase_name", str, dims, "", "course of drive and contact in a phase", "", names.reshape(shape))
 
 
 def _add_maps(content: Outline, plan: Plan) -> None:

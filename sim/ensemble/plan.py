@@ -117,8 +117,14 @@ class Plan:
 
     @cached_property
     def largest(self) -> tuple[Variable, ...]:
-        """Return the quantities that are recorded once a run; slip events are those of members."""
-        return tuple(each for each in self._recorded(LARGEST) if each.axis != "slip" or self.per_member)
+        """Return the quantities that are recorded once a run: slip events of members, phases if there are several."""
+        axes = "", "slip" * self.per_member, "phase" * (self.phases > 1)
+        return tuple(each for each in self._recorded(LARGEST) if each.axis in axes)
+
+    @cached_property
+    def phases(self) -> int:
+        """Return the largest number of phases of a point."""
+        return max(len(point.phases.starts) for point in self.points)
 
     def _recorded(self, variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
         wanted = (variable for variable in variables if self.scenario.record.keeps(variable.name))

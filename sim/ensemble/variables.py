@@ -19,8 +19,8 @@ from sim.parts.contact.balance import (
     LoadControl,
     Shares,
 )
-from sim.parts.drive import READINGS
-from sim.parts.events import LATE, MOMENTS, SLIP, Slips, column
+from sim.parts.drive import READINGS, Driven, Force
+from sim.parts.events import CONTACT, LATE, MOMENTS, SLIP, Slips
 from sim.scenario.checks import pull_off_error, pulled, renewed
 from sim.scenario.scenario import Scenario
 
@@ -109,26 +109,95 @@ def _equilibrium_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
     return _where_closed(course, EQUILIBRIUM, scene.contact.equilibrium(_control(scene, course), terms))
 
 
-def _pulled(state: State, name: str, sign: float) -> np.ndarray:
-    """Return a column of the largest pull; nan for a contact that was never pulled."""
-    pull = state.events.pull
-    return np.where(column("largest", pull) > 0.0, sign * column(name, pull), np.nan)
+def _largest(of: str, column: str) -> Callable[[Scenario, State], Any]:
+    """Return the reading of a column of the largest stress or friction of the run."""
+    return lambda scene, state: np.nan_to_num(state.events.largest(of)[column])
 
 
+def _pull(column: str, pulls: Any) -> Any:
+    """Return a column of largest pulls; nan for a contact that was never pulled."""
+    return np.where(pulls["largest"] > 0.0, pulls[column], np.nan)
+
+
+def _pulled(column: str, sign: float = 1.0) -> Callable[[Scenario, State], Any]:
+    return lambda scene, state: sign * _pull(column, state.events.largest("pull"))
+
+
+def _displaced(scene: Scenario, pulls: Any) -> Any:
+    """Return the displacement of the mount at largest pulls [m]."""
+    radius, time = np.sqrt(_pull("area", pulls) / np.pi), np.nan_to_num(_pull("time", pulls))
+    return scene.contact.control(time, scene.clock.duration).displacement(radius, scene.bodies)
+
+
+def _turn(of: str, column: str) -> Callable[[Scenario, State], Any]:
+    """Return the reading of a column of the first opening or closing of the run."""
+    return lambda scene, state: state.events.first_turn(of)[column]
+
+
+def _at_closing(of: str) -> Callable[[Scenario, State], Any]:
+    """Return the reading of a quantity of the control at the first closing."""
+
+    def read(scene: Scenario, state: State) -> Any:
+        turn = state.events.first_turn("closing")
+        control = scene.contact.control(np.nan_to_num(turn["closing"]), scene.clock.duration)
+        return np.where(np.isfinite(turn["closing"]), getattr(control, of)(turn["radius"], scene.bodies), np.nan)
+
+    return read
+
+
+def _of_contact(column: str) -> Callable[[Scenario, State], Any]:
+    return lambda scene, state: state.events.contact.view(CONTACT)[:, 0][column]
+
+
+def _masked_share(scene: Scenario, state: State) -> Any:
+    row = state.events.contact.view(CONTACT)[:, 0]
+    return np.divide(row["hidden"], row["closed"], out=np.full(len(row), np.nan), where=row["closed"] > 0.0)
+
+
+def _runaway_force(scene: Scenario, state: State) -> Any:
+    drive, slider = cast(Force, scene.drive), cast(Driven, state.drive)
+    when = slider.runaway_time
+    if drive.spring:
+        return np.where(np.isfinite(when), slider.spring_force, np.nan)
+    return np.where(np.isfinite(when), drive.course.at(np.nan_to_num(when), scene.clock.duration), np.nan)
+
+
+_CHANGES: Any = (lambda scene: scene.contact.makes_load, "a load that changes")
 #: Quantities of a whole run, read at its end.
 LARGEST: tuple[Variable, ...] = (
     Variable("peak_stress", "Pa", "largest magnitude of the mean shear stress of the run, that of the highest start;"
-          " open contacts count", "tau_p", "bonds", lambda scene, state: column("largest", state.events.stress)),
+          " open contacts count", "tau_p", "bonds", _largest("stress", "largest")),
     Variable("peak_friction", "N", "largest magnitude of the friction force of the run, that of the highest start",
-          "F_p", "contact", lambda scene, state: column("largest", state.events.friction)),
-    Variable("peak_time", "s", "time of the largest shear stress", "t_p", "bonds",
-          lambda scene, state: column("time", state.events.stress)),
+          "F_p", "contact", _largest("friction", "largest")),
+    Variable("peak_time", "s", "time of the largest shear stress", "t_p", "bonds", _largest("stress", "time")),
+    Variable("peak_speed", "m/s", "sliding speed at the largest shear stress", "", "bonds",
+             _largest("stress", "speed")),
+    Variable("peak_area", "m^2", "contact area at the largest shear stress", "", "contact", _largest("stress", "area")),
+    Variable("peak_friction_time", "s", "time of the largest friction force", "", "contact",
+             _largest("friction", "time")),
+    Variable("peak_friction_speed", "m/s", "sliding speed at the largest friction force", "", "contact",
+             _largest("friction", "speed")),
+    Variable("peak_friction_area", "m^2", "contact area at the largest friction force", "", "contact",
+             _largest("friction", "area")),
     Variable("pull_off_load", "N", "lowest normal load that the contact bore, a tension; nan without one", "P_min",
-          "contact", lambda scene, state: _pulled(state, "largest", -1.0),
-          lambda scene: scene.contact.makes_load, "a load that changes"),
-    Variable("pull_off_time", "s", "time of the lowest normal load", "t_min", "contact",
-          lambda scene, state: _pulled(state, "time", 1.0),
-          lambda scene: scene.contact.makes_load, "a load that changes"),
+          "contact", _pulled("largest", -1.0), *_CHANGES),
+    Variable("pull_off_time", "s", "time of the lowest normal load", "t_min", "contact", _pulled("time"), *_CHANGES),
+    Variable("pull_off_displacement", "m", "displacement of the mount at the lowest normal load", "", "contact",
+             lambda scene, state: _displaced(scene, state.events.largest("pull")), *_CHANGES),
+    Variable("first_detachment", "s", "time of the first detachment; nan without one", "t_d", "contact",
+             _turn("opening", "opening")),
+    Variable("detachments", "1", "number of detachments", "", "contact", _of_contact("detachments")),
+    Variable("first_closing", "s", "time at which an open contact first closes; nan if none does", "", "contact",
+             _turn("closing", "closing")),
+    Variable("closing_displacement", "m", "displacement of the mount at the first closing", "", "contact",
+             _at_closing("displacement")),
+    Variable("closing_load", "N", "normal load after the first closing", "", "contact", _at_closing("normal_load")),
+    Variable("first_masked", "s", "time at which the contact is first masked; nan if it never is", "", "contact",
+             _of_contact("masked")),
+    Variable("time_masked", "1", "share of the time closed in which the contact is masked", "", "contact",
+             _masked_share),
+    Variable("runaway_force", "N", "force at the time at which the slider lost stability; nan if it never did", "",
+             "drive", _runaway_force, lambda scene: scene.drive.solves_motion, 'drive.model = "spring" or "force"'),
     Variable("step_renewal", "1", "largest share of the variance of DeltaGamma that a clock step renews", "", "drive",
           lambda scene, state: renewed(scene, state.events.path),
           lambda scene: scene.feels_steps, "an edge that lags, or tension"),
@@ -172,6 +241,38 @@ def _late(quantity: str, moment: str) -> Callable[[Slips], Any]:
     return read
 
 
+_EXTREME = ("largest", "time", "speed", "area")
+
+
+def _phase(name: str, described: tuple[str, str, str], read: Callable[[Scenario, Any], Any], of: str) -> Variable:
+    """Return an event of each phase, read from a field of ``Past``."""
+    unit, meaning, _ = described
+    part = "bonds" if of == "stress" and not name.endswith("area") else "contact"
+    long_name = f"in a phase: {meaning}".replace("of the run", "of it")
+    applies, condition = _CHANGES if of == "pull" else (lambda scene: True, "")
+
+    def values(scene: Scenario, state: State) -> Any:
+        return read(scene, state.events.by_phase(of))
+
+    return Variable(f"phase_{name}", unit, long_name, "", part, values, applies, condition, "phase")
+
+
+def _column(name: str) -> Callable[[Scenario, Any], Any]:
+    return lambda scene, rows: np.nan_to_num(rows[name])
+
+
+_BY_NAME: dict[str, Any] = {variable.name: variable[1:4] for variable in LARGEST}
+LARGEST += (
+    *(_phase(name, _BY_NAME[name], _column(column), of)
+      for of, names in (("stress", ("peak_stress", "peak_time", "peak_speed", "peak_area")), ("friction", (
+          "peak_friction", "peak_friction_time", "peak_friction_speed", "peak_friction_area")))
+      for column, name in zip(_EXTREME, names, strict=True)),
+    _phase("pull_off_load", _BY_NAME["pull_off_load"], lambda scene, rows: -_pull("largest", rows), "pull"),
+    _phase("pull_off_time", _BY_NAME["pull_off_time"], lambda scene, rows: _pull("time", rows), "pull"),
+    _phase("pull_off_displacement", _BY_NAME["pull_off_displacement"], _displaced, "pull"),
+    _phase("detachment", _BY_NAME["first_detachment"], lambda scene, rows: rows["opening"], "contact"),
+    _phase("closing", _BY_NAME["first_closing"], lambda scene, rows: rows["closing"], "contact"),
+)  # fmt: skip
 LARGEST += (
     *(_slip(f"slip_{column}", _SLIPS[column], functools.partial(Slips.column, name=column), "slip")
       for column in SLIP.names or ()),

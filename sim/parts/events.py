@@ -1,15 +1,19 @@
-"""Events of a run, seen at every clock step: the largest stress, friction and pull, and slip events.
+"""Events of a run, seen at every clock step: the largest stress, friction and pull, openings, masking, slip events.
 
-Maxima are refined between steps. Records have no influence on events.
+Maxima are refined between steps. Records have no influence on events. Most are kept for each phase of the run.
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.numerics.jit import device, kernel
-from sim.parts.exchange import Array, Bonding, Motion, during, record
+from sim.parts.contact import Contact
+from sim.parts.drive import Drive, Force
+from sim.parts.exchange import Array, Bonding, ContactState, Motion, Times, during, record
+from sim.units.tables import Pieces
 
 #: Arrays that are read alone, as they come.
 _READ = "Array(float64, 2, 'A', readonly=True), "
@@ -17,8 +21,83 @@ _READ = "Array(float64, 2, 'A', readonly=True), "
 _OF_THE_STRESS = "stress", "stiffness", "relaxation"
 #: Change over a step, by the slope at one of its ends, over the value, up to which a cubic holds.
 _RESOLVED = 5.0
-#: Row of a running maximum: the last value but one, the last value, the maximum so far, and its time [s].
-MAXIMUM = record("before last largest time")
+#: A maximum, its time [s], the sliding speed [m/s] and the contact area [m²] there.
+EXTREME = record("largest time speed area")
+#: Row of a running maximum: the last value but one, the last value, 1 if the value fell at both ends of the last step
+#: by its slopes, and the maximum of the phase so far.
+MAXIMUM = record("before last falls " + " ".join(EXTREME.names or ()))
+#: Time of the first opening and of the first closing of a contact [s], and the radius after that closing [m].
+TURN = record("opening closing radius")
+#: Row of a contact: radius [m] and time of the last detachment [s], at the last step; number of detachments; time at
+#: which it was first masked, time for which it was closed, and of that masked [s]; then the turns of the phase.
+CONTACT = record("last detached detachments masked closed hidden " + " ".join(TURN.names or ()))
+#: Phases of a run that are told apart at most.
+MOST_PHASES = 1000
+
+
+#: Times nearer than this share of the run, and values nearer than this share of the largest, are the same.
+_SAME = 1e-9
+
+
+class Phases(NamedTuple):
+    """Phases of a run: their starts [s], names, and the first clock step of each."""
+
+    starts: tuple[float, ...]
+    names: tuple[str, ...]
+    steps: tuple[int, ...]
+
+
+def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
+    """Return the phases of a run: maximal intervals in which no prescribed course turns, stops, starts or jumps.
+
+    The speed of a drive keeps its sign, too. A phase that is shorter than a clock step is none.
+    """
+    whole = np.array([0.0, times.duration])
+    forced, kind = isinstance(drive, Force), contact.kind
+    course = drive.driven if isinstance(drive, Force) else drive.pieces
+    moved = _turns(course(whole, times.duration), signed=True)
+    pressed = _turns(contact.course.pieces(whole, times.duration), signed=False)
+    words = "force" if forced else "speed"
+    of_drive = {
+        0.0: f"constant {words}" if forced else "sliding",
+        1.0: f"increasing {words}",
+        -1.0: f"decreasing {words}",
+    }
+    of_contact = {0.0: f"constant {kind}", 1.0: "approach", -1.0: "retraction"}
+    starts = sorted({*moved, *pressed})
+    result: dict[int, tuple[float, str]] = {}
+    for start in starts:
+        place = [max(at for at in course if at <= start) for course in (moved, pressed)]
+        sense, trend = moved[place[0]]
+        names = ["rest" if sense == 0.0 else of_drive[trend], of_contact[pressed[place[1]][1]]]
+        shown = [name for name, course in zip(names, (moved, pressed), strict=True) if len(course) > 1]
+        step = math.floor(start / times.step + 0.5) + 1  # the first whose middle is later
+        if step <= times.steps:
+            result[step] = start, ", ".join(shown or names[:1])
+    kept = sorted(result)[:MOST_PHASES]
+    return Phases(tuple(result[step][0] for step in kept), tuple(result[step][1] for step in kept), tuple(kept))
+
+
+def _turns(pieces: Pieces, signed: bool) -> dict[float, tuple[float, float]]:
+    """Return the starts of intervals [s] in which a course keeps its sense and its trend, with both.
+
+    The sense of a course that is not ``signed`` is 1; the trend of one that is that of its magnitude.
+    """
+    largest = max(np.abs(pieces.first).max(), np.abs(pieces.last).max())
+    result: dict[float, tuple[float, float]] = {}
+    before, value = (math.nan, math.nan), math.nan
+    for start, stop, first, last in zip(*pieces[1:5], strict=True):
+        crossing = start + (stop - start) * first / (first - last) if signed and first * last < 0.0 else stop
+        for at, low, high in (
+            ((start, first, 0.0), (crossing, 0.0, last)) if crossing < stop else ((start, first, last),)
+        ):
+            sense = float(np.sign(low + high)) if signed else 1.0
+            change = (high - low) * sense
+            now = sense, float(np.sign(change)) if abs(change) > _SAME * largest else 0.0
+            if now != before or abs(low - value) > _SAME * largest:
+                result[float(at)] = now
+            before, value = now, high
+    return result
 
 
 #: Fall of the spring force that makes a slip event, and rise that ends it, over the largest force so far.
@@ -228,71 +307,114 @@ def _follow_slips(times, stage, speed, force, position, slip, stress, work, half
             state.before = event.time
 
 
+class Past(NamedTuple):
+    """Events of the phases that have ended, arrays (rows, phases, columns): rows of ``EXTREME``, last of ``TURN``."""
+
+    stress: Array
+    friction: Array
+    pull: Array
+    contact: Array
+
+
 class Events(NamedTuple):
-    """Running maxima over the clock steps, rows of ``MAXIMUM``; NaN counts as 0; ties keep the first.
+    """Events so far; NaN counts as 0 in a maximum; ties keep the first.
 
     ``stress`` is that of the shear stress [Pa] and ``friction`` that of the friction force [N], in magnitude; ``pull``
-    is that of the tensile load of a closed contact [N], followed where the control makes the load. ``path`` is the
+    is that of the tensile load of a closed contact [N], followed where the control makes the load: rows of ``MAXIMUM``.
+    ``contact`` are rows of ``CONTACT``. Of the phases before this one ``past`` has them. ``path`` is the
     longest path within a step [m], shape (1,) or (members,). ``slips`` are the slip events.
     """
 
     stress: Array
     friction: Array
     pull: Array
+    contact: Array
+    past: Past
     path: Array
     slips: Slips
 
+    def next_phase(self) -> "Events":
+        """Return the events at the start of another phase."""
+        now = {name: getattr(self, name) for name in Past._fields}
+        kept = {name: rows[:, np.newaxis, -getattr(self.past, name).shape[-1] :] for name, rows in now.items()}
+        past = Past(*(np.concatenate([getattr(self.past, name), rows], axis=1) for name, rows in kept.items()))
+        stress, friction, pull = (_started(rows[:, 1]) for rows in self[:3])
+        contact = self.contact.copy()
+        contact[:, -len(TURN.names or ()) :] = np.nan
+        return Events(stress, friction, pull, contact, past, self.path, self.slips)
 
-def first(bonding: Bonding, radius: Array, pull: Array, stage: Array) -> Events:
-    """Maxima at t = 0 of the bonds' stress, of friction over a contact radius [m] and of a pull [N].
+    def by_phase(self, name: str) -> NDArray[np.void]:
+        """Return a field of ``Past`` for all phases up to this one, as records, shape (rows, phases)."""
+        past, rows = getattr(self.past, name), getattr(self, name)
+        every = np.concatenate([past, rows[:, np.newaxis, -past.shape[-1] :]], axis=1)
+        return every.view(TURN if name == "contact" else EXTREME)[..., 0]
+
+    def largest(self, name: str) -> NDArray[np.void]:
+        """Return the largest stress, friction or pull of the run, as a record ``EXTREME`` in each row."""
+        maxima = self.by_phase(name)
+        first = maxima["largest"].argmax(axis=1)
+        return maxima[np.arange(len(maxima)), first]
+
+    def first_turn(self, name: str) -> NDArray[np.void]:
+        """Return the first opening or closing of the run, as a record ``TURN`` in each row; nan without one."""
+        turns = self.by_phase("contact")
+        first = np.isfinite(turns[name]).argmax(axis=1)
+        return turns[np.arange(len(turns)), first]
+
+
+def first(bonding: Bonding, contact: ContactState, pull: Array, stage: Array) -> Events:
+    """Return the events at t = 0, from the bonds, the contact and a pull [N].
 
     ``stage`` are positions of the stages that pull through a spring [m].
     """
     stress = np.abs(bonding.stress)
-    started = (_started(np.nan_to_num(values)) for values in (stress, stress * (np.pi * radius**2), pull))
-    return Events._make([*started, np.zeros(1), Slips.none(stage)])
-
-
-def column(name: str, maxima: Array) -> Array:
-    """Return a column of running maxima by its name in ``MAXIMUM``."""
-    values: Array = maxima.view(MAXIMUM)[:, 0][name]
-    return values
+    friction = stress * (np.pi * contact.radius**2)
+    rows = np.full(len(contact.radius), np.nan)
+    zero, masked = np.zeros(len(rows)), (contact.work <= 0.0) & (contact.radius > 0.0)
+    columns = contact.radius, contact.detached, zero, np.where(masked, 0.0, np.nan), zero, zero, rows, rows, rows
+    started = [_started(np.nan_to_num(values)) for values in (stress, friction, pull)]
+    extreme, turn = (len(kind.names or ()) for kind in (EXTREME, TURN))
+    past = Past._make([*(np.empty((len(values), 0, extreme)) for values in started), np.empty((len(rows), 0, turn))])
+    return Events._make([*started, np.stack(columns, axis=1), past, np.zeros(1), Slips.none(stage)])
 
 
 def _started(values: Array) -> Array:
-    return np.stack([np.full(values.shape, -np.inf), values, values, np.zeros(values.shape)], axis=1)
+    """Return running maxima before the first step, from the values at its start."""
+    rows = np.full((len(values), len(MAXIMUM.names or ())), -np.inf)
+    rows[:, 1], rows[:, 2] = values, 0.0
+    return rows
 
 
 def after(
-    so_far: Events, before: tuple[Bonding, Array], bonding: Bonding, radius: Array, pull: Array, motions: Motion,
-    with_path: bool = False,
+    so_far: Events, before: tuple[Bonding, Array], bonding: Bonding, contact: ContactState, pull: Array,
+    motions: Motion, with_path: bool = False,
 ) -> Events:  # fmt: skip
-    """Maxima a block of steps later, from the bonds, contact radius [m] and pull [N] at the end of each.
+    """Return the events after a block of steps in one phase, from bonds, contact and pull [N] at the end of each.
 
     ``before`` are bonds and contact radius at its start. The path is followed only ``with_path``.
 
     Notes
     -----
-    The slope of the stress over time is ``stiffness`` × speed + ``relaxation``, and the area is taken as linear within
-    a step. Where the slopes are known, a maximum between the ends is that of the cubic through values and slopes, of
-    fourth order, if neither slope alone would change the value by more than five times its size within the step. Where
-    they are not, and for the pull, a sample above its two neighbours is refined by the parabola
-    through the three, of third order, if both neighbours have more than half of its value: a quantity that jumps is
-    not smooth there.
+    The slope of the stress over time is ``stiffness`` × speed + ``relaxation``, and speed and area are taken as linear
+    within a step. Where the slopes are known, a maximum between the ends is that of the cubic through values and
+    slopes, of fourth order, if neither slope alone would change the value by more than five times its size within the
+    step. Where they are not, or contradict the values (bonds follow the mean speed of a step), and for the pull, a
+    sample above its two neighbours is refined by the parabola through the three, of third order, if both neighbours
+    have more than half of its value: a quantity that jumps is not smooth there.
     """
     start, radius_before = before
     stress, stiffness, relaxation = (
-        _with_start(getattr(start, name), getattr(bonding, name), len(radius)) for name in _OF_THE_STRESS
+        _with_start(getattr(start, name), getattr(bonding, name), len(contact.radius)) for name in _OF_THE_STRESS
     )
-    radii = _with_start(radius_before, radius, len(radius))
+    radii = _with_start(radius_before, contact.radius, len(contact.radius))
     rows = max(len(so_far.stress), stress.shape[1])
     members = max(rows, len(so_far.friction), radii.shape[1])
-    counts = rows, members, max(len(so_far.pull), pull.shape[1])
-    largest = [values + np.zeros((count, 1)) for values, count in zip(so_far[:3], counts, strict=True)]
+    counts = rows, members, max(len(so_far.pull), pull.shape[1]), max(len(so_far.contact), radii.shape[1])
+    now = [values + np.zeros((count, 1)) for values, count in zip(so_far[:4], counts, strict=True)]
     ends = motions.first, motions.speed, motions.time[:, 0], motions.duration[:, 0]
-    _follow(stress, stiffness, relaxation, radii, pull, *ends, *largest)
+    _follow(stress, stiffness, relaxation, radii, pull, contact.work, contact.detached, *ends, *now)
     path = np.maximum(so_far.path, motions.path.max(axis=0)) if with_path else so_far.path
-    return Events._make([*largest, path, so_far.slips])
+    return Events._make([*now, so_far.past, path, so_far.slips])
 
 
 def _with_start(before: Array, values: Array, steps: int) -> Array:
@@ -316,45 +438,84 @@ def _load(k, i, stress, stiffness, relaxation, speed, radius):
     return math.fabs(value), (slope if value > 0.0 else -slope if value < 0.0 else math.fabs(slope)), area
 
 
-@kernel(f"void({7 * _READ}{2 * 'float64[:], '}{', '.join(3 * ['float64[:, ::1]'])})")
-def _follow(stresses, stiffness, relaxation, radii, pulls, first, speed, times, steps, stress, friction, pull):
+@kernel(f"void({9 * _READ}{2 * 'float64[:], '}{', '.join(4 * ['float64[:, ::1]'])})")
+def _follow(
+    stresses, stiffness, relaxation, radii, pulls, works, detached, first, speed, times, steps,
+    stress, friction, pull, contact,
+):  # fmt: skip
     bonds = stresses, stiffness, relaxation
     for k in range(len(times)):
         time, step = times[k], steps[k]
         for i in range(len(friction)):
-            value0, slope0, area0 = _load(k, i, *bonds, _of(first, k, i), radii)
-            value1, slope1, area1 = _load(k + 1, i, *bonds, _of(speed, k, i), radii)
+            speeds = _of(first, k, i), _of(speed, k, i)
+            value0, slope0, area0 = _load(k, i, *bonds, speeds[0], radii)
+            value1, slope1, area1 = _load(k + 1, i, *bonds, speeds[1], radii)
+            around = time, step, speeds[0], speeds[1], area0, area1
             if i < len(stress):
-                _keep(value1, slope0, slope1, time, step, stress[i])
+                _keep(value1, slope0, slope1, around, stress[i])
             growth = (area1 - area0) / step
             rise, slope = area0 * slope0 + growth * value0, area1 * slope1 + growth * value1
-            _keep(value1 * area1, rise, slope, time, step, friction[i])
+            _keep(value1 * area1, rise, slope, around, friction[i])
         for i in range(len(pull)):
-            _keep(_of(pulls, k, i), math.nan, math.nan, time, step, pull[i])
+            area0, area1 = math.pi * _of(radii, k, i) ** 2, math.pi * _of(radii, k + 1, i) ** 2
+            around = time, step, _of(first, k, i), _of(speed, k, i), area0, area1
+            _keep(_of(pulls, k, i), math.nan, math.nan, around, pull[i])
+        for i in range(len(contact)):
+            _turn(time, step, _of(radii, k + 1, i), _of(works, k, i), _of(detached, k, i), contact[i])
 
 
 @device
-def _keep(now, rise, slope, time, step, maximum):
-    """Replace a maximum by that after a value ``now`` at ``time``; slopes at both ends of the step, nan if unknown."""
-    before, last, largest, when = (
-        maximum[0],
-        maximum[1],
-        maximum[2],
-        maximum[3],
-    )  # numbers, as a view of a record for each costs twice the time
+def _turn(time, step, radius, work, detached, contact):
+    """Take the radius [m], work of adhesion [J/m²] and time of the last detachment of a contact after a step."""
+    row = contact.view(CONTACT)[0]
+    was_open = not row.last > 0.0
+    row.last = radius
+    if detached > row.detached or (math.isnan(row.detached) and not math.isnan(detached)):
+        row.detached, was_open = detached, True
+        row.detachments += 1.0
+        if math.isnan(row.opening):
+            row.opening = detached
+    if not radius > 0.0:
+        return
+    row.closed += step
+    if work <= 0.0:
+        row.hidden += step
+        if math.isnan(row.masked):
+            row.masked = time
+    if was_open and math.isnan(row.closing):
+        row.closing, row.radius = time, radius
+
+
+@device
+def _keep(now, rise, slope, around, maximum):
+    """Replace a maximum by that after a value ``now``; slopes at both ends of the step, nan if unknown.
+
+    ``around``: time and length of the step [s], speeds and areas at both ends.
+    """
+    time, step, speed0, speed1, area0, area1 = around
+    before, last, fell, largest = maximum[0], maximum[1], maximum[2], maximum[3]  # a view of a record costs twice
     now = 0.0 if math.isnan(now) else now
+    place = -1.0  # of a new maximum, as share of the step before its end
+    if last > largest:  # at the start of a phase
+        largest, place = last, 1.0
     if now > largest:
-        largest, when = now, time
+        largest, place = now, 0.0
     peak, back = -math.inf, 0.0
     steepest, larger = rise if rise > -slope else -slope, last if last > now else now  # max compiles for long
     if rise > 0.0 > slope and step * steepest < _RESOLVED * larger:
         peak, back = _top(last, now, step * rise, step * slope)
-    elif math.isnan(rise + slope) and last >= before and last > now and before > 0.5 * last and now > 0.5 * last:
+    elif (
+        (fell > 0.0 or math.isnan(rise + slope) or (rise > 0.0 and slope > 0.0))  # slopes are wrong or unknown
+        and (last >= before and last > now and before > 0.5 * last and now > 0.5 * last)
+    ):
         back = 1.0 - 0.5 * (before - now) / (before - 2.0 * last + now)
         peak = last - 0.25 * (before - now) * (1.0 - back)
     if peak > largest:
-        largest, when = peak, time - back * step
-    maximum[0], maximum[1], maximum[2], maximum[3] = last, now, largest, when
+        largest, place = peak, back
+    maximum[0], maximum[1], maximum[2] = last, now, 1.0 if rise < 0.0 and slope < 0.0 else 0.0
+    if place >= 0.0:
+        maximum[3], maximum[4] = largest, time - place * step
+        maximum[5], maximum[6] = speed1 - place * (speed1 - speed0), area1 - place * (area1 - area0)
 
 
 @device

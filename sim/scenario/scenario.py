@@ -18,6 +18,7 @@ from sim.parts.contact import Contact
 from sim.parts.contact.balance import Bodies, Shares
 from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import Drive, Steady as SteadyDrive
+from sim.parts.events import Phases, phases
 from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
 from sim.parts.shear.maps import CarriedProcess
@@ -242,6 +243,11 @@ class Scenario:
     def is_random(self) -> bool:
         """Return True if a part of the scene is random. Members behind a spring differ only then."""
         return self.population.is_random or self.fluctuations.per_member
+
+    @cached_property
+    def phases(self) -> Phases:
+        """Return the phases of the run."""
+        return phases(self.drive, self.contact, self.times)
 
     @cached_property
     def feels_steps(self) -> bool:
