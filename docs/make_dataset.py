@@ -44,7 +44,11 @@ cycles behind a stage at rest it adds up.
 """,
     "Numbers of the scene": """Every quantity of the scenario is a variable, too, named as its key with underscores.
 
-Events are seen by the engine at its clock steps, whatever the records. A *slip event* is a fall of the spring force by
+Events are seen by the engine at its clock steps, whatever the records. A *phase* of a run is an interval in which no
+prescribed course turns, stops, starts or jumps, and no prescribed speed changes its sign: rest and sliding of a
+`start`, approach and retraction of each cycle. If a run has several, at most 1,000, events of each are kept, too.
+
+A *slip event* is a fall of the spring force by
 more than 0.3 of the largest force so far, from its maximum to the next minimum, during which the interface slips at
 least half of the slider's advance. The minimum is known once the force has risen again by 0.1 of the largest. A stage
 that stops or turns back ends a fall without an event. The first 1,000 events of a member are kept one by one, if
@@ -91,12 +95,16 @@ mean.nc` over runs. `ncra` averages over a record dimension, which comes first, 
 with `b.nc` as above. It reads up to two dimensions beside time: of a sweep choose a point first, by
 `ncwa -a contact_load -d contact_load,0`.
 """
-MAPS = "record.maps"
+MAPS, PHASES = "record.maps", "a run of several phases"
 COORDINATES = (
     ("t", "s", "t", "time since the start", ""),
     ("member", "1", "member", "number of the ensemble member", "members differ and each is kept"),
     ("slip", "1", "slip", "number of the slip event of a member", 'drive.model = "spring", and each member is kept'),
     ("late", "", "late", "statistic of the members' means over the second half of the run", "members are not kept"),
+    ("phase", "1", "phase", "number of the phase", PHASES),
+    ("phase_start", "s", "*sweep*, phase", "time at which a phase begins", PHASES),
+    ("phase_end", "s", "*sweep*, phase", "time at which a phase ends", PHASES),
+    ("phase_name", "", "*sweep*, phase", "course of drive and contact in a phase", PHASES),
     ("map_member", "1", "map_member", "member of a map", MAPS),
     ("map_time", "s", "map_time", "time of a map", MAPS),
     ("x", "m", "x", "position along the sliding direction", MAPS),

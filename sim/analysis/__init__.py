@@ -8,7 +8,7 @@ peak); ``summary`` turns both into statistics over the members.
 
 from sim.analysis.dataset import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
 from sim.analysis.errors import SystematicError, remarks, systematic_errors
-from sim.analysis.events import events, loop_energy, peaks, slip_sizes, slips, stick_slip
+from sim.analysis.events import events, loop_energy, peaks, pull_offs, slip_sizes, slips, slips_by_phase, stick_slip
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
 from sim.analysis.over_speed import crossing, extremes, loss_speeds, speed_curves, steady_speeds
 from sim.analysis.statements import Statement, each, relaxation, statements
@@ -36,10 +36,10 @@ __all__ = [
     "QUANTILES", "Control", "IntegralTime", "Lifetime", "Statement", "SystematicError", "averaging", "bond_work",
     "concise", "control", "correlation_time", "crossing", "distribution", "each", "engineering", "events", "extremes",
     "first_passage", "highlights", "in_columns", "integral_time", "is_stationary", "is_steady", "lifetime",
-    "loop_energy", "loss_speeds", "losses", "notes", "observables", "over_time", "peaks", "reference_radii",
-    "relaxation", "remarks", "scaled", "setting", "settled", "share_observables", "shares", "skewness_error",
-    "slip_sizes", "slips", "speed_curves", "spread", "statements", "statistics", "steady_speeds", "stick_slip",
-    "summary", "sweep_dims", "systematic_errors", "table", "tidy", "to_csv", "where",
+    "loop_energy", "loss_speeds", "losses", "notes", "observables", "over_time", "peaks", "pull_offs",
+    "reference_radii", "relaxation", "remarks", "scaled", "setting", "settled", "share_observables", "shares",
+    "skewness_error", "slip_sizes", "slips", "slips_by_phase", "speed_curves", "spread", "statements", "statistics",
+    "steady_speeds", "stick_slip", "summary", "sweep_dims", "systematic_errors", "table", "tidy", "to_csv", "where",
 ]  # fmt: skip
 
 

@@ -27,7 +27,7 @@ ROOM = 2**26
 #: Quantities that every run records unless its scenario chooses some, and the statements that need them.
 _STATEMENTS = {
     "contact_area": "contact area", "friction_force": "friction", "in_contact": "open contacts",
-    "masked": "masked contacts", "detachment_time": "detachment", "jkr_radius": "area ratio",
+    "time_masked": "masked contacts", "first_detachment": "detachment", "jkr_radius": "area ratio",
     "bonds_radius": "area lost to bonds and fluctuations", "peak_stress": "peak of stress",
     "peak_friction": "peak of friction",
 }  # fmt: skip
@@ -212,7 +212,11 @@ def steady_points(dataset: xr.Dataset) -> xr.DataArray:
     if speed_name(dataset) not in dataset:
         return word(dataset, "drive.model", "") == "steady"
     speed = speed_of(dataset)
-    return ((speed == speed.isel(t=0)) | speed.isnull()).all("t")  # unknown after a runaway
+    steady = ((speed == speed.isel(t=0)) | speed.isnull()).all("t")  # unknown after a runaway
+    if "phase_name" in dataset:  # records may be too few to show a course
+        driven = dataset["phase_name"].str.contains("speed|sliding|rest").any("phase")
+        steady = steady & ~(driven & (dataset["phase_start"].count("phase") > 1))
+    return steady
 
 
 def is_steady(dataset: xr.Dataset) -> bool:

@@ -13,7 +13,6 @@ from sim.analysis.dataset import (
     control,
     in_pieces,
     is_stationary,
-    may_stop,
     plain,
     setting,
     speed_name,
@@ -23,7 +22,7 @@ from sim.analysis.dataset import (
     with_trajectories,
     word,
 )
-from sim.analysis.observables import KEPT, labelled, masks, pure
+from sim.analysis.observables import labelled, pure
 from sim.parts.events import SLIP
 
 #: Speeds of a stage that gets faster or slower between which slips follow each other.
@@ -140,9 +139,38 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     return result.merge(means[["slip_duration", "stick_duration", "stress_drop"]], compat="no_conflicts")
 
 
+def slips_by_phase(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the means over the slip events in each phase of a stage that stops, turns or changes its speed.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, of a drive ``spring`` with each member recorded and more than one phase.
+
+    Returns
+    -------
+    xarray.Dataset
+        With the dimension ``phase`` last: ``slip_count``, the means ``static_friction``, ``force_drop`` [N],
+        ``slip_amplitude`` [m] and ``recurrence_time`` [s], and the ``first_friction`` [N] at which the first slip
+        event of a phase begins: after a hold the peak, with the time for which it was held before, ``time_held`` [s].
+    """
+    each, start, end = slips(dataset), dataset["phase_start"], dataset["phase_end"]
+    inside = (each["slip_time"] >= start) & (each["slip_time"] < end)
+    each["recurrence_time"] = each["recurrence_time"].where(each["slip_time"] + each["recurrence_time"] < end)
+    result = each[list(_LATE)].where(inside).mean("slip", keep_attrs=True)
+    result["slip_count"] = pure(inside.sum("slip").astype(float), "number of slip events in a phase")
+    first = each["static_friction"].isel(slip=inside.argmax("slip")).where(inside.any("slip"))
+    result["first_friction"] = labelled(first, "N", "spring force at which the first slip event of a phase begins")
+    held = (end - start).where(dataset["phase_name"].str.contains("rest")).shift(phase=1)
+    result["time_held"] = labelled(held, "s", "time for which the stage rested before a phase")
+    return result.drop_vars("slip", errors="ignore").transpose(..., "phase")
+
+
 def _between_speeds(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
     """Return the speeds of a stage between which slips follow each other."""
     turn, each_slip = abs(dataset["stage_speed"]).idxmax("t"), slips(dataset)
+    if "phase_name" in dataset:
+        turn = dataset["phase_end"].where(dataset["phase_name"].str.contains("increasing")).max("phase").fillna(0.0)
     later, before = each_slip["recurrence_time"].notnull(), each_slip["slip_time"] <= turn
     chosen = later & before, later.shift(slip=1, fill_value=False) & ~before & each_slip["slip_time"].notnull()
     return {
@@ -153,6 +181,8 @@ def _between_speeds(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
 
 def varies(dataset: xr.Dataset) -> bool:
     """Return True if the magnitude of the stage's speed changes in a run."""
+    if "phase_name" in dataset and bool(dataset["phase_name"].str.contains("ing speed").any()):
+        return True
     stage = abs(dataset["stage_speed"]).where(dataset["stage_speed"] != 0.0)
     return bool((stage.max("t") > (1.0 + _ROUNDING) * stage.min("t")).any())
 
@@ -201,20 +231,14 @@ def runaways(dataset: xr.Dataset) -> xr.Dataset:
     -------
     xarray.Dataset
         ``ran_away``, 1 where nothing held the body any longer; ``runaway_after`` [s] and ``static_friction`` [N],
-        the force at that time on the line through the last two records, nan where the body is held to the end.
+        the force at that time, nan where the body is held to the end.
     """
-    when, time = dataset["runaway_time"].isel(t=-1).astype(float), dataset["t"]
-    gone, force = when.notnull(), dataset["spring_force"].astype(float)
-    last = (time < when).sum("t").clip(2) - 1
-    now, before = force.isel(t=last), force.isel(t=last - 1)
-    slope = (now - before) / (time.isel(t=last) - time.isel(t=last - 1))
-    limit = now + slope * (when - time.isel(t=last))
-    result = {
-        "ran_away": pure(gone.astype(float), "members that ran away"),
+    when = dataset["runaway_time"].isel(t=-1, drop=True).astype(float)
+    return xr.Dataset({
+        "ran_away": pure(when.notnull().astype(float), "members that ran away"),
         "runaway_after": labelled(when, "s", "time of the runaway, of those that ran away"),
-        "static_friction": labelled(limit, "N", "force at which the slider lost stability"),
-    }
-    return xr.Dataset({name: values.drop_vars("t") for name, values in result.items()})
+        "static_friction": labelled(dataset["runaway_force"], "N", "force at which the slider lost stability"),
+    })  # fmt: skip
 
 
 def _growth(series: xr.DataArray, times: xr.DataArray, ends: xr.DataArray) -> xr.DataArray:
@@ -380,12 +404,15 @@ def _of_each(dataset: xr.Dataset, described: dict[str, tuple[str, str]], of: Any
 # --- all events of a run, once per member ---
 
 
-#: A maximum of an ensemble is one if its mean stands above the ends of the run by so many standard errors.
-_ERRORS = 5.0
 #: A loop below this share of what is put in and given back is nothing.
 _NOTHING = 1e-12
-#: Names of a peak, beginning of those of its time and speed, and the quantity that it is of with its unit.
-_PEAKS = (("peak_stress", "peak", "shear_stress", "Pa"), ("peak_friction", "peak_friction", "friction_force", "N"))
+#: Names of a peak, the quantity that it is of, and its unit.
+_PEAKS = (("peak_stress", "shear_stress", "Pa"), ("peak_friction", "friction_force", "N"))
+#: Events of openings, closings and masking.
+_SEEN = (
+    "first_detachment", "detachments", "first_closing", "closing_displacement", "closing_load", "first_masked",
+    "time_masked",
+)  # fmt: skip
 
 
 def events(dataset: xr.Dataset) -> xr.Dataset:
@@ -401,8 +428,11 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         Without the dimension ``t``; what a scene cannot have is left out.
 
-        - ``ever_detached``: 1 where the contact opened; ``first_detachment`` [s], nan where it never did.
-        - ``time_masked``: share of the time in which adhesion was masked; ``first_masked`` [s], nan where it never was.
+        - ``ever_detached``: 1 where the contact opened; ``first_detachment`` [s], nan where it never did; number of
+          ``detachments``; ``first_closing`` [s] with ``closing_load`` [N] and ``closing_displacement`` [m].
+        - ``time_masked``: share of the time closed in which it was masked; ``first_masked`` [s], nan where never.
+        - ``pull_off_load`` [N] and more: of a load that changes; with several pull-offs means over them, and their
+          number ``pull_offs``; see ``pull_offs``.
         - ``total_dissipated`` [J]: by opening and closing, to the end of the run.
         - ``loop_energy``, ``loop_dissipation`` [J]: means over the cycles there and back; see ``loop_energy``.
         - ``peak_stress`` [Pa], ``peak_time`` [s], ``peak_speed`` [m/s], and ``peak_friction`` [N] with
@@ -415,14 +445,7 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
         Where only statistics were recorded, those of them that follow, as ``…_mean``.
     """
     dataset = plain(dataset)
-    dims, latest = (*sweep_dims(dataset), MEMBERS), with_trajectories(dataset, "detachment_time")
-    if "detachment_time" in latest and bool(latest["detachment_time"].isel(t=-1).isnull().all()):
-        latest = latest.isel(t=[-1])  # none was open before either
-    result = in_pieces(latest, dims, _openings)
-    read = ["masked", "in_contact_mean", *(f"masked_{kind}" for kind in KEPT)]
-    read += ["contact_area"] if may_stop(dataset) else []
-    with where_recorded():
-        result = result.merge(in_pieces(with_trajectories(dataset, *read), dims, _masks), compat="no_conflicts")
+    result = _recorded(dataset).merge(_pulled_off(dataset), compat="no_conflicts")
     for part in (peaks, stick_slip, speed_step, way_to_sliding):
         with where_recorded():
             result = result.merge(part(dataset), compat="no_conflicts")
@@ -431,36 +454,52 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
             lost = dataset[f"dissipated_energy{suffix}"].isel(t=-1, drop=True).astype(float)
             text = "energy dissipated by opening and closing, in all"
             result[f"total_dissipated{suffix}"] = labelled(lost, "J", text, "W")
-    result = result.assign({name: dataset[name].astype(float) for name in dataset if str(name).startswith("pull_off_")})
     with contextlib.suppress(ValueError), answered():
         result = result.merge(loop_energy(dataset).mean("cycle", keep_attrs=True), compat="no_conflicts")
     return result
 
 
-def _openings(dataset: xr.Dataset) -> xr.Dataset:
-    if "detachment_time" not in dataset:
-        return xr.Dataset()
-    first = dataset["detachment_time"].astype(float).fillna(np.inf).min("t")  # the latest opening so far never falls
-    ever, text = first < np.inf, "time of the first detachment, of the contacts that detached"
-    result = {"ever_detached": pure(ever.astype(float), "contacts that detached")}
-    result["first_detachment"] = labelled(first.where(ever), "s", text, "t_d")
-    return xr.Dataset(result)
+def _recorded(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the events that the engine has recorded of openings, closings and masking, and how often the first was."""
+    names = [name + ending for name in _SEEN for ending in _ENDINGS if name + ending in dataset]
+    result = dataset[names].astype(float).drop_vars([MEMBERS], errors="ignore")
+    if "first_detachment" in result:
+        result["ever_detached"] = pure(result["first_detachment"].notnull().astype(float), "contacts that detached")
+    return result.reset_coords(drop=True)
 
 
-def _masks(dataset: xr.Dataset) -> xr.Dataset:
-    """Return how long and when adhesion was masked; each record stands for the time since the one before."""
-    suffix, result = "" if "masked" in dataset else "_mean", masks(dataset)
-    masked = result[f"fraction_masked{suffix}"]
-    if stops := not suffix and may_stop(dataset):
-        masked = masked.where(dataset["contact_area"].notnull())
-    share = masked.isel(t=slice(min(1, dataset.sizes["t"] - 1), None)).mean("t", skipna=stops)
-    result = {f"time_masked{suffix}": pure(share, "share of the time in which adhesion was masked")}
-    if not suffix:
-        ever = masked == 1.0
-        text = "time at which adhesion was first masked, of the contacts in which it was"
-        first = dataset["t"].isel(t=ever.argmax("t")).drop_vars("t").where(ever.any("t"))
-        result["first_masked"] = labelled(first, "s", text)
-    return xr.Dataset(result)
+def pull_offs(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the pull-offs of a run one by one, those of all cycles.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, of a load that changes with each member recorded.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``pull_off_load`` [N], ``pull_off_time`` [s] and ``pull_off_displacement`` [m], the lowest load of each phase
+        in which a contact detaches, with the dimension ``phase`` last if the run has several; nan in the others.
+    """
+    phased = "phase_detachment" in dataset
+    names = [f"pull_off_{name}" for name in ("load", "time", "displacement")]
+    opened = dataset["phase_detachment" if phased else "first_detachment"].notnull()
+    return xr.Dataset({name: dataset[f"phase_{name}" if phased else name].where(opened) for name in names})
+
+
+def _pulled_off(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the lowest load that the contact bore; of several cycles the mean over the pull-offs of a member."""
+    recorded = dataset[[name for name in dataset if str(name).startswith("pull_off_")]].astype(float)
+    if not {"phase_detachment", "phase_pull_off_load", "pull_off_load"} <= dataset.keys():
+        return recorded
+    each = pull_offs(dataset)
+    count = each["pull_off_load"].count("phase")
+    if bool((count <= 1).all()):
+        return recorded
+    several = each[["pull_off_load", "pull_off_displacement"]].mean("phase", keep_attrs=True)
+    several["pull_off_load"].attrs["long_name"] = "mean of the lowest normal loads over the pull-offs of a member"
+    return several.merge(xr.Dataset({"pull_offs": pure(count.astype(float), "number of phases with a pull-off")}))
 
 
 def peaks(dataset: xr.Dataset) -> xr.Dataset:
@@ -476,81 +515,42 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         ``peak_stress`` [Pa], the largest magnitude of the shear stress while sliding; ``peak_time`` [s], from
         where sliding starts; ``peak_speed`` [m/s]; and ``peak_friction`` [N], ``peak_friction_time`` and
-        ``peak_friction_speed``, the same of the friction force. Empty under any other drive.
+        ``peak_friction_speed``, the same of the friction force. Empty under any other drive, and of members that
+        differ: their largest value is that of the noise.
 
     Notes
     -----
-    Peaks are those of the clock steps, refined between them, where members were recorded; their speed is that of
-    the highest record. nan where there is none: the stress is largest at the last record, or on a ramp at the
-    first, or the members fall from the peak of their mean to those by less than five standard errors. A start may
-    peak at once, when the stress falls from what it was at rest. In members with noise the largest value lies above
-    the peak of their mean. Where only statistics were recorded it is the peak of the ensemble mean over the
-    records, ``peak_stress_mean``, with the standard error at that time.
+    Peaks are those of the clock steps, refined between them. nan where there is none: the value at the end of the run,
+    or on a ramp that at its start, is as large. A start may peak at once, when the stress falls from what it was at
+    rest.
     """
     dataset = plain(dataset)
     drive = word(dataset, "drive.model", "")
     ramp, start = drive == "ramp", drive == "start"
     if not bool((ramp | start).any()):
         return xr.Dataset()
-    result, between = {}, float(dataset["t"][-1] - dataset["t"][0]) / max(dataset.sizes["t"] - 1, 1)
-    first = (dataset["speed"] != 0.0).argmax("t")
-    beginning = dataset["t"].isel(t=(first - 1).clip(0)).drop_vars("t")  # the last record before the slider moves
-    with contextlib.suppress(KeyError):
-        beginning = setting(dataset, "drive.rest")
-    slides = (ramp | start) & (dataset["t"] >= beginning - 1e-6 * between)  # the record of the start counts
-    for name, prefix, source, unit in _PEAKS:
-        suffix = "" if source in dataset else "_mean"
-        read = dataset[[source + suffix, "contact_modulus"]].assign(slides=slides)
-        largest = _maximum(read, source + suffix, ramp)
-        at, known = largest["at"], largest["known"]
-        stepped = not suffix and name in dataset
-        when = dataset["peak_time"] if stepped and prefix == "peak" else dataset["t"].isel(t=at)
-        text = f"largest {dataset[source + suffix].attrs.get('long_name', source)} while sliding"
+    result, phased = {}, "phase_start" in dataset
+    last = dataset["phase_start"].count("phase") - 1 if phased else xr.DataArray(0)
+    beginning = dataset["phase_start"].isel(phase=last).where(start, 0.0) if phased else xr.DataArray(0.0)
+    for name, source, unit in _PEAKS:
+        if name not in dataset or source not in dataset or MEMBERS in dataset[name].dims:
+            continue
+        prefix, ends = name.removesuffix("_stress"), abs(dataset[source].astype(float)).isel(t=[0, -1])
+        read = {key: dataset[key] for key in (name, f"{prefix}_time", f"{prefix}_speed")}
+        if phased:
+            read = {key: dataset[f"phase_{key}"].isel(phase=last).where(start, whole) for key, whole in read.items()}
+        size, when, speed = read.values()
+        before, after = (size / (1.0 + _ROUNDING) > ends.isel(t=k, drop=True) for k in (0, 1))
+        known = (ramp | start) & after & (~ramp | before)
+        text = f"largest {dataset[source].attrs.get('long_name', source)} while sliding"
         described = {
-            name + suffix: (dataset[name] if stepped else largest["size"], unit, text),
+            name: (size, unit, text),
             f"{prefix}_time": (when - beginning, "s", f"time from the start of sliding to the {text}"),
-            f"{prefix}_speed": (dataset["speed"].isel(t=at), "m/s", f"sliding speed at the {text}"),
+            f"{prefix}_speed": (speed, "m/s", f"sliding speed at the {text}"),
         }
-        if suffix:
-            error = dataset[f"{source}_sem"].isel(t=at)
-            described[f"{name}_sem"] = (error, unit, error.attrs["long_name"])
         for key, (values, *about) in described.items():
-            result[key] = labelled(values.where(known).drop_vars("t", errors="ignore"), *about)
+            result[key] = labelled(values.where(known).drop_vars("phase", errors="ignore"), *about)
     return xr.Dataset(result)
-
-
-def _maximum(recorded: xr.Dataset, name: str, ramp: xr.DataArray) -> xr.Dataset:
-    """Return the largest value while it ``slides``: ``size``, record ``at``, and True in ``known`` if it is a maximum.
-
-    It is one if it stands above the ends by more than rounding; and members must fall from where their mean is largest
-    to the ends, in parts of it, by more than noise may.
-    """
-
-    def magnitude(piece: xr.Dataset) -> xr.DataArray:
-        return abs(piece[name].astype(float)).where(piece["slides"])
-
-    def largest(piece: xr.Dataset) -> xr.Dataset:
-        values = magnitude(piece)
-        known, at = values.notnull(), values.fillna(-1.0).argmax("t")
-        last = values.sizes["t"] - 1 - known.isel(t=slice(None, None, -1)).argmax("t")
-        places = {"size": at, "first": known.argmax("t"), "last": last}
-        places |= {"peak": piece["top"]} if "top" in piece else {}
-        return xr.Dataset({key: values.isel(t=place).drop_vars("t") for key, place in places.items()} | {"at": at})
-
-    dims, is_ensemble = sweep_dims(recorded), recorded.sizes.get(MEMBERS, 1) > 1
-    if is_ensemble:
-        means = in_pieces(recorded, ("t",), lambda piece: xr.Dataset({"mean": magnitude(piece).mean(MEMBERS)}))
-        recorded = recorded.assign(top=means["mean"].fillna(-1.0).argmax("t"))
-    result = in_pieces(recorded, (*dims, MEMBERS), largest)
-    ends = result["first"], result["last"]
-    above = [result["size"] / (1.0 + _ROUNDING) > end for end in ends]
-    if is_ensemble:
-        drops = [1.0 - end / result["peak"].where(result["peak"] > 0.0) for end in ends]
-        errors = [drop.std(MEMBERS, ddof=1) / np.sqrt(recorded.sizes[MEMBERS]) for drop in drops]
-        falls = [drop.mean(MEMBERS) > _ERRORS * error for drop, error in zip(drops, errors, strict=True)]
-        above = [higher & fall for higher, fall in zip(above, falls, strict=True)]
-    first, last = above
-    return result.assign(known=last & (~ramp | first))
 
 
 def loop_energy(dataset: xr.Dataset) -> xr.Dataset:

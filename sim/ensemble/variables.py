@@ -162,6 +162,9 @@ def _runaway_force(scene: Scenario, state: State) -> Any:
     return np.where(np.isfinite(when), drive.course.at(np.nan_to_num(when), scene.clock.duration), np.nan)
 
 
+_TOGETHER: Any = (
+    lambda scene: scene.varies["bonds"] == scene.varies["contact"], "members with a stress of their own, or one area",
+)  # fmt: skip
 _CHANGES: Any = (lambda scene: scene.contact.makes_load, "a load that changes")
 #: Quantities of a whole run, read at its end.
 LARGEST: tuple[Variable, ...] = (
@@ -172,7 +175,8 @@ LARGEST: tuple[Variable, ...] = (
     Variable("peak_time", "s", "time of the largest shear stress", "t_p", "bonds", _largest("stress", "time")),
     Variable("peak_speed", "m/s", "sliding speed at the largest shear stress", "", "bonds",
              _largest("stress", "speed")),
-    Variable("peak_area", "m^2", "contact area at the largest shear stress", "", "contact", _largest("stress", "area")),
+    Variable("peak_area", "m^2", "contact area at the largest shear stress", "", "bonds", _largest("stress", "area"),
+             *_TOGETHER),
     Variable("peak_friction_time", "s", "time of the largest friction force", "", "contact",
              _largest("friction", "time")),
     Variable("peak_friction_speed", "m/s", "sliding speed at the largest friction force", "", "contact",
@@ -247,9 +251,9 @@ _EXTREME = ("largest", "time", "speed", "area")
 def _phase(name: str, described: tuple[str, str, str], read: Callable[[Scenario, Any], Any], of: str) -> Variable:
     """Return an event of each phase, read from a field of ``Past``."""
     unit, meaning, _ = described
-    part = "bonds" if of == "stress" and not name.endswith("area") else "contact"
+    part = "bonds" if of == "stress" else "contact"
     long_name = f"in a phase: {meaning}".replace("of the run", "of it")
-    applies, condition = _CHANGES if of == "pull" else (lambda scene: True, "")
+    applies, condition = _CHANGES if of == "pull" else _TOGETHER if name == "peak_area" else (lambda scene: True, "")
 
     def values(scene: Scenario, state: State) -> Any:
         return read(scene, state.events.by_phase(of))

@@ -28,9 +28,11 @@ EXTREME = record("largest time speed area")
 MAXIMUM = record("before last falls " + " ".join(EXTREME.names or ()))
 #: Time of the first opening and of the first closing of a contact [s], and the radius after that closing [m].
 TURN = record("opening closing radius")
-#: Row of a contact: radius [m] and time of the last detachment [s], at the last step; number of detachments; time at
+#: Row of a contact: radius [m], positive if it was closed, and time of the last detachment [s], at the last step; number of detachments; time at
 #: which it was first masked, time for which it was closed, and of that masked [s]; then the turns of the phase.
 CONTACT = record("last detached detachments masked closed hidden " + " ".join(TURN.names or ()))
+#: Columns of it that are read at each step, as a view of a record costs more than the rest.
+_DETACHED, _CLOSED = ((CONTACT.names or ()).index(name) for name in ("detached", "closed"))
 #: Phases of a run that are told apart at most.
 MOST_PHASES = 1000
 
@@ -371,7 +373,17 @@ def first(bonding: Bonding, contact: ContactState, pull: Array, stage: Array) ->
     friction = stress * (np.pi * contact.radius**2)
     rows = np.full(len(contact.radius), np.nan)
     zero, masked = np.zeros(len(rows)), (contact.work <= 0.0) & (contact.radius > 0.0)
-    columns = contact.radius, contact.detached, zero, np.where(masked, 0.0, np.nan), zero, zero, rows, rows, rows
+    columns = (
+        contact.radius,
+        np.full(len(rows), -np.inf),
+        zero,
+        np.where(masked, 0.0, np.nan),
+        zero,
+        zero,
+        rows,
+        rows,
+        rows,
+    )
     started = [_started(np.nan_to_num(values)) for values in (stress, friction, pull)]
     extreme, turn = (len(kind.names or ()) for kind in (EXTREME, TURN))
     past = Past._make([*(np.empty((len(values), 0, extreme)) for values in started), np.empty((len(rows), 0, turn))])
@@ -461,23 +473,30 @@ def _follow(
             around = time, step, _of(first, k, i), _of(speed, k, i), area0, area1
             _keep(_of(pulls, k, i), math.nan, math.nan, around, pull[i])
         for i in range(len(contact)):
-            _turn(time, step, _of(radii, k + 1, i), _of(works, k, i), _of(detached, k, i), contact[i])
+            radius, work, opening = _of(radii, k + 1, i), _of(works, k, i), _of(detached, k, i)
+            if radius > 0.0:
+                contact[i, _CLOSED] += step
+            if not (radius > 0.0 and work > 0.0 and contact[i, 0] > 0.0) or opening > contact[i, _DETACHED]:
+                _turn(time, step, radius, work, opening, contact[i])
 
 
 @device
 def _turn(time, step, radius, work, detached, contact):
-    """Take the radius [m], work of adhesion [J/m²] and time of the last detachment of a contact after a step."""
+    """Take the radius [m], work of adhesion [J/m²] and time of the last detachment of a contact after a step.
+
+    It is called where one of them matters: a contact that stays closed with work of adhesion left has no events.
+    """
     row = contact.view(CONTACT)[0]
-    was_open = not row.last > 0.0
+    opens = detached > row.detached
+    was_open = opens or not row.last > 0.0
     row.last = radius
-    if detached > row.detached or (math.isnan(row.detached) and not math.isnan(detached)):
-        row.detached, was_open = detached, True
+    if opens:
+        row.detached = detached
         row.detachments += 1.0
         if math.isnan(row.opening):
             row.opening = detached
     if not radius > 0.0:
         return
-    row.closed += step
     if work <= 0.0:
         row.hidden += step
         if math.isnan(row.masked):

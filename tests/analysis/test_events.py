@@ -1,7 +1,7 @@
 """Events of a run: detachment, masking, loops and friction peaks."""
 
-import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,24 +10,20 @@ from helpers.lens import scene
 from helpers.parts import Bell, Clock, Ensemble, Equilibrium, Record, analysis, bonds, drive, jkr, run, shear
 from numpy.testing import assert_allclose, assert_array_equal
 
+import sim
 from sim.analysis.events import speed_step, way_to_sliding
 
 NAN = math.nan
 
 
 def per_member(dataset, **values):
-    """The dataset with these numbers per member and time, and no maxima of others."""
-    dataset = dataset.drop_vars(["peak_stress", "peak_friction", "peak_time"])
-    shape = (dataset.sizes["member"], dataset.sizes["t"])
-    return dataset.assign({name: (("member", "t"), np.broadcast_to(v, shape)) for name, v in values.items()})
+    """The dataset with these numbers per member."""
+    return dataset.assign({name: dataset[name].copy(data=np.array(each)) for name, each in values.items()})
 
 
 def test_first_detachment_and_masking_are_told_of_those_members_that_had_them(ramp):
-    # One of six opens twice, two once, three never.
-    times = np.full((6, 21), NAN)
-    times[0, 4:], times[0, 9:] = 0.07, 0.18  # the last one so far is what is recorded
-    times[1, 10:], times[2, 15:] = 0.19, 0.3
-    result = analysis.statistics(per_member(ramp, detachment_time=times))
+    # Three of six open, one of them twice: its first time counts.
+    result = analysis.statistics(per_member(ramp, first_detachment=[0.07, 0.19, 0.3, NAN, NAN, NAN]))
     assert_allclose(result["ever_detached_mean"], 0.5, rtol=1e-14)
     assert_allclose(result["ever_detached_sem"], math.sqrt(0.25 / 5.0), rtol=1e-13)
     assert_allclose(result["first_detachment_mean"], (0.07 + 0.19 + 0.3) / 3.0, rtol=1e-13)
@@ -47,27 +43,35 @@ def test_first_detachment_and_masking_are_told_of_those_members_that_had_them(ra
     (row,) = analysis.highlights(dataset)
     share = 100.0 * len(first) / 24.0
     assert row["detached,\nof members (%)"].startswith(f"{share:.0f}(") and "5 to 95 %\nof members (ms)" in row
-    masked = np.zeros((6, 21))
-    masked[:, 0] = 1.0  # no time has passed
-    masked[1, 11:] = 1.0
-    result = analysis.events(per_member(ramp, masked=masked, in_contact=1))["time_masked"]
-    assert_allclose(result, [0.0, 0.5, 0.0, 0.0, 0.0, 0.0], rtol=1e-14)
-    area = ramp["contact_area"].copy()
-    area[1, 16:] = NAN
-    scenario = json.loads(ramp.attrs["scenario_resolved"])
-    scenario["contact"]["after_pull_off"] = "stop"
-    stopped = per_member(ramp, masked=masked, in_contact=1).assign(contact_area=area)
-    result = analysis.events(stopped.assign_attrs(scenario_resolved=json.dumps(scenario)))["time_masked"]
-    assert_allclose(result[1], 5.0 / 15.0, rtol=1e-14)
-    masked = np.zeros((6, 21))
-    masked[1, 11:], masked[2, 4], masked[2, 7:] = 1.0, 1.0, 1.0
-    dataset, t = per_member(ramp, masked=masked, in_contact=1), ramp["t"].to_numpy()
-    assert_array_equal(analysis.events(dataset)["first_masked"], [NAN, t[11], t[4], NAN, NAN, NAN])
-    (row,) = analysis.highlights(dataset)
+    at, masked = ramp["t"].to_numpy()[[11, 4]], [0.0, 0.5, 0.75, 0.0, 0.0, 0.0]
+    (row,) = analysis.highlights(per_member(ramp, time_masked=masked, first_masked=[NAN, *at, NAN, NAN, NAN]))
     assert row["first\nmasked (ms)"] == "200(500)" and row["half\nmasked (ms)"] == "> 80"  # a third of the members were
-    masked[3:, 9] = 1.0
-    (row,) = analysis.highlights(per_member(ramp, masked=masked, in_contact=1))
+    (row,) = analysis.highlights(per_member(ramp, time_masked=masked, first_masked=[NAN, *at, *[ramp["t"][9]] * 3]))
     assert row["half\nmasked (ms)"] == "180 (> 80)"
+
+
+def test_openings_closings_and_masking_are_those_of_all_clock_steps_however_seldom_is_recorded():
+    clock, held = Clock(duration=0.4, step=2e-3), Equilibrium(indentation=-0.4e-6, after_pull_off="reattach")
+    moved = Equilibrium(load={"from": 4e-3, "to": -1e-3, "cycles": 2}, after_pull_off="reattach")
+    for part, count in ((held, 24), (moved, 6)):
+        for policy in ("reattach", "stop"):
+            contact = replace(part, after_pull_off=policy)
+            parts = {"contact": contact, "drive": drive.Steady(speed=3e-3), "ensemble": Ensemble(members=count)}
+            dense, seldom = (run(scene(clock=replace(clock, record=each), **parts)) for each in (2e-3, 0.4))
+            names = ["first_detachment", "detachments", "first_closing", "closing_load", "first_masked", "time_masked"]
+            for name in names:
+                assert_array_equal(seldom[name], dense[name])
+            closed, t = dense["in_contact"].values == 1, dense["t"].values
+            opens, closes = closed[:, :-1] & ~closed[:, 1:], ~closed[:, :-1] & closed[:, 1:]
+            assert_array_equal(dense["detachments"], opens.sum(axis=1))
+            for turns, name in ((opens, "first_detachment"), (closes, "first_closing")):
+                first = np.where(turns.any(axis=1), t[1:][turns.argmax(axis=1)], NAN)
+                assert_allclose(dense[name], first, rtol=1e-12)
+            hidden = dense["masked"].values[:, 1:].sum(axis=1)
+            assert_allclose(dense["time_masked"], hidden / closed[:, 1:].sum(axis=1), rtol=1e-12)
+            at = dense["first_closing"].fillna(0.0)
+            load = dense["normal_load"].sel(t=at, method="nearest").where(dense["first_closing"].notnull())
+            assert_allclose(dense["closing_load"], load, rtol=1e-12, atol=1e-18)
 
 
 def cycled(cycles=2, steps=400, **held):
@@ -185,40 +189,69 @@ def test_a_static_peak_is_timed_from_the_start_among_steps_and_of_statistics_tha
     assert peak(2e-3, 2e-3) == peak(2e-3, 0.1)
     coarse, half, fine = (peak(step, 0.1)[0] for step in (2.5e-3, 1.25e-3, 2.5e-4))
     assert max(abs(coarse / fine - 1.0), abs(half / fine - 1.0)) < 1e-4  # the cohorts' tolerance
-    stretched = bonds.Tracked(
-        rupture=Bell(zero_force_rate=5.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=5.0, site_density=9e16,
-        sites=200,
-    )  # fmt: skip
-    parts = {"bonds": stretched, "shear": shear.Uniform(), "drive": drive.Start(rest=0.1, speed=5e-6)}
-    few, members = run(scene(record=Record(per_member=False), **parts)), run(scene(**parts))
-    result, mean = analysis.statistics(few), members["shear_stress"].mean("member")
-    assert_allclose(result["peak_stress_mean"], mean.max(), rtol=1e-12)
-    at = int(np.argmax(mean.to_numpy()))
-    error = members["shear_stress"][:, at].std(ddof=1) / math.sqrt(6.0)
-    assert_allclose(result["peak_stress_sem"], error, rtol=1e-10)
-    assert_allclose(result["peak_time_mean"], members["t"][at] - 0.1, rtol=1e-12)
 
 
-def test_peaks_are_maxima_inside_a_ramp_or_at_once_after_a_start(ramp):
-    heights = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])[:, None]
-    shape = 1e5 * (1.0 - (np.arange(21) - 12.0) ** 2 / 400.0)
-    result = analysis.statistics(per_member(ramp, shear_stress=heights * shape, friction_force=-heights * shape))
-    assert_allclose(result["peak_stress_mean"], 3.5e5, rtol=1e-14)
-    assert_allclose(result["peak_stress_sem"], 1e5 * math.sqrt(3.5 / 6.0), rtol=1e-13)
-    assert_allclose(result["peak_friction_mean"], 3.5e5, rtol=1e-14)  # its size: sliding back it is negative
-    for name in ("peak_speed_mean", "peak_friction_speed_mean"):
-        assert_allclose(result[name], ramp["speed"][12], rtol=1e-14)
-    assert_allclose(result["peak_time_mean"], ramp["t"][12], rtol=1e-14)
-    for shape in ["level", "rising", "falling", "rounding"]:
-        n = np.arange(21.0)
-        shape = {"level": 0 * n + 1, "rising": n, "falling": n[::-1], "rounding": 1 + 1e-14 * np.sin(n)}[shape]
-        result = analysis.events(per_member(ramp, shear_stress=shape, friction_force=shape))
-        assert all(bool(result[name].isnull().all()) for name in result if str(name).startswith("peak"))
-    noise = np.random.default_rng(3).normal(1e5, 1e3, size=(6, 21))
-    result = analysis.events(per_member(ramp, shear_stress=noise))
-    assert bool(result["peak_stress"].isnull().all())
-    hump = noise + 1e5 * np.exp(-((np.arange(21) - 12.0) ** 2) / 8.0)
-    assert bool(analysis.events(per_member(ramp, shear_stress=hump))["peak_stress"].notnull().all())
+def test_the_friction_maximum_and_the_static_peak_are_those_of_the_clock_steps_whatever_the_records():
+    """Own quadrature: 24.40 kPa at 2.270 mm/s; own integration: 59.32 kPa after 14.37 ms; within a clock step."""
+    bell = {"model": "bell", "zero_force_rate": "20 1/s", "bell_force": "4 pN"}
+    parts = {
+        "solid": {"shear_modulus": "1.6 MPa"}, "sphere": {"radius": "2 mm"}, "contact": {"load": "4 mN"},
+        "adhesion": {"work": "42 mJ/m^2", "bond_share": 0.0},
+        "bonds": {"model": "cohort", "rupture": bell, "bond_stiffness": "0.4 uN/m", "rebinding_rate": "100 1/s",
+                  "site_density": "1e16 1/m^2"},
+    }  # fmt: skip
+    ramp = {"model": "ramp", "from": "1 um/s", "to": "1 m/s", "scale": "log"}
+    slow = {"model": "rate", "rupture": bell | {"zero_force_rate": "1 1/s"}, "bond_stiffness": "0.4 mN/m",
+            "rebinding_rate": "1 1/s", "site_density": "1e16 1/m^2", "start": "empty"}  # fmt: skip
+    start = {"model": "start", "rest": "1 s", "speed": "3 um/s"}
+    for record in ("20 s", "100 s"):
+        clock = {"duration": "100 s", "step": "0.1 s", "record": record}
+        result = analysis.peaks(run(sim.Scenario(**parts | {"drive": ramp, "clock": clock})))
+        assert_allclose(result["peak_stress"], 24.40e3, rtol=2e-4)
+        for name in ("peak_speed", "peak_friction_speed"):
+            assert_allclose(result[name], 2.270e-3, rtol=1e6 ** (0.1 / 100.0) - 1.0)
+    for record in ("100 ms", "2 s"):
+        clock = {"duration": "2 s", "step": "0.1 ms", "record": record}
+        result = analysis.peaks(run(sim.Scenario(**parts | {"bonds": slow, "drive": start, "clock": clock})))
+        assert_allclose(result["peak_stress"], 59.32e3, rtol=1e-4)
+        assert_allclose(result["peak_time"], 14.37e-3, atol=1e-4)
+        assert_allclose(result["peak_friction_time"], result["peak_time"], rtol=1e-12)
+
+
+def test_pull_offs_of_ten_cycles_are_those_of_all_cycles_and_not_the_lowest():
+    """Own Gillespie and JKR, 200 pull-offs: mean -364 nN, quantiles of 5, 50 and 95 %."""
+    tracked = {"model": "tracked", "sites": 8, "rupture": {"model": "constant", "rate": "20 1/s"},
+               "bond_stiffness": "1 mN/m", "rebinding_rate": "60 1/s", "site_density": "1e13 1/m^2"}  # fmt: skip
+    moved = {"from": "0.1 um", "to": "-3 um", "cycles": 10}
+    parts = {
+        "solid": {"shear_modulus": "1 MPa"}, "sphere": {"radius": "5 um"}, "drive": {"speed": "0 m/s"},
+        "contact": {"displacement": moved, "stiffness": "0.3 N/m", "after_pull_off": "reattach"}, "bonds": tracked,
+        "adhesion": {"work": "20 mJ/m^2", "bond_share": 0.8}, "ensemble": {"members": 20},
+    }  # fmt: skip
+    dataset = run(sim.Scenario(**parts | {"clock": {"duration": "20 s", "step": "1 ms", "record": "10 s"}}))
+    loads = analysis.pull_offs(dataset)["pull_off_load"]
+    every = 1e9 * loads.values[np.isfinite(loads.values)]
+    assert every.size == 200 and dataset["phase_name"].values.tolist() == ["retraction", "approach"] * 10
+    error = every.std(ddof=1) / np.sqrt(200.0)
+    assert abs(every.mean() + 364.0) < 5.0 * error
+    assert_allclose(np.quantile(every, [0.05, 0.5, 0.95]), [-451.0, -370.0, -255.0], atol=1.0)  # the same seed
+    result = analysis.events(dataset)
+    assert_allclose(result["pull_off_load"].mean(), 1e-9 * every.mean(), rtol=1e-12)
+    assert_array_equal(result["pull_offs"], 10.0)
+
+
+def test_peaks_are_maxima_inside_a_ramp_or_at_once_after_a_start_and_none_is_of_noise(ramp):
+    one, n = ramp.isel(member=0, drop=True), np.arange(21.0)
+    shape = 1e5 * (1.0 - (n - 12.0) ** 2 / 400.0)
+    shapes = {"level": 0 * n + 1, "rising": n, "falling": n[::-1], "rounding": 1 + 1e-14 * np.sin(n), "peak": shape}
+    for name, values in shapes.items():
+        made_up = {"shear_stress": values, "friction_force": -values}  # its size: sliding back it is negative
+        made_up = {key: ("t", series) for key, series in made_up.items()}
+        made_up |= dict.fromkeys(("peak_stress", "peak_friction"), np.abs(values).max())
+        result = analysis.peaks(one.assign(made_up))
+        known = [bool(result[key].notnull()) for key in result]
+        assert len(known) == 6 and set(known) == {name == "peak"}
+    assert not any("friction" in name for name in analysis.peaks(ramp))  # members differ by noise
     # Bonds without a stretch bear most at the first slip: the first record after it, two lives of the transient on.
     part = drive.Start(rest=0.1, speed=1e-2)
     population = bonds.Rate(critical_speed=1e-2, rebinding_rate=50.0, stress=3e5)

@@ -192,6 +192,11 @@ def test_sizes_of_slips_are_shared_out_over_all_members_and_a_stage_at_many_spee
     assert_allclose(result["share_as_large"][:5], 1.0 - np.arange(5) / 5.0, rtol=1e-14)
     t = dataset["t"]
     up_and_down = dataset.assign(stage_speed=dataset["stage_speed"] * (1.0 + np.minimum(t, 5.0 - t)))
+    names = {"phase_name": ("phase", ["increasing speed", "decreasing speed"]), "phase_end": ("phase", [2.5, 5.0])}
+    names["phase_start"] = ("phase", [0.0, 2.5])
+    seldom = up_and_down.isel(t=[0, -1]).assign(names)
+    for name in ("slips_from", "slips_down_to"):
+        assert_array_equal(analysis.stick_slip(seldom)[name], analysis.stick_slip(up_and_down)[name])
     result = analysis.stick_slip(up_and_down)
     assert_allclose(result["slip_count"], [3.0, 4.0])
     assert_allclose(result["slips_from"], [1.0, 2.0])
@@ -209,11 +214,19 @@ def test_the_scene_of_slips_has_the_counts_of_its_hysteresis_whatever_the_record
         xr.testing.assert_identical(analysis.stick_slip(each), analysis.stick_slip(results[0]))
 
 
-def test_slips_after_a_hold_are_told_apart():
-    """Own closed-form run: forces at the first slip, after a hold of a second, and then every 196.9 ms."""
-    result = analysis.slips(run(sim.Scenario(**HELD))).isel(member=0)
-    assert_allclose(1e6 * result["static_friction"], [1255.0, 1158.0, *[475.0] * 5], rtol=6e-4)
-    assert_allclose(1e3 * result["recurrence_time"][2:-1], 196.9, atol=0.11)
+def test_slip_events_after_a_hold_are_told_apart_from_those_before_whatever_the_records():
+    """Own run by the rate equation: forces at the first slip, after a hold of a second, and then every 196.9 ms."""
+    dataset = run(sim.Scenario(**HELD))
+    assert dataset["phase_name"].values.tolist() == ["sliding", "rest", "sliding"]
+    each, result = analysis.slips(dataset).isel(member=0), analysis.slips_by_phase(dataset).isel(member=0)
+    assert_allclose(1e6 * each["static_friction"], [1255.0, 1158.0, *[475.0] * 5], rtol=6e-4)
+    assert_allclose(1e3 * each["recurrence_time"][2:-1], 196.9, atol=0.11)
+    assert_array_equal(result["slip_count"], [1.0, 0.0, 6.0])
+    assert_allclose(1e6 * result["first_friction"], [1255.0, NAN, 1158.0], rtol=6e-4)
+    assert_array_equal(result["time_held"], [NAN, NAN, 1.0])
+    seldom = run(sim.Scenario(**HELD | {"clock": HELD["clock"] | {"record": "3 s"}}))
+    xr.testing.assert_identical(analysis.slips_by_phase(seldom), analysis.slips_by_phase(dataset))
+    assert "static_friction" not in analysis.stick_slip(dataset)  # it would be a mean over phases
 
 
 def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused():
@@ -229,7 +242,7 @@ def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused(
     when = dataset["runaway_time"].isel(t=-1).values
     assert np.all(when > 1.0) and np.all(result["ran_away"] == 1.0)
     assert_allclose(result["runaway_after"], when, rtol=1e-14)
-    assert_allclose(result["static_friction"], force * (0.2 + 1.8 * (when - 1.0) / 19.0), rtol=1e-9)
+    assert_allclose(result["static_friction"], force * (0.2 + 1.8 * (when - 1.0) / 19.0), rtol=1e-12)
     assert all("–" not in row.values() for row in analysis.table(dataset)[-3:])  # none after its end
     held = run(scene(1, clock=Clock(duration=0.5, step=0.1), drive=drive, bonds=bonds))
     calm = analysis.stick_slip(held)
