@@ -28,8 +28,9 @@ EXTREME = record("largest time speed area")
 MAXIMUM = record("before last falls " + " ".join(EXTREME.names or ()))
 #: Time of the first opening and of the first closing of a contact [s], and the radius after that closing [m].
 TURN = record("opening closing radius")
-#: Row of a contact: radius [m], positive if it was closed, and time of the last detachment [s], at the last step; number of detachments; time at
-#: which it was first masked, time for which it was closed, and of that masked [s]; then the turns of the phase.
+#: Row of a contact: radius [m] when it last opened or closed, and time of the last detachment [s]; number of
+#: detachments; time at which it was first masked, time for which it was closed, and of that masked [s]; then the turns
+#: of the phase.
 CONTACT = record("last detached detachments masked closed hidden " + " ".join(TURN.names or ()))
 #: Columns of it that are read at each step, as a view of a record costs more than the rest.
 _DETACHED, _CLOSED = ((CONTACT.names or ()).index(name) for name in ("detached", "closed"))
