@@ -119,7 +119,8 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
         return advance(scenario, state, noise, steps[:valid])
     at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
     seen = state.events.next_phase() if steps.start in scenario.phases.steps[1:] else state.events
-    seen = events.after(seen, at_start, bonding, touch, pull, motions, scenario.feels_steps)
+    alike = scenario.varies["bonds"] == scenario.varies["contact"]
+    seen = events.after(seen, at_start, bonding, touch, pull, motions, scenario.feels_steps, alike)
     if has_stage(scenario):
         stage = sliders.stage_position, sliders.stage_speed
         of_slider = sliders.spring_force, sliders.position, motions.slip, bonding.stress, sliders.work
@@ -195,9 +196,9 @@ def _step_contact(scenario: Scenario, touch: ContactState, shear: Storing, steps
 
 
 def _pull(scenario: Scenario, time: float | Array, radius: Array) -> Array:
-    """Return the tensile load of the contact [N] if the control makes it, else 0."""
+    """Return the tensile load of the contact [N] if the control makes it, else nothing."""
     if not scenario.contact.makes_load:
-        return np.zeros((*radius.shape[:-1], 1))
+        return np.empty((*radius.shape[:-1], 0))
     return -scenario.contact.control(time, scenario.times.duration).normal_load(radius, scenario.bodies)
 
 

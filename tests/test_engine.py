@@ -62,7 +62,11 @@ def check_case(case, members=3, steps=6):
     alone = list(march(scenario, np.array([1])))
     for together, single in zip(straight, alone, strict=True):
         member = {k: v[1:2] if v.ndim and v.shape[0] == members else v for k, v in pack(together).items()}
-        assert all(np.array_equal(member[k], v, equal_nan=True) for k, v in pack(single).items())
+        own = pack(single)
+        member["events.slips.log"] = member["events.slips.log"][
+            :, : own["events.slips.log"].shape[1]
+        ]  # others slip more
+        assert all(np.array_equal(member[k], v, equal_nan=True) for k, v in own.items())
     check_blocks(scenario, straight, members)
     for state in straight:
         check_waist(scenario, state, members)

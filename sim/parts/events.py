@@ -323,7 +323,8 @@ class Events(NamedTuple):
     """Events so far; NaN counts as 0 in a maximum; ties keep the first.
 
     ``stress`` is that of the shear stress [Pa] and ``friction`` that of the friction force [N], in magnitude; ``pull``
-    is that of the tensile load of a closed contact [N], followed where the control makes the load: rows of ``MAXIMUM``.
+    is that of the tensile load of a closed contact [N], without rows if the control does not make the load: rows of
+    ``MAXIMUM``.
     ``contact`` are rows of ``CONTACT``. Of the phases before this one ``past`` has them. ``path`` is the
     longest path within a step [m], shape (1,) or (members,). ``slips`` are the slip events.
     """
@@ -400,11 +401,12 @@ def _started(values: Array) -> Array:
 
 def after(
     so_far: Events, before: tuple[Bonding, Array], bonding: Bonding, contact: ContactState, pull: Array,
-    motions: Motion, with_path: bool = False,
+    motions: Motion, with_path: bool = False, with_area: bool = True,
 ) -> Events:  # fmt: skip
     """Return the events after a block of steps in one phase, from bonds, contact and pull [N] at the end of each.
 
-    ``before`` are bonds and contact radius at its start. The path is followed only ``with_path``.
+    ``before`` are bonds and contact radius at its start. The path is followed only ``with_path``, the area at the
+    largest stress only ``with_area``: members that share a stress may differ in it.
 
     Notes
     -----
@@ -425,7 +427,7 @@ def after(
     counts = rows, members, max(len(so_far.pull), pull.shape[1]), max(len(so_far.contact), radii.shape[1])
     now = [values + np.zeros((count, 1)) for values, count in zip(so_far[:4], counts, strict=True)]
     ends = motions.first, motions.speed, motions.time[:, 0], motions.duration[:, 0]
-    _follow(stress, stiffness, relaxation, radii, pull, contact.work, contact.detached, *ends, *now)
+    _follow(stress, stiffness, relaxation, radii, pull, contact.work, contact.detached, *ends, 1.0 * with_area, *now)
     path = np.maximum(so_far.path, motions.path.max(axis=0)) if with_path else so_far.path
     return Events._make([*now, so_far.past, path, so_far.slips])
 
@@ -451,9 +453,9 @@ def _load(k, i, stress, stiffness, relaxation, speed, radius):
     return math.fabs(value), (slope if value > 0.0 else -slope if value < 0.0 else math.fabs(slope)), area
 
 
-@kernel(f"void({9 * _READ}{2 * 'float64[:], '}{', '.join(4 * ['float64[:, ::1]'])})")
+@kernel(f"void({9 * _READ}{2 * 'float64[:], '}float64, {', '.join(4 * ['float64[:, ::1]'])})")
 def _follow(
-    stresses, stiffness, relaxation, radii, pulls, works, detached, first, speed, times, steps,
+    stresses, stiffness, relaxation, radii, pulls, works, detached, first, speed, times, steps, share,
     stress, friction, pull, contact,
 ):  # fmt: skip
     bonds = stresses, stiffness, relaxation
@@ -465,7 +467,7 @@ def _follow(
             value1, slope1, area1 = _load(k + 1, i, *bonds, speeds[1], radii)
             around = time, step, speeds[0], speeds[1], area0, area1
             if i < len(stress):
-                _keep(value1, slope0, slope1, around, stress[i])
+                _keep(value1, slope0, slope1, (*around[:4], share * area0, share * area1), stress[i])
             growth = (area1 - area0) / step
             rise, slope = area0 * slope0 + growth * value0, area1 * slope1 + growth * value1
             _keep(value1 * area1, rise, slope, around, friction[i])
