@@ -8,6 +8,7 @@ import scipy
 import xarray as xr
 
 from sim.analysis.dataset import MEMBERS, is_stationary, plain
+from sim.analysis.ensemble_peaks import ensemble_peaks
 from sim.analysis.events import events
 from sim.analysis.over_speed import loss_speeds
 from sim.analysis.statistics import averaging, half_lives, of_second_half, summary
@@ -113,7 +114,7 @@ def of_events(dataset: xr.Dataset) -> xr.Dataset:
             members[f"{name}_{end}"] = (known + sign * half).assign_attrs(members[f"{name}_{end}"].attrs)
     for further in (as_means(half_lives(dataset, result)), beside["reason"]):
         members = members.merge(further, compat="no_conflicts", join="outer")
-    return members
+    return members.assign(ensemble_peaks(dataset))
 
 
 def as_means(values: xr.Dataset) -> xr.Dataset:
