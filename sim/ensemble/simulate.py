@@ -232,7 +232,8 @@ def _record(task: Task, point: Scenario, state: State | None, block: Block) -> t
     if block.end == clock.steps:
         for largest in LARGEST:
             if largest.name in task.quantities:
-                values = largest.read(point, end)
+                unknown = np.full((1, 0) if largest.axis else 1, np.nan)  # at a point of a sweep without it
+                values = largest.read(point, end) if largest.applies(point) else unknown
                 rows[largest.name] = np.broadcast_to(values, (rows_of[largest.name], *np.shape(values)[1:]))
     if task.pooled:
         each, late = {name: values for name, values in rows.items() if name in task.each}, {}
