@@ -63,14 +63,21 @@ def mean_stress_energy(radius, stress, modulus, poisson_ratio=0.5):
 
 
 @device
-def crossing_at_load(z, p, m, s):
-    """Largest z with (z^3 - p)^2/z^3 = m + s z and the slope there, from a z right of it; nan if none."""
+def crossing(z, level, hard, m, s):
+    """Largest z with missing^2/z = m + s z and the slope there, from a z right of it; nan if none.
+
+    missing = (hard z^2 + (2/3) soft z^3 - level)/(hard + soft z), soft = 1 - hard, is a^2/R - delta behind a spring
+    of stiffness 2 E* hard/soft: hard = 1 is an indentation and hard = 0 a load. ``level`` is where missing is 0.
+    """
     slope = math.nan
+    soft = 1.0 - hard
     for _ in range(100):
-        cube = z * z * z
-        missing = cube - p
-        over = missing / cube * missing - m - s * z
-        slope = 3.0 * (missing / cube) * ((cube + p) / z) - s
+        square = z * z
+        share = hard + soft * z
+        missing = (hard * square - level + 2.0 / 3.0 * soft * square * z) / share
+        over = missing / z * missing - m - s * z
+        growth = 2.0 * z - soft * missing / share
+        slope = missing / z * (2.0 * growth - missing / z) - s
         if over <= 0.0:
             break
         lower = z - over / slope
@@ -83,51 +90,31 @@ def crossing_at_load(z, p, m, s):
 
 
 @device
-def crossing_at_displacement(z, q, soft, m, s, stuck):
-    """Largest z with missing^2/z + stuck/z^3 = m + s z and the slope there, as at a load.
-
-    missing = (z^2 - q + (2/3) soft z^3)/(1 + soft z) is a^2/R - delta at a displacement q behind a spring of
-    stiffness 2 E*/soft; without the spring, soft = 0, it is z^2 - q.
-    """
-    slope = math.nan
-    hard = 1.0 / (1.0 + soft)
-    soft = 1.0 - hard
-    for _ in range(100):
-        square = z * z
-        share = hard + soft * z
-        missing = (hard * (square - q) + 2.0 / 3.0 * soft * square * z) / share
-        over = missing / z * missing + stuck / square / z - m - s * z
-        growth = 2.0 * z - soft * missing / share
-        slope = missing / z * (2.0 * growth - missing / z) - s - 3.0 * stuck / square / square
-        if over <= 0.0:
-            break
-        lower = z - over / slope
-        if not (slope > 0.0 and lower > 0.0):
-            return math.nan, math.nan
-        if not lower < z:
-            break
-        z = lower
-    return z, slope
+def _shrunk(jkr, hertz, control, level, hard, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio):
+    """Contact radius at a load or a displacement, ``control``, of a ``level`` as in ``crossing``."""
+    if reversible == 0.0 or stress == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
+        return jkr
+    tilt = sphere_radius / jkr
+    shear = stress / modulus * tilt
+    s = 12.0 * reversible * compressible(poisson_ratio) * shear * shear
+    if not s >= 0.0:
+        return math.nan
+    m = 2.0 * math.pi * (work / modulus / jkr) * tilt * tilt
+    start = min(1.0, m / s)
+    if control >= 0.0 and not start * jkr > hertz:
+        return hertz
+    z, slope = crossing(start, level, hard, m, -s)
+    if not slope >= held * s:
+        return hertz if control >= 0.0 else math.nan
+    return max(z * jkr, hertz) if control >= 0.0 else z * jkr
 
 
 @law
 def shrunk_at_load(jkr, hertz, load, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio):
     """Contact radius at a load from those of JKR and Hertz; ``held`` as in ``shrunk_at_displacement``."""
-    if reversible == 0.0 or stress == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
-        return jkr
-    tilt = sphere_radius / jkr
-    shear = stress / modulus * tilt
-    s = 27.0 * reversible * compressible(poisson_ratio) * shear * shear
-    if not s >= 0.0:
-        return math.nan
-    m = 4.5 * math.pi * (work / modulus / jkr) * tilt * tilt
-    start = min(1.0, m / s)
-    if load >= 0.0 and not start * jkr > hertz:
-        return hertz
-    z, slope = crossing_at_load(start, 0.75 * (load / modulus / jkr) * (tilt / jkr), m, -s)
-    if not slope >= held * s:
-        return hertz if load >= 0.0 else math.nan
-    return max(z * jkr, hertz) if load >= 0.0 else z * jkr
+    level = 0.5 * (load / modulus / jkr) * (sphere_radius / jkr / jkr)
+    rest = (sphere_radius, modulus, poisson_ratio)
+    return _shrunk(jkr, hertz, load, level, 0.0, work, stress, reversible, held, *rest)
 
 
 @law
@@ -160,22 +147,10 @@ def shrunk_at_displacement(
     is a quadratic form in y with a discriminant of ``(k + 4a)^2 - 4 (k^2 + 4 k a + 6 a^2) < 0``, times a
     square. For a displacement of at least zero Hertz's contact exists.
     """
-    if reversible == 0.0 or stress == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
-        return jkr
-    tilt = sphere_radius / jkr
-    shear = stress / modulus * tilt
-    s = 12.0 * reversible * compressible(poisson_ratio) * shear * shear
-    if not s >= 0.0:
-        return math.nan
-    m = 2.0 * math.pi * (work / modulus / jkr) * tilt * tilt
-    start = min(1.0, m / s)
-    if displacement >= 0.0 and not start * jkr > hertz:
-        return hertz
-    soft = 2.0 * modulus * jkr / stiffness
-    z, slope = crossing_at_displacement(start, displacement / jkr * tilt, soft, m, -s, 0.0)
-    if not slope >= held * s:
-        return hertz if displacement >= 0.0 else math.nan
-    return max(z * jkr, hertz) if displacement >= 0.0 else z * jkr
+    hard = 1.0 / (1.0 + 2.0 * modulus * jkr / stiffness)
+    level = hard * (displacement / jkr * (sphere_radius / jkr))
+    rest = (sphere_radius, modulus, poisson_ratio)
+    return _shrunk(jkr, hertz, displacement, level, hard, work, stress, reversible, held, *rest)
 
 
 def radius_at_load_reversible(load, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5):

@@ -54,13 +54,7 @@ import numpy as np
 
 from sim.laws import jkr
 from sim.laws.jkr import twice_pull_off
-from sim.laws.reversible import (
-    compressible,
-    crossing_at_displacement,
-    crossing_at_load,
-    shrunk_at_displacement,
-    shrunk_at_load,
-)
+from sim.laws.reversible import compressible, crossing, shrunk_at_displacement, shrunk_at_load
 from sim.numerics.jit import device, law
 from sim.numerics.special import cube_root
 
@@ -336,23 +330,20 @@ def _stuck_at_load(jkr, hertz, load, work, tangential_force, share, sphere_radiu
     return cube_root(0.75 * (sphere_radius / modulus) * (load + pull + rest))
 
 
-@law
-def _stuck_at_indentation(
-    jkr, hertz, indentation, work, tangential_force, share, sphere_radius, modulus, poisson_ratio
-):
-    """Contact radius at an indentation, otherwise as ``_stuck_at_load``."""
-    if tangential_force == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
-        return jkr
-    tilt = sphere_radius / jkr
-    shear = tangential_force / modulus / jkr * (tilt / jkr)
-    stuck = 0.25 * share * compressible(poisson_ratio) * shear * shear
-    if math.isnan(stuck):
-        return math.nan
-    m = 2.0 * math.pi * (work / modulus / jkr) * tilt * tilt
-    z, slope = crossing_at_displacement(1.0, indentation / jkr * tilt, 0.0, m, 0.0, stuck)
-    if not slope >= 0.0:
-        return hertz if indentation >= 0.0 else math.nan
-    return max(z * jkr, hertz) if indentation >= 0.0 else z * jkr
+@device
+def _widened(normal, control, hard, work, stress, sphere_radius, modulus, poisson_ratio):
+    """Contact radius at a load or an indentation, ``control``, at whose size Hertz's is ``normal``."""
+    adhesive = cube_root(2.0 * math.pi * abs(work) * sphere_radius * (sphere_radius / modulus))
+    sheared = math.sqrt(12.0 * compressible(poisson_ratio)) * abs(stress) / modulus * sphere_radius
+    scale = max(normal, max(adhesive, sheared))
+    known = normal + adhesive + sheared
+    if known == 0.0 or not known < math.inf:
+        return known
+    size = normal / scale
+    level = math.copysign(hard * size**2 + 2.0 / 3.0 * (1.0 - hard) * size**3, control)
+    m = math.copysign((adhesive / scale) ** 3, work)
+    z, _ = crossing(2.1, level, hard, m, (sheared / scale) ** 2)  # all terms at most 1: z <= 2.1 at a load, else 1.9
+    return max(normal, scale * z) if control >= 0.0 else scale * z
 
 
 @law
@@ -381,16 +372,7 @@ def uncorrected_at_load(load, work, stress, sphere_radius, modulus, poisson_rati
     1.7371 2.0640
     """
     normal = cube_root(0.75 * (sphere_radius / modulus) * abs(load))
-    adhesive = cube_root(4.5 * math.pi * abs(work) * sphere_radius * (sphere_radius / modulus))
-    sheared = math.sqrt(27.0 * compressible(poisson_ratio)) * abs(stress) / modulus * sphere_radius
-    scale = max(normal, max(adhesive, sheared))
-    known = normal + adhesive + sheared
-    if known == 0.0 or not known < math.inf:
-        return known
-    p = math.copysign((normal / scale) ** 3, load)
-    m = math.copysign((adhesive / scale) ** 3, work)
-    z, _ = crossing_at_load(1.7, p, m, (sheared / scale) ** 2)  # z^3 < 2 p + m + s z <= 3 + z
-    return max(normal, scale * z) if load >= 0.0 else scale * z
+    return _widened(normal, load, 0.0, work, stress, sphere_radius, modulus, poisson_ratio)
 
 
 @law
@@ -403,16 +385,7 @@ def uncorrected_at_indentation(indentation, work, stress, sphere_radius, modulus
     1.6093 1.8197
     """
     normal = math.sqrt(sphere_radius) * math.sqrt(abs(indentation))
-    adhesive = cube_root(2.0 * math.pi * abs(work) * sphere_radius * (sphere_radius / modulus))
-    sheared = math.sqrt(12.0 * compressible(poisson_ratio)) * abs(stress) / modulus * sphere_radius
-    scale = max(normal, max(adhesive, sheared))
-    known = normal + adhesive + sheared
-    if known == 0.0 or not known < math.inf:
-        return known
-    q = math.copysign((normal / scale) ** 2, indentation)
-    m = math.copysign((adhesive / scale) ** 3, work)
-    z, _ = crossing_at_displacement(1.9, q, 0.0, m, (sheared / scale) ** 2, 0.0)  # z^2 <= 1 + sqrt(z + z^2)
-    return max(normal, scale * z) if indentation >= 0.0 else scale * z
+    return _widened(normal, indentation, 1.0, work, stress, sphere_radius, modulus, poisson_ratio)
 
 
 def savkoor_briggs_at_load(load, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
@@ -452,8 +425,7 @@ def savkoor_briggs_at_indentation(indentation, work, tangential_force, sphere_ra
     -----
     ``E* (delta - a^2/R)^2/(2 pi a) + 3 T^2/(16 pi E* a^3) = w`` at nu = 1/2.
     """
-    held = _at_indentation(indentation, work, sphere_radius, modulus)
-    return _stuck_at_indentation(*held, tangential_force, _STICK, sphere_radius, modulus, poisson_ratio)
+    return shear_share_at_indentation(indentation, work, tangential_force, 1.0, sphere_radius, modulus, poisson_ratio)
 
 
 @law
@@ -544,8 +516,8 @@ def reversible_force_at_load(load, work, tangential_force, sphere_radius, modulu
 
 def reversible_force_at_indentation(indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
     """Contact radius at an indentation [m]; otherwise as ``reversible_force_at_load``."""
-    held = _at_indentation(indentation, work, sphere_radius, modulus)
-    return _stuck_at_indentation(*held, tangential_force, _UNIFORM, sphere_radius, modulus, poisson_ratio)
+    sticking = math.sqrt(_UNIFORM / _STICK) * np.asarray(tangential_force)  # the force with this energy in full stick
+    return shear_share_at_indentation(indentation, work, sticking, 1.0, sphere_radius, modulus, poisson_ratio)
 
 
 @device
