@@ -543,9 +543,6 @@ def energy_release_rate_at_displacement(radius, displacement, stiffness, sphere_
 # Adhesive contact at a displacement behind a spring of any stiffness: one compiled solver.
 
 
-_BLOCK = 4096
-
-
 @device
 def _first_guess(excess, second, fourth, sixth, root, floor):
     """The root t >= 0 of F(root + t) - F(root) = excess, from 7 % too small to 12 % too large.
@@ -670,23 +667,12 @@ def radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus
     6.68e-05 3.83e-05 nan
     """
     arguments = displacement, stiffness, work, sphere_radius, modulus
-    shape = np.broadcast(*arguments).shape
-    if math.prod(shape) <= _BLOCK:
-        small = np.empty((6, *shape))
-        for row, value in enumerate(arguments):
-            small[row] = value
-        _solve(*small.reshape(6, -1))
-        return small[5][()]
-    arrays = [np.asarray(value, dtype=float) for value in arguments]
-    flat = [(array if array.size == 1 else np.broadcast_to(array, shape)).reshape(-1) for array in arrays]
-    radii = np.empty(math.prod(shape))
-    block = np.empty((5, min(radii.size, _BLOCK)))
-    for first in range(0, radii.size, _BLOCK):
-        part = radii[first : first + _BLOCK]
-        for row, array in zip(block, flat, strict=True):
-            row[: part.size] = array if array.size == 1 else array[first : first + _BLOCK]
-        _solve(*block[:, : part.size], part)
-    return radii.reshape(shape)[()]
+    radii = np.empty(np.broadcast(*arguments).shape)
+    rows = np.empty((5, *radii.shape))
+    for row, value in enumerate(arguments):
+        rows[row] = value
+    _solve(*rows.reshape(5, -1), radii.reshape(-1))
+    return radii[()]
 
 
 # Adhesive contact at a given indentation ("fixed grips").
