@@ -16,12 +16,14 @@ The linear law counts bonds relative to rest. The others start from sites: ``bou
 the sites, ``*_fraction`` the number of bonds relative to rest.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import exprel
 
 from sim.numerics.jit import device, law
 from sim.numerics.special import lambert, reduced
@@ -526,12 +528,6 @@ def _pace(speed, zero_force_rate, bell_force, bond_stiffness):
     return zero_force_rate * bell_force / (bond_stiffness * math.fabs(speed))
 
 
-@device
-def _times_z(z, order):
-    """R_j/z^j, by which forces are in units of f_b: 0 at z = 0 where R_j/z^j is 0/0."""
-    return 0.0 if z == 0.0 else reduced(z, order) / z**order
-
-
 @law
 def _life(speed, zero_force_rate, bell_force, bond_stiffness, order):
     n = int(order)
@@ -575,26 +571,6 @@ def bell_lives(speed, zero_force_rate, bell_force, bond_stiffness):
     return Lives(_life(*arguments, 0), _life(*arguments, 1), _life(*arguments, 2))
 
 
-@law
-def _bell_bound(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    life = reduced(_pace(speed, zero_force_rate, bell_force, bond_stiffness), 0)
-    return life / (life + zero_force_rate / rebinding_rate)
-
-
-@law
-def _bell_force(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, order):
-    n = int(order)
-    z = _pace(speed, zero_force_rate, bell_force, bond_stiffness)
-    cycle = reduced(z, 0) + zero_force_rate / rebinding_rate
-    if z >= 1.0:  # in units of kappa V/k_0: rest and an infinite Bell force are regular
-        unit, moment = bond_stiffness * math.fabs(speed) / zero_force_rate, reduced(z, n)
-    else:  # in units of the Bell force: infinite speed is regular
-        unit, moment = bell_force, _times_z(z, n)
-    if n == 2:
-        return 2.0 * moment * unit * unit / cycle
-    return math.copysign(moment * unit / cycle, speed)
-
-
 def bell_moments(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
     """Bound share and force moments of Bell bonds in steady sliding.
 
@@ -623,8 +599,8 @@ def bell_moments(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_r
     >>> print(f"{bound:.5f} {force:.6f} {force / bound:.2f}")
     0.23985 0.218485 0.91
     """
-    arguments = (speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
-    return SiteMoments(_bell_bound(*arguments), _bell_force(*arguments, 1), _bell_force(*arguments, 2))
+    lives = bell_lives(speed, zero_force_rate, bell_force, bond_stiffness)
+    return renewal(*lives, speed, bond_stiffness, rebinding_rate)
 
 
 @law
@@ -652,12 +628,10 @@ def bell_fraction(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_
     >>> print("%.3f %.3f %.3f" % tuple(bell_fraction(4.045, 1.0, 1.0, 1.0, [0.01, 1.0, 100.0])))
     0.336 0.500 0.981
     """
+    if rebinding_rate == math.inf:
+        return 1.0
     life = reduced(_pace(speed, zero_force_rate, bell_force, bond_stiffness), 0)
-    if rebinding_rate < zero_force_rate:
-        beta = rebinding_rate / zero_force_rate
-        return (1.0 + beta) * life / (1.0 + beta * life)
-    wait = zero_force_rate / rebinding_rate
-    return (1.0 + wait) * life / (wait + life)
+    return (zero_force_rate + rebinding_rate) * life / (zero_force_rate + rebinding_rate * life)
 
 
 def bell_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
@@ -682,8 +656,8 @@ def bell_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_ra
     >>> print("%.0f %.0f %.0f" % tuple(bell_stress([1e-6, 4.5e-6, 1e-4], 1.0, 1e-11, 1e-5, 1.0, 1e14)))
     167 218 87
     """
-    force = _bell_force(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, 1)
-    return np.multiply(site_density, force)
+    moments = bell_moments(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
+    return np.multiply(site_density, moments.force)
 
 
 @device
@@ -727,7 +701,7 @@ def _bell_peak_force(zero_force_rate, bell_force, bond_stiffness, rebinding_rate
     if wait == 0.0:
         return math.inf
     z = _peak_pace(wait)
-    return bell_force * _times_z(z, 1) / (wait + reduced(z, 0))
+    return bell_force * reduced(z, 1) / z / (wait + reduced(z, 0))
 
 
 def bell_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
@@ -1103,23 +1077,21 @@ def first_moment_amplitude(speed, zero_force_rate, bell_force, bond_stiffness, r
     right, left = (1.0, (1j * turns - by_n[0]) / by_x[0]), (1.0, (1j * turns - by_n[0]) / by_n[1])
     back, scale = tuple(map(np.conj, right)), left[0] * right[0] + left[1] * right[1]
 
-    def projected(of_bound, of_stretch):
-        return (left[0] * of_bound + left[1] * of_stretch) / scale
+    # second and third derivatives of both rates, by 0, 1, ... times the stretch and else by n
+    square = (0.0, -k, -k * n), (x * r_nn, p_x * q_n + r_n, (2.0 + x) * k * (1.0 - share))
+    cube = (0.0, 0.0, -k, -k * n), (x * r_nnn, p_x * q_nn + r_nn, -(2.0 + x) * k * q_n, (3.0 + x) * k * (1.0 - share))
 
-    def second(u, v):
-        crossed, curved = u[0] * v[1] + u[1] * v[0], u[1] * v[1]
-        of_stretch = x * r_nn * u[0] * v[0] + (p_x * q_n + r_n) * crossed + (2.0 + x) * k * (1.0 - share) * curved
-        return projected(-k * (n * curved + crossed), of_stretch)
+    def along(derivatives, *vectors):
+        """Derivatives of both rates along vectors, projected on the oscillation."""
+        total = 0.0
+        for places in itertools.product((0, 1), repeat=len(vectors)):
+            of_bound, of_stretch = (each[sum(places)] for each in derivatives)
+            weight = math.prod(vector[place] for vector, place in zip(vectors, places, strict=True))
+            total = total + (left[0] * of_bound + left[1] * of_stretch) * weight
+        return total / scale
 
-    def third(u, v, w):
-        once = u[0] * v[1] * w[1] + u[1] * v[0] * w[1] + u[1] * v[1] * w[0]
-        twice = u[0] * v[0] * w[1] + u[0] * v[1] * w[0] + u[1] * v[0] * w[0]
-        curved = u[1] * v[1] * w[1]
-        of_stretch = x * r_nnn * u[0] * v[0] * w[0] + (p_x * q_nn + r_nn) * twice
-        of_stretch = of_stretch - (2.0 + x) * k * q_n * once + (3.0 + x) * k * (1.0 - share) * curved
-        return projected(-k * (n * curved + once), of_stretch)
-
-    bends = np.real(0.5j * second(right, right) * second(right, back) / turns + 0.5 * third(right, right, back))
+    bends = 0.5j * along(square, right, right) * along(square, right, back) / turns
+    bends = np.real(bends + 0.5 * along(cube, right, right, back))
     grows = -0.5 * p_x * share * (1.0 - share)
     size = np.sqrt(grows / np.where(falls & (bends < 0.0), -bends, np.nan))
     return (2.0 * size * np.abs(x * right[0] + n * right[1]) / (n * x))[()]
@@ -1206,7 +1178,6 @@ def cut_off_moments(speed, rate, stretch, bond_stiffness, rebinding_rate):
     return SiteMoments(bound, np.sign(speed) * size, square)
 
 
-@law
 def cut_off_fraction(speed, rate, stretch, rebinding_rate):
     """Bond fraction of bonds that break at a stretch, in steady sliding: bonds over bonds at rest [1].
 
@@ -1228,15 +1199,7 @@ def cut_off_fraction(speed, rate, stretch, rebinding_rate):
     >>> print("%.3f %.3f" % tuple(cut_off_fraction(1.0, [0.0, 1.0], 1.0, 1.0)))
     0.500 0.775
     """
-    if rebinding_rate == math.inf:
-        return 1.0
-    longest = stretch / math.fabs(speed)
-    a = min(rate * longest, 1e4) if rate > 0.0 else 0.0
-    if a > _SWITCH:
-        life = _slow(a, 0)
-        return life * (rebinding_rate + rate) / (rebinding_rate * life + rate)
-    life = _fast(a, 0)
-    return life * (rebinding_rate + rate) / (rebinding_rate * life + 1.0 / longest)
+    return _site(speed, rate, stretch, 1.0, rebinding_rate, 0) / rest_share(rate, rebinding_rate)
 
 
 def cut_off_stress(speed, rate, stretch, bond_stiffness, rebinding_rate, site_density):
@@ -1315,8 +1278,8 @@ def catch_lives(
     edges = np.sort(np.concatenate([longest * share, shortest * (longest / shortest) ** share], axis=-1), axis=-1)
     half = 0.5 * np.diff(edges, axis=-1)[..., np.newaxis]
     age = edges[..., :-1, np.newaxis] + half * (_CATCH_NODES + 1.0)
-    lost = catch_rate * age * _mean_exponential(-easing[..., np.newaxis] * age)
-    lost += slip_rate * age * _mean_exponential(growing[..., np.newaxis] * age)
+    lost = catch_rate * age * exprel(-easing[..., np.newaxis] * age)
+    lost += slip_rate * age * exprel(growing[..., np.newaxis] * age)
     alive = half * _CATCH_WEIGHTS * np.exp(-lost)
     return Lives(*(np.sum(age**n * alive, axis=(-2, -1)) for n in range(3)))
 
@@ -1353,11 +1316,6 @@ def catch_moments(
     """
     lives = catch_lives(speed, catch_rate, catch_force, slip_rate, slip_force, bond_stiffness)
     return renewal(*lives, speed, bond_stiffness, rebinding_rate)
-
-
-def _mean_exponential(z: Array) -> Array:
-    """(e^z − 1)/z, 1 at z = 0."""
-    return np.divide(np.expm1(z), z, out=np.ones(z.shape), where=z != 0.0)
 
 
 # Bell bonds loaded once, at a constant rate, until they break: rupture forces and the static peak.
@@ -1399,13 +1357,8 @@ def bell_rupture_force(loading_rate, zero_force_rate, bell_force):
     >>> print("%.4f %.4f" % tuple(bell_rupture_force([1e3, 1e4], 1.0, 1.0)))
     6.3379 8.6341
     """
-    if loading_rate == 0.0:
-        return 0.0
-    z = zero_force_rate * bell_force / math.fabs(loading_rate)
-    life = reduced(z, 0)
-    if z >= 1.0:
-        return loading_rate / zero_force_rate * life
-    return math.copysign(bell_force * life / z, loading_rate) if z > 0.0 else loading_rate
+    z = _pace(loading_rate, zero_force_rate, bell_force, 1.0)
+    return loading_rate / zero_force_rate * reduced(z, 0) if z > 0.0 else loading_rate
 
 
 @law
