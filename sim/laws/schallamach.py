@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import exprel
 
 from sim.numerics.jit import device, law
-from sim.numerics.special import lambert, reduced
+from sim.numerics.special import lambert, lambert_w, reduced
 
 Array = NDArray[np.float64]
 
@@ -907,18 +907,6 @@ def first_moment_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebi
     return np.multiply(site_density, force)
 
 
-@law
-def _mean_field_peak_speed(zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    tilt = 1.0 + lambert(rebinding_rate / zero_force_rate / math.e)
-    return zero_force_rate * bell_force / bond_stiffness * tilt * math.exp(tilt)
-
-
-@law
-def _mean_field_peak_force(zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    # the stiffness only broadcasts
-    return bell_force * lambert(rebinding_rate / zero_force_rate / math.e)
-
-
 def first_moment_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
     """Friction maximum of a mean-field Bell population.
 
@@ -944,8 +932,10 @@ def first_moment_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rat
     >>> print("%.3f %.6f" % first_moment_peak(1.0, 1.0, 1.0, 1.0, 1.0))
     4.591 0.278465
     """
-    arguments = (zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
-    return Peak(_mean_field_peak_speed(*arguments), np.multiply(site_density, _mean_field_peak_force(*arguments)))
+    rate, force, stiffness, binding = np.broadcast_arrays(zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
+    beyond = lambert_w(binding / rate / math.e)
+    speed = rate * force / stiffness * (1.0 + beyond) * np.exp(1.0 + beyond)
+    return Peak(speed, np.multiply(site_density, force * beyond))
 
 
 def first_moment_numbers(critical_speed, stress, bell_force, bond_stiffness, rebinding_ratio):
@@ -1422,20 +1412,6 @@ def start_up_force(time, speed, zero_force_rate, bell_force, bond_stiffness):
     return pull * alive if alive > 0.0 else 0.0
 
 
-@law
-def _peak_time(speed, zero_force_rate, bell_force, bond_stiffness):
-    return math.exp(-steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness)) / zero_force_rate
-
-
-@law
-def _start_up_peak_force(speed, zero_force_rate, bell_force, bond_stiffness):
-    tilt = steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness)
-    lost = math.expm1(-tilt) / tilt if tilt > 0.0 else -1.0
-    if tilt > 1.0:
-        return math.copysign(bell_force * tilt * math.exp(lost), speed)
-    return bond_stiffness * speed / zero_force_rate * math.exp(lost - tilt)
-
-
 def start_up_peak(speed, zero_force_rate, bell_force, bond_stiffness):
     """Static peak: the largest force of bonds that were unstretched when sliding began, none of which rebinds.
 
@@ -1464,8 +1440,9 @@ def start_up_peak(speed, zero_force_rate, bell_force, bond_stiffness):
     >>> print("%.4f %.4f" % tuple(start_up_peak([1e2, 1e4], 1.0, 1.0, 1.0).force))
     2.5451 6.2985
     """
-    arguments = (speed, zero_force_rate, bell_force, bond_stiffness)
-    return StartUpPeak(_peak_time(*arguments), _start_up_peak_force(*arguments))
+    tilt = lambert_w(np.multiply(bond_stiffness, np.abs(speed)) / np.multiply(zero_force_rate, bell_force))
+    steady_force = bond_stiffness * first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness)
+    return StartUpPeak(np.exp(-tilt) / zero_force_rate, steady_force * np.exp(-exprel(-tilt)))
 
 
 # A cluster of bonds that share a given force equally (Erdmann & Schwarz, PRL 92, 108102 (2004)).
