@@ -33,7 +33,7 @@ scenarios](../../scenarios), which say what they assume. Numbers are computed fr
 they are means over the members, with the standard error of the last digits in brackets.
 """
 #: Pixels an inch and colours of a picture, the first with which it is small enough, and its bytes.
-FINENESS, MOST_BYTES = ((140, 64), (140, 32), (120, 24), (110, 16)), 60_000
+FINENESS, MOST_BYTES = ((140, 256), (120, 256), (110, 128), (100, 128), (90, 64)), 60_000
 #: A number of an answer, or one with its standard error.
 Number = float | tuple[float, float]
 
@@ -95,9 +95,9 @@ class Entry(NamedTuple):
         for dpi, colours in FINENESS:
             drawn, small = io.BytesIO(), io.BytesIO()
             figure.savefig(drawn, format="png", dpi=dpi)
-            Image.open(drawn).convert("RGB").quantize(colours, dither=Image.Dither.NONE).save(
-                small, "png", optimize=True
-            )
+            picture = Image.open(drawn).convert("RGB")  # rare colours, such as those of a bar's ends, stay
+            palette = {"method": Image.Quantize.MAXCOVERAGE, "dither": Image.Dither.NONE}
+            picture.quantize(colours, **palette).save(small, "png", optimize=True)
             if small.tell() < MOST_BYTES:
                 break
         (FOLDER / f"{self.name}.png").write_bytes(small.getvalue())
@@ -427,7 +427,7 @@ def friction_loop(dataset: xr.Dataset) -> dict[str, Number]:
     "Which tangential force does a contact bear for ever, and how long a larger one?",
     """Up to {most:.2f} mN, where Bell's cluster of bonds comes apart. Under {held:g} mN it creeps at
     {creep:.2f} mm/s for good; under {more:g} mN it gives way after {late:.0f} ms, under {much:g} mN after
-    {soon:.1f} ms, before the first record, so that the figure has no curve of it.""",
+    {soon:.1f} ms.""",
 )
 def creep(dataset: xr.Dataset) -> dict[str, Number]:
     names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate", "site_density")
@@ -469,12 +469,15 @@ def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
 def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate", "site_density")
     peak = laws.schallamach.first_moment_peak(*(float(dataset[f"bonds_{name}"]) for name in names))
-    slips, events = analysis.slips(dataset).isel(member=0), analysis.stick_slip(dataset).isel(member=0)
-    mean = slips.mean("slip")
-    return {"onset": 1e3 * float(events["slips_from"]), "peak": 1e3 * float(peak.speed),
+    run = dataset.isel(member=0)
+    end = float(run["slip_end"].min())  # the first event begins at the maximum of friction, long before it slips
+    mean, last = analysis.slips(run).isel(slip=slice(1, None)).mean("slip"), float(run["slip_time"].max())
+    stage = run.sel(t=slice(end, last))
+    path, work = (float(stage[name][-1] - stage[name][0]) for name in ("stage_position", "drive_work"))
+    return {"onset": 1e3 * float(stage["stage_speed"][0]), "peak": 1e3 * float(peak.speed),
             "drop": 1e3 * float(mean["force_drop"]), "slip": 1e6 * float(mean["slip_amplitude"]),
             "static": 1e3 * float(mean["static_friction"]),
-            "kinetic": 1e3 * float(events["kinetic_friction"])}  # fmt: skip
+            "kinetic": 1e3 * work / path}  # fmt: skip
 
 
 @asks(
@@ -518,10 +521,11 @@ def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "motor_clutch",
     "On which substrate does a cell pull hardest: soft, stiff, or in between?",
-    """In between: on one of {best:g} pN/nm its clutches bear {most} of the {motors:g} pN that its motors can pull
-    with. On a softer one, of {soft:g} pN/nm, they bear {softly} pN: they load it for so long that they fail together.
-    On a stiff one, of {stiff:g} pN/nm, they bear {stiffly} pN, as each is torn off soon after it has bound, and the
-    filament glides at {glides} nm/s, hardly slower than free. These are means over the second half of the run.""",
+    """In between: on one whose stiffness, here that of the contact, is {best:g} pN/nm its clutches bear {most} of
+    the {motors:g} pN that its motors can pull with. On a softer one, of {soft:g} pN/nm, they bear {softly} pN: they
+    load it for so long that they fail together. On a stiff one, of {stiff:g} pN/nm, they bear {stiffly} pN, as each
+    is torn off soon after it has bound, and the filament glides at {glides} nm/s, hardly slower than free. These
+    are means over the second half of the run.""",
     kind="sweep",
 )
 def motor_clutch(dataset: xr.Dataset) -> dict[str, Number]:

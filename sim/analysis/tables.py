@@ -58,6 +58,7 @@ _COLUMNS = (
     _Column("displacement", "Δ", changing=True, meaning="displacement of the base, without one the indentation"),
     _Column("bond_fraction", "N/N0", 1.0),
     _Column("fluctuation_energy", "ΔΓ"),
+    _Column("edge_energy", "edge", meaning="energy of the fluctuations that new contact pays at its edge, dE/dA"),
     _Column("work_of_adhesion", "w", math.nan),
     _Column("contact_radius", "a", math.nan),
     _Column("area_ratio", "A/A_JKR", meaning="contact area over that with the full work of adhesion"),

@@ -85,6 +85,12 @@ def _stored(scene: Scenario, course: Trajectory) -> np.ndarray:
     return course.energy * cast(Shares, _terms(scene, course).margin).mean(_radius(scene, course))
 
 
+def _edge(scene: Scenario, course: Trajectory) -> np.ndarray:
+    """Return χ dE/dA, that part of ΔΓ which a unit of new contact at the edge of the disc pays [J/m²]."""
+    terms = _terms(scene, course)
+    return terms.fluctuating * cast(Shares, terms.margin)(_radius(scene, course))
+
+
 def _where_closed(course: Trajectory, reference: int, radius: np.ndarray) -> np.ndarray:
     """Radius of a reference contact [m], 0 where it is open."""
     return np.where(course.phases[:, : radius.shape[1], reference] == CLOSED, radius, 0.0)
@@ -300,6 +306,8 @@ VARIABLES: tuple[Variable, ...] = (
           lambda scene, course: course.stress),
     Variable("fluctuation_energy", "J/m^2", "elastic energy of the shear-stress fluctuations per area",
           "DeltaGamma", "shear", _stored),
+    Variable("edge_energy", "J/m^2", "energy of the fluctuations that a unit of new contact pays at the edge of the"
+          " disc", "dE/dA", "contact", _edge, lambda scene: scene.margin is not None, 'shear.contact = "disc"'),
     Variable("work_of_adhesion", "J/m^2", "work of adhesion left to the contact", "w", "contact",
           _until_stopped(lambda scene, course: course.work)),
     Variable("contact_radius", "m", "contact radius", "a", "contact", _until_stopped(_radius)),

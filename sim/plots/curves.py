@@ -44,7 +44,7 @@ _NAMED, _MOST = 10, 20
 _OF_CONTACT = ("contact_radius", "contact_area", "area_ratio", "friction_force")
 
 #: Markers that stand for line styles where points are not joined.
-_MARKS = {"-": "o", "--": "s", "-.": "^"}
+_MARKS = {"-": "o", "--": "s", "-.": "^", ":": "v"}
 
 #: Width of the place that the curves of a category share.
 _CATEGORY = 0.6
@@ -394,6 +394,9 @@ Panel = Callable[[Axes, Scene], None]
 #: Share of the largest energy below which the fluctuations' own has a panel of its own.
 _SMALL = 0.02
 
+#: Quantiles that an axis shows, of records whose whole range is larger by more than a factor.
+_USUAL, _FAR = (0.005, 0.995), 3.0
+
 #: Records that show a slip.
 _FINE = 3
 
@@ -406,6 +409,24 @@ def series(name: str, words: str, si: str) -> Panel:
 
     def panel_of(panel: Axes, scene: Scene) -> None:
         contact_curves(panel, scene, name, style.in_unit(panel.yaxis, words, scene.all(f"{name}_mean"), si))
+
+    return panel_of
+
+
+def _driven_panel(name: str, words: str, si: str) -> Panel:
+    """Return a panel of what drives a contact; few records far from the others do not rule its axis, but are stated."""
+    draw = series(name, words, si)
+
+    def panel_of(panel: Axes, scene: Scene) -> None:
+        draw(panel, scene)
+        values = scene.all(f"{name}_mean")
+        values = values[np.isfinite(values)]
+        low, high = np.quantile(values, _USUAL)
+        if np.ptp(values) > _FAR * (high - low) > 0.0:
+            factor, room = Unit.of(scene.all(f"{name}_mean"), si).factor, 0.3 * (high - low)
+            panel.set_ylim(factor * (low - room), factor * (high + room))
+            text = f"largest {style.rounded(np.max(values), si)}"
+            panel.text(0.02, 0.86, text, transform=panel.transAxes, va="top", fontsize=7)
 
     return panel_of
 
@@ -462,6 +483,7 @@ def _broken(values: np.ndarray) -> np.ndarray:
 _ENERGIES: Any = (
     ("bond_work", r"bonds left, $\Delta\gamma(N)$", style.BONDS, "-."),
     ("fluctuation_energy", r"fluctuations, $\Delta\Gamma$", style.FLUCTUATIONS, "--"),
+    ("edge_energy", r"paid at the edge, $\mathrm{d}E/\mathrm{d}A$", style.FLUCTUATIONS, ":"),
     ("work_of_adhesion", "left to the contact, $w$", style.BOTH, "-"),
 )
 
@@ -495,11 +517,13 @@ def _small_fluctuations(scene: Scene) -> bool:
 
 
 def share_panel(panel: Axes, scene: Scene) -> None:
-    """Draw A/A_JKR; for a single curve with the share of each mechanism, stacked from JKR's line down."""
+    """Draw A/A_JKR with the share of each mechanism, stacked from JKR's line down; a line parts those of several."""
     if scene.single:
         _stacked_shares(panel, scene)
     contact_curves(panel, scene, "area_ratio", 1.0)
     panel.axhline(1.0, linestyle="--", label="JKR", **style.GREY)
+    if not scene.single and scene.varies("lost_to_bonds") and scene.varies("lost_to_fluctuations"):
+        _reference(panel, scene, list(1.0 - scene.all("lost_to_bonds_mean")), "-.", "with the bonds left alone")
     ratios = []
     for line in scene.lines:
         hertz, jkr = (scene.values(f"{name}_radius_mean", line.whole) for name in ("hertz", "jkr"))
@@ -590,9 +614,19 @@ def time_figure(
     moved = not stays_held(dataset).all()
     shown = [name for name in _DRIVEN if (name != "displacement" or moved) and name != scene.over]
     shown = [name for name in shown if any(map(_changes, scene.all(f"{name}_mean")))]
-    driven = [(0.8, series(name, *_DRIVEN[name])) for name in shown]
-    first = area_panel if absolute else radius_panel
-    return stacked(scene, [(1.6, first), *further_panels(scene), *driven], ax=ax)[0]
+    driven = [(0.8, _driven_panel(name, *_DRIVEN[name])) for name in shown]
+    return _with_size(scene, [*further_panels(scene), *driven], absolute, ax=ax)[0]
+
+
+def _with_size(
+    scene: Scene, panels: list[tuple[float, Panel]], absolute: bool, room: float | None = None, ax: Axes | None = None
+) -> tuple[Figure, list[Axes]]:
+    """Return panels below that of the size of the contact, which is left out if others change and the size does not."""
+    if ax is None and panels and scene.measured is None and not scene.varies("contact_radius"):
+        figure, axes = stacked(scene, [(1.6, panels[0][1]), *panels[1:]], room)
+        style.legend(axes[0], scene.title)
+        return figure, axes
+    return stacked(scene, [(1.6, area_panel if absolute else radius_panel), *panels], room, ax)
 
 
 def coarse_slips(dataset: xr.Dataset) -> str:
@@ -644,7 +678,13 @@ def needs_sweep(dataset: xr.Dataset) -> None:
 def sweep_figure(
     dataset: xr.Dataset, x: str = "", absolute: bool = False, data: Measured | None = None, ax: Axes | None = None
 ) -> Figure:
-    """Contact radius, energies and friction over the first swept key; further keys make curves."""
+    """Contact radius, energies and friction over the first swept key; further keys make curves.
+
+    If all contacts are open at the end, their pull-off loads.
+    """
+    off = "pull_off_load" in dataset or "pull_off_load_mean" in dataset
+    if off and data is None and ax is None and not (style.recorded(dataset, "contact_radius").isel(t=-1) > 0.0).any():
+        return statement_figure(dataset, "pull_off_load")
     scene = (over(dataset, x) if x else over_key(dataset, style.swept(dataset)[0]))._replace(measured=data)
     room = None if not scene.width else (0.5 * scene.width + 0.1) / max(np.ptp(scene.x), 1.0)
     if not is_stationary(dataset):
@@ -654,8 +694,7 @@ def sweep_figure(
             ends = dict.fromkeys(style.text_of(end, "m/s") for end in (speed.min(), speed.max()))
             words.append(f"$V$ = {' to '.join(ends)}")
         scene = scene._replace(heading=", ".join(filter(None, [*words, scene.title])))
-    first = area_panel if absolute else radius_panel
-    figure, axes = stacked(scene, [(1.7, first), *further_panels(scene)], room, ax)
+    figure, axes = _with_size(scene, further_panels(scene), absolute, room, ax)
     if scene.width:
         names = dataset[scene.over].to_numpy()
         axes[-1].set_xticks(range(names.size), [str(value) for value in names])

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 #: Pixels that a cell has at least in a picture.
 PIXELS = 384
 
+#: Share of the pixels that the colours tell apart.
+_SHOWN = 0.999
+
 
 def needs_maps(dataset: xr.Dataset) -> None:
     """Refuse a dataset without stress maps."""
@@ -49,7 +52,7 @@ def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     solid = (float(point[f"effective_{name}"]) for name in ("shear_modulus", "poisson_ratio"))
     moved = displacement(stress.to_numpy(), sides, *solid)
     radius, speed = (float(_then(point, name, stress)) for name in ("contact_radius", "speed"))
-    figure, axes = style.pairs(3.1, shared=True)
+    figure, axes = style.pairs(0.6 + 2.5 * min(1.0, sides[1] / sides[0]), shared=True)
     length = style.Unit.of(np.array(sides), "m")
     sizes = [length.factor * size for size in (*sides, radius)]
     draw = _draw_measured if measured else _draw_map
@@ -104,13 +107,22 @@ def _draw_measured(panel: Axes, field: np.ndarray, sizes: list[float], about: tu
 
 
 def _image(panel: Axes, field: np.ndarray, extent: tuple, about: tuple) -> None:
-    """Draw a field (x, y) with x to the right, and a colour bar; ``about`` holds its SI unit, words and colour map."""
+    """Draw a field (x, y) with x to the right, and a colour bar; ``about`` holds its SI unit, words and colour map.
+
+    The bar has the colours of the field alone; few pixels beyond its ends do not rule it.
+    """
     si, words, colours = about
     unit = style.Unit.of(field, si)
-    most = unit.factor * np.max(np.abs(field)) or 1.0
-    look: Any = {"cmap": colours, "vmin": -most, "vmax": most, "origin": "lower", "interpolation": "nearest"}
-    image = panel.imshow(unit.factor * field.T, extent=extent, **look)
-    panel.figure.colorbar(image, cax=panel.inset_axes((1.03, 0.0, 0.045, 1.0)), label=unit.label(words))
+    field = unit.factor * field
+    most = np.quantile(np.abs(field), _SHOWN) or 1.0
+    cut = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+    extend = cut[bool(field.min() < -most), bool(field.max() > most)]
+    look: Any = {"cmap": style.part_of(colours, 0.05, 0.95), "vmin": -most, "vmax": most, "interpolation": "nearest"}
+    image = panel.imshow(field.T, extent=extent, origin="lower", **look)
+    beside: Any = {"cax": panel.inset_axes((1.03, 0.0, 0.045, 1.0)), "label": unit.label(words), "extend": extend}
+    bar = panel.figure.colorbar(image, extendfrac=0.03, **beside)
+    if np.ptp(field) > 0.0:
+        bar.ax.set_ylim(max(field.min(), -most), min(field.max(), most))
 
 
 def _target(dataset: xr.Dataset, point: xr.Dataset, stress: xr.DataArray) -> tuple[Any, float, str]:

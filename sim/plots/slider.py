@@ -125,10 +125,11 @@ def stability_figure(dataset: xr.Dataset) -> Figure:
     figure, axes = style.pairs(2.6, shared=True) if len(legs) > 1 else style.rows([2.6])
     fine = np.geomspace(edges[0], edges[-1], _FINE)
     boundary = _boundary(dataset, fine)
-    for panel, (words, leg) in zip(axes, legs.items(), strict=True):
-        swing = _swings(force.to_numpy()[:, leg], speed[leg], edges)
-        grey: Any = {"vmin": 0.0, "vmax": 1.0, "cmap": "Greys", "rasterized": True}  # greys that no page turns over
-        mesh = panel.pcolormesh(pace.factor * edges, hard.factor * rows, swing, **grey)
+    swings = [_swings(force.to_numpy()[:, leg], speed[leg], edges) for leg in legs.values()]
+    ends: Any = {"vmin": np.nanmin(swings), "vmax": np.nanmax(swings)}
+    grey = style.part_of("Greys", 0.0, 0.65)  # greys that no page turns over and that show a line
+    for panel, words, swing in zip(axes, legs, swings, strict=True):
+        mesh = panel.pcolormesh(pace.factor * edges, hard.factor * rows, swing, cmap=grey, rasterized=True, **ends)
         panel.plot(pace.factor * fine, hard.factor * boundary, label="theory: unstable below", **_FRAME)
         panel.set(yscale="log", ylim=hard.factor * rows[[0, -1]])
         style.across(panel, pace.factor * edges, pace.label("speed of the stage $V$"), "log")

@@ -32,8 +32,14 @@ BONDS, FLUCTUATIONS, BOTH, REFERENCE = "#0072B2", "#D55E00", "#000000", "#777777
 #: Colours of several curves.
 LINES = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
+
 #: Colours of many curves, none too light for paper.
-SHADES = mpl.colors.ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.92, 256)))
+def part_of(colours: str, first: float, last: float) -> mpl.colors.ListedColormap:
+    """Return the part of a colour map between two of its places, of 0 to 1."""
+    return mpl.colors.ListedColormap(mpl.colormaps[colours](np.linspace(first, last, 256)))
+
+
+SHADES = part_of("viridis", 0.0, 0.92)
 
 #: A closed form beneath what was simulated, a line that only guides the eye, and a marker with a white face.
 GREY: Any = {"color": REFERENCE, "linewidth": 0.9, "zorder": 1.5}
@@ -42,6 +48,9 @@ HOLLOW: Any = {"marker": "o", "markersize": 3.5, "mfc": "white", "linestyle": "n
 
 #: Look of all legends.
 LEGEND: Any = {"handletextpad": 0.5, "labelspacing": 0.25, "alignment": "left", "title_fontsize": 7.0}
+
+#: Fewest numbers of a linear axis.
+_TICKS_LEAST = 3
 
 _TICKS = {"direction": "in", "labelsize": 7.5, "major.width": 0.6, "minor.width": 0.4}
 STYLE: Any = {
@@ -91,6 +100,8 @@ def _panels(size: tuple[float, float], count: tuple[int, int], **options: Any) -
     figure = Picture(figsize=size, dpi=200, layout="constrained")
     FigureCanvasAgg(figure)
     axes = list(figure.subplots(*count, squeeze=False, **options).flat)
+    for panel in axes:
+        panel.locator_params(axis="y", min_n_ticks=_TICKS_LEAST)
     corner: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "right", "va": "bottom"}
     for mark, panel in zip(string.ascii_lowercase, axes if len(axes) > 1 else (), strict=False):
         panel.annotate(f"({mark})", (0.0, 1.0), (-2, 4), fontweight="bold", **corner)
@@ -245,6 +256,8 @@ def across(panel: Axes, x: np.ndarray, words: str, scale: str = "linear", room: 
     known = x[np.isfinite(x) & ((x > 0.0) | (scale != "log"))]
     low, high = known.min(), known.max()
     panel.set_xscale(scale, **({"linthresh": np.min(x[x > 0.0])} if scale == "symlog" else {}))
+    if scale == "linear":
+        panel.locator_params(axis="x", min_n_ticks=_TICKS_LEAST)
     if scale == "log" and high < 100.0 * low:
         plain_ticks(panel.xaxis)
     if scale != "symlog" and high > low:

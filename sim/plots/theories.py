@@ -27,9 +27,9 @@ _THEORIES: dict[str, tuple[str, str, Any]] = {
     "reversible_force": ("reversible, force held", style.LINES[5], "--"),
     "reversible_stress": ("reversible, stress held", style.LINES[2], "-"),
     "fraction": ("a fraction {share:.3g} reversible", style.LINES[3], "-."),
-    "scaled_angle": (r"mixed mode $1+\tan^2((1-\lambda)\psi)$", style.LINES[6], "-"),
-    "shear_share": (r"mixed mode $1/(1-(1-\lambda)\sin^2\psi)$", style.LINES[6], "--"),
-    "scaled_tangent": (r"mixed mode $1+(1-\lambda)\tan^2\psi$, $\lambda=$ {mixity:.3g}", style.LINES[6], "-."),
+    "scaled_angle": (r"mixed mode $1+\tan^2((1-\lambda)\psi)$", "#7A4B1F", "-"),
+    "shear_share": (r"mixed mode $1/(1-(1-\lambda)\sin^2\psi)$", "#6A3D9A", "--"),
+    "scaled_tangent": (r"mixed mode $1+(1-\lambda)\tan^2\psi$, $\lambda=$ {mixity:.3g}", "#8A9A00", "-."),
 }
 
 #: Reversible fraction that is drawn where the dataset has none of its own.
@@ -139,7 +139,7 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
     fine = np.geomspace(low, high, _FINE)
     areas = {name: np.pi * radius**2 for name, radius in case.radii(fine).items()}
     figure, axes = style.pairs(3.3, shared=True)
-    full, mark = areas["jkr"][0], style.HOLLOW | {"color": style.BOTH, "zorder": 4}
+    full, mark = areas["jkr"][0], style.HOLLOW | {"color": style.BOTH, "zorder": 1.8, "markersize": 2.8, "mew": 0.7}
     factor = style.in_unit(axes[0].yaxis, "contact area $A$", areas["jkr"], "m^2")
     for panel, (words, si, power) in zip(axes, _AXES, strict=True):
         unit = style.Unit.of(full**power * fine, si, logarithmic=True)
@@ -461,16 +461,11 @@ def _equilibria(panels: list[Axes], scene: Scene, theories: list[Theory], factor
 
 
 def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
-    """Draw the loads at which a dead load and fixed grips lose JKR's contact, with their names if all are the same."""
-    pulls = {factor * jkr.pull_off_load(*theory[:2]) for theory in theories if theory.work > 0.0}
-    panel.margins(y=0.15)  # a name stands below the lowest line
-    dead, grips = (0.01, 1.0, r"$-\frac{3}{2}\pi wR$"), (0.99, _GRIPS, r"$-\frac{5}{6}\pi wR$")
-    for pull in pulls:
-        for (x, share, text), ha, va in ((dead, "left", "top"), (grips, "right", "bottom")):
-            panel.axhline(share * pull, **style.GUIDE)
-            if len(pulls) == 1:
-                place: Any = {"transform": panel.get_yaxis_transform(), "ha": ha, "va": va}
-                panel.text(x, share * pull, text, color=style.REFERENCE, fontsize=7, **place)
+    """Draw the loads at which a dead load and fixed grips lose JKR's contact."""
+    levels = ((1.0, "-.", r"JKR under a dead load, $-3\pi wR/2$"), (_GRIPS, ":", r"in fixed grips, $-5\pi wR/6$"))
+    for pull in {factor * jkr.pull_off_load(*theory[:2]) for theory in theories if theory.work > 0.0}:
+        for share, dashes, text in levels:
+            panel.axhline(share * pull, linestyle=dashes, label=text, **style.GUIDE)
 
 
 def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]:

@@ -60,7 +60,8 @@ HINTS = {
     "stability": "Dark is stick-slip; below the line steady sliding is unstable in theory.",
     "creep": "A line of slope one is sliding at a constant speed; a line that bends up runs away.",
     "friction": "The area of the friction loop is the work of friction.",
-    "curve": "Blue is lost to broken bonds, vermilion to fluctuations; adhesion is masked on Hertz's dotted line.",
+    "curve": "Blue, or above a dash-dotted line, is lost to broken bonds, vermilion, or below it, to fluctuations;"
+    " adhesion is masked on Hertz's dotted line.",
     "sweep": "Each point is a run of its own.",
     "time": "The contact lies between JKR's radius and Hertz's.",
     "incipient": "Slip begins where the area leaves the dashed law.",

@@ -166,6 +166,11 @@ def test_a_map_passes_through_every_sample_and_a_measured_one_is_drawn_as_it_is(
     (image,) = panel.images
     assert_allclose(image.get_array().T * 1e3, values - values.mean(), rtol=0, atol=1e-6)
     left, right, low, high = image.get_extent()
+    bar = panel.child_axes[0]
+    most = 1e-3 * np.quantile(np.abs(values - values.mean()), 0.999)  # of 1280 normal numbers one is larger
+    assert_allclose(image.get_clim(), [-most, most], rtol=1e-12)
+    assert_allclose(sorted(np.abs(bar.get_ylim()))[-1], most, rtol=1e-12)
+    assert np.all(np.abs(bar.get_ylim()) <= 1e-3 * np.abs(values - values.mean()).max())
     assert_allclose((left, right, low, high), 9.0 * np.array([-20.5, 19.5, -16.5, 15.5]), rtol=1e-12)
     (circle,) = (patch for patch in panel.patches if isinstance(patch, Circle))
     assert circle.center == (0.0, 0.0)

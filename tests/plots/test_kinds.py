@@ -81,6 +81,18 @@ def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_wi
     assert "$P$ = 2 mN, $R$ = 2 mm" in names and "10 of 27 curves drawn" in title.replace("\n", " ")
 
 
+def test_several_curves_keep_their_mechanisms_by_a_line_of_the_area_with_the_bonds_left():
+    loads = {"contact.load": ["1 mN", "4 mN"]}
+    dataset = simulated(bonds=bonds.Steady(critical_speed=2e-2, stress=3e5), sweep=loads)
+    panel = plots.draw(dataset, "curve").axes[0]
+    lost = analysis.shares(dataset)["lost_to_bonds_mean"].transpose("contact_load", "t")
+    for colour, share in zip(pictures.LINES, lost, strict=False):
+        assert_allclose(drawn(panel, colour, "-.")[1], 1.0 - share, rtol=1e-12)
+    assert "with the bonds left alone" in legend_of(panel)[0]
+    alone = simulated(bonds=bonds.Steady(critical_speed=2e-2, stress=3e5), shear=shear.Uniform(), sweep=loads)
+    assert "with the bonds left alone" not in legend_of(plots.draw(alone, "curve").axes[0])[0]  # the curves themselves
+
+
 def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the_speed_jumps(ramp):
     figure = rendered(plots.draw(ramp, "curve"))
     found, shares = analysis.statistics(ramp), analysis.shares(ramp)

@@ -48,6 +48,21 @@ def test_slips_that_last_few_records_are_remarked_on_with_the_key_that_shows_the
     assert curves.coarse_slips(driven("pull")) == ""
 
 
+def test_few_fast_records_do_not_rule_the_axis_of_the_speed_and_are_stated_and_what_stays_is_left_out():
+    dataset = driven("pull").copy(deep=True)
+    dataset["speed"][:] = 1e-3 * np.linspace(1.0, 2.0, dataset.sizes["t"])
+    dataset["speed"][..., 7] = 0.5
+    panel = draw(dataset, "time").axes[-1]
+    assert panel.get_ylim()[0] < 1.0 and 2.0 < panel.get_ylim()[1] < 3.0
+    assert [text.get_text() for text in panel.texts if "largest" in text.get_text()] == ["largest 500 mm/s"]
+    assert not any("largest" in text.get_text() for text in draw(driven("pull"), "time").axes[-1].texts)
+    stays, changes = (
+        draw(driven(kind).isel(drive_stiffness=0) if kind == "map" else driven(kind), "time")
+        for kind in ("map", "pull")
+    )
+    assert "radius" in changes.axes[0].get_ylabel() and not any("radius" in panel.get_ylabel() for panel in stays.axes)
+
+
 def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_its_bonds():
     dataset = driven("map")
     figure = rendered(draw(dataset))

@@ -9,6 +9,7 @@ from helpers.scenes import BONDS, DRIVES, Band, Onset, RateDependent, Slip, Stre
 from numpy.testing import assert_allclose
 
 import sim
+from sim.analysis.tables import table
 from sim.engine import MemberNoise, follow
 from sim.laws import halfspace, jkr
 from sim.numerics.grid import Grid
@@ -79,6 +80,13 @@ def test_a_map_moves_with_the_slider_and_its_shares_go_smoothly_from_pixel_to_pi
     assert_allclose(at[1.0], moved(radius)[0], rtol=0.05)  # but for what came in at the end of the map
     shifted = np.fft.irfft2(np.fft.rfft2(patchy()) * np.exp(-2j * np.pi * np.fft.fftfreq(64) * 1.5)[:, None], (64, 48))
     assert_allclose(at[1.5], passing(shifted, 20.0)(radius)[0], rtol=0.05)
+
+
+def test_the_edge_pays_what_is_missing_of_the_work_of_adhesion_and_the_table_shows_it():
+    dataset = sim.run(sliding(measured(patchy() + 2e5, "disc"), bonds=Unbroken(stress=2e5)))
+    assert float(dataset["edge_energy"].max()) > 0.0
+    assert_allclose(dataset["work_of_adhesion"] + dataset["edge_energy"], 42e-3, rtol=1e-12)
+    assert any(heading.startswith("edge") for heading in table(dataset)[0])
 
 
 def test_a_map_that_was_drawn_saved_and_read_back_gives_the_same_trajectory(tmp_path):
