@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from sim.analysis import control, is_steady, loop_energy, setting, settled
 from sim.analysis.dataset import plain, stays_held
-from sim.analysis.events import cycles_of
+from sim.analysis.events import cycles_of, pull_offs
 from sim.laws import halfspace, jkr
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.plots import style
@@ -423,13 +423,18 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
 
 
 def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, kind: str, cycles: float) -> None:
-    """Draw one curve with its jumps: a cross at each pull-off, a ring at each jump-in; thin after its first cycle."""
+    """Draw one curve with its jumps: a cross at each pull-off, a ring at each jump-in; thin after its first cycle.
+
+    If members differ, crosses are their own pull-offs, at their lowest loads: their mean ends where the last comes off.
+    """
     x, gone, loads = scene.x[line.number], scene.opened(line), name == "normal_load"
     mean, _, low, high = (np.where(gone, np.nan, factor * values) for values in scene.drawn(name, line))
     along_load = scene.over == "normal_load"
-    if np.any(high > low) and not along_load:  # where the members' loads differ a band over their mean says nothing
-        style.fill(panel, x, low, high, color=line.colour, alpha=0.18, label="" if loads else scene.spread)
     first = int(np.ceil(len(x) / max(cycles, 1.0)))
+    known = scene.statistics.get(f"{name}_quantile") is not None  # a standard deviation reaches loads that none has
+    if known and np.any(high > low) and not along_load:  # a band over a mean of loads says nothing
+        shade: Any = {"color": line.colour, "alpha": 0.18, "label": "" if loads else scene.spread}
+        style.fill(panel, x[:first], low[:first], high[:first], **shade)
     panel.plot(x[:first], mean[:first], color=line.colour, label=line.label if loads else "")
     if first < len(x):
         later: Any = {"linewidth": _LATER, "label": "" if loads else "later cycles"}
@@ -437,10 +442,37 @@ def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, kind
     if loads:
         colour = line.colour if scene.single else style.REFERENCE  # the open spheres of all curves lie on each other
         panel.plot(x, np.where(gone, 0.0, np.nan), color=colour, linewidth=0.4)
+    off = _pull_offs(scene.statistics.dataset, line)
+    if off is not None:
+        if loads:
+            look: Any = {"color": line.colour, "markersize": 2.5, "linestyle": "none", "alpha": 0.6}
+            words = "mean pull-off" if "pull_off_load_std" in scene.statistics.dataset else "pull-off of each member"
+            panel.plot(scene.unit.factor * off[0], factor * off[1], "x", label=words, **look)
+        return
     if kind != "load" and not along_load:  # under a dead load the sphere leaves: no place to draw a jump to
         jumps = np.concatenate(scene.openings(line))
         panel.vlines(x[jumps], 0.0, mean[jumps], colors=line.colour, linestyles="dotted", linewidth=0.8)
     mark_jumps(panel, scene, name, line, factor, labelled=not loads)
+
+
+def _pull_offs(dataset: xr.Dataset, line: Line) -> np.ndarray | None:
+    """Return displacements [m] and loads [N] of the pull-offs of members, their means if no more is recorded.
+
+    None if members agree, or without the records; nan where the means are not of pull-offs alone.
+    """
+    names = ("pull_off_displacement", "pull_off_load")
+    with contextlib.suppress(KeyError):
+        if dataset.sizes.get("member", 1) > 1 and "member" in dataset["pull_off_load"].dims:
+            off = pull_offs(dataset)
+        elif "pull_off_load_std" in dataset:
+            phase, opened = ("phase_", "phase_") if "phase_detachment_count" in dataset else ("", "first_")
+            all_off = dataset[f"{opened}detachment_count"] == dataset[f"{phase}pull_off_load_count"]
+            off = xr.Dataset({name: dataset[f"{phase}{name}_mean"].where(all_off) for name in names})
+        else:
+            return None
+        off = off.isel(line.point, missing_dims="ignore")
+        return np.stack([off[name].to_numpy().ravel() for name in names])
+    return None
 
 
 def _equilibria(panels: list[Axes], scene: Scene, theories: list[Theory], factors: tuple[float, ...]) -> None:

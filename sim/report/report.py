@@ -54,7 +54,7 @@ Data = Path | str | Mapping[str, Any]
 
 #: Hint of how to read a figure of each kind.
 HINTS = {
-    "loop": "A cross is a pull-off, a ring a jump into contact; the enclosed area is energy lost.",
+    "loop": "A cross is a pull-off (of each member), a ring a jump into contact; the enclosed area is energy lost.",
     "theories": "Measured areas tell theories apart where their curves separate.",
     "stress": "A mark is the maximum of the stress; thin lines are closed forms.",
     "stability": "Dark is stick-slip; below the line steady sliding is unstable in theory.",

@@ -230,6 +230,7 @@ def test_every_variable_has_unit_and_long_name_and_stands_where_its_condition_ho
     scenes = [
         (set(), sample()), ({"fluctuations_radius"}, sample(contact=CONTACTS["partly reversible"])),
         ({"equilibrium_radius"}, sample(contact=CONTACTS["rate_dependent"])),
+        ({"edge_energy"}, sample(shear=SHEARS["modal on a disc"])),
         ({"applied_load"}, sample(contact=CONTACTS["load there and back"])),
         (driven, sample(drive=DRIVES["spring"], **bell)), (driven - stage, sample(drive=DRIVES["force"], **bell)),
     ]  # fmt: skip

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from helpers.parts import Clock, Ensemble, Equilibrium, bonds, jkr, shear
-from helpers.pictured import STEADY, drawn, legend_of, rendered, simulated
+from helpers.parts import Clock, Ensemble, Equilibrium, Record, bonds, jkr, shear
+from helpers.pictured import STEADY, drawn, field, legend_of, rendered, simulated
 from numpy.testing import assert_allclose
 
 from sim.analysis import loop_energy
@@ -123,6 +123,26 @@ def test_behind_a_machine_cycles_have_crosses_rings_verticals_and_the_energy_of_
         assert_allclose(spent, dataset["dissipated_energy"].max(), rtol=1e-14)
         legend = plots.draw(dataset, "loop").axes[0].get_legend()
         assert legend.get_title().get_text() == "dissipated in all: $W$"
+
+
+def test_members_that_differ_have_their_own_pull_offs_and_a_deviation_alone_makes_no_band():
+    parts = {"shear": field(), "ensemble": Ensemble(members=3)}
+    dataset = moved(MACHINE, **parts)
+    loads, radii, over_load = plots.draw(dataset, "loop").axes
+    ((place, load),) = marks(loads, "x")
+    assert not marks(radii, "x") and not marks(over_load, "x") and loads.collections
+    # in each of two cycles the lowest load of each member: below that of its records
+    half = dataset.sizes["t"] // 2
+    cycles = [dataset["normal_load"].isel(t=slice(first, first + half)).min("t") for first in (0, half)]
+    known = np.isfinite(load)
+    lowest = 1e6 * np.sort(np.concatenate([cycle.to_numpy().ravel() for cycle in cycles]))
+    assert known.sum() == 6 and np.all(np.sort(load[known]) <= lowest * (1.0 - 1e-12))
+    assert np.all(np.diff(np.sort(place[known])) > 0.0)
+    sparse = moved(MACHINE, **parts, record=Record(per_member=False))
+    loads, *_ = plots.draw(sparse, "loop").axes
+    assert not loads.collections and "mean pull-off" in legend_of(loads)[0]
+    ((_, means),) = marks(loads, "x")
+    assert_allclose(np.nanmean(means), np.mean(load[known]), rtol=1e-9)
 
 
 def test_each_value_of_a_sweep_has_its_curves():
