@@ -400,6 +400,9 @@ _USUAL, _FAR = (0.005, 0.995), 3.0
 #: Records that show a slip.
 _FINE = 3
 
+#: Shares below it are nothing.
+_ROUNDING = 1e-12
+
 #: Opacity of the shades that show what a mechanism takes.
 _SHADE = 0.35
 
@@ -457,7 +460,9 @@ def _same(curves: Sequence[np.ndarray]) -> bool:
     return all(np.array_equal(values, curves[0], equal_nan=True) for values in curves)
 
 
-def _reference(panel: Axes, scene: Scene, curves: list[np.ndarray], dashes: str, name: str) -> None:
+def _reference(
+    panel: Axes, scene: Scene, curves: list[np.ndarray], dashes: str, name: str, zorder: float = 1.5
+) -> None:
     """Draw lines of a closed form: one grey line if all curves have the same, else lines in their colours."""
     known = [_broken(values) for values in curves]
     if not np.any(np.isfinite(known)):
@@ -469,7 +474,7 @@ def _reference(panel: Axes, scene: Scene, curves: list[np.ndarray], dashes: str,
             half = 0.5 * scene.width
             x, y = np.stack([x - half, x + half, x], axis=1).ravel(), np.repeat(y, 3)
             y[2::3] = np.nan
-        panel.plot(x, y, dashes, **style.GREY | ({} if same else {"color": line.colour}))
+        panel.plot(x, y, dashes, **style.GREY | {"zorder": zorder} | ({} if same else {"color": line.colour}))
     panel.plot([], [], dashes, label=name, **style.GREY)
 
 
@@ -522,8 +527,11 @@ def share_panel(panel: Axes, scene: Scene) -> None:
         _stacked_shares(panel, scene)
     contact_curves(panel, scene, "area_ratio", 1.0)
     panel.axhline(1.0, linestyle="--", label="JKR", **style.GREY)
-    if not scene.single and scene.varies("lost_to_bonds") and scene.varies("lost_to_fluctuations"):
-        _reference(panel, scene, list(1.0 - scene.all("lost_to_bonds_mean")), "-.", "with the bonds left alone")
+    if not scene.single:  # of curves that lose to both, in front of a curve without fluctuations
+        lost = [scene.all(f"lost_to_{name}_mean") for name in ("bonds", "fluctuations")]
+        known = np.all(np.max(np.nan_to_num(lost), axis=2) > _ROUNDING, axis=0)
+        bonds = list(np.where(known[:, np.newaxis], 1.0 - lost[0], np.nan))
+        _reference(panel, scene, bonds, "-.", "with the bonds left alone", zorder=2.5)
     ratios = []
     for line in scene.lines:
         hertz, jkr = (scene.values(f"{name}_radius_mean", line.whole) for name in ("hertz", "jkr"))
