@@ -319,8 +319,9 @@ def narrow(rows: list[dict[str, str]], keys: int, most: int = 10) -> list[list[d
 def _places(places: xr.Dataset, points: Points) -> Columns:
     """Return the columns of the place in the sweep and the time of each row."""
     cells: Columns = {}
+    several = len(points.keys() - {"t"}) > 1  # then long names on one line part their values
     for name, index in points.items():
-        cells |= _cells(name, places[name].attrs.get("units", "1"), places[name][index].to_numpy())
+        cells |= _cells(name.replace("_", "_\n", 1) if several else name, places[name].attrs.get("units", "1"), places[name][index].to_numpy())
     return cells
 
 

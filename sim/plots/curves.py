@@ -727,7 +727,7 @@ def statement_figure(dataset: xr.Dataset, name: str) -> Figure:
     figure, (panel,) = style.rows([2.2])
     sizes = np.concatenate([each.to_numpy().ravel() for each in values])
     text = str(mean.attrs.get("long_name", name)).removeprefix("ensemble mean of ").partition(",")[0]
-    factor = style.in_unit(panel.yaxis, "\n".join(textwrap.wrap(text, 44)), sizes, str(mean.attrs.get("units", "1")))
+    factor = style.in_unit(panel.yaxis, "\n".join(textwrap.wrap(text, 36)), sizes, str(mean.attrs.get("units", "1")))
     for line in lines:
         points = {dim: at for dim, at in line.point.items() if dim in mean.dims}
         curves = [factor * np.broadcast_to(each.isel(points).to_numpy(), x.size)[order] for each in values]

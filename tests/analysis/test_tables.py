@@ -53,7 +53,7 @@ def test_tables_have_a_dozen_rows_or_one_for_each_point(ramp):
         }
         dataset = run(scene(drive=drive.Steady(speed=1e-2), shear=shear.Uniform(), sweep=sweep))
         table = analysis.table(dataset)
-        assert len(table) == rows and [row["contact_load\n(mN)"] for row in (table[0], table[-1])] == ["1", "9"]
+        assert len(table) == rows and [row["contact_\nload (mN)"] for row in (table[0], table[-1])] == ["1", "9"]
         assert not any(heading.startswith("t\n") for heading in table[0])
     rows = analysis.table(run(scene(sweep={"contact.load": ["1 mN", "4 mN"]}, shear=shear.Uniform())))
     points = [(row["contact_load\n(mN)"], row["t\n(ms)"]) for row in rows]
