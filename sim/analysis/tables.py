@@ -321,7 +321,8 @@ def _places(places: xr.Dataset, points: Points) -> Columns:
     cells: Columns = {}
     several = len(points.keys() - {"t"}) > 1  # then long names on one line part their values
     for name, index in points.items():
-        cells |= _cells(name.replace("_", "_\n", 1) if several else name, places[name].attrs.get("units", "1"), places[name][index].to_numpy())
+        heading = name.replace("_", "_\n", 1) if several else name
+        cells |= _cells(heading, places[name].attrs.get("units", "1"), places[name][index].to_numpy())
     return cells
 
 
