@@ -226,7 +226,7 @@ def lag(point: Scenario, slower: float = 1.0) -> tuple[float, float, float]:
         largest [m/s]. They are nan without a contact.
     """
     shear, courses = cast(Any, point.fluctuations), []
-    begin: dict[str, Any] = {"bonds.start": "steady"} if hasattr(point.bonds, "start_from") else {}
+    begin: dict[str, Any] = {"bonds.start": "steady"}  # bonds without a start do not read it
     if not math.isinf(shear.side(point.setting.cell)):
         begin["shear"] = Mean(shear.spectrum, shear.law, shear.paid_by_adhesion, shear.contact)
     for factor in (slower, _VERY_SLOW):
@@ -248,7 +248,7 @@ def _lagging(point: Scenario) -> Iterator[str]:
     Nothing is said of few bonds and of an amplitude that relaxes, which ``lag`` does not follow, nor of a part that
     feeds back, which it follows slowly.
     """
-    left_out = hasattr(point.population, "sites") or point.fluctuations.law.relaxing or point.by_steps
+    left_out = point.population.per_member or point.fluctuations.law.relaxing or point.by_steps
     if point.drive.model == "ramp" and not left_out and max((behind := lag(point))[:2]) > _LAG:
         values, longer = [100.0 * value for value in behind[:2] + lag(point, 10.0)[:2]], 10.0 * point.clock.duration
         yield (
