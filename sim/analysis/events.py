@@ -23,7 +23,7 @@ from sim.analysis.dataset import (
     word,
 )
 from sim.analysis.observables import labelled, pure
-from sim.parts.events import SLIP
+from sim.units.notation import SLIP_EVENT
 
 #: Speeds of a stage that gets faster or slower between which slips follow each other.
 _ENDS = {
@@ -84,7 +84,7 @@ def slips(dataset: xr.Dataset) -> xr.Dataset:
         raise ValueError("slips need each member; record them: [record] per_member = true")
     if not bool((word(dataset, "drive.model", "") == "spring").any()):
         raise ValueError('slips need a stage that pulls through a spring: [drive] model = "spring"')
-    event = {name: dataset[f"slip_{name}"].astype(float) for name in SLIP.names or ()}
+    event = {name: dataset[f"slip_{name}"].astype(float) for name in SLIP_EVENT}
     begins, following = event["time"], event["time"].shift(slip=-1)
     values = {
         "slip_time": begins, "slip_duration": event["end"] - begins, "stick_duration": following - event["end"],

@@ -226,7 +226,7 @@ def lag(point: Scenario, slower: float = 1.0) -> tuple[float, float, float]:
         largest [m/s]. They are nan without a contact.
     """
     shear, courses = cast(Any, point.fluctuations), []
-    begin: dict[str, Any] = {"bonds.start": "steady"} if point.bonds.stretched else {}
+    begin: dict[str, Any] = {"bonds.start": "steady"} if point.population.stretched else {}
     if not math.isinf(shear.side(point.setting.cell)):
         begin["shear"] = Mean(shear.spectrum, shear.law, shear.paid_by_adhesion, shear.contact)
     for factor in (slower, _VERY_SLOW):

@@ -10,10 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.numerics.jit import device, kernel
-from sim.parts.contact import Contact
-from sim.parts.drive import Drive, Force
-from sim.parts.exchange import Array, Bonding, ContactState, Motion, Times, during, record
-from sim.units.tables import Pieces
+from sim.parts.exchange import Array, Bonding, ContactState, Motion, during, record
+from sim.units.notation import SLIP_EVENT
 
 #: Arrays that are read alone, as they come.
 _READ = "Array(float64, 2, 'A', readonly=True), "
@@ -34,75 +32,6 @@ TURN = record("opening closing radius")
 CONTACT = record("last detached detachments masked closed hidden " + " ".join(TURN.names or ()))
 #: Columns of it that are read at each step, as a view of a record costs more than the rest.
 _DETACHED, _CLOSED = ((CONTACT.names or ()).index(name) for name in ("detached", "closed"))
-#: Phases of a run that are told apart at most.
-MOST_PHASES = 1000
-
-
-#: Times nearer than this share of the run, and values nearer than this share of the largest, are the same.
-_SAME = 1e-9
-
-
-class Phases(NamedTuple):
-    """Phases of a run: their starts [s], names, and the first clock step of each."""
-
-    starts: tuple[float, ...]
-    names: tuple[str, ...]
-    steps: tuple[int, ...]
-
-
-def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
-    """Return the phases of a run: maximal intervals in which no prescribed course turns, stops, starts or jumps.
-
-    The speed of a drive keeps its sign, too. A phase that is shorter than a clock step is none.
-    """
-    whole = np.array([0.0, times.duration])
-    forced, kind = isinstance(drive, Force), contact.kind
-    course = drive.driven if isinstance(drive, Force) else drive.pieces
-    moved = _turns(course(whole, times.duration), signed=True)
-    pressed = _turns(contact.course.pieces(whole, times.duration), signed=False)
-    words = "force" if forced else "speed"
-    of_drive = {
-        0.0: f"constant {words}" if forced else "sliding",
-        1.0: f"increasing {words}",
-        -1.0: f"decreasing {words}",
-    }
-    of_contact = {0.0: f"constant {kind}", 1.0: "approach", -1.0: "retraction"}
-    starts = sorted({*moved, *pressed})
-    result: dict[int, tuple[float, str]] = {}
-    for start in starts:
-        place = [max(at for at in course if at <= start) for course in (moved, pressed)]
-        sense, trend = moved[place[0]]
-        names = ["rest" if sense == 0.0 else of_drive[trend], of_contact[pressed[place[1]][1]]]
-        shown = [name for name, course in zip(names, (moved, pressed), strict=True) if len(course) > 1]
-        step = math.floor(start / times.step + 0.5) + 1  # the first whose middle is later
-        if step <= times.steps:
-            result[step] = start, ", ".join(shown or names[:1])
-    kept = sorted(result)[:MOST_PHASES]
-    return Phases(tuple(result[step][0] for step in kept), tuple(result[step][1] for step in kept), tuple(kept))
-
-
-def _turns(pieces: Pieces, signed: bool) -> dict[float, tuple[float, float]]:
-    """Return the starts of intervals [s] in which a course keeps its sense and its trend, with both.
-
-    The sense of a course that is not ``signed`` is 1; the trend of one that is that of its magnitude.
-    """
-    largest = max(np.abs(pieces.first).max(), np.abs(pieces.last).max())
-    result: dict[float, tuple[float, float]] = {}
-    before, value = (math.nan, math.nan), math.nan
-    for start, stop, first, last in zip(*pieces[1:5], strict=True):
-        crossing = start + (stop - start) * first / (first - last) if signed and first * last < 0.0 else stop
-        for at, low, high in (
-            ((start, first, 0.0), (crossing, 0.0, last)) if crossing < stop else ((start, first, last),)
-        ):
-            sense = float(np.sign(low + high)) if signed else 1.0
-            change = (high - low) * sense
-            now = sense, float(np.sign(change)) if abs(change) > _SAME * largest else 0.0
-            if now != before or abs(low - value) > _SAME * largest:
-                result[float(at)] = now
-            before, value = now, high
-    return result
-
-
 #: Fall of the spring force that makes a slip event, and rise that ends it, over the largest force so far.
 FALL, RISE = 0.3, 0.1
 #: Slip of the interface over the slider's advance in a slip event, at least.
@@ -112,7 +41,7 @@ MOST_SLIPS = 1000
 #: A slip event: its time (that of the force's maximum) and its end [s], the slider's advance [m], speed of the stage
 #: at its time [m/s], spring force there and at its end [N], largest stress since the event before and least stress in
 #: the event [Pa]. Forces and stresses are in the sense in which the stage moves.
-SLIP = record("time end amplitude speed force_before force_after stress_before stress_after")
+SLIP = record(" ".join(SLIP_EVENT))
 #: Work of the stage [J], path of the stage and of the slider [m], all since the start.
 _GONE = "work", "path", "gone"
 #: State of the detector: sense in which the stage moves and its position, that of the slider, slip of the interface so

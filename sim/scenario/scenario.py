@@ -18,7 +18,6 @@ from sim.parts.contact import Contact
 from sim.parts.contact.balance import Bodies, Shares
 from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import Drive, Steady as SteadyDrive
-from sim.parts.events import Phases, phases
 from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
 from sim.parts.shear.maps import CarriedProcess
@@ -27,6 +26,7 @@ from sim.scenario.checks import faults_across, pulled, remarks_between, remarks_
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
+from sim.scenario.phases import Phases, phases
 from sim.scenario.schema import as_html, entries, quantities, with_models
 from sim.scenario.sweep import read_sweep, rows, set_key
 from sim.units.errors import BadInput
