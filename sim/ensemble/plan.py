@@ -235,7 +235,8 @@ class Plan:
 
     @property
     def _scenario_bytes(self) -> float:
-        return _SCENARIO_BYTES + _VARIABLE_BYTES * self.late
+        pooled = [] if self.per_member else list(filter(self.varies, self.variables + self.largest))
+        return _SCENARIO_BYTES + _VARIABLE_BYTES * (self.late + _STATISTICS * len(pooled))
 
     @property
     def late(self) -> int:

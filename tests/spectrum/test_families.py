@@ -35,7 +35,7 @@ ANISOTROPIC = {
 WITH_DENSITY = ISOTROPIC | ANISOTROPIC
 ALL = WITH_DENSITY | {
     "ripple": Ripple(2.0, 3.0, 0.3),
-    "measured": Measured("map.csv", 0.1, "hann", "shear_map", (1.0, 2.0), (3.0, 4.0)),
+    "measured": Measured("map.csv", 0.1, "hann", wavenumbers=(1.0, 2.0), densities=(3.0, 4.0)),
 }
 
 

@@ -34,7 +34,7 @@ FAMILIES = {
     "self-affine 0.8": SelfAffine(RMS, 0.8, longest=50e-6, rolloff=20e-6, shortest=5.6e-6),
     "self-affine 1": SelfAffine(RMS, 1.0, longest=100e-6, rolloff=100e-6, shortest=5.6e-6),
     "tabulated": Tabulated((1e5, 2e5, 3e5, 5e5, 9e5), (0.0, 3.0, 3.0, 0.2, 0.0)),
-    "measured": Measured("map.csv", 1e-6, "none", "shear_map", (6e4, 3e5, 1e6), (3.0, 4.0, 0.1)),
+    "measured": Measured("map.csv", 1e-6, wavenumbers=(6e4, 3e5, 1e6), densities=(3.0, 4.0, 0.1)),
     "ripple": Ripple(RMS, 20e-6, 0.3),
 }
 MEMORIES = {
