@@ -407,28 +407,17 @@ _ROUNDING = 1e-12
 _SHADE = 0.35
 
 
-def series(name: str, words: str, si: str) -> Panel:
-    """Return a panel of one observable."""
+def series(name: str, words: str, si: str, usual: bool = False) -> Panel:
+    """Return a panel of one observable; if ``usual``, few records far from the others are stated and do not rule it."""
 
     def panel_of(panel: Axes, scene: Scene) -> None:
-        contact_curves(panel, scene, name, style.in_unit(panel.yaxis, words, scene.all(f"{name}_mean"), si))
-
-    return panel_of
-
-
-def _driven_panel(name: str, words: str, si: str) -> Panel:
-    """Return a panel of what drives a contact; few records far from the others do not rule its axis, but are stated."""
-    draw = series(name, words, si)
-
-    def panel_of(panel: Axes, scene: Scene) -> None:
-        draw(panel, scene)
         values = scene.all(f"{name}_mean")
-        values = values[np.isfinite(values)]
-        low, high = np.quantile(values, _USUAL)
-        if np.ptp(values) > _FAR * (high - low) > 0.0:
-            factor, room = Unit.of(scene.all(f"{name}_mean"), si).factor, 0.3 * (high - low)
-            panel.set_ylim(factor * (low - room), factor * (high + room))
-            text = f"largest {style.rounded(np.max(values), si)}"
+        factor = style.in_unit(panel.yaxis, words, values, si)
+        contact_curves(panel, scene, name, factor)
+        low, high = np.nanquantile(values, _USUAL) if usual else (0.0, 0.0)
+        if high > low and np.nanmax(values) - np.nanmin(values) > _FAR * (high - low):
+            panel.set_ylim(factor * (1.3 * low - 0.3 * high), factor * (1.3 * high - 0.3 * low))
+            text = f"largest {style.rounded(np.nanmax(values), si)}"
             panel.text(0.02, 0.86, text, transform=panel.transAxes, va="top", fontsize=7)
 
     return panel_of
@@ -460,9 +449,7 @@ def _same(curves: Sequence[np.ndarray]) -> bool:
     return all(np.array_equal(values, curves[0], equal_nan=True) for values in curves)
 
 
-def _reference(
-    panel: Axes, scene: Scene, curves: list[np.ndarray], dashes: str, name: str, zorder: float = 1.5
-) -> None:
+def _reference(panel: Axes, scene: Scene, curves: list[np.ndarray], dashes: str, name: str, **look: Any) -> None:
     """Draw lines of a closed form: one grey line if all curves have the same, else lines in their colours."""
     known = [_broken(values) for values in curves]
     if not np.any(np.isfinite(known)):
@@ -474,7 +461,7 @@ def _reference(
             half = 0.5 * scene.width
             x, y = np.stack([x - half, x + half, x], axis=1).ravel(), np.repeat(y, 3)
             y[2::3] = np.nan
-        panel.plot(x, y, dashes, **style.GREY | {"zorder": zorder} | ({} if same else {"color": line.colour}))
+        panel.plot(x, y, dashes, **style.GREY | look | ({} if same else {"color": line.colour}))
     panel.plot([], [], dashes, label=name, **style.GREY)
 
 
@@ -523,11 +510,12 @@ def _small_fluctuations(scene: Scene) -> bool:
 
 def share_panel(panel: Axes, scene: Scene) -> None:
     """Draw A/A_JKR with the share of each mechanism, stacked from JKR's line down; a line parts those of several."""
-    if scene.single:
+    steps = np.diff(scene.parted(scene.lines[0])[0])  # shades of there and back would lie on each other
+    if is_shaded := scene.single and bool(np.all(steps >= 0.0) or np.all(steps <= 0.0)):
         _stacked_shares(panel, scene)
     contact_curves(panel, scene, "area_ratio", 1.0)
     panel.axhline(1.0, linestyle="--", label="JKR", **style.GREY)
-    if not scene.single:  # of curves that lose to both, in front of a curve without fluctuations
+    if not is_shaded:  # of curves that lose to both, in front of a curve without fluctuations
         lost = [scene.all(f"lost_to_{name}_mean") for name in ("bonds", "fluctuations")]
         known = np.all(np.max(np.nan_to_num(lost), axis=2) > _ROUNDING, axis=0)
         bonds = list(np.where(known[:, np.newaxis], 1.0 - lost[0], np.nan))
@@ -546,11 +534,6 @@ def _stacked_shares(panel: Axes, scene: Scene) -> None:
     line = scene.lines[0]
     bonds, ratio = 1.0 - scene.values("lost_to_bonds_mean", line), scene.values("area_ratio_mean", line)
     x, bonds, ratio = scene.parted(line, bonds, ratio)
-    steps = np.diff(x)
-    if not (np.all(steps >= 0.0) or np.all(steps <= 0.0)):  # shades of there and back would lie on each other
-        if scene.varies("lost_to_bonds"):
-            panel.plot(x, bonds, "-.", color=style.BONDS, label="with the bonds left alone")
-        return
     if scene.varies("lost_to_bonds"):
         style.fill(panel, x, bonds, np.ones_like(bonds), color=style.BONDS, alpha=_SHADE, label="lost to broken bonds")
     if scene.varies("lost_to_fluctuations"):
@@ -622,7 +605,7 @@ def time_figure(
     moved = not stays_held(dataset).all()
     shown = [name for name in _DRIVEN if (name != "displacement" or moved) and name != scene.over]
     shown = [name for name in shown if any(map(_changes, scene.all(f"{name}_mean")))]
-    driven = [(0.8, _driven_panel(name, *_DRIVEN[name])) for name in shown]
+    driven = [(0.8, series(name, *_DRIVEN[name], usual=True)) for name in shown]
     return _with_size(scene, [*further_panels(scene), *driven], absolute, ax=ax)[0]
 
 

@@ -49,9 +49,6 @@ HOLLOW: Any = {"marker": "o", "markersize": 3.5, "mfc": "white", "linestyle": "n
 #: Look of all legends.
 LEGEND: Any = {"handletextpad": 0.5, "labelspacing": 0.25, "alignment": "left", "title_fontsize": 7.0}
 
-#: Fewest numbers of a linear axis.
-_TICKS_LEAST = 3
-
 _TICKS = {"direction": "in", "labelsize": 7.5, "major.width": 0.6, "minor.width": 0.4}
 STYLE: Any = {
     "font.family": "STIXGeneral", "mathtext.fontset": "stix",
@@ -101,7 +98,7 @@ def _panels(size: tuple[float, float], count: tuple[int, int], **options: Any) -
     FigureCanvasAgg(figure)
     axes = list(figure.subplots(*count, squeeze=False, **options).flat)
     for panel in axes:
-        panel.locator_params(axis="y", min_n_ticks=_TICKS_LEAST)
+        panel.locator_params(axis="y", min_n_ticks=3)
     corner: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "right", "va": "bottom"}
     for mark, panel in zip(string.ascii_lowercase, axes if len(axes) > 1 else (), strict=False):
         panel.annotate(f"({mark})", (0.0, 1.0), (-2, 4), fontweight="bold", **corner)
@@ -257,7 +254,7 @@ def across(panel: Axes, x: np.ndarray, words: str, scale: str = "linear", room: 
     low, high = known.min(), known.max()
     panel.set_xscale(scale, **({"linthresh": np.min(x[x > 0.0])} if scale == "symlog" else {}))
     if scale == "linear":
-        panel.locator_params(axis="x", min_n_ticks=_TICKS_LEAST)
+        panel.locator_params(axis="x", min_n_ticks=3)
     if scale == "log" and high < 100.0 * low:
         plain_ticks(panel.xaxis)
     if scale != "symlog" and high > low:
