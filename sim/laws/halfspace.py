@@ -951,40 +951,6 @@ def _cross_weight(points, radius, poisson_ratio):
 # Profiles of stress and displacement across one contact.
 
 
-@device
-def _lever(turn):
-    """sin(turn) - turn cos(turn), without cancellation where it is turn^3/3."""
-    if turn > 0.5:
-        return math.sin(turn) - turn * math.cos(turn)
-    square = turn * turn
-    term = turn * square / 3.0
-    total = 0.0
-    for k in range(1, 9):  # terms fall as (turn^2/2k)^k: the ninth is below 1e-19 of the first
-        total += term
-        term *= -square / (2.0 * k * (2.0 * k + 3.0))
-    return total
-
-
-@device
-def _opening(t):
-    """t + (t^2 - 1) atan t, without cancellation where it is 4 t^3/3."""
-    if t > 0.2:
-        return t + (t * t - 1.0) * math.atan(t)
-    square = t * t
-    power = t * square
-    total = 0.0
-    for k in range(1, 14):  # 0.04^13 is below 1e-18
-        total += power * 4.0 * k / (4.0 * k * k - 1.0)
-        power *= -square
-    return total
-
-
-@device
-def _slant(r, radius):
-    """sqrt(r^2 - a^2) outside, sqrt(a^2 - r^2) inside."""
-    return math.sqrt(abs(r - radius)) * math.sqrt(r + radius)
-
-
 @law
 def pressure(r, radius, indentation, sphere_radius, modulus):
     """Normal stress between sphere and half-space.
@@ -1021,13 +987,12 @@ def pressure(r, radius, indentation, sphere_radius, modulus):
     """
     if r > radius:
         return 0.0
-    slant = _slant(r, radius)
+    slant = math.sqrt(radius - r) * math.sqrt(radius + r)
     missing = radius * (radius / sphere_radius) - indentation
     hertz = 2.0 * modulus / math.pi * (slant / sphere_radius)
     return hertz if missing == 0.0 else hertz - modulus / math.pi * (missing / slant)
 
 
-@law
 def normal_displacement(r, radius, indentation, sphere_radius):
     """Displacement of the surface of the half-space along the normal, into it.
 
@@ -1057,14 +1022,16 @@ def normal_displacement(r, radius, indentation, sphere_radius):
     >>> print(f"{normal_displacement(1.0, 1.0, -0.5, 1.0):.2f} {normal_displacement(2.0, 1.0, -0.5, 1.0):.2f}")
     -1.00 -0.28
     """
-    if r <= radius:
-        return indentation - 0.5 * r * (r / sphere_radius)
-    turn = math.atan2(radius, _slant(r, radius))  # asin would lose half its digits at the edge
+    r = np.asarray(r, dtype=float)
+    outside = np.maximum(r, radius)
+    # the arcsine of radius/r would lose half its digits at the edge
+    turn = np.arctan2(radius, np.sqrt(outside - radius) * np.sqrt(outside + radius))
+    lever = (2.0 * turn) ** 3 / 3.0 * scipy.special.hyp0f1(2.5, -(turn**2))  # sin 2t - 2t cos 2t without cancellation
     punch = indentation - radius * (radius / sphere_radius)
-    return 0.5 / math.pi * r * (r / sphere_radius) * _lever(2.0 * turn) + 2.0 / math.pi * punch * turn
+    free = 0.5 / math.pi * outside * (outside / sphere_radius) * lever + 2.0 / math.pi * punch * turn
+    return np.where(r <= radius, indentation - 0.5 * r * (r / sphere_radius), free)[()]
 
 
-@law
 def gap(r, radius, indentation, sphere_radius):
     """Distance between the surfaces of sphere and half-space along the normal.
 
@@ -1091,11 +1058,10 @@ def gap(r, radius, indentation, sphere_radius):
     >>> print("%.2e %.2e" % tuple(gap(1.0001, 1.0, [1.0, 0.9], 1.0)))
     1.20e-06 9.01e-04
     """
-    if r <= radius:
-        return 0.0
-    t = _slant(r, radius) / radius
+    t = np.sqrt(np.maximum(np.subtract(r, radius), 0.0)) * np.sqrt(np.add(r, radius)) / radius
+    opening = t**2 * np.arctan(t) + t**3 / 3.0 * scipy.special.hyp2f1(1.0, 1.5, 2.5, -(t**2))  # t + (t^2 - 1) atan t
     hertz = radius * (radius / sphere_radius)
-    return hertz / math.pi * _opening(t) + 2.0 / math.pi * (hertz - indentation) * math.atan(t)
+    return hertz / math.pi * opening + 2.0 / math.pi * np.subtract(hertz, indentation) * np.arctan(t)
 
 
 @law
