@@ -46,8 +46,8 @@ def fold_indentation(work, sphere_radius, modulus):
 
 @device
 def series_shares(stiffness, contact):
-    """k/(k + b) and b/(k + b) for the stiffness k of the spring and b of the contact, each from 0 to inf."""
-    stiffness = stiffness + 0.0  # no -0
+    """k/(k + b) and b/(k + b) for the stiffness k and b of spring and contact, each from 0 to inf; nan if k < 0."""
+    stiffness = stiffness + 0.0 if stiffness >= 0.0 else math.nan  # no -0
     stiffer = stiffness > contact
     high = stiffness if stiffer else contact
     low = contact if stiffer else stiffness
@@ -415,15 +415,9 @@ def pull_off_displacement(stiffness, work, sphere_radius, modulus):
 
 
 @law
-def _pull_off(stiffness, work, sphere_radius, modulus, which):
-    """Field 0, 1 or 2 of ``PullOff``."""
+def _pull_off_radius(stiffness, work, sphere_radius, modulus):
     root, unit, _, _ = _fold(stiffness, work, sphere_radius, modulus)
-    if which == 0.0:
-        return unit * root * root
-    cube = root * root * root
-    if which == 1.0:
-        return math.pi * work * sphere_radius * (cube * (cube - 6.0) / 6.0) + 0.0  # no -0
-    return unit * (unit / sphere_radius) * (root * (cube - 4.0)) + 0.0
+    return unit * root * root
 
 
 def pull_off_at_stiffness(stiffness, work, sphere_radius, modulus) -> PullOff:
@@ -453,7 +447,9 @@ def pull_off_at_stiffness(stiffness, work, sphere_radius, modulus) -> PullOff:
     >>> print("%.6f %.6f %.6f" % last)
     0.666667 -1.037037 -0.888889
     """
-    return PullOff(*(_pull_off(stiffness, work, sphere_radius, modulus, which) for which in range(3)))
+    radius = _pull_off_radius(stiffness, work, sphere_radius, modulus)
+    load, indentation = (of(radius, work, sphere_radius, modulus) for of in (load_at_radius, indentation_at_radius))
+    return PullOff(radius, load, indentation)
 
 
 @law
@@ -505,8 +501,6 @@ def indentation_under_displacement(radius, displacement, stiffness, sphere_radiu
     [0.6667 1.    ]
     """
     grips, load = series_shares(stiffness, 2.0 * modulus * radius)
-    if not stiffness >= 0.0:
-        return math.nan
     return grips * displacement + load * (radius * (radius / sphere_radius) / 3.0)
 
 
@@ -533,8 +527,6 @@ def energy_release_rate_at_displacement(radius, displacement, stiffness, sphere_
     0.113 0.134 0.163
     """
     grips, load = series_shares(stiffness, 2.0 * modulus * radius)
-    if not stiffness >= 0.0:
-        return math.nan
     hertz = radius * (radius / sphere_radius)
     missing = grips * (hertz - displacement) + load * (2.0 / 3.0 * hertz)
     return missing * modulus / (2.0 * math.pi * radius) * missing
