@@ -816,12 +816,10 @@ def steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness):
     return lambert(bond_stiffness * math.fabs(speed) / (zero_force_rate * bell_force))
 
 
-@device
-def _stretch(tilt, speed, zero_force_rate, bell_force, bond_stiffness):
-    """x = W f_b/kappa, or what is the same, V/k: the second also for an infinite Bell force."""
-    if tilt > 1.0:
-        return math.copysign(tilt * bell_force / bond_stiffness, speed)
-    return speed / zero_force_rate * math.exp(-tilt)
+@law
+def _steady_rate(speed, zero_force_rate, bell_force, bond_stiffness):
+    """Rupture rate k of all bonds in steady sliding."""
+    return zero_force_rate * math.exp(steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness))
 
 
 @law
@@ -843,10 +841,11 @@ def first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness):
     0.5671 -0.5671
     """
     tilt = steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness)
-    return _stretch(tilt, speed, zero_force_rate, bell_force, bond_stiffness)
+    if tilt > 1.0:
+        return math.copysign(tilt * bell_force / bond_stiffness, speed)
+    return speed / zero_force_rate * math.exp(-tilt)  # the same, also for an infinite Bell force
 
 
-@law
 def first_moment_fraction(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
     """Bond fraction of a mean-field Bell population in steady sliding: bonds over bonds at rest [1].
 
@@ -866,20 +865,8 @@ def first_moment_fraction(speed, zero_force_rate, bell_force, bond_stiffness, re
     >>> print("%.3f %.3f" % tuple(first_moment_fraction([1.0, 10.0], 1.0, 1.0, 1.0, 1.0)))
     0.724 0.297
     """
-    if rebinding_rate == math.inf:
-        return 1.0
-    growth = math.exp(steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness))
-    return (rebinding_rate + zero_force_rate) / (rebinding_rate + zero_force_rate * growth)
-
-
-@law
-def _mean_field_force(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    tilt = steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness)
-    wait = zero_force_rate / rebinding_rate
-    if tilt == math.inf and wait > 0.0:
-        return 0.0
-    stretch = _stretch(tilt, speed, zero_force_rate, bell_force, bond_stiffness)
-    return bond_stiffness * stretch / (1.0 + wait * math.exp(tilt))
+    rate = _steady_rate(speed, zero_force_rate, bell_force, bond_stiffness)
+    return rest_share(rate, rebinding_rate) / rest_share(zero_force_rate, rebinding_rate)
 
 
 def first_moment_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
@@ -903,8 +890,8 @@ def first_moment_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebi
     >>> print(f"{first_moment_stress(10.0, 1.0, 1.0, 1.0, 1.0, 1.0):.3f}")
     0.259
     """
-    force = _mean_field_force(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
-    return np.multiply(site_density, force)
+    rate = _steady_rate(speed, zero_force_rate, bell_force, bond_stiffness)
+    return np.multiply(site_density, constant_moments(speed, rate, bond_stiffness, rebinding_rate).force)
 
 
 def first_moment_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
@@ -1005,8 +992,8 @@ def first_moment_onset(speed, zero_force_rate, bell_force, bond_stiffness, rebin
     """
     unit = np.divide(bell_force, bond_stiffness)
     tilt = np.abs(first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness) / unit)
-    rate = zero_force_rate * np.exp(tilt)
-    bound = rebinding_rate / (rebinding_rate + rate)
+    rate = _steady_rate(speed, zero_force_rate, bell_force, bond_stiffness)
+    bound = rest_share(rate, rebinding_rate)
     density = site_density * bond_stiffness * bound
 
     def answer(frequency):
