@@ -71,18 +71,14 @@ class Compared(NamedTuple):
         way = np.sign(np.diff(self.x))
         ends = np.flatnonzero(np.diff(way)) + 1
         spans = [(a, b + 1) for a, b in itertools.pairwise([0, *ends, len(way)]) if way[a] != 0.0]
-        branches = [a + np.argsort(self.x[a:b]) for a, b in spans]
-        none = [np.full(x.shape, np.nan)]
-        inside = [np.clip(x, self.x[rows[0]], self.x[rows[-1]]) for rows in branches]
-        # rounding puts no point beyond an end
-        placed = [np.where(np.abs(x - at) <= _ROUNDING * np.abs(at), at, x) for at in inside]
-        return [
-            np.array(
-                [np.interp(at, self.x[r], curve[r], np.nan, np.nan) for at, r in zip(placed, branches, strict=True)]
-                or none
-            )
-            for curve in along
-        ]
+        branches = []
+        for rows in (a + np.argsort(self.x[a:b]) for a, b in spans):
+            inside = np.clip(x, self.x[rows[0]], self.x[rows[-1]])
+            # rounding puts no point beyond an end
+            placed = np.where(np.abs(x - inside) <= _ROUNDING * np.abs(inside), inside, x)
+            branches.append([np.interp(placed, self.x[rows], curve[rows], np.nan, np.nan) for curve in along])
+        none = np.full((1, len(along), *x.shape), np.nan)
+        return [*np.swapaxes(branches or none, 0, 1)]
 
 
 class Residuals(NamedTuple):

@@ -10,7 +10,6 @@ error that curves share is one more number, known to be 0 within its size.
 """
 
 import functools
-import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -414,13 +413,12 @@ class Problem:
 
         There is no curve by runs, or if a row is at rest.
         """
-        group = next(item for item in self.groups[table] if rows[0] in item.rows)
+        group, k = self.group(table, rows[0])
         speeds = self.tables[table].conditions["speed"][rows]
         if self.by_run or not np.min(speeds) > 0.0:
             return None
         fine = np.geomspace(np.min(speeds), np.max(speeds), _DRAWN)[:, np.newaxis]
-        time = group.time[group.rows == rows[0]] + 0.0 * fine
-        course = group._replace(rows=np.arange(_DRAWN), time=time, speed=fine)
+        course = group._replace(rows=np.arange(_DRAWN), time=group.time[k] + 0.0 * fine, speed=fine)
         return fine[:, 0], by_steady_sliding(course, self.numbers(x), [name], self.theory)[name]
 
     def conditions(self) -> dict[str, tuple[Quantity, list[Array]]]:
@@ -449,13 +447,19 @@ class Problem:
 
     def at(self, number: int) -> tuple[int, str, int]:
         """Return the table, the variable and the row of one of all numbers."""
-        curve, tables = self.curve[number], [place for place, table in enumerate(self.tables) for _ in table.curves]
-        return tables[curve], self.names[curve], number - int(np.argmax(self.curve == curve))
+        curve = self.curve[number]
+        table = int(np.repeat(np.arange(len(self.tables)), [len(table.curves) for table in self.tables])[curve])
+        return table, self.names[curve], number - int(np.argmax(self.curve == curve))
 
     def place(self, number: int) -> str:
         """Return the variable and the row of one of all numbers, for people."""
         _, name, row = self.at(number)
         return f"{name}: row {row + 1}"
+
+    def group(self, table: int, row: int) -> tuple[Group, int]:
+        """Return the group of a row of a table, and the place of the row in the group."""
+        group = next(item for item in self.groups[table] if row in item.rows)
+        return group, int(np.flatnonzero(group.rows == row)[0])
 
     def residuals(self, x: Array) -> Array:
         """Deviations over errors, and the common errors over their sizes."""
@@ -487,31 +491,28 @@ def lag(problem: Problem, x: Array) -> str:
 
     It is that where the run adds most to steady sliding, from a run at this speed: fluctuations add to it as well.
     """
-    if not any(map(_by_speed, itertools.chain(*problem.groups))):
+    passing = [
+        number for number, (table, _, row) in enumerate(map(problem.at, range(len(problem.values))))
+        if "t" not in problem.tables[table].conditions and _by_speed(problem.group(table, row)[0])
+    ]  # fmt: skip
+    if not passing:
         return ""
     ramp = problem.steady(x) + problem.shift
     added = np.abs(ramp - replace(problem, by_run=False).steady(x)) / np.hypot(problem.sigma, problem.noise)
-    for number in np.argsort(-added).tolist():
-        table, name, row = problem.at(number)
-        group = next(item for item in problem.groups[table] if row in item.rows)
-        if "t" in problem.tables[table].conditions or not _by_speed(group):
-            continue
-        (k,) = np.flatnonzero(group.rows == row)
-        speed = float(group.speed[k, 0])
-        still = group.scenario.with_values({"drive": {"model": "steady", "speed": speed}})
-        alone = Group(still, np.zeros(1, int), group.time[[k]], group.speed[[k]])
-        mean, noise = (
-            by_runs([alone], problem.numbers(x), [name], False)[:, 0, 0] if added[number] > 1.0 else (0.0, 0.0)
-        )
-        error = math.hypot(problem.sigma[number], 2.0 * noise, 2.0 * problem.noise[number])
-        if mean != 0.0 and abs(ramp[number] - mean) > error:
-            share, errors = 100.0 * (ramp[number] / mean - 1.0), abs(ramp[number] - mean) / problem.sigma[number]
-            side = f"{abs(share):.2g} % {'above' if share > 0.0 else 'below'} that of a steady speed"
-            return (
-                f"the run lags: at {engineering(speed, 'm/s')} its {name} is {side}, {errors:.2g} errors of the point"
-            )
-        break
-    return ""
+    number = max(passing, key=added.__getitem__)
+    if added[number] <= 1.0:
+        return ""
+    table, name, row = problem.at(number)
+    group, k = problem.group(table, row)
+    alone = Group(_still(group.scenario, group, k), np.zeros(1, int), group.time[[k]], group.speed[[k]])
+    mean, noise = by_runs([alone], problem.numbers(x), [name], False)[:, 0, 0]
+    off = ramp[number] - mean
+    error = math.hypot(problem.sigma[number], 2.0 * noise, 2.0 * problem.noise[number])
+    if mean == 0.0 or not abs(off) > error:
+        return ""
+    side = f"{abs(100.0 * off / mean):.2g} % {'above' if off / mean > 0.0 else 'below'} that of a steady speed"
+    at_speed = f"at {engineering(float(group.speed[k, 0]), 'm/s')} its {name} is {side}"
+    return f"the run lags: {at_speed}, {abs(off) / problem.sigma[number]:.2g} errors of the point"
 
 
 class Minimum(NamedTuple):
