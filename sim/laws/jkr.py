@@ -281,7 +281,6 @@ def potential_at_indentation(separation, stress, radius, work, sphere_radius, mo
     return modulus * normal - 4.0 * stress * stress * a**3 / modulus - math.pi * work * a * a
 
 
-@law
 def potential_at_load(tractive_force, stress, radius, work, sphere_radius, modulus):
     """MCD's potential G at a fixed tractive force F = -P [J]; otherwise as ``potential_at_indentation``.
 
@@ -295,10 +294,9 @@ def potential_at_load(tractive_force, stress, radius, work, sphere_radius, modul
     >>> print(f"{potential_at_load(0.0, 0.0, 1.0, 0.0, 1.0, 45.0):.2f}")
     4.00
     """
-    a, force, curvature = radius, tractive_force, 1.0 / sphere_radius
-    normal = -force * force / (4.0 * modulus * a) + force * a * a * curvature / 3.0
-    normal += 4.0 / 45.0 * modulus * a**5 * curvature * curvature
-    return normal - 4.0 * stress * stress * a**3 / modulus - math.pi * work * a * a
+    separation = -indentation_under_load(radius, np.negative(tractive_force), sphere_radius, modulus)
+    whole = potential_at_indentation(separation, stress, radius, work, sphere_radius, modulus)
+    return whole - tractive_force * separation
 
 
 @law
@@ -320,7 +318,6 @@ def potential_slope_at_indentation(separation, stress, radius, work, sphere_radi
     return modulus * missing * missing - shear - 2.0 * math.pi * work * radius
 
 
-@law
 def potential_slope_at_load(tractive_force, stress, radius, work, sphere_radius, modulus):
     """dG/da at fixed load and stress [J/m]; arguments as for ``potential_at_load``.
 
@@ -333,9 +330,9 @@ def potential_slope_at_load(tractive_force, stress, radius, work, sphere_radius,
     >>> print(f"{potential_slope_at_load(0.0, 1.0, 1.0, 0.0, 1.0, 9.0):.4f}")
     2.6667
     """
-    missing = tractive_force + 4.0 / 3.0 * modulus * radius * radius * (radius / sphere_radius)
-    shear = 12.0 * stress * stress * radius * radius / modulus
-    return missing / (4.0 * modulus * radius) * (missing / radius) - shear - 2.0 * math.pi * work * radius
+    # with the force held, the separation changes with the radius but does no work in G
+    separation = -indentation_under_load(radius, np.negative(tractive_force), sphere_radius, modulus)
+    return potential_slope_at_indentation(separation, stress, radius, work, sphere_radius, modulus)
 
 
 # Adhesive contact behind a spring of stiffness k: pull-off, load, indentation and energy release rate.
