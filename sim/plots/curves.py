@@ -400,8 +400,8 @@ _USUAL, _FAR = (0.005, 0.995), 3.0
 #: Records that show a slip.
 _FINE = 3
 
-#: Shares below it are nothing.
-_ROUNDING = 1e-12
+#: Least share of the area by which a line stands apart from a curve.
+_APART = 0.005
 
 #: Opacity of the shades that show what a mechanism takes.
 _SHADE = 0.35
@@ -417,7 +417,7 @@ def series(name: str, words: str, si: str, usual: bool = False) -> Panel:
         low, high = np.nanquantile(values, _USUAL) if usual else (0.0, 0.0)
         if high > low and np.nanmax(values) - np.nanmin(values) > _FAR * (high - low):
             panel.set_ylim(factor * (1.3 * low - 0.3 * high), factor * (1.3 * high - 0.3 * low))
-            text = f"largest {style.rounded(np.nanmax(values), si)}"
+            text = f"largest record {style.rounded(np.nanmax(values), si)}"
             panel.text(0.02, 0.86, text, transform=panel.transAxes, va="top", fontsize=7)
 
     return panel_of
@@ -517,7 +517,7 @@ def share_panel(panel: Axes, scene: Scene) -> None:
     panel.axhline(1.0, linestyle="--", label="JKR", **style.GREY)
     if not is_shaded:  # of curves that lose to both, in front of a curve without fluctuations
         lost = [scene.all(f"lost_to_{name}_mean") for name in ("bonds", "fluctuations")]
-        known = np.all(np.max(np.nan_to_num(lost), axis=2) > _ROUNDING, axis=0)
+        known = np.all(np.max(np.nan_to_num(lost), axis=2) > _APART, axis=0)
         bonds = list(np.where(known[:, np.newaxis], 1.0 - lost[0], np.nan))
         _reference(panel, scene, bonds, "-.", "with the bonds left alone", zorder=2.5)
     ratios = []

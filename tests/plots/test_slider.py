@@ -54,7 +54,7 @@ def test_few_fast_records_do_not_rule_the_axis_of_the_speed_and_are_stated_and_w
     dataset["speed"][..., 7] = 0.5
     panel = draw(dataset, "time").axes[-1]
     assert panel.get_ylim()[0] < 1.0 and 2.0 < panel.get_ylim()[1] < 3.0
-    assert [text.get_text() for text in panel.texts if "largest" in text.get_text()] == ["largest 500 mm/s"]
+    assert [text.get_text() for text in panel.texts if "largest" in text.get_text()] == ["largest record 500 mm/s"]
     assert not any("largest" in text.get_text() for text in draw(driven("pull"), "time").axes[-1].texts)
     stays, changes = (
         draw(driven(kind).isel(drive_stiffness=0) if kind == "map" else driven(kind), "time")
