@@ -38,13 +38,6 @@ def fold_radius(work, sphere_radius, modulus):
 
 
 @device
-def fold_indentation(work, sphere_radius, modulus):
-    """Indentation at which it ends: -3 a^2/R with that radius [m]."""
-    a = fold_radius(work, sphere_radius, modulus)
-    return -3.0 * (a * (a / sphere_radius))
-
-
-@device
 def series_shares(stiffness, contact):
     """k/(k + b) and b/(k + b) for the stiffness k and b of spring and contact, each from 0 to inf; nan if k < 0."""
     stiffness = stiffness + 0.0 if stiffness >= 0.0 else math.nan  # no -0
@@ -237,7 +230,6 @@ def energy_release_rate(radius, load, sphere_radius, modulus):
     return missing / (8.0 * math.pi * modulus * radius * radius) * (missing / radius)
 
 
-@law
 def energy_release_rate_at_indentation(radius, indentation, sphere_radius, modulus):
     """Elastic energy released per area at an indentation [J/m^2]; otherwise as ``energy_release_rate``.
 
@@ -252,8 +244,7 @@ def energy_release_rate_at_indentation(radius, indentation, sphere_radius, modul
     >>> print(f"{energy_release_rate_at_indentation(a, 1e-6, 2e-3, 6.4e6):.6f}")
     0.042000
     """
-    missing = radius * (radius / sphere_radius) - indentation
-    return missing * modulus / (2.0 * math.pi * radius) * missing
+    return energy_release_rate_at_displacement(radius, indentation, math.inf, sphere_radius, modulus)
 
 
 @law
@@ -736,7 +727,6 @@ def indentation_at_radius(radius, work, sphere_radius, modulus):
     return hertz - math.sqrt(2.0 * math.pi * work * (radius / modulus))
 
 
-@law
 def load_under_indentation(radius, indentation, sphere_radius, modulus):
     """Load of any contact, in equilibrium or not, of given radius and indentation [N].
 
@@ -756,10 +746,9 @@ def load_under_indentation(radius, indentation, sphere_radius, modulus):
     >>> print(f"{load_under_indentation(1.0, 1.0, 1.0, 1.0):.4f}")
     1.3333
     """
-    return 2.0 * modulus * radius * (indentation - radius * (radius / sphere_radius) / 3.0)
+    return load_under_displacement(radius, indentation, math.inf, sphere_radius, modulus)
 
 
-@law
 def pull_off_indentation(work, sphere_radius, modulus):
     """Lowest indentation that an adhesive contact bears at fixed grips [m]; 0 where w <= 0.
 
@@ -777,6 +766,4 @@ def pull_off_indentation(work, sphere_radius, modulus):
     >>> print(f"{pull_off_indentation(0.042, 2e-3, 6.4e6):.3e}")
     -7.105e-07
     """
-    if work <= 0.0:
-        return 0.0
-    return fold_indentation(work, sphere_radius, modulus)
+    return pull_off_displacement(math.inf, work, sphere_radius, modulus)

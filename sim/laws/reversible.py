@@ -209,10 +209,8 @@ def radius_at_indentation_reversible(indentation, work, stress, reversible, sphe
     >>> print("%.2e %.2e %.2e" % tuple(a))
     3.44e-05 2.57e-05 nan
     """
-    adhesive = jkr.radius_at_indentation(indentation, work, sphere_radius, modulus)
-    hertz = jkr.hertz_radius_at_indentation(indentation, sphere_radius)
     rest = (sphere_radius, modulus, poisson_ratio)
-    return shrunk_at_displacement(adhesive, hertz, indentation, math.inf, work, stress, reversible, 0.0, *rest)
+    return radius_at_displacement_reversible(indentation, math.inf, work, stress, reversible, *rest)
 
 
 def radius_at_displacement_reversible(

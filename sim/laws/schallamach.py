@@ -695,15 +695,6 @@ def _bell_peak_speed(zero_force_rate, bell_force, bond_stiffness, rebinding_rate
     return zero_force_rate * bell_force / (bond_stiffness * z)
 
 
-@law
-def _bell_peak_force(zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    wait = zero_force_rate / rebinding_rate
-    if wait == 0.0:
-        return math.inf
-    z = _peak_pace(wait)
-    return bell_force * reduced(z, 1) / z / (wait + reduced(z, 0))
-
-
 def bell_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
     """Friction maximum of a Bell population: the largest steady stress at any speed.
 
@@ -729,8 +720,10 @@ def bell_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_
     >>> print("%.4f %.3f" % tuple(speed), "%.6f %.6f" % tuple(stress))
     4.5029 146.903 0.218485 1.794870
     """
-    arguments = (zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
-    return Peak(_bell_peak_speed(*arguments), np.multiply(site_density, _bell_peak_force(*arguments)))
+    bonds = zero_force_rate, bell_force, bond_stiffness, rebinding_rate
+    speed = _bell_peak_speed(*bonds)
+    # without a wait for the next bond the stress grows with speed for ever
+    return Peak(speed, np.where(np.isinf(speed), math.inf, bell_stress(speed, *bonds, site_density))[()])
 
 
 @law

@@ -19,12 +19,7 @@ import numpy as np
 
 from sim.laws import jkr
 from sim.laws.jkr import series_shares
-from sim.laws.reversible import (
-    mean_stress_energy,
-    radius_at_displacement_reversible,
-    radius_at_indentation_reversible,
-    radius_at_load_reversible,
-)
+from sim.laws.reversible import mean_stress_energy, radius_at_displacement_reversible, radius_at_load_reversible
 from sim.numerics.jit import device, kernel
 from sim.parts.exchange import Array, Flags, Mount
 from sim.spectrum.radial import Terms, share_of
@@ -114,13 +109,9 @@ class DisplacementControl:
 
     def radius(self, work: Array, stress: Array, reversible: float, bodies: Bodies) -> Array:
         """Return the largest stable equilibrium radius [m]: Hertz's if no work of adhesion is left, nan without one."""
-        rigid, machine = math.isinf(self.stiffness), (self.base, self.stiffness)
-        if reversible == 0.0 and rigid:
-            return np.asarray(jkr.radius_at_indentation(self.base, work, *bodies[:2]))
+        machine = self.base, self.stiffness
         if reversible == 0.0:
             return np.asarray(jkr.radius_at_displacement(*machine, work, *bodies[:2]))
-        if rigid:
-            return np.asarray(radius_at_indentation_reversible(self.base, work, stress, reversible, *bodies))
         return np.asarray(radius_at_displacement_reversible(*machine, work, stress, reversible, *bodies))
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
