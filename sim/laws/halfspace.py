@@ -489,13 +489,8 @@ def displacement(field, cell, shear_modulus, poisson_ratio=0.5):
     """
     field = np.asarray(field, dtype=float)
     lattice, unit = _unit_compliance(_sides(cell), field.shape[-2:], float(poisson_ratio))
-    fields, moduli = np.broadcast_arrays(field, np.asarray(shear_modulus, dtype=float)[..., None, None])
-    displaced = np.empty(fields.shape)
-    for index in np.ndindex(fields.shape[:-2]):
-        spectrum = scipy.fft.rfft2(fields[index])
-        spectrum *= unit / (moduli[*index, 0, 0] * (lattice.shape[0] * lattice.shape[1]))
-        lattice.superpose(spectrum, spectrum, displaced[index])
-    return displaced
+    spectrum = scipy.fft.rfft2(field) * unit / np.asarray(shear_modulus, dtype=float)[..., None, None]
+    return scipy.fft.irfft2(spectrum, lattice.shape)
 
 
 def surface_energy(field, cell, shear_modulus, poisson_ratio=0.5):
