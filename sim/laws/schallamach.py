@@ -83,17 +83,13 @@ def rest_share(rupture_rate, rebinding_rate):
     >>> print(f"{rest_share(2.0, 6.0):.2f}")
     0.75
     """
-    if rebinding_rate == math.inf:
-        return 1.0
-    return rebinding_rate / (rebinding_rate + rupture_rate)
+    return 1.0 / (1.0 + rupture_rate / rebinding_rate)
 
 
 @law
 def _bound(life, pull, rebinding_rate):
     # the pull only broadcasts
-    if life == math.inf and rebinding_rate > 0.0:
-        return 1.0
-    return life / (life + 1.0 / rebinding_rate)
+    return 1.0 / (1.0 + 1.0 / (life * rebinding_rate))
 
 
 @law
@@ -628,10 +624,9 @@ def bell_fraction(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_
     >>> print("%.3f %.3f %.3f" % tuple(bell_fraction(4.045, 1.0, 1.0, 1.0, [0.01, 1.0, 100.0])))
     0.336 0.500 0.981
     """
-    if rebinding_rate == math.inf:
-        return 1.0
     life = reduced(_pace(speed, zero_force_rate, bell_force, bond_stiffness), 0)
-    return (zero_force_rate + rebinding_rate) * life / (zero_force_rate + rebinding_rate * life)
+    rupture, rebinding = 1.0 / (1.0 + rebinding_rate / zero_force_rate), 1.0 / (1.0 + zero_force_rate / rebinding_rate)
+    return life / (rupture + rebinding * life)
 
 
 def bell_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
