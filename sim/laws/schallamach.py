@@ -655,14 +655,15 @@ def bell_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_ra
     return np.multiply(site_density, moments.force)
 
 
-@device
-def _peak_pace(wait):
-    """z where the force is largest, for ``wait`` = k_0/k_on: the root of d ln(force)/d ln z.
+@law
+def _bell_peak_speed(zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
+    """Speed at which the force is largest, by the root z of d ln(force)/d ln z.
 
     Derivatives of the integrals are integrals again, ``R_0' z = (1 + z) R_0 - z`` and
     ``(R_1/z)' z = (1 + z) R_1/z - R_0``, so the root is as sharp as the rounding. It is at 0.384 for a
     long wait and tends to z = wait for a short one: within the bracket for every wait from 0 to infinity.
     """
+    wait = zero_force_rate / rebinding_rate
     high = min(1.0, 2.0 * wait)
     low = 0.01 * high
     for _ in range(60):
@@ -673,7 +674,7 @@ def _peak_pace(wait):
             low = z
         else:
             high = z
-    return high
+    return zero_force_rate * bell_force / (bond_stiffness * high)
 
 
 class BellNumbers(NamedTuple):
@@ -682,12 +683,6 @@ class BellNumbers(NamedTuple):
     zero_force_rate: Array
     rebinding_rate: Array
     site_density: Array
-
-
-@law
-def _bell_peak_speed(zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    z = _peak_pace(zero_force_rate / rebinding_rate)
-    return zero_force_rate * bell_force / (bond_stiffness * z)
 
 
 def bell_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):

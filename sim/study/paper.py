@@ -217,7 +217,7 @@ def _fixed_load() -> Iterator[Row]:
     slopes = jkr.potential_slope_at_load(force, STRESS, x * hertz, **LENS)
     by_radius = [_slope(lambda a: _potential_g(force, a), y * hertz, 1e-6) for y in x]
     yield "separation under a load", "29", -jkr.indentation_under_load(a, LOAD, SPHERE, MODULUS), s
-    yield "Legendre transform G = H - F s", "27, 30", whole, _potential_h(s, a) - force * s, 1e-11
+    yield "Legendre transform G = H - F s", "27, 30", whole, _potential_g(force, a), 1e-11
     yield "potential G, dimensionless", "31", wholes / unit, reduced, 1e-11
     yield "dG/da against differences", "28, 32", slopes, by_radius, 1e-7
     yield "dG/da, dimensionless", "32", slopes * hertz / unit, steepness, 1e-11
