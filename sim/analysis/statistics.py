@@ -2,7 +2,8 @@
 
 import itertools
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy import special
 
 from sim.analysis.dataset import (
     MEMBERS,
+    ROOM,
     has_noise,
     in_pieces,
     is_stationary,
@@ -907,13 +909,14 @@ def distribution(
         again = (closed[..., 1:] & ~closed[..., :-1]).any(axis=-1).sum(axis=-1)
         counts = closed.sum(axis=1), itertools.repeat(closed.shape[1]), (str(count or "") for count in again)
         openings = [_openings(*point, words) for point in zip(*counts, strict=False)]
+    readers = [_reader(each, names) for each in (late, base) if each is not None]
     for name in map(str, chosen_observables(restricted(late, names).isel(t=[-1]), names)):
         if name in CUMULATIVE:
             continue
-        variable = observable_of(late, name)
-        differ, values = noisy & (MEMBERS in variable.dims), _series(late, name, step)
+        variable = readers[0](name)
+        differ, values = noisy & (MEMBERS in variable.dims), _series(late, variable, step)
         if base is not None:
-            values = values - _series(base, name, step)
+            values = values - _series(base, readers[1](name), step)
         values = values.reshape(-1, *values.shape[-2:])
         numbers, freedom = _over_time(values, step, name, differ)
         known = zip(values, numbers["sem"], freedom, map(bool, differ), strict=True)
@@ -922,12 +925,19 @@ def distribution(
     return xr.Dataset(result)
 
 
-def _series(dataset: xr.Dataset, name: str, step: float) -> np.ndarray:
+def _reader(dataset: xr.Dataset, names: Collection[str] | None) -> Callable[[str], xr.DataArray]:
+    """Return a function that returns an observable; all are computed at once if the dataset is small."""
+    if dataset.nbytes > ROOM:
+        return partial(observable_of, dataset)
+    return chosen_observables(closed_only(dataset.compute()), names).__getitem__
+
+
+def _series(dataset: xr.Dataset, variable: xr.DataArray, step: float) -> np.ndarray:
     """Return values of an observable, shape (..., members, records); the speed of a slider that may slip by its way."""
     sweep = dataset["contact_modulus"]
-    if name == "speed" and {"slider_position", "spring_force"} <= set(dataset) and dataset.sizes["t"] > 1:
+    if variable.name == "speed" and {"slider_position", "spring_force"} <= set(dataset) and dataset.sizes["t"] > 1:
         return np.diff(rows_of(dataset["slider_position"].compute(), sweep)) / step  # slips come between two records
-    return rows_of(observable_of(dataset, name), sweep)
+    return rows_of(variable, sweep)
 
 
 def _described(
