@@ -706,8 +706,7 @@ def _coverage(points, radius):
     area = radius**2 * _quarter(corner[:, None], corner)
     weight = np.clip(np.diff(np.diff(area, axis=0), axis=1), 0.0, 1.0)
     for axis in (0, 1):
-        around = np.pad(weight, [(1, 1) if other == axis else (0, 0) for other in (0, 1)])
-        weight = weight - np.diff(around, 2, axis=axis) / 24.0
+        weight = weight - scipy.ndimage.correlate1d(weight, [1.0, -2.0, 1.0], axis, mode="constant") / 24.0
     weight.flags.writeable = False
     return index % points, index - middle, weight
 

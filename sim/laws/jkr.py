@@ -165,7 +165,6 @@ def pull_off_load(work, sphere_radius):
 # Contact of a sphere without adhesion, after Hertz.
 
 
-@law
 def hertz_radius_at_load(load, sphere_radius, modulus):
     """Contact radius without adhesion at a load [m]: ``(3 P R / 4 E*)^(1/3)``; nan if pulled.
 
@@ -179,7 +178,7 @@ def hertz_radius_at_load(load, sphere_radius, modulus):
     >>> print(f"{hertz_radius_at_load(4.0 / 3.0, 1.0, 1.0):.3f}")
     1.000
     """
-    return cube_root(0.75 * (sphere_radius / modulus) * load)
+    return radius_at_load(load, 0.0, sphere_radius, modulus)
 
 
 @law

@@ -1182,8 +1182,7 @@ def cut_off_stress(speed, rate, stretch, bond_stiffness, rebinding_rate, site_de
     >>> print("%.3f %.3f" % tuple(cut_off_stress([1e-6, 1.0], 0.0, 1.0, 1.0, 1.0, 1.0)))
     0.500 0.250
     """
-    arguments = (speed, rate, stretch, bond_stiffness, rebinding_rate)
-    return np.multiply(site_density, np.sign(speed) * _site(*arguments, 1))
+    return np.multiply(site_density, cut_off_moments(speed, rate, stretch, bond_stiffness, rebinding_rate).force)
 
 
 # Catch bonds: two pathways of rupture, one that force slows down and one that it speeds up.

@@ -35,6 +35,7 @@ from sim.scenario.reader import override
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read, quantities
 from sim.study import likelihood
+from sim.study.converge import Printed
 from sim.study.likelihood import HELD, LEVEL, Curve, Free, Interval, Measured, Minimum, Problem, idle, with_errors
 from sim.study.mechanisms import WHOLE, Verdict, compare
 from sim.units.errors import BadInput
@@ -405,14 +406,10 @@ def _alike(problem: Problem) -> tuple[list[NDArray[np.int64]], list[str]]:
 _MADE = "# Made by sim fit"
 
 
-#: A table to print, with the text below it.
-Shown = tuple[list[dict[str, str]], str]
-
-
 def carried_out(
     scenario: Scenario, data: Sequence[Path], free: Sequence[str], common: Sequence[str], stem: Path, replace: bool,
     steady: bool, judged: bool, units: Sequence[str] = (),
-) -> tuple[Fit, list[Shown]]:  # fmt: skip
+) -> tuple[Fit, list[Printed]]:  # fmt: skip
     """Fit, compare mechanisms if wanted, write the files, and return the tables to print.
 
     Arguments are those of ``sim.study.fit.fit``, with ``common`` as texts ``"COLUMN=2 %"``, and the ``units`` of the
@@ -442,7 +439,7 @@ def carried_out(
     for path, content in zip(outputs, texts, strict=True):
         with files.output(path) as beside:
             beside.write_bytes(content)
-    shown: list[Shown] = [(_table(result), f"\n{_explanation(result)}\n")]
+    shown: list[Printed] = [(_table(result), f"\n{_explanation(result)}\n")]
     if verdict is not None:
         doubt = "; but even the scenario as it is lies off: perhaps none of these is true"
         shown.append((_comparison(verdict), f"\n{verdict.words}{doubt if result.p_value <= POOR else ''}\n"))

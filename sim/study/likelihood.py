@@ -220,10 +220,9 @@ def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool
     result = np.empty((2, len(names), sum(len(group.rows) for group in groups)))
     for group in groups:
         scenario = group.scenario.with_values(dict(values) | {"record": {}})
-        runs = list[tuple[NDArray[np.int64], Scenario, Reading]]()
-        if by_time or _by_speed(group):
-            runs = [(group.rows, scenario, functools.partial(_at_rows, group, by_time))]
-        else:
+        along: Reading = functools.partial(_at_rows, group, by_time)
+        runs = [(group.rows, scenario, along)]
+        if not (by_time or _by_speed(group)):
             runs = [(group.rows[k : k + 1], _still(scenario, group, k), _second_half) for k in range(len(group.rows))]
         for rows, point, read_rows in runs:
             members = _members(point, names, read_rows)
