@@ -22,8 +22,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import exprel
 
 from sim.numerics.jit import device, law
 from sim.numerics.special import lambert, lambert_w, reduced
@@ -1237,8 +1237,8 @@ def catch_lives(
     edges = np.sort(np.concatenate([longest * share, shortest * (longest / shortest) ** share], axis=-1), axis=-1)
     half = 0.5 * np.diff(edges, axis=-1)[..., np.newaxis]
     age = edges[..., :-1, np.newaxis] + half * (_CATCH_NODES + 1.0)
-    lost = catch_rate * age * exprel(-easing[..., np.newaxis] * age)
-    lost += slip_rate * age * exprel(growing[..., np.newaxis] * age)
+    lost = catch_rate * age * scipy.special.exprel(-easing[..., np.newaxis] * age)
+    lost += slip_rate * age * scipy.special.exprel(growing[..., np.newaxis] * age)
     alive = half * _CATCH_WEIGHTS * np.exp(-lost)
     return Lives(*(np.sum(age**n * alive, axis=(-2, -1)) for n in range(3)))
 
@@ -1411,7 +1411,7 @@ def start_up_peak(speed, zero_force_rate, bell_force, bond_stiffness):
     """
     tilt = lambert_w(np.multiply(bond_stiffness, np.abs(speed)) / np.multiply(zero_force_rate, bell_force))
     steady_force = bond_stiffness * first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness)
-    return StartUpPeak(np.exp(-tilt) / zero_force_rate, steady_force * np.exp(-exprel(-tilt)))
+    return StartUpPeak(np.exp(-tilt) / zero_force_rate, steady_force * np.exp(-scipy.special.exprel(-tilt)))
 
 
 # A cluster of bonds that share a given force equally (Erdmann & Schwarz, PRL 92, 108102 (2004)).

@@ -30,8 +30,8 @@ TURN = record("opening closing radius")
 #: detachments; time at which it was first masked, time for which it was closed, and of that masked [s]; then the turns
 #: of the phase.
 CONTACT = record("last detached detachments masked closed hidden " + " ".join(TURN.names or ()))
-#: Columns of it that are read at each step, as a view of a record costs more than the rest.
-_DETACHED, _CLOSED = ((CONTACT.names or ()).index(name) for name in ("detached", "closed"))
+#: Its columns for the kernel, because a kernel with a view of a record takes 0.1 s to load.
+_LAST, _DETACHED, _DETACHMENTS, _MASKED, _CLOSED, _HIDDEN, _OPENING, _CLOSING, _RADIUS = range(len(CONTACT))
 #: Fall of the spring force that makes a slip event, and rise that ends it, over the largest force so far.
 FALL, RISE = 0.3, 0.1
 #: Slip of the interface over the slider's advance in a slip event, at least.
@@ -396,55 +396,57 @@ def _follow(
             value1, slope1, area1 = _load(k + 1, i, *bonds, speeds[1], radii)
             around = time, step, speeds[0], speeds[1], area0, area1
             if i < len(stress):
-                _keep(value1, slope0, slope1, (*around[:4], share * area0, share * area1), stress[i])
+                _keep(value1, slope0, slope1, (*around[:4], share * area0, share * area1), stress, i)
             growth = (area1 - area0) / step
             rise, slope = area0 * slope0 + growth * value0, area1 * slope1 + growth * value1
-            _keep(value1 * area1, rise, slope, around, friction[i])
+            _keep(value1 * area1, rise, slope, around, friction, i)
         for i in range(len(pull)):
             area0, area1 = math.pi * _of(radii, k, i) ** 2, math.pi * _of(radii, k + 1, i) ** 2
             around = time, step, _of(first, k, i), _of(speed, k, i), area0, area1
-            _keep(_of(pulls, k, i), math.nan, math.nan, around, pull[i])
+            _keep(_of(pulls, k, i), math.nan, math.nan, around, pull, i)
         for i in range(len(contact)):
             radius, work, opening = _of(radii, k + 1, i), _of(works, k, i), _of(detached, k, i)
-            if radius > 0.0:
+            closed, was_closed = radius > 0.0, contact[i, _LAST] > 0.0
+            if closed:
                 contact[i, _CLOSED] += step
-            if not (radius > 0.0 and work > 0.0 and contact[i, 0] > 0.0) or opening > contact[i, _DETACHED]:
+            if closed != was_closed or (closed and not work > 0.0) or opening > contact[i, _DETACHED]:
                 _turn(time, step, radius, work, opening, contact[i])
 
 
 @device
-def _turn(time, step, radius, work, detached, contact):
+def _turn(time, step, radius, work, detached, row):
     """Take the radius [m], work of adhesion [J/m²] and time of the last detachment of a contact after a step.
 
-    It is called where one of them matters: a contact that stays closed with work of adhesion left has no events.
+    It is called where one of them matters: a contact that stays open, or closed with work of adhesion left, has no
+    events.
     """
-    row = contact.view(CONTACT)[0]
-    opens = detached > row.detached
-    was_open = opens or not row.last > 0.0
-    row.last = radius
+    opens = detached > row[_DETACHED]
+    was_open = opens or not row[_LAST] > 0.0
+    row[_LAST] = radius
     if opens:
-        row.detached = detached
-        row.detachments += 1.0
-        if math.isnan(row.opening):
-            row.opening = detached
+        row[_DETACHED] = detached
+        row[_DETACHMENTS] += 1.0
+        if math.isnan(row[_OPENING]):
+            row[_OPENING] = detached
     if not radius > 0.0:
         return
     if work <= 0.0:
-        row.hidden += step
-        if math.isnan(row.masked):
-            row.masked = time
-    if was_open and math.isnan(row.closing):
-        row.closing, row.radius = time, radius
+        row[_HIDDEN] += step
+        if math.isnan(row[_MASKED]):
+            row[_MASKED] = time
+    if was_open and math.isnan(row[_CLOSING]):
+        row[_CLOSING], row[_RADIUS] = time, radius
 
 
 @device
-def _keep(now, rise, slope, around, maximum):
-    """Replace a maximum by that after a value ``now``; slopes at both ends of the step, nan if unknown.
+def _keep(now, rise, slope, around, maxima, i):
+    """Replace the maximum of a row by that after a value ``now``; slopes at both ends of the step, nan if unknown.
 
-    ``around``: time and length of the step [s], speeds and areas at both ends.
+    ``around``: time and length of the step [s], speeds and areas at both ends. Rows are taken by their number, because
+    a row that is an array, or a view of a record, costs twice the time.
     """
     time, step, speed0, speed1, area0, area1 = around
-    before, last, fell, largest = maximum[0], maximum[1], maximum[2], maximum[3]  # a view of a record costs twice
+    before, last, fell, largest = maxima[i, 0], maxima[i, 1], maxima[i, 2], maxima[i, 3]
     now = 0.0 if math.isnan(now) else now
     place = -1.0  # of a new maximum, as share of the step before its end
     if last > largest:  # at the start of a phase
@@ -463,10 +465,10 @@ def _keep(now, rise, slope, around, maximum):
         peak = last - 0.25 * (before - now) * (1.0 - back)
     if peak > largest:
         largest, place = peak, back
-    maximum[0], maximum[1], maximum[2] = last, now, 1.0 if rise < 0.0 and slope < 0.0 else 0.0
+    maxima[i, 0], maxima[i, 1], maxima[i, 2] = last, now, 1.0 if rise < 0.0 and slope < 0.0 else 0.0
     if place >= 0.0:
-        maximum[3], maximum[4] = largest, time - place * step
-        maximum[5], maximum[6] = speed1 - place * (speed1 - speed0), area1 - place * (area1 - area0)
+        maxima[i, 3], maxima[i, 4] = largest, time - place * step
+        maxima[i, 5], maxima[i, 6] = speed1 - place * (speed1 - speed0), area1 - place * (area1 - area0)
 
 
 @device
