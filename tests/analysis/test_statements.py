@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 import xarray as xr
 from helpers.lens import scene
 from helpers.parts import Bell, Clock, Ensemble, analysis, bonds, drive, run, shear
@@ -54,7 +55,10 @@ def test_a_reason_marks_its_cell_and_is_a_note_of_the_table():
     assert "* A/A_JKR: not settled" in analysis.notes(dataset, rows, [], stated)
 
 
-def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_members_or_a_reason():
+@pytest.mark.parametrize(
+    ("count", "least", "most"), [(40, 32, 40), pytest.param(200, 179, 198, marks=pytest.mark.verify)]
+)
+def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_members_or_a_reason(count, least, most):
     rates, still = {"critical_speed": 3e-3, "rebinding_rate": 5.0, "stress": 2e5}, {"shear": shear.Uniform()}
     lens = still | {"drive": drive.Steady(speed=1e-3), "clock": Clock(duration=2.0, step=0.01)}
     exact = 1.0 / (5.0 * (1.0 + 1.0 / 3.0))  # dN/dt = h (N0 - N) - h (V/Vc) N
@@ -72,8 +76,8 @@ def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_memb
             noise[:, k] = memory * noise[:, k - 1] + math.sqrt(1.0 - memory**2) * noise[:, k]
         return xr.Dataset({"x": (("member", "t"), mean + 0.1 * noise)}, {"t": time})
 
-    intervals = [analysis.relaxation(course(1.0 - np.exp(-time / 0.63)), "x") for _ in range(200)]
-    assert 179 <= sum(each.low < 0.63 < each.high for each in intervals) <= 198  # a band of 99.9 %
+    intervals = [analysis.relaxation(course(1.0 - np.exp(-time / 0.63)), "x") for _ in range(count)]
+    assert least <= sum(each.low < 0.63 < each.high for each in intervals) <= most  # a band of 99.9 %
     later = analysis.relaxation(
         xr.Dataset({"x": ("t", np.exp(-np.maximum(time - 1.0, 0.0) / 0.4))}, {"t": time}), "x", 1.0
     )
@@ -86,7 +90,9 @@ def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_memb
     for words, mean in cases.items():
         refused = analysis.relaxation(xr.Dataset({"x": ("t", mean)}, {"t": time}), "x")
         assert words in refused.reason and math.isnan(refused.value)
-    assert sum(not analysis.relaxation(course(0.0 * time), "x").reason for _ in range(50)) <= 2  # of noise alone
+    assert (
+        sum(not analysis.relaxation(course(0.0 * time), "x").reason for _ in range(count // 4)) <= 2
+    )  # of noise alone
 
 
 def test_a_maximum_inside_a_sweep_and_a_systematic_error_are_notes():
