@@ -22,8 +22,8 @@ from sim.spectrum.families import Band
 from sim.spectrum.radial import share_of_long_waves
 from sim.units.notation import engineering
 
-#: Times of a run at which it is judged, steps of a ramp, keys in a sentence; energies of a member, on a disc, and points
-#: at which their density is summed.
+#: Times of a run at which it is judged, steps of a ramp, keys in a sentence; energies of a member, on a disc, and
+#: points at which their density is summed.
 _TIMES, _STEPS, _KEYS, _ENERGIES, _ON_DISC, _POINTS = 21, 1000, 5, 256, 32, 2**12
 #: Error of A/A_JKR and lag that need a sentence; share of the work of adhesion that nearly masks it.
 _ERROR, _LAG, _MASKING = 0.01, 0.005, 0.9
