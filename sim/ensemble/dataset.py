@@ -123,8 +123,9 @@ def outline(plan: Plan, parts: Blocks) -> Outline:
     content.sizes["t"] = clock.records
     content.add("t", "f8", ("t",), "s", "time since the start", "t", clock.times)
     _add_numbers(content, plan)
-    content.attributes["remarks"] = json.dumps([*remarks(plan), *diagnosis(plan)], ensure_ascii=False)
-    if (most := worst(plan.points)) and "cell_error_area" in content.variables:
+    most = worst(plan.points)
+    content.attributes["remarks"] = json.dumps([*remarks(plan, most), *diagnosis(plan)], ensure_ascii=False)
+    if most and "cell_error_area" in content.variables:
         content.variables["cell_error_area"].attributes["cure"] = cure(*most)
     slips = [variable.name for variable in plan.largest if variable.axis == "slip"]
     content.sizes |= {"slip": 1} if slips else {}

@@ -32,6 +32,9 @@ _MOST_POINTS, _BAND = 2**14, (0.8, 1.2)
 #: Relative change of bonds and stress in the derivative of the area; duration over that of a ramp that nothing delays.
 _LITTLE, _VERY_SLOW = 1e-4, 1e6
 
+#: A point of a sweep, and its systematic errors.
+Worst = tuple[Scenario, dict[str, float]]
+
 
 def spread(points: Sequence[Scenario], most: int = 8) -> list[Scenario]:
     """Return some of the points, first and last included."""
@@ -109,7 +112,7 @@ def _scores(skewness: float, count: int) -> Array:
     return cast(Array, (values - np.mean(values)) / np.std(values))
 
 
-def worst(points: Sequence[Scenario]) -> tuple[Scenario, dict[str, float]] | None:
+def worst(points: Sequence[Scenario]) -> Worst | None:
     """Return the point of a sweep at which the cell changes A/A_JKR most, with its errors; None without a cell."""
     found = [(point, errors) for point in spread(points) if (errors := systematic_errors(point))]
     known = [pair for pair in found if math.isfinite(pair[1]["cell_error_area"])]
@@ -151,11 +154,11 @@ def place(plan: Plan, point: Scenario, speed: float) -> str:
     return ", ".join([*words, engineering(speed, "m/s") if speed else "rest"])
 
 
-def remarks(plan: Plan) -> list[str]:
-    """Return the remarks on a run, one sentence each."""
+def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
+    """Return the remarks on a run, one sentence each; ``most`` is ``worst`` of its points if that is known."""
     some = spread(plan.points)
     texts = [text for point in some for text in [*point.remarks(), *_outside(point)]]
-    if (most := worst(plan.points)) and (keys := cure(*most)):
+    if (most := most or worst(plan.points)) and (keys := cure(*most)):
         point, area, friction = most[0], *(100.0 * most[1][f"cell_error_{of}"] for of in ("area", "friction"))
         too, at = "large" if area > 0.0 else "small", place(plan, point, most[1]["error_speed"])
         size = f"{abs(area):.2g} points and the friction {abs(friction):.2g} % too {too}"

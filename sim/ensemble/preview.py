@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from sim.engine import MemberNoise, follow
-from sim.ensemble.diagnosis import diagnosis, place as in_words, remarks, slider_body, spread, worst
+from sim.ensemble.diagnosis import Worst, diagnosis, place as in_words, remarks, slider_body, spread, worst
 from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots, state_numbers, work
 from sim.ensemble.variables import SOURCES
 from sim.laws import jkr
@@ -308,16 +308,16 @@ def preview(scenario: Scenario) -> str:
         Several lines for a terminal.
     """
     plan = Plan.of(scenario)
-    some = spread(plan.points)
+    some, most = spread(plan.points), worst(plan.points)
     blocks: dict[str, Rows] = {
         "models": _models(plan),
         "quantities in SI": _quantities(plan.points),
         "contact at rest": _contact(plan.points),
         "fluctuations": _fluctuations(some),
-        "errors of the result": _errors(plan),
+        "errors of the result": _errors(plan, most),
         "slider": _slider([point for point in some if point.drive.solves_motion]),
         "diagnosis": [(text,) for text in diagnosis(plan)],
-        "notes": [(text,) for text in [*remarks(plan), *_lacking(plan)]],
+        "notes": [(text,) for text in [*remarks(plan, most), *_lacking(plan)]],
         "the run": _run(plan),
     }
     return "\n\n".join([scenario.name, *(f"{title}\n{_aligned(rows)}" for title, rows in blocks.items() if rows)])
@@ -434,9 +434,9 @@ def _power(point: Scenario) -> float:
     return float(settled.frozen[0] + settled.varying[0])
 
 
-def _errors(plan: Plan) -> Rows:
+def _errors(plan: Plan, most: Worst | None) -> Rows:
     """Return the systematic errors of area and friction where they are largest, beside the standard error."""
-    if not (most := worst(plan.points)):
+    if most is None:
         return []
     (point, errors), rows, members = most, list[tuple[str, ...]](), plan.scenario.ensemble.members
     for name, words in SOURCES.items():

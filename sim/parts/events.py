@@ -31,7 +31,7 @@ TURN = record("opening closing radius")
 #: of the phase.
 CONTACT = record("last detached detachments masked closed hidden " + " ".join(TURN.names or ()))
 #: Its columns for the kernel, because a kernel with a view of a record takes 0.1 s to load.
-_LAST, _DETACHED, _DETACHMENTS, _MASKED, _CLOSED, _HIDDEN, _OPENING, _CLOSING, _RADIUS = range(len(CONTACT))
+_LAST, _DETACHED, _DETACHMENTS, _MASKED, _CLOSED, _HIDDEN, _OPENING, _CLOSING, _RADIUS = range(len(CONTACT.names or ()))
 #: Fall of the spring force that makes a slip event, and rise that ends it, over the largest force so far.
 FALL, RISE = 0.3, 0.1
 #: Slip of the interface over the slider's advance in a slip event, at least.
@@ -102,13 +102,11 @@ class Slips(NamedTuple):
             Time from which on events are late [s].
         """
         samples = time, *stage, *slider, half
-        slips = self._replace(running=self.running.copy(), late=self.late.copy(), log=self.log[:, :0].copy())
-        _follow_slips(*samples, *slips)
-        count = slips.total
-        if np.array_equal(count, self.total):
-            return slips._replace(log=self.log)
-        room = 2 ** math.ceil(math.log2(min(count.max(), MOST_SLIPS)))  # of the count alone, not of the blocks
-        log = np.full((len(count), room, self.log.shape[2]), np.nan)
+        slips = Slips(self.running.copy(), self.late.copy(), self.log[:, :0])
+        if not _follow_slips(*samples, *slips):
+            return Slips(*slips[:2], self.log)
+        room = 2 ** math.ceil(math.log2(min(slips.total.max(), MOST_SLIPS)))  # of the count alone, not of the blocks
+        log = np.full((len(self.log), room, self.log.shape[2]), np.nan)
         log[:, : self.log.shape[1]] = self.log
         slips = Slips(self.running.copy(), self.late.copy(), log)
         _follow_slips(*samples, *slips)
@@ -208,10 +206,12 @@ def _gather(value, moments):
 
 
 @kernel(
-    f"void(Array(float64, 1, 'A', readonly=True), {7 * _READ}float64, "
+    f"boolean(Array(float64, 1, 'A', readonly=True), {7 * _READ}float64, "
     "float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1])"
 )
 def _follow_slips(times, stage, speed, force, position, slip, stress, work, half, running, late, log):
+    """Take samples of all members; return True if a slip event has ended."""
+    ends = False
     columns = np.zeros(log.shape[2])
     event = columns.view(SLIP)[0]
     for i in range(len(running)):
@@ -224,6 +224,7 @@ def _follow_slips(times, stage, speed, force, position, slip, stress, work, half
                 state.half_work, state.half_path, state.half_gone = state.work, state.path, state.gone
             if not ended:
                 continue
+            ends = True
             if state.count < min(log.shape[1], MOST_SLIPS):
                 log[i, int(state.count)] = columns
             if event.time >= half:
@@ -237,6 +238,7 @@ def _follow_slips(times, stage, speed, force, position, slip, stress, work, half
                     _gather(event.time - state.before, late[i, 3])
             state.count += 1.0
             state.before = event.time
+    return ends
 
 
 class Past(NamedTuple):
