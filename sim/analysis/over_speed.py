@@ -309,9 +309,10 @@ class Population(NamedTuple):
 
 def population_of(point: xr.Dataset) -> Population | None:
     """Return the bonds of a dataset without a sweep; None if they do not stretch or it lacks their numbers."""
+    if not (keys := [str(name) for name in point.variables if str(name).startswith(_PREFIX)]):
+        return None
     from sim.parts.bonds.rupture import Rupture  # which takes a while, and few datasets need it
 
-    keys = [str(name) for name in point.variables if str(name).startswith(_PREFIX)]
     with contextlib.suppress(KeyError, ValueError):
         numbers = {key.removeprefix(_PREFIX): float(point[key]) for key in keys}
         rupture = TypeAdapter(get_args(Rupture)[0]).validate_python(numbers)  # any law by its numbers alone
