@@ -9,19 +9,17 @@ peak); ``summary`` turns both into statistics over the members.
 from sim.analysis.dataset import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
 from sim.analysis.errors import SystematicError, remarks, systematic_errors
 from sim.analysis.events import events, loop_energy, peaks, pull_offs, slip_sizes, slips, slips_by_phase, stick_slip
+from sim.analysis.lifetimes import Lifetime, first_passage, lifetime
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
 from sim.analysis.over_speed import crossing, extremes, loss_speeds, speed_curves, steady_speeds
 from sim.analysis.statements import Statement, each, relaxation, statements
 from sim.analysis.statistics import (
     QUANTILES,
     IntegralTime,
-    Lifetime,
     averaging,
     correlation_time,
     distribution,
-    first_passage,
     integral_time,
-    lifetime,
     over_time,
     shares,
     skewness_error,

@@ -19,6 +19,8 @@ _PEAKS = {"peak_stress": ("shear_stress", "peak"), "peak_friction": ("friction_f
 _CHANCE, _RESAMPLED, _AFTER = 0.01, 200, 8
 #: Standard errors by which estimates of a peak over different numbers of records may differ.
 _ALIKE = 2.0
+#: Records that a peak needs: an eighth of them are its end.
+_FEWEST = 8
 
 
 class Peak(NamedTuple):
@@ -146,7 +148,8 @@ def ensemble_peaks(dataset: xr.Dataset) -> xr.Dataset:
             known = known[np.isfinite(known).all(axis=-1)]
             peak = Peak("a peak of members with noise needs each of them: [record] per_member = true")
             if is_known:
-                peak = peak_of_mean(known, since, unit) if min(known.shape) > 1 else Peak("too few records or members")
+                is_enough = len(known) > 1 and known.shape[1] >= _FEWEST
+                peak = peak_of_mean(known, since, unit) if is_enough else Peak("too few records or members")
                 numbers[:, *point] = *peak[1:], *np.interp(peak[-3:], since, speeds[point][first:])
             reasons[point] = peak.reason
         ends = ("mean", "low", "high")

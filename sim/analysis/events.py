@@ -17,6 +17,7 @@ from sim.analysis.dataset import (
     setting,
     speed_name,
     speed_of,
+    stays_held,
     sweep_dims,
     where_recorded,
     with_trajectories,
@@ -49,6 +50,8 @@ _LATE = {
     "static_friction": "force_before", "force_drop": "force_drop", "slip_amplitude": "amplitude",
     "recurrence_time": "recurrence",
 }  # fmt: skip
+#: Half of a 95 % interval of a normal law in standard errors.
+_WIDE = 1.96
 #: Endings of the names of values of each member, and of statistics.
 _ENDINGS = ("", "_mean", "_std", "_sem")
 
@@ -135,8 +138,14 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     text = "standard deviation of the displacements in slips over their mean"
     result["slip_spread"] = pure(dataset["late_amplitude_std"] / dataset["late_amplitude_mean"], text)
     counted = dataset["slip_time"] >= _beginning(dataset)
-    means = slips(dataset).where(counted).mean("slip", keep_attrs=True)
-    return result.merge(means[["slip_duration", "stick_duration", "stress_drop"]], compat="no_conflicts")
+    each = slips(dataset).where(counted)[["slip_duration", "stick_duration", "stress_drop"]]
+    result = result.merge(each.mean("slip", keep_attrs=True), compat="no_conflicts")
+    if dataset.sizes.get(MEMBERS, 1) == 1:  # there is no other error than the scatter between slip events
+        errors = {str(name): each[name].std("slip", ddof=1) / each[name].count("slip") ** 0.5 for name in each}
+        of_late = {name: dataset[f"late_{of}_std"] / dataset["slip_count_late"] ** 0.5 for name, of in _LATE.items()}
+        errors |= of_late | {"kinetic_friction": 0.5 * of_late["force_drop"]}
+        result = result.assign({f"{name}_reading": _WIDE * error for name, error in errors.items()})
+    return result
 
 
 def slips_by_phase(dataset: xr.Dataset) -> xr.Dataset:
@@ -256,6 +265,8 @@ _JUMP = 4.0
 _REST = 0.01
 #: Fall of a force over its largest so far with which it has passed its first maximum.
 _FALL = 0.02
+#: Records from which on an event is read off them.
+_FEWEST = 16
 #: Share of the largest force up to which the law of incipient shear is fitted.
 _FITTED = 0.5
 _STEP = {
@@ -353,9 +364,9 @@ def way_to_sliding(dataset: xr.Dataset) -> xr.Dataset:
         ``static_threshold`` [N], the force of the spring before it first falls; ``area_at_threshold`` [1], the contact
         area there over that at rest; ``area_by_law`` [1], what A0 - alpha Q^2 gives there; ``incipient_alpha``
         [m^2/N^2], see ``incipient_law``. nan where the force does not fall while the stage is not slowed down, or the
-        area does not. Empty where no stage pulls.
+        area does not. Empty if no stage pulls, or the load or another control of the contact changes its area, too.
     """
-    if "stage_speed" not in dataset:
+    if "stage_speed" not in dataset or not bool(stays_held(dataset).all()):
         return xr.Dataset()
     return _of_each(dataset, _PULL, _pulled, "stage_speed", "spring_force", "contact_area")
 
@@ -389,13 +400,24 @@ def incipient_law(force: np.ndarray, area: np.ndarray) -> tuple[int, float]:
 
 
 def _of_each(dataset: xr.Dataset, described: dict[str, tuple[str, str]], of: Any, *read: str) -> xr.Dataset:
-    """Apply a function to the trajectories ``read`` of each member; describe its results by units and meanings."""
+    """Apply a function to the trajectories ``read`` of each member; describe its results by units and meanings.
+
+    ``<name>_reading`` is what a result changes at most if the odd or the even records are left out.
+    """
     dims: Any = {"input_core_dims": [["t"]] * len(read), "output_core_dims": [[]] * len(described), "vectorize": True}
+    if dataset.sizes["t"] < _FEWEST:
+        return xr.Dataset()
 
     def applied(piece: xr.Dataset) -> xr.Dataset:
         series = [piece[name].astype(float).broadcast_like(piece[read[-1]]) for name in read]
-        results = zip(described.items(), xr.apply_ufunc(of, *series, **dims), strict=True)
-        return xr.Dataset({name: labelled(values, *about) for (name, about), values in results})
+        chosen = np.r_[0 : piece.sizes["t"] : 2], np.r_[0, 1 : piece.sizes["t"] : 2]  # both begin with the first record
+        thinner = [[values.isel(t=records) for values in series] for records in chosen]
+        whole, *coarse = (xr.apply_ufunc(of, *values, **dims) for values in (series, *thinner))
+        result = xr.Dataset()
+        for (name, about), values, even, odd in zip(described.items(), whole, *coarse, strict=True):
+            result[name] = labelled(values, *about)
+            result[f"{name}_reading"] = np.fmax(abs(values - even), abs(values - odd))
+        return result
 
     outer = [name for name in (*sweep_dims(dataset), MEMBERS) if name in dataset[read[-1]].dims]
     return in_pieces(with_trajectories(dataset, *read), outer, applied)
@@ -404,6 +426,10 @@ def _of_each(dataset: xr.Dataset, described: dict[str, tuple[str, str]], of: Any
 # --- all events of a run, once per member ---
 
 
+#: Energies of a loop, of each member.
+_LOOPS = ("loop_energy", "loop_dissipation")
+#: Records that a cycle needs, and the energies of a cycle of each member.
+_CORNERS, _LOOPS = 4, ("loop_energy", "loop_dissipation")
 #: A loop below this share of what is put in and given back is nothing.
 _NOTHING = 1e-12
 #: Names of a peak, the quantity that it is of, and its unit.
@@ -455,7 +481,13 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
             text = "energy dissipated by opening and closing, in all"
             result[f"total_dissipated{suffix}"] = labelled(lost, "J", text, "W")
     with contextlib.suppress(ValueError), answered():
-        result = result.merge(loop_energy(dataset).mean("cycle", keep_attrs=True), compat="no_conflicts")
+        loops = loop_energy(dataset)
+        if dataset.sizes["t"] > _CORNERS * loops.sizes["cycle"]:
+            means = loops.mean("cycle", keep_attrs=True)
+            coarse = loop_energy(dataset.isel(t=slice(None, None, 2))).mean("cycle")
+            for name in [name for name in _LOOPS if name in coarse]:
+                means[f"{name}_reading"] = abs(means[name] - coarse[name])
+            result = result.merge(means, compat="no_conflicts")
     return result
 
 

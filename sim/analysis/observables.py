@@ -174,6 +174,22 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(shares, attrs=dataset.attrs)
 
 
+def radius_at_work(dataset: xr.Dataset, work: xr.DataArray) -> xr.DataArray:
+    """Return the radius of a contact with a work of adhesion [J/m^2], held as the sphere is [m]; nan if it is open.
+
+    Raises
+    ------
+    KeyError
+        If the dataset does not hold a number that is needed.
+    """
+    held, sphere = control(dataset), (work, setting(dataset, "sphere.radius"), dataset["contact_modulus"])
+    if held.kind == "load":
+        load = dataset["applied_load"] if "applied_load" in dataset else dataset.get("contact_load")
+        return xr.apply_ufunc(jkr.radius_at_load, load, *sphere)
+    # an indentation is a displacement behind an infinite stiffness
+    return xr.apply_ufunc(jkr.radius_at_displacement, dataset[held.kind], held.stiffness, *sphere)
+
+
 def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
     """Return the share that fluctuations take if they are charged first; see ``charges``.
 
@@ -184,17 +200,12 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
     """
     if "fluctuation_energy" not in dataset or bool((word(dataset, "shear.contact", "plane") != "plane").any()):
         raise ValueError("the other order of charging needs the fluctuation energy of each member, on a plane")
+    energy = dataset["fluctuation_energy"].astype(float, copy=False)
     try:
-        held, share = control(dataset), setting(dataset, "shear.paid_by_adhesion")
-        load = dataset["applied_load"] if "applied_load" in dataset else dataset.get("contact_load")
+        work = setting(dataset, "adhesion.work") - setting(dataset, "shear.paid_by_adhesion") * energy
+        radius = radius_at_work(dataset, work)
     except KeyError as fault:
         raise ValueError(f"the other order of charging is not known: {fault.args[0]}") from None
-    work = setting(dataset, "adhesion.work") - share * dataset["fluctuation_energy"].astype(float, copy=False)
-    sphere = work, setting(dataset, "sphere.radius"), dataset["contact_modulus"]
-    if held.kind == "load":
-        radius = xr.apply_ufunc(jkr.radius_at_load, load, *sphere)
-    else:  # an indentation is a displacement behind an infinite stiffness
-        radius = xr.apply_ufunc(jkr.radius_at_displacement, dataset[held.kind], held.stiffness, *sphere)
     full, alone = full_area(dataset), np.pi * radius.fillna(0.0) ** 2
     alone = alone.where(dataset["contact_area"].notnull())
     return pure((full - alone) / full, "share of JKR's area lost to fluctuations, which are charged first")

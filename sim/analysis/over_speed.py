@@ -24,8 +24,16 @@ from sim.analysis.dataset import (
     speed_of,
     stays_held,
     sweep_dims,
+    word,
 )
-from sim.analysis.observables import chosen_observables, closed_only, labelled, reference_radii, restricted
+from sim.analysis.observables import (
+    chosen_observables,
+    closed_only,
+    labelled,
+    radius_at_work,
+    reference_radii,
+    restricted,
+)
 from sim.analysis.statistics import LEVEL, of_second_half, over_members
 from sim.laws import schallamach
 from sim.units.errors import BadInput
@@ -241,17 +249,30 @@ def extremes(curves: xr.Dataset, name: str, along: str) -> xr.Dataset:
     curves, result = curves.sortby(along), xr.Dataset()
     mean, low, high = (curves[f"{name}_{end}"] for end in ("mean", "low", "high"))
     low, high, last = low.fillna(mean), high.fillna(mean), curves.sizes[along] - 1
-    for word, sign, near, far in (("largest", 1.0, low, high), ("least", -1.0, -high, -low)):
+    for kind, sign, near, far in (("largest", 1.0, low, high), ("least", -1.0, -high, -low)):
         index = (sign * mean).fillna(-np.inf).argmax(along)
         inside = near.isel({along: index}) > far.isel({along: [0, last]}).max(along)
         for end, step, values in (("", 0, mean), ("_low", -1, low), ("_high", 1, high)):
             place = curves[along].isel({along: (index + step).clip(0, last)}).where(inside)
-            result[f"{name}_{word}{end}"] = (
+            result[f"{name}_{kind}{end}"] = (
                 values.isel({along: index}, drop=True).where(inside).assign_attrs(mean.attrs)
             )
-            result[f"{name}_{word}_at{end}"] = place.drop_vars(along, errors="ignore").assign_attrs(curves[along].attrs)
-        result[f"{name}_{word}_reason"] = xr.where(inside, "", "at an end of the sweep, within the errors")
+            result[f"{name}_{kind}_at{end}"] = place.drop_vars(along, errors="ignore").assign_attrs(curves[along].attrs)
+        result[f"{name}_{kind}_reason"] = xr.where(inside, "", "at an end of the sweep, within the errors")
     return result.drop_vars(along, errors="ignore")
+
+
+def _least_area(dataset: xr.Dataset, hertz: xr.DataArray) -> xr.DataArray:
+    """Return the least area over JKR's that can be left: Hertz's, and without fluctuations that without bonds."""
+    energy = dataset.get("fluctuation_energy", dataset.get("fluctuation_energy_mean", xr.DataArray(math.nan)))
+    others = {"fluctuations_radius", "fluctuations_radius_mean", "equilibrium_radius", "equilibrium_radius_mean"}
+    if bool((energy != 0.0).any()) or others & dataset.keys():
+        return hertz
+    with contextlib.suppress(KeyError):
+        left = setting(dataset, "adhesion.work") * (1.0 - setting(dataset, "adhesion.bond_share"))
+        bare = radius_at_work(dataset, left) / reference_radii(dataset)["radius_jkr"]
+        return bare.min([name for name in bare.dims if name not in hertz.dims]) ** 2 + 0.0 * hertz
+    return hertz
 
 
 def _course(dataset: xr.Dataset) -> tuple[str, xr.DataArray]:
@@ -265,6 +286,8 @@ def _course(dataset: xr.Dataset) -> tuple[str, xr.DataArray]:
     has_area = bool({"contact_area", "contact_area_mean"} & dataset.keys())
     if speed_name(dataset) not in dataset or not (has_area and {"jkr_radius", "hertz_radius"} <= dataset.keys()):
         raise BadInput(["speeds of a loss need speed, contact_area, jkr_radius and hertz_radius in record.quantities"])
+    if bool((word(dataset, "drive.model", "") == "force").any()):
+        raise BadInput(["a force drives the slider, and its speed is a result; speeds of a loss need it prescribed"])
     if not bool(stays_held(dataset).all()):
         raise BadInput(["the load, indentation or displacement changes in the run; speeds of a loss need it constant"])
     speed = abs(speed_of(dataset))
@@ -337,7 +360,9 @@ def steady_speeds(dataset: xr.Dataset) -> xr.DataArray:
             continue
         fine = np.geomspace(1e-3 * np.min(sizes[sizes > 0.0]), 1e3 * np.nanmax(sizes), _FINE)
         law = np.full(_FINE, math.nan)
-        if bonds := population_of(point):
+        if (bonds := population_of(point)) and word(point, "bonds.model", "") == "rate" and bonds.pathway:
+            law = schallamach.first_moment_fraction(fine, *bonds.pathway, bonds.rebinding) / bonds.at_rest
+        elif bonds:
             law = bonds.rupture.closed_form(fine, bonds.stiffness, bonds.rebinding).bound / bonds.at_rest
         elif "bonds_critical_speed" in point:
             law = schallamach.steady_fraction(fine, float(point["bonds_critical_speed"]))
@@ -395,6 +420,7 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
     if not wanted:
         left = [(f"at_{k}_percent_lost", 1.0 - 0.01 * k + 0.0 * hertz, f"{k} % of JKR's") for k in LOSSES]
         left.append(("halfway_to_hertz", 0.5 * (1.0 + hertz), "half of what it can, down to Hertz's"))
+    least = _least_area(dataset, hertz)
     means, sizes, alone = _group_means(dataset, along, bool(wanted))
     if along == "t" and bool(((steady := steady_speeds(dataset)) != abs(speed_of(dataset))).any()):
         means["steady_speed"] = np.log(steady.where(steady > 0.0)) + 0.0 * means["area_ratio"]
@@ -403,8 +429,8 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
     how |= {"output_core_dims": [[], [], [], [], ["quantity", "end"]], "output_dtypes": [*"dddOd"], "vectorize": True}
     for name, level, loss in left:
         *ends, reason, others = xr.apply_ufunc(crossing, speed, means["area_ratio"], sizes, level, beside, **how)
-        found, never = ends[0].notnull(), ends[0].isnull() & (level < hertz)
-        reason = _worded(reason, never, "never: at most {:.3g} % can be lost".format, 100.0 * (1.0 - hertz))
+        found, never = ends[0].notnull(), ends[0].isnull() & (level < least)
+        reason = _worded(reason, never, "never: at most {:.3g} % can be lost".format, 100.0 * (1.0 - least))
         columns = {f"speed_{name}": (ends, "m/s", f"sliding speed at which the mean contact area has lost {loss}")}
         for key, numbers in zip(means, others.transpose("quantity", "end", ...), strict=True):
             text = f"{means[key].attrs.get('long_name', '')}, at the speed at which {loss} is lost"
@@ -412,7 +438,8 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
         del columns[f"area_ratio_{name}"]
         if slow := columns.pop(f"steady_speed_{name}", None):
             steady, text = np.exp(slow[0][0]), f"sliding speed, about, at which steady sliding loses {loss}"
-            result[f"steady_speed_{name}"] = labelled(steady, "m/s", text)
+            for (end, words), values in zip(_ENDS.items(), slow[0], strict=True):
+                result[f"steady_speed_{name}{end}"] = labelled(np.exp(values), "m/s", words + text)
             result[f"steady_speed_{name}_reason"] = reason
             lags = abs(np.log(ends[0] / steady)) > np.fmax(0.5 * np.log(ends[2] / ends[1]), _UNSEEN)
             reason = _worded(reason, lags, _lag, steady)

@@ -10,14 +10,16 @@ import xarray as xr
 from sim.analysis.dataset import MEMBERS, is_stationary, plain
 from sim.analysis.ensemble_peaks import ensemble_peaks
 from sim.analysis.events import events
+from sim.analysis.lifetimes import half_lives
 from sim.analysis.over_speed import loss_speeds
-from sim.analysis.statistics import averaging, half_lives, of_second_half, summary
+from sim.analysis.statistics import averaging, of_second_half, summary
+from sim.units.errors import BadInput
 from sim.units.notation import bounded, scaled, share
 
 #: Endings of the variables of a statement beside its value.
 _BESIDE = ("sem", "low", "high", "reason")
 #: Pure numbers that are no shares, so that they are not printed in percent.
-COUNTS = frozenset(("bond_fraction", "slip_count", "slip_count_late", "detachments", "step_renewal"))
+COUNTS = frozenset(("bond_fraction", "slip_count", "slip_count_late", "pull_offs", "detachments", "step_renewal"))
 #: Shares that are at least 0 and at most 1.
 BOUNDED = frozenset(("fraction_detached", "fraction_masked", "time_masked", "ever_detached", "ran_away"))
 
@@ -86,6 +88,9 @@ def statements(
         - of a stationary run means over its second half (see ``distribution``).
     """
     dataset = plain(dataset)
+    if MEMBERS in dataset["contact_modulus"].dims:
+        cure = 'xarray.concat(..., "member", data_vars="minimal", coords="minimal", compat="override")'
+        raise BadInput([f"numbers of the scenario differ between members; join runs by {cure}"])
     groups = [(of_events(dataset), False), (as_means(loss_speeds(dataset, lost)), False)]
     if is_stationary(dataset):
         groups.append((of_second_half(dataset, names), True))

@@ -11,18 +11,7 @@ import scipy
 import xarray as xr
 from scipy import special
 
-from sim.analysis.dataset import (
-    MEMBERS,
-    ROOM,
-    has_noise,
-    in_pieces,
-    is_stationary,
-    plain,
-    steady_points,
-    sweep_dims,
-    with_trajectories,
-    word,
-)
+from sim.analysis.dataset import MEMBERS, ROOM, has_noise, in_pieces, plain, steady_points, sweep_dims, word
 from sim.analysis.events import events
 from sim.analysis.observables import (
     FEW_LEFT,
@@ -581,6 +570,8 @@ _NO_FORCE = 1e-24
 _FALSE_ALARM = 0.01
 #: Whole cycles that each half of a span needs; share of a span over which its begin and its end are averaged.
 _CYCLES, _ENDS_SHARE = 2, 0.125
+#: Records of a run without noise from which on it can be said to have settled.
+_FEW_RECORDS = 4
 _LEVELS = np.array(QUANTILES)
 
 
@@ -751,13 +742,15 @@ class Settlement(NamedTuple):
     """Answer if a mean over a span is one, with the value of the span and those at its begin and its end.
 
     ``verdict`` is "" if the values have settled. The value is that at the end, of cycles the mean over whole ones, and
-    the mean over the span if it is too short to tell.
+    the mean over the span if it is too short to tell. ``half`` is half of the 95 % interval by the scatter between
+    cycles, nan without cycles.
     """
 
     verdict: str
     value: float
     begin: float
     end: float
+    half: float = math.nan
 
     def reason(self, unit: str, span: str) -> str:
         """Return why a span gives no mean, with the values at its ends in a unit; "" if it does."""
@@ -819,12 +812,13 @@ def _settled(course: np.ndarray, drift: float, error: float, free: float, noisy:
     if course.size == 1 or np.ptp(course) <= (_UNSEEN if noisy else _STILL) * np.max(np.abs(course)):
         return Settlement("", end, begin, end)
     limit = error * float(special.stdtrit(free, 1.0 - 0.5 * _FALSE_ALARM)) if noisy else _STILL * abs(mean)
-    is_short = math.isnan(limit)
+    is_short = math.isnan(limit) or (not noisy and course.size < _FEW_RECORDS)
     steps = np.diff(course)
     is_one_way = course.size >= _ONE_WAY and (steps.min() >= 0.0 or steps.max() <= 0.0)
     is_still = abs(drift) <= limit and not is_one_way if noisy else abs(change) <= limit
     if not is_short and (is_still or abs(change) <= bound):
-        return Settlement("", mean, begin, end)
+        between = 0.5 * bound * WIDE / float(special.ndtri(1.0 - 0.5 * _FALSE_ALARM))
+        return Settlement("", mean, begin, end, between if between > 0.0 else math.nan)
     off = course > course.mean()
     if is_short or (not noisy and np.count_nonzero(off[1:] > off[:-1]) > 1):
         return Settlement("too short to tell if it has settled", float(course.mean()), begin, end)
@@ -935,7 +929,7 @@ def _reader(dataset: xr.Dataset, names: Collection[str] | None) -> Callable[[str
 def _series(dataset: xr.Dataset, variable: xr.DataArray, step: float) -> np.ndarray:
     """Return values of an observable, shape (..., members, records); the speed of a slider that may slip by its way."""
     sweep = dataset["contact_modulus"]
-    if variable.name == "speed" and {"slider_position", "spring_force"} <= set(dataset) and dataset.sizes["t"] > 1:
+    if variable.name == "speed" and {"slider_position", "spring_force"} <= set(dataset) and dataset.sizes["t"] > 2:
         return np.diff(rows_of(dataset["slider_position"].compute(), sweep)) / step  # slips come between two records
     return rows_of(variable, sweep)
 
@@ -959,6 +953,9 @@ def _described(
     reasons = np.where(opened != "", opened, drifts)
     ends = np.where(opened != "", np.nan, [state.value for state in states])
     numbers["mean"] = np.where((reasons != "") | ~noisy, ends, numbers["mean"])
+    halves = np.where(noisy, math.nan, [state.half for state in states])  # without noise cycles differ, if anything
+    for kind, sign in (("low", -1.0), ("high", 1.0)):
+        numbers[kind] = np.where(np.isnan(halves), numbers[kind], numbers["mean"] + sign * halves)
     result: dict[str, xr.DataArray] = {}
     for kind, values in numbers.items():
         if kind != "mean":
@@ -1050,167 +1047,3 @@ def rows_of(variable: xr.DataArray, sweep: xr.DataArray) -> np.ndarray:
     sizes = {name: sweep.sizes.get(name, 1) for name in (*sweep.dims, MEMBERS) if name not in variable.dims}
     rows = variable.drop_vars(sizes, errors="ignore").expand_dims(sizes).transpose(*sweep.dims, MEMBERS, "t")
     return rows.to_numpy().astype(float, copy=False)
-
-
-# --- lifetimes, of which some are longer than the run ---
-
-
-class Lifetime(NamedTuple):
-    """Median and rate of an event, with the ends of their 95 % intervals; nan what the runs are too short to tell.
-
-    ``half`` [s] is the time by which it has happened in half of the members, ``rate`` [1/s] how often it
-    happened in all the time in which it could.
-    """
-
-    half: float
-    half_low: float
-    half_high: float
-    rate: float
-    rate_low: float
-    rate_high: float
-
-
-def lifetime(times: np.ndarray, ends: np.ndarray | float, begins: np.ndarray | float = 0.0) -> Lifetime:
-    """Return the median and the rate of an event that may come after a run's end.
-
-    Parameters
-    ----------
-    times : array, shape (members,)
-        When it happened [s]; nan where it did not.
-    ends : float or array
-        Until when each member was watched [s]; nan if it could not happen in a member, which then does not count.
-    begins : float or array
-        From when on it could happen in each member [s], such as the time at which its contact closed; nan as above.
-
-    Notes
-    -----
-    Members are at risk from when on it could happen, and count only from then on (left truncation). The median is that
-    of Kaplan and Meier's survival; its interval, after Brookmeyer and Crowley, holds the times at which the log-log
-    interval of the survival has one half. The interval of the rate is that of a Poisson process, from chi-square.
-
-    Examples
-    --------
-    Three of four members detach within 10 s:
-
-    >>> result = lifetime(np.array([2.0, 5.0, 7.0, np.nan]), 10.0)
-    >>> print(f"{result.half:.0f} s, {result.rate:.3f} /s, {result.rate_low:.2f} to {result.rate_high:.2f} /s")
-    5 s, 0.125 /s, 0.03 to 0.37 /s
-    """
-    watched = np.where(np.isfinite(times), times, ends)
-    since = np.broadcast_to(begins, watched.shape)
-    counts = (watched > since) | ((since == 0.0) & ~np.isnan(watched))
-    happened, watched, since = np.isfinite(times)[counts], watched[counts], since[counts]
-    half = low = high = np.nan
-    if np.any(happened) and np.all(np.isfinite(watched)):
-        half, low, high = _halves(watched, happened, since)
-    count, exposure, tail = float(happened.sum()), float(np.sum(watched - since)) or np.nan, 0.5 - 0.5 * LEVEL
-    least = special.gammaincinv(count, tail) if count else 0.0
-    most = special.gammaincinv(count + 1.0, 1.0 - tail)
-    return Lifetime(half, low, high, count / exposure, least / exposure, most / exposure)
-
-
-def _halves(watched: np.ndarray, happened: np.ndarray, begins: np.ndarray) -> list[float]:
-    """Return the times at which a survival, and the ends of its interval, first are one half or less, or nan.
-
-    The numbers are those of ``scipy.stats.ecdf``, whose import would make the start of ``sim run`` a quarter longer.
-    """
-    times, places, counts = np.unique(watched, return_inverse=True, return_counts=True)
-    events, at_risk = np.bincount(places, happened), watched.size - np.cumsum(counts) + counts
-    at_risk = at_risk - np.sum((begins > 0.0) & (begins >= times[:, np.newaxis]), axis=1)
-    left = at_risk - events
-    if np.any(left[:-1] <= 0):  # nobody was watched for a while
-        return [np.nan] * 3
-    survival = left / watched.size if np.all(happened) and not np.any(begins) else np.cumprod(left / at_risk)
-    with np.errstate(divide="ignore", invalid="ignore"):  # there is no interval if the survival is 1 or 0
-        logarithm = np.log(survival)
-        width = WIDE * np.sqrt(np.cumsum(events / (at_risk * left))) / np.abs(logarithm)
-        ends = [np.exp(-np.exp(np.log(-logarithm) + side * width)) for side in (1.0, -1.0)]
-    curves = [survival, *ends] if happened.sum() > 1 else [survival]
-    below = [np.flatnonzero(curve <= 0.5) for curve in curves]
-    halves = [float(times[first[0]]) if first.size else np.nan for first in below]
-    return halves + [np.nan] * (3 - len(halves))
-
-
-def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
-    """Return the time at which each member first crosses a level from either side [s]; nan if it never does.
-
-    Between two records that lie on both sides of it the time is interpolated; a crossing there and back between two
-    records is not seen.
-
-    Parameters
-    ----------
-    observable : xarray.DataArray
-        With the dimension ``t``, as a variable of a dataset or one of ``observables``.
-    level : float
-        In the unit of the observable.
-    """
-    above = observable.drop_vars("t").reset_coords(drop=True).astype(float) - level
-    side = np.sign(above.isel(t=0))
-    crossed = (above * side <= 0.0) & (side != 0.0)
-    at = crossed.argmax("t")
-    times = observable["t"].drop_vars("t")
-    (before, first), (after, last) = ((above.isel(t=k), times.isel(t=k)) for k in ((at - 1).clip(0), at))
-    share = before / (before - after).where(before != after)
-    passage = (first + share * (last - first)).where(crossed.any("t"))
-    passage = passage.where(side != 0.0, float(times[0]))
-    text = f"time at which the {observable.attrs.get('long_name', observable.name)} first crosses {level:.6g}"
-    return labelled(passage, "s", text)
-
-
-def _first_closed(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the time of the first record at which the contact is closed [s]; nan if it never is."""
-    closed = dataset["contact_radius"] > 0.0
-    return (
-        dataset["t"].isel(t=closed.argmax("t")).drop_vars("t").where(closed.any("t")).to_dataset(name="contact_radius")
-    )
-
-
-def half_lives(dataset: xr.Dataset, event_times: xr.Dataset) -> xr.Dataset:
-    """Return median times of first detachment and masking from ``events``, and rates if the run is stationary."""
-    result = xr.Dataset()
-    happened = {"first_detachment": ("detached", "detached"), "first_masked": ("masked", "had their adhesion masked")}
-    for event, words in happened.items():
-        result.update(lifetimes(dataset, event_times[event], *words) if event in event_times else {})
-    return result if is_stationary(dataset) else result.drop_vars([name for name in result if "_rate" in str(name)])
-
-
-def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -> xr.Dataset:
-    """Return the median and the rate of an event, at each point of the sweep.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it.
-    times : xarray.DataArray
-        When it first happened in each member [s], nan where it did not: ``events(dataset)["first_detachment"]``, or
-        of ``first_passage``.
-    name, words : str
-        What the variables are named by, and what has happened: ``"detached"``, ``"detached"``.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``half_<name>`` and ``<name>_rate``, with ``…_low`` and ``…_high``; see ``lifetime``. Members that are open from
-        the start count from the record at which they are closed, and never if they are never in contact. Empty where
-        members do not differ.
-    """
-    if MEMBERS not in times.dims:
-        return xr.Dataset()
-    duration, dims = float(dataset["t"][-1] - dataset["t"][0]), [str(name) for name in times.dims if name != MEMBERS]
-    values = (times - float(dataset["t"][0])).transpose(..., MEMBERS).to_numpy()
-    watched, begins = np.full(values.shape, duration), np.zeros(values.shape)
-    if "contact_radius" in dataset and not bool((dataset["contact_radius"].isel(t=0) > 0.0).all()):
-        radius = with_trajectories(dataset, "contact_radius")
-        closed = in_pieces(radius, (*dims, MEMBERS), _first_closed)["contact_radius"].transpose(*dims, MEMBERS)
-        begins = np.maximum(closed.to_numpy() - float(dataset["t"][0]), 0.0)
-    first_member, result = times.isel({MEMBERS: 0}, drop=True), {}
-    estimates = iter(np.vectorize(lifetime, signature="(n),(n),(n)->(),(),(),(),(),()")(values, watched, begins))
-    for key, unit, text in (
-        (f"half_{name}", "s", f"time by which half of the members have {words}"),
-        (f"{name}_rate", "1/s", f"rate at which members have {words}"),
-    ):
-        for end in ("", "low", "high"):
-            about = f"{end} end of the 95 % interval of the {text}" if end else text
-            numbers = first_member.copy(data=next(estimates))
-            result[f"{key}_{end}" if end else key] = labelled(numbers, unit, about)
-    return xr.Dataset(result)

@@ -108,7 +108,7 @@ _EVENTS = (
     _Column("slips_down_to", "slips\ndown to", math.nan, meaning="as it gets slower, at the last that follows another"),
     _Column("ran_away", "ran away,\nof members"),
     _Column("runaway_after", "ran away\nafter", math.nan),
-    _Column("static_friction", "static\nfriction", math.nan, meaning="force at which a slip or a runaway begins"),
+    _Column("static_friction", "static\nfriction", math.nan, meaning="force as a slip or a runaway begins"),
     _Column("kinetic_friction", "kinetic\nfriction", math.nan, meaning="work of the stage over its path"),
     _Column("force_drop", "drop", math.nan),
     _Column("stress_drop", "drop of\nstress", math.nan),

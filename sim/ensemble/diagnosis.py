@@ -196,7 +196,8 @@ def _fluctuating(point: Scenario) -> Iterator[str]:
     masked, always = course.work <= 0.0, "at any speed" if shear.amplitude.model == "constant" else "throughout the run"
     how = f": masked {always}" if paid >= 1.0 else f": nearly masked {always}" if paid > _MASKING else ""
     if paid < 1.0 and np.any(masked):
-        how = f": masked {'throughout' if np.all(masked) else 'in part of'} the run"
+        noise = " without the noise of the bonds" if point.population.per_member else ""
+        how = f": masked {'throughout' if np.all(masked) else 'in part of'} the run{noise}"
     share = f"{100.0 * most / (work or math.inf):.2g} % of the work of adhesion"
     yield f"stored energy in steady sliding {engineering(most, 'J/m^2')}, {share}{how}"
     long_waves = share_of_long_waves(spectrum, 2.0 * point.rest_radius, point.solid.effective[1])

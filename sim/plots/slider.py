@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sim.analysis import is_steady, setting, sweep_dims
-from sim.analysis.dataset import MEMBERS, word
+from sim.analysis.dataset import MEMBERS, stays_held, word
 from sim.analysis.events import incipient_law, jumps
 from sim.analysis.over_speed import population_of, speed_dim
 from sim.laws import jkr, schallamach
@@ -190,6 +190,8 @@ def needs_pull(dataset: xr.Dataset) -> None:
     force = style.mean_of(dataset, "spring_force")
     if (abs(force.isel(t=0)) > 0.01 * abs(force).max("t")).any():
         raise ValueError('the force does not begin at zero; start at rest: [drive] start = "rest"')
+    if not bool(stays_held(dataset).all()):
+        raise ValueError("the control of the contact changes its area, too: hold contact.load constant")
     if not (style.mean_of(dataset, "contact_area").isel(t=0) > 0.0).all():
         raise ValueError("the contact is open at the start, so that it has no area to lose; begin with a closed one")
 

@@ -7,12 +7,27 @@ import pytest
 import xarray as xr
 from helpers import lens
 from helpers.lens import LOAD, MODULUS, RADIUS, WORK, scene
-from helpers.parts import Adhesion, Band, Clock, Equilibrium, RateDependent, Record, analysis, bonds, drive, run, shear
+from helpers.parts import (
+    Adhesion,
+    Band,
+    Bell,
+    Clock,
+    Equilibrium,
+    Force,
+    RateDependent,
+    Record,
+    analysis,
+    bonds,
+    drive,
+    run,
+    shear,
+)
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.analysis import dataset as dataset_module, over_speed
 from sim.analysis.observables import charges, chosen_observables
 from sim.laws import jkr, reversible
+from sim.units.errors import BadInput
 
 LONG = pytest.mark.verify
 SPEEDS = np.geomspace(1e-3, 1e3, 61)
@@ -413,3 +428,21 @@ def test_a_moved_sphere_loses_nothing_but_to_its_bonds_and_comes_off_by_its_poli
     lost = analysis.share_observables(dataset)
     for name in lost:
         assert_array_equal(lost[name].isnull(), gone | analysis.reference_radii(dataset)["radius_jkr"].isnull())
+
+
+def test_no_speed_is_stated_at_which_more_is_lost_than_can_be_nor_under_a_force():
+    scenario = scene(shear=shear.Uniform(), adhesion=Adhesion(work=WORK, bond_share=0.3))
+    speeds = analysis.loss_speeds(run(scenario))
+    # JKR's areas with 70 % of the work of adhesion and with all of it
+    left, full = (jkr.radius_at_load(LOAD, share * WORK, RADIUS, MODULUS) ** 2 for share in (0.7, 1.0))
+    assert 100.0 * (1.0 - left / full) < 50.0
+    reason = f"never: at most {100 * (1 - left / full):.3g} % can be lost"
+    assert speeds["speed_at_50_percent_lost_reason"].item() == reason
+    creeping = scene(
+        shear=shear.Uniform(), drive=Force(force=1e-3, contact_stiffness="rigid"),
+        bonds=bonds.FirstMoment(rupture=Bell(zero_force_rate=5.0, bell_force=4e-12), bond_stiffness=8e-7,
+                                rebinding_rate=50.0, site_density=6.5e16),
+    )  # fmt: skip
+    assert not analysis.loss_speeds(run(creeping))
+    with pytest.raises(BadInput, match="force"):
+        analysis.loss_speeds(run(creeping), ["10 %"])
