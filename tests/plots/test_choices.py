@@ -162,8 +162,7 @@ def test_measured_points_lie_where_they_were_measured_in_curves_and_loops(loads,
     assert label.endswith(" of 2")
 
 
-@pytest.mark.parametrize("column", ["normal_load [mN]", "load [N]", "contact_load [uN]"])
-@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize(("column", "order"), [("normal_load [mN]", 1), ("load [N]", -1), ("contact_load [uN]", 1)])
 def test_each_row_of_a_table_is_drawn_once_or_counted_as_left_out(loads, table, column, order):
     factor = {"mN": 1e3, "N": 1.0, "uN": 1e6}[column.partition("[")[2].rstrip("]")]
     known = [(load, 10.0**k, 0.03 + 0.001 * k + load) for load in (1e-3, 4e-3) for k in range(-1, 2)]

@@ -179,6 +179,7 @@ def test_every_shape_of_dataset_is_drawn_as_what_fits_it_and_a_quantity_not_reco
     moving = {"model": "equilibrium", "indentation": {"from": "2 um", "to": "-2 um"}}
     tracked = bonds.Tracked(rupture=Bell(zero_force_rate=1e4, bell_force=4e-12), bond_stiffness=4e-4,
                             rebinding_rate=1e5, site_density=9e16, sites=50)  # fmt: skip
+    known = set()
     for changes in [
         {"record": Record(per_member=False)}, {"ensemble": Ensemble(members=1)},
         {"record": Record(precision="float32")}, {"drive": drive.Ramp(start=-2e-3, stop=8e-3)},
@@ -191,8 +192,11 @@ def test_every_shape_of_dataset_is_drawn_as_what_fits_it_and_a_quantity_not_reco
         {"contact": Equilibrium(indentation={"from": -4e-6, "to": -2e-6})}, {"sweep": {"contact": [moving, *contacts]}},
         {"drive": STEADY, "clock": Clock(duration=0.02, step=0.02)},
     ]:  # fmt: skip
-        dataset = simulated(**changes)
+        dataset, scenes = simulated(**changes), repr([changes.get(key) for key in ("contact", "sweep", "shear")])
         for kind in plots.drawable(dataset):
+            if kind in ("theories", "profile") and (kind, scenes) in known:
+                continue  # one of the same contact: it has no speeds, members or records
+            known.add((kind, scenes))
             figure = plots.draw(dataset, kind)
             assert any(panel.get_xlabel() for panel in figure.axes) and figure.axes[0].get_ylabel()
             for panel in figure.axes:
