@@ -183,12 +183,13 @@ def test_a_damaged_block_is_computed_anew(tmp_path, how):
     assert same(path)
 
 
-def test_no_flipped_byte_of_a_block_is_silent(tmp_path):
+@pytest.mark.parametrize("apart", [71, pytest.param(23, marks=pytest.mark.verify)])
+def test_no_flipped_byte_of_a_block_is_silent(tmp_path, apart):
     blocks, task = BlockFiles(tmp_path), next(Plan.of(sample()).tasks())
     ensemble.simulate(Plan.of(sample()), blocks)
     path = blocks.path(task.names[0])
     content, numbers = path.read_bytes(), blocks.load(task.names[0]) | blocks.state(task.names[0])
-    for place in range(0, len(content), 23):
+    for place in range(0, len(content), apart):
         path.write_bytes(content[:place] + bytes([content[place] ^ 1 << place % 8]) + content[place + 1 :])
         blocks.drop_damaged(task.names[0])
         if task.names[0] in blocks:  # such as a flip in the time of an entry
