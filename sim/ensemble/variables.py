@@ -86,9 +86,9 @@ def _stored(scene: Scenario, course: Trajectory) -> np.ndarray:
 
 
 def _edge(scene: Scenario, course: Trajectory) -> np.ndarray:
-    """Return χ dE/dA, that part of ΔΓ which a unit of new contact at the edge of the disc pays [J/m²]."""
+    """Return χ dE/dA, that part of ΔΓ which a unit of new contact at the edge pays [J/m²]; on a plane all of it."""
     terms = _terms(scene, course)
-    return terms.fluctuating * cast(Shares, terms.margin)(_radius(scene, course))
+    return terms.fluctuating * (1.0 if terms.margin is None else terms.margin(_radius(scene, course)))
 
 
 def _where_closed(course: Trajectory, reference: int, radius: np.ndarray) -> np.ndarray:
