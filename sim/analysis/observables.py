@@ -114,6 +114,18 @@ def closed_only(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(result)
 
 
+def with_slips(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset in which the speed of a driven slider on single bonds is its displacement over the time.
+
+    Such a slider slips without duration as bonds break, which its recorded speed leaves out.
+    """
+    if "bonds_sites" not in dataset.variables or dataset.sizes["t"] < 2:
+        return dataset
+    names = [end for end in ("", "_mean") if f"spring_force{end}" in dataset and f"slider_position{end}" in dataset]
+    moved = {f"speed{end}": dataset[f"slider_position{end}"].astype(float).differentiate("t") for end in names}
+    return dataset.assign({name: speed.assign_attrs(dataset[name].attrs) for name, speed in moved.items()})
+
+
 def full_area(dataset: xr.Dataset) -> xr.DataArray:
     """Return JKR's area at the full work of adhesion [m^2]; nan if that contact is open."""
     return np.pi * reference_radii(dataset)["radius_jkr"] ** 2

@@ -28,7 +28,7 @@ from sim.analysis.dataset import (
 )
 from sim.analysis.errors import systematic_errors
 from sim.analysis.events import varies
-from sim.analysis.observables import restricted
+from sim.analysis.observables import restricted, with_slips
 from sim.analysis.over_speed import extremes, loss_speeds
 from sim.analysis.statements import BOUNDED, COUNTS, as_means, each, of_events, reasons, statements
 from sim.analysis.statistics import QUANTILES, WIDE, averaging, correlation_time, over_members, shares, statistics
@@ -378,6 +378,7 @@ def _tabulated(
     if _has_one_row_each(dataset):
         result = statements(dataset, names) if stated is None else stated
     else:
+        dataset = with_slips(dataset)
         if counts["t"] < dataset.sizes["t"]:  # of the records only those that are shown, none after all have ended
             dataset = dataset.isel(t=slice(_last(dataset) + 1))
             dataset = restricted(dataset, names).isel(t=_spread(dataset.sizes["t"], counts["t"]))

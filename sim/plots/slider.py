@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from sim.analysis import is_steady, setting, sweep_dims
 from sim.analysis.dataset import MEMBERS, stays_held, word
 from sim.analysis.events import incipient_law, jumps
+from sim.analysis.observables import with_slips
 from sim.analysis.over_speed import population_of, speed_dim
 from sim.laws import jkr, schallamach
 from sim.laws.schallamach import Body
@@ -75,7 +76,7 @@ def needs_force(dataset: xr.Dataset) -> None:
 
 def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     """Displacement and speed of the slider over time under a prescribed force; a cross ends a runaway."""
-    later = dataset.isel(t=slice(1, None))
+    later = with_slips(dataset).isel(t=slice(1, None))
     scene = scene_along(later, "t")._replace(measured=data)
     scene = scene.placed("t", later["t"].to_numpy(), "time under the force $t$", "s", "log")
     position, speed = _run("slider_position", "displacement $x$", "m"), _run("speed", "speed $V$", "m/s")

@@ -10,7 +10,20 @@ import pytest
 from helpers import lens
 from helpers.cases import posix
 from helpers.lens import scene
-from helpers.parts import Clock, Ensemble, Equilibrium, Record, analysis, bonds, drive, run, shear
+from helpers.parts import (
+    Adhesion,
+    Bell,
+    Clock,
+    Ensemble,
+    Equilibrium,
+    Force,
+    Record,
+    analysis,
+    bonds,
+    drive,
+    run,
+    shear,
+)
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
@@ -199,3 +212,18 @@ def test_notes_say_what_is_averaged_how_many_rows_are_shown_and_what_symbols_mea
     assert analysis.notes(dataset, rows, [])[0].startswith("mean over the second half of the run and 6 members")
     assert analysis.notes(dataset, rows, [])[1].startswith("12 of 16 rows shown")
     assert [heading for heading in rows[0] if heading.endswith("(mm/s)")] == ["drive_speed\n(mm/s)"]
+
+
+def test_the_speed_of_a_slider_on_single_bonds_is_its_displacement_over_the_time():
+    rupture = Bell(zero_force_rate=5.0, bell_force=4e-12)
+    numbers = {"bond_stiffness": 8e-7, "rebinding_rate": 50.0, "site_density": 6.5e16, "start_from": "bonded"}
+    creeping = scene(
+        clock=Clock(duration=0.4, step=0.002), shear=shear.Uniform(), bonds=bonds.Tracked(rupture, **numbers, sites=40),
+        drive=Force(force=4e-3, contact_stiffness="rigid"), adhesion=Adhesion(work=lens.WORK, bond_share=0.0),
+    )  # fmt: skip
+    dataset = run(creeping)
+    position, time = dataset["slider_position"].mean("member").to_numpy(), dataset["t"].to_numpy()
+    shown = [float(re.match(r"[\d.]+", row["V\n(µm/s)"])[0]) for row in analysis.table(dataset)]
+    at = np.rint(np.linspace(0, 200, 12)).astype(int)[1:-1]
+    speed = 1e6 * (position[at + 1] - position[at - 1]) / (2.0 * time[1])
+    np.testing.assert_allclose(shown[1:-1], speed, atol=5.0)  # half of the last digit that an error of 10 leaves
