@@ -36,8 +36,9 @@ change.contact_area_mean, change.contact_area_sem
 
 Under a drive that feels the friction `drive_work` is the rise of `stored_energy`, the energies `dissipated_by_...` and
 `energy_residual`, the error of the integration. It stays below ten times the largest `tolerance` of the scene, of the
-larger of work and stored energy. With `tracked` bonds, and with a body that rings without damping, it may be larger
-after thousands of sub-steps (up to 4e-5 and 3e-4 at the default tolerance in scenes tried).
+larger of work and stored energy, the largest since the start. A body that rings may have given back nearly all of that
+at each record. With `tracked` bonds, and with a body that rings without damping, the residual may be larger after
+thousands of sub-steps (up to 4e-5 and 3e-4 at the default tolerance in scenes tried).
 No energy exceeds ten times the larger of the two, with this exception: `dissipated_by_area` is negative while the area
 grows, because bonds that are gained are stretched as the others are (`bonds.area = "present"`). Under a load that
 cycles behind a stage at rest it adds up.

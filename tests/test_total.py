@@ -13,7 +13,7 @@ from sim.ensemble.variables import LARGEST
 from sim.parts.drive import READINGS
 
 #: Seeds of the scenes: fifteen, and scenes whose energies, sub-steps or messages have been wrong.
-SEEDS = [*range(15), 45, 59, 75, 214, 266, 310, 319, 445, 689, 730, 807, 1042, 1240, 1293, 1319]
+SEEDS = [*range(15), 45, 59, 75, 214, 266, 310, 319, 445, 689, 730, 807, 1042, 1240, 1293, 1319, 1768]
 #: Those that are looked at with finer steps as well.
 FINER = 59, 445, 807
 #: Energies of a driven slider, none of which exceeds ten times the larger of work and stored energy.
@@ -53,14 +53,28 @@ def ended(scenario, course):
     return is_open
 
 
-def check_energy(scenario, course):
-    """The residual is at most ten times the largest tolerance of the larger of work and stored energy."""
+def largest_energy(scenario, course):
+    """Return the larger of work and stored energy, the largest since the start, at each record."""
     work, stored = (column(scenario, course, name) for name in ("drive_work", "stored_energy"))
+    return np.maximum.accumulate(np.nan_to_num(np.fmax(np.abs(work), stored)))
+
+
+def check_energy(scenario, course):
+    """The residual is at most ten times the largest tolerance of the larger of work and stored energy since the start.
+
+    A body that rings may have given back nearly all of its energy at the end of each clock step. The largest energy
+    within the steps is therefore read off a run at an eighth of the clock step, if the records do not show enough.
+    """
     path = np.max(np.abs(np.diff(column(scenario, course, "stage_position"), axis=0)))
     free = 1e-3 * scenario.drive.tolerance * scenario.drive.spring * path**2  # of a slider that nothing holds
     bound = max(1e-6, 10.0 * largest_tolerance(scenario))
-    size = np.maximum.accumulate(np.nan_to_num(np.fmax(np.abs(work), stored))) + free / bound + 1e-30
+    size = largest_energy(scenario, course) + free / bound + 1e-30
     residual = np.nan_to_num(column(scenario, course, "energy_residual"))
+    over = np.flatnonzero(np.any(np.abs(residual) > bound * size, axis=1))
+    if len(over):
+        finer, records = scenario.with_values({"clock.step": scenario.clock.step / 8.0}), over[-1] + 1
+        _, within = run(finer, range(3), range(8 * over[-1] + 1))
+        size[:records] = np.maximum(size[:records], largest_energy(finer, within)[::8])
     assert np.all(np.abs(residual) <= bound * size), f"energy residual {np.max(np.abs(residual) / size):.1e}"
     for name in ENERGIES:
         largest = np.max(np.abs(np.nan_to_num(column(scenario, course, name))) / size)
