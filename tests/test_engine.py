@@ -127,6 +127,10 @@ def test_more_fronts_between_bonds_of_one_limit_than_there_is_room_for_are_given
     check_case({"drive": "spring", "contact": "machine", "bonds": "cohort, cut-off", "shear": "mapped, fixed, stress"})
 
 
+def test_an_open_contact_has_no_area_at_the_largest_stress_that_all_members_share():
+    check_case({"drive": "steady", "contact": "lifted", "shear": "banded, slip, onset", "bonds": "rate"})
+
+
 @pytest.mark.verify
 @pytest.mark.parametrize("name", BONDS)
 def test_every_depth_runs_with_every_depth(name):

@@ -398,7 +398,8 @@ def _follow(
             value1, slope1, area1 = _load(k + 1, i, *bonds, speeds[1], radii)
             around = time, step, speeds[0], speeds[1], area0, area1
             if i < len(stress):
-                _keep(value1, slope0, slope1, (*around[:4], share * area0, share * area1), stress, i)
+                areas = (area0, area1) if share > 0.0 else (0.0, 0.0)  # an open contact has none to leave out
+                _keep(value1, slope0, slope1, (*around[:4], areas[0], areas[1]), stress, i)
             growth = (area1 - area0) / step
             rise, slope = area0 * slope0 + growth * value0, area1 * slope1 + growth * value1
             _keep(value1 * area1, rise, slope, around, friction, i)
