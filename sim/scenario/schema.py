@@ -183,7 +183,8 @@ def json_schema(root: type) -> dict[str, Any]:
     for table in schema["$defs"].values():
         properties = table["properties"]
         if "file" in properties and "file" not in table.get("required", ()):
-            table["anyOf"] = [{"required": ["file"]}, {"required": table.pop("required")}]
+            columns = [name for name, each in properties.items() if each.get("type") == "array"]
+            table["anyOf"] = [{"required": ["file"]}, {"required": table.pop("required", columns)}]
         word = properties.get("model", {}).get("const")
         if word and (word, properties.keys()) not in optional:  # only the simplest table may leave its model out
             table["required"] = ["model", *table.get("required", ())]

@@ -7,13 +7,12 @@ without pickled objects, or netCDF; declared sizes are not trusted.
 
 import functools
 import math
-from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, model_validator
-from pydantic_core import ArgsKwargs, PydanticCustomError
+from pydantic_core import PydanticCustomError
 
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice, lattice_of
@@ -43,9 +42,13 @@ _FLAT, _PART = 0.5, 0.01
 class FromFile(Rowed, Protocol):
     """Base of spectra whose rows may be read from a file."""
 
+    file: str
     wavenumbers: Wavenumbers
     densities: Densities
     rms: Rescaled | None
+
+    def read_file(self, context: Any) -> tuple[Array, Array]:
+        """Return the wavenumbers and densities of the file; ``context`` is that of the validation."""
 
     @property
     def normalization(self) -> str:
@@ -53,8 +56,12 @@ class FromFile(Rowed, Protocol):
         return "in_integral"
 
     @model_validator(mode="after")
-    def _check(self) -> Self:
-        """Refuse rows that are no spectrum."""
+    def _check(self, info: ValidationInfo) -> Self:
+        """Read the file if no rows are given; refuse rows that are no spectrum."""
+        if not (self.wavenumbers or self.densities):
+            with blamed(self.file):
+                q, density = self.read_file(info.context)
+            vars(self).update(wavenumbers=tuple(q.tolist()), densities=tuple(density.tolist()))
         rows, steps = (len(self.wavenumbers), len(self.densities)), np.diff(self.wavenumbers)
         falls = np.flatnonzero((-steps if self._falling else steps) <= 0.0)
         if rows[0] != rows[1] or rows[0] < 2:
@@ -81,18 +88,6 @@ class FromFile(Rowed, Protocol):
         """The rows as a chain of power laws, with the 4π² in the integral, at the rms that is given."""
         chain = self._chain(NORMALIZATIONS[self.normalization])
         return chain if self.rms is None else PowerLaws(chain.q, chain.density * (self.rms**2 / chain.variance))
-
-
-def by_name(values: Any, kind: Any) -> Any:
-    """Return the arguments of a direct construction as a dictionary, as in a scenario, arrays as lists."""
-    if isinstance(values, ArgsKwargs):
-        names = [field.name for field in fields(kind)]
-        if len(values.args) > len(names):
-            raise TypeError(f"at most {len(names)} positional arguments: {', '.join(names)}")
-        values = dict(zip(names, values.args, strict=False)) | dict(values.kwargs or {})
-    if not isinstance(values, dict):
-        return values
-    return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in values.items()}
 
 
 @keyed()
@@ -125,27 +120,20 @@ class Tabulated(FromFile):
     1.273240e+10 1.273240e+10
     """
 
-    wavenumbers: Wavenumbers
-    densities: Densities
+    wavenumbers: Wavenumbers = ()
+    densities: Densities = ()
     normalization: _Normalization = "in_integral"
     file: Annotated[str, Field(description="CSV with the columns q [rad/m], C [Pa^2 m^2], in place of the rows")] = ""
     header: Annotated[str, Field(description="header of a file without one, as q [cycles/um], C [Pa^2 m^2]")] = ""
     rms: Rescaled | None = None
     model: Literal["tabulated"] = "tabulated"
 
-    @model_validator(mode="before")
-    @classmethod
-    def _read_file(cls, values: Any, info: ValidationInfo) -> Any:
-        values = by_name(values, cls)
-        if not isinstance(values, dict) or "wavenumbers" in values or "densities" in values:
-            return values
-        name = values.get("file")
-        if not name or not isinstance(name, str):
+    def read_file(self, context: Any) -> tuple[Array, Array]:
+        """Return the columns q and C of the file."""
+        if not self.file:
             raise PydanticCustomError("no_table", 'needs file = "psd.csv" with the columns q [rad/m], C [Pa^2 m^2]', {})
-        header = values.get("header", "")
-        columns = {"q": _WAVENUMBER, "C": _DENSITY}
-        table = file_columns(name, info.context, columns, header if isinstance(header, str) else "")
-        return {**values, "wavenumbers": table["q"], "densities": table["C"]}
+        table = file_columns(self.file, context, {"q": _WAVENUMBER, "C": _DENSITY}, self.header)
+        return table["q"], table["C"]
 
     @model_validator(mode="after")
     def _no_gaps(self) -> Self:
@@ -214,7 +202,7 @@ class MapFile(NamedTuple):
 
 def checked_unit(unit: str) -> str:
     """Return a unit of stress, "" for that of the file; raise ValueError for any other."""
-    STRESS.scaled(1.0, str(unit))
+    STRESS.scaled(1.0, unit)
     return unit
 
 
@@ -301,6 +289,19 @@ def _from_netcdf(path: Path, variable: str, unit: str) -> MapFile:
             f'"{variable}" is in {data.attrs["units"]}, not in {unit} as the key unit has it; leave unit out'
         )
     return MapFile(np.asarray(data, float) * factor, has_axes, spacings if has_axes else (None, None))
+
+
+def spacings_of(map_file: MapFile, along: float | None, across: float | None, key: str) -> tuple[float, float]:
+    """Return the distances of points along x and y [m], of the ``key`` of a scenario or the file, which must agree."""
+    across = along if across is None else across
+    for step, spacing in zip((along, across), map_file.spacings, strict=True):
+        if step is not None and spacing is not None and not math.isclose(step, spacing, rel_tol=1e-4):
+            raise ValueError(f"the points are {spacing:g} m apart, not {step:g} m as {key} has it; leave {key} out")
+    along = along or map_file.spacings[0]
+    across = across or map_file.spacings[1] or along
+    if along is None or across is None:
+        raise ValueError(f'the map has no coordinates with units; give {key}, such as "0.5 um"')
+    return along, across
 
 
 def _factor(data: Any, quantity: Quantity, unit: str = "") -> float:
@@ -471,38 +472,15 @@ class Measured(FromFile):
     rms: Rescaled | None = None
     model: Literal["measured"] = "measured"
 
-    @model_validator(mode="before")
-    @classmethod
-    def _read_file(cls, values: Any, info: ValidationInfo) -> Any:
-        values = by_name(values, cls)
-        if not isinstance(values, dict):
-            return values
-        name, window, unit = values.get("file"), values.get("window", "none"), values.get("unit", "")
-        if values.get("wavenumbers") or not isinstance(name, str) or window not in ("none", "hann"):
-            return values
-        try:
-            checked_unit(unit)
-            spacing = None if values.get("spacing") is None else SPACING.read(values["spacing"])
-        except ValueError:
-            return values  # refused by the field's own check
-        with blamed(name):
-            map_file = read_map(name, info.context, str(values.get("variable", "shear_map")), unit=unit)
-            spacing = _one_spacing(map_file, spacing)
-            maps = map_file.values.reshape(-1, *map_file.values.shape[-2:])
-            q, density = estimate(maps, (maps.shape[1] * spacing, maps.shape[2] * spacing), window)
-        return {**values, "spacing": spacing, "wavenumbers": q.tolist(), "densities": density.tolist()}
-
-
-def _one_spacing(map_file: MapFile, spacing: float | None) -> float:
-    """Spacing in x and y alike [m], which must agree with the one given."""
-    for step in filter(None, map_file.spacings):
-        if spacing is not None and not math.isclose(step, spacing, rel_tol=1e-4):
-            text = "the coordinates are not spaced by one step, equal in x and y and to the key spacing"
-            raise ValueError(f"{text}; interpolate the map onto a square lattice")
-        spacing = step if spacing is None else spacing
-    if spacing is None:
-        raise ValueError('the map has no coordinates with units; give spacing, such as "0.5 um"')
-    return spacing
+    def read_file(self, context: Any) -> tuple[Array, Array]:
+        """Return the rows of the estimate from the maps of the file."""
+        map_file = read_map(self.file, context, self.variable, unit=self.unit)
+        along, across = spacings_of(map_file, self.spacing, None, "spacing")
+        if not math.isclose(along, across, rel_tol=1e-4):
+            raise ValueError("x and y are not spaced by one step; interpolate the map onto a square lattice")
+        vars(self).update(spacing=along)
+        maps = map_file.values.reshape(-1, *map_file.values.shape[-2:])
+        return estimate(maps, (maps.shape[1] * along, maps.shape[2] * along), self.window)
 
 
 def estimate(maps: Array, cell: float | tuple[float, float], window: str) -> tuple[Array, Array]:

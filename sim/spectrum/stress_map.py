@@ -7,27 +7,17 @@ to twice or half as much.
 import hashlib
 import math
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, PlainSerializer, ValidationInfo, model_validator
+from pydantic import Field, PlainSerializer, Strict, ValidationInfo, model_validator
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError
 
 from sim.laws.halfspace import free_energy_of_map, noise_energy, surface_energy
 from sim.numerics.grid import Grid, Rectangle, lattice_of
 from sim.spectrum.family import Array
-from sim.spectrum.measured import (
-    SPACING,
-    MapFile,
-    MapUnit,
-    Measured,
-    by_name,
-    checked_unit,
-    estimate,
-    read_map,
-    tapered,
-)
+from sim.spectrum.measured import SPACING, MapFile, MapUnit, Measured, estimate, read_map, spacings_of, tapered
 from sim.units.quantity import Quantity, keyed
 from sim.units.tables import blamed
 
@@ -39,7 +29,7 @@ _MASK = "true: nan marks what lies outside of the contact, where there is no str
 
 
 _DIGEST = PlainSerializer(lambda values: hashlib.sha256(values).hexdigest(), return_type=str, when_used="json")
-_Values = Annotated[bytes, SkipJsonSchema(), _DIGEST]
+_Values = Annotated[bytes, Strict(), SkipJsonSchema(), _DIGEST]
 _Shape = Annotated[tuple[int, int], SkipJsonSchema()]
 
 
@@ -99,41 +89,27 @@ class StressMap:
     values: _Values = Field(default=b"", repr=False)
     shape: _Shape = (0, 0)
 
-    @model_validator(mode="before")
-    @classmethod
-    def _read_file(cls, table: Any, info: ValidationInfo) -> Any:
-        table = by_name(table, cls)
-        if not isinstance(table, dict) or isinstance(table.get("values"), bytes):
-            return table
-        if strange := {"values", "shape"} & table.keys():
-            raise PydanticCustomError("not_given", "{key} is read from the file; leave it out", {"key": strange.pop()})
-        name, rows, mask = table.get("file"), table.get("rows", "y"), table.get("mask", False)
-        unit = table.get("unit", "")
-        if not isinstance(name, str) or not isinstance(mask, bool) or rows not in ("x", "y"):
-            return table
-        try:
-            checked_unit(unit)
-            keys = [None if table.get(key) is None else SPACING.read(table[key]) for key in ("pixel", "pixel_y")]
-        except ValueError:
-            return table  # refused by the field's own check
-        with blamed(name):
-            map_file = read_map(name, info.context, str(table.get("variable", "shear_map")), gaps=True, unit=unit)
-            values = _one_map(map_file, rows)
-            if not mask and np.isnan(values).any():
-                raise ValueError("the map has gaps (nan); with mask = true they are what lies outside of the contact")
-            if not np.nanmax(values, initial=-math.inf) > np.nanmin(values, initial=math.inf):
-                raise ValueError("the stress is the same everywhere, so that nothing fluctuates; check the file")
-            pixel, pixel_y = _pixels(map_file, *keys)
-        return {**table, "pixel": pixel, "pixel_y": pixel_y, "values": values.tobytes(), "shape": values.shape}
-
     @model_validator(mode="after")
-    def _goes_together(self) -> "StressMap":
+    def _goes_together(self, info: ValidationInfo) -> Self:
+        if not self.values:
+            with blamed(self.file):
+                self._read_file(info.context)
         if self.mask and self.window != "none":
             message = "a window would taper the stress inside of the contact; leave it out beside mask"
             raise PydanticCustomError("window", message, {})
         if self.mask and not self.square:
             raise PydanticCustomError("pixels", "a masked map needs square pixels; interpolate it onto them", {})
         return self
+
+    def _read_file(self, context: Any) -> None:
+        map_file = read_map(self.file, context, self.variable, gaps=True, unit=self.unit)
+        values = _one_map(map_file, self.rows)
+        if not self.mask and np.isnan(values).any():
+            raise ValueError("the map has gaps (nan); with mask = true they are what lies outside of the contact")
+        if not np.nanmax(values, initial=-math.inf) > np.nanmin(values, initial=math.inf):
+            raise ValueError("the stress is the same everywhere, so that nothing fluctuates; check the file")
+        pixel, pixel_y = spacings_of(map_file, self.pixel, self.pixel_y, "pixel")
+        vars(self).update(pixel=pixel, pixel_y=pixel_y, values=values.tobytes(), shape=values.shape)
 
     @property
     def pixels(self) -> tuple[float, float]:
@@ -218,16 +194,3 @@ def _one_map(map_file: MapFile, rows: str) -> Array:
         raise ValueError(f"it holds {many} maps; save the one that is meant on its own")
     values = map_file.values.reshape(map_file.values.shape[-2:])
     return np.ascontiguousarray(values if map_file.has_axes or rows == "x" else values.T)
-
-
-def _pixels(map_file: MapFile, pixel: float | None, pixel_y: float | None) -> tuple[float, float]:
-    """Distances of neighbouring points along x and y [m], of the keys or the file, which must agree."""
-    across = pixel if pixel_y is None else pixel_y
-    for step, spacing in zip((pixel, across), map_file.spacings, strict=True):
-        if step is not None and spacing is not None and not math.isclose(step, spacing, rel_tol=1e-4):
-            raise ValueError(f"the points are {spacing:g} m apart, not {step:g} m as pixel has it; leave pixel out")
-    along = pixel or map_file.spacings[0]
-    across = across or map_file.spacings[1] or along
-    if along is None or across is None:
-        raise ValueError('the map has no coordinates with units; give pixel, such as "0.5 um"')
-    return along, across

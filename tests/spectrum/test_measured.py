@@ -264,7 +264,7 @@ def rescaled(data, x, y, attrs=None):
 
 WRONG_DATASETS = [
     (lambda data: data.assign_coords(x=data.x.to_numpy() ** 2), "not spaced by one step"),
-    (lambda data: rescaled(data, 2.0, 2.0), "equal in x and y and to the key"),
+    (lambda data: rescaled(data, 2.0, 2.0), "0.2 m apart, not 0.1 m"),
     (lambda data: rescaled(data, 2.0, 1.0, {}), "no units"),
     (lambda data: data.where(data.x > 0.05), "gaps"),
     (lambda data: data * 0.0, "every density is zero"),
@@ -282,8 +282,10 @@ def test_a_wrong_map_is_refused_with_the_cure(files):
             read(files, model="measured", file=f"{number}.nc", spacing=0.1)
     np.savetxt(files.folder / "a.csv", white_map(8, 1.0, 1.0), delimiter=",")
     (files.folder / "a.nc").write_text("no netCDF")
+    rescaled(whole, 1.0, 2.0).to_netcdf(files.folder / "long.nc")
     for keys, fault in [
         ({"file": "a.csv"}, "give spacing"),
+        ({"file": "long.nc"}, "x and y are not spaced by one step"),
         ({"file": "a.nc", "spacing": 1}, "a.nc: "),
         ({"file": "a.csv", "spacing": 1, "window": "box"}, "'none' or 'hann'"),
     ]:
