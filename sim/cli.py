@@ -179,7 +179,7 @@ def run(
 
     parts: Any = BlockFiles(parts_of(target)) if resume else ()
     jobs, lines = preview.processes(plan, jobs, memory, share, parts)
-    for line in [] if quiet else lines:
+    for line in () if quiet else (*(f"note: {text}" for text in preview.remarks(plan)), *lines):
         note(line)
     how: dict[str, Any] = {"shard": share, "replace": force, "resume": resume, "jobs": jobs, "scheduler": scheduler}
     with contextlib.ExitStack() as shown:

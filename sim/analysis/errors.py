@@ -1,12 +1,12 @@
 """Systematic errors of a dataset in the unit of its results, and the remarks of ``sim check`` on its scenario."""
 
-import json
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from sim.analysis.dataset import sweep_dims
+from sim.units.errors import BadInput
 from sim.units.notation import engineering
 
 #: Unit and factor of an error by the last word of its name.
@@ -64,8 +64,15 @@ def _largest(dataset: xr.Dataset, name: str) -> SystematicError:
 
 
 def remarks(dataset: xr.Dataset) -> list[str]:
-    """Return the remarks and the diagnosis that ``sim check`` prints for the scenario of a dataset."""
+    """Return the remarks and the diagnosis that ``sim check`` prints for the scenario of a dataset.
+
+    If the dataset does not hold all of its scenario, as with a measured map, one sentence gives the reason.
+    """
+    from sim.ensemble import diagnosis, plan  # slow to import
+    from sim.ensemble.dataset import scenario_of
+
     try:
-        return [str(remark) for remark in json.loads(dataset.attrs["remarks"])]
-    except (LookupError, TypeError, ValueError):
-        return []
+        run = plan.Plan.of(scenario_of(dataset.attrs))
+    except BadInput as fault:
+        return [f"not in the dataset, but printed by `sim check` of its scenario ({fault.problems[0]})"]
+    return [*diagnosis.remarks(run), *diagnosis.diagnosis(run)]

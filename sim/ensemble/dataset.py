@@ -17,7 +17,7 @@ import netCDF4
 import numpy as np
 from pydantic import TypeAdapter
 
-from sim.ensemble.diagnosis import cure, diagnosis, remarks, systematic_errors, worst
+from sim.ensemble.diagnosis import cure, systematic_errors, worst
 from sim.ensemble.execute import pool
 from sim.ensemble.plan import Plan, part_name
 from sim.ensemble.store import Blocks
@@ -25,6 +25,8 @@ from sim.ensemble.variables import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, SY
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice
 from sim.numerics.hdf5 import CHUNK_CACHE, Refused, opened, tables
+from sim.scenario.files import Files
+from sim.scenario.messages import in_plain_words
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
 from sim.scenario.sweep import Axis, written
@@ -123,10 +125,6 @@ def outline(plan: Plan, parts: Blocks) -> Outline:
     content.sizes["t"] = clock.records
     content.add("t", "f8", ("t",), "s", "time since the start", "t", clock.times)
     _add_numbers(content, plan)
-    most = worst(plan.points)
-    content.attributes["remarks"] = json.dumps([*remarks(plan, most), *diagnosis(plan)], ensure_ascii=False)
-    if most and "cell_error_area" in content.variables:
-        content.variables["cell_error_area"].attributes["cure"] = cure(*most)
     slips = [variable.name for variable in plan.largest if variable.axis == "slip"]
     content.sizes |= {"slip": 1} if slips else {}
     if plan.phases > 1:
@@ -213,6 +211,21 @@ def scenario_json(scenario: Scenario, per_member: bool | None = None) -> str:
     return json.dumps(dumped | sweep, sort_keys=True, default=str)
 
 
+def scenario_of(attributes: Mapping[str, Any]) -> Scenario:
+    """Return the scenario of a dataset from its attributes.
+
+    Raises
+    ------
+    BadInput
+        If the attributes do not hold it: of a measured map they have the digest alone.
+    """
+    files = tables(attributes.get("scenario_files"))
+    texts = {name: str(entry.get("text")) for name, entry in files.items() if isinstance(entry, dict)}
+    with in_plain_words(Scenario):
+        document, context = tables(attributes.get("scenario_resolved")), {"files": Files(Path(), texts)}
+        return TypeAdapter(Scenario).validate_python(document, context=context, by_alias=True, by_name=False)
+
+
 def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -264,12 +277,14 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
     described_as |= {name: ("1", text, "") for name, text in KNOWN_ERRORS.items()}
     described_as |= {name: (*unit_and_text, "") for name, unit_and_text in SYSTEMATIC.items()}
     derived: dict[str, list[float]] = {}
+    errors = []
     for point in plan.points:
+        errors.append((point, systematic_errors(point)))
         numbers = {number.name: number.read(point) for number in NUMBERS if number.applies(point)}
         for key, (quantity, value) in point.derived.items():
             described_as[variable_name(key)] = quantity.unit, quantity.meaning, quantity.symbol
             numbers[variable_name(key)] = value
-        for name, value in (numbers | point.process.known_errors() | systematic_errors(point)).items():
+        for name, value in (numbers | point.process.known_errors() | errors[-1][1]).items():
             derived.setdefault(name, []).append(float(value))
         point.release()
     for name, values in derived.items():
@@ -278,6 +293,8 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
             content.add(name, "f8", tuple(content.sweep), *described_as[name], array)
             if "error" in name and name in KNOWN_ERRORS:
                 content.attributes[name] = max(values, key=abs)
+    if (most := worst(errors)) and "cell_error_area" in content.variables:
+        content.variables["cell_error_area"].attributes["cure"] = cure(*most)
 
 
 def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:

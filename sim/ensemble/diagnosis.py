@@ -1,7 +1,7 @@
 """Judgement of a run before it starts: systematic errors of its results, remarks, and the limits of its contact."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -112,11 +112,15 @@ def _scores(skewness: float, count: int) -> Array:
     return cast(Array, (values - np.mean(values)) / np.std(values))
 
 
-def worst(points: Sequence[Scenario]) -> Worst | None:
-    """Return the point of a sweep at which the cell changes A/A_JKR most, with its errors; None without a cell."""
-    found = [(point, errors) for point in spread(points) if (errors := systematic_errors(point))]
-    known = [pair for pair in found if math.isfinite(pair[1]["cell_error_area"])]
+def worst(judged: Iterable[Worst]) -> Worst | None:
+    """Return that of some points at which the cell changes A/A_JKR most, with its errors; None without a cell."""
+    known = [pair for pair in judged if math.isfinite(pair[1].get("cell_error_area", math.nan))]
     return max(known, key=lambda pair: abs(pair[1]["cell_error_area"]), default=None)
+
+
+def judged(points: Sequence[Scenario]) -> list[Worst]:
+    """Return some points of a sweep, each with its systematic errors."""
+    return [(point, systematic_errors(point)) for point in spread(points)]
 
 
 def cure(point: Scenario, errors: dict[str, float]) -> str:
@@ -155,10 +159,10 @@ def place(plan: Plan, point: Scenario, speed: float) -> str:
 
 
 def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
-    """Return the remarks on a run, one sentence each; ``most`` is ``worst`` of its points if that is known."""
+    """Return the remarks on a run, one sentence each; ``most`` are its ``worst`` errors if they are known."""
     some = spread(plan.points)
     texts = [text for point in some for text in [*point.remarks(), *_outside(point)]]
-    if (most := most or worst(plan.points)) and (keys := cure(*most)):
+    if (most := most or worst(judged(plan.points))) and (keys := cure(*most)):
         point, area, friction = most[0], *(100.0 * most[1][f"cell_error_{of}"] for of in ("area", "friction"))
         too, at = "large" if area > 0.0 else "small", place(plan, point, most[1]["error_speed"])
         size = f"{abs(area):.2g} points and the friction {abs(friction):.2g} % too {too}"
@@ -236,21 +240,26 @@ def lag(point: Scenario, slower: float = 1.0) -> tuple[float, float, float]:
         Largest differences of A/A_JKR, and of the friction over its largest [1]; the speed at which both together are
         largest [m/s]. They are nan without a contact.
     """
-    shear, courses = cast(Any, point.fluctuations), []
-    begin: dict[str, Any] = {"bonds.start": "steady"} if point.population.stretched else {}
+    return _behind(_along_course(point, slower), _along_course(point, _VERY_SLOW))
+
+
+def _along_course(point: Scenario, slower: float) -> Array:
+    """Return A/A_JKR, the friction over that of A_JKR [Pa] and the speed [m/s] along a course, shape (3, steps)."""
+    shear, duration = cast(Any, point.fluctuations), slower * point.clock.duration
+    values: dict[str, Any] = {"bonds.start": "steady"} if point.population.stretched else {}
     if not math.isinf(shear.side(point.setting.cell)):
-        begin["shear"] = Mean(shear.spectrum, shear.law, shear.paid_by_adhesion, shear.contact)
-    for factor in (slower, _VERY_SLOW):
-        duration = factor * point.clock.duration
-        scene = changed(point, begin | {"clock.duration": duration, "clock.step": duration / _STEPS})
-        courses.append(follow(scene, MemberNoise.of(0, np.zeros(1, int)), None, range(_STEPS + 1))[1])
-    full = _jkr_radius(scene, courses[1].time) ** 2
-    areas = [course.radius**2 / full for course in courses]
-    friction = [area * course.strength for area, course in zip(areas, courses, strict=True)]
-    gaps = [abs(there - steady) for there, steady in (areas, friction)]
-    gaps[1] /= max(np.max(friction[1]), 1e-300)
-    where = int(np.argmax(gaps[0] + gaps[1]))
-    return float(np.max(gaps[0])), float(np.max(gaps[1])), float(np.abs(courses[0].speed[where, 0]))
+        values["shear"] = Mean(shear.spectrum, shear.law, shear.paid_by_adhesion, shear.contact)
+    scene = changed(point, values | {"clock.duration": duration, "clock.step": duration / _STEPS})
+    course = follow(scene, MemberNoise.of(0, np.zeros(1, int)), None, range(_STEPS + 1))[1]
+    area = course.radius**2 / _jkr_radius(scene, course.time) ** 2
+    return np.stack([area, area * course.strength, course.speed])[..., 0]
+
+
+def _behind(course: Array, steady: Array) -> tuple[float, float, float]:
+    """Return the differences of ``lag`` between two results of ``_along_course``."""
+    area, friction = np.abs(course - steady)[:2]
+    friction = friction / max(np.max(steady[1]), 1e-300)
+    return float(np.max(area)), float(np.max(friction)), float(np.abs(course[2, np.argmax(area + friction)]))
 
 
 def _lagging(point: Scenario) -> Iterator[str]:
@@ -260,8 +269,12 @@ def _lagging(point: Scenario) -> Iterator[str]:
     feeds back, which it follows slowly.
     """
     left_out = point.population.per_member or point.fluctuations.law.relaxing or point.by_steps
-    if point.drive.model == "ramp" and not left_out and max((behind := lag(point))[:2]) > _LAG:
-        values, longer = [100.0 * value for value in behind[:2] + lag(point, 10.0)[:2]], 10.0 * point.clock.duration
+    if point.drive.model != "ramp" or left_out:
+        return
+    steady = _along_course(point, _VERY_SLOW)
+    behind, longer = _behind(_along_course(point, 1.0), steady), 10.0 * point.clock.duration
+    if max(behind[:2]) > _LAG:
+        values = [100.0 * value for value in behind[:2] + _behind(_along_course(point, 10.0), steady)[:2]]
         yield (
             f"along the ramp A/A_JKR is up to {values[0]:.2g} points off its steady value, the friction"
             f" {values[1]:.2g} % of its largest (near {engineering(behind[2], 'm/s')});"

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from sim.engine import MemberNoise, follow
-from sim.ensemble.diagnosis import Worst, diagnosis, place as in_words, remarks, slider_body, spread, worst
+from sim.ensemble.diagnosis import Worst, diagnosis, judged, place as in_words, remarks, slider_body, spread, worst
 from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots, state_numbers, work
 from sim.ensemble.variables import SOURCES
 from sim.laws import jkr
@@ -226,7 +226,7 @@ def processes(
     of one of several processes, say how much it takes beside the ``parts`` that are done. Missing kernels are compiled
     for these lines, before the processes need them.
     """
-    wanted, lines = jobs or usual_jobs(plan), [f"note: {text}" for text in remarks(plan)]
+    wanted, lines = jobs or usual_jobs(plan), list[str]()
     if (jobs := fitting(plan, wanted, most)) < wanted:
         lines.append(f"note: there is memory for {jobs} of {wanted} processes")
     if not tabulated(plan):
@@ -308,7 +308,7 @@ def preview(scenario: Scenario) -> str:
         Several lines for a terminal.
     """
     plan = Plan.of(scenario)
-    some, most = spread(plan.points), worst(plan.points)
+    some, most = spread(plan.points), worst(judged(plan.points))
     blocks: dict[str, Rows] = {
         "models": _models(plan),
         "quantities in SI": _quantities(plan.points),

@@ -1,7 +1,6 @@
 """Systematic errors of a run, its diagnosis and its remarks, against closed forms and solutions of other codes."""
 
 import itertools
-import json
 import math
 import re
 import tomllib
@@ -203,13 +202,28 @@ def test_the_diagnosis_has_the_numbers_of_closed_forms_and_goes_with_the_dataset
     assert strict.endswith(f"(shear.paid_by_adhesion = 0) fluctuations take none: {bonded:.3g} %")
     dataset = run(lens)
     printed = preview(lens)
-    assert analysis.remarks(dataset) == [*remarks(plan), *said] == json.loads(dataset.attrs["remarks"])
+    assert analysis.remarks(dataset) == [*remarks(plan), *said]
     assert all(text in printed for text in analysis.remarks(dataset))
     errors = {each.name: each for each in analysis.systematic_errors(dataset)}
     most = errors["cell_error_area"]
     assert_allclose(most.value, 100 * float(dataset["cell_error_area"].max()), rtol=1e-12)
     assert (most.unit, most.where) == ("points of A/A_JKR", "contact_load = 1 mN, 1 µm/s")
     assert most.cure == cure(plan.points[0], systematic_errors(plan.points[0])) != ""
+
+
+def test_remarks_on_a_dataset_need_no_file_but_a_measured_map(scene, tmp_path):
+    table, stress_map = tmp_path / "psd.csv", tmp_path / "map.npy"
+    table.write_text("q [rad/m],C [Pa^2 m^2]\n1e4,1e-2\n1e5,1e-2\n1e6,1e-6\n", encoding="utf-8")
+    np.save(stress_map, 1e5 * np.random.default_rng(1).random((16, 16)))
+    tabulated = {"model": "tabulated", "file": str(table)}
+    read = scene(shear={"model": "mean", "spectrum": tabulated})
+    mapped = scene(shear={"model": "mapped", "field": {"file": str(stress_map), "pixel": "50 um"}})
+    datasets, expected = [run(read), run(mapped)], [*remarks(Plan.of(read)), *diagnosis(Plan.of(read))]
+    for path in (table, stress_map):
+        path.unlink()
+    assert analysis.remarks(datasets[0]) == expected != []
+    (reason,) = analysis.remarks(datasets[1])
+    assert "sim check" in reason and "shear.field" in reason
 
 
 def test_a_contact_softer_than_the_onset_of_oscillations_lies_outside_the_rigid_slider(scene):
