@@ -284,7 +284,7 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
         for key, (quantity, value) in point.derived.items():
             described_as[variable_name(key)] = quantity.unit, quantity.meaning, quantity.symbol
             numbers[variable_name(key)] = value
-        for name, value in (numbers | point.process.known_errors() | errors[-1][1]).items():
+        for name, value in (numbers | errors[-1][1]).items():
             derived.setdefault(name, []).append(float(value))
         point.release()
     for name, values in derived.items():

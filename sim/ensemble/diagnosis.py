@@ -62,16 +62,17 @@ def _jkr_radius(point: Scenario, times: Array) -> Array:
 
 
 def systematic_errors(point: Scenario) -> dict[str, float]:
-    """Return the systematic errors of area and friction by the names of ``SYSTEMATIC``; none without a cell.
+    """Return the known errors of the shear process, and those of area and friction by the names of ``SYSTEMATIC``.
 
-    They are those of the mean over members in steady sliding. The energy of a member is a gamma number with an offset,
-    of the mean, variance and skewness in the cell. The error of the cell is that of this mean against the infinite
-    plane, the error of the bands that of the skewness against all modes. A clock step adds at most the variance of the
-    radius that a lagging edge gains by it. They are nan if the contact opens at some of the energies at all times.
+    There are none of area and friction without a cell. They are those of the mean over members in steady sliding. The
+    energy of a member is a gamma number with an offset, of the mean, variance and skewness in the cell. The error of
+    the cell is that of this mean against the infinite plane, the error of the bands that of the skewness against all
+    modes. A clock step adds at most the variance of the radius that a lagging edge gains by it. They are nan if the
+    contact opens at some of the energies at all times.
     """
     shear, plane = point.fluctuations, plane_energy(point.fluctuations.spectrum, *point.solid.effective)
     if "cell_error_energy" not in (known := point.process.known_errors()) or not plane > 0.0:
-        return {}
+        return known
     weight, shape, _, constant = point.process.gammas
     mean, sd = float(np.sum(weight * shape)) + constant, math.sqrt(np.sum(weight**2 * shape))
     skewness = 2.0 * float(np.sum(weight**3 * shape)) / sd**3 if sd else 0.0
@@ -81,8 +82,7 @@ def systematic_errors(point: Scenario) -> dict[str, float]:
     energies = np.concatenate([mean + scores, plane + scores, mean + sd * _scores(whole, count)])
     times, speeds = _along(point)
     scene = changed(point, {"shear.amplitude.floor": 1.0}) if shear.law.remembers else point
-    rows, stored = np.repeat([times, speeds], energies.size, axis=1), np.tile(energies, len(times))
-    areas = _areas(scene, rows[0], rows[1], stored[:, np.newaxis]).reshape(len(times), 3, -1)
+    areas = _areas(scene, times, speeds, energies).reshape(len(times), 3, count)
     (cell, exact, banded), gained = np.mean(areas, axis=-1).T, np.zeros(len(times))
     if point.contact.lags and point.feels_steps:
         left = -0.5 * np.log1p(-np.clip(renewed(point, speeds[:, 0] * point.clock.step), 1e-12, 0.999))
@@ -95,7 +95,7 @@ def systematic_errors(point: Scenario) -> dict[str, float]:
         speeds[worst, 0],
         np.std(areas[worst, 0]),
     )
-    return dict(zip(SYSTEMATIC, map(float, values), strict=True))
+    return known | dict(zip(SYSTEMATIC, map(float, values), strict=True))
 
 
 def _scores(skewness: float, count: int) -> Array:
@@ -131,11 +131,7 @@ def cure(point: Scenario, errors: dict[str, float]) -> str:
     if not abs(errors["cell_error_area"]) > _ERROR:
         return ""
     shear, solid = cast(Any, point.fluctuations), point.solid.effective
-    side, points, error = (
-        shear.side(point.setting.cell),
-        shear.points,
-        point.process.known_errors()["cell_error_energy"],
-    )
+    side, points, error = shear.side(point.setting.cell), shear.points, errors["cell_error_energy"]
     decade = 10.0 ** math.floor(math.log10(10.0 * side))
 
     def lacks(cell: float, share: float) -> bool:

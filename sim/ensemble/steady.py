@@ -46,7 +46,8 @@ def _fields(table: Any) -> tuple[list[str], dict[str, str]]:
 def steady_course(scenario: Scenario, time: Array, speed: Array, stored: Array | None = None) -> Trajectory:
     """Return contacts that have slid at speeds [m/s] for ever, held as the scenario has it at times [s].
 
-    Shapes are (rows, 1). ``stored`` is ΔΓ at amplitude 1 [J/m²], by default its mean on the infinite plane.
+    Shapes are (rows, 1). ``stored`` is ΔΓ at amplitude 1 [J/m²], by default its mean on the infinite plane; of several
+    energies the energy, the work and the radius have the shape (rows, energies).
     """
     result = bonds_at(scenario.population, tuple(speed[:, 0]))
     still = 0.0 * speed
@@ -56,7 +57,7 @@ def steady_course(scenario: Scenario, time: Array, speed: Array, stored: Array |
     size = shear.amplitude.factor(speed, bonding.strength) ** 2
     size = bonding.frozen + bonding.varying if shear.spectrum.bond_made else size
     energy = size * (plane_energy(shear.spectrum, *scenario.solid.effective) if stored is None else stored)
-    terms = balance(scenario, bonding.fraction, bonding.strength, np.broadcast_to(energy, speed.shape), still)
+    terms = balance(scenario, bonding.fraction, bonding.strength, energy + still, still)
     touch = scenario.contact.start(motion, scenario.clock.duration, terms)
     moving = time, still, speed, bonding.fraction, bonding.stress, bonding.strength, energy
     return Trajectory(*moving, np.empty((len(speed), 1, 0)), *touch)
