@@ -23,7 +23,7 @@ from pydantic_core import PydanticCustomError
 from sim.laws.halfspace import angular_compliance, energy_factors, ripple_energy
 from sim.spectrum.family import Array, Factors, Family, gaussian_boxes
 from sim.spectrum.measured import Measured, Tabulated
-from sim.spectrum.radial import Isotropic, PowerLaws, Rowed, Waves, disc_sums
+from sim.spectrum.radial import Isotropic, PowerLaws, Rowed, Waves
 from sim.units.quantity import Quantity, keyed
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(80)
@@ -91,18 +91,17 @@ class BondMade(Isotropic):
         """Variance beyond wavenumber q [Pa²]."""
         return self.variance * self._outside(q)
 
-    def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
-        """Integrals over discs, in real space, where the field ends: its spectrum oscillates."""
-        return disc_sums(self, radii, lambda radius: (self._overlap(factors, radius), 0.0))
+    def integrals(self, factors: Factors, radius: float) -> tuple[float, float]:
+        """Integrals over a disc in real space, because the field ends there and its spectrum oscillates.
 
-    def _overlap(self, factors: Factors, radius: float) -> float:
-        """``∫ C0 P dq``: that of J0(qs) q C/2π over q is the autocorrelation, the overlap of two footprints."""
+        That of J0(qs) q C/2π over q is the autocorrelation, the overlap of two footprints.
+        """
         least = min(self.footprint, radius)
         distance = least * np.sin(_PHASE)  # half of it; the root at the end of the overlap becomes smooth
         u, v = distance / radius, distance / self.footprint
         disc = np.arccos(u) - (u * np.sqrt(1 - u * u) if factors is energy_factors else 0.0)
         bond = np.arccos(v) - v * np.sqrt(1 - v * v)
-        return 16 / self.footprint**2 * float(np.sum(disc * bond * np.cos(_PHASE) * _WEIGHTS)) * least
+        return 16 / self.footprint**2 * float(np.sum(disc * bond * np.cos(_PHASE) * _WEIGHTS)) * least, 0.0
 
     def _outside(self, q: ArrayLike) -> Array:
         x = np.asarray(q, float) * self.footprint

@@ -59,21 +59,31 @@ class Waves(Family, Protocol):
         """``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
 
     def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
-        """Integrals over discs, by quadrature over the wavenumbers, see ``Family``."""
+        """Integrals over discs of any radius, see ``Family``."""
 
-        def integrals(radius: float) -> tuple[float, float]:
-            q, step = _nodes(self, radius)
-            x = 2 * radius * q
-            followed = _window(self, radius, x)
-            mean, skew = factors(x)
-            # without its oscillation P is pi/2 and S, beyond its slow part, -pi/2
-            limit = 4.0 / x if factors is energy_factors else 2.0 / x
-            mean = followed * mean + (1.0 - followed) * (0.5 * math.pi)
-            skew = followed * skew + (1.0 - followed) * (limit - 0.5 * math.pi)
-            level, lean = self.harmonics(q)
-            return float(np.sum(level * mean * step)), float(np.sum(lean * skew * step))
+        def sums(radius: float) -> tuple[float, float]:
+            if radius == 0.0:
+                return 0.0, 0.0
+            if math.isinf(radius):
+                at_zero, at_one = (4 * math.pi**3 * float(self.surface_energy(1.0, nu)) for nu in (0.0, 1.0))
+                return at_zero, 2 * at_one - at_zero
+            return self.integrals(factors, radius)
 
-        return disc_sums(self, radii, integrals)
+        mean, skew = np.vectorize(sums, otypes=[float, float])(radii)
+        return mean, skew
+
+    def integrals(self, factors: Factors, radius: float) -> tuple[float, float]:
+        """``∫ C0 P dq`` and ``∫ C2 S dq`` for a radius between 0 and infinity, by quadrature over the wavenumbers."""
+        q, step = _nodes(self, radius)
+        x = 2 * radius * q
+        followed = _window(self, radius, x)
+        mean, skew = factors(x)
+        # without its oscillation P is pi/2 and S, beyond its slow part, -pi/2
+        limit = 4.0 / x if factors is energy_factors else 2.0 / x
+        mean = followed * mean + (1.0 - followed) * (0.5 * math.pi)
+        skew = followed * skew + (1.0 - followed) * (limit - 0.5 * math.pi)
+        level, lean = self.harmonics(q)
+        return float(np.sum(level * mean * step)), float(np.sum(lean * skew * step))
 
 
 def disc_energy(spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
@@ -182,21 +192,6 @@ def _on_disc(
     mean, skew = spectrum.on_disc(factors, radii)
     level, swing = angular_compliance(np.asarray(poisson_ratio, float))
     return (level * mean - swing * skew) / (4 * math.pi**3 * np.asarray(shear_modulus, float))
-
-
-def disc_sums(spectrum: Waves, radii: Array, integrals: Callable[[float], tuple[float, float]]) -> tuple[Array, Array]:
-    """``∫ C0 P dq`` and ``∫ C2 S dq`` for discs of any radius, by ``integrals`` for those between 0 and infinity."""
-
-    def sums(radius: float) -> tuple[float, float]:
-        if radius == 0.0:
-            return 0.0, 0.0
-        if math.isinf(radius):
-            at_zero, at_one = (4 * math.pi**3 * float(spectrum.surface_energy(1.0, nu)) for nu in (0.0, 1.0))
-            return at_zero, 2 * at_one - at_zero
-        return integrals(radius)
-
-    mean, skew = np.vectorize(sums, otypes=[float, float])(radii)
-    return mean, skew
 
 
 def _nodes(spectrum: Waves, radius: float) -> tuple[Array, Array]:

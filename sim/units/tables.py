@@ -7,7 +7,7 @@ import errno
 import itertools
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
@@ -50,7 +50,7 @@ def columns(text: str, wanted: dict[str, Quantity], header: str | None = None, g
         Names of the columns of a text without that line, whose numbers blanks may separate, too. An empty one
         stands for a key ``header`` that would give them.
     gaps : bool
-        True if cells may be empty, which are then nan.
+        True if cells may be empty or nan.
 
     Returns
     -------
@@ -97,37 +97,15 @@ def columns(text: str, wanted: dict[str, Quantity], header: str | None = None, g
             quantity.scaled(1.0, unit)
         except ValueError as fault:
             raise TableError(f'{place}: column "{name}" {fault}') from None
-        filled = [k for k, row in enumerate(table.rows) if row[places[0]] or not gaps]
-        result[name] = np.full(len(table.rows), np.nan)
-        if filled:
-            part, cells = [table.lines[k] for k in filled], [table.rows[k][places[0]] for k in filled]
-            result[name][filled] = _numbers(name, table._replace(lines=part), cells, unit, quantity)
+        cells = [row[places[0]] or "nan" * gaps for row in table.rows]
+        result[name] = _numbers(name, table, cells, unit, quantity, gaps)
     return result
-
-
-def headings(text: str) -> dict[str, str]:
-    """Return the names of the columns of a CSV text with the texts of their units, "" for a column without one.
-
-    Raises
-    ------
-    TableError
-        If there is no header, or it cannot be read or has a name twice.
-
-    >>> headings("speed (mm/s), share\\n1, 2")
-    {'speed': 'mm/s', 'share': ''}
-    """
-    place, units, _ = _headed(_cells(text))
-    if not units:
-        raise TableError("the columns have no header; add one of names and units, such as speed [mm/s]")
-    if len(dict(units)) < len(units):
-        raise TableError(f"{place}: the header has a name twice; name each column once")
-    return dict(units)
 
 
 def matrix(text: str, quantity: Quantity, gaps: bool = False, unit: str = "") -> Array:
     """Return a plain rectangular block of SI numbers, separated as in ``columns`` or by blanks, shape (rows, columns).
 
-    With ``gaps`` numbers may be nan, and bounds are not checked. The numbers are in ``unit`` or in that of a comment
+    With ``gaps`` numbers may be nan. The numbers are in ``unit`` or in that of a comment
     above, such as ``# stress in kPa``, else in SI units.
 
     Raises
@@ -237,7 +215,8 @@ def _numbers(name: str, table: _Cells, cells: list[str], unit: str, quantity: Qu
     except ValueError:
         place = next(place for place, cell in enumerate(cells) if "," in cell or not _is_number(cell))
         raise fault(place, "is not a number; write decimals with a point, or leave the row out") from None
-    for place in () if gaps else (numbers.argmin(), numbers.argmax()):  # the first nan is both
+    filled = np.flatnonzero(~(np.isnan(numbers) & gaps))
+    for place in filled[[numbers[filled].argmin(), numbers[filled].argmax()]] if filled.size else ():
         try:
             quantity.read(numbers[place])
         except ValueError as refusal:  # shown without the number, as a scenario may name any file
@@ -699,7 +678,7 @@ def measured_points(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -
         For names that are not known, or columns of different lengths.
     """
     arrays = {str(name): np.asarray(values, float) for name, values in columns.items()}
-    _refuse_unknown([name for name in arrays if not _is_known(name, arrays, known, known)], known)
+    _refuse_unknown(arrays, known, known)
     for name in arrays:
         if len(twice := [other for other in names_of(name) if other in arrays]) > 1:
             raise ValueError(f'columns "{twice[0]}" and "{twice[1]}" are one condition; leave one of them out')
@@ -712,8 +691,10 @@ def _measured_columns(
     text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity], gaps: bool
 ) -> tuple[dict[str, Points], list[str]]:
     """Return the columns, and the names of those that would need a unit if none has one."""
-    units = headings(text)
-    _refuse_unknown([name for name in units if not _is_known(name, units, known, outcomes)], known)
+    units = dict(_headed(_cells(text))[1])
+    if not units:
+        raise TableError("the columns have no header; add one of names and units, such as speed [mm/s]")
+    _refuse_unknown(units, known, outcomes)
     wanted: dict[str, Quantity] = {}
     for name, unit in units.items():
         if name in known:
@@ -734,16 +715,10 @@ def _measured_columns(
     return measured_points(arrays, known), [name for name in bare if name in known]
 
 
-def _is_known(name: str, names: Iterable[str], known: Iterable[str], outcomes: Iterable[str]) -> bool:
-    """Return True for a condition or a variable, and for the error of a variable that has a column."""
-    base = name.removesuffix(ERROR)
-    return name in known or (base != name and base in names and base in outcomes)
-
-
-def _refuse_unknown(names: list[str], known: Iterable[str]) -> None:
-    """Refuse columns that are neither conditions nor variables, all at once and with proposals."""
-    texts = []
-    for name in names[:_MOST_NAMED]:
+def _refuse_unknown(names: Collection[str], known: Iterable[str], outcomes: Iterable[str]) -> None:
+    """Refuse columns that are no conditions, variables or errors of such a column, all at once and with proposals."""
+    errors, texts = [name + ERROR for name in names if name in outcomes], []
+    for name in [name for name in names if name not in known and name not in errors][:_MOST_NAMED]:
         base = name.removesuffix(ERROR)
         near = difflib.get_close_matches(base.lower()[:40], known, 1, 0.75)
         for word in [base, *re.findall("[^\\W\\d_]+", base.lower())]:

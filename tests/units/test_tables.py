@@ -12,7 +12,7 @@ from sim.scenario.files import Files
 from sim.units import tables
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
-from sim.units.tables import TableError, at_once, columns, file_path, file_text, headings, matrix, read_measured
+from sim.units.tables import TableError, at_once, columns, file_path, file_text, matrix, read_measured
 
 TIME = Quantity("s", "time", at_least=0)
 SPEED = Quantity("m/s", "speed")
@@ -61,7 +61,6 @@ def test_units_of_pure_numbers_percents_products_and_angles_are_read():
     for unit in ("1/um", "um^-1", "um**-1"):
         with pytest.raises(TableError, match=r'"rad/um" .* "cycles/um"'):
             columns(f"q [{unit}]\n1", q)
-    assert headings("speed (mm/s), share\n1, 2") == {"speed": "mm/s", "share": ""}
 
 
 def test_a_map_has_the_unit_of_its_comment_or_key_and_an_area_that_of_a_spreadsheet():
@@ -130,8 +129,6 @@ def test_a_wrong_table_is_refused_with_place_and_cure():
         with pytest.raises(TableError, match=words):
             matrix(text, STRESS)
     np.testing.assert_array_equal(matrix("1;nan\n2,5;4", STRESS, gaps=True), [[1.0, np.nan], [2.5, 4.0]])
-    with pytest.raises(TableError, match="each column once"):
-        headings("a, a\n1, 2")
 
 
 def test_an_array_is_checked_as_its_numbers_are():
