@@ -439,7 +439,8 @@ def carried_out(
     for path, content in zip(outputs, texts, strict=True):
         with files.output(path) as beside:
             beside.write_bytes(content)
-    shown: list[Printed] = [(_table(result), f"\n{_explanation(result)}\n")]
+    sources = [f"{table.path}: {table.rows} rows, {table.ranges}" for table in tables]
+    shown: list[Printed] = [(_table(result), "\n".join(["", _quality(result), *result.remarks, *sources, ""]))]
     if verdict is not None:
         doubt = "; but even the scenario as it is lies off: perhaps none of these is true"
         shown.append((_comparison(verdict), f"\n{verdict.words}{doubt if result.p_value <= POOR else ''}\n"))
@@ -467,12 +468,6 @@ def _quality(fit: Fit) -> str:
     cure = "choose --steady or a slower ramp" if fit.lag else "start nearer, give bounds, or free fewer keys"
     ending = "" if fit.converged else f"\nthe fit has not converged: {cure}"
     return f"{chi_square}, AICc {fit.aicc:.4g}{ending}"
-
-
-def _explanation(fit: Fit) -> str:
-    """Return the quality of the fit, the remarks on its numbers and its tables."""
-    tables = [f"{table.path}: {table.rows} rows, {table.ranges}" for table in fit.problem.tables]
-    return "\n".join([_quality(fit), *fit.remarks, *tables])
 
 
 def _comparison(verdict: Verdict) -> list[dict[str, str]]:

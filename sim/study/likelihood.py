@@ -219,13 +219,14 @@ def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool
     """
     result = np.empty((2, len(names), sum(len(group.rows) for group in groups)))
     for group in groups:
-        scenario = group.scenario.with_values(dict(values) | {"record": {}})
-        along: Reading = functools.partial(_at_rows, group, by_time)
-        runs = [(group.rows, scenario, along)]
-        if not (by_time or _by_speed(group)):
-            runs = [(group.rows[k : k + 1], _still(scenario, group, k), _second_half) for k in range(len(group.rows))]
-        for rows, point, read_rows in runs:
-            members = _members(point, names, read_rows)
+        scenario, is_along = group.scenario.with_values(dict(values) | {"record": {}}), by_time or _by_speed(group)
+        still = () if is_along else enumerate(group.rows)
+        runs = [(group.rows[[k]], _still(scenario, group, k)) for k, _ in still] or [(group.rows, scenario)]
+        for rows, point in runs:
+            time, speed, records = _records(point, names)
+            members = records[..., np.newaxis, :, len(time) // 2 :].mean(axis=-1)
+            if is_along:
+                members = _at_rows(group, by_time, time, speed, records)
             error = members.std(axis=-1, ddof=min(members.shape[-1] - 1, 1)) / math.sqrt(members.shape[-1])
             result[..., rows] = members.mean(axis=-1), error
         if not group.scenario.drive.solves_motion:
@@ -247,16 +248,8 @@ def _still(scenario: Scenario, group: Group, row: int) -> Scenario:
     return scenario.with_values(drive | {f"contact.{scenario.contact.kind}": float(held[0])})
 
 
-#: Values of a run at the rows, shape (rows, members), from times and speeds of its records and values by member.
-Reading = Callable[[Array, Array, Array], Array]
-
-
-def _second_half(time: Array, _: Array, values: Array) -> Array:
-    return values[np.newaxis, :, len(time) // 2 :].mean(axis=-1)
-
-
-def _at_rows(group: Group, by_time: bool, time: Array, speed: Array, values: Array) -> Array:
-    """Values between two records, by the time of a row or by the logarithm of its speed."""
+def _at_rows(group: Group, by_time: bool, time: Array, speed: Array, records: Array) -> Array:
+    """Return values between two records, by the time of a row or by the logarithm of its speed."""
     along, at = time, group.time[:, 0]
     if not by_time:
         with np.errstate(divide="ignore"):
@@ -269,11 +262,13 @@ def _at_rows(group: Group, by_time: bool, time: Array, speed: Array, values: Arr
         run, data = (f"{values.min():.3g} to {values.max():.3g} m/s" for values in ends)
         cure = 'must pass each speed of the data once; widen it, or fit with [drive] model = "steady"'
         raise BadInput([f"drive.speed: the run goes from {run}, the data from {data}; it {cure}"])
-    return np.transpose([np.interp(at, along, member) for member in values])
+    return np.array([np.transpose([np.interp(at, along, member) for member in members]) for members in records])
 
 
-def _members(point: Scenario, names: list[str], read_rows: Reading) -> Array:
-    """Return variables at rows by member, shape (names, rows, members); one member if none differ.
+def _records(point: Scenario, names: list[str]) -> tuple[Array, Array, Array]:
+    """Return times and speeds of the records of a run, and variables, shape (names, members, records).
+
+    There is one member if none differ.
 
     If the speed is prescribed, the variables are the differences from steady sliding. A run that adds nothing has no
     error between its records.
@@ -285,7 +280,7 @@ def _members(point: Scenario, names: list[str], read_rows: Reading) -> Array:
     if not point.drive.solves_motion:
         alone = steady_course(point, times[:, np.newaxis], speeds[:1].T)
         values = [members - READ[name](point, alone)[:, 0] for name, members in zip(names, values, strict=True)]
-    return np.array([read_rows(times, speeds[0], members) for members in values])
+    return times, speeds[0], np.array(values)
 
 
 try:

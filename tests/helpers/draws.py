@@ -1,7 +1,7 @@
 """Random numbers of compiled loops as arrays, and whether they have a law."""
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import chi2, poisson
 
 from sim.numerics import noise
 from sim.numerics.jit import kernel
@@ -95,3 +95,8 @@ def fits(counted, expected):
         counted, expected = counted[:-1], expected[:-1]
     assert len(expected) > 1
     assert chi2.sf(np.sum((counted - expected) ** 2 / expected), len(expected) - 1) > FIVE_SIGMA
+
+
+def is_usual(count, mean):
+    """Return True if a Poisson count is no rarer than five standard deviations."""
+    return min(poisson.cdf(count, mean), poisson.sf(count - 1, mean)) > 0.5 * FIVE_SIGMA
