@@ -46,7 +46,7 @@ SPEEDS = np.geomspace(1e-5, 5e-2, 10)
 #: What the curves of the lens are fitted for, and its true values.
 KEYS = {"bonds.critical_speed": 0.01, "bonds.stress": 3e5, "shear.spectrum.rms": 1.5e5}
 UNITS = {"contact_area": ("mm^2", 1e6), "friction_force": ("mN", 1e3), "contact_radius": ("um", 1e6),
-         "spring_force": ("mN", 1e3)}  # fmt: skip
+         "spring_force": ("mN", 1e3), "shear_stress": ("kPa", 1e-3)}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +88,8 @@ def rows_of(scene, **conditions):
 
 
 def test_steady_sliding_is_what_a_run_ends_in_also_for_rows_of_loads_and_solids_of_their_own():
+    stretched = {"rupture": {"model": "bell", "zero_force_rate": "100 1/s", "bell_force": "4 pN"},
+                 "bond_stiffness": "1 mN/m", "rebinding_rate": "500 1/s", "site_density": "1e15 1/m^2"}  # fmt: skip
     scenes = {
         "lens": {},
         "self-affine": {"shear.spectrum": SELF_AFFINE},
@@ -96,14 +98,10 @@ def test_steady_sliding_is_what_a_run_ends_in_also_for_rows_of_loads_and_solids_
         "behind a spring": {"contact": {"displacement": "2 um", "stiffness": "100 N/m"}},
         "reversible share": {"contact.reversible": 0.01},
         "disc": {"shear.contact": "disc"},
-        "bonds with a stretch": {"bonds": {"model": "rate", "rupture": {"model": "bell", "zero_force_rate": "100 1/s",
-                                 "bell_force": "4 pN"}, "bond_stiffness": "1 mN/m", "rebinding_rate": "500 1/s",
-                                 "site_density": "1e15 1/m^2"}},
+        "bonds with a stretch": {"bonds": {"model": "rate"} | stretched},
         "size by stress": {"shear.amplitude": {"model": "stress", "reference": "0.3 MPa"}},
         "size by unsteadiness": {"shear.amplitude": {"model": "slip_rate", "memory_length": "5 um", "floor": 0.4}},
-        "field of the bonds": {"bonds": {"model": "cohort", "rupture": {"model": "bell", "zero_force_rate": "100 1/s",
-                               "bell_force": "4 pN"}, "bond_stiffness": "1 mN/m", "rebinding_rate": "500 1/s",
-                               "site_density": "1e15 1/m^2"},
+        "field of the bonds": {"bonds": {"model": "cohort"} | stretched,
                                "shear": {"model": "mean", "spectrum": {"model": "bonds", "footprint": "1 nm"}}},
         "slow edge": {"contact": {"model": "rate_dependent", "load": "4 mN", "front_speed": "1 mm/s"}},
     }  # fmt: skip
@@ -167,15 +165,11 @@ def test_the_critical_speed_and_stress_of_bells_bonds_are_fitted_as_they_are_giv
     bonds = {"model": "cohort", "rupture": rupture, "bond_stiffness": 8e-7, "rebinding_ratio": 10.0}
     lens, speeds = load(LENS | {"bonds": bonds}), np.geomspace(1e-5, 1e-1, 9)
     stress = lens.population.steady(speeds).strength
-    measured = stress * (1.0 + 0.01 * np.random.default_rng(5).standard_normal(9))
-    path, rows = tmp_path / "stress.csv", zip(speeds, measured, 0.01 * stress, strict=True)
-    lines = ["speed [m/s],shear_stress [Pa],shear_stress_error [Pa]", *(f"{v},{t},{e}" for v, t, e in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    path = table(tmp_path / "stress.csv", {"speed [m/s]": speeds}, noisy({"shear_stress": stress}, 0.01, 5), 0.01)
     start, keys = lens.with_values({"bonds.rupture.critical_speed": 1e-3}), ("critical_speed", "stress")
     result = fit(start, [path], [f"bonds.rupture.{key}" for key in keys], steady=True)
-    assert all(
-        abs(item.value - rupture[key]) < 4.0 * item.error for key, item in zip(keys, result.numbers, strict=True)
-    )
+    for key, item in zip(keys, result.numbers, strict=True):
+        assert abs(item.value - rupture[key]) < 4.0 * item.error
     speed, largest, chi_square = repr(result).splitlines()  # a line for each number, and the chi^2
     assert speed.startswith("bonds.rupture.critical_speed = ") and speed.endswith("] mm/s")
     low, high = map(float, re.findall(r"\[(.*), (.*)\] kPa", largest)[0])
@@ -339,9 +333,8 @@ def drawn_by_colour(panel):
     return points, fits
 
 
-@pytest.mark.parametrize("unit", [("mm/s", 1e3, "mN", 1e3), ("um/s", 1e6, "N", 1.0)])
 @pytest.mark.parametrize("tables", [[[2e-3, 1e-2]], [[2e-3], [1e-2]], [[1e-3, 2e-3, 5e-3, 1e-2, 2e-2]], [[None]]])
-def test_the_figure_has_one_curve_and_colour_for_each_load_in_one_table_or_in_several(tmp_path, tables, unit):
+def test_the_figure_has_one_curve_and_colour_for_each_load_in_one_table_or_in_several(tmp_path, tables):
     scene, forces, paths, rng = load(LENS), {}, [], np.random.default_rng(5)
     for loads in tables:
         for each in loads:
@@ -350,13 +343,13 @@ def test_the_figure_has_one_curve_and_colour_for_each_load_in_one_table_or_in_se
             forces[each] = likelihood.by_steady_sliding(group, {}, ["friction_force"])["friction_force"]
         rows = [(v, each or 4e-3, force) for each in loads for v, force in zip(SPEEDS, forces[each], strict=True)]
         speed, held, force = rng.permutation(rows).T
-        conditions = {f"speed [{unit[0]}]": unit[1] * speed, f"load [{unit[2]}]": unit[3] * held}
-        conditions = dict(list(conditions.items())[: 1 if loads == [None] else 2])
+        conditions = {"speed [um/s]": 1e6 * speed} | ({} if loads == [None] else {"load [N]": held})
         paths.append(table(tmp_path / f"{len(paths)}.csv", conditions, {"friction_force": 1.03 * force}, 0.05))
     read = [likelihood.read(path, scene) for path in paths]
     problem = problem_of(read, [likelihood.groups(scene, each) for each in read], [], {})
     with in_units(["mm/s", "mN"]):
         upper, lower = figure(problem, likelihood.Minimum(problem.start, 0.0, None, True)).axes
+    assert "(mN)" in upper.get_ylabel() and "(mm/s)" in lower.get_xlabel()
     (points, fits), (residuals, _) = drawn_by_colour(upper), drawn_by_colour(lower)
     assert len(points) == len(forces) and points.keys() == fits.keys() == residuals.keys()
     labels = [text.get_text() for text in upper.get_legend().get_texts()][2:]
@@ -369,19 +362,7 @@ def test_the_figure_has_one_curve_and_colour_for_each_load_in_one_table_or_in_se
         assert_allclose(off, [1e3 * SPEEDS, np.full(len(SPEEDS), 0.03 / (0.05 * 1.03))], rtol=1e-8)
 
 
-def test_the_figure_has_its_units_and_keys_that_data_cannot_tell_apart_are_remarked_or_refused(curves, tmp_path, truth):
-    result = fit(load(LENS), [curves], KEYS, steady=True)
-    problem, fitted = result.problem, result.problem.predicted(result.best.x)
-    with in_units(["um/s", "um^2"]):
-        upper, lower, *_ = figure(problem, result.best).axes
-    assert "(µm²)" in upper.get_ylabel() and "(µm/s)" in lower.get_xlabel()
-    ((points,),), ((line,),) = (lines.values() for lines in drawn_by_colour(upper))
-    assert_allclose(points[1], 1e12 * problem.values[:10], rtol=1e-12)
-    at_rows = np.interp(np.log(1e6 * SPEEDS), np.log(line[0]), line[1])
-    # between 200 speeds the curve is straight to a few parts in ten thousand
-    assert_allclose(at_rows, 1e12 * fitted[:10], rtol=3e-4)
-    assert_allclose(lower.lines[0].get_xdata(), 1e6 * SPEEDS, rtol=1e-11)  # a table of 12 digits
-    assert_allclose(lower.lines[0].get_ydata(), ((problem.values - fitted) / problem.sigma)[:10], rtol=1e-12)
+def test_keys_that_data_cannot_tell_apart_are_remarked_or_refused(curves, tmp_path, truth):
     path = table(tmp_path / "um.csv", {"speed [m/s]": SPEEDS}, {"contact_area": 1e6 * truth["contact_area"]}, 0.01)
     result = fit(load(LENS), [path], ["bonds.critical_speed"], steady=True)
     (remark,) = (remark for remark in result.remarks if "unit" in remark)
@@ -593,11 +574,7 @@ def test_every_line_of_the_paper_holds_and_a_wrong_value_or_law_fails(monkeypatc
     lines = checks()
     assert len(lines) >= 30 and [line.name for line in lines if not line.holds] == []
     assert len({(line.name, line.equation, line.computed) for line in lines}) == len(lines)
-    for line in lines:
-        assert line.equation and math.isfinite(line.computed)
-        scale = abs(line.expected) if line.expected != 0.0 else 1.0
-        assert line.error == abs(line.computed - line.expected) / scale
-    loose = [line.name for line in checks() if line.tolerance > 1e-7]
+    loose = [line.name for line in lines if line.tolerance > 1e-7]
     assert len(loose) == 3 and all("as printed" in name for name in loose)
     assert not Check("", "", 1.1, 1.0, 0.1, 1e-3).holds
     assert not Check("", "", math.nan, 1.0, math.nan, 1e-3).holds
