@@ -6,6 +6,7 @@ it. With ``--check`` the script fails if lengths or openings exceed the goals; t
 """
 
 import ast
+import itertools
 import re
 import statistics
 import sys
@@ -26,7 +27,7 @@ _ABBREVIATION = re.compile(r"\b(e\.g|i\.e|cf|vs|Fig|Eq|al|etc|[A-Z])\.")
 def prose(markdown: str) -> list[str]:
     """Return the paragraphs and list items of a page, without tables, headings and code."""
     tokens, texts, table = MarkdownIt().enable("table").parse(markdown), list[str](), False
-    for before, token in zip(tokens, tokens[1:], strict=False):
+    for before, token in itertools.pairwise(tokens):
         table = (table or token.type == "table_open") and token.type != "table_close"
         if token.type == "inline" and before.type == "paragraph_open" and not table:
             parts = (" " if child.type.endswith("break") else child.content for child in token.children or ())
@@ -61,8 +62,8 @@ def docstrings(tree: ast.AST) -> Iterator[str]:
 def sentences(text: str) -> list[str]:
     """Return the sentences of a paragraph or of several."""
     flat = (" ".join(part.split()) for part in re.split(r"\n\s*\n|\n(?=\s*- )", text))
-    found = (sentence for part in flat for sentence in _ENDS.split(_ABBREVIATION.sub(r"\1", part)))
-    return [sentence for sentence in found if len(sentence.split()) > 1]
+    result = (sentence for part in flat for sentence in _ENDS.split(_ABBREVIATION.sub(r"\1", part)))
+    return [sentence for sentence in result if len(sentence.split()) > 1]
 
 
 def syllables(word: str) -> int:
