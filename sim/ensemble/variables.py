@@ -20,7 +20,7 @@ from sim.parts.contact.balance import (
     Shares,
 )
 from sim.parts.drive import READINGS, Driven, Force
-from sim.parts.events import CONTACT, LATE, MOMENTS, SLIP, Slips
+from sim.parts.events import CONTACT, LATE, MOMENTS, SLIP, TURN, Slips
 from sim.scenario.checks import pull_off_error, pulled, renewed
 from sim.scenario.scenario import Scenario
 
@@ -115,9 +115,9 @@ def _equilibrium_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
     return _where_closed(course, EQUILIBRIUM, scene.contact.equilibrium(_control(scene, course), terms))
 
 
-def _largest(of: str, column: str) -> Callable[[Scenario, State], Any]:
-    """Return the reading of a column of the largest stress or friction of the run."""
-    return lambda scene, state: np.nan_to_num(state.events.largest(of)[column])
+def _column(name: str) -> Callable[[Scenario, Any], Any]:
+    """Return the reading of a column of the largest stresses or frictions."""
+    return lambda scene, rows: np.nan_to_num(rows[name])
 
 
 def _pull(column: str, pulls: Any) -> Any:
@@ -125,19 +125,10 @@ def _pull(column: str, pulls: Any) -> Any:
     return np.where(pulls["largest"] > 0.0, pulls[column], np.nan)
 
 
-def _pulled(column: str, sign: float = 1.0) -> Callable[[Scenario, State], Any]:
-    return lambda scene, state: sign * _pull(column, state.events.largest("pull"))
-
-
 def _displaced(scene: Scenario, pulls: Any) -> Any:
     """Return the displacement of the mount at largest pulls [m]."""
     radius, time = np.sqrt(_pull("area", pulls) / np.pi), np.nan_to_num(_pull("time", pulls))
     return scene.contact.control(time, scene.clock.duration).displacement(radius, scene.bodies)
-
-
-def _turn(of: str, column: str) -> Callable[[Scenario, State], Any]:
-    """Return the reading of a column of the first opening or closing of the run."""
-    return lambda scene, state: state.events.first_turn(of)[column]
 
 
 def _at_closing(of: str) -> Callable[[Scenario, State], Any]:
@@ -168,37 +159,60 @@ def _runaway_force(scene: Scenario, state: State) -> Any:
     return np.where(np.isfinite(when), drive.course.at(np.nan_to_num(when), scene.clock.duration), np.nan)
 
 
+def _event(
+    name: str, unit: str, long_name: str, symbol: str, of: str, read: Callable[[Scenario, Any], Any],
+    applies: Callable[[Scenario], bool] = lambda scene: True, condition: str = "",
+) -> tuple[Variable, Variable]:  # fmt: skip
+    """Return a quantity of an event of the whole run, and that of the event in each phase.
+
+    ``read`` takes the scenario and rows of events ``of`` a kind: a largest value, or an opening or closing.
+    """
+    part, turns = "bonds" if of == "stress" else "contact", of in (TURN.names or ())
+
+    def whole(scene: Scenario, state: State) -> Any:
+        return read(scene, state.events.first_turn(of) if turns else state.events.largest(of))
+
+    def in_phases(scene: Scenario, state: State) -> Any:
+        return read(scene, state.events.by_phase("contact" if turns else of))
+
+    of_phase = f"phase_{name.removeprefix('first_')}", unit, f"in a phase: {long_name}".replace("of the run", "of it")
+    return (
+        Variable(name, unit, long_name, symbol, part, whole, applies, condition),
+        Variable(*of_phase, "", part, in_phases, applies, condition, "phase"),
+    )
+
+
 _TOGETHER: Any = (
     lambda scene: scene.varies["bonds"] == scene.varies["contact"], "members with a stress of their own, or one area",
 )  # fmt: skip
 _CHANGES: Any = (lambda scene: scene.contact.makes_load, "a load that changes")
+_EVENTS = (
+    _event("peak_stress", "Pa", "largest magnitude of the mean shear stress of the run, that of the highest start;"
+           " open contacts count", "tau_p", "stress", _column("largest")),
+    _event("peak_time", "s", "time of the largest shear stress", "t_p", "stress", _column("time")),
+    _event("peak_speed", "m/s", "sliding speed at the largest shear stress", "", "stress", _column("speed")),
+    _event("peak_area", "m^2", "contact area at the largest shear stress", "", "stress", _column("area"), *_TOGETHER),
+    _event("peak_friction", "N", "largest magnitude of the friction force of the run, that of the highest start",
+           "F_p", "friction", _column("largest")),
+    _event("peak_friction_time", "s", "time of the largest friction force", "", "friction", _column("time")),
+    _event("peak_friction_speed", "m/s", "sliding speed at the largest friction force", "", "friction",
+           _column("speed")),
+    _event("peak_friction_area", "m^2", "contact area at the largest friction force", "", "friction", _column("area")),
+    _event("pull_off_load", "N", "lowest normal load that the contact bore, a tension; nan without one", "P_min",
+           "pull", lambda scene, rows: -1.0 * _pull("largest", rows), *_CHANGES),
+    _event("pull_off_time", "s", "time of the lowest normal load", "t_min", "pull",
+           lambda scene, rows: _pull("time", rows), *_CHANGES),
+    _event("pull_off_displacement", "m", "displacement of the mount at the lowest normal load", "", "pull", _displaced,
+           *_CHANGES),
+    _event("first_detachment", "s", "time of the first detachment; nan without one", "t_d", "opening",
+           lambda scene, rows: rows["opening"]),
+    _event("first_closing", "s", "time at which an open contact first closes; nan if none does", "", "closing",
+           lambda scene, rows: rows["closing"]),
+)  # fmt: skip
 #: Quantities of a whole run, read at its end.
 LARGEST: tuple[Variable, ...] = (
-    Variable("peak_stress", "Pa", "largest magnitude of the mean shear stress of the run, that of the highest start;"
-          " open contacts count", "tau_p", "bonds", _largest("stress", "largest")),
-    Variable("peak_friction", "N", "largest magnitude of the friction force of the run, that of the highest start",
-          "F_p", "contact", _largest("friction", "largest")),
-    Variable("peak_time", "s", "time of the largest shear stress", "t_p", "bonds", _largest("stress", "time")),
-    Variable("peak_speed", "m/s", "sliding speed at the largest shear stress", "", "bonds",
-             _largest("stress", "speed")),
-    Variable("peak_area", "m^2", "contact area at the largest shear stress", "", "bonds", _largest("stress", "area"),
-             *_TOGETHER),
-    Variable("peak_friction_time", "s", "time of the largest friction force", "", "contact",
-             _largest("friction", "time")),
-    Variable("peak_friction_speed", "m/s", "sliding speed at the largest friction force", "", "contact",
-             _largest("friction", "speed")),
-    Variable("peak_friction_area", "m^2", "contact area at the largest friction force", "", "contact",
-             _largest("friction", "area")),
-    Variable("pull_off_load", "N", "lowest normal load that the contact bore, a tension; nan without one", "P_min",
-          "contact", _pulled("largest", -1.0), *_CHANGES),
-    Variable("pull_off_time", "s", "time of the lowest normal load", "t_min", "contact", _pulled("time"), *_CHANGES),
-    Variable("pull_off_displacement", "m", "displacement of the mount at the lowest normal load", "", "contact",
-             lambda scene, state: _displaced(scene, state.events.largest("pull")), *_CHANGES),
-    Variable("first_detachment", "s", "time of the first detachment; nan without one", "t_d", "contact",
-             _turn("opening", "opening")),
+    *(of_run for of_run, _ in _EVENTS),
     Variable("detachments", "1", "number of detachments", "", "contact", _of_contact("detachments")),
-    Variable("first_closing", "s", "time at which an open contact first closes; nan if none does", "", "contact",
-             _turn("closing", "closing")),
     Variable("closing_displacement", "m", "displacement of the mount at the first closing", "", "contact",
              _at_closing("displacement")),
     Variable("closing_load", "N", "normal load after the first closing", "", "contact", _at_closing("normal_load")),
@@ -251,38 +265,7 @@ def _late(quantity: str, moment: str) -> Callable[[Slips], Any]:
     return read
 
 
-_EXTREME = ("largest", "time", "speed", "area")
-
-
-def _phase(name: str, described: tuple[str, str, str], read: Callable[[Scenario, Any], Any], of: str) -> Variable:
-    """Return an event of each phase, read from a field of ``Past``."""
-    unit, meaning, _ = described
-    part = "bonds" if of == "stress" else "contact"
-    long_name = f"in a phase: {meaning}".replace("of the run", "of it")
-    applies, condition = _CHANGES if of == "pull" else _TOGETHER if name == "peak_area" else (lambda scene: True, "")
-
-    def values(scene: Scenario, state: State) -> Any:
-        return read(scene, state.events.by_phase(of))
-
-    return Variable(f"phase_{name}", unit, long_name, "", part, values, applies, condition, "phase")
-
-
-def _column(name: str) -> Callable[[Scenario, Any], Any]:
-    return lambda scene, rows: np.nan_to_num(rows[name])
-
-
-_BY_NAME: dict[str, Any] = {variable.name: variable[1:4] for variable in LARGEST}
-LARGEST += (
-    *(_phase(name, _BY_NAME[name], _column(column), of)
-      for of, names in (("stress", ("peak_stress", "peak_time", "peak_speed", "peak_area")), ("friction", (
-          "peak_friction", "peak_friction_time", "peak_friction_speed", "peak_friction_area")))
-      for column, name in zip(_EXTREME, names, strict=True)),
-    _phase("pull_off_load", _BY_NAME["pull_off_load"], lambda scene, rows: -_pull("largest", rows), "pull"),
-    _phase("pull_off_time", _BY_NAME["pull_off_time"], lambda scene, rows: _pull("time", rows), "pull"),
-    _phase("pull_off_displacement", _BY_NAME["pull_off_displacement"], _displaced, "pull"),
-    _phase("detachment", _BY_NAME["first_detachment"], lambda scene, rows: rows["opening"], "contact"),
-    _phase("closing", _BY_NAME["first_closing"], lambda scene, rows: rows["closing"], "contact"),
-)  # fmt: skip
+LARGEST += tuple(of_phase for _, of_phase in _EVENTS)
 LARGEST += (
     *(_slip(f"slip_{column}", _SLIPS[column], functools.partial(Slips.column, name=column), "slip")
       for column in SLIP.names or ()),
