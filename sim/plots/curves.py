@@ -2,6 +2,7 @@
 
 import contextlib
 import difflib
+import functools
 import textwrap
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, cast
@@ -25,14 +26,14 @@ from sim.analysis import (
     summary,
     sweep_dims,
 )
-from sim.analysis.dataset import answered, speed_name, speed_of, stays_held
+from sim.analysis.dataset import speed_name, speed_of, stays_held
 from sim.analysis.events import jumps
-from sim.analysis.observables import KEPT, observables, share_observables
+from sim.analysis.observables import KEPT, chosen_observables
 from sim.analysis.over_speed import speed_dim
-from sim.analysis.statistics import of_second_half
+from sim.analysis.statistics import of_second_half, over_members
 from sim.plots import style
 from sim.plots.measured import Compared, Line, Measured
-from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, swept_value, symbol
+from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, named, swept_value
 
 #: Largest number of points of a curve that carry markers.
 _MARKED = 25
@@ -56,41 +57,44 @@ _RING: Any = HOLLOW | {"mew": 0.8, "zorder": 3}
 class Statistics:
     """Statistics over the members along time (``"t"``) or a dimension of the sweep, each computed when first read.
 
-    Along the sweep they are the statements on the second half of a stationary run, else those of the last record.
+    Along the sweep they are the statements on a run, and statistics of its last record if it is not stationary.
     """
 
     def __init__(self, dataset: xr.Dataset, along: str) -> None:
         self.dataset, self.along = dataset, along
         self.late = along != "t" and is_stationary(dataset)
-        self.stated = of_second_half(dataset) if self.late else xr.Dataset()
-        self.observables = self._along(observables(dataset))
-        self._computed: dict[str, xr.DataArray | None] = {}
-        with contextlib.suppress(KeyError):
-            self.observables.update(self._along(bond_work(dataset).to_dataset(name="bond_work")))
-
-    def _along(self, trajectories: xr.Dataset) -> xr.Dataset:
-        if self.along == "t":
-            return trajectories
-        return (settled(trajectories) if self.late else trajectories.isel(t=[-1])).isel(t=0, drop=True)
+        self._computed: dict[str, xr.Dataset] = {}
 
     def get(self, name: str) -> xr.DataArray | None:
         """Return a statistic by its name, such as ``contact_radius_mean``; None if it is not known."""
-        if name in self.stated:
-            return self.stated[name]
-        if name not in self._computed:
-            stem = name.rpartition("_")[0]
-            if stem.startswith("lost_to") and stem not in self.observables:
-                with contextlib.suppress(ValueError), answered():
-                    self.observables.update(self._along(share_observables(self.dataset)))
-            recorded = {stem, *(f"{stem}_{kind}" for kind in KEPT)}
-            chosen = self.observables[[each for each in self.observables if each in recorded]]
-            self._computed |= {name: None} | {str(key): each for key, each in summary(chosen).items()}
-        return self._computed[name]
+        observable = name.rpartition("_")[0]
+        if observable not in self._computed:
+            self._computed[observable] = self._of(observable)
+        return self._computed[observable].get(name, None if self.along == "t" else self.events.get(name))
+
+    @functools.cached_property
+    def events(self) -> xr.Dataset:
+        """Statements on the events of a run."""
+        return statements(self.dataset, [])
+
+    def _of(self, name: str) -> xr.Dataset:
+        """Return the statistics of an observable; none if it is not known."""
+        part = self.dataset if self.along == "t" else self.dataset.isel(t=[-1])
+        if name == "bond_work":
+            result = xr.Dataset()
+            with contextlib.suppress(KeyError):
+                left = bond_work(self.dataset if self.late else part).to_dataset(name=name)
+                result = summary(settled(left) if self.late else left)
+        else:
+            result = over_members(part, [name])
+        if self.along == "t":
+            return result
+        result = result.isel(t=0, drop=True, missing_dims="ignore")
+        return result.assign(of_second_half(self.dataset, [name])) if self.late else result
 
     def names(self) -> list[str]:
         """Return the names of all observables."""
-        self.get("lost_to_bonds_mean")
-        parts = (str(name).rpartition("_") for name in self.observables)
+        parts = (str(name).rpartition("_") for name in chosen_observables(self.dataset.isel(t=[0]), None))
         return sorted({stem if kind in KEPT else f"{stem}{line}{kind}" for stem, line, kind in parts})
 
 
@@ -98,15 +102,17 @@ class Scene(NamedTuple):
     """Statistics laid out for panels, one curve for each point of the sweep.
 
     ``x`` has shape (curves, points) and holds the variable ``over`` in the ``unit`` of the axis, which has ``words``
-    and a ``scale``. ``averaged`` and ``spread`` state the means and bands of the curves. ``bar`` is a colour bar with
-    its label, in place of the names of many curves. ``width`` is that of the place of a curve's points if these are
-    categories, else 0. If lines are ``broken``, they have a gap at each jump of the speed.
+    and a ``scale``. ``averaged`` and ``spread`` state the means and bands of the curves, ``left_out`` counts curves
+    that are not drawn. ``bar`` is a colour bar with its label, in place of the names of many curves. ``width`` is that
+    of the place of a curve's points if these are categories, else 0. If lines are ``broken``, they have a gap at each
+    jump of the speed.
     """
 
     statistics: Statistics
     lines: list[Line]
     averaged: str
     spread: str
+    left_out: str = ""
     bar: tuple[ScalarMappable, str] | None = None
     over: str = ""
     heading: str = ""
@@ -134,7 +140,7 @@ class Scene(NamedTuple):
     @property
     def title(self) -> str:
         """The heading, or a statement of the means of several curves; the name of a single curve states its own."""
-        return self.heading or ("" if self.single else self.averaged)
+        return self.heading or ("" if self.single else "; ".join(filter(None, [self.averaged, self.left_out])))
 
     def placed(
         self, over: str, x: np.ndarray, words: str, si: str, scale: str = "linear", broken: bool = False
@@ -207,11 +213,11 @@ def scene_along(dataset: xr.Dataset, along: str) -> Scene:
     """Return ``Statistics`` along time (``"t"``) or a dimension of the sweep, as curves."""
     lines, bar, left_out = _lines_of(dataset, [name for name in sweep_dims(dataset) if name != along])
     statistics = Statistics(dataset, along)
-    words = "; ".join(filter(None, [averaging(dataset, statistics.late), left_out]))
+    words = averaging(dataset, statistics.late)
     if len(lines) == 1:
         lines = [lines[0]._replace(label=words or "simulated", colour=BOTH)]
     spread = "± 1 std. dev. of members" if "contact_radius_std" in dataset else "5–95 % of members"
-    return Scene(statistics, lines, words, f"{spread} and records" if statistics.late else spread, bar)
+    return Scene(statistics, lines, words, f"{spread} and records" if statistics.late else spread, left_out, bar)
 
 
 def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], tuple[ScalarMappable, str] | None, str]:
@@ -241,8 +247,7 @@ def _bar(key: xr.DataArray) -> tuple[tuple[ScalarMappable, str], list[str]]:
     values = unit.factor * values
     norm = (mpl.colors.LogNorm if logarithmic else mpl.colors.Normalize)(values.min(), values.max())
     colours = ScalarMappable(norm, style.SHADES)
-    words = f"{key.attrs.get('long_name', key.name).partition(',')[0]} {symbol(key)}".strip()
-    return (colours, unit.label(words)), [mpl.colors.to_hex(shade) for shade in colours.to_rgba(values)]
+    return (colours, unit.label(named(key))), [mpl.colors.to_hex(shade) for shade in colours.to_rgba(values)]
 
 
 def colour_bar(figure: Figure, axes: list[Axes], scene: Scene) -> None:
@@ -302,10 +307,13 @@ def beside(panel: Axes, scene: Scene, name: str, factor: float) -> None:
 
 
 def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float, labelled: bool = True) -> None:
-    """Draw a cross at each pull-off and a ring at each jump-in of a curve."""
+    """Draw a cross at each pull-off and a ring at each jump-in of a curve, at the ends of its parts."""
     x, mean = scene.x[line.number], factor * scene.values(f"{name}_mean", line)
-    for words, at, sign in zip(("pull-off", "jump-in"), scene.openings(line), (_CROSS, _RING), strict=True):
-        if at.size:
+    known, (off, on) = np.flatnonzero(np.isfinite(mean)), scene.openings(line)
+    places = np.searchsorted(known, off, "right") - 1, np.searchsorted(known, on)
+    for words, place, sign in zip(("pull-off", "jump-in"), places, (_CROSS, _RING), strict=True):
+        if place.size and known.size:
+            at = known.take(place, mode="clip")
             panel.plot(x[at], mean[at], color=line.colour, label=words if labelled else "", **sign)
 
 
@@ -345,7 +353,7 @@ def over_key(dataset: xr.Dataset, name: str) -> Scene:
     """Return statistics over a swept key of numbers or categories."""
     dataset = dataset.sortby(name) if dataset[name].dtype.kind in "fi" else dataset
     key, scene = dataset[name], scene_along(dataset, name)
-    words = f"{key.attrs.get('long_name', name).partition(',')[0]} {symbol(key)}".strip()
+    words = named(key)
     if key.dtype.kind not in "fi":
         count = len(scene.lines)
         width = _CATEGORY / count
@@ -373,14 +381,13 @@ def over(dataset: xr.Dataset, name: str) -> Scene:
     scene = scene_along(dataset, "t")
     if name == "t":
         return scene.placed("t", dataset["t"].to_numpy(), "time $t$", "s")
-    about, mean = (scene.statistics.get(f"{name}_{kind}") for kind in ("std", "mean"))
-    if about is None or mean is None:
+    mean = scene.statistics.get(f"{name}_mean")
+    if mean is None:
         known = scene.statistics.names()
         near = difflib.get_close_matches(name, [*known, *swept], 1, 0.6)
         cure = f'did you mean "{near[0]}"?' if near else f"choose of: t, speed, {', '.join([*swept, *known])}"
         raise ValueError(f'nothing can be drawn over "{name[:40]}"; {cure}')
-    words = f"{about.attrs.get('long_name', name).partition(' of ')[2].partition(',')[0]} {symbol(mean)}".strip()
-    return scene.placed(name, scene.all(f"{name}_mean"), words, about.attrs["units"], broken=True)
+    return scene.placed(name, scene.all(f"{name}_mean"), named(mean), mean.attrs["units"], broken=True)
 
 
 #: Other words for variables that figures are drawn over.
@@ -389,7 +396,7 @@ _PLAIN = {"time": "t", "load": "normal_load", "travel": "displacement", "drive.s
 
 # -- panels and figures -------------------------------------------------------------------------
 
-Panel = Callable[[Axes, Scene], None]
+Panel = Callable[[Axes, Scene], object]
 
 #: Share of the largest energy below which the fluctuations' own has a panel of its own.
 _SMALL = 0.02
@@ -436,7 +443,6 @@ def _size_panel(name: str, words: str, si: str, of_radius: Callable[[np.ndarray]
         for theory, dashes in (("JKR", "--"), ("Hertz", ":")):
             radii = [scene.values(f"{theory.lower()}_radius_mean", line.whole) for line in scene.lines]
             _reference(panel, scene, [factor * of_radius(radius) for radius in radii], dashes, theory)
-        style.legend(panel, scene.title)
 
     return panel_of
 
@@ -525,7 +531,6 @@ def share_panel(panel: Axes, scene: Scene) -> None:
         hertz, jkr = (scene.values(f"{name}_radius_mean", line.whole) for name in ("hertz", "jkr"))
         ratios.append((hertz / np.where(jkr > 0.0, jkr, np.nan)) ** 2)
     _reference(panel, scene, ratios, ":", "Hertz")
-    style.legend(panel, scene.title)
     panel.set_ylabel(r"contact area $A/A_\mathrm{JKR}$")
 
 
@@ -540,9 +545,7 @@ def _stacked_shares(panel: Axes, scene: Scene) -> None:
         style.fill(panel, x, ratio, bonds, color=style.FLUCTUATIONS, alpha=_SHADE, label="lost to fluctuations")
 
 
-def stacked(
-    scene: Scene, panels: list[tuple[float, Panel]], room: float | None = None, ax: Axes | None = None
-) -> tuple[Figure, list[Axes]]:
+def stacked(scene: Scene, panels: list[tuple[float, Panel]], ax: Axes | None = None) -> tuple[Figure, list[Axes]]:
     """Return panels of given heights [in] above each other with one x axis, lettered, and a colour bar if there is one.
 
     Below them are residuals of measured points, if any. With ``ax`` the first panel alone is drawn, there.
@@ -554,8 +557,13 @@ def stacked(
         drawing(panel, scene)
     if scene.measured and compared:
         scene.measured.residual_panel(axes[-1], scene.over)
-    edge = 0.03 if scene.marked or scene.measured else 0.0
-    style.across(axes[-1], scene.reach, scene.words, scene.scale, edge if room is None else room)
+    style.legend(axes[0], scene.title)
+    room = 0.03 if scene.marked or scene.measured else 0.0
+    room = (0.5 * scene.width + 0.1) / max(np.ptp(scene.x), 1.0) if scene.width else room
+    style.across(axes[-1], scene.reach, scene.words, scene.scale, room)
+    if scene.width:
+        names = scene.statistics.dataset[scene.over].to_numpy()
+        axes[-1].set_xticks(range(names.size), [str(name) for name in names])
     if ax is not None and (legend := ax.get_legend()):  # above the panel there may be no room
         legend.set_bbox_to_anchor(None)
         legend.set_loc("best")
@@ -566,7 +574,7 @@ def stacked(
 
 
 def further_panels(scene: Scene) -> list[tuple[float, Panel]]:
-    """Return panels of energies and friction that change."""
+    """Return panels of energies and friction that change, and of the share of open contacts if members differ."""
     panels: list[tuple[float, Panel]] = []
     if scene.varies("work_of_adhesion") or scene.varies("fluctuation_energy"):
         panels.append((1.6, energy_panel))
@@ -574,6 +582,9 @@ def further_panels(scene: Scene) -> list[tuple[float, Panel]]:
             panels.append((1.2, series("fluctuation_energy", r"fluctuations $\Delta\Gamma$", "J/m^2")))
     if scene.varies("friction_force"):
         panels.append((1.2, friction_panel))
+    opened = scene.all("fraction_detached_mean")
+    if np.any((opened > 0.0) & (opened < 1.0)):
+        panels.append((0.8, series("fraction_detached", "open contacts", "1")))
     return panels
 
 
@@ -606,18 +617,15 @@ def time_figure(
     shown = [name for name in _DRIVEN if (name != "displacement" or moved) and name != scene.over]
     shown = [name for name in shown if any(map(_changes, scene.all(f"{name}_mean")))]
     driven = [(0.8, series(name, *_DRIVEN[name], usual=True)) for name in shown]
-    return _with_size(scene, [*further_panels(scene), *driven], absolute, ax=ax)[0]
+    return _with_size(scene, [*further_panels(scene), *driven], absolute, ax)
 
 
-def _with_size(
-    scene: Scene, panels: list[tuple[float, Panel]], absolute: bool, room: float | None = None, ax: Axes | None = None
-) -> tuple[Figure, list[Axes]]:
+def _with_size(scene: Scene, panels: list[tuple[float, Panel]], absolute: bool, ax: Axes | None) -> Figure:
     """Return panels below that of the size of the contact, which is left out if others change and the size does not."""
+    size = area_panel if absolute else radius_panel
     if ax is None and panels and scene.measured is None and not scene.varies("contact_radius"):
-        figure, axes = stacked(scene, [(1.6, panels[0][1]), *panels[1:]], room)
-        style.legend(axes[0], scene.title)
-        return figure, axes
-    return stacked(scene, [(1.6, area_panel if absolute else radius_panel), *panels], room, ax)
+        (_, size), *panels = panels
+    return stacked(scene, [(1.6, size), *panels], ax)[0]
 
 
 def coarse_slips(dataset: xr.Dataset) -> str:
@@ -677,7 +685,6 @@ def sweep_figure(
     if off and data is None and ax is None and not (style.recorded(dataset, "contact_radius").isel(t=-1) > 0.0).any():
         return statement_figure(dataset, "pull_off_load")
     scene = (over(dataset, x) if x else over_key(dataset, style.swept(dataset)[0]))._replace(measured=data)
-    room = None if not scene.width else (0.5 * scene.width + 0.1) / max(np.ptp(scene.x), 1.0)
     if not is_stationary(dataset):
         words = [f"at the end: $t$ = {style.text_of(dataset['t'][-1], 's')}"]
         if "speed" in dataset:
@@ -685,11 +692,7 @@ def sweep_figure(
             ends = dict.fromkeys(style.text_of(end, "m/s") for end in (speed.min(), speed.max()))
             words.append(f"$V$ = {' to '.join(ends)}")
         scene = scene._replace(heading=", ".join(filter(None, [*words, scene.title])))
-    figure, axes = _with_size(scene, further_panels(scene), absolute, room, ax)
-    if scene.width:
-        names = dataset[scene.over].to_numpy()
-        axes[-1].set_xticks(range(names.size), [str(value) for value in names])
-    return figure
+    return _with_size(scene, further_panels(scene), absolute, ax)
 
 
 def statement_figure(dataset: xr.Dataset, name: str) -> Figure:
@@ -697,46 +700,34 @@ def statement_figure(dataset: xr.Dataset, name: str) -> Figure:
 
     An arrow is a bound: the value lies beyond. Curves are sorted along numbers.
     """
-    stated = statements(dataset)
-    key, mean = dataset[style.swept(dataset)[0]], stated[f"{name}_mean"]
-    others = [dim for dim in style.swept(dataset) if dim != key.name]
-    lines, bar, left_out = _lines_of(dataset, others)
-    is_number = key.dtype.kind in "fi"
-    x = np.sort(key.to_numpy().astype(float)) if is_number else np.arange(key.size)
-    order = np.argsort(key.to_numpy()) if is_number else x
-    kinds = ("mean", "low", "high")
-    values = [stated.get(f"{name}_{kind}", xr.full_like(mean, np.nan)).broadcast_like(mean) for kind in kinds]
-    unit = Unit.of(x, key.attrs.get("units", "1"), axis_scale(x) == "log") if is_number else Unit(1.0, "")
-    figure, (panel,) = style.rows([2.2])
-    sizes = np.concatenate([each.to_numpy().ravel() for each in values])
-    text = str(mean.attrs.get("long_name", name)).removeprefix("ensemble mean of ").partition(",")[0]
-    factor = style.in_unit(panel.yaxis, "\n".join(textwrap.wrap(text, 36)), sizes, str(mean.attrs.get("units", "1")))
-    for line in lines:
-        points = {dim: at for dim, at in line.point.items() if dim in mean.dims}
-        curves = [factor * np.broadcast_to(each.isel(points).to_numpy(), x.size)[order] for each in values]
-        _interval(panel, unit.factor * x, curves, line.colour if len(lines) > 1 else BOTH, line.label, is_number)
-    scale = axis_scale(x) if is_number else "linear"
-    if axis_scale(np.abs(sizes[np.isfinite(sizes)])) == "log" and np.all(sizes[np.isfinite(sizes)] > 0.0):
-        panel.set_yscale("log")
-    words = f"{key.attrs.get('long_name', key.name).partition(',')[0]} {symbol(key)}".strip()
-    style.across(panel, unit.factor * x, unit.label(words), scale, 0.05)
-    if not is_number:
-        panel.set_xticks(x, [str(label) for label in key.to_numpy()])
-    over = f"mean over the {mean.attrs['over']}, 95 % intervals" if mean.attrs.get("over") else ""
-    style.legend(panel, "; ".join(filter(None, [over, left_out])))
-    if bar:
-        figure.colorbar(bar[0], ax=[panel], label=bar[1], aspect=45, pad=0.02)
-    return figure
+    scene = over_key(dataset, style.swept(dataset)[0])
+    over = cast(xr.DataArray, scene.statistics.get(f"{name}_mean")).attrs.get("over")
+    words = f"mean over the {over}, 95 % intervals" if over else scene.averaged and f"{scene.averaged}, 95 % intervals"
+    scene = scene._replace(heading="; ".join(filter(None, [words, scene.left_out])))
+    return stacked(scene, [(2.2, lambda panel, scene: statement_curves(panel, scene, name))])[0]
 
 
-def _interval(panel: Axes, x: np.ndarray, curves: list[np.ndarray], colour: str, label: str, is_joined: bool) -> None:
+def statement_curves(panel: Axes, scene: Scene, name: str) -> float:
+    """Draw a statement over a swept key, and return the factor to the unit of its axis."""
+    mean = cast(xr.DataArray, scene.statistics.get(f"{name}_mean"))
+    ends = [f"{name}_{end}" for end in ("mean", "low", "high")]
+    values, words = scene.all(*ends), "\n".join(textwrap.wrap(named(mean, with_symbol=False), 36))
+    factor = style.in_unit(panel.yaxis, words, values, str(mean.attrs.get("units", "1")))
+    for line in scene.lines:
+        _interval(panel, scene, line, [factor * scene.values(end, line) for end in ends])
+    panel.set_yscale("log" if axis_scale(values[np.isfinite(values)]) == "log" else "linear")
+    return factor
+
+
+def _interval(panel: Axes, scene: Scene, line: Line, curves: list[np.ndarray]) -> None:
     """Draw values with the ends of their intervals, and arrows where an end is a bound."""
-    mean, low, high = curves
-    look: Any = {"color": colour, "elinewidth": 0.8, "capsize": 1.5, "linestyle": "none"}
+    x, (mean, low, high), label = scene.x[line.number], curves, "" if scene.single else line.label
+    look: Any = {"color": line.colour, "elinewidth": 0.8, "capsize": 1.5, "linestyle": "none"}
     known = np.isfinite(mean)
     errors = np.nan_to_num([np.maximum(mean - low, 0.0), np.maximum(high - mean, 0.0)])
     panel.errorbar(x[known], mean[known], errors[:, known], **look)
-    panel.plot(x, mean, marker="o", markersize=3, color=colour, label=label, linestyle="-" if is_joined else "none")
+    marks: Any = {"marker": "o", "markersize": 3} | line_style(scene, "-")
+    panel.plot(x, mean, color=line.colour, label=label, **marks)
     for bound, other, sign in ((low, high, {"lolims": True}), (high, low, {"uplims": True})):
         alone = ~known & np.isfinite(bound) & ~np.isfinite(other)
         if alone.any():

@@ -1,26 +1,24 @@
 """Figures of sliding: bond stress over speed with closed forms, starts from rest, stability, creep, incipient slip."""
 
 import contextlib
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sim.analysis import is_steady, setting, sweep_dims
-from sim.analysis.dataset import MEMBERS, stays_held, word
+from sim.analysis import is_steady, setting, statements, sweep_dims
+from sim.analysis.dataset import MEMBERS, scenario_of, stays_held, word
 from sim.analysis.events import incipient_law, jumps
 from sim.analysis.observables import with_slips
 from sim.analysis.over_speed import population_of, speed_dim
-from sim.laws import jkr, schallamach
-from sim.laws.schallamach import Body
+from sim.laws import schallamach
 from sim.plots import style
-from sim.plots.curves import Panel, Scene, contact_curves, over_speed, scene_along, stacked
+from sim.plots.curves import Panel, Scene, contact_curves, over_key, over_speed, scene_along, stacked, statement_curves
 from sim.plots.measured import Line, Measured
+from sim.units.errors import BadInput
 
 
 class Steady(NamedTuple):
@@ -63,8 +61,6 @@ def steady_laws(point: xr.Dataset, speed: np.ndarray) -> list[Steady]:
 
 #: Speeds of a map, and at which its boundary is drawn.
 _CELLS, _FINE = 28, 200
-#: Change of the bond fraction by which the growth of the area is found.
-_LITTLE = 1e-4
 _FRAME: Any = {"color": style.BONDS, "linewidth": 1.4}
 
 
@@ -96,8 +92,6 @@ def _run(name: str, words: str, si: str) -> Panel:
             if 0 < known.size < values.size:
                 look: Any = {"color": line.colour, "markersize": 4, "label": "runaway"}
                 panel.plot(scene.x[line.number][known[-1]], values[known[-1]], "x", **look)
-        if name == "slider_position":
-            style.legend(panel, scene.title)
 
     return panel_of
 
@@ -151,37 +145,13 @@ def _swings(force: np.ndarray, speed: np.ndarray, edges: np.ndarray) -> np.ndarr
 
 
 def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
-    """Return the stiffness below which steady sliding is unstable [N/m], in mean field for ``rate`` bonds; else nan."""
-    point = dataset.isel(dict.fromkeys(sweep_dims(dataset), 0))
-    bonds = population_of(point)
-    if bonds is None:
-        return np.full(speed.shape, np.nan)
-    mean_field = bool(bonds.pathway) and str(word(dataset, "bonds.model", "").item()) == "rate"
-    onset = bonds.rupture.first_moment_onset if mean_field else bonds.rupture.resolved_onset
-    bound = steady_laws(point, speed)[mean_field].fraction
-    less, area, more = (_area(point, bound * share) for share in (1.0 - _LITTLE, 1.0, 1.0 + _LITTLE))
-    growth, firm, contact_growth = (more - less) / (2.0 * _LITTLE * area), np.full(speed.shape, math.inf), 0.0
-    if str(word(dataset, "drive.contact_stiffness", "half_space").item()) == "half_space":
-        contact_growth = 0.5
-        modulus, ratio = (float(point[f"effective_{name}"]) for name in ("shear_modulus", "poisson_ratio"))
-        firm = 0.75 * math.pi**2 * modulus * np.sqrt(area / math.pi) / (2.0 - ratio)
-    with contextlib.suppress(KeyError):
-        firm = np.full(speed.shape, float(setting(point, "drive.contact_stiffness")))
-    mass, damping, viscosity = (float(setting(point, f"drive.{key}")) for key in ("mass", "damping", "viscosity"))
-    body = Body(area, growth, 0.0, mass, damping, viscosity, firm, contact_growth)
-    return onset(speed, (bonds.stiffness, bonds.rebinding, bonds.density), body).stiffness
+    """Return the stiffness below which steady sliding is unstable [N/m]; nan if the scenario cannot be read."""
+    from sim.ensemble.diagnosis import slider_body  # heavy: for this figure alone
 
-
-def _area(point: xr.Dataset, bound: np.ndarray) -> np.ndarray:
-    """Return the area of an equilibrium contact at a load at these bond fractions [m²]; nan under other controls."""
-    try:
-        keys = ("contact.load", "sphere.radius", "adhesion.work", "adhesion.bond_share")
-        load, size, work, share = (float(setting(point, key)) for key in keys)
-    except KeyError:
-        return np.full(bound.shape, np.nan)
-    work_left = work * (1.0 - share + share * bound)
-    radius = jkr.radius_at_load(load, work_left, size, float(point["contact_modulus"]))
-    return np.asarray(math.pi * np.square(radius))
+    with contextlib.suppress(BadInput, KeyError):
+        scene = scenario_of(dataset.isel(dict.fromkeys(sweep_dims(dataset), 0)))
+        return np.asarray(scene.population.onset(speed, slider_body(scene, speed)).stiffness)
+    return np.full(speed.shape, np.nan)
 
 
 def needs_pull(dataset: xr.Dataset) -> None:
@@ -237,10 +207,8 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
 #: Speeds at which a closed form is drawn.
 _CURVE = 600
 
-#: Those of the closed forms of a start; a peak is resolved if more steps than that lead up to it.
-_FEWER, _STEPS = 300, 3.5
-
-_MARKERS = "osD^vP"
+#: A peak is resolved if more clock steps than that lead up to it.
+_STEPS = 3.5
 
 #: Look of an exact closed form, grey that shows on a black line and beside it, and of an approximate one.
 _LAWS: Any = {
@@ -271,18 +239,18 @@ def stress_figure(dataset: xr.Dataset, data: Measured | None = None, ax: Axes | 
             raise ValueError("starts from rest have panels of their own; draw the kind time beside data, or on an ax")
         return start_figure(dataset)
     scene = over_speed(dataset)._replace(measured=data)
-    laws = {line.number: _laws_of(dataset, scene, line) for line in scene.lines}
 
     def thin_lines(panel: Axes, scene: Scene, values: Callable[[Steady], np.ndarray]) -> None:
-        for speed, law in (law for line in scene.lines for law in laws[line.number]):
-            panel.plot(scene.unit.factor * speed, values(law), label=law.words, **_LAWS[law.style])
+        for line in scene.lines:
+            speeds = _fine(scene, line)
+            for law in steady_laws(dataset.isel(line.point), speeds):
+                panel.plot(scene.unit.factor * speeds, values(law), label=law.words, **_LAWS[law.style])
 
     def stress_panel(panel: Axes, scene: Scene) -> None:
         """Draw the shear stress upon closed forms, with the maximum of each curve."""
         factor = style.in_unit(panel.yaxis, r"shear stress $\tau_0$", scene.all("shear_stress_mean"), "Pa")
         contact_curves(panel, scene._replace(lines=_marked(panel, scene, factor)), "shear_stress", factor)
         thin_lines(panel, scene, lambda law: factor * law.stress)
-        style.legend(panel, scene.title)
 
     def fraction_panel(panel: Axes, scene: Scene) -> None:
         thin_lines(panel, scene, lambda law: law.fraction)
@@ -293,16 +261,15 @@ def stress_figure(dataset: xr.Dataset, data: Measured | None = None, ax: Axes | 
     return stacked(scene, panels if scene.varies("bond_fraction") else panels[:1], ax=ax)[0]
 
 
-def _laws_of(dataset: xr.Dataset, scene: Scene, line: Line) -> list[tuple[np.ndarray, Steady]]:
-    """Return closed forms over the speeds of a curve, each with the speeds [m/s]."""
+def _fine(scene: Scene, line: Line) -> np.ndarray:
+    """Return the speeds of a closed form beside a curve [m/s]."""
     speeds = scene.speeds(line)
     low, high = np.min(speeds), np.max(speeds)
-    fine = np.linspace(low, high, _CURVE)
     if scene.scale == "log":
-        fine = np.geomspace(low, high, _CURVE)
-    elif scene.scale == "symlog":
-        fine = np.append(0.0, np.geomspace(np.min(speeds[speeds > 0.0]), high, _CURVE - 1))
-    return [(fine, law) for law in steady_laws(dataset.isel(line.point), fine)]
+        return np.geomspace(low, high, _CURVE)
+    if scene.scale == "symlog":
+        return np.append(0.0, np.geomspace(np.min(speeds[speeds > 0.0]), high, _CURVE - 1))
+    return np.linspace(low, high, _CURVE)
 
 
 def maximum_of(speed: np.ndarray, stress: np.ndarray) -> int | None:
@@ -335,112 +302,57 @@ def _marked(panel: Axes, scene: Scene, factor: float) -> list[Line]:
     return labelled
 
 
-class Start(NamedTuple):
-    """A start from rest: its point of the sweep, rest [s], speed [m/s], and since it began times [s] and stresses [Pa].
-
-    ``fraction`` is the bond fraction before it. ``peak`` [Pa] is the largest stress, at the time ``when`` [s]; it is
-    ``resolved`` if the stress falls again and more than three steps lead up to it.
-    """
-
-    point: xr.Dataset
-    rest: float
-    speed: float
-    fraction: float
-    time: np.ndarray
-    stress: np.ndarray
-    peak: float
-    when: float
-    resolved: bool
-
-
-def _varied(dataset: xr.Dataset) -> list[str]:
-    """Return the dimensions of the sweep along which the rest or the speed changes."""
-    dims = {*setting(dataset, "drive.rest").dims, *setting(dataset, "drive.speed").dims}
-    return [name for name in sweep_dims(dataset) if name in dims]
-
-
-def starts_of(dataset: xr.Dataset) -> list[Start]:
-    """Return all starts of a sweep, from short to long rest and slow to fast, at the first point of further swept keys.
-
-    Peaks are those of the clock steps, or where members differ those of their mean over the records.
-    """
-    varied, starts, times = _varied(dataset), [], dataset["t"].to_numpy()
-    for where in np.ndindex(*(dataset.sizes[name] for name in varied)):
-        point = dataset.isel(dict.fromkeys(sweep_dims(dataset), 0) | dict(zip(varied, where, strict=True)))
-        rest, speed = (float(setting(point, f"drive.{key}")) for key in ("rest", "speed"))
-        first = int(np.searchsorted(times, rest + 1e-9 * times[-1], "right"))
-        if first == times.size:
-            continue
-        stress, fraction = (style.mean_of(point, name).to_numpy() for name in ("shear_stress", "bond_fraction"))
-        k = first + int(np.argmax(np.abs(stress[first:])))
-        peak, when, step = abs(stress[k]), times[k], times[1] - times[0]
-        if "peak_stress" in point and "member" not in point["peak_stress"].dims:
-            peak, when, step = (float(point[name]) for name in ("peak_stress", "peak_time", "clock_step"))
-        resolved = bool(abs(stress[-1]) < peak and when - rest > _STEPS * step)
-        bound, peak = fraction[max(first - 1, 0)], np.copysign(peak, speed)
-        course = times[first:] - rest, stress[first:]
-        starts.append(Start(point, rest, speed, bound, *course, peak, when - rest, resolved))
-    return sorted(starts, key=lambda start: (start.rest, abs(start.speed)))
-
-
 def start_figure(dataset: xr.Dataset) -> Figure:
-    """Draw the stress since the start at the longest rest, one line a speed, and the peak stress, one line a rest."""
-    starts = starts_of(dataset)
-    rests, speeds = ({start.rest for start in starts}, {abs(start.speed) for start in starts})
-    longest = [start for start in starts if start.rest == max(rests)]
-    figure, axes = style.rows([2.15]) if len(rests) == len(speeds) == 1 else style.pairs(2.9, shared=True)
-    stresses = np.concatenate([start.stress for start in starts])
-    factor = style.in_unit(axes[0].yaxis, r"shear stress $\tau_0$", stresses, "Pa")
-    for panel in axes[1:]:
-        _peak_panel(panel, starts, len(speeds - {0.0}) > 1, factor)
-    _time_panel(axes[0], longest, factor)
-    others = [style.swept_value(dataset, name, 0) for name in style.swept(dataset) if name not in _varied(dataset)]
-    style.legend(axes[0], ", ".join([*others, f"after {style.text_of(max(rests), 's')} at rest, sliding at"]))
+    """Draw the stress since the start at the longest rest, and the peak stress over the speed, or over the rest."""
+    rests, speeds = (setting(dataset, f"drive.{key}") for key in ("rest", "speed"))
+    longest = dataset.isel({dim: np.flatnonzero(rests == rests.max()) for dim in rests.dims})
+    over = [str(dim) for dim in (*speeds.dims, *rests.dims) if dataset.sizes[dim] > 1]
+    if not over or "peak_stress_mean" not in statements(dataset, []):
+        figure, axes = style.rows([2.15])
+    else:
+        figure, axes = style.pairs(2.9)
+        _peak_panel(axes[1], dataset, over_key(dataset, over[0]))
+    _time_panel(axes[0], longest, float(rests.max()))
     return figure
 
 
-def _time_panel(panel: Axes, starts: list[Start], factor: float) -> None:
-    """Draw the stress over the time since the start; a dot is a peak that is resolved."""
-    scale, times = "log" if len(starts) > 1 else "linear", starts[0].time
-    length = style.Unit.of(times, "s", scale == "log")
-    for start, colour in zip(starts, mpl.colormaps["viridis"](np.linspace(0.0, 0.88, len(starts))), strict=True):
-        words = style.rounded(start.speed, "m/s")
-        panel.plot(length.factor * start.time, factor * start.stress, color=colour, label=words)
-        if start.resolved:
-            panel.plot(length.factor * start.when, factor * start.peak, "o", markersize=3, color=colour)
-    ends = times if scale == "log" else np.append(0.0, times)
-    style.across(panel, length.factor * ends, length.label("time since the start"), scale)
+def _time_panel(panel: Axes, dataset: xr.Dataset, rest: float) -> None:
+    """Draw the stress over the time since the start; a dot is a peak."""
+    slid = dataset.isel(t=np.flatnonzero(dataset["t"] > rest + 1e-9 * dataset["t"][-1]))
+    scene = scene_along(slid, "t")
+    scale = "linear" if scene.single else "log"
+    scene = scene.placed("t", slid["t"].to_numpy() - rest, "time since the start", "s", scale)
+    factor = style.in_unit(panel.yaxis, r"shear stress $\tau_0$", scene.all("shear_stress_mean"), "Pa")
+    contact_curves(panel, scene, "shear_stress", factor)
+    stated = statements(dataset, [])
+    for line in scene.lines if "peak_stress_mean" in stated else ():
+        when, peak = (style.number_at(stated[f"peak_{name}_mean"], line.point) for name in ("time", "stress"))
+        peak = np.copysign(peak, scene.values("shear_stress_mean", line)[-1])
+        panel.plot(scene.unit.factor * when, factor * peak, "o", markersize=3, color=line.colour)
+    style.across(panel, scene.x, scene.words, scale)
+    style.legend(panel, "; ".join(filter(None, [f"after {style.text_of(rest, 's')} at rest", scene.title])))
 
 
-def _peak_panel(panel: Axes, starts: list[Start], over_speed: bool, factor: float) -> None:
-    """Draw the peak stress over the speed, one line a rest, or over the rest if there is only one speed.
+def _peak_panel(panel: Axes, dataset: xr.Dataset, scene: Scene) -> None:
+    """Draw the peak stress; a hollow one comes within few steps of the start.
 
     Thin lines over the speed are closed forms: the peak of Bell bonds if none rebinds, and steady sliding.
     """
-    places = np.array([abs(start.speed) if over_speed else start.rest for start in starts])
-    peaks, resolved = (np.array([getattr(start, name) for start in starts]) for name in ("peak", "resolved"))
-    groups = np.array([start.rest if over_speed else 0.0 for start in starts])
-    pace = style.Unit.of(places, "m/s" if over_speed else "s", logarithmic=True)
-    x, y, rests = pace.factor * places, factor * peaks, np.unique(groups)
-    fine = np.geomspace(places[places > 0.0].min(), places.max(), _FEWER)
-    thin: Any = style.GREY | {"linewidth": 0.7}
-    for number, rest in enumerate(rests):
-        chosen = groups == rest
-        grey = mpl.colors.to_hex((0.65 * (1.0 - (number + 1) / rests.size),) * 3)
-        look: Any = {"color": grey, "marker": _MARKERS[number % len(_MARKERS)], "markersize": 3.5}
-        panel.plot(x[chosen], y[chosen], label=f"{style.text_of(rest, 's')} at rest" if over_speed else "", **look)
-        panel.plot(x[chosen & ~resolved], y[chosen & ~resolved], **look | {"linestyle": "none", "mfc": "white"})
-    if not np.all(resolved):
-        panel.plot([], [], "o", color=style.REFERENCE, mfc="white", label="not resolved")
-    for start in {start.rest: start for start in starts if over_speed}.values():
-        bonds = population_of(start.point)
+    factor = statement_curves(panel, scene, "peak_stress")
+    for line in scene.lines:
+        x, peaks, when = scene.x[line.number], *(scene.values(f"peak_{name}_mean", line) for name in ("stress", "time"))
+        few = when <= _STEPS * float(dataset["clock_step"])
+        look: Any = {"markersize": 3, "mfc": "white", "color": line.colour, "label": "not resolved" * bool(few.any())}
+        panel.plot(x[few], factor * peaks[few], "o", **look)
+    for line in scene.lines if scene.over.endswith("speed") else ():
+        point = dataset.isel(line.point | {scene.over: 0})
+        speeds, bonds = _fine(scene, line), population_of(point)
         if bonds and bonds.pathway:
-            force = schallamach.start_up_peak(fine, *bonds.pathway).force
-            peak = start.fraction * (bonds.density * bonds.at_rest * force)
-            panel.plot(pace.factor * fine, factor * peak, linestyle=":", label="none rebinds", **thin)
-    for law in steady_laws(starts[0].point, fine)[:1] if over_speed else ():
-        panel.plot(pace.factor * fine, factor * law.stress, label="steady sliding", **thin)
-    panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
-    words = pace.label("sliding speed $V$" if over_speed else "time at rest")
-    style.across(panel, x, words, "log", 0.05)
+            rested = style.mean_of(point, "bond_fraction").sel(t=float(setting(point, "drive.rest")), method="ffill")
+            force = schallamach.start_up_peak(speeds, *bonds.pathway).force
+            peak = factor * float(rested) * bonds.density * bonds.at_rest * force
+            panel.plot(scene.unit.factor * speeds, peak, ":", label="none rebinds", **style.GREY)
+        for law in steady_laws(point, speeds)[:1]:
+            panel.plot(scene.unit.factor * speeds, factor * law.stress, label=law.words, **_LAWS[law.style])
+    style.across(panel, scene.x, scene.words, scene.scale, 0.05)
     style.legend(panel, "peak of the stress")

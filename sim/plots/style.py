@@ -183,6 +183,12 @@ def symbol(variable: xr.DataArray) -> str:
     return f"${text}$" if text else ""
 
 
+def named(variable: xr.DataArray, with_symbol: bool = True) -> str:
+    """Return the meaning of a variable or of its mean, and its symbol: ``normal load $P$``."""
+    words = str(variable.attrs.get("long_name", variable.name)).removeprefix("ensemble mean of ").partition(",")[0]
+    return f"{words} {symbol(variable)}".strip() if with_symbol else words
+
+
 class Unit(NamedTuple):
     """A factor from SI and the unit that it leads to."""
 
@@ -251,7 +257,7 @@ def upward(panel: Axes) -> None:
 def across(panel: Axes, x: np.ndarray, words: str, scale: str = "linear", room: float = 0.0) -> None:
     """Set the x axis from the least to the largest value, with some ``room`` for markers at its ends, and its label."""
     known = x[np.isfinite(x) & ((x > 0.0) | (scale != "log"))]
-    low, high = known.min(), known.max()
+    low, high = (known.min(), known.max()) if known.size else (0.0, 0.0)  # of a contact that never closes
     panel.set_xscale(scale, **({"linthresh": np.min(x[x > 0.0])} if scale == "symlog" else {}))
     if scale == "linear":
         panel.locator_params(axis="x", min_n_ticks=3)
