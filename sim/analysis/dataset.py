@@ -4,7 +4,6 @@ A number of the scenario is a variable, a swept one a coordinate; the resolved s
 """
 
 import contextlib
-import functools
 import hashlib
 import json
 import os
@@ -153,20 +152,21 @@ def plain(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def claim(dataset: xr.Dataset, path: Path, target: Path, replace: bool, *others: Path) -> None:
-    """Refuse a file to be made of the dataset at ``path`` and ``others``; errors as of ``files.claim``."""
-    files.claim(target, replace, [path, *others], guard=functools.partial(_guard, dataset))
+    """Refuse a file to be made of the dataset at ``path`` and ``others``; errors as of ``files.claim``.
 
-
-def _guard(dataset: xr.Dataset, path: Path) -> None:
-    """Refuse to replace a dataset, or a file that this dataset was made from."""
-    with path.open("rb") as file:
+    Neither a dataset nor a file that this dataset was made from is replaced.
+    """
+    files.claim(target, replace, [path, *others])
+    if not target.is_file() or target.is_relative_to("/dev"):
+        return
+    with target.open("rb") as file:
         content = file.read(_MOST_BYTES)
     text = content.decode("utf-8-sig", "replace").replace("\r\n", "\n")
     if content.startswith((b"\x89HDF", b"CDF")):
-        raise BadInput([f"{path} is a dataset, which is not replaced; name another file"])
+        raise BadInput([f"{target} is a dataset, which is not replaced; name another file"])
     recorded = str(dataset.attrs.get("scenario_files")), dataset.attrs.get("scenario_toml")
     if content and (hashlib.sha256(text.encode()).hexdigest() in recorded[0] or text == recorded[1]):
-        raise BadInput([f"{path} is the scenario of this dataset, or a table of it; name another file"])
+        raise BadInput([f"{target} is the scenario of this dataset, or a table of it; name another file"])
 
 
 @contextlib.contextmanager

@@ -6,7 +6,6 @@ import hashlib
 import os
 import pickle
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -20,20 +19,11 @@ _WORTH = 0.1
 
 
 def folder() -> Path:
-    """Return the folder of the cache: ``SIM_CACHE_DIR``, else the user's cache."""
+    """Return the folder of the cache: ``SIM_CACHE_DIR``, else the user's cache, else none that can be written."""
     base = os.environ.get("SIM_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
     try:
         return Path(base).expanduser() / "sliding-sim"
-    except RuntimeError:  # there is no home
-        return _private_folder()
-
-
-@functools.cache
-def _private_folder() -> Path:
-    """Return a folder of this process alone, because one that others can write may hold their code."""
-    try:
-        return Path(tempfile.mkdtemp(prefix="sliding-sim-"))
-    except OSError:  # nothing is written below a device
+    except RuntimeError:  # there is no home; nothing is written below a device
         return Path(os.devnull)
 
 

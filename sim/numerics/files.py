@@ -7,7 +7,7 @@ import shutil
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from sim.units.errors import BadInput
@@ -65,10 +65,7 @@ class OutputExists(FileExistsError):
     exit_code = 73
 
 
-def claim(
-    path: Path, replace: bool, inputs: Iterable[Path] = (), beside: tuple[str, ...] = (),
-    guard: Callable[[Path], None] = lambda path: None,
-) -> None:  # fmt: skip
+def claim(path: Path, replace: bool, inputs: Iterable[Path] = (), beside: tuple[str, ...] = ()) -> None:
     """Refuse an output that would destroy an existing file or cannot be written, before anything is computed.
 
     Parameters
@@ -81,8 +78,6 @@ def claim(
         Files that the command reads.
     beside : tuple of str
         Ends of the names of the other files that are written.
-    guard : callable
-        Refuses older files that are never to be replaced.
 
     Raises
     ------
@@ -119,7 +114,6 @@ def claim(
             raise OutputExists(f"{path} exists; replace it with --force or name another file")
         if path.suffix == ".toml":
             raise BadInput([f"{path} is a scenario by its name, which is never replaced; name another file"])
-        guard(path)
 
 
 @contextlib.contextmanager
