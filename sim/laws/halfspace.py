@@ -622,60 +622,6 @@ def marginal_factors(x):
     return np.where(x < _SERIES_END, near[0], integral), np.where(x < _SERIES_END, near[1], skew)
 
 
-def _ripple(factors, amplitude, wavenumber, angle, radius, shear_modulus, poisson_ratio):
-    amplitude, q, nu = (np.asarray(number, float) for number in (amplitude, wavenumber, poisson_ratio))
-    mean, skew = factors(2.0 * q * np.asarray(radius, float))
-    level, swing = angular_compliance(nu)
-    turned = level * mean - swing * np.cos(2.0 * np.asarray(angle, float)) * skew
-    return amplitude**2 / (2.0 * math.pi * np.asarray(shear_modulus, float) * q) * turned
-
-
-def disc_ripple_energy(amplitude, wavenumber, angle, radius, shear_modulus, poisson_ratio=0.5):
-    """Elastic energy per area of a sinusoidal shear stress on a disc, its phase averaged.
-
-    Parameters
-    ----------
-    amplitude : float or array
-        tau1 of ``tau1 cos(q.x + phase)`` [Pa].
-    wavenumber : float or array
-        q [rad/m], above 0.
-    angle : float or array
-        theta from the sliding direction to the wavevector [rad].
-    radius : float or array
-        a of the disc [m]; inf is the infinite plane, ``halfspace.ripple_energy``.
-    shear_modulus, poisson_ratio : float or array
-        G [Pa], nu [1].
-
-    Returns
-    -------
-    float or array
-        E/(pi a^2) [J/m^2]; towards a = 0 half of what a uniform stress of this amplitude stores.
-
-    Examples
-    --------
-    Ten waves along a diameter of 2: the disc stores 2 % more than the plane, and 1 % less if they run across:
-
-    >>> for angle, plane in (0.0, 0.125), (math.pi / 2, 0.25):
-    ...     print(f"{disc_ripple_energy(1.0, 10 * math.pi, angle, 1.0, 1.0) * 10 * math.pi / plane:.5f}")
-    1.02027
-    0.98987
-    """
-    return _ripple(energy_factors, amplitude, wavenumber, angle, radius, shear_modulus, poisson_ratio)
-
-
-def ripple_marginal_energy(amplitude, wavenumber, angle, radius, shear_modulus, poisson_ratio=0.5):
-    """Energy of a unit of new contact under a sinusoidal shear stress: dE/dA = (1/(2 pi a)) dE/da [J/m^2].
-
-    Arguments as for ``ripple_energy``.
-
-    Examples
-    --------
-    >>> print(f"{ripple_marginal_energy(1.0, 10 * math.pi, 0.0, 1.0, 1.0) * 80 * math.pi:.5f}")
-    0.98987
-    """
-    return _ripple(marginal_factors, amplitude, wavenumber, angle, radius, shear_modulus, poisson_ratio)
-
-
 def _quarter(x, y):
     """Area of the unit disc to the left of x and below y."""
 
@@ -968,7 +914,8 @@ def pressure(r, radius, indentation, sphere_radius, modulus):
     Notes
     -----
     ``p = (2 E*/(pi R)) sqrt(a^2 - r^2) - (E*/pi) (a^2/R - delta)/sqrt(a^2 - r^2)``. Its integral is
-    ``jkr.load_under_indentation``, its singularity at the edge ``-edge_intensity/sqrt(2 pi (a - r))``.
+    ``jkr.load_under_indentation``, its singularity at the edge ``-K_I/sqrt(2 pi (a - r))`` with the stress intensity
+    ``K_I = E* (a^2/R - delta)/sqrt(pi a)``, and ``K_I^2/(2 E*)`` the energy release rate.
 
     Examples
     --------
@@ -1055,28 +1002,6 @@ def gap(r, radius, indentation, sphere_radius):
     opening = t**2 * np.arctan(t) + t**3 / 3.0 * scipy.special.hyp2f1(1.0, 1.5, 2.5, -(t**2))  # t + (t^2 - 1) atan t
     hertz = radius * (radius / sphere_radius)
     return hertz / math.pi * opening + 2.0 / math.pi * np.subtract(hertz, indentation) * np.arctan(t)
-
-
-@law
-def edge_intensity(radius, indentation, sphere_radius, modulus):
-    """Stress intensity factor of the tension at the edge [Pa m^(1/2)].
-
-    Parameters
-    ----------
-    radius, indentation, sphere_radius, modulus : float or array
-        a [m], delta [m], R [m], E* [Pa].
-
-    Notes
-    -----
-    ``K_I = E* (a^2/R - delta)/sqrt(pi a) = (P_H - P)/(2 sqrt(pi a^3))``, and ``K_I^2/(2 E*)`` is the
-    energy release rate.
-
-    Examples
-    --------
-    >>> print(f"{edge_intensity(1.0, 0.0, 1.0, 1.0):.4f}")
-    0.5642
-    """
-    return modulus * (radius * (radius / sphere_radius) - indentation) / math.sqrt(math.pi * radius)
 
 
 @law

@@ -17,7 +17,6 @@ contact. A nan among the numbers a result depends on makes it nan; nothing raise
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -328,14 +327,6 @@ def potential_slope_at_load(tractive_force, stress, radius, work, sphere_radius,
 # Adhesive contact behind a spring of stiffness k: pull-off, load, indentation and energy release rate.
 
 
-class PullOff(NamedTuple):
-    """Last equilibrium before pull-off: radius [m], load [N], indentation [m]."""
-
-    radius: np.ndarray
-    load: np.ndarray
-    indentation: np.ndarray
-
-
 @device
 def fold_root(grips, load):
     """Minimum over x > 0 of F for g = ``grips`` and 1 - g = ``load``: from 1 at grips to 3^(1/3) at a load.
@@ -386,8 +377,9 @@ def pull_off_displacement(stiffness, work, sphere_radius, modulus):
     Returns
     -------
     float or array
-        Delta [m], the indentation plus load/k of ``pull_off_at_stiffness``; ``pull_off_indentation``
-        at k = inf; -inf at k = 0, where no displacement can pull. ``radius_at_displacement`` is nan just below it.
+        Delta [m], the indentation plus load/k at the last equilibrium; ``pull_off_indentation``
+        at k = inf; -inf at k = 0, where no displacement can pull. ``radius_at_displacement`` is
+        the radius of the last contact there, and nan just below it.
 
     Examples
     --------
@@ -399,44 +391,6 @@ def pull_off_displacement(stiffness, work, sphere_radius, modulus):
     """
     root, unit, grips, load = _fold(stiffness, work, sphere_radius, modulus)
     return fold_level(root, grips, load) * (unit * (unit / sphere_radius) / grips) + 0.0  # no -0
-
-
-@law
-def _pull_off_radius(stiffness, work, sphere_radius, modulus):
-    root, unit, _, _ = _fold(stiffness, work, sphere_radius, modulus)
-    return unit * root * root
-
-
-def pull_off_at_stiffness(stiffness, work, sphere_radius, modulus) -> PullOff:
-    """Last equilibrium of a contact that is pulled off through a spring of given stiffness.
-
-    Parameters
-    ----------
-    stiffness, work, sphere_radius, modulus : float or array
-        k [N/m], 0 to inf, w [J/m^2], R [m], E* [Pa].
-
-    Returns
-    -------
-    PullOff
-        Its radius [m], load [N] and indentation [m]; all 0 where w <= 0, nan for a negative stiffness.
-
-    Notes
-    -----
-    The displacement of the equilibrium with radius a is least where ``P'(a) + k delta'(a) = 0``. That is
-    where the load is least (-3/2 pi w R) for k = 0, where the indentation is (5/9 of that load) for
-    k = inf, and between the two otherwise.
-
-    Examples
-    --------
-    At k = 5 (pi w R K^2)^(1/3), K = 4 E*/3, all three are rational in Maugis's units:
-
-    >>> last = pull_off_at_stiffness(5.0, 1.0 / np.pi, 1.0, 0.75)
-    >>> print("%.6f %.6f %.6f" % last)
-    0.666667 -1.037037 -0.888889
-    """
-    radius = _pull_off_radius(stiffness, work, sphere_radius, modulus)
-    load, indentation = (of(radius, work, sphere_radius, modulus) for of in (load_at_radius, indentation_at_radius))
-    return PullOff(radius, load, indentation)
 
 
 @law

@@ -9,14 +9,12 @@ From the law of Menga, Carbone & Dini to more complete ones, each with its own a
 - cut-off: bonds that break at a stretch, whose limit without thermal rupture is the linear law;
 - catch: bonds that force first strengthens and then breaks;
 - loading: a Bell bond pulled once: rupture forces and the static peak;
-- cluster: a finite number of bonds under a shared force;
 - stability: the spring and the mass behind which bonds make a slider oscillate.
 
 The linear law counts bonds relative to rest. The others start from sites: ``bound`` is a share of
 the sites, ``*_fraction`` the number of bonds relative to rest.
 """
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -409,27 +407,6 @@ def linear_onset(speed, critical_speed, rebinding_rate, strength, damping, mass=
         over = np.divide(falls - damping * pace, damping)
     over = np.where(over > 0.0, over, np.nan)
     return Onset(((damping + mass * pace) * over)[()], np.sqrt(pace * over)[()])
-
-
-@law
-def fraction_rate(fraction, speed, critical_speed, rebinding_rate):
-    """Time derivative of the bond fraction [1/s].
-
-    Parameters
-    ----------
-    fraction, speed, critical_speed, rebinding_rate : float or array
-        phi [1], V [m/s], Vc [m/s], h [1/s].
-
-    Notes
-    -----
-    ``h (1 - phi) - h (|V|/Vc) phi``.
-
-    Examples
-    --------
-    >>> print(f"{fraction_rate(0.5, 1e-2, 1e-2, 200.0):.1f} {fraction_rate(1.0, 1e-2, 1e-2, 200.0):.1f}")
-    0.0 -200.0
-    """
-    return rebinding_rate * (1.0 - fraction) - rebinding_rate * (math.fabs(speed) / critical_speed) * fraction
 
 
 @law
@@ -989,74 +966,6 @@ def first_moment_onset(speed, zero_force_rate, bell_force, bond_stiffness, rebin
     return _onset_behind(answer, speed, density * tilt * unit, (_LOWEST_RATE * pace, _HIGHEST_RATE * pace), body)
 
 
-def first_moment_amplitude(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    """Growth of the oscillations of a mean-field Bell population behind a spring beyond their onset.
-
-    Parameters
-    ----------
-    speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate : float or array
-        As in ``first_moment_stress``.
-
-    Returns
-    -------
-    float or array
-        Amplitude of friction over its mean [1], divided by sqrt(1 - K/K_c) for a spring K just below that of the onset;
-        nan where oscillations set in suddenly, with an amplitude that does not vanish with K_c - K, and where there
-        is no onset.
-
-    Notes
-    -----
-    Without mass, behind a contact of constant area that does not yield,
-
-        ``N' = k_on (1 - N) - k N``,  ``x' = K (V - k x)/(K + N) - k_on x (1 - N)/N + k x``,  ``k = k_0 e^x``
-
-    for the share N bound and x the stretch over f_b/kappa. The oscillations' complex amplitude z grows at the onset
-    with ``z' = (sigma + i omega) z + c z |z|^2`` (Kuznetsov, Elements of Applied Bifurcation Theory, 3.5): gradually if
-    the real part of c is negative, then to |z|^2 = -sigma/Re c. It changes its sign at 20.37 times the speed
-    k_0 f_b/kappa if k_on = k_0.
-
-    Examples
-    --------
-    Fast sliding begins to oscillate gradually, slow sliding suddenly:
-
-    >>> print("%.4f %.4f" % tuple(first_moment_amplitude([100.0, 10.0], 1.0, 1.0, 1.0, 1.0)))
-    6.3664 nan
-    """
-    x = np.abs(bond_stiffness * first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness) / bell_force)
-    binding = np.divide(rebinding_rate, zero_force_rate)
-    falls = (x - 1.0) * np.exp(x) > binding
-    x = np.where(falls, x, 1.0)
-    k = np.exp(x)
-    n = binding / (binding + k)
-    share = np.where(falls, (x * k - binding - k) / ((1.0 + x) * k), 0.5)  # K/(K + n) at the onset
-    # derivatives, by the letters: of K/(K + n), of -k_on (1/n - 1), and of V - k x over x
-    q_n, r_n, p_x = (share - 1.0) * share / n, binding / n**2, -(1.0 + x) * k
-    q_nn, r_nn, r_nnn = 2.0 * q_n**2 / share, -2.0 * r_n / n, 6.0 * r_n / n**2
-    by_n, by_x = (-binding - k, x * r_n), (-k * n, x * k + p_x * share)
-    turns = np.sqrt(np.where(falls, by_n[0] * by_x[1] - by_x[0] * by_n[1], 1.0))
-    right, left = (1.0, (1j * turns - by_n[0]) / by_x[0]), (1.0, (1j * turns - by_n[0]) / by_n[1])
-    back, scale = tuple(map(np.conj, right)), left[0] * right[0] + left[1] * right[1]
-
-    # second and third derivatives of both rates, by 0, 1, ... times the stretch and else by n
-    square = (0.0, -k, -k * n), (x * r_nn, p_x * q_n + r_n, (2.0 + x) * k * (1.0 - share))
-    cube = (0.0, 0.0, -k, -k * n), (x * r_nnn, p_x * q_nn + r_nn, -(2.0 + x) * k * q_n, (3.0 + x) * k * (1.0 - share))
-
-    def along(derivatives, *vectors):
-        """Derivatives of both rates along vectors, projected on the oscillation."""
-        total = 0.0
-        for places in itertools.product((0, 1), repeat=len(vectors)):
-            of_bound, of_stretch = (each[sum(places)] for each in derivatives)
-            weight = math.prod(vector[place] for vector, place in zip(vectors, places, strict=True))
-            total = total + (left[0] * of_bound + left[1] * of_stretch) * weight
-        return total / scale
-
-    bends = 0.5j * along(square, right, right) * along(square, right, back) / turns
-    bends = np.real(bends + 0.5 * along(cube, right, right, back))
-    grows = -0.5 * p_x * share * (1.0 - share)
-    size = np.sqrt(grows / np.where(falls & (bends < 0.0), -bends, np.nan))
-    return (2.0 * size * np.abs(x * right[0] + n * right[1]) / (n * x))[()]
-
-
 # Bonds that open at a constant rate and all break at a stretch l (after Chernyak & Leonov 1986).
 
 
@@ -1321,34 +1230,6 @@ def bell_rupture_force(loading_rate, zero_force_rate, bell_force):
 
 
 @law
-def bell_rupture_force_density(force, loading_rate, zero_force_rate, bell_force):
-    """Probability density of the force at which a Bell bond breaks [1/N].
-
-    Parameters
-    ----------
-    force : float or array
-        f [N]; no bond breaks at a force below 0.
-    loading_rate, zero_force_rate, bell_force : float or array
-        r [N/s], k_0 [1/s], f_b [N], all above 0.
-
-    Notes
-    -----
-    ``(k_0/r) exp(f/f_b - z (e^(f/f_b) - 1))`` with ``z = k_0 f_b/r``. It peaks at ``f_b ln(1/z)`` for z below
-    1 and at 0 otherwise.
-
-    Examples
-    --------
-    >>> print("%.4f %.4f" % tuple(bell_rupture_force_density([0.0, 1.0], 2.0, 1.0, 1.0)))
-    0.5000 0.5756
-    """
-    if force < 0.0 or force == math.inf:
-        return 0.0
-    tilt = force / bell_force
-    rate = zero_force_rate / loading_rate
-    return rate * math.exp(tilt - rate * force * _growth(tilt))
-
-
-@law
 def start_up_force(time, speed, zero_force_rate, bell_force, bond_stiffness):
     """Mean force of bonds that were all unstretched when sliding began, none of which rebinds.
 
@@ -1412,52 +1293,3 @@ def start_up_peak(speed, zero_force_rate, bell_force, bond_stiffness):
     tilt = lambert_w(np.multiply(bond_stiffness, np.abs(speed)) / np.multiply(zero_force_rate, bell_force))
     steady_force = bond_stiffness * first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness)
     return StartUpPeak(np.exp(-tilt) / zero_force_rate, steady_force * np.exp(-scipy.special.exprel(-tilt)))
-
-
-# A cluster of bonds that share a given force equally (Erdmann & Schwarz, PRL 92, 108102 (2004)).
-
-
-@law
-def cluster_lifetime(bonds, force, zero_force_rate, bell_force, rebinding_rate):
-    """Mean time until the last of some Bell bonds has broken that share a constant force [s].
-
-    Parameters
-    ----------
-    bonds : float or array
-        N, a whole number from 1: sites, all bound at the start.
-    force : float or array
-        F [N] on the whole cluster; i bonds bear F/i each, whether old or just bound.
-    zero_force_rate, bell_force : float or array
-        k_0 [1/s], above 0; f_b [N], above 0.
-    rebinding_rate : float or array
-        k_on [1/s] of each open site, as long as one bond is left.
-
-    Returns
-    -------
-    float or array
-        T [s]; infinite where it is beyond the largest float; nan for numbers that are not whole.
-
-    Notes
-    -----
-    With i bonds, rupture at ``r_i = i k_0 e^(F/(i f_b))`` and rebinding at ``g_i = k_on (N - i)``, the mean time
-    from i bonds to i - 1 is ``t_i = (1 + g_i t_(i+1))/r_i``, and T is the sum of them: positive terms
-    throughout. Bonds of a sliding population do not share their load; the two agree only without
-    rebinding, at rest.
-
-    Examples
-    --------
-    Without force and rebinding a harmonic number of lives; a force of two Bell forces takes away most:
-
-    >>> print("%.4f %.4f" % tuple(cluster_lifetime(5, [0.0, 2.0], 1.0, 1.0, 0.0)))
-    2.2833 0.7761
-    """
-    if not bonds >= 1.0 or bonds != math.floor(bonds) or bonds == math.inf:
-        return math.nan
-    total, step = 0.0, 0.0
-    for i in range(int(bonds), 0, -1):
-        open_sites = bonds - i
-        step = (1.0 + rebinding_rate * open_sites * step) * math.exp(-force / (i * bell_force)) / (i * zero_force_rate)
-        total += step
-        if total == math.inf:
-            return total
-    return total

@@ -174,15 +174,14 @@ def scaled_angle_at_load(load, work, tangential_force, mixity, sphere_radius, mo
     Returns
     -------
     float or array
-        a [m]; Hertz's radius (nan if pulled) beyond ``scaled_angle_limit``, nan for any other lambda.
+        a [m]; Hertz's radius (nan if pulled) beyond the largest force that adhesion bears, nan for any other lambda.
 
     Examples
     --------
-    At its limit a lightly pressed contact loses what is left of adhesion at once, one that is pressed more has lost it:
+    At a limit a lightly pressed contact loses what is left of adhesion at once, one that is pressed more has lost it:
 
-    >>> for load in (3.0, 300.0):
-    ...     limit = scaled_angle_limit(load, 1.0, 0.2, 1.0)
-    ...     a = [float(scaled_angle_at_load(load, 1.0, x * limit, 0.2, 1.0, 0.75)) for x in (0.0, 1.0 - 1e-9, 1.1)]
+    >>> for load, limit in (3.0, 22.2491), (300.0, 198.6932):
+    ...     a = scaled_angle_at_load(load, 1.0, [0.0, limit, limit + 1e-3], 0.2, 1.0, 0.75)
     ...     print("%.3f %.3f %.3f" % tuple(a))
     2.904 1.973 1.442
     7.276 6.694 6.694
@@ -236,66 +235,6 @@ def scaled_tangent_at_indentation(
 ):
     """Contact radius at an indentation [m], with the tangential force held; otherwise as ``scaled_tangent_at_load``."""
     return _mixed_at_depth(_TANGENT, indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio)
-
-
-@device
-def _fold_load(y, mixity):
-    """Load at which the contact by the scaled angle jumps at y = cot psi; it falls with y, to -3/2."""
-    toughness, growth = _toughness(y, mixity, _ANGLE)
-    return 6.0 * (toughness - y * growth) / (growth * growth)
-
-
-@law
-def scaled_angle_limit(load, work, mixity, sphere_radius, poisson_ratio=0.5):
-    """Largest tangential force that adhesion bears at a load by ``f = 1 + tan^2((1 - lambda) psi)`` [N].
-
-    Parameters
-    ----------
-    load, work, mixity, sphere_radius, poisson_ratio : float or array
-        P [N], w [J/m^2], lambda [1], R [m], nu [1]. The modulus does not matter.
-
-    Returns
-    -------
-    float or array
-        T [N]; nan below the pull-off load, 0 without adhesion, infinite at lambda = 0.
-
-    Notes
-    -----
-    At small loads the contact jumps to Hertz's, where load and slope of the search above meet:
-    ``P = 6 (F - y F')/F'^2``, ``T = 4 sqrt(3/2)/F'`` in Maugis' units. At loads of
-    ``6 F(0)/F'(0)^2`` and more it reaches Hertz's smoothly, at ``T = 2 sqrt(P)/sin(pi lambda/2)``.
-
-    Examples
-    --------
-    At lambda = 1 it is the limit of Savkoor & Briggs:
-
-    >>> print(f"{scaled_angle_limit(0.0, 1.0, 1.0, 1.0) / (1.5 * math.pi):.4f}")
-    1.6330
-    """
-    if not 0.0 <= mixity <= 1.0:
-        return math.nan
-    if work <= 0.0:
-        return 0.0
-    scale = math.pi * work * sphere_radius
-    p = load / scale
-    if not p >= -1.5:
-        return math.nan
-    if mixity == 0.0:
-        return math.inf
-    scale /= math.sqrt(compressible(poisson_ratio))
-    if p >= _fold_load(0.0, mixity):
-        return 2.0 * math.sqrt(p) / math.sin(0.5 * math.pi * mixity) * scale
-    low, high = 0.0, 1.0
-    while _fold_load(high, mixity) > p and high < _NO_FORCE:
-        low, high = high, 2.0 * high
-    while True:
-        y = 0.5 * (low + high)
-        if not low < y < high:
-            return 4.0 * _SHEAR / _toughness(high, mixity, _ANGLE)[1] * scale
-        if _fold_load(y, mixity) > p:
-            low = y
-        else:
-            high = y
 
 
 # Competing theories of the radius of an adhesive contact under shear.

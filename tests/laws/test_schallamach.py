@@ -60,14 +60,12 @@ def test_a_step_solves_the_rate_equation_and_transitions_are_those_of_its_genera
     for speed in [0.0, 3e-3, 0.5]:
         duration = 4e-3
         exact = solve_ivp(
-            lambda t, y: law.fraction_rate(y, speed, CRITICAL, HEALING), (0.0, duration), [0.3], rtol=1e-12, atol=1e-14
+            lambda t, y: HEALING * (1.0 - y - speed / CRITICAL * y), (0.0, duration), [0.3], rtol=1e-12, atol=1e-14
         )
         stepped = law.relax_fraction(0.3, speed * duration, duration, CRITICAL, HEALING)
         assert_allclose(stepped, exact.y[0, -1], rtol=1e-10, atol=0)
-    duration = 1e-9 / HEALING
-    gained = law.relax_fraction(0.0, 1e-3 * duration, duration, CRITICAL, HEALING)
     # the next term of the exponential is 1e-9 of the first
-    assert_allclose(gained, law.fraction_rate(0.0, 1e-3, CRITICAL, HEALING) * duration, rtol=1e-9, atol=0)
+    assert_allclose(law.relax_fraction(0.0, 5e-15, 1e-9 / HEALING, CRITICAL, HEALING), 1e-9, rtol=1e-9, atol=0)
     for start in [0.0, 0.3, 1.0]:
         for ratio in [0.0, 1e-6, 0.2, 1e9]:
             duration = EXPONENTS / (HEALING * (1.0 + ratio))
@@ -106,10 +104,6 @@ def test_a_step_solves_the_rate_equation_and_transitions_are_those_of_its_genera
     assert_allclose(law.steady_fraction(speed, 1e-2), [10 / 11, 0.5, 0.5, 1.0, 1.0, 0.0, 0.0], rtol=1e-15, atol=0)
     assert np.isnan(law.steady_fraction(np.nan, 1e-2))
     assert law.steady_fraction(1.0, np.inf) == 1.0
-    for speed in [0.0, 1e-5, 1e-2, 10.0]:
-        steady = law.steady_fraction(speed, CRITICAL)
-        flow = HEALING * (1.0 - steady) + HEALING * speed / CRITICAL * steady
-        assert abs(law.fraction_rate(steady, speed, CRITICAL, HEALING)) <= 4e-16 * max(flow, HEALING)
 
 
 def test_populations_have_their_limits_in_lives_force_and_speed():
@@ -313,7 +307,7 @@ def test_cut_off_is_the_law_of_the_paper_to_fifty_digits_with_its_limits_and_max
             assert_allclose(law.cut_off_fraction(u, 1.0, 1.0, k_on), expected, rtol=1e-14, atol=0)
 
 
-def test_rupture_forces_have_their_density_and_a_start_its_peak_to_fifty_digits():
+def test_rupture_forces_have_their_mean_and_a_start_its_peak_to_fifty_digits():
     rate = 1.0 / np.array([2.0, 0.1, 1e-3])
     mean = law.bell_rupture_force(rate, 1.0, 1.0)
     assert_allclose(mean, [0.361329, 2.014643, 6.337874], rtol=0, atol=5.1e-7)
@@ -321,21 +315,11 @@ def test_rupture_forces_have_their_density_and_a_start_its_peak_to_fifty_digits(
     assert_allclose(variance, [0.080249, 0.830820, 1.591758], rtol=0, atol=5.1e-7)
     assert_array_equal(law.bell_rupture_force([0.0, -1.0], 1.0, 1.0), [0.0, -law.bell_rupture_force(1.0, 1.0, 1.0)])
     assert law.bell_rupture_force(3.0, 2.0, math.inf) == 1.5
-    for z in [5.0, 0.1, 1e-6]:
-        rate = 2e-11 / z  # k0 = 2/s, f_b = 1e-11 N
-        top = 1e-11 * math.log1p(40.0 / z)
-
-        def density(x):
-            return law.bell_rupture_force_density(top * x, rate, 2.0, 1e-11) * top
-
-        whole, _ = quad(density, 0, 1, epsabs=0, epsrel=1e-12, limit=200)
-        mean, _ = quad(lambda x: top * x * density(x), 0, 1, epsabs=0, epsrel=1e-12, limit=200)
-        assert_allclose(whole, 1.0, rtol=1e-11, atol=0)
-        assert_allclose(mean, law.bell_rupture_force(rate, 2.0, 1e-11), rtol=1e-11, atol=0)
-        mode = 1e-11 * max(0.0, -math.log(z))
-        near = law.bell_rupture_force_density(mode + 1e-13 * np.array([0.0, 1.0]), rate, 2.0, 1e-11)
-        assert near[1] < near[0]
-        assert_array_equal(law.bell_rupture_force_density([-1e-11, 1e-6, math.inf], rate, 2.0, 1e-11), [0.0, 0.0, 0.0])
+    for z in [5.0, 0.1, 1e-6]:  # z = k0 f_b/r: force over f_b, whose share of bonds not broken yet is integrated
+        rest, _ = quad(
+            lambda x: math.exp(-z * math.expm1(x)), 0, math.log1p(40.0 / z), epsabs=0, epsrel=1e-12, limit=200
+        )
+        assert_allclose(law.bell_rupture_force(2e-11 / z, 2.0, 1e-11), 1e-11 * rest, rtol=1e-11, atol=0)
     for eps in 10.0 ** np.arange(-6, 9):
         with mp.workdps(50):
             tilt = mp.lambertw(mp.mpf(eps)).real
@@ -352,37 +336,6 @@ def test_rupture_forces_have_their_density_and_a_start_its_peak_to_fifty_digits(
     assert_allclose(law.start_up_force(0.5, 3.0, 2.0, math.inf, 1.0), 1.5 * math.exp(-1.0), rtol=1e-15, atol=0)
     assert_array_equal(law.start_up_peak(0.0, 4.0, 1.0, 1.0), [0.25, 0.0])
     assert_allclose(law.start_up_peak(3.0, 4.0, math.inf, 1.0), [0.25, 0.75 / math.e], rtol=1e-15, atol=0)
-
-
-def test_lifetimes_of_clusters_large_and_small_solve_the_equations_of_first_passage():
-    cases = [(5, 0.0, 0.0, 137 / 60), (2, 0.0, 1.0, 2.0), (5, 2.0, 1.0, 1.1504943644695798)]
-    cases += [(10, 5.0, 1.0, 0.8210570712132322), (10, 0.0, 0.5, 16.07684151785714)]
-    for bonds, force, beta, exact in cases:
-        assert_allclose(law.cluster_lifetime(bonds, force, 1.0, 1.0, beta), exact, rtol=1e-14, atol=0)
-    for bonds, force, beta in [(1, 3.0, 2.0), (7, 4.0, 0.3), (40, 30.0, 2.0), (40, 0.0, 3.0)]:
-        i = np.arange(1, bonds + 1)
-        with mp.workdps(60):
-            up = [mp.mpf(beta) * int(bonds - k) for k in i]
-            down = [int(k) * mp.exp(mp.mpf(force) / int(k)) for k in i]
-            matrix = mp.zeros(bonds)
-            for k in range(bonds):
-                matrix[k, k] = up[k] + down[k]
-                if k > 0:
-                    matrix[k, k - 1] = -down[k]
-                if k + 1 < bonds:
-                    matrix[k, k + 1] = -up[k]
-            exact = float(mp.lu_solve(matrix, mp.ones(bonds, 1))[bonds - 1])
-        # three roundings a bond, and those of F/(i f_b) up to 30 in the exponent
-        lifetime = law.cluster_lifetime(bonds, force * 1e-11, 50.0, 1e-11, beta * 50.0)
-        assert_allclose(lifetime, exact / 50.0, rtol=3e-14, atol=0)
-    n = np.arange(1, 3001)
-    assert_allclose(law.cluster_lifetime(3000, 0.0, 1.0, 1.0, 0.0), math.fsum(1 / n), rtol=1e-13, atol=0)
-    pulled = law.cluster_lifetime(3000, 900.0, 1.0, 1.0, 0.0)
-    assert_allclose(pulled, math.fsum(np.exp(-900 / n) / n), rtol=1e-13, atol=0)
-    # 2^3000 and more, also where the last bond has no time left
-    assert_array_equal(law.cluster_lifetime(3000, [0.0, 800.0], 1.0, 1.0, [1.0, 5.0]), math.inf)
-    assert 0.0 < law.cluster_lifetime(3000, 1e5, 1.0, 1.0, 1.0) < 1e-10
-    assert np.isnan(law.cluster_lifetime([0.0, -1.0, 2.5, math.inf, math.nan], 0.0, 1.0, 1.0, 1.0)).all()
 
 
 def test_fractions_are_even_and_forces_odd_in_the_speed():
@@ -417,7 +370,7 @@ def test_fractions_are_even_and_forces_odd_in_the_speed():
     assert_array_equal(whole, [law.bell_moments(v, 1.0, 1.0, 1.0, 1.0).force for v in (1.0, 10.0)])
 
 
-def test_the_onset_of_resolved_bonds_lies_beyond_the_maximum_of_friction_and_is_gradual_or_sudden():
+def test_the_onset_of_resolved_bonds_lies_beyond_the_maximum_of_friction():
     for beta, speed, *exact in (
         (0.1, 5.0, 0.00320497, 2.00008), (0.1, 20.0, 0.00436311, 8.59175), (1.0, 5.0, 0.00559440, 1.08232),
         (1.0, 10.0, 0.0295565, 4.25784), (1.0, 100.0, 0.0205200, 36.2893), (10.0, 20.0, 0.00714525, 2.71580),
@@ -442,15 +395,3 @@ def test_the_onset_of_resolved_bonds_lies_beyond_the_maximum_of_friction_and_is_
     swings = 1e-3 * alone.frequency**2
     series = alone.stiffness / (1.0 - alone.stiffness / 0.05)
     assert_allclose(behind.stiffness, (swings + alone.stiffness, swings + series, math.inf), rtol=1e-12)
-
-    def amplitude(speed, beta=1.0):
-        return law.first_moment_amplitude(speed, 1.0, 1.0, 1.0, beta)
-
-    assert_allclose(amplitude(100.0), 6.366370, rtol=1e-7)
-    for beta, turn in ((0.1, 15.372886), (1.0, 20.372634), (10.0, 60.085501)):
-        assert amplitude(turn * (1.0 + 1e-6), beta) > 100.0
-        assert np.isnan(amplitude(turn * (1.0 - 1e-6), beta))
-    assert np.isnan(amplitude([0.0, 0.5, -0.5, 10.0])).all()
-    assert_allclose(amplitude([-100.0, 50.0]), [amplitude(100.0), amplitude(50.0)], rtol=1e-12)
-    # of the rates and forces only ratios count
-    assert_allclose(law.first_moment_amplitude(100.0, 3.0, 2.0, 6.0, 3.0), amplitude(100.0), rtol=1e-13)

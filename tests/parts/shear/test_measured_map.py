@@ -17,6 +17,8 @@ from sim.parts.bonds.models import Counted, Unbroken
 from sim.parts.shear import Carried, Mapped
 from sim.parts.shear.maps import Passing
 from sim.scenario.clock import Record
+from sim.spectrum.families import Ripple
+from sim.spectrum.radial import disc_energy, marginal_energy
 from sim.spectrum.stress_map import StressMap
 from sim.study.converge import converge
 from sim.units.errors import BadInput
@@ -121,7 +123,7 @@ def test_uniform_stress_and_passing_waves_store_the_closed_forms_as_new_contact_
     for angle in [0.0, 0.5 * math.pi]:
         waves = np.cos(2 * math.pi / 12 * np.arange(96))
         field = waves[:, None] * np.ones(96) if angle == 0.0 else waves * np.ones((96, 1))
-        q, radius = 2 * math.pi / 12, np.array([14.0, 18.0, 21.5])
+        wave, radius = Ripple(1.0, 12.0, angle), np.array([14.0, 18.0, 21.5])
         # a disc at twelve places of the wave: along x by sliding, across it by the map itself
         mean, new = np.zeros(3), np.zeros(3)
         for place in range(12):
@@ -132,8 +134,8 @@ def test_uniform_stress_and_passing_waves_store_the_closed_forms_as_new_contact_
         whole = passing(field, 25.0).field.surface_energy(1.0)
         # the soft edge costs 0.65 (pixel/a)² for each wave on the diameter at most
         lost = 0.7 * np.max(2 * radius / 12 / radius**2)
-        assert_allclose(whole * mean, halfspace.disc_ripple_energy(1.0, q, angle, radius, 1.0), rtol=lost)
-        assert_allclose(whole * new, halfspace.ripple_marginal_energy(1.0, q, angle, radius, 1.0), rtol=lost)
+        assert_allclose(whole * mean, disc_energy(wave, radius, 1.0), rtol=lost)
+        assert_allclose(whole * new, marginal_energy(wave, radius, 1.0), rtol=lost)
     shares = passing(patchy(), 20.0).at(np.array([[0.0], [2.3]]))
     nodes, weights = np.polynomial.legendre.leggauss(400)
     ends = 5.0, 19.0
