@@ -70,7 +70,7 @@ def errors(ours: Bonding, step: float, more: str = "") -> str:
 def tracked(bench: Bench) -> list[Row]:
     """20 members of 10⁴ bonds over ten lives at rest, eps = 10 and beta = 1, at many outputs and at few."""
     sites, members = bench.of((10_000, 20), (50, 2))
-    part, rows = bonds.Tracked(sites=sites, site_density=1.0, **BELL), []
+    part, rows, random = bonds.Tracked(sites=sites, site_density=1.0, **BELL), [], np.random.default_rng(1)
     for name, step, steps, fine, goal in (
         ("at 1000 steps of 0.01 lives", 0.01, 1000, 0.01, 20),
         ("at 100 steps of 0.1 lives", 0.1, 100, 0.001, 30),
@@ -85,7 +85,7 @@ def tracked(bench: Bench) -> list[Row]:
             Beside(
                 "compiled renewals (numba)",
                 lambda steps=steps, step=step: bonds_plain.renewal(
-                    members * sites, steps, step, BELL_SPEED, 1.0, 1.0, 1.0, 1
+                    members * sites, steps, step, BELL_SPEED, 1.0, 1.0, 1.0, random
                 ),
                 steps,
                 goal=1.1,

@@ -43,23 +43,22 @@ def mean_stretch_in_steps(slip, duration, rate, softness, rebinding_rate):
 
 
 @numba.njit(cache=True)
-def renewal(sites, outputs, step, speed, rate, softness, rebinding_rate, seed):
+def renewal(sites, outputs, step, speed, rate, softness, rebinding_rate, random):
     """Bonds under Bell's rupture in steady sliding, one after the other and life by life: exact, compiled.
 
     A life ends where its integrated rupture k0 (e^(gt) − 1)/g, g = softness × speed, reaches an exponential number.
     """
-    np.random.seed(seed)  # noqa: NPY002  the generator of compiled code
     sums, growth, end = np.zeros((3, outputs)), softness * speed, outputs * step
     for _ in range(sites):
-        birth = -math.log1p(-np.random.random()) / rebinding_rate  # noqa: NPY002
+        birth = random.standard_exponential() / rebinding_rate
         while birth < end:
-            life = math.log1p(-math.log1p(-np.random.random()) * growth / rate) / growth  # noqa: NPY002
+            life = math.log1p(random.standard_exponential() * growth / rate) / growth
             for k in range(int(birth / step), min(int((birth + life) / step), outputs)):
                 stretch = speed * ((k + 1) * step - birth)
                 sums[0, k] += 1.0
                 sums[1, k] += stretch
                 sums[2, k] += stretch * stretch
-            birth += life - math.log1p(-np.random.random()) / rebinding_rate  # noqa: NPY002
+            birth += life + random.standard_exponential() / rebinding_rate
     return sums
 
 

@@ -36,7 +36,8 @@ CONSTANT = {"model": "constant", "rate": 200.0}
 CUT_OFF = {"model": "cut_off", "stretch": 20e-6, "rate": 50.0}
 CATCH = {"model": "catch", "catch_rate": 300.0, "catch_force": 4e-12, "slip_rate": 20.0, "slip_force": 4e-12}
 
-FULL = [scenes.COHORT, scenes.TRACKED, STRETCHED | {"model": "rate", "rupture": CUT_OFF}]
+SPREAD = STRETCHED | {"model": "rate", "rupture": CUT_OFF}
+POPULATIONS = [scenes.STEADY, RATE, scenes.COUNTED, scenes.COHORT, scenes.TRACKED, SPREAD]
 
 BAND = {"model": "band", "rms": 120e3, "longest": 120e-6, "shortest": 60e-6}
 COARSE = scenes.ROUGH | {"longest": 120e-6, "rolloff": 60e-6, "shortest": 30e-6}
@@ -139,21 +140,7 @@ SCENES: dict[str, Tables] = {
         "contact": {"indentation": {"time": [0.0, 5e-3, 1.0], "value": [2e-6, -2e-6, -2e-6]}},
         "sweep": {"bonds.rupture": [CONSTANT, scenes.BELL, CUT_OFF]},
     },
-    "force": {
-        "drive": CREEP,
-        "bonds": RATE,
-        "contact": LAGGING | {"load": "4 mN"},
-        "sweep": {
-            "bonds": [
-                scenes.STEADY,
-                RATE,
-                scenes.COUNTED,
-                scenes.COHORT,
-                scenes.TRACKED,
-                STRETCHED | {"model": "rate", "rupture": CUT_OFF},
-            ]
-        },
-    },
+    "force": {"drive": CREEP, "bonds": RATE, "contact": LAGGING | {"load": "4 mN"}, "sweep": {"bonds": POPULATIONS}},
     "pooled": {
         "drive": RAMP,
         "bonds": scenes.COHORT | {"area": "carried", "rupture": CATCH},
