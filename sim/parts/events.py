@@ -79,12 +79,10 @@ class Slips(NamedTuple):
     @classmethod
     def none(cls, stage: Array) -> "Slips":
         """Return the slip events before the first sample, for positions of the stage at the start [m]."""
-        columns = (len(kind.names or ()) for kind in (SLIPPING, MOMENTS, SLIP))
-        running, late, log = (
-            np.zeros((len(stage), *rows, count)) for rows, count in zip(((), (len(LATE),), (0,)), columns, strict=True)
-        )
+        slipping, moments, slip = (len(kind.names or ()) for kind in (SLIPPING, MOMENTS, SLIP))
+        running = np.zeros((len(stage), slipping))
         running.view(SLIPPING)[:, 0]["stage"] = stage
-        return cls(running, late, log)
+        return cls(running, np.zeros((len(stage), len(LATE), moments)), np.zeros((len(stage), 0, slip)))
 
     def after(self, time: Array, stage: tuple[Array, Array], slider: tuple[Array, ...], half: float) -> "Slips":
         """Return the slip events after some more samples.
@@ -271,8 +269,8 @@ class Events(NamedTuple):
     def next_phase(self) -> "Events":
         """Return the events at the start of another phase."""
         now = {name: getattr(self, name) for name in Past._fields}
-        kept = {name: rows[:, np.newaxis, -getattr(self.past, name).shape[-1] :] for name, rows in now.items()}
-        past = Past(*(np.concatenate([getattr(self.past, name), rows], axis=1) for name, rows in kept.items()))
+        ended = {name: rows[:, np.newaxis, -getattr(self.past, name).shape[-1] :] for name, rows in now.items()}
+        past = Past(*(np.concatenate([getattr(self.past, name), rows], axis=1) for name, rows in ended.items()))
         stress, friction, pull = (_started(rows[:, 1]) for rows in self[:3])
         contact = self.contact.copy()
         contact[:, -len(TURN.names or ()) :] = np.nan
@@ -304,23 +302,13 @@ def first(bonding: Bonding, contact: ContactState, pull: Array, stage: Array) ->
     """
     stress = np.abs(bonding.stress)
     friction = stress * (np.pi * contact.radius**2)
-    rows = np.full(len(contact.radius), np.nan)
-    zero, masked = np.zeros(len(rows)), (contact.work <= 0.0) & (contact.radius > 0.0)
-    columns = (
-        contact.radius,
-        np.full(len(rows), -np.inf),
-        zero,
-        np.where(masked, 0.0, np.nan),
-        zero,
-        zero,
-        rows,
-        rows,
-        rows,
-    )
+    rows = np.zeros((len(contact.radius), len(CONTACT.names or ())))
+    rows[:, _LAST], rows[:, _DETACHED], rows[:, _OPENING:] = contact.radius, -np.inf, np.nan
+    rows[:, _MASKED] = np.where((contact.work <= 0.0) & (contact.radius > 0.0), 0.0, np.nan)
     started = [_started(np.nan_to_num(values)) for values in (stress, friction, pull)]
     extreme, turn = (len(kind.names or ()) for kind in (EXTREME, TURN))
     past = Past._make([*(np.empty((len(values), 0, extreme)) for values in started), np.empty((len(rows), 0, turn))])
-    return Events._make([*started, np.stack(columns, axis=1), past, np.zeros(1), Slips.none(stage)])
+    return Events._make([*started, rows, past, np.zeros(1), Slips.none(stage)])
 
 
 def _started(values: Array) -> Array:

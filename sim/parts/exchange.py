@@ -80,7 +80,7 @@ def _constant(value: float) -> Array:
     return array
 
 
-_NONE, _UNKNOWN, _EMPTY = _constant(0.0), _constant(np.nan), np.empty(0)
+_NONE, UNKNOWN, _EMPTY = _constant(0.0), _constant(np.nan), np.empty(0)
 
 
 class Memory(NamedTuple):
@@ -215,9 +215,9 @@ class Bonding(NamedTuple):
     stress: Array
     strength: Array
     stiffness: Array = _NONE
-    relaxation: Array = _UNKNOWN
-    frozen: Array = _UNKNOWN
-    varying: Array = _UNKNOWN
+    relaxation: Array = UNKNOWN
+    frozen: Array = UNKNOWN
+    varying: Array = UNKNOWN
     stored: Array = _NONE
 
     def at(self, k: int) -> "Bonding":

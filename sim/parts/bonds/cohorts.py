@@ -145,18 +145,13 @@ class Rules(NamedTuple):
     steepness: float  # largest relative change of the rupture rate per stretch [1/m]
     rebinding: float
     tolerance: float
-    largest: float  # longest sub-step [s]
     cell: float  # width of a merging cell [m]
     heavy: float  # width × share of a cell allowed, in units of 1/steepness
     most: float  # cohorts left by merging
 
 
-@device
-def rules_of(numbers):
-    """Return the ``Rules`` of an array of ``numbers_of``."""
-    law = numbers[8], numbers[9], numbers[10], numbers[11], numbers[12]
-    cells = numbers[5], numbers[6], numbers[7]
-    return Rules(law, numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], *cells)
+#: Type of the numbers of ``Rules`` in kernels.
+RULES = "Tuple((UniTuple(float64, 5), float64, float64, float64, float64, float64, float64, float64))"
 
 
 @device
@@ -261,9 +256,8 @@ def try_step(pool, count, move, speed, step, off, free, rules):
     born_early, born_late, lowest, error = births(free, early, late, step, speed, rules)
     if lowest < -1e-14:
         return born_early, born_late, 0.2
-    allowed = rules.tolerance / 3.0 * (late + born_early + born_late + 1e-9 * (1.0 - free)) + 1e-15 * (
-        1.0 + rules.rebinding * step
-    )
+    bound, rounding = late + born_early + born_late + 1e-9 * (1.0 - free), 1e-15 * (1.0 + rules.rebinding * step)
+    allowed = rules.tolerance / 3.0 * bound + rounding
     factor = 4.0 if error <= 0.0 else (allowed / error) ** (1.0 / 3.0)
     if factor < 1.0:
         return born_early, born_late, max(0.02, 0.85 * factor)
@@ -301,7 +295,7 @@ def _step_row(pool, count, travelled, settled, slip, duration, rules):
         left = settle(pool[0], pool[1], pool[2], steady_count, direction, 0.0, rules)
         return left, 0.0, left
     typical = hazard_time(0.0, speed, 1.0, rules.law)
-    longest = min(rules.largest, typical * (7.0 * rules.tolerance) ** (1.0 / 3.0))
+    longest = typical * (7.0 * rules.tolerance) ** (1.0 / 3.0)
     shortest = 1e-13 * duration
     if speed != 0.0:
         longest = min(longest, 0.75 * rules.cell / math.fabs(speed))
@@ -351,35 +345,35 @@ def read_row(pool, weight, stretch, width, share):
     return count
 
 
-@kernel(f"void({_COHORTS}, float64[:], float64[:,:], float64[:], float64[::1], {_COHORTS}, float64[:,:,::1])")
+@kernel(f"void({_COHORTS}, float64[:], float64[:,:], float64[:], {RULES}, {_COHORTS}, float64[:,:,::1])")
 def step_rows(before, share, slip, duration, numbers, after, sums):
     """Advance all rows by all steps, each row from a ``share`` of its bonds, and write its sums after each step."""
     (weight, stretch, width, lattice), (new_weight, new_stretch, new_width, new_lattice) = before, after
-    rules = rules_of(numbers)
-    rows, capacity = new_weight.shape
-    pool = np.empty((9, capacity + 520))
-    for m in range(rows):
+    rules = Rules(*numbers)
+    pool = np.empty((9, new_weight.shape[1] + 520))
+    for m in range(len(new_weight)):
         old = m % len(weight)
         count = read_row(pool, weight[old], stretch[old], width[old], share[m % share.size])
         travelled, settled = lattice[old, 0], lattice[old, 1]
         for k in range(duration.size):
             moved = slip[k, m % slip.shape[1]]
             count, travelled, settled = _step_row(pool, count, travelled, settled, moved, duration[k], rules)
-            if count > capacity:
-                direction = -1.0 if moved < 0.0 else 1.0
-                count = settle(pool[0], pool[1], pool[2], count, direction, travelled, rules)
-                settled = count
-            if rules.cell < math.inf:
-                travelled = travelled % (1048576.0 * rules.cell)
-            write_row(pool, count, new_weight[m], new_stretch[m], new_width[m])
+            row = new_weight[m], new_stretch[m], new_width[m], new_lattice[m]
+            write_row(pool, count, travelled, settled, moved, rules, row)
+            travelled, settled = row[3][0], row[3][1]
             sum_row(new_weight[m], new_stretch[m], new_width[m], rules, pool[4], sums[:, k, m])
             count = read_row(pool, new_weight[m], new_stretch[m], new_width[m], 1.0)
-        new_lattice[m, 0], new_lattice[m, 1] = travelled, settled
 
 
 @device
-def write_row(pool, count, weight, stretch, width):
-    """Write the first ``count`` cohorts of a pool into a row, and zeros behind them."""
+def write_row(pool, count, travelled, settled, slip, rules, row):
+    """Write the first ``count`` cohorts of a pool into a row of ``Cohorts``, with its lattice; merge too many ones."""
+    weight, stretch, width, lattice = row
+    if count > weight.size:
+        count = settle(pool[0], pool[1], pool[2], count, -1.0 if slip < 0.0 else 1.0, travelled, rules)
+        settled = count
+    lattice[0] = travelled % (1048576.0 * rules.cell) if rules.cell < math.inf else travelled
+    lattice[1] = settled
     weight[:count], stretch[:count] = pool[0, :count], pool[1, :count]
     weight[count:], stretch[count:] = 0.0, 0.0
     if width.size > 1:
@@ -407,23 +401,22 @@ def sum_row(weight, stretch, width, rules, lost, sums):
         sums[4] += lost[i]
 
 
-@kernel("void(float64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[:,::1])")
+@kernel(f"void(float64[:,::1], float64[:,::1], float64[:,::1], {RULES}, float64[:,::1])")
 def sum_rows(weight, stretch, width, numbers, sums):
     """Write the sums over the cohorts of each row, shape (5, rows)."""
-    rules, lost = rules_of(numbers), np.empty(weight.shape[1])
+    rules, lost = Rules(*numbers), np.empty(weight.shape[1])
     for m in range(len(weight)):
         sum_row(weight[m], stretch[m], width[m], rules, lost, sums[:, m])
 
 
-@kernel("void(float64, float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")
+@kernel(f"void(float64, {RULES}, float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")
 def settle_steady(speed, numbers, weight, stretch, width, lattice):
     """Write the merged steady state of one row."""
-    rules = rules_of(numbers)
+    rules = Rules(*numbers)
     pool = np.empty((3, weight.shape[1] + 520))
     count, _, _ = fill_steady(pool, min(max(speed, -1e200), 1e200), rules)
     count = settle(pool[0], pool[1], pool[2], count, math.copysign(1.0, speed), 0.0, rules)
-    write_row(pool, count, weight[0], stretch[0], width[0])
-    lattice[0, 1] = count
+    write_row(pool, count, 0.0, count, speed, rules, (weight[0], stretch[0], width[0], lattice[0]))
 
 
 _POINTS = np.polynomial.legendre.leggauss(5)
@@ -495,34 +488,13 @@ class Cohorts(NamedTuple):
     lattice: Array
 
 
-def empty(rupture: RuptureRate, tolerance: float) -> Cohorts:
-    """Return a population without a bond."""
+def unstretched(rupture: RuptureRate, tolerance: float, share: float) -> Cohorts:
+    """Return a population with an unstretched bond at a ``share`` of the sites."""
     capacity = 5 * _most(rupture, tolerance) // 4 + 32
-    blank = np.zeros((1, capacity))
+    weight = np.zeros((1, capacity))
+    weight[0, 0] = share
     width = np.zeros((1, capacity if rupture.limit < math.inf else 1))
-    return Cohorts(blank, blank.copy(), width, np.zeros((1, 2)))
-
-
-def bonded(rupture: RuptureRate, tolerance: float) -> Cohorts:
-    """Return a population with a bond at every site, all unstretched."""
-    full = empty(rupture, tolerance)
-    full.weight[0, 0] = 1.0
-    return full
-
-
-def resting(rupture: RuptureRate, rebinding_rate: float, tolerance: float) -> Cohorts:
-    """Return a population after a long rest: the share k_on/(k_on + k0) is bound, all unstretched.
-
-    Examples
-    --------
-    >>> half = resting(RuptureRate(rate=2.0, softness=1e9, limit=math.inf), rebinding_rate=2.0, tolerance=1e-4)
-    >>> float(half.weight.sum())
-    0.5
-    """
-    rest = empty(rupture, tolerance)
-    if rebinding_rate > 0.0:
-        rest.weight[0, 0] = rebinding_rate / (rebinding_rate + rupture.at_rest)
-    return rest
+    return Cohorts(weight, np.zeros((1, capacity)), width, np.zeros((1, 2)))
 
 
 def steady(rupture: RuptureRate, rebinding_rate: float, speed: float, tolerance: float) -> Cohorts:
@@ -530,7 +502,8 @@ def steady(rupture: RuptureRate, rebinding_rate: float, speed: float, tolerance:
 
     Notes
     -----
-    Bonds of age a are stretched by V a and number k_on F S(a) da, F = 1/(1 + k_on⟨T⟩), S the survival of a fresh
+    After a long rest the share k_on/(k_on + k0) is bound, all unstretched. In sliding bonds
+    of age a are stretched by V a and number k_on F S(a) da, F = 1/(1 + k_on⟨T⟩), S the survival of a fresh
     bond and ⟨T⟩ its mean life: quadrature over the age, good to 1e-9 before it is merged within the tolerance.
 
     Examples
@@ -542,11 +515,10 @@ def steady(rupture: RuptureRate, rebinding_rate: float, speed: float, tolerance:
     >>> print(f"{moving.weight.sum():.3f} of {steady(bell, 1.0, 0.0, 1e-4).weight.sum():.1f}")
     0.374 of 0.5
     """
-    if rebinding_rate == 0.0 or speed == 0.0:
-        return resting(rupture, rebinding_rate, tolerance)
-    result = empty(rupture, tolerance)
-    numbers = numbers_of(rupture, rebinding_rate, tolerance, math.inf)
-    settle_steady(float(speed), numbers, result.weight, result.stretch, result.width, result.lattice)
+    at_rest = rebinding_rate / (rebinding_rate + rupture.at_rest) if rebinding_rate > 0.0 else 0.0
+    result = unstretched(rupture, tolerance, at_rest)
+    if rebinding_rate > 0.0 and speed != 0.0:
+        settle_steady(float(speed), numbers_of(rupture, rebinding_rate, tolerance), *result)
     return result
 
 
@@ -557,8 +529,7 @@ def advance(
     rupture: RuptureRate,
     rebinding_rate: float,
     tolerance: float,
-    largest: float = math.inf,
-    share: Array | None = None,
+    share: Array,
 ) -> tuple[Cohorts, Array]:
     """Return the populations after steps of constant speed each, and their moments.
 
@@ -576,10 +547,8 @@ def advance(
         k_on of a free site [1/s], not negative.
     tolerance : float
         Relative error allowed in the number of bonds.
-    largest : float
-        Bound on the steps that a row makes by itself within a duration [s].
     share : array, shape (1,) or (rows,)
-        Share of each row's bonds that is left before the first step [1], by default all; the other sites are free.
+        Share of each row's bonds that is left before the first step [1]; the other sites are free.
 
     Returns
     -------
@@ -596,11 +565,9 @@ def advance(
     The births make two new cohorts, so bonds and free sites add up to one. A step that no bond
     outlives ends in the steady state.
     """
-    share = np.ones(1) if share is None else share
     rows = max(slip.shape[1], len(cohorts.weight), len(share))
     after, sums = tuple(np.zeros((rows, a.shape[1])) for a in cohorts), np.empty((5, len(duration), rows))
-    numbers = numbers_of(rupture, rebinding_rate, tolerance, largest)
-    step_rows(tuple(cohorts), share, slip, duration, numbers, after, sums)
+    step_rows(tuple(cohorts), share, slip, duration, numbers_of(rupture, rebinding_rate, tolerance), after, sums)
     return Cohorts(*after), sums
 
 
@@ -615,7 +582,7 @@ def moments(cohorts: Cohorts, rupture: RuptureRate, tolerance: float) -> Array:
     - Stretch that thermal rupture takes in unit time [m/s], the sum of w x k(|x|).
     """
     sums = np.empty((5, len(cohorts.weight)))
-    sum_rows(cohorts.weight, cohorts.stretch, cohorts.width, numbers_of(rupture, 0.0, tolerance, math.inf), sums)
+    sum_rows(cohorts.weight, cohorts.stretch, cohorts.width, numbers_of(rupture, 0.0, tolerance), sums)
     return sums
 
 
@@ -633,8 +600,8 @@ _KINK = 66.0
 
 
 @functools.lru_cache(maxsize=256)
-def numbers_of(rupture: RuptureRate, rebinding_rate: float, tolerance: float, largest: float) -> Array:
-    """Return ``Rules`` as an array.
+def numbers_of(rupture: RuptureRate, rebinding_rate: float, tolerance: float) -> tuple[object, ...]:
+    """Return the numbers of ``Rules``.
 
     A two-point Gauss rule over a cell of width d errs by d⁴/4320 of the cell's bonds, a uniform segment
     by d²/8 of them. A cell that contains zero averages a rupture with a kink and errs by 0.015 of its
@@ -645,5 +612,5 @@ def numbers_of(rupture: RuptureRate, rebinding_rate: float, tolerance: float, la
         cell = rupture.limit * max(math.sqrt(tolerance), 1.0 / 1800.0)
     elif rupture.steepness > 0.0:
         cell = (432.0 * tolerance) ** 0.25 / rupture.steepness
-    steps = rupture.limit, rupture.steepness, rebinding_rate, tolerance, largest
-    return np.array([*steps, cell, _KINK * tolerance, _most(rupture, tolerance), *rupture], dtype=float)
+    law, bound, left = tuple(map(float, rupture)), float(rebinding_rate), float(_most(rupture, tolerance))
+    return law, law[2], float(rupture.steepness), bound, float(tolerance), cell, _KINK * tolerance, left

@@ -249,26 +249,32 @@ def _rosenbrock(bound, moment, step, speed, rate, binding, work):
 
 
 @device
+def regula_falsi(bracket, place, value):
+    """Return a bracket of a zero with another place in it, at which the value is known.
+
+    A bracket is a place and a value above zero, a place and a value below, and the sign of the last value. The value of
+    an end that stays a second time counts half (Illinois).
+    """
+    near, above, far, below, side = bracket
+    if value > 0.0:
+        return place, value, far, below * (0.5 if side > 0 else 1.0), 1
+    return near, above * (0.5 if side < 0 else 1.0), place, value, -1
+
+
+@device
 def _to_zero(bound, moment, step, below, speed, rate, binding, work):
     """Return the part of ``step`` after which a moment above zero has come to zero, and bound then.
 
-    After the whole step the moment is ``below`` zero. Regula falsi, where the end that stays counts half (Illinois).
+    After the whole step the moment is ``below`` zero.
     """
-    near, above, far, side = 0.0, moment, step, 0
-    part, after = step, bound
+    bracket, part, after = (0.0, moment, step, below, 0), step, bound
     for _ in range(60):
+        near, above, far, below, _ = bracket
         part = near + (far - near) * (above / (above - below))
         after, rest, _ = _rosenbrock(bound, moment, part, speed, rate, binding, work)
         if math.fabs(rest) <= 1e-13 * moment:
             break
-        if rest > 0.0:
-            near, above = part, rest
-            below *= 0.5 if side > 0 else 1.0
-            side = 1
-        else:
-            far, below = part, rest
-            above *= 0.5 if side < 0 else 1.0
-            side = -1
+        bracket = regula_falsi(bracket, part, rest)
     return part, after
 
 

@@ -33,7 +33,7 @@ from sim.numerics.noise import Noise, binomial, stream
 from sim.parts.bonds.cohorts import Cohorts
 from sim.parts.bonds.rupture import Bell, Derivable, Rupture, RuptureRate
 from sim.parts.bonds.tracked import CYCLES, Tracks
-from sim.parts.exchange import Array, Bonding, Motion, Part, Setting
+from sim.parts.exchange import UNKNOWN, Array, Bonding, Motion, Part, Setting
 from sim.units.quantity import Quantity, keyed, tagged
 
 Area = Annotated[
@@ -41,8 +41,7 @@ Area = Annotated[
 ]
 
 #: Contact radius of a population that does not depend on the area, or has not had a contact yet.
-_NO_AREA = np.full(1, np.nan)
-_NO_AREA.setflags(write=False)
+_NO_AREA = UNKNOWN
 
 
 def share_kept(before: Array, radius: Array) -> Array:
@@ -62,6 +61,8 @@ class _BondModel(Part):
 
     start_from: str
     rebinding_rate: float
+    per_member: ClassVar[bool] = False
+    feeds_back: ClassVar[bool] = False
     #: True if bonds break by chance, one by one.
     is_random: ClassVar[bool] = False
     #: True if the population is solved through blocks of clock steps.
@@ -96,7 +97,7 @@ class _OverArea(_BondModel):
     area: Area
 
     @property
-    def per_member(self) -> bool:
+    def per_member(self) -> bool:  # type: ignore[override]
         return self.area == "carried"
 
     feeds_back = per_member
@@ -215,8 +216,6 @@ def _relax(bound, path, duration, critical_speed, rebinding_rate, relaxed_bound)
 class _AtOnce(_WithoutStretch):
     """Attributes of models whose bonds are steady at every speed."""
 
-    per_member: ClassVar[bool] = False
-    feeds_back: ClassVar[bool] = False
     in_blocks: ClassVar[bool] = True
 
     def start(self, motion: Motion, noise: Noise) -> Population:
@@ -304,7 +303,6 @@ class Counted(_WithoutStretch):
 
     per_member: ClassVar[bool] = True
     is_random: ClassVar[bool] = True
-    feeds_back: ClassVar[bool] = False
 
     def bonding(self, state: Population) -> Bonding:
         return super().bonding(state._replace(bound=state.bound / self.sites))
@@ -355,15 +353,15 @@ def _one_way(bonds: _T) -> _T:
     is_bell = isinstance(bonds.rupture, Bell)
     by_rates = (*(("rupture.zero_force_rate",) if is_bell else ()), "rebinding_rate", "site_density")
     keys = (*by_rates, *(_BY_SPEED if is_bell else _BY_SPEED[-1:]))
-    given = [key for key in keys if attrgetter(key)(bonds) is not None]
-    if set(given) <= set(by_rates):
-        missing = [key.replace("rupture.", "rupture.bell.").split(".") for key in by_rates if key not in given]
+    present = [key for key in keys if attrgetter(key)(bonds) is not None]
+    if set(present) <= set(by_rates):
+        missing = [key.replace("rupture.", "rupture.bell.").split(".") for key in by_rates if key not in present]
         if missing:
             errors = [InitErrorDetails(type="missing", loc=tuple(place), input=None) for place in missing]
             raise ValidationError.from_exception_data("bonds", errors)
-    elif not is_bell or {*given} != {*_BY_SPEED}:
+    elif not is_bell or {*present} != {*_BY_SPEED}:
         ways = f"give either {', '.join(by_rates)} or, of Bell's rupture, {', '.join(_BY_SPEED)}"
-        raise PydanticCustomError("one_way", f"{ways}; given are {', '.join(given)}")
+        raise PydanticCustomError("one_way", f"{ways}; given are {', '.join(present)}")
     return bonds
 
 
@@ -414,9 +412,8 @@ class _Stretched(_BondModel):
 
     def remarks(self, setting: Setting) -> list[str]:
         number = 1.0 / self.bound_at_rest
-        remark = (
-            f'start = "bonded" binds every site, {number:.3g} times the bonds of rest, for which adhesion.work holds'
-        )
+        times = f"{number:.3g} times the bonds of rest"
+        remark = f'start = "bonded" binds every site, {times}, for which adhesion.work holds'
         return [remark] if self.start_from == "bonded" and number > 1.01 else []
 
     def onset(self, speed: Array, body: Body) -> Onset:
@@ -504,7 +501,7 @@ class FirstMoment(_OverArea, _Separable):
         mean = np.divide(state.stretch, state.bound, out=np.zeros(state.bound.shape), where=state.bound > 0.0)
         breaking, lost = 2.0 * np.abs(state.stretch) / self.law.limit, state.stretch * self.law.at(mean)
         stored = 0.5 * self.site_density * self.bond_stiffness * mean * state.stretch
-        return self._bonding(state.bound, state.stretch, _UNKNOWN, breaking, lost)._replace(stored=stored)
+        return self._bonding(state.bound, state.stretch, UNKNOWN, breaking, lost)._replace(stored=stored)
 
     def steady(self, speed: Array) -> Bonding:
         return self.bonding(Stretches(*mean_field.steady(speed, self.law, self.rebinding_rate)))
@@ -515,9 +512,6 @@ class Ages(NamedTuple):
 
     cohorts: Cohorts
     area_radius: Array = _NO_AREA
-
-
-_UNKNOWN = np.full(1, np.nan)
 
 
 @keyed()
@@ -540,17 +534,15 @@ class Cohort(_OverArea, _Stretched):
     def start(self, motion: Motion, noise: Noise) -> Ages:
         if self.start_from == "steady":
             first = cohorts.steady(self.law, self.rebinding_rate, float(motion.first[0]), self.tolerance)
-        elif self.start_from == "bonded":
-            first = cohorts.bonded(self.law, self.tolerance)
         else:
-            first = cohorts.empty(self.law, self.tolerance)
+            first = cohorts.unstretched(self.law, self.tolerance, 1.0 if self.start_from == "bonded" else 0.0)
         rows = max(len(self.rows(noise)), len(motion.first))  # a drive that solves the motion has its members
         return Ages(Cohorts(*(np.repeat(array, rows, axis=0) for array in first)))
 
     def advance(self, state: Ages, motions: Motion, radius: Array, noise: Noise) -> tuple[Ages, Bonding]:
         share, area_radius = self.diluted(state.area_radius, radius)
         recipe, duration = (self.law, self.rebinding_rate, self.tolerance), motions.duration[:, 0]
-        after, sums = cohorts.advance(state.cohorts, motions.slip, duration, *recipe, share=share)
+        after, sums = cohorts.advance(state.cohorts, motions.slip, duration, *recipe, share)
         return Ages(after, area_radius), self.read(sums)
 
     def bonding(self, state: Ages) -> Bonding:
@@ -583,7 +575,6 @@ class Tracked(_Separable):
     state_class: ClassVar[type[Tracks]] = Tracks
     per_member: ClassVar[bool] = True
     is_random: ClassVar[bool] = True
-    feeds_back: ClassVar[bool] = False
 
     @property
     def numbers(self) -> int:  # type: ignore[override]
@@ -613,7 +604,7 @@ class Tracked(_Separable):
 
     def read(self, frames: Array) -> Bonding:
         """Return the readings of frames: bonds break one after the other, at a limit or by themselves."""
-        return self._bonding(*tracks.moments(frames, self.sites), np.zeros(1), _UNKNOWN)
+        return self._bonding(*tracks.moments(frames, self.sites), np.zeros(1), UNKNOWN)
 
     def steady(self, speed: Array) -> Bonding:
         return Cohort(self.rupture, self.bond_stiffness, self.rebinding_rate, self.site_density).steady(speed)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.numerics.jit import device, kernel
-from sim.parts.bonds.cohorts import carry, inside, read_row, rules_of, settle, steepen, sum_row, try_step, write_row
+from sim.parts.bonds.cohorts import RULES, Rules, carry, inside, read_row, settle, steepen, sum_row, try_step, write_row
 from sim.parts.bonds.rupture import hazard_integral, hazard_time, rate_at
 from sim.parts.coupled import mechanics
 from sim.parts.drive import ENERGY
@@ -179,7 +179,7 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
     after.sheared = yields * force
     if mass > 0.0:  # by its momentum: differences of positions are roundings in the shortest sub-steps
         after.body_speed = (momentum + pull - force) / (damping + mass * rate)
-    firmest, bears = max(stiffness, 1.0 / yields if yields > 0.0 else 0.0), area * (bound + mechanics.SOME)
+    firmest, bears = max(stiffness, mechanics.stiffness_of(radius, slider)), area * (bound + mechanics.SOME)
     firm = firmest / bears if area > 0.0 else 1.0
     none, slope = 1e-3 * tolerance / max(1.0, firm), grows + loads * (1.0 + softer + yields * grows)
     if mass + damping > 0.0:  # what is left of the forces is work on the body, whose displacement may be the longer
@@ -208,9 +208,8 @@ def go_to_node(place, nodes, at_start, pool, count, start, step, row, slider, co
             ahead = shift >= 0.0
             steepen(pool, count, shift, off, rules)
         bound, moment, early, late, factor = _try_motion(pool, count, unit * shift, duration, off, free, rules)
-        over, elasticity, none = balance(
-            shift, bound, moment / unit, before, after, approach, start, row, slider, contact
-        )
+        moment /= unit
+        over, elasticity, none = balance(shift, bound, moment, before, after, approach, start, row, slider, contact)
         if turn == 0:
             slope = elasticity
         elif math.fabs(shift - last_shift) > 1e-9 * (1.0 + math.fabs(shift)):
@@ -233,8 +232,7 @@ def accept_nodes(row, nodes, start, step, slider, contact, limit, energy):
     damping, viscosity = slider.damping, slider.viscosity
     firms = np.empty(3)
     for i in range(3):
-        yields, _ = mechanics.compliance(nodes[i].radius, slider)
-        firms[i] = 1.0 / yields if yields > 0.0 else 0.0
+        firms[i] = mechanics.stiffness_of(nodes[i].radius, slider)
     speeds = slopes(nodes[0].slip, nodes[1].slip, nodes[2].slip, step)
     bodies = slopes(nodes[0].body, nodes[1].body, nodes[2].body, step)
     spreads = slopes(nodes[0].area, nodes[1].area, nodes[2].area, step)
@@ -505,9 +503,9 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
 @device
 def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, room):
     """Take a row and its cohorts through a clock step; return the time reached, and False if stability is lost."""
-    (weight, stretch, width, lattice), (pool, _, nodes) = bonds, room
-    count = read_row(pool, weight, stretch, width, share)
-    time, going, travelled, settled, stays = 0.0, True, lattice[0], lattice[1], contact.stays
+    pool, _, nodes = room
+    count = read_row(pool, bonds[0], bonds[1], bonds[2], share)
+    time, going, travelled, settled, stays = 0.0, True, bonds[3][0], bonds[3][1], contact.stays
     for p in range(len(pieces)):
         slider = mechanics.slider_in(slider, pieces[p])
         from_here = mechanics.later(mechanics.feeling(contact, row), time, stays)
@@ -538,18 +536,12 @@ def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, ro
         sums_at(pool, count, unit, rules, nodes[0])
         contact = mechanics.later(mechanics.settled(contact, row, slider), 0.0, stays)
         energy.stored = stored_energy(row, nodes[0].square, time, slider, contact)
-    if count > weight.size:
-        count = settle(pool[0], pool[1], pool[2], count, 1.0 if row.slip >= 0.0 else -1.0, travelled, rules)
-        settled = count
-    if rules.cell < math.inf:
-        travelled = travelled % (1048576.0 * rules.cell)
-    write_row(pool, count, weight, stretch, width)
-    lattice[0], lattice[1] = travelled, settled
+    write_row(pool, count, travelled, settled, row.slip, rules, bonds)
     return time, going
 
 
 @kernel(
-    f"void({mechanics.ARGUMENTS}, float64[::1], float64[::1],"
+    f"void({mechanics.ARGUMENTS}, float64[::1], {RULES},"
     " float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1])"
 )
 def advance_cohorts(inputs, numbers, outputs, share, rules, weight, stretch, width, lattice, sums):
@@ -560,7 +552,7 @@ def advance_cohorts(inputs, numbers, outputs, share, rules, weight, stretch, wid
     """
     rows, energies, pieces, clock, units, work = inputs
     slider, contact, (reached, spent) = mechanics.Slider(*numbers[0]), mechanics.contact_of(numbers), outputs
-    rules, most, unit = rules_of(rules), weight.shape[1] + 520, units[mechanics.SLIP]
+    rules, most, unit = Rules(*rules), weight.shape[1] + 520, units[mechanics.SLIP]
     columns, booked, nodes = np.empty(mechanics.COLUMNS), np.empty(mechanics.ENERGIES), np.zeros(3, NODE)
     row, energy = columns.view(mechanics.ROW)[0], booked.view(ENERGY)[0]
     room = np.empty((9, most)), np.empty((3, most)), nodes

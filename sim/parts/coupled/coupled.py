@@ -233,7 +233,7 @@ def _advanced(
         ages = cast(models.Ages, population)
         share, area_radius = bonds.diluted(ages.area_radius, radius)
         cohorts, sums = Cohorts(*(array.copy() for array in ages.cohorts)), np.empty((5, *shape))
-        rules = numbers_of(bonds.law, bonds.rebinding_rate, bonds.tolerance, math.inf)
+        rules = numbers_of(bonds.law, bonds.rebinding_rate, bonds.tolerance)
         advance_cohorts(tuple(inputs), numbers, outputs, share, rules, *cohorts, sums)
         return models.Ages(cohorts, area_radius), bonds.read(sums)
     if isinstance(bonds, models.Tracked):
@@ -294,9 +294,8 @@ def _numbers(drive: Force | Spring, bonds: _Driven, contact: StepContact, units:
     mean_stress = 0.0
     if contact.reversible:
         stress = density * stretch
-        mean_stress = contact.reversible * float(
-            mean_stress_energy(1.0, stress, contact.modulus, contact.poisson_ratio)
-        )
+        energy = float(mean_stress_energy(1.0, stress, contact.modulus, contact.poisson_ratio))
+        mean_stress = contact.reversible * energy
     still = contact.bare, 0.0, 0.0, 0.0, 0.0, float(contact.stays), contact.bonded / of_rest, mean_stress
     solid = contact.mounts[0].stiffness, 1.0 / contact.sphere_radius, contact.modulus, contact.area
     return tuple(slider), tuple(breaking), (*still, *solid)

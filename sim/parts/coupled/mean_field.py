@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device, kernel
+from sim.parts.bonds.mean_field import regula_falsi
 from sim.parts.coupled import mechanics, radau
 from sim.parts.coupled.radau import accept, try_sub_step  # by name: numba inlines no attribute of a module
 from sim.parts.drive import ENERGY
@@ -128,22 +129,16 @@ def _at_end(row, nodes, step, law):
 def _to_zero(row, start, step, none, slider, law, contact, nodes):
     """Shorten a solved sub-step to where ``_at_end`` is zero, but for ``none``; return its length, True if solved."""
     first = math.fabs(row.moment) if law.sense == 0.0 else row.speed * law.sense
-    near, above, far, below, side = 0.0, first, step, _at_end(row, nodes, step, law), 0
+    bracket = 0.0, first, step, _at_end(row, nodes, step, law), 0
     for _ in range(100):
+        near, above, far, below, _ = bracket
         step = near + (far - near) * (above / (above - below))
         if not radau.newton(row, start, step, slider, law, contact, nodes):
             return step, False
         value = _at_end(row, nodes, step, law)
         if math.fabs(value) <= none or far - near <= 1e-15 * far:
             break
-        if value > 0.0:
-            near, above = step, value
-            below *= 0.5 if side > 0 else 1.0
-            side = 1
-        else:
-            far, below = step, value
-            above *= 0.5 if side < 0 else 1.0
-            side = -1
+        bracket = regula_falsi(bracket, step, value)
     return step, True
 
 

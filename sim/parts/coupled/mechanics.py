@@ -173,6 +173,13 @@ def compliance(radius, slider):
 
 
 @device
+def stiffness_of(radius, slider):
+    """Return k_t of the contact, or 0 if the contact does not yield."""
+    yields, _ = compliance(radius, slider)
+    return 1.0 / yields if yields > 0.0 else 0.0
+
+
+@device
 def softening(slope, radius, by_moment, contact):
     """Return the slope of 1/k_t over M from that over the radius and that of the area."""
     return slope * by_moment * contact.area / (2.0 * math.pi * radius) if by_moment != 0.0 else 0.0
@@ -501,11 +508,8 @@ def misses(before, after, last, energy, row, slider, step):
     A stored energy below the tolerance is as good as none: all sites at the unit of stretch store 1/2. If much is
     missing already, the tolerance is of what is dissipated, and of what is stored by the share of the time so far.
     """
-    tolerance, missing, size = (
-        slider.tolerance,
-        retained(energy) - retained(last) - (after - before),
-        max(before, after),
-    )
+    tolerance, size = slider.tolerance, max(before, after)
+    missing = retained(energy) - retained(last) - (after - before)
     if step > BRIEF * slider.length and math.fabs(missing) > tolerance * max(size, math.fabs(energy.work), tolerance):
         return True
     size, total = max(size, math.fabs(row.worked + energy.work)), row.missed + retained(energy) - after + energy.stored

@@ -18,17 +18,7 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device, inlined
-from sim.parts.coupled.mechanics import (
-    FEW,
-    SOME,
-    compliance,
-    contact_area,
-    contact_energy,
-    driven,
-    pull_on,
-    remember,
-    within_reach,
-)
+from sim.parts.coupled import mechanics
 
 _S6 = math.sqrt(6.0)
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
@@ -131,17 +121,16 @@ def equations(row, nodes, start, step, slider, law, contact):
         bound, moment = row.bound + nodes.bound[i], row.moment + nodes.moment[i]
         if contact.stays == 0.0:
             now = start + NODES[i] * step
-            radius, area, by_bound, by_moment = contact_area(bound, moment, now, nodes.radii[i], contact)
+            radius, area, by_bound, by_moment = mechanics.contact_area(bound, moment, now, nodes.radii[i], contact)
             nodes.radii[i] = radius
         if not (bound >= 0.0 and area >= 0.0):
             return math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         speed = sum_over(RATES, i, nodes.slip) * over
         body = speed + sum_over(RATES, i, nodes.sheared) * over if gives else speed
         stress = moment + viscosity * speed
-        yields, softer = compliance(radius, slider)
-        nodes.residuals[0, i] = (
-            area * stress + damping * body - nodes.pulls[i] + stiffness * (nodes.slip[i] + nodes.sheared[i])
-        )
+        yields, softer = mechanics.compliance(radius, slider)
+        shift = nodes.slip[i] + nodes.sheared[i]
+        nodes.residuals[0, i] = area * stress + damping * body - nodes.pulls[i] + stiffness * shift
         if mass > 0.0:
             bend = (sum_over(BENDS, i, nodes.slip) + sum_over(BENDS, i, nodes.sheared)) * over
             bend -= _OFF[i] * row.body_speed
@@ -165,11 +154,11 @@ def equations(row, nodes, start, step, slider, law, contact):
             of_balance = by_bound * stress, area + by_moment * stress, area * viscosity
             if yields > 0.0:
                 softer *= contact.area / (2.0 * math.pi * radius) * area * stress
-                of_u = (
+                u_bound, u_moment = (
                     -yields * of_balance[0] - softer * by_bound,
                     -yields * of_balance[1] - softer * by_moment,
-                    -yields * of_balance[2],
                 )
+                of_u = u_bound, u_moment, -yields * of_balance[2]
     return of_balance + of_u + of_bonds
 
 
@@ -279,14 +268,11 @@ def newton(row, start, step, slider, law, contact, nodes):
     _ahead(row, nodes, step, law)
     for i in range(3):
         nodes.radii[i] = row.radius
-        nodes.pulls[i] = pull_on(start + NODES[i] * step, start, 0.0, row, slider)
-    bound = min(row.bound, row.bound + nodes.bound[2]) + FEW
+        nodes.pulls[i] = mechanics.pull_on(start + NODES[i] * step, start, 0.0, row, slider)
+    bound = min(row.bound, row.bound + nodes.bound[2]) + mechanics.FEW
     moment = min(math.fabs(row.moment), math.fabs(row.moment + nodes.moment[2]))
-    of_slip, of_bound, of_moment = (
-        1.0 / (law.scale + math.fabs(nodes.slip[2])),
-        1.0 / bound,
-        1.0 / (law.scale * bound + moment),
-    )
+    of_slip, of_bound = 1.0 / (law.scale + math.fabs(nodes.slip[2])), 1.0 / bound
+    of_moment = 1.0 / (law.scale * bound + moment)
     before, close = math.inf, min(1e-6, 0.1 * slider.tolerance)
     slopes, shrinks = _UNKNOWN, 0.5
     modes = _NO_MODES
@@ -306,9 +292,8 @@ def newton(row, start, step, slider, law, contact, nodes):
                 part = min(part, 0.9 * bound / nodes.residuals[2, i])
         for i in range(3):
             change = max(change, math.fabs(nodes.residuals[0, i]) * of_slip)
-            change = max(
-                change, math.fabs(nodes.residuals[2, i]) * of_bound, math.fabs(nodes.residuals[3, i]) * of_moment
-            )
+            change = max(change, math.fabs(nodes.residuals[2, i]) * of_bound)
+            change = max(change, math.fabs(nodes.residuals[3, i]) * of_moment)
             for k in range(4):
                 nodes.values[k, i] -= part * nodes.residuals[k, i]
         shrinks = change / before if turn > 0 else 0.5
@@ -346,30 +331,30 @@ def error_of(row, start, step, slider, law, contact, nodes):
         to_bound += SLOPES[j] * nodes.bound[j]
         to_moment += SLOPES[j] * nodes.moment[j]
     time = start + BETWEEN * step
-    radius, area, _, _ = contact_area(bound, moment, time, nodes.radii[0], contact)
+    radius, area, _, _ = mechanics.contact_area(bound, moment, time, nodes.radii[0], contact)
     if not (area >= 0.0 and bound >= 0.0):
         return math.inf
     of_bound, of_moment, on, _, _, _ = kinetics(bound, moment, speed, law)
     pace = pace if mass > 0.0 else going
     balance = area * (moment + viscosity * speed) + damping * pace + mass * bend
-    balance -= pull_on(time, start, body, row, slider)
+    balance -= mechanics.pull_on(time, start, body, row, slider)
     bears = area * bound + (damping + area * viscosity) / step + mass / (step * step)
-    scale = law.scale * (bound + FEW) + math.fabs(moment)
+    scale = law.scale * (bound + mechanics.FEW) + math.fabs(moment)
     if law.sense != 0.0:
         to_moment = step * of_moment[0]
     if law.slows != 0.0:
         to_bound = step * of_bound[0] + bound - share_left(speed, law)
     error = max(
-        math.fabs(to_bound - step * of_bound[0]) / (1.0 + step * math.fabs(of_bound[1])) / (bound + FEW),
+        math.fabs(to_bound - step * of_bound[0]) / (1.0 + step * math.fabs(of_bound[1])) / (bound + mechanics.FEW),
         math.fabs(to_moment - step * of_moment[0]) / (1.0 + step * math.fabs(on[0])) / scale,
     )
     # a mass between stiff springs rings within a small part of a stretch: as a force that is no small part
-    yields, _ = compliance(radius, slider)
+    yields, _ = mechanics.compliance(radius, slider)
     if contact.mean_stress > 0.0:  # in a slip that takes no time u leaves its polynomial first
         sheared = yields * area * (moment + viscosity * speed)
         error = max(error, math.fabs(row.sheared + body - slip - sheared) / law.scale)
-    stiffest = max(stiffness, 1.0 / yields if yields > 0.0 else 0.0)
-    firm = max(1.0, stiffest / (area * (bound + SOME))) if mass > 0.0 and area > 0.0 else 1.0
+    stiffest = max(stiffness, mechanics.stiffness_of(radius, slider))
+    firm = max(1.0, stiffest / (area * (bound + mechanics.SOME))) if mass > 0.0 and area > 0.0 else 1.0
     # an open contact bears nothing: then what is missing from the spring counts
     error = max(error, firm * math.fabs(balance) / (bears if bears > 0.0 else stiffness) / law.scale)
     return max(error, firm * step * math.fabs(going - pace) / law.scale) if mass > 0.0 else error
@@ -389,7 +374,7 @@ def try_sub_step(row, start, step, slider, law, contact, nodes):
     error *= math.sqrt(error) / slider.tolerance
     if not error < math.inf:
         return 0.25, False
-    within = within_reach(nodes.slip[2], step, row, contact)
+    within = mechanics.within_reach(nodes.slip[2], step, row, contact)
     if within < 1.0:
         return max(0.1, 0.9 * within), False
     root = max(error, 1e-6) ** (1.0 / 6.0)
@@ -405,7 +390,7 @@ def try_sub_step(row, start, step, slider, law, contact, nodes):
 @device
 def stored_with(row, area, slider, law):
     """Return the elastic and kinetic energy of spring, body, contact of some area and bonds."""
-    energy = 0.5 * slider.mass * row.body_speed * row.body_speed + contact_energy(row, area, slider)
+    energy = 0.5 * slider.mass * row.body_speed * row.body_speed + mechanics.contact_energy(row, area, slider)
     if slider.stiffness > 0.0:
         energy += 0.5 * row.spring_force * row.spring_force / slider.stiffness
     if row.bound > 0.0 and law.sense == 0.0:
@@ -421,20 +406,12 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
     """
     damping, viscosity = slider.damping, slider.viscosity
     shift, speed, body, going, passed = 0.0, 0.0, 0.0, row.speed, 0.0
-    follows = contact.stays == 0.0
-    first, firm = math.pi * row.radius * row.radius / contact.area, 0.0
-    if follows:
-        _, first, _, _ = contact_area(row.bound, row.moment, start, row.radius, contact)
-        yields, _ = compliance(row.radius, slider)
-        firm = 1.0 / yields if yields > 0.0 else 0.0
+    _, first, _, _ = mechanics.contact_area(row.bound, row.moment, start, row.radius, contact)
+    firm = mechanics.stiffness_of(row.radius, slider)
     for i in range(3):
-        nodes.areas[i] = first
-        if follows:
-            bound, moment = row.bound + nodes.bound[i], row.moment + nodes.moment[i]
-            time = start + NODES[i] * step
-            nodes.radii[i], nodes.areas[i], _, _ = contact_area(bound, moment, time, nodes.radii[i], contact)
-            yields, _ = compliance(nodes.radii[i], slider)
-            nodes.firms[i] = 1.0 / yields if yields > 0.0 else 0.0
+        bound, moment, time = row.bound + nodes.bound[i], row.moment + nodes.moment[i], start + NODES[i] * step
+        nodes.radii[i], nodes.areas[i], _, _ = mechanics.contact_area(bound, moment, time, nodes.radii[i], contact)
+        nodes.firms[i] = mechanics.stiffness_of(nodes.radii[i], slider)
     before = stored_with(row, first, slider, law)
     for i in range(3):
         bound, moment, area = row.bound + nodes.bound[i], row.moment + nodes.moment[i], nodes.areas[i]
@@ -442,14 +419,11 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
         for j in range(3):
             speed += RATES[i, j] * nodes.slip[j] / step
             body += RATES[i, j] * (nodes.slip[j] + nodes.sheared[j]) / step
-            if follows:
-                spreads += RATES[i, j] * (nodes.areas[j] - first)
-                firms += RATES[i, j] * (nodes.firms[j] - firm)
-        sheared, pull = (
-            row.sheared + nodes.sheared[i],
-            nodes.pulls[i] - slider.stiffness * (nodes.slip[i] + nodes.sheared[i]),
-        )
-        drive_speed = body if slider.forced > 0.0 else driven(start + NODES[i] * step, slider)[1]
+            spreads += RATES[i, j] * (nodes.areas[j] - first)
+            firms += RATES[i, j] * (nodes.firms[j] - firm)
+        sheared = row.sheared + nodes.sheared[i]
+        pull = nodes.pulls[i] - slider.stiffness * (nodes.slip[i] + nodes.sheared[i])
+        drive_speed = body if slider.forced > 0.0 else mechanics.driven(start + NODES[i] * step, slider)[1]
         _, _, _, _, k, travel = kinetics(bound, moment, speed, law)
         square = moment * moment / bound if bound > 0.0 and law.sense == 0.0 else 0.0
         fresh = law.binding * (1.0 - bound) * square / bound if bound > 0.0 else 0.0
@@ -461,14 +435,10 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
         if law.sense != 0.0:
             energy.rupture += share * area * moment * speed
         energy.area -= SHARES[i] * 0.5 * (square * spreads + sheared * sheared * firms)
-        remember(row, nodes.slip[i] - shift, going, speed, (NODES[i] - passed) * step, contact)
+        mechanics.remember(row, nodes.slip[i] - shift, going, speed, (NODES[i] - passed) * step, contact)
         shift, going, passed = nodes.slip[i], speed, NODES[i]
-    row.spring_force, row.body_speed, row.speed = (
-        nodes.pulls[2] - slider.stiffness * (nodes.slip[2] + nodes.sheared[2]),
-        body,
-        speed,
-    )
-    row.radius = nodes.radii[2]
+    row.spring_force = nodes.pulls[2] - slider.stiffness * (nodes.slip[2] + nodes.sheared[2])
+    row.body_speed, row.speed, row.radius = body, speed, nodes.radii[2]
     row.sheared += nodes.sheared[2]
     row.bound = min(row.bound + nodes.bound[2], 1.0)
     row.moment += nodes.moment[2]

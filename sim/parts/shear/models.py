@@ -55,6 +55,7 @@ _margin = functools.lru_cache(maxsize=32)(Margin)
 class ShearModel:
     """Attributes of all shear models."""
 
+    per_member: ClassVar[bool] = False
     feeds_back: ClassVar[bool] = False
     draws_maps: ClassVar[bool] = False
     keeps_modes: ClassVar[bool] = False
@@ -165,7 +166,6 @@ class ShearModel:
 class Uniform(ShearModel):
     """No fluctuation: a uniform shear stress, which stores nothing at the expense of adhesion."""
 
-    per_member: ClassVar[bool] = False
     spectrum = Ripple(amplitude=0.0, wavelength=1.0)
     amplitude = Constant()
     paid_by_adhesion = 1.0
@@ -181,8 +181,6 @@ class Uniform(ShearModel):
 @keyed()
 class Mean(ShearModel):
     """The ensemble mean of ΔΓ on the infinite plane, in closed form. Limit: uniform as rms -> 0."""
-
-    per_member: ClassVar[bool] = False
 
     spectrum: Spectrum
     amplitude: Amplitude = Field(default_factory=Constant)
@@ -224,7 +222,7 @@ class _Fluctuating(ShearModel):
     contact: Contact = "plane"
 
     @property
-    def per_member(self) -> bool:
+    def per_member(self) -> bool:  # type: ignore[override]
         return self.mode_amplitudes == "gaussian"  # fixed ones give all members one ΔΓ
 
     @property
@@ -414,7 +412,6 @@ class Carried(ShearModel):
     the sphere, without an end that meets its beginning.
     """
 
-    per_member: ClassVar[bool] = False
     draws_maps: ClassVar[bool] = True
     measured: ClassVar[bool] = True
 

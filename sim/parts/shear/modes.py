@@ -268,7 +268,7 @@ class ModalProcess(Renewing):
 
     def _renew(self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise) -> Array:
         energy = np.empty((len(keep), len(values)))
-        renew_modes(values, keep, renew, size, self.weights, *noise.at(step), 0, energy)
+        renew_modes(values, keep, renew, size, self.weights, *noise.at(step), energy)
         return energy
 
     def _standard(self, state: Fluctuation) -> tuple[Array, Array]:
@@ -355,27 +355,27 @@ class FixedProcess(ModalProcess):
 
 @kernel(
     "void(float64[:,:,::1], float64[:,:,:], float64[:,:,:], float64[:,:], float64[::1],"
-    " uint64, uint64, uint64[::1], int64, int64, float64[:,::1])"
+    " uint64, uint64, uint64[::1], int64, float64[:,::1])"
 )
-def renew_modes(values, keep, renew, size, weights, seed, part, members, step, row, energy):
+def renew_modes(values, keep, renew, size, weights, seed, part, members, step, energy):
     """Advance all modes of all members in place by Ornstein-Uhlenbeck steps, and write the energy after each step.
 
-    The amplitudes of a member are in two rows from ``row`` on, which is also the lane of their numbers.
+    The amplitudes of a member are in its first two rows.
     """
     many = keep.shape[2] > 1
     for m in range(members.size):
         step_row = m if keep.shape[1] > 1 else 0
         for s in range(len(keep)):
-            numbers = stream(seed, part, members[m], step + s, row)
+            numbers = stream(seed, part, members[m], step + s, 0)
             total, unit = 0.0, size[s, m if size.shape[1] > 1 else 0]
             for k in range(weights.size):
                 first, numbers = normal(numbers)
                 second, numbers = normal(numbers)
                 i = k if many else 0
                 keeping, kick = keep[s, step_row, i], renew[s, step_row, i] * unit
-                x = keeping * values[m, row, k] + kick * first
-                y = keeping * values[m, row + 1, k] + kick * second
-                values[m, row, k], values[m, row + 1, k] = x, y
+                x = keeping * values[m, 0, k] + kick * first
+                y = keeping * values[m, 1, k] + kick * second
+                values[m, 0, k], values[m, 1, k] = x, y
                 total += weights[k] * (x * x + y * y)
             energy[s, m] = total
 
@@ -428,7 +428,7 @@ class SiteModes(ModalProcess):
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         parts, sizes = np.zeros((len(noise.members), 4, self.pairs)), _sizes(bonding)
         whole, energy = (np.zeros((1, 1, 1)), np.ones((1, 1, 1))), np.empty((1, len(parts)))
-        renew_modes(parts, *whole, np.ones((1, 1)), self.weights, *noise.at(motion.step), 0, energy)
+        renew_modes(parts, *whole, np.ones((1, 1)), self.weights, *noise.at(motion.step), energy)
         _renew_sites(parts, *whole, sizes, self.weights, *noise.at(motion.step), energy)
         return Fluctuation(energy[0], sizes[:, 0].T, parts, expected=energy[0])
 

@@ -31,6 +31,8 @@ class _OfTheMoment:
 
     #: True if the amplitude depends on earlier sliding.
     remembers: ClassVar[bool] = False
+    #: True if the amplitude depends on the shear stress.
+    reads_stress: ClassVar[bool] = False
 
     def within(self, length: float) -> Self:
         """Return the law in a field with this correlation length [m]."""
@@ -60,7 +62,6 @@ class _OfTheMoment:
 class Constant(_OfTheMoment):
     """The fluctuations have the spectrum's rms at every speed: g = 1."""
 
-    reads_stress: ClassVar[bool] = False
     relaxing: ClassVar[bool] = False
 
     model: Literal["constant"] = "constant"
@@ -77,8 +78,6 @@ class Onset(_OfTheMoment):
     With ``relaxing`` only the part that the correlation renews has the new size; otherwise the whole field scales
     at once.
     """
-
-    reads_stress: ClassVar[bool] = False
 
     speed: Annotated[float, Quantity("m/s", "speed at the onset of the fluctuations", "V_0", above=0)]
     width: Annotated[float, Quantity("1", "width of the onset in the logarithm of speed", "b", above=0)]
@@ -127,7 +126,6 @@ class SlipRate(_OfTheMoment):
     integrates the memory in its sub-steps instead.
     """
 
-    reads_stress: ClassVar[bool] = False
     remembers: ClassVar[bool] = True
 
     memory_length: _Memory | None = None

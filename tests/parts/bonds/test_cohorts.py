@@ -11,7 +11,7 @@ from scipy.special import lambertw
 
 from sim.laws.schallamach import bell_moments, cut_off_moments
 from sim.parts.bonds import cohorts as populations
-from sim.parts.bonds.cohorts import empty, resting, steady
+from sim.parts.bonds.cohorts import steady, unstretched
 from sim.parts.bonds.rupture import RuptureRate
 
 BELL = RuptureRate(rate=1.0, softness=1.0, limit=math.inf)
@@ -22,8 +22,8 @@ def moments(cohorts):
     return populations.moments(cohorts, RuptureRate(0.0, 0.0, math.inf), 1e-4)[:3, 0]
 
 
-def advance(cohorts, slip, duration, *recipe, **more):
-    return populations.advance(cohorts, slip[np.newaxis], np.array([duration]), *recipe, **more)[0]
+def advance(cohorts, slip, duration, *recipe, share=1.0):
+    return populations.advance(cohorts, slip[np.newaxis], np.array([duration]), *recipe, np.full(1, share))[0]
 
 
 def march(cohorts, speeds, duration, rupture, rebinding, tolerance, **more):
@@ -53,7 +53,7 @@ def test_the_steady_state_has_the_moments_of_renewal_theory_and_marching_from_re
     for beta, eps in product([0.01, 1.0, 1000.0], [1e-3, 1e-2, 0.1, 1.0, 10.0, 1e2, 1e4]):
         # a start-up of Bell bonds rings down like a renewal process: 40 lives are enough below 1e-6 where CV > 0.15
         duration, exact = life_of(eps) * 0.23, bell_moments(eps, 1.0, 1.0, 1.0, beta)
-        out, _ = march(resting(BELL, beta, 1e-4), [eps] * 174, duration, BELL, beta, 1e-4)
+        out, _ = march(steady(BELL, beta, 0.0, 1e-4), [eps] * 174, duration, BELL, beta, 1e-4)
         assert_allclose(out[-1], exact, rtol=1e-4, atol=0)
 
 
@@ -61,7 +61,7 @@ def test_start_up_peak_without_rebinding_is_the_lambert_formula():
     for eps in [1.0, 10.0, 100.0, 1e4]:
         w = lambertw(eps).real
         peak, time = 0.5 * w * math.exp(1.0 / eps - 1.0 / w), w / eps
-        start = resting(BELL, 1.0, 1e-4)
+        start = steady(BELL, 1.0, 0.0, 1e-4)
         many, _ = march(start, [eps] * 400, time / 200, BELL, 0.0, 1e-4)
         assert_allclose(many[199, 1], peak, rtol=1e-12, atol=0)  # no births: survival is exact
         assert np.argmax(many[:, 1]) == 199
@@ -71,7 +71,7 @@ def test_start_up_peak_without_rebinding_is_the_lambert_formula():
 def test_constant_rupture_follows_the_exact_moments_and_births_are_third_order():
     for tolerance in [1e-3, 1e-5, 1e-7]:
         # a step h errs by h^3/72 of the moments, h = (7 tolerance)^(1/3): a tenth of the tolerance
-        out, last = march(resting(CONSTANT, 2.0, tolerance), [0.7] * 20, 0.25, CONSTANT, 2.0, tolerance)
+        out, last = march(steady(CONSTANT, 2.0, 0.0, tolerance), [0.7] * 20, 0.25, CONSTANT, 2.0, tolerance)
         time = 0.25 * np.arange(1.0, 21.0)
         second = 2.0 * 0.7**2 * (1.0 - np.exp(-time) * (1.0 + time))
         exact = 2.0 / 3.0 * np.array([np.ones(20), 0.7 * -np.expm1(-time), second])
@@ -80,7 +80,7 @@ def test_constant_rupture_follows_the_exact_moments_and_births_are_third_order()
     beta, speed, end, errors = 2.0, 0.7, 1.0, []
     number = beta / (1.0 + beta) * (1.0 - math.exp(-(1.0 + beta) * end))  # from no bond at all
     for steps in (4, 8, 16, 32, 512):
-        out, _ = march(empty(CONSTANT, 0.1), [speed], end, CONSTANT, beta, 0.1, largest=1.0001 * end / steps)
+        out, _ = march(unstretched(CONSTANT, 0.1, 0.0), [speed] * steps, end / steps, CONSTANT, beta, 0.1)
         errors.append(abs(out[-1, 0] / number - 1.0))
     assert np.all(np.log2(np.divide(errors[:3], errors[1:4])) > 2.5)
     assert errors[-1] < 1e-9
@@ -95,7 +95,7 @@ def test_cut_off_bonds_slide_by_their_closed_form_and_without_a_rate_break_at_on
             out, _ = march(start, [u] * 50, 0.11 * min(1.0, 1.0 / u), rupture, 1.0 / m, tolerance)
             assert_allclose(out, np.tile(exact, (50, 1)), rtol=tolerance, atol=0)
     rupture = RuptureRate(rate=0.0, softness=0.0, limit=1.0)
-    start = resting(rupture, 2.0, 1e-4)
+    start = steady(rupture, 2.0, 0.0, 1e-4)
     out, _ = march(start, [1.0] * 30, 0.07, rupture, 2.0, 1e-4)
     time = 0.07 * np.arange(1, 31)
     assert_allclose(out[time < 1.0, :2], np.stack([np.ones(14), time[:14]], 1), rtol=1e-12, atol=0)
@@ -130,7 +130,7 @@ def test_jumps_of_speed_and_any_clock_step_keep_the_number_and_the_steady_state(
 
 
 def test_ageing_at_rest_is_an_exponential_dilution_frees_sites_and_no_duration_only_stretches():
-    out, _ = march(empty(BELL, 1e-5), [0.0] * 40, 0.1, BELL, 2.0, 1e-5)
+    out, _ = march(unstretched(BELL, 1e-5, 0.0), [0.0] * 40, 0.1, BELL, 2.0, 1e-5)
     time = 0.1 * np.arange(1, 41)
     assert_allclose(out[:, 0], 2.0 / 3.0 * -np.expm1(-3.0 * time), rtol=1e-5, atol=0)
     assert np.all(out[:, 1:] == 0.0)
@@ -138,7 +138,7 @@ def test_ageing_at_rest_is_an_exponential_dilution_frees_sites_and_no_duration_o
     moved = advance(start, np.array([0.5]), 0.0, BELL, 1.0, 1e-4)
     number, first, second = moments(start)
     assert_allclose(moments(moved), [number, first + 0.5 * number, second + first + 0.25 * number], rtol=1e-14, atol=0)
-    out, _ = march(resting(BELL, 1.0, 1e-4), [0.0], 1.0, BELL, 1.0, 1e-4, share=np.array([0.5]))
+    out, _ = march(steady(BELL, 1.0, 0.0, 1e-4), [0.0], 1.0, BELL, 1.0, 1e-4, share=0.5)
     assert_allclose(out[0, 0], 0.5 - 0.25 * math.exp(-2.0), rtol=1e-4, atol=0)
 
 
@@ -168,13 +168,13 @@ def test_any_rates_and_slips_give_shares_between_zero_and_one(exponents, kind, s
 def test_steps_of_extreme_length_have_their_limits():
     for fast, bind in product([1e-9, 1e9], [1e-9, 1e9]):
         rupture = RuptureRate(fast, 1.0, math.inf)
-        result = advance(empty(rupture, 1e-4), np.array([1.0]), 1.0, rupture, bind, 1e-4).weight.sum()
+        result = advance(unstretched(rupture, 1e-4, 0.0), np.array([1.0]), 1.0, rupture, bind, 1e-4).weight.sum()
         assert_allclose(result, -math.expm1(-bind) if fast < 1.0 else bind / (bind + fast), rtol=1e-4, atol=0)
 
 
 def test_cohorts_stay_few_for_ever_and_merging_keeps_four_moments():
     tolerance, rng = 1e-3, np.random.default_rng(4)
-    state = resting(BELL, 1.0, tolerance)
+    state = steady(BELL, 1.0, 0.0, tolerance)
     capacity, most = state.weight.shape[1], 0
     for speed in rng.choice([0.1, 3.0, 30.0, -10.0], 40).repeat(250):
         state = advance(state, np.array([speed * 0.01]), 0.01, BELL, 1.0, tolerance)
@@ -183,7 +183,7 @@ def test_cohorts_stay_few_for_ever_and_merging_keeps_four_moments():
     assert state.weight.shape[1] == capacity
     # without rupture to speak of nothing breaks; every birth is where it was made but for merging
     slow = RuptureRate(1e-12, 1.0, math.inf)
-    state = empty(slow, 1e-2)
+    state = unstretched(slow, 1e-2, 0.0)
     for _ in range(300):
         state = advance(state, np.array([0.01]), 0.01, slow, 1e-3, 1e-2)
     x, w = state.stretch[0], state.weight[0]
