@@ -20,6 +20,7 @@ from PIL import Image
 import sim
 from sim import analysis, laws
 from sim.analysis import concise, distribution, shares, statistics
+from sim.analysis.events import incipient_law
 from sim.study.fit import Fit, figure as fitted
 from sim.study.likelihood import LEVEL
 
@@ -397,10 +398,12 @@ def velocity_step(dataset: xr.Dataset) -> dict[str, Number]:
     force, stage = (dataset[name].isel(member=0).to_numpy() for name in ("friction_force", "stage_speed"))
     up, down = (int(place) + 1 for place in np.flatnonzero(np.diff(stage))[[0, -1]])
     top = up + int(np.argmax(force[up:down]))
+    position, settled = 1e6 * dataset["slider_position"].isel(member=0).to_numpy(), force[down - 1]
+    left = up + int(np.flatnonzero(np.abs(force[up:down] - settled) > (force[top] - settled) / np.e)[-1]) + 1
     return {"slow": 1e3 * float(stage[0]), "fast": 1e3 * float(stage[up]), "before": 1e3 * float(force[0]),
             "peak": 1e3 * float(force[top]), "settled": 1e3 * float(force[down - 1]),
             "after": 1e3 * float(dataset["t"][top] - dataset["t"][up - 1]),
-            "length": 1e6 * analysis.events(dataset)["step_length"].item(),
+            "length": float(position[left] - position[up - 1]),
             "last": 1e3 * float(force[down:].min())}  # fmt: skip
 
 
@@ -453,7 +456,8 @@ def creep(dataset: xr.Dataset) -> dict[str, Number]:
 def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
     pulls, load = analysis.events(dataset).isel(member=0), 1e3 * dataset["contact_load"].to_numpy()
     lost, area = 100.0 * (1.0 - pulls["area_at_threshold"].to_numpy()), dataset["contact_area"].isel(member=0, t=0)
-    power = np.polyfit(np.log(area), np.log(pulls["incipient_alpha"]), 1)[0]
+    curves = zip(*(dataset[name].isel(member=0).to_numpy() for name in ("spring_force", "contact_area")), strict=True)
+    power = np.polyfit(np.log(area), np.log([incipient_law(*curve)[1] for curve in curves]), 1)[0]
     return {"small": float(lost[0]), "least": float(load[0]), "large": float(lost[-1]), "load": float(load[-1]),
             "power": float(power)}  # fmt: skip
 

@@ -208,7 +208,8 @@ def _tables(dataset: Any, most: int = _ROWS, lost: tuple[str, ...] = ()) -> tupl
 
     stated = analysis.tables.stated(dataset, lost)
     rows, once = analysis.table(dataset, most, stated), analysis.highlights(dataset, most, stated)
-    further = analysis.losses(dataset, most, stated), analysis.spread(dataset, stated)
+    further = [of(dataset, most, stated) for of in (analysis.losses, analysis.phases)]
+    further.append(analysis.spread(dataset, stated))
     return [shown for shown in (rows, once, *further) if shown], analysis.notes(dataset, rows, once, stated)
 
 

@@ -9,7 +9,7 @@ peak); ``summary`` turns both into statistics over the members.
 from sim.analysis.dataset import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
 from sim.analysis.errors import SystematicError, remarks, systematic_errors
 from sim.analysis.events import events, loop_energy, peaks, pull_offs, slip_sizes, slips, slips_by_phase, stick_slip
-from sim.analysis.lifetimes import Lifetime, first_passage, lifetime
+from sim.analysis.lifetimes import Lifetime, lifetime
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
 from sim.analysis.over_speed import crossing, extremes, loss_speeds, speed_curves, steady_speeds
 from sim.analysis.statements import Statement, each, relaxation, statements
@@ -22,21 +22,20 @@ from sim.analysis.statistics import (
     integral_time,
     over_time,
     shares,
-    skewness_error,
     statistics,
     summary,
     where,
 )
-from sim.analysis.tables import highlights, in_columns, losses, notes, spread, table, tidy, to_csv
+from sim.analysis.tables import highlights, in_columns, losses, notes, phases, spread, table, tidy, to_csv
 from sim.units.notation import concise, engineering, scaled
 
 __all__ = [
     "QUANTILES", "Control", "IntegralTime", "Lifetime", "Statement", "SystematicError", "averaging", "bond_work",
     "concise", "control", "correlation_time", "crossing", "distribution", "each", "engineering", "events", "extremes",
-    "first_passage", "highlights", "in_columns", "integral_time", "is_stationary", "is_steady", "lifetime",
-    "loop_energy", "loss_speeds", "losses", "notes", "observables", "over_time", "peaks", "pull_offs",
+    "highlights", "in_columns", "integral_time", "is_stationary", "is_steady", "lifetime",
+    "loop_energy", "loss_speeds", "losses", "notes", "observables", "over_time", "peaks", "phases", "pull_offs",
     "reference_radii", "relaxation", "remarks", "scaled", "setting", "settled", "share_observables", "shares",
-    "skewness_error", "slip_sizes", "slips", "slips_by_phase", "speed_curves", "spread", "statements", "statistics",
+    "slip_sizes", "slips", "slips_by_phase", "speed_curves", "spread", "statements", "statistics",
     "steady_speeds", "stick_slip", "summary", "sweep_dims", "systematic_errors", "table", "tidy", "to_csv", "where",
 ]  # fmt: skip
 

@@ -321,11 +321,6 @@ def _label(dataset: xr.Dataset, key: str) -> xr.DataArray | None:
     return dataset[name] if swept else None
 
 
-def may_stop(dataset: xr.Dataset) -> bool:
-    """Return True if trajectories may stop at a pull-off, nan from there on."""
-    return bool((word(dataset, "contact.after_pull_off", "stop") == "stop").any())
-
-
 class Control(NamedTuple):
     """Control of the contact: ``kind`` is ``"load"``, ``"indentation"`` or ``"displacement"``.
 

@@ -2,15 +2,15 @@
 
 import contextlib
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from scipy import special
 
-from sim.analysis.dataset import MEMBERS, plain, setting, speed_of, sweep_dims, word
+from sim.analysis.dataset import MEMBERS, plain, setting, speed_of, word
 from sim.analysis.observables import labelled
-from sim.analysis.statistics import LEVEL, observable_of, rows_of
+from sim.analysis.statistics import LEVEL, observable_of
 from sim.units.notation import engineering
 
 #: Quantities whose peak is stated, with the beginnings of the names of its time and speed.
@@ -19,6 +19,8 @@ _PEAKS = {"peak_stress": ("shear_stress", "peak"), "peak_friction": ("friction_f
 _CHANCE, _RESAMPLED, _AFTER = 0.01, 200, 8
 #: Standard errors by which estimates of a peak over different numbers of records may differ.
 _ALIKE = 2.0
+#: Dimensions of a quantity of each member.
+_EACH = [MEMBERS, "t"]
 #: Records that a peak needs: an eighth of them are its end.
 _FEWEST = 8
 
@@ -132,35 +134,33 @@ def ensemble_peaks(dataset: xr.Dataset) -> xr.Dataset:
     rest = xr.DataArray(0.0)
     with contextlib.suppress(KeyError):
         rest = setting(dataset, "drive.rest").where(drive == "start", 0.0)
-    sweep, dims, times = xr.full_like(dataset["contact_modulus"], np.nan, float), sweep_dims(dataset), dataset["t"]
-    onset = (times >= rest - 1e-6 * times[-1]).argmax("t").broadcast_like(sweep).transpose(*dims).to_numpy()
-    speeds = abs(speed_of(dataset)).broadcast_like(sweep).transpose(*dims, "t").to_numpy()
+    times, sweep = dataset["t"], xr.zeros_like(dataset["contact_modulus"], float)
+    onset, speeds = (times >= rest - 1e-6 * times[-1]).argmax("t"), abs(speed_of(dataset)) + sweep
     for name, (source, prefix) in _PEAKS.items():
-        if f"{source}_mean" not in dataset and MEMBERS not in dataset.get(source, drive).dims:
+        is_recorded = source in dataset
+        if f"{source}_mean" not in dataset and not (is_recorded and MEMBERS in dataset[source].dims):
             continue
-        text, is_known = f"peak of the mean of the {source.replace('_', ' ')}", source in dataset
-        unit = dataset[source if is_known else f"{source}_mean"].attrs.get("units", "1")
-        values = rows_of(observable_of(dataset, source), sweep) if is_known else np.full((*sweep.shape, 1, 1), np.nan)
-        numbers, reasons = np.full((10, *sweep.shape), np.nan), np.empty(sweep.shape, object)
-        for point in np.ndindex(*sweep.shape):
-            first = int(onset[point])
-            known, since = np.abs(values[point][:, first:]), times.to_numpy()[first:] - float(times[first])
-            known = known[np.isfinite(known).all(axis=-1)]
-            peak = Peak("a peak of members with noise needs each of them: [record] per_member = true")
-            if is_known:
-                is_enough = len(known) > 1 and known.shape[1] >= _FEWEST
-                peak = peak_of_mean(known, since, unit) if is_enough else Peak("too few records or members")
-                numbers[:, *point] = *peak[1:], *np.interp(peak[-3:], since, speeds[point][first:])
-            reasons[point] = peak.reason
-        ends = ("mean", "low", "high")
-        keys = [f"{name}_{kind}" for kind in ("mean", "sem", "low", "high")]
-        keys += [f"{prefix}_{of}_{end}" for of in ("time", "speed") for end in ends]
-        units = (
-            4 * [(unit, text)] + 3 * [("s", f"time of sliding to the {text}")] + 3 * [("m/s", f"speed at the {text}")]
-        )
-        for key, about, column in zip(keys, units, numbers, strict=True):
-            result[key] = labelled(sweep.copy(data=column), *about)
-        result[f"{name}_reason"] = xr.DataArray(
-            reasons, sweep.coords, dims, attrs={"long_name": f"reason for no {text}"}
-        )
+        unit = dataset[source if is_recorded else f"{source}_mean"].attrs.get("units", "1")
+        values = observable_of(dataset, source) if is_recorded else xr.DataArray(np.empty((0, times.size)), dims=_EACH)
+        how: Any = {"input_core_dims": [_EACH, ["t"], [], ["t"]], "output_core_dims": [[]] * 11, "vectorize": True}
+        how |= {"output_dtypes": [object, *"dddddddddd"], "kwargs": {"unit": unit}}
+        reason, *numbers = xr.apply_ufunc(_peak_since, values, speeds, onset, times, **how)
+        text = f"peak of the mean of the {source.replace('_', ' ')}"
+        described: dict[str, Any] = {f"{name}_{kind}": (unit, text) for kind in ("mean", "sem", "low", "high")}
+        for of, *about in (("time", "s", f"time of sliding to the {text}"), ("speed", "m/s", f"speed at the {text}")):
+            described |= {f"{prefix}_{of}_{end}": about for end in ("mean", "low", "high")}
+        for (key, about), column in zip(described.items(), numbers, strict=True):
+            result[key] = labelled(column, *about)
+        result[f"{name}_reason"] = reason.drop_attrs(deep=False).assign_attrs(long_name=f"reason for no {text}")
     return result
+
+
+def _peak_since(values: np.ndarray, speeds: np.ndarray, first: int, times: np.ndarray, unit: str) -> tuple[Any, ...]:
+    """Return the fields of the ``Peak`` of the members after a record, and the speed at its time and interval."""
+    if not len(values):
+        return *Peak("a peak of members with noise needs each of them: [record] per_member = true"), *[math.nan] * 3
+    known, since = np.abs(values[:, first:]), times[first:] - times[first]
+    known = known[np.isfinite(known).all(axis=-1)]
+    is_enough = len(known) > 1 and known.shape[1] >= _FEWEST
+    peak = peak_of_mean(known, since, unit) if is_enough else Peak("too few records or members")
+    return *peak, *np.interp(peak[-3:], since, speeds[first:])

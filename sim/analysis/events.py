@@ -1,7 +1,6 @@
-"""Events of a run: slips, jumps of the speed, onset of sliding, detachment, masking, friction peaks, cycles."""
+"""Events of a run: slips, onset of sliding, detachment, masking, friction peaks, cycles."""
 
 import contextlib
-import math
 from typing import Any
 
 import numpy as np
@@ -11,38 +10,20 @@ from sim.analysis.dataset import (
     MEMBERS,
     answered,
     control,
+    has_noise,
     in_pieces,
     is_stationary,
     plain,
     setting,
-    speed_name,
-    speed_of,
     stays_held,
     sweep_dims,
     where_recorded,
     with_trajectories,
     word,
 )
-from sim.analysis.observables import labelled, pure
+from sim.analysis.observables import ENDINGS, labelled, pure
 from sim.units.notation import SLIP_EVENT
 
-#: Speeds of a stage that gets faster or slower between which slips follow each other.
-_ENDS = {
-    "slips_from": "lowest speed of the stage, as it gets faster, at which a slip begins that another one follows",
-    "slips_down_to": "lowest speed of the stage, as it gets slower, at which a slip begins that follows another one",
-}
-#: Properties of each slip: unit and meaning.
-_SLIPS = {
-    "slip_time": ("s", "time at which a slip begins"),
-    "slip_duration": ("s", "time from the beginning of a slip to its end"),
-    "stick_duration": ("s", "time from the end of a slip to the beginning of the next"),
-    "recurrence_time": ("s", "time from the beginning of a slip to that of the next"),
-    "slip_amplitude": ("m", "displacement of the slider in a slip"),
-    "slip_speed": ("m/s", "speed of the stage at which a slip begins"),
-    "static_friction": ("N", "force of the spring at which a slip begins"),
-    "force_drop": ("N", "fall of the spring's force in a slip"),
-    "stress_drop": ("Pa", "fall of the shear stress in a slip"),
-}
 #: Relative changes below it are rounding.
 _ROUNDING = 1e-9
 #: Properties of slip events and the quantities of late ones of which the engine records moments.
@@ -52,8 +33,6 @@ _LATE = {
 }  # fmt: skip
 #: Half of a 95 % interval of a normal law in standard errors.
 _WIDE = 1.96
-#: Endings of the names of values of each member, and of statistics.
-_ENDINGS = ("", "_mean", "_std", "_sem")
 
 
 def slips(dataset: xr.Dataset) -> xr.Dataset:
@@ -88,14 +67,20 @@ def slips(dataset: xr.Dataset) -> xr.Dataset:
     if not bool((word(dataset, "drive.model", "") == "spring").any()):
         raise ValueError('slips need a stage that pulls through a spring: [drive] model = "spring"')
     event = {name: dataset[f"slip_{name}"].astype(float) for name in SLIP_EVENT}
-    begins, following = event["time"], event["time"].shift(slip=-1)
-    values = {
-        "slip_time": begins, "slip_duration": event["end"] - begins, "stick_duration": following - event["end"],
-        "recurrence_time": following - begins, "slip_amplitude": event["amplitude"], "slip_speed": event["speed"],
-        "static_friction": event["force_before"], "force_drop": event["force_before"] - event["force_after"],
-        "stress_drop": event["stress_before"] - event["stress_after"],
-    }  # fmt: skip
-    result = xr.Dataset({name: labelled(values[name], *described) for name, described in _SLIPS.items()})
+    begins, ends, following = event["time"], event["end"], event["time"].shift(slip=-1)
+    drop, fall = event["force_before"] - event["force_after"], event["stress_before"] - event["stress_after"]
+    columns = {
+        "slip_time": (begins, "s", "time at which a slip begins"),
+        "slip_duration": (ends - begins, "s", "time from the beginning of a slip to its end"),
+        "stick_duration": (following - ends, "s", "time from the end of a slip to the beginning of the next"),
+        "recurrence_time": (following - begins, "s", "time from the beginning of a slip to that of the next"),
+        "slip_amplitude": (event["amplitude"], "m", "displacement of the slider in a slip"),
+        "slip_speed": (event["speed"], "m/s", "speed of the stage at which a slip begins"),
+        "static_friction": (event["force_before"], "N", "force of the spring at which a slip begins"),
+        "force_drop": (drop, "N", "fall of the spring's force in a slip"),
+        "stress_drop": (fall, "Pa", "fall of the shear stress in a slip"),
+    }
+    result = xr.Dataset({name: labelled(*column) for name, column in columns.items()})
     return result.transpose(..., "slip")
 
 
@@ -128,7 +113,7 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     late = {"slip_count": "slip_count_late", "kinetic_friction": "kinetic_friction"}
     late |= {name: f"late_{quantity}_mean" for name, quantity in _LATE.items()}
     late |= {f"{name}_{kind}": f"late_{of}_{kind}" for name, of in _LATE.items() for kind in ("least", "largest")}
-    named = {name + ending: source + ending for ending in _ENDINGS for name, source in late.items()}
+    named = {name + ending: source + ending for ending in ENDINGS for name, source in late.items()}
     result = xr.Dataset({name: dataset[source].astype(float) for name, source in named.items() if source in dataset})
     if "slip_time" not in dataset or not result:
         return result
@@ -161,7 +146,8 @@ def slips_by_phase(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         With the dimension ``phase`` last: ``slip_count``, the means ``static_friction``, ``force_drop`` [N],
         ``slip_amplitude`` [m] and ``recurrence_time`` [s], and the ``first_friction`` [N] at which the first slip
-        event of a phase begins: after a hold the peak, with the time for which it was held before, ``time_held`` [s].
+        event of a phase begins: after a hold the peak, with the time for which it was held before, ``time_held`` [s];
+        and the ``start`` [s] of the phase.
     """
     each, start, end = slips(dataset), dataset["phase_start"], dataset["phase_end"]
     inside = (each["slip_time"] >= start) & (each["slip_time"] < end)
@@ -172,6 +158,7 @@ def slips_by_phase(dataset: xr.Dataset) -> xr.Dataset:
     result["first_friction"] = labelled(first, "N", "spring force at which the first slip event of a phase begins")
     held = (end - start).where(dataset["phase_name"].str.contains("rest")).shift(phase=1)
     result["time_held"] = labelled(held, "s", "time for which the stage rested before a phase")
+    result["start"] = labelled(start, "s", "start of a phase")
     return result.drop_vars("slip", errors="ignore").transpose(..., "phase")
 
 
@@ -180,11 +167,13 @@ def _between_speeds(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
     turn, each_slip = abs(dataset["stage_speed"]).idxmax("t"), slips(dataset)
     if "phase_name" in dataset:
         turn = dataset["phase_end"].where(dataset["phase_name"].str.contains("increasing")).max("phase").fillna(0.0)
-    later, before = each_slip["recurrence_time"].notnull(), each_slip["slip_time"] <= turn
-    chosen = later & before, later.shift(slip=1, fill_value=False) & ~before & each_slip["slip_time"].notnull()
+    speed, time, later = each_slip["slip_speed"], each_slip["slip_time"], each_slip["recurrence_time"].notnull()
+    after_another = later.shift(slip=1, fill_value=False) & (time > turn)
+    begins = "lowest speed of the stage, as it gets {}, at which a slip begins that {}".format
+    up, down = begins("faster", "another one follows"), begins("slower", "follows another one")
     return {
-        name: labelled(each_slip["slip_speed"].where(which).min("slip"), "m/s", text)
-        for (name, text), which in zip(_ENDS.items(), chosen, strict=True)
+        "slips_from": labelled(speed.where(later & (time <= turn)).min("slip"), "m/s", up),
+        "slips_down_to": labelled(speed.where(after_another).min("slip"), "m/s", down),
     }
 
 
@@ -256,30 +245,15 @@ def _growth(series: xr.DataArray, times: xr.DataArray, ends: xr.DataArray) -> xr
     return xr.apply_ufunc(np.interp, ends, times, series.astype(float), **dims).where(ends.notnull()).diff("end")
 
 
-# --- jumps of the speed, and the way to sliding ---
+# --- readings of records, for figures ---
 
 
 #: A speed jumps between two records if it changes by more than this many times what it does before and after.
 _JUMP = 4.0
-#: A force begins at zero if it is below this share of its largest.
-_REST = 0.01
 #: Fall of a force over its largest so far with which it has passed its first maximum.
 _FALL = 0.02
-#: Records from which on an event is read off them.
-_FEWEST = 16
 #: Share of the largest force up to which the law of incipient shear is fitted.
 _FITTED = 0.5
-_STEP = {
-    "direct_effect": ("N", "rise of friction after the first jump of the speed to a higher one"),
-    "step_overshoot": ("N", "largest friction after the first jump of the speed over the level at which it settles"),
-    "step_length": ("m", "sliding distance after a jump until friction stays within 1/e of the overshoot of its level"),
-}
-_PULL = {
-    "static_threshold": ("N", "largest force on the way to sliding"),
-    "area_at_threshold": ("1", "contact area at the static threshold over that at rest"),
-    "area_by_law": ("1", "what A0 - alpha Q^2 gives of the area at rest there, fitted up to half of that force"),
-    "incipient_alpha": ("m^2/N^2", "coefficient alpha of A0 - alpha Q^2"),
-}
 
 
 def jumps(speed: np.ndarray, turns: bool = False) -> np.ndarray:
@@ -296,90 +270,6 @@ def jumps(speed: np.ndarray, turns: bool = False) -> np.ndarray:
     jumped = np.append(False, change[1:-1] > _JUMP * np.maximum(change[:-2], change[2:]))
     turned = (speed[1:] * speed[:-1] < 0.0) & turns
     return np.flatnonzero(np.pad(jumped, (0, change.size - jumped.size)) | turned) + 1
-
-
-def speed_step(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the answer of friction to the first jump to a higher prescribed speed, of each member.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``direct_effect`` [N], the rise of friction from before the jump to its largest value before the next one;
-        ``step_overshoot`` [N] of that over the mean of the second half of this time; ``step_length`` [m], how far the
-        slider goes from the jump until friction stays within 1/e of the overshoot of that mean. nan where friction does
-        not overshoot, or settle in the first half of the time. Empty where no speed is prescribed, or it does not jump.
-    """
-    if bool((word(dataset, "drive.model", "") == "force").any()) or speed_name(dataset) not in dataset:
-        return xr.Dataset()
-    speeds = speed_of(dataset).transpose(..., "t").to_numpy()
-    if not any(_rise(course) for course in speeds.reshape(-1, speeds.shape[-1])):
-        return xr.Dataset()
-    return _of_each(dataset, _STEP, _stepped, speed_name(dataset), "friction_force", "slider_position")
-
-
-def _rise(speed: np.ndarray) -> tuple[int, int] | None:
-    """Return the record at which the speed has first jumped to a higher one, and that of the next jump."""
-    places = [*jumps(speed), len(speed)]
-    rises = [n for n, at in enumerate(places[:-1]) if 0.0 < speed[at - 1] * np.sign(speed[at]) < abs(speed[at])]
-    return (places[rises[0]], places[rises[0] + 1]) if rises else None
-
-
-def _stepped(speed: np.ndarray, force: np.ndarray, position: np.ndarray) -> tuple[float, ...]:
-    """Return the numbers of ``speed_step`` of one trajectory."""
-    unknown = (math.nan,) * len(_STEP)
-    if (place := _rise(speed)) is None:
-        return unknown
-    start, stop = place
-    after = force[start:stop] * np.sign(speed[start])
-    half = len(after) // 2
-    level, most = np.mean(after[half:]), np.max(after)
-    over = most - level
-    if not over > _ROUNDING * abs(level):
-        return unknown
-    beyond = np.abs(after - level) - over / math.e
-    last = int(np.flatnonzero(beyond > 0.0)[-1])
-    if last + 1 >= half:
-        return unknown
-    gone = np.abs(position[start + last : start + last + 2] - position[start - 1])
-    share = beyond[last] / (beyond[last] - beyond[last + 1])
-    return most - force[start - 1] * np.sign(speed[start]), over, gone[0] + share * (gone[1] - gone[0])
-
-
-def way_to_sliding(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the static threshold of a slider that a stage pulls from rest, and the contact area on the way there.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``static_threshold`` [N], the force of the spring before it first falls; ``area_at_threshold`` [1], the contact
-        area there over that at rest; ``area_by_law`` [1], what A0 - alpha Q^2 gives there; ``incipient_alpha``
-        [m^2/N^2], see ``incipient_law``. nan where the force does not fall while the stage is not slowed down, or the
-        area does not. Empty if no stage pulls, or the load or another control of the contact changes its area, too.
-    """
-    if "stage_speed" not in dataset or not bool(stays_held(dataset).all()):
-        return xr.Dataset()
-    return _of_each(dataset, _PULL, _pulled, "stage_speed", "spring_force", "contact_area")
-
-
-def _pulled(speed: np.ndarray, force: np.ndarray, area: np.ndarray) -> tuple[float, ...]:
-    """Return the numbers of ``way_to_sliding`` of one trajectory."""
-    slowed, turned = np.diff(np.abs(speed)) < 0.0, speed[1:] * speed[:-1] < 0.0
-    force = np.abs(force[: 1 + np.argmax(np.append(slowed | turned, True))])
-    top, alpha = incipient_law(force, area)
-    known = force[0] <= _REST * force[top] and np.nanmin(force[top:]) < (1.0 - _ROUNDING) * force[top]
-    if not (known and area[top] < (1.0 - _ROUNDING) * area[0]):
-        return (math.nan,) * len(_PULL)
-    return force[top], area[top] / area[0], 1.0 - alpha * force[top] ** 2 / area[0], alpha
 
 
 def incipient_law(force: np.ndarray, area: np.ndarray) -> tuple[int, float]:
@@ -399,39 +289,15 @@ def incipient_law(force: np.ndarray, area: np.ndarray) -> tuple[int, float]:
     return top, float(alpha)
 
 
-def _of_each(dataset: xr.Dataset, described: dict[str, tuple[str, str]], of: Any, *read: str) -> xr.Dataset:
-    """Apply a function to the trajectories ``read`` of each member; describe its results by units and meanings.
-
-    ``<name>_reading`` is what a result changes at most if the odd or the even records are left out.
-    """
-    dims: Any = {"input_core_dims": [["t"]] * len(read), "output_core_dims": [[]] * len(described), "vectorize": True}
-    if dataset.sizes["t"] < _FEWEST:
-        return xr.Dataset()
-
-    def applied(piece: xr.Dataset) -> xr.Dataset:
-        series = [piece[name].astype(float).broadcast_like(piece[read[-1]]) for name in read]
-        chosen = np.r_[0 : piece.sizes["t"] : 2], np.r_[0, 1 : piece.sizes["t"] : 2]  # both begin with the first record
-        thinner = [[values.isel(t=records) for values in series] for records in chosen]
-        whole, *coarse = (xr.apply_ufunc(of, *values, **dims) for values in (series, *thinner))
-        result = xr.Dataset()
-        for (name, about), values, even, odd in zip(described.items(), whole, *coarse, strict=True):
-            result[name] = labelled(values, *about)
-            result[f"{name}_reading"] = np.fmax(abs(values - even), abs(values - odd))
-        return result
-
-    outer = [name for name in (*sweep_dims(dataset), MEMBERS) if name in dataset[read[-1]].dims]
-    return in_pieces(with_trajectories(dataset, *read), outer, applied)
-
-
 # --- all events of a run, once per member ---
 
 
-#: Energies of a loop, of each member.
-_LOOPS = ("loop_energy", "loop_dissipation")
 #: Records that a cycle needs, and the energies of a cycle of each member.
 _CORNERS, _LOOPS = 4, ("loop_energy", "loop_dissipation")
 #: A loop below this share of what is put in and given back is nothing.
 _NOTHING = 1e-12
+#: A force begins at zero if it is below this share of its largest.
+_REST = 0.01
 #: Names of a peak, the quantity that it is of, and its unit.
 _PEAKS = (("peak_stress", "shear_stress", "Pa"), ("peak_friction", "friction_force", "N"))
 #: Events of openings, closings and masking.
@@ -465,17 +331,20 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
           ``peak_friction_time``, ``peak_friction_speed``: of a start or a ramp; see ``peaks``.
         - ``slip_count``, ``static_friction``, ``kinetic_friction`` [N], ``slip_amplitude`` [m] and more, of a slider
           behind a spring, ``ran_away`` and ``runaway_after`` [s] of one under a force; see ``stick_slip``.
-        - ``direct_effect`` [N], ``step_length`` [m] and more of a jump of the speed; see ``speed_step``.
-        - ``static_threshold`` [N], ``area_at_threshold`` and more of a pull from rest; see ``way_to_sliding``.
+        - ``static_threshold`` [N] and ``area_at_threshold``, of a pull from rest; see ``static_threshold``.
 
         Where only statistics were recorded, those of them that follow, as ``…_mean``.
     """
     dataset = plain(dataset)
-    result = _recorded(dataset).merge(_pulled_off(dataset), compat="no_conflicts")
-    for part in (peaks, stick_slip, speed_step, way_to_sliding):
+    result = dataset[[f"{name}{end}" for name in _SEEN for end in ENDINGS if f"{name}{end}" in dataset]].astype(float)
+    if "first_detachment" in result:
+        result["ever_detached"] = pure(result["first_detachment"].notnull().astype(float), "contacts that detached")
+    result = result.drop_vars(MEMBERS, errors="ignore").reset_coords(drop=True)
+    result = result.merge(_pulled_off(dataset), compat="no_conflicts")
+    for part in (peaks, stick_slip, static_threshold):
         with where_recorded():
             result = result.merge(part(dataset), compat="no_conflicts")
-    for suffix in ("", "_mean", "_std", "_sem"):
+    for suffix in ENDINGS:
         if f"dissipated_energy{suffix}" in dataset:
             lost = dataset[f"dissipated_energy{suffix}"].isel(t=-1, drop=True).astype(float)
             text = "energy dissipated by opening and closing, in all"
@@ -489,15 +358,6 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
                 means[f"{name}_reading"] = abs(means[name] - coarse[name])
             result = result.merge(means, compat="no_conflicts")
     return result
-
-
-def _recorded(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the events that the engine has recorded of openings, closings and masking, and how often the first was."""
-    names = [name + ending for name in _SEEN for ending in _ENDINGS if name + ending in dataset]
-    result = dataset[names].astype(float).drop_vars([MEMBERS], errors="ignore")
-    if "first_detachment" in result:
-        result["ever_detached"] = pure(result["first_detachment"].notnull().astype(float), "contacts that detached")
-    return result.reset_coords(drop=True)
 
 
 def pull_offs(dataset: xr.Dataset) -> xr.Dataset:
@@ -530,8 +390,12 @@ def _pulled_off(dataset: xr.Dataset) -> xr.Dataset:
     if bool((count <= 1).all()):
         return recorded
     several = each[["pull_off_load", "pull_off_displacement"]].mean("phase", keep_attrs=True)
-    several["pull_off_load"].attrs["long_name"] = "mean of the lowest normal loads over the pull-offs of a member"
-    return several.merge(xr.Dataset({"pull_offs": pure(count.astype(float), "number of phases with a pull-off")}))
+    several["pull_offs"] = pure(count.astype(float), "number of phases with a pull-off")
+    text = "of the lowest normal loads over the pull-offs of a member"
+    several["pull_off_load"].attrs["long_name"] = f"mean {text}"
+    several["pull_off_load_least"] = labelled(each["pull_off_load"].min("phase"), "N", f"least {text}")
+    several["pull_off_load_largest"] = labelled(each["pull_off_load"].max("phase"), "N", f"largest {text}")
+    return several
 
 
 def peaks(dataset: xr.Dataset) -> xr.Dataset:
@@ -583,6 +447,38 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
         for key, (values, *about) in described.items():
             result[key] = labelled(values.where(known).drop_vars("phase", errors="ignore"), *about)
     return xr.Dataset(result)
+
+
+def static_threshold(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the largest friction force of a slider that a stage pulls from rest, and the contact area at it.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``static_threshold`` [N] and ``area_at_threshold`` [1], the contact area there over that at rest, both of the
+        clock steps. nan if friction does not begin at zero or is as large at the end, if the course of the stage has
+        several phases, the control of the contact changes, or members differ by noise: see ``slips_by_phase``. Empty if
+        no stage pulls.
+    """
+    if "stage_speed" not in dataset:
+        return xr.Dataset()
+    force = dataset["peak_friction"]
+    first, last = (abs(dataset["friction_force"]).isel(t=record, drop=True) for record in (0, -1))
+    known = stays_held(dataset) & ~has_noise(dataset)
+    known = known & (first <= _REST * force) & (last < (1.0 - _ROUNDING) * force)
+    if "phase_start" in dataset:
+        known = known & (dataset["phase_start"].count("phase") == 1)
+    share = dataset["peak_friction_area"] / dataset["contact_area"].isel(t=0, drop=True)
+    text = "largest friction force on the way to sliding"
+    return xr.Dataset({
+        "static_threshold": labelled(force.where(known), "N", text),
+        "area_at_threshold": pure(share.where(known), f"contact area at the {text} over that at rest"),
+    })  # fmt: skip
 
 
 def loop_energy(dataset: xr.Dataset) -> xr.Dataset:

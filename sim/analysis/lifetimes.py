@@ -1,12 +1,12 @@
-"""Lifetimes of members, of which some are longer than the run: medians, rates, and first passages."""
+"""Lifetimes of members, of which some are longer than the run: medians and rates."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from scipy import special
 
-from sim.analysis.dataset import MEMBERS, in_pieces, is_stationary, with_trajectories
+from sim.analysis.dataset import MEMBERS, is_stationary
 from sim.analysis.observables import labelled
 from sim.analysis.statistics import LEVEL, WIDE
 
@@ -87,40 +87,6 @@ def _halves(watched: np.ndarray, happened: np.ndarray, begins: np.ndarray) -> li
     return halves + [np.nan] * (3 - len(halves))
 
 
-def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
-    """Return the time at which each member first crosses a level from either side [s]; nan if it never does.
-
-    Between two records that lie on both sides of it the time is interpolated; a crossing there and back between two
-    records is not seen.
-
-    Parameters
-    ----------
-    observable : xarray.DataArray
-        With the dimension ``t``, as a variable of a dataset or one of ``observables``.
-    level : float
-        In the unit of the observable.
-    """
-    above = observable.drop_vars("t").reset_coords(drop=True).astype(float) - level
-    side = np.sign(above.isel(t=0))
-    crossed = (above * side <= 0.0) & (side != 0.0)
-    at = crossed.argmax("t")
-    times = observable["t"].drop_vars("t")
-    (before, first), (after, last) = ((above.isel(t=k), times.isel(t=k)) for k in ((at - 1).clip(0), at))
-    share = before / (before - after).where(before != after)
-    passage = (first + share * (last - first)).where(crossed.any("t"))
-    passage = passage.where(side != 0.0, float(times[0]))
-    text = f"time at which the {observable.attrs.get('long_name', observable.name)} first crosses {level:.6g}"
-    return labelled(passage, "s", text)
-
-
-def _first_closed(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the time of the first record at which the contact is closed [s]; nan if it never is."""
-    closed = dataset["contact_radius"] > 0.0
-    return (
-        dataset["t"].isel(t=closed.argmax("t")).drop_vars("t").where(closed.any("t")).to_dataset(name="contact_radius")
-    )
-
-
 def half_lives(dataset: xr.Dataset, event_times: xr.Dataset) -> xr.Dataset:
     """Return median times of first detachment and masking from ``events``, and rates if the run is stationary."""
     result = xr.Dataset()
@@ -138,8 +104,7 @@ def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -
     dataset : xarray.Dataset
         As ``sim run`` writes it.
     times : xarray.DataArray
-        When it first happened in each member [s], nan where it did not: ``events(dataset)["first_detachment"]``, or
-        of ``first_passage``.
+        When it first happened in each member [s], nan where it did not: ``events(dataset)["first_detachment"]``.
     name, words : str
         What the variables are named by, and what has happened: ``"detached"``, ``"detached"``.
 
@@ -147,26 +112,25 @@ def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -
     -------
     xarray.Dataset
         ``half_<name>`` and ``<name>_rate``, with ``…_low`` and ``…_high``; see ``lifetime``. Members that are open from
-        the start count from the record at which they are closed, and never if they are never in contact. Empty where
+        the start count from the time at which they close, and never if they are never in contact. Empty where
         members do not differ.
     """
     if MEMBERS not in times.dims:
         return xr.Dataset()
-    duration, dims = float(dataset["t"][-1] - dataset["t"][0]), [str(name) for name in times.dims if name != MEMBERS]
-    values = (times - float(dataset["t"][0])).transpose(..., MEMBERS).to_numpy()
-    watched, begins = np.full(values.shape, duration), np.zeros(values.shape)
-    if "contact_radius" in dataset and not bool((dataset["contact_radius"].isel(t=0) > 0.0).all()):
-        radius = with_trajectories(dataset, "contact_radius")
-        closed = in_pieces(radius, (*dims, MEMBERS), _first_closed)["contact_radius"].transpose(*dims, MEMBERS)
-        begins = np.maximum(closed.to_numpy() - float(dataset["t"][0]), 0.0)
-    first_member, result = times.isel({MEMBERS: 0}, drop=True), {}
-    estimates = iter(np.vectorize(lifetime, signature="(n),(n),(n)->(),(),(),(),(),()")(values, watched, begins))
+    start, end = (float(dataset["t"][record]) for record in (0, -1))
+    begins = xr.zeros_like(times, float)
+    if {"contact_radius", "first_closing"} <= dataset.keys():
+        closed = dataset["contact_radius"].isel(t=0, drop=True) > 0.0
+        begins = (dataset["first_closing"] - start).where(~closed, 0.0)
+    how: Any = {"input_core_dims": [[MEMBERS]] * 3, "output_core_dims": [[]] * 6, "vectorize": True}
+    watched = xr.full_like(times, end - start, float)
+    estimates = iter(xr.apply_ufunc(lifetime, times - start, watched, begins.broadcast_like(times), **how))
+    result = xr.Dataset()
     for key, unit, text in (
         (f"half_{name}", "s", f"time by which half of the members have {words}"),
         (f"{name}_rate", "1/s", f"rate at which members have {words}"),
     ):
-        for end in ("", "low", "high"):
-            about = f"{end} end of the 95 % interval of the {text}" if end else text
-            numbers = first_member.copy(data=next(estimates))
-            result[f"{key}_{end}" if end else key] = labelled(numbers, unit, about)
-    return xr.Dataset(result)
+        for side in ("", "low", "high"):
+            about = f"{side} end of the 95 % interval of the {text}" if side else text
+            result[f"{key}_{side}" if side else key] = labelled(next(estimates), unit, about)
+    return result

@@ -27,7 +27,7 @@ from sim.units.notation import OF_CONTACT
 
 KEPT = ("mean", "std", "sem")
 #: Endings of a variable of each member, and of those of its recorded statistics.
-_ENDINGS = ("", *(f"_{kind}" for kind in KEPT))
+ENDINGS = ("", *(f"_{kind}" for kind in KEPT))
 
 #: Shares of the area after that lost to bonds, in the order of charging: radius before each, and what it is lost to.
 _LOSSES = {
@@ -232,7 +232,7 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     """
     dataset = plain(dataset)
     result = dataset.drop_vars([n for n, v in dataset.data_vars.items() if "t" not in v.dims])
-    for suffix in _ENDINGS:
+    for suffix in ENDINGS:
         if f"contact_area{suffix}" in result and set(_REFERENCES) <= set(result):
             ratio = result[f"contact_area{suffix}"].astype(float, copy=False) / full_area(dataset)
             result[f"area_ratio{suffix}"] = pure(ratio, "contact area over JKR's", "A/A_JKR")
@@ -287,7 +287,7 @@ def restricted(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset
     sources = {source for name in names for source in _SOURCES.get(name, (name,))} | {*_REFERENCES, "in_contact"}
     if _shares_among(names):
         sources |= {*_SOURCES_OF_SHARES, *(radius for radius, _ in _LOSSES.values())}
-    return with_trajectories(dataset, *(f"{name}{ending}" for name in sources for ending in _ENDINGS))
+    return with_trajectories(dataset, *(f"{name}{ending}" for name in sources for ending in ENDINGS))
 
 
 def chosen_observables(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset:
@@ -300,7 +300,7 @@ def chosen_observables(dataset: xr.Dataset, names: Collection[str] | None) -> xr
         return result.merge(charges(dataset), compat="no_conflicts")
     if _shares_among(names):
         result = result.merge(charges(dataset, names), compat="no_conflicts")
-    wanted = {f"{name}{ending}" for name in names for ending in _ENDINGS}
+    wanted = {f"{name}{ending}" for name in names for ending in ENDINGS}
     return result[[name for name in result if name in wanted]]
 
 

@@ -3,7 +3,7 @@
 import contextlib
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple, get_args
 
 import numpy as np
@@ -40,8 +40,8 @@ from sim.units.errors import BadInput
 from sim.units.notation import engineering
 from sim.units.quantity import read_option
 
-#: Shares of JKR's area whose loss has a speed [%].
-LOSSES = (5, 50)
+#: Shares of JKR's area whose loss has a speed.
+_LOSSES = (0.05, 0.5)
 #: Observables whose curves over the speed are wanted, unless others are named.
 _CURVES = ("contact_area", "friction_force", "shear_stress")
 #: Shares of a loss, in both orders of charging.
@@ -416,9 +416,9 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
     hertz = (radii["radius_hertz"] / radii["radius_jkr"]) ** 2
     if along in hertz.dims:
         hertz = hertz.min(along)
-    left = [(f"at_{100 * k:g}_percent_lost", 1.0 - k + 0.0 * hertz, f"{100 * k:g} % of JKR's") for k in wanted]
+    shares = wanted or _LOSSES
+    left = [(f"at_{100 * k:g}_percent_lost", 1.0 - k + 0.0 * hertz, f"{100 * k:g} % of JKR's") for k in shares]
     if not wanted:
-        left = [(f"at_{k}_percent_lost", 1.0 - 0.01 * k + 0.0 * hertz, f"{k} % of JKR's") for k in LOSSES]
         left.append(("halfway_to_hertz", 0.5 * (1.0 + hertz), "half of what it can, down to Hertz's"))
     least = _least_area(dataset, hertz)
     means, sizes, alone = _group_means(dataset, along, bool(wanted))
@@ -428,49 +428,38 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
     how: Any = {"input_core_dims": [[along], ["group", along], ["group"], [], ["quantity", "group", along]]}
     how |= {"output_core_dims": [[], [], [], [], ["quantity", "end"]], "output_dtypes": [*"dddOd"], "vectorize": True}
     for name, level, loss in left:
-        *ends, reason, others = xr.apply_ufunc(crossing, speed, means["area_ratio"], sizes, level, beside, **how)
-        found, never = ends[0].notnull(), ends[0].isnull() & (level < least)
-        reason = _worded(reason, never, "never: at most {:.3g} % can be lost".format, 100.0 * (1.0 - least))
-        columns = {f"speed_{name}": (ends, "m/s", f"sliding speed at which the mean contact area has lost {loss}")}
-        for key, numbers in zip(means, others.transpose("quantity", "end", ...), strict=True):
-            text = f"{means[key].attrs.get('long_name', '')}, at the speed at which {loss} is lost"
-            columns[f"{key}_{name}"] = list(numbers), "1", text
-        del columns[f"area_ratio_{name}"]
-        if slow := columns.pop(f"steady_speed_{name}", None):
-            steady, text = np.exp(slow[0][0]), f"sliding speed, about, at which steady sliding loses {loss}"
-            for (end, words), values in zip(_ENDS.items(), slow[0], strict=True):
-                result[f"steady_speed_{name}{end}"] = labelled(np.exp(values), "m/s", words + text)
-            result[f"steady_speed_{name}_reason"] = reason
-            lags = abs(np.log(ends[0] / steady)) > np.fmax(0.5 * np.log(ends[2] / ends[1]), _UNSEEN)
-            reason = _worded(reason, lags, _lag, steady)
+        *ends, why, others = xr.apply_ufunc(crossing, speed, means["area_ratio"], sizes, level, beside, **how)
+        is_known, never = ends[0].notnull(), ends[0].isnull() & (level < least)
+        reasons = [why, never, 100.0 * (1.0 - least)]
+        columns = dict(zip(means, others.transpose("quantity", "end", ...), strict=True))
+        columns["area_ratio"] = xr.concat(ends, "end")
+        lag: list[Any] = [math.nan, False]
+        if "steady_speed" in columns:
+            columns["steady_speed"] = np.exp(columns["steady_speed"])
+            lags = abs(np.log(ends[0] / columns["steady_speed"][0])) > np.fmax(0.5 * np.log(ends[2] / ends[1]), _UNSEEN)
             off = abs(means["steady_speed"].isel(group=0) - np.log(speed.where(speed > 0.0))).max(along) > _LATE
-            reason = _worded(reason, off & ~found & ~never, "{}; the course lags".format, reason)
-        reason = _worded(reason, found & alone, _alone, reason)
-        for key, (numbers, unit, text) in columns.items():
+            lag = [columns["steady_speed"][0].where(lags), off & ~is_known]
+        texts = {"area_ratio": ("speed", "m/s", f"sliding speed at which the mean contact area has lost {loss}")}
+        texts["steady_speed"] = "steady_speed", "m/s", f"sliding speed, about, at which steady sliding loses {loss}"
+        for key, numbers in columns.items():
+            text = f"{means[key].attrs.get('long_name', '')}, at the speed at which {loss} is lost"
+            stem, unit, text = texts.get(str(key), (key, "1", text))
             for (end, words), values in zip(_ENDS.items(), numbers, strict=True):
-                known = ~never & ~(found & alone) if end else ~never
-                result[f"{key}{end}"] = labelled(values.where(known), unit, words + text)
-            result[f"{key}_reason"] = reason
+                known = ~never & ~(is_known & alone) if end else ~never
+                result[f"{stem}_{name}{end}"] = labelled(values.where(known), unit, words + text)
+            further = [math.nan, False, False] if key == "steady_speed" else [*lag, is_known & alone]
+            reason = xr.apply_ufunc(_in_words, *reasons, *further, vectorize=True, output_dtypes=[object])
+            result[f"{stem}_{name}_reason"] = reason.drop_attrs(deep=False)
     return result
 
 
-def _lag(steady: float) -> str:
-    return f"lags: near {engineering(float(f'{steady:.3g}'), 'm/s')} in steady sliding"
-
-
-def _alone(reason: str) -> str:
-    return "; ".join(filter(None, [reason, "one member: the error is unknown"]))
-
-
-def _worded(reason: xr.DataArray, chosen: xr.DataArray, words: Callable[[Any], str], value: Any) -> xr.DataArray:
-    """Return reasons, where chosen those that words make of a value."""
-
-    def one(text: str, chosen: bool, value: Any) -> str:
-        return words(value) if chosen else text
-
-    result = xr.apply_ufunc(one, reason, chosen, value, vectorize=True, output_dtypes=[object])
-    result.attrs.clear()
-    return result
+def _in_words(reason: str, never: bool, most: float, steady: float, lags: bool, alone: bool) -> str:
+    """Return the reason why there is no speed or no error, from the largest loss [%] and the ``steady`` speed [m/s]."""
+    if never:
+        return f"never: at most {most:.3g} % can be lost"
+    near = "" if math.isnan(steady) else f"lags: near {engineering(float(f'{steady:.3g}'), 'm/s')} in steady sliding"
+    words = near or reason, "the course lags" if lags else "", "one member: the error is unknown" if alone else ""
+    return "; ".join(filter(None, words))
 
 
 def _group_means(dataset: xr.Dataset, along: str, charged: bool) -> tuple[xr.Dataset, xr.DataArray, bool]:

@@ -9,7 +9,7 @@ import xarray as xr
 
 from sim.analysis.dataset import MEMBERS, is_stationary, plain
 from sim.analysis.ensemble_peaks import ensemble_peaks
-from sim.analysis.events import events
+from sim.analysis.events import events, slips_by_phase
 from sim.analysis.lifetimes import half_lives
 from sim.analysis.over_speed import loss_speeds
 from sim.analysis.statistics import averaging, of_second_half, summary
@@ -19,7 +19,7 @@ from sim.units.notation import bounded, scaled, share
 #: Endings of the variables of a statement beside its value.
 _BESIDE = ("sem", "low", "high", "reason")
 #: Pure numbers that are no shares, so that they are not printed in percent.
-COUNTS = frozenset(("bond_fraction", "slip_count", "slip_count_late", "pull_offs", "detachments", "step_renewal"))
+COUNTS = frozenset(("bond_fraction", "slip_count", "phase_slip_count", "pull_offs", "detachments", "step_renewal"))
 #: Shares that are at least 0 and at most 1.
 BOUNDED = frozenset(("fraction_detached", "fraction_masked", "time_masked", "ever_detached", "ran_away"))
 
@@ -119,6 +119,9 @@ def of_events(dataset: xr.Dataset) -> xr.Dataset:
             members[f"{name}_{end}"] = (known + sign * half).assign_attrs(members[f"{name}_{end}"].attrs)
     for further in (as_means(half_lives(dataset, result)), beside["reason"]):
         members = members.merge(further, compat="no_conflicts", join="outer")
+    if {"phase_start", "slip_time"} <= dataset.keys() | dataset.coords.keys() and dataset.sizes["slip"]:
+        of_phases = summary(slips_by_phase(dataset).assign_attrs(dataset.attrs), quantiles=False)
+        members = members.merge(of_phases.rename({name: f"phase_{name}" for name in of_phases}), join="outer")
     return members.assign(ensemble_peaks(dataset))
 
 

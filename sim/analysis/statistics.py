@@ -356,7 +356,7 @@ def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
     The interval of a mean is Student's, that of a share of the members Wilson's (J. Am. Stat. Assoc. 22 (1927) 209).
     That of a quantile lies between order statistics, with linear interpolation, and holds for any law; where so few
     members have none (a 5 % quantile of less than 59), it is nan. The skewness is corrected for the number of members;
-    of n members of a normal law it has the standard error ``skewness_error(n)``.
+    of n members of a normal law it has about the standard error ``sqrt(6/n)``.
     """
     result: dict[str, xr.DataArray] = {}
     members: Any = float(trajectories.attrs.get("members", 1))
@@ -436,13 +436,7 @@ def interval(name: str, mean: np.ndarray, sem: np.ndarray, count: np.ndarray | f
     shrunk = 1.0 + WIDE**2 / count
     middle = (mean + 0.5 * WIDE**2 / count) / shrunk
     half = WIDE / shrunk * np.sqrt(np.maximum(mean * (1.0 - mean), 0.0) / count + (0.5 * WIDE / count) ** 2)
-    return np.maximum(middle - half, 0.0), np.minimum(middle + half, 1.0)
-
-
-def skewness_error(count: float) -> float:
-    """Return the standard error of the skewness of ``count`` numbers that follow a normal law."""
-    n = count
-    return float(np.sqrt(6.0 * n * (n - 1.0) / ((n - 2.0) * (n + 1.0) * (n + 3.0)))) if n > 2.0 else np.nan
+    return np.maximum(middle - half, 0.0) * (mean != 0.0), np.minimum(middle + half, 1.0)
 
 
 def _quantiles(ordered: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:

@@ -96,13 +96,8 @@ _EVENTS = (
     _Column("peak_friction", "peak of\nfriction"),
     _Column("peak_friction_speed", "at V ", math.nan),
     _Column("peak_friction_time", "after ", math.nan),
-    _Column("direct_effect", "direct\neffect", math.nan, meaning="rise of friction at the first jump of the speed"),
-    _Column("step_overshoot", "over-\nshoot", math.nan, meaning="then, over the level at which friction settles"),
-    _Column("step_length", "settled\nwithin", math.nan, meaning="sliding distance until 1/e of the overshoot is left"),
-    _Column("static_threshold", "static\nthreshold", math.nan, meaning="largest force on the way to sliding"),
-    _Column("area_at_threshold", "A/A0\nthere", math.nan, meaning="contact area there over that at rest"),
-    _Column("area_by_law", "A0 − αQ²\nover A0", math.nan, meaning="there, by a fit up to half of the threshold"),
-    _Column("incipient_alpha", "α", math.nan),
+    _Column("static_threshold", "static\nthreshold", math.nan, meaning="largest friction force on the way to sliding"),
+    _Column("area_at_threshold", "A/A0\nthere", 1.0, meaning="contact area there over that at rest"),
     _Column("slip_count", "slips", meaning="falls of the spring force by more than 0.3 of its largest so far"),
     _Column("slips_from", "slips\nfrom", math.nan, meaning="speed of the stage at the first slip that another follows"),
     _Column("slips_down_to", "slips\ndown to", math.nan, meaning="as it gets slower, at the last that follows another"),
@@ -117,6 +112,16 @@ _EVENTS = (
     _Column("slip_duration", "slip\nlasts", math.nan),
     _Column("stick_duration", "stick\nlasts", math.nan),
     _Column("recurrence_time", "slip\nevery", math.nan),
+)
+
+_PHASES = (
+    _Column("phase_start", "starts"),
+    _Column("phase_time_held", "held\nbefore"),
+    _Column("phase_slip_count", "slips"),
+    _Column("phase_first_friction", "first slip\nat", math.nan),
+    _Column("phase_static_friction", "static\nfriction", math.nan),
+    _Column("phase_force_drop", "drop", math.nan),
+    _Column("phase_recurrence_time", "slip\nevery", math.nan),
 )
 
 #: Name of such a statement, its kind, and the share.
@@ -267,21 +272,33 @@ def highlights(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = 
         (the mean, and the 5 and 95 % quantiles of those that did), what a cycle there and back took and
         how much it dissipated, and the friction peak of a start or a ramp.
     """
-    statistics_once = of_events(dataset) if stated is None else stated
-    sizes = dataset["contact_modulus"].sizes
+    once = of_events(dataset) if stated is None else stated
+    return _once(once, [column for column in _EVENTS if _of_drive(dataset, column.name)], rows)
+
+
+def losses(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None) -> list[dict[str, str]]:
+    """Return the speeds at which area is lost, a row for each point of the sweep of other keys, if any is lost."""
+    speeds = as_means(loss_speeds(dataset)) if stated is None else stated
+    return _once(speeds, _of_losses(speeds, "stage" if speed_name(dataset) == "stage_speed" else "V"), rows)
+
+
+def phases(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None) -> list[dict[str, str]]:
+    """Return the slip events in each phase of the course of a stage, a row for each phase, if there are any."""
+    return _once(of_events(dataset) if stated is None else stated, _PHASES, rows)
+
+
+def _once(stated: xr.Dataset, columns: Sequence[_Column], rows: int) -> list[dict[str, str]]:
+    """Return statements of a whole run, a row for each point of their dimensions; no rows if there are none."""
+    chosen = stated[[name for name in stated if str(name).startswith(tuple(f"{c.name}_" for c in columns))]]
+    sizes = {str(name): size for name, size in chosen.sizes.items() if name != "quantile"}
     points = _points(sizes, _thinned(sizes, rows))
-    shown = _shown(statistics_once, points, (column for column in _EVENTS if _of_drive(dataset, column.name)))
-    cells = _places(dataset, points)
-    for heading, texts in shown.items():
-        cells[heading] = texts
-        if heading.startswith("first\ndetached") and "first_detachment_quantile" in statistics_once:
-            cells |= _range(statistics_once["first_detachment_quantile"], points)
-    return _rows(cells) if shown else []
+    shown = _shown(chosen, points, columns)
+    return _rows(_places(chosen, points) | shown) if shown else []
 
 
 def key_figures(dataset: xr.Dataset, stated: xr.Dataset) -> list[dict[str, str]]:
     """Return the statements of a run without a sweep, a row each: symbol, value, and definition with the sample."""
-    known = (*_COLUMNS, *_EVENTS, *_of_losses(stated))
+    known = (*_COLUMNS, *_EVENTS, *_PHASES, *_of_losses(stated))
     columns = {c.name: c for c in known if not c.changing and _of_drive(dataset, c.name)}
     rows = []
     for statement in each(stated):
@@ -290,7 +307,8 @@ def key_figures(dataset: xr.Dataset, stated: xr.Dataset) -> list[dict[str, str]]
         if column is None or unknown or abs(statement.value - column.dull) < _ROUNDING:
             continue
         text, over = column.meaning or statement.text, statement.over and f"; mean over the {statement.over}"
-        heading = ", ".join([" ".join(column.heading.split()), *filter(None, [statement.at.get("branch")])])
+        places = [f"phase {at}" if name == "phase" else str(at) for name, at in statement.at.items()]
+        heading = ", ".join([" ".join(column.heading.split()), *places])
         rows.append({"": heading, "value": str(statement), "definition": text[:1].upper() + text[1:] + over})
     return rows
 
@@ -326,20 +344,29 @@ def _places(places: xr.Dataset, points: Points) -> Columns:
     return cells
 
 
-def _range(quantiles: xr.DataArray, points: Points) -> Columns:
-    """Return the 5 and 95 % quantiles of a time, if there is a spread."""
-    low, high = (_at(quantiles.isel(quantile=end), points) for end in (0, -1))
-    if not np.any(low < high):
+def _range(means: xr.Dataset, name: str, heading: str, points: Points) -> Columns:
+    """Return the least and largest value of an event over its cycles, or the quantiles of a time over members."""
+    if name == "first_detachment" and f"{name}_quantile" in means:
+        low, high = (_at(means[f"{name}_quantile"].isel(quantile=end), points) for end in (0, -1))
+        heading = "5 to 95 %\nof members"
+    elif f"{name}_least_mean" in means:
+        low, high = (_at(means[f"{name}_{end}_mean"], points) for end in ("least", "largest"))
+        heading = f"{' '.join(heading.split())},\nleast to largest"
+    else:
         return {}
-    factor, shown = scaled(float(np.nanmax(high)), "s")
-    texts = [f"{concise(factor * a, 0.0)} to {concise(factor * b, 0.0)}" for a, b in zip(low, high, strict=True)]
-    return {f"5 to 95 %\nof members ({shown})": texts}
+    factor, shown = scaled(float(np.nanmax(np.abs([low, high]), initial=0.0)), means[f"{name}_mean"].attrs["units"])
+    ends = [[concise(factor * end, 0.0) for end in column] for column in (low, high)]
+    if ends[0] == ends[1]:
+        return {}
+    texts = [" to ".join(pair) for pair in zip(*ends, strict=True)]
+    return {f"{heading} ({shown})": texts}
 
 
 def _shown(means: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Columns:
     """Return the columns that are not constant at their dull value at these points."""
     cells: Columns = {}
-    for name, heading, dull, *_ in columns:
+    for column in columns:
+        name, heading, dull, *_ = column
         if f"{name}_mean" not in means:
             continue
         mean, low, high = (_at(means.get(f"{name}_{kind}"), points) for kind in ("mean", "low", "high"))
@@ -355,6 +382,7 @@ def _shown(means: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Col
                 has_reason = _at(means[f"{name}_reason"], points) != ""
                 texts = [f"{text}*" if marked else text for text, marked in zip(texts, has_reason, strict=True)]
             cells[heading] = texts
+            cells |= _range(means, name, column.heading, points)
     return cells
 
 
@@ -480,17 +508,6 @@ def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
     return row | {"free values": f"{of('effective_samples'):.3g}"}
 
 
-def losses(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None) -> list[dict[str, str]]:
-    """Return the speeds at which area is lost, a row for each point of the sweep of other keys, if any is lost."""
-    speeds = as_means(loss_speeds(dataset)) if stated is None else stated
-    columns = _of_losses(speeds, "stage" if speed_name(dataset) == "stage_speed" else "V")
-    speeds = speeds[[name for name in speeds if str(name).startswith(tuple(column.name for column in columns))]]
-    sizes = {str(name): size for name, size in speeds.sizes.items()}
-    points = _points(sizes, _thinned(sizes, rows))
-    shown = _shown(speeds, points, columns)
-    return _rows(_places(speeds, points) | shown) if shown else []
-
-
 # --- a long table for other programs, and a data frame ---
 
 
@@ -543,6 +560,7 @@ def in_columns(dataset: xr.Dataset, every: bool = False, lost: Sequence[str] = (
     """
     stated = xr.Dataset() if every else statements(dataset, lost=lost)
     kept = re.compile("(?!.*_(quantile|correlation_time)).*_(mean|sem|low|high|reason)")
+    stated = stated.drop_dims("phase", errors="ignore")
     rows = frame(dataset) if every else _framed(dataset, stated[[n for n in stated if kept.fullmatch(str(n))]])
     units, columns = rows.attrs["units"], {}
     for name in rows.replace("", np.nan).dropna(axis="columns", how="all"):
@@ -575,7 +593,7 @@ def tidy(dataset: xr.Dataset, lost: Sequence[str] = ()) -> pd.DataFrame:
         flat = _flat(group)
         keys = [str(key) for key in flat if str(key).endswith("_mean")]
         frames += [_long(dataset, flat, key, flat[key].attrs.get("over", over) or "one run") for key in keys]
-    places = [*map(str, dataset["contact_modulus"].coords), "branch", "t", "speed"]
+    places = [*map(str, dataset["contact_modulus"].coords), "branch", "phase", "t", "speed"]
     columns = [*places, "quantity", "unit", "over", *_ENDINGS]
     rows = pd.concat(frames, ignore_index=True)
     return rows[[name for name in columns if name in rows]]
@@ -583,7 +601,8 @@ def tidy(dataset: xr.Dataset, lost: Sequence[str] = ()) -> pd.DataFrame:
 
 def _long(dataset: xr.Dataset, group: xr.Dataset, key: str, over: str) -> pd.DataFrame:
     """Return rows of the statistics of a quantity, of which ``key`` is the mean."""
-    name, dims = key.removesuffix("_mean"), [n for n in (*sweep_dims(dataset), "branch", "t") if n in group[key].dims]
+    name, every = key.removesuffix("_mean"), (*sweep_dims(dataset), "branch", "phase", "t")
+    dims = [dim for dim in every if dim in group[key].dims]
     columns = {column: group[f"{name}_{end}"] for column, end in _ENDINGS.items() if f"{name}_{end}" in group}
     if speed_name(dataset) in dataset:
         speed = speed_of(dataset)

@@ -28,6 +28,7 @@ from sim.analysis import (
     is_steady,
     losses,
     notes,
+    phases,
     setting,
     speed_of,
     statements,
@@ -440,7 +441,7 @@ def html(
     stated, swept = statements(dataset, lost=lost), sweep_dims(dataset)
     rows, whole = table(dataset, _ROWS, stated), highlights(dataset, _ROWS, stated)
     keys = sum(heading.partition("\n")[0] in (*swept, "t") for heading in (rows or [{}])[0])
-    wide = [rows, *([whole, losses(dataset, _ROWS, stated)] if swept else [])]
+    wide = [rows, *([whole, *(of(dataset, _ROWS, stated) for of in (losses, phases))] if swept else [])]
     stem = Path(source).stem
     page = Environment(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined,

@@ -224,6 +224,9 @@ def test_slip_events_after_a_hold_are_told_apart_from_those_before_whatever_the_
     assert_array_equal(result["slip_count"], [1.0, 0.0, 6.0])
     assert_allclose(1e6 * result["first_friction"], [1255.0, NAN, 1158.0], rtol=6e-4)
     assert_array_equal(result["time_held"], [NAN, NAN, 1.0])
+    rows = analysis.phases(dataset)
+    assert [row["first slip\nat (mN)"] for row in rows] == ["1.255", "–", "1.158"]
+    assert [row["held\nbefore (s)"] for row in rows] == ["–", "–", "1"]
     seldom = run(sim.Scenario(**HELD | {"clock": HELD["clock"] | {"record": "3 s"}}))
     xr.testing.assert_identical(analysis.slips_by_phase(seldom), analysis.slips_by_phase(dataset))
     assert "static_friction" not in analysis.stick_slip(dataset)  # it would be a mean over phases
