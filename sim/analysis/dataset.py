@@ -10,7 +10,7 @@ import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 import xarray as xr
@@ -19,9 +19,6 @@ from sim.numerics import files, hdf5
 from sim.numerics.lazy import Refused, open_lazily
 from sim.units.errors import BadInput
 from sim.units.notation import Recorded
-
-if TYPE_CHECKING:
-    from sim.scenario.scenario import Scenario
 
 MEMBERS = "member"
 #: Trajectories that are read and worked on at once [byte].
@@ -294,24 +291,6 @@ def resolved(dataset: xr.Dataset, key: str) -> Any:
             raise KeyError(f"the scenario does not say {key}")
         value = value[name]
     return value
-
-
-def scenario_of(point: xr.Dataset) -> "Scenario":
-    """Return the scenario of a dataset at a point of its sweep.
-
-    Raises
-    ------
-    KeyError
-        If tables or words are swept: the dataset holds numbers only.
-    BadInput
-        If this version cannot read the scenario.
-    """
-    from sim.scenario.reader import load  # which takes a while, and few figures need it
-
-    tables = json.loads(point.attrs["scenario_resolved"])
-    swept = tables.pop("sweep", {})
-    keys = [key for axis in (swept if isinstance(swept, list) else [swept]) for key in axis]
-    return load(tables, {key: float(setting(point, key)) for key in keys})
 
 
 def _label(dataset: xr.Dataset, key: str) -> xr.DataArray | None:

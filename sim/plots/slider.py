@@ -1,6 +1,7 @@
 """Figures of sliding: bond stress over speed with closed forms, starts from rest, stability, creep, incipient slip."""
 
 import contextlib
+import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -10,11 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sim.analysis import is_steady, setting, statements, sweep_dims
-from sim.analysis.dataset import MEMBERS, scenario_of, stays_held, word
+from sim.analysis.dataset import MEMBERS, stays_held, word
 from sim.analysis.events import incipient_law, jumps
 from sim.analysis.observables import with_slips
 from sim.analysis.over_speed import population_of, speed_dim
 from sim.laws import schallamach
+from sim.numerics import hdf5
 from sim.plots import style
 from sim.plots.curves import Panel, Scene, contact_curves, over_key, over_speed, scene_along, stacked, statement_curves
 from sim.plots.measured import Line, Measured
@@ -61,6 +63,8 @@ def steady_laws(point: xr.Dataset, speed: np.ndarray) -> list[Steady]:
 
 #: Speeds of a map, and at which its boundary is drawn.
 _CELLS, _FINE = 28, 200
+#: A file that a scenario names.
+_FILE = re.compile(r'"file": *"[^"]')
 _FRAME: Any = {"color": style.BONDS, "linewidth": 1.4}
 
 
@@ -145,11 +149,19 @@ def _swings(force: np.ndarray, speed: np.ndarray, edges: np.ndarray) -> np.ndarr
 
 
 def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
-    """Return the stiffness below which steady sliding is unstable [N/m]; nan if the scenario cannot be read."""
-    from sim.ensemble.diagnosis import slider_body  # heavy: for this figure alone
+    """Return the stiffness below which steady sliding is unstable [N/m]; nan if the scenario cannot be read.
 
+    No file that a dataset names is read.
+    """
+    from sim.ensemble.diagnosis import slider_body  # heavy: for this figure alone
+    from sim.scenario.reader import load
+
+    text = dataset.attrs["scenario_resolved"]
+    tables, point = hdf5.tables(text), dataset.isel(dict.fromkeys(sweep_dims(dataset), 0))
+    swept = tables.pop("sweep", {})
     with contextlib.suppress(BadInput, KeyError):
-        scene = scenario_of(dataset.isel(dict.fromkeys(sweep_dims(dataset), 0)))
+        keys = [key for axis in (swept if isinstance(swept, list) else [swept]) for key in axis]
+        scene = load({} if _FILE.search(text) else tables, {key: float(setting(point, key)) for key in keys})
         return np.asarray(scene.population.onset(speed, slider_body(scene, speed)).stiffness)
     return np.full(speed.shape, np.nan)
 
