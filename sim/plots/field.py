@@ -180,9 +180,7 @@ def spectrum_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     expected = raised * radial_average(mode_density(modes(spectrum, grid.cell, grid.points), grid), grid).density
     rings = [radial_average(density, grid) for density in periodogram(stress.to_numpy(), grid.cell)]
     fine = np.geomspace(0.4 * rings[0].q[0], rings[0].q[-1], 2000)
-    angle = np.pi * (np.arange(64) + 0.5) / 64
-    qx, qy = fine[:, None] * np.cos(angle), fine[:, None] * np.sin(angle)
-    density = raised * np.mean(spectrum.density(qx, qy), axis=1)
+    density = raised * spectrum.harmonics(fine)[0] / (2.0 * np.pi)
     least = np.min(density[density > 0.0], initial=np.max(expected))
     held = expected > max(0.2 * least, 1e-12 * np.max(expected))  # not where a ring only touches the spectrum
     q, expected = rings[0].q[held], expected[held]

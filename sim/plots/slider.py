@@ -18,7 +18,17 @@ from sim.analysis.over_speed import population_of, speed_dim
 from sim.laws import schallamach
 from sim.numerics import hdf5
 from sim.plots import style
-from sim.plots.curves import Panel, Scene, contact_curves, over_key, over_speed, scene_along, stacked, statement_curves
+from sim.plots.curves import (
+    Panel,
+    Scene,
+    contact_curves,
+    over_key,
+    over_speed,
+    scene_along,
+    series,
+    stacked,
+    statement_curves,
+)
 from sim.plots.measured import Line, Measured
 from sim.units.errors import BadInput
 
@@ -79,25 +89,18 @@ def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     later = with_slips(dataset).isel(t=slice(1, None))
     scene = scene_along(later, "t")._replace(measured=data)
     scene = scene.placed("t", later["t"].to_numpy(), "time under the force $t$", "s", "log")
-    position, speed = _run("slider_position", "displacement $x$", "m"), _run("speed", "speed $V$", "m/s")
-    return stacked(scene, [(1.8, position), (1.6, speed)])[0]
-
-
-def _run(name: str, words: str, si: str) -> Panel:
-    """Return a panel of a growing quantity, with a cross at the last record before a trajectory ends."""
-
-    def panel_of(panel: Axes, scene: Scene) -> None:
-        every = scene.all(f"{name}_mean")
-        factor = style.in_unit(panel.yaxis, words, every, si)
-        contact_curves(panel, scene, name, factor)
+    position, speed = series("slider_position", "displacement $x$", "m"), series("speed", "speed $V$", "m/s")
+    figure, axes = stacked(scene, [(1.8, position), (1.6, speed)])
+    for panel in axes[:2]:
         style.upward(panel)
-        for line, values in zip(scene.lines, factor * every, strict=True):
+        for line in scene.lines:
+            place, values = panel.lines[line.number].get_xydata().T
             known = np.flatnonzero(np.isfinite(values))
             if 0 < known.size < values.size:
                 look: Any = {"color": line.colour, "markersize": 4, "label": "runaway"}
-                panel.plot(scene.x[line.number][known[-1]], values[known[-1]], "x", **look)
-
-    return panel_of
+                panel.plot(place[known[-1]], values[known[-1]], "x", **look)
+    style.legend(axes[0], scene.title)
+    return figure
 
 
 def needs_map(dataset: xr.Dataset) -> None:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from sim.analysis import control, is_steady, loop_energy, setting, settled
+from sim.analysis import control, is_steady, setting, settled, statements
 from sim.analysis.dataset import plain, stays_held
 from sim.analysis.events import cycles_of, pull_offs
 from sim.laws import halfspace, jkr
@@ -186,43 +186,35 @@ _SIDE, _REACH = 1500, 2.0
 _MAP = 201
 
 
-class Shape(NamedTuple):
-    """A contact: radius, indentation [m], shear stress [Pa], and its bodies."""
+class Profile(NamedTuple):
+    """Fields across a contact of a ``radius`` [m], over places ``x`` along the sliding [m], and the ``look`` of lines.
+
+    The pressure [Pa] is nan at the edge, where tension has no bound; ``low`` and ``high`` are the heights of half-space
+    and sphere [m].
+    """
 
     radius: float
-    indentation: float
-    stress: float
-    sphere_radius: float
-    modulus: float
-    shear_modulus: float
-    poisson_ratio: float
-
-    def pressure(self, r: np.ndarray) -> np.ndarray:
-        """Return the normal stress at distances from the axis [Pa]."""
-        return np.asarray(halfspace.pressure(r, self.radius, self.indentation, self.sphere_radius, self.modulus))
-
-    def surfaces(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the heights of half-space and sphere at distances from the axis [m]."""
-        place = r, self.radius, self.indentation, self.sphere_radius
-        low = -halfspace.normal_displacement(*place)
-        return low, low + halfspace.gap(*place)
-
-    def distances(self, reach: float) -> np.ndarray:
-        """Return distances on both sides of the axis, dense on both sides of the edge, with the edge itself [m]."""
-        near = np.geomspace(1e-6, 0.5, 200)
-        r = np.concatenate([np.linspace(0.0, reach, _SIDE), self.radius * (1.0 - near), self.radius * (1.0 + near)])
-        r = np.unique(np.append(r[r <= reach], self.radius))
-        return np.append(-r[:0:-1], r)
+    x: np.ndarray
+    pressure: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    look: dict[str, Any]
 
 
-#: Contacts with the look of their lines.
-_Shown = list[tuple[Shape, dict[str, Any]]]
+def _profile(reach: float, radius: float, depth: float, sphere: float, modulus: float, **look: Any) -> Profile:
+    """Return the fields of a contact, dense on both sides of the edge, with the edge itself."""
+    near = np.geomspace(1e-6, 0.5, 200)
+    r = np.concatenate([np.linspace(0.0, reach, _SIDE), radius * (1.0 - near), radius * (1.0 + near), [radius]])
+    r = np.unique(r[r <= reach])
+    x = np.append(-r[:0:-1], r)
+    place = np.abs(x), radius, depth, sphere
+    pressure = np.where(np.abs(x) == radius, np.nan, halfspace.pressure(*place, modulus))
+    low = -halfspace.normal_displacement(*place)
+    return Profile(radius, x, pressure, low, low + halfspace.gap(*place), look)
 
 
-def shapes_of(dataset: xr.Dataset, time: float | None = None) -> tuple[_Shown, float, float]:
-    """Return the last closed contact of the first member at the first point of the sweep, and any contact at rest.
-
-    In place of the last one that of the record nearest to a time [s]. Also the time [s] and speed [m/s] of the former.
+def closed_contact(dataset: xr.Dataset, time: float | None = None) -> xr.Dataset:
+    """Return the last record of the first member in contact, or that nearest to a time, at the first point of a sweep.
 
     Raises
     ------
@@ -230,24 +222,13 @@ def shapes_of(dataset: xr.Dataset, time: float | None = None) -> tuple[_Shown, f
         If the member is never in contact, or not at that time.
     """
     point = dataset.isel(style.first_point(dataset)[0] | {"member": 0}, missing_dims="ignore")
-    names = ("contact_radius", "indentation", "shear_stress", "speed")
-    radius, depth, stress, speed = (style.recorded(point, name).to_numpy() for name in names)
-    if not np.any(radius > 0.0):
+    closed = style.recorded(point, "contact_radius").to_numpy() > 0.0
+    if not closed.any():
         raise ValueError("the contact that would be drawn is never closed; raise the load or the indentation")
-    k = int(np.flatnonzero(radius > 0.0)[-1] if time is None else np.abs(dataset["t"].to_numpy() - time).argmin())
-    if not radius[k] > 0.0:
-        when = style.text_of(dataset["t"][k], "s")
-        raise ValueError(f"the contact is open at t = {when}; choose another time")
-    sphere, work = (float(setting(point, key)) for key in ("sphere.radius", "adhesion.work"))
-    moduli = ("contact_modulus", "effective_shear_modulus", "effective_poisson_ratio")
-    bodies = (sphere, *(float(point[name]) for name in moduli))
-    last = Shape(radius[k], depth[k], stress[k], *bodies)
-    full = float(point["radius_at_rest"])
-    shown: _Shown = [(last, {"color": style.BOTH})]
-    if full > 0.0:
-        rest = Shape(full, jkr.indentation_at_radius(full, work, sphere, bodies[1]), 0.0, *bodies)
-        shown.append((rest, style.GREY | {"linestyle": "--", "label": "at rest (JKR)"}))
-    return shown, float(dataset["t"][k]), speed[k]
+    k = int(np.flatnonzero(closed)[-1] if time is None else np.abs(dataset["t"].to_numpy() - time).argmin())
+    if not closed[k]:
+        raise ValueError(f"the contact is open at t = {style.text_of(dataset['t'][k], 's')}; choose another time")
+    return point.isel(t=k)
 
 
 def profile_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
@@ -256,20 +237,29 @@ def profile_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     The surfaces are cut along the axis of the sphere; heights are not to the scale of the lengths. The
     shear stress is the mean one, uniform over the contact; without any its displacement is left out.
     """
-    shown, time, speed = shapes_of(dataset, at)
-    last, reach = shown[0][0], _REACH * max(shape.radius for shape, _ in shown)
-    length = style.Unit.of(np.array([reach]), "m")
-    count = 2 if last.stress != 0.0 else 1
+    point = closed_contact(dataset, at)
+    names = ("contact_radius", "indentation", "shear_stress", "speed")
+    radius, depth, stress, speed = (float(style.recorded(point, name)) for name in names)
+    sphere, work = (float(setting(point, key)) for key in ("sphere.radius", "adhesion.work"))
+    names = ("contact_modulus", "effective_shear_modulus", "effective_poisson_ratio", "radius_at_rest")
+    modulus, *bodies, full = (float(point[name]) for name in names)
+    reach = _REACH * max(radius, full)
+    shown = [_profile(reach, radius, depth, sphere, modulus, color=style.BOTH)]
+    if full > 0.0:
+        rest = jkr.indentation_at_radius(full, work, sphere, modulus)
+        look = style.GREY | {"linestyle": "--", "label": "at rest (JKR)"}
+        shown.append(_profile(reach, full, rest, sphere, modulus, **look))
+    length, count = style.Unit.of(np.array([reach]), "m"), 2 if stress != 0.0 else 1
     figure, axes = style.pairs(0.35 + 2.4 * count, count)
-    _pressure_panel(axes[0], shown, reach, length)
-    _surface_panel(axes[1], shown, reach, length)
+    _pressure_panel(axes[0], shown, length)
+    _surface_panel(axes[1], shown, length)
     radial = "distance from the axis $r$"
     for panel, words in zip(axes, (radial, radial, "distance from the axis"), strict=False):
         style.across(panel, length.factor * np.array([-reach, reach]), length.label(words))
     if count == 2:
-        _displacement_panel(axes[2], last, reach, length)
-        _map_panel(figure, axes[3], last, reach, length)
-    remarks = [style.first_point(dataset)[1], f"$t$ = {style.text_of(time, 's')}"]
+        _displacement_panel(axes[2], (radius, stress, *bodies), reach, length)
+        _map_panel(axes[3], (radius, stress, *bodies), reach, length)
+    remarks = [style.first_point(dataset)[1], f"$t$ = {style.text_of(point['t'], 's')}"]
     if "$V$" not in remarks[0]:
         remarks.append(f"$V$ = {style.text_of(speed, 'm/s')}")
     axes[0].lines[0].set_label(", ".join(filter(None, remarks)))
@@ -277,51 +267,49 @@ def profile_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     return figure
 
 
-def _pressure_panel(panel: Axes, shown: _Shown, reach: float, length: style.Unit) -> None:
-    middle = max((shape.pressure(np.zeros(1))[0] for shape, _ in shown), key=abs)
+def _pressure_panel(panel: Axes, shown: list[Profile], length: style.Unit) -> None:
+    middle = max((shape.pressure[shape.x.size // 2] for shape in shown), key=abs)
     factor = style.in_unit(panel.yaxis, "normal pressure $p$", np.array([middle]), "Pa")
-    for shape, line in shown:
-        x = shape.distances(reach)
-        r = np.abs(x)
-        pressure = np.where(r == shape.radius, np.nan, shape.pressure(r))  # tension has no bound at the edge
-        panel.plot(length.factor * x, factor * pressure, **line)
+    for shape in shown:
+        panel.plot(length.factor * shape.x, factor * shape.pressure, **shape.look)
     panel.axhline(0.0, **style.GUIDE)
     size = factor * abs(middle)
     panel.set_ylim((-1.6 * size, 1.15 * size) if middle > 0.0 else (-4.0 * size, 0.5 * size))
 
 
-def _surface_panel(panel: Axes, shown: _Shown, reach: float, length: style.Unit) -> None:
+def _surface_panel(panel: Axes, shown: list[Profile], length: style.Unit) -> None:
     """Draw sphere and half-space, cut along the axis, with the gap between them."""
-    x = [shape.distances(reach) for shape, _ in shown]
-    heights = [shape.surfaces(np.abs(place)) for (shape, _), place in zip(shown, x, strict=True)]
-    factor = style.in_unit(panel.yaxis, "height $z$", np.concatenate([upper for _, upper in heights]), "m")
-    for (_, line), place, surfaces in zip(shown, x, heights, strict=True):
-        panel.plot(length.factor * place, factor * np.transpose(surfaces), **line)
-    low, ball = factor * np.array(heights[0])
+    factor = style.in_unit(panel.yaxis, "height $z$", np.concatenate([shape.high for shape in shown]), "m")
+    for shape in shown:
+        panel.plot(length.factor * shape.x, factor * np.transpose([shape.low, shape.high]), **shape.look)
+    last, ball = shown[0], factor * shown[0].high
     bottom = np.min(ball) - 0.35 * np.ptp(ball)
-    panel.fill_between(length.factor * x[0], bottom, low, color=style.LINES[6], alpha=0.18, linewidth=0)
+    look: Any = {"color": style.LINES[6], "alpha": 0.18, "linewidth": 0}
+    panel.fill_between(length.factor * last.x, bottom, factor * last.low, **look)
     panel.set_ylim(bottom, np.max(ball))
-    panel.text(0.5, 0.8, "sphere", transform=panel.transAxes, ha="center", fontsize=7)
-    panel.text(0.5, 0.06, "half-space", transform=panel.transAxes, ha="center", fontsize=7)
+    for words, place in (("sphere", 0.8), ("half-space", 0.06)):
+        panel.text(0.5, place, words, transform=panel.transAxes, ha="center", fontsize=7)
 
 
-def _displacement_panel(panel: Axes, shape: Shape, reach: float, length: style.Unit) -> None:
+#: Contact radius [m], shear stress [Pa], shear modulus [Pa] and Poisson's ratio.
+_Sheared = tuple[float, ...]
+
+
+def _displacement_panel(panel: Axes, contact: _Sheared, reach: float, length: style.Unit) -> None:
     """Draw the tangential displacement along and across the sliding direction; thin lines are the edge."""
     distance = reach * np.linspace(-1.0, 1.0, 801)
-    bodies = shape.shear_modulus, shape.poisson_ratio
-    profiles = halfspace.tangential_profiles(distance, shape.radius, shape.stress, *bodies)
+    profiles = halfspace.tangential_profiles(distance, *contact)
     factor = style.in_unit(panel.yaxis, "tangential displacement $u_x$", np.concatenate(profiles), "m")
     for values, line, words in zip(profiles, ("-", "--"), ("along $x$, the sliding", "across, along $y$"), strict=True):
         panel.plot(length.factor * distance, factor * values, line, color=style.BOTH, label=words)
-    for edge in (-shape.radius, shape.radius):
+    for edge in (-contact[0], contact[0]):
         panel.axvline(length.factor * edge, **style.GUIDE)
     style.legend(panel)
 
 
-def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: style.Unit) -> None:
+def _map_panel(panel: Axes, contact: _Sheared, reach: float, length: style.Unit) -> None:
     """Draw the tangential displacement of the surface around the contact circle."""
-    bodies = shape.shear_modulus, shape.poisson_ratio
-    x, moved = halfspace.tangential_map(shape.radius, shape.stress, *bodies, points=_MAP, extent=reach / shape.radius)
+    x, moved = halfspace.tangential_map(*contact, points=_MAP, extent=reach / contact[0])
     unit = style.Unit.of(moved, "m")
     x, moved = length.factor * x, unit.factor * moved.T
     side = x[-1] + 0.5 * (x[1] - x[0])
@@ -329,8 +317,8 @@ def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: 
     levels = MaxNLocator(7).tick_values(np.min(moved), np.max(moved))
     lines = panel.contour(x, x, moved, levels, colors="white", linewidths=0.4, linestyles="-")
     panel.clabel(lines, fmt="%g", fontsize=5)
-    figure.colorbar(image, ax=panel, pad=0.02).set_label(unit.label("displacement along $x$, $u_x$"))
-    style.contact_circle(panel, length.factor * shape.radius)
+    panel.figure.colorbar(image, ax=panel, pad=0.02).set_label(unit.label("displacement along $x$, $u_x$"))
+    style.contact_circle(panel, length.factor * contact[0])
     panel.set(xlabel=length.label("$x$"), ylabel=length.label("$y$"))
 
 
@@ -389,9 +377,12 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     length = style.in_unit(radii.yaxis, "contact radius $a$", scene.all("contact_radius_mean"), "m")
     loaded.set_ylabel(radii.get_ylabel())
     of_load = scene.placed("normal_load", scene.all("normal_load_mean"), "normal load $P$", "N")
-    (spent, loop), cycles = lost_energy(dataset), cycles_of(dataset)
+    stated, cycles = statements(dataset, []), cycles_of(dataset)
     integral = rf"$\oint\,P\,\mathrm{{d}}{symbol}$"
-    labelled = scene._replace(lines=_labelled(scene, {"$W$": spent} | ({} if loop is None else {integral: loop})))
+    in_cycles = "loop_energy_mean" in stated and bool(stated["loop_energy_mean"].notnull().all())
+    spent = stated["loop_dissipation_mean" if in_cycles else "total_dissipated_mean"]
+    energies = {"$W$": spent} | ({integral: stated["loop_energy_mean"]} if in_cycles else {})
+    labelled = scene._replace(lines=_labelled(scene, energies))
     for panel, placed, name, factor in (
         (loads, labelled, "normal_load", force),
         (radii, scene, "contact_radius", length),
@@ -415,7 +406,7 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     loads.sharex(radii)
     put_in = f"{integral} put in, the area of the loop with each jump a straight line between records"
     cycled = f"per cycle: $W$ dissipated by opening and closing; {put_in}"
-    lost = "dissipated in all: $W$" if loop is None else cycled
+    lost = cycled if in_cycles else "dissipated in all: $W$"
     style.legend(loads, lost if (spent != 0.0).any() else scene.title, columns=1)
     style.legend(radii)
     colour_bar(figure, panels, scene)
@@ -498,22 +489,6 @@ def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
     for pull in {factor * jkr.pull_off_load(*theory[:2]) for theory in theories if theory.work > 0.0}:
         for share, dashes, text in levels:
             panel.axhline(share * pull, linestyle=dashes, label=text, **style.GUIDE)
-
-
-def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]:
-    """Return the energy dissipated by opening and closing, and the integral of load over displacement, per cycle [J].
-
-    Means over the members, with the sweep's dimensions. Where no cycles are made, or a run stopped on the way, the
-    energy is that of the whole run, and there is no integral.
-    """
-    spent = style.recorded(dataset, "dissipated_energy")
-    spent = spent.isel(t=spent.notnull().cumsum("t").argmax("t")).drop_vars("t")  # the last record of those that stop
-    spent = spent.mean("member") if "member" in spent.dims else spent
-    cycles = cycles_of(dataset)
-    whole = style.recorded(dataset, "contact_radius").isel(t=-1).notnull().all()
-    if not whole or not (cycles >= 1.0).all():
-        return spent, None
-    return spent / cycles, style.mean_of(loop_energy(dataset), "loop_energy").mean("cycle")
 
 
 def _labelled(scene: Scene, energies: dict[str, xr.DataArray]) -> list[Line]:
