@@ -178,7 +178,7 @@ class Scene(NamedTuple):
         return np.stack([self.values(name, line) for name in names for line in self.lines])
 
     def drawn(self, name: str, line: Line) -> list[np.ndarray]:
-        """Return the mean, its standard error, and both sides of the band; nan where there is no contact.
+        """Return the mean, its standard error, and both sides of the band.
 
         The band is between the 5 and 95 % quantiles, or one standard deviation to both sides if only that is recorded.
         """
@@ -186,8 +186,7 @@ class Scene(NamedTuple):
         low, high = mean - spread, mean + spread
         if (quantiles := self.statistics.get(f"{name}_quantile")) is not None:
             low, _, high = quantiles.isel(line.point).transpose("quantile", ...).to_numpy()
-        gone = self.opened(line) if name in _OF_CONTACT else False
-        return [np.where(gone, np.nan, values) for values in (mean, error, low, high)]
+        return [mean, error, low, high]
 
     def parted(self, line: Line, *along: np.ndarray) -> list[np.ndarray]:
         """Return the x values of a curve and values over them, with a nan at each gap of the line."""

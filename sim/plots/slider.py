@@ -3,7 +3,7 @@
 import contextlib
 import re
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import xarray as xr
@@ -94,7 +94,7 @@ def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     for panel in axes[:2]:
         style.upward(panel)
         for line in scene.lines:
-            place, values = panel.lines[line.number].get_xydata().T
+            place, values = np.transpose(cast(np.ndarray, panel.lines[line.number].get_xydata()))
             known = np.flatnonzero(np.isfinite(values))
             if 0 < known.size < values.size:
                 look: Any = {"color": line.colour, "markersize": 4, "label": "runaway"}
@@ -143,12 +143,13 @@ def stability_figure(dataset: xr.Dataset) -> Figure:
 
 def _swings(force: np.ndarray, speed: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Return the range of each row of forces over its largest, in each cell of the speed."""
-    place = np.clip(np.searchsorted(edges, speed, "right") - 1, 0, len(edges) - 2)
-    swings = np.full((len(force), len(edges) - 1), np.nan)
-    for cell in np.unique(place):
-        forces = np.abs(force[:, place == cell])
-        swings[:, cell] = 1.0 - forces.min(axis=1) / forces.max(axis=1)
-    return swings
+    from scipy.stats import binned_statistic  # heavy: for this figure alone
+
+    def swing(forces: np.ndarray) -> float:
+        return float(1.0 - np.min(forces) / np.max(forces)) if len(forces) else np.nan
+
+    within = np.clip(speed, edges[0], edges[-1])
+    return np.asarray(binned_statistic(within, np.abs(force), swing, edges).statistic)
 
 
 def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:

@@ -242,7 +242,7 @@ def profile_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     radius, depth, stress, speed = (float(style.recorded(point, name)) for name in names)
     sphere, work = (float(setting(point, key)) for key in ("sphere.radius", "adhesion.work"))
     names = ("contact_modulus", "effective_shear_modulus", "effective_poisson_ratio", "radius_at_rest")
-    modulus, *bodies, full = (float(point[name]) for name in names)
+    modulus, shear_modulus, poisson_ratio, full = (float(point[name]) for name in names)
     reach = _REACH * max(radius, full)
     shown = [_profile(reach, radius, depth, sphere, modulus, color=style.BOTH)]
     if full > 0.0:
@@ -257,8 +257,9 @@ def profile_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     for panel, words in zip(axes, (radial, radial, "distance from the axis"), strict=False):
         style.across(panel, length.factor * np.array([-reach, reach]), length.label(words))
     if count == 2:
-        _displacement_panel(axes[2], (radius, stress, *bodies), reach, length)
-        _map_panel(axes[3], (radius, stress, *bodies), reach, length)
+        contact = radius, stress, shear_modulus, poisson_ratio
+        _displacement_panel(axes[2], contact, reach, length)
+        _map_panel(axes[3], contact, reach, length)
     remarks = [style.first_point(dataset)[1], f"$t$ = {style.text_of(point['t'], 's')}"]
     if "$V$" not in remarks[0]:
         remarks.append(f"$V$ = {style.text_of(speed, 'm/s')}")
@@ -292,7 +293,7 @@ def _surface_panel(panel: Axes, shown: list[Profile], length: style.Unit) -> Non
 
 
 #: Contact radius [m], shear stress [Pa], shear modulus [Pa] and Poisson's ratio.
-_Sheared = tuple[float, ...]
+_Sheared = tuple[float, float, float, float]
 
 
 def _displacement_panel(panel: Axes, contact: _Sheared, reach: float, length: style.Unit) -> None:
@@ -309,7 +310,7 @@ def _displacement_panel(panel: Axes, contact: _Sheared, reach: float, length: st
 
 def _map_panel(panel: Axes, contact: _Sheared, reach: float, length: style.Unit) -> None:
     """Draw the tangential displacement of the surface around the contact circle."""
-    x, moved = halfspace.tangential_map(*contact, points=_MAP, extent=reach / contact[0])
+    x, moved = halfspace.tangential_map(*contact, _MAP, reach / contact[0])
     unit = style.Unit.of(moved, "m")
     x, moved = length.factor * x, unit.factor * moved.T
     side = x[-1] + 0.5 * (x[1] - x[0])
@@ -419,7 +420,7 @@ def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, kind
     If members differ, crosses are their own pull-offs, at their lowest loads: their mean ends where the last comes off.
     """
     x, gone, loads = scene.x[line.number], scene.opened(line), name == "normal_load"
-    mean, _, low, high = (np.where(gone, np.nan, factor * values) for values in scene.drawn(name, line))
+    mean, _, low, high = (factor * values for values in scene.drawn(name, line))
     along_load = scene.over == "normal_load"
     first = int(np.ceil(len(x) / max(cycles, 1.0)))
     known = scene.statistics.get(f"{name}_quantile") is not None  # a standard deviation reaches loads that none has
