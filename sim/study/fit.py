@@ -6,7 +6,6 @@ the fit is made anew, until it stays. The same noise is drawn each time. Where s
 that is free, such as the speed of an edge that lags, or what slides feels its friction, every prediction is a run.
 """
 
-import copy
 import difflib
 import io
 import itertools
@@ -25,7 +24,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from sim.ensemble.dataset import scenario_json, variable_name
+from sim.ensemble.dataset import variable_name
 from sim.numerics import files
 from sim.parts.exchange import Array
 from sim.plots import style
@@ -507,22 +506,17 @@ def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[st
 
 
 def scenario_text(scenario: Scenario, fit: Fit, folder: Path) -> str:
-    """Return the scenario as it was written, its opening comment first, with the estimates, for a file in a folder."""
-
-    def present(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        return {key: value for key, value in pairs if value is not None}
-
+    """Return a scenario file, its opening comment first, with the estimates, for a file in a folder."""
     source = scenario.origin
-    text = source.text or written(json.loads(scenario_json(scenario), object_pairs_hook=present))
-    tables, numbers = copy.deepcopy(parse(text, source.path)), dict[str, Any]()
+    tables, numbers = parse(source.text, source.path), dict[str, Any]()
     for item in fit.numbers:
         unit = item.free.quantity.unit
         numbers[item.free.key] = item.value if unit == "1" else f"{item.value:.12g} {unit}"
     override(tables, source.overrides | numbers)
     above = Path(source.path).parent
-    if source.path and above.resolve() != folder.resolve():
+    if above.resolve() != folder.resolve():
         _move(tables, above, folder)
-    comment = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
+    comment = itertools.takewhile(lambda line: line.startswith("#"), source.text.splitlines())
     question = "".join(f"{line}\n" for line in comment if not line.startswith(_MADE)).removesuffix("#\n")
     opening = f"{question}#\n" if question else ""
     return f"{opening}{_MADE}: {', '.join(numbers)} are calibrated to measured curves.\n{written(tables)}"

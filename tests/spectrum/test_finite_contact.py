@@ -70,16 +70,12 @@ def test_waves_along_and_across_a_disc_store_the_tabulated_energy():
 
 
 def test_factors_are_the_bessel_integrals_of_the_overlap():
-    for factors in [halfspace.energy_factors, halfspace.marginal_factors]:
-        area = (
-            (lambda t: mpmath.acos(t) - t * mpmath.sqrt(1 - t * t))
-            if factors is halfspace.energy_factors
-            else mpmath.acos
-        )
+    of_disc = lambda t: mpmath.acos(t) - t * mpmath.sqrt(1 - t * t)  # noqa: E731
+    for factors, area in ((halfspace.energy_factors, of_disc), (halfspace.marginal_factors, mpmath.acos)):
         for x in (1e-3, 0.7, 2.999, 3.001, 9.0, 40.0):
             cuts = mpmath.linspace(0, 1, 2 + int(x / 3))
-            mean = x * mpmath.quad(lambda t, x=x: area(t) * mpmath.besselj(0, x * t), cuts)
-            skew = -x * mpmath.quad(lambda t, x=x: area(t) * mpmath.besselj(2, x * t), cuts)
+            mean = x * mpmath.quad(lambda t, x=x, area=area: area(t) * mpmath.besselj(0, x * t), cuts)
+            skew = -x * mpmath.quad(lambda t, x=x, area=area: area(t) * mpmath.besselj(2, x * t), cuts)
             # P = q/(2 a^2) integral of A J0 ds; s = 2 a t. At x = 3 the closed form of S loses a digit
             assert_allclose(factors(x), [float(mean), float(skew)], rtol=3e-14, atol=0)
 

@@ -15,6 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 from sim.laws import halfspace
 from sim.scenario.reader import load
 from sim.spectrum.families import Ripple
+from sim.spectrum.measured import Measured
 from sim.spectrum.radial import disc_energy
 from sim.spectrum.stress_map import StressMap
 from tests.spectrum.test_measured import Files
@@ -65,23 +66,14 @@ def test_the_energy_of_a_map_is_that_of_its_file(files, name):
 
 def test_a_map_has_the_unit_of_its_file_or_of_the_key_and_axes_without_units_the_pixels_of_the_key(files):
     kilo = FIELD * 1e-3
-    for name, keys in (
-        ("a.csv", {"unit": "kPa"}),
-        ("a.npy", {"unit": "kPa"}),
-        ("b.csv", {}),
-        ("b.csv", {"unit": "kPa"}),
-    ):
+    for name, unit in (("a.csv", "kPa"), ("a.npy", "kPa"), ("b.csv", ""), ("b.csv", "kPa")):
         written(files, name, kilo)
         if name == "b.csv":
             np.savetxt(files.folder / name, kilo.T, delimiter=",", fmt="%.17g", header="stress in kPa")
-        assert_allclose(read(files, file=name, pixel="5 um", pixel_y="7 um", **keys).mean, FIELD.mean(), rtol=1e-12)
-    for keys, fault in (
-        ({"unit": "MPa"}, "MPa and kPa"),
-        ({"unit": "mm"}, "not a unit of Pa"),
-        ({"unit": 3}, "string"),
-    ):
+        assert_allclose(read(files, file=name, pixel=PIXEL, unit=unit).mean, FIELD.mean(), rtol=1e-12)
+    for unit, fault in (("MPa", "MPa and kPa"), ("mm", "not a unit of Pa"), (3, "string")):
         with pytest.raises(ValidationError, match=fault):
-            read(files, file="b.csv", pixel=1e-6, **keys)
+            read(files, file="b.csv", pixel=1e-6, unit=unit)
     data = xr.load_dataset(files.folder / written(files, "map.nc"))
     with pytest.raises(ValidationError, match="is in kPa, not in MPa"):
         read(files, file="map.nc", unit="MPa")
@@ -112,9 +104,8 @@ def test_a_map_that_is_a_thousand_times_off_the_stress_of_the_bonds_is_remarked(
 def test_a_window_keeps_the_rms_and_takes_the_seam(files):
     x = (np.arange(64) + 0.5) / 64
     ramp = (1e5 * (x - 0.5))[:, None] * np.ones(64) + 3e4  # which ends elsewhere than it begins
-    plain, hann = (
-        read(files, file=written(files, "map.csv", ramp), pixel=1e-6, window=window) for window in ("none", "hann")
-    )
+    name = written(files, "map.csv", ramp)
+    plain, hann = (read(files, file=name, pixel=1e-6, window=window) for window in ("none", "hann"))
     weight = (1 - np.cos(2 * np.pi * x))[:, None] * (1 - np.cos(2 * np.pi * x))
     exact = (ramp - np.mean(ramp * weight)) * weight / math.sqrt(np.mean(weight**2))
     assert_allclose(hann.surface_energy(G), halfspace.surface_energy(exact, 64e-6, G), rtol=1e-12)
@@ -156,11 +147,8 @@ def test_the_noise_and_the_radial_spectrum_of_a_map_are_reported(files):
     exact = 3 * math.asinh(1.0) / (4 * math.pi) * 2e3**2 * 5e-6 / G
     assert_allclose(result.noise_energy(G), exact, rtol=1e-14)
     assert read(files, file="map.csv", pixel="5 um").surface_energy(G) == result.surface_energy(G)
-    from sim.spectrum.measured import Measured
-
-    name = written(files, "map.csv")
-    exact = TypeAdapter(Measured).validate_python({"file": name, "spacing": 5e-6}, context={"files": files})
-    assert_allclose(read(files, file=name, pixel=5e-6).spectrum.densities, exact.densities, rtol=1e-9)
+    exact = TypeAdapter(Measured).validate_python({"file": "map.csv", "spacing": 5e-6}, context={"files": files})
+    assert_allclose(result.spectrum.densities, exact.densities, rtol=1e-9)
 
 
 class Payload:
@@ -213,7 +201,7 @@ def test_a_map_that_cannot_be_the_field_is_refused_with_the_cure(files):
         with pytest.raises(ValidationError, match=fault):
             read(files, file=written(files, "map.csv", field), **keys)
     whole = xr.load_dataset(files.folder / written(files, "map.nc"))
-    for change, keys, fault in [  # change, keys, fault
+    for change, keys, fault in [
         (lambda data: data.rename(shear_map="heights"), {}, 'no variable "shear_map"'),
         (lambda data: data.expand_dims(member=2), {}, "2 maps"),
         (lambda data: data, {"pixel": "6 um"}, "5e-06 m apart, not 6e-06 m"),

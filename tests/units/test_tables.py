@@ -67,10 +67,7 @@ def test_a_map_has_the_unit_of_its_comment_or_key_and_an_area_that_of_a_spreadsh
     for comment, unit, pascals in (
         ("# stress in kPa", "", 1e3), ("# stress [kPa], 5 um;;", "kPa", 1e3), ("# in June", "", 1.0), ("", "MPa", 1e6),
     ):  # fmt: skip
-        assert matrix(f"{comment}\n1;2\n3;4", STRESS, unit=unit).tolist() == [
-            [pascals, 2 * pascals],
-            [3 * pascals, 4 * pascals],
-        ]
+        assert np.array_equal(matrix(f"{comment}\n1;2\n3;4", STRESS, unit=unit), pascals * np.array([[1, 2], [3, 4]]))
     with pytest.raises(TableError, match="MPa and kPa"):
         matrix("# stress in kPa\n1 2\n3 4", STRESS, unit="MPa")
     areas = [columns(f"a ({unit})\n2", {"a": Quantity("m^2", "area")})["a"][0] for unit in ("mm2", "mm²", "mm^2")]
@@ -111,7 +108,6 @@ def test_a_wrong_table_is_refused_with_place_and_cure():
         (f"{time_speed}1,2\n-1,1", None, "line 3: time must be at least 0 s$"),
         (f'{time_speed}1,"2', None, "quotes"),
         ("time [s]; speed [m/s]\n1,5;2\n1.5;2", None, 'time .* "." and with ","'),
-        ("time [s]; speed [m/s]\n1;1,234,567", None, "line 2: speed is not a number"),
         (f'{time_speed}1,"2,5"', None, "line 2: speed is not a number"),
         ("1 2\n3 4", "", r'header = "time \[s\], speed \[m/s\]"'),
         ("1 2\n3 4", "time [s], speed [m]", 'header: column "speed" .* unit'),
