@@ -15,6 +15,7 @@ import sim
 from sim import analysis
 from sim.cli import cli
 from sim.numerics.files import StoreTrouble
+from sim.scenario.files import written
 
 SCENE = {
     "name": "a <scene>",
@@ -26,11 +27,6 @@ SCENE = {
     "drive": {"model": "ramp", "from": "0 mm/s", "to": "10 mm/s"},
     "bonds": {"model": "steady", "critical_speed": "10 mm/s", "stress": "0.3 MPa"},
 }
-TEXT = "\n".join(
-    f"[{table}]\n{''.join(f'{key} = {chr(34)}{value}{chr(34)}{chr(10)}' for key, value in keys.items())}"
-    for table, keys in SCENE.items()
-    if isinstance(keys, dict)
-)
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +54,7 @@ def test_importing_the_package_imports_nothing_heavy_and_dir_lists_what_is_publi
 
 def test_a_scene_is_a_path_a_dictionary_or_keywords(dataset, tmp_path):
     path = tmp_path / "x.toml"
-    path.write_text(TEXT, encoding="utf-8")
+    path.write_text(written(SCENE), encoding="utf-8")
     keywords = sim.Scenario(**{**SCENE, "drive": {"model": "ramp", "start": "0 mm/s", "stop": "10 mm/s"}})
     for scene in (path, str(path), sim.load(SCENE), keywords):
         np.testing.assert_array_equal(sim.run(scene).contact_radius, dataset.contact_radius)
@@ -105,7 +101,7 @@ def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statist
 
 
 def test_check_reads_as_the_command_prints_and_a_scene_is_shown_as_a_table(tmp_path):
-    (tmp_path / "x.toml").write_text(TEXT, encoding="utf-8")
+    (tmp_path / "x.toml").write_text(written(SCENE), encoding="utf-8")
     printed = CliRunner().invoke(cli, ["check", str(tmp_path / "x.toml")]).stdout
     assert printed == f"{sim.check(tmp_path / 'x.toml')}\n" and "sphere.radius" in printed
     assert repr(sim.check(SCENE)) == str(sim.check(SCENE))

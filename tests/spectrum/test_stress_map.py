@@ -13,12 +13,12 @@ from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
 from sim.laws import halfspace
+from sim.scenario.files import Files
 from sim.scenario.reader import load
 from sim.spectrum.families import Ripple
 from sim.spectrum.measured import Measured
 from sim.spectrum.radial import disc_energy
 from sim.spectrum.stress_map import StressMap
-from tests.spectrum.test_measured import Files
 
 G, NU = 1.6e6, 0.3
 FIELD = np.random.default_rng(7).normal(size=(24, 16)) * 1e5 + 4e4
@@ -31,7 +31,7 @@ def files(tmp_path):
 
 
 def read(files, **keys):
-    return TypeAdapter(StressMap).validate_python(keys, context={"files": files})
+    return TypeAdapter(StressMap).validate_python(keys, context={"files": Files(files.folder)})
 
 
 def written(files, name, field=FIELD):
@@ -147,7 +147,9 @@ def test_the_noise_and_the_radial_spectrum_of_a_map_are_reported(files):
     exact = 3 * math.asinh(1.0) / (4 * math.pi) * 2e3**2 * 5e-6 / G
     assert_allclose(result.noise_energy(G), exact, rtol=1e-14)
     assert read(files, file="map.csv", pixel="5 um").surface_energy(G) == result.surface_energy(G)
-    exact = TypeAdapter(Measured).validate_python({"file": "map.csv", "spacing": 5e-6}, context={"files": files})
+    exact = TypeAdapter(Measured).validate_python(
+        {"file": "map.csv", "spacing": 5e-6}, context={"files": Files(files.folder)}
+    )
     assert_allclose(result.spectrum.densities, exact.densities, rtol=1e-9)
 
 
