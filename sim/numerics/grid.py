@@ -24,8 +24,9 @@ def _read_only(array: np.ndarray) -> np.ndarray:
     return array
 
 
+@dataclass(frozen=True)
 class Lattice:
-    """Attributes of periodic cells: of ``sides`` [m] and ``shape`` along x and y."""
+    """Periodic cell of ``sides`` [m] along x and y with ``shape`` samples."""
 
     sides: tuple[float, float]
     shape: tuple[int, int]
@@ -99,15 +100,6 @@ class Lattice:
         return np.reshape(sums, fields.shape[:-2]) * self.pixel**2
 
 
-@dataclass(frozen=True)
-class Rectangle(Lattice):
-    """Periodic cell of ``sides`` [m] along x and y with ``shape`` samples."""
-
-    sides: tuple[float, float]
-    shape: tuple[int, int]
-
-
-@dataclass(frozen=True)
 class Grid(Lattice):
     """Square periodic cell with points x points samples, an odd or an even number of them.
 
@@ -133,23 +125,23 @@ class Grid(Lattice):
     0.500000 0.500000
     """
 
-    cell: float
-    points: int
+    def __init__(self, cell: float, points: int) -> None:
+        super().__init__((cell, cell), (points, points))
+
+    @property
+    def cell(self) -> float:
+        """Side of the cell [m]."""
+        return self.sides[0]
+
+    @property
+    def points(self) -> int:
+        """Samples per side."""
+        return self.shape[0]
 
     @property
     def spacing(self) -> float:
         """Distance between neighbouring samples [m]."""
         return self.cell / self.points
-
-    @property
-    def sides(self) -> tuple[float, float]:  # type: ignore[override]
-        """Sides of the cell along x and y [m]."""
-        return self.cell, self.cell
-
-    @property
-    def shape(self) -> tuple[int, int]:  # type: ignore[override]
-        """Samples along x and y."""
-        return self.points, self.points
 
     @property
     def area(self) -> float:
@@ -162,12 +154,12 @@ class Grid(Lattice):
         return self.spacing**2
 
 
-def lattice_of(cell: float | tuple[float, float], shape: tuple[int, int]) -> Grid | Rectangle:
+def lattice_of(cell: float | tuple[float, float], shape: tuple[int, int]) -> Lattice:
     """The periodic cell of one or both sides [m] and a shape, a ``Grid`` where it is square."""
     first, second = (cell, cell) if isinstance(cell, int | float) else cell
     if first == second and shape[0] == shape[1]:
         return Grid(float(first), shape[0])
-    return Rectangle((float(first), float(second)), (shape[0], shape[1]))
+    return Lattice((float(first), float(second)), (shape[0], shape[1]))
 
 
 @kernel("float64(complex128[:, ::1], Array(float64, 2, 'C', readonly=True), Array(float64, 1, 'C', readonly=True))")

@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 from sim.analysis import setting
 from sim.analysis.dataset import resolved, where_recorded, word
 from sim.laws.halfspace import angular_compliance, displacement
-from sim.numerics.grid import Grid, Rectangle, lattice_of
+from sim.numerics.grid import Grid, Lattice, lattice_of
 from sim.parts.shear.modes import Modes, modes
 from sim.parts.shear.process import Amplitude
 from sim.plots import style
@@ -149,7 +149,7 @@ def _target(dataset: xr.Dataset, point: xr.Dataset, stress: xr.DataArray) -> tup
     return spectrum, float(np.mean(factor**2)), "target"
 
 
-def _lattice_of(stress: xr.DataArray) -> Grid | Rectangle:
+def _lattice_of(stress: xr.DataArray) -> Lattice:
     shape = stress.sizes["x"], stress.sizes["y"]
     sides = (float(stress[axis][1] - stress[axis][0]) * points for axis, points in zip("xy", shape, strict=True))
     return lattice_of(cast(tuple[float, float], tuple(sides)), shape)

@@ -393,7 +393,7 @@ def radial_average(density: Array, grid: Lattice) -> RadialAverage:
     ----------
     density : array, shape (nx, ny // 2 + 1)
         On the half spectrum of ``grid``.
-    grid : Grid or Rectangle
+    grid : Lattice
         The periodic cell, L its side or the square root of its area; all longer waves count to the first ring.
 
     Examples

@@ -15,7 +15,7 @@ from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError
 
 from sim.laws.halfspace import free_energy_of_map, noise_energy, surface_energy
-from sim.numerics.grid import Grid, Rectangle, lattice_of
+from sim.numerics.grid import Lattice, lattice_of
 from sim.spectrum.family import Array
 from sim.spectrum.measured import SPACING, MapFile, MapUnit, Measured, estimate, read_map, spacings_of, tapered
 from sim.units.quantity import Quantity, keyed
@@ -133,7 +133,7 @@ class StressMap:
         return self.middle if self.start is None else self.start
 
     @cached_property
-    def lattice(self) -> Grid | Rectangle:
+    def lattice(self) -> Lattice:
         """The map as a periodic cell."""
         (nx, ny), (along, across) = self.shape, self.pixels
         return lattice_of((nx * along, ny * across), self.shape)

@@ -173,12 +173,10 @@ def fit(
     if len({item.key for item in free_numbers}) < len(free_numbers):
         raise BadInput(["--free: a key is there twice; give each once"])
     tables = [likelihood.read(path, base) if isinstance(path, Path) else path for path in data]
-    groups = [likelihood.groups(base, table) for table in tables]
-    problem = likelihood.problem_of(tables, groups, free_numbers, common or {})
-    drive = base.drive
-    if steady and drive.solves_motion:
-        raise BadInput([f'--steady: drive.model = "{drive.model}" is answered by its own runs alone; leave it out'])
-    if drive.solves_motion or (not steady and idle(problem)):
+    problem = likelihood.problem_of(base, tables, free_numbers, common or {})
+    if steady and base.drive.solves_motion:
+        raise BadInput([f'--steady: drive.model = "{base.drive.model}" is answered by runs alone; leave it out'])
+    if base.drive.solves_motion or (not steady and idle(problem)):
         problem = replace(problem, by_run=True).compared(problem.start)
     faults = [f"--free {key}: has no effect on what was measured; fix it" for key in idle(problem)]
     for keys in [] if faults else likelihood.entangled(problem):

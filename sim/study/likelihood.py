@@ -655,7 +655,7 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
 
 
 def problem_of(
-    tables: Sequence[Measured], groups: Sequence[list[Group]], free: Sequence[Free], common: dict[str, float]
+    scenario: Scenario, tables: Sequence[Measured], free: Sequence[Free], common: dict[str, float]
 ) -> Problem:
     """Return the problem of some tables; ``BadInput`` if they hold fewer numbers than are free."""
     curves = [curve for table in tables for curve in table.curves]
@@ -669,4 +669,5 @@ def problem_of(
     number = np.repeat(np.arange(len(curves)), [len(curve.values) for curve in curves])
     sigma = [np.full_like(c.values, 0.01 * np.abs(c.values).max()) if c.errors is None else c.errors for c in curves]
     estimated, zero = np.array([curve.errors is None for curve in curves])[number], np.zeros(len(values))
-    return Problem(tables, groups, free, common, values, np.concatenate(sigma), number, estimated, zero, zero, {})
+    rows = [groups(scenario, table) for table in tables]
+    return Problem(tables, rows, free, common, values, np.concatenate(sigma), number, estimated, zero, zero, {})

@@ -9,7 +9,7 @@ from helpers.fields import field_of
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
-from sim.numerics.grid import Grid, Rectangle
+from sim.numerics.grid import Grid, Lattice
 from sim.scenario.files import Files
 from sim.spectrum import Measured, SelfAffine, Spectrum, Tabulated, periodogram, radial_average
 
@@ -174,7 +174,7 @@ def test_a_map_that_is_not_square_is_used_whole(files):
     np.save(files.folder / "b.npy", np.asfortranarray(field.T))
     a, b = (read(files, model="measured", file=name, spacing=0.1) for name in ("a.csv", "b.npy"))
     assert_allclose(a.densities, b.densities, rtol=1e-12, atol=0)  # exchange of x and y
-    lattice = Rectangle((4.8, 3.0), (48, 30))
+    lattice = Lattice((4.8, 3.0), (48, 30))
     density, (qx, qy) = periodogram(field, lattice.sides), lattice.wavevectors
     assert_allclose(lattice.mode_sum(density) / lattice.area, np.var(field), rtol=1e-13, atol=0)
     width = TURN / math.sqrt(4.8 * 3.0)

@@ -346,7 +346,7 @@ def test_the_figure_has_one_curve_and_colour_for_each_load_in_one_table_or_in_se
         conditions = {"speed [um/s]": 1e6 * speed} | ({} if loads == [None] else {"load [N]": held})
         paths.append(table(tmp_path / f"{len(paths)}.csv", conditions, {"friction_force": 1.03 * force}, 0.05))
     read = [likelihood.read(path, scene) for path in paths]
-    problem = problem_of(read, [likelihood.groups(scene, each) for each in read], [], {})
+    problem = problem_of(scene, read, [], {})
     with in_units(["mm/s", "mN"]):
         upper, lower = figure(problem, likelihood.Minimum(problem.start, 0.0, None, True)).axes
     assert "(mN)" in upper.get_ylabel() and "(mm/s)" in lower.get_xlabel()
@@ -405,7 +405,7 @@ def test_keys_that_data_cannot_tell_apart_are_remarked_or_refused(curves, tmp_pa
 
 def judged(scene, made, keys, draws, seed=LENS["seed"]):
     free = [calibration._free(scene, key) for key in keys]
-    problem = problem_of([made], [likelihood.groups(scene, made)], free, {})
+    problem = problem_of(scene, [made], free, {})
     return mechanisms.compare(problem, minimum(problem, problem.start, errors=True), seed, draws)
 
 
@@ -428,7 +428,7 @@ ONE_ALONE = {"bonds only": {"shear.paid_by_adhesion": 0.0}, "fluctuations only":
 def test_curves_are_doubted_beyond_errors_and_the_mechanism_that_made_them_excludes_no_other(tmp_path, truth, curves):
     scene = load(SPRUNG)
     made = drawn_of(scene, 0.01, 3)
-    problem = problem_of([made], [likelihood.groups(scene, made)], [calibration._free(scene, "bonds.stress")], {})
+    problem = problem_of(scene, [made], [calibration._free(scene, "bonds.stress")], {})
     best = minimum(problem, problem.start, errors=True)
     for less in (0.0, 1e-6, -1e-6):  # as precisely as a minimum is known
         least = best._replace(chi_square=best.chi_square * (1.0 + less))
