@@ -20,7 +20,7 @@ from sim.parts.contact.balance import (
     Shares,
 )
 from sim.parts.drive import READINGS, Driven, Force
-from sim.parts.events import CONTACT, LATE, MOMENTS, SLIP, TURN, Slips
+from sim.parts.events import LATE, MOMENTS, SLIP, TURN, Slips
 from sim.scenario.checks import pull_off_error, pulled, renewed
 from sim.scenario.scenario import Scenario
 
@@ -143,11 +143,11 @@ def _at_closing(of: str) -> Callable[[Scenario, State], Any]:
 
 
 def _of_contact(column: str) -> Callable[[Scenario, State], Any]:
-    return lambda scene, state: state.events.contact.view(CONTACT)[:, 0][column]
+    return lambda scene, state: state.events.by_phase("contact")[:, -1][column]
 
 
 def _masked_share(scene: Scenario, state: State) -> Any:
-    row = state.events.contact.view(CONTACT)[:, 0]
+    row = state.events.by_phase("contact")[:, -1]
     return np.divide(row["hidden"], row["closed"], out=np.full(len(row), np.nan), where=row["closed"] > 0.0)
 
 

@@ -239,57 +239,44 @@ def _follow_slips(times, stage, speed, force, position, slip, stress, work, half
     return ends
 
 
-class Past(NamedTuple):
-    """Events of the phases that have ended, arrays (rows, phases, columns): rows of ``EXTREME``, last of ``TURN``."""
-
-    stress: Array
-    friction: Array
-    pull: Array
-    contact: Array
-
-
 class Events(NamedTuple):
     """Events so far; NaN counts as 0 in a maximum; ties keep the first.
 
-    ``stress`` is that of the shear stress [Pa] and ``friction`` that of the friction force [N], in magnitude; ``pull``
-    is that of the tensile load of a closed contact [N], without rows if the control does not make the load: rows of
-    ``MAXIMUM``.
-    ``contact`` are rows of ``CONTACT``. Of the phases before this one ``past`` has them. ``path`` is the
-    longest path within a step [m], shape (1,) or (members,). ``slips`` are the slip events.
+    The first four are arrays of the shape (rows, phases, columns), the present phase last. ``stress`` is that of the
+    shear stress [Pa] and ``friction`` that of the friction force [N], in magnitude; ``pull`` is that of the tensile
+    load of a closed contact [N], without rows if the control does not make the load: rows of ``MAXIMUM``.
+    ``contact`` are rows of ``CONTACT``. ``path`` is the longest path within a step [m], shape (1,) or (members,).
+    ``slips`` are the slip events.
     """
 
     stress: Array
     friction: Array
     pull: Array
     contact: Array
-    past: Past
     path: Array
     slips: Slips
 
     def next_phase(self) -> "Events":
         """Return the events at the start of another phase."""
-        now = {name: getattr(self, name) for name in Past._fields}
-        ended = {name: rows[:, np.newaxis, -getattr(self.past, name).shape[-1] :] for name, rows in now.items()}
-        past = Past(*(np.concatenate([getattr(self.past, name), rows], axis=1) for name, rows in ended.items()))
-        stress, friction, pull = (_started(rows[:, 1]) for rows in self[:3])
-        contact = self.contact.copy()
-        contact[:, -len(TURN.names or ()) :] = np.nan
-        return Events(stress, friction, pull, contact, past, self.path, self.slips)
+        contact = self.contact[:, -1:].copy()
+        contact[..., _OPENING:] = np.nan
+        ahead = *(_started(rows[:, -1, 1]) for rows in self[:3]), contact
+        phases = (np.concatenate(pair, axis=1) for pair in zip(self[:4], ahead, strict=True))
+        return Events._make([*phases, self.path, self.slips])
 
     def by_phase(self, name: str) -> NDArray[np.void]:
-        """Return a field of ``Past`` for all phases up to this one, as records, shape (rows, phases)."""
-        past, rows = getattr(self.past, name), getattr(self, name)
-        every = np.concatenate([past, rows[:, np.newaxis, -past.shape[-1] :]], axis=1)
-        return every.view(TURN if name == "contact" else EXTREME)[..., 0]
+        """Return the events of a name in all phases up to this one, as records, shape (rows, phases)."""
+        rows: Array = getattr(self, name)
+        return rows.view(CONTACT if name == "contact" else MAXIMUM)[..., 0]
 
     def largest(self, name: str) -> NDArray[np.void]:
-        """Return the largest stress, friction or pull of the run, as a record ``EXTREME`` in each row."""
+        """Return the largest stress, friction or pull of the run, as a record ``MAXIMUM`` in each row."""
         maxima = self.by_phase(name)
         first = maxima["largest"].argmax(axis=1)
         return maxima[np.arange(len(maxima)), first]
 
     def first_turn(self, name: str) -> NDArray[np.void]:
-        """Return the first opening or closing of the run, as a record ``TURN`` in each row; nan without one."""
+        """Return the first opening or closing of the run, as a record ``CONTACT`` in each row; nan without one."""
         turns = self.by_phase("contact")
         first = np.isfinite(turns[name]).argmax(axis=1)
         return turns[np.arange(len(turns)), first]
@@ -302,19 +289,17 @@ def first(bonding: Bonding, contact: ContactState, pull: Array, stage: Array) ->
     """
     stress = np.abs(bonding.stress)
     friction = stress * (np.pi * contact.radius**2)
-    rows = np.zeros((len(contact.radius), len(CONTACT.names or ())))
-    rows[:, _LAST], rows[:, _DETACHED], rows[:, _OPENING:] = contact.radius, -np.inf, np.nan
-    rows[:, _MASKED] = np.where((contact.work <= 0.0) & (contact.radius > 0.0), 0.0, np.nan)
+    rows = np.zeros((len(contact.radius), 1, len(CONTACT.names or ())))
+    rows[:, 0, _LAST], rows[..., _DETACHED], rows[..., _OPENING:] = contact.radius, -np.inf, np.nan
+    rows[:, 0, _MASKED] = np.where((contact.work <= 0.0) & (contact.radius > 0.0), 0.0, np.nan)
     started = [_started(np.nan_to_num(values)) for values in (stress, friction, pull)]
-    extreme, turn = (len(kind.names or ()) for kind in (EXTREME, TURN))
-    past = Past._make([*(np.empty((len(values), 0, extreme)) for values in started), np.empty((len(rows), 0, turn))])
-    return Events._make([*started, rows, past, np.zeros(1), Slips.none(stage)])
+    return Events._make([*started, rows, np.zeros(1), Slips.none(stage)])
 
 
 def _started(values: Array) -> Array:
-    """Return running maxima before the first step, from the values at its start."""
-    rows = np.full((len(values), len(MAXIMUM.names or ())), -np.inf)
-    rows[:, 1], rows[:, 2] = values, 0.0
+    """Return running maxima before the first step of a phase, from the values at its start."""
+    rows = np.full((len(values), 1, len(MAXIMUM.names or ())), -np.inf)
+    rows[:, 0, 1], rows[:, 0, 2] = values, 0.0
     return rows
 
 
@@ -344,11 +329,12 @@ def after(
     rows = max(len(so_far.stress), stress.shape[1])
     members = max(rows, len(so_far.friction), radii.shape[1])
     counts = rows, members, max(len(so_far.pull), pull.shape[1]), max(len(so_far.contact), radii.shape[1])
-    now = [values + np.zeros((count, 1)) for values, count in zip(so_far[:4], counts, strict=True)]
+    now = [values + np.zeros((count, 1, 1)) for values, count in zip(so_far[:4], counts, strict=True)]
+    here = (values[:, -1] for values in now)
     ends = motions.first, motions.speed, motions.time[:, 0], motions.duration[:, 0]
-    _follow(stress, stiffness, relaxation, radii, pull, contact.work, contact.detached, *ends, 1.0 * with_area, *now)
+    _follow(stress, stiffness, relaxation, radii, pull, contact.work, contact.detached, *ends, 1.0 * with_area, *here)
     path = np.maximum(so_far.path, motions.path.max(axis=0)) if with_path else so_far.path
-    return Events._make([*now, so_far.past, path, so_far.slips])
+    return Events._make([*now, path, so_far.slips])
 
 
 def _with_start(before: Array, values: Array, steps: int) -> Array:
@@ -372,7 +358,7 @@ def _load(k, i, stress, stiffness, relaxation, speed, radius):
     return math.fabs(value), (slope if value > 0.0 else -slope if value < 0.0 else math.fabs(slope)), area
 
 
-@kernel(f"void({9 * _READ}{2 * 'float64[:], '}float64, {', '.join(4 * ['float64[:, ::1]'])})")
+@kernel(f"void({9 * _READ}{2 * 'float64[:], '}float64, {', '.join(4 * ['float64[:, :]'])})")
 def _follow(
     stresses, stiffness, relaxation, radii, pulls, works, detached, first, speed, times, steps, share,
     stress, friction, pull, contact,

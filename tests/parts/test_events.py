@@ -44,7 +44,7 @@ def _after(maxima, bondings, radii, step, number):
 
 
 def stress(*course):
-    return followed(*course).stress
+    return followed(*course).stress[:, 0]
 
 
 def test_parabolas_and_cubics_are_found_between_samples_and_friction_over_a_growing_area():
@@ -67,8 +67,8 @@ def test_parabolas_and_cubics_are_found_between_samples_and_friction_over_a_grow
     values, slopes = [np.array([0.75]), np.array([0.75])], [np.array([1.0]), np.array([-1.0])]
     maxima = followed(values, 1.0, slopes, (ONE, np.sqrt(2.0) * ONE))
     top = 0.5 * np.sqrt(7.0 / 3.0)  # where 7/4 − 3 t² is 0: 0.76
-    assert_allclose(maxima.stress[0, 3:5], [1.0, 0.5], rtol=1e-14)
-    assert_allclose(maxima.friction[0, 3:5], [(1.0 + top) * (0.75 + top - top**2), top], rtol=1e-14)
+    assert_allclose(maxima.stress[0, 0, 3:5], [1.0, 0.5], rtol=1e-14)
+    assert_allclose(maxima.friction[0, 0, 3:5], [(1.0 + top) * (0.75 + top - top**2), top], rtol=1e-14)
 
 
 def test_a_jump_keeps_its_sample_and_nothing_is_larger_than_nan():

@@ -355,10 +355,10 @@ def step_rows(before, share, slip, duration, numbers, after, sums):
         old = m % len(weight)
         count = read_row(pool, weight[old], stretch[old], width[old], share[m % share.size])
         travelled, settled = lattice[old, 0], lattice[old, 1]
+        row = new_weight[m], new_stretch[m], new_width[m], new_lattice[m]
         for k in range(duration.size):
             moved = slip[k, m % slip.shape[1]]
             count, travelled, settled = _step_row(pool, count, travelled, settled, moved, duration[k], rules)
-            row = new_weight[m], new_stretch[m], new_width[m], new_lattice[m]
             write_row(pool, count, travelled, settled, moved, rules, row)
             travelled, settled = row[3][0], row[3][1]
             sum_row(new_weight[m], new_stretch[m], new_width[m], rules, pool[4], sums[:, k, m])

@@ -227,7 +227,7 @@ class _Fluctuating(ShearModel):
 
     @property
     def _memory(self) -> float:  # type: ignore[override]
-        return self.correlation.length if self.correlation.model == "slip" else math.nan
+        return getattr(self.correlation, "length", math.nan)  # of a correlation by slip
 
     def side(self, cell: float) -> float:
         return cell if self.cell is None else self.cell
@@ -360,21 +360,14 @@ def _grouped_anew(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, 
 
 
 @keyed()
-class Auto:
+class Auto(_Fluctuating):
     """The simplest model that gives what the scene records; it takes the keys of all of them."""
 
-    spectrum: Spectrum
-    correlation: Correlation | None = None
-    amplitude: Amplitude = Field(default_factory=Constant)
-    cell: _Cell | None = None
-    points: _Points | None = None
-    mode_amplitudes: _ModeAmplitudes = "gaussian"
+    correlation: Correlation | None = None  # type: ignore[assignment]
     tolerance: _Tolerance = 0.01
-    paid_by_adhesion: Paid = 1.0
-    contact: Contact = "plane"
     model: Literal["auto"] = "auto"
 
-    def chosen(self, maps: bool) -> "Mean | Banded | Modal":
+    def chosen(self, maps: bool) -> "Mean | Banded | Modal":  # type: ignore[override]
         """Return the model for a scene with or without recorded ``maps``.
 
         Raises
