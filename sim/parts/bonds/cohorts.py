@@ -359,15 +359,18 @@ def step_rows(before, share, slip, duration, numbers, after, sums):
         for k in range(duration.size):
             moved = slip[k, m % slip.shape[1]]
             count, travelled, settled = _step_row(pool, count, travelled, settled, moved, duration[k], rules)
-            write_row(pool, count, travelled, settled, moved, rules, row)
+            count = write_row(pool, count, travelled, settled, moved, rules, row)
             travelled, settled = row[3][0], row[3][1]
-            sum_row(new_weight[m], new_stretch[m], new_width[m], rules, pool[4], sums[:, k, m])
+            sum_row(new_weight[m, :count], new_stretch[m], new_width[m], rules, pool[4], sums[:, k, m])
             count = read_row(pool, new_weight[m], new_stretch[m], new_width[m], 1.0)
 
 
 @device
 def write_row(pool, count, travelled, settled, slip, rules, row):
-    """Write the first ``count`` cohorts of a pool into a row of ``Cohorts``, with its lattice; merge too many ones."""
+    """Write the first ``count`` cohorts of a pool into a row of ``Cohorts``, with its lattice; merge too many ones.
+
+    Return the number written.
+    """
     weight, stretch, width, lattice = row
     if count > weight.size:
         count = settle(pool[0], pool[1], pool[2], count, -1.0 if slip < 0.0 else 1.0, travelled, rules)
@@ -378,6 +381,7 @@ def write_row(pool, count, travelled, settled, slip, rules, row):
     weight[count:], stretch[count:] = 0.0, 0.0
     if width.size > 1:
         width[:count], width[count:] = pool[2, :count], 0.0
+    return count
 
 
 @device
