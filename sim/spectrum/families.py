@@ -23,7 +23,7 @@ from pydantic_core import PydanticCustomError
 from sim.laws.halfspace import angular_compliance, energy_factors, ripple_energy
 from sim.spectrum.family import Array, Factors, Family, gaussian_boxes
 from sim.spectrum.measured import Measured, Tabulated
-from sim.spectrum.radial import Isotropic, PowerLaws, Rowed, Waves
+from sim.spectrum.radial import Isotropic, PowerLaws, Rowed, Rows, Waves
 from sim.units.quantity import Quantity, keyed
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(80)
@@ -235,10 +235,10 @@ class Band(Rowed):
         return self
 
     @functools.cached_property
-    def rows(self) -> PowerLaws:
-        """The band as a chain of power laws."""
+    def rows(self) -> Rows:  # type: ignore[override]
+        """Both ends of the band."""
         q = 2 * np.pi / np.array([self.longest, self.shortest])
-        return PowerLaws(q, np.full(2, 4 * np.pi * self.rms**2 / ((q[1] - q[0]) * (q[1] + q[0]))))
+        return Rows(q, np.full(2, 4 * np.pi * self.rms**2 / ((q[1] - q[0]) * (q[1] + q[0]))))
 
 
 @keyed()
@@ -282,12 +282,12 @@ class SelfAffine(Rowed):
         return self
 
     @functools.cached_property
-    def rows(self) -> PowerLaws:
-        """Plateau and power law as a chain, scaled to the given rms."""
+    def rows(self) -> Rows:  # type: ignore[override]
+        """Ends of plateau and power law, scaled to the given rms."""
         waves = sorted({self.longest, self.rolloff, self.shortest}, reverse=True)
         q = 2 * np.pi / np.array(waves)
         level = np.maximum(q * self.rolloff / (2 * np.pi), 1.0) ** (-2 - 2 * self.hurst)
-        return PowerLaws(q, level * self.rms**2 / PowerLaws(q, level).variance)
+        return Rows(q, level * self.rms**2 / PowerLaws(Rows(q, level)).variance)
 
 
 @keyed()

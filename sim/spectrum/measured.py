@@ -17,7 +17,7 @@ from pydantic_core import PydanticCustomError
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice, lattice_of
 from sim.spectrum.family import Array
-from sim.spectrum.radial import PowerLaws, Rowed
+from sim.spectrum.radial import PowerLaws, Rowed, Rows
 from sim.units.quantity import Quantity, keyed
 from sim.units.tables import at_once, blamed, file_columns, file_path, file_text, matrix
 
@@ -78,16 +78,16 @@ class FromFile(Rowed, Protocol):
     def _falling(self) -> bool:
         return len(self.wavenumbers) > 1 and self.wavenumbers[0] > self.wavenumbers[-1]
 
-    def _chain(self, factor: float) -> PowerLaws:
-        """The rows with a factor of the density as a chain of power laws."""
+    def _chain(self, factor: float) -> Rows:
+        """The rows with a factor of the density, rising."""
         order = slice(None, None, -1 if self._falling else 1)
-        return PowerLaws(np.array(self.wavenumbers[order]), factor * np.array(self.densities[order]))
+        return Rows(np.array(self.wavenumbers[order]), factor * np.array(self.densities[order]))
 
     @functools.cached_property
-    def rows(self) -> PowerLaws:
-        """The rows as a chain of power laws, with the 4π² in the integral, at the rms that is given."""
+    def rows(self) -> Rows:  # type: ignore[override]
+        """The rows with the 4π² in the integral, at the rms that is given."""
         chain = self._chain(NORMALIZATIONS[self.normalization])
-        return chain if self.rms is None else PowerLaws(chain.q, chain.density * (self.rms**2 / chain.variance))
+        return chain if self.rms is None else Rows(chain.q, chain.density * (self.rms**2 / PowerLaws(chain).variance))
 
 
 @keyed()
@@ -153,7 +153,7 @@ class Tabulated(FromFile):
     def _normalized(self) -> tuple[str, ...]:
         """Remark on the rms that the table has under the other normalization."""
         chains = {where: self._chain(factor) for where, factor in NORMALIZATIONS.items()}
-        rms = {where: math.sqrt(chain.variance) for where, chain in chains.items()}
+        rms = {where: math.sqrt(PowerLaws(chain).variance) for where, chain in chains.items()}
         other = next(where for where in NORMALIZATIONS if where != self.normalization)
         words = {where: where.replace("_", " the ") for where in NORMALIZATIONS}
         if self.rms is not None and abs(math.log(self.rms / rms[other])) < _NEAR:
@@ -170,9 +170,9 @@ class Tabulated(FromFile):
         """Remark on the energy below a first row at which the density is flat; the mean energy goes as ∫ C dq."""
         (q, *_), (density, *_) = self.rows.q, self.rows.density
         flat = density > 0.0 and abs(math.log(self.rows.density[1] / density)) < _FLAT * math.log(self.rows.q[1] / q)
-        if not (flat and self.file) or q * density < _PART * self.rows.line_integral:
+        if not (flat and self.file) or q * density < _PART * self.line_integral:
             return ()
-        more, condition = q * density / self.rows.line_integral, ""
+        more, condition = q * density / self.line_integral, ""
         if self.rms is not None:  # the plateau takes its part of the variance from the rest
             more = (1.0 + more) / (1.0 + density * q**2 / (4.0 * math.pi * self.rms**2)) - 1.0
             condition = ", the rms kept"

@@ -17,7 +17,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, cast
+from typing import NamedTuple, Protocol, cast
 
 import numpy as np
 import scipy
@@ -353,45 +353,34 @@ def _decay(x: Array) -> Array:
     return np.where(x == 0.0, 1.0, -np.expm1(-safe) / safe)
 
 
-@dataclass(frozen=True, eq=False)
-class PowerLaws:
-    """A radial density given by rows, a power law between neighbours, zero outside.
-
-    Parameters
-    ----------
-    q : array, shape (rows,)
-        Wavenumbers [rad/m], positive and increasing.
-    density : array, shape (rows,)
-        C at each row [Pa² m²], at least zero; next to a zero the interpolation is linear.
-
-    Examples
-    --------
-    A flat spectrum between 1 and 2 rad/m holds (4 - 1)/(4 pi) times its level:
-
-    >>> flat = PowerLaws(np.array([1.0, 2.0]), np.array([1.0, 1.0]))
-    >>> print(round(4 * np.pi * float(flat.cumulative(9.0)), 12))
-    3.0
-    """
+class Rows(NamedTuple):
+    """Rows of a radial density: wavenumbers [rad/m], positive and increasing, and C there [Pa² m²], at least zero."""
 
     q: Array
     density: Array
 
+
+class Rowed(Isotropic, Protocol):
+    """Base of isotropic spectra that are a power law between neighbouring rows, next to a zero linear, zero outside."""
+
+    rows: Rows
+
     def radial_density(self, q: ArrayLike) -> Array:
         """C(q), zero outside the rows."""
-        inside = (np.asarray(q) >= self.q[0]) & (np.asarray(q) <= self.q[-1])
+        inside = (np.asarray(q) >= self.rows.q[0]) & (np.asarray(q) <= self.rows.q[-1])
         return np.where(inside, self._value(*self._locate(q)), 0.0)
 
     def cumulative(self, q: ArrayLike) -> Array:
         """Variance within the circle of radius q: ``(1/2 pi) ∫ C q dq`` from 0 to q [Pa²]."""
         q, row = self._locate(q)
         held = np.concatenate([[0.0], np.cumsum(self._moments(1))])
-        return (held[row] + self._piece(1, self.q[row], self.density[row], q, row)) / (2 * np.pi)
+        return (held[row] + self._piece(1, self.rows.q[row], self.rows.density[row], q, row)) / (2 * np.pi)
 
     def beyond(self, q: ArrayLike) -> Array:
         """Variance outside the circle of radius q [Pa²], without cancellation at large q."""
         q, row = self._locate(q)
         left = np.concatenate([np.cumsum(self._moments(1)[::-1])[::-1], [0.0]])
-        return (left[row + 1] + self._piece(1, q, self._value(q, row), self.q[row + 1], row)) / (2 * np.pi)
+        return (left[row + 1] + self._piece(1, q, self._value(q, row), self.rows.q[row + 1], row)) / (2 * np.pi)
 
     @functools.cached_property
     def line_integral(self) -> float:
@@ -401,33 +390,43 @@ class PowerLaws:
     @property
     def variance(self) -> float:
         """Variance within all rows [Pa²]."""
-        return float(self.cumulative(self.q[-1]))
+        return float(self.cumulative(self.rows.q[-1]))
+
+    @property
+    def support(self) -> tuple[float, float]:  # type: ignore[override]
+        """Wavenumbers [rad/m] between which the density may differ from zero."""
+        return float(self.rows.q[0]), float(self.rows.q[-1])
+
+    @property
+    def breaks(self) -> Array:  # type: ignore[override]
+        """Wavenumbers [rad/m] where the density jumps or kinks."""
+        return self.rows.q
 
     def _moments(self, power: int) -> Array:
         """∫ q^power C dq of each piece."""
-        rows = np.arange(len(self.q) - 1)
-        return self._piece(power, self.q[:-1], self.density[:-1], self.q[1:], rows)
+        rows = np.arange(len(self.rows.q) - 1)
+        return self._piece(power, self.rows.q[:-1], self.rows.density[:-1], self.rows.q[1:], rows)
 
     def _locate(self, q: ArrayLike) -> tuple[Array, NDArray[np.intp]]:
         """q brought into the rows, and the piece it lies in."""
-        q = np.clip(q, self.q[0], self.q[-1])
-        return q, np.minimum(np.searchsorted(self.q, q, side="right") - 1, len(self.q) - 2)
+        q = np.clip(q, self.rows.q[0], self.rows.q[-1])
+        return q, np.minimum(np.searchsorted(self.rows.q, q, side="right") - 1, len(self.rows.q) - 2)
 
     @functools.cached_property
     def _slopes(self) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Exponent where a piece is a power law, gradient where it is linear, and which it is."""
-        linear = (self.density[1:] == 0.0) | (self.density[:-1] == 0.0)
-        logs = np.log(np.where(self.density > 0.0, self.density, 1.0))
-        exponent = np.where(linear, 0.0, np.diff(logs) / np.diff(np.log(self.q)))
-        gradient = np.where(linear, np.diff(self.density) / np.diff(self.q), 0.0)
+        linear = (self.rows.density[1:] == 0.0) | (self.rows.density[:-1] == 0.0)
+        logs = np.log(np.where(self.rows.density > 0.0, self.rows.density, 1.0))
+        exponent = np.where(linear, 0.0, np.diff(logs) / np.diff(np.log(self.rows.q)))
+        gradient = np.where(linear, np.diff(self.rows.density) / np.diff(self.rows.q), 0.0)
         return exponent, gradient, linear
 
     def _value(self, q: Array, row: NDArray[np.intp]) -> Array:
         """C at q by the law of its piece."""
         exponent, gradient, linear = self._slopes
         larger = row + (exponent[row] > 0.0)  # seen from there a power law only falls: no overflow
-        power = self.density[larger] * np.exp(exponent[row] * np.log(q / self.q[larger]))
-        straight = self.density[row] + gradient[row] * (q - self.q[row])
+        power = self.rows.density[larger] * np.exp(exponent[row] * np.log(q / self.rows.q[larger]))
+        straight = self.rows.density[row] + gradient[row] * (q - self.rows.q[row])
         return np.where(linear[row], np.maximum(straight, 0.0), power)
 
     def _piece(self, power: int, low: Array, level: Array, high: Array, row: NDArray[np.intp]) -> Array:
@@ -446,41 +445,17 @@ class PowerLaws:
         return np.where(linear[row], straight, powered)
 
 
-class Rowed(Isotropic, Protocol):
-    """Base of isotropic spectra that are a chain of power laws."""
+@dataclass(frozen=True, eq=False)
+class PowerLaws(Rowed):
+    """A radial density of some rows.
 
-    @property
-    def rows(self) -> PowerLaws:
-        """The chain of power laws."""
+    Examples
+    --------
+    A flat spectrum between 1 and 2 rad/m holds (4 - 1)/(4 pi) times its level:
 
-    def radial_density(self, q: ArrayLike) -> Array:
-        """Density C at wavenumber q [rad/m], in Pa² m²; zero outside ``support``."""
-        return self.rows.radial_density(q)
+    >>> flat = PowerLaws(Rows(np.array([1.0, 2.0]), np.array([1.0, 1.0])))
+    >>> print(round(4 * np.pi * float(flat.cumulative(9.0)), 12))
+    3.0
+    """
 
-    def cumulative(self, q: ArrayLike) -> Array:
-        """Variance within wavenumber q [Pa²]."""
-        return self.rows.cumulative(q)
-
-    def beyond(self, q: ArrayLike) -> Array:
-        """Variance beyond wavenumber q [Pa²]."""
-        return self.rows.beyond(q)
-
-    @property
-    def line_integral(self) -> float:
-        """∫ C dq [Pa² m]."""
-        return self.rows.line_integral
-
-    @property
-    def variance(self) -> float:
-        """Mean square of the stress [Pa²]."""
-        return self.rows.variance
-
-    @property
-    def support(self) -> tuple[float, float]:  # type: ignore[override]
-        """Wavenumbers [rad/m] between which the density may differ from zero."""
-        return float(self.rows.q[0]), float(self.rows.q[-1])
-
-    @property
-    def breaks(self) -> Array:  # type: ignore[override]
-        """Wavenumbers [rad/m] where the density jumps or kinks."""
-        return self.rows.q
+    rows: Rows
