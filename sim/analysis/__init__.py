@@ -12,7 +12,7 @@ from sim.analysis.events import events, loop_energy, peaks, pull_offs, slip_size
 from sim.analysis.lifetimes import Lifetime, lifetime
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
 from sim.analysis.over_speed import crossing, extremes, loss_speeds, speed_curves, steady_speeds
-from sim.analysis.statements import Statement, each, relaxation, statements
+from sim.analysis.statements import Statement, each, relaxation, statements, statistics
 from sim.analysis.statistics import (
     QUANTILES,
     IntegralTime,
@@ -22,7 +22,6 @@ from sim.analysis.statistics import (
     integral_time,
     over_time,
     shares,
-    statistics,
     summary,
     where,
 )

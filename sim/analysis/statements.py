@@ -12,7 +12,7 @@ from sim.analysis.ensemble_peaks import ensemble_peaks
 from sim.analysis.events import events, slips_by_phase
 from sim.analysis.lifetimes import half_lives
 from sim.analysis.over_speed import loss_speeds
-from sim.analysis.statistics import averaging, of_second_half, summary
+from sim.analysis.statistics import averaging, correlation_time, of_second_half, over_members, summary
 from sim.units.errors import BadInput
 from sim.units.notation import bounded, scaled, share
 
@@ -101,6 +101,28 @@ def statements(
             group[key] = group[key].assign_attrs(over=over)
         result = result.merge(group, compat="no_conflicts", join="outer")
     return result
+
+
+def statistics(dataset: xr.Dataset) -> xr.Dataset:
+    """Return statistics over the members of everything recorded, at each sweep value and time.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, with each member or with statistics only.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``…_mean``, ``…_std``, ``…_sem`` and ``…_quantile`` of every trajectory (see ``summary``), the same of
+        ``area_ratio`` (A/A_JKR), of the shares of the lost area (see ``shares``), of ``fraction_detached`` and
+        ``fraction_masked`` (the latter is known of statistics alone only while all contacts are closed), of what a
+        whole run has once (see ``statements``), and ``correlation_time`` with its standard error. A member whose
+        trajectory has stopped is left out from there on; ``fraction_detached`` counts it.
+    """
+    once = of_events(dataset).drop_dims("phase", errors="ignore")
+    each = over_members(dataset), once, correlation_time(dataset)
+    return xr.merge(each, compat="no_conflicts", join="outer", combine_attrs="override")
 
 
 def of_events(dataset: xr.Dataset) -> xr.Dataset:

@@ -12,7 +12,6 @@ import xarray as xr
 from scipy import special
 
 from sim.analysis.dataset import MEMBERS, ROOM, has_noise, in_pieces, plain, steady_points, sweep_dims, word
-from sim.analysis.events import events
 from sim.analysis.observables import (
     FEW_LEFT,
     KEPT,
@@ -21,7 +20,6 @@ from sim.analysis.observables import (
     closed_only,
     is_of_contact,
     labelled,
-    observables,
     pure,
     reference_radii,
     restricted,
@@ -482,33 +480,11 @@ def values_at_ranks(ordered: np.ndarray, places: np.ndarray) -> np.ndarray:
     return np.where(share > 0.0, low + share * (high - low), np.where(known, low, np.nan))
 
 
-def statistics(dataset: xr.Dataset) -> xr.Dataset:
-    """Return statistics over the members of everything recorded, at each sweep value and time.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it, with each member or with statistics only.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``…_mean``, ``…_std``, ``…_sem`` and ``…_quantile`` of every trajectory (see ``summary``), the
-        same of ``area_ratio`` (A/A_JKR), ``fraction_detached`` and ``fraction_masked`` (the latter is
-        known of statistics alone only while all contacts are closed), of what a whole run has once (see
-        ``sim.analysis.events.events``), and ``correlation_time`` with its standard error. A member whose trajectory
-        has stopped is left out from there on; ``fraction_detached`` counts it.
-    """
-    each = over_members(dataset), summary(events(dataset).assign_attrs(dataset.attrs)), correlation_time(dataset)
-    return xr.merge(each, compat="no_conflicts", join="outer", combine_attrs="override")
-
-
 def over_members(dataset: xr.Dataset, names: Collection[str] | None = None, quantiles: bool = True) -> xr.Dataset:
-    """Return the ``summary`` of observables at each sweep value and time, by default of all except shares."""
+    """Return the ``summary`` of observables at each sweep value and time, by default of all."""
 
     def reduce(piece: xr.Dataset) -> xr.Dataset:
-        piece = closed_only(piece)
-        return summary(observables(piece) if names is None else chosen_observables(piece, names), quantiles)
+        return summary(chosen_observables(closed_only(piece), names), quantiles)
 
     return in_pieces(restricted(dataset, names), ("t",), reduce)
 

@@ -15,7 +15,6 @@ import xarray as xr
 
 from sim.analysis.dataset import (
     MEMBERS,
-    answered,
     is_stationary,
     is_steady,
     resolved,
@@ -30,8 +29,8 @@ from sim.analysis.errors import systematic_errors
 from sim.analysis.events import varies
 from sim.analysis.observables import restricted, with_slips
 from sim.analysis.over_speed import extremes, loss_speeds
-from sim.analysis.statements import BOUNDED, COUNTS, as_means, each, of_events, reasons, statements
-from sim.analysis.statistics import QUANTILES, WIDE, averaging, correlation_time, over_members, shares, statistics
+from sim.analysis.statements import BOUNDED, COUNTS, as_means, each, of_events, reasons, statements, statistics
+from sim.analysis.statistics import QUANTILES, WIDE, averaging, correlation_time, over_members
 from sim.numerics.files import output
 from sim.units.notation import bounded, chosen_unit, concise, engineering, scaled, share
 
@@ -586,8 +585,6 @@ def tidy(dataset: xr.Dataset, lost: Sequence[str] = ()) -> pd.DataFrame:
     """
     members = averaging(dataset, False).removeprefix("mean over the ")
     groups = [(over_members(dataset), members), (statements(dataset, lost=lost), "")]
-    with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
-        groups.append((shares(dataset), members))
     frames = []
     for group, over in groups:
         flat = _flat(group)
@@ -614,10 +611,7 @@ def _long(dataset: xr.Dataset, group: xr.Dataset, key: str, over: str) -> pd.Dat
 
 def frame(dataset: xr.Dataset) -> pd.DataFrame:
     """Return all statistics at all times and sweep values, one row each; ``attrs["units"]`` holds units by column."""
-    result = statistics(dataset)
-    with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
-        result = result.merge(shares(dataset), compat="no_conflicts")
-    return _framed(dataset, result)
+    return _framed(dataset, statistics(dataset))
 
 
 def _framed(dataset: xr.Dataset, statistics: xr.Dataset) -> pd.DataFrame:

@@ -97,6 +97,7 @@ def test_few_members_widen_an_interval_and_those_of_shares_hold_what_they_promis
         none = analysis.summary(xr.Dataset({"fraction_detached": (("member",), np.zeros(64))}))
         # Wilson's bound of none in 64: z^2/(64 + z^2)
         assert_allclose(none["fraction_detached_high"], 3.841458820694124 / 67.84145882069413, rtol=1e-12)
+        assert none["fraction_detached_low"] == 0.0
 
 
 def covered(law, members, length, ensembles):
