@@ -184,14 +184,13 @@ def balance(scenario: Scenario, fraction: Array, strength: Array, energy: Array,
 
 def _step_contact(scenario: Scenario, touch: ContactState, shear: Storing, steps: range) -> StepContact:
     """Return contact and half-space at the start of some clock steps, for a drive that feels the friction."""
-    contact, bodies, times, adhesion = scenario.contact, scenario.bodies, scenario.times, scenario.adhesion
+    contact, times, adhesion = scenario.contact, scenario.times, scenario.adhesion
     first, last = contact.mount_between(times.at(np.arange(steps.start - 1.0, steps.stop)), times.duration)
     share = 1.0 if scenario.margin is None else scenario.margin(np.nan_to_num(touch.radius, nan=0.0))
     bare, paid = adhesion.work_of_bonds(0.0), scenario.fluctuations.paid_by_adhesion * share
     bonded = adhesion.work_of_bonds(1.0) - adhesion.work_of_bonds(0.0)
-    area = scenario.contact_area
     stays = contact.lags or not (contact.changes or bonded or contact.reversible)
-    around = (first.mount, last.mount), stays, *bodies, scenario.solid.effective[0], area
+    around = (first.mount, last.mount), stays, scenario.bodies, scenario.solid.effective[0], scenario.contact_area
     return StepContact(touch.radius, bare, paid, shear, bonded, contact.reversible, *around)
 
 

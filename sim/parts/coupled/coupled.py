@@ -17,6 +17,7 @@ from sim.numerics.noise import Noise
 from sim.parts.bonds import models
 from sim.parts.bonds.cohorts import Cohorts, numbers_of
 from sim.parts.bonds.tracked import AGAIN, Tracks
+from sim.parts.contact.balance import Bodies
 from sim.parts.coupled.cohorts import advance_cohorts
 from sim.parts.coupled.mean_field import advance_rows
 from sim.parts.coupled.mechanics import COLUMNS, ROW, Inputs, Law, Slider
@@ -60,7 +61,7 @@ class StepContact(NamedTuple):
         Mount of the sphere at the start and at the end of each step.
     stays : bool
         True if the radius stays during a step.
-    sphere_radius, modulus, poisson_ratio : float
+    bodies : Bodies
         R [m], E* [Pa], ν [1].
     shear_modulus : float
         G [Pa] of the effective half-space.
@@ -76,9 +77,7 @@ class StepContact(NamedTuple):
     reversible: float
     mounts: tuple[Mount, Mount]
     stays: bool
-    sphere_radius: float
-    modulus: float
-    poisson_ratio: float
+    bodies: Bodies
     shear_modulus: float
     area: float
 
@@ -129,7 +128,7 @@ def load(parts: Parts, slider: Sliding, bonding: Bonding, contact: StepContact, 
     """Return the slider at t = 0, with its spring loaded for its motion, and the stored energy."""
     drive, slider = cast(Force | Spring, parts.drive), cast(Driven, slider)
     speed, radius = slider.speed, np.nan_to_num(contact.radius, nan=0.0)
-    area, (yields, slope) = np.pi * radius**2, drive.yields(contact.shear_modulus, contact.poisson_ratio)
+    area, (yields, slope) = np.pi * radius**2, drive.yields(contact.shear_modulus, contact.bodies.poisson_ratio)
     friction = area * bonding.stress
     sheared = friction * (yields + np.divide(slope, radius, out=np.zeros(radius.shape), where=radius > 0.0))
     first = drive.first(duration)
@@ -149,14 +148,9 @@ def with_contact_stress(parts: Parts, bonding: Bonding, speed: Array) -> Bonding
 
 
 def advance(
-    parts: Parts,
-    slider: Sliding,
-    population: tuple[object, ...],
-    contact: StepContact,
-    times: Times,
-    steps: range,
+    parts: Parts, slider: Sliding, population: tuple[object, ...], contact: StepContact, times: Times, steps: range,
     noise: Noise,
-) -> tuple[Driven, Motion, tuple[object, ...], Bonding]:
+) -> tuple[Driven, Motion, tuple[object, ...], Bonding]:  # fmt: skip
     """Return the slider at the end of each of some clock steps, its motion, the bonds at the end and their readings.
 
     The contact is that at the start, except for its equilibrium with the bonds; ``steps_until_contact_changes`` counts
@@ -213,15 +207,9 @@ def advance(
 
 
 def _advanced(
-    bonds: _Driven,
-    population: tuple[object, ...],
-    radius: Array,
-    inputs: Inputs,
-    numbers: _Numbers,
-    outputs: tuple[Array, Array],
-    reached: dict[str, Array],
-    noise: Noise,
-) -> tuple[tuple[object, ...], Bonding]:
+    bonds: _Driven, population: tuple[object, ...], radius: Array, inputs: Inputs, numbers: _Numbers,
+    outputs: tuple[Array, Array], reached: dict[str, Array], noise: Noise,
+) -> tuple[tuple[object, ...], Bonding]:  # fmt: skip
     """Return the bonds after some clock steps and their readings at each.
 
     ``radius`` of the contact at the start [m]; ``outputs`` are filled with the rows and energies at the end of each
@@ -281,7 +269,8 @@ def _numbers(drive: Force | Spring, bonds: _Driven, contact: StepContact, units:
     """Return the numbers of slider, bonds and contact in their units, without load and base of the mount."""
     stretch, force = units
     stiff, density = force / stretch, force / (stretch * contact.area)
-    yields, slope = (stiff * value for value in drive.yields(contact.shear_modulus, contact.poisson_ratio))
+    bodies = contact.bodies
+    yields, slope = (stiff * value for value in drive.yields(contact.shear_modulus, bodies.poisson_ratio))
     body = drive.spring / stiff, drive.mass / stiff, drive.damping / stiff, drive.viscosity / density
     slider = Slider(0.0, 0.0, 0.0, 0.0, *body, 0.0 if drive.spring else 1.0, yields, slope, drive.tolerance)
     if isinstance(bonds, _WITH_STRETCH):
@@ -293,11 +282,9 @@ def _numbers(drive: Force | Spring, bonds: _Driven, contact: StepContact, units:
         breaking, of_rest = Law(0.0, 0.0, stretch / _renewing(bonds), binding, 1.0, 1.0, slows), 1.0
     mean_stress = 0.0
     if contact.reversible:
-        stress = density * stretch
-        energy = float(mean_stress_energy(1.0, stress, contact.modulus, contact.poisson_ratio))
-        mean_stress = contact.reversible * energy
+        mean_stress = contact.reversible * float(mean_stress_energy(1.0, density * stretch, *bodies[1:]))
     still = contact.bare, 0.0, 0.0, 0.0, 0.0, float(contact.stays), contact.bonded / of_rest, mean_stress
-    solid = contact.mounts[0].stiffness, 1.0 / contact.sphere_radius, contact.modulus, contact.area
+    solid = contact.mounts[0].stiffness, 1.0 / bodies.sphere_radius, bodies.modulus, contact.area
     return tuple(slider), tuple(breaking), (*still, *solid)
 
 
