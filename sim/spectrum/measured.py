@@ -283,8 +283,8 @@ def _from_netcdf(path: Path, variable: str, unit: str) -> MapFile:
     steps = [np.ptp(np.asarray(data[axis], float)) / (data.sizes[axis] - 1) for axis in ("x", "y") if has_axes]
     if has_axes and None in spacings and not math.isclose(*steps, rel_tol=1e-4):
         raise ValueError("x and y have other steps but no units; give both coordinates the attribute units, such as um")
-    factor, given = _factor(data, STRESS, unit), STRESS.scaled(1.0, unit)
-    if unit and not math.isclose(factor, given):
+    factor, of_key = _factor(data, STRESS, unit), STRESS.scaled(1.0, unit)
+    if unit and not math.isclose(factor, of_key):
         raise ValueError(
             f'"{variable}" is in {data.attrs["units"]}, not in {unit} as the key unit has it; leave unit out'
         )

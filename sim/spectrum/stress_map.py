@@ -71,8 +71,8 @@ class StressMap:
     A ripple along x stores τ²/(8Gq), whatever its mean:
 
     >>> ripple = 5.0 + np.cos(2 * np.pi * np.arange(16) / 16)[:, None] * np.ones(8)
-    >>> found = StressMap(file="", pixel=1 / 16, values=ripple.tobytes(), shape=(16, 8))
-    >>> print(f"{found.mean:.1f} {found.surface_energy(1.0) * 16 * np.pi:.3f}")
+    >>> stress = StressMap(file="", pixel=1 / 16, values=ripple.tobytes(), shape=(16, 8))
+    >>> print(f"{stress.mean:.1f} {stress.surface_energy(1.0) * 16 * np.pi:.3f}")
     5.0 1.000
     """
 

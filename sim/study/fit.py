@@ -35,7 +35,7 @@ from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read, quantities
 from sim.study import likelihood
 from sim.study.converge import Printed
-from sim.study.likelihood import HELD, LEVEL, Curve, Free, Interval, Measured, Minimum, Problem, idle, with_errors
+from sim.study.likelihood import LEVEL, MOUNT, Curve, Free, Interval, Measured, Minimum, Problem, idle, with_errors
 from sim.study.mechanisms import WHOLE, Verdict, compare
 from sim.units.errors import BadInput
 from sim.units.notation import concise, engineering, in_units, scaled
@@ -367,8 +367,8 @@ def _along(table: Measured) -> Along:
     if not varied:
         return Along("", "row", "1", np.arange(1.0, table.rows + 1.0))
     key = max(varied, key=lambda name: (len(_levels(varied[name])[0]), name == "speed"))
-    column, unit, _ = HELD[table.held]
-    known = {"held": (column.replace("_", " "), unit), "speed": ("sliding speed $V$", "m/s"), "t": ("time $t$", "s")}
+    column, unit, _ = MOUNT[table.mount]
+    known = {"mount": (column.replace("_", " "), unit), "speed": ("sliding speed $V$", "m/s"), "t": ("time $t$", "s")}
     return Along(key, *known.get(key, (key, "1")), varied[key])
 
 
@@ -387,8 +387,8 @@ def _alike(problem: Problem) -> tuple[list[NDArray[np.int64]], list[str]]:
     along, places = [_along(table) for table in problem.tables], np.cumsum([table.rows for table in problem.tables])
     numbers, texts = [np.zeros(places[-1], int)], [[""]]
     for key, (quantity, columns) in problem.conditions().items():
-        kept = [np.where(axis.key == key, np.nan, values) for axis, values in zip(along, columns, strict=True)]
-        means, level = _levels(np.concatenate(kept))
+        others = [np.where(axis.key == key, np.nan, values) for axis, values in zip(along, columns, strict=True)]
+        means, level = _levels(np.concatenate(others))
         name, described = variable_name(key), {"units": quantity.unit, "symbol": quantity.symbol}
         words = xr.Dataset(coords={name: (name, means[np.isfinite(means)], described)})
         if words.sizes[name] > 1:

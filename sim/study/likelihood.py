@@ -34,7 +34,7 @@ from sim.units.quantity import Quantity
 from sim.units.tables import names_of, read_measured
 
 #: Column, unit and symbol of what holds the sphere, by the key of the contact that prescribes it.
-HELD = {
+MOUNT = {
     "load": ("normal_load", "N", "P"), "indentation": ("indentation", "m", "delta"),
     "displacement": ("displacement", "m", "Delta"),
 }  # fmt: skip
@@ -61,13 +61,13 @@ class Curve(NamedTuple):
 class Measured(NamedTuple):
     """One table: under which conditions which curves were measured.
 
-    ``conditions`` holds the columns ``"t"``, ``"speed"``, ``"held"`` (load, indentation or displacement) and those of
-    other keys of the scenario, by the key; rows are numbered alike in all columns. ``held`` is the key of the contact
+    ``conditions`` holds the columns ``"t"``, ``"speed"``, ``"mount"`` (load, indentation or displacement) and those of
+    other keys of the scenario, by the key; rows are numbered alike in all columns. ``mount`` is the key of the contact
     that holds the sphere. ``ranges`` names the range of each column, for people.
     """
 
     path: Path
-    held: str
+    mount: str
     conditions: dict[str, Array]
     curves: tuple[Curve, ...]
     ranges: str = ""
@@ -125,10 +125,10 @@ def _faults(scenario: Scenario, conditions: dict[str, Array], curves: tuple[Curv
     drive, contact, known = scenario.drive, scenario.contact, quantities(scenario)
     steady = {"drive.stage", "drive.force"} & known.keys() if drive.solves_motion else {"speed"} & conditions.keys()
     varies = not steady and drive.model != "steady"
-    if "t" in conditions and len(conditions.keys() & {"speed", "held"}):
+    if "t" in conditions and len(conditions.keys() & {"speed", "mount"}):
         yield "the scenario has the speed and the load at each time; leave out t, or the columns of these"
-    elif "t" not in conditions and (not conditions or varies or ("held" not in conditions and contact.changes)):
-        yield f'no column has the conditions of each row; add "t [s]", or "speed [mm/s]" and "{HELD[contact.kind][0]}"'
+    elif "t" not in conditions and (not conditions or varies or ("mount" not in conditions and contact.changes)):
+        yield f'no column has the conditions of each row; add "t [s]", or "speed [mm/s]" and "{MOUNT[contact.kind][0]}"'
     for name, values, errors in curves:
         if name in ("friction_force", "shear_stress") and np.all(values * conditions.get("speed", 1.0) < 0.0):
             yield f"{name} has the sign of the speed; turn the sign of one of them"
@@ -144,9 +144,9 @@ def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
         result["speed"] = result["drive_speed"] = "speed", Quantity("m/s", "sliding speed", "V")
     elif "drive_stage" in result:
         result["stage_speed"] = result["drive_stage"]
-    column, unit, symbol = HELD[kind]
-    held = Quantity(unit, f"{column} of the sphere, contact.{kind}", symbol)
-    result |= dict.fromkeys(names_of(column), ("held", held))
+    column, unit, symbol = MOUNT[kind]
+    mount = Quantity(unit, f"{column} of the sphere, contact.{kind}", symbol)
+    result |= dict.fromkeys(names_of(column), ("mount", mount))
     return result | {"t": ("t", Quantity("s", "time since the start", at_least=0, at_most=scenario.clock.duration))}
 
 
@@ -165,7 +165,7 @@ class Group(NamedTuple):
 
 def groups(scenario: Scenario, table: Measured) -> list[Group]:
     """The groups of a table's rows; ``BadInput`` where a row has values that do not go together."""
-    keyed = {key: values for key, values in table.conditions.items() if key not in ("t", "speed", "held")}
+    keyed = {key: values for key, values in table.conditions.items() if key not in ("t", "speed", "mount")}
     columns = np.array([*keyed.values()]).reshape(len(keyed), table.rows)
     result = []
     for place in np.unique(columns, axis=1, return_index=True)[1] if keyed else [0]:
@@ -177,9 +177,9 @@ def groups(scenario: Scenario, table: Measured) -> list[Group]:
         conditions = {name: values[rows] for name, values in table.conditions.items()}
         duration, count = item.clock.duration, len(rows)
         time = conditions.get("t", np.linspace(0.0, duration, count))  # a course of the rows, as long as the run
-        if (held := conditions.get("held")) is not None:
-            course = float(held[0]) if np.all(held == held[0]) else {"time": time, "value": held}
-            item = item.with_values({f"contact.{table.held}": course})
+        if (mount := conditions.get("mount")) is not None:
+            course = float(mount[0]) if np.all(mount == mount[0]) else {"time": time, "value": mount}
+            item = item.with_values({f"contact.{table.mount}": course})
         instants = np.repeat(conditions.get("t", np.zeros(count)), 2)
         speed = conditions.get("speed", item.drive.pieces(instants, duration).joined.last[::2])
         result.append(Group(item, rows, time[:, np.newaxis], speed[:, np.newaxis]))
@@ -241,11 +241,11 @@ def _by_speed(group: Group) -> bool:
 
 
 def _still(scenario: Scenario, group: Group, row: int) -> Scenario:
-    """The scenario at the steady speed of a row, or under its own steady stage or force, and held as it was there."""
-    held = scenario.contact.course.at(group.time[row], scenario.clock.duration)
+    """Return the scenario at the steady speed of a row, or its own steady stage or force, with the mount there."""
+    mount = scenario.contact.course.at(group.time[row], scenario.clock.duration)
     steady = {"drive": {"model": "steady", "speed": float(group.speed[row, 0])}}
     drive = {} if scenario.drive.solves_motion else steady
-    return scenario.with_values(drive | {f"contact.{scenario.contact.kind}": float(held[0])})
+    return scenario.with_values(drive | {f"contact.{scenario.contact.kind}": float(mount[0])})
 
 
 def _at_rows(group: Group, by_time: bool, time: Array, speed: Array, records: Array) -> Array:
@@ -426,7 +426,7 @@ class Problem:
             for values, table, groups in zip(result[key][1], self.tables, self.groups, strict=True):
                 for group in () if "t" in table.conditions else groups:
                     course, duration = group.scenario.contact.course, group.scenario.clock.duration
-                    own = {"speed": group.speed[:, 0], "held": course.at(group.time[:, 0], duration)}
+                    own = {"speed": group.speed[:, 0], "mount": course.at(group.time[:, 0], duration)}
                     values[group.rows] = own[key] if key in own else quantities(group.scenario)[key][1]
         return result
 
@@ -519,29 +519,29 @@ class Minimum(NamedTuple):
 
 
 def minimum(
-    problem: Problem, start: Array, held: dict[int, float] | None = None, errors: bool = False, precision: float = 1e-8
+    problem: Problem, start: Array, fixed: dict[int, float] | None = None, errors: bool = False, precision: float = 1e-8
 ) -> Minimum:
-    """The least sum of squares near a start, with some numbers held, to a relative precision."""
-    held = held or {}
+    """The least sum of squares near a start, with some numbers fixed, to a relative precision."""
+    fixed = fixed or {}
     parameters = lmfit.Parameters()
     for k, (low, high) in enumerate(problem.bounds):
         room = 1e-3 * (high - low) if math.isfinite(high - low) else 0.0  # at a bound no step has an effect
-        value = held[k] if k in held else min(max(start[k], low + room), high - room)
-        if k not in held and abs(value - 0.5 * (low + high)) < _BESIDE * room:  # in the middle its steps are none
+        value = fixed[k] if k in fixed else min(max(start[k], low + room), high - room)
+        if k not in fixed and abs(value - 0.5 * (low + high)) < _BESIDE * room:  # in the middle its steps are none
             value = 0.5 * (low + high) + _BESIDE * room
-        parameters.add(f"p{k}", value=value, min=low, max=high, vary=k not in held)
+        parameters.add(f"p{k}", value=value, min=low, max=high, vary=k not in fixed)
 
     def numbers(current: Any) -> Array:
         return np.array([*current.valuesdict().values()])
 
-    if len(held) == len(parameters):
+    if len(fixed) == len(parameters):
         x = numbers(parameters)
         return Minimum(x, float(np.sum(problem.residuals(x) ** 2)), None, True)
-    how: dict[str, Any] = {"calc_covar": errors, "scale_covar": False, "max_nfev": _EVALUATIONS * (len(parameters) + 1)}
+    options: dict[str, Any] = {"calc_covar": errors, "scale_covar": False, "max_nfev": _EVALUATIONS * (len(start) + 1)}
     if problem.by_run:  # steps of the minimizer's own would be lost in the rounding of a run
-        moved, precision = [k for k in range(len(parameters)) if k not in held], _RUN_PRECISION
-        how["Dfun"] = lambda current: _derivatives(problem, numbers(current), moved)
-    result = lmfit.Minimizer(lambda current: problem.residuals(numbers(current)), parameters, **how).leastsq(
+        varied, precision = [k for k in range(len(parameters)) if k not in fixed], _RUN_PRECISION
+        options["Dfun"] = lambda current: _derivatives(problem, numbers(current), varied)
+    result = lmfit.Minimizer(lambda current: problem.residuals(numbers(current)), parameters, **options).leastsq(
         ftol=precision, xtol=precision
     )
     covariance = getattr(result, "covar", None) if errors else None
@@ -633,12 +633,12 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
         nonlocal start
         if distance == 0.0:
             return -rise
-        held = bound if distance == room else best.x[k] + sign * distance
-        starts = np.array([start, best.x + along * (held - best.x[k]) / spread])
-        starts[:, k] = held
+        number = bound if distance == room else best.x[k] + sign * distance
+        starts = np.array([start, best.x + along * (number - best.x[k]) / spread])
+        starts[:, k] = number
         # if the data do not bound a number, the straight way to it leads out of the bounds
         guess = min(np.clip(starts, lowest, highest), key=lambda x: float(np.sum(problem.residuals(x) ** 2)))
-        result = minimum(problem, guess, {k: held}, precision=_END_SQUARES)
+        result = minimum(problem, guess, {k: number}, precision=_END_SQUARES)
         root, start = math.sqrt(max(result.chi_square - best.chi_square, 0.0)), result.x
         return 0.0 if abs(root / rise - 1.0) < _END else root - rise
 

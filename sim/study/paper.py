@@ -142,8 +142,8 @@ def _reduced(hertz: float) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:
 def _point_force() -> Iterator[Row]:
     angle = np.array([0.0, 0.6, np.pi / 2])
     cerruti = 1.5 / (2.0 * np.pi * 3.0 * SHEAR * 3e-6) * (1.0 + np.cos(angle) ** 2)
-    moved = halfspace.point_displacement(3e-6 * np.cos(angle), 3e-6 * np.sin(angle), SHEAR)
-    yield "displacement by a point force", "A1", moved, cerruti
+    displacement = halfspace.point_displacement(3e-6 * np.cos(angle), 3e-6 * np.sin(angle), SHEAR)
+    yield "displacement by a point force", "A1", displacement, cerruti
     for name, direction in (("along sliding", 0.0), ("oblique", 0.6), ("across", math.pi / 2)):
         computed = halfspace.compliance(math.cos(direction), math.sin(direction), 1.0)
         yield f"compliance, {name}", "40", computed, _transform(direction)
@@ -289,8 +289,8 @@ def _fluctuation() -> Iterator[Row]:
     wave = 2.0 * np.pi * np.fft.fftfreq(points, cell / points)
     size = np.hypot(wave[:, None], wave)
     size[0, 0] = np.inf  # the mean stress moves nothing
-    moved = np.fft.ifft2(np.fft.fft2(stress) * (1.0 + (wave / size) ** 2) / (2.0 * SHEAR * size)).real
-    mapped = 0.5 * np.mean(stress * moved)
+    displacement = np.fft.ifft2(np.fft.fft2(stress) * (1.0 + (wave / size) ** 2) / (2.0 * SHEAR * size)).real
+    mapped = 0.5 * np.mean(stress * displacement)
     lifted = halfspace.surface_energy(stress + STRESS, cell, SHEAR)
     reduced = jkr.potential_at_indentation(-DEPTH, STRESS, RADIUS, WORK - mapped, SPHERE, MODULUS)
     total = _potential_h(-DEPTH, RADIUS) + mapped * np.pi * RADIUS**2
@@ -309,12 +309,12 @@ def _ripple() -> Iterator[Row]:
     q = 2.0 * np.pi * WAVES / cell
     phase = 2.0 * np.pi * WAVES * np.arange(points) / points
     along = amplitude * np.cos(phase + 0.3)[:, None] * np.ones(points)
-    held = np.abs(Grid(cell, points).forward(along)[WAVES, 0]) ** 2 / cell**2 * (2.0 * np.pi / cell) ** 2
-    moved = np.max(np.abs(np.fft.rfft2(halfspace.displacement(along, cell, SHEAR)))) * 2.0 / points**2
+    weight = np.abs(Grid(cell, points).forward(along)[WAVES, 0]) ** 2 / cell**2 * (2.0 * np.pi / cell) ** 2
+    displacement = np.max(np.abs(np.fft.rfft2(halfspace.displacement(along, cell, SHEAR)))) * 2.0 / points**2
     closed = halfspace.ripple_energy(amplitude, q, 0.0, SHEAR)
     yield "variance of a ripple", "48", Ripple(amplitude, cell / WAVES).variance, amplitude**2 / 2.0
-    yield "weight of its two spectral lines", "49", held, np.pi**2 * amplitude**2
-    yield "its displacement w1 = G_x tau1", "41", moved, amplitude / (2.0 * SHEAR * q)
+    yield "weight of its two spectral lines", "49", weight, np.pi**2 * amplitude**2
+    yield "its displacement w1 = G_x tau1", "41", displacement, amplitude / (2.0 * SHEAR * q)
     yield "its energy, by its map", "50", halfspace.surface_energy(along, cell, SHEAR), amplitude**2 / (8.0 * SHEAR * q)
     yield "its energy, tau1^2 L/(16 pi G k)", "50", closed, amplitude**2 / (16 * np.pi * SHEAR) * WIDTH / WAVES
 

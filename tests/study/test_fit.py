@@ -125,7 +125,7 @@ def test_steady_sliding_is_what_a_run_ends_in_also_for_rows_of_loads_and_solids_
         assert_allclose(means, [alone[name] for name in names], rtol=1e-12, atol=0)
     scene = load(LENS)
     loads, moduli = np.array([-1e-4, 0.0, 4e-3, 4e-3]), np.array([1e6, 1e6, 1e6, 2e6])
-    made, names = rows_of(scene, held=loads, **{"solid.shear_modulus": moduli})
+    made, names = rows_of(scene, mount=loads, **{"solid.shear_modulus": moduli})
     groups = likelihood.groups(scene, made)
     assert [group.rows.tolist() for group in groups] == [[0, 1, 2], [3]]
     for group in groups:
@@ -450,7 +450,7 @@ def test_curves_are_doubted_beyond_errors_and_the_mechanism_that_made_them_exclu
     assert "[shear]" in verdict.words and "[bonds]" not in verdict.words
     loads = np.array([0.0, 1e-3, 2e-3, 4e-3])
     radii = sim.laws.jkr.radius_at_load(loads, 42e-3, 2e-3, 6.4e6)
-    data = Measured(Path("data.csv"), "load", {"held": loads}, (Curve("contact_radius", radii, 0.01 * radii),))
+    data = Measured(Path("data.csv"), "load", {"mount": loads}, (Curve("contact_radius", radii, 0.01 * radii),))
     assert "speed [mm/s]" in judged(still(), data, ["adhesion.work"], 2).words
 
     def weighed(*others):  # the scenario itself by its AICc of 10, others by name, AICc, p and rejection
