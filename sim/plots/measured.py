@@ -101,7 +101,8 @@ class Measured:
 
     Its columns are variables of a dataset with their units and errors, as those of ``sim fit``. A column that is a
     number of the scenario, such as ``contact_load``, assigns a row to a curve of a sweep. For each column of which a
-    panel has points, ``reasons`` says why a row is none of them or has no residual; "" if neither.
+    panel has points, ``reasons`` says why a row is none of them or has no residual; "" if neither. ``assumed`` tells
+    of missing units.
     """
 
     def __init__(self, data: Path | str | Mapping[str, Any], dataset: xr.Dataset) -> None:
@@ -112,10 +113,12 @@ class Measured:
                 units.setdefault(str(name).removesuffix("_mean"), variable.attrs["units"])
         self.units = {each: unit for name, unit in units.items() for each in names_of(name)}
         known = {name: Quantity(unit, name) for name, unit in self.units.items()}
+        self.source, self.assumed = "data", ""
         if isinstance(data, Path | str):
-            self.source, self.table = str(data), read_measured(Path(data), known, known, gaps=True)
+            self.source = str(data)
+            self.table, self.assumed = read_measured(Path(data), known, known, gaps=True)
         else:
-            self.source, self.table = "data", measured_points(data, known)
+            self.table = measured_points(data, known)
         self.forget()
 
     def forget(self) -> None:

@@ -16,7 +16,6 @@ from sim.analysis.events import incipient_law, jumps
 from sim.analysis.observables import with_slips
 from sim.analysis.over_speed import population_of, speed_dim
 from sim.laws import schallamach
-from sim.numerics import hdf5
 from sim.plots import style
 from sim.plots.curves import (
     Panel,
@@ -157,15 +156,13 @@ def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
 
     No file that a dataset names is read.
     """
-    from sim.ensemble.diagnosis import slider_body  # heavy: for this figure alone
-    from sim.scenario.reader import load
+    from sim.ensemble.dataset import scenario_of  # heavy: for this figure alone
+    from sim.ensemble.diagnosis import slider_body
 
-    text = dataset.attrs["scenario_resolved"]
-    tables, point = hdf5.tables(text), dataset.isel(dict.fromkeys(sweep_dims(dataset), 0))
-    swept = tables.pop("sweep", {})
+    point = dataset.isel(dict.fromkeys(sweep_dims(dataset), 0))
     with contextlib.suppress(BadInput, KeyError):
-        keys = [key for axis in (swept if isinstance(swept, list) else [swept]) for key in axis]
-        scene = load({} if _FILE.search(text) else tables, {key: float(setting(point, key)) for key in keys})
+        scene = scenario_of({} if _FILE.search(str(dataset.attrs.get("scenario_resolved"))) else dataset.attrs)
+        scene = scene.with_values({key: float(setting(point, key)) for axis in scene.sweep for key in axis.keys})
         return np.asarray(scene.population.onset(speed, slider_body(scene, speed)).stiffness)
     return np.full(speed.shape, np.nan)
 

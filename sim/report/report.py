@@ -8,7 +8,7 @@ import json
 import math
 import re
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -365,22 +365,6 @@ _PROVENANCE = {
 }  # fmt: skip
 
 
-class Known(NamedTuple):
-    """An error or a spread: in words, as estimated before the run, and as measured in it."""
-
-    words: str
-    before: str
-    measured: str = "–"
-
-
-class Question(NamedTuple):
-    """Purpose of a scenario: its name, its question, and further paragraphs of its first comment."""
-
-    name: str
-    text: str
-    more: list[str]
-
-
 def written(
     dataset: xr.Dataset, source: Path, path: Path | None, replace: bool,
     data: Path | None = None, fit: Path | None = None, lost: Sequence[str] = (),
@@ -449,10 +433,10 @@ def html(
         finalize=lambda value: plain(value) if type(value) is str else value, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     return page.get_template("page.html").render(
-        question=question(dataset),
+        question=dict(zip(("name", "text", "more"), question(dataset), strict=True)),
         compared=agreement(dataset, points, fitted) if points else None,
         fitted=fitted,
-        measured=str(data) if isinstance(data, Path | str) else "the columns given",
+        measured="; ".join(filter(None, [points[0].source, points[0].assumed])) if points else "",
         averaged=averaging(dataset, is_stationary(dataset)),
         drawings=figures,
         swept=bool(swept),
@@ -460,7 +444,7 @@ def html(
         tables=[part for each in wide for part in narrow(each, min(keys, 3))],
         remarks=remarks(dataset),
         notes=notes(dataset, rows, whole, stated),
-        known=list(known(dataset)),
+        known=known(dataset),
         scenario=scenario(dataset),
         changes=changes(dataset),
         files=list(hdf5.tables(dataset.attrs.get("scenario_files"))),
@@ -473,13 +457,16 @@ def html(
     )
 
 
-def question(dataset: xr.Dataset) -> Question:
-    """Return the question of a scenario: the first paragraph of its first comment, else its name."""
+def question(dataset: xr.Dataset) -> tuple[str, str, list[str]]:
+    """Return the name of a scenario, its question, and further paragraphs of its first comment.
+
+    The question is the first paragraph of the comment, else the name.
+    """
     text, name = str(dataset.attrs.get("scenario_toml", "")), str(dataset.attrs.get("title", "")) or "A run of sim"
     comment = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
     lines = [line[1:].strip() for line in comment]
     question, *more = [" ".join(part.split()) for part in "\n".join(lines).split("\n\n") if part.strip()] or [name]
-    return Question(name, question, more)
+    return name, question, more
 
 
 def changes(dataset: xr.Dataset) -> dict[str, str]:
@@ -520,26 +507,28 @@ def cost(log: Path) -> dict[str, str]:
         return {}
 
 
-def known(dataset: xr.Dataset) -> Iterator[Known]:
-    """Yield the error estimates before the run, beside the errors measured in it.
+def known(dataset: xr.Dataset) -> Rows:
+    """Return the error estimates before the run, beside the errors measured in it.
 
     The spread of the fluctuation energy between members is the largest over the sweep at the last record; its own
     standard error is that of the jackknife over the members.
     """
-    count = int(dataset.attrs["members"])
+    count, rows = int(dataset.attrs["members"]), list[tuple[str, str, str]]()
     spread_measured, error_measured = _spreads(dataset)
     if "member_spread_energy" in dataset:
         spread = float(dataset["member_spread_energy"].max())
-        yield Known("spread of ΔΓ between members, over its mean", _percent(spread), spread_measured)
+        rows.append(("spread of ΔΓ between members, over its mean", _percent(spread), spread_measured))
         if count > 1:
-            error = spread / math.sqrt(count)
             words = f"standard error of the mean ΔΓ of {count} members, over the mean"
-            yield Known(words, _percent(error), error_measured)
-    yield from (Known(str(each), "systematic") for each in systematic_errors(dataset))
+            rows.append((words, _percent(spread / math.sqrt(count)), error_measured))
+    rows += [(str(each), "systematic", "–") for each in systematic_errors(dataset)]
     times = np.unique(np.linspace(0, dataset.sizes["t"] - 1, _ROWS).round().astype(int))
     ratios = over_members(dataset.isel(t=times), ["area_ratio"], quantiles=False)
     if "area_ratio_sem" in ratios and (error := float(ratios["area_ratio_sem"].max())) > _ROUNDING:
-        yield Known(f"largest standard error of the mean area over JKR's, of {times.size} times", "–", _percent(error))
+        rows.append(
+            (f"largest standard error of the mean area over JKR's, of {times.size} times", "–", _percent(error))
+        )
+    return [dict(zip(("error", "estimate", "measured"), row, strict=True)) for row in rows]
 
 
 def _spreads(dataset: xr.Dataset) -> tuple[str, str]:

@@ -109,7 +109,7 @@ def read(path: Path, scenario: Scenario) -> Measured:
         and (item.part != "drive" or (by_run and item.name in _OF_SLIDER))
     }  # fmt: skip
     known = {name: quantity for name, (_, quantity) in at.items()} | outcomes
-    result = read_measured(path, known, outcomes)
+    result, _ = read_measured(path, known, outcomes)
     conditions = {at[name][0]: points.values for name, points in result.items() if name in at}
     curves = tuple(Curve(name, *points) for name, points in result.items() if name not in at)
     for fault in _faults(scenario, conditions, curves):

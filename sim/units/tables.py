@@ -639,8 +639,8 @@ class Points(NamedTuple):
 
 def read_measured(
     path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity], gaps: bool = False
-) -> dict[str, Points]:
-    """Return the columns of a table of measured values; a note is printed if it has no units.
+) -> tuple[dict[str, Points], str]:
+    """Return the columns of a table of measured values, and a remark if it has no units, which is printed, too.
 
     Parameters
     ----------
@@ -663,10 +663,11 @@ def read_measured(
             result, bare = _measured_columns(plain_text(path), known, outcomes, gaps)
     except PydanticCustomError as fault:
         raise BadInput([str(fault)]) from None
-    if bare:
-        reach = (f"{name} reaches {np.nanmax(np.abs(result[name].values)):.4g} {known[name].unit}" for name in bare)
-        note(f"note: {path}: no units: SI assumed; {', '.join(reach)}")
-    return result
+    reach = [f"{name} reaches {np.nanmax(np.abs(result[name].values)):.4g} {known[name].unit}" for name in bare]
+    remark = f"no units: SI assumed; {', '.join(reach)}" if bare else ""
+    if remark:
+        note(f"note: {path}: {remark}")
+    return result, remark
 
 
 def measured_points(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -> dict[str, Points]:

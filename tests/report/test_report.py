@@ -290,10 +290,10 @@ def test_a_page_has_the_numbers_of_the_statistics_its_question_and_error_estimat
     each = np.array([np.std(members, ddof=1) / np.mean(members) for members in left_out])
     error = np.sqrt((energy.size - 1) * np.var(each))
     spread = np.std(energy, ddof=1) / np.mean(energy)
-    assert row.measured == f"{analysis.concise(100 * spread, 100 * error)} %"
+    assert row["measured"] == f"{analysis.concise(100 * spread, 100 * error)} %"
     assert abs(spread - float(dataset["member_spread_energy"])) < 5.0 * error
-    assert row.before == f"{100 * float(dataset['member_spread_energy']):.3g} %"
-    assert mean.before == f"{5 * float(dataset['member_spread_energy']):.3g} %"  # of 400 members
+    assert row["estimate"] == f"{100 * float(dataset['member_spread_energy']):.3g} %"
+    assert mean["estimate"] == f"{5 * float(dataset['member_spread_energy']):.3g} %"  # of 400 members
 
 
 def test_tables_key_figures_and_figures_of_a_page_have_the_chosen_units(here):

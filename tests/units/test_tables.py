@@ -85,10 +85,11 @@ def test_measured_columns_are_all_named_at_once_with_proposals_and_without_units
     assert dict(re.findall(r"(\S+) → (\w+)", line)) == proposed | {"contact_aera": "contact_area"}
     assert all(word in line for word in (str(path), "t_error", " x;"))
     path.write_bytes("\ufeffspeed;contact_area\r\n50,0;0,2\r\n-60;0,1\r\n".encode())
-    assert read_measured(path, known, known)["speed"].values.tolist() == [50.0, -60.0]
+    result, remark = read_measured(path, known, known)
+    assert result["speed"].values.tolist() == [50.0, -60.0] and "speed reaches 60 m/s" in remark
     assert re.search(r"speed reaches 60 m/s, contact_area reaches 0\.2 m\^2", capsys.readouterr().err)
     path.write_text("speed [m/s];contact_area [m2]\n50,0;0,2\n", encoding="utf-8")
-    assert read_measured(path, known, known) and capsys.readouterr().err == ""
+    assert not read_measured(path, known, known)[1] and capsys.readouterr().err == ""
 
 
 def test_a_wrong_table_is_refused_with_place_and_cure():
