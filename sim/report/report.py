@@ -424,7 +424,8 @@ def html(
     points = [figure.measured for figure in figures if figure.measured]
     stated, swept = statements(dataset, lost=lost), sweep_dims(dataset)
     rows, whole = table(dataset, _ROWS, stated), highlights(dataset, _ROWS, stated)
-    keys = sum(heading.partition("\n")[0] in (*swept, "t") for heading in (rows or [{}])[0])
+    headings = [heading.replace("\n", "").partition("(")[0].strip() for heading in (rows or [{}])[0]]
+    keys = sum(heading in (*swept, "t") for heading in headings)
     wide = [rows, *([whole, *(of(dataset, _ROWS, stated) for of in (losses, phases))] if swept else [])]
     stem = Path(source).stem
     page = Environment(
