@@ -285,11 +285,11 @@ def _slide(line, start, slider, along, contact, nodes, books):
             row.next_step = step * grows
             continue
         stops = _at_end(row, nodes, step, along) <= 0.0
-        if stops and row.speed == 0.0:
+        if stops and row.speed != 0.0:
+            step, _ = _to_zero(row, start, step, 1e-13 * math.fabs(row.speed), slider, along, contact, nodes)
+        if stops and not nodes.slip[2] * along.sense > 0.0:  # too long for a speed that grows from nearly zero
             row.next_step = 0.25 * step
             continue
-        if stops:
-            step, _ = _to_zero(row, start, step, 1e-13 * math.fabs(row.speed), slider, along, contact, nodes)
         line[1], books[1] = row, energy
         before, after = accept(row, start, step, slider, along, contact, nodes, energy)
         if mechanics.misses(before, after, books[1], energy, row, slider, step):

@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+import sim
 from sim.laws.reversible import radius_at_load_reversible
 from sim.laws.schallamach import linear_onset
 from sim.parts.bonds import Counted, Rate, Steady, Unbroken
@@ -215,3 +216,19 @@ def test_counted_bonds_at_rest_carry_the_pull_up_to_their_strength_and_are_the_s
     assert np.all(force[1:][still] <= (COULOMB * bound * areas)[:-1][still] * (1.0 + 1e-9))
     residuals = scene.parts.drive.readings(straight[-1].drive)
     assert np.all(np.abs(residuals[:, 10]) < 1e-5 * residuals[:, 3])
+
+
+@pytest.mark.parametrize("parts", [1, 6, 7, 8, 9, 10, 14, 64])
+def test_a_slider_that_leaves_rest_never_slides_against_its_pull_however_long_the_clock_step(parts):
+    """Where bonds break a million times faster than they are loaded, a long sub-step has a solution that goes back."""
+    step = 0.010513783203699044 / parts
+    scene = {
+        "clock": {"duration": 24 * parts * step, "step": step}, "solid": {"shear_modulus": "0.32 MPa"},
+        "sphere": {"radius": "0.57 mm"}, "adhesion": {"work": "0.1 J/m^2", "bond_share": 0.0},
+        "contact": {"indentation": "8 um"}, "bonds": {"model": "rate", "stress": 2888.5, "critical_speed": "12 um/s",
+        "rebinding_rate": 49.0, "start": "empty"}, "drive": {"model": "spring", "stage": 1.1177e-4, "stiffness": 5.6166,
+        "viscosity": 172.7, "contact_stiffness": "rigid", "damping": 2.58e-4, "tolerance": 1e-6},
+    }  # fmt: skip
+    _, course = follow(sim.Scenario(**scene), MemberNoise.of(0, np.arange(1)), None, range(24 * parts + 1))
+    assert np.max(course.position) > 1e-5  # it has slipped
+    assert np.min(np.diff(course.position[:, 0])) >= 0.0
