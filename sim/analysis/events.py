@@ -474,7 +474,7 @@ def static_threshold(dataset: xr.Dataset) -> xr.Dataset:
     if "phase_start" in dataset:
         known = known & (dataset["phase_start"].count("phase") == 1)
     share = dataset["peak_friction_area"] / dataset["contact_area"].isel(t=0, drop=True)
-    text = "largest friction force on the way to sliding"
+    text = "largest friction force of a pull from rest"
     return xr.Dataset({
         "static_threshold": labelled(force.where(known), "N", text),
         "area_at_threshold": pure(share.where(known), f"contact area at the {text} over that at rest"),

@@ -35,8 +35,6 @@ _LOSSES = {
     "lost_to_mean_stress": ("fluctuations_radius", "the mean stress, after bonds and fluctuations"),
     "lost_to_lag": ("equilibrium_radius", "the edge's lag behind equilibrium, after all else"),
 }
-#: What follows from both orders of charging.
-_DIFFERENCES = frozenset(("lost_to_bonds_last", "order_of_charging"))
 #: Radii that others are compared with.
 _REFERENCES = ("jkr_radius", "hertz_radius")
 #: So few closed contacts give no mean if others are open.
@@ -245,15 +243,13 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     return result.drop_vars([n for n in result if str(n).startswith(("in_contact", "masked"))])
 
 
-def charges(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
+def charges(dataset: xr.Dataset) -> xr.Dataset:
     """Return the shares of the lost area in both orders of charging, as far as they are known.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         As ``sim run`` writes it.
-    names : collection of str, optional
-        Shares that are needed. The differences between both orders are left out if none of them is among these.
 
     Returns
     -------
@@ -271,12 +267,10 @@ def charges(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dat
     with contextlib.suppress(ValueError), answered():
         shares = share_observables(dataset)
         first, later = _charged_first(dataset), shares["lost_to_fluctuations"]
-        shares = shares.assign(lost_to_fluctuations_first=first)
-        if names is None or not _DIFFERENCES.isdisjoint(names):
-            last, text = shares["lost_to_bonds"] + later - first, "share of JKR's area lost to broken bonds"
-            last = pure(last, f"{text}, after the fluctuations")
-            more = pure(first - later, "what fluctuations take more if they are charged first")
-            return shares.assign(lost_to_bonds_last=last, order_of_charging=more)
+        last = shares["lost_to_bonds"] + later - first
+        last = pure(last, "share of JKR's area lost to broken bonds, after the fluctuations")
+        more = pure(first - later, "what fluctuations take more if they are charged first")
+        shares = shares.assign(lost_to_fluctuations_first=first, lost_to_bonds_last=last, order_of_charging=more)
     return shares
 
 
@@ -296,10 +290,10 @@ def chosen_observables(dataset: xr.Dataset, names: Collection[str] | None) -> xr
     If ``names`` is None, return all observables, and the shares of the lost area in both orders if they are known.
     """
     result = observables(dataset)
+    if names is None or _shares_among(names):
+        result = result.merge(charges(dataset), compat="no_conflicts")
     if names is None:
-        return result.merge(charges(dataset), compat="no_conflicts")
-    if _shares_among(names):
-        result = result.merge(charges(dataset, names), compat="no_conflicts")
+        return result
     wanted = {f"{name}{ending}" for name in names for ending in ENDINGS}
     return result[[name for name in result if name in wanted]]
 

@@ -95,7 +95,7 @@ _EVENTS = (
     _Column("peak_friction", "peak of\nfriction"),
     _Column("peak_friction_speed", "at V ", math.nan),
     _Column("peak_friction_time", "after ", math.nan),
-    _Column("static_threshold", "static\nthreshold", math.nan, meaning="largest friction force on the way to sliding"),
+    _Column("static_threshold", "static\nthreshold", math.nan, meaning="largest friction force of a pull from rest"),
     _Column("area_at_threshold", "A/A0\nthere", 1.0, meaning="contact area there over that at rest"),
     _Column("slip_count", "slips", meaning="falls of the spring force by more than 0.3 of its largest so far"),
     _Column("slips_from", "slips\nfrom", math.nan, meaning="speed of the stage at the first slip that another follows"),
