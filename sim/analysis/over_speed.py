@@ -450,7 +450,7 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
             further = [math.nan, False, False] if key == "steady_speed" else [*lag, is_known & alone]
             reason = xr.apply_ufunc(_in_words, *reasons, *further, vectorize=True, output_dtypes=[object])
             result[f"{stem}_{name}_reason"] = reason.drop_attrs(deep=False)
-    return result
+    return result.assign_coords({name: dataset[name] for name in sweep_dims(dataset)})  # with their units
 
 
 def _in_words(reason: str, never: bool, most: float, steady: float, lags: bool, alone: bool) -> str:
