@@ -126,8 +126,8 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     each = slips(dataset).where(counted)[["slip_duration", "stick_duration", "stress_drop"]]
     result = result.merge(each.mean("slip", keep_attrs=True), compat="no_conflicts")
     if dataset.sizes.get(MEMBERS, 1) == 1:  # there is no other error than the scatter between slip events
-        count, squares = each.count("slip"), ((each - each.mean("slip")) ** 2).sum("slip")
-        errors = dict((squares / count / (count - 1).where(count > 1)) ** 0.5)
+        events, squares = each.count("slip"), ((each - each.mean("slip")) ** 2).sum("slip")
+        errors = {str(n): (squares[n] / events[n] / (events[n] - 1).where(events[n] > 1)) ** 0.5 for n in each}
         of_late = {name: dataset[f"late_{of}_std"] / dataset["slip_count_late"] ** 0.5 for name, of in _LATE.items()}
         errors |= of_late | {"kinetic_friction": 0.5 * of_late["force_drop"]}
         result = result.assign({f"{name}_reading": _WIDE * error for name, error in errors.items()})
