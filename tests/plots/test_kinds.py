@@ -9,7 +9,7 @@ from helpers.parts import Band, Bell, Clock, Ensemble, Equilibrium, Record, anal
 from helpers.pictured import STEADY, drawn, field, legend_of, lines_of, mapped, rendered, simulated
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.plots import kinds as plots, style as pictures
+from sim.plots import Choices, kinds as plots, style as pictures
 
 REVERSING = drive.Table(time=(0.0, 0.1, 0.1, 0.3, 0.3, 0.4), speed=(2e-3, 2e-3, -2e-3, -2e-3, 2e-3, 2e-3))
 
@@ -150,6 +150,23 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
                 x = np.asarray(line.get_xdata(), float)
                 speeds = np.insert(speed, np.flatnonzero(np.diff(speed)) + 1, np.nan)
                 assert len(x) == len(speeds) and np.all(np.isnan(x) == np.isnan(speeds)), kind
+
+
+def test_of_members_that_come_off_at_different_times_the_closed_ones_are_drawn_beside_the_share_of_open_ones():
+    counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=200)
+    dataset = simulated(contact=Equilibrium(load=-3e-4), bonds=counted, ensemble=Ensemble(members=8))
+    closed = dataset["in_contact"] == 1
+    count = closed.sum("member").to_numpy()
+    assert {8, 0} < {*count}
+    radius, *_, opened = rendered(plots.draw(dataset, "curve", Choices(absolute=True))).axes
+    mean = 1e6 * dataset["contact_area"].where(closed).mean("member").to_numpy()
+    speed, area = drawn(radius, pictures.BOTH)
+    assert_allclose(area, np.where(count > 2, mean, np.nan), rtol=1e-12)
+    (cross,) = (line.get_xydata() for line in radius.lines if line.get_marker() == "x")
+    last = np.flatnonzero(count > 2)[-1]
+    assert_allclose(cross, [[speed[last], area[last]]], rtol=1e-14)
+    assert opened.get_ylabel() == "open contacts"
+    assert_allclose(drawn(opened, pictures.BOTH)[1], 1.0 - count / 8, rtol=0, atol=1e-15)
 
 
 def test_branches_of_a_course_are_apart_and_shuffled_speeds_make_the_same_curves():

@@ -80,7 +80,6 @@ def test_behind_a_machine_cycles_have_crosses_rings_verticals_and_the_energy_of_
     assert len(first) == len(later) == machine.sizes["t"] // 2 + 1 and first[-1] == later[0]
     assert radii.get_xlabel() == r"displacement $\Delta$ (µm)"
     assert_allclose(thick(loads)[0], 1e6 * machine["displacement"], rtol=1e-14)
-    loads, radii, _ = plots.draw(machine, "loop").axes
     closed = machine["in_contact"].to_numpy().astype(int)
     off, on = np.flatnonzero(np.diff(closed) == -1), np.flatnonzero(np.diff(closed) == 1) + 1
     assert len(off) == len(on) == 2
@@ -106,8 +105,8 @@ def test_behind_a_machine_cycles_have_crosses_rings_verticals_and_the_energy_of_
     spent, loop = 0.5 * float(machine["dissipated_energy"][-1]), 0.5 * np.trapezoid(P, displacement)
     # a jump drawn as a straight line between two records costs half its load times their distance, twice a cycle
     assert_allclose(loop, spent, rtol=0, atol=2 * 0.5 * 1.5 * np.pi * 42e-3 * 2e-3 * RECORD)
-    entry, *_ = plots.draw(machine, "loop").axes[0].get_legend().get_texts()
-    assert all(f"{1e12 * energy:.3g} pJ" in entry.get_text() for energy in (spent, loop))
+    entry, *_ = legend_of(plots.draw(machine, "loop").axes[0])[0]
+    assert all(f"{1e12 * energy:.3g} pJ" in entry for energy in (spent, loop))
     for contact in (
         Equilibrium(indentation={"from": 2e-6, "to": -2e-6}),
         Equilibrium(indentation={"time": [0.0, 0.5, 1.0], "value": [2e-6, -2e-6, 1e-6]}),
@@ -171,12 +170,11 @@ def test_a_loop_is_what_fits_a_sphere_that_moves_with_load_and_radius_over_the_i
     np.testing.assert_array_equal(thin.get_ydata(), np.where(closed, np.nan, 0.0))
     load, radius = drawn(over_load, pictures.REFERENCE, "--")
     assert_allclose(load, 1e6 * jkr.load_at_radius(1e-6 * radius, *JKR), rtol=1e-12, atol=1e-12)
-    panel = plots.draw(grips, "loop").axes[0]
-    levels = sorted(line.get_ydata()[0] for line in panel.lines if line.get_linewidth() == 0.5)
+    levels = sorted(line.get_ydata()[0] for line in loads.lines if line.get_linewidth() == 0.5)
     pull = np.pi * 42e-3 * 2e-3
     assert_allclose(levels, [-1.5e6 * pull, -5.0 / 6.0 * 1e6 * pull], rtol=1e-14)
-    named = [line.get_label()[-3:] for line in panel.lines if line.get_linewidth() == 0.5]
-    assert named == ["/2$", "/6$"] and sum("pi wR" in words for words in legend_of(panel)[0]) == 2
+    named = [line.get_label()[-3:] for line in loads.lines if line.get_linewidth() == 0.5]
+    assert named == ["/2$", "/6$"] and sum("pi wR" in words for words in legend_of(loads)[0]) == 2
     # under fixed grips the loop reaches below the one, and an equilibrium never beyond the other
     assert -1.5 * pull * (1.0 + 1e-12) <= float(grips["normal_load"].min()) < -5.0 / 6.0 * pull
     assert plots.default(grips) == "loop"

@@ -112,9 +112,9 @@ def slid():
 
 
 def test_pressure_surfaces_and_tangential_displacement_are_those_of_the_first_member_at_the_last_time(slid):
-    panel = rendered(plots.draw(slid, "profile")).axes[0]
+    pressure, surfaces, *panels = rendered(plots.draw(slid, "profile")).axes
     radius, depth = (float(slid[name][0, -1]) for name in ("contact_radius", "indentation"))
-    (x, p), (_, rest) = data_of(panel, pictures.BOTH)[0], data_of(panel, pictures.REFERENCE, "--")[0]
+    (x, p), (_, rest) = data_of(pressure, pictures.BOTH)[0], data_of(pressure, pictures.REFERENCE, "--")[0]
     inside = np.abs(1e-6 * x) < 0.999 * radius
     exact = halfspace.pressure(np.abs(1e-6 * x[inside]), radius, depth, 2e-3, 6.4e6)
     assert_allclose(p[inside], 1e-3 * exact, rtol=1e-9)
@@ -122,24 +122,22 @@ def test_pressure_surfaces_and_tangential_displacement_are_those_of_the_first_me
     full = jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6)
     depth = jkr.indentation_at_radius(full, 42e-3, 2e-3, 6.4e6)
     assert_allclose(rest[len(rest) // 2], 1e-3 * halfspace.pressure(0.0, full, depth, 2e-3, 6.4e6), rtol=1e-12)
-    panel = plots.draw(slid, "profile").axes[1]
-    (x, low), (_, high) = data_of(panel, pictures.BOTH)
-    radius, depth = (float(slid[name][0, -1]) for name in ("contact_radius", "indentation"))
+    (x, low), (_, high) = data_of(surfaces, pictures.BOTH)
     r = np.abs(1e-6 * x)
     assert np.all(high[r < radius] == low[r < radius])
+    depth = float(slid["indentation"][0, -1])
     assert_allclose(low, -1e6 * halfspace.normal_displacement(r, radius, depth, 2e-3), rtol=1e-9, atol=1e-12)
     # outside the upper surface is the sphere's own; heights are some micrometres
     out = r > radius
     assert_allclose(high[out], 1e6 * (r[out] ** 2 / 4e-3 - depth), rtol=0, atol=1e-11)
-    panels = plots.draw(slid, "profile").axes
-    radius, stress = float(slid["contact_radius"][0, -1]), float(slid["shear_stress"][-1])
-    (x, along), (_, across) = (data_of(panels[2], pictures.BOTH, style)[0] for style in ("-", "--"))
+    stress = float(slid["shear_stress"][-1])
+    (x, along), (_, across) = (data_of(panels[0], pictures.BOTH, style)[0] for style in ("-", "--"))
     exact = halfspace.tangential_profiles(1e-6 * x, radius, stress, 1.6e6)
     assert_allclose([along, across], 1e6 * np.array(exact), rtol=1e-9)
-    shown = panels[3].images[0].get_array()
+    shown = panels[1].images[0].get_array()
     assert_allclose(shown.max(), along.max(), rtol=1e-9)
     assert shown[100, 0] > shown[0, 100]  # x to the right: farther along the sliding than across
-    (circle,) = (patch for patch in panels[3].patches if isinstance(patch, Circle))
+    (circle,) = (patch for patch in panels[1].patches if isinstance(patch, Circle))
     assert_allclose(circle.radius, 1e6 * radius, rtol=1e-14)
 
 

@@ -127,6 +127,9 @@ def test_every_shape_of_dataset_has_its_page(tmp_path):
         {"drive": STEADY, "clock": Clock(duration=0.02, step=0.02)},
     ]:
         harmless(Page(html(simulated(**changes))))
+    text = html(simulated(sweep={"adhesion.bond_share": [0.0, 1.0], "contact.load": [1e-3, 4e-3]}))
+    heads = re.findall("<thead>(.*?)</thead>", text.partition("<h2>Figures")[0], re.DOTALL)
+    assert len(heads) > 1 and all("bond_share" in head and "load (mN)" in head for head in heads)
     for log in ("", "no JSON\n", '{"seconds": "x"}\n', "[1]\n", '{"began": 1, "seconds": 1}\n', "\xff\n"):
         (tmp_path / "x.nc.log").write_bytes(log.encode("latin-1"))
         assert report.cost(tmp_path / "x.nc.log") == {}  # a log that cannot be read costs only its table
