@@ -2,7 +2,6 @@
 
 import contextlib
 import difflib
-import functools
 import textwrap
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, cast
@@ -14,23 +13,12 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
-from sim.analysis import (
-    averaging,
-    bond_work,
-    is_stationary,
-    is_steady,
-    setting,
-    settled,
-    slips,
-    statements,
-    summary,
-    sweep_dims,
-)
+from sim.analysis import bond_work, is_stationary, is_steady, setting, settled, slips, statements, sweep_dims
 from sim.analysis.dataset import speed_name, speed_of, stays_held
 from sim.analysis.events import jumps
 from sim.analysis.observables import KEPT, chosen_observables
 from sim.analysis.over_speed import speed_dim
-from sim.analysis.statistics import of_second_half, over_members
+from sim.analysis.statistics import averaging, of_second_half, over_members, summary
 from sim.plots import style
 from sim.plots.measured import Compared, Line, Measured
 from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, named, swept_value
@@ -57,25 +45,22 @@ _RING: Any = HOLLOW | {"mew": 0.8, "zorder": 3}
 class Statistics:
     """Statistics over the members along time (``"t"``) or a dimension of the sweep, each computed when first read.
 
-    Along the sweep they are the statements on a run, and statistics of its last record if it is not stationary.
+    Along the sweep they are means over the second half of a stationary run, else those of the last record, and whatever
+    has been ``stated`` beside.
     """
 
     def __init__(self, dataset: xr.Dataset, along: str) -> None:
         self.dataset, self.along = dataset, along
         self.late = along != "t" and is_stationary(dataset)
         self._computed: dict[str, xr.Dataset] = {}
+        self.stated = xr.Dataset()
 
     def get(self, name: str) -> xr.DataArray | None:
         """Return a statistic by its name, such as ``contact_radius_mean``; None if it is not known."""
         observable = name.rpartition("_")[0]
         if observable not in self._computed:
             self._computed[observable] = self._of(observable)
-        return self._computed[observable].get(name, None if self.along == "t" else self.events.get(name))
-
-    @functools.cached_property
-    def events(self) -> xr.Dataset:
-        """Statements on the events of a run."""
-        return statements(self.dataset, [])
+        return self._computed[observable].get(name, self.stated.get(name))
 
     def _of(self, name: str) -> xr.Dataset:
         """Return the statistics of an observable; none if it is not known."""
@@ -700,8 +685,9 @@ def statement_figure(dataset: xr.Dataset, name: str) -> Figure:
     An arrow is a bound: the value lies beyond. Curves are sorted along numbers.
     """
     scene = over_key(dataset, style.swept(dataset)[0])
-    over = cast(xr.DataArray, scene.statistics.get(f"{name}_mean")).attrs.get("over")
-    words = f"mean over the {over}, 95 % intervals" if over else scene.averaged and f"{scene.averaged}, 95 % intervals"
+    scene.statistics.stated = statements(scene.statistics.dataset, [name])
+    over = scene.statistics.stated[f"{name}_mean"].attrs["over"]
+    words = f"mean over the {over}, 95 % intervals" if over else ""
     scene = scene._replace(heading="; ".join(filter(None, [words, scene.left_out])))
     return stacked(scene, [(2.2, lambda panel, scene: statement_curves(panel, scene, name))])[0]
 

@@ -320,24 +320,24 @@ def start_figure(dataset: xr.Dataset) -> Figure:
     rests, speeds = (setting(dataset, f"drive.{key}") for key in ("rest", "speed"))
     longest = dataset.isel({dim: np.flatnonzero(rests == rests.max()) for dim in rests.dims})
     over = [str(dim) for dim in (*speeds.dims, *rests.dims) if dataset.sizes[dim] > 1]
-    if not over or "peak_stress_mean" not in statements(dataset, []):
+    stated = statements(longest, [])
+    if not over or "peak_stress_mean" not in stated:
         figure, axes = style.rows([2.15])
     else:
         figure, axes = style.pairs(2.9)
         _peak_panel(axes[1], dataset, over_key(dataset, over[0]))
-    _time_panel(axes[0], longest, float(rests.max()))
+    _time_panel(axes[0], longest, float(rests.max()), stated)
     return figure
 
 
-def _time_panel(panel: Axes, dataset: xr.Dataset, rest: float) -> None:
-    """Draw the stress over the time since the start; a dot is a peak."""
+def _time_panel(panel: Axes, dataset: xr.Dataset, rest: float, stated: xr.Dataset) -> None:
+    """Draw the stress over the time since the start; a dot is a stated peak."""
     slid = dataset.isel(t=np.flatnonzero(dataset["t"] > rest + 1e-9 * dataset["t"][-1]))
     scene = scene_along(slid, "t")
     scale = "linear" if scene.single else "log"
     scene = scene.placed("t", slid["t"].to_numpy() - rest, "time since the start", "s", scale)
     factor = style.in_unit(panel.yaxis, r"shear stress $\tau_0$", scene.all("shear_stress_mean"), "Pa")
     contact_curves(panel, scene, "shear_stress", factor)
-    stated = statements(dataset, [])
     for line in scene.lines if "peak_stress_mean" in stated else ():
         when, peak = (style.number_at(stated[f"peak_{name}_mean"], line.point) for name in ("time", "stress"))
         peak = np.copysign(peak, scene.values("shear_stress_mean", line)[-1])
@@ -351,6 +351,7 @@ def _peak_panel(panel: Axes, dataset: xr.Dataset, scene: Scene) -> None:
 
     Thin lines over the speed are closed forms: the peak of Bell bonds if none rebinds, and steady sliding.
     """
+    scene.statistics.stated = statements(scene.statistics.dataset, [])
     factor = statement_curves(panel, scene, "peak_stress")
     for line in scene.lines:
         x, peaks, when = scene.x[line.number], *(scene.values(f"peak_{name}_mean", line) for name in ("stress", "time"))

@@ -494,12 +494,10 @@ def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
 
 def _labelled(scene: Scene, energies: dict[str, xr.DataArray]) -> list[Line]:
     """Return the curves, each with its energies in its name."""
-    unit = style.Unit.of(np.concatenate([*map(np.ravel, energies.values())]), "J")
     labelled = []
     for line in scene.lines:
-        known = {words: unit.factor * style.number_at(values, line.point) for words, values in energies.items()}
-        known = {words: value for words, value in known.items() if value != 0.0 and np.isfinite(value)}
-        parts = [f"{words} = {value:.3g} {unit.name}" for words, value in known.items()]
-        label = ": ".join(filter(None, [line.label, ", ".join(parts).replace("-", "−")])) if line.label else ""
+        known = {words: style.number_at(values, line.point) for words, values in energies.items()}
+        parts = [f"{words} = {style.rounded(value, 'J')}" for words, value in known.items() if abs(value) > 0.0]
+        label = ": ".join(filter(None, [line.label, ", ".join(parts)])) if line.label else ""
         labelled.append(line._replace(label=label))
     return labelled

@@ -21,24 +21,11 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.path import Path as Outline
 
-from sim.analysis import (
-    averaging,
-    highlights,
-    is_stationary,
-    is_steady,
-    losses,
-    notes,
-    phases,
-    setting,
-    speed_of,
-    statements,
-    sweep_dims,
-    table,
-)
+from sim.analysis import is_stationary, is_steady, setting, speed_of, statements, sweep_dims
 from sim.analysis.dataset import claim, speed_name
 from sim.analysis.errors import remarks, systematic_errors
-from sim.analysis.statistics import over_members
-from sim.analysis.tables import key_figures, narrow
+from sim.analysis.statistics import averaging, over_members
+from sim.analysis.tables import highlights, key_figures, losses, narrow, notes, phases, table
 from sim.numerics import hdf5
 from sim.numerics.files import output
 from sim.plots import kinds
@@ -306,9 +293,9 @@ def fit_of(path: Path, dataset: xr.Dataset) -> Fit:
 def _read(content: dict[str, Any], dataset: xr.Dataset) -> Fit:
     rows, in_run = [], []
     for key, number in content["numbers"].items():
-        unit, value, error = str(number["unit"]), float(number["value"]), _known(number["standard_error"])
+        unit, value, error = str(number["unit"]), float(number["value"]), np.float64(number["standard_error"])
         factor, shown = scaled(value, unit)
-        low, high = (_end(factor * _known(number[end]), bool(number[f"{end}_open"])) for end in ("low", "high"))
+        low, high = (_end(factor * np.float64(number[end]), bool(number[f"{end}_open"])) for end in ("low", "high"))
         run = math.nan
         with contextlib.suppress(KeyError, ValueError):  # of a scenario that has no such number, or several
             run = float(setting(dataset, key).item())
@@ -333,10 +320,6 @@ def _read(content: dict[str, Any], dataset: xr.Dataset) -> Fit:
         raise ValueError
     few = correlations if len(keys) > 1 else []
     return Fit(rows, few, [*notes, *map(str, content["remarks"])], freedom, all(in_run))
-
-
-def _known(value: Any) -> float:
-    return math.nan if value is None else float(value)
 
 
 def _number(value: Any) -> str:
@@ -488,13 +471,8 @@ def commands(dataset: xr.Dataset, stem: str) -> list[str]:
     if not dataset.attrs.get("scenario_toml"):
         return [f'sim.run(json.load(open("{stem}.json")), to="{stem}.nc")']
     words = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in changes(dataset).items()]
-    name = shlex.quote(f"{stem}.toml")
-    dataset_name = shlex.quote(f"{stem}.nc")
-    return [
-        " ".join(["sim run", name, "-o", dataset_name, *words]),
-        f"sim stats {dataset_name}",
-        f"sim report {dataset_name}",
-    ]
+    name, output = (shlex.quote(f"{stem}.{ending}") for ending in ("toml", "nc"))
+    return [" ".join(["sim run", name, "-o", output, *words]), f"sim stats {output}", f"sim report {output}"]
 
 
 def cost(log: Path) -> dict[str, str]:
