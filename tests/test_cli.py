@@ -27,8 +27,6 @@ from sim.scenario.files import written
 from sim.study import paper
 from sim.units import terminal
 
-LENS = Path(__file__).parent.parent / "scenarios" / "pdms_lens.toml"
-
 
 @pytest.fixture
 def here(tmp_path, monkeypatch):
@@ -60,22 +58,18 @@ def complaints(errors):
 def test_commands_import_only_what_they_need_and_a_reader_that_leaves_at_once_is_no_error(here):
     figures = {"xarray", "matplotlib", "rich"}
     numbers = {"numpy", "scipy", "numba", "pydantic", "pint", "netCDF4", "tomllib", "json"}
-    for command in ("--help",), ("run", "--help"):
-        assert not loaded(*command) & (figures | numbers)
+    assert not loaded("run", "--help") & (figures | numbers)
     heavy = {"pandas", "scipy.stats", "dask"} | figures
-    assert not loaded("check", LENS) & heavy
+    assert not loaded("check", "scene.toml") & heavy
     assert not loaded("run", "scene.toml", "--no-table", "--quiet") & heavy
     assert Path("outputs/scene.nc").exists() and "xarray" in (table := loaded("stats", "outputs/scene.nc"))
     assert not table & {"pint", "dask.array", "matplotlib", "scipy.stats"}  # xarray would, to compare types with theirs
-    assert sim("run", "scene.toml", "-o", "x.nc", "--quiet").exit_code == 0
-    for arguments in (["check", LENS], ["stats", "x.nc", "--csv", "x.csv"]):
-        reading, writing = os.pipe()
-        os.close(reading)
-        command = [sys.executable, "-m", "sim", *arguments]
-        done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, timeout=120)
-        os.close(writing)
-        assert (done.returncode, complaints(done.stderr.decode())) == (0, [])
-    assert Path("x.csv").exists()
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "sim", "stats", "outputs/scene.nc", "--csv", "x.csv"]
+    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, timeout=120)
+    os.close(writing)
+    assert (done.returncode, complaints(done.stderr.decode())) == (0, []) and Path("x.csv").exists()
 
 
 @posix

@@ -58,28 +58,28 @@ def workers(parent=None):
 
 
 @pytest.mark.parametrize("jobs", [2, *(pytest.param(jobs, marks=pytest.mark.verify) for jobs in (3, 5))])
-def test_any_number_of_processes_gives_the_same_numbers(tmp_path, many_parts, jobs):
+def test_any_number_of_processes_gives_the_same_numbers_of_threads_too(tmp_path, many_parts, jobs):
     counted = []
-    ensemble.run(sample(), tmp_path / "out.nc", jobs=jobs, progress=counted.append)
+    how = {"jobs": jobs, "progress": counted.append}
+    thread = threading.Thread(target=lambda: ensemble.run(sample(), tmp_path / "out.nc", **how))
+    thread.start()
+    thread.join()
     assert sum(counted) == plans.work(Plan.of(sample())) and same(tmp_path / "out.nc")
     scenario = sample(members=5, sweep=None, contact=CONTACTS["load there and back"])  # of classes that are local
     assert ensemble.run(scenario, jobs=jobs).identical(ensemble.run(scenario))
 
 
 def test_a_worker_that_dies_costs_its_blocks_alone(tmp_path, many_parts):
-    counted, killed = [], set()
+    counted = []
 
     def kill(done):
+        if not counted:
+            workers()[0].kill()
         counted.append(done)
-        alive = [worker for worker in workers() if worker.pid not in killed]
-        if len(killed) < 2 and alive:
-            killed.add(alive[0].pid)
-            alive[0].kill()
 
     scenario = sample(members=8, steps=40)
     ensemble.run(scenario, tmp_path / "out.nc", jobs=2, progress=kill)
-    assert len(killed) == 2 and sum(counted) == plans.work(Plan.of(scenario))
-    assert same(tmp_path / "out.nc", scenario) and not workers()
+    assert sum(counted) == plans.work(Plan.of(scenario)) and same(tmp_path / "out.nc", scenario) and not workers()
 
 
 def test_a_block_that_raises_or_breaks_three_pools_is_given_up_and_the_others_are_kept(tmp_path, many_parts):
@@ -93,7 +93,7 @@ def test_a_block_that_raises_or_breaks_three_pools_is_given_up_and_the_others_ar
     assert all(name in blocks for task, _ in tasks for name in task.names)
     task = next(Plan.of(sample()).tasks())
     with pytest.raises(OSError, match="out"):  # which may concern all blocks: the run ends at once
-        compute(ensemble.advance, BlockFiles(tmp_path / "out"), [(task, [0])] * 2, print, never, 2)
+        compute(ensemble.advance, BlockFiles(tmp_path / "out"), [(task, [0])] * 2, print, never)
     assert not workers()
 
 
@@ -145,7 +145,9 @@ def script(path, members=3, steps=9):
     return SCRIPT.format(tests=str(Path(__file__).parents[1]), path=str(path), members=members, steps=steps)
 
 
-@pytest.mark.parametrize("way", ["unguarded", "standard input", pytest.param("notebook", marks=pytest.mark.verify)])
+@pytest.mark.parametrize(
+    "way", ["unguarded", *(pytest.param(way, marks=pytest.mark.verify) for way in ("standard input", "notebook"))]
+)
 def test_processes_need_no_guard_in_what_starts_them_and_import_nothing_of_the_present_folder(tmp_path, way):
     folder, path = tmp_path / "present", tmp_path / "own" / "out.nc"
     folder.mkdir()
@@ -162,14 +164,6 @@ def test_processes_need_no_guard_in_what_starts_them_and_import_nothing_of_the_p
             how = {"cwd": folder, "stdin": file, "capture_output": True, "text": True, "check": True}
             assert subprocess.run(words, **how).stdout.count("begun") == 1
     assert same(path)
-
-
-def test_any_number_of_processes_gives_the_same_numbers_of_threads_too(tmp_path, many_parts):
-    done = []
-    thread = threading.Thread(target=lambda: done.append(sim.run(sample(), tmp_path / "out.nc", jobs=2)))
-    thread.start()
-    thread.join()
-    assert done and same(tmp_path / "out.nc")
 
 
 @pytest.mark.parametrize("kills", [2, pytest.param(50, marks=pytest.mark.verify)])
@@ -238,14 +232,10 @@ def test_workers_of_another_version_and_schedulers_that_do_not_answer_are_told(t
             compute(ensemble.advance, MemoryBlocks(), [], print, never, scheduler=address)
 
 
-def test_a_cluster_gives_the_numbers_of_one_process_and_maps_scenes(tmp_path, many_parts, threads):
-    counted = []
-    how = {"scheduler": threads.scheduler_address, "progress": counted.append}
-    ensemble.run(sample(), tmp_path / "out.nc", **how)
-    assert sum(counted) == plans.work(Plan.of(sample())) and same(tmp_path / "out.nc")
-    assert ensemble.run(sample(), scheduler=threads.scheduler_address).identical(ensemble.run(sample()))
+def test_a_cluster_maps_scenes(threads):
     from distributed import Client
 
+    assert ensemble.run(sample(), scheduler=threads.scheduler_address).identical(ensemble.run(sample()))
     scenarios = [sample(seed=seed) for seed in (1, 2, 3)]
     with Client(threads) as client:
         results = client.gather(client.map(sim.run, scenarios))

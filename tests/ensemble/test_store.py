@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from filelock import FileLock
 from helpers import scenes
 from helpers.cases import posix
 from helpers.parts import Clock
@@ -306,7 +305,7 @@ def test_blocks_of_two_runs_do_not_mix(tmp_path, monkeypatch, method):
 
 
 @posix
-def test_a_folder_that_no_run_made_is_not_touched(tmp_path):
+def test_a_folder_that_no_run_made_is_not_touched_nor_files_of_others_in_one(tmp_path):
     other, folder = tmp_path / "precious", tmp_path / "out.nc.parts"
     other.mkdir()
     (other / "thesis.txt").write_text("years", encoding="utf-8")
@@ -318,12 +317,9 @@ def test_a_folder_that_no_run_made_is_not_touched(tmp_path):
         if folder.is_symlink():
             folder.unlink()
             other.rename(folder)
-
-
-def test_files_and_folders_of_others_stay(tmp_path):
     path = tmp_path / "out.nc"
-    folder = stopped(path)
-    (folder / "notes.txt").write_text("do not forget", encoding="utf-8")
+    shutil.rmtree(folder)
+    (stopped(path) / "notes.txt").write_text("do not forget", encoding="utf-8")
     ensemble.run(sample(), path, resume=True)
     assert names(folder) == ["notes.txt"]
 
@@ -387,7 +383,8 @@ def test_a_run_without_shard_computes_what_no_shard_holds_and_names_the_others(t
     def others(done):
         for how, fault in () if refused else (
             ({"resume": True}, "the shards 2/3 of"), ({"shard": (2, 3), "resume": True}, "another run"),
-            ({"shard": (2, 3)}, None), ({"shard": (1, 2), "replace": True}, None), ({}, None),
+            ({"shard": (2, 3)}, None), ({"shard": (2, 3), "replace": True}, None), ({}, None),
+            ({"shard": (1, 2), "replace": True}, None),
         ):  # fmt: skip
             with pytest.raises((OutputBusy, OutputExists), match=fault):
                 ensemble.run(shared(), path, **how)
@@ -426,17 +423,6 @@ def test_a_shard_that_replaces_begins_only_its_own_blocks_anew(tmp_path):
     for number in (1, 2, 1, 3):
         ensemble.run(shared(), path, shard=(number, 3), replace=True)
     assert same(path, shared())
-
-
-def test_a_shard_that_another_process_computes_keeps_its_blocks(tmp_path):
-    path = tmp_path / "out.nc"
-    ensemble.run(shared(), path, shard=(1, 3))
-    folder = tmp_path / "out.nc.parts"
-    blocks = set(folder.glob("*.npz"))
-    with FileLock(folder / store.lock_of(1, 3)), pytest.raises(OutputBusy):
-        ensemble.run(shared(), path, shard=(1, 3), replace=True)
-    assert blocks
-    assert blocks == set(folder.glob("*.npz"))
 
 
 @pytest.mark.parametrize("shard", ["0/3", "4/3", "3", "a/b", f"1/{'9' * 5000}"])
