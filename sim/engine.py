@@ -85,13 +85,13 @@ def start(scenario: Scenario, noise: MemberNoise) -> State:
         bonding = coupled.with_contact_stress(scenario.parts, bonding, motion.speed)
     shear = process.start(motion, bonding, noise.shear)
     terms = balance(scenario, bonding.fraction, bonding.strength, shear.energy, slider.position)
-    touch = contact.start(motion, scenario.times.duration, terms)
+    contact_state = contact.start(motion, scenario.times.duration, terms)
     if drive.solves_motion:
-        around = _step_contact(scenario, touch, shear, range(1, 2))
-        slider = coupled.load(scenario.parts, slider, bonding, around, scenario.times.duration)
+        step_contact = _step_contact(scenario, contact_state, shear, range(1, 2))
+        slider = coupled.load(scenario.parts, slider, bonding, step_contact, scenario.times.duration)
     stage = cast(Driven, slider).stage_position if has_stage(scenario) else np.empty(0)
-    seen = events.first(bonding, touch, _pull(scenario, 0.0, touch.radius), stage)
-    return State(0, slider, bonds, bonding, shear, touch, seen)
+    history = events.first(bonding, contact_state, _pull(scenario, 0.0, contact_state.radius), stage)
+    return State(0, slider, bonds, bonding, shear, contact_state, history)
 
 
 def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) -> tuple[State, Trajectory]:
@@ -102,9 +102,9 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
     drive, population, process, contact = scenario.parts
     slider: Sliding
     if drive.solves_motion:
-        around = _step_contact(scenario, state.contact, state.shear, steps)
+        step_contact = _step_contact(scenario, state.contact, state.shear, steps)
         sliders, motions, bonds, bonding = coupled.advance(
-            scenario.parts, state.drive, state.bonds, around, scenario.times, steps, noise.bonds
+            scenario.parts, state.drive, state.bonds, step_contact, scenario.times, steps, noise.bonds
         )
         slider, driven = sliders.at(-1), drive.readings(sliders)
     else:
@@ -113,21 +113,21 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
         driven = during(drive.readings(slider), len(steps))
     shear, energy = process.advance(state.shear, motions, bonding, noise.shear)
     terms = balance(scenario, bonding.fraction, bonding.strength, energy, motions.position)
-    touch = contact.advance(state.contact, motions, scenario.times.duration, terms)
-    valid = coupled.steps_until_contact_changes(sliders, touch.radius) if drive.solves_motion else len(steps)
+    contact_state = contact.advance(state.contact, motions, scenario.times.duration, terms)
+    valid = coupled.steps_until_contact_changes(sliders, contact_state.radius) if drive.solves_motion else len(steps)
     if valid < len(steps):
         return advance(scenario, state, noise, steps[:valid])
-    at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
-    seen = state.events.next_phase() if steps.start in scenario.phases.steps[1:] else state.events
-    alike = scenario.varies["bonds"] == scenario.varies["contact"]
-    seen = events.after(seen, at_start, bonding, touch, pull, motions, scenario.feels_steps, alike)
+    at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, contact_state.radius)
+    history = state.events.next_phase() if steps.start in scenario.phases.steps[1:] else state.events
+    with_area = scenario.varies["bonds"] == scenario.varies["contact"]
+    history = events.after(history, at_start, bonding, contact_state, pull, motions, scenario.feels_steps, with_area)
     if has_stage(scenario):
         stage = sliders.stage_position, sliders.stage_speed
         of_slider = sliders.spring_force, sliders.position, motions.slip, bonding.stress, sliders.work
         late = 0.5 * scenario.times.duration
-        seen = seen._replace(slips=seen.slips.after(motions.time[:, 0], stage, of_slider, late))
-    end = State(steps[-1], slider, bonds, bonding.at(-1), shear, touch.at(-1), seen)
-    return end, _trajectory(motions.time, motions, bonding, energy, driven, touch)
+        history = history._replace(slips=history.slips.after(motions.time[:, 0], stage, of_slider, late))
+    end = State(steps[-1], slider, bonds, bonding.at(-1), shear, contact_state.at(-1), history)
+    return end, _trajectory(motions.time, motions, bonding, energy, driven, contact_state)
 
 
 def has_stage(scenario: Scenario) -> bool:
@@ -182,16 +182,18 @@ def balance(scenario: Scenario, fraction: Array, strength: Array, energy: Array,
     return Balance(bonded, fluctuating, strength, margin, scenario.bodies, scenario.adhesion.work)
 
 
-def _step_contact(scenario: Scenario, touch: ContactState, shear: Storing, steps: range) -> StepContact:
+def _step_contact(scenario: Scenario, contact_state: ContactState, shear: Storing, steps: range) -> StepContact:
     """Return contact and half-space at the start of some clock steps, for a drive that feels the friction."""
     contact, times, adhesion = scenario.contact, scenario.times, scenario.adhesion
     first, last = contact.mount_between(times.at(np.arange(steps.start - 1.0, steps.stop)), times.duration)
-    share = 1.0 if scenario.margin is None else scenario.margin(np.nan_to_num(touch.radius, nan=0.0))
+    share = 1.0 if scenario.margin is None else scenario.margin(np.nan_to_num(contact_state.radius, nan=0.0))
     bare, paid = adhesion.work_of_bonds(0.0), scenario.fluctuations.paid_by_adhesion * share
     bonded = adhesion.work_of_bonds(1.0) - adhesion.work_of_bonds(0.0)
     stays = contact.lags or not (contact.changes or bonded or contact.reversible)
-    around = (first.mount, last.mount), stays, scenario.bodies, scenario.solid.effective[0], scenario.contact_area
-    return StepContact(touch.radius, bare, paid, shear, bonded, contact.reversible, *around)
+    mounts = first.mount, last.mount
+    bodies, shear_modulus, area = scenario.bodies, scenario.solid.effective[0], scenario.contact_area
+    of_contact = contact_state.radius, bare, paid, shear, bonded, contact.reversible
+    return StepContact(*of_contact, mounts, stays, bodies, shear_modulus, area)
 
 
 def _pull(scenario: Scenario, time: float | Array, radius: Array) -> Array:

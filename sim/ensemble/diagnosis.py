@@ -30,7 +30,7 @@ _ERROR, _LAG, _MASKING = 0.01, 0.005, 0.9
 #: Points along a side of a cell beyond which no more are proposed; wavelengths of a band over a correlation length.
 _MOST_POINTS, _BAND = 2**14, (0.8, 1.2)
 #: Relative change of bonds and stress in the derivative of the area; duration over that of a ramp that nothing delays.
-_LITTLE, _VERY_SLOW = 1e-4, 1e6
+_RELATIVE_STEP, _VERY_SLOW = 1e-4, 1e6
 
 #: A point of a sweep, and its systematic errors.
 Worst = tuple[Scenario, dict[str, float]]
@@ -89,12 +89,8 @@ def systematic_errors(point: Scenario) -> dict[str, float]:
         gained = np.var(np.sqrt(areas[:, 0]), axis=-1) * np.minimum(left / np.tanh(left) - 1.0, 1.0)
     errors = np.stack([cell - exact, cell - banded, gained])
     worst = int(np.argmax(np.nan_to_num(np.sum(np.abs(errors), axis=0))))
-    values = (
-        *errors[:, worst],
-        *(errors[:, worst] / (exact[worst] or math.nan)),
-        speeds[worst, 0],
-        np.std(areas[worst, 0]),
-    )
+    relative = errors[:, worst] / (exact[worst] or math.nan)
+    values = *errors[:, worst], *relative, speeds[worst, 0], np.std(areas[worst, 0])
     return known | dict(zip(SYSTEMATIC, map(float, values), strict=True))
 
 
@@ -187,18 +183,15 @@ def diagnosis(plan: Plan) -> list[str]:
 
 def _fluctuating(point: Scenario) -> Iterator[str]:
     """Yield sentences on the size of the stored energy and on the waves that store it."""
-    shear, spectrum, work = point.fluctuations, point.fluctuations.spectrum, point.adhesion.work
+    shear, spectrum, work = point.fluctuations, point.fluctuations.spectrum, point.adhesion.work or math.inf
     course = steady_course(point, *_along(point))
-    most, paid = (
-        float(np.max(course.energy)),
-        float(np.min(shear.paid_by_adhesion * course.energy)) / (work or math.inf),
-    )
+    most, paid = float(np.max(course.energy)), float(np.min(shear.paid_by_adhesion * course.energy)) / work
     masked, always = course.work <= 0.0, "at any speed" if shear.amplitude.model == "constant" else "throughout the run"
     how = f": masked {always}" if paid >= 1.0 else f": nearly masked {always}" if paid > _MASKING else ""
     if paid < 1.0 and np.any(masked):
         noise = " without the noise of the bonds" if point.population.per_member else ""
         how = f": masked {'throughout' if np.all(masked) else 'in part of'} the run{noise}"
-    share = f"{100.0 * most / (work or math.inf):.2g} % of the work of adhesion"
+    share = f"{100.0 * most / work:.2g} % of the work of adhesion"
     yield f"stored energy in steady sliding {engineering(most, 'J/m^2')}, {share}{how}"
     long_waves = share_of_long_waves(spectrum, 2.0 * point.rest_radius, point.solid.effective[1])
     if long_waves > _LAG:
@@ -288,7 +281,7 @@ def slider_body(point: Scenario, speeds: Array) -> Body:
         terms = steady.strength * stress, point.contact.reversible, point.bodies
         return np.asarray(np.pi * control.radius(work_left, *terms) ** 2)
 
-    now, few = area(), _LITTLE
+    now, few = area(), _RELATIVE_STEP
     by_bonds = (area(share=1.0 + few) - area(share=1.0 - few)) / (2.0 * few * now)
     by_stress = (area(stress=1.0 + few) - area(stress=1.0 - few)) / (2.0 * few * now)
     firm = 1.0 / (yields + slope / np.sqrt(now / np.pi)) if yields + slope > 0.0 else math.inf
