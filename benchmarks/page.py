@@ -6,26 +6,32 @@ from benchmarks.timing import Row
 
 TITLE = """# Speed
 
-`make bench` measures every row below and writes this page; `make bench ROWS="modal contact"` measures
-only some groups of rows. The programs are in [benchmarks/](../benchmarks): ours beside the best simple one that a
-user of numpy and scipy would write for the same work, or beside a step that no program can do without.
+This page compares the CPU time of `sim` with that of other programs. `make bench` measures every row below and writes
+the page. To measure only some groups of rows:
 
-- **Times** are CPU times on one core. In each turn of a row all its programs run one after the other, and a ratio is
-  that of one turn. The result is the median over the turns, in brackets the ends of their middle half. Absolute times
-  differ between machines, and with what else they do; compare ratios. A time is that of one step of one member, of
-  one field, of one set of radii or of one whole command, as the first column says; commands use one process.
-- **"10 times faster"**: the other program takes 10 times our time. **"1.1 times as long"**: ours takes 1.1 times the
-  other's. Ours is the slower one where a row reads "times slower", or more than 1 "times as long".
-- **Goals** for fields are meant beside the textbook's program, which makes its noise by a transform; a leaner one,
-  which draws no number that it does not need, stands in the next row without a goal.
-- **Errors**, ours first: of the third cumulant of ΔΓ for bands, of the friction for bonds, of the position (over the
-  largest) for sliders, of the radius for contacts. No error is given if both programs are exact to rounding.
-- Memory that a program has freed stays with its process, for ours and the others alike: else the system's time for
-  new pages decides between them. `sim` as a command runs as it does for a user.
+    make bench ROWS="modal contact"
+
+The programs are in [benchmarks/](../benchmarks). Most rows compare ours with the best simple program that a user of
+numpy and scipy would write for the same work. Other rows compare it with a step that every program needs.
+
+- **Times** are CPU times on one core. The first column names the work: one step of one member, one field, one set of
+  radii, or one whole command. Commands use one process.
+- **Ratios**: in each turn of a row all its programs run one after the other, and each turn gives a ratio. The result
+  is the median over the turns, with the middle half of the ratios in brackets. Compare ratios, because absolute times
+  depend on the machine and its load.
+- **"10 times faster"**: the other program takes 10 times our time.
+- **"1.1 times as long"**: ours takes 1.1 times the time of the other program.
+- **Slower rows**: ours is slower if a row reads "times slower", or more than 1 "times as long".
+- **Goals** for fields refer to the textbook program, which makes its noise by a transform. A leaner program draws only
+  the numbers that it needs. It stands in the next row, without a goal.
+- **Errors**, ours first, are those of one quantity: third cumulant of ΔΓ (bands), friction (bonds), position over its
+  largest value (sliders), radius (contacts). No error is given if both programs are exact to rounding.
+- **Memory** that a program has freed stays with its process, for ours and the others alike. Otherwise the system's time
+  for new pages would decide the comparison. The command `sim` runs as it does for a user.
 
 """
 END = """
-`sim converge SCENARIO.toml` shows what the models cost and err on a scene of your own.
+The command `sim converge SCENARIO.toml` measures the cost and the error of each model on a scenario of your own.
 """
 HEADINGS = ("work", "beside", "goal", "result", "met", "CPU time, ours; theirs", "errors, ours; theirs")
 

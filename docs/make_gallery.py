@@ -29,9 +29,14 @@ FOLDER = Path(__file__).with_name("gallery")
 PAGE, NUMBERS = FOLDER / "README.md", FOLDER / "numbers.json"
 HEAD = """# Gallery
 
-Questions, each with a figure, an answer and the commands that give the figure. Made by `make gallery` from [the
-scenarios](../../scenarios), which say what they assume. Numbers are computed from the datasets; where members differ
-they are means over the members, with the standard error of the last digits in brackets.
+This page answers questions with a figure each, and shows the commands that give the figure. The shortest example:
+
+    sim run scenarios/pull_off.toml
+    sim plot outputs/pull_off.nc
+
+Each answer links to its [scenario](../../scenarios), which states the assumptions. The command `make gallery` computes
+all numbers and figures. If members differ, a number is the mean over the members. Its standard error stands in brackets
+and refers to the last digits.
 """
 #: Pixels an inch and colours of a picture, the first with which it is small enough, and its bytes.
 FINENESS, MOST_BYTES = ((140, 256), (120, 256), (110, 128), (100, 128), (90, 64)), 60_000
@@ -186,9 +191,10 @@ def asks(scenario: str, question: str, answer: str, **how: Any) -> Callable[[Rea
 @asks(
     "uniform_stress",
     "Does a uniform shear stress change the contact?",
-    """No. From {low:g} to {high:g} MPa the radius under {load:g} mN stays {radius:.2f} µm (it changes by
-    {change:g} %), while friction grows to {friction:.1f} mN: the drive pays for all that a uniform stress
-    stores. What follows is the paper's theorem, which `sim paper` checks line by line.""",
+    """No. From {low:g} to {high:g} MPa the contact radius under {load:g} mN stays {radius:.2f} µm (it changes by
+    {change:g} %). Friction grows to {friction:.1f} mN. The contact does not change because the drive supplies all
+    the energy that a uniform stress stores. The command `sim paper` checks this theorem of the paper line by
+    line.""",
 )
 def uniform_stress(dataset: xr.Dataset) -> dict[str, Number]:
     stress, load = 1e-6 * dataset["bonds_stress"], 1e3 * dataset["contact_load"]
@@ -201,11 +207,12 @@ def uniform_stress(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "theories",
-    "Does it, by the other theories?",
-    """By most of them it shrinks. At {stress:g} kPa the area of the corrected theory is JKR's; where adhesion
-    pays a share α = {share:g} of the energy of the mean stress {some:.1f} % of it are left, where it pays for
-    all {all:.1f} %, which is Hertz's. Savkoor and Briggs, whose contact sticks, end at {ends:.1f} mN of
-    tangential force and jump to Hertz. The uncorrected theory of 2018 has friction enlarge the contact.""",
+    "What do other theories say about a uniform shear stress?",
+    """Most of them predict a smaller contact. At {stress:g} kPa, the corrected theory keeps JKR's area. If adhesion
+    supplies a share α = {share:g} of the energy of the mean stress, {some:.1f} % of JKR's area are left. If
+    adhesion supplies all of it, {all:.1f} % are left, which is Hertz's area. In Savkoor and Briggs' theory the
+    contact sticks; at {ends:.1f} mN of tangential force it jumps to Hertz. In the uncorrected theory of 2018
+    friction enlarges the contact.""",
     kind="theories",
 )
 def theories(dataset: xr.Dataset) -> dict[str, Number]:
@@ -220,9 +227,9 @@ def theories(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "masking",
     "How strong must a ripple of the stress be to mask adhesion?",
-    """An amplitude of {amplitude:.1f} kPa, at a wavelength of {wavelength:g} µm, a tenth of the contact's
-    width: there the energy that it stores equals the work of adhesion and the contact is Hertz's, {hertz:.1f} %
-    of JKR's area. Beyond, the area falls no further.""",
+    """It needs an amplitude of {amplitude:.1f} kPa at a wavelength of {wavelength:g} µm, a tenth of the contact's
+    width. The stored energy then equals the work of adhesion. The contact is Hertzian, with {hertz:.1f} % of JKR's
+    area. A stronger ripple does not reduce the area further.""",
 )
 def masking(dataset: xr.Dataset) -> dict[str, Number]:
     wavelength, work = float(dataset["shear_spectrum_wavelength"]), float(dataset["adhesion_work"])
@@ -233,10 +240,10 @@ def masking(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "masking",
-    "Does it matter which way the ripple runs?",
-    """It doubles the energy. A ripple of {amplitude:g} kPa along the sliding stores {along:.2f} mJ/m², the same
-    across it {across:.2f} mJ/m²: across it the half-space is half as stiff. The area left falls from {wide:.1f}
-    to {narrow:.1f} % of JKR's.""",
+    "Does the direction of the ripple matter?",
+    """Yes, it changes the energy by a factor of two. A ripple of {amplitude:g} kPa stores {along:.2f} mJ/m² if it
+    runs along the sliding direction. Across it the ripple stores {across:.2f} mJ/m², because the half-space is half
+    as stiff there. The area falls from {wide:.1f} to {narrow:.1f} % of JKR's.""",
     changes={"shear.spectrum.amplitude": "300 kPa",
              "sweep": {"shear.spectrum.angle": {"from": "0 deg", "to": "90 deg", "count": 19}}},
     units=("deg",),
@@ -251,10 +258,10 @@ def direction(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "pdms_lens",
     "Does the contact of a PDMS lens shrink because its bonds break, or because its stress fluctuates?",
-    """Because of both, as assumed. Up to {slow:.2g} mm/s the area stays at {kept} % of JKR's. At {fast:.2g}
-    mm/s {left} % are left; broken bonds, charged first, took {bonds} %, the fluctuations {fluctuations} %. The
-    fluctuations set in where the scenario prescribes it; what a spring makes of that by itself is another
-    question.""",
+    """Both contribute, under the assumptions of the scenario. At {slow:.2g} mm/s the area is still {kept} % of
+    JKR's. At {fast:.2g} mm/s {left} % are left. Broken bonds, which are counted first, account for a loss of
+    {bonds} %, fluctuations for {fluctuations} %. The scenario prescribes the onset of the fluctuations; behind a
+    spring (see below) nothing prescribes it.""",
 )
 def pdms_lens(dataset: xr.Dataset) -> dict[str, Number]:
     (slow, slower), (fast, faster) = (at_speed(dataset, speed) for speed in (1e-3, 8e-3))
@@ -266,9 +273,9 @@ def pdms_lens(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "decomposition",
     "Do the two mechanisms add up?",
-    """Not the areas. At {speed:.2g} mm/s broken bonds alone leave {bonds} % of the area, fluctuations alone
-    {fluctuations} %; the product of the two would be {product:.1f} %, and together they leave {both} %. What
-    adds up is the work of adhesion, of which the area is no straight function.""",
+    """Their effects on the area do not. At {speed:.2g} mm/s broken bonds alone leave {bonds} % of the area,
+    fluctuations alone {fluctuations} %. The product would be {product:.1f} %, but both together leave {both} %. The
+    reductions of the work of adhesion do add up; the area is not a linear function of it.""",
 )
 def decomposition(dataset: xr.Dataset) -> dict[str, Number]:
     then, speed = at_speed(dataset, 8e-3)
@@ -284,8 +291,9 @@ def decomposition(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "soft_lens",
     "How small a fluctuation masks the adhesion of a softer, larger contact?",
-    """With G = {modulus:g} MPa and a contact {width:.1f} mm wide an rms of {rms:g} kPa masks it {masked} % of
-    the time: it stores {energy} mJ/m² where the bonds at this speed hold {work:.1f} mJ/m².""",
+    """With G = {modulus:g} MPa and a contact {width:.1f} mm wide, an rms of {rms:g} kPa masks the contact {masked}
+    % of the time. The fluctuations then store {energy} mJ/m². The bonds at this speed supply a work of adhesion of
+    {work:.1f} mJ/m².""",
 )
 def soft_lens(dataset: xr.Dataset) -> dict[str, Number]:
     rms = 30e3
@@ -299,10 +307,11 @@ def soft_lens(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "ten_wavelengths",
-    "How wide is the area's distribution when the contact holds ten wavelengths?",
-    """Its standard deviation is {ten} % of the mean area, nine contacts in ten lie between {low:.1f} and
-    {high:.1f} % of JKR's area. With three wavelengths it is {three} %, with thirty {thirty} %: the energy is a
-    sum over the waves in the contact, so that its spread falls about as one over their number along a side.""",
+    "How wide is the area's distribution if the contact holds ten wavelengths?",
+    """The standard deviation is {ten} % of the mean area. Nine contacts in ten have between {low:.1f} and
+    {high:.1f} % of JKR's area. With three wavelengths the standard deviation is {three} %, with thirty {thirty} %.
+    The energy is a sum over the waves in the contact. Its spread therefore falls about as one over the number of
+    waves along a side.""",
 )
 def ten_wavelengths(dataset: xr.Dataset) -> dict[str, Number]:
     area, ratio = (dataset["contact_area"].isel(t=-1), statistics(dataset)["area_ratio_quantile"].isel(t=-1))
@@ -316,9 +325,9 @@ def ten_wavelengths(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "soft_lens",
     "What does a fluctuating shear stress look like?",
-    """A map of it, and of the displacement that it makes, around the contact (circle). Waves across the sliding
-    move the surface twice as far as those along it, so that the displacement is streaky along x. This
-    realisation has an rms of {rms:.1f} kPa and stores {energy:.1f} mJ/m²; the displacement has an rms of
+    """The figure maps the stress and the displacement that it causes; the circle is the contact. Waves across the
+    sliding direction move the surface twice as far as waves along it. The displacement therefore has streaks along
+    x. This realisation has an rms of {rms:.1f} kPa and stores {energy:.1f} mJ/m². The displacement has an rms of
     {moved:.2f} µm.""",
     kind="map",
     changes={
@@ -341,9 +350,9 @@ def stress_map(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "uniform_stress",
     "What is the shape of a sliding contact?",
-    """Adhesion pulls at the edge, the sphere presses in the middle; sliding at {stress:g} MPa shifts the
-    surface by {shift:.1f} µm in the middle, along the sliding, which is {part:.0f} % of the contact's radius.
-    Normal and tangential fields do not feel each other in an incompressible half-space.""",
+    """Adhesion pulls at the edge, and the sphere presses in the middle. Sliding at {stress:g} MPa displaces the
+    middle of the surface by {shift:.1f} µm along the sliding direction. That is {part:.0f} % of the contact radius.
+    Normal and tangential fields are independent in an incompressible half-space.""",
     kind="profile",
     where={"bonds.stress": "0.3 MPa", "contact.load": "4 mN"},
 )
@@ -357,9 +366,9 @@ def profile(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "friction_maximum",
     "Why does the friction of rubber first rise and then fall with speed?",
-    """A bond that is pulled faster carries more before it breaks, until too few sites hold one. Bell's bonds
-    have a maximum of {stress:.1f} kPa at {speed:.2f} mm/s, where {bound:.0f} % of the bonds of rest are left;
-    the area has lost {lost:.1f} % there.""",
+    """A bond that is pulled faster bears more before it breaks, but fewer sites hold a bond. Bonds under Bell's law
+    have a maximum of {stress:.1f} kPa at {speed:.2f} mm/s. At that speed {bound:.0f} % of the bonds at rest are
+    left. The area has then fallen by {lost:.1f} %.""",
 )
 def friction_maximum(dataset: xr.Dataset) -> dict[str, Number]:
     top = int(dataset["shear_stress"].argmax("t"))
@@ -371,10 +380,10 @@ def friction_maximum(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "static_peak",
     "How does the peak of static friction grow with the time at rest and the speed of the start?",
-    """Ever closer to the logarithm of the speed: after {rest:g} s it is {slow:.0f} kPa at {slower:g} µm/s and
-    {fast:.0f} kPa at {faster:g} µm/s; it rises by {first:.0f} kPa over the first decade of the speed and by
-    {last:.0f} kPa over the last. With the time at rest it grows to an end: after {short:g} s it has {share:.0f} % of
-    that height. One rebinding rate makes no logarithm of time.""",
+    """The peak grows with the speed, ever closer to the logarithm of the speed. After {rest:g} s at rest the peak
+    is {slow:.0f} kPa at {slower:g} µm/s and {fast:.0f} kPa at {faster:g} µm/s. It rises by {first:.0f} kPa over the
+    first decade of the speed and by {last:.0f} kPa over the last. With the time at rest the peak saturates: after
+    {short:g} s it has {share:.0f} % of that height. A single rebinding rate gives no logarithm of time.""",
 )
 def static_peak(dataset: xr.Dataset) -> dict[str, Number]:
     peak, rest, speed = (dataset[name] for name in ("peak_stress", "drive_rest", "drive_speed"))
@@ -387,11 +396,11 @@ def static_peak(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "velocity_step",
-    "How does friction answer a sudden change of the speed?",
-    """It overshoots. When the stage goes from {slow:g} to {fast:g} mm/s at once the force rises from
-    {before:.2f} mN to {peak:.2f} mN within {after:.1f} ms, as the bonds are stretched further before more of
-    them break, and settles at {settled:.2f} mN: {length:.1f} µm of sliding on, an e-th of the overshoot is left.
-    Back at the old speed the force is {last:.2f} mN once more, and never below.""",
+    "How does friction respond to a sudden change of the speed?",
+    """Friction overshoots. When the stage jumps from {slow:g} to {fast:g} mm/s, the force rises from {before:.2f}
+    mN to {peak:.2f} mN within {after:.1f} ms. The bonds are stretched further before more of them break. The force
+    settles at {settled:.2f} mN. After {length:.1f} µm of sliding the overshoot has fallen to one e-th. Back at the
+    old speed the force returns to {last:.2f} mN and never falls below.""",
     kind="time",
 )
 def velocity_step(dataset: xr.Dataset) -> dict[str, Number]:
@@ -410,9 +419,9 @@ def velocity_step(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "friction_loop",
     "How much of a stroke back and forth is sliding?",
-    """Of the {stage:.0f} µm of each stroke the slider goes {slider:.0f} µm; the rest strains the spring and the
-    contact. Sliding at a steady {force:.2f} mN each way, the stage does {work:.2f} µJ of work in a stroke, all
-    of which ends in bonds that break.""",
+    """In each stroke of {stage:.0f} µm the slider moves {slider:.0f} µm. The rest strains the spring and the
+    contact. The slider slides at a steady {force:.2f} mN in both directions. The stage does {work:.2f} µJ of work
+    in a stroke; all of it is dissipated by bonds that break.""",
 )
 def friction_loop(dataset: xr.Dataset) -> dict[str, Number]:
     member = dataset.isel(member=0)
@@ -428,9 +437,9 @@ def friction_loop(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "creep",
     "Which tangential force does a contact bear for ever, and how long a larger one?",
-    """Up to {most:.2f} mN, where Bell's cluster of bonds comes apart. Under {held:g} mN it creeps at
-    {creep:.2f} mm/s for good; under {more:g} mN it gives way after {late:.0f} ms, under {much:g} mN after
-    {soon:.1f} ms.""",
+    """The contact bears up to {most:.2f} mN, the limit at which a cluster of Bell's bonds fails. Under {held:g} mN
+    it creeps at {creep:.2f} mm/s without end. Under {more:g} mN it fails after {late:.0f} ms, under {much:g} mN
+    after {soon:.1f} ms.""",
 )
 def creep(dataset: xr.Dataset) -> dict[str, Number]:
     names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate", "site_density")
@@ -446,11 +455,12 @@ def creep(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "incipient_shear",
-    "How does the contact area fall on the way to sliding?",
-    """About with the square of the tangential force, as measured on many contacts, and faster as the slider
-    gives way: when the force is largest, {small:.1f} % of the area are gone under {least:g} mN, {large:.1f} %
-    under {load:g} mN. Here broken bonds are all of it. The coefficient α falls as the area at rest to the power
-    {power:.2f}; measured contacts have about minus three halves.""",
+    "How does the contact area fall before sliding begins?",
+    """The loss of area grows about as the square of the tangential force, as measured on many contacts. It grows
+    faster when sliding begins. At the largest tangential force, {small:.1f} % of the area are lost under a load of
+    {least:g} mN, {large:.1f} % under {load:g} mN. Broken bonds cause all of it here. The coefficient α of the
+    square scales with the area at rest to the power {power:.2f}; measured contacts have about minus three
+    halves.""",
     kind="incipient",
 )
 def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
@@ -465,9 +475,10 @@ def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "stick_slip",
     "At which speed does a lens behind a soft spring begin to stick and slip?",
-    """At {onset:.1f} mm/s, as the stage is driven faster: beyond the friction maximum, which mean field has at
-    {peak:.1f} mm/s, and nothing prescribes it. From then on the force falls by {drop:.1f} mN in each slip of
-    {slip:.0f} µm, and the mean force is {kinetic:.1f} mN where slips begin at {static:.1f} mN.""",
+    """The onset is at {onset:.1f} mm/s as the stage speed increases. Nothing prescribes it. It lies above the
+    friction maximum, at {peak:.1f} mm/s in the mean-field theory. From then on the force falls by {drop:.1f} mN in
+    each slip event of {slip:.0f} µm. Slip events begin at {static:.1f} mN, and the mean force is {kinetic:.1f}
+    mN.""",
     kind="time",
 )
 def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
@@ -486,11 +497,11 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "stability_map",
-    "For which springs and speeds does a slider stick and slip, and does it matter where it comes from?",
-    """For springs softer than the theory's boundary (blue), about where it says, but with a delay: behind
-    {soft:g} N/m it sticks and slips from {up:.1f} mm/s on when it gets faster, and down to {down:.1f} mm/s when
-    it gets slower. Behind {stiff:.0f} N/m and more it never does here: it leaves the unstable speeds before
-    what disturbs it has grown.""",
+    "For which springs and speeds does a slider stick and slip, and does the history matter?",
+    """Springs softer than the theory's boundary (blue) give stick-slip, with a delay. Behind {soft:g} N/m
+    stick-slip begins at {up:.1f} mm/s as the speed increases. As the speed decreases, it ends at {down:.1f} mm/s.
+    Behind {stiff:.0f} N/m and more there is none here, because the slider leaves the unstable speeds before a
+    disturbance has grown.""",
     kind="stability",
 )
 def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
@@ -502,13 +513,12 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "pdms_lens_spring",
-    "Does the lens shrink where stick-slip sets in, with nothing prescribed?",
-    """Yes, and by the fluctuations. Between {slow:g} mm/s, where it slides steadily, and {fast:g} mm/s, where
-    it sticks and slips, the mean area falls from {before} to {after} % of JKR's. The bonds lose less of it than
-    before, {bonds} % after {bonded} %, as they recover while the slider sticks; the fluctuations that unsteady
-    sliding makes take {noise} % instead of {calm} %. That they are as strong as assumed, an rms of {rms:g} kPa,
-    how long they remember ({length:g} µm of sliding), and a damping without which the area would not fall there, is
-    put in.""",
+    "Does the lens shrink at the onset of stick-slip if nothing prescribes it?",
+    """Yes, because of the fluctuations. At {slow:g} mm/s the lens slides steadily, with a mean area of {before} %
+    of JKR's. At {fast:g} mm/s it sticks and slips, with {after} %. The loss to broken bonds falls from {bonded} to
+    {bonds} %, because bonds recover in the stick phases. Unsteady sliding makes fluctuations: the loss to them
+    rises from {calm} to {noise} %. Three things are assumed: an rms of {rms:g} kPa, a memory of {length:g} µm of
+    sliding, and a damping. Without the damping the area would not fall there.""",
 )
 def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
     late = analysis.distribution(dataset)
@@ -525,11 +535,11 @@ def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "motor_clutch",
     "On which substrate does a cell pull hardest: soft, stiff, or in between?",
-    """In between: on one whose stiffness, here that of the contact, is {best:g} pN/nm its clutches bear {most} of
-    the {motors:g} pN that its motors can pull with. On a softer one, of {soft:g} pN/nm, they bear {softly} pN: they
-    load it for so long that they fail together. On a stiff one, of {stiff:g} pN/nm, they bear {stiffly} pN, as each
-    is torn off soon after it has bound, and the filament glides at {glides} nm/s, hardly slower than free. These
-    are means over the second half of the run.""",
+    """In between. The stiffness of the contact stands for that of the substrate. At {best:g} pN/nm the clutches
+    (bonds) bear {most} of the {motors:g} pN that the motors can pull. At {soft:g} pN/nm they bear {softly} pN,
+    because they are loaded for so long that they fail together. At {stiff:g} pN/nm they bear {stiffly} pN, because
+    each is torn off soon after it has bound. The filament then glides at {glides} nm/s, hardly slower than without
+    clutches. These are means over the second half of the run.""",
     kind="sweep",
 )
 def motor_clutch(dataset: xr.Dataset) -> dict[str, Number]:
@@ -549,9 +559,9 @@ def motor_clutch(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "bond_noise",
     "Do the bonds themselves make fluctuations that matter?",
-    """Hardly. They store at most {energy:.2f} mJ/m², {part:.2f} % of the work of adhesion, at a speed where
-    broken bonds cost {bonds:.0f} % of it. Whether adhesion pays for that energy (χ = 1) or friction has done so
-    already (χ = 0) moves the area by {moved:.2f} % at most.""",
+    """Hardly. They store at most {energy:.2f} mJ/m², {part:.2f} % of the work of adhesion. At that speed broken
+    bonds cost {bonds:.0f} % of it. Either adhesion supplies that energy (χ = 1), or friction has already supplied
+    it (χ = 0). The choice changes the area by at most {moved:.2f} %.""",
 )
 def bond_noise(dataset: xr.Dataset) -> dict[str, Number]:
     energy = dataset["fluctuation_energy"].max("shear_paid_by_adhesion")
@@ -565,10 +575,10 @@ def bond_noise(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "fixed_grips",
-    "What if the sphere is held at a depth instead of under a load?",
-    """It holds on further. At an indentation of {deep:g} µm the contact keeps {kept} % of its JKR area at
-    {speed:.0f} mm/s; held above the surface at {high:g} µm, where no load could hold it, it comes off on the
-    way: {open} % of the members, on average at {off} ms, at a speed of {at:.1f} mm/s.""",
+    "What changes if the indentation is fixed instead of the load?",
+    """The contact holds longer. At an indentation of {deep:g} µm it keeps {kept} % of its JKR area at {speed:.0f}
+    mm/s. At {high:g} µm the sphere is held above the surface, where no load could hold it. There {open} % of the
+    members detach as the speed increases, on average at {off} ms and a speed of {at:.1f} mm/s.""",
 )
 def fixed_grips(dataset: xr.Dataset) -> dict[str, Number]:
     depth, over_members = dataset["contact_indentation"], statistics(dataset)
@@ -582,10 +592,11 @@ def fixed_grips(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "pull_off",
-    "Where does a sphere pull off a soft spring and a stiff one?",
-    """At the same load behind all of them, {pull:.3f} mN at the most, as JKR has it; but a cycle loses
-    {soft:.2f} nJ behind {softest:g} N/m and {stiff:.2f} nJ behind {stiffest:g} N/m: the sphere jumps off the
-    soft spring far out, from the stiff one nearly at the surface. Nothing in the material is lost.""",
+    "At which load does a sphere pull off a soft and a stiff spring?",
+    """The largest pull is {pull:.3f} mN for all springs, as in JKR theory. The energy lost in a cycle differs:
+    {soft:.2f} nJ behind {softest:g} N/m and {stiff:.2f} nJ behind {stiffest:g} N/m. Behind the soft spring the
+    sphere jumps off far from the surface, behind the stiff spring close to it. The material itself dissipates
+    nothing.""",
 )
 def pull_off(dataset: xr.Dataset) -> dict[str, Number]:
     lost = 1e9 * analysis.loop_energy(dataset)["loop_dissipation"].mean("cycle")
@@ -596,10 +607,10 @@ def pull_off(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "peeling",
-    "How much harder does a sphere hold when its edge cannot follow?",
-    """Pulled off with an edge that runs at {fast:g} mm/s at twice the work of adhesion it bears {quick:.2f} mN,
-    with one at {slow:g} µm/s {slack:.2f} mN, {times:.0f} times what JKR's contact bears. A cycle then loses
-    {lost:.1f} nJ.""",
+    "How much larger is the pull-off force if the edge cannot follow?",
+    """If the edge runs at {fast:g} mm/s at twice the work of adhesion, the largest pull is {quick:.2f} mN. At
+    {slow:g} µm/s it is {slack:.2f} mN, {times:.0f} times JKR's pull-off force. A cycle then dissipates {lost:.1f}
+    nJ.""",
 )
 def peeling(dataset: xr.Dataset) -> dict[str, Number]:
     pull, speed = -1e3 * dataset["pull_off_load"], dataset["contact_front_speed"]
@@ -612,11 +623,11 @@ def peeling(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "measured_lens",
-    "Which critical speed and stress of the bonds do measured areas and forces give?",
-    """A critical speed of {speed} mm/s, with {level:g} % confidence between {slowest:.2f} and {fastest:.2f},
-    and a stress of {stress} kPa, between {least:.1f} and {most:.1f}. The measurement,
-    [measured_lens.csv](../../scenarios/measured_lens.csv), is made up; the scenario says with which numbers,
-    and both are found.""",
+    "Which critical speed and stress of the bonds follow from measured areas and forces?",
+    """The critical speed is {speed} mm/s, with {level:g} % confidence between {slowest:.2f} and {fastest:.2f}. The
+    stress is {stress} kPa, between {least:.1f} and {most:.1f}. The measurement,
+    [measured_lens.csv](../../scenarios/measured_lens.csv), is made up. The scenario names the true values, and both
+    lie in the intervals.""",
     free=("bonds.critical_speed", "bonds.stress"),
 )
 def measured_lens(fit: Fit) -> dict[str, Number]:
@@ -630,11 +641,11 @@ def measured_lens(fit: Fit) -> dict[str, Number]:
 
 @asks(
     "jkr_fit",
-    "Which work of adhesion and which modulus does a JKR test give?",
-    """A work of adhesion of {work} mJ/m², with {level:g} % confidence between {least:.1f} and {most:.1f}, and a contact
-    modulus E* of {modulus} MPa, between {softest:.2f} and {stiffest:.2f}. The two go together: their correlation is
-    {together:.2f}. The test, [jkr_fit.csv](../../scenarios/jkr_fit.csv), is made up; the scenario says with which
-    numbers, and the intervals hold both. A table of your own loads and radii (or areas) takes its place.""",
+    "Which work of adhesion and which modulus follow from a JKR test?",
+    """The work of adhesion is {work} mJ/m², with {level:g} % confidence between {least:.1f} and {most:.1f}. The
+    contact modulus E* is {modulus} MPa, between {softest:.2f} and {stiffest:.2f}. Their correlation is
+    {together:.2f}. The test, [jkr_fit.csv](../../scenarios/jkr_fit.csv), is made up. The scenario names the true
+    values, and both lie in the intervals. Replace it by a table of your own loads and radii (or areas).""",
     free=("adhesion.work", "solid.youngs_modulus"),
 )
 def jkr_fit(fit: Fit) -> dict[str, Number]:
@@ -648,11 +659,11 @@ def jkr_fit(fit: Fit) -> dict[str, Number]:
 
 @asks(
     "jkr_test",
-    "What work of adhesion does a JKR test read off a contact whose edge lags?",
-    """Two, and neither is right. Under {load:g} mN the radius on loading gives {loading:.1f} mJ/m², that on
-    unloading {unloading:.1f} mJ/m², where {work:g} mJ/m² are true, if the edge runs at {speed:g} µm/s; if at
-    {faster:g} µm/s they are {closer:.1f} and {nearer:.1f} mJ/m². The loads over time are a made-up record,
-    [jkr_test.csv](../../scenarios/jkr_test.csv).""",
+    "Which work of adhesion follows from a JKR test if the edge lags?",
+    """Two different values follow, and both are wrong. The true value is {work:g} mJ/m². If the edge runs at
+    {speed:g} µm/s, the radius under {load:g} mN gives {loading:.1f} mJ/m² on loading and {unloading:.1f} mJ/m² on
+    unloading. At {faster:g} µm/s the values are {closer:.1f} and {nearer:.1f} mJ/m². The loads over time are a
+    made-up record, [jkr_test.csv](../../scenarios/jkr_test.csv).""",
 )
 def jkr_test(dataset: xr.Dataset) -> dict[str, Number]:
     size, modulus = float(dataset["sphere_radius"]), float(dataset["contact_modulus"].max())
@@ -670,9 +681,10 @@ def jkr_test(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "own_psd",
     "How strong may a stress of my measured spectrum be before the contact loses its adhesion?",
-    """At an rms of {lost:.0f} kPa its energy is all of the work of adhesion, {work:g} mJ/m². At {rms:g} kPa it stores
-    {energy} mJ/m² and {share} % of JKR's area are left. The spectrum is a made-up table,
-    [own_psd.csv](../../scenarios/own_psd.csv), scaled to each rms; the energy goes with its square.""",
+    """The limit is an rms of {lost:.0f} kPa: there the stored energy equals the work of adhesion, {work:g} mJ/m².
+    At {rms:g} kPa the stress stores {energy} mJ/m², and {share} % of JKR's area are left. The energy is
+    proportional to the square of the rms. The spectrum is a made-up table,
+    [own_psd.csv](../../scenarios/own_psd.csv), scaled to each rms.""",
 )
 def own_psd(dataset: xr.Dataset) -> dict[str, Number]:
     rms, work = 100.0, 1e3 * float(dataset["adhesion_work"])
@@ -685,11 +697,12 @@ def own_psd(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "own_map",
-    "What does a contact feel of one measured pattern of stress that passes under it?",
-    """Now less, now more than its mean. The map stores {whole:.1f} mJ/m² as a periodic one, {radial:.1f} mJ/m² by its
-    radial spectrum; on the disc of the contact it stores {low:.1f} to {high:.1f} mJ/m² as it passes. What counts is
-    what a unit of new contact at the edge pays: that lies between {least:.1f} and {most:.1f} mJ/m², and the area
-    between {small:.1f} and {large:.1f} % of JKR's. The map is made up, [own_map.csv](../../scenarios/own_map.csv).""",
+    "How does a measured pattern of stress change the contact as it passes under it?",
+    """The contact area varies with the part of the pattern under it, between {small:.1f} and {large:.1f} % of JKR's
+    area. The stored energy of the whole map is {whole:.1f} mJ/m² if it is periodic, and {radial:.1f} mJ/m² by its
+    radial spectrum. On the disc of the contact it is {low:.1f} to {high:.1f} mJ/m². The area depends on the energy
+    of a unit of new contact at the edge. This energy lies between {least:.1f} and {most:.1f} mJ/m². The map is made
+    up, [own_map.csv](../../scenarios/own_map.csv).""",
 )
 def own_map(dataset: xr.Dataset) -> dict[str, Number]:
     field = sim.load(ROOT / "scenarios" / "own_map.toml").shear.field
@@ -708,10 +721,10 @@ def own_map(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "own_map",
-    "What does such a pattern look like, and where is the contact on it?",
-    """Streaks along the sliding, with an rms of {rms:.1f} kPa on a mean of {mean:.0f} kPa that the bonds bear; the
-    circle is the contact, {width:.0f} µm wide. The pattern moves with the slider; where the map ends there is no
-    stress.""",
+    "What does such a pattern look like, and which part of it is in contact?",
+    """The pattern has streaks along the sliding direction. Its rms is {rms:.1f} kPa, on a mean of {mean:.0f} kPa
+    that the bonds bear. The circle is the contact, {width:.0f} µm wide. The pattern moves with the slider. Beyond
+    the map there is no stress.""",
     kind="map",
 )
 def pattern(dataset: xr.Dataset) -> dict[str, Number]:
@@ -723,8 +736,8 @@ def pattern(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "afm_tip",
     "Is the friction of an AFM tip a measure of its contact area?",
-    """In the model yes: friction is {stress:g} GPa times JKR's area, also in tension, down to the pull-off at
-    {off:.0f} nN, where {friction:.0f} nN of it are left. Without load it is {zero:.0f} nN.""",
+    """In the model it is. Friction is {stress:g} GPa times JKR's area. This holds in tension, too, down to the
+    pull-off at {off:.0f} nN, where friction is {friction:.0f} nN. Without load friction is {zero:.0f} nN.""",
 )
 def afm_tip(dataset: xr.Dataset) -> dict[str, Number]:
     last, load = dataset.isel(t=-1), dataset["contact_load"]
