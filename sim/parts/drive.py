@@ -153,7 +153,7 @@ class Table(tables.Table, _Sliding):
     column: ClassVar[str] = "speed"
     values_in: ClassVar[str] = "speed"
 
-    speed: Annotated[tuple[Annotated[float, _SPEED], ...], tables.at_once(_SPEED)]
+    speed: Annotated[tuple[Annotated[float, _SPEED], ...], tables.LISTED] = ()
     model: Literal["table"] = "table"
 
 

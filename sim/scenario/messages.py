@@ -127,7 +127,7 @@ def _fault(root: type, error: ErrorDetails) -> Fault:
     if kind in _UNKNOWN:
         return _unknown(root, _place(root, error["loc"][:-1]), str(error["loc"][-1]))
     if kind in _MISSING:
-        return _missing(place, _place(root, error["loc"][:-1]))
+        return _missing(place)
     if kind == "union_tag_invalid" or (kind == "union_tag_not_found" and isinstance(error["input"], dict)):
         models = [name for option in place.admitted.values() if (name := model(option))]
         return Fault((*place.path, "model"), _choice(error["input"].get("model"), models))
@@ -155,12 +155,10 @@ def _unknown(root: type, table: _Place, key: str) -> Fault:
     return Fault(path, f"is not a key; known: {', '.join(table.keys)}")
 
 
-def _missing(place: _Place, table: _Place) -> Fault:
+def _missing(place: _Place) -> Fault:
     """Return the fault of a key that is missing, with an example of it."""
     name = place.path[-1]
     quantity = place.field and declaration(place.field)
-    if "file" in table.keys:
-        return Fault((*table.path, "file"), 'is missing; name a CSV file such as file = "data.csv"')
     if quantity is not None:
         return Fault(place.path, f"is missing; add for example {name} = {quantity.example}")
     if not place.admitted:

@@ -19,15 +19,15 @@ from sim.numerics.grid import Lattice, lattice_of
 from sim.spectrum.family import Array
 from sim.spectrum.radial import PowerLaws, Rowed, Rows
 from sim.units.quantity import Quantity, keyed
-from sim.units.tables import at_once, blamed, file_columns, file_path, file_text, matrix
+from sim.units.tables import LISTED, blamed, file_columns, file_path, file_text, matrix
 
 _WAVENUMBER = Quantity("rad/m", "wavenumber", "q", above=0)
 _HEIGHTS = 'it is a spectrum of heights; a stress is needed, whose density over the plane is in "Pa^2 m^2"'
 _LINE = 'it is the spectrum of a line; give that of the plane, whose density is in "Pa^2 m^2"'
 _MISTAKEN = (("m^4", _HEIGHTS), ("m^3", _HEIGHTS), ("m^2", _HEIGHTS), ("Pa^2 m", _LINE))
 _DENSITY = Quantity("Pa^2 m^2", "power spectral density of the stress", "C", at_least=0, mistaken=_MISTAKEN)
-Wavenumbers = Annotated[tuple[Annotated[float, _WAVENUMBER], ...], at_once(_WAVENUMBER)]
-Densities = Annotated[tuple[Annotated[float, _DENSITY], ...], at_once(_DENSITY)]
+Wavenumbers = Annotated[tuple[Annotated[float, _WAVENUMBER], ...], LISTED]
+Densities = Annotated[tuple[Annotated[float, _DENSITY], ...], LISTED]
 Rescaled = Annotated[float, Quantity("Pa", "root mean square of the shear stress", "σ", above=0)]
 _WHERE = "4π² in the integral, <τ1²> = ∫ d²q C / 4π², or in the density, <τ1²> = ∫ d²q C (Persson)"
 _Normalization = Annotated[Literal["in_integral", "in_density"], Field(description=_WHERE)]

@@ -7,14 +7,14 @@ import errno
 import itertools
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Discriminator, Field, Tag, ValidationInfo, WrapValidator, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
 from sim.units.errors import BadInput
@@ -224,18 +224,8 @@ def _numbers(name: str, table: _Cells, cells: list[str], unit: str, quantity: Qu
     return numbers
 
 
-def at_once(quantity: Quantity) -> WrapValidator:
-    """Return a validator that checks an array of numbers as a whole, all else number by number."""
-
-    def check(values: Any, each: Callable[[Any], tuple[float, ...]]) -> tuple[float, ...]:
-        if isinstance(values, np.ndarray) and values.dtype == float and values.ndim == 1:
-            with contextlib.suppress(ValueError):
-                for extreme in (values.min(), values.max()):  # the first nan is both
-                    quantity.read(extreme)
-                return tuple(values.tolist())
-        return each(values)
-
-    return WrapValidator(check)
+#: Validator that takes an array for the numbers in it.
+LISTED = BeforeValidator(lambda values: values.tolist() if isinstance(values, np.ndarray) else values)
 
 
 def plain_text(path: Path) -> str:
@@ -514,23 +504,19 @@ class Table:
     changes: ClassVar[bool] = True
     cycles: ClassVar[int] = 0
 
-    time: Annotated[tuple[Annotated[float, _TIME], ...], at_once(_TIME)]
+    time: Annotated[tuple[Annotated[float, _TIME], ...], LISTED] = ()
     file: Annotated[str, Field(description="CSV with these columns, beside the scenario, in place of them")] = ""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _read_file(cls, table: Any, info: ValidationInfo) -> Any:
-        if not isinstance(table, dict) or not isinstance(table.get("file"), str) or "time" in table:
-            return table
-        result = file_columns(table["file"], info.context, {"time": _TIME, cls.column: cls.quantity})
-        return {**table, "time": result["time"], cls.values_in: result[cls.column]}
-
     @model_validator(mode="after")
-    def _rows_in_order(self) -> "Table":
+    def _rows_in_order(self, info: ValidationInfo) -> "Table":
+        if self.file and not self.time:
+            read = file_columns(self.file, info.context, {"time": _TIME, self.column: self.quantity})
+            vars(self).update({"time": tuple(read["time"].tolist()), self.values_in: tuple(read[self.column].tolist())})
         if len(self.time) != len(self.extremes):
             raise PydanticCustomError("short_table", "a table needs as many values as times")
         if len(self.time) < 2:
-            raise PydanticCustomError("short_table", "a table needs two rows or more")
+            message = 'a table needs two rows or more; give them, or a CSV file such as file = "data.csv"'
+            raise PydanticCustomError("short_table", message)
         if np.any(np.diff(self.time) < 0.0) or self.time[0] > 0.0:
             raise PydanticCustomError("time_order", "times must start at 0 s or before and never decrease")
         return self
@@ -580,7 +566,7 @@ def over_time(unit: Quantity, name: str) -> Any:
 
         quantity: ClassVar[Quantity] = unit
         column: ClassVar[str] = name
-        value: Annotated[tuple[Annotated[float, unit], ...], at_once(unit)]
+        value: Annotated[tuple[Annotated[float, unit], ...], LISTED] = ()
         file: Annotated[str, Field(description=f"CSV with the columns `time` and `{name}`, in place of these")] = ""
 
     number, course = Annotated[float, unit, Tag("[value]")], Annotated[_Course, Tag("[course]")]

@@ -105,7 +105,7 @@ MISSING = [
     ('[sphere]\nradius = "2 mm"', "[sphere]", "sphere.radius", 'add...radius = "2 mm"'),
     ('[sphere]\nradius = "2 mm"', "", "sphere", "add the table [sphere]"),
     ("members = 4", 'members = 4\n[shear.amplitude]\nmodel = "onset"\nspeed = 1', "shear.amplitude.width", "add"),
-    (RAMP, 'model = "table"', "drive.file", 'file = "data.csv"'),
+    (RAMP, 'model = "table"', "drive", 'file = "data.csv"'),
     ('model = "modal"\n', "", "shear.model", '"banded", "modal"'),
 ]
 TABLES = [
