@@ -9,63 +9,84 @@ from sim.ensemble.variables import DISC_ENERGIES, KNOWN_ERRORS, LARGEST, MAP, NU
 TARGET = Path(__file__).with_name("dataset.md")
 HEAD = """# The variables of a dataset
 
-Made by `python docs/make_dataset.py` from the declarations in the code. All numbers are in SI units; each variable has
-the attributes `units`, `long_name` and `symbol`. *Sweep* stands for the dimensions of the sweep, each named as its key
-with an underscore for each dot (`contact_load`); a run without a sweep has none.
+This page lists every variable of a dataset. The shortest example:
+
+    dataset = sim.open("outputs/pull_off.nc")
+    dataset.contact_area
+
+All numbers are in SI units. Each variable has the attributes `units`, `long_name` and `symbol`. *Sweep* stands for the
+dimensions of the sweep. Each is named as its key with an underscore for each dot (`contact_load`). A run without a
+sweep has none. Made by `python docs/make_dataset.py` from the declarations in the code.
 """
 SECTIONS = {
-    "Coordinates": """`speed` is an auxiliary coordinate, too, where it is the same for all members, as it is if a drive
-prescribes it: `dataset.contact_area.mean("member").plot(x="speed")`, without the mean where members do not differ.
+    "Coordinates": """If the drive prescribes the speed, `speed` is the same for all members and an auxiliary
+coordinate: `dataset.contact_area.mean("member").plot(x="speed")`. Omit the mean if members do not differ.
 """,
-    "Recorded at each time": """A variable that differs between members has the dimension `member`, too. With
-`per_member = false` it becomes `<name>_mean`, `<name>_std` and `<name>_sem` instead: mean, standard deviation and
-standard error of the mean over the members, without members of which the value is nan.
+    "Recorded at each time": """A variable that differs between members has the dimension `member`, too.
+With `per_member = false` it is replaced by `<name>_mean`, `<name>_std` and `<name>_sem`. These are the mean, the standard deviation and the standard
+error of the mean over the members. Members whose value is nan are omitted.
 
-Then there is also `late_<name>`, of quantities that have a mean over time. Its dimension `late` has four values. `mean`
-and `sem` are mean and standard error over the members' means over the second half of the run. `drift` and `drift_sem`
-are those of their drift, the mean over the last quarter of the run less that over the third. Radius, area, load and
-friction count while the contact is closed.
+With `per_member = false` there is also `late_<name>`, for quantities that have a mean over time. Its dimension `late`
+has four values:
 
-A member has the same noise at all points of a sweep. So the error of a difference between two points is that of the
-members' differences, often far below the two errors combined:
+- `mean` and `sem`: each member is averaged over the second half of the run. These are the mean and the standard error
+  over the members.
+- `drift` and `drift_sem`: the drift of a member is its mean over the last quarter of the run minus that over the third
+  quarter. These are its mean and its standard error over the members.
+
+Radius, area, load and friction are averaged over the times at which the contact is closed.
+
+A member has the same noise at all points of a sweep. The error of a difference between two points is therefore that of
+the members' differences. It is often far below the two errors combined:
 
 ```python
 change = sim.analysis.distribution(dataset, ["contact_area"], minus={"contact.load": "4 mN"})
 change.contact_area_mean, change.contact_area_sem
 ```
 
-Under a drive that feels the friction `drive_work` is the rise of `stored_energy`, the energies `dissipated_by_...` and
-`energy_residual`, the error of the integration. It stays below ten times the largest `tolerance` of the scene, of the
-larger of work and stored energy, the largest since the start. A body that rings may have given back nearly all of that
-at each record. With `tracked` bonds, and with a body that rings without damping, the residual may be larger after
-thousands of sub-steps (up to 4e-5 and 3e-4 at the default tolerance in scenes tried).
-No energy exceeds ten times the larger of the two, with this exception: `dissipated_by_area` is negative while the area
-grows, because bonds that are gained are stretched as the others are (`bonds.area = "present"`). Under a load that
-cycles behind a stage at rest it adds up.
+With the drives `spring` and `force`, energies balance. `drive_work` is the sum of three parts: the rise of
+`stored_energy`, the energies `dissipated_by_...`, and `energy_residual`, the error of the integration.
+
+The residual is compared with the larger of work and stored energy, at its largest since the start. The slider may have
+returned nearly all of that energy at each record, if it rings. The ratio stays below ten times the largest `tolerance`
+of the scenario, with these exceptions after thousands of sub-steps:
+
+- With `tracked` bonds it may be larger (up to 4e-5 at the default tolerance in scenarios tried).
+- With a slider that rings without damping it may be larger (up to 3e-4).
+
+No energy exceeds ten times the larger of work and stored energy, with one exception. `dissipated_by_area` is negative
+while the area grows, because bonds that are gained are stretched as the others are (`bonds.area = "present"`). It
+accumulates under a load that cycles behind a stage at rest.
 """,
     "Numbers of the scene": """Every quantity of the scenario is a variable, too, named as its key with underscores.
 
-Events are seen by the engine at its clock steps, whatever the records. A *phase* of a run is an interval in which no
-prescribed course turns, stops, starts or jumps, and no prescribed speed changes its sign: rest and sliding of a
-`start`, approach and retraction of each cycle. If a run has several, at most 1,000, events of each are kept, too.
+Events are detected at the clock steps. They do not depend on the records.
 
-A *slip event* is a fall of the spring force by
-more than 0.3 of the largest force so far, from its maximum to the next minimum, during which the interface slips at
-least half of the slider's advance. The minimum is known once the force has risen again by 0.1 of the largest. A stage
-that stops or turns back ends a fall without an event. The first 1,000 events of a member are kept one by one, if
-members are; moments are those of all. With `per_member = false` an event has a `<name>_count`, too: the number of
-members that had it, of which the mean and its error are.
+A *phase* of a run is an interval in which no prescribed course turns, stops, starts or jumps. No prescribed speed
+changes its sign in it, either. Examples are rest and sliding of a `start`, approach and retraction of each cycle. If a
+run has several phases (at most 1,000), the events of each phase are recorded, too.
+
+A *slip event* is a fall of the spring force from a maximum to the next minimum, under these conditions:
+
+- The fall exceeds 0.3 of the largest force so far.
+- The interface slips at least half of the slider's advance.
+- The minimum is known once the force has risen again by 0.1 of the largest force.
+- If the stage stops or turns back, the fall ends without an event.
+
+If members are kept, the first 1,000 slip events of each member are recorded one by one. Moments include all events.
+With `per_member = false` an event has a `<name>_count`, too. It is the number of members with that event, over which
+the mean and its error are taken.
 """,
-    "Known before the run": "As far as the model of `[shear]` has them. The largest errors are attributes, too.\n",
-    "Stress maps": """`dataset.shear_map[0, 0].plot(x="x")` draws a map with the sliding direction across, as
-`sim plot OUT.nc map` does.
+    "Known before the run": "Only some models of `[shear]` have these errors. The largest errors are attributes, too.\n",
+    "Stress maps": """`dataset.shear_map[0, 0].plot(x="x")` draws a map with the sliding direction
+horizontal. The command `sim plot OUT.nc map` does the same.
 """,
 }
 OTHERS = """
 ## Other programs
 
-**xarray.** Runs that differ in a key are joined along it, as a sweep of that key would be, and runs of different seeds
-along `member`; `sim.stats`, `sim.plot` and `sim.analysis` take what is joined:
+**xarray** joins runs that differ in a key, as a sweep of that key would. It joins runs of different seeds along
+`member`. `sim.stats`, `sim.plot` and `sim.analysis` accept the joined dataset:
 
 ```python
 runs = xarray.open_mfdataset(
@@ -79,22 +100,23 @@ seeds = xarray.open_mfdataset(
 `open_mfdataset` needs dask, which `pip install 'sliding-sim[cluster]'` adds. Without dask, `xarray.concat` joins the
 runs that `[sim.open(path) for path in paths]` has opened, with the same options.
 
-Attributes are those of the first run. `t` counts seconds and is no date: `dataset.resample` needs
+Attributes are those of the first run. `t` counts seconds and is no date. Therefore `dataset.resample` needs
 `dataset.assign_coords(t=(1e9 * dataset.t).round().astype("timedelta64[ns]"))`.
 
 **NCO.** `ncwa -a t out.nc mean.nc` and `ncwa -a member out.nc mean.nc` average over time and members, `nces a.nc b.nc
-mean.nc` over runs. `ncra` averages over a record dimension, which comes first, and a dataset has none:
+mean.nc` over runs. `ncra` averages over a record dimension, which comes first. A dataset has none, so that it must be
+made:
 
     ncpdq -a t,member out.nc a.nc && ncks --mk_rec_dmn t a.nc b.nc
     ncra b.nc mean.nc
 
-**CDO** takes for time only what has a calendar; without, `cdo timmean` averages nothing:
+**CDO** recognises time only if it has a calendar. Without a calendar, `cdo timmean` averages nothing:
 
     ncatted -a units,t,o,c,"seconds since 2000-01-01" -a calendar,t,o,c,standard b.nc c.nc
     cdo timmean c.nc mean.nc
 
-with `b.nc` as above. It reads up to two dimensions beside time: of a sweep choose a point first, by
-`ncwa -a contact_load -d contact_load,0`.
+Here `b.nc` is the file made above. CDO reads up to two dimensions beside time. If there is a sweep, choose a point
+first, by `ncwa -a contact_load -d contact_load,0`.
 """
 MAPS, PHASES = "record.maps", "a run of several phases"
 COORDINATES = (

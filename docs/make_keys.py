@@ -11,12 +11,18 @@ from sim.scenario.schema import all_tables, declaration, keys, model, tables
 TARGET = Path(__file__).with_name("keys.md")
 HEAD = """# Every key of a scenario file
 
-Made by `python docs/make_keys.py` from the declarations in the code. A quantity is a string with a unit (`"4 mN"`) or
-a bare number in the unit given here; a unit of 1 is a pure number. The models of a table go from simple to full: a
-table that is left out is its first model, and so is one whose `model` is left out. The last column names the models
-that have a key, where not all do. `[sweep]` takes any of these keys with a list of values, or
-`{from, to, count, scale}`; several keys form the outer product, a list of tables is one axis. `sim schema` prints the
-JSON schema, by which an editor completes keys.
+This page lists every key of a scenario with its unit, its meaning and its default. The shortest example:
+
+    contact.load = "4 mN"
+
+- **Quantities** are text with a unit, or a bare number in the unit given here. A unit of 1 is a pure number.
+- **Models** of a table go from simple to full. If a table or its `model` is omitted, the first model is used. The last
+  column names the models that have a key; it is empty if all have it.
+- **Sweeps**: `[sweep]` takes any of these keys with a list of values, or `{from, to, count, scale}`. Several keys form
+  the outer product. A list of tables is one axis.
+- **Editors** complete keys by the JSON schema that `sim schema` prints.
+
+Made by `python docs/make_keys.py` from the declarations in the code.
 """
 #: Keys of the file itself that stand before its tables.
 _FIRST = ("name", "seed")
