@@ -108,15 +108,15 @@ def _scores(skewness: float, count: int) -> Array:
     return cast(Array, (values - np.mean(values)) / np.std(values))
 
 
-def worst(judged: Iterable[Worst]) -> Worst | None:
+def worst(candidates: Iterable[Worst]) -> Worst | None:
     """Return that of some points at which the cell changes A/A_JKR most, with its errors; None without a cell."""
-    known = [pair for pair in judged if math.isfinite(pair[1].get("cell_error_area", math.nan))]
+    known = [pair for pair in candidates if math.isfinite(pair[1].get("cell_error_area", math.nan))]
     return max(known, key=lambda pair: abs(pair[1]["cell_error_area"]), default=None)
 
 
-def judged(points: Sequence[Scenario]) -> list[Worst]:
-    """Return some points of a sweep, each with its systematic errors."""
-    return [(point, systematic_errors(point)) for point in spread(points)]
+def worst_of_sweep(points: Sequence[Scenario]) -> Worst | None:
+    """Return the ``worst`` of some points of a sweep."""
+    return worst((point, systematic_errors(point)) for point in spread(points))
 
 
 def cure(point: Scenario, errors: dict[str, float]) -> str:
@@ -154,7 +154,7 @@ def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
     """Return the remarks on a run, one sentence each; ``most`` are its ``worst`` errors if they are known."""
     some = spread(plan.points)
     texts = [text for point in some for text in [*point.remarks(), *_outside(point)]]
-    if (most := most or worst(judged(plan.points))) and (keys := cure(*most)):
+    if (most := most or worst_of_sweep(plan.points)) and (keys := cure(*most)):
         point, area, friction = most[0], *(100.0 * most[1][f"cell_error_{of}"] for of in ("area", "friction"))
         too, at = "large" if area > 0.0 else "small", place(plan, point, most[1]["error_speed"])
         size = f"{abs(area):.2g} points and the friction {abs(friction):.2g} % too {too}"

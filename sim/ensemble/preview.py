@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from sim.engine import MemberNoise, follow
-from sim.ensemble.diagnosis import Worst, diagnosis, judged, place as in_words, remarks, slider_body, spread, worst
+from sim.ensemble.diagnosis import Worst, diagnosis, place as in_words, remarks, slider_body, spread, worst_of_sweep
 from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots, state_numbers, work
 from sim.ensemble.variables import SOURCES
 from sim.laws import jkr
@@ -139,9 +139,8 @@ def _parts(plan: Plan) -> float:
     states = (blocks - 1) * plan.members * state_numbers(first)
     late = 0.5 * blocks * plan.late  # sums and counts of each member over two quarters
     headers = _HEADER * len(plan.packs) * groups * (blocks * len(plan.variables) + late)
-    return (
-        plan.maps + headers + 8.0 * len(plan.points) * (rows * first.clock.records + states + 4 * late * plan.members)
-    )
+    numbers = len(plan.points) * (rows * first.clock.records + states + 4 * late * plan.members)
+    return plan.maps + headers + 8.0 * numbers
 
 
 def memory_limit() -> tuple[float, str]:
@@ -308,7 +307,7 @@ def preview(scenario: Scenario) -> str:
         Several lines for a terminal.
     """
     plan = Plan.of(scenario)
-    some, most = spread(plan.points), worst(judged(plan.points))
+    some, most = spread(plan.points), worst_of_sweep(plan.points)
     blocks: dict[str, Rows] = {
         "models": _models(plan),
         "quantities in SI": _quantities(plan.points),

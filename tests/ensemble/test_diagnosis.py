@@ -172,9 +172,9 @@ def test_the_lag_along_a_ramp_is_that_of_the_rate_equation(scene):
         # run and slow reference are half a step late at the most: 10 um/s of 5 mm/s each
         assert_allclose(lag(lens, slower)[:2], off, atol=1.0 / 1000 * ends[1] / critical)
     (line,) = (text for text in diagnosis(Plan.of(lens)) if text.startswith("along the ramp"))
-    said = [float(number) for number in re.findall(r"([0-9.]+) (?:points|%)", line)]
+    shown = [float(number) for number in re.findall(r"([0-9.]+) (?:points|%)", line)]
     first, last = lag(lens), lag(lens, 10.0)
-    assert_allclose(said, 100.0 * np.array([*first[:2], *last[:2]]), rtol=0.05)
+    assert_allclose(shown, 100.0 * np.array([*first[:2], *last[:2]]), rtol=0.05)
     assert 'clock.duration = "10 s"' in line and first[0] > 3.0 * last[0]
     calm = scene(drive=ramp, bonds=bonds | {"rebinding_rate": "5000 1/s"})
     assert not any(text.startswith("along the ramp") for text in diagnosis(Plan.of(calm)))
@@ -184,11 +184,11 @@ def test_the_diagnosis_has_the_numbers_of_closed_forms_and_goes_with_the_dataset
     bonds = {"model": "steady", "critical_speed": "9 um/s", "stress": "0.1 MPa"}
     calm = GAUSSIAN | {"rms": "60 kPa"}
     lens = scene(shear=LENS | {"spectrum": calm}, bonds=bonds, sweep={"contact.load": ["1 mN", "5 mN", "20 mN"]})
-    said = diagnosis(plan := Plan.of(lens))
+    texts = diagnosis(plan := Plan.of(lens))
     stored = STORED * (60 / 80) ** 2
     full = area(W, 5e-3)
     rest, bonded, waves, both = (100 * float(area(w, 5e-3) / full) for w in (W, 0.9 * W, W - stored, 0.9 * W - stored))
-    energy, long, length, mechanisms, strict, *_ = said
+    energy, long, length, mechanisms, strict, *_ = texts
     assert energy.startswith(f"stored energy in steady sliding {1e3 * stored:.4g} mJ/m², {100 * stored / W:.2g} % of")
     radius = math.sqrt(full / math.pi)
     assert f"store {100 * math.erf(math.pi * 10e-6 / (2 * radius)):.2g} %" in long
@@ -202,7 +202,7 @@ def test_the_diagnosis_has_the_numbers_of_closed_forms_and_goes_with_the_dataset
     assert strict.endswith(f"(shear.paid_by_adhesion = 0) fluctuations take none: {bonded:.3g} %")
     dataset = run(lens)
     printed = preview(lens)
-    assert analysis.remarks(dataset) == [*remarks(plan), *said]
+    assert analysis.remarks(dataset) == [*remarks(plan), *texts]
     assert all(text in printed for text in analysis.remarks(dataset))
     errors = {each.name: each for each in analysis.systematic_errors(dataset)}
     most = errors["cell_error_area"]
