@@ -50,7 +50,7 @@ def test_every_scenario_is_read_and_keeps_its_text_and_fits_the_schema():
         assert not schema.is_valid({key: value for key, value in document.items() if key != "clock"})
 
 
-def test_a_table_or_a_model_left_out_is_the_simplest(scene):
+def test_a_table_or_a_model_left_out_is_the_simplest_and_a_table_names_a_file_or_holds_columns(scene):
     assert (scene().drive, scene().bonds, scene().shear) == (drive.Steady(), bonds.Unbroken(), shear.Uniform())
     scenario = scene(
         '[drive]\nspeed = "1 mm/s"\n[bonds]\nstress = "1 kPa"\n'
@@ -62,6 +62,8 @@ def test_a_table_or_a_model_left_out_is_the_simplest(scene):
     schema = Draft202012Validator(json_schema(Scenario))
     assert schema.is_valid(tomllib.loads(LENS + "[drive]\nspeed = 1\n[bonds]\n"))
     assert not schema.is_valid(tomllib.loads(LENS + "[bonds]\ncritical_speed = 1\n"))
+    for table, fitting in (({"file": "speeds.csv"}, True), ({"time": [0, 1], "speed": [0, 1]}, True), ({}, False)):
+        assert schema.is_valid(tomllib.loads(LENS) | {"drive": {"model": "table", **table}}) == fitting
 
 
 def test_a_dictionary_is_read_as_a_file_is(scene):
@@ -112,6 +114,9 @@ LEFT_OUT = {"shear.points", "shear.correlation"}
     (LOADS, {"solid.poisson_ratio": 0.4}, [1e-3, 2e-3], set()),
     ('"shear.points" = [16, 32]', {"shear.model": "mean"}, [4e-3], LEFT_OUT),
     ('"shear.spectrum.length" = ["1 um", "2 um"]', {"shear.model": "mean"}, [4e-3] * 2, LEFT_OUT),
+    (LOADS, {"sweep": {}}, [4e-3], set()),
+    (LOADS, {"sweep": {"solid.shear_modulus": [1e6]}}, [4e-3], set()),
+    (LOADS, {'sweep."contact.load"': ["1 mN", "2 mN", "3 mN"]}, [1e-3, 2e-3, 3e-3], set()),
 ])  # fmt: skip
 def test_an_override_replaces_the_sweep_of_its_key_and_the_keys_of_another_model(
     scene, sweep, overrides, points, named
@@ -132,14 +137,6 @@ def test_rows_of_a_sweep_lose_a_key_that_is_set_and_no_key_is_set_inside_of_a_sw
         scene(text, {"bonds.stress": "3 kPa"})
     with pytest.raises(BadInput, match=r"shear\.points.*not a key of this model"):
         scene(BANDED, {"shear.model": "mean", "shear.points": 32})
-
-
-def test_an_override_can_set_replace_and_drop_a_sweep(scene):
-    text = '[sweep]\n"contact.load" = ["1 mN", "2 mN"]\n'
-    assert len(scene(text).points()) == 2
-    assert len(scene(text, {"sweep": {}}).points()) == 1
-    assert len(scene(text, {'sweep."contact.load"': ["1 mN", "2 mN", "3 mN"]}).points()) == 3
-    assert len(scene(text, {"sweep": {"solid.shear_modulus": [1e6]}}).points()) == 1
 
 
 def loads(scenario):
@@ -248,12 +245,6 @@ def test_every_setting_in_the_comments_of_the_starter_is_a_scene(tmp_path):
     assert scenario.record.maps == (0.5, 1.0)
     assert len(scenario.points()) == 15
     assert scenario.solid.counter_body is not None
-
-
-def test_a_table_may_name_a_file_or_hold_its_columns_by_the_schema():
-    schema, scene = Draft202012Validator(json_schema(Scenario)), tomllib.loads(LENS)
-    for table, fitting in (({"file": "speeds.csv"}, True), ({"time": [0, 1], "speed": [0, 1]}, True), ({}, False)):
-        assert schema.is_valid({**scene, "drive": {"model": "table", **table}}) == fitting
 
 
 def test_points_of_a_sweep_are_those_made_one_by_one(scene):
