@@ -84,10 +84,10 @@ class StepContact(NamedTuple):
 
 #: Bonds that are solved together with a slider; of them those with a stretch first.
 _WITH_STRETCH = models.FirstMoment | models.Cohort | models.Tracked
-_Driven = _WITH_STRETCH | models.Unbroken | models.Steady | models.Rate | models.Counted
+_SolvedBonds = _WITH_STRETCH | models.Unbroken | models.Steady | models.Rate | models.Counted
 
 
-def _units(drive: Force | Spring, bonds: _Driven, contact: StepContact, step: float) -> tuple[float, float]:
+def _units(drive: Force | Spring, bonds: _SolvedBonds, contact: StepContact, step: float) -> tuple[float, float]:
     """Return the units in which a step is computed: a stretch b [m], and a force over the area at rest [N].
 
     The force is that of all sites at the stretch b, n κ b A0. In models without stretch it is their strength, τ A0, and
@@ -119,7 +119,7 @@ def _of_columns(stretch: float, force: float) -> Array:
     return scales
 
 
-def _renewing(bonds: _Driven) -> float:
+def _renewing(bonds: _SolvedBonds) -> float:
     """Return the displacement on which sliding renews bonds of the rate equation, V_c/h [m], infinite for others."""
     return bonds.critical_speed / bonds.rebinding_rate if isinstance(bonds, models.Rate) else math.inf
 
@@ -156,7 +156,7 @@ def advance(
     The contact is that at the start, except for its equilibrium with the bonds; ``steps_until_contact_changes`` counts
     the valid steps. ``counted`` bonds stay as well: they are drawn at the end of a step, with the slip in it.
     """
-    drive, bonds, slider = cast(Force | Spring, parts.drive), cast(_Driven, parts.bonds), cast(Driven, slider)
+    drive, bonds, slider = cast(Force | Spring, parts.drive), cast(_SolvedBonds, parts.bonds), cast(Driven, slider)
     ends, members = times.at(np.arange(steps.start - 1.0, steps.stop)), len(slider.speed)
     units = _units(drive, bonds, contact, times.step)
     stretch, force = units
@@ -207,7 +207,7 @@ def advance(
 
 
 def _advanced(
-    bonds: _Driven, population: tuple[object, ...], radius: Array, inputs: Inputs, numbers: _Numbers,
+    bonds: _SolvedBonds, population: tuple[object, ...], radius: Array, inputs: Inputs, numbers: _Numbers,
     outputs: tuple[Array, Array], reached: dict[str, Array], noise: Noise,
 ) -> tuple[tuple[object, ...], Bonding]:  # fmt: skip
     """Return the bonds after some clock steps and their readings at each.
@@ -265,7 +265,7 @@ def _agree(slider_radius: Array, radius: Array) -> Flags:
     return same
 
 
-def _numbers(drive: Force | Spring, bonds: _Driven, contact: StepContact, units: tuple[float, float]) -> _Numbers:
+def _numbers(drive: Force | Spring, bonds: _SolvedBonds, contact: StepContact, units: tuple[float, float]) -> _Numbers:
     """Return the numbers of slider, bonds and contact in their units, without load and base of the mount."""
     stretch, force = units
     stiff, density = force / stretch, force / (stretch * contact.area)
