@@ -23,8 +23,9 @@ SECTIONS = {
 coordinate: `dataset.contact_area.mean("member").plot(x="speed")`. Omit the mean if members do not differ.
 """,
     "Recorded at each time": """A variable that differs between members has the dimension `member`, too.
-With `per_member = false` it is replaced by `<name>_mean`, `<name>_std` and `<name>_sem`. These are the mean, the standard deviation and the standard
-error of the mean over the members. Members whose value is nan are omitted.
+With `per_member = false` it is replaced by `<name>_mean`, `<name>_std` and `<name>_sem`.
+These are the mean, the standard deviation and the standard error of the mean over the members.
+Members whose value is nan are omitted.
 
 With `per_member = false` there is also `late_<name>`, for quantities that have a mean over time. Its dimension `late`
 has four values:
@@ -77,7 +78,7 @@ If members are kept, the first 1,000 slip events of each member are recorded one
 With `per_member = false` an event has a `<name>_count`, too. It is the number of members with that event, over which
 the mean and its error are taken.
 """,
-    "Known before the run": "Only some models of `[shear]` have these errors. The largest errors are attributes, too.\n",
+    "Known before the run": "Only some models of `[shear]` have these errors. The largest are attributes, too.\n",
     "Stress maps": """`dataset.shear_map[0, 0].plot(x="x")` draws a map with the sliding direction
 horizontal. The command `sim plot OUT.nc map` does the same.
 """,
