@@ -6,7 +6,7 @@ EXTRAS ?= test,lint
 STAMP = $(VENV)/.installed-$(subst $(comma),-,$(EXTRAS))
 comma := ,
 
-.PHONY: run test verify bench gallery lint lines clean
+.PHONY: run test verify bench gallery docs lint lines clean
 
 run: $(STAMP)
 	$(BIN)/sim run scenarios/pdms_lens.toml --force
@@ -53,6 +53,14 @@ bench: $(STAMP)
 gallery: $(STAMP)
 	$(BIN)/python docs/make_gallery.py $(NAMES)
 
+# `make docs` builds the site of docs/ into docs/_build, with warnings as errors.
+docs:
+	$(MAKE) EXTRAS=docs .site
+
+.PHONY: .site
+.site: $(STAMP)
+	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build
+
 lines:
 	$(PYTHON) benchmarks/lines.py
 
@@ -78,4 +86,4 @@ $(STAMP): pyproject.toml constraints.txt
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(LOWEST) build dist *.egg-info .mypy_cache .ruff_cache
+	rm -rf $(VENV) $(LOWEST) docs/_build docs/_api build dist *.egg-info .mypy_cache .ruff_cache

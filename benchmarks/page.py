@@ -11,7 +11,7 @@ the page. To measure only some groups of rows:
 
     make bench ROWS="modal contact"
 
-The programs are in [benchmarks/](../benchmarks). Most rows compare ours with the best simple program that a user of
+The programs are in `benchmarks/`. Most rows compare ours with the best simple program that a user of
 numpy and scipy would write for the same work. Other rows compare it with a step that every program needs.
 
 - **Times** are CPU times on one core. The first column names the work: one step of one member, one field, one set of

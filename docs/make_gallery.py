@@ -34,7 +34,7 @@ This page answers questions with a figure each, and shows the commands that give
     sim run scenarios/pull_off.toml
     sim plot outputs/pull_off.nc
 
-Each answer links to its [scenario](../../scenarios), which states the assumptions. The command `make gallery` computes
+Each answer links to its scenario, which states the assumptions. The command `make gallery` computes
 all numbers and figures. If members differ, a number is the mean over the members. Its standard error stands in brackets
 and refers to the last digits.
 """

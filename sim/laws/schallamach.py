@@ -418,7 +418,7 @@ def relax_fraction(fraction, path, duration, critical_speed, rebinding_rate):
     fraction : float or array
         phi at the start of the step [1].
     path : float or array
-        Distance slid in the step, integral of |V| dt [m], at least 0.
+        Distance slid in the step, integral of abs(V) dt [m], at least 0.
     duration : float or array
         Length of the step [s], at least 0.
     critical_speed : float or array
@@ -462,12 +462,12 @@ def relaxed(fraction, path, duration, critical_speed, rebinding_rate):
 
 
 def transition_probabilities(path, duration, critical_speed, rebinding_rate):
-    """Transition probabilities of one site over a step, with rates h to close and h |V|/Vc to open.
+    """Transition probabilities of one site over a step, with rates h to close and h abs(V)/Vc to open.
 
     Parameters
     ----------
     path, duration, critical_speed, rebinding_rate : float or array
-        Integral of |V| dt [m], length of the step [s], Vc [m/s], h [1/s].
+        Integral of abs(V) dt [m], length of the step [s], Vc [m/s], h [1/s].
 
     Returns
     -------

@@ -387,7 +387,7 @@ def side_of_rings(lattice: Lattice) -> float:
 
 
 def radial_average(density: Array, grid: Lattice) -> RadialAverage:
-    """Average a density over rings |q| L/2π in [k - ½, k + ½), k = 1, 2, ... below Nyquist.
+    """Average a density over rings of q L/2π in [k - ½, k + ½), k = 1, 2, ... below Nyquist.
 
     Parameters
     ----------

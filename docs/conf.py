@@ -1,0 +1,25 @@
+"""Configuration of the documentation site: ``make docs``."""
+
+from importlib import metadata
+
+project, author, project_copyright = "sliding-sim", "The sliding-sim developers", "The sliding-sim developers"
+release = metadata.version("sliding-sim")
+extensions = [
+    "myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.viewcode", "numpydoc", "sphinx_click",
+    "sphinx_copybutton",
+]  # fmt: skip
+exclude_patterns, templates_path = ["_build", "_templates"], ["_templates"]
+html_theme, html_title = "furo", "sliding-sim"
+html_static_path: list[str] = []
+
+# Markdown as code hosts show it: formulas between dollars or in fenced blocks, anchors of headings
+myst_enable_extensions = ["dollarmath"]
+myst_fence_as_directive = ["math"]
+myst_heading_anchors = 3
+nb_execution_mode = "off"  # outputs are stored, and a test executes the notebook
+
+autosummary_generate = True
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+copybutton_prompt_text = ">>> "
