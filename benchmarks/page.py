@@ -23,11 +23,12 @@ numpy and scipy would write for the same work. Other rows compare it with a step
 - **"1.1 times as long"**: ours takes 1.1 times the time of the other program.
 - **Slower rows**: ours is slower if a row reads "times slower", or more than 1 "times as long".
 - **Goals** for fields refer to the textbook program, which makes its noise by a transform. A leaner program draws only
-  the numbers that it needs. It stands in the next row, without a goal.
+  the numbers that it needs. This leaner program stands in the next row, without a goal.
 - **Errors**, ours first, are those of one quantity: third cumulant of ΔΓ (bands), friction (bonds), position over its
   largest value (sliders), radius (contacts). No error is given if both programs are exact to rounding.
 - **Memory** that a program has freed stays with its process, for ours and the others alike. Otherwise the system's time
-  for new pages would decide the comparison. The command `sim` runs as it does for a user.
+  for new pages would decide the comparison. Commands of `sim` run as they do for a user,
+  without this setting.
 
 """
 END = """

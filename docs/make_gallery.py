@@ -514,11 +514,11 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "pdms_lens_spring",
     "Does the lens shrink at the onset of stick-slip if nothing prescribes it?",
-    """Yes, because of the fluctuations. At {slow:g} mm/s the lens slides steadily, with a mean area of {before} %
-    of JKR's. At {fast:g} mm/s it sticks and slips, with {after} %. The loss to broken bonds falls from {bonded} to
-    {bonds} %, because bonds recover in the stick phases. Unsteady sliding makes fluctuations: the loss to them
-    rises from {calm} to {noise} %. Three things are assumed: an rms of {rms:g} kPa, a memory of {length:g} µm of
-    sliding, and a damping. Without the damping the area would not fall there.""",
+    """Yes, because of the fluctuations. At {slow:g} mm/s the lens slides steadily, with a mean area of {before} % of
+    JKR's. At {fast:g} mm/s the lens sticks and slips, with a mean area of {after} %. The loss to broken bonds falls
+    from {bonded} to {bonds} %, because bonds recover in the stick phases. Unsteady sliding makes fluctuations: the
+    loss to them rises from {calm} to {noise} %. Three things are assumed: an rms of {rms:g} kPa, a memory of
+    {length:g} µm of sliding, and a damping. Without the damping the area would not fall there.""",
 )
 def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
     late = analysis.distribution(dataset)
