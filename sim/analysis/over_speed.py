@@ -448,7 +448,12 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
                 known = ~never & ~(is_known & alone) if end else ~never
                 result[f"{stem}_{name}{end}"] = labelled(values.where(known), unit, words + text)
             further = [math.nan, False, False] if key == "steady_speed" else [*lag, is_known & alone]
-            reason = xr.apply_ufunc(_in_words, *reasons, *further, vectorize=True, output_dtypes=[object])
+            if key == "steady_speed":  # a reason of the course says nothing of steady sliding
+                unmet = f"unknown, as the course has no speed at which it loses {loss}"
+                further = [xr.where(is_known, why, unmet), *reasons[1:], *further]
+            else:
+                further = [*reasons, *further]
+            reason = xr.apply_ufunc(_in_words, *further, vectorize=True, output_dtypes=[object])
             result[f"{stem}_{name}_reason"] = reason.drop_attrs(deep=False)
     return result.assign_coords({name: dataset[name] for name in sweep_dims(dataset)})  # with their units
 

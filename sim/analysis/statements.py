@@ -12,7 +12,7 @@ from sim.analysis.ensemble_peaks import ensemble_peaks
 from sim.analysis.events import events, slips_by_phase
 from sim.analysis.lifetimes import half_lives
 from sim.analysis.over_speed import loss_speeds
-from sim.analysis.statistics import averaging, correlation_time, of_second_half, over_members, summary
+from sim.analysis.statistics import WIDE, averaging, correlation_time, of_second_half, over_members, summary
 from sim.units.errors import BadInput
 from sim.units.notation import bounded, scaled, share
 
@@ -57,7 +57,8 @@ class Statement(NamedTuple):
         sizes = [abs(size) for size in (self.value, self.low, self.high) if np.isfinite(size)]
         is_share = self.unit == "1" and self.name not in COUNTS
         factor, unit = (100.0, "%") if is_share else scaled(max(sizes, default=0.0), self.unit)
-        numbers = (factor * number for number in (self.value, self.error, self.low, self.high))
+        error = (self.high - self.low) / (2.0 * WIDE)  # of few members above the standard error
+        numbers = (factor * number for number in (self.value, error, self.low, self.high))
         text = share(self.value, self.low, self.high) if self.name in BOUNDED else ""
         text = text or bounded(*numbers)
         return "; ".join(filter(None, (f"{text} {unit}".rstrip() if sizes else "", self.reason)))

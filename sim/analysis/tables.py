@@ -245,6 +245,8 @@ def _turning(dataset: xr.Dataset, stated: xr.Dataset) -> Iterator[str]:
     if len(swept) != 1 or dataset[swept[0]].dtype.kind not in "fi" or dataset.sizes[swept[0]] < _TURNS:
         return
     for name in (name for name in ("contact_area", "friction_force") if f"{name}_mean" in stated):
+        if bool((stated.get(f"{name}_reason", xr.DataArray("")) != "").any()):
+            continue  # values at an end are no means
         inside = extremes(stated.isel({n: 0 for n in sweep_dims(dataset) if n != swept[0]}), name, swept[0])
         for extreme in ("largest", "least"):
             if math.isfinite(value := float(inside[f"{name}_{extreme}"])):
@@ -459,9 +461,7 @@ def _cells(heading: str, unit: str, values: np.ndarray, errors: Any = 0.0, *ends
     """Return a column's cells in the unit of its largest value, under its heading with that unit."""
     if values.dtype.kind not in "fi":
         return {heading: [str(value) for value in values]}
-    sizes = np.abs(np.concatenate([values, *ends]))
-    if np.any(np.isfinite(values)):
-        sizes = np.abs(values)
+    sizes = np.abs(values if np.any(np.isfinite(values)) else np.concatenate([values, *ends]))
     finite = sizes[np.isfinite(sizes)]
     factor, shown = (100.0, "%") if unit == "%" else scaled(finite.max(initial=0.0), unit)
     texts = [bounded(*(factor * number for number in numbers)) for numbers in np.broadcast(values, errors, *ends)]

@@ -174,14 +174,16 @@ def diagnosis(plan: Plan) -> list[str]:
         return []
     time, speed = np.full((1, 1), 0.5 * point.clock.duration), np.abs(point.speeds(3)[1:2, np.newaxis])
     at = place(plan, point, float(speed[0, 0]))
-    texts = [*_fluctuating(point), *_mechanisms(point, time, speed, at)] if point.fluctuations.spectrum.variance else []
+    where, texts = f" at {at}" if len(plan.points) > 1 else "", list[str]()
+    if point.fluctuations.spectrum.variance:
+        texts = [*_fluctuating(point, where), *_mechanisms(point, time, speed, at)]
     if shown := list(sensitivities(point, float(time[0, 0]), float(speed[0, 0])).items())[:_KEYS]:
         words = [f"{key} {area:+.2g}" + f"/{force:+.2g}" * bool(force) for key, (area, force) in shown]
         texts.append(f"area/friction change by these % for 1 % more of a key, at {at}: {', '.join(words)}")
     return [*texts, *_lagging(point)]
 
 
-def _fluctuating(point: Scenario) -> Iterator[str]:
+def _fluctuating(point: Scenario, where: str) -> Iterator[str]:
     """Yield sentences on the size of the stored energy and on the waves that store it."""
     shear, spectrum, work = point.fluctuations, point.fluctuations.spectrum, point.adhesion.work or math.inf
     course = steady_course(point, *_along(point))

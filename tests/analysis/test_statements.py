@@ -45,6 +45,15 @@ def test_table_csv_and_statements_have_the_same_numbers_and_samples():
     assert analysis.table(dataset) == analysis.table(dataset, stated=stated)
 
 
+def test_key_figures_have_the_errors_of_the_table():
+    dataset = run(scene(drive=drive.Steady(speed=1e-3)))
+    stated = analysis.statements(dataset)
+    values = {row[""]: row["value"].split()[0] for row in analysis.tables.key_figures(dataset, stated)}
+    rows = {row["quantity"].partition(" (")[0]: row["mean"] for row in analysis.tables.spread(dataset, stated)}
+    assert {"ΔΓ", "w", "a", "A/A_JKR"} <= rows.keys() and all("(" in values[name] for name in rows)
+    assert {name: values[name] for name in ("ΔΓ", "w", "a", "A/A_JKR")}.items() <= rows.items()
+
+
 def test_a_reason_marks_its_cell_and_is_a_note_of_the_table():
     dataset = run(scene(drive=drive.Steady(speed=1e-3), shear=shear.Uniform(), sweep={"contact.load": [1e-3, 4e-3]}))
     stated = analysis.statements(dataset)
@@ -110,6 +119,8 @@ def test_a_maximum_inside_a_sweep_and_a_systematic_error_are_notes():
     (line,) = [line for line in lines if line.startswith("friction force is largest")]
     assert line.endswith("at drive_speed = 4 mm/s (between 100 µm/s and 100 mm/s)")
     assert not [line for line in lines if "contact area is" in line]  # it falls all the way
+    drifting = stated.assign(friction_force_reason=("drive_speed", np.array(["", "not settled", ""], object)))
+    assert not [line for line in analysis.notes(dataset, [], [], drifting) if "friction force is" in line]
     error = SystematicError("cell_error_area", 5.13, "points of A/A_JKR", "contact_load = 1 mN", 'shear.cell = "4 mm"')
     words = 'the cell adds +5.1 points of A/A_JKR at contact_load = 1 mN; cure: shear.cell = "4 mm"'
     assert str(error) == words and error.matters

@@ -226,4 +226,6 @@ def test_the_speed_of_a_slider_on_single_bonds_is_its_displacement_over_the_time
     shown = [float(re.match(r"[\d.]+", row["V\n(µm/s)"])[0]) for row in analysis.table(dataset)]
     at = np.rint(np.linspace(0, 200, 12)).astype(int)[1:-1]
     speed = 1e6 * (position[at + 1] - position[at - 1]) / (2.0 * time[1])
+    few = analysis.distribution(dataset.isel(t=[0, 100, 200]), ["speed"])["speed_mean"]
+    np.testing.assert_allclose(few, (position[200] - position[100]) / (time[200] - time[100]), rtol=1e-9)
     np.testing.assert_allclose(shown[1:-1], speed, atol=5.0)  # half of the last digit that an error of 10 leaves

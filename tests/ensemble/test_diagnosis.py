@@ -190,6 +190,9 @@ def test_the_diagnosis_has_the_numbers_of_closed_forms_and_goes_with_the_dataset
     rest, bonded, waves, both = (100 * float(area(w, 5e-3) / full) for w in (W, 0.9 * W, W - stored, 0.9 * W - stored))
     energy, long, length, mechanisms, strict, *_ = texts
     assert energy.startswith(f"stored energy in steady sliding {1e3 * stored:.4g} mJ/m², {100 * stored / W:.2g} % of")
+    fast = bonds | {"critical_speed": "0.1 um/s"}
+    fast = Plan.of(scene(shear=LENS, bonds=fast, sweep={"contact.load": ["1 mN", "5 mN"]}))
+    assert "masked throughout the run at contact.load = 5 mN, 1 µm/s" in diagnosis(fast)[0]
     radius = math.sqrt(full / math.pi)
     assert f"store {100 * math.erf(math.pi * 10e-6 / (2 * radius)):.2g} %" in long
     q = 2 * math.pi / np.array([12e-6, 8e-6])
