@@ -192,7 +192,7 @@ def _fluctuating(point: Scenario, where: str) -> Iterator[str]:
     how = f": masked {always}" if paid >= 1.0 else f": nearly masked {always}" if paid > _MASKING else ""
     if paid < 1.0 and np.any(masked):
         noise = " without the noise of the bonds" if point.population.per_member else ""
-        how = f": masked {'throughout' if np.all(masked) else 'in part of'} the run{noise}"
+        how = f": masked {'throughout' if np.all(masked) else 'in part of'} the run{where}{noise}"
     share = f"{100.0 * most / work:.2g} % of the work of adhesion"
     yield f"stored energy in steady sliding {engineering(most, 'J/m^2')}, {share}{how}"
     long_waves = share_of_long_waves(spectrum, 2.0 * point.rest_radius, point.solid.effective[1])
