@@ -2,6 +2,7 @@
 
 import doctest
 import importlib.util
+import json
 import math
 import re
 import shlex
@@ -154,13 +155,36 @@ def test_the_python_of_the_readme_makes_its_scenes_and_figures(tmp_path, monkeyp
     assert (tmp_path / "first.png").stat().st_size > 1000
 
 
+NOTEBOOK = ROOT / "docs" / "first_steps.ipynb"
+
+
+def outputs_of(notebook):
+    """The outputs of each code cell, without the cells that only import."""
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    return [cell["outputs"] for cell in cells if not "".join(cell["source"]).startswith("import")]
+
+
+def printed(outputs):
+    return ["".join(output["text"]) for cell in outputs for output in cell if output.get("name") == "stdout"]
+
+
+def test_the_notebook_stores_the_output_of_each_cell_and_no_warning_or_path():
+    stored = outputs_of(json.loads(NOTEBOOK.read_text(encoding="utf-8")))
+    assert all(stored), "execute docs/first_steps.ipynb and save its outputs"
+    assert {output.get("name", "result") for cell in stored for output in cell} == {"stdout", "result"}
+    assert not re.search(r"/(home|root|tmp|work|Users)/|Warning", json.dumps(stored, ensure_ascii=False))
+    assert NOTEBOOK.stat().st_size < 400_000
+
+
 @pytest.mark.verify
 @pytest.mark.filterwarnings("default")  # those of the notebook's packages
 def test_the_notebook_runs_to_its_end():
     nbclient, nbformat = (pytest.importorskip(name, reason="in the extra verify") for name in ("nbclient", "nbformat"))
-    notebook = nbformat.read(ROOT / "docs" / "first_steps.ipynb", 4)
+    notebook = nbformat.read(NOTEBOOK, 4)
+    stored = printed(outputs_of(notebook))
     resources = {"metadata": {"path": str(ROOT / "docs")}}
     nbclient.NotebookClient(notebook, timeout=600, kernel_name="python3", resources=resources).execute()
+    assert printed(outputs_of(notebook)) == stored
     results = [result for cell in notebook.cells for result in cell.get("outputs", [])]
     assert sum("image/png" in result.get("data", {}) for result in results) == 3
     assert [result for result in results if result.get("name") == "stderr"] == []
