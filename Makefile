@@ -69,6 +69,7 @@ lint: $(STAMP)
 	$(BIN)/ruff check --preview --select PLW1514 sim
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/python docs/readability.py --check
 
 $(STAMP): pyproject.toml constraints.txt
 	@command -v uv >/dev/null 2>&1 || command -v $(PYTHON) >/dev/null 2>&1 || \
