@@ -21,7 +21,7 @@ FORBIDDEN = {"analysis": {"parts", "scenario", "engine", "ensemble"}, "plots": {
 FORBIDDEN |= {"report": {"ensemble"}}
 #: The lag of a ramp needs the steady law of bonds, made of the numbers that a dataset records.
 ALLOWED = {("analysis.over_speed", "parts.bonds.rupture")}
-#: A report shows the remarks of ``sim check``, and a figure its boundary of steady sliding, for the scenario in a dataset.
+#: A report shows the remarks of ``sim check``, a figure the boundary of steady sliding, of a stored scenario.
 ALLOWED |= {("analysis.errors", f"ensemble.{name}") for name in ("dataset", "diagnosis", "plan")}
 ALLOWED |= {("plots.slider", f"ensemble.{name}") for name in ("dataset", "diagnosis")}
 #: Names that hold a part outside of ``parts``.
