@@ -53,13 +53,13 @@ bench: $(STAMP)
 gallery: $(STAMP)
 	$(BIN)/python docs/make_gallery.py $(NAMES)
 
-# `make docs` builds the site of docs/ into docs/_build, with warnings as errors.
+# `make docs` builds the site of docs/ into docs/_build/html, with warnings as errors.
 docs:
 	$(MAKE) EXTRAS=docs .site
 
 .PHONY: .site
 .site: $(STAMP)
-	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build
+	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
 
 lines:
 	$(PYTHON) benchmarks/lines.py
