@@ -123,7 +123,16 @@ def test_an_output_that_is_open_elsewhere_is_published_by_resume(elsewhere):
 
 
 @pytest.mark.verify
-def test_the_workflow_of_the_code_host_follows_its_schema():
-    workflow = Path(__file__).parents[1] / ".github" / "workflows" / "tests.yml"
-    command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.github-workflows", str(workflow)]
+@pytest.mark.parametrize(
+    ("schema", "files"),
+    [
+        ("github-workflows", ".github/workflows/*.yml"),
+        ("github-issue-forms", ".github/ISSUE_TEMPLATE/*.yml"),
+        ("readthedocs", ".readthedocs.yaml"),
+    ],
+)
+def test_the_files_for_hosts_follow_their_schemas(schema, files):
+    paths = [str(path) for path in Path(__file__).parents[1].glob(files)]
+    command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", f"vendor.{schema}", *paths]
+    assert paths
     subprocess.run(command, check=True)
