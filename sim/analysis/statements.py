@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 import xarray as xr
 
-from sim.analysis.dataset import MEMBERS, is_stationary, plain
+from sim.analysis.dataset import MEMBERS, is_stationary, plain, sweep_dims
 from sim.analysis.ensemble_peaks import ensemble_peaks
 from sim.analysis.events import events, slips_by_phase
 from sim.analysis.lifetimes import half_lives
@@ -101,7 +101,7 @@ def statements(
         for key in (key for key in group if str(key).endswith("_mean")):
             group[key] = group[key].assign_attrs(over=over)
         result = result.merge(group, compat="no_conflicts", join="outer")
-    return result
+    return result.assign_coords({name: dataset[name] for name in sweep_dims(dataset)})  # with their units
 
 
 def statistics(dataset: xr.Dataset) -> xr.Dataset:
