@@ -1,6 +1,7 @@
 """Judgement of a run before it starts: systematic errors of its results, remarks, and the limits of its contact."""
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, cast
 
@@ -21,6 +22,7 @@ from sim.scenario.schema import quantities
 from sim.spectrum.families import Band
 from sim.spectrum.radial import share_of_long_waves
 from sim.units.notation import engineering
+from sim.units.quantity import same_unit
 
 #: Times of a run at which it is judged, steps of a ramp, keys in a sentence; energies of a member, on a disc, and
 #: points at which their density is summed.
@@ -31,6 +33,9 @@ _ERROR, _LAG, _MASKING = 0.01, 0.005, 0.9
 _MOST_POINTS, _BAND = 2**14, (0.8, 1.2)
 #: Relative change of bonds and stress in the derivative of the area; duration over that of a ramp that nothing delays.
 _RELATIVE_STEP, _VERY_SLOW = 1e-4, 1e6
+
+#: A value in a remark with its unit, if it has one; a number after "=" or in quotes is part of a cure.
+_VALUE = re.compile(r'(?<![\w.^"-])(?<!= )\d+(?:\.\d+)?(?:e[+-]?\d+)?\b(?: [pnµmkMG]?(?P<unit>m/s|N/m|Pa|m|s|N)\b)?')
 
 #: A point of a sweep, and its systematic errors.
 Worst = tuple[Scenario, dict[str, float]]
@@ -153,7 +158,7 @@ def place(plan: Plan, point: Scenario, speed: float) -> str:
 def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
     """Return the remarks on a run, one sentence each; ``most`` are its ``worst`` errors if they are known."""
     some = spread(plan.points)
-    texts = [text for point in some for text in [*point.remarks(), *_outside(point)]]
+    texts = _with_ranges([text for point in some for text in [*point.remarks(), *_outside(point)]])
     if (most := most or worst_of_sweep(plan.points)) and (keys := cure(*most)):
         point, area, friction = most[0], *(100.0 * most[1][f"cell_error_{of}"] for of in ("area", "friction"))
         too, at = "large" if area > 0.0 else "small", place(plan, point, most[1]["error_speed"])
@@ -165,6 +170,23 @@ def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
             " (record.per_member = true keeps every member)"
         )
     return list(dict.fromkeys(texts))
+
+
+def _with_ranges(texts: Sequence[str]) -> list[str]:
+    """Return remarks that differ in their values alone as one remark, with the range of each value."""
+    alike: dict[str, list[str]] = {}
+    for text in texts:
+        alike.setdefault(_VALUE.sub(lambda value: f"\0{value['unit'] or ''}", text), []).append(text)
+    return [_in_range(group) for group in alike.values()]
+
+
+def _in_range(texts: Sequence[str]) -> str:
+    """Return the one remark of remarks that are alike, with ranges in place of values."""
+    ends = []
+    for column in zip(*([value[0] for value in _VALUE.finditer(text)] for text in texts), strict=True):
+        ordered = sorted(column, key=lambda value: (same_unit(column[0], value) or (0.0, 0.0))[1])
+        ends.append(" to ".join(dict.fromkeys([ordered[0], ordered[-1]])))
+    return _VALUE.sub(lambda _: ends.pop(0), texts[0])
 
 
 def diagnosis(plan: Plan) -> list[str]:

@@ -246,6 +246,20 @@ def test_a_contact_softer_than_the_onset_of_oscillations_lies_outside_the_rigid_
     assert f"needs {engineering(needed, 'N/m')}, and the contact itself has {engineering(own, 'N/m')}" in found[0]
 
 
+def test_a_sweep_has_one_remark_with_the_range_of_its_values(scene):
+    # the mean stress is 0.8 to 2 times the shear modulus; the first and the last of three values lie beyond 0.5
+    stresses = [0.8 * G, 0.1 * G, 2.0 * G]
+    found = remarks(Plan.of(scene(bonds={"model": "none", "stress": 0.1 * G}, sweep={"bonds.stress": stresses})))
+    (text,) = (text for text in found if "linear elasticity" in text)
+    assert "is 0.8 to 2 times the shear modulus" in text
+    spring = {"model": "spring", "stage": "10 mm/s", "stiffness": "100 N/m"}
+    bonds = {"model": "rate", "rupture": {"model": "bell", "zero_force_rate": "20 1/s", "bell_force": "4 pN"}}
+    bonds |= {"bond_stiffness": "0.8 uN/m", "rebinding_rate": "200 1/s", "start": "steady", "site_density": 3e16}
+    plan = Plan.of(scene(drive=spring, bonds=bonds, sweep={"drive.stage": ["20 mm/s", "10 mm/s"]}))
+    (text,) = (text for text in remarks(plan) if "outside the model of a rigid slider" in text)
+    assert "at 10 mm/s to 20 mm/s stable" in text
+
+
 @pytest.mark.parametrize("slider", ["spring with mass", "start", "table", "linear ramp", "force"])
 def test_a_run_has_as_many_speeds_as_asked_for_and_each_contact_has_a_diagnosis(slider):
     contacts, fields = ("load", "lifted", "tension", "rate_dependent"), ("mean, slip rate", "modal, fixed")
