@@ -157,8 +157,10 @@ def place(plan: Plan, point: Scenario, speed: float) -> str:
 
 def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
     """Return the remarks on a run, one sentence each; ``most`` are its ``worst`` errors if they are known."""
-    some = spread(plan.points)
-    texts = _with_ranges([text for point in some for text in [*point.remarks(), *_outside(point)]])
+    alike: dict[str, list[str]] = {}
+    for text in (text for point in spread(plan.points) for text in [*point.remarks(), *_outside(point)]):
+        alike.setdefault(_VALUE.sub(lambda value: f"\0{value['unit'] or ''}", text), []).append(text)
+    texts = [_in_range(group) for group in alike.values()]
     if (most := most or worst_of_sweep(plan.points)) and (keys := cure(*most)):
         point, area, friction = most[0], *(100.0 * most[1][f"cell_error_{of}"] for of in ("area", "friction"))
         too, at = "large" if area > 0.0 else "small", place(plan, point, most[1]["error_speed"])
@@ -169,15 +171,7 @@ def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
             "every member would make a file of more than 20 GB: mean, spread and standard error are kept alone"
             " (record.per_member = true keeps every member)"
         )
-    return list(dict.fromkeys(texts))
-
-
-def _with_ranges(texts: Sequence[str]) -> list[str]:
-    """Return remarks that differ in their values alone as one remark, with the range of each value."""
-    alike: dict[str, list[str]] = {}
-    for text in texts:
-        alike.setdefault(_VALUE.sub(lambda value: f"\0{value['unit'] or ''}", text), []).append(text)
-    return [_in_range(group) for group in alike.values()]
+    return texts
 
 
 def _in_range(texts: Sequence[str]) -> str:
@@ -260,6 +254,7 @@ def _along_course(point: Scenario, slower: float) -> Array:
     """Return A/A_JKR, the friction over that of A_JKR [Pa] and the speed [m/s] along a course, shape (3, steps)."""
     shear, duration = cast(Any, point.fluctuations), slower * point.clock.duration
     values: dict[str, Any] = {"bonds.start": "steady"} if point.population.stretched else {}
+    values |= {"drive.time": tuple(slower * time for time in point.drive.time)} if point.drive.model == "table" else {}
     if not math.isinf(shear.side(point.setting.cell)):
         values["shear"] = Mean(shear.spectrum, shear.law, shear.paid_by_adhesion, shear.contact)
     scene = changed(point, values | {"clock.duration": duration, "clock.step": duration / _STEPS})
@@ -276,22 +271,25 @@ def _behind(course: Array, steady: Array) -> tuple[float, float, float]:
 
 
 def _lagging(point: Scenario) -> Iterator[str]:
-    """Yield how far values along a ramp are from steady ones, and how far they would be along a slower ramp.
+    """Yield how far values along a ramp or table are from steady ones, and how far they would be along a slower one.
 
     Nothing is said of few bonds and of an amplitude that relaxes, which ``lag`` does not follow, nor of a part that
-    feeds back, which it follows slowly.
+    feeds back, which it follows slowly. Nothing is said of a table with a jump or beside a changing load.
     """
     left_out = point.population.per_member or point.fluctuations.law.relaxing or point.by_steps
-    if point.drive.model != "ramp" or left_out:
+    rows = getattr(point.drive, "time", ())
+    jumps = bool(rows) and (point.contact.changes or 0.0 in np.diff(rows))
+    if point.drive.model not in ("ramp", "table") or left_out or jumps:
         return
     steady = _along_course(point, _VERY_SLOW)
     behind, longer = _behind(_along_course(point, 1.0), steady), 10.0 * point.clock.duration
     if max(behind[:2]) > _LAG:
         values = [100.0 * value for value in behind[:2] + _behind(_along_course(point, 10.0), steady)[:2]]
+        times = "10 times drive.time and " if rows else ""
         yield (
-            f"along the ramp A/A_JKR is up to {values[0]:.2g} points off its steady value, the friction"
+            f"along the {point.drive.model} A/A_JKR is up to {values[0]:.2g} points off its steady value, the friction"
             f" {values[1]:.2g} % of its largest (near {engineering(behind[2], 'm/s')});"
-            f' clock.duration = "{engineering(longer, "s")}" leaves {values[2]:.2g} points and {values[3]:.2g} %'
+            f' {times}clock.duration = "{engineering(longer, "s")}" leaves {values[2]:.2g} points and {values[3]:.2g} %'
         )
 
 

@@ -176,6 +176,12 @@ def test_the_lag_along_a_ramp_is_that_of_the_rate_equation(scene):
     first, last = lag(lens), lag(lens, 10.0)
     assert_allclose(shown, 100.0 * np.array([*first[:2], *last[:2]]), rtol=0.05)
     assert 'clock.duration = "10 s"' in line and first[0] > 3.0 * last[0]
+    # a table of the same course has the same lag; at a jump there is no statement
+    table = {"model": "table", "time": [0.0, 1.0], "speed": list(ends)}
+    (same,) = (text for text in diagnosis(Plan.of(scene(drive=table, bonds=bonds))) if text.startswith("along the"))
+    assert [float(number) for number in re.findall(r"([0-9.]+) (?:points|%)", same)] == shown and "table" in same
+    jump = {"model": "table", "time": [0.0, 0.5, 0.5, 1.0], "speed": [ends[0], ends[0], ends[1], ends[1]]}
+    assert not any(text.startswith("along the") for text in diagnosis(Plan.of(scene(drive=jump, bonds=bonds))))
     calm = scene(drive=ramp, bonds=bonds | {"rebinding_rate": "5000 1/s"})
     assert not any(text.startswith("along the ramp") for text in diagnosis(Plan.of(calm)))
 
