@@ -885,6 +885,11 @@ def distribution(
         numbers, freedom = _over_time(values, step, name, differ)
         known = zip(values, numbers["sem"], freedom, map(bool, differ), strict=True)
         states = [settlement(*point) for point in known]
+        if words == "the run":  # of two records, the first of which is the start
+            few = [k for k, state in enumerate(states) if differ[k] and state.begin != state.end]
+            states = [
+                s._replace(verdict="too few records", value=s.end) if k in few else s for k, s in enumerate(states)
+            ]
         result |= _described(variable.rename(name), numbers, sweep, states, openings, words, differ)
     return xr.Dataset(result)
 

@@ -200,3 +200,12 @@ def test_joined_runs_are_described_as_what_they_are(tmp_path):
     run(scene(**parts), to=tmp_path / "one.nc")
     with sim.open(tmp_path / "one.nc") as dataset:
         assert "joined" not in dataset.attrs
+
+
+def test_two_records_one_of_which_is_the_start_have_no_mean_but_the_value_at_the_end():
+    dataset = run(scene(drive=drive.Steady(speed=4e-3), clock=Clock(0.8, 2e-3), ensemble=Ensemble(members=20)))
+    ends = analysis.distribution(dataset.isel(t=[0, -1]))
+    for name in ("contact_area", "friction_force"):
+        assert_allclose(ends[f"{name}_mean"], dataset[name].isel(t=-1).mean(), rtol=1e-12)
+        assert math.isnan(ends[f"{name}_sem"]) and ends[f"{name}_reason"].item().startswith("too few records")
+    assert analysis.distribution(dataset.isel(t=[0, 10, -1]))["contact_area_reason"] == ""
