@@ -121,7 +121,9 @@ def with_slips(dataset: xr.Dataset) -> xr.Dataset:
         return dataset
     names = [end for end in ("", "_mean") if f"spring_force{end}" in dataset and f"slider_position{end}" in dataset]
     moved = {f"speed{end}": dataset[f"slider_position{end}"].astype(float).differentiate("t") for end in names}
-    return dataset.assign({name: speed.assign_attrs(dataset[name].attrs) for name, speed in moved.items()})
+    later = dataset["t"] > dataset["t"][0]  # at the start nothing has moved yet
+    speeds = {name: speed.where(later, dataset[name]) for name, speed in moved.items()}
+    return dataset.assign({name: speed.assign_attrs(dataset[name].attrs) for name, speed in speeds.items()})
 
 
 def full_area(dataset: xr.Dataset) -> xr.DataArray:

@@ -15,6 +15,7 @@ import xarray as xr
 
 from sim.analysis.dataset import (
     MEMBERS,
+    has_noise,
     is_stationary,
     is_steady,
     resolved,
@@ -142,8 +143,8 @@ _MEMORY = _Column("correlation_time", "t_c", meaning="integral correlation time 
 
 #: Values of a sweep from which on an extreme inside is worth a note.
 _TURNS = 3
-#: Shares below it are nothing.
-_ROUNDING = 1e-13
+#: Shares below it are nothing; spread over the mean below which a motion without noise has settled.
+_ROUNDING, _SETTLED = 1e-13, 1e-3
 
 
 def stated(dataset: xr.Dataset, lost: Sequence[str] = ()) -> xr.Dataset:
@@ -477,7 +478,8 @@ def spread(dataset: xr.Dataset, stated: xr.Dataset | None = None) -> list[dict[s
     stated = statements(dataset, [column.name for column in fixed]) if stated is None else stated
     result = stated.isel(dict.fromkeys(sweep_dims(dataset), 0))
     fixed = [column for column in fixed if f"{column.name}_std" in result]
-    varied = (c for c in fixed if result[f"{c.name}_std"] > _ROUNDING * abs(result[f"{c.name}_mean"]))
+    least = _ROUNDING if bool(has_noise(dataset).any()) else _SETTLED
+    varied = (c for c in fixed if result[f"{c.name}_std"] > least * abs(result[f"{c.name}_mean"]))
     return [_spread_of(result, column) for column in varied]
 
 

@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.driven import force, scenario, spring
 from helpers.parts import Adhesion, Bell, Clock, Force, Record, Spring, analysis, run
 from helpers.scenes import scene
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
+from sim.analysis.observables import with_slips
 from sim.ensemble.dataset import moments, pooled as pooled_moments
-from sim.parts.bonds import FirstMoment, Steady, Unbroken
+from sim.parts.bonds import Cohort, FirstMoment, Steady, Tracked, Unbroken
 from sim.parts.events import LATE, SLIP, Slips
 
 NAN = math.nan
@@ -272,3 +274,11 @@ def test_statistics_alone_have_the_means_of_slip_events_over_the_members_that_sl
     assert_array_equal(result["count"], [2.0, 0.0])
     assert_array_equal(result["mean"], [1.5, NAN])
     assert_allclose(result["sem"], [0.5, NAN], rtol=1e-14)
+
+
+def test_a_slider_on_single_bonds_is_at_rest_at_its_start_and_a_settled_creep_without_noise_has_no_spread():
+    ends = run(scenario(8.0, 8, spring(0.2), make=functools.partial(Tracked, sites=10), members=3)).isel(t=[0, -1])
+    speed = with_slips(ends)["speed"]
+    assert_array_equal(speed[:, 0], 0.0)
+    assert_allclose(speed[:, 1], ends["slider_position"][:, 1] / ends["t"][1], rtol=1e-12)
+    assert analysis.spread(run(scenario(20.0, 60, force(0.05), make=Cohort, members=1))) == []
