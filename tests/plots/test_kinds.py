@@ -252,3 +252,9 @@ def test_equal_figures_give_equal_files_of_one_or_two_columns_and_leave_matplotl
     widths = [int.from_bytes((tmp_path / f"{name}.png").read_bytes()[16:20], "big") for name in ("first", "map")]
     assert widths == [680, 1400]  # at 200 dpi
     assert mpl.rcParams.copy() == before and "matplotlib.pyplot" not in sys.modules  # no test imports it
+
+
+def test_a_band_of_few_members_is_named_as_interpolated_between_them():
+    for members, name in ((3, "5–95 %, interpolated between 3 members"), (20, "5–95 % of members")):
+        figure = plots.draw(simulated(ensemble=Ensemble(members=members)))
+        assert name in legend_of(figure.axes[0])[0]
