@@ -277,7 +277,7 @@ def _lagging(point: Scenario) -> Iterator[str]:
     feeds back, which it follows slowly. Nothing is said of a table with a jump or beside a changing load.
     """
     left_out = point.population.per_member or point.fluctuations.law.relaxing or point.by_steps
-    rows = getattr(point.drive, "time", ())
+    rows = point.drive.time if point.drive.model == "table" else ()
     jumps = bool(rows) and (point.contact.changes or 0.0 in np.diff(rows))
     if point.drive.model not in ("ramp", "table") or left_out or jumps:
         return
