@@ -795,6 +795,14 @@ def _settled(course: np.ndarray, drift: float, error: float, free: float, noisy:
     return Settlement("not settled", end, begin, end)
 
 
+def _of_two(states: list[Settlement], noisy: np.ndarray) -> list[Settlement]:
+    """Return the settlements of two records, the first of which is the start of the run: the values at its end."""
+    unknown = [bool(noise) or state.verdict.startswith("too short") for noise, state in zip(noisy, states, strict=True)]
+    ends = [state._replace(verdict="too few records", value=state.end) for state in states]
+    every = zip(unknown, ends, states, strict=True)
+    return [end if is_unknown and state.begin != state.end else state for is_unknown, end, state in every]
+
+
 def _cycles(course: np.ndarray) -> tuple[float, float, float] | None:
     """Return the mean over whole cycles, its change from the first half to the second, and the 99 % bound of that.
 
@@ -885,11 +893,7 @@ def distribution(
         numbers, freedom = _over_time(values, step, name, differ)
         known = zip(values, numbers["sem"], freedom, map(bool, differ), strict=True)
         states = [settlement(*point) for point in known]
-        if words == "the run":  # of two records, the first of which is the start
-            few = [k for k, state in enumerate(states) if differ[k] and state.begin != state.end]
-            states = [
-                s._replace(verdict="too few records", value=s.end) if k in few else s for k, s in enumerate(states)
-            ]
+        states = _of_two(states, differ) if words == "the run" else states
         result |= _described(variable.rename(name), numbers, sweep, states, openings, words, differ)
     return xr.Dataset(result)
 
@@ -987,6 +991,7 @@ def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) ->
         known = zip(course, after - mean, error, free[:, free.shape[1] // 2], map(bool, differ), strict=True)
         numbers = {"mean": mean, "sem": sem, "low": low, "high": high}
         states = [_settled(*point) for point in known]
+        states = _of_two(states, differ) if words == "the run" else states
         result |= _described(courses[key].rename(name), numbers, sweep, states, openings, words, differ)
     return xr.Dataset(result)
 

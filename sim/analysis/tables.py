@@ -560,9 +560,9 @@ def in_columns(dataset: xr.Dataset, every: bool = False, lost: Sequence[str] = (
         and ``name_high`` (95 % interval) and ``name_reason``. Units are those of ``in_units``, else SI.
     """
     stated = xr.Dataset() if every else statements(dataset, lost=lost)
-    kept = re.compile("(?!.*_(quantile|correlation_time)).*_(mean|sem|low|high|reason)")
+    wanted = re.compile("(?!.*_(quantile|correlation_time)).*_(mean|sem|low|high|reason)")
     stated = stated.drop_dims("phase", errors="ignore")
-    rows = frame(dataset) if every else _framed(dataset, stated[[n for n in stated if kept.fullmatch(str(n))]])
+    rows = frame(dataset) if every else _framed(dataset, stated[[n for n in stated if wanted.fullmatch(str(n))]])
     units, columns = rows.attrs["units"], {}
     for name in rows.replace("", np.nan).dropna(axis="columns", how="all"):
         stem, _, end = name.rpartition("_")

@@ -203,9 +203,13 @@ def test_joined_runs_are_described_as_what_they_are(tmp_path):
 
 
 def test_two_records_one_of_which_is_the_start_have_no_mean_but_the_value_at_the_end():
-    dataset = run(scene(drive=drive.Steady(speed=4e-3), clock=Clock(0.8, 2e-3), ensemble=Ensemble(members=20)))
+    parts = {"drive": drive.Steady(speed=4e-3), "ensemble": Ensemble(members=20)}
+    dataset = run(scene(**parts, clock=Clock(0.8, 2e-3)))
     ends = analysis.distribution(dataset.isel(t=[0, -1]))
     for name in ("contact_area", "friction_force"):
         assert_allclose(ends[f"{name}_mean"], dataset[name].isel(t=-1).mean(), rtol=1e-12)
         assert math.isnan(ends[f"{name}_sem"]) and ends[f"{name}_reason"].item().startswith("too few records")
     assert analysis.distribution(dataset.isel(t=[0, 10, -1]))["contact_area_reason"] == ""
+    pooled = of_second_half(run(scene(**parts, record=Record(per_member=False), clock=Clock(0.8, 2e-3, record=0.8))))
+    assert_allclose(pooled["contact_area_mean"], dataset["contact_area"].isel(t=-1).mean(), rtol=1e-12)
+    assert pooled["contact_area_reason"].item().startswith("too few records") and math.isnan(pooled["contact_area_sem"])
