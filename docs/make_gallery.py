@@ -1,7 +1,7 @@
-"""Writes docs/gallery: each scenario's question with its figure, its answer and the commands that give both.
+"""Writes docs/gallery: a page for each question with its figure, its answer and its commands, and an index of all.
 
-``python docs/make_gallery.py`` runs all scenarios; with names, those alone. The numbers of the answers are kept in
-``gallery/numbers.json``, from which the page is made.
+``python docs/make_gallery.py`` runs all scenarios; with names, those alone; with ``--text``, none. The numbers of the
+answers are kept in ``gallery/numbers.json``, from which the pages are made.
 """
 
 import io
@@ -26,18 +26,22 @@ from sim.study.likelihood import LEVEL
 
 ROOT = Path(__file__).parent.parent
 FOLDER = Path(__file__).with_name("gallery")
-PAGE, NUMBERS = FOLDER / "README.md", FOLDER / "numbers.json"
+NUMBERS = FOLDER / "numbers.json"
 HEAD = """# Gallery
 
-This page answers questions with a figure each, and shows the commands that give the figure. The shortest example:
+Each question below leads to a page with its figure, its answer and the commands that give the figure. The shortest
+example:
 
     sim run scenarios/pull_off.toml
     sim plot outputs/pull_off.nc
 
-Each answer links to its scenario, which states the assumptions. The command `make gallery` computes
-all numbers and figures. If members differ, a number is the mean over the members. Its standard error stands in brackets
-and refers to the last digits.
+Each page links to its scenario, which states the assumptions. If members differ, a number is the mean over the members.
+Its standard error stands in brackets and refers to the last digits. The command `make gallery` computes all numbers and
+figures.
 """
+#: Headings of the index, each with the first of its questions.
+TOPICS = {"uniform_stress": "The sliding contact", "friction_maximum": "Friction", "stick_slip": "Stick-slip",
+          "motor_clutch": "Single bonds", "fixed_grips": "Pull-off", "measured_lens": "Measured data"}  # fmt: skip
 #: Pixels an inch and colours of a picture, the first with which it is small enough, and its bytes.
 FINENESS, MOST_BYTES = ((140, 256), (120, 256), (110, 128), (100, 128), (90, 64)), 60_000
 #: A number of an answer, or one with its standard error.
@@ -109,14 +113,13 @@ class Entry(NamedTuple):
         (FOLDER / f"{self.name}.png").write_bytes(small.getvalue())
 
     def text(self, numbers: dict[str, Any]) -> str:
-        """Return the part of the page with the question, its figure, its answer and the commands."""
+        """Return the page with the question, its figure, its answer and the commands."""
         commands = "\n".join(f"    {command}" for command in self.commands)
         figure = f"![{self.question}]({self.name}.png)"
-        scenario = f"[`{self.scenario}`](../../scenarios/{self.scenario}.toml)"
-        answer = textwrap.fill(
-            f"{self.filled(numbers)} ({scenario})", 120, break_long_words=False, break_on_hyphens=False
-        )
-        return f"## {self.question}\n\n{figure}\n\n{answer}\n\n{commands}\n"
+        scenario = f"[`{self.scenario}.toml`](../../scenarios/{self.scenario}.toml)"
+        links = f"Scenario: {scenario}. [All questions](README.md)."
+        answer = textwrap.fill(self.filled(numbers), 120, break_long_words=False, break_on_hyphens=False)
+        return f"# {self.question}\n\n{answer}\n\n{figure}\n\n{commands}\n\n{links}\n"
 
     def filled(self, numbers: dict[str, Any]) -> str:
         """Return the answer with its numbers."""
@@ -174,12 +177,12 @@ def at_speed(dataset: xr.Dataset, speed: float) -> tuple[float, float]:
     return float(dataset["t"][place]), float(course[place])
 
 
-#: All questions, in the order of the page.
+#: All questions, in the order of the index.
 ENTRIES: list[Entry] = []
 
 
 def asks(scenario: str, question: str, answer: str, **how: Any) -> Callable[[Reading], Reading]:
-    """Add a question to the page; the function below it reads the numbers of its answer from the dataset."""
+    """Add a question; the function below it reads the numbers of its answer from the dataset."""
 
     def add(reading: Reading) -> Reading:
         ENTRIES.append(Entry(reading.__name__, scenario, question, answer, reading, **how))
@@ -260,8 +263,8 @@ def direction(dataset: xr.Dataset) -> dict[str, Number]:
     "Does the contact of a PDMS lens shrink because its bonds break, or because its stress fluctuates?",
     """Both contribute, under the assumptions of the scenario. At {slow:.2g} mm/s the area is still {kept} % of
     JKR's. At {fast:.2g} mm/s {left} % are left. Broken bonds, which are counted first, account for a loss of
-    {bonds} %, fluctuations for {fluctuations} %. The scenario prescribes the onset of the fluctuations; behind a
-    spring (see below) nothing prescribes it.""",
+    {bonds} %, fluctuations for {fluctuations} %. The scenario prescribes the onset of the fluctuations;
+    [behind a spring](pdms_lens_spring.md) nothing prescribes it.""",
 )
 def pdms_lens(dataset: xr.Dataset) -> dict[str, Number]:
     (slow, slower), (fast, faster) = (at_speed(dataset, speed) for speed in (1e-3, 8e-3))
@@ -622,6 +625,20 @@ def peeling(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 @asks(
+    "afm_tip",
+    "Is the friction of an AFM tip a measure of its contact area?",
+    """In the model it is. Friction is {stress:g} GPa times JKR's area. This holds in tension, too, down to the
+    pull-off at {off:.0f} nN, where friction is {friction:.0f} nN. Without load friction is {zero:.0f} nN.""",
+)
+def afm_tip(dataset: xr.Dataset) -> dict[str, Number]:
+    last, load = dataset.isel(t=-1), dataset["contact_load"]
+    force = 1e9 * last["friction_force"].where(last["in_contact"] == 1, drop=True)
+    zero = 1e9 * last["friction_force"][nearest(load, 0.0)]
+    return {"stress": 1e-9 * float(last["shear_stress"].max()), "off": 1e9 * float(dataset["jkr_pull_off_load"].max()),
+            "friction": float(force[0]), "zero": float(zero)}  # fmt: skip
+
+
+@asks(
     "measured_lens",
     "Which critical speed and stress of the bonds follow from measured areas and forces?",
     """The critical speed is {speed} mm/s, with {level:g} % confidence between {slowest:.2f} and {fastest:.2f}. The
@@ -721,7 +738,7 @@ def own_map(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "own_map",
-    "What does such a pattern look like, and which part of it is in contact?",
+    "What does a measured pattern look like, and which part of it is in contact?",
     """The pattern has streaks along the sliding direction. Its rms is {rms:.1f} kPa, on a mean of {mean:.0f} kPa
     that the bonds bear. The circle is the contact, {width:.0f} µm wide. The pattern moves with the slider. Beyond
     the map there is no stress.""",
@@ -733,23 +750,15 @@ def pattern(dataset: xr.Dataset) -> dict[str, Number]:
     return {"rms": 1e-3 * field.rms, "mean": 1e-3 * field.mean, "width": width}
 
 
-@asks(
-    "afm_tip",
-    "Is the friction of an AFM tip a measure of its contact area?",
-    """In the model it is. Friction is {stress:g} GPa times JKR's area. This holds in tension, too, down to the
-    pull-off at {off:.0f} nN, where friction is {friction:.0f} nN. Without load friction is {zero:.0f} nN.""",
-)
-def afm_tip(dataset: xr.Dataset) -> dict[str, Number]:
-    last, load = dataset.isel(t=-1), dataset["contact_load"]
-    force = 1e9 * last["friction_force"].where(last["in_contact"] == 1, drop=True)
-    zero = 1e9 * last["friction_force"][nearest(load, 0.0)]
-    return {"stress": 1e-9 * float(last["shear_stress"].max()), "off": 1e9 * float(dataset["jkr_pull_off_load"].max()),
-            "friction": float(force[0]), "zero": float(zero)}  # fmt: skip
-
-
-def text(numbers: dict[str, dict[str, Any]]) -> str:
-    """Return the page."""
-    return "\n".join([HEAD, *(entry.text(numbers[entry.name]) for entry in ENTRIES)])
+def pages(numbers: dict[str, dict[str, Any]]) -> dict[Path, str]:
+    """Return the text of each page: the index and one page for each question."""
+    index = HEAD
+    for entry in ENTRIES:
+        index += f"\n## {TOPICS[entry.name]}\n\n" if entry.name in TOPICS else ""
+        index += f'- [<img src="{entry.name}.png" alt="" width="160"> {entry.question}]({entry.name}.md)\n'
+    index += "\n```{toctree}\n:hidden:\n\n" + "".join(f"{entry.name}\n" for entry in ENTRIES) + "```\n"
+    texts = {FOLDER / f"{entry.name}.md": entry.text(numbers[entry.name]) for entry in ENTRIES}
+    return {FOLDER / "README.md": index} | texts
 
 
 def stored_numbers() -> dict[str, dict[str, Any]]:
@@ -758,7 +767,7 @@ def stored_numbers() -> dict[str, dict[str, Any]]:
 
 
 def main(names: list[str]) -> None:
-    """Run, draw and answer questions, all or some, and write the page."""
+    """Run, draw and answer questions, all or some, and write the pages."""
     numbers = stored_numbers()
     for entry in ENTRIES:
         if not names or entry.name in names:
@@ -768,8 +777,8 @@ def main(names: list[str]) -> None:
             sys.stdout.write(f"{entry.name}: {entry.filled(numbers[entry.name])}\n")
     ordered = {entry.name: numbers[entry.name] for entry in ENTRIES}
     NUMBERS.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
-    PAGE.write_text(text(ordered), encoding="utf-8")
-    sys.stdout.write(f"{PAGE}\n")
+    for path, text in pages(ordered).items():
+        path.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

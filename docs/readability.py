@@ -19,7 +19,7 @@ from markdown_it import MarkdownIt
 ROOT = Path(__file__).parent.parent
 #: Pages of tables that a program writes, and pages of prose that a program writes with its numbers.
 TABLES = {"docs/keys.md", "docs/api.md", "docs/dataset.md"}
-WITH_NUMBERS = {"docs/speed.md", "docs/gallery/README.md"}
+WITH_NUMBERS = {"docs/speed.md", "docs/gallery"}
 MOST_MEDIAN, MOST_LENGTH, LONG = 16, 28, 25
 #: Largest numbers of words, as counted by ``wc -w``: of README, and of the pages in docs that no program writes.
 MOST_README, MOST_PAGES = 1_000, 15_000
@@ -90,8 +90,10 @@ def figures(texts: list[str]) -> tuple[int, float, float, float, float]:
 
 def main() -> None:
     """Print a row for each page and kind of text; with ``--check`` fail if one exceeds a goal."""
-    paths = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    paths = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
     markdown = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in paths}
+    gallery = sorted((ROOT / "docs" / "gallery").glob("*.md"))
+    markdown["docs/gallery"] = "\n".join(path.read_text(encoding="utf-8") for path in gallery)
     trees = [ast.parse(path.read_text(encoding="utf-8")) for path in sorted((ROOT / "sim").rglob("*.py"))]
     texts = {name: prose(page) for name, page in markdown.items() if name not in TABLES}
     texts["docstrings"] = [text for tree in trees for text in docstrings(tree)]

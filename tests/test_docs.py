@@ -41,7 +41,7 @@ def test_pages_made_from_the_code_are_up_to_date():
 
 def test_links_between_pages_lead_to_files():
     for page in PAGES:
-        for target in re.findall(r"\]\((?!https?:)([^)#]+)", text_of(page)):
+        for target in re.findall(r"(?:\]\(|src=\")(?!https?:)([^)#\"]+)", text_of(page)):
             assert (ROOT / page).parent.joinpath(target).exists(), (page, target)
 
 
@@ -96,7 +96,10 @@ def test_every_scenario_has_its_question_in_the_gallery():
 
 
 def test_the_gallery_shows_the_numbers_that_were_computed():
-    assert GALLERY.PAGE.read_text(encoding="utf-8") == GALLERY.text(NUMBERS), "run make gallery"
+    pages = GALLERY.pages(NUMBERS)
+    assert {*GALLERY.FOLDER.glob("*.md")} == {*pages}, "delete the page of a question that is gone"
+    for path, text in pages.items():
+        assert path.read_text(encoding="utf-8") == text, "run python docs/make_gallery.py --text"
     for entry in GALLERY.ENTRIES:  # and no number is typed
         typed = re.sub(r"\{.*?\}|`.*?`|\]\(.*?\)|[χα] = [01]|theory of 2018", "", entry.answer)
         assert not re.search(r"\d", typed), entry.name
