@@ -9,6 +9,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from helpers.cases import posix
 from numpy.testing import assert_allclose
 
@@ -83,6 +84,21 @@ def test_the_commands_that_a_page_shows_exist_with_their_options_kinds_and_keys(
 
 def test_the_page_for_newcomers_shows_what_its_code_gives():
     assert doctest.testfile(str(ROOT / "docs" / "jkr_only.md"), module_relative=False).failed == 0
+
+
+@posix
+@pytest.mark.verify
+@pytest.mark.parametrize("page", ["first_contact", "fit", "stick_slip"])
+def test_a_tutorial_has_the_numbers_of_its_commands(page, tmp_path, monkeypatch):
+    (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
+    monkeypatch.chdir(tmp_path)
+    text = text_of(f"docs/{page}.md")
+    lines = re.findall(r"^    sim (.*)$", text, re.M)
+    printed = "".join(CliRunner().invoke(cli, shlex.split(line), catch_exceptions=False).output for line in lines)
+    numbers = re.findall(r"\d[\d.]*\(\d+\)|\d+(?= slip events| N/m)|\d\.\d{3}", text)
+    assert len(numbers) > 1
+    for number in numbers:
+        assert number in printed
 
 
 GALLERY = maker_of("gallery")
