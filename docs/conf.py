@@ -23,6 +23,7 @@ myst_fence_as_directive = ["math"]
 myst_heading_anchors = 3
 nb_execution_mode = "off"  # outputs are stored, and a test executes the notebook
 
+default_role = "code"  # of docstrings: `sim run` is a command
 autosummary_generate = True
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
