@@ -1,4 +1,4 @@
-"""The commands. Each imports what it needs when it runs, so that ``sim --help`` is instant."""
+"""The commands. Each imports its modules when it runs, so that ``sim --help`` is instant."""
 
 import atexit
 import contextlib
@@ -19,19 +19,19 @@ from sim.units.terminal import Stages, note, print_rows, print_table, progress_b
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
 
 _PATH = click.Path(path_type=Path)
-_SET = click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE", help="Replace a value of the file.")
-_SEED = click.option("--seed", type=click.IntRange(0, 2**64 - 1), help="Replace the seed.")
+_SET = click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE", help="Replace a value of SCENARIO.")
+_SEED = click.option("--seed", type=click.IntRange(0, 2**64 - 1), help="Replace the seed of the random numbers.")
 _MEMBERS = click.option("--members", type=click.IntRange(1, 10**7), help="Replace the number of ensemble members.")
 _FORCE = click.option("--force", is_flag=True, help="Replace files that exist.")
-_UNITS = click.option("--units", multiple=True, metavar="UNIT", help="Unit of numbers of its dimension, such as mm/s.")
-_WHERE = click.option("--where", "chosen", multiple=True, metavar="KEY=VALUE", help="Of a swept key this value alone.")
+_UNITS = click.option("--units", multiple=True, metavar="UNIT", help="Show values in UNIT, such as mm/s for speeds.")
+_WHERE = click.option("--where", "chosen", multiple=True, metavar="KEY=VALUE", help="Only this value of a swept key.")
 
-_LOST = click.option("--lost", multiple=True, metavar="SHARE", help="The speed at which 10 % of the area is lost.")
+_LOST = click.option("--lost", multiple=True, metavar="SHARE", help="Add the speed at which SHARE of the area is lost.")
 
-_STOPPED = "stopped; what was computed is kept: the same command with --resume goes on"
+_STOPPED = "stopped; the results so far are kept: the same command with --resume continues"
 _CODES = (
-    "Exit codes: 0 done; 1 failed; 2 bad input; 73 the output exists; 74 trouble with disk or files; 75 stopped, to go"
-    " on with --resume, or another run holds the output; 130 stopped at once."
+    "Exit codes: 0 success; 1 failure; 2 bad input; 73 the output exists; 74 disk or file error; 75 interrupted"
+    " (continue with --resume), or another run writes the output; 130 stopped at once."
 )
 
 #: Rows of a table on the terminal.
@@ -58,7 +58,7 @@ def main() -> None:
         fault.show(shown)
         _fail(shown.getvalue().rstrip("\n"), fault.exit_code)
     except MemoryError:
-        _fail("there is not enough memory; fewer points, members or records take less (see `sim check`)", FAILED)
+        _fail("there is not enough memory; use fewer points, members or records (see `sim check`)", FAILED)
     except (OSError, RuntimeError, ValueError) as trouble:
         if hasattr(trouble, "exit_code"):
             _fail(str(trouble), trouble.exit_code)
@@ -80,7 +80,7 @@ def _announce_compiling(quiet: bool = False) -> None:
     def announce(name: str) -> None:
         jit.on_compiling.clear()
         if not quiet:
-            note("compiling kernels for this scene, once: up to half a minute; `sim warm` compiles all")
+            note("compiling kernels, once per model (up to half a minute); `sim warm` compiles all")
 
     jit.on_compiling[:] = [announce]
 
@@ -136,24 +136,24 @@ def cli() -> None:
 
 @cli.command(epilog=_CODES)
 @click.argument("scenario", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="The netCDF file; default outputs/<name>.nc.")
+@click.option("-o", "--output", type=_PATH, help="The netCDF file. Default: outputs/<name>.nc.")
 @_SET
 @_SEED
 @_MEMBERS
-@click.option("-j", "--jobs", type=click.IntRange(1), help="Processes; default one a core, fewer for short runs.")
-@click.option("--scheduler", default="", metavar="ADDRESS", help="Work on the cluster of this scheduler of dask.")
-@click.option("--max-memory", metavar="SIZE", help="Memory of all processes; default SIM_MAX_MEMORY or what is free.")
-@click.option("--max-time", metavar="TIME", help="Stop in time, such as 8 h, and go on later with --resume.")
-@click.option("--shard", metavar="I/N", help="Only share I of N, for job arrays; the last one makes the file.")
-@click.option("--force", is_flag=True, help="Replace an existing output, or an unfinished run of it.")
-@click.option("--resume", is_flag=True, help="Go on with an unfinished run, bit for bit as if nothing had happened.")
-@click.option("--quiet", is_flag=True, help="Print nothing but errors.")
-@click.option("--no-table", "bare", is_flag=True, help="End without reading the dataset back for its table.")
+@click.option("-j", "--jobs", type=click.IntRange(1), help="Processes. Default: one per core, fewer for short runs.")
+@click.option("--scheduler", default="", metavar="ADDRESS", help="Run on the dask cluster with this scheduler.")
+@click.option("--max-memory", metavar="SIZE", help="Limit of memory. Default: SIM_MAX_MEMORY, or the free memory.")
+@click.option("--max-time", metavar="TIME", help="Stop before this time, such as 8 h. Continue with --resume.")
+@click.option("--shard", metavar="I/N", help="Run part I of N in a job array. The last part writes the file.")
+@click.option("--force", is_flag=True, help="Replace an existing output or an unfinished run.")
+@click.option("--resume", is_flag=True, help="Continue an unfinished run; the results are the same bit for bit.")
+@click.option("--quiet", is_flag=True, help="Print only errors.")
+@click.option("--no-table", "bare", is_flag=True, help="Do not print the table of statistics at the end.")
 def run(
     scenario: Path, output: Path | None, jobs: int | None, scheduler: str, max_memory: str | None, max_time: str | None,
     shard: str | None, force: bool, resume: bool, quiet: bool, bare: bool, **overrides: Any,
 ) -> None:  # fmt: skip
-    """Run a scenario with its ensemble and its sweep, into a netCDF file."""
+    """Run a scenario with its ensemble and sweep, and write a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
     from sim.ensemble.store import BlockFiles, parts_of, shard_of
 
@@ -166,13 +166,13 @@ def run(
     with slow_stage("loading the scenario", quiet):
         scene = _load(scenario, **overrides, quiet=quiet)
     if force and resume:
-        raise click.UsageError("--resume goes on with an unfinished run, --force throws it away: give one of them")
+        raise click.UsageError("--resume continues an unfinished run, --force deletes it: give one of them")
 
     from sim.ensemble import plan as plans, preview, simulate
 
     plan = plans.Plan.of(scene)
     if not any(plan.share(*share)):
-        say(f"shard {shard} has no work: the run has fewer groups of members than shards")
+        say(f"shard {shard} has no work, because the run has fewer groups of members than shards")
         return
     simulate.claim(target, force or resume, simulate.files_read(scene), simulate.BESIDE)
     from sim.ensemble.execute import orders
@@ -199,7 +199,7 @@ def run(
     if tabulated:
         _print_tables(*tables)
     if not quiet:
-        say(str(target) if target.exists() else f"shard {shard} is done; the last shard that is done makes {target}")
+        say(str(target) if target.exists() else f"shard {shard} is done; the last shard to finish writes {target}")
 
 
 def _tables(dataset: Any, most: int = _ROWS, lost: tuple[str, ...] = ()) -> tuple[list[Any], list[str]]:
@@ -219,7 +219,7 @@ def _tables_of(target: Path) -> tuple[list[list[dict[str, str]]], list[str]]:
         with _opened(target) as dataset:
             return _tables(dataset.load() if dataset.nbytes < _SMALL else dataset)
     except (MemoryError, OSError) as trouble:
-        return [], [f"the output is complete; its table could not be made: {trouble or 'not enough memory'}"]
+        return [], [f"the output is complete, but its table could not be made: {trouble or 'not enough memory'}"]
 
 
 def _print_tables(tables: list[list[dict[str, str]]], notes: list[str]) -> None:
@@ -235,7 +235,7 @@ def _print_tables(tables: list[list[dict[str, str]]], notes: list[str]) -> None:
 @_SEED
 @_MEMBERS
 def check(scenario: Path, **overrides: Any) -> None:
-    """Preview a run: models, quantities in SI, error estimates, and the time, memory and file that it takes."""
+    """Preview a run: models, quantities in SI, error estimates, and its time, memory and file size."""
     from sim.ensemble.preview import preview
 
     _announce_compiling()
@@ -245,14 +245,14 @@ def check(scenario: Path, **overrides: Any) -> None:
 @cli.command()
 @click.argument("output", type=_PATH)
 @_WHERE
-@click.option("--all", "whole", is_flag=True, help="Every row: all times and sweep values.")
+@click.option("--all", "whole", is_flag=True, help="Show all times and sweep values.")
 @_LOST
 @click.option("--csv", type=_PATH, help="Also write every time and sweep value to this CSV file.")
-@click.option("--wide", is_flag=True, help="CSV of a row for each sweep value; with --all of each record.")
+@click.option("--wide", is_flag=True, help="In the CSV, one row per sweep value; with --all, per record.")
 @_UNITS
 @_FORCE
 def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None, force: bool, **form: Any) -> None:
-    """Ensemble statistics over time and sweep."""
+    """Print tables of ensemble statistics over time and sweep."""
     from sim import analysis
     from sim.units.notation import in_units
 
@@ -281,25 +281,25 @@ class _Plot(click.Command):
 @cli.command(cls=_Plot)
 @click.argument("output", type=_PATH)
 @click.argument("kind", required=False)
-@click.option("-o", "--picture", "to", type=_PATH, help="The picture; default beside the dataset.")
+@click.option("-o", "--picture", "to", type=_PATH, help="The picture. Default: beside the dataset.")
 @_WHERE
-@click.option("--member", type=click.IntRange(0), help="Only this member of the ensemble, the first is 0.")
-@click.option("--at", metavar="TIME", help="The record or map nearest to this time, such as 1.3 s.")
-@click.option("--x", default="", metavar="NAME", help="What it is drawn over: t, speed, any variable, a swept key.")
-@click.option("--absolute", is_flag=True, help="Areas in place of shares.")
+@click.option("--member", type=click.IntRange(0), help="Draw only this member of the ensemble; the first is 0.")
+@click.option("--at", metavar="TIME", help="Use the record or map nearest to this time, such as 1.3 s.")
+@click.option("--x", default="", metavar="NAME", help="Quantity of the x axis: t, another variable or a swept key.")
+@click.option("--absolute", is_flag=True, help="Draw areas instead of shares.")
 @click.option("--size", default="", metavar="SIZE", help="Width and height of the picture, such as 3.4x2.6in.")
 @click.option("--xlim", default="", metavar="LOW:HIGH", help="Range of the x axis in its unit, such as 0.1:10.")
 @click.option("--from", "start", metavar="TIME", help="First time of a figure over time, such as 0.2 s.")
 @click.option("--to", "stop", metavar="TIME", help="Last time of a figure over time.")
 @_UNITS
-@click.option("--data", type=_PATH, help="Measured points from a CSV of columns as those of `sim fit`.")
+@click.option("--data", type=_PATH, help="Add measured points from a CSV file, as in `sim fit`.")
 @_FORCE
 def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...], force: bool, **choices: Any) -> None:
-    """Draw a figure: of a KIND, or without one the first of these kinds that fits the dataset.
+    """Draw a figure. Without KIND, the first kind that fits the dataset is drawn.
 
-    KIND may also be a statement, such as pull_off_load: it is drawn over the swept key. The figure of a scenario,
-    OUTPUT.toml, is that of its spectrum before any run. Any kind takes --where, --member, --units, --size and --xlim,
-    and the options beside its name. --from and --to are for kinds over time.
+    KIND may also be a statement, such as pull_off_load, which is drawn over the swept key. If OUTPUT is a
+    scenario (.toml), its spectrum is drawn before any run. Every kind takes --where, --member, --units, --size
+    and --xlim, and the options beside its name. Kinds over time also take --from and --to.
     """
     from sim.plots import kinds as plots
 
@@ -316,17 +316,17 @@ def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...
 
 @cli.command()
 @click.argument("output", type=_PATH)
-@click.option("-o", "--page", type=_PATH, help="The page; default beside the dataset.")
+@click.option("-o", "--page", type=_PATH, help="The page. Default: beside the dataset.")
 @_WHERE
-@click.option("--data", type=_PATH, help="Measured points from a CSV, as of `sim plot`, with their chi^2.")
-@click.option("--fit", type=_PATH, help="The result of `sim fit`, STEM_fit.json.")
+@click.option("--data", type=_PATH, help="Add measured points from a CSV file and their chi^2.")
+@click.option("--fit", type=_PATH, help="Add the result of `sim fit`, STEM_fit.json.")
 @_LOST
 @_UNITS
 @_FORCE
 def report(
     output: Path, page: Path | None, chosen: tuple[str, ...], units: tuple[str, ...], force: bool, **beside: Any
 ) -> None:
-    """One page of a run as HTML: question, key figures, remarks, figures, errors, and how to repeat it."""
+    """Write an HTML page on a run: question, key figures, remarks, figures, errors and commands."""
     from sim.report import written
     from sim.units.notation import in_units
 
@@ -361,20 +361,20 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
 
 @cli.command()
 @click.argument("scenario", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="The netCDF file; default outputs/<name>-converge.nc.")
-@click.option("--budget", default="60 s", show_default=True, help="Computing time to share over the settings.")
-@click.option("--tolerance", help="Error that is accepted, such as 1 %; default that of the scene.")
+@click.option("-o", "--output", type=_PATH, help="The netCDF file. Default: outputs/<name>-converge.nc.")
+@click.option("--budget", default="60 s", show_default=True, help="Computing time for all settings together.")
+@click.option("--tolerance", help="Accepted error, such as 1 %. Default: that of the scenario.")
 @_SET
 @_FORCE
 def converge(
     scenario: Path, output: Path | None, budget: str, tolerance: str | None, changes: tuple[str, ...], force: bool
 ) -> None:
-    """Speed against error for this scene: models, tolerances and clock steps, and which to choose.
+    """Compare speed and error of models, tolerances and clock steps, and recommend a setting.
 
-    Behind a spring or under a force, averages over the second half of the run are compared. If the scene is not shown
-    to converge as the clock step decreases, nothing is recommended.
+    With a spring or a prescribed force, averages over the second half of the run are compared. Nothing is recommended
+    if the results are not shown to converge as the clock step decreases.
 
-    One core is used: settings that run side by side would disturb each other's times.
+    Only one core is used, because simultaneous runs would disturb the measured times.
     """
     from sim.units.quantity import read_option
 
@@ -387,19 +387,22 @@ def converge(
     print_table(*study(scene, target, force, seconds, accepted))
 
 
-@cli.command(epilog="Exit codes: 0 done; 1 not converged; 2 bad input; 73 an output exists; 74 trouble with files.")
+@cli.command(epilog="Exit codes: 0 success; 1 not converged; 2 bad input; 73 an output exists; 74 file error.")
 @click.argument("scenario", type=_PATH)
 @click.argument("data", type=_PATH, nargs=-1, required=True)
-@click.option("--free", multiple=True, required=True, metavar="KEY[=LOW:HIGH]", help="A number to be found.")
-@click.option("--common", multiple=True, metavar="COLUMN=SIZE", help="An error that a column's points share, as 2 %.")
-@click.option("--steady", is_flag=True, help="Steady sliding is enough: do not run the scenario's own models.")
-@click.option("--compare", "judged", is_flag=True, help="Also which mechanism or theory is sufficient for the data.")
-@click.option("-o", "--output", type=_PATH, help="STEM of STEM_fit.toml, .json, .png; default the scenario's.")
+@click.option("--free", multiple=True, required=True, metavar="KEY[=LOW:HIGH]", help="Calibrate this key.")
+@click.option("--common", multiple=True, metavar="COLUMN=SIZE", help="Error shared by all points, such as 2 %.")
+@click.option("--steady", is_flag=True, help="Fit steady sliding only, without corrections by runs.")
+@click.option("--compare", "judged", is_flag=True, help="Also compare mechanisms and theories by the data.")
+@click.option("-o", "--output", type=_PATH, help="STEM of STEM_fit.toml, .json and .png. Default: scenario name.")
 @_UNITS
 @_SET
 @_FORCE
 def fit(scenario: Path, output: Path | None, changes: tuple[str, ...], force: bool, **options: Any) -> None:
-    """Calibrate numbers of a scenario to measured curves: CSV columns named as variables of a dataset, with units."""
+    """Calibrate keys of a scenario to measured curves.
+
+    DATA are CSV files with units. Their columns have names of variables of a dataset, such as contact_area.
+    """
     _announce_compiling()
     scene, stem = _load(scenario, changes), output or scenario.with_suffix("")
     from sim.study import fit
@@ -412,7 +415,7 @@ def fit(scenario: Path, output: Path | None, changes: tuple[str, ...], force: bo
 
 @cli.command()
 def paper() -> None:
-    """Reproduce every equation and number of the paper, one line each with its error; exit 1 if any fails."""
+    """Reproduce every equation and number of the paper, one line each. Exit code 1 if any fails."""
     from sim.study.paper import checks
 
     results = checks()
@@ -425,7 +428,7 @@ def paper() -> None:
 @cli.command()
 @click.argument("name", default="first.toml", type=_PATH)
 def new(name: Path) -> None:
-    """Write a commented starter scenario."""
+    """Write a starter scenario with comments."""
     from sim.scenario.schema import write_starter
 
     target = write_starter(name)
@@ -444,9 +447,9 @@ def schema() -> None:
 
 
 @cli.command()
-@click.option("-j", "--jobs", type=click.IntRange(1), help="Processes; default one a core.")
+@click.option("-j", "--jobs", type=click.IntRange(1), help="Number of processes. Default: one per core.")
 def warm(jobs: int | None) -> None:
-    """Compile all kernels at once in parallel; else each compiles when a run first calls it."""
+    """Compile all kernels now. Otherwise a run compiles each at its first use."""
     from sim.ensemble.warm import compile_missing
 
     say(compile_missing(jobs))

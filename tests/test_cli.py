@@ -222,7 +222,7 @@ def test_nothing_after_the_rename_makes_a_failure_of_a_run(here, monkeypatch):
         patched.setattr("sim.analysis.table", broken(lambda *_: done.append("read")))
         found = sim("run", "scene.toml", "-o", "x.nc")
     assert found.exit_code == 0 and "note: x.nc.log was not written: " in found.stderr
-    assert "the output is complete; its table could not be made: [Errno 5]" in found.stdout
+    assert "the output is complete, but its table could not be made: [Errno 5]" in found.stdout
     assert sim("stats", "x.nc").exit_code == 0
 
 

@@ -587,7 +587,7 @@ def needs_speeds(dataset: xr.Dataset) -> None:
 def curve_figure(
     dataset: xr.Dataset, x: str = "", absolute: bool = False, data: Measured | None = None, ax: Axes | None = None
 ) -> Figure:
-    """Contact area with what each mechanism takes of it, energies and friction, over speed."""
+    """Contact area with the loss by each mechanism, energies and friction, over speed."""
     scene = over(dataset, x or "speed")._replace(measured=data)
     return stacked(scene, [(1.9, area_panel if absolute else share_panel), *further_panels(scene)], ax=ax)[0]
 
@@ -599,7 +599,7 @@ _DRIVEN = {"speed": ("speed $V$", "m/s"), "normal_load": ("load $P$", "N"), "dis
 def time_figure(
     dataset: xr.Dataset, x: str = "", absolute: bool = False, data: Measured | None = None, ax: Axes | None = None
 ) -> Figure:
-    """Contact radius, energies, friction, and speed, load and displacement that change, over time."""
+    """Contact radius, energies, friction, and changing speed, load and displacement, over time."""
     scene = over(dataset, x or "t")._replace(measured=data)
     scene = scene._replace(heading="; ".join(filter(None, [scene.title, coarse_slips(dataset)])))
     moved = not stays_held(dataset).all()
@@ -666,7 +666,7 @@ def needs_sweep(dataset: xr.Dataset) -> None:
 def sweep_figure(
     dataset: xr.Dataset, x: str = "", absolute: bool = False, data: Measured | None = None, ax: Axes | None = None
 ) -> Figure:
-    """Contact radius, energies and friction over the first swept key; further keys make curves.
+    """Contact radius, energies and friction over the first swept key. Each value of a further key is a curve.
 
     If all contacts are open at the end, their pull-off loads.
     """

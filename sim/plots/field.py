@@ -44,7 +44,7 @@ def _maps_of(point: xr.Dataset, at: float | None) -> xr.DataArray:
 
 
 def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
-    """The last stress map of a member, or that nearest to a time, and the displacement that it makes."""
+    """Last stress map of a member, or the map nearest to a time, and the displacement by this stress."""
     where, words = style.first_point(dataset)
     point = dataset.isel(where)
     stress = _maps_of(point, at).isel(map_member=0)
@@ -166,7 +166,7 @@ def mode_density(cells: Modes, grid: Grid) -> np.ndarray:
 
 
 def spectrum_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
-    """Power spectrum of the stress maps of one time: target, discretised on the cell, and realised."""
+    """Power spectrum of the stress maps at one time: target, discretised on the cell, and realised."""
     where, words = style.first_point(dataset)
     point = dataset.isel(where)
     stress = _maps_of(point, at)

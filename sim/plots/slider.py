@@ -84,7 +84,7 @@ def needs_force(dataset: xr.Dataset) -> None:
 
 
 def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
-    """Displacement and speed of the slider over time under a prescribed force; a cross ends a runaway."""
+    """Displacement and speed of the slider over time under a prescribed force. A cross marks a runaway."""
     later = with_slips(dataset).isel(t=slice(1, None))
     scene = scene_along(later, "t")._replace(measured=data)
     scene = scene.placed("t", later["t"].to_numpy(), "time under the force $t$", "s", "log")
@@ -112,7 +112,7 @@ def needs_map(dataset: xr.Dataset) -> None:
 
 
 def stability_figure(dataset: xr.Dataset) -> Figure:
-    """Swing of the spring's force over speed and stiffness, up and down, with the theory's boundary."""
+    """Force amplitude of the spring over speed and stiffness, at increasing and decreasing speed, with theory."""
     force = style.mean_of(dataset.isel({MEMBERS: slice(0, 1)}), "spring_force").transpose(..., "t")
     speed = dataset["stage_speed"].isel({MEMBERS: 0, "drive_stiffness": 0}, missing_dims="ignore").to_numpy()
     stiffness = dataset["drive_stiffness"].to_numpy()
@@ -181,7 +181,7 @@ def needs_pull(dataset: xr.Dataset) -> None:
 
 
 def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
-    """Contact area over the tangential force on the way to sliding, with A0 − αQ² beside it.
+    """Contact area over the tangential force before sliding, with the law A0 − αQ².
 
     The law is fitted by least squares up to half of the largest force.
     """
@@ -246,7 +246,7 @@ def needs_stress(dataset: xr.Dataset) -> None:
 
 
 def stress_figure(dataset: xr.Dataset, data: Measured | None = None, ax: Axes | None = None) -> Figure:
-    """Shear stress with its maximum, and bonds, over speed; for a start from rest the static peaks."""
+    """Shear stress with its maximum, and bonds, over speed. After a start from rest: the static peaks."""
     if "drive_rest" in dataset:
         if data or ax:
             raise ValueError("starts from rest have panels of their own; draw the kind time beside data, or on an ax")

@@ -130,7 +130,7 @@ def points_of(dataset: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 
 def theories_figure(dataset: xr.Dataset) -> Figure:
-    """Contact area by every theory, and simulated, over shear stress and tangential force."""
+    """Contact area, simulated and by each theory, over shear stress and tangential force."""
     case = case_of(dataset)
     stress, area = points_of(dataset)
     sheared = stress[stress > 0.0]
@@ -232,7 +232,7 @@ def closed_contact(dataset: xr.Dataset, time: float | None = None) -> xr.Dataset
 
 
 def profile_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
-    """Pressure, surfaces and tangential displacement across the contact at the last time, or another.
+    """Pressure, surfaces and tangential displacement across the contact, at the last or another time.
 
     The surfaces are cut along the axis of the sphere; heights are not to the scale of the lengths. The
     shear stress is the mean one, uniform over the contact; without any its displacement is left out.
@@ -356,7 +356,7 @@ def needs_course(dataset: xr.Dataset) -> None:
 
 
 def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
-    """Load and contact radius over displacement, energy lost in a cycle, and radius over load.
+    """Load and contact radius over displacement with the energy lost per cycle, and radius over load.
 
     A line is broken while the contact is open; there the load is a thin line at zero. Grey is JKR's contact at
     the full work of adhesion: every equilibrium, the unstable ones as well, and the loads at which a dead load and
