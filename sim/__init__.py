@@ -3,6 +3,8 @@
 A scenario is a TOML file, a dictionary of the same tables and keys, or a ``Scenario``; it is run into an
 ``xarray.Dataset`` in SI units with named dimensions. What cannot be used raises ``BadInput``, all faults at once.
 
+Remarks on what is read are warnings of the logger ``"sim"``, as of the standard ``logging``.
+
 >>> import sim
 >>> scene = sim.Scenario(
 ...     clock=dict(duration="1 s", step="0.1 s"),
@@ -69,7 +71,8 @@ def run(
     jobs : int
         Processes that share the work; the numbers are the same for any. The command takes one a core by itself.
     progress : bool or callable
-        True shows a bar; a function is called with the number of member-steps done since its last call.
+        True shows a bar; a function is called with the number of member-steps done since its last call. Without it a
+        long run tells its progress to the logger ``"sim"`` at the level INFO, after the remarks of ``check``.
 
     Returns
     -------
@@ -82,14 +85,20 @@ def run(
         If the scenario cannot be used, or the file or an unfinished run of it is there and is neither replaced nor gone
         on with.
     """
+    import logging
+
+    from sim.ensemble.diagnosis import remarks
     from sim.ensemble.plan import Plan, work
     from sim.ensemble.simulate import OutputExists, run as simulate
-    from sim.units.terminal import Shown, progress_bar
+    from sim.units.terminal import LOG, Shown, progress_bar, progress_lines
 
     scene = _scene(scenario)
-    own_display = contextlib.nullcontext(Shown(progress) if callable(progress) else Shown())
+    plan = Plan.of(scene)
+    for remark in remarks(plan) if LOG.isEnabledFor(logging.INFO) else ():
+        LOG.info(remark)
+    lines = Shown(progress) if callable(progress) else progress_lines(work(plan), "member-steps", LOG.info)
     try:
-        with progress_bar(work(Plan.of(scene))) if progress is True else own_display as bar:
+        with progress_bar(work(plan)) if progress is True else contextlib.nullcontext(lines) as bar:
             return simulate(scene, to, replace=replace, resume=resume, jobs=jobs, progress=bar.advance, stage=bar.begin)
     except Exception as fault:
         message = str(fault).replace("the same command", "the same call")

@@ -14,7 +14,19 @@ from typing import Any, NoReturn
 
 import click
 
-from sim.units.terminal import Stages, note, print_rows, print_table, progress_bar, say, signals, slow_stage, while_read
+from sim.units.terminal import (
+    LOG,
+    Notes,
+    Stages,
+    note,
+    print_rows,
+    print_table,
+    progress_bar,
+    say,
+    signals,
+    slow_stage,
+    while_read,
+)
 
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
 
@@ -45,6 +57,8 @@ def main() -> None:
     gc.set_threshold(500_000)  # imports make many objects that stay: looking through them is a tenth of a start,
     atexit.register(gc.freeze)  # and as much of the end
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else what all packages declare is looked through
+    if not LOG.handlers:
+        LOG.addHandler(Notes())
     for order in signals("SIGTERM", "SIGHUP"):  # schedulers stop a run by these
         signal.signal(order, signal.default_int_handler)
     if isinstance(sys.stdout, io.TextIOWrapper):  # letters that the terminal's encoding lacks end no command
@@ -428,11 +442,14 @@ def paper() -> None:
 @cli.command()
 @click.argument("name", default="first.toml", type=_PATH)
 def new(name: Path) -> None:
-    """Write a starter scenario with comments."""
-    from sim.scenario.schema import write_starter
+    """Write a starter scenario with comments, and the schema by which an editor completes its keys."""
+    from sim.scenario.scenario import Scenario
+    from sim.scenario.schema import write_schema, write_starter
 
     target = write_starter(name)
     say(f"{target}: run it with `sim run {target}`")
+    if not write_schema(schema := target.with_name("sim.schema.json"), Scenario):
+        note(f"note: {schema} is another file and stays; `sim schema` prints the schema of this version")
 
 
 @cli.command()

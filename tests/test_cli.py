@@ -355,9 +355,15 @@ def test_stats_and_plot_write_beside_the_dataset_or_where_asked_or_refuse_in_one
 
 def test_new_converge_and_a_reduced_file_work_and_name_what_a_figure_misses(here):
     done = sim("new", "mine")
-    assert done.exit_code == 0 and done.stdout.startswith("mine.toml: ")
+    assert done.exit_code == 0 and done.stdout.startswith("mine.toml: ") and done.stderr == ""
+    schema = Path("sim.schema.json")
+    assert Path("mine.toml").read_text(encoding="utf-8").startswith(f"#:schema ./{schema}\n")
+    assert json.loads(schema.read_text(encoding="utf-8")) == json.loads(sim("schema").stdout)
+    schema.write_text("{}", encoding="utf-8")
     assert sim("run", "mine.toml", "--quiet", "--members", 2).exit_code == 0
-    assert sim("new").stdout.startswith("first.toml: ")
+    other = sim("new")
+    assert other.stdout.startswith("first.toml: ") and other.stderr.startswith(f"note: {schema} is another file")
+    assert schema.read_text(encoding="utf-8") == "{}"
     for name, code in (("mine.toml", 73), ("no/where.toml", 74)):
         again = sim("new", name)
         assert again.exit_code == code and again.stderr.startswith(name)

@@ -72,13 +72,18 @@ def test_a_run_into_a_file_is_replaced_only_if_asked(file, dataset, monkeypatch)
         sim.run(SCENE, to="out.nc")
 
 
-def test_progress_is_told_to_a_function_or_shown(capsys, monkeypatch):
+def test_progress_is_told_to_a_function_or_shown_or_logged(capsys, caplog, monkeypatch):
     done = []
     sim.run(SCENE, progress=done.append)
     assert sum(done) == 11
     monkeypatch.setattr("time.monotonic", iter(range(0, 10_000, 31)).__next__)
     sim.run(SCENE, progress=True)
     assert "100 % of 11 member-steps" in capsys.readouterr().err
+    with caplog.at_level("INFO", "sim"):
+        sim.run({**SCENE, "solid": {"shear_modulus": "1.6 MPa", "poisson_ratio": 0.4}})
+    assert "poisson_ratio is not 0.5: the normal-tangential coupling is neglected" in caplog.messages
+    assert any(line.startswith("100 % of 11 member-steps") for line in caplog.messages)
+    assert capsys.readouterr() == ("", "")
 
 
 def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statistics(file, dataset, tmp_path):

@@ -33,7 +33,7 @@ from sim.parts.shear.process import Fluctuation
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read
 from sim.units.notation import CUMULATIVE, OF_CONTACT, second_half
-from sim.units.terminal import note
+from sim.units.terminal import LOG
 
 Progress = Callable[[int], None]
 
@@ -301,4 +301,4 @@ def log(target: Path, began: float, stages: dict[str, float]) -> None:
         with explained(target.parent), path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(entry) + "\n")
     except StoreTrouble as trouble:
-        note(f"note: {target}.log was not written: {trouble}")
+        LOG.warning("%s.log was not written: %s", target, trouble)

@@ -2,6 +2,7 @@
 
 import functools
 import html
+import json
 from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import is_dataclass
 from importlib.resources import files
@@ -164,7 +165,10 @@ def _noted(annotation: Any) -> Iterator[Any]:
 
 
 def write_starter(name: Path) -> Path:
-    """Write a commented starter scenario, if there is no such file yet; return its path."""
+    """Write a commented starter scenario, if there is no such file yet; return its path.
+
+    Its first line names a schema beside it, by which an editor completes keys.
+    """
     target = name if name.suffix else name.with_suffix(".toml")
     text = files("sim").joinpath("starter.toml").read_text(encoding="utf-8")
     try:
@@ -173,6 +177,17 @@ def write_starter(name: Path) -> Path:
     except FileExistsError:
         raise OutputExists(f"{target} exists; name another file") from None
     return target
+
+
+def write_schema(path: Path, root: type) -> bool:
+    """Write the JSON schema of scenario files to a path; return False if another file is there, which stays."""
+    text = json.dumps(json_schema(root), indent=2) + "\n"
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        return path.read_bytes() == text.encode()
+    return True
 
 
 def json_schema(root: type) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from pydantic_core import PydanticCustomError
 
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity, keyed
-from sim.units.terminal import note
+from sim.units.terminal import LOG
 
 Array = NDArray[np.float64]
 
@@ -652,7 +652,7 @@ def read_measured(
     reach = [f"{name} reaches {np.nanmax(np.abs(result[name].values)):.4g} {known[name].unit}" for name in bare]
     remark = f"no units: SI assumed; {', '.join(reach)}" if bare else ""
     if remark:
-        note(f"note: {path}: {remark}")
+        LOG.warning("%s: %s", path, remark)
     return result, remark
 
 

@@ -1,6 +1,7 @@
 """Output on a terminal: text without control characters, tables, and the progress of a run."""
 
 import contextlib
+import logging
 import os
 import signal
 import sys
@@ -10,6 +11,9 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import click
+
+#: What the Python interface tells: remarks as warnings, progress as information.
+LOG = logging.getLogger("sim")
 
 #: Seconds between two lines of progress without a terminal; seconds after which a slow stage is printed.
 _PAUSE, _SLOW = 30.0, 3.0
@@ -40,6 +44,13 @@ def note(text: str) -> None:
     """Print a line to standard error; a reader that is gone is no error."""
     with contextlib.suppress(OSError):
         say(text, err=True)
+
+
+class Notes(logging.Handler):
+    """Prints the remarks of the package as the commands do, a note on standard error each."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        note(f"note: {record.getMessage()}")
 
 
 def print_rows(rows: list[dict[str, str]]) -> None:
@@ -115,6 +126,11 @@ def progress_bar(total: int, what: str = "member-steps") -> Iterator[Shown]:
             task = progress.add_task(what, total=total)
             yield Shown(lambda n: progress.advance(task, n), lambda stage: progress.update(task, description=stage))
         return
+    yield progress_lines(total, what, note)
+
+
+def progress_lines(total: int, what: str, tell: Callable[[str], None]) -> Shown:
+    """Return a display that tells the fraction of a total that is done from time to time; short runs tell nothing."""
     finished, began = 0, time.monotonic()
     printed = began
 
@@ -123,13 +139,13 @@ def progress_bar(total: int, what: str = "member-steps") -> Iterator[Shown]:
         finished, now = finished + done, time.monotonic()
         if now - printed > _PAUSE and finished:
             printed, left = now, (now - began) * (total - finished) / finished
-            note(f"{100 * finished / total:.0f} % of {total:,} {what}, {duration(left)} left")
+            tell(f"{100 * finished / total:.0f} % of {total:,} {what}, {duration(left)} left")
 
     def begin(stage: str) -> None:
-        if stage and time.monotonic() - began > _PAUSE:  # shorter runs need no lines
-            note(stage)
+        if stage and time.monotonic() - began > _PAUSE:
+            tell(stage)
 
-    yield Shown(advance, begin)
+    return Shown(advance, begin)
 
 
 def duration(seconds: float) -> str:

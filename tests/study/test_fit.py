@@ -491,11 +491,11 @@ def test_the_right_mechanism_is_sufficient_or_at_least_not_rejected_in_95_of_100
 
 def test_the_lines_of_the_documentation_sample_a_posterior_that_agrees_with_the_intervals(monkeypatch):
     root = Path(__file__).parents[2]
-    text = (root / "docs" / "own_data.md").read_text(encoding="utf-8")
+    text = (root / "docs" / "fit.md").read_text(encoding="utf-8")
     lines = re.search(r"```python\n(import lmfit.*?flatchain)\n", text, re.DOTALL)[1]
-    monkeypatch.chdir(root / "scenarios")
+    monkeypatch.chdir(root)
     values = {}
-    exec(lines.replace("2000", "300"), values)
+    exec(lines.replace("1000", "300"), values)
     # 2,000 samples that are some 24 steps alike: a quantile is off by 0.2 standard deviations
     for number, samples in zip(values["fit"].numbers, values["chain"].to_numpy().T, strict=True):
         low, middle, high = np.exp(np.quantile(samples, [0.025, 0.5, 0.975]))
