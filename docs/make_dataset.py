@@ -41,6 +41,11 @@ A member has the same noise at all points of a sweep. The error of a difference 
 the members' differences. It is often far below the two errors combined:
 
 ```python
+import sim
+
+few = {"ensemble.members": 8}
+loads = {"sweep": {"contact.load": ["1 mN", "4 mN"]}}
+dataset = sim.run(sim.load("scenarios/pdms_lens.toml", few | loads))
 change = sim.analysis.distribution(dataset, ["contact_area"], minus={"contact.load": "4 mN"})
 change.contact_area_mean, change.contact_area_sem
 ```
@@ -90,11 +95,14 @@ OTHERS = """
 `member`. `sim.stats`, `sim.plot` and `sim.analysis` accept the joined dataset:
 
 ```python
-runs = xarray.open_mfdataset(
-    paths, combine="nested", concat_dim="contact_load", preprocess=lambda run: run.set_coords("contact_load")
-)
+import xarray
+
+for name, value in [("contact.load", "2 mN"), ("contact.load", "3 mN"), ("seed", 1), ("seed", 2)]:
+    sim.run(sim.load("scenarios/pdms_lens.toml", few | {name: value}), to=f"{name}_{value}.nc")
+by_load = {"concat_dim": "contact_load", "preprocess": lambda run: run.set_coords("contact_load")}
+runs = xarray.open_mfdataset("contact.load_*.nc", combine="nested", **by_load)
 seeds = xarray.open_mfdataset(
-    paths, combine="nested", concat_dim="member", data_vars="minimal", coords="minimal", compat="override"
+    "seed_*.nc", combine="nested", concat_dim="member", data_vars="minimal", coords="minimal", compat="override"
 )
 ```
 
