@@ -92,7 +92,7 @@ def test_an_order_to_stop_keeps_what_is_computed(here, orders):
     _, errors = run.communicate(timeout=60)
     assert run.returncode == (130 if len(orders) > 1 else 75)
     assert [line.startswith("stop") for line in complaints(errors)] == [True, True] and "--resume" in errors
-    assert "its run is not done: `sim run ... --resume` goes on" in sim("stats", "outputs/scene.nc").stderr
+    assert "the run is not complete; continue it with `sim run ... --resume`" in sim("stats", "outputs/scene.nc").stderr
     assert not (here / "outputs" / "scene.nc").exists()
     assert "simulating" in Path("outputs/scene.nc.log").read_text(encoding="utf-8")
     kept = {part: part.stat().st_mtime_ns for part in parts.glob("*.npz")}
@@ -376,7 +376,7 @@ def test_new_converge_and_a_reduced_file_work_and_name_what_a_figure_misses(here
     assert refused.exit_code == 2 and "budget" in refused.stderr
     done = sim("run", "scene.toml", "-o", "out.nc", "--set", 'record.quantities=["speed"]')
     assert done.exit_code == 0 and "V" in done.output and "A/A_JKR" not in done.output
-    assert "record.quantities keeps speed" in done.output
+    assert "record.quantities has speed" in done.output
     assert "record.quantities" not in sim("run", "scene.toml", "-o", "whole.nc").stdout
     assert sim("stats", "out.nc", "--csv", "out.csv").exit_code == 0
     drawn = sim("plot", "out.nc", "stress")
@@ -461,7 +461,7 @@ def test_max_memory_is_honoured_and_refused_with_the_least_where_it_is_too_littl
         assert (refused.exit_code, "--max-memory" in refused.stderr) == (2, True)
     refused = sim("run", "scene.toml", "--max-memory", "9 MB")
     assert refused.exit_code == 1
-    assert re.search(r"takes \d+ MB of memory at least, of which 9 MB are allowed \(--max-memory\)", refused.stderr)
+    assert re.search(r"needs at least \d+ MB of memory, but 9 MB are allowed \(--max-memory\)", refused.stderr)
     assert not Path("outputs").exists()
     assert sim("run", "scene.toml", "--max-memory", "4 GB", "--no-table").exit_code == 0
     monkeypatch.setattr(preview, "_MOST_TABULATED", 0.0)

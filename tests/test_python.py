@@ -66,7 +66,7 @@ def test_a_run_into_a_file_is_replaced_only_if_asked(file, dataset, monkeypatch)
     with pytest.raises(sim.BadInput, match=r"out\.nc exists; .* replace=True"):
         sim.run(SCENE, to="out.nc")
     assert sim.run(SCENE, to="out.nc", replace=True) == file
-    trouble = StoreTrouble("out.nc: no space; the same command with --resume goes on")
+    trouble = StoreTrouble("out.nc: no space; repeat the command with --resume")
     monkeypatch.setattr("sim.ensemble.simulate.run", Mock(side_effect=trouble))
     with pytest.raises(StoreTrouble, match=r"^out\.nc: no space; .* resume=True"):
         sim.run(SCENE, to="out.nc")

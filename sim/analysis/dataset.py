@@ -51,21 +51,21 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
     if not os.path.exists(path) or os.path.isdir(path):
         reason = "is a folder" if os.path.isdir(path) else "there is no such file"
         unfinished = os.path.isdir(f"{path}.parts")
-        cure = "its run is not done: `sim run ... --resume` goes on" if unfinished else "name a dataset"
+        cure = "the run is not complete; continue it with `sim run ... --resume`" if unfinished else "name a dataset"
         raise BadInput([f"{path}: {reason}; {cure}"])
     try:
         dataset = open_lazily(path)
     except Refused as fault:
         reason = f"{fault}; run the scenario again"
         if str(path).endswith(".toml"):
-            reason = "is a scenario; name the dataset that `sim run` makes of it"
+            reason = "is a scenario; name the dataset that `sim run` writes"
         raise BadInput([f"{path}: {reason}"]) from None
     with contextlib.ExitStack() as refused:
         refused.callback(dataset.close)
         if "sim_version" not in dataset.attrs:
             raise BadInput([f"{path}: was not written by `sim run`; name one of its outputs"])
         if reason := _fault(dataset):
-            raise BadInput([f"{path}: {reason}: it was changed after its run; run the scenario again"])
+            raise BadInput([f"{path}: {reason}: it was changed after the run; run the scenario again"])
         refused.pop_all()
     dataset.attrs |= _joined(dataset)  # a copy would not close the file
     return hdf5.located(dataset)
@@ -89,7 +89,7 @@ def _fault(dataset: xr.Dataset) -> str:
     if not isinstance(dataset.attrs.get("members"), np.integer):
         return "lacks the attribute members"
     if not hdf5.tables(dataset.attrs.get("scenario_resolved")):
-        return "the attribute scenario_resolved is no scenario"
+        return "the attribute scenario_resolved does not hold a scenario"
     missing = [name for name in ("contact_modulus", "t") if name not in dataset or dataset[name].dtype.kind != "f"]
     return f"lacks the numbers {missing[0]}" if missing else ""
 
@@ -101,7 +101,7 @@ def lacking(dataset: xr.Dataset) -> str:
     recorded = {re.sub("_(mean|std|sem)$", "", str(name)) for name in dataset.variables}
     lost = [statement for name, statement in _STATEMENTS.items() if name not in recorded]
     text = f"made by sim {dataset.attrs['sim_version']}, which did not record all"
-    return f"{text}: no {', no '.join(lost)}; run anew for these" if lost else ""
+    return f"{text}: no {', no '.join(lost)}; run the scenario again for these" if lost else ""
 
 
 def with_trajectories(dataset: xr.Dataset, *names: str) -> xr.Dataset:
@@ -160,7 +160,7 @@ def claim(dataset: xr.Dataset, path: Path, target: Path, replace: bool, *others:
         content = file.read(_MOST_BYTES)
     text = content.decode("utf-8-sig", "replace").replace("\r\n", "\n")
     if content.startswith((b"\x89HDF", b"CDF")):
-        raise BadInput([f"{target} is a dataset, which is not replaced; name another file"])
+        raise BadInput([f"{target} is a dataset, which is never replaced; name another file"])
     recorded = str(dataset.attrs.get("scenario_files")), dataset.attrs.get("scenario_toml")
     if content and (hashlib.sha256(text.encode()).hexdigest() in recorded[0] or text == recorded[1]):
         raise BadInput([f"{target} is the scenario of this dataset, or a table of it; name another file"])
@@ -260,7 +260,7 @@ def setting(dataset: xr.Dataset, key: str) -> xr.DataArray:
 def word(dataset: xr.Dataset, key: str, default: str) -> xr.DataArray:
     """Return a word of the scenario, with the sweep's dimensions if it is swept.
 
-    ``default`` where the scenario does not say it, or a table that holds it is swept whole.
+    ``default`` where the scenario does not define it, or a table that holds it is swept whole.
     """
     table, _, last = key.rpartition(".")
     label = _label(dataset, key)
@@ -288,7 +288,7 @@ def resolved(dataset: xr.Dataset, key: str) -> Any:
     value = json.loads(dataset.attrs["scenario_resolved"])
     for name in words:
         if not isinstance(value, dict) or name not in value:
-            raise KeyError(f"the scenario does not say {key}")
+            raise KeyError(f"the scenario does not define {key}")
         value = value[name]
     return value
 
@@ -325,7 +325,7 @@ def control(dataset: xr.Dataset) -> Control:
         if table.get(kind) is not None or f"contact_{kind}" in dataset:
             stiffness = setting(dataset, "contact.stiffness") if kind == "displacement" else xr.DataArray(np.inf)
             return Control(kind, stiffness)
-    raise KeyError("the dataset does not say what holds the sphere: a load, an indentation or a displacement")
+    raise KeyError("the dataset does not name the mount: a load, an indentation or a displacement")
 
 
 def has_noise(dataset: xr.Dataset) -> xr.DataArray:

@@ -77,7 +77,7 @@ def peak_of_mean(values: np.ndarray, times: np.ndarray, unit: str = "1") -> Peak
             return Peak(f"no peak above the noise: at most {most} after {when}, {end} at the end")
     if place < 3:
         step = engineering(float(times[place]) / 4.0, "s")
-        return Peak(f"records too sparse for the peak: record every {step} or more often")
+        return Peak(f"too few records to resolve the peak: record every {step} or more often")
     tried, width = [_top(mean, 0, last)], 1
     while 2 * width <= place:
         weights, at = _top(mean, width, last)
@@ -158,7 +158,7 @@ def ensemble_peaks(dataset: xr.Dataset) -> xr.Dataset:
 def _peak_since(values: np.ndarray, speeds: np.ndarray, first: int, times: np.ndarray, unit: str) -> tuple[Any, ...]:
     """Return the fields of the ``Peak`` of the members after a record, and the speed at its time and interval."""
     if not len(values):
-        return *Peak("a peak of members with noise needs each of them: [record] per_member = true"), *[math.nan] * 3
+        return *Peak("the peak of members with noise needs every member: [record] per_member = true"), *[math.nan] * 3
     known, since = np.abs(values[:, first:]), times[first:] - times[first]
     known = known[np.isfinite(known).all(axis=-1)]
     is_enough = len(known) > 1 and known.shape[1] >= _FEWEST

@@ -63,22 +63,22 @@ def slips(dataset: xr.Dataset) -> xr.Dataset:
     which the stage moves. A member has at most 1,000 of them here; ``stick_slip`` counts all.
     """
     if "slip_count_mean" in dataset:
-        raise ValueError("slips need each member; record them: [record] per_member = true")
+        raise ValueError("slip events need every member; record them: [record] per_member = true")
     if not bool((word(dataset, "drive.model", "") == "spring").any()):
         raise ValueError('slips need a stage that pulls through a spring: [drive] model = "spring"')
     event = {name: dataset[f"slip_{name}"].astype(float) for name in SLIP_EVENT}
     begins, ends, following = event["time"], event["end"], event["time"].shift(slip=-1)
     drop, fall = event["force_before"] - event["force_after"], event["stress_before"] - event["stress_after"]
     columns = {
-        "slip_time": (begins, "s", "time at which a slip begins"),
-        "slip_duration": (ends - begins, "s", "time from the beginning of a slip to its end"),
-        "stick_duration": (following - ends, "s", "time from the end of a slip to the beginning of the next"),
-        "recurrence_time": (following - begins, "s", "time from the beginning of a slip to that of the next"),
-        "slip_amplitude": (event["amplitude"], "m", "displacement of the slider in a slip"),
-        "slip_speed": (event["speed"], "m/s", "speed of the stage at which a slip begins"),
-        "static_friction": (event["force_before"], "N", "force of the spring at which a slip begins"),
-        "force_drop": (drop, "N", "fall of the spring's force in a slip"),
-        "stress_drop": (fall, "Pa", "fall of the shear stress in a slip"),
+        "slip_time": (begins, "s", "time at which a slip event begins"),
+        "slip_duration": (ends - begins, "s", "duration of a slip event"),
+        "stick_duration": (following - ends, "s", "duration of a stick phase"),
+        "recurrence_time": (following - begins, "s", "time between the starts of two slip events"),
+        "slip_amplitude": (event["amplitude"], "m", "displacement of the slider in a slip event"),
+        "slip_speed": (event["speed"], "m/s", "stage speed at the start of a slip event"),
+        "static_friction": (event["force_before"], "N", "spring force at the start of a slip event"),
+        "force_drop": (drop, "N", "drop of the spring force in a slip event"),
+        "stress_drop": (fall, "Pa", "drop of the shear stress in a slip event"),
     }
     result = xr.Dataset({name: labelled(*column) for name, column in columns.items()})
     return result.transpose(..., "slip")
@@ -120,7 +120,7 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     if not is_stationary(dataset):
         count = pure(dataset["slip_count"].astype(float), "number of slip events")
         return xr.Dataset({"slip_count": count} | (_between_speeds(dataset) if varies(dataset) else {}))
-    text = "standard deviation of the displacements in slips over their mean"
+    text = "standard deviation of slip displacements over their mean"
     result["slip_spread"] = pure(dataset["late_amplitude_std"] / dataset["late_amplitude_mean"], text)
     counted = dataset["slip_time"] >= _beginning(dataset)
     each = slips(dataset).where(counted)[["slip_duration", "stick_duration", "stress_drop"]]
@@ -158,7 +158,7 @@ def slips_by_phase(dataset: xr.Dataset) -> xr.Dataset:
     first = each["static_friction"].isel(slip=inside.argmax("slip")).where(inside.any("slip"))
     result["first_friction"] = labelled(first, "N", "spring force at which the first slip event of a phase begins")
     held = (end - start).where(dataset["phase_name"].str.contains("rest")).shift(phase=1)
-    result["time_held"] = labelled(held, "s", "time for which the stage rested before a phase")
+    result["time_held"] = labelled(held, "s", "time at rest of the stage before a phase")
     result["start"] = labelled(start, "s", "start of a phase")
     return result.drop_vars("slip", errors="ignore").transpose(..., "phase")
 
@@ -210,7 +210,7 @@ def slip_sizes(dataset: xr.Dataset, of: str = "slip_amplitude") -> xr.Dataset:
     ascending = sizes.copy(data=np.sort(sizes.to_numpy(), axis=-1))
     count, rank = ascending.count("rank"), xr.DataArray(np.arange(sizes.sizes["rank"]), dims="rank")
     share = (1.0 - rank / count).where(ascending.notnull())
-    return xr.Dataset({of: ascending, "share_as_large": pure(share, "share of the slips that are as large")})
+    return xr.Dataset({of: ascending, "share_as_large": pure(share, "share of slip events of this size")})
 
 
 def _beginning(dataset: xr.Dataset) -> float:
@@ -235,7 +235,7 @@ def runaways(dataset: xr.Dataset) -> xr.Dataset:
     when = dataset["runaway_time"].isel(t=-1, drop=True).astype(float)
     return xr.Dataset({
         "ran_away": pure(when.notnull().astype(float), "members that ran away"),
-        "runaway_after": labelled(when, "s", "time of the runaway, of those that ran away"),
+        "runaway_after": labelled(when, "s", "mean time of the runaways"),
         "static_friction": labelled(dataset["runaway_force"], "N", "force at which the slider lost stability"),
     })  # fmt: skip
 
@@ -348,7 +348,7 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
     for suffix in ENDINGS:
         if f"dissipated_energy{suffix}" in dataset:
             lost = dataset[f"dissipated_energy{suffix}"].isel(t=-1, drop=True).astype(float)
-            text = "energy dissipated by opening and closing, in all"
+            text = "total energy dissipated by opening and closing"
             result[f"total_dissipated{suffix}"] = labelled(lost, "J", text, "W")
     with contextlib.suppress(ValueError), answered():
         loops = loop_energy(dataset)
@@ -475,7 +475,7 @@ def static_threshold(dataset: xr.Dataset) -> xr.Dataset:
     if "phase_start" in dataset:
         known = known & (dataset["phase_start"].count("phase") == 1)
     share = dataset["peak_friction_area"] / dataset["contact_area"].isel(t=0, drop=True)
-    text = "largest friction force of a pull from rest"
+    text = "largest friction force after a start from rest"
     return xr.Dataset({
         "static_threshold": labelled(force.where(known), "N", text),
         "area_at_threshold": pure(share.where(known), f"contact area at the {text} over that at rest"),
@@ -516,7 +516,7 @@ def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
     cycles = cycles_of(dataset)
     if not bool((cycles >= 1.0).any()):
         cure = 'give some, such as [contact] load = { from = "4 mN", to = "-1 mN", cycles = 2 }'
-        raise ValueError(f"nothing makes cycles there and back; {cure}")
+        raise ValueError(f"neither load nor position moves in cycles; {cure}")
     count = int(cycles.max())
     suffix = "" if "normal_load" in dataset else "_mean"
     read = (f"{name}{suffix}" for name in ("contact_radius", "normal_load", "displacement", "dissipated_energy"))

@@ -127,7 +127,7 @@ def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -
     estimates = iter(xr.apply_ufunc(lifetime, times - start, watched, begins.broadcast_like(times), **how))
     result = xr.Dataset()
     for key, unit, text in (
-        (f"half_{name}", "s", f"time by which half of the members have {words}"),
+        (f"half_{name}", "s", f"time at which half of the members have {words}"),
         (f"{name}_rate", "1/s", f"rate at which members have {words}"),
     ):
         for side in ("", "low", "high"):

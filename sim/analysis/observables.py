@@ -33,7 +33,7 @@ ENDINGS = ("", *(f"_{kind}" for kind in KEPT))
 _LOSSES = {
     "lost_to_fluctuations": ("bonds_radius", "fluctuations, after the bonds"),
     "lost_to_mean_stress": ("fluctuations_radius", "the mean stress, after bonds and fluctuations"),
-    "lost_to_lag": ("equilibrium_radius", "the edge's lag behind equilibrium, after all else"),
+    "lost_to_lag": ("equilibrium_radius", "the lag of the edge, subtracted last"),
 }
 #: Radii that others are compared with.
 _REFERENCES = ("jkr_radius", "hertz_radius")
@@ -141,7 +141,7 @@ def bond_work(dataset: xr.Dataset) -> xr.DataArray:
     share = setting(dataset, "adhesion.bond_share")
     fraction = dataset["bond_fraction" if "bond_fraction" in dataset else "bond_fraction_mean"]
     left = setting(dataset, "adhesion.work") * (1.0 - share + share * fraction)
-    return labelled(left, "J/m^2", "work of adhesion of the bonds left", "Δγ")
+    return labelled(left, "J/m^2", "work of adhesion of the intact bonds", "Δγ")
 
 
 def share_observables(dataset: xr.Dataset) -> xr.Dataset:
@@ -171,15 +171,15 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     recorded = {str(name).removesuffix("_mean") for name in dataset}
     charged = {name: loss for name, loss in _LOSSES.items() if loss[0] in recorded}
     if any(radius not in dataset for radius, _ in charged.values()):
-        raise ValueError("shares need each member; record them: [record] per_member = true")
+        raise ValueError("shares need every member; record them: [record] per_member = true")
     left = [np.pi * dataset[radius].astype(float, copy=False) ** 2 for radius, _ in charged.values()]
     left = [level.where(area.notnull()) for level in left]
     levels = [full, *left, area]
-    texts = {"lost_to_bonds": "broken bonds, which are charged first"}
+    texts = {"lost_to_bonds": "broken bonds, which are subtracted first"}
     texts |= {name + suffix: text for name, (_, text) in charged.items()}
     shares = {}
     for (name, text), (before, after) in zip(texts.items(), itertools.pairwise(levels), strict=False):
-        shares[name] = pure((before - after) / full, f"share of JKR's area lost to {text}")
+        shares[name] = pure((before - after) / full, f"share of the JKR area lost to {text}")
     if suffix:  # the bonds are the same for all members, so the spread is the area's
         for kind in ("std", "sem"):
             shares[f"lost_to_fluctuations_{kind}"] = pure(dataset[f"contact_area_{kind}"] / full, "")
@@ -211,16 +211,16 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
         If members were not recorded, or the contact is on a disc of finite radius.
     """
     if "fluctuation_energy" not in dataset or bool((word(dataset, "shear.contact", "plane") != "plane").any()):
-        raise ValueError("the other order of charging needs the fluctuation energy of each member, on a plane")
+        raise ValueError("the other order of losses needs the fluctuation energy of each member, on a plane")
     energy = dataset["fluctuation_energy"].astype(float, copy=False)
     try:
         work = setting(dataset, "adhesion.work") - setting(dataset, "shear.paid_by_adhesion") * energy
         radius = radius_at_work(dataset, work)
     except KeyError as fault:
-        raise ValueError(f"the other order of charging is not known: {fault.args[0]}") from None
+        raise ValueError(f"the other order of losses is not known: {fault.args[0]}") from None
     full, alone = full_area(dataset), np.pi * radius.fillna(0.0) ** 2
     alone = alone.where(dataset["contact_area"].notnull())
-    return pure((full - alone) / full, "share of JKR's area lost to fluctuations, which are charged first")
+    return pure((full - alone) / full, "share of the JKR area lost to fluctuations, which are subtracted first")
 
 
 def observables(dataset: xr.Dataset) -> xr.Dataset:
@@ -270,8 +270,8 @@ def charges(dataset: xr.Dataset) -> xr.Dataset:
         shares = share_observables(dataset)
         first, later = _charged_first(dataset), shares["lost_to_fluctuations"]
         last = shares["lost_to_bonds"] + later - first
-        last = pure(last, "share of JKR's area lost to broken bonds, after the fluctuations")
-        more = pure(first - later, "what fluctuations take more if they are charged first")
+        last = pure(last, "share of the JKR area lost to broken bonds, after the fluctuations")
+        more = pure(first - later, "additional loss to fluctuations if they are subtracted first")
         shares = shares.assign(lost_to_fluctuations_first=first, lost_to_bonds_last=last, order_of_charging=more)
     return shares
 
@@ -306,7 +306,7 @@ def _shares_among(names: Collection[str]) -> bool:
 
 def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
     """Return ``fraction_masked``; of statistics alone it is known if all contacts are closed, else nan."""
-    text = "closed contacts without work of adhesion"
+    text = "closed contacts without effective work of adhesion"
     if "masked" in dataset:
         return {"fraction_masked": pure(dataset["masked"].astype(float, copy=False), text)}
     closed = dataset["in_contact_mean"] == 1.0

@@ -58,7 +58,7 @@ _NEAR = 4.0
 _REACH = 6
 #: Reasons for a bound: below the speeds, above them, and above those at which all groups are in contact.
 _BEYOND = (
-    "more is lost at the lowest speed", "less is lost at the highest speed", "less is lost until contacts come off",
+    "more is lost at the lowest speed", "less is lost at the highest speed", "the contacts detach before this loss",
 )  # fmt: skip
 #: Numbers of bonds that stretch, and of a rupture law, in a dataset; speeds at which steady bonds are tabulated.
 _BONDS, _PREFIX, _FINE = ("bond_stiffness", "rebinding_rate", "site_density"), "bonds_rupture_", 600
@@ -99,7 +99,7 @@ def speed_curves(dataset: xr.Dataset, *names: str) -> xr.Dataset:
     elif is_stationary(dataset) and (swept := speed_dim(dataset)) is not None:
         along, speed, curves = swept, speed.isel(t=0, drop=True), of_second_half(dataset, wanted)
     else:
-        raise ValueError("the speed neither changes nor is swept while all else stays; curves over it need one of both")
+        raise ValueError("the speed neither changes nor is swept alone; curves over speed need one of both")
     with answered():
         curves[[f"{name}_mean" for name in wanted]]
     prefixes = tuple(f"{name}_" for name in wanted)
@@ -166,7 +166,7 @@ def crossing(
     speeds, order = np.unique(np.where(np.isfinite(curves[0]).all(axis=0), speeds, 0.0), return_index=True)
     x, curves = np.log(speeds[speeds > 0.0]), curves[..., order[speeds > 0.0]]
     if not x.size:
-        here = "contacts are open, or would be with the full work of adhesion"
+        here = "contacts are open, or open even at the full work of adhesion"
         return none._replace(reason=here if highest > 0.0 else "the speed does not change here")
     weight = (sizes / sizes.sum())[:, np.newaxis]
     ends_early = bool(speeds[-1] < highest)
@@ -197,7 +197,7 @@ def crossing(
     high = min(x[k:][rows[0, k:] < -surely[k:]], default=math.nan)
     bracket = none._replace(low=math.exp(low), high=math.exp(high), reason=f"{count} speeds: add some here")
     if math.isnan(low) and math.isnan(high):
-        bracket = bracket._replace(reason="hidden by the noise: add members")
+        bracket = bracket._replace(reason="hidden by the noise; add members")
     if not 2 <= k <= len(x) - 2:
         return bracket._replace(reason=_BEYOND[k > 0 and 1 + ends_early]) if k in (0, len(x)) else bracket
     near = slice(max(k - _REACH, 0), k + _REACH)
@@ -287,9 +287,9 @@ def _course(dataset: xr.Dataset) -> tuple[str, xr.DataArray]:
     if speed_name(dataset) not in dataset or not (has_area and {"jkr_radius", "hertz_radius"} <= dataset.keys()):
         raise BadInput(["speeds of a loss need speed, contact_area, jkr_radius and hertz_radius in record.quantities"])
     if bool((word(dataset, "drive.model", "") == "force").any()):
-        raise BadInput(["a force drives the slider, and its speed is a result; speeds of a loss need it prescribed"])
+        raise BadInput(["a loss at a speed needs a prescribed speed, but a force drives the slider"])
     if not bool(stays_held(dataset).all()):
-        raise BadInput(["the load, indentation or displacement changes in the run; speeds of a loss need it constant"])
+        raise BadInput(["a loss at a speed needs a constant mount, but load, indentation or displacement changes"])
     speed = abs(speed_of(dataset))
     if is_steady(dataset) and (along := speed_dim(dataset)) is not None:
         return along, speed.isel(t=0, drop=True)
@@ -305,8 +305,8 @@ def _course(dataset: xr.Dataset) -> tuple[str, xr.DataArray]:
                 records = (*point, slice(first, last + 1))
                 branches.setdefault(name, np.full(values.shape, np.nan))[records] = values[records]
     if not branches:
-        raise BadInput(["the speed neither changes steadily nor is swept; speeds of a loss need one of both"])
-    names = xr.Variable("branch", list(branches), {"long_name": "branch of the course of the speed"})
+        raise BadInput(["the speed neither changes steadily nor is swept; a loss at a speed needs one of both"])
+    names = xr.Variable("branch", list(branches), {"long_name": "branch of increasing or decreasing speed"})
     return "t", xr.concat([speed.copy(data=each) for each in branches.values()], names).squeeze(drop=len(branches) == 1)
 
 
@@ -419,7 +419,7 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
     shares = wanted or _LOSSES
     left = [(f"at_{100 * k:g}_percent_lost", 1.0 - k + 0.0 * hertz, f"{100 * k:g} % of JKR's") for k in shares]
     if not wanted:
-        left.append(("halfway_to_hertz", 0.5 * (1.0 + hertz), "half of what it can, down to Hertz's"))
+        left.append(("halfway_to_hertz", 0.5 * (1.0 + hertz), "half of the JKR area above the Hertz area"))
     least = _least_area(dataset, hertz)
     means, sizes, alone = _group_means(dataset, along, bool(wanted))
     if along == "t" and bool(((steady := steady_speeds(dataset)) != abs(speed_of(dataset))).any()):
@@ -449,7 +449,7 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
                 result[f"{stem}_{name}{end}"] = labelled(values.where(known), unit, words + text)
             further = [math.nan, False, False] if key == "steady_speed" else [*lag, is_known & alone]
             if key == "steady_speed":  # a reason of the course says nothing of steady sliding
-                unmet = f"unknown, as the course has no speed at which it loses {loss}"
+                unmet = f"unknown, because the course has no speed with a loss of {loss}"
                 further = [xr.where(is_known, why, unmet), *reasons[1:], *further]
             else:
                 further = [*reasons, *further]
@@ -461,9 +461,9 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
 def _in_words(reason: str, never: bool, most: float, steady: float, lags: bool, alone: bool) -> str:
     """Return the reason why there is no speed or no error, from the largest loss [%] and the ``steady`` speed [m/s]."""
     if never:
-        return f"never: at most {most:.3g} % can be lost"
+        return f"never: at most {most:.3g} % of the area can be lost"
     near = "" if math.isnan(steady) else f"lags: near {engineering(float(f'{steady:.3g}'), 'm/s')} in steady sliding"
-    words = near or reason, "the course lags" if lags else "", "one member: the error is unknown" if alone else ""
+    words = near or reason, "the course lags" if lags else "", "a single member has no known error" if alone else ""
     return "; ".join(filter(None, words))
 
 

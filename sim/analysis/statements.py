@@ -226,7 +226,7 @@ def relaxation(dataset: xr.Dataset, name: str, start: float = 0.0) -> Statement:
     noise = np.sqrt(np.mean(values.var(axis=0)) / max(number - 1, 1)) / abs(change)
     off = np.sqrt(np.mean(missed(fits[0], courses[0]) ** 2))
     if off > 0.01 + 2.0 * noise:
-        return result._replace(reason=f"it is no exponential: the best one misses {off:.1%} of the change")
+        return result._replace(reason=f"it is not exponential: the best exponential misses {off:.1%} of the change")
     is_long, is_short = value > 0.5 * (time[-1] - time[0]), value < time[1] - time[0]
     if is_long or is_short or doubt > abs(fits[0, 1]) / 3.0 or spread > 0.5:
         kind = "too long for the run" if is_long else "too short for its records" if is_short else "not above the noise"

@@ -262,7 +262,7 @@ _OF = {
     "low": "lower end of the 95 % interval of the ensemble mean",
     "high": "upper end of the 95 % interval of the ensemble mean",
     "skewness": "skewness",
-    "effective_samples": "number of independent values that tell as much of the mean",
+    "effective_samples": "effective number of independent values of the mean",
     "correlation_time": "integral correlation time",
     "correlation_time_sem": "standard error of the integral correlation time",
     "quantile": "quantiles",
@@ -517,7 +517,7 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
     area is not linear in the work, so what is taken off later weighs more.
     """
     radii = reference_radii(dataset)
-    ratio = pure((radii["radius_hertz"] / radii["radius_jkr"]) ** 2, "Hertz's contact area over JKR's")
+    ratio = pure((radii["radius_hertz"] / radii["radius_jkr"]) ** 2, "Hertz area over JKR area")
     share_observables(dataset.isel(t=[0]))  # where they are not known it says why
     lost = in_pieces(restricted(dataset, ["lost_to_bonds"]), ("t",), lambda piece: summary(charges(closed_only(piece))))
     return lost.merge(radii, compat="no_conflicts").assign(area_ratio_hertz=ratio)
@@ -791,7 +791,7 @@ def _settled(course: np.ndarray, drift: float, error: float, free: float, noisy:
         return Settlement("", mean, begin, end, between if between > 0.0 else math.nan)
     off = course > course.mean()
     if is_short or (not noisy and np.count_nonzero(off[1:] > off[:-1]) > 1):
-        return Settlement("too short to tell if it has settled", float(course.mean()), begin, end)
+        return Settlement("too short to show that it has settled", float(course.mean()), begin, end)
     return Settlement("not settled", end, begin, end)
 
 

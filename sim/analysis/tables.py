@@ -55,60 +55,60 @@ _COLUMNS = (
     _Column("stage_speed", "stage", changing=True, meaning="speed of the stage"),
     _Column("speed", "V"),
     _Column("normal_load", "P", changing=True),
-    _Column("displacement", "Δ", changing=True, meaning="displacement of the base, without one the indentation"),
+    _Column("displacement", "Δ", changing=True, meaning="displacement of the mount, or the indentation"),
     _Column("bond_fraction", "N/N0", 1.0),
     _Column("fluctuation_energy", "ΔΓ"),
-    _Column("edge_energy", "edge", meaning="energy of the fluctuations that new contact pays at its edge, dE/dA"),
+    _Column("edge_energy", "edge", meaning="fluctuation energy per unit of new contact area at the edge, dE/dA"),
     _Column("work_of_adhesion", "w", math.nan),
     _Column("contact_radius", "a", math.nan),
-    _Column("area_ratio", "A/A_JKR", meaning="contact area over that with the full work of adhesion"),
-    _Column("lost_to_bonds", "lost to\nbonds", meaning="share of A_JKR, bonds charged first"),
+    _Column("area_ratio", "A/A_JKR", meaning="contact area over the JKR area at the full work of adhesion"),
+    _Column("lost_to_bonds", "lost to\nbonds", meaning="share of A_JKR, with bonds subtracted first"),
     _Column(
         "lost_to_fluctuations",
         "lost to\nfluct.",
-        meaning="if adhesion pays for ΔΓ (shear.paid_by_adhesion); by the paper's strict balance there is no such loss",
+        meaning="depends on shear.paid_by_adhesion; the paper's strict energy balance has no such loss",
     ),
-    _Column("lost_to_fluctuations_first", "fluct.\nfirst", meaning="lost to fluctuations if charged before the bonds"),
+    _Column("lost_to_fluctuations_first", "fluct.\nfirst", meaning="lost to fluctuations if subtracted before bonds"),
     _Column("lost_to_mean_stress", "lost to\nstress"),
-    _Column("lost_to_lag", "lost to\nlag", meaning="by the edge's lag; negative where it retreats late"),
+    _Column("lost_to_lag", "lost to\nlag", meaning="by the lag of the edge; negative if the edge retreats late"),
     _Column("friction_force", "F"),
     _Column("fraction_detached", "open"),
-    _Column("fraction_masked", "masked", meaning="closed contacts without any work of adhesion left"),
+    _Column("fraction_masked", "masked", meaning="share of closed contacts without effective work of adhesion"),
     _Column("dissipated_energy", "W", changing=True, meaning="energy dissipated so far by opening and closing"),
 )
 
 _EVENTS = (
     _Column("time_masked", "masked,\nof the time"),
     _Column("ever_detached", "detached,\nof members"),
-    _Column("first_detachment", "first\ndetached", meaning="mean of those that did, at ends of clock steps"),
-    _Column("half_detached", "half\ndetached", math.nan, meaning="time by which half of the members did"),
-    _Column("detached_rate", "rate of\ndetaching", meaning="detached, per time in contact of all members"),
-    _Column("first_masked", "first\nmasked", meaning="mean of those that were"),
-    _Column("half_masked", "half\nmasked", math.nan, meaning="time by which half of the members were"),
-    _Column("loop_energy", "∮P dΔ,\nper cycle", meaning="work put in over a cycle"),
+    _Column("first_detachment", "first\ndetached", meaning="mean time of the first detachment, at ends of clock steps"),
+    _Column("half_detached", "half\ndetached", math.nan, meaning="time at which half of the members had detached"),
+    _Column("detached_rate", "rate of\ndetaching", meaning="detachments per time in contact, of all members"),
+    _Column("first_masked", "first\nmasked", meaning="mean time of the masked members"),
+    _Column("half_masked", "half\nmasked", math.nan, meaning="time at which half of the members had been masked"),
+    _Column("loop_energy", "∮P dΔ,\nper cycle", meaning="work done by the mount in a cycle"),
     _Column("loop_dissipation", "dissipated,\nper cycle"),
     _Column("total_dissipated", "dissipated,\nin all"),
     _Column("pull_off_load", "pull-off\nload"),
-    _Column("pull_off_time", "pull-off\nafter", math.nan, meaning="end of the clock step in which it comes off"),
+    _Column("pull_off_time", "pull-off\nafter", math.nan, meaning="end of the clock step with the pull-off"),
     _Column("peak_stress", "peak of\nstress"),
     _Column("peak_speed", "at V", math.nan),
     _Column("peak_time", "after", math.nan),
     _Column("peak_friction", "peak of\nfriction"),
     _Column("peak_friction_speed", "at V ", math.nan),
     _Column("peak_friction_time", "after ", math.nan),
-    _Column("static_threshold", "static\nthreshold", math.nan, meaning="largest friction force of a pull from rest"),
-    _Column("area_at_threshold", "A/A0\nthere", 1.0, meaning="contact area there over that at rest"),
-    _Column("slip_count", "slips", meaning="falls of the spring force by more than 0.3 of its largest so far"),
-    _Column("slips_from", "slips\nfrom", math.nan, meaning="speed of the stage at the first slip that another follows"),
-    _Column("slips_down_to", "slips\ndown to", math.nan, meaning="as it gets slower, at the last that follows another"),
+    _Column("static_threshold", "static\nthreshold", math.nan, meaning="largest friction after the start"),
+    _Column("area_at_threshold", "A/A0\nthere", 1.0, meaning="contact area at the threshold over the area at rest"),
+    _Column("slip_count", "slips", meaning="drops of the spring force by more than 0.3 of its maximum so far"),
+    _Column("slips_from", "slips\nfrom", math.nan, meaning="stage speed at the first slip event before another"),
+    _Column("slips_down_to", "slips\ndown to", math.nan, meaning="at decreasing speed: at the last after another"),
     _Column("ran_away", "ran away,\nof members"),
     _Column("runaway_after", "ran away\nafter", math.nan),
-    _Column("static_friction", "static\nfriction", math.nan, meaning="force as a slip or a runaway begins"),
-    _Column("kinetic_friction", "kinetic\nfriction", math.nan, meaning="work of the stage over its path"),
+    _Column("static_friction", "static\nfriction", math.nan, meaning="force at the start of a slip event or a runaway"),
+    _Column("kinetic_friction", "kinetic\nfriction", math.nan, meaning="work of the stage divided by its displacement"),
     _Column("force_drop", "drop", math.nan),
     _Column("stress_drop", "drop of\nstress", math.nan),
     _Column("slip_amplitude", "slip", math.nan),
-    _Column("slip_spread", "spread\nof slips", math.nan, meaning="standard deviation of slips over their mean"),
+    _Column("slip_spread", "spread\nof slips", math.nan, meaning="standard deviation of the slip over its mean"),
     _Column("slip_duration", "slip\nlasts", math.nan),
     _Column("stick_duration", "stick\nlasts", math.nan),
     _Column("recurrence_time", "slip\nevery", math.nan),
@@ -129,13 +129,13 @@ _LOSS = re.compile(r"((\w+?)_(?:at_(.+)_percent_lost|halfway_to_hertz))_mean")
 #: Headings of what is known where a share of the area is lost, and meanings.
 _LOSSES = {
     "speed": ("{long} at {V}", ""),
-    "steady_speed": ("{short}, if\nsteady, at {V}", "about the speed at which steady sliding loses as much"),
-    "lost_to_bonds": ("of {short}:\nbonds", "of that loss, charged first"),
-    "lost_to_fluctuations": ("of {short}:\nfluct.", "of that loss, charged after the bonds"),
-    "lost_to_fluctuations_first": ("of {short}:\nfluct. first", "of that loss, charged before the bonds"),
-    "lost_to_bonds_last": ("of {short}:\nbonds last", "of that loss, charged after the fluctuations"),
-    "lost_to_mean_stress": ("of {short}:\nstress", "of that loss"),
-    "lost_to_lag": ("of {short}:\nlag", "of that loss"),
+    "steady_speed": ("{short}, if\nsteady, at {V}", "about the speed of the same loss in steady sliding"),
+    "lost_to_bonds": ("of {short}:\nbonds", "share of that loss, subtracted first"),
+    "lost_to_fluctuations": ("of {short}:\nfluct.", "share of that loss, subtracted after the bonds"),
+    "lost_to_fluctuations_first": ("of {short}:\nfluct. first", "share of that loss, subtracted before the bonds"),
+    "lost_to_bonds_last": ("of {short}:\nbonds last", "share of that loss, subtracted after the fluctuations"),
+    "lost_to_mean_stress": ("of {short}:\nstress", "share of that loss"),
+    "lost_to_lag": ("of {short}:\nlag", "share of that loss"),
 }
 
 #: Heading and meaning of the correlation time.
@@ -209,22 +209,22 @@ def notes(
     one_row_each, points = _has_one_row_each(dataset), dataset["contact_modulus"].size
     phrases = [words] if (words := averaging(dataset, one_row_each)) else []
     if "runaway_time" in dataset and (gone := int(dataset["runaway_time"].isel(t=-1).notnull().sum())):
-        why = "nothing held the body"
+        why = "the slider lost stability"
         if "stage_speed" in dataset:
-            why = 'the interface let go faster than it is followed; give drive.viscosity or contact_stiffness = "rigid"'
+            why = 'a slip was too fast to resolve; set drive.viscosity, or contact_stiffness = "rigid"'
         phrases.append(f"{gone} of {dataset['runaway_time'].isel(t=-1).size} trajectories end in a runaway: {why}")
     if any("(" in cell for row in rows for cell in row.values()):
-        phrases.append("in brackets the standard error in the last digits, wider where members are few")
+        phrases.append("brackets: standard error in the last digits, larger if there are few members")
     if any(" to " in cell for row in (*rows, *once) for cell in row.values() if "(" in cell):
-        phrases.append("near 0 and 100 % the 95 % interval")
+        phrases.append("near 0 and 100 %: 95 % interval")
     lines = ["; ".join(phrases)] if phrases else []
     for shown, total in ((rows, points if one_row_each else points * dataset.sizes["t"]), (once, points)):
         if 0 < len(shown) < total:
-            lines.append(f"{len(shown)} of {total} rows shown; all: --all, or --csv FILE; chosen: --where KEY=VALUE")
+            lines.append(f"{len(shown)} of {total} rows shown; see --all, --csv FILE and --where KEY=VALUE")
     headings = {re.sub(r"[ \n]\([^()]*\)$", "", heading) for row in (*rows[:1], *once[:1]) for heading in row}
     with contextlib.suppress(KeyError, TypeError):  # not of every dataset; none where all was recorded
         recorded = ", ".join(resolved(dataset, "record.quantities")) or "contact_radius alone"
-        lines.append(f"columns of what was not recorded are left out; record.quantities keeps {recorded}")
+        lines.append(f"no columns for quantities that were not recorded; record.quantities has {recorded}")
     columns = (*_COLUMNS, *_EVENTS, *_of_losses(stated or xr.Dataset()))
     headed = {c.name: " ".join(c.heading.split()) for c in columns}
     for reason, names in reasons(stated or xr.Dataset()).items():
@@ -235,7 +235,7 @@ def notes(
     known = [c for c in (*_COLUMNS, _MEMORY, *_EVENTS) if c.meaning and c.heading in headings]
     if _spreads(dataset):
         over = averaging(dataset, True).removeprefix("mean over the ")
-        lines.append(f"by quantity: over the {over}; free values: independent ones that tell as much of the mean")
+        lines.append(f"by quantity: over the {over}; free values: the effective number of independent values")
     words = "; ".join(f"{' '.join(column.heading.split())}: {column.meaning}" for column in known)
     return [*dict.fromkeys(lines), *filter(None, [words])]
 

@@ -49,7 +49,7 @@ _STATISTICS = {
     "sem": "standard error of the ensemble mean of",
 }
 #: Statistic of quantities of the whole run, which members may lack.
-_COUNT = {"count": "number of members that have a"}
+_COUNT = {"count": "number of members with a"}
 
 
 #: Statistics of the members' means over the second half of the run, and of their drift: of the last quarter less that
@@ -326,7 +326,7 @@ def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:
 def _add_late(content: Outline, recorded: Variable) -> None:
     """Add statistics of the members' means over the second half of the run."""
     content.sizes["late"] = len(LATE)
-    text = "statistic of the members' means over the second half of the run, and of their drift over it"
+    text = "statistic of the members' means over the second half of the run, and of their drift"
     content.add("late", str, ("late",), "", text, "", np.array(LATE, object))
     about = recorded.unit, f"over the second half of the run: {recorded.long_name}", recorded.symbol
     content.add(f"late_{recorded.name}", "f8", (*content.sweep, "late"), *about)

@@ -168,8 +168,8 @@ def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
         texts.append(f"the cell makes A/A_JKR up to {size} (at {at}): {keys}")
     if plan.scenario.record.per_member is None and not plan.per_member:
         texts.append(
-            "every member would make a file of more than 20 GB: mean, spread and standard error are kept alone"
-            " (record.per_member = true keeps every member)"
+            "a file with every member would exceed 20 GB: only mean, spread and standard error are recorded"
+            " (record.per_member = true records every member)"
         )
     return texts
 
@@ -195,7 +195,7 @@ def diagnosis(plan: Plan) -> list[str]:
         texts = [*_fluctuating(point, where), *_mechanisms(point, time, speed, at)]
     if shown := list(sensitivities(point, float(time[0, 0]), float(speed[0, 0])).items())[:_KEYS]:
         words = [f"{key} {area:+.2g}" + f"/{force:+.2g}" * bool(force) for key, (area, force) in shown]
-        texts.append(f"area/friction change by these % for 1 % more of a key, at {at}: {', '.join(words)}")
+        texts.append(f"area/friction change (%) for 1 % more of a key, at {at}: {', '.join(words)}")
     return [*texts, *_lagging(point)]
 
 
@@ -220,7 +220,7 @@ def _fluctuating(point: Scenario, where: str) -> Iterator[str]:
         times = plane_energy(spectrum, 1.0, 0.5) / plane_energy(band, 1.0, 0.5)
         yield (
             f"shear.spectrum.length is a correlation length: wavelengths from {engineering(short, 'm')} to"
-            f" {engineering(long, 'm')} with the same rms store {times:.2g} times less"
+            f" {engineering(long, 'm')} with the same rms store {times:.2g} times less energy"
         )
 
 
@@ -231,7 +231,7 @@ def _mechanisms(point: Scenario, time: Array, speed: Array, at: str) -> Iterator
     rest, bonds, waves, both = (100.0 * float(_areas(scene, time, speed, stored)[0, 0]) for scene, stored in scenes)
     if bonds > both:
         first = f"bonds take {rest - bonds:.2g} points, fluctuations {bonds - both:.2g}"
-        other = f" ({waves - both:.2g} and {rest - waves:.2g} if fluctuations are charged first)"
+        other = f" ({waves - both:.2g} and {rest - waves:.2g} if fluctuations are subtracted first)"
         yield f"the mean A/A_JKR at {at} is {both:.3g} %: {first}{other if bonds < rest else ''}"
         yield f"by the paper's strict balance (shear.paid_by_adhesion = 0) fluctuations take none: {bonds:.3g} %"
 
@@ -322,6 +322,6 @@ def _outside(point: Scenario) -> Iterator[str]:
             worst = int(np.nanargmax(needed / own))
             high, low = (engineering(float(values[worst]), "N/m") for values in (needed, own))
             yield (
-                f"your rig is outside the model of a rigid slider: at {engineering(float(speeds[worst]), 'm/s')} stable"
-                f" sliding needs {high}, and the contact itself has {low}, so that the half-space would oscillate"
+                f"the model of a rigid slider does not hold: at {engineering(float(speeds[worst]), 'm/s')} stable"
+                f" sliding needs {high}, but the stiffness of the contact is {low}, so the half-space would oscillate"
             )

@@ -157,12 +157,12 @@ def compute(
             _last.__dict__.update(before)  # of a run whose ``progress`` runs this one
     for chain in chains:
         if chain.fault:
-            chain.fault.add_note(f"in {chain.task}; all other blocks are kept, --resume tries these again")
+            chain.fault.add_note(f"in {chain.task}; all other blocks are kept; --resume repeats these")
             raise chain.fault
     if lost := [chain for chain in chains if chain.broken == _TRIES]:
         names = "; ".join(str(chain.task) for chain in lost)
-        cure = "the likely reason is too little memory; all other blocks are kept, --resume tries these again"
-        raise WorkerDied(f"given up after processes died again and again: {names}; {cure}")
+        cure = "the likely reason is too little memory; all other blocks are kept; --resume repeats these"
+        raise WorkerDied(f"stopped after repeated crashes of processes: {names}; {cure}")
 
 
 def _work_off(
@@ -243,7 +243,7 @@ def _block(
 ) -> tuple[Arrays, Arrays] | None:  # fmt: skip
     """Compute a block in a worker and save it, or return it if there is no store."""
     if code != _code():
-        raise BadInput(["a worker has another version of sim, numpy, scipy or numba; install the same"])
+        raise BadInput(["a worker has another version of sim, numpy, scipy or numba; install the same versions"])
     group: _Group | None = _last.__dict__.pop("group", None)
     if group is None or group.key != key:
         group = _Group(key, pickle.loads(task) if isinstance(task, bytes) else task)
@@ -331,8 +331,8 @@ def _cluster(address: str) -> Iterator[_Team]:
         resolve_address(address)  # a client that fails at it is not closed within its patience
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as trouble:
-        raise WorkerDied(f"no scheduler of dask answers at {address}: {trouble}") from None
-    lost = WorkerDied(f"the scheduler at {address} went away; what is computed is kept")
+        raise WorkerDied(f"no dask scheduler answers at {address}: {trouble}") from None
+    lost = WorkerDied(f"the scheduler at {address} does not answer any more; the results so far are kept")
 
     def room() -> int:
         try:

@@ -174,9 +174,9 @@ def fitting(plan: Plan, jobs: int, most: float = math.inf, in_memory: bool = Fal
     for count in range(jobs, 0, -1):
         if memory(plan, count) + dataset <= limit:
             return count
-    cure = "fewer modes, maps, records or points of a sweep take less (see `sim check`)"
+    cure = "reduce modes, maps, records or points of a sweep (see `sim check`)"
     needed = size(memory(plan, 1) + dataset)
-    raise NoRoom(f"the run takes {needed} of memory at least, of which {size(limit)} {source}; {cure}")
+    raise NoRoom(f"the run needs at least {needed} of memory, but {size(limit)} {source}; {cure}")
 
 
 def refuse_full_disk(plan: Plan, target: Path, shares: int = 1) -> None:
@@ -192,8 +192,8 @@ def refuse_full_disk(plan: Plan, target: Path, shares: int = 1) -> None:
     parts = Path(f"{target}.parts")  # of an unfinished run
     free += sum(path.stat().st_size for path in parts.iterdir() if path.is_file()) if parts.is_dir() else 0.0
     if needed > free:
-        text = f"parts and dataset take {size(needed)} until they are one file, of which {size(free)} are free"
-        raise StoreTrouble(f"{folder}: {text}; fewer members, records or maps take less, as do pooled statistics")
+        text = f"parts and dataset need {size(needed)} until they are merged, but {size(free)} are free"
+        raise StoreTrouble(f"{folder}: {text}; reduce members, records or maps, or record statistics only")
 
 
 def size(count: float) -> str:
@@ -227,9 +227,9 @@ def processes(
     """
     wanted, lines = jobs or usual_jobs(plan), list[str]()
     if (jobs := fitting(plan, wanted, most)) < wanted:
-        lines.append(f"note: there is memory for {jobs} of {wanted} processes")
+        lines.append(f"note: the memory is enough for {jobs} of {wanted} processes")
     if not tabulated(plan):
-        lines.append("note: of so large a dataset `sim stats` prints the table")
+        lines.append("note: the dataset is large; `sim stats` prints its table")
     left = 1.0 - sum(task.done(parts) for task in plan.share(*shard)) / work(plan, *shard) if parts else 1.0
     if jobs > 1 or left * counted(plan) > _LONG:
         needs = forecast(plan, jobs, tried(plan, compiling=True) or 1.0, shard[1], left)
@@ -288,8 +288,8 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
 
 def _times(needs: Forecast, jobs: int, compiled: bool = True) -> str:
     """Return CPU time and time by the clock as text."""
-    clock = f", {duration(needs.clock)} by the clock in {jobs} processes" if jobs > 1 else ""
-    compiling = "" if compiled else " by rough costs, and up to half a minute to compile, once"
+    clock = f", {duration(needs.clock)} of wall time in {jobs} processes" if jobs > 1 else ""
+    compiling = "" if compiled else " (rough estimate), and once up to half a minute to compile"
     return f"about {duration(needs.cpu)} of CPU time{clock}{compiling}"
 
 
@@ -338,7 +338,7 @@ def _span(values: Sequence[float], unit: str = "", digits: str = ".4g") -> str:
 def _models(plan: Plan) -> Rows:
     """Return the model of each part, its origin, and its description."""
     source = plan.scenario.origin
-    origins = dict.fromkeys(Parts._fields, "left out, so the simplest" if source.text else "given")
+    origins = dict.fromkeys(Parts._fields, "omitted: the simplest" if source.text else "given")
     origins |= dict.fromkeys(tomllib.loads(source.text.removeprefix("\ufeff").replace("\r\n", "\n")), "in the file")
     origins |= {key.partition(".")[0]: "changed by an override" for key in source.overrides}
     origins |= {key: "swept" for axis in plan.scenario.sweep for key in axis.keys}
@@ -353,7 +353,7 @@ def _models(plan: Plan) -> Rows:
                 models[chosen] = ("", chosen, "chosen", point.why[name])
         rows += models.values()
     differ = ", ".join(name for name in Parts._fields if any(point.varies[name] for point in plan.points))
-    text = f"differ in {differ}" if differ else "differ in nothing, so one is computed for all"
+    text = f"differ in {differ}" if differ else "are identical, so one is computed for all"
     return [*rows, ("members", str(plan.scenario.ensemble.members), text)]
 
 
@@ -468,7 +468,7 @@ def _slider(points: Sequence[Scenario]) -> Rows:
         at = f"at {speeds[worst]:.3g} m/s, with {alone.frequency[worst] / (2.0 * math.pi):.3g} Hz"
         rows.setdefault(("oscillates below", f"N/m of the spring, {at}"), []).append(float(alone.stiffness[worst]))
         if bonds.stretched:
-            text = "N/m of the spring; 0: never, inf: behind any"
+            text = "N/m of the spring; 0: never, inf: with any spring"
             stiffness = float(np.nanmax([0.0, *delayed.stiffness]))
             rows.setdefault(("with mass, damping, viscosity, k_t", text), []).append(stiffness)
     return [(name, f"{_span(values)} {text}") for (name, text), values in rows.items()]
@@ -488,7 +488,7 @@ def _lacking(plan: Plan) -> list[str]:
 def _run(plan: Plan) -> Rows:
     """Return the size of a run: steps, members, time, memory and file."""
     scene, clock, jobs = plan.scenario, plan.points[0].clock, usual_jobs(plan)
-    alike = ", all alike, so one is computed" if scene.ensemble.members > plan.members else ""
+    alike = ", all identical, so one is computed" if scene.ensemble.members > plan.members else ""
     rows: Rows = [("time", f"{clock.steps:,} step{'s' if clock.steps > 1 else ''}, {clock.records:,} records")]
     rows.append(("members", f"{scene.ensemble.members:,}{alike}"))
     if scene.sweep:
@@ -502,5 +502,5 @@ def _run(plan: Plan) -> Rows:
         ("work", f"{work(plan):,} member-steps, {_times(needs, jobs, pace is not None)}"),
         ("memory", f"about {size(needs.memory)}{', all processes together' if jobs > 1 else ''}"),
         ("file", f"about {size(needs.file)}{before}"),
-        ("disk", f"about {size(needs.disk)} while it is made"),
+        ("disk", f"about {size(needs.disk)} during the run"),
     ]

@@ -119,7 +119,7 @@ def run(
     claim(Path(to), replace or resume, files_read(scenario), BESIDE)
     target = Path(to).resolve() if Path(to).is_symlink() else Path(to)
     if target.exists() and not target.is_file():
-        raise OutputExists(f"{target} is no plain file; name another output")
+        raise OutputExists(f"{target} is not a regular file; name another output")
     with explained(target.parent):
         target.parent.mkdir(parents=True, exist_ok=True)
     if replace or not target.exists():
@@ -130,7 +130,7 @@ def run(
             is_done = _run(plan, target, shard, resume, replace, stage, how)
             resume, replace = True, False  # of another run that published meanwhile
     except DiskFull as trouble:
-        raise DiskFull(f"{trouble}; make room, and the same command with --resume goes on") from trouble
+        raise DiskFull(f"{trouble}; free some space and repeat the command with --resume") from trouble
     return target
 
 
@@ -165,7 +165,7 @@ def _run(
     is_done = folder.publish(names, of, lambda path: write(outline(plan, folder.blocks), folder.blocks, path))
     if is_done is False and shard == WHOLE:
         shards = ", ".join(f"{number}/{of}" for number in busy) or "some"
-        raise OutputBusy(f"other processes run the shards {shards} of {target}; when they are done, --resume goes on")
+        raise OutputBusy(f"other processes run the shards {shards} of {target}; continue with --resume after them")
     return is_done is not None
 
 
@@ -190,7 +190,7 @@ def simulate(
                 missing.append((task, lacking))
     compute(advance, blocks, missing, progress, stop, jobs, scheduler)
     if any(name not in blocks for task, _ in missing for name in task.names):
-        raise Stopped("stopped; what was computed is kept")
+        raise Stopped("stopped; the results so far are kept")
 
 
 def advance(task: Task, number: int, state: State | None) -> tuple[State, Arrays]:
@@ -297,7 +297,7 @@ def log(target: Path, began: float, stages: dict[str, float]) -> None:
     path = target.with_name(f"{target.name}.log")
     try:
         if path.is_symlink() or (path.exists() and not path.is_file()):
-            raise StoreTrouble("it is no plain file")
+            raise StoreTrouble("it is not a regular file")
         with explained(target.parent), path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(entry) + "\n")
     except StoreTrouble as trouble:

@@ -83,7 +83,7 @@ class MemoryBlocks(dict[str, Arrays]):
         return self[name]
 
     def state(self, name: str) -> Arrays:
-        raise KeyError(f"{name} was kept without its state")
+        raise KeyError(f"{name} was stored without its state")
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ class BlockFiles:
                     raise ValueError("another run or another process wrote it")
                 return content
         except Exception as trouble:  # a damaged file raises whatever its reader meets
-            cure = "go on with --resume, which computes it anew"
+            cure = "continue with --resume, which computes it again"
             raise StoreTrouble(f"{self.path(name)} is damaged; {cure}") from trouble
 
 
@@ -192,7 +192,7 @@ class Unfinished:
                 refuse_other(self.target, finished, self.run)
             joins = shard != WHOLE and older and not _changed(older, manifest)
             if older and not (resume or replace or (joins and not any(name in self.blocks for name in names))):
-                cure = "go on with --resume, or begin anew with --force"
+                cure = "continue with --resume, or start again with --force"
                 raise OutputExists(f"{self.folder} holds an unfinished run; {cure}")
             if exists and finished != self.run and not (replace or older.get("replace")):
                 raise OutputExists(f"{self.target} exists; replace it with --force or name another output")
@@ -236,12 +236,12 @@ class Unfinished:
             with explained(self.folder), whole(dataset) as aside:
                 write(aside)
             if self.target.exists() and not manifest["replace"] and self.read(self.target) != self.run:
-                cure = "move it away, and the same command with --resume goes on"
-                raise OutputExists(f"{self.target} has come during the run, which does not replace it: {cure}")
+                cure = "move it away and repeat the command with --resume"
+                raise OutputExists(f"{self.target} appeared during the run and is not replaced: {cure}")
             try:
                 move(dataset, self.target)
             except StoreTrouble as trouble:
-                cure = "then the same command with --resume puts the output there"
+                cure = "then repeat the command with --resume to write the output"
                 raise StoreTrouble(f"{trouble}; {cure}") from trouble
             with contextlib.suppress(OSError):  # the output is there
                 self._clean()
@@ -361,14 +361,14 @@ def refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
     if "version.sim" in changed:
         version = _short(changed["version.sim"][0])
         if changed["version.sim"][0] is None:
-            fault = "is no netCDF file, is cut short or damaged, or was not written by `sim run`"
+            fault = "is not a netCDF file, is truncated or damaged, or was not written by `sim run`"
             raise BadInput([f"{path}: {fault}; move it away, or replace it with --force"])
-        raise BadInput([f"{path} was made by sim {version}: finish it there, or move it away and run anew"])
+        raise BadInput([f"{path} was made by sim {version}: finish it by that version, or move it and run again"])
     if changed:
         some = [f"{key} was {_short(was)}, is {_short(now)}" for key, (was, now) in changed.items()]
         more = f" and {len(some) - _MOST_NAMED} more" if len(some) > _MOST_NAMED else ""
-        cure = "run what was begun, or begin anew with --force"
-        raise BadInput([f"{path} is of another run: {'; '.join(some[:_MOST_NAMED])}{more}; {cure}"])
+        cure = "run the original scenario, or start again with --force"
+        raise BadInput([f"{path} belongs to another run: {'; '.join(some[:_MOST_NAMED])}{more}; {cure}"])
 
 
 def _changed(older: Manifest, wanted: Manifest) -> dict[str, tuple[Any, Any]]:

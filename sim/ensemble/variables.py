@@ -183,30 +183,30 @@ def _event(
 
 
 _TOGETHER: Any = (
-    lambda scene: scene.varies["bonds"] == scene.varies["contact"], "members with a stress of their own, or one area",
+    lambda scene: scene.varies["bonds"] == scene.varies["contact"], "members with different stresses, or one area",
 )  # fmt: skip
 _CHANGES: Any = (lambda scene: scene.contact.makes_load, "a load that changes")
 _EVENTS = (
-    _event("peak_stress", "Pa", "largest magnitude of the mean shear stress of the run, that of the highest start;"
-           " open contacts count", "tau_p", "stress", _column("largest")),
+    _event("peak_stress", "Pa", "largest magnitude of the mean shear stress of the run, of the highest start;"
+           " open contacts included", "tau_p", "stress", _column("largest")),
     _event("peak_time", "s", "time of the largest shear stress", "t_p", "stress", _column("time")),
     _event("peak_speed", "m/s", "sliding speed at the largest shear stress", "", "stress", _column("speed")),
     _event("peak_area", "m^2", "contact area at the largest shear stress", "", "stress", _column("area"), *_TOGETHER),
-    _event("peak_friction", "N", "largest magnitude of the friction force of the run, that of the highest start",
+    _event("peak_friction", "N", "largest magnitude of the friction force of the run, of the highest start",
            "F_p", "friction", _column("largest")),
     _event("peak_friction_time", "s", "time of the largest friction force", "", "friction", _column("time")),
     _event("peak_friction_speed", "m/s", "sliding speed at the largest friction force", "", "friction",
            _column("speed")),
     _event("peak_friction_area", "m^2", "contact area at the largest friction force", "", "friction", _column("area")),
-    _event("pull_off_load", "N", "lowest normal load that the contact bore, a tension; nan without one", "P_min",
+    _event("pull_off_load", "N", "lowest normal load of the contact, a tension; nan without tension", "P_min",
            "pull", lambda scene, rows: -1.0 * _pull("largest", rows), *_CHANGES),
     _event("pull_off_time", "s", "time of the lowest normal load", "t_min", "pull",
            lambda scene, rows: _pull("time", rows), *_CHANGES),
     _event("pull_off_displacement", "m", "displacement of the mount at the lowest normal load", "", "pull", _displaced,
            *_CHANGES),
-    _event("first_detachment", "s", "time of the first detachment; nan without one", "t_d", "opening",
+    _event("first_detachment", "s", "time of the first detachment; nan if there is none", "t_d", "opening",
            lambda scene, rows: rows["opening"]),
-    _event("first_closing", "s", "time at which an open contact first closes; nan if none does", "", "closing",
+    _event("first_closing", "s", "time at which an open contact first closes; nan if there is none", "", "closing",
            lambda scene, rows: rows["closing"]),
 )  # fmt: skip
 #: Quantities of a whole run, read at its end.
@@ -218,33 +218,33 @@ LARGEST: tuple[Variable, ...] = (
     Variable("closing_load", "N", "normal load after the first closing", "", "contact", _at_closing("normal_load")),
     Variable("first_masked", "s", "time at which the contact is first masked; nan if it never is", "", "contact",
              _of_contact("masked")),
-    Variable("time_masked", "1", "share of the time closed in which the contact is masked", "", "contact",
+    Variable("time_masked", "1", "share of the closed time in which the contact is masked", "", "contact",
              _masked_share),
-    Variable("runaway_force", "N", "force at the time at which the slider lost stability; nan if it never did", "",
+    Variable("runaway_force", "N", "force at which the slider lost stability; nan if it never did", "",
              "drive", _runaway_force, lambda scene: scene.drive.solves_motion, 'drive.model = "spring" or "force"'),
-    Variable("step_renewal", "1", "largest share of the variance of DeltaGamma that a clock step renews", "", "drive",
+    Variable("step_renewal", "1", "largest share of the variance of DeltaGamma renewed in a clock step", "", "drive",
           lambda scene, state: renewed(scene, state.events.path),
           lambda scene: scene.feels_steps, "an edge that lags, or tension"),
-    Variable("pull_off_error", "N", "systematic error of the load at pull-off by the clock step, at most about", "",
+    Variable("pull_off_error", "N", "approximate systematic error of the pull-off load by the clock step", "",
           "drive", lambda scene, state: pull_off_error(scene, state.events.path),
           lambda scene: scene.feels_steps and pulled(scene) and scene.contact.load is not None,
-          "fluctuations, and a contact.load that pulls"),
+          "fluctuations, and a negative contact.load"),
 )  # fmt: skip
 
 #: Columns of slip events and moments of late ones: unit, meaning, symbol.
 _SLIPS = {
-    "time": ("s", "time at which a slip event begins, that of the largest spring force", "t_s"),
-    "end": ("s", "time at which a slip event ends, that of the least spring force", ""),
+    "time": ("s", "time at which a slip event begins, at the largest spring force", "t_s"),
+    "end": ("s", "time at which a slip event ends, at the smallest spring force", ""),
     "amplitude": ("m", "displacement of the slider in a slip event", "S"),
-    "speed": ("m/s", "speed of the stage at which a slip event begins", ""),
-    "force_before": ("N", "spring force at which a slip event begins, in the sense of the stage", "Q_s"),
-    "force_after": ("N", "spring force at the end of a slip event, in the sense of the stage", ""),
-    "stress_before": ("Pa", "largest shear stress from the slip event before to this one", ""),
-    "stress_after": ("Pa", "least shear stress in a slip event", ""),
-    "force_drop": ("N", "fall of the spring force in a slip event", ""),
-    "recurrence": ("s", "time from the beginning of a slip event to that of the next", ""),
+    "speed": ("m/s", "speed of the stage at the start of a slip event", ""),
+    "force_before": ("N", "spring force at the start of a slip event, positive along the stage motion", "Q_s"),
+    "force_after": ("N", "spring force at the end of a slip event, positive along the stage motion", ""),
+    "stress_before": ("Pa", "largest shear stress since the previous slip event", ""),
+    "stress_after": ("Pa", "smallest shear stress in a slip event", ""),
+    "force_drop": ("N", "drop of the spring force in a slip event", ""),
+    "recurrence": ("s", "time from the start of a slip event to the start of the next one", ""),
 }
-_MOMENTS = {"mean": "mean", "std": "standard deviation", "least": "least", "largest": "largest"}
+_MOMENTS = {"mean": "mean", "std": "standard deviation", "least": "smallest", "largest": "largest"}
 
 
 def _slip(name: str, described: tuple[str, str, str], read: Callable[[Slips], Any], axis: str = "") -> Variable:
@@ -276,22 +276,22 @@ LARGEST += (
                                       f" run: {_SLIPS[name][1]}", ""), _late(name, moment))
       for name in LATE for moment, text in _MOMENTS.items()),
     _slip("kinetic_friction", ("N", "work of the stage over its path, from the first slip event in the second half of"
-          " the run to the last; without two over the second half", "F_k"), Slips.kinetic_friction),
+          " the run to the last; with fewer than two, over the whole second half", "F_k"), Slips.kinetic_friction),
 )  # fmt: skip
 
 VARIABLES: tuple[Variable, ...] = (
     Variable("speed", "m/s", "sliding speed", "V", "drive", lambda scene, course: course.speed),
     Variable("slider_position", "m", "displacement of the slider", "X", "drive",
           lambda scene, course: course.position),
-    Variable("bond_fraction", "1", "bonds over bonds at rest", "N/N_0", "bonds",
+    Variable("bond_fraction", "1", "number of bonds over that at rest", "N/N_0", "bonds",
           lambda scene, course: course.fraction),
     Variable("shear_stress", "Pa", "mean shear stress at the interface", "tau_0", "bonds",
           lambda scene, course: course.stress),
     Variable("fluctuation_energy", "J/m^2", "elastic energy of the shear-stress fluctuations per area",
           "DeltaGamma", "shear", _stored),
-    Variable("edge_energy", "J/m^2", "energy of the fluctuations that a unit of new contact pays at the edge of the"
+    Variable("edge_energy", "J/m^2", "fluctuation energy per unit of new contact area at the edge of the"
           " disc", "dE/dA", "contact", _edge, lambda scene: scene.margin is not None, 'shear.contact = "disc"'),
-    Variable("work_of_adhesion", "J/m^2", "work of adhesion left to the contact", "w", "contact",
+    Variable("work_of_adhesion", "J/m^2", "effective work of adhesion", "w", "contact",
           _until_stopped(lambda scene, course: course.work)),
     Variable("contact_radius", "m", "contact radius", "a", "contact", _until_stopped(_radius)),
     Variable("contact_area", "m^2", "contact area", "A", "contact", _until_stopped(_area)),
@@ -299,35 +299,35 @@ VARIABLES: tuple[Variable, ...] = (
           _until_stopped(lambda scene, course: _control(scene, course).normal_load(course.radius, scene.bodies))),
     Variable("indentation", "m", "indentation of the sphere", "delta", "contact",
           _until_stopped(lambda scene, course: _control(scene, course).indentation(course.radius, scene.bodies))),
-    Variable("displacement", "m", "displacement of what holds the sphere", "Delta", "contact",
+    Variable("displacement", "m", "displacement of the mount", "Delta", "contact",
           _until_stopped(lambda scene, course: _control(scene, course).displacement(course.radius, scene.bodies))),
     Variable("friction_force", "N", "friction force, shear stress times contact area", "F", "contact",
           _until_stopped(lambda scene, course: course.stress * _area(scene, course))),
-    Variable("in_contact", "1", "whether the contact is closed", "", "contact",
+    Variable("in_contact", "1", "1 if the contact is closed", "", "contact",
           lambda scene, course: (course.radius > 0.0).astype(float)),
-    Variable("masked", "1", "whether no work of adhesion is left, so that the contact is Hertz's", "", "contact",
+    Variable("masked", "1", "1 if the effective work of adhesion is not positive (a Hertz contact)", "", "contact",
           lambda scene, course: ((course.work <= 0.0) & (course.radius > 0.0)).astype(float)),
     Variable("detachment_time", "s", "time of the last detachment", "t_d", "contact",
           lambda scene, course: course.detached),
     Variable("dissipated_energy", "J", "energy dissipated by the edge and the jumps of the contact", "W", "contact",
           lambda scene, course: course.dissipated),
-    Variable("jkr_radius", "m", "radius in equilibrium with the full work of adhesion, under the same control and rule"
+    Variable("jkr_radius", "m", "equilibrium radius at the full work of adhesion, with the same mount and rule"
           " after pull-off; 0 while that contact is open", "a_JKR", "control",
           lambda scene, course: _with_work(scene, course, JKR, np.full(course.time.shape, scene.adhesion.work))),
-    Variable("hertz_radius", "m", "radius without adhesion, under the same control; 0 where nothing presses", "a_H",
+    Variable("hertz_radius", "m", "radius without adhesion, with the same mount; 0 without compression", "a_H",
           "control", lambda scene, course: np.nan_to_num(
               _control(scene, course).radius(np.zeros(1), np.zeros(1), 0.0, scene.bodies))),
-    Variable("bonds_radius", "m", "radius in equilibrium with the work of adhesion of the bonds alone, under the same"
-          " control and rule after pull-off; 0 while that contact is open", "a_b", "bonds",
+    Variable("bonds_radius", "m", "equilibrium radius at the work of adhesion of the bonds alone, with the same"
+          " mount and rule after pull-off; 0 while that contact is open", "a_b", "bonds",
           lambda scene, course: _with_work(scene, course, BONDS_ONLY, _terms(scene, course).bonded)),
-    Variable("fluctuations_radius", "m", "radius in equilibrium with the work of adhesion that fluctuations leave"
-          " before the mean stress takes its share, under the same control and rule after pull-off; 0 while that"
+    Variable("fluctuations_radius", "m", "equilibrium radius at the work of adhesion after the fluctuations and"
+          " before the mean stress, with the same mount and rule after pull-off; 0 while that"
           " contact is open", "a_f", "contact", _stressless_radius,
           lambda scene: scene.contact.reversible > 0.0, "contact.reversible above 0"),
-    Variable("equilibrium_radius", "m", "radius in equilibrium with the work of adhesion left, under the same control"
+    Variable("equilibrium_radius", "m", "equilibrium radius at the effective work of adhesion, with the same mount"
           " and rule after pull-off; 0 while that contact is open", "a_e", "contact", _equilibrium_radius,
           lambda scene: scene.contact.lags, 'contact.model = "rate_dependent"'),
-    Variable("applied_load", "N", "load applied to the sphere, in contact or not", "P_a", "control", _applied_load,
+    Variable("applied_load", "N", "load applied to the sphere, in contact or open", "P_a", "control", _applied_load,
           lambda scene: scene.contact.load is not None and scene.contact.changes, "a contact.load that changes"),
 )  # fmt: skip
 
@@ -344,19 +344,19 @@ def _driven(name: str, unit: str, long_name: str, symbol: str) -> Variable:
 VARIABLES += (
     _driven("stage_position", "m", "displacement of the stage", "X_s"),
     _driven("stage_speed", "m/s", "speed of the stage", "V_s"),
-    _driven("spring_force", "N", "force of the spring on the body, or that prescribed", "Q"),
-    _driven("drive_work", "J", "work of the stage, or of the force", "W_d"),
+    _driven("spring_force", "N", "force of the spring on the body, or the prescribed force", "Q"),
+    _driven("drive_work", "J", "work of the stage or of the prescribed force", "W_d"),
     _driven("stored_energy", "J", "energy of spring, mass, yielding contact and bonds", "U"),
     _driven("dissipated_by_damping", "J", "energy dissipated by the damping of the body", "W_c"),
     _driven("dissipated_by_viscosity", "J", "energy dissipated by the viscosity of the interface", "W_v"),
-    _driven("dissipated_by_rupture", "J", "energy that bonds lose as they break and are made", "W_b"),
-    _driven("dissipated_by_snaps", "J", "energy that slips without duration take beside that of their bonds:"
-            " avalanches, and where the force jumps", "W_s"),
-    _driven("dissipated_by_area", "J", "energy stored in what the area loses less that in what it gains", "W_A"),
-    _driven("energy_residual", "J", "work of the drive less the rise of the energy stored and all that is dissipated",
+    _driven("dissipated_by_rupture", "J", "energy dissipated as bonds break and form", "W_b"),
+    _driven("dissipated_by_snaps", "J", "energy dissipated in instantaneous slips, except that of the bonds:"
+            " avalanches and jumps of the force", "W_s"),
+    _driven("dissipated_by_area", "J", "stored energy of the area that is lost, minus that of the area gained", "W_A"),
+    _driven("energy_residual", "J", "work of the drive minus the increase of stored energy and the dissipated energy",
             "W_0"),
     _driven("substeps", "1", "number of sub-steps since the start", ""),
-    _driven("runaway_time", "s", "time at which nothing held the body any longer", "t_r"),
+    _driven("runaway_time", "s", "time at which the slider lost stability", "t_r"),
 )  # fmt: skip
 
 #: Numbers of a scene, written for each point of the sweep.
@@ -366,7 +366,7 @@ NUMBERS = (
           lambda scene: scene.solid.effective[0]),
     Variable("effective_poisson_ratio", "1", "Poisson ratio of the tangential compliance", "nu", "",
           lambda scene: scene.solid.effective[1]),
-    Variable("has_noise", "1", "whether something in the scene is random, so that members differ by chance", "", "",
+    Variable("has_noise", "1", "1 if the scenario has random parts, so that members differ", "", "",
           lambda scene: float(scene.is_random)),
     Variable("radius_at_rest", "m", "JKR radius at the full work of adhesion", "a_0", "",
           lambda scene: scene.rest_radius),
@@ -379,16 +379,16 @@ NUMBERS = (
 
 #: Long names of what a process knows of its errors and spreads before the run, all relative but for two counts.
 KNOWN_ERRORS = {
-    "cell_error_variance": "error of the cell's variance of the stress against the infinite plane's",
-    "cell_error_energy": "error of the cell's mean fluctuation energy against the infinite plane's",
-    "member_spread_variance": "standard deviation of one member's variance over its mean",
-    "member_spread_energy": "standard deviation of one member's fluctuation energy over its mean",
+    "cell_error_variance": "error of the stress variance of the cell relative to the infinite plane",
+    "cell_error_energy": "error of the mean fluctuation energy of the cell relative to the infinite plane",
+    "member_spread_variance": "relative standard deviation of the stress variance of a member",
+    "member_spread_energy": "relative standard deviation of the fluctuation energy of a member",
     "mode_pairs": "number of mode pairs of the cell",
     "bands": "number of bands",
-    "banded_error_third_cumulant": "error of the energy's third cumulant by banding",
-    "banded_error_fourth_cumulant": "error of the energy's fourth cumulant by banding",
-    "banded_error_correlation_time": "error of the energy's integral correlation time by banding",
-    "banded_error_autocorrelation": "largest error of the energy's autocorrelation by banding",
+    "banded_error_third_cumulant": "error of the third cumulant of the energy by banding",
+    "banded_error_fourth_cumulant": "error of the fourth cumulant of the energy by banding",
+    "banded_error_correlation_time": "error of the integral correlation time of the energy by banding",
+    "banded_error_autocorrelation": "largest error of the autocorrelation of the energy by banding",
     "banded_error_relaxing_mean": "largest error of the mean energy by banding while the amplitude relaxes",
 }
 
@@ -396,7 +396,7 @@ KNOWN_ERRORS = {
 SOURCES = {"cell": "cell", "banded": "bands", "step": "clock step"}
 #: Unit and long name of the systematic errors of a run.
 SYSTEMATIC = {
-    f"{name}_error_{of}": ("1", f"{words} by the {source}, where errors of the area are largest")
+    f"{name}_error_{of}": ("1", f"{words} by the {source}, at the largest error of the area")
     for of, words in (("area", "error of the mean A/A_JKR"), ("friction", "relative error of the mean friction"))
     for name, source in SOURCES.items()
 }
@@ -406,7 +406,7 @@ SYSTEMATIC["member_spread_area"] = "1", "standard deviation of A/A_JKR between m
 #: Name, unit, long name and symbol of what is recorded with each stress map.
 MAP = ("shear_map", "Pa", "shear-stress fluctuation", "tau_1")
 DISC_ENERGIES = (
-    ("disc_energy", "J/m^2", "energy of the map on the disc of the contact, per area", "DeltaGamma_d"),
-    ("cross_energy", "J/m^2", "energy of the map in the field of the mean stress, per area of the disc",
+    ("disc_energy", "J/m^2", "energy of the map on the contact disc, per area", "DeltaGamma_d"),
+    ("cross_energy", "J/m^2", "energy between the map and the mean stress, per area of the disc",
      "DeltaGamma_x"),
 )  # fmt: skip

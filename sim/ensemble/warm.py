@@ -37,9 +37,9 @@ def compile_missing(jobs: int | None) -> str:
                 future.result()
                 shown.advance(1)
     if left := sum(not jit.cached(name) for name in lacking):
-        raise StoreTrouble(f"{left} kernels could not be stored; set SIM_CACHE_DIR to a folder that can be written")
+        raise StoreTrouble(f"{left} kernels could not be stored; set SIM_CACHE_DIR to a writable folder")
     took = f" in {time.monotonic() - began:.0f} s" if lacking else ""
-    return f"{len(lacking)} of {len(jit.compiled)} kernels and laws compiled{took}; the others were there"
+    return f"{len(lacking)} of {len(jit.compiled)} kernels and laws compiled{took}; the others are in the cache"
 
 
 def _compile(name: str) -> None:

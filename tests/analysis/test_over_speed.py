@@ -126,7 +126,7 @@ def test_area_that_a_contact_loses_as_it_comes_off_is_no_loss_to_a_speed():
     parts = {"bonds": bonds.Steady(critical_speed=1e-2), "shear": shear.Uniform(), "clock": Clock(0.4, 1e-3)}
     result = analysis.loss_speeds(run(scene(contact=pulled, **parts)), ["10 %", "90 %"])
     assert math.isfinite(result["speed_at_10_percent_lost"]) and math.isnan(result["speed_at_90_percent_lost"])
-    assert "come off" in str(result["speed_at_90_percent_lost_reason"].values)
+    assert "detach before" in str(result["speed_at_90_percent_lost_reason"].values)
     last = float(result["speed_at_90_percent_lost_low"])  # the pull-off is at the critical speed, where w = W/2
     assert last <= 1e-2 <= last * math.exp(math.log(1e4) / 400.0 * 1.001)
 
@@ -438,7 +438,7 @@ def test_no_speed_is_stated_at_which_more_is_lost_than_can_be_nor_under_a_force(
     # JKR's areas with 70 % of the work of adhesion and with all of it
     left, full = (jkr.radius_at_load(LOAD, share * WORK, RADIUS, MODULUS) ** 2 for share in (0.7, 1.0))
     assert 100.0 * (1.0 - left / full) < 50.0
-    reason = f"never: at most {100 * (1 - left / full):.3g} % can be lost"
+    reason = f"never: at most {100 * (1 - left / full):.3g} % of the area can be lost"
     assert speeds["speed_at_50_percent_lost_reason"].item() == reason
     creeping = scene(
         shear=shear.Uniform(), drive=Force(force=1e-3, contact_stiffness="rigid"),

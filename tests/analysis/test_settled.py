@@ -137,7 +137,7 @@ def test_a_peak_of_noisy_members_is_that_of_their_mean_or_none_and_its_intervals
     assert 179 <= sum(peak.first <= at <= peak.last for peak in peaks) <= 200
     assert sum(reason.startswith("no peak above the noise") for reason in calm) >= 190
     sparse = peak_of_mean((mean + members)[:, ::15], times[::15])
-    assert sparse.reason.startswith("records too sparse") and math.isnan(sparse.value)
+    assert sparse.reason.startswith("too few records to resolve the peak") and math.isnan(sparse.value)
     exact = peak_of_mean(np.tile(mean, (5, 1)), times)
     assert_allclose([exact.value, exact.time, exact.sem], [3.0, at, 0.0], rtol=1e-12)
 

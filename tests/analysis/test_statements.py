@@ -92,7 +92,7 @@ def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_memb
     )
     assert_allclose(later.value, 0.4, rtol=1e-9)
     cases = {
-        "no exponential": np.exp(-np.sqrt(time)),
+        "not exponential": np.exp(-np.sqrt(time)),
         "too long for the run": np.exp(-time / 8.0),
         "not change": 0.0 * time,
     }

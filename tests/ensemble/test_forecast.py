@@ -47,7 +47,7 @@ def test_a_run_has_as_many_processes_as_memory_holds_and_is_refused_if_it_holds_
     assert needed == sorted(needed)
     monkeypatch.setattr(preview, "memory_limit", lambda: (needed[2], "are free"))
     assert [fitting(plan, jobs) for jobs in (4, 2)] == [3, 2]
-    assert "note: there is memory for 3 of 4 processes" in preview.processes(plan, 4, needed[2])[1]
+    assert "note: the memory is enough for 3 of 4 processes" in preview.processes(plan, 4, needed[2])[1]
     monkeypatch.setattr(preview, "memory_limit", lambda: (0.5 * needed[0], "are free"))
     assert fitting(plan, 4, needed[2]) == 3  # what is asked for counts alone
     for to in (None, tmp_path / "x.nc"):

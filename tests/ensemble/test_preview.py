@@ -102,7 +102,7 @@ def test_the_run_is_counted_and_its_file_estimated_with_its_maps(tmp_path):
     assert row(lines, "work")[1].startswith(f"{work:,} member-steps, about ")
     assert row(blocks("uniform_stress")["the run"], "sweep")[1] == "4 bonds.stress × 5 contact.load = 20 points"
     alone = blocks("masking", **{"ensemble.members": 9})["the run"]
-    assert row(alone, "members")[1] == "9, all alike, so one is computed"
+    assert row(alone, "members")[1] == "9, all identical, so one is computed"
     scenes = ("fixed_grips", {}), ("soft_lens", {"record.per_member": False})
     scenes += (("fixed_grips", {"record.quantities": ["speed"]}),)
     for compression, (name, changes) in itertools.product(("none", "zlib", "digits"), scenes):
@@ -142,7 +142,7 @@ def test_limits_of_the_theory_and_of_the_cell_are_noted_once():
 def test_depths_are_listed_with_their_reason_also_if_chosen_by_the_scene():
     lines = blocks("masking", **{"drive.speed": "2 mm/s"})["models"]
     assert row(lines, "drive")[1:3] == ["steady", "changed by an override"]
-    assert row(lines, "bonds")[1:3] == ["none", "left out, so the simplest"]
+    assert row(lines, "bonds")[1:3] == ["none", "omitted: the simplest"]
     assert row(lines, "shear")[1:3] == ["mean", "in the file"]
     assert row(lines, "contact")[3].startswith("The contact is in JKR equilibrium")
     tables = [{"model": "none"}, {"model": "steady", "critical_speed": 0.01}]

@@ -117,9 +117,9 @@ def test_a_run_goes_on_only_when_asked_and_only_as_it_was_begun(tmp_path, monkey
     assert len(kept) == 2
     with pytest.raises(OutputExists, match="--resume"):
         ensemble.run(sample(), path)
-    with pytest.raises(BadInput, match=r"is of another run: scenario.ensemble.members was 3, is 4"):
+    with pytest.raises(BadInput, match=r"belongs to another run: scenario.ensemble.members was 3, is 4"):
         ensemble.run(sample(members=4), path, resume=True)
-    with pytest.raises(BadInput, match=r"is of another run: sweep was \['contact.load"):
+    with pytest.raises(BadInput, match=r"belongs to another run: sweep was \['contact.load"):
         turned = replace(sample(sweep=LOADS_AND_SHARES), sweep=sample(sweep=LOADS_AND_SHARES).sweep[::-1])
         stopped(tmp_path / "two.nc", sample(sweep=LOADS_AND_SHARES))
         ensemble.run(turned, tmp_path / "two.nc", resume=True)
@@ -132,7 +132,9 @@ def test_a_run_goes_on_only_when_asked_and_only_as_it_was_begun(tmp_path, monkey
     xr.Dataset({"a": 1.0}).to_netcdf(tmp_path / "foreign.nc")
     for content in (b"", path.read_bytes()[:3000], (tmp_path / "foreign.nc").read_bytes()):
         path.write_bytes(content)
-        with pytest.raises(BadInput, match=r"out.nc: is no netCDF .* written by `sim run`; move it away, .*--force$"):
+        with pytest.raises(
+            BadInput, match=r"out.nc: is not a netCDF .* written by `sim run`; move it away, .*--force$"
+        ):
             ensemble.run(sample(), path, resume=True)
 
 
@@ -244,7 +246,7 @@ def test_nothing_stays_on_a_system_that_removes_no_open_file(tmp_path, monkeypat
 
 def test_a_file_that_comes_during_a_run_is_not_replaced(tmp_path):
     path = tmp_path / "out.nc"
-    with pytest.raises(OutputExists, match="has come during the run"):
+    with pytest.raises(OutputExists, match="appeared during the run"):
         ensemble.run(sample(), path, progress=lambda done: path.write_text("precious", encoding="utf-8"))
     assert path.read_text(encoding="utf-8") == "precious"
     path.unlink()
@@ -261,14 +263,14 @@ def test_a_run_that_replaces_an_output_and_is_stopped_goes_on_and_a_finished_one
     assert same(path)
     before = path.stat()
     assert ensemble.run(sample(), path, resume=True) == path and path.stat().st_mtime_ns == before.st_mtime_ns
-    with pytest.raises(BadInput, match=r"out.nc is of another run: scenario.seed was 5, is 6"):
+    with pytest.raises(BadInput, match=r"out.nc belongs to another run: scenario.seed was 5, is 6"):
         ensemble.run(sample(seed=6), path, resume=True)
     assert names(tmp_path) == ["out.nc"]
 
 
 def test_runs_of_an_older_version_are_named_and_folders_of_another_format_stay(tmp_path, monkeypatch):
     path = ensemble.run(sample(), tmp_path / "out.nc")
-    with monkeypatch.context() as patched, pytest.raises(BadInput, match=r"made by sim .*: finish it there"):
+    with monkeypatch.context() as patched, pytest.raises(BadInput, match=r"made by sim .*: finish it by that version"):
         patched.setattr("sim.ensemble.dataset._version", lambda name: "9.9")
         ensemble.run(sample(), path, resume=True)
     for folder in ("old.nc.parts", "shards.nc.parts/1-of-2"):
@@ -294,7 +296,10 @@ def test_blocks_of_two_runs_do_not_mix(tmp_path, monkeypatch, method):
             stopped(path, sample(seed=6), replace=True)
         return result
 
-    with monkeypatch.context() as patched, pytest.raises(BadInput, match=r"is of another run: scenario.seed was 6"):
+    with (
+        monkeypatch.context() as patched,
+        pytest.raises(BadInput, match=r"belongs to another run: scenario.seed was 6"),
+    ):
         patched.setattr(Unfinished, method, replaced)
         ensemble.run(sample(), path)
     block = min((tmp_path / "out.nc.parts").glob("*.npz"))
