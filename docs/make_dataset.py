@@ -11,8 +11,14 @@ HEAD = """# The variables of a dataset
 
 This page lists every variable of a dataset. The shortest example:
 
-    dataset = sim.open("outputs/pull_off.nc")
-    dataset.contact_area
+    sim run scenarios/pull_off.toml
+
+```python
+import sim
+
+dataset = sim.open("outputs/pull_off.nc")
+dataset.contact_area
+```
 
 All numbers are in SI units. Each variable has the attributes `units`, `long_name` and `symbol`. *Sweep* stands for the
 dimensions of the sweep. Each is named as its key with an underscore for each dot (`contact_load`). A run without a

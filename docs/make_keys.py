@@ -13,7 +13,9 @@ HEAD = """# Every key of a scenario file
 
 This page lists every key of a scenario with its unit, its meaning and its default. The shortest example:
 
-    contact.load = "4 mN"
+```toml
+contact.load = "4 mN"
+```
 
 - **Quantities** are text with a unit, or a bare number in the unit given here. A unit of 1 is a pure number.
 - **Models** of a table go from simple to full. If a table or its `model` is omitted, the first model is used. The last

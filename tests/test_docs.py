@@ -7,6 +7,7 @@ import math
 import re
 import shlex
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -72,10 +73,21 @@ def test_names_of_code_in_the_pages_exist():
             assert code is not None, (page, name)
 
 
+def blocks(page):
+    """The blocks of code of a page, each with the words after its fence."""
+    tokens = MarkdownIt().parse(text_of(page))
+    return [(token.info.split(), token.content) for token in tokens if token.type in ("code_block", "fence")]
+
+
+def command_lines(code):
+    """The commands of a block, each as its words after ``sim``."""
+    return [shlex.split(line, comments=True)[1:] for line in code.splitlines() if line.startswith("sim ")]
+
+
 def commands(page):
-    """The commands that a page shows, in lines of their own or between words, each as its words after ``sim``."""
-    shown = re.findall(r"^    (sim .*?)(?: {2,}#.*)?$|`(sim\s(?!-)[^`]*)`", text_of(page), re.M)
-    return sorted({tuple(shlex.split("".join(pair))[1:]) for pair in shown})
+    """The commands that a page shows, in blocks or between words, each as its words after ``sim``."""
+    between = [shlex.split(text)[1:] for text in re.findall(r"`(sim\s(?!-)[^`]*)`", text_of(page))]
+    return sorted({*map(tuple, between), *(tuple(line) for _, code in blocks(page) for line in command_lines(code))})
 
 
 def test_the_commands_that_a_page_shows_exist_with_their_options_kinds_and_keys():
@@ -175,15 +187,9 @@ def test_the_findings_have_the_numbers_of_the_lens_behind_a_spring_at_a_16_times
             )
 
 
-def blocks(page):
-    """The blocks of code of a page, each with the words after its fence."""
-    tokens = MarkdownIt().parse(text_of(page))
-    return [(token.info.split(), token.content) for token in tokens if token.type in ("code_block", "fence")]
-
-
-#: Pages whose blocks are run one after the other. ``.ci/run`` runs those of README that install; a block that is marked
-#: ``cluster`` needs more than one machine.
-RUN = [page for page in PAGES if any("sim" in code and "cluster" not in words for words, code in blocks(page))]
+#: Pages whose blocks are run one after the other. A block that is marked ``cluster`` needs several machines and is only
+#: parsed. Lines of ``make`` and ``pip`` need a network: ``.ci/run`` runs those of README.
+RUN = [page for page in PAGES if any("python" in words or command_lines(code) for words, code in blocks(page))]
 
 
 @pytest.mark.parametrize(
@@ -197,10 +203,20 @@ def test_what_a_page_shows_runs(page, tmp_path, monkeypatch):
         if "python" in words and ">>>" not in code:  # which the test of the page for newcomers runs
             parsed = compile(code, page, "exec")
             exec(parsed if "cluster" not in words else "", names)
-        for line in code.splitlines() if not words else ():
-            if line.startswith("sim "):
-                done = command_line(*shlex.split(line, comments=True)[1:])
-                assert done.exit_code == 0, (line, done.stderr)
+        for line in command_lines(code) if "cluster" not in words else ():
+            done = command_line(*line)
+            assert done.exit_code == 0, (line, done.stderr)
+
+
+def test_tables_that_a_page_shows_are_those_of_a_scenario(tmp_path):
+    """The files of a table are those of the scenarios with the same tables."""
+    shutil.copy(ROOT / "sim" / "starter.toml", tmp_path / "first.toml")
+    for kind in ("psd", "map"):
+        shutil.copy(ROOT / "scenarios" / f"own_{kind}.csv", tmp_path / f"{kind}.csv")
+    shown = [code for page in PAGES for words, code in blocks(page) if "toml" in words]
+    assert len(shown) > 2
+    for code in shown:
+        load(tmp_path / "first.toml", tomllib.loads(code))
 
 
 NOTEBOOK = ROOT / "docs" / "first_steps.ipynb"
