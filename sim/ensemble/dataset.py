@@ -178,6 +178,19 @@ def _add_sweep_coordinates(content: Outline, plan: Plan, axis: Axis, stride: int
             meanings = [f"{name}: {_course(value)}" for name, value in courses if _is_course(value)]
             words = ", ".join(filter(None, [f"swept {key}", "; ".join(meanings)]))
             content.add(variable_name(key), str, along, "", words, "", np.array(names, object))
+            contacts = [plan.points[i * stride].contact for i in range(len(axis.values))]
+            if all(key == f"contact.{contact.kind}" for contact in contacts):
+                rates = [_last_rate(contact.course, plan.points[0].clock.duration) for contact in contacts]
+                unit, text = "N/s" if contacts[0].kind == "load" else "m/s", f"rate of the last change of {key}"
+                content.add(f"{variable_name(key)}_rate", "f8", along, unit, text, "", rates)
+
+
+def _last_rate(course: Any, duration: float) -> float:
+    """Return the rate of change in the last moving part of a course, in the unit of its value per second; 0 if none."""
+    pieces = course.pieces(np.array([0.0, duration]), duration)
+    span, change = pieces.stop - pieces.start, pieces.last - pieces.first
+    moving = np.flatnonzero((span > 0.0) & (change != 0.0))
+    return float(change[moving[-1]] / span[moving[-1]]) if moving.size else 0.0
 
 
 def _is_course(value: Any) -> bool:

@@ -339,9 +339,15 @@ def _branches(scene: Scene) -> list[Line]:
 
 
 def over_key(dataset: xr.Dataset, name: str) -> Scene:
-    """Return statistics over a swept key of numbers or categories."""
-    dataset = dataset.sortby(name) if dataset[name].dtype.kind in "fi" else dataset
-    key, scene = dataset[name], scene_along(dataset, name)
+    """Return statistics over a swept key of numbers or categories, of courses over their rates if these differ."""
+    by = name
+    if (rates := dataset.get(f"{name}_rate")) is not None:
+        sizes = abs(rates).assign_attrs(rates.attrs)
+        if bool((sizes > 0.0).all()) and np.unique(sizes).size == sizes.size:
+            by = f"{name}_rate"
+            dataset = dataset.assign({by: sizes})
+    dataset = dataset.sortby(by) if dataset[by].dtype.kind in "fi" else dataset
+    key, scene = dataset[by], scene_along(dataset, name)
     words = named(key)
     if key.dtype.kind not in "fi":
         count = len(scene.lines)

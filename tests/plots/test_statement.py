@@ -35,12 +35,15 @@ def test_a_statement_is_drawn_over_the_sorted_sweep_with_its_interval(speeds):
         kinds.draw(simulated(), "contact_area")  # nothing is swept
 
 
-def test_swept_courses_have_short_names_and_a_key_below_the_figure():
+def test_swept_courses_have_short_names_a_key_below_the_figure_and_their_rates_as_its_axis():
     courses = [{"from": "4 mN", "to": f"{end} mN"} for end in (1, 2)]
     dataset = run(scene(drive=drive.Steady(speed=1e-3), shear=shear.Uniform(), sweep={"contact.load": courses}))
     assert dataset["contact_load"].to_numpy().tolist() == ["load 1", "load 2"]
-    words = kinds.draw(dataset, "sweep").get_supxlabel()
-    assert words == "load 1: from 4 mN to 1 mN\nload 2: from 4 mN to 2 mN"
+    figure = kinds.draw(dataset, "sweep")
+    assert figure.get_supxlabel() == "load 1: from 4 mN to 1 mN\nload 2: from 4 mN to 2 mN"
+    rates = np.array([2.0, 3.0]) / float(dataset["t"][-1])  # of the loads in mN, the slower one first
+    assert_allclose(figure.axes[0].lines[0].get_xdata(), rates, rtol=1e-12)
+    assert figure.axes[-1].get_xlabel() == "rate of the last change of contact.load (mN/s)"
 
 
 def test_size_range_and_time_of_a_figure_are_chosen(speeds):
