@@ -92,12 +92,13 @@ def check_missing(scenario, course):
             assert not np.any(np.isnan(column(scenario, course, name)) & ~explained), f"{name} is missing"
 
 
-def check_cuts(scenario, course, end):
+def check_cuts(scenario, course, end, cut=None):
     """A member alone, a resumed run and sparse records have the same numbers and events, bit for bit."""
     last = scenario.clock.steps
+    cut = last // 3 if cut is None else cut
     single, alone = run(scenario, [1], range(last + 1))
-    middle, _ = run(scenario, range(3), range(last // 3 + 1))
-    resumed, _ = run(scenario, range(3), range(last // 3 + 1, last + 1), unpack(scenario, pack(middle)))
+    middle, _ = run(scenario, range(3), range(cut + 1))
+    resumed, _ = run(scenario, range(3), range(cut + 1, last + 1), unpack(scenario, pack(middle)))
     seldom, sparse = run(scenario, range(3), range(last % 5, last + 1, 5))
     for name, values in pack(end).items():
         assert np.array_equal(values, pack(resumed)[name], equal_nan=True), f"{name} of a resumed run"

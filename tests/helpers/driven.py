@@ -7,7 +7,7 @@ import numpy as np
 from helpers.scenes import march
 from numpy.testing import assert_allclose
 
-from sim.engine import MemberNoise, follow, pack, unpack
+from sim.engine import MemberNoise as MemberNoise, follow as follow
 from sim.laws import jkr
 from sim.parts.bonds import FirstMoment
 from sim.parts.bonds.rupture import Bell
@@ -92,36 +92,6 @@ PULLED_OFF = {
     "load": {"time": (0.0, 0.95, 1.1, 2.0, 2.0, 9.0), "value": (LOAD, LOAD, -LOAD, -LOAD, LOAD, LOAD)},
     "after_pull_off": "reattach",
 }
-
-
-def fastest(straight, speed=10.0):
-    """Number of the state in the middle of the fastest slip, three times as fast as the ``speed`` of the stage."""
-    slip = max(range(len(straight) - 1), key=lambda k: straight[k].drive.speed[0])
-    assert straight[slip].drive.speed[0] > 3.0 * speed * STRETCH
-    return slip
-
-
-def check_members(scene, straight, slip):
-    """Taken up at the state of this number, and a member alone, a march ends as that of all, bit for bit."""
-    again = list(march(scene, np.arange(3), unpack(scene, pack(straight[slip]))))
-    alone = list(march(scene, np.array([1])))
-    one, other, single = (pack(states[-1]) for states in (straight, again, alone))
-    assert all(np.array_equal(one[key], other[key], equal_nan=True) for key in one)
-    for key, values in single.items():
-        whole = one[key][1:2] if one[key].ndim and len(one[key]) == 3 else one[key]
-        assert np.array_equal(whole, values, equal_nan=True), key
-
-
-def check_blocks(scene, states, every=1):
-    """Blocks of steps give what a march gave of all members, bit for bit."""
-    assert not scene.by_steps
-    members = np.arange(len(states[0].drive.speed))
-    end, passed = follow(scene, MemberNoise.of(scene.seed, members), None, range(0, scene.times.steps + 1, every))
-    readings = [scene.parts.drive.readings(state.drive) for state in states[::every]]
-    assert np.array_equal(passed.driven, readings, equal_nan=True)
-    assert np.array_equal(passed.radius, [state.contact.radius for state in states[::every]], equal_nan=True)
-    one, other = pack(end), pack(states[-1])
-    assert [name for name in one if not np.array_equal(one[name], other[name], equal_nan=True)] == []
 
 
 def stuck(duration, steps, bonds, drive, share=0.0, members=1, **contact):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers import driven
-from helpers.driven import AREA, ENERGY, READINGS, STRETCH, UNIT, force, march, marched, residual, scenario, spring
+from helpers.driven import AREA, ENERGY, STRETCH, UNIT, force, march, marched, residual, scenario, spring
 from numpy.testing import assert_allclose
 
 from sim.laws.schallamach import Body
@@ -212,10 +212,3 @@ def test_bonds_of_many_stretches_snap_again_and_again_and_catch_bonds_feel_a_dri
     states, read = marched(cohorts(4.0, 8, spring(0.02), 1e-5, rupture=catch))
     assert residual(read) < 1e-5
     assert np.all(np.diff(reached(states)[:4, 2]) > 0.0)
-
-
-def test_a_member_that_lets_go_while_its_body_stays_is_the_same_alone_and_restarted():
-    scene = cohorts(1.0, 20, spring(2e-3, 1000.0, mass=1e-4, damping=1e-3, contact=4e-3), 1e-4, share=0.5)
-    straight = list(march(scene, np.arange(3)))
-    snapped = [scene.parts.drive.readings(state.drive)[0, READINGS.index("dissipated_by_snaps")] for state in straight]
-    driven.check_members(scene, straight, int(np.argmax(np.array(snapped) > 0.0)) - 1)

@@ -135,26 +135,6 @@ def test_the_loss_of_a_force_that_jumps_is_half_its_change_times_the_slip_at_onc
             assert_allclose(snaps / driven.ENERGY, lost, rtol=1e-5, atol=1e-12)  # of the cohorts bound
 
 
-def test_a_contact_that_viscosity_lets_collapse_keeps_its_energies_to_ten_tolerances():
-    # of a slider that snaps to the area of Hertz; the friction after it by equations solved apart
-    courses = []
-    for viscosity in (100.0, 1e4):
-        scene = driven.Scenario(
-            clock=Clock(duration=0.1, step=1e-3), solid=Solid(shear_modulus=0.233e6), sphere=Sphere(radius=0.309e-3),
-            adhesion=Adhesion(work=32.6e-3, bond_share=0.0), contact=Equilibrium(load=33e-6, reversible=0.0039),
-            drive=Spring(stage=1.9e-3, stiffness=96.0, mass=1.07e-3, contact_stiffness=7.5, viscosity=viscosity),
-            bonds=FirstMoment(
-                rupture=Constant(rate=24.0), bond_stiffness=0.6e-6, rebinding_rate=84.0, site_density=3.8e16
-            ),
-        )  # fmt: skip
-        states, read = marched(scene)
-        assert residual(read) < 10.0 * scene.drive.tolerance
-        friction = [state.bonding.stress[0] * math.pi * state.contact.radius[0] ** 2 for state in states]
-        assert_allclose(np.array(friction)[[89, 100]], [0.78909e-3, 0.8941e-3], rtol=2e-4)
-        courses.append(read["dissipated_by_area"][-1])
-    assert_allclose(*courses, rtol=1e-3)
-
-
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
 def test_a_contact_that_becomes_masked_in_a_slip_of_no_time_closes_its_energies(tolerance):
     # ΔΓ in sliding exceeds the work of adhesion: the area jumps to Hertz's as sliding begins

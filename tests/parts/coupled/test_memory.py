@@ -138,11 +138,3 @@ def test_without_noise_a_slip_does_not_depend_on_the_clock_step(keys):
 def test_the_loss_to_fluctuations_is_that_of_two_independent_codes(speed, limit, step):
     lost = losses(slipping(step, 2.0, speed, members=16), 0.5)
     assert abs(np.mean(lost) / limit - 1.0) < 2e-3 + 5.0 * np.std(lost, ddof=1) / math.sqrt(len(lost)) / limit
-
-
-def test_a_member_is_the_same_alone_restarted_in_a_slip_and_with_few_records():
-    lens = slipping(1.0, 0.06, 20, members=3)
-    straight = list(march(lens, np.arange(3)))
-    driven.check_members(lens, straight, driven.fastest(straight, 0.02 / driven.STRETCH))
-    course = follow(lens, MemberNoise.of(lens.seed, np.arange(3)), None, range(0, 61, 7))[1]
-    assert np.array_equal(course.energy, [state.shear.energy for state in straight[::7]])

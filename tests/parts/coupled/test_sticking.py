@@ -1,6 +1,5 @@
 """Sliders on bonds without a stretch that take time: a linear rate equation, and a finite number of them."""
 
-import itertools
 import math
 
 import numpy as np
@@ -120,13 +119,7 @@ def test_the_missing_energy_falls_with_the_tolerance_while_the_area_follows_the_
         assert missing[2] < 0.1 * missing[1] < 0.1 * missing[0]
 
 
-def test_a_member_is_the_same_alone_and_restarted_and_a_stage_that_turns_leaves_it_at_rest():
-    for area, keys in itertools.product(("present", "carried"), ({"damping": 0.05}, {"mass": 0.01, "damping": 0.05})):
-        scene = stuck(12.0, 240, renewed(area=area), pulled(1.0, 0.3, **keys), share=0.5)
-        straight = list(march(scene, np.arange(3)))
-        driven.check_members(scene, straight, driven.fastest(straight, 0.3))
-        if area == "present":
-            driven.check_blocks(scene, straight, 4)
+def test_a_stage_that_turns_leaves_a_slider_at_rest():
     turns = {"time": (0.0, 4.0, 4.0, 8.0, 8.0, 99.0), "value": tuple(v * STRETCH for v in (1.0, 1.0, -2.0, -2.0, 0, 0))}
     states, read = marched(stuck(12.0, 48, renewed(), pulled(1.0, turns, damping=0.1)))
     ways = reached(states)
@@ -155,7 +148,6 @@ def test_a_contact_that_pays_for_its_mean_stress_follows_it_within_the_sub_steps
         assert_allclose(radii, exact, rtol=1e-9)
         assert np.min(radii) < 0.97 * np.max(radii)
         assert missing[1] < missing[0]
-        driven.check_blocks(scene, states)
 
 
 @pytest.mark.parametrize("bonds", [renewed(), Steady(critical_speed=STRETCH, stress=COULOMB)])
@@ -170,7 +162,6 @@ def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_it_up_again(b
         assert residual(read) < 1e-5
         if "viscosity" in keys:  # which nothing bears in an open contact
             assert_allclose(read["spring_force"][16:20], 0.0, atol=1e-12 * HELD)
-        driven.check_blocks(scene, states)
 
 
 def counted(sites, start="bonded"):
@@ -199,10 +190,9 @@ def test_counted_bonds_of_a_slider_fluctuate_as_independent_sites_in_steady_slid
     assert_allclose(np.var(bound[-1]), share * (1.0 - share) / sites, rtol=4.0 * math.sqrt(2.0 / members))
 
 
-def test_counted_bonds_at_rest_carry_the_pull_up_to_their_strength_and_are_the_same_in_any_batch():
+def test_counted_bonds_at_rest_carry_the_pull_up_to_their_strength():
     scene = stuck(6.0, 240, counted(40), pulled(1.0, 0.5, damping=0.05), share=0.5, members=3)
     straight = list(march(scene, np.arange(3)))
-    driven.check_members(scene, straight, driven.fastest(straight, 0.5))
     force, rest = (
         np.array([getattr(state.drive, name) for state in straight[1:]]) for name in ("spring_force", "speed")
     )

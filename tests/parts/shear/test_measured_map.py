@@ -5,12 +5,11 @@ import math
 import numpy as np
 import pytest
 from helpers.commands import LENS, sim as command
-from helpers.scenes import BONDS, DRIVES, Band, Onset, RateDependent, Slip, Stress, drive, march, scene
+from helpers.scenes import BONDS, DRIVES, Band, Onset, RateDependent, Slip, Stress, drive, scene
 from numpy.testing import assert_allclose
 
 import sim
 from sim.analysis.tables import table
-from sim.engine import MemberNoise, follow
 from sim.laws import halfspace, jkr
 from sim.numerics.grid import Grid
 from sim.parts.bonds.models import Counted, Unbroken
@@ -22,6 +21,7 @@ from sim.spectrum.radial import disc_energy, marginal_energy
 from sim.spectrum.stress_map import StressMap
 from sim.study.converge import converge
 from sim.units.errors import BadInput
+from tests.test_total import check_cuts, run
 
 G = 1.6e6
 
@@ -172,18 +172,12 @@ def test_an_edge_or_equilibrium_follows_the_pattern_and_grows_where_contact_give
     assert abs(moving["equilibrium_radius"] - moving["contact_radius"]).max() > 1e-8
 
 
-def test_batches_blocks_and_restarts_agree_under_a_measured_map():
+def test_members_alone_restarts_and_few_records_agree_under_a_measured_map():
     for shear in (measured(), measured(patchy(rms=4e4), "disc", amplitude=Stress(reference=2e5))):
         bonds = Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=40, stress=2e5)
         scenario = sliding(shear, steps=12, bonds=bonds, members=3)
-        states = list(march(scenario, np.arange(3)))
-        alone = list(march(scenario, np.array([2])))
-        radii = np.array([state.contact.radius for state in states])
-        assert np.array_equal(radii[:, 2], [state.contact.radius[0] for state in alone])
-        _, course = follow(scenario, MemberNoise.of(scenario.seed, np.arange(3)), None, range(13))
-        assert np.array_equal(course.radius, radii)
-        again = list(march(scenario, np.arange(3), states[5]))
-        assert np.array_equal([state.contact.radius for state in again], radii[6:])
+        end, course = run(scenario, range(3), range(13))
+        check_cuts(scenario, course, end)
         energy = sim.run(scenario)["fluctuation_energy"]
         assert ("member" in energy.dims) == (shear.contact == "disc" or shear.reads_stress)
 
