@@ -12,7 +12,6 @@ from scipy.optimize import curve_fit
 
 from sim import fit
 from sim.laws import schallamach as law
-from sim.laws.halfspace import surface_energy
 
 FOLDER = Path(__file__).parent.parent / "scenarios"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.toml"))
@@ -93,7 +92,7 @@ def test_the_lens_shows_the_papers_finding():
     assert to_bonds > error and to_fluctuations.mean() > error
 
 
-def test_masking_uniform_stress_and_mechanisms_apart_are_the_closed_forms():
+def test_masking_is_the_closed_form_and_a_uniform_stress_changes_nothing():
     dataset = at("masking").isel(t=-1)
     hertz = dataset["radius_without_adhesion"].values
     masked = dataset["shear_spectrum_amplitude"].values >= 375.158e3
@@ -103,16 +102,6 @@ def test_masking_uniform_stress_and_mechanisms_apart_are_the_closed_forms():
     assert_allclose(work, 42e-3 * (1 - (375 / 375.157768) ** 2), rtol=1e-6)
     radii = four("uniform_stress")["contact_radius"]
     assert np.all(radii == radii.isel(bonds_stress=0))
-    dataset = four("afm_tip").isel(t=-1)
-    assert_allclose(dataset["friction_force"], 0.9e9 * dataset["contact_area"], rtol=1e-14)
-    open_ = dataset["contact_load"] < dataset["jkr_pull_off_load"]
-    assert np.all(dataset["in_contact"] == ~open_) and 0 < int(open_.sum()) < dataset.sizes["contact_load"] / 2
-    dataset = four("decomposition").isel(t=-100)
-    energy = dataset["fluctuation_energy"]
-    assert np.all(energy == energy.isel(adhesion_bond_share=0, shear_paid_by_adhesion=0))
-    work = dataset["work_of_adhesion"].transpose("adhesion_bond_share", "shear_paid_by_adhesion", "member").values
-    assert np.all(work[0, 0] == 42e-3)
-    assert_allclose(work[1, 1] - work[0, 0], (work[1, 0] - work[0, 0]) + (work[0, 1] - work[0, 0]), rtol=1e-12)
 
 
 def test_the_made_up_jkr_test_gives_the_work_and_modulus_with_which_it_was_made():
@@ -128,14 +117,7 @@ def test_the_made_up_jkr_test_gives_the_work_and_modulus_with_which_it_was_made(
         assert item.interval.low < truth / scale < item.interval.high
 
 
-def test_few_waves_spread_as_is_known_beforehand_and_a_jkr_test_reads_two_works_of_adhesion():
-    dataset = at("ten_wavelengths").isel(t=-1)
-    energy, area = (dataset[name].values for name in ("fluctuation_energy", "contact_area"))
-    centred = energy - energy.mean(axis=1, keepdims=True)
-    fourth = (centred**4).mean(axis=1) / (centred**2).mean(axis=1) ** 2
-    error = np.sqrt((fourth - 1.0) / 4.0 / energy.shape[1])  # of a standard deviation, relative
-    found = energy.std(axis=1, ddof=1) / energy.mean(axis=1) / dataset["member_spread_energy"].values
-    assert np.all(abs(found - 1.0) < 5.0 * error) and np.all(np.diff(area.std(axis=1)) < 0.0)
+def test_a_jkr_test_with_a_slow_edge_reads_two_works_of_adhesion():
     dataset = at("jkr_test")
     held = np.flatnonzero(np.isclose(dataset["normal_load"].isel(contact_front_speed=0), 1e-3, rtol=1e-9))
     half = dataset.sizes["t"] // 2
@@ -184,7 +166,7 @@ def test_the_static_peak_ages_to_an_end_and_grows_with_the_logarithm_of_the_spee
     assert_allclose(peaks[:, -1] / peaks[-1, -1], came / came[-1], atol=0.021 / peaks[-1, -1])
 
 
-def test_friction_of_stretched_bonds_and_the_field_they_make_are_the_closed_forms():
+def test_friction_of_stretched_bonds_is_the_closed_form():
     # bonds of 0.1 ms are steady within a step of 10 ms: what errs is the quadrature of the steady state, 1e-9
     dataset = four("friction_maximum")
     recipe, speed = bell(dataset), speed_of_steps(dataset)
@@ -203,22 +185,6 @@ def test_friction_of_stretched_bonds_and_the_field_they_make_are_the_closed_form
     radius = dataset["contact_radius"].values
     assert np.all(radius > float(dataset["radius_without_adhesion"]))
     assert np.all(radius <= float(dataset["radius_at_rest"])) and np.all(np.diff(radius) < 0.0)
-    dataset = four("bond_noise").transpose("shear_paid_by_adhesion", "t")
-    recipe, speed, density = bell(dataset), speed_of_steps(dataset), float(dataset["bonds_site_density"])
-    energy = dataset["fluctuation_energy"].values
-    force_square = law.bell_moments(speed, *recipe).force_square
-    modulus, footprint = float(dataset["solid_shear_modulus"]), float(dataset["shear_spectrum_footprint"])
-    exact = density * force_square / (math.pi**2 * modulus * footprint)
-    assert_allclose(energy[:, 1:], np.broadcast_to(exact, energy[:, 1:].shape), rtol=1e-9)
-    # less than half a percent of the work at rest, where broken bonds cost more than half of it
-    work, fraction = float(dataset["adhesion_work"]), np.atleast_2d(dataset["bond_fraction"].values)
-    assert 0.004 < energy.max() / work < 0.005 and 1.0 - fraction[0, energy[0].argmax()] > 0.5
-    # unpaid, the contact is JKR with the bonds that are left
-    unpaid, paid = dataset["contact_radius"].values
-    assert_allclose(unpaid, jkr.radius_at_load(4e-3, work * fraction[0], 2e-3, 6.4e6), rtol=1e-12)
-    assert_allclose(paid, jkr.radius_at_load(4e-3, work * fraction[-1] - energy[-1], 2e-3, 6.4e6), rtol=1e-12)
-    lost = 1.0 - np.square(paid / unpaid)
-    assert np.all(lost > 0.0) and lost.max() < 0.002
 
 
 def strengths(dataset, name="shear_stress"):
@@ -342,23 +308,3 @@ def test_clutches_bear_what_programs_by_event_or_time_have_and_settle_where_moto
     last = at("motor_clutch", **rigid, **{"clock.duration": "60 s"}).isel(t=-1, member=0)
     assert_allclose(1e12 * last["friction_force"], 10.7105709537, rtol=1e-4)
     assert_allclose(1e9 * last["speed"], 107.147314856, rtol=1e-5)
-
-
-def test_a_measured_spectrum_is_scaled_to_each_rms_and_a_measured_pattern_is_paid_at_the_edge():
-    dataset = four("own_psd")
-    rms, energy = dataset["shear_spectrum_rms"], dataset["fluctuation_energy"]
-    ratio = energy / rms**2  # one realisation at all sizes: the noise is shared
-    assert_allclose(ratio, ratio.isel(shear_spectrum_rms=[0] * rms.size).values, rtol=1e-11)
-    spectrum = load(FOLDER / "own_psd.toml").shear.spectrum
-    exact = float(spectrum.surface_energy(1.6e6)) / spectrum.rms**2
-    # energies are correlated over 5 ms, as e^(-2t/5 ms): 0.2 s are 40 independent ones of each of four members
-    spread, cell = (float(dataset[name][0]) for name in ("member_spread_energy", "cell_error_energy"))
-    assert abs(float(ratio.mean()) / exact - 1.0 - cell) < 5.0 * spread / math.sqrt(4 * 40)
-    dataset = four("own_map")
-    radius, modulus = dataset["contact_radius"], float(dataset["contact_modulus"])
-    rate = jkr.energy_release_rate(radius.values, 4e-3, 2e-3, modulus)
-    assert_allclose(rate, dataset["work_of_adhesion"].values, rtol=1e-9)
-    field = np.loadtxt(FOLDER / "own_map.csv", delimiter=",").T  # x along axis 0
-    plane = at("own_map", shear={"model": "mapped", "field": {"file": "own_map.csv", "pixel": "8 um"}})
-    exact = surface_energy(field, (72 * 8e-6, 44 * 8e-6), 1.6e6)
-    assert_allclose(plane["fluctuation_energy"], exact, rtol=1e-12)

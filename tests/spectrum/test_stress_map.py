@@ -131,17 +131,6 @@ def test_the_stress_of_a_contact_in_a_mask_is_that_of_a_free_disc(files, pixels)
     assert_allclose(np.mean(energy), exact, rtol=3 * 0.2 / pixels)
 
 
-def test_a_uniform_disc_stores_the_closed_form():
-    error = []
-    for pixels in (20, 80):
-        x = (np.arange(-2 * pixels, 2 * pixels) + 0.5) / pixels
-        disc = (np.hypot(x[:, None], x) < 1.0).astype(float)
-        result = halfspace.free_energy_of_map(3.0 * disc, 2e-3 / pixels, G) * (8e-3) ** 2
-        error.append(result / halfspace.disc_tangential_energy(2e-3, 3.0, G) - 1.0)
-    assert abs(error[0]) < 3 * 0.2 / 20
-    assert abs(error[1]) < 3 * 0.2 / 80
-
-
 def test_the_noise_and_the_radial_spectrum_of_a_map_are_reported(files):
     result = read(files, file=written(files, "map.csv"), pixel="5 um", noise="2 kPa")
     exact = 3 * math.asinh(1.0) / (4 * math.pi) * 2e3**2 * 5e-6 / G

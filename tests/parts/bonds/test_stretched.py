@@ -10,7 +10,7 @@ import pytest
 from helpers.scenes import BELL, BONDS, CELL, STRETCHED, Time, bonds, drive, march, one_step, records, scene, shear
 from numpy.testing import assert_allclose
 
-from sim.laws.schallamach import bell_lives, start_up_force, start_up_peak
+from sim.laws.schallamach import start_up_peak
 from sim.numerics.noise import Noise
 from sim.parts.bonds.rupture import Constant
 from sim.scenario.clock import Clock
@@ -52,24 +52,6 @@ def last(members=1, **parts):
     scenario = scene(members, **parts)
     *_, state = march(scenario, np.arange(members))
     return scenario, state
-
-
-def test_the_start_of_a_bonded_contact_is_the_closed_form_plus_what_rebinds():
-    for eps in [3.0, 100.0, 1e4]:
-        # fewer than k_on sites bind a second, and each bears the force of its age: k_on kappa V <T^2>/2 at the most
-        speed = eps * PACE
-        times = start_up_peak(speed, *RATES).time * np.arange(41) / 20.0
-        whole = bonds.Cohort(rupture=BELL, **STRETCHED, start_from="bonded")
-        parts = {"drive": drive.Steady(speed=speed), "clock": Clock(duration=times[-1], step=times[1])}
-        stress = records(scene(1, bonds=whole, **parts), "shear_stress")[0][:, 0]
-        held = SITES * start_up_force(times, speed, *RATES)
-        reborn = SITES * BINDING * STRETCHED["bond_stiffness"] * speed * bell_lives(speed, *RATES).half_square
-        assert np.all(stress >= held * (1.0 - 1e-4))
-        assert np.all(stress <= (held + reborn) * (1.0 + 1e-4))
-        if eps == 1e4:  # where rebinding is negligible, the peak is that of the closed form, and at its time
-            assert reborn < 2e-3 * held.max()
-            assert_allclose(stress[20], SITES * start_up_peak(speed, *RATES).force, rtol=2e-3)
-            assert abs(np.argmax(stress) - 20) <= 1
 
 
 def test_static_friction_ages_as_the_bonds_of_an_empty_contact_come_and_saturate():
