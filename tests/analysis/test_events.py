@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
 from sim.analysis.events import static_threshold
+from tests.analysis.test_invariance import LENS, SCENES
 
 NAN = math.nan
 
@@ -183,8 +184,7 @@ def test_a_static_peak_is_timed_from_the_start_among_steps_and_of_statistics_tha
 def test_the_friction_maximum_and_the_static_peak_are_those_of_the_clock_steps_whatever_the_records():
     """Own quadrature: 24.40 kPa at 2.270 mm/s; own integration: 59.32 kPa after 14.37 ms; within a clock step."""
     bell = {"model": "bell", "zero_force_rate": "20 1/s", "bell_force": "4 pN"}
-    parts = {
-        "solid": {"shear_modulus": "1.6 MPa"}, "sphere": {"radius": "2 mm"}, "contact": {"load": "4 mN"},
+    parts = LENS | {
         "adhesion": {"work": "42 mJ/m^2", "bond_share": 0.0},
         "bonds": {"model": "cohort", "rupture": bell, "bond_stiffness": "0.4 uN/m", "rebinding_rate": "100 1/s",
                   "site_density": "1e16 1/m^2"},
@@ -193,32 +193,24 @@ def test_the_friction_maximum_and_the_static_peak_are_those_of_the_clock_steps_w
     slow = {"model": "rate", "rupture": bell | {"zero_force_rate": "1 1/s"}, "bond_stiffness": "0.4 mN/m",
             "rebinding_rate": "1 1/s", "site_density": "1e16 1/m^2", "start": "empty"}  # fmt: skip
     start = {"model": "start", "rest": "1 s", "speed": "3 um/s"}
-    for record in ("20 s", "100 s"):
-        clock = {"duration": "100 s", "step": "0.1 s", "record": record}
-        result = analysis.peaks(run(sim.Scenario(**parts | {"drive": ramp, "clock": clock})))
-        assert_allclose(result["peak_stress"], 24.40e3, rtol=2e-4)
-        for name in ("peak_speed", "peak_friction_speed"):
-            assert_allclose(result[name], 2.270e-3, rtol=1e6 ** (0.1 / 100.0) - 1.0)
-    for record in ("100 ms", "2 s"):
-        clock = {"duration": "2 s", "step": "0.1 ms", "record": record}
-        result = analysis.peaks(run(sim.Scenario(**parts | {"bonds": slow, "drive": start, "clock": clock})))
-        assert_allclose(result["peak_stress"], 59.32e3, rtol=1e-4)
-        assert_allclose(result["peak_time"], 14.37e-3, atol=1e-4)
-        assert_allclose(result["peak_friction_time"], result["peak_time"], rtol=1e-12)
+    clock = {"duration": "100 s", "step": "0.1 s", "record": "100 s"}  # the first record and the last alone
+    result = analysis.peaks(run(sim.Scenario(**parts | {"drive": ramp, "clock": clock})))
+    assert_allclose(result["peak_stress"], 24.40e3, rtol=2e-4)
+    for name in ("peak_speed", "peak_friction_speed"):
+        assert_allclose(result[name], 2.270e-3, rtol=1e6 ** (0.1 / 100.0) - 1.0)
+    clock = {"duration": "2 s", "step": "0.1 ms", "record": "2 s"}
+    result = analysis.peaks(run(sim.Scenario(**parts | {"bonds": slow, "drive": start, "clock": clock})))
+    assert_allclose(result["peak_stress"], 59.32e3, rtol=1e-4)
+    assert_allclose(result["peak_time"], 14.37e-3, atol=1e-4)
+    assert_allclose(result["peak_friction_time"], result["peak_time"], rtol=1e-12)
 
 
 @pytest.mark.parametrize("cycles", [2, pytest.param(10, marks=pytest.mark.verify)])
 def test_pull_offs_of_cycles_are_those_of_all_cycles_and_not_the_lowest(cycles):
     """Own Gillespie and JKR, 200 pull-offs: mean -364 nN, quantiles of 5, 50 and 95 %."""
-    tracked = {"model": "tracked", "sites": 8, "rupture": {"model": "constant", "rate": "20 1/s"},
-               "bond_stiffness": "1 mN/m", "rebinding_rate": "60 1/s", "site_density": "1e13 1/m^2"}  # fmt: skip
-    moved = {"from": "0.1 um", "to": "-3 um", "cycles": cycles}
-    parts = {
-        "solid": {"shear_modulus": "1 MPa"}, "sphere": {"radius": "5 um"}, "drive": {"speed": "0 m/s"},
-        "contact": {"displacement": moved, "stiffness": "0.3 N/m", "after_pull_off": "reattach"}, "bonds": tracked,
-        "adhesion": {"work": "20 mJ/m^2", "bond_share": 0.8}, "ensemble": {"members": 20},
-    }  # fmt: skip
-    dataset = run(sim.Scenario(**parts | {"clock": {"duration": 2.0 * cycles, "step": "1 ms", "record": 1.0 * cycles}}))
+    scenario = sim.Scenario(**SCENES["cycles"]).with_values({"contact.displacement.cycles": cycles})
+    clock = {"duration": 2.0 * cycles, "step": "1 ms", "record": 1.0 * cycles}
+    dataset = run(scenario.with_values({"clock": clock, "ensemble.members": 20}))
     loads = analysis.pull_offs(dataset)["pull_off_load"]
     every = 1e9 * loads.values[np.isfinite(loads.values)]
     assert every.size == 20 * cycles and dataset["phase_name"].values.tolist() == ["retraction", "approach"] * cycles

@@ -13,8 +13,8 @@ import sim
 from sim.analysis.ensemble_peaks import peak_of_mean
 from sim.analysis.statistics import closed_only, of_second_half, settlement
 from sim.ensemble import plan as plans
-from sim.parts.bonds.rupture import Constant
-from sim.parts.contact.models import Adhesion, Solid, Sphere
+from sim.parts.contact.models import Adhesion
+from tests.analysis.test_invariance import SCENES
 
 ENSEMBLES, LEAST, MOST = 1000, 0.92, 0.98
 TIME = np.linspace(0.0, 1.0, 400)
@@ -64,13 +64,7 @@ def test_a_run_without_noise_settles_to_the_end_or_to_whole_cycles_without_an_er
     assert one.verdict.startswith("too short")
 
 
-PULLED = {
-    "clock": Clock(duration=0.6, step=2e-3), "solid": Solid(shear_modulus=1e6), "sphere": Sphere(radius=5e-6),
-    "adhesion": Adhesion(work=20e-3, bond_share=0.8), "drive": drive.Steady(speed=0.0), "shear": shear.Uniform(),
-    "contact": Equilibrium(load=-250e-9), "ensemble": Ensemble(members=40),
-    "bonds": bonds.Tracked(sites=8, rupture=Constant(rate=20.0), bond_stiffness=1e-3, rebinding_rate=60.0,
-                           site_density=1e13),
-}  # fmt: skip
+PULLED = SCENES["lives"] | {"clock": Clock(duration=0.6, step=2e-3), "shear": shear.Uniform()}
 FLUCTUATING = {
     "clock": Clock(duration=0.4, step=4e-3), "drive": drive.Steady(speed=4e-3),
     "shear": shear.Modal(correlation=Time(time=0.01), **FIELD), "sweep": {"contact.load": [1e-3, 4e-3]},
@@ -94,12 +88,6 @@ def test_a_mean_has_one_error_with_and_without_members_and_in_any_division_into_
     assert_allclose(expected["contact_area_mean"], means.mean("member"), rtol=1e-12)
     error = means.std("member", ddof=1) / np.sqrt(means.count("member"))
     assert_allclose(expected["contact_area_sem"], error, rtol=1e-10)
-    at_each_time = [
-        analysis.statistics(dataset) for dataset in (each, run(scene(**parts, record=Record(per_member=False))))
-    ]
-    for kind in ("mean", "sem", "low"):
-        area, area_pooled = (result[f"contact_area_{kind}"] for result in at_each_time)
-        assert_allclose(area_pooled, area, rtol=1e-6)
 
 
 def test_contacts_that_come_off_lose_no_area_to_bonds_and_too_few_or_those_that_close_again_have_no_mean():

@@ -7,31 +7,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from helpers.driven import force, scenario, spring
+from helpers.driven import force, scenario
 from helpers.parts import Adhesion, Bell, Clock, Force, Record, Spring, analysis, run
 from helpers.scenes import scene
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
-from sim.analysis.observables import with_slips
 from sim.ensemble.dataset import moments, pooled as pooled_moments
-from sim.parts.bonds import Cohort, FirstMoment, Steady, Tracked, Unbroken
+from sim.parts.bonds import Cohort, FirstMoment, Steady, Unbroken
 from sim.parts.events import LATE, SLIP, Slips
+from tests.analysis.test_invariance import LENS, SCENES, STRETCHED
 
 NAN = math.nan
 #: A slider of 5 g that sticks and slips at four speeds.
 PULLED = {
     "clock": {"duration": "1.2 s", "step": "0.2 ms"}, "solid": {"shear_modulus": "0.9 MPa"},
     "sphere": {"radius": "3 mm"}, "adhesion": {"work": "40 mJ/m^2"}, "contact": {"load": "3 mN"},
-    "drive": {"model": "spring", "stage": "2 mm/s", "stiffness": "150 N/m", "mass": "5 g", "damping": "40 mN s/m"},
-    "bonds": {"model": "rate", "rupture": {"model": "bell", "zero_force_rate": "20 1/s", "bell_force": "4 pN"},
-              "bond_stiffness": "0.8 uN/m", "rebinding_rate": "200 1/s", "site_density": "6e16 1/m^2"},
+    "drive": SCENES["slips"]["drive"], "bonds": STRETCHED,
     "sweep": {"drive.stage": ["2 mm/s", "3 mm/s", "5 mm/s", "10 mm/s"]},
 }  # fmt: skip
 #: Slide, hold for a second, slide.
-HELD = {
-    "clock": {"duration": "3 s", "step": "0.1 ms"}, "solid": {"shear_modulus": "1.6 MPa"}, "sphere": {"radius": "2 mm"},
-    "adhesion": {"work": "42 mJ/m^2", "bond_share": 0.0}, "contact": {"load": "4 mN"},
+HELD = LENS | {
+    "clock": {"duration": "3 s", "step": "0.1 ms"}, "adhesion": {"work": "42 mJ/m^2", "bond_share": 0.0},
     "drive": {"model": "spring", "stiffness": "1 kN/m", "contact_stiffness": "rigid", "stage": {
         "time": ["0 s", "0.5 s", "0.5 s", "1.5 s", "1.5 s", "3 s"],
         "value": ["3 um/s", "3 um/s", "0 m/s", "0 m/s", "3 um/s", "3 um/s"]}},
@@ -276,9 +273,5 @@ def test_statistics_alone_have_the_means_of_slip_events_over_the_members_that_sl
     assert_allclose(result["sem"], [0.5, NAN], rtol=1e-14)
 
 
-def test_a_slider_on_single_bonds_is_at_rest_at_its_start_and_a_settled_creep_without_noise_has_no_spread():
-    ends = run(scenario(8.0, 8, spring(0.2), make=functools.partial(Tracked, sites=10), members=3)).isel(t=[0, -1])
-    speed = with_slips(ends)["speed"]
-    assert_array_equal(speed[:, 0], 0.0)
-    assert_allclose(speed[:, 1], ends["slider_position"][:, 1] / ends["t"][1], rtol=1e-12)
+def test_a_settled_creep_without_noise_has_no_spread():
     assert analysis.spread(run(scenario(20.0, 60, force(0.05), make=Cohort, members=1))) == []

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-import xarray as xr
 from click.testing import CliRunner
 from helpers import deadly, scenes
 from helpers.scenes import CONTACTS, LOADS
@@ -26,23 +25,13 @@ from sim.ensemble.plan import Plan
 from sim.ensemble.store import BlockFiles, MemoryBlocks, Stopped
 from sim.numerics import jit
 from sim.units.errors import BadInput
+from tests.ensemble.test_store import same
 
 sample = functools.partial(scenes.sample, sweep=LOADS)
 
 
 def never():
     return False
-
-
-def numbers(path):
-    with xr.open_dataset(path, decode_times=False, decode_coords=False) as dataset:
-        return dataset.load()
-
-
-def same(path, scenario=None):
-    """True if a file has the numbers of one process, and nothing lies beside it."""
-    assert [each.name for each in path.parent.iterdir()] == [path.name]
-    return numbers(path).reset_coords().equals(ensemble.run(scenario or sample()).reset_coords())
 
 
 def workers(parent=None):
@@ -116,18 +105,6 @@ def test_a_run_within_the_progress_of_another_changes_neither(many_parts):
     assert outer.identical(ensemble.run(sample())) and inner[0].identical(ensemble.run(sample(seed=6)))
 
 
-def test_a_run_that_is_stopped_again_and_again_gives_the_same_numbers(tmp_path, many_parts):
-    path, stops = tmp_path / "out.nc", 0
-    while not path.exists():
-        count = itertools.count()
-        try:
-            how = {"jobs": 1 + stops % 2, "stop": lambda count=count: next(count) > 1}
-            ensemble.run(sample(), path, resume=True, **how)
-        except Stopped:
-            stops += 1
-    assert stops > 2 and same(path)
-
-
 SCRIPT = """
 import sys
 sys.path.insert(0, {tests!r})
@@ -198,17 +175,17 @@ def threads():
         yield cluster
 
 
-def test_a_run_on_a_cluster_is_stopped_and_goes_on_anywhere(tmp_path, many_parts, threads):
+def test_a_run_that_is_stopped_again_and_again_goes_on_in_processes_and_on_a_cluster(tmp_path, many_parts, threads):
     path, stops, scenario = tmp_path / "out.nc", 0, sample(members=7)
-    where = itertools.cycle((threads.scheduler_address, ""))
+    ways = itertools.cycle(({"scheduler": threads.scheduler_address}, {"jobs": 1}, {"jobs": 2}))
     while not path.exists():
         count, counted = itertools.count(), []
-        how = {"scheduler": next(where), "progress": counted.append}
+        how = next(ways) | {"progress": counted.append}
         try:
             ensemble.run(scenario, path, resume=True, stop=lambda count=count: next(count) > 4, **how)
         except Stopped:
             stops += 1
-    assert stops > 1 and sum(counted) == plans.work(Plan.of(scenario)) and same(path, scenario)
+    assert stops > 2 and sum(counted) == plans.work(Plan.of(scenario)) and same(path, scenario)
 
 
 def test_what_a_block_raises_on_a_cluster_is_raised_and_what_is_computed_stays(
@@ -275,18 +252,7 @@ def test_a_scheduler_that_goes_away_is_told_and_what_is_computed_stays(tmp_path,
     assert same(path, sample(members=20))
 
 
-def test_a_suspect_runs_alone_and_an_executor_that_does_not_start_is_no_endless_loop(monkeypatch, many_parts):
-    waiting = [execute._Chain(str(place), None, [0]) for place in range(3)]
-    suspect, other = waiting.pop(), waiting.pop()
-    suspect.broken = 2
-    execute._put(waiting, suspect)
-    execute._put(waiting, other)
-    assert execute._taken(waiting, [other]) is None and execute._taken(waiting, []) is suspect
-    assert execute._taken(waiting, [suspect]) is None
-    suspect.broken = 3
-    execute._put(waiting, suspect)
-    assert suspect not in waiting and execute._taken(waiting, [other]) is not None
-
+def test_an_executor_that_does_not_start_is_no_endless_loop(monkeypatch, many_parts):
     class Broken(concurrent.futures.Executor):
         def submit(self, *given):
             raise concurrent.futures.BrokenExecutor

@@ -37,11 +37,10 @@ def names(folder):
 
 
 def same(path, scenario=None):
-    """True if a file holds the numbers of an undivided run, and nothing lies beside it."""
+    """True if a file holds the numbers of an undivided run in one process, and nothing lies beside it."""
     assert names(path.parent) == [path.name]
     with xr.open_dataset(path, decode_times=False, decode_coords=False) as dataset:
-        whole = ensemble.run(scenario or sample()).reset_coords()
-        return dataset.reset_coords().equals(whole)
+        return dataset.reset_coords().equals(ensemble.run(scenario or sample()).reset_coords())
 
 
 def stopped(path, scenario=None, after=2, **how):
@@ -208,40 +207,6 @@ def test_a_full_disk_is_told_with_what_a_run_takes_and_the_run_goes_on(tmp_path,
         assert not path.exists()
     ensemble.run(sample(), path, resume=True)
     assert same(path)
-
-
-def test_an_output_that_is_open_in_another_program_is_published_by_resume(tmp_path, monkeypatch):
-    path, move = tmp_path / "out.nc", os.replace
-
-    def windows(source, target):
-        if Path(target) == path:
-            raise PermissionError(errno.EACCES, "Access is denied")
-        move(source, target)
-
-    with monkeypatch.context() as patched, pytest.raises(StoreTrouble, match=r"close the program .*--resume"):
-        patched.setattr(os, "replace", windows)
-        ensemble.run(sample(), path)
-    ensemble.run(sample(), path, resume=True)
-    assert same(path)
-
-
-def test_nothing_stays_on_a_system_that_removes_no_open_file(tmp_path, monkeypatch):
-    unlink = Path.unlink
-
-    def windows(path, **how):
-        if path.exists() and any(
-            os.path.samefile(path, link) for link in Path("/proc/self/fd").iterdir() if link.exists()
-        ):
-            raise PermissionError(errno.EACCES, "Access is denied")
-        unlink(path, **how)
-
-    if not Path("/proc/self/fd").exists():
-        pytest.skip("open files are looked up in /proc")
-    for shard in ((1, 2), (2, 2)):
-        with monkeypatch.context() as patched:
-            patched.setattr(Path, "unlink", windows)
-            ensemble.run(sample(), tmp_path / "out.nc", shard=shard)
-    assert same(tmp_path / "out.nc")
 
 
 def test_a_file_that_comes_during_a_run_is_not_replaced(tmp_path):

@@ -154,13 +154,6 @@ def test_a_range_is_spaced_evenly_with_both_ends_in_one_unit(scene):
         np.testing.assert_allclose(loads(swept), exact, rtol=1e-14, atol=1e-19)
 
 
-def test_several_keys_form_the_outer_product_the_last_fastest(scene):
-    swept = scene('[sweep]\n"contact.load" = ["1 mN", "2 mN"]\n"adhesion.bond_share" = [0, 0.5, 1]\n')
-    result = [(point.contact.load, point.adhesion.bond_share) for point in swept.points()]
-    assert result == list(itertools.product([1e-3, 2e-3], [0.0, 0.5, 1.0]))
-    assert [axis.keys for axis in swept.sweep] == [("contact.load",), ("adhesion.bond_share",)]
-
-
 def test_nested_keys_lists_of_tables_and_whole_models_are_swept(scene):
     assert loads(scene('[sweep]\ncontact.load = ["1 mN", "2 mN"]\n')) == [1e-3, 2e-3]
     assert loads(scene('[sweep.contact]\nload = { from = "1 mN", to = "2 mN", count = 2 }\n')) == [1e-3, 2e-3]
