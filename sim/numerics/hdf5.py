@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import xarray
 
 #: Reason for refusing a file that cannot be read.
-BROKEN = "is not a netCDF file, or is cut short or damaged"
+BROKEN = "is not a netCDF file, or is truncated or damaged"
 #: Cache of HDF5 for each variable [byte]; its default of 64 MiB holds every variable of a usual run whole.
 CHUNK_CACHE = 4 * 2**20
 

@@ -30,7 +30,7 @@ class _Array(NetCDF4ArrayWrapper):
             return super().__getitem__(key)
         except (OSError, RuntimeError):
             place = f"{self.datastore.path}: variable {self.variable_name}"
-            raise Damaged(f"{place} is damaged; take another copy of the file") from None
+            raise Damaged(f"{place} is damaged; use another copy of the file") from None
 
 
 class _Store(NetCDF4DataStore):

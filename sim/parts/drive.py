@@ -321,7 +321,7 @@ class Spring(_Driven):
     start_after: Annotated[float, Quantity("s", "time at rest before the stage moves", "t_w", at_least=0)] = 0.0
     start: Annotated[
         Literal["rest", "steady"],
-        Field(description='"steady": moving with the stage, preloaded; until disturbed it stays so, stable or not'),
+        Field(description='"steady": moving with the stage; it remains so until disturbed, even if unstable'),
     ] = "rest"
     model: Literal["spring"] = "spring"
 

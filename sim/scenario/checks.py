@@ -57,56 +57,56 @@ def _cannot_be_driven(scene: Scene) -> Faults:
     drive, bonds = scene.drive, scene.population
     if drive.solves_motion and not bonds.stretched:
         if drive.contact_stiffness != "rigid":
-            fault = "bonds without a stretch hold interface and body together as one"
+            fault = "bonds without a stretch allow no slip between interface and body"
             yield ("drive", "contact_stiffness"), f'{fault}: take "rigid", or bonds with a rupture'
         if drive.at_once:
-            fault = "nothing sets the speed at which bonds without a stretch slip"
+            fault = "the slip speed of bonds without a stretch is not determined"
             yield ("drive",), f"{fault}: give drive.damping, mass or viscosity, or bonds with a rupture"
         if not bonds.carries_stress:
-            yield ("bonds", "stress"), "is 0 Pa, so that a drive would feel nothing; give the stress of the bonds"
+            yield ("bonds", "stress"), "is 0 Pa, so there is no friction; give the stress of the bonds"
 
 
 def _lacks_bonds(scene: Scene) -> Faults:
     shear, bonds = scene.fluctuations, scene.population
     if bonds.stretched and bonds.rebinding_rate == 0.0 and bonds.start_from != "bonded":
-        yield ("bonds", "start"), 'without rebinding no site is ever bound: take "bonded", or a rebinding_rate above 0'
+        yield ("bonds", "start"), 'no site binds without rebinding: give "bonded", or a rebinding_rate above 0'
     if not shear.spectrum.bond_made:
         if shear.reads_stress and not bonds.carries_stress:
             fault = 'amplitude model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
             yield ("shear", "amplitude"), fault
     elif not bonds.knows_forces:
-        fault = 'the spectrum that bonds make needs the force of each bond; use bonds.model = "cohort" or "tracked"'
+        fault = 'the spectrum of the bonds needs the force of each bond; use bonds.model = "cohort" or "tracked"'
         yield ("shear", "spectrum"), fault
     else:
         stiffest = cast(BondMade, shear.spectrum).stiffest(*scene.solid.effective)
         if cast(Cohort | Tracked, bonds).bond_stiffness > stiffest * (1.0 + 1e-9):
-            fault = f"the half-space under a bond of this footprint yields with {stiffest:.3g} N/m, in series with it"
+            fault = f"the half-space under a bond of this footprint has a stiffness of {stiffest:.3g} N/m in series"
             yield ("bonds", "bond_stiffness"), f"{fault}: give at most that, or a larger shear.spectrum.footprint"
 
 
 def _implausible(scene: Scene) -> Faults:
     drive, contact, radius, size = scene.drive, scene.contact, scene.rest_radius, scene.sphere.radius
     if contact.lags and not scene.adhesion.work > 0.0:
-        fault = "a rate-dependent edge measures its drive by the work of adhesion at rest; give a work above zero"
+        fault = "a rate-dependent edge needs a work of adhesion at rest; give adhesion.work above zero"
         yield ("adhesion", "work"), fault
     if radius > _WIDEST * size:
         fault = f"makes a contact of {radius:.3g} m on a sphere of {size:.3g} m radius, for which no theory holds;"
         yield ("contact", contact.kind), f"{fault} check its unit, and those of sphere, adhesion and solid"
     if drive.solves_motion and contact.reversible > 0.0 and drive.at_once:
-        fault = "makes friction fall with the contact, which nothing delays: give drive.mass, damping or viscosity"
+        fault = "lets friction drop with the contact at once: give drive.mass, damping or viscosity"
         yield ("contact", "reversible"), fault
 
 
 def _wrong_maps(scene: Scene) -> Faults:
     record, clock, members = scene.record, scene.clock, scene.ensemble.members
     if record.maps and not scene.fluctuations.draws_maps:
-        yield ("record", "maps"), 'needs shear.model = "mapped"; choose it or leave the maps out'
+        yield ("record", "maps"), 'needs shear.model = "mapped"; choose it or omit the maps'
     between = clock.step * clock.stride
     records = {time: time / between for time in record.maps}
     off = [time for time, number in records.items() if abs(number - round(number)) > 1e-9 * max(number, 1.0)]
     off += [time for time in record.maps if time > clock.duration * (1 + 1e-9)]
     if off:
-        fault = f"{off[0]:g} s is none of the recorded times; choose whole multiples of {between:g} s"
+        fault = f"{off[0]:g} s is not a recorded time; choose whole multiples of {between:g} s"
         yield ("record", "maps"), f"{fault} up to {clock.duration:g} s"
     elif len({*map(round, records.values())}) < len(record.maps):
         yield ("record", "maps"), "names a time twice; give each once"
@@ -120,8 +120,8 @@ def _shear_faults(scene: Scene, built: bool) -> Faults:
     if not shear.side(math.sqrt(math.pi) * radius) > 0.0:
         pull_off = jkr.pull_off_load(scene.adhesion.work, scene.sphere.radius)
         limit = f" of {pull_off:.3g} N" if contact.kind == "load" else ""
-        fault = f"is beyond pull-off{limit} at the start, so that no contact at rest gives the size of the cell"
-        yield ("contact", contact.kind), f'{fault}; hold the sphere closer, or give shear.cell such as "0.2 mm"'
+        fault = f"is beyond pull-off{limit} at the start, so there is no contact at rest for the size of the cell"
+        yield ("contact", contact.kind), f'{fault}; move the sphere closer, or give shear.cell such as "0.2 mm"'
     elif built:
         listed = shear.faults(*scene.solid.effective, radius)
         yield from ((("shear", key) if key else ("shear",), fault) for key, fault in listed)
@@ -130,7 +130,7 @@ def _shear_faults(scene: Scene, built: bool) -> Faults:
 def _off_the_map(scene: Scene) -> Faults:
     shear, clock = scene.fluctuations, scene.clock
     if shear.passes and scene.drive.solves_motion:
-        fault = 'a measured map under a disc needs a slip that is known before: prescribe the speed, or give "plane"'
+        fault = 'a measured map under a disc needs a known slip: prescribe the speed, or give "plane"'
         yield ("shear", "contact"), fault
     elif shear.passes:
         ends = np.linspace(0.0, clock.duration, min(clock.steps, _MOST_SLIPS) + 1)
@@ -159,9 +159,9 @@ def remarks_between(scene: Scene) -> list[str]:
             f'sphere.radius is {scene.sphere.radius:g} m: a number without a unit is in metres, write "5 mm"'
         )
     if varies and bonds.feeds_back and not contact.lags:
-        remarks.append('carried area in a fluctuating contact has no limit of fine steps: use model = "rate_dependent"')
+        remarks.append('carried area does not converge in a fluctuating contact: use model = "rate_dependent"')
     if contact.after_pull_off == "reattach" and bonds.stretched and not bonds.feeds_back:
-        remarks.append('bonds go on sliding while the contact is open: bonds.area = "carried" starts without them')
+        remarks.append('bonds continue to slide while the contact is open; bonds.area = "carried" starts without bonds')
     strength = np.broadcast_to(bonds.steady(speeds).strength, speeds.shape)
     strain = strength.max() / scene.setting.shear_modulus
     if strain > _LARGEST_STRAIN:
@@ -231,14 +231,14 @@ def _remarks_on_step(scene: Scene, path: Array) -> list[str]:
         gone = -math.log1p(-min(renewed(scene, path)[0], 0.999))
         share = -math.log1p(-(_RENEWED_LATE if pulled(scene) else _RENEWED_LAGGING)) / max(gone, 1e-300)
         lost = 0.5 * gone / math.tanh(0.5 * gone) - 1.0 if gone else 0.0
-        error = f"its radius varies by up to {lost:.1%} too much, in variance"
+        error = f"the variance of its radius is up to {lost:.1%} too large"
         if pulled(scene):
-            error = f"its load at pull-off is off by up to {engineering(pull_off_error(scene, path)[0], 'N')}"
+            error = f"the error of its pull-off load is up to {engineering(pull_off_error(scene, path)[0], 'N')}"
         part = f"a step renews {-math.expm1(-gone):.1%} of its variance"
-        text = f"the contact feels ΔΓ at clock steps alone, and {part}: {error}"
+        text = f"ΔΓ acts on the contact only at clock steps, and {part}: {error}"
     elif scene.fluctuations.passes and (scene.contact.lags or pulled(scene)):
         share = scene.fluctuations.field.pixels[0] / max(slid, 1e-300)
-        text = f"a clock step slides {engineering(slid, 'm')}, beyond a pixel of the map: the contact misses some"
+        text = f"a clock step slides {engineering(slid, 'm')}, more than a pixel of the map: the contact skips pixels"
     else:
         return []
     if share >= 1.0:

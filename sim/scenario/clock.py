@@ -86,14 +86,14 @@ class Record:
     per_member: Annotated[
         bool | None,
         Field(
-            description="keep every member; false: mean, standard deviation and standard error alone; not given: every"
-            " member, unless their trajectories would make a file of more than 20 GB"
+            description="record every member; false: mean, standard deviation and standard error; if omitted: every"
+            " member, unless the file would exceed 20 GB"
         ),
     ] = None
     maps: tuple[Annotated[float, Quantity("s", "time of a stress map", "t", at_least=0)], ...] = ()
-    map_members: Annotated[int, Quantity("1", "members whose maps are kept", at_least=1, at_most=10**4, whole=True)] = 1
+    map_members: Annotated[int, Quantity("1", "members with recorded maps", at_least=1, at_most=10**4, whole=True)] = 1
     quantities: Annotated[
-        tuple[Recorded, ...] | None, Field(description="what is kept beside contact_radius; not given: all")
+        tuple[Recorded, ...] | None, Field(description="quantities to record beside contact_radius; if omitted: all")
     ] = None
     precision: Annotated[Literal["float64", "float32"], Field(description="of trajectories in the file")] = "float64"
     compression: Annotated[

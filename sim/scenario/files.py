@@ -18,7 +18,7 @@ _MOST_BYTES = 2**20
 _CURES = {
     "Expected newline": 'put a value with its unit in quotes, such as load = "4 mN"',
     "Invalid value": 'put text in quotes, such as model = "rate"',
-    "Cannot": "a key or table is there twice, so keep one",
+    "Cannot": "a key or table appears twice; keep one",
     "Unescaped": "double the backslash or use single quotes",
     "Unterminated": "close the quotes",
     "Illegal character": "close the quotes on the same line",
@@ -30,7 +30,7 @@ def read_text(path: Path) -> str:
     """Return the text of a scenario file, which is UTF-8 and of at most 1 MiB."""
     try:
         if path.exists() and not (path.is_file() or path.is_fifo()):
-            raise OSError(errno.EINVAL, "it is no plain file")
+            raise OSError(errno.EINVAL, "it is not a regular file")
         with path.open("rb") as file:
             content = file.read(_MOST_BYTES + 1)
     except FileNotFoundError:

@@ -56,7 +56,7 @@ def load(
     wrong = [Fault(("source",), "is not a key")] if "source" in document else []
     for table in (key for axis in _axes(document) for key in axis.keys):
         inside = (path for path in words if path[: len(_words(table))] == _words(table) != path)
-        wrong += [Fault(path, f"is inside of {table}, which is swept as a whole: set sweep instead") for path in inside]
+        wrong += [Fault(path, f"is part of {table}, which is swept as a whole: set sweep instead") for path in inside]
     files = Files(folder)
     source = Source(file, text, overrides, files.texts, notes=tuple(notes))
     document = with_models(Scenario, document) | {"source": source}
@@ -89,7 +89,7 @@ def override(document: dict[str, Any], overrides: dict[str, Any]) -> list[str]:
         if isinstance(table, dict) and table.pop(key, None) is not None:
             dropped.append(dotted((*above, key)))
     if dropped:
-        notes.append(f"left out, because the model that is set has no such key: {', '.join(dropped)}")
+        notes.append(f"omitted, because the chosen model has no such key: {', '.join(dropped)}")
     axes = () if ("sweep",) in paths else _axes(document)
     for swept, count in [(key, len(axis.values)) for axis in axes for key in axis.keys]:
         if any(_words(swept)[: len(path)] == path for path in (*paths, *others)):

@@ -32,7 +32,7 @@ from sim.scenario.sweep import read_sweep, rows, set_key
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
 
-_Title = Annotated[str, Field(max_length=200, description="what the scenario is about, the title of its dataset")]
+_Title = Annotated[str, Field(max_length=200, description="subject of the scenario and title of the dataset")]
 #: Points of a sweep whose shear processes are all tried.
 _MOST_BUILT = 64
 #: Faults of a sweep that are reported at once.
@@ -271,7 +271,7 @@ class Scenario:
         remarks = [remark for part in self.chosen for remark in part.remarks(self.setting)]
         remarks += [*remarks_between(self), *remarks_on_force(self)]
         if self.ensemble.members > 1 and self.fluctuations.measured and not any(self.varies.values()):
-            remarks.append("all members and seeds have the same map, and nothing else is random: one member is enough")
+            remarks.append("all members and seeds share the map and nothing else is random, so one member is enough")
         if self.solid.poisson_ratio != 0.5:
             remarks.append("poisson_ratio is not 0.5: the normal-tangential coupling is neglected")
         return list(dict.fromkeys(remarks))

@@ -58,9 +58,9 @@ def read_sweep(sweep: Any) -> tuple[Axis, ...]:
         _require_sweepable(key, keys)
     for axis in axes:
         if len({str(row) for row in axis.values}) < len(axis.values):
-            raise _fault(f"{', '.join(axis.keys)}: has a value twice; take it out once")
+            raise _fault(f"{', '.join(axis.keys)}: has a value twice; remove one")
     if math.prod(len(axis.values) for axis in axes) > _MOST_POINTS:
-        raise _fault(f"has more than {_MOST_POINTS:,} points; take fewer values, or several runs")
+        raise _fault(f"has more than {_MOST_POINTS:,} points; give fewer values, or use several runs")
     return tuple(axes)
 
 
@@ -122,12 +122,12 @@ def _require_sweepable(key: str, keys: list[str]) -> None:
     if first in ("seed", "sweep", "source"):
         raise _fault(f"{key}: cannot be swept; members differ in their noise, so raise ensemble.members")
     if first in _SHARED[3:] or key in _SHARED:
-        raise _fault(f"{key}: cannot be swept, as all points of a sweep share it; run the scenario once for each value")
+        raise _fault(f"{key}: cannot be swept, because all points share it; run the scenario once for each value")
     if key.endswith(".model"):
         table = key.removesuffix(".model")
         raise _fault(f'{key}: a model is swept as a whole table: "{table}" = [{{ model = ... }}, {{ model = ... }}]')
     if any(other != key and key.startswith(f"{other}.") for other in keys) or keys.count(key) > 1:
-        raise _fault(f"{key}: is swept twice; take it out once")
+        raise _fault(f"{key}: is swept twice; remove one")
 
 
 def _spaced(key: str, values: dict[str, Any]) -> list[Any]:

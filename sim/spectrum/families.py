@@ -272,7 +272,7 @@ class SelfAffine(Rowed):
     rms: Rms
     hurst: Annotated[float, Quantity("1", "Hurst exponent", "H", at_least=0, at_most=1)]
     longest: Longest
-    rolloff: Annotated[float, Quantity("m", "wavelength at which the plateau ends", "λ_r", above=0)]
+    rolloff: Annotated[float, Quantity("m", "wavelength at the end of the plateau", "λ_r", above=0)]
     shortest: Shortest
     model: Literal["self_affine"] = "self_affine"
 

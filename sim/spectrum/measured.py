@@ -65,10 +65,10 @@ class FromFile(Rowed, Protocol):
         rows, steps = (len(self.wavenumbers), len(self.densities)), np.diff(self.wavenumbers)
         falls = np.flatnonzero((-steps if self._falling else steps) <= 0.0)
         if rows[0] != rows[1] or rows[0] < 2:
-            text = "a spectrum needs at least two rows and as many densities as wavenumbers"
+            text = "a spectrum needs at least two rows and one density per wavenumber"
             raise PydanticCustomError("table_too_short", f"{text}, not {rows[0]} and {rows[1]}")
         if len(falls):
-            text = f"the wavenumbers must all rise or all fall, but row {falls[0] + 2} does not go on from the one"
+            text = f"the wavenumbers must be monotonic, but row {falls[0] + 2} reverses the order of the rows"
             raise PydanticCustomError("table_not_increasing", f"{text} before; sort the rows and merge equal ones")
         if not any(self.densities):
             raise PydanticCustomError("table_empty", "every density is zero; give a row with a positive one", {})
@@ -123,8 +123,8 @@ class Tabulated(FromFile):
     wavenumbers: Wavenumbers = ()
     densities: Densities = ()
     normalization: _Normalization = "in_integral"
-    file: Annotated[str, Field(description="CSV with the columns q [rad/m], C [Pa^2 m^2], in place of the rows")] = ""
-    header: Annotated[str, Field(description="header of a file without one, as q [cycles/um], C [Pa^2 m^2]")] = ""
+    file: Annotated[str, Field(description="CSV file with the columns q [rad/m], C [Pa^2 m^2], instead of rows")] = ""
+    header: Annotated[str, Field(description="header for a file without one, such as q [cycles/um], C [Pa^2 m^2]")] = ""
     rms: Rescaled | None = None
     model: Literal["tabulated"] = "tabulated"
 
@@ -141,8 +141,8 @@ class Tabulated(FromFile):
         full = np.flatnonzero(self.densities)
         gaps = np.setdiff1d(np.arange(full[0], full[-1]), full) if full.size else full
         if gaps.size:
-            text = f"row {gaps[0] + 1} is zero between positive ones, as an empty bin of an average is"
-            raise PydanticCustomError("table_gaps", f"{text}: its energy would be lost; leave such rows out")
+            text = f"row {gaps[0] + 1} is zero between positive rows, like an empty bin of an average"
+            raise PydanticCustomError("table_gaps", f"{text}: its energy would be lost; remove such rows")
         return self
 
     @property
@@ -239,7 +239,7 @@ def read_map(name: str, context: Any, variable: str, gaps: bool = False, unit: s
         map_file = MapFile(matrix(file_text(name, context), STRESS, gaps, unit))
     values = map_file.values
     if values.ndim < 2 or values.size == 0:
-        raise ValueError("the map has not two dimensions; give rows and columns")
+        raise ValueError("the map does not have two dimensions; give rows and columns")
     if (points := min(values.shape[-2:])) < LEAST:
         raise ValueError(f"a map of {points} points along a side is too small; give at least {LEAST}")
     if not np.all(np.isfinite(values) | (np.isnan(values) & gaps)):
@@ -253,9 +253,9 @@ def _from_npy(path: Path) -> Array:
     """Return the numbers of an array that numpy has saved."""
     values = np.load(path, mmap_mode="r", allow_pickle=False)  # the file holds as many numbers as its header says
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
-        raise ValueError("it holds no plain real numbers; save a map of numbers, such as numpy.save of a float array")
+        raise ValueError("it does not hold real numbers; save a map of numbers, such as numpy.save of a float array")
     if values.size > _MOST:
-        raise ValueError(f"it holds more than {_MOST:.0e} numbers; crop the map")
+        raise ValueError(f"it has more than {_MOST:.0e} numbers; crop the map")
     return np.array(values, float)
 
 
@@ -266,13 +266,13 @@ def _from_netcdf(path: Path, variable: str, unit: str) -> MapFile:
     try:
         dataset = open_lazily(path)
     except Refused as fault:
-        raise ValueError(f"{fault}; write the map anew, as a plain variable") from None
+        raise ValueError(f"{fault}; write the map again, as a plain variable") from None
     with HDF5, dataset:
         if variable not in dataset:
             raise ValueError(f'there is no variable "{variable}"; name it by variable = "..."')
         data = dataset[variable]
         if data.ndim < 2 or data.dtype.kind not in "fiu":
-            raise ValueError(f'"{variable}" has no two dimensions, or no numbers; name a map by variable = "..."')
+            raise ValueError(f'"{variable}" is not an array of numbers in two dimensions; give variable = "..."')
         if data.size > _MOST:
             raise ValueError(f'"{variable}" has more than {_MOST:.0e} numbers; crop the map')
         data = data.load()
@@ -296,7 +296,7 @@ def spacings_of(map_file: MapFile, along: float | None, across: float | None, ke
     across = along if across is None else across
     for step, spacing in zip((along, across), map_file.spacings, strict=True):
         if step is not None and spacing is not None and not math.isclose(step, spacing, rel_tol=1e-4):
-            raise ValueError(f"the points are {spacing:g} m apart, not {step:g} m as {key} has it; leave {key} out")
+            raise ValueError(f"the points are {spacing:g} m apart, not {step:g} m as in {key}; omit {key}")
     along = along or map_file.spacings[0]
     across = across or map_file.spacings[1] or along
     if along is None or across is None:

@@ -21,11 +21,11 @@ from sim.spectrum.measured import SPACING, MapFile, MapUnit, Measured, estimate,
 from sim.units.quantity import Quantity, keyed
 from sim.units.tables import blamed
 
-_START = Quantity("m", "place along x of the map where a disc begins, left out the middle", "x_0", at_least=0)
-_NOISE = Quantity("Pa", "rms of the measurement's white noise in a pixel, which is reported", "s", at_least=0)
+_START = Quantity("m", "first position of a disc along x of the map; if omitted, the middle", "x_0", at_least=0)
+_NOISE = Quantity("Pa", "rms of the white measurement noise per pixel, which is reported", "s", at_least=0)
 _WINDOW = 'taper of a map that is not periodic; "none" on a disc'
-_ROWS = "axis that goes from row to row of a CSV or npy; netCDF names it"
-_MASK = "true: nan marks what lies outside of the contact, where there is no stress"
+_ROWS = "axis from row to row of a CSV or npy file; netCDF names its axes"
+_MASK = "true: nan marks points outside the contact, without stress"
 
 
 _DIGEST = PlainSerializer(lambda values: hashlib.sha256(values).hexdigest(), return_type=str, when_used="json")
@@ -95,7 +95,7 @@ class StressMap:
             with blamed(self.file):
                 self._read_file(info.context)
         if self.mask and self.window != "none":
-            message = "a window would taper the stress inside of the contact; leave it out beside mask"
+            message = "a window would taper the stress inside the contact; omit it with mask"
             raise PydanticCustomError("window", message, {})
         if self.mask and not self.square:
             raise PydanticCustomError("pixels", "a masked map needs square pixels; interpolate it onto them", {})
@@ -105,9 +105,9 @@ class StressMap:
         map_file = read_map(self.file, context, self.variable, gaps=True, unit=self.unit)
         values = _one_map(map_file, self.rows)
         if not self.mask and np.isnan(values).any():
-            raise ValueError("the map has gaps (nan); with mask = true they are what lies outside of the contact")
+            raise ValueError("the map has gaps (nan); with mask = true they mark points outside the contact")
         if not np.nanmax(values, initial=-math.inf) > np.nanmin(values, initial=math.inf):
-            raise ValueError("the stress is the same everywhere, so that nothing fluctuates; check the file")
+            raise ValueError("the stress is uniform, so there are no fluctuations; check the file")
         pixel, pixel_y = spacings_of(map_file, self.pixel, self.pixel_y, "pixel")
         vars(self).update(pixel=pixel, pixel_y=pixel_y, values=values.tobytes(), shape=values.shape)
 
@@ -191,6 +191,6 @@ def _one_map(map_file: MapFile, rows: str) -> Array:
     """The only map of a file, shape (nx, ny)."""
     if math.prod(map_file.values.shape[:-2]) != 1:
         many = math.prod(map_file.values.shape[:-2])
-        raise ValueError(f"it holds {many} maps; save the one that is meant on its own")
+        raise ValueError(f"it holds {many} maps; save the wanted map on its own")
     values = map_file.values.reshape(map_file.values.shape[-2:])
     return np.ascontiguousarray(values if map_file.has_axes or rows == "x" else values.T)

@@ -75,7 +75,7 @@ def columns(text: str, wanted: dict[str, Quantity], header: str | None = None, g
     if header and table.bare:
         place, units = "header", _headings("header", header.split(","))
     elif header:
-        raise TableError(f"line {table.lines[0]}: the columns have a header of their own; leave the key header out")
+        raise TableError(f"line {table.lines[0]}: the file has a header; omit the key header")
     else:
         place, units, table = _headed(table)
         if not units:
@@ -84,7 +84,7 @@ def columns(text: str, wanted: dict[str, Quantity], header: str | None = None, g
     if not table.rows:
         raise TableError("no rows follow the header; add rows of numbers below it")
     if len(units) != len(table.rows[0]):
-        raise TableError(f"{place}: {len(units)} names of {len(table.rows[0])} columns; name each column")
+        raise TableError(f"{place}: {len(units)} names for {len(table.rows[0])} columns; name each column")
     result = {}
     for name, quantity in wanted.items():
         places = [k for k, (heading, _) in enumerate(units) if heading == name]
@@ -122,7 +122,7 @@ def matrix(text: str, quantity: Quantity, gaps: bool = False, unit: str = "") ->
         raise TableError(f"the unit is {' and '.join(units)}, by the comments and the key unit; give one of them")
     for edge in (table.rows[0], [row[0] for row in table.rows]):
         if len(edge) > 4 and edge[0] in ("0", "1") and edge == [str(k + int(edge[0])) for k in range(len(edge))]:
-            raise TableError("its first row or column only counts the others; leave it out")
+            raise TableError("its first row or column only numbers the others; remove it")
     cells = list(itertools.chain.from_iterable(table.rows))
     return _numbers("value", table, cells, "".join(units), quantity, gaps).reshape(len(table.rows), -1)
 
@@ -214,7 +214,7 @@ def _numbers(name: str, table: _Cells, cells: list[str], unit: str, quantity: Qu
         numbers = quantity.scaled(np.fromiter(map(float, cells), float, len(cells)), unit)
     except ValueError:
         place = next(place for place, cell in enumerate(cells) if "," in cell or not _is_number(cell))
-        raise fault(place, "is not a number; write decimals with a point, or leave the row out") from None
+        raise fault(place, "is not a number; write decimals with a point, or omit the row") from None
     filled = np.flatnonzero(~(np.isnan(numbers) & gaps))
     for place in filled[[numbers[filled].argmin(), numbers[filled].argmax()]] if filled.size else ():
         try:
@@ -240,7 +240,7 @@ def plain_text(path: Path) -> str:
 def _plain(path: Path) -> Path:
     """Return the path of a plain file, so that no pipe or device is waited for."""
     if not path.is_file():
-        raise OSError(errno.ENOENT, "there is none, or it is no plain file")
+        raise OSError(errno.ENOENT, "it does not exist, or is not a regular file")
     return path
 
 
@@ -298,7 +298,7 @@ def file_columns(name: str, context: Any, wanted: dict[str, Quantity], header: s
 
 Indices = NDArray[np.int64]
 _TIME = Quantity("s", "time", "t")
-_CYCLES = Quantity("1", "cycles there and back; 0: one way", at_least=0, at_most=10**6, whole=True)
+_CYCLES = Quantity("1", "number of cycles between both ends; 0: one way", at_least=0, at_most=10**6, whole=True)
 #: Times nearer than this share of the run are meant to be the same.
 _SAME = 1e-9
 
@@ -410,7 +410,7 @@ class Course:
 
     start: Annotated[float, Field(alias="from")]
     stop: Annotated[float, Field(alias="to")]
-    scale: Annotated[Literal["linear", "log"], Field(description="how it goes from one end to the other")] = "linear"
+    scale: Annotated[Literal["linear", "log"], Field(description="spacing of values between the ends")] = "linear"
     changes: ClassVar[bool] = True
     cycles: ClassVar[int] = 0
     end: ClassVar[float] = math.inf
@@ -505,7 +505,7 @@ class Table:
     cycles: ClassVar[int] = 0
 
     time: Annotated[tuple[Annotated[float, _TIME], ...], LISTED] = ()
-    file: Annotated[str, Field(description="CSV with these columns, beside the scenario, in place of them")] = ""
+    file: Annotated[str, Field(description="CSV file with these columns, beside the scenario, instead of lists")] = ""
 
     @model_validator(mode="after")
     def _rows_in_order(self, info: ValidationInfo) -> "Table":
@@ -567,7 +567,7 @@ def over_time(unit: Quantity, name: str) -> Any:
         quantity: ClassVar[Quantity] = unit
         column: ClassVar[str] = name
         value: Annotated[tuple[Annotated[float, unit], ...], LISTED] = ()
-        file: Annotated[str, Field(description=f"CSV with the columns `time` and `{name}`, in place of these")] = ""
+        file: Annotated[str, Field(description=f"CSV file with the columns `time` and `{name}`, instead of lists")] = ""
 
     number, course = Annotated[float, unit, Tag("[value]")], Annotated[_Course, Tag("[course]")]
     return Annotated[number | course | Annotated[_Table, Tag("[table]")], Discriminator(_kind)]
@@ -668,7 +668,7 @@ def measured_points(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -
     _refuse_unknown(arrays, known, known)
     for name in arrays:
         if len(twice := [other for other in names_of(name) if other in arrays]) > 1:
-            raise ValueError(f'columns "{twice[0]}" and "{twice[1]}" are one condition; leave one of them out')
+            raise ValueError(f'columns "{twice[0]}" and "{twice[1]}" are the same condition; omit one of them')
     if len({values.shape for values in arrays.values()}) != 1 or next(iter(arrays.values())).ndim != 1:
         raise ValueError("measured columns need the same number of rows; give arrays of one length")
     return {name: Points(values, arrays.get(name + ERROR)) for name, values in arrays.items() if name in known}
@@ -692,13 +692,13 @@ def _measured_columns(
     bare = [name for name, quantity in wanted.items() if not units[name] and quantity.unit != "1"]
     if bare and any(units.values()):
         cure = f'write "{bare[0]} [{wanted[bare[0]].unit}]" if that is its unit'
-        raise TableError(f'column "{bare[0]}" has no unit where others have one; {cure}')
+        raise TableError(f'column "{bare[0]}" has no unit, but others have one; {cure}')
     arrays = columns(text, wanted, gaps=gaps)
     for base in (name for name in outcomes if {name, name + ERROR} <= wanted.keys()):
         if wanted[base + ERROR].unit != outcomes[base].unit:  # a share of the value
             arrays[base + ERROR] *= np.abs(arrays[base])
         if np.any(arrays[base + ERROR] <= 0.0):
-            raise TableError(f'column "{base}" has a value of 0, whose relative error says nothing; give it in units')
+            raise TableError(f'column "{base}" has a value of 0, so a relative error is undefined; give it in units')
     return measured_points(arrays, known), [name for name in bare if name in known]
 
 
@@ -713,5 +713,5 @@ def _refuse_unknown(names: Collection[str], known: Iterable[str], outcomes: Iter
         ending = f" → {near[0]}{name[len(base) :]}" if near else ""
         texts.append(name[:40] + (" (the error of no measured column)" if base in known else ending))
     if texts:
-        cure = "rename these columns (docs/dataset.md), or leave them out"
+        cure = "rename these columns (docs/dataset.md), or omit them"
         raise TableError(f"neither variables of a dataset nor numbers of the scenario: {', '.join(texts)}; {cure}")

@@ -170,11 +170,11 @@ def test_what_bonds_do_to_the_paper_is_listed_with_the_size_of_their_field():
 
     def twice(**overrides):
         lines = blocks("bond_noise", **overrides).get("notes", [])
-        return sum(line.startswith("friction has paid for the energy under each bond") for line in lines)
+        return sum(line.startswith("friction already supplies the energy under each bond") for line in lines)
 
     assert twice() == twice(sweep={}) == 1
     assert twice(**{"sweep": {}, "shear.paid_by_adhesion": 0.0}) == twice(sweep={}, shear={"model": "uniform"}) == 0
-    assert not any("friction has paid" in line for line in blocks("masking")["notes"])
+    assert not any("friction already supplies" in line for line in blocks("masking")["notes"])
     lines = blocks("bond_noise")["fluctuations"]
     square = 9e16 * float(bell_moments(0.1, 1e4, 4e-12, 4e-4, 1e5).force_square)
     energy, unit, *when = row(lines, "stored energy")[1].split(" ", 2)

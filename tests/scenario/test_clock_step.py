@@ -71,7 +71,7 @@ def test_the_radius_of_a_lagging_edge_varies_too_much_by_what_is_said():
 
 
 def test_the_step_that_is_given_needs_no_remark_and_a_scene_without_error_has_none():
-    written = next(text for text in scene().remarks() if "at pull-off is off by up to" in text)
+    written = next(text for text in scene().remarks() if "the error of its pull-off load is up to" in text)
     step = written.rpartition('"')[0].rpartition('"')[2]
     for lens in (scene(clock=clock(step)), scene(contact={"load": "4 mN"}), scene(shear={"model": "uniform"})):
         assert not [text for text in lens.remarks() if "clock step" in text]

@@ -133,7 +133,7 @@ def test_rows_of_a_sweep_lose_a_key_that_is_set_and_no_key_is_set_inside_of_a_sw
     for overrides, count in (({"drive.speed": 3}, 1), ({"contact.load": 2e-3}, 2)):
         assert len(scene(overrides=overrides, base=rows + LENS).points()) == count
     text = '[sweep]\nbonds = [{ model = "none", stress = "1 kPa" }, { model = "none", stress = "2 kPa" }]\n'
-    with pytest.raises(BadInput, match=r"bonds\.stress.*is inside of bonds"):
+    with pytest.raises(BadInput, match=r"bonds\.stress.*is part of bonds"):
         scene(text, {"bonds.stress": "3 kPa"})
     with pytest.raises(BadInput, match=r"shear\.points.*not a key of this model"):
         scene(BANDED, {"shear.model": "mean", "shear.points": 32})

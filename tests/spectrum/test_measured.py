@@ -257,7 +257,7 @@ WRONG_DATASETS = [
     (lambda data: data.where(data.x > 0.05), "gaps"),
     (lambda data: data * 0.0, "every density is zero"),
     (lambda data: data.isel(x=slice(5)), "too small"),
-    (lambda data: data.isel(x=0, member=0), "no two dimensions"),
+    (lambda data: data.isel(x=0, member=0), "in two dimensions"),
     (lambda data: data.assign(shear_map=data.shear_map.assign_attrs(units="N")), "not a unit of Pa"),
 ]
 

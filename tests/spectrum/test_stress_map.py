@@ -84,7 +84,7 @@ def test_a_map_has_the_unit_of_its_file_or_of_the_key_and_axes_without_units_the
     result = read(files, file="bare.nc", unit="kPa", pixel=PIXEL, pixel_y=PIXEL_Y)
     assert_allclose(result.surface_energy(G, NU), read(files, file="map.nc").surface_energy(G, NU), rtol=1e-12)
     np.savetxt(files.folder / "index.csv", np.c_[np.arange(16), kilo.T], delimiter=",", fmt="%.9g")
-    with pytest.raises(ValidationError, match="only counts"):
+    with pytest.raises(ValidationError, match="only numbers"):
         read(files, file="index.csv", pixel=1e-6)
 
 
@@ -182,10 +182,10 @@ def test_a_map_that_cannot_be_the_field_is_refused_with_the_cure(files):
         (FIELD, {"pixel": "0 um"}, "above 0"),
         (FIELD, {"pixel": 1e-6, "window": "box"}, "'none' or 'hann'"),
         (np.where(FIELD < 0.0, np.nan, FIELD), {"pixel": 1e-6}, "gaps .* mask = true"),
-        (FIELD, {"pixel": 1e-6, "mask": True, "window": "hann"}, "leave it out beside mask"),
+        (FIELD, {"pixel": 1e-6, "mask": True, "window": "hann"}, "omit it with mask"),
         (FIELD, {"pixel": 1e-6, "mask": True, "pixel_y": 2e-6}, "square pixels"),
         (FIELD * np.inf, {"pixel": 1e-6, "mask": True}, "finite"),
-        (FIELD * 0.0 + 3.0, {"pixel": 1e-6}, "the same everywhere"),
+        (FIELD * 0.0 + 3.0, {"pixel": 1e-6}, "the stress is uniform"),
         (FIELD[:7], {"pixel": 1e-6}, "too small"),
         (FIELD, {"pixel": 1e-6, "values": "YQ=="}, "values\n.* valid bytes"),
     ]:

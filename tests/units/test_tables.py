@@ -104,7 +104,7 @@ def test_a_wrong_table_is_refused_with_place_and_cure():
         ("time [s], speed [furlongs/blink]\n1,2", None, 'column "speed" .*unknown unit'),
         (f"{time_speed}1,2\n3", None, "line 3: 1 cells"),
         (f"{time_speed}1,2\n\n3,fast", None, "line 4: speed is not a number"),
-        (f"{time_speed}1,", None, "line 2: speed .* leave the row out"),
+        (f"{time_speed}1,", None, "line 2: speed .* omit the row"),
         (f"{time_speed}1,2\n1,nan", None, "line 3: speed must be finite"),
         (f"{time_speed}1,2\n-1,1", None, "line 3: time must be at least 0 s$"),
         (f'{time_speed}1,"2', None, "quotes"),
@@ -112,8 +112,8 @@ def test_a_wrong_table_is_refused_with_place_and_cure():
         (f'{time_speed}1,"2,5"', None, "line 2: speed is not a number"),
         ("1 2\n3 4", "", r'header = "time \[s\], speed \[m/s\]"'),
         ("1 2\n3 4", "time [s], speed [m]", 'header: column "speed" .* unit'),
-        ("1 2\n3 4", "time, speed, other", "header: 3 names of 2 columns"),
-        ("time, speed\n3, 4", "time, speed", "line 1: .* leave the key header out"),
+        ("1 2\n3 4", "time, speed, other", "header: 3 names for 2 columns"),
+        ("time, speed\n3, 4", "time, speed", "line 1: .* omit the key header"),
     ):
         with pytest.raises(TableError, match=words):
             columns(text, WANTED, header)

@@ -38,7 +38,7 @@ Contact = Annotated[
     Field(description='"disc": the energy that a contact of finite size pays when it grows, instead of the plane\'s'),
 ]
 _ModeAmplitudes = Annotated[
-    Literal["gaussian", "fixed"], Field(description='"fixed": modes keep their modulus, so that the energy is constant')
+    Literal["gaussian", "fixed"], Field(description='"fixed": modes have a constant modulus, so the energy is constant')
 ]
 _Points = Annotated[int, Quantity("1", "grid points along a side of the cell", at_least=2, at_most=2**14, whole=True)]
 
@@ -84,9 +84,9 @@ class ShearModel:
             message = 'fixed mode_amplitudes are never renewed; use mode_amplitudes = "gaussian" or relaxing = false'
             raise PydanticCustomError("fixed_cannot_relax", message)
         if self.spectrum.bond_made and law.model != "constant":
-            raise PydanticCustomError("bond_made", "the bonds set the size of the field they make; leave amplitude out")
+            raise PydanticCustomError("bond_made", "the bonds set the amplitude of their field; omit amplitude")
         if law.model == "slip_rate" and law.memory_length is None and math.isnan(self._memory):
-            message = 'slip_rate remembers a distance: give memory_length, or shear.correlation.model = "slip"'
+            message = 'slip_rate needs a memory distance: give memory_length, or shear.correlation.model = "slip"'
             raise PydanticCustomError("no_memory", message)
         if self.spectrum.bond_made and fixed:
             cure = "leave it out"
@@ -144,16 +144,16 @@ class ShearModel:
         if self.paid_by_adhesion > 0.0:
             remarks.append("adhesion pays for the stored energy: the paper's assumption (shear.paid_by_adhesion)")
             if spectrum.bond_made:
-                twice = "with paid_by_adhesion it counts twice"
-                remarks.append(f"friction has paid for the energy under each bond: {twice}")
+                twice = "with paid_by_adhesion the energy counts twice"
+                remarks.append(f"friction already supplies the energy under each bond: {twice}")
         longest, side = 2.0 * math.pi / max(spectrum.support[0], 1e-300), self.side(setting.cell)
         if spectrum.wavevector is None and side < longest < 1e300:
-            remarks.append("the spectrum has waves longer than the cell, which are missing: give a larger shear.cell")
+            remarks.append("the spectrum has waves longer than the cell, which are omitted: give a larger shear.cell")
         if self.contact == "plane" and radius > 0.0:
             share = float(marginal_energy(spectrum, radius, *solid)) / plane
             long = min(longest, side) > 2.0 * radius
             what = "the longest waves exceed the contact, which" if long else "a contact of this size"
-            off = f"{what} pays {share:.1%} of the plane's fluctuation energy when it grows"
+            off = f"{what} stores {share:.1%} of the fluctuation energy of the plane per new area"
             if abs(share - 1.0) > self.tolerance:
                 remarks.append(f'{off}: shear.contact = "disc" takes that into account')
         if not spectrum.bond_made and rms > setting.shear_modulus:
@@ -191,7 +191,7 @@ class Mean(ShearModel):
     @model_validator(mode="after")
     def _no_memory(self) -> "Mean":
         if self.amplitude.relaxing:
-            message = 'amplitude that relaxes needs a correlation, which "mean" has not; use model = "modal"'
+            message = 'a relaxing amplitude needs a correlation, which "mean" lacks; use model = "modal"'
             raise PydanticCustomError("mean_has_no_memory", message)
         return self
 
@@ -236,9 +236,9 @@ class _Fluctuating(ShearModel):
         cell = self.side(math.sqrt(math.pi) * rest_radius)
         if self.contact == "disc" and self.draws_maps and not 2.0 * rest_radius <= cell:
             if math.isnan(rest_radius):
-                message = "the scene has no contact at rest, which the cell must hold"
-                return [("contact", f'{message}; hold the sphere closer by a key of [contact], or give "plane"')]
-            message = f"the cell of {cell:g} m does not hold the contact, which is {2.0 * rest_radius:g} m wide at rest"
+                message = "there is no contact at rest, so the size of the cell is unknown"
+                return [("contact", f'{message}; move the sphere closer by a key of [contact], or give "plane"')]
+            message = f"the cell of {cell:g} m is smaller than the contact: {2.0 * rest_radius:g} m wide at rest"
             return [("cell", f'{message}; give shear.cell = "{2.2e6 * rest_radius:.3g} um" or more')]
         if too_many := self.too_many_modes(cell):
             return [("", f'{too_many}; take a smaller cell, longer waves or fewer points, or model = "mean"')]
@@ -258,7 +258,7 @@ class _Fluctuating(ShearModel):
         pairs = (2.0 * reach + 1.0) * (reach + 1.0)
         listed = self.keeps_modes and (self.draws_maps or not ripple)
         if listed and math.isfinite(reach) and pairs > _MOST_PAIRS:
-            return f"the cell of {cell:g} m has {pairs:.2g} Fourier modes, of which {_MOST_PAIRS:.2g} can be kept"
+            return f"the cell of {cell:g} m has {pairs:.2g} Fourier modes; at most {_MOST_PAIRS:.2g} are possible"
         return ""
 
 
@@ -314,7 +314,7 @@ class Banded(_Fluctuating):
     @model_validator(mode="after")
     def _not_of_bonds(self) -> "Banded":
         if self.spectrum.bond_made:
-            message = 'the frozen part of a field that bonds make has no bands; use model = "mean" or "modal"'
+            message = 'the constant part of the field of bonds has no bands; use model = "mean" or "modal"'
             raise PydanticCustomError("bond_made", message)
         return self
 
@@ -384,12 +384,12 @@ class Auto(_Fluctuating):
     def why(self, maps: bool) -> str:
         """Return the reason for the choice, in words."""
         if self.correlation is None:
-            return "no correlation is given, so the ensemble mean answers, exactly and without noise"
+            return "no correlation is given, so the ensemble mean is exact, without noise"
         if maps:
             return "maps are recorded"
         if self.spectrum.bond_made:
-            return "the field that bonds make has a frozen part, so each mode is followed"
-        return "a correlation is given and no maps are recorded: energies in time are all the contact feels"
+            return "the field of the bonds has a constant part, so each mode is computed"
+        return "a correlation is given and no maps are recorded, so the energy over time is sufficient"
 
 
 #: Radius up to which energies on discs are found, over the largest of the contact without fluctuations.
@@ -417,12 +417,12 @@ class Carried(ShearModel):
     @model_validator(mode="after")
     def _goes_with_the_contact(self) -> "Carried":
         if self.amplitude.relaxing:
-            raise PydanticCustomError("never_renewed", "a measured map is never renewed: give relaxing = false")
+            raise PydanticCustomError("never_renewed", "a measured map does not change: give relaxing = false")
         if self.contact == "disc" and (self.field.window != "none" or not self.field.square):
             message = 'a disc needs square pixels and no window; interpolate the map, or take contact = "plane"'
             raise PydanticCustomError("disc_of_map", message)
         if self.contact == "plane" and self.field.start is not None:
-            message = 'start is where a disc begins: give contact = "disc", or leave it out'
+            message = 'start is the first position of a disc: give contact = "disc", or omit start'
             raise PydanticCustomError("disc_of_map", message)
         return self
 
@@ -469,7 +469,7 @@ class Carried(ShearModel):
         (nx, ny), (along, across) = field.shape, field.pixels
         size = f"{nx} × {ny} points of {along:.4g} m × {across:.4g} m along and across the sliding"
         less = f"{100.0 * abs(energy / radial - 1.0):.2g} % {'more' if energy > radial else 'less'}"
-        mean = f"{field.mean:.4g} Pa, which is no part of the field; the bonds at rest bear {setting.strength:.4g} Pa"
+        mean = f"{field.mean:.4g} Pa, not part of the field; bonds at rest: {setting.strength:.4g} Pa"
         rows = [("rms of the stress", f"{field.rms:.4g} Pa at amplitude 1"), ("map", size), ("mean of the map", mean)]
         stored = f"{energy:.4g} J/m^2 at amplitude 1 of the map itself, {less} than that of its radial spectrum"
         rows.append(("stored energy", stored))
