@@ -57,8 +57,7 @@ def main() -> None:
     gc.set_threshold(500_000)  # imports make many objects that stay: looking through them is a tenth of a start,
     atexit.register(gc.freeze)  # and as much of the end
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else what all packages declare is looked through
-    if not LOG.handlers:
-        LOG.addHandler(Notes())
+    LOG.addHandler(notes := Notes())
     for order in signals("SIGTERM", "SIGHUP"):  # schedulers stop a run by these
         signal.signal(order, signal.default_int_handler)
     if isinstance(sys.stdout, io.TextIOWrapper):  # letters that the terminal's encoding lacks end no command
@@ -79,6 +78,8 @@ def main() -> None:
         if not isinstance(trouble, OSError) or trouble.strerror is None:
             raise
         _fail(f"{trouble.filename or 'files'}: {trouble.strerror}", TROUBLE)
+    finally:  # a program that calls this function goes on to use the package
+        LOG.removeHandler(notes)
 
 
 def _fail(text: str, code: int) -> NoReturn:
