@@ -98,13 +98,18 @@ def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
     points = None if data is None else Measured(data, dataset)
     best, of_points = kinds.default(dataset), kinds.default(dataset, points)
     could = kinds.drawable(dataset)
-    others = [kind for kind in could if kind in _ALSO or kinds.KINDS[kind].fits(dataset)]
+    speeds = speed_of(dataset).to_numpy() if speed_name(dataset) in dataset else np.zeros(1)
+    both_ways = bool(np.all(speeds > 0.0) or np.all(speeds < 0.0)) and np.unique(speeds).size > _SPEEDS
+    others = [
+        kind for kind in could
+        if kind in _ALSO or kinds.KINDS[kind].fits(dataset) or (kind == "curve" and both_ways)
+    ]  # fmt: skip
     # theories have an axis of their own; the end of a run that is on its way says little, and over the speed a sweep
     # is a curve already; only bonds with a rupture law have a maximum of the stress, which transients after steps
     # between few speeds do not show, nor many springs upon each other
     lasts = is_stationary(dataset)
     varies = speed_name(dataset) in dataset and not is_steady(dataset)
-    steps = varies and np.unique(speed_of(dataset).to_numpy()).size <= _SPEEDS
+    steps = varies and np.unique(speeds).size <= _SPEEDS
     has_peak = any(str(name).startswith("bonds_rupture") for name in dataset.variables)
     less = {"sweep": best in ("theories", "curve") or not lasts, "friction": best in ("creep", "stability")}
     less["curve"] = best == "creep"  # whose speed nothing sets

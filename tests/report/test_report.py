@@ -142,7 +142,10 @@ def test_the_figures_of_a_page_are_those_that_show_more_of_a_run_and_others_have
     crept = shipped("creep", clock={"duration": "0.1 s", "step": "2 ms"}, sweep={"drive.force": [4e-3, 8e-3]})
     loads = {"contact.load": {"from": 1e-3, "to": 2e-3, "count": 21}}
     steady = simulated(drive=STEADY, shear=shear.Uniform(), sweep=loads, clock=Clock(duration=0.04, step=0.02))
+    up_and_down = {"model": "table", "time": [0.0, 0.01, 0.02], "speed": [1e-4, 2e-2, 1e-4]}
+    both_ways = shipped("uniform_stress", drive=up_and_down, sweep={}, clock={"duration": 0.02, "step": 1e-3})
     for dataset, best, shown, left_out in (
+        (both_ways, "friction", {"curve"}, set()),  # a branch for each sense
         (stepped, "curve", set(), {"stress"}),  # transients are no curve of stress over speed
         (crept, "creep", {"sweep"}, {"stress", "time", "curve"}),
         (steady, "sweep", set(), {"time"}),  # nothing changes in time
