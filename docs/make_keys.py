@@ -22,7 +22,8 @@ contact.load = "4 mN"
   column names the models that have a key; it is empty if all have it.
 - **Sweeps**: `[sweep]` takes any of these keys with a list of values, or `{from, to, count, scale}`. Several keys form
   the outer product. A list of tables is one axis.
-- **Editors** complete keys by the JSON schema that `sim schema` prints.
+- **Editors** complete keys by the JSON schema that `sim new` writes beside the starter, as `sim.schema.json`. The
+  first line of the starter, `#:schema ./sim.schema.json`, names it. `sim schema` prints the same schema.
 
 Made by `python docs/make_keys.py` from the declarations in the code.
 """

@@ -356,6 +356,7 @@ def test_new_converge_and_a_reduced_file_work_and_name_what_a_figure_misses(here
     schema = Path("sim.schema.json")
     assert Path("mine.toml").read_text(encoding="utf-8").startswith(f"#:schema ./{schema}\n")
     assert json.loads(schema.read_text(encoding="utf-8")) == json.loads(sim("schema").stdout)
+    assert sim("new", "next").stderr == ""
     schema.write_text("{}", encoding="utf-8")
     assert sim("run", "mine.toml", "--quiet", "--members", 2).exit_code == 0
     other = sim("new")

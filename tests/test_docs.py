@@ -44,6 +44,12 @@ def test_pages_made_from_the_code_are_up_to_date():
         assert text_of(f"docs/{page}.md") == maker_of(page).text(), f"run python docs/make_{page}.py"
 
 
+def test_the_pages_of_a_release_name_its_version():
+    version = tomllib.loads(text_of("pyproject.toml"))["project"]["version"]
+    assert f"\nversion: {version}\n" in text_of("CITATION.cff")
+    assert f"\n## [{version}] - " in text_of("CHANGELOG.md") or "dev" in version
+
+
 def anchors(page):
     """The anchors that a code host gives to the headings of a page."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.M)

@@ -129,6 +129,7 @@ def test_an_output_that_is_open_elsewhere_is_published_by_resume(elsewhere):
         ("github-workflows", ".github/workflows/*.yml"),
         ("github-issue-forms", ".github/ISSUE_TEMPLATE/*.yml"),
         ("readthedocs", ".readthedocs.yaml"),
+        ("citation-file-format", "CITATION.cff"),
     ],
 )
 def test_the_files_for_hosts_follow_their_schemas(schema, files):

@@ -183,7 +183,7 @@ def write_schema(path: Path, root: type) -> bool:
     """Write the JSON schema of scenario files to a path; return False if another file is there, which stays."""
     text = json.dumps(json_schema(root), indent=2) + "\n"
     try:
-        with path.open("x", encoding="utf-8") as file:
+        with path.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
     except FileExistsError:
         return path.read_bytes() == text.encode()
