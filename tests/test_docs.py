@@ -194,7 +194,7 @@ def test_the_findings_have_the_numbers_of_the_lens_behind_a_spring_at_a_16_times
 
 
 #: Pages whose blocks are run one after the other. A block that is marked ``cluster`` needs several machines and is only
-#: parsed. Lines of ``make`` and ``pip`` need a network: ``.ci/run`` runs those of README.
+#: parsed. Lines of ``make`` and ``pip`` need a network: ``.ci/run`` runs ``make run`` and ``make test`` of README.
 RUN = [page for page in PAGES if any("python" in words or command_lines(code) for words, code in blocks(page))]
 
 
