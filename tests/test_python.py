@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import tomllib
 from importlib.metadata import version
 from unittest.mock import Mock
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from helpers.commands import LENS
 
 import sim
 from sim import analysis
@@ -17,13 +19,8 @@ from sim.cli import cli
 from sim.numerics.files import StoreTrouble
 from sim.scenario.files import written
 
-SCENE = {
+SCENE = tomllib.loads(LENS) | {
     "name": "a <scene>",
-    "clock": {"duration": "1 s", "step": "0.1 s"},
-    "solid": {"shear_modulus": "1.6 MPa"},
-    "sphere": {"radius": "2 mm"},
-    "adhesion": {"work": "42 mJ/m^2"},
-    "contact": {"load": "4 mN"},
     "drive": {"model": "ramp", "from": "0 mm/s", "to": "10 mm/s"},
     "bonds": {"model": "steady", "critical_speed": "10 mm/s", "stress": "0.3 MPa"},
 }

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.draws import ornstein_uhlenbeck
 from helpers.lens import FIELD, scene
 from helpers.parts import Bell, Clock, Ensemble, Equilibrium, Record, Time, analysis, bonds, drive, run, shear
 from numpy.testing import assert_allclose
@@ -21,12 +22,8 @@ TIME = np.linspace(0.0, 1.0, 400)
 
 
 def series(rng, members, times):
-    """Gaussian series of five records a correlation time, as in the module of stationary statistics."""
-    keep, values = math.exp(-0.2), np.empty((ENSEMBLES, members, 5 * times))
-    values[..., 0] = rng.normal(size=values.shape[:2])
-    for k in range(1, values.shape[-1]):
-        values[..., k] = keep * values[..., k - 1] + math.sqrt(1.0 - keep**2) * rng.normal(size=values.shape[:2])
-    return values
+    """Gaussian series of five records a correlation time."""
+    return ornstein_uhlenbeck(rng, (ENSEMBLES, members, 5 * times), math.exp(-0.2))
 
 
 @pytest.mark.parametrize(("members", "times"), [(2, 5), (4, 2), (6, 20), (40, 5)])

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.draws import ornstein_uhlenbeck
 from helpers.lens import scene
 from helpers.parts import Bell, Clock, Ensemble, analysis, bonds, drive, run, shear
 from numpy.testing import assert_allclose
@@ -77,12 +78,10 @@ def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_memb
     counted = bonds.Counted(**rates, start_from="empty", sites=50)
     found = analysis.relaxation(run(scene(bonds=counted, ensemble=Ensemble(members=40), **lens)), "shear_stress")
     assert found.low < exact < found.high and found.error < 0.1 * exact
-    time, rng, memory = np.linspace(0.0, 5.0, 101), np.random.default_rng(27), math.exp(-0.05 / 0.5)
+    time, rng = np.linspace(0.0, 5.0, 101), np.random.default_rng(27)
 
     def course(mean, members=10):
-        noise = rng.standard_normal((members, time.size))  # of a correlation time of 0.5 s
-        for k in range(1, time.size):
-            noise[:, k] = memory * noise[:, k - 1] + math.sqrt(1.0 - memory**2) * noise[:, k]
+        noise = ornstein_uhlenbeck(rng, (members, time.size), math.exp(-0.05 / 0.5))  # of a correlation time of 0.5 s
         return xr.Dataset({"x": (("member", "t"), mean + 0.1 * noise)}, {"t": time})
 
     intervals = [analysis.relaxation(course(1.0 - np.exp(-time / 0.63)), "x") for _ in range(count)]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from helpers import lens
+from helpers.draws import ornstein_uhlenbeck
 from helpers.lens import FIELD, scene
 from helpers.parts import Adhesion, Clock, Ensemble, Equilibrium, Time, analysis, bonds, drive, run, shear
 from numpy.testing import assert_allclose
@@ -20,15 +21,6 @@ from sim.spectrum.families import Gaussian
 LEVELS = np.array(QUANTILES)
 #: Ensembles that a coverage is counted over, and its bounds; five of its standard errors are 3.4 %.
 ENSEMBLES, LEAST, MOST = 1000, 0.92, 0.98
-
-
-def ornstein_uhlenbeck(rng, members, records, keep):
-    """Standard normal series that keep a share from record to record."""
-    values = np.empty((members, records))
-    values[:, 0] = rng.normal(size=members)
-    for k in range(1, records):
-        values[:, k] = keep * values[:, k - 1] + math.sqrt(1.0 - keep**2) * rng.normal(size=members)
-    return values
 
 
 LAWS = {
@@ -103,8 +95,8 @@ def test_few_members_widen_an_interval_and_those_of_shares_hold_what_they_promis
 def covered(law, members, length, ensembles):
     """Shares of intervals that hold the truth, and of series that have one, for the mean and each quantile."""
     of, exact = LAWS[law]
-    shape = ensembles * members, 5 * length  # five records a correlation time
-    drawn = of(ornstein_uhlenbeck(np.random.default_rng(14), *shape, math.exp(-0.2))).reshape(ensembles, members, -1)
+    shape = ensembles, members, 5 * length  # five records a correlation time
+    drawn = of(ornstein_uhlenbeck(np.random.default_rng(14), shape, math.exp(-0.2)))
     result = [analysis.over_time(series) for series in drawn]
     ends = [
         np.column_stack([[estimate[end], *estimate[f"quantile_{end}"]] for estimate in result])
@@ -144,14 +136,14 @@ def test_a_single_series_that_is_short_for_its_memory_has_no_interval():
 
 
 def test_correlation_times_and_free_values_are_those_of_the_law_and_of_white_noise():
-    series = ornstein_uhlenbeck(np.random.default_rng(17), 64, 2000, math.exp(-0.2))
+    series = ornstein_uhlenbeck(np.random.default_rng(17), (64, 2000), math.exp(-0.2))
     result = analysis.over_time(series, step=0.1)
     assert abs(result["correlation_time"] - 0.5) < 5.0 * result["correlation_time_sem"]
     # the mean of n records has the variance (1 + k)/(1 - k)/n, its estimate from 64 means the error sqrt(2/63)
     keep = math.exp(-0.2)
     exact = 64 * 2000 * (1.0 - keep) / (1.0 + keep)
     assert abs(result["effective_samples"] / exact - 1.0) < 5.0 * math.sqrt(2.0 / 63.0)
-    series = ornstein_uhlenbeck(np.random.default_rng(16), 1, 50, math.exp(-0.2))
+    series = ornstein_uhlenbeck(np.random.default_rng(16), (1, 50), math.exp(-0.2))
     assert np.all(np.isnan(analysis.over_time(series)["quantile_low"]))
     result = analysis.over_time(np.random.default_rng(18).normal(size=(1, 20_000)))
     assert abs(result["effective_samples"] / 20_000 - 1.0) < 0.1 and math.isnan(result["correlation_time"])
@@ -162,7 +154,7 @@ STEADY = {"drive": drive.Steady(speed=4e-3), "clock": Clock(duration=0.8, step=0
 
 def test_statistics_leave_out_missing_values_and_a_distribution_is_over_members_and_the_second_half():
     for members in [40, 3, 1]:
-        values = ornstein_uhlenbeck(np.random.default_rng(19), members, 2000, math.exp(-0.2)) ** 2
+        values = ornstein_uhlenbeck(np.random.default_rng(19), (members, 2000), math.exp(-0.2)) ** 2
         values[0, 100:] = math.nan
         result, known = analysis.over_time(values), values[np.isfinite(values)]
         assert_allclose(result["quantile"], np.quantile(known, LEVELS), rtol=1e-13)
@@ -183,12 +175,7 @@ def test_statistics_leave_out_missing_values_and_a_distribution_is_over_members_
 def squared_ornstein_uhlenbeck(rng, members, records, keep, pairs=5):
     """Energies of modes whose amplitudes keep a share from record to record: correlation keep^(2 lag)."""
     weights = 1.0 / np.arange(1.0, pairs + 1.0)
-    state, energy = rng.normal(size=(members, pairs, 2)), np.empty((members, records))
-    for k in range(records):
-        if k:
-            state = keep * state + math.sqrt(1.0 - keep**2) * rng.normal(size=state.shape)
-        energy[:, k] = np.einsum("mpc,p->m", state**2, weights)
-    return energy
+    return np.einsum("mpct,p->mt", ornstein_uhlenbeck(rng, (members, pairs, 2, records), keep) ** 2, weights)
 
 
 def exact_time(keep, step):

@@ -252,7 +252,12 @@ def test_a_scheduler_that_goes_away_is_told_and_what_is_computed_stays(tmp_path,
     assert same(path, sample(members=20))
 
 
-def test_an_executor_that_does_not_start_is_no_endless_loop(monkeypatch, many_parts):
+def test_a_suspect_runs_alone_and_an_executor_that_does_not_start_is_no_endless_loop(monkeypatch, many_parts):
+    waiting = [execute._Chain(str(place), None, [0], broken=broken) for place, broken in enumerate((0, 0, 2))]
+    suspect, other = waiting[2], waiting[1]
+    assert execute._taken(waiting, [other]) is None and execute._taken(waiting, []) is suspect
+    assert execute._taken(waiting, [suspect]) is None
+
     class Broken(concurrent.futures.Executor):
         def submit(self, *given):
             raise concurrent.futures.BrokenExecutor

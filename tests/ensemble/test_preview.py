@@ -81,9 +81,6 @@ def test_the_contact_at_rest_its_stiffness_and_errors_of_the_cell_are_those_of_t
     radius = next(iter(load(FOLDER / "stick_slip.toml").points())).rest_radius
     firm = float(row(lines, "contact k_t")[1].split()[0])
     assert_allclose(firm, 3.0 * math.pi**2 * 1.6e6 * radius / (4.0 * 1.5), rtol=1e-3)
-    keys = ("oscillates below", "with mass, damping, viscosity, k_t")
-    alone, delayed = (float(row(lines, key)[1].split()[0]) for key in keys)
-    assert 0.0 < alone < delayed < math.inf  # the compliance of the contact adds to that of the spring
 
 
 def sizes(name, **overrides):

@@ -87,6 +87,15 @@ def log_chances(number, trials, chance):
     return result
 
 
+def ornstein_uhlenbeck(rng, shape, keep):
+    """Standard normal series along the last axis, which keep a share from record to record."""
+    values = np.empty(shape)
+    values[..., 0] = rng.normal(size=shape[:-1])
+    for k in range(1, shape[-1]):
+        values[..., k] = keep * values[..., k - 1] + np.sqrt(1.0 - keep**2) * rng.normal(size=shape[:-1])
+    return values
+
+
 def fits(counted, expected):
     """Whether counts have their expected values, by Pearson's χ²; cells of few are put together."""
     few = expected < 10.0

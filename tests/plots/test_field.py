@@ -1,10 +1,11 @@
 """Figures of stress maps show the map, its displacement and its spectrum."""
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.commands import sim
+from helpers.commands import LENS, sim
 from helpers.parts import Ensemble, Onset, Record, Stress, drive, load
 from helpers.pictured import CELL, STEADY, field, mapped, rendered, simulated
 from matplotlib.patches import Circle
@@ -90,16 +91,12 @@ def test_maps_and_spectra_that_cannot_be_drawn_say_why():
     assert plots.draw(resting, "map").axes
 
 
-SCENE = {
-    "clock": {"duration": "4 ms", "step": "1 ms"}, "solid": {"shear_modulus": "1.6 MPa"}, "sphere": {"radius": "2 mm"},
-    "adhesion": {"work": "42 mJ/m^2"}, "contact": {"load": "4 mN"},
-}  # fmt: skip
 ANISOTROPIC = {"model": "anisotropic_gaussian", "rms": "100 kPa", "length_x": "12 um", "length_y": "40 um"}
 
 
 def before(**spectrum):
     """The figure of a scene that has not run."""
-    return field_figures.density_figure(load(SCENE | {"shear": {"model": "mean", "spectrum": spectrum}}))
+    return field_figures.density_figure(load(tomllib.loads(LENS) | {"shear": {"model": "mean", "spectrum": spectrum}}))
 
 
 def test_a_spectrum_is_drawn_before_any_run_also_by_the_command_which_replaces_nothing(tmp_path, monkeypatch):
