@@ -445,6 +445,13 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
             f"{prefix}_time": (when - beginning, "s", f"time from the start of sliding to the {text}"),
             f"{prefix}_speed": (speed, "m/s", f"sliding speed at the {text}"),
         }
+        if bool(ramp.any()):  # a clock step has one speed, so the peak is up to half a step from where it is found
+            is_log, step = word(dataset, "drive.scale", "") == "log", setting(dataset, "clock.step")
+            low, high = (abs(setting(dataset, f"drive.{end}")) for end in ("from", "to"))
+            change = (speed * np.log(high / low.where(is_log, high))).where(is_log, high - low)
+            half = 0.5 * abs(change) * step / setting(dataset, "clock.duration")
+            described[f"{prefix}_time_reading"] = 0.5 * step + 0.0 * when, "s", ""
+            described[f"{prefix}_speed_reading"] = half, "m/s", ""
         for key, (values, *about) in described.items():
             result[key] = labelled(values.where(known).drop_vars("phase", errors="ignore"), *about)
     return xr.Dataset(result)

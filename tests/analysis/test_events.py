@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
 from sim.analysis.events import static_threshold
+from sim.laws.schallamach import bell_peak
 from tests.analysis.test_invariance import LENS, SCENES
 
 NAN = math.nan
@@ -235,7 +237,7 @@ def test_peaks_are_maxima_inside_a_ramp_or_at_once_after_a_start_and_none_is_of_
         made_up |= dict.fromkeys(("peak_stress", "peak_friction"), np.abs(values).max())
         result = analysis.peaks(one.assign(made_up))
         known = [bool(result[key].notnull()) for key in result]
-        assert len(known) == 6 and set(known) == {name == "peak"}
+        assert len(known) == 10 and set(known) == {name == "peak"}
     assert not any("friction" in name for name in analysis.peaks(ramp))  # members differ by noise
     # Bonds without a stretch bear most at the first slip: the first record after it, two lives of the transient on.
     part = drive.Start(rest=0.1, speed=1e-2)
@@ -251,6 +253,16 @@ def test_peaks_are_maxima_inside_a_ramp_or_at_once_after_a_start_and_none_is_of_
     exact = float(jkr.pull_off_load(float(dataset["adhesion_work"]), float(dataset["sphere_radius"])))
     assert not dataset["in_contact"].isel(t=-1).any()
     assert_allclose(dataset["pull_off_load"], exact, rtol=2e-3)
+
+
+@pytest.mark.parametrize("step", ["10 ms", "40 ms"])
+def test_the_speed_of_a_friction_maximum_has_the_closed_form_in_its_interval_at_any_clock_step(step):
+    point = sim.load(Path(sim.__file__).parents[1] / "scenarios" / "friction_maximum.toml", {"clock.step": step})
+    stated, law, rupture = analysis.statements(run(point)), point.bonds, point.bonds.rupture
+    exact = bell_peak(rupture.zero_force_rate, rupture.bell_force, law.bond_stiffness, law.rebinding_rate, 1.0).speed
+    low, high = (float(stated[f"peak_speed_{end}"]) for end in ("low", "high"))
+    assert low < exact < high < low * 1e7 ** (1.01 * point.clock.step / point.clock.duration)  # seven decades in all
+    assert stated["peak_time_low"] < np.log(exact / 1e-7) / np.log(1e7) * 10.0 < stated["peak_time_high"]
 
 
 def test_a_pull_from_rest_has_the_largest_force_of_all_clock_steps_and_the_area_there_unless_it_still_grows():
