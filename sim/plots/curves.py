@@ -224,7 +224,7 @@ def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], tuple[S
     for number, k in enumerate(np.rint(np.linspace(0, len(points) - 1, count)).astype(int)):
         words = "" if bar else ", ".join(swept_value(dataset, name, points[k][name]) for name in varied)
         lines.append(Line(number, points[k], words, shades[k]))
-    left_out = f"{count} of {len(points)} curves drawn (--where draws others)" if count < len(points) else ""
+    left_out = f"{count} of {len(points)} curves drawn (choose others by --where)" if count < len(points) else ""
     return lines, bar, left_out
 
 
@@ -381,7 +381,7 @@ def over(dataset: xr.Dataset, name: str) -> Scene:
         known = scene.statistics.names()
         near = difflib.get_close_matches(name, [*known, *swept], 1, 0.6)
         cure = f'did you mean "{near[0]}"?' if near else f"choose of: t, speed, {', '.join([*swept, *known])}"
-        raise ValueError(f'nothing can be drawn over "{name[:40]}"; {cure}')
+        raise ValueError(f'there is no x axis "{name[:40]}"; {cure}')
     return scene.placed(name, scene.all(f"{name}_mean"), named(mean), mean.attrs["units"], broken=True)
 
 
@@ -474,10 +474,10 @@ def _broken(values: np.ndarray) -> np.ndarray:
 
 
 _ENERGIES: Any = (
-    ("bond_work", r"bonds left, $\Delta\gamma(N)$", style.BONDS, "-."),
+    ("bond_work", r"intact bonds, $\Delta\gamma(N)$", style.BONDS, "-."),
     ("fluctuation_energy", r"fluctuations, $\Delta\Gamma$", style.FLUCTUATIONS, "--"),
-    ("edge_energy", r"paid at the edge, $\mathrm{d}E/\mathrm{d}A$", style.FLUCTUATIONS, ":"),
-    ("work_of_adhesion", "left to the contact, $w$", style.BOTH, "-"),
+    ("edge_energy", r"at the edge, $\mathrm{d}E/\mathrm{d}A$", style.FLUCTUATIONS, ":"),
+    ("work_of_adhesion", "effective, $w$", style.BOTH, "-"),
 )
 
 
@@ -520,7 +520,7 @@ def share_panel(panel: Axes, scene: Scene) -> None:
         lost = [scene.all(f"lost_to_{name}_mean") for name in ("bonds", "fluctuations")]
         known = np.all(np.max(np.nan_to_num(lost), axis=2) > _APART, axis=0)
         bonds = list(np.where(known[:, np.newaxis], 1.0 - lost[0], np.nan))
-        _reference(panel, scene, bonds, "-.", "with the bonds left alone", zorder=2.5)
+        _reference(panel, scene, bonds, "-.", "with intact bonds only", zorder=2.5)
     ratios = []
     for line in scene.lines:
         hertz, jkr = (scene.values(f"{name}_radius_mean", line.whole) for name in ("hertz", "jkr"))
@@ -585,7 +585,7 @@ def further_panels(scene: Scene) -> list[tuple[float, Panel]]:
 
 def needs_speeds(dataset: xr.Dataset) -> None:
     if "drive_rest" in dataset:
-        raise ValueError("a rest and a start have two speeds only; draw the kind stress")
+        raise ValueError("a start from rest has only two speeds; draw the kind stress")
     if is_steady(dataset) and speed_dim(dataset) is None:
         raise ValueError('the speed neither changes in time nor is swept; ramp it: [drive] model = "ramp"')
 
@@ -629,7 +629,7 @@ def coarse_slips(dataset: xr.Dataset) -> str:
         lasting, apart = slips(dataset)["slip_duration"].median(), float(dataset["t"][1] - dataset["t"][0])
         if lasting < _FINE * apart:
             key = "step" if apart < 1.5 * float(setting(dataset, "clock.step")) else "record"
-            return f"slips last less than {_FINE} records, which miss part of them: a shorter clock.{key} shows them"
+            return f"slip events are shorter than {_FINE} records and not resolved: reduce clock.{key}"
     return ""
 
 

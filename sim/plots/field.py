@@ -130,16 +130,16 @@ def _target(dataset: xr.Dataset, point: xr.Dataset, stress: xr.DataArray) -> tup
     try:
         shear = resolved(dataset, "shear")
     except KeyError:
-        raise ValueError("the spectrum is swept as a whole table; run the one of interest on its own") from None
+        raise ValueError("the spectrum is swept as a whole table; run the wanted spectrum on its own") from None
     for table in ("spectrum", "amplitude"):
         for key in shear[table]:
             with contextlib.suppress(KeyError):
                 shear[table][key] = float(setting(point, f"shear.{table}.{key}"))
     if shear["spectrum"].get("file") and not shear["spectrum"].get("wavenumbers"):
-        raise ValueError("the spectrum names a file, whose rows the dataset lacks; run the scenario again")
+        raise ValueError("the dataset lacks the rows of the spectrum file; run the scenario again")
     spectrum: Any = TypeAdapter(Spectrum).validate_python(shear["spectrum"])
     if spectrum.wavevector is not None:
-        raise ValueError("a ripple is a single wave and has no spectral density to compare; draw its map")
+        raise ValueError("a ripple is a single wave without a spectral density; draw its map")
     amplitude = TypeAdapter(Amplitude).validate_python(shear["amplitude"])
     if amplitude.relaxing or amplitude.remembers:  # the amplitude has a past: only the shape can be compared
         grid = cast(Grid, _lattice_of(stress))
@@ -171,11 +171,11 @@ def spectrum_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     point = dataset.isel(where)
     stress = _maps_of(point, at)
     if not np.any(stress.to_numpy()):
-        raise ValueError("the map holds no stress; record one where fluctuations have grown")
+        raise ValueError("the map has no stress; record a map at a later time")
     if word(dataset, "shear.spectrum.model", "") == "bonds":
-        raise ValueError("the field that bonds make follows them, without a spectrum of its own; draw the kind map")
+        raise ValueError("the field of the bonds has no given spectrum; draw the kind map")
     if word(dataset, "shear.field.file", ""):
-        raise ValueError("a measured map has no spectrum to follow; `sim plot` of the scenario draws its own")
+        raise ValueError("a measured map has no target spectrum; `sim plot` of the scenario draws its spectrum")
     (spectrum, raised, name), grid = _target(dataset, point, stress), cast(Grid, _lattice_of(stress))
     expected = raised * radial_average(mode_density(modes(spectrum, grid.cell, grid.points), grid), grid).density
     rings = [radial_average(density, grid) for density in periodogram(stress.to_numpy(), grid.cell)]
@@ -219,7 +219,7 @@ def density_figure(scene: "Scenario") -> Figure:
     shear, radius = scene.fluctuations, scene.rest_radius if scene.rest_radius > 0.0 else 0.01 * scene.sphere.radius
     spectrum = shear.spectrum
     if spectrum.wavevector is not None:
-        raise ValueError("its stress has no spectrum to draw before a run; name the dataset that `sim run` makes of it")
+        raise ValueError("its stress has no spectrum before a run; name the dataset that `sim run` writes")
     low, high = cast(Waves, spectrum).reach(radius)
     q = np.geomspace(0.7 * low, min(1.4 * high, 1e4 * low), 1500)
     along, across = spectrum.density(q, 0.0), spectrum.density(0.0, q)

@@ -69,7 +69,7 @@ class Choices(NamedTuple):
         of_all = ("member", "units", "size", "xlim", *(("start", "stop") if kind in _OVER_TIME else ()))
         options = {name: value for name, value in self.chosen.items() if name not in of_all}
         if refused := [name for name in options if name not in takes]:
-            words = f"it takes: {', '.join(takes)}" if takes else "it takes none but member and units"
+            words = f"it takes: {', '.join(takes)}" if takes else "it takes only member and units"
             raise ValueError(f'the figure "{kind}" has no choice of {refused[0]}; {words}')
         if self.at is not None:
             options["at"] = read_option(self.at, "at", "s")
@@ -292,7 +292,7 @@ def planned(source: Path, kind: str | None, path: Path | None, replace: bool, ch
     if kind not in (None, "spectrum"):
         raise BadInput([f'{source}: before a run only "spectrum" can be drawn; for "{kind}" run it: sim run {source}'])
     if chosen:
-        fault = f"nothing can be chosen of a figure before a run ({', '.join(chosen)})"
+        fault = f"a figure before a run takes no options ({', '.join(chosen)})"
         raise BadInput([f"{source}: {fault}; name the dataset that `sim run` writes"])
     claim_file(target, replace, files_read(scene))
     try:

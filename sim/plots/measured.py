@@ -26,7 +26,7 @@ _NEAR, _ROUNDING = 5e-3, 1e-9
 _ALIKE = 0.01
 _MARKS = "osD^v"
 #: Reasons why a row is not drawn, and why it has no residual.
-_NO_CURVE, _SEVERAL = "of no curve that is drawn", ("of several curves", "of curves with other areas of JKR's contact")
+_NO_CURVE, _SEVERAL = "not of a curve in the figure", ("of several curves", "of curves with other JKR areas")
 _APART = (_SEVERAL[0], "beyond the curve", "without an error")
 #: Most values of a condition that are named.
 _MOST = 3
@@ -237,7 +237,7 @@ class Measured:
         left_out = ", ".join(f"{count} {self._cause(reason)}" for reason, count in counts.items() if count)
         shown = {each for name in (*self.over, *self.reasons, *self.conditions) for each in names_of(name)}
         idle = ", ".join(name for name in self.table if name not in shown)
-        parts = [(f"{drawn} of {total} points drawn; left out: ", left_out), ("without a residual: ", apart)]
+        parts = [(f"{drawn} of {total} points drawn; omitted: ", left_out), ("without a residual: ", apart)]
         return "; ".join(words + text for words, text in [*parts, ("no panel of ", idle)] if text)
 
     def _cause(self, reason: str) -> str:
@@ -259,9 +259,9 @@ class Measured:
             If nothing could be drawn, with the axis or the columns that the table lacks.
         """
         if self.column(over) is None:
-            raise ValueError(f'{self.source}: no column "{over}", over which the figure is drawn; add it or choose --x')
+            raise ValueError(f'{self.source}: no column "{over}", the x axis of the figure; add it or choose --x')
         if not any(np.any(np.isin(reasons, ("", *_APART))) for reasons in self.reasons.values()):
-            lack = "no row is of what is drawn: its columns are no variables of this figure, or its conditions differ"
+            lack = "no row fits the figure: the columns are not its variables, or the conditions differ"
             columns = self.remark or f"columns: {', '.join(self.table)}"
             raise ValueError(f"{self.source}: {lack} ({columns}); choose another kind, --x or --where")
         text = textwrap.fill(self.remark, 64)

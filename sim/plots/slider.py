@@ -80,7 +80,7 @@ _FRAME: Any = {"color": style.BONDS, "linewidth": 1.4}
 def needs_force(dataset: xr.Dataset) -> None:
     """Refuse a dataset in which no force is prescribed."""
     if not (word(dataset, "drive.model", "") == "force").all():
-        raise ValueError('no force is prescribed; let one: [drive] model = "force"')
+        raise ValueError('no force is prescribed; set [drive] model = "force"')
 
 
 def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
@@ -105,10 +105,10 @@ def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
 def needs_map(dataset: xr.Dataset) -> None:
     """Refuse a dataset that is no sweep of springs over stage speeds."""
     if "stage_speed" not in dataset and "stage_speed_mean" not in dataset:
-        raise ValueError('no stage pulls through a spring; let one: [drive] model = "spring"')
+        raise ValueError('no stage pulls through a spring; set [drive] model = "spring"')
     if style.swept(dataset) != ["drive_stiffness"] or not (dataset["stage_speed"].isel(t=-1) > 0.0).all():
         cure = '[sweep] "drive.stiffness" = {from = "10 N/m", to = "1 kN/m", count = 9, scale = "log"}'
-        raise ValueError(f"a map needs a sweep of the spring alone under a stage that ramps; {cure}")
+        raise ValueError(f"a map needs a sweep of only the spring stiffness under a ramped stage; {cure}")
 
 
 def stability_figure(dataset: xr.Dataset) -> Figure:
@@ -136,7 +136,7 @@ def stability_figure(dataset: xr.Dataset) -> Figure:
         style.across(panel, pace.factor * edges, pace.label("speed of the stage $V$"), "log")
         style.legend(panel, words)
     axes[0].set_ylabel(hard.label("stiffness of the spring $K$"))
-    figure.colorbar(mesh, ax=axes, label="swing of the force over its largest", pad=0.02)
+    figure.colorbar(mesh, ax=axes, label="force amplitude (normalised)", pad=0.02)
     return figure
 
 
@@ -170,14 +170,14 @@ def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
 def needs_pull(dataset: xr.Dataset) -> None:
     """Refuse a dataset in which no force grows from rest."""
     if "spring_force" not in dataset and "spring_force_mean" not in dataset:
-        raise ValueError('nothing pulls the slider; let a spring do it: [drive] model = "spring"')
+        raise ValueError('nothing pulls the slider; add a spring: [drive] model = "spring"')
     force = style.mean_of(dataset, "spring_force")
     if (abs(force.isel(t=0)) > 0.01 * abs(force).max("t")).any():
         raise ValueError('the force does not begin at zero; start at rest: [drive] start = "rest"')
     if not bool(stays_held(dataset).all()):
-        raise ValueError("the control of the contact changes its area, too: hold contact.load constant")
+        raise ValueError("the mount also changes the contact area: set a constant contact.load")
     if not (style.mean_of(dataset, "contact_area").isel(t=0) > 0.0).all():
-        raise ValueError("the contact is open at the start, so that it has no area to lose; begin with a closed one")
+        raise ValueError("the contact is open at the start; begin with a closed contact")
 
 
 def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
@@ -235,21 +235,21 @@ def needs_stress(dataset: xr.Dataset) -> None:
     """Refuse a dataset without shear stress, or with one speed only."""
     rest = dataset.get("drive_rest")
     if rest is not None and not (dataset["t"] > rest).any():
-        raise ValueError("the run ends before the slider starts; make clock.duration longer than drive.rest")
+        raise ValueError("the run ends before the slider starts; set clock.duration above drive.rest")
     if not (style.recorded(dataset, "shear_stress") != 0.0).any():
-        raise ValueError('the bonds bear no shear stress; give them one, such as [bonds] stress = "0.3 MPa"')
+        raise ValueError('the bonds have no shear stress; add one, such as [bonds] stress = "0.3 MPa"')
     if (word(dataset, "drive.model", "") == "force").any():
-        raise ValueError("stress is drawn over the speed, and a force is prescribed; see the figure creep")
+        raise ValueError("a stress over speed needs a prescribed speed, but a force is given; see the figure creep")
     if rest is None and is_steady(dataset) and speed_dim(dataset) is None:
         cure = 'ramp it: [drive] model = "ramp", or rest and start: [drive] model = "start"'
-        raise ValueError(f"stress is drawn over the speed, which neither changes nor is swept; {cure}")
+        raise ValueError(f"stress is drawn over the speed, but the speed is constant; {cure}")
 
 
 def stress_figure(dataset: xr.Dataset, data: Measured | None = None, ax: Axes | None = None) -> Figure:
     """Shear stress with its maximum, and bonds, over speed. After a start from rest: the static peaks."""
     if "drive_rest" in dataset:
         if data or ax:
-            raise ValueError("starts from rest have panels of their own; draw the kind time beside data, or on an ax")
+            raise ValueError("starts from rest need several panels; with data or an ax, draw the kind time")
         return start_figure(dataset)
     scene = over_speed(dataset)._replace(measured=data)
 
@@ -365,7 +365,7 @@ def _peak_panel(panel: Axes, dataset: xr.Dataset, scene: Scene) -> None:
             rested = style.mean_of(point, "bond_fraction").sel(t=float(setting(point, "drive.rest")), method="ffill")
             force = schallamach.start_up_peak(speeds, *bonds.pathway).force
             peak = factor * float(rested) * bonds.density * bonds.at_rest * force
-            panel.plot(scene.unit.factor * speeds, peak, ":", label="none rebinds", **style.GREY)
+            panel.plot(scene.unit.factor * speeds, peak, ":", label="without rebinding", **style.GREY)
         for law in steady_laws(point, speeds)[:1]:
             panel.plot(scene.unit.factor * speeds, factor * law.stress, label=law.words, **_LAWS[law.style])
     style.across(panel, scene.x, scene.words, scene.scale, 0.05)

@@ -93,11 +93,11 @@ def case_of(dataset: xr.Dataset) -> Case:
         settings["value"] = setting(dataset, f"contact.{held}")
     if not settings or held not in _CONTROLS:
         cure = 'run it with [contact] load = "4 mN", or with an indentation'
-        raise ValueError(f"theories need a load or an indentation that stays; {cure}")
+        raise ValueError(f"theories need a constant load or indentation;  {cure}")
     settings |= {"work": setting(dataset, "adhesion.work"), "sphere_radius": setting(dataset, "sphere.radius")}
     settings |= {"modulus": dataset["contact_modulus"], "poisson_ratio": dataset["effective_poisson_ratio"]}
     if not settings["work"].max() > 0.0:
-        raise ValueError("there is no adhesion that theories could differ on; give [adhesion] a work above 0")
+        raise ValueError("the theories differ only with adhesion; give adhesion.work above 0")
     if not (dataset["radius_at_rest"] > 0.0).any():
         raise ValueError("there is no contact at rest; raise the load or the indentation")
     for values in settings.values():
@@ -105,7 +105,7 @@ def case_of(dataset: xr.Dataset) -> Case:
             dim = str(values.dims[0])
             value = style.swept_value(dataset, dim, 0).rpartition("= ")[2].replace("−", "-")
             cure = f'choose by --where, such as --where {dim}="{value}"'
-            raise ValueError(f"theories are of one contact; {cure}")
+            raise ValueError(f"theories describe a single contact; {cure}")
     fractions = np.ravel(dataset.get("contact_reversible", ()))
     shares = [float(share) for share in fractions if 0.0 < share != 1.0]
     numbers = {key: float(values.max()) for key, values in settings.items()}
@@ -148,7 +148,7 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
         x = unit.factor * stress * area**power
         panel.plot(x, factor * area, label="simulated", **mark)
         if not is_steady(dataset) and area.size:
-            panel.plot(x[-1:], factor * area[-1:], label="simulated, the last record", **mark | {"mfc": style.BOTH})
+            panel.plot(x[-1:], factor * area[-1:], label="simulated, last record", **mark | {"mfc": style.BOTH})
         style.across(panel, unit.factor * np.array([low, high]) * full**power, unit.label(words), "log")
     # heights from Hertz's area, or none, to somewhat above JKR's: the uncorrected theory goes far beyond
     least = np.nan_to_num(areas["hertz"][0])
@@ -224,7 +224,7 @@ def closed_contact(dataset: xr.Dataset, time: float | None = None) -> xr.Dataset
     point = dataset.isel(style.first_point(dataset)[0] | {"member": 0}, missing_dims="ignore")
     closed = style.recorded(point, "contact_radius").to_numpy() > 0.0
     if not closed.any():
-        raise ValueError("the contact that would be drawn is never closed; raise the load or the indentation")
+        raise ValueError("the contact is never closed; raise the load or the indentation")
     k = int(np.flatnonzero(closed)[-1] if time is None else np.abs(dataset["t"].to_numpy() - time).argmin())
     if not closed[k]:
         raise ValueError(f"the contact is open at t = {style.text_of(dataset['t'][k], 's')}; choose another time")
@@ -301,7 +301,7 @@ def _displacement_panel(panel: Axes, contact: _Sheared, reach: float, length: st
     distance = reach * np.linspace(-1.0, 1.0, 801)
     profiles = halfspace.tangential_profiles(distance, *contact)
     factor = style.in_unit(panel.yaxis, "tangential displacement $u_x$", np.concatenate(profiles), "m")
-    for values, line, words in zip(profiles, ("-", "--"), ("along $x$, the sliding", "across, along $y$"), strict=True):
+    for values, line, words in zip(profiles, ("-", "--"), ("along $x$ (sliding)", "along $y$ (across)"), strict=True):
         panel.plot(length.factor * distance, factor * values, line, color=style.BOTH, label=words)
     for edge in (-contact[0], contact[0]):
         panel.axvline(length.factor * edge, **style.GUIDE)
@@ -352,7 +352,7 @@ def needs_course(dataset: xr.Dataset) -> None:
     """Refuse a dataset in which the mount of the sphere does not move."""
     if stays_held(dataset).all():
         cure = '[contact] indentation = { from = "2 um", to = "-12 um", cycles = 1 }'
-        raise ValueError(f"what holds the sphere stays the same, so that there is no loop; move it: {cure}")
+        raise ValueError(f"the mount does not move, so there is no loop; move it: {cure}")
 
 
 def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:

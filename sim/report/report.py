@@ -42,17 +42,17 @@ Data = Path | str | Mapping[str, Any]
 
 #: Hint of how to read a figure of each kind.
 HINTS = {
-    "loop": "A cross is a pull-off (of each member), a ring a jump into contact; the enclosed area is energy lost.",
-    "theories": "Measured areas tell theories apart where their curves separate.",
-    "stress": "A mark is the maximum of the stress; thin lines are closed forms.",
-    "stability": "Dark is stick-slip; below the line steady sliding is unstable in theory.",
-    "creep": "A line of slope one is sliding at a constant speed; a line that bends up runs away.",
+    "loop": "A cross is a pull-off (of each member). A ring is a jump into contact. The loop area is the energy lost.",
+    "theories": "Measured areas distinguish theories where their curves separate.",
+    "stress": "A mark is the maximum of the stress. Thin lines are closed forms.",
+    "stability": "Dark cells are stick-slip. Below the line, steady sliding is unstable in theory.",
+    "creep": "A line of slope one is sliding at constant speed. A line that bends upward is a runaway.",
     "friction": "The area of the friction loop is the work of friction.",
-    "curve": "Blue, or above a dash-dotted line, is lost to broken bonds, vermilion, or below it, to fluctuations;"
-    " adhesion is masked on Hertz's dotted line.",
-    "sweep": "Each point is a run of its own.",
-    "time": "The contact lies between JKR's radius and Hertz's.",
-    "incipient": "Slip begins where the area leaves the dashed law.",
+    "curve": "Blue, or above a dash-dotted line: lost to broken bonds. Vermilion, or below it: lost to fluctuations."
+    " On the dotted Hertz line, adhesion is masked.",
+    "sweep": "Each point is a separate run.",
+    "time": "The contact radius lies between the JKR and Hertz radii.",
+    "incipient": "Slip begins where the area deviates from the dashed law.",
     "map": "The circle is the edge of the contact.",
     "spectrum": "The maps follow the spectrum of the scenario.",
     "profile": "Adhesion pulls up the neck at the edge of the contact.",
@@ -237,7 +237,7 @@ def agreement(dataset: xr.Dataset, drawn: list[Measured], fit: Fit | None = None
     measured, curves = drawn[most], list(once[most].values())[::-1]
     if not curves:
         keys = [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
-        lacks = "no curve of the run reaches the measured points, or the curve has several branches"
+        lacks = "no curve of the run covers the measured points, or the curve has several branches"
         if not all(map(measured.column, keys)):
             lacks = f"the run has several curves; give the points a column {keys[0]}, or choose one curve by --where"
         if not measured.has_errors:
@@ -292,7 +292,7 @@ def fit_of(path: Path, dataset: xr.Dataset) -> Fit:
     except OSError as fault:
         raise BadInput([f"{path}: cannot be read ({fault.strerror}); name the file STEM_fit.json"]) from None
     except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError):
-        raise BadInput([f"{path}: is no result of `sim fit`; name the file STEM_fit.json that it wrote"]) from None
+        raise BadInput([f"{path}: is not a result of `sim fit`; name the file STEM_fit.json that it wrote"]) from None
 
 
 def _read(content: dict[str, Any], dataset: xr.Dataset) -> Fit:
@@ -320,7 +320,7 @@ def _read(content: dict[str, Any], dataset: xr.Dataset) -> Fit:
     freedom, square = int(content["degrees_of_freedom"]), float(content["chi_square"])
     notes = [f"fit to {', '.join(map(str, content['data']))}: χ² {square:.4g} at {freedom} degrees of freedom"]
     notes += [] if content["converged"] is True else ["the fit has not converged"]
-    notes += [] if all(in_run) else ["this run has other numbers than the fit: run its scenario STEM_fit.toml"]
+    notes += [] if all(in_run) else ["this run has other values than the fit: run its scenario STEM_fit.toml"]
     if not rows:
         raise ValueError
     few = correlations if len(keys) > 1 else []
@@ -348,7 +348,7 @@ _ROUNDING = 1e-12
 #: Attributes on where a dataset comes from, in the page's words.
 _PROVENANCE = {
     "source": "written by", "history": "scenario and versions", "seed": "seed", "members": "members",
-    "joined": "of several runs or some members, while the scenario is that of one run",
+    "joined": "of several runs or some members, but the scenario describes one run",
     "references": "references", "Conventions": "conventions of the file",
 }  # fmt: skip
 
@@ -501,17 +501,15 @@ def known(dataset: xr.Dataset) -> Rows:
     spread_measured, error_measured = _spreads(dataset)
     if "member_spread_energy" in dataset:
         spread = float(dataset["member_spread_energy"].max())
-        rows.append(("spread of ΔΓ between members, over its mean", _percent(spread), spread_measured))
+        rows.append(("relative spread of ΔΓ between members", _percent(spread), spread_measured))
         if count > 1:
-            words = f"standard error of the mean ΔΓ of {count} members, over the mean"
+            words = f"relative standard error of the mean ΔΓ of {count} members"
             rows.append((words, _percent(spread / math.sqrt(count)), error_measured))
     rows += [(str(each), "systematic", "–") for each in systematic_errors(dataset)]
     times = np.unique(np.linspace(0, dataset.sizes["t"] - 1, _ROWS).round().astype(int))
     ratios = over_members(dataset.isel(t=times), ["area_ratio"], quantiles=False)
     if "area_ratio_sem" in ratios and (error := float(ratios["area_ratio_sem"].max())) > _ROUNDING:
-        rows.append(
-            (f"largest standard error of the mean area over JKR's, of {times.size} times", "–", _percent(error))
-        )
+        rows.append((f"largest standard error of the mean A/A_JKR, of {times.size} times", "–", _percent(error)))
     return [dict(zip(("error", "estimate", "measured"), row, strict=True)) for row in rows]
 
 

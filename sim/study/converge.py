@@ -71,10 +71,10 @@ _PARTS = {
 }
 #: Unit and meaning of the variables of the dataset, by attribute of ``Setting``.
 _DESCRIBED = {
-    "part": ("", "part of the scene that the setting changes"),
+    "part": ("", "part of the scenario that the setting changes"),
     "toml": ("", "lines of the scenario file that choose the setting"),
-    "own": ("1", "1 if the scene has this setting as it is written"),
-    "time": ("s", "CPU time of the scene's run, median of three pieces"),
+    "own": ("1", "1 if the scenario has this setting"),
+    "time": ("s", "CPU time of the run, median of three parts"),
     "members": ("1", "members that were compared"),
     "error": ("1", "largest error over the run"),
     "standard_error": ("1", "standard error of the error"),
@@ -93,7 +93,7 @@ class Setting:
     scenario : Scenario
         The scene at this setting, without sweep and maps.
     own : int
-        1 if the scene has this setting as it is written.
+        1 if the scenario has this setting.
     ratio : float
         Clock step over the scene's.
     time : float
@@ -393,7 +393,7 @@ def _judged(base: Scenario, settings: list[Setting], end: float, left_out: list[
 def _leave_out(row: Setting, left_out: list[str]) -> None:
     """Name a setting that does not fit into the budget; ``BadInput`` if it is that of the scene."""
     if row.own:
-        raise BadInput([f'--budget: "{row.label}", as the scene has it, does not fit; give a larger budget'])
+        raise BadInput([f'--budget: "{row.label}", as in the scenario, does not fit; give a larger budget'])
     left_out.append(f"{row.label}: does not fit into the budget")
 
 
@@ -575,13 +575,13 @@ def recommendation(dataset: xr.Dataset) -> str:
     """
     if trend := dataset.attrs.get("not_converging"):
         text = f"The scene is not shown to converge. From quarter to quarter of the clock step {trend}.\nNo setting is"
-        return f"{text} recommended. With a larger budget it may converge; if it has no limit, sim check may say why."
+        return f"{text} recommended. With a larger budget it may converge. See also sim check."
     tolerance, tried = float(dataset.attrs["tolerance"]), choices(dataset)
     written, (best, good) = tried[0], chosen(tried, tolerance)
     name = "It" if best is written else f"“{', '.join(dataset['row'].values[list(best.rows)])}”"
-    verdict = "is the cheapest combination that keeps" if good else "comes nearest; none is shown to keep"
+    verdict = "is the fastest combination within" if good else "has the smallest error; none is shown to be within"
     cost = f"{engineering(best.time, 's')} of CPU time"
-    lines = [f"As it is written the scene is {_off(written)}."]
+    lines = [f"The scenario as written is {_off(written)}."]
     lines.append(f"{name} {verdict} {100.0 * tolerance:.4g} %: {_off(best)}, {cost}.")
     if (factor := (2.0 * float(best.noise.max()) / tolerance) ** 2) > 1.0:
         needed = float(f"{factor * dataset['members'].values[list(best.rows)].max():.2g}")

@@ -45,7 +45,7 @@ from sim.units.quantity import read_option
 _WIDE = 1e4
 #: Most runs of the scenario's own models, and the change of every number, over its error, that ends them.
 _RUNS, _STAYS = 3, 0.1
-#: Correlation beyond which the data hardly tell two numbers apart.
+#: Correlation beyond which the data hardly separate two keys.
 _ALIKE = 0.95
 #: Start of another search, over an e-fold or the range of a number; and most rows that are named.
 _BESIDE, _MOST_ROWS = 0.5, 3
@@ -175,7 +175,7 @@ def fit(
     tables = [likelihood.read(path, base) if isinstance(path, Path) else path for path in data]
     problem = likelihood.problem_of(base, tables, free_numbers, common or {})
     if steady and base.drive.solves_motion:
-        raise BadInput([f'--steady: drive.model = "{base.drive.model}" is answered by runs alone; leave it out'])
+        raise BadInput([f'--steady: drive.model = "{base.drive.model}" needs runs; omit --steady'])
     if base.drive.solves_motion or (not steady and idle(problem)):
         problem = replace(problem, by_run=True).compared(problem.start)
     faults = [f"--free {key}: has no effect on what was measured; fix it" for key in idle(problem)]
@@ -229,7 +229,7 @@ def _assembled(scenario: Scenario, problem: Problem, best: Minimum, alone: Minim
     alike = (covariance / np.outer(spread, spread))[:count, :count]
     result = Fit(scenario, problem, best, tuple(estimates), alike, known and converged, ())
     if not known:
-        return result._replace(remarks=("the errors could not be computed: the data do not hold some of the numbers",))
+        return result._replace(remarks=("the errors could not be computed: the data do not determine all keys",))
     result = result._replace(scenario=scenario.with_values(result.values), lag=likelihood.lag(problem, best.x))
     return result._replace(remarks=tuple(_remarks(result)))
 
@@ -241,19 +241,19 @@ def _remarks(result: Fit) -> Iterator[str]:
         for other, correlation in zip(result.numbers[:i], result.correlations[i], strict=False):
             if abs(correlation) > _ALIKE:
                 pair = f"{other.free.key} and {item.free.key}"
-                yield f"the data hardly tell {pair} apart (correlation {correlation:.3f})"
+                yield f"the data hardly separate {pair} (correlation {correlation:.3f})"
         low, high, *open_ends = item.interval
         for word, end, is_open in zip(("lower", "upper"), (low, high), open_ends, strict=True):
             if math.isnan(end):
                 yield f"{item.free.key}: the {word} end of its interval could not be computed"
             elif is_open:
-                yield f"{item.free.key}: the data do not set the {word} end of its interval; its bound is given instead"
-    causes = "the model lacks something, a number that is not free is wrong, or the errors are too small"
+                yield f"{item.free.key}: the data do not set the {word} end of its interval; its bound is shown"
+    causes = "the model is incomplete, a fixed key is wrong, or the errors are too small"
     if result.lag:
         yield f"{result.lag}; if steady speeds were measured, choose --steady or a slower ramp"
-        causes = "such a lag is enough for it"
+        causes = "such a lag can explain it"
     if result.p_value <= POOR:
-        far = f"the curves lie further off than their errors (p = {result.p_value:.2g}), so the intervals do not hold"
+        far = f"the residuals exceed the errors (p = {result.p_value:.2g}), so the intervals do not hold"
         yield f"{far}: {causes}"
     for number, name in enumerate(problem.names):
         here = problem.curve == number
@@ -262,9 +262,9 @@ def _remarks(result: Fit) -> Iterator[str]:
             yield f"{name} is {size / least:.2g} times what is fitted: check its unit, and those of the scenario"
     if (open_rows := _open(problem, result.best)).size:
         places = ", ".join(map(problem.place, open_rows[:_MOST_ROWS]))
-        yield f"the contact is open by the fit where it was measured: {places}"
+        yield f"the fit has an open contact at measured points: {places}"
     if problem.estimated.any():
-        yield "curves without errors: their scatter around the fit stands for them"
+        yield "curves without errors: the scatter around the fit is used instead"
 
 
 def _free(scenario: Scenario, text: str) -> Free:
@@ -274,7 +274,7 @@ def _free(scenario: Scenario, text: str) -> Free:
     key, known = key.strip(), {name: number for name, number in physical if not number[0].whole}
     if key not in known:
         near = "".join(f'; did you mean "{name}"?' for name in difflib.get_close_matches(key, known, 1, 0.5))
-        raise BadInput([f"--free {key[:80]}: is no physical number of the scenario{near}"])
+        raise BadInput([f"--free {key[:80]}: is not a physical key of the scenario{near}"])
     quantity, start = known[key]
     low, high = max(quantity.at_least, quantity.above), min(quantity.at_most, quantity.below)
     if sign:
@@ -439,7 +439,7 @@ def carried_out(
     sources = [f"{table.path}: {table.rows} rows, {table.ranges}" for table in tables]
     shown: list[Printed] = [(_table(result), "\n".join(["", _quality(result), *result.remarks, *sources, ""]))]
     if verdict is not None:
-        doubt = "; but even the scenario as it is lies off: perhaps none of these is true"
+        doubt = "; but even the unchanged scenario misses the data, so perhaps none of these is true"
         shown.append((_comparison(verdict), f"\n{verdict.words}{doubt if result.p_value <= POOR else ''}\n"))
     return result, [*shown, ([], "\n".join(map(str, outputs)))]
 
@@ -474,7 +474,7 @@ def _comparison(verdict: Verdict) -> list[dict[str, str]]:
         drawn = f"{item.p_value:.3g}" if math.isfinite(item.p_value) else "by AICc alone"
         rows.append({
             "mechanism": item.name, "chi^2": f"{item.chi_square:.4g}", "AICc - least": f"{item.aicc - least:.3g}",
-            "p": "compared with" if item.name == WHOLE else drawn, "rejected": "yes" if item.rejected else "",
+            "p": "reference" if item.name == WHOLE else drawn, "rejected": "yes" if item.rejected else "",
         })  # fmt: skip
     return rows
 

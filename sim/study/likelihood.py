@@ -126,14 +126,14 @@ def _faults(scenario: Scenario, conditions: dict[str, Array], curves: tuple[Curv
     steady = {"drive.stage", "drive.force"} & known.keys() if drive.solves_motion else {"speed"} & conditions.keys()
     varies = not steady and drive.model != "steady"
     if "t" in conditions and len(conditions.keys() & {"speed", "mount"}):
-        yield "the scenario has the speed and the load at each time; leave out t, or the columns of these"
+        yield "the scenario has the speed and the load at each time; omit t, or these columns"
     elif "t" not in conditions and (not conditions or varies or ("mount" not in conditions and contact.changes)):
         yield f'no column has the conditions of each row; add "t [s]", or "speed [mm/s]" and "{MOUNT[contact.kind][0]}"'
     for name, values, errors in curves:
         if name in ("friction_force", "shear_stress") and np.all(values * conditions.get("speed", 1.0) < 0.0):
-            yield f"{name} has the sign of the speed; turn the sign of one of them"
+            yield f"{name} needs the sign of the speed; change the sign of one of them"
         if errors is None and not np.any(values):
-            yield f"{name} is 0 in all rows, so that it has no scatter; give errors, or leave it out"
+            yield f"{name} is 0 in all rows, so it has no scatter; give errors, or omit it"
 
 
 def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:

@@ -29,7 +29,7 @@ _ALPHA = Free("alpha", Quantity("1", "reversible share", at_least=0, at_most=1),
 _LAMBDA = Free("lambda", Quantity("1", "mixity", at_least=0, at_most=1), 0.5, 0.0, 1.0)
 #: Theories by their name in ``sim.laws.theories``: words, and numbers of their own.
 _THEORIES: dict[str, tuple[str, tuple[Free, ...]]] = {
-    "jkr": ("JKR, whatever the shear", ()),
+    "jkr": ("JKR, independent of shear", ()),
     "uncorrected": ("Menga et al. 2018, uncorrected", ()),
     "savkoor_briggs": ("Savkoor & Briggs, full stick", ()),
     "reversible_force": ("reversible, force held", ()),
@@ -112,7 +112,7 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
     if not others:
         return "", "there is no other mechanism to compare with"
     if math.isinf(whole.aicc):
-        return "", f"the data cannot tell: AICc of {WHOLE} needs two points more than free numbers; measure more"
+        return "", f"the data cannot tell: AICc of {WHOLE} needs two more points than free keys; measure more"
     left = [item for item in others if not item.rejected]
     if not left:
         return WHOLE, f"the data prefer {WHOLE}: every other mechanism is rejected"
@@ -152,8 +152,8 @@ def _lacking(problem: Problem) -> str:
     """Return advice if the curves or the scenario cannot distinguish bonds, fluctuations and theories; else ""."""
     all_groups = [group for groups in problem.groups for group in groups]
     if not any(group.scenario.drive.solves_motion or np.any(group.speed) for group in all_groups):
-        return 'curves at rest tell no mechanism from another; measure while it slides, with a column "speed [mm/s]"'
-    advice = "no {} act in the scenario; to compare with them, add for example {}"
+        return 'curves at rest do not distinguish mechanisms; measure during sliding, with a column "speed [mm/s]"'
+    advice = "the scenario has no {}; to compare with them, add for example {}"
     return "\n".join(advice.format(*item) for item, acts in zip(_TABLES, _acting(problem), strict=True) if not acts)
 
 

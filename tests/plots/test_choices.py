@@ -178,7 +178,7 @@ def test_each_row_of_a_table_is_drawn_once_or_counted_as_left_out(loads, table, 
         wanted = sorted((speed, area) for each, speed, area in [*known, beyond] if each == load)
         assert_allclose(sorted(np.transpose(drawn_of[colour]).tolist()), wanted, rtol=1e-12)
     remark = " ".join(figure.get_supxlabel().split())
-    numbers = re.findall(r"(\d+) (?:of 12|of no|with|at|beyond)", remark)
+    numbers = re.findall(r"(\d+) (?:of 12|not of|with|at|beyond)", remark)
     assert [*map(int, numbers)] == [7, 1, 3, 1, 1, 1] and "2 mN, 9 mN" in remark
     (drawing,) = (each for each in drawings(loads, path) if each.measured)
     assert drawing.kind == plots.default(loads) and drawing.measured.remark == remark
@@ -198,7 +198,7 @@ def test_rows_without_a_load_are_of_no_one_curve_and_a_table_without_speeds_is_r
     area, *_ = (figure := draw(loads, "curve", data=path, absolute=True)).axes
     assert [line.get_color() for line in area.lines if line.get_mfc() == "white"] == [pictures.BOTH]
     assert "2 of several curves (no column contact_load)" in " ".join(figure.get_supxlabel().split())
-    with pytest.raises(ValueError, match=r"left out: 2 of curves .* \(no column contact_load\)"):
+    with pytest.raises(ValueError, match=r"omitted: 2 of curves .* \(no column contact_load\)"):
         draw(loads, "curve", data=path)  # the area of JKR's contact is not known
     path = table("contact_load [mN], contact_area [mm^2]\n1, 0.04\n4, 0.05\n")
     for show in (lambda: draw(loads, data=path), lambda: drawings(loads, path)):
@@ -209,7 +209,7 @@ def test_rows_without_a_load_are_of_no_one_curve_and_a_table_without_speeds_is_r
 def test_what_cannot_be_drawn_is_refused_and_given_axes_are_drawn_in(ramp, table, loads, tmp_path, monkeypatch):
     for kind, choices, words in (
         ("time", {"x": "slider_positon"}, '"slider_position"'), ("time", {"x": "zzz"}, "t, speed, .*contact_radius"),
-        ("profile", {"x": "t"}, "x; it takes: at$"), ("theories", {"data": "x.csv"}, "data; it takes none"),
+        ("profile", {"x": "t"}, "x; it takes: at$"), ("theories", {"data": "x.csv"}, "data; it takes only"),
         ("curve", {"units": ("mm",)}, '"mm"'), ("curve", {"units": ("parsnip",)}, '"parsnip"'),
     ):  # fmt: skip
         with pytest.raises(ValueError, match=words):

@@ -137,7 +137,7 @@ def test_a_spectrum_is_drawn_before_any_run_also_by_the_command_which_replaces_n
         assert answer.exit_code == 2 and words in answer.stderr
     Path("ripple.toml").write_text(STARTER.read_text(encoding="utf-8").partition("[shear]")[0], encoding="utf-8")
     answer = sim("plot", "ripple.toml")
-    assert answer.exit_code == 2 and "no spectrum to draw before a run" in answer.stderr
+    assert answer.exit_code == 2 and "no spectrum before a run" in answer.stderr
     assert sorted(path.name for path in Path("outputs").iterdir()) == ["scene-spectrum.png"]
 
 
@@ -171,5 +171,5 @@ def test_a_map_passes_through_every_sample_and_a_measured_one_is_drawn_as_it_is(
     assert_allclose((left, right, low, high), 9.0 * np.array([-20.5, 19.5, -16.5, 15.5]), rtol=1e-12)
     (circle,) = (patch for patch in panel.patches if isinstance(patch, Circle))
     assert circle.center == (0.0, 0.0)
-    with pytest.raises(ValueError, match="measured map has no spectrum to follow"):
+    with pytest.raises(ValueError, match="measured map has no target spectrum"):
         plots.draw(dataset, "spectrum")

@@ -69,7 +69,7 @@ def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_wi
     ends = [line.get_ydata()[0] for line in panel.lines if line.get_linestyle() == "-"]
     places = np.rint(np.linspace(0, 40, 20)).astype(int)
     assert_allclose(ends, 1e6 * dataset["contact_radius"].isel(contact_load=places, t=0), rtol=1e-14)
-    assert "20 of 41 curves drawn (--where draws others)" in legend_of(panel)[1].replace("\n", " ")
+    assert "20 of 41 curves drawn (choose others by --where)" in legend_of(panel)[1].replace("\n", " ")
     chosen = plots.draw(analysis.where(dataset, {"contact.load": "1 mN"}), "time")
     assert chosen.get_suptitle() == "$P$ = 1 mN"
     dataset = swept(contact_load=9, sphere_radius=3)
@@ -88,9 +88,9 @@ def test_several_curves_keep_their_mechanisms_by_a_line_of_the_area_with_the_bon
     lost = analysis.shares(dataset)["lost_to_bonds_mean"].transpose("contact_load", "t")
     for colour, share in zip(pictures.LINES, lost, strict=False):
         assert_allclose(drawn(panel, colour, "-.")[1], 1.0 - share, rtol=1e-12)
-    assert "with the bonds left alone" in legend_of(panel)[0]
+    assert "with intact bonds only" in legend_of(panel)[0]
     alone = simulated(bonds=bonds.Steady(critical_speed=2e-2, stress=3e5), shear=shear.Uniform(), sweep=loads)
-    assert "with the bonds left alone" not in legend_of(plots.draw(alone, "curve").axes[0])[0]  # the curves themselves
+    assert "with intact bonds only" not in legend_of(plots.draw(alone, "curve").axes[0])[0]  # the curves themselves
 
 
 def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the_speed_jumps(ramp):

@@ -122,7 +122,7 @@ def test_peaks_after_rests_are_those_of_steps_beside_the_closed_form_and_hollow_
         assert_allclose(lines[k][1], 1e-3 * starts["peak_stress"][k], rtol=1e-14)
         highest = starts["shear_stress"][k].where(starts["t"] > rest).max("t")
         assert np.all(starts["peak_stress"][k] >= highest)  # between two records it is higher
-    assert legend_of(peaks)[0][2:] == ["none rebinds", "steady sliding, exact"]
+    assert legend_of(peaks)[0][2:] == ["without rebinding", "steady sliding, exact"]
     dotted = [line.get_data() for line in peaks.lines if line.get_linestyle() == ":"]
     for rest, (speed, peak) in zip((0.5, 1.0), dotted, strict=True):
         bound = 0.5 * -np.expm1(-2.0 * rest)  # sites bind and open with 1/s each

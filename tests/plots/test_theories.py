@@ -75,13 +75,13 @@ def test_points_are_means_over_members_and_the_second_half_and_lie_on_the_theori
     late = members["contact_area"].isel(t=slice(members.sizes["t"] // 2, None))
     assert_allclose(rival_figures.points_of(members)[1], [late.mean()], rtol=1e-13)
     dataset = plain(sweep={"contact.load": [-3e-4, 1e-3, 4e-3]})
-    with pytest.raises(ValueError, match=r"of one contact.*--where contact_load="):
+    with pytest.raises(ValueError, match=r"a single contact.*--where contact_load="):
         plots.draw(dataset, "theories")
     figure = plots.draw(where(dataset, {"load": "4 mN"}), "theories")
     assert "$P$ = 4 mN, $w$ = 42 mJ/m²" in figure.legends[0].get_title().get_text()
     dataset = simulated(shear=shear.Uniform())
     panel = plots.draw(dataset, "theories").axes[0]
-    (last,) = (line for line in panel.lines if line.get_label() == "simulated, the last record")
+    (last,) = (line for line in panel.lines if line.get_label() == "simulated, last record")
     at = [1e-3 * dataset["shear_stress"][-1], 1e6 * dataset["contact_area"][-1]]
     assert_allclose(np.ravel(last.get_data()), at, rtol=1e-14)
     contact = Equilibrium(load=4e-3, reversible=0.02)
@@ -99,7 +99,7 @@ def test_scenes_that_theories_do_not_describe_are_refused_with_the_cure():
     for changes, words in (
         ({"contact": Equilibrium(displacement=1e-6, stiffness=100.0)}, "load = .*indentation; .*drawn as: .*profile"),
         ({"contact": Equilibrium(load={"from": 0.0, "to": 4e-3})}, "load = .*indentation; .*drawn as: .*profile"),
-        ({"adhesion": Adhesion(work=0.0)}, "no adhesion"),
+        ({"adhesion": Adhesion(work=0.0)}, "only with adhesion"),
         ({"contact": Equilibrium(load=-1.0)}, "no contact at rest.*drawn as: time$"),
     ):
         with pytest.raises(ValueError, match=words):

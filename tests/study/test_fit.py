@@ -260,7 +260,7 @@ def test_a_ramp_that_lags_behind_points_of_steady_speeds_is_named_with_its_size_
     assert_allclose([share, errors], [100.0 * (ratio - 1.0), (ratio - 1.0) / 0.01], rtol=0.1)
     assert 1e-3 * speed in speeds and share > 3.0 and "--steady" in remark
     for cure in (repr(result._replace(converged=False)), *result.remarks):
-        assert "fewer keys" not in cure and "the model lacks" not in cure
+        assert "fewer keys" not in cure and "the model is incomplete" not in cure
     for scene, steady in ((fast, True), (slow, False)):
         result = fit(scene, [path], ["bonds.critical_speed"], steady=steady)
         assert not result.lag and "fewer keys" in repr(result._replace(converged=False))
@@ -362,7 +362,7 @@ def test_keys_that_data_cannot_tell_apart_are_remarked_or_refused(curves, tmp_pa
     assert 0.5e6 < float(remark.removeprefix("contact_area is ").partition(" ")[0]) < 2e6
     found = fit(load(LENS), [curves], ["adhesion.bond_share", "shear.spectrum.rms", "bonds.stress"], steady=True)
     assert abs(found.correlations[0, 1]) > 0.95
-    assert [said for said in found.remarks if "adhesion.bond_share and shear.spectrum.rms apart" in said]
+    assert [said for said in found.remarks if "adhesion.bond_share and shear.spectrum.rms (corr" in said]
     with pytest.raises(BadInput, match=r"only together") as refused:
         fit(load(LENS), [curves], ["shear.spectrum.rms", "shear.paid_by_adhesion", "bonds.critical_speed"], steady=True)
     (said,) = refused.value.problems
@@ -372,7 +372,7 @@ def test_keys_that_data_cannot_tell_apart_are_remarked_or_refused(curves, tmp_pa
     with pytest.raises(BadInput, match=r"^--free bonds.rebinding_rate: has no effect"):
         fit(scene, [curves], ["bonds.rebinding_rate", "bonds.stress"])
     for free, cure in (
-        ("bonds.crital_speed", 'did you mean "bonds.critical_speed"'), ("clock.step", "no physical number"),
+        ("bonds.crital_speed", 'did you mean "bonds.critical_speed"'), ("clock.step", "not a physical key"),
         ("bonds.stress=1:2", "start inside"), ("bonds.stress=2 kPa:1 kPa", "lower one first"),
         ("bonds.critical_speed=0:1 m/s", "LOW:HIGH, bound 0: must be above 0 m/s"),
     ):  # fmt: skip
@@ -450,13 +450,13 @@ def test_curves_are_doubted_beyond_errors_and_the_mechanism_that_made_them_exclu
         rows = [(mechanisms.WHOLE, 10.0, math.nan, False), *others]
         return mechanisms._verdict([mechanisms.Judged(name, {}, 1.0, *rest) for name, *rest in rows])
 
-    others = ("fluctuations only", 40.0, 0.01, True), ("JKR, whatever the shear", 70.0, math.nan, True)
+    others = ("fluctuations only", 40.0, 0.01, True), ("JKR, independent of shear", 70.0, math.nan, True)
     for aicc, p in ((8.0, 0.4), (12.0, 0.2), (12.0, 0.01)):
         name, words = weighed(("bonds only", aicc, p, False), *others)
         assert name == "bonds only" and "cannot tell whether fluctuations act" in words
     assert weighed(*others)[0] == mechanisms.WHOLE
-    for aicc, sufficient in ((4.0, "JKR, whatever the shear"), (8.0, "")):
-        theory = ("JKR, whatever the shear", aicc, 0.7, False)
+    for aicc, sufficient in ((4.0, "JKR, independent of shear"), (8.0, "")):
+        theory = ("JKR, independent of shear", aicc, 0.7, False)
         assert weighed(("bonds only", 40.0, 0.01, True), theory)[0] == sufficient
 
 
@@ -518,8 +518,8 @@ def test_a_bad_table_or_unit_is_refused_and_a_fit_without_convergence_exits_1(sc
         f"{header}\n1,0.04\n2,-0.04\n": "line 3: contact_area must be at least 0 m^2",
         f"{header}\n1,0\n2,0\n3,0\n": "contact_area is 0 in all rows",
         f"{header}\n1,0.04\n": "free fewer keys",
-        "t [s],speed [mm/s],contact_area [mm^2]\n0,1,2\n1,2,3\n": "leave out t",
-        "speed [mm/s],friction_force [mN]\n-1,2\n-2,3\n": "has the sign of the speed",
+        "t [s],speed [mm/s],contact_area [mm^2]\n0,1,2\n1,2,3\n": "omit t",
+        "speed [mm/s],friction_force [mN]\n-1,2\n-2,3\n": "needs the sign of the speed",
     }.items():  # fmt: skip
         path.write_text(text, encoding="utf-8")
         done = command(scenario, path, "--free", "bonds.critical_speed")
