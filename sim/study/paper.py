@@ -1,6 +1,6 @@
 """The equations and numbers of Menga, Carbone & Dini recomputed, for ``sim paper``.
 
-N. Menga, G. Carbone, D. Dini, "Do uniform tangential interfacial stresses affect adhesion?", J. Mech.
+N. Menga, G. Carbone, D. Dini, "Do uniform tangential interfacial stresses enhance adhesion?", J. Mech.
 Phys. Solids 112 (2018) 145 with the corrigendum 133 (2019) 103744, in the corrected text of
 arXiv:1710.06506. Equation numbers count its numbered displays. Each line compares a value of the
 package with an independent one: a closed number, the paper's formula written out here, or a
