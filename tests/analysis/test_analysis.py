@@ -30,17 +30,13 @@ def known(ramp):
 
 
 @pytest.mark.verify  # dask comes with its extra
-def test_runs_joined_as_the_page_says_have_the_table_of_a_sweep_and_of_more_members(tmp_path):
+def test_runs_joined_as_the_page_says_have_the_table_of_a_sweep(tmp_path):
     parts = {"drive": Steady(speed=1e-2), "record": Record(quantities=["contact_area"])}
     loads = [run(scene(contact=Equilibrium(load=load), **parts), to=tmp_path / f"{load}.nc") for load in (2e-3, 4e-3)]
     key = {"concat_dim": "contact_load", "preprocess": lambda dataset: dataset.set_coords("contact_load")}
     with xr.open_mfdataset(loads, combine="nested", **key) as runs:
         swept = run(scene(sweep={"contact.load": [2e-3, 4e-3]}, **parts))
         assert analysis.table(runs) == analysis.table(swept)
-    how = {"data_vars": "minimal", "coords": "minimal", "compat": "override"}
-    with xr.open_mfdataset(loads, combine="nested", concat_dim="member", **how) as runs:
-        assert runs["contact_area"].sizes["member"] == 12 and runs["contact_modulus"].ndim == 0
-        assert analysis.notes(runs, analysis.table(runs), [])[0].startswith("mean over the 12 members")
 
 
 def test_statistics_of_known_numbers_few_members_and_missing_values(known, ramp):

@@ -12,7 +12,7 @@ from scipy.special import lambertw
 
 from sim.laws import schallamach as law
 from sim.parts.bonds import mean_field
-from sim.parts.bonds.mean_field import LOCAL_ERROR, _rosenbrock, steady
+from sim.parts.bonds.mean_field import LOCAL_ERROR, steady
 from sim.parts.bonds.rupture import RuptureRate
 
 BELL = RuptureRate(1.0, 1.0, math.inf)
@@ -186,25 +186,6 @@ def test_a_step_in_two_unequal_parts_is_the_step_and_hardly_any_softness_the_con
     for softness in (1e-14, 1e-300):
         near = slide(first, speed, 1.5, RuptureRate(1.0, softness, math.inf), 0.7)
         assert_allclose(near, constant, rtol=1e-13, atol=0)
-
-
-def test_the_method_is_of_fifth_order_and_forgets_the_start_in_an_endless_step():
-    exact, errors, estimates = reference(0.5, 0.2, 10.0, 0.4, 2.0), [], []
-    for count in (8, 16, 32):
-        work, state, estimate = np.empty((8, 2)), (0.5, 0.2), 0.0
-        for _ in range(count):
-            *state, error = _rosenbrock(*state, 0.4 / count, 10.0, 1.0, 2.0, work)[:3]
-            estimate = estimate or error
-        errors.append(np.abs(np.divide(state, exact) - 1.0))
-        estimates.append(estimate)
-    # slopes approach 5 with the step; the next term changes them by a part that halves each time
-    for sizes in (errors, estimates):
-        assert_allclose(np.log2(np.divide(sizes[1], sizes[2])), 5.0, rtol=0.08, atol=0)
-    # N' = k_on (1 - N) - k N with a stretch too small to matter: what is left of the start goes as 1/step
-    result = [_rosenbrock(0.9, 1e-30, step, 0.0, 1.0, 3.0, np.empty((8, 2)))[:2] for step in (1e4, 1e7)]
-    left = np.array(result) - [0.75, 0.0]
-    assert_allclose(left[1] / left[0], 1e-3, rtol=0.01, atol=0)
-    assert np.max(np.abs(left[1] / [0.15, 1e-30])) < 1e-5
 
 
 def test_one_entry_serves_all_rows_and_what_has_no_answer_is_nan():

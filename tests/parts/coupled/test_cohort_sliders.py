@@ -61,17 +61,7 @@ def test_a_massless_slider_follows_its_reference_through_a_slip_from_the_static_
     assert max(before, after) < peak
 
 
-def test_the_missing_energy_falls_with_the_tolerance_as_of_order_two_or_more_also_of_a_body_that_lags():
-    errors, missing, counts = [], [], []
-    for tolerance in (1e-4, 1e-6, 1e-8):
-        states, read = marched(cohorts(4.0, 8, spring(0.02, tolerance=tolerance), 1e-3 * tolerance**0.5))
-        errors.append(off(states)[2])
-        missing.append(residual(read))
-        counts.append(read["substeps"][-1])
-    orders = -np.diff(np.log(errors)) / np.diff(np.log(counts))
-    assert np.all(orders > 2.0)
-    assert np.all(np.array(missing) < 10.0 * np.array([1e-4, 1e-6, 1e-8]))
-    assert missing[2] < missing[1] < missing[0]
+def test_the_missing_energy_of_a_body_that_lags_falls_with_the_tolerance():
     missing = []
     for tolerance in (1e-4, 1e-6, 1e-8):
         drive = spring(2.5e-4, 1000.0, mass=1e-6, contact=4e-3, viscosity=1e-6, tolerance=tolerance)

