@@ -89,7 +89,8 @@ def run(
 
     from sim.ensemble.diagnosis import remarks
     from sim.ensemble.plan import Plan, work
-    from sim.ensemble.simulate import OutputExists, run as simulate
+    from sim.ensemble.simulate import run as simulate
+    from sim.numerics.files import OutputExists
     from sim.units.terminal import LOG, Shown, progress_bar, progress_lines
 
     scene = _scene(scenario)
