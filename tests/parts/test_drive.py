@@ -1,28 +1,8 @@
 """Drives hand over the exact slip of each step."""
 
-from helpers.scenes import DRIVES
 from numpy.testing import assert_allclose
-from scipy.integrate import quad
 
 from sim.parts.drive import Ramp, Start, Steady, Table
-
-DURATION = 0.02
-PRESCRIBED = [name for name, drive in DRIVES.items() if not drive.solves_motion]
-
-
-def speed(drive, time):
-    return drive.motion(1, time, time, DURATION).speed[0]
-
-
-def test_the_slip_of_a_step_is_the_integral_of_the_speed():
-    for name in PRESCRIBED:
-        drive, (first, last) = DRIVES[name], (0.0011, 0.0175)
-        motion = drive.motion(1, first, last, DURATION)
-        keys = {"points": [0.003, DURATION / 6.0], "epsabs": 0, "epsrel": 1e-12}
-        slip, _ = quad(lambda t, drive=drive: speed(drive, t), first, last, **keys)
-        path, _ = quad(lambda t, drive=drive: abs(speed(drive, t)), first, last, **keys)
-        assert_allclose([motion.slip[0], motion.path[0]], [slip, path], rtol=1e-11, atol=1e-25, err_msg=name)
-        assert_allclose(motion.speed[0], speed(drive, last), rtol=1e-12, atol=0, err_msg=name)
 
 
 def test_ramps_count_the_path_of_both_directions_and_tables_jump_between_steps():

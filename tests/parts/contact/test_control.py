@@ -126,35 +126,23 @@ def test_load_indentation_and_displacement_of_any_radius_go_together_and_an_open
         assert LoadControl(load).energy(np.zeros(2), np.zeros(2), MAUGIS).tolist() == [0.0, 0.0]
 
 
-def random_cases(seed, kind, reversible, size, count, margin):
-    """Contacts of random controls; works from masked to strong, and stresses over decades."""
-    rng = np.random.default_rng(seed)
+def random_cases(kind, size, count):
+    """Contacts on a disc of random controls; works from masked to strong, and stresses over decades."""
+    rng = np.random.default_rng(13)
     for _ in range(count):
         held = {kind: rng.uniform(-2.0, 3.0)}
         if kind == "displacement":
             held["stiffness"] = 10.0 ** rng.uniform(-3.0, 3.0)
-        contact = Equilibrium(**held, reversible=reversible)
+        contact = Equilibrium(**held)
         bonded, fluctuating = WORK * rng.uniform(0.0, 1.0, size), WORK * rng.uniform(0.0, 2.0, size)
-        balance = Balance(bonded, fluctuating, 10.0 ** rng.uniform(-3.0, 1.0, size), margin, MAUGIS, WORK)
+        balance = Balance(bonded, fluctuating, 10.0 ** rng.uniform(-3.0, 1.0, size), DISC, MAUGIS, WORK)
         control = contact.control(0.0, 1.0)
         hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, MAUGIS)
-        yield contact, control, balance, contact.equilibrium(control, balance), hertz
+        yield control, balance, contact.equilibrium(control, balance), hertz
 
 
 def release_rate(a, control):
     return jkr.energy_release_rate_at_indentation(a, control.indentation(a, MAUGIS), 1.0, 0.75)
-
-
-@pytest.mark.parametrize("contacts", [15, pytest.param(60, marks=pytest.mark.verify)])
-def test_no_contact_is_smaller_than_hertz_and_each_balances(contacts):
-    for margin, reversible, kind in product([None, DISC], [0.0, 0.3], ["load", "indentation", "displacement"]):
-        for contact, control, balance, a, hertz in random_cases(11, kind, reversible, 40, contacts, margin):
-            left, closed = contact._left(a, balance), np.isfinite(a)
-            pulled = closed & ((a > hertz * (1.0 + 1e-9)) | (not control.closes))
-            assert not control.closes or (closed.all() and np.all(a >= hertz * (1.0 - 4e-16)))
-            # G is a square whose root has lost digits to the difference of a^2 and delta; the scale is w at rest
-            assert_allclose(release_rate(a, control)[pulled], left[pulled], rtol=1e-9, atol=1e-12 * WORK)
-            assert np.all(left[closed & ~pulled] <= 1e-8 * WORK)
 
 
 @pytest.mark.parametrize("contacts", [8, pytest.param(20, marks=pytest.mark.verify)])
@@ -163,7 +151,7 @@ def test_the_contact_on_a_disc_is_the_widest_that_balances(contacts):
     places = np.geomspace(4.0, 1e-3, 4000)[:, None]
     step = places[0, 0] / places[1, 0]
     for kind in ("load", "indentation", "displacement"):
-        for _, control, balance, a, hertz in random_cases(13, kind, 0.0, 30, contacts, DISC):
+        for control, balance, a, hertz in random_cases(kind, 30, contacts):
             rate = release_rate(places, control)
             pull = np.where(places**2 > control.indentation(places, MAUGIS), rate, -rate)
             below = pull <= balance.bonded - balance.fluctuating * DISC(places)

@@ -91,21 +91,6 @@ def test_stationary_draws_follow_the_law_of_all_modes(draws):
         assert abs(sample.mean() - weights.sum()) < 5.0 * np.sqrt(np.sum(weights**2) / draws)
 
 
-@pytest.mark.parametrize("name", ["band", "self-affine"])
-@pytest.mark.parametrize("steps", [1000, pytest.param(4000, marks=pytest.mark.verify)])
-def test_the_law_is_the_same_after_many_steps(steps, name):
-    waves = 1.0
-    process, weights, wavenumbers = process_of(name, Wave(waves=waves))
-    path = 0.3 * 2.0 * np.pi * waves / wavenumbers.min()  # the slowest keeps e^-0.6 of its energy's deviation
-    noise = Noise(8, "shear", np.arange(MEMBERS))
-    state, sample = process.start(moved(0), UNLOADED, noise), []
-    for step in range(1, steps + 1):
-        state = advanced(process, state, moved(step, path), UNLOADED, noise)
-        if step % 16 == 0:  # by then e^-9.6 of it: the draws count as independent
-            sample.append(state.energy)
-    assert kstest(np.concatenate(sample), law_of(weights)).pvalue > FIVE_SIGMA
-
-
 def lone(freedom, copies=1000):
     """A process of equal bands of rate 1/s."""
     bands = Bands(np.ones(copies), np.full(copies, freedom), np.ones(copies), {})
