@@ -187,10 +187,8 @@ def test_the_findings_have_the_numbers_of_the_lens_behind_a_spring_at_a_16_times
             value, _, error = text.rstrip(")").partition("(")
             digit = 10.0 ** -len(value.partition(".")[2])
             assert text in findings
-            assert abs(mean - float(value)) < 2.0 * math.hypot(sem, digit * float(error or 0)) + 0.5 * digit, (
-                name,
-                mean,
-            )
+            room = 2.0 * math.hypot(sem, digit * float(error or 0)) + 0.5 * digit
+            assert abs(mean - float(value)) < room, (name, mean)
 
 
 #: Pages whose blocks are run one after the other. A block that is marked ``cluster`` needs several machines and is only

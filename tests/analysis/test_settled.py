@@ -133,16 +133,13 @@ def test_the_peak_after_a_rest_does_not_grow_with_the_time_of_sliding():
         sites=20, rupture=Bell(zero_force_rate=10.0, bell_force=4e-12), bond_stiffness=0.4e-3, rebinding_rate=10.0,
         site_density=1e16, start_from="empty"), "shear": shear.Uniform(), "ensemble": Ensemble(members=40),
         "adhesion": Adhesion(work=42e-3, bond_share=0.0)}  # fmt: skip
-    results = [
-        analysis.statements(run(scene(**parts, clock=Clock(duration=duration, step=1e-3)))) for duration in (0.3, 1.0)
-    ]
+    clocks = (Clock(duration=duration, step=1e-3) for duration in (0.3, 1.0))
+    results = [analysis.statements(run(scene(**parts, clock=clock))) for clock in clocks]
     for name in ("peak_stress", "peak_friction", "peak_time", "peak_friction_time"):
         assert_allclose(*(result[f"{name}_mean"] for result in results), rtol=1e-6)
     # bond by bond, in 400 ensembles of another code: 32.1 kPa
-    assert (
-        results[0]["peak_stress_low"] < 32.1e3 < results[0]["peak_stress_high"]
-        and results[0]["peak_stress_reason"] == ""
-    )
+    low, high, reason = (results[0][f"peak_stress_{end}"] for end in ("low", "high", "reason"))
+    assert low < 32.1e3 < high and reason == ""
 
 
 @pytest.mark.parametrize("members", [1, 2, 6])
@@ -169,18 +166,16 @@ def test_joined_runs_are_described_as_what_they_are(tmp_path):
     joined.to_netcdf(tmp_path / "loads.nc")
     swept = run(scene(**FLUCTUATING))
     with sim.open(tmp_path / "loads.nc") as dataset:
-        assert dataset.attrs["joined"] == "joined along contact_load" and analysis.table(dataset) == analysis.table(
-            swept
-        )
+        assert dataset.attrs["joined"] == "joined along contact_load"
+        assert analysis.table(dataset) == analysis.table(swept)
     seeds = [run(scene(**parts, seed=seed)) for seed in (1, 2)]
     how = {"data_vars": "minimal", "coords": "minimal", "compat": "override"}
-    xr.concat(seeds, "member", **how).to_netcdf(tmp_path / "seeds.nc")
+    both = xr.concat(seeds, "member", **how)
+    both.to_netcdf(tmp_path / "seeds.nc")
     with sim.open(tmp_path / "seeds.nc") as dataset:
         assert dataset.attrs["members"] == 12 and dataset.attrs["joined"] == "12 members joined, 6 of one run"
         error = of_second_half(dataset)["contact_area_sem"]
-        halves = (
-            xr.concat(seeds, "member", **how)["contact_area"].isel(t=slice(dataset.sizes["t"] // 2, None)).mean("t")
-        )
+        halves = both["contact_area"].isel(t=slice(dataset.sizes["t"] // 2, None)).mean("t")
         assert_allclose(error, halves.std("member", ddof=1) / math.sqrt(12.0), rtol=1e-10)
     run(scene(**parts), to=tmp_path / "one.nc")
     with sim.open(tmp_path / "one.nc") as dataset:

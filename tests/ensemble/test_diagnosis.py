@@ -249,9 +249,8 @@ def test_a_contact_softer_than_the_onset_of_oscillations_lies_outside_the_rigid_
         assert (needed > own) == outside
         found = [text for text in remarks(Plan.of(lens)) if "the model of a rigid slider does not hold" in text]
         assert bool(found) == outside
-    assert (
-        f"needs {engineering(needed, 'N/m')}, but the stiffness of the contact is {engineering(own, 'N/m')}" in found[0]
-    )
+    texts = (engineering(value, "N/m") for value in (needed, own))
+    assert "needs {}, but the stiffness of the contact is {}".format(*texts) in found[0]
 
 
 def test_a_sweep_has_one_remark_with_the_range_of_its_values(scene):

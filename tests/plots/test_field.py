@@ -111,9 +111,8 @@ def test_a_spectrum_is_drawn_before_any_run_also_by_the_command_which_replaces_n
     inside = np.isfinite(line.get_ydata())
     assert_allclose(line.get_ydata()[inside], table.radial_density(line.get_xdata()[inside] * 1e6), rtol=1e-9)
     assert_allclose(rows.get_ydata(), density, rtol=1e-9)
-    variance = below.lines[
-        -2
-    ]  # by trapezoids, one of which begins at the jump of the density: half of it counts too much
+    # by trapezoids, one of which begins at the jump of the density: half of it counts too much
+    variance = below.lines[-2]
     exact = table.cumulative(variance.get_xdata() * 1e6) / table.variance
     assert_allclose(variance.get_ydata(), exact, rtol=0, atol=1e-3)
     along, across = before(**ANISOTROPIC).axes[0].lines[:2]

@@ -11,14 +11,13 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
 from sim.laws.schallamach import bell_moments, catch_lives, catch_moments, constant_moments
-from sim.parts.bonds.rupture import Catch, fresh_integral, growth, hazard_integral, hazard_time
+from sim.parts.bonds.rupture import Catch
 
 #: Half of the bonds of rest are bound; force holds them up to some 12 pN and breaks them beyond.
 CATCH = Catch(catch_rate=200.0, catch_force=3e-12, slip_rate=5.0, slip_force=6e-12)
 RATES = CATCH.catch_rate, CATCH.catch_force, CATCH.slip_rate, CATCH.slip_force
 STIFFNESS, BINDING = STRETCHED["bond_stiffness"], STRETCHED["rebinding_rate"]
 SPEEDS = [1e-5, 1e-3, -4e-3, 2e-2, 0.3]
-LAW = (5.0, 0.8, math.inf, 200.0, 1.7)
 
 
 @functools.cache
@@ -71,23 +70,6 @@ def test_cohorts_in_steady_sliding_obey_the_law_and_do_not_depend_on_the_clock_s
     coarse, fine = (np.array([state.bonding[:2] for state in march(moving, np.arange(1))]) for moving in scenes)
     off = np.abs(fine[::10] - coarse).max(axis=(0, 2)) / np.abs(coarse).max(axis=(0, 2))
     assert np.all(off < 1e-4)  # ten times the tolerance: one for each of the eight steps
-
-
-def test_the_device_functions_are_the_integral_of_the_rate_and_its_inverse():
-    for stretch, speed in list(product([-1.7, -0.3, 0.0, 0.2, 2.1], [-3.0, -0.4, 0.0, 0.7, 2.5])):
-        time = 0.013
-        cuts = sorted({0.0, min(max(-stretch / speed if speed else 0.5 * time, 0.0), time), time})
-
-        def rate(t, start=stretch, speed=speed):
-            x = abs(start + speed * t)
-            return LAW[0] * math.exp(x * LAW[1]) + LAW[3] * math.exp(-x * LAW[4])
-
-        exact = sum(quad(rate, *ends, epsabs=0.0, epsrel=1e-12)[0] for ends in pairwise(cuts))
-        assert_allclose(hazard_integral(stretch, speed * time, time, LAW), exact, rtol=1e-12)
-        assert_allclose(hazard_time(stretch, speed, exact, LAW), time, rtol=1e-12)
-        if stretch == 0.0:
-            assert_allclose(fresh_integral(time, speed, LAW), exact, rtol=1e-12)
-        assert growth(stretch, speed, LAW) == 0.0  # no factor for all motions, unlike Bell's
 
 
 def test_models_with_one_clock_for_all_bonds_refuse_catch_bonds_and_auto_takes_cohorts():

@@ -1,6 +1,7 @@
 """Laws that a slider on bonds of any model obeys: limits of the spring, balances, pull-off."""
 
 import functools
+import itertools
 import math
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 import sim
 from sim.laws.reversible import mean_stress_energy, radius_at_load_reversible
-from sim.parts.bonds import Cohort, FirstMoment, Rate, Tracked
+from sim.parts.bonds import Cohort, FirstMoment, Rate, Steady, Tracked
 from sim.parts.bonds.rupture import Bell
 from sim.parts.drive import Start, Steady as AtSpeed
 from tests.test_total import check_cuts, run
@@ -94,22 +95,32 @@ def test_a_stage_that_rests_turns_and_stops_keeps_the_energies_balanced_and_the_
 CARRIED = functools.partial(Cohort, tolerance=1e-4, area="carried")
 
 
-@pytest.mark.parametrize(("make", "viscosity"), [(MOMENT, 0.0), (MOMENT, 0.1), (COHORTS, 0.0), (SITES, 0.0),
-                                                 (CARRIED, 0.0)])  # fmt: skip
-def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_again(make, viscosity):
-    load = driven.PULLED_OFF["load"]
+#: Bonds without a stretch.
+STICKING = Rate(critical_speed=0.5 * STRETCH, rebinding_rate=2.0, stress=1e5)
+COULOMB = Steady(critical_speed=STRETCH, stress=driven.COULOMB)
+VISCOUS = {"viscosity": 0.1 * driven.COULOMB / STRETCH}
+
+
+@pytest.mark.parametrize(
+    ("make", "keys"),
+    [*((make, {}) for make in (MOMENT, COHORTS, SITES, CARRIED)), (MOMENT, {"viscosity": 0.1}),
+     *itertools.product((STICKING, COULOMB), ({"damping": 0.1}, {"mass": 0.05}, VISCOUS))],
+)  # fmt: skip
+def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_again(make, keys):
+    pull = driven.PULLED_OFF
     if make is SITES:  # a load at which pull-off is not left to chance
-        load = load | {"value": tuple(min(value, 2.0 * value) for value in load["value"])}
-    scene = scenario(
-        3.0, 30, spring(1.0, viscosity=viscosity), share=0.5, make=make, **(driven.PULLED_OFF | {"load": load})
-    )
-    states, read = marched(scene)
+        load = pull["load"] | {"value": tuple(min(value, 2.0 * value) for value in pull["load"]["value"])}
+        pull = pull | {"load": load}
+    if callable(make):
+        states, read = marched(scenario(3.0, 30, spring(1.0, **keys), share=0.5, make=make, **pull))
+    else:
+        states, read = marched(stuck(3.0, 30, make, pulled(1.0, 1.0, **keys), share=0.5, **pull))
     open_ = np.isnan([state.contact.radius[0] for state in states])
-    assert open_[11:20].all()
-    assert not open_[21:].any()
-    assert_allclose(read["spring_force"][12:20], 0.0, atol=1e-12 * driven.UNIT)
-    assert read["spring_force"][-1] > 0.05 * driven.UNIT
-    assert residual(read) < 1e-5
+    assert open_[11 if callable(make) else 15 : 20].all() and not open_[21:].any()
+    assert np.isnan(read["runaway_time"]).all() and residual(read) < 1e-5
+    if not {"damping", "mass"} & keys.keys():  # nothing bears the force in an open contact
+        assert_allclose(read["spring_force"][16:20], 0.0, atol=1e-12 * driven.UNIT)
+        assert read["spring_force"][-1] > 0.05 * driven.UNIT
 
 
 @pytest.mark.parametrize(("make", "keys"), [(MOMENT, {"mass": 0.1, "damping": 0.1}),
@@ -152,9 +163,6 @@ def test_bonds_that_break_ever_faster_slip_at_once_which_is_the_limit_of_little_
         courses.append(np.stack([read["spring_force"] / driven.UNIT, [state.bonding.fraction[0] for state in states]]))
     near, far = (np.max(np.abs(course - courses[0]), axis=1) for course in courses[1:])
     assert np.all(far < 0.01) and np.all(near < 0.3 * far)
-
-
-STICKING = Rate(critical_speed=0.5 * STRETCH, rebinding_rate=2.0, stress=1e5)
 
 
 def test_a_check_shows_below_which_spring_the_slider_oscillates():

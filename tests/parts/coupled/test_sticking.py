@@ -140,20 +140,6 @@ def test_a_contact_that_pays_for_its_mean_stress_follows_it_within_the_sub_steps
         assert missing[1] < missing[0]
 
 
-@pytest.mark.parametrize("bonds", [renewed(), Steady(critical_speed=STRETCH, stress=COULOMB)])
-def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_it_up_again(bonds):
-    for keys in [{"damping": 0.1}, {"mass": 0.05}, {"viscosity": 0.1 * COULOMB / STRETCH}]:
-        scene = stuck(3.0, 30, bonds, pulled(1.0, 1.0, **keys), share=0.5, **driven.PULLED_OFF)
-        states, read = marched(scene)
-        open_ = np.isnan([state.contact.radius[0] for state in states])
-        assert open_[15:20].all()
-        assert not open_[:11].any() and not open_[21:].any()
-        assert np.isnan(read["runaway_time"]).all()
-        assert residual(read) < 1e-5
-        if "viscosity" in keys:  # which nothing bears in an open contact
-            assert_allclose(read["spring_force"][16:20], 0.0, atol=1e-12 * HELD)
-
-
 def counted(sites, start="bonded"):
     """A finite number of bonds with the rates of the linear equation."""
     return Counted(**LINEAR, sites=sites, start_from=start)
