@@ -60,10 +60,11 @@ def strings(tree: ast.AST) -> Iterator[str]:
 
 
 def docstrings(tree: ast.AST) -> Iterator[str]:
-    """Yield the prose of each docstring: without the numpydoc sections that list arguments, and without examples."""
+    """Yield the prose of each docstring: without sections that list arguments, examples, formulas and tables."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (text := ast.get_docstring(node)):
-            yield re.split(r"\n\n[A-Z][A-Za-z ]+\n-{3,}\n|>>>", text)[0]
+            text = re.split(r"\n\n[A-Z][A-Za-z ]+\n-{3,}\n|>>>", text)[0]
+            yield re.sub(r"(?ms)^=+ [= ]+$.*^=+ [= ]+$|^    .*?$", "", text)
 
 
 def sentences(text: str) -> list[str]:

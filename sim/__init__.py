@@ -1,6 +1,6 @@
 """Adhesive sliding interfaces: a smooth sphere slides on a soft half-space.
 
-A scenario is a TOML file, a dictionary of the same tables and keys, or a ``Scenario``; it is run into an
+A scenario is a TOML file, a dictionary of the same tables and keys, or a ``Scenario``. The result of a run is an
 ``xarray.Dataset`` in SI units with named dimensions. What cannot be used raises ``BadInput``, all faults at once.
 
 Remarks on what is read are warnings of the logger ``"sim"``, as of the standard ``logging``.

@@ -44,9 +44,9 @@ class State(NamedTuple):
 class Trajectory(NamedTuple):
     """Trajectory of a batch of members, with the time as first axis and the member as second.
 
-    ``time`` [s], ``position`` [m] and ``speed`` [m/s] of the slider; ``fraction``, ``stress`` and ``strength`` of the
-    bonds as of ``Bonding``; ``energy`` ΔΓ [J/m²]; ``driven`` the readings of a drive that feels the friction, in
-    columns; ``work`` and the rest as of ``ContactState``.
+    ``time`` [s], ``position`` [m] and ``speed`` [m/s] are those of the slider. ``fraction``, ``stress`` and
+    ``strength`` of the bonds are as in ``Bonding``; ``energy`` is ΔΓ [J/m²]. ``driven`` has the readings of a drive
+    that solves the motion, in columns. ``work`` and the rest are as in ``ContactState``.
     """
 
     time: Array

@@ -297,7 +297,7 @@ def test_what_a_command_reads_is_never_replaced_and_an_older_file_only_if_asked_
         *([(["plot", "x.nc", "-o", "link.png"], "link.png: the command reads")] if os.name == "posix" else []),
         (["stats", "x.nc", "--csv", "x.nc"], "x.nc: the command reads"),
         (["stats", "x.nc", "--csv", "other.nc"], "other.nc is a dataset"),
-        (["stats", "x.nc", "--csv", "new.toml"], "new.toml is a scenario"),
+        (["stats", "x.nc", "--csv", "new.toml"], "new.toml has a scenario name"),
         (["plot", "x.nc", "-o", "copy"], "copy is the scenario of this dataset"),
         (["converge", "scene.toml", "-o", "new.png"], "new.png: the dataset cannot have the name of its picture"),
     ):

@@ -1,9 +1,8 @@
 """Statistics of a dataset: over its members, at each time and sweep value, and what they say about the area.
 
-Everything is read from the file; nothing of the simulation is needed. *Observables* are variables
-per member and time, some recorded, some derived from recorded ones (the share of the area lost to
-broken bonds, whether adhesion is masked); *events* come once in a run (when it detached, its friction
-peak); ``summary`` turns both into statistics over the members.
+Everything is read from the file; nothing of the simulation is needed. *Observables* are variables per member and time.
+Some are recorded, others are derived (such as the share of the area lost to broken bonds). *Events* occur once in a
+run, such as the detachment or the friction peak. ``summary`` returns statistics of both over the members.
 """
 
 from sim.analysis.dataset import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims

@@ -40,7 +40,7 @@ class SystematicError(NamedTuple):
 def systematic_errors(dataset: xr.Dataset) -> list[SystematicError]:
     """Return the systematic errors of area, friction and pull-off load that are not 0, as far as they are known.
 
-    The cure of an error of the cell leaves about a tenth of it; it is "" if the error is less than 1 % of the JKR area.
+    The cure of an error of the cell leaves about a tenth of it. It is "" if the error is less than 1 % of the JKR area.
     """
     names = [f"{source}_error_{of}" for of in _UNITS for source in ("cell", "banded", "step")]
     return [

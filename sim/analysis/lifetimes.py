@@ -14,8 +14,8 @@ from sim.analysis.statistics import LEVEL, WIDE
 class Lifetime(NamedTuple):
     """Median and rate of an event, with the ends of their 95 % intervals; nan what the runs are too short to tell.
 
-    ``half`` [s] is the time by which it has happened in half of the members, ``rate`` [1/s] how often it
-    happened in all the time in which it could.
+    ``half`` [s] is the time at which the event has occurred in half of the members. ``rate`` [1/s] is the number of
+    events per exposure time.
     """
 
     half: float

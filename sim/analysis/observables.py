@@ -226,9 +226,9 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
 def observables(dataset: xr.Dataset) -> xr.Dataset:
     """Return every recorded trajectory, per member if members differ, and what follows from them.
 
-    ``area_ratio`` is A/A_JKR, with the area of JKR's contact held as the sphere is at that time;
-    ``fraction_detached`` is 1 where the contact is open, ``fraction_masked`` is 1 where it is closed though
-    no work of adhesion is left (Hertz's contact): their ensemble means are the fractions.
+    ``area_ratio`` is A/A_JKR, with the JKR area for the same mount at that time. ``fraction_detached`` is 1 if the
+    contact is open. ``fraction_masked`` is 1 if it is closed without effective work of adhesion (a Hertz contact).
+    Their ensemble means are the fractions.
     """
     dataset = plain(dataset)
     result = dataset.drop_vars([n for n, v in dataset.data_vars.items() if "t" not in v.dims])
@@ -316,9 +316,9 @@ def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
 def settled(trajectories: xr.Dataset) -> xr.Dataset:
     """Return observables averaged over the second half of the run, one record long.
 
-    Each member is averaged over time first, so that a standard error over members holds whatever
-    the correlation in time; a trajectory that stops, over what there is of it. Where only statistics
-    were recorded, their mean over time is taken: for a standard error an upper bound.
+    Each member is averaged over time first, so the standard error over members is valid for any correlation in time. A
+    trajectory that stops is averaged over its recorded part. Where only statistics were recorded, their mean over time
+    is taken: for a standard error an upper bound.
     """
     late = trajectories.isel(t=slice(trajectories.sizes["t"] // 2, None))
     averaged = late.mean("t", keep_attrs=True).expand_dims(t=late["t"][-1:], axis=-1)

@@ -346,8 +346,8 @@ def population_of(point: xr.Dataset) -> Population | None:
 def steady_speeds(dataset: xr.Dataset) -> xr.DataArray:
     """Return the speed at which steady sliding has the bonds of each record, along a course of the speed [m/s].
 
-    If the amplitude of the field relaxes and lags more, it is about that at which the field would be steady: the speed
-    before the memory of its energy, to first order in the rate of the course. nan if a law is not known.
+    If the amplitude of the field relaxes and lags more, it is approximately the speed of the steady field. This is the
+    speed one memory time earlier, to first order in the rate of the course. It is nan if a law is not known.
     """
     speed = (abs(speed_of(dataset)) + 0.0 * dataset["contact_modulus"]).transpose(*sweep_dims(dataset), "t")
     fraction = dataset.get("bond_fraction", dataset.get("bond_fraction_mean", math.nan * speed))

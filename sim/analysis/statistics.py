@@ -452,8 +452,8 @@ def _quantiles(ordered: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
 def quantile_ranks(count: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the places in ``count`` ordered numbers between which a quantile of their law lies, from 0 on.
 
-    The number of them below the quantile is binomial. Where one tail of it cannot be as small as half of what may be
-    left out, the other takes the rest; nan where there is no such interval.
+    The number of them below the quantile is binomial. If one tail cannot be as small as half of the excluded
+    probability, the other tail has the rest. The result is nan if there is no such interval.
 
     >>> low, high = quantile_ranks(np.array([64.0]), np.array([0.5]))
     >>> print(f"{low[0]:.2f} {high[0]:.2f}")
@@ -550,9 +550,9 @@ def _shares(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the shares of the ordered values between which each quantile of the law lies.
 
-    They are those of as many free values as have the error of the share of values under it, of fewer where that error
-    is not well known. There are none where the mean, which is first in each array, has too few free values for any:
-    twice as few where they are estimated by the autocorrelation, which sees a tail seldom.
+    The number of free values follows from the error of the share of values below the quantile. It is smaller if that
+    error is not well known. There are none if the mean, which is first in each array, has too few free values. Twice as
+    many are required if they are estimated by the autocorrelation, because a tail is seldom sampled.
     """
     wider = errors * special.stdtrit(freedoms, 0.5 + 0.5 * LEVEL) / WIDE
     with np.errstate(divide="ignore", invalid="ignore"):  # what does not spread is known without end

@@ -203,8 +203,8 @@ def table(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None)
 def notes(
     dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, str]], stated: xr.Dataset | None = None
 ) -> list[str]:
-    """Return notes on the rows of ``table`` and ``highlights``: sample of the means, number of rows, symbols, and the
-    reasons of statements that are missing or no means.
+    """Return notes on the rows of ``table`` and ``highlights``: sample of the means, number of rows, symbols, and
+    reasons for missing statements.
     """
     one_row_each, points = _has_one_row_each(dataset), dataset["contact_modulus"].size
     phrases = [words] if (words := averaging(dataset, one_row_each)) else []

@@ -273,8 +273,8 @@ def _behind(course: Array, steady: Array) -> tuple[float, float, float]:
 def _lagging(point: Scenario) -> Iterator[str]:
     """Yield how far values along a ramp or table are from steady ones, and how far they would be along a slower one.
 
-    Nothing is said of few bonds and of an amplitude that relaxes, which ``lag`` does not follow, nor of a part that
-    feeds back, which it follows slowly. Nothing is said of a table with a jump or beside a changing load.
+    There is no statement for few bonds and for a relaxing amplitude, which ``lag`` does not include, nor for a part
+    with feedback, which is slow. Nothing is said of a table with a jump or beside a changing load.
     """
     left_out = point.population.per_member or point.fluctuations.law.relaxing or point.by_steps
     rows = point.drive.time if point.drive.model == "table" else ()

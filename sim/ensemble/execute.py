@@ -1,8 +1,8 @@
 """Blocks of a run given to workers: this process, several processes, or a dask cluster, all by one interface.
 
 A task is the next block of one group of members at one point of the sweep. The blocks of a group form a chain: the next
-is given out when the one before is done. A worker keeps its last group in memory, so that modes are not made again;
-another worker goes on from the state that was stored with the block before.
+is given out when the one before is done. A worker keeps its last group in memory, so modes are not computed again.
+Another worker continues from the state that was stored with the previous block.
 """
 
 import bisect

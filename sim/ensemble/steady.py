@@ -46,8 +46,8 @@ def _fields(table: Any) -> tuple[list[str], dict[str, str]]:
 def steady_course(scenario: Scenario, time: Array, speed: Array, stored: Array | None = None) -> Trajectory:
     """Return contacts that have slid at speeds [m/s] for ever, held as the scenario has it at times [s].
 
-    Shapes are (rows, 1). ``stored`` is ΔΓ at amplitude 1 [J/m²], by default its mean on the infinite plane; of several
-    energies the energy, the work and the radius have the shape (rows, energies).
+    Shapes are (rows, 1). ``stored`` is ΔΓ at amplitude 1 [J/m²], by default its mean on the infinite plane. With
+    several energies, energy, work and radius have the shape (rows, energies).
     """
     result = bonds_at(scenario.population, tuple(speed[:, 0]))
     still = 0.0 * speed
@@ -80,9 +80,9 @@ def sensitivities(scenario: Scenario, time: float, speed: float) -> dict[str, tu
     """Return the sensitivities of contact area and friction in steady sliding to each key, the largest first.
 
     They are logarithmic derivatives (percent per percent) by differences of the steady laws, central unless the number
-    is at its bound, at a time of the run [s] and a sliding speed [m/s], which counts as the key "speed". Keys that
-    change neither area nor friction are left out, as are numbers that are 0 or whole. There is none if the contact is
-    open.
+    is at its bound. The time of the run [s] and the sliding speed [m/s] are given; the speed counts as the key "speed".
+    Keys that change neither area nor friction are left out, as are numbers that are 0 or whole. There is none if the
+    contact is open.
 
     Examples
     --------

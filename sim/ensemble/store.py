@@ -1,8 +1,8 @@
 """Blocks of a run that is not done, in the folder ``OUT.nc.parts``, and their way to the output.
 
-The folder holds ``manifest.json``, which says what is run, by which versions and in how many shards; a file ``.npz``
-for each block that was computed, written beside its place and renamed; and the locks. Each shard has a lock, held while
-the shard is computed. The output has another one, held while a run begins and while the output is published. A folder
+The folder holds ``manifest.json`` with the run, its versions and the number of shards, and the locks. Each computed
+block has a file ``.npz``, which is written under another name and then renamed. Each shard has a lock, held while the
+shard is computed. The output has another one, held while a run begins and while the output is published. A folder
 without a manifest of ours is not touched, nor is any file in it that a run did not make.
 """
 
@@ -90,8 +90,8 @@ class MemoryBlocks(dict[str, Arrays]):
 class BlockFiles:
     """Blocks of a run as files of a folder, each with the state at its end.
 
-    A block is sealed by a text that begins with the run and goes on with its names and shapes, because a zip file may
-    lack entries or be that of another run.
+    A block ends with a text of the run, its names and its shapes. This check is needed because a zip file may lack
+    entries or belong to another run.
     """
 
     folder: Path

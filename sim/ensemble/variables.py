@@ -29,9 +29,8 @@ class Variable(NamedTuple):
     """One recorded quantity, or one number of a scene.
 
     ``part`` names the part whose class decides whether members differ, or their control; "" for a number of the scene.
-    ``read`` takes the scenario and what a batch went through, a ``Trajectory``, and gives an array that broadcasts to
-    shape (times, members); that of a quantity of the whole run takes the state at its end, that of a number the
-    scenario alone.
+    ``read`` takes the scenario and the ``Trajectory`` of a batch, and returns an array that broadcasts to shape (times,
+    members). For a quantity of the whole run it takes the final state; for a number it takes only the scenario.
     ``applies`` is True for the scenes of which it is recorded, with ``condition`` in words. A quantity of the whole run
     may have an ``axis``: a dimension beside that of the members.
     """

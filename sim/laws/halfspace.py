@@ -1,15 +1,14 @@
 """Shear stress and displacement at the surface of an elastic half-space.
 
-Stress and displacement are both along x, the sliding direction. Menga, Carbone & Dini (MCD below)
-treat the incompressible half-space, nu = 1/2; every formula here holds its coefficient for any
-Poisson ratio, with the coupling between normal and tangential fields (which vanishes at
-nu = 1/2) neglected elsewhere. For two elastic bodies the compliances add (``in_series``).
+Stress and displacement are both along x, the sliding direction. Menga, Carbone & Dini (MCD below) treat the
+incompressible half-space, nu = 1/2. Every formula here has its coefficient for any Poisson ratio. The coupling between
+normal and tangential fields vanishes at nu = 1/2 and is neglected elsewhere. For two elastic bodies the compliances add
+(``in_series``).
 
-A uniform mean stress tau0 on the contact disc and its fluctuation tau1 (zero mean) are kept apart:
-the mean moves the disc, which ``disc_*`` describe and which has no meaning on an infinite plane;
-the fluctuation stores the surface energy of ``surface_energy``. The power spectrum C_tau and every
-energy below are therefore built from tau1 alone: with the mean in it, the integral of G_x C_tau
-would diverge at q = 0.
+A uniform mean stress tau0 on the contact disc and its fluctuation tau1 (zero mean) are separate. The mean moves the
+disc, as in the functions ``disc_*``; it has no meaning on an infinite plane. The fluctuation stores the energy of
+``surface_energy``. The power spectrum C_tau and every energy below therefore contain only tau1. With the mean, the
+integral of G_x C_tau would diverge at q = 0.
 """
 
 import functools
@@ -787,8 +786,8 @@ def disc_energies_of_map(field, pixel, radii, shear_modulus, poisson_ratio=0.5, 
 def soft_disc(radius):
     """Weights [1] of the samples around the middle of a disc of ``radius`` pixels: lattices do not feel its edge.
 
-    The disc smoothed by a Gaussian, less the second moment that smoothing brings: sums over samples are those over
-    the plane but for some 1e-5, whatever the radius, so that they can be differentiated over it.
+    The disc is smoothed by a Gaussian, and the second moment of the smoothing is subtracted. Sums over samples then
+    equal integrals over the plane except for about 1e-5 at any radius, so they can be differentiated over the radius.
     """
     half = math.ceil(radius + _EDGE)
     place = np.arange(-half, half + 1)

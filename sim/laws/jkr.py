@@ -1,15 +1,14 @@
 """Adhesive contact of a sphere with an elastic half-space: Johnson, Kendall & Roberts, and Hertz.
 
-Loads press: a load P above 0 pushes the sphere into the half-space, P = -F for the tractive force F
-of Menga, Carbone & Dini (MCD); an indentation delta is -s for their separation s. ``modulus`` is
-the contact modulus E* = E/(1 - nu^2) throughout. The contact with radius a and work of adhesion w
-obeys ``energy_release_rate = w``; of its two solutions every law here returns the stable one, the
-wider.
+A load P above 0 pushes the sphere into the half-space, so P = -F for the tractive force F of Menga, Carbone & Dini
+(MCD). An indentation delta is -s for their separation s. ``modulus`` is the contact modulus E* = E/(1 - nu^2)
+throughout. The contact with radius a and work of adhesion w obeys ``energy_release_rate = w``; of its two solutions
+every law here returns the stable one, the wider.
 
-The control is a load, an indentation, or a displacement ``Delta = delta + P/k`` of a base behind a spring
-of stiffness k, which comprises both: k = inf is an indentation, k -> 0 at a given k Delta a load. In names
-``_at_load`` and so on mean an equilibrium under that control (a work of adhesion is given), and ``_under_load``
-any contact of a given radius, in equilibrium or not.
+The control is a load, an indentation, or a displacement ``Delta = delta + P/k`` of a base behind a spring of stiffness
+k. The displacement includes both others: k = inf is an indentation, and k -> 0 at a given k Delta is a load. In names,
+``_at_load`` and similar endings mean an equilibrium under that control, at a given work of adhesion. ``_under_load``
+means any contact of a given radius, in equilibrium or not.
 
 Where no equilibrium exists (pulled beyond the fold, or pulled at all without adhesion) the result
 is nan. A work of zero or below, as when stress fluctuations outweigh adhesion, leaves Hertz's
@@ -331,8 +330,8 @@ def potential_slope_at_load(tractive_force, stress, radius, work, sphere_radius,
 def fold_root(grips, load):
     """Minimum over x > 0 of F for g = ``grips`` and 1 - g = ``load``: from 1 at grips to 3^(1/3) at a load.
 
-    x is the root of ``2 g (x^3 - 1) + 3 (1 - g) x^2 (x^3 - 3)``: a rational function right to 5e-4, one
-    step of Halley's method (1e-9) and one of Newton's. No branch and no call, for vector instructions.
+    x is the root of ``2 g (x^3 - 1) + 3 (1 - g) x^2 (x^3 - 3)``. The start is a rational function with an error of
+    5e-4. A step of Halley's method (1e-9) and one of Newton's follow. No branch and no call, for vector instructions.
     """
     x = (1.0001867 + load * (3.79243383 + 12.48194754 * load)) / (1.0 + load * (2.83851392 + 8.14055122 * load))
     cube = x * x * x

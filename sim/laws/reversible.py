@@ -1,22 +1,20 @@
 """JKR contact whose adhesion also pays a share alpha of the elastic energy of the mean shear stress.
 
 A contact that grows by dA under a uniform stress tau stores ``6 tau^2 a/(pi E*) dA`` (at nu = 1/2,
-``mean_stress_energy``). Menga, Carbone & Dini (MCD) let the drive pay for all of it, alpha = 0; at
-alpha = 1 sliding is reversible and adhesion pays for all of it. With G the energy release rate of
-the normal load alone (``jkr.energy_release_rate``) the contact obeys ``G(a) = w - alpha 6 tau^2 a/(pi E*)``.
+``mean_stress_energy``). In Menga, Carbone & Dini (MCD) the drive supplies all of it, alpha = 0. At alpha = 1 sliding is
+reversible and adhesion supplies all of it. With G the energy release rate of the normal load alone
+(``jkr.energy_release_rate``) the contact obeys ``G(a) = w - alpha 6 tau^2 a/(pi E*)``.
 
-**One crossing.** G(a) is convex in a at a load, at an indentation and behind a spring of any stiffness:
-at a load it is ``(X - 2P + P^2/X)/(6 pi R)`` with X = 4 E* a^3/(3R), at an indentation
-``E*/(2 pi) (a^3/R^2 - 2 delta a/R + delta^2/a)``. The right side is a straight line in a. So there are at
-most two crossings, and only the wider is stable: there G rises above the line, whose slope is the
-dw/da in the condition of stability. Newton's method from the right of it goes left and never passes
-it. A step that does not go left is rounding and ends the search; a slope that is not positive means
-that there is no crossing.
+**One crossing.** G(a) is convex in a at a load, at an indentation and behind a spring of any stiffness. At a load it is
+``(X - 2P + P^2/X)/(6 pi R)`` with X = 4 E* a^3/(3R), at an indentation ``E*/(2 pi) (a^3/R^2 - 2 delta a/R +
+delta^2/a)``. The right side is a straight line in a. So there are at most two crossings, and only the wider one is
+stable. There G rises above the line, and the slope of the line is dw/da in the stability condition. Newton's method
+from the right of it goes left and never passes it. A step that does not go left is rounding and ends the search; a
+slope that is not positive means that there is no crossing.
 
-**Never below Hertz.** The edge can pull but not push: where adhesion does not pay for the shear even
-at Hertz's radius, the contact has that radius. It does so under a load or an indentation of at
-least zero, beyond the last adhesive state; a contact that is pulled comes off there, and the
-answer is nan.
+**Never below Hertz.** The edge can pull but not push: where adhesion does not pay for the shear even at Hertz's radius,
+the contact has that radius. It does so under a load or an indentation of at least zero, beyond the last adhesive state.
+A contact under tension detaches there, and the result is nan.
 """
 
 import math
@@ -66,8 +64,8 @@ def mean_stress_energy(radius, stress, modulus, poisson_ratio=0.5):
 def crossing(z, level, hard, m, s):
     """Largest z with missing^2/z = m + s z and the slope there, from a z right of it; nan if none.
 
-    missing = (hard z^2 + (2/3) soft z^3 - level)/(hard + soft z), soft = 1 - hard, is a^2/R - delta behind a spring
-    of stiffness 2 E* hard/soft: hard = 1 is an indentation and hard = 0 a load. ``level`` is where missing is 0.
+    missing = (hard z^2 + (2/3) soft z^3 - level)/(hard + soft z), soft = 1 - hard, is a^2/R - delta behind a spring of
+    stiffness 2 E* hard/soft. An indentation has hard = 1, a load hard = 0. ``level`` is where missing is 0.
     """
     slope = math.nan
     soft = 1.0 - hard

@@ -636,9 +636,9 @@ def bell_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_ra
 def _bell_peak_speed(zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
     """Speed at which the force is largest, by the root z of d ln(force)/d ln z.
 
-    Derivatives of the integrals are integrals again, ``R_0' z = (1 + z) R_0 - z`` and
-    ``(R_1/z)' z = (1 + z) R_1/z - R_0``, so the root is as sharp as the rounding. It is at 0.384 for a
-    long wait and tends to z = wait for a short one: within the bracket for every wait from 0 to infinity.
+    Derivatives of the integrals are integrals again, ``R_0' z = (1 + z) R_0 - z`` and ``(R_1/z)' z = (1 + z) R_1/z -
+    R_0``. So the root is exact to rounding. It is at 0.384 for a long wait and tends to z = wait for a short one:
+    within the bracket for every wait from 0 to infinity.
     """
     wait = zero_force_rate / rebinding_rate
     high = min(1.0, 2.0 * wait)

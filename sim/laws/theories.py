@@ -13,10 +13,10 @@ tangential force, tau = T/(pi a^2) the mean shear stress and E* the contact modu
     ``A = A0 - alpha_S T^2``            Sahli et al. 2018, measured
     ``G + G_s = w f(psi)``              mixed-mode fracture, G_s as Savkoor & Briggs'
 
-MCD is Menga, Carbone & Dini. The two laws at a constant force differ by 32/(3 pi^2) = 1.08 in energy;
-both have the radius of the last but one at alpha = pi^2/32 and 1/3, but are less stable, for T stays
-the same and not tau. For another Poisson ratio all shear terms gain the factor (2 - nu)/(3 (1 - nu)),
-the coupling of normal and tangential fields being neglected.
+MCD is Menga, Carbone & Dini. The two laws at a constant force differ by 32/(3 pi^2) = 1.08 in energy. Both have the
+radius of the reversible law at alpha = pi^2/32 and 1/3, but are less stable, because T is constant and not tau. For
+another Poisson ratio all shear terms gain the factor (2 - nu)/(3 (1 - nu)). The coupling of normal and tangential
+fields is neglected.
 
 The terms in T^2/a^3 are convex in a, so that each theory has one stable radius at most, found and
 bounded by Hertz's as in ``sim.laws.reversible``.
@@ -35,17 +35,17 @@ interfaces are described by one of three functions of a mixity lambda from 0 to 
     ``f = 1 + (1 - lambda) tan^2 psi``             scaled tangent
 
 All are Savkoor & Briggs' theory at lambda = 1 and JKR's at 0. Shear is added to G as ``lambda (2 - lambda) G_s``,
-``lambda G_s`` and ``lambda G_s`` to second order in T. For another Poisson ratio G_s gains the factor
-(2 - nu)/(3 (1 - nu)), the coupling of normal and tangential fields being neglected.
+``lambda G_s`` and ``lambda G_s``, to second order in the force. For another Poisson ratio G_s gains the factor (2 -
+nu)/(3 (1 - nu)). The coupling of normal and tangential fields is neglected.
 
-**One search.** With y = cot psi each law is ``w/G_s = F(y)``: ``cos^2((1 - lambda) psi) (1 + y^2)``,
-``y^2 + lambda`` and ``y^2 + lambda y^2/(y^2 + 1 - lambda)``. Under a given force y gives the radius,
-``a^3 = T^2 F/4``, with the load ``a^3 - sqrt(3/2) T y`` and the indentation ``a^2 - sqrt(2/3) T y/a`` (in Maugis'
-units: pi w R for forces, (3 pi w R^2/4 E*)^(1/3) for a, a^2/R for the indentation). The contact is stable where they
-grow with y, the widest one at the largest y. For the first two laws they fall to one minimum and grow from there on:
-F is convex and y F'/F grows with y. The third may have an outer and an inner stable branch when lambda is near 1.
-So the search goes left from the radius of JKR by Newton's steps, none longer than a fifth of y, and looks for
-a crossing wherever it has passed a minimum.
+**One search.** With y = cot psi each law is ``w/G_s = F(y)``. The three F(y) are ``cos^2((1 - lambda) psi) (1 + y^2)``,
+``y^2 + lambda`` and ``y^2 + lambda y^2/(y^2 + 1 - lambda)``. Under a given force y gives the radius, ``a^3 = T^2 F/4``.
+The load is ``a^3 - sqrt(3/2) T y`` and the indentation ``a^2 - sqrt(2/3) T y/a``. Units are those of Maugis: pi w R for
+forces, (3 pi w R^2/4 E*)^(1/3) for a, a^2/R for the indentation. The contact is stable where load and indentation grow
+with y, the widest one at the largest y. For the first two laws they fall to one minimum and grow from there on: F is
+convex and y F'/F grows with y. The third may have an outer and an inner stable branch when lambda is near 1. So the
+search goes left from the JKR radius by Newton steps, none longer than a fifth of y. After each minimum it looks for a
+crossing.
 """
 
 import math
@@ -213,9 +213,9 @@ def shear_share_at_indentation(indentation, work, tangential_force, mixity, sphe
 def scaled_tangent_at_load(load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):
     """Contact radius at a load and a tangential force by ``f = 1 + (1 - lambda) tan^2 psi`` [m].
 
-    Otherwise as ``scaled_angle_at_load``. However large the force, a share 1 - lambda of adhesion is left: the
-    radius tends to JKR's at ``(1 - lambda) w`` and never to Hertz's, and only a contact that is pulled harder
-    than that work bears comes off.
+    Otherwise as ``scaled_angle_at_load``. A share 1 - lambda of adhesion remains at any force. The radius therefore
+    tends to the JKR radius at ``(1 - lambda) w`` and never to the Hertz radius. Only a contact with a pull beyond the
+    limit of this work detaches.
 
     Examples
     --------

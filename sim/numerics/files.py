@@ -108,12 +108,12 @@ def claim(path: Path, replace: bool, inputs: Iterable[Path] = (), beside: tuple[
     except OSError as trouble:
         raise StoreTrouble(f"{path}: {trouble.strerror}; name a file in another folder") from trouble
     if any(name.exists() and each.exists() and name.samefile(each) for name in names for each in inputs):
-        raise BadInput([f"{path}: the command also reads this file; name another file"])
+        raise BadInput([f"{path}: the command reads this file, too; name another file"])
     if path.is_file() and not device:
         if not replace:
             raise OutputExists(f"{path} exists; replace it with --force or name another file")
         if path.suffix == ".toml":
-            raise BadInput([f"{path} has the name of a scenario, which is never replaced; name another file"])
+            raise BadInput([f"{path} has a scenario name, which is never replaced; name another file"])
 
 
 @contextlib.contextmanager

@@ -1,12 +1,11 @@
 """Periodic cell, square or rectangular: coordinates, wavevectors, the Fourier pair and Parseval's sum.
 
-Conventions, once for the whole project. A field f(x, y) is an array (..., points, points): axis -2
-is x (the sliding direction), axis -1 is y, axes before them are members or times. Its spectrum is
-``f(q) = integral of f(x) exp(-i q.x) d2x`` and back ``f(x) = (1/2pi)^2 integral of f(q)
-exp(i q.x) d2q``; on the cell the second integral is the sum over its lattice of wavevectors divided
-by the cell's area. Fields are real, so only the half with qy >= 0 is kept (a *half spectrum*, array
-(..., points, points//2 + 1)); ``multiplicity`` is the number of wavevectors that each of its columns
-stands for.
+Conventions, once for the whole project. A field f(x, y) is an array (..., points, points). Axis -2 is x (the sliding
+direction) and axis -1 is y. Axes before them are members or times. Its spectrum is ``f(q) = integral of f(x) exp(-i
+q.x) d2x`` and back ``f(x) = (1/2pi)^2 integral of f(q) exp(i q.x) d2q``. On the cell the second integral is the sum
+over the lattice of wavevectors, divided by the area of the cell. Fields are real, so only the half with qy >= 0 is
+stored (a *half spectrum*, array (..., points, points//2 + 1)). ``multiplicity`` is the number of wavevectors that each
+column represents.
 """
 
 import math

@@ -1,11 +1,11 @@
 """Compilation by numba, the only place that decorates with it.
 
-Four decorators: ``device`` for a helper that compiles into its callers, ``inlined`` for one whose body must stand in
-the calling loop (Philox words in the lives of single bonds: a tenth of their time), ``kernel`` for a loop over arrays,
-``law`` for a formula that broadcasts as a numpy ufunc but keeps its Python signature, defaults and docstring. Kernels
-and laws compile at their first call. Their machine code is kept on disk, one file each, in a folder named by a hash of
-all compiled sources; it is loaded without numba's tables of what it can compile, which take half a second to set up. A
-cache that is broken, read-only or full costs time, never a run.
+There are four decorators. ``device`` is for a helper that compiles into its callers. ``inlined`` is for a helper whose
+body must be part of the calling loop (Philox words for single bonds: a tenth of their time). ``kernel`` is for a loop
+over arrays. ``law`` is for a formula that broadcasts as a numpy ufunc but keeps its Python signature, defaults and
+docstring. Kernels and laws compile at their first call. Their machine code is kept on disk, one file each, in a folder
+named by a hash of all compiled sources. It is loaded without numba's type tables, because their setup takes half a
+second. A cache that is broken, read-only or full costs time, never a run.
 
 Loading in this way needs some internals of numba. If a version of numba lacks one of them, ``FAST`` is false: the
 decorators are then numba's public ones with numba's own cache, in the same folder. The numbers are the same.

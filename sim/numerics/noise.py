@@ -1,15 +1,15 @@
 """Counter-based random numbers: a draw depends only on (seed, part, member, step).
 
-No generator is carried from step to step, so that a member draws the same numbers alone, in a batch, after a restart
-or on another machine. The numbers of one address come from a stream of their own: xoshiro256++ (Blackman & Vigna,
-ACM TOMS 47, 2021), whose state is four words of Philox4x64-10 (Salmon, Moraes, Dror & Shaw, SC11, 2011) at that
-address, equal to numpy's ``Philox(...).random_raw``. Normals follow by the ziggurat (Marsaglia & Tsang, J. Stat. Softw.
-5(8), 2000), gammas by Marsaglia & Tsang's rejection from normals (ACM TOMS 26, 2000), binomials by transformed
+No generator is carried from step to step, so that a member draws the same numbers alone, in a batch, after a restart or
+on another machine. The numbers of each address come from a separate stream of xoshiro256++ (Blackman & Vigna, ACM TOMS
+47, 2021). Its state is four words of Philox4x64-10 (Salmon, Moraes, Dror & Shaw, SC11, 2011) at that address. These
+words are equal to ``Philox(...).random_raw`` of numpy. Normals follow by the ziggurat (Marsaglia & Tsang, J. Stat.
+Softw. 5(8), 2000), gammas by Marsaglia & Tsang's rejection from normals (ACM TOMS 26, 2000), binomials by transformed
 rejection.
 
 Compiled loops draw where they use a number: ``number, numbers = normal(numbers)``. Scalar code of exactly rounded
-operations, so the same bits with any vector instructions (but for gammas of shapes below 1 other than 0.5, which
-take the library's exponential).
+operations, so the bits are the same with any vector instructions. An exception are gammas of shapes below 1 other than
+0.5, which use the library's exponential.
 """
 
 import math
@@ -102,8 +102,8 @@ def words_at(seed, part, c0, c1, c2, c3):
 def stream(seed, part, member, step, lane):
     """The numbers of one member and step at their beginning; a ``lane`` of its own for each law of a part.
 
-    Philox words of the counter (step, 0, member, 256 + lane) under the key (seed, part) are the state of xoshiro256++,
-    a tuple of four words that each draw takes and returns.
+    Philox words of the counter (step, 0, member, 256 + lane) under the key (seed, part) are the state of xoshiro256++.
+    Each draw takes and returns this tuple of four words.
     """
     return words_at(seed, part, _U(step), _U(0), member, _STREAMS + _U(lane))
 

@@ -4,9 +4,9 @@ The generalised exponential integral of order j is
 
     ``E(z) = 1/j! int_1^inf (ln u)^j/u e^(-z u) du``
 
-(Milgram, Math. Comp. 44, 443 (1985)); order 0 is the ordinary E1. It decays like e^-z and grows like a
-power of ln z at small z. The product with ``e^z z^(j + 1)`` runs from 0 at z = 0 to 1 at z = infinity
-without overflow; it is computed for any z, and the rest follows from it.
+(Milgram, Math. Comp. 44, 443 (1985)); order 0 is the ordinary E1. It decays like e^-z and grows like a power of ln z at
+small z. The product with ``e^z z^(j + 1)`` increases from 0 at z = 0 to 1 at z = infinity without overflow. It is
+computed for any z, and the rest follows from it.
 """
 
 import math

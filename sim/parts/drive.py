@@ -4,8 +4,8 @@ A prescribed drive is a function of time, the same for all members. It gives the
 times the step, so that parts that live on slip see no step error.
 
 A force, or a stage that pulls through a spring, feels the friction. The body has a mass and a damping to the
-counter-surface; between it and the interface the contact itself yields with k_t, and the interface may have a
-viscosity. Slider and bonds are solved together by ``sim.parts.coupled``.
+counter-surface. Between body and interface, the contact has the stiffness k_t. The interface may have a viscosity.
+Slider and bonds are solved together by ``sim.parts.coupled``.
 """
 
 import math
@@ -145,8 +145,8 @@ class Ramp(tables.Course, _Sliding):
 class Table(tables.Table, _Sliding):
     """A speed tabulated over time, linear between the rows; two rows at one time are a jump.
 
-    In a scenario file ``file`` names a CSV with the columns ``time`` and ``speed``, each with its
-    unit in brackets; in Python give the two columns [s], [m/s].
+    In a scenario, ``file`` names a CSV file with the columns ``time`` and ``speed``, each with its unit in brackets. In
+    Python give the two columns [s], [m/s].
     """
 
     quantity: ClassVar[Quantity] = _SPEED

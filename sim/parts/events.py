@@ -124,8 +124,8 @@ class Slips(NamedTuple):
     def kinetic_friction(self) -> Array:
         """Return the work of the stage over its path [N], from the first late event to the last.
 
-        Without two late events the span is the second half of the run. nan if the slider went less than half as far as
-        the stage, which stretches the spring.
+        Without two late events the span is the second half of the run. The result is nan if the slider moved less than
+        half as far as the stage, because the spring is then still extending.
         """
         state = self.running.view(SLIPPING)[:, 0]
         slips = self.late[:, 0].view(MOMENTS)[:, 0]["count"] > 1.0
@@ -242,11 +242,11 @@ def _follow_slips(times, stage, speed, force, position, slip, stress, work, half
 class Events(NamedTuple):
     """Events so far; NaN counts as 0 in a maximum; ties keep the first.
 
-    The first four are arrays of the shape (rows, phases, columns), the present phase last. ``stress`` is that of the
-    shear stress [Pa] and ``friction`` that of the friction force [N], in magnitude; ``pull`` is that of the tensile
-    load of a closed contact [N], without rows if the control does not make the load: rows of ``MAXIMUM``.
-    ``contact`` are rows of ``CONTACT``. ``path`` is the longest path within a step [m], shape (1,) or (members,).
-    ``slips`` are the slip events.
+    The first four are arrays of the shape (rows, phases, columns), the present phase last. All are rows of ``MAXIMUM``,
+    in magnitude. ``stress`` is that of the shear stress [Pa] and ``friction`` that of the friction force [N]. ``pull``
+    is that of the tensile load of a closed contact [N], without rows if the load is constant. ``contact`` are rows of
+    ``CONTACT``. ``path`` is the longest path within a step [m], shape (1,) or (members,). ``slips`` are the slip
+    events.
     """
 
     stress: Array

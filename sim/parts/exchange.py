@@ -2,11 +2,10 @@
 
     drive ── slip, speed ─► bonds ── fraction, stress, … ─► shear ── energy ΔΓ ─► contact ── radius
 
-Parts advance by blocks of clock steps: of one where the state of a part feeds back into an earlier one, else of
-many. What they hand on during a block has the step as first axis and the member as second, of length 1 where all
-members agree; a state, and what is of one step, has the member as first axis. The state of a part is a
-``NamedTuple`` of arrays of its own (or of such tuples); others read of it only what its protocol names. Sliding
-in +x is positive.
+Parts advance by blocks of clock steps: of one where the state of a part feeds back into an earlier one, else of many.
+Results of a block have the step as first axis and the member as second, of length 1 if all members agree. A state, and
+the results of a single step, have the member as first axis. The state of a part is a ``NamedTuple`` of arrays of its
+own (or of such tuples); others read of it only what its protocol names. Sliding in +x is positive.
 """
 
 import math

@@ -34,11 +34,11 @@ class Choices(NamedTuple):
     """Choices for a figure.
 
     Any kind takes ``member``, one of the ensemble, and ``units`` of axes, such as ``"mm/s"``. Kinds with these
-    parameters take ``at``, the time [s] of the record or map that is drawn; ``x``, the variable or swept key that it is
-    drawn over; ``absolute``, areas in place of shares; ``data``, measured points in a CSV table or columns in SI by
-    name (``{"speed": [1e-3], "contact_area": [4e-8]}``); ``ax``, the matplotlib axes that its first panel is drawn in.
-    ``size`` is that of the picture, such as ``"3.4x2.6in"``; ``xlim`` the range of the x axis in its unit, such as
-    ``"0.1:10"``; ``start`` and ``stop`` limit the time of figures over time.
+    parameters take ``at``, the time [s] of the drawn record or map. ``x`` is the variable or swept key of the x axis.
+    ``absolute`` draws areas instead of shares. ``data`` are measured points in a CSV table, or columns in SI by name
+    (``{"speed": [1e-3], "contact_area": [4e-8]}``). ``ax`` are the matplotlib axes of the first panel. ``size`` is the
+    size of the picture, such as ``"3.4x2.6in"``. ``xlim`` is the range of the x axis in its unit, such as ``"0.1:10"``.
+    ``start`` and ``stop`` limit the time of figures over time.
     """
 
     member: int | None = None

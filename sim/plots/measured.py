@@ -53,8 +53,8 @@ class Line(NamedTuple):
 class Compared(NamedTuple):
     """A curve that points may lie on.
 
-    Over ``x`` in the unit of the axis it has the mean and its standard error in that of the other axis, and JKR's area
-    at the full work of adhesion [m^2].
+    Over ``x`` in the unit of the axis, it has the mean and its standard error in the unit of the other axis. It also
+    has the JKR area at the full work of adhesion [m^2].
     """
 
     line: Line

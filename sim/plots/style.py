@@ -1,7 +1,7 @@
 """Look of pictures: style, colours, units on axes, symbols, letters and legends.
 
-One colour means one thing throughout: blue what broken bonds do, vermilion what shear fluctuations
-do, black the contact with both; grey lines are closed forms, such as JKR's and Hertz's contacts.
+Each colour has one meaning: blue for broken bonds, vermilion for shear fluctuations, black for the contact with both.
+Grey lines are closed forms, such as JKR and Hertz contacts.
 """
 
 import io

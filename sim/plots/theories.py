@@ -358,9 +358,9 @@ def needs_course(dataset: xr.Dataset) -> None:
 def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     """Load and contact radius over displacement with the energy lost per cycle, and radius over load.
 
-    A line is broken while the contact is open; there the load is a thin line at zero. Grey is JKR's contact at
-    the full work of adhesion: every equilibrium, the unstable ones as well, and the loads at which a dead load and
-    fixed grips lose it.
+    A line is broken while the contact is open; there the load is a thin line at zero. Grey is the JKR contact at the
+    full work of adhesion, with stable and unstable equilibria. The loads of pull-off under a dead load and in fixed
+    grips are also shown.
     """
     kind, stiffness, scene = "", xr.DataArray(np.nan), scene_along(dataset, "t")._replace(measured=data)
     with contextlib.suppress(KeyError):  # the whole table [contact] is swept

@@ -494,8 +494,8 @@ def cost(log: Path) -> dict[str, str]:
 def known(dataset: xr.Dataset) -> Rows:
     """Return the error estimates before the run, beside the errors measured in it.
 
-    The spread of the fluctuation energy between members is the largest over the sweep at the last record; its own
-    standard error is that of the jackknife over the members.
+    The spread of the fluctuation energy between members is the largest over the sweep at the last record. Its standard
+    error is that of the jackknife over the members.
     """
     count, rows = int(dataset.attrs["members"]), list[tuple[str, str, str]]()
     spread_measured, error_measured = _spreads(dataset)

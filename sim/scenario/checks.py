@@ -210,9 +210,9 @@ def renewed(scene: Scene, path: Array) -> Array:
 def pull_off_error(scene: Scene, path: Array) -> Array:
     """Return about how much the load at pull-off is off [N], as the contact is seen after clock steps with a path [m].
 
-    The first passage of ΔΓ is seen late by the overshoot of its changes (Siegmund, Sequential Analysis, 1985), 3/2 πR
-    of it as a load, and a prescribed load by half of its largest change in a step. The two have opposite signs; this
-    is a bound.
+    The first passage of ΔΓ is detected late by the overshoot of its changes (Siegmund, Sequential Analysis, 1985). As a
+    load this is 3/2 πR times the overshoot. A prescribed load adds half of its largest change in a step. The two have
+    opposite signs; this is a bound.
     """
     shear, clock, settled = scene.fluctuations, scene.clock, scene.population.steady(path / scene.clock.step)
     size = np.ones(1) if shear.law.remembers else shear.law.factor(path / clock.step, settled.strength)

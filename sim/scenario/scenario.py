@@ -259,8 +259,8 @@ class Scenario:
     def by_steps(self) -> bool:
         """Return True if a part feeds back, so that a run goes step by step and not by blocks of steps.
 
-        Under a drive that feels the friction bonds and an equilibrium contact follow within its own sub-steps; a block
-        of them needs fluctuations that the contact does not feel, or that stay as they are.
+        With a drive that solves the motion, bonds and an equilibrium contact are solved within its sub-steps. A block
+        of such steps needs fluctuations that are constant or do not affect the contact.
         """
         _, bonds, shear, contact = self.chosen
         alone = contact.lags or not (shear.paid_by_adhesion == 0.0 or shear.stays) or not bonds.in_blocks

@@ -1,7 +1,7 @@
 """Contract of every power spectrum of the shear stress, and its exact integrals over pixels of wavevectors.
 
-Samples at lattice points miss cut-offs by whole pixels and, near q = 0, most of a steep spectrum;
-integrals over pixels lose only the pixel of q = 0.
+Samples at lattice points miss cut-offs by whole pixels and, near q = 0, most of a steep spectrum. Integrals over pixels
+lose only the pixel of q = 0.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Isotropic spectra, and the mean energy of the fluctuating shear stress on a finite disc of contact.
 
-A spectrum that is given by rows (a band, a self-affine law with cut-offs, a table, a measurement) is a chain of
-power laws, whose integrals over a circle are closed forms.
+A spectrum of rows (a band, a self-affine law with cut-offs, a table, a measurement) is a chain of power laws. Their
+integrals over a circle are closed forms.
 
 ``surface_energy`` of a spectrum is that of the infinite plane, right for a contact of very many wavelengths. On
 a disc of radius a every wave counts with the share that ``laws.halfspace`` gives in closed form, so that
@@ -335,8 +335,8 @@ class Isotropic(Waves, Radial, Protocol):
     def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
         """Mean elastic energy per area [J/m²] stored by the fluctuations in an infinite half-space.
 
-        ``ΔΓ = (2 - nu) / (8 pi G) ∫ C dq``, the angular mean of ``½ G_x C``; the normal-tangential
-        coupling that exists for nu other than 1/2 is neglected.
+        ``ΔΓ = (2 - nu) / (8 pi G) ∫ C dq``, the angular mean of ``½ G_x C``. The normal-tangential coupling for nu
+        other than 1/2 is neglected.
         """
         mean, _ = angular_compliance(np.asarray(poisson_ratio, float))
         return mean / (4 * np.pi * np.asarray(shear_modulus, float)) * self.line_integral

@@ -1,9 +1,10 @@
 """Numbers of a scenario calibrated to measured curves: ``sim fit``.
 
-The curves are fitted by steady sliding, which is quick (``sim.study.likelihood``). Then the scenario's own models run
-once with what was found; what they add to steady sliding is added to it, with the error that their members leave, and
-the fit is made anew, until it stays. The same noise is drawn each time. Where steady sliding does not depend on a key
-that is free, such as the speed of an edge that lags, or what slides feels its friction, every prediction is a run.
+The curves are fitted by steady sliding, which is quick (``sim.study.likelihood``). Then the models of the scenario run
+once with the fitted values. Their difference from steady sliding is added as a correction, with the error of their
+members. The fit is repeated until it no longer changes. The same noise is drawn each time. Every prediction is a run in
+two cases. Steady sliding may not depend on a free key, such as the speed of an edge that lags. Or the drive may solve
+the motion of the slider.
 """
 
 import difflib
@@ -310,8 +311,8 @@ class Along(NamedTuple):
 def figure(problem: Problem, best: Minimum) -> Figure:
     """Draw each variable over the condition that varies most, with error bars and fit, above its residuals.
 
-    Residuals are in standard errors. Rows of any table that are alike in all other conditions have one colour, and one
-    curve: it is of many speeds over the speed, else it joins the rows. If the scenario's own models add to steady
+    Residuals are in standard errors. Rows of any table with the same other conditions have one colour and one curve.
+    Over the speed the curve has many speeds; otherwise it joins the rows. If the scenario's own models add to steady
     sliding, that alone is dashed.
     """
     fitted, alone = problem.predicted(best.x), problem.steady(best.x)

@@ -1,9 +1,9 @@
 """Measured curves, their prediction by a scenario, and their least squares.
 
-Curves are columns of CSV tables, named as variables of a dataset, with units and standard errors. They are predicted
-in two ways. Steady sliding answers for all rows in a fraction of a millisecond: each row is a contact that has always
-slid at its speed, with the mean of the fluctuations and the edge in equilibrium. The scenario's own run has everything
-else: members, clock steps, histories, edges that lag.
+Curves are columns of CSV tables, named as variables of a dataset, with units and standard errors. They are predicted in
+two ways. Steady sliding is computed for all rows in a fraction of a millisecond. Each row is a contact in steady
+sliding at its speed, with the mean of the fluctuations and the edge in equilibrium. The scenario's own run has
+everything else: members, clock steps, histories, edges that lag.
 
 A number above zero without an upper bound is fitted in its logarithm. The sum of squares is over errors; a relative
 error that curves share is one more number, known to be 0 within its size.
@@ -62,8 +62,8 @@ class Measured(NamedTuple):
     """One table: under which conditions which curves were measured.
 
     ``conditions`` holds the columns ``"t"``, ``"speed"``, ``"mount"`` (load, indentation or displacement) and those of
-    other keys of the scenario, by the key; rows are numbered alike in all columns. ``mount`` is the key of the contact
-    that holds the sphere. ``ranges`` names the range of each column, for people.
+    other keys of the scenario. Rows have the same numbers in all columns. ``mount`` is the key of the contact that
+    holds the sphere. ``ranges`` names the range of each column, for people.
     """
 
     path: Path
@@ -189,9 +189,9 @@ def groups(scenario: Scenario, table: Measured) -> list[Group]:
 def by_steady_sliding(group: Group, values: Values, names: list[str], theory: str = "") -> dict[str, Array]:
     """Variables at the rows of a group with some numbers changed, in steady sliding.
 
-    ``theory`` is the name of a theory of ``sim.laws.theories`` that gives the radius in place of the contact's balance,
-    at the stress of the bonds and the full work of adhesion. Its numbers ``"alpha"`` and ``"lambda"`` are among the
-    ``values``.
+    ``theory`` is the name of a theory of ``sim.laws.theories``. It then gives the radius instead of the contact
+    balance, at the stress of the bonds and the full work of adhesion. Its numbers ``"alpha"`` and ``"lambda"`` are
+    among the ``values``.
     """
     scenario = changed(group.scenario, {key: value for key, value in values.items() if "." in key})
     course = steady_course(scenario, group.time, group.speed)
@@ -610,8 +610,8 @@ class Interval(NamedTuple):
 def interval(problem: Problem, best: Minimum, k: int) -> Interval:
     """Return the interval in which the sum of squares, least over all else, stays below its bound (profile likelihood).
 
-    ``lmfit.conf_interval`` gives no interval if a bound and not the data ends it, and widens all by an estimated
-    variance where the errors are known; so the ends are sought here.
+    The ends are computed here because ``lmfit.conf_interval`` has two limits. It returns no interval if a bound ends
+    it, and it widens all intervals by an estimated variance even if the errors are known.
     """
     estimated = problem.estimated.any()
     rise = math.sqrt(stats.f.ppf(LEVEL, 1, problem.freedom) if estimated else stats.chi2.ppf(LEVEL, 1))

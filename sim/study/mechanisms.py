@@ -1,8 +1,8 @@
 """Mechanisms that measured curves prefer: bonds, fluctuations, both, or a theory of the sheared contact.
 
-Each is fitted to the same curves with the keys that it has, and judged by Akaike's criterion AICc and by the
-likelihood ratio to the scenario as it is. Numbers of a mechanism that is left out lie on their bounds or do not exist,
-so the distribution of the ratio is not a chi-square: it is drawn, by fitting both to curves made by the poorer one.
+Each is fitted to the same curves with its keys. The criteria are AICc (Akaike) and the likelihood ratio to the
+unchanged scenario. The keys of an omitted mechanism lie on their bounds or do not exist, so the ratio has no chi-square
+distribution. Its distribution is simulated: both models are fitted to curves of the poorer one.
 """
 
 import math
@@ -68,8 +68,8 @@ class Judged(NamedTuple):
 class Verdict(NamedTuple):
     """The mechanisms in the order of AICc, and what the data say of them, in words.
 
-    ``sufficient`` is the one that is left when the data reject all others, or all but the scenario as it is, of which
-    it is a part: that more acts than is sufficient they do not show, and do not exclude. "" where several are left.
+    ``sufficient`` is the remaining mechanism if the data reject all others, except possibly the unchanged scenario. The
+    data then neither show nor exclude further mechanisms. It is "" if several remain.
     """
 
     judged: tuple[Judged, ...]

@@ -1,18 +1,17 @@
 """The equations and numbers of Menga, Carbone & Dini recomputed, for ``sim paper``.
 
-N. Menga, G. Carbone, D. Dini, "Do uniform tangential interfacial stresses enhance adhesion?", J. Mech.
-Phys. Solids 112 (2018) 145 with the corrigendum 133 (2019) 103744, in the corrected text of
-arXiv:1710.06506. Equation numbers count its numbered displays. Each line compares a value of the
-package with an independent one: a closed number, the paper's formula written out here, or a
-quadrature or root found by numpy and scipy alone.
+N. Menga, G. Carbone, D. Dini, "Do uniform tangential interfacial stresses enhance adhesion?", J. Mech. Phys. Solids 112
+(2018) 145 with the corrigendum 133 (2019) 103744, in the corrected text of arXiv:1710.06506. Equation numbers count its
+numbered displays. Each line compares a value of the package with an independent one. This is a closed number, the
+formula of the paper, or a quadrature or root by numpy and scipy alone.
 
 What the paper does not settle, or settles twice (``docs/paper.md`` has the details):
 
 - the spectrum is written with the whole stress where only its fluctuation can be meant;
-- the Hertz radius at a load is the real cube root of a negative force, and the dimensionless forms
-  do not exist for pulled or lifted spheres; the same symbols carry two scales;
-- the thresholds of 375 and 51 kPa are amplitudes of the cheapest direction: a ripple across the
-  sliding needs 265 and 36 kPa, a ring of directions 306 and 42 kPa;
+- the Hertz radius at a load is the real cube root of a negative force. The dimensionless forms do not exist for pulled
+  or lifted spheres, and the same symbols have two scales;
+- the thresholds of 375 and 51 kPa are amplitudes of the cheapest direction. A ripple across the sliding needs 265 and
+  36 kPa, a ring of directions 306 and 42 kPa.
 - G = 1.6 MPa may have been a Young's modulus;
 - nothing here can push the contact below Hertz's, and broken bonds alone are too few at 2-3 mm/s;
 - N0/(1 + V/Vc) belongs to one bond model without a friction maximum, and no Delta gamma(N) is given;

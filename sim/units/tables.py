@@ -375,8 +375,8 @@ def _intervals(ends: Array, places: Indices) -> Indices:
 class Number(NamedTuple):
     """A constant value.
 
-    Every prescribed value has ``changes``, true if it depends on time, ``cycles``, the number of ways there and back,
-    and ``end`` [s], the last time for which it is given.
+    Every prescribed value has ``changes``, true if it depends on time, and ``cycles``, the number of cycles. ``end``
+    [s] is the last time for which it is given.
     """
 
     value: float

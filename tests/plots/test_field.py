@@ -129,7 +129,7 @@ def test_a_spectrum_is_drawn_before_any_run_also_by_the_command_which_replaces_n
     assert made.startswith(b"\x89PNG") and sim("plot", "scene.toml").exit_code == 73
     for arguments, words in (
         (("scene.toml", "curve"), 'before a run only "spectrum"'),
-        (("scene.toml", "-o", "scene.toml", "--force"), "the command also reads this file"),
+        (("scene.toml", "-o", "scene.toml", "--force"), "the command reads this file"),
         (("none.toml",), "none.toml"),
     ):
         answer = sim("plot", *arguments)

@@ -124,7 +124,7 @@ VALUES = [
     (LOAD, 'load = { time = [0, 1], value = [1, "2 kg"] }', "contact.load.value", 'value 2...unit "kg"'),
 ]
 TOGETHER = [
-    (LOAD, f'{LOAD}\nindentation = "1 um"', "contact", "load...indentation...leave one"),
+    (LOAD, f'{LOAD}\nindentation = "1 um"', "contact", "load...indentation...omit one"),
     (LOAD, "stiffness = 3", "contact", "give a load"),
     (LOAD, 'displacement = "1 um"', "contact", "stiffness"),
     (LOAD, 'load = "4 MN"', "contact.load", "check its unit"),
@@ -149,7 +149,7 @@ TOGETHER = [
     (RATE, BELL.replace('site_density = "1e17 1/m^2"', ""), "bonds.site_density", "add...1e17 1/m^2"),
     (RATE, BY_NONE.replace("cohort", "auto").replace("bond_stiff", "#"), "bonds", "bond_stiffness is missing"),
     (RATE, BELL.replace("cohort", "auto") + 'critical_speed = "1 mm/s"\n', "bonds", "either critical_speed"),
-    (RATE, BELL.replace("cohort", "auto") + 'stress = "1 MPa"\n', "bonds", "leave stress out"),
+    (RATE, BELL.replace("cohort", "auto") + 'stress = "1 MPa"\n', "bonds", "omit stress"),
     (RATE, RATE.replace("500", "0").replace("rate", "auto", 1), "bonds", "rebinding_rate...above 0"),
     (SHEAR, '[shear]\nmodel = "mean"\nspectrum = { model = "bonds", footprint = "10 um" }\n', "shear.spectrum",
      'bonds.model = "cohort" or "tracked"'),
@@ -232,7 +232,7 @@ def test_a_fault_of_an_override_names_the_override(refusal):
         ("nope.x.y", 3, "nope: is not a key; known: clock, "),
         ("contact", 5, "must be a table"),
         ('""', 1, "is not a key"),
-        ("contact.indentation", "1 um", "contact: a load and an indentation cannot both"),
+        ("contact.indentation", "1 um", "contact: a load and an indentation exclude each other"),
         ('sweep."contact.load"', [1, "2 mm"], 'contact.load...unit "mm"'),
     ):
         (problem,) = refusal(overrides={key: value})

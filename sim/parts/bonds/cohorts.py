@@ -199,9 +199,8 @@ def steepen(pool, count, slip, off, rules):
 def births(free, early, late, step, speed, rules):
     """Return the births of a step by Radau IIA: weights at its third and at its end, free sites then, and the error.
 
-    F(t) = 1 − R(t) − ∫k_on F(s) S(t − s)ds at t = h/3 and h, R = ``early`` and ``late``, the integral by the
-    two-stage rule: third order, and stable for any k_on h. The error is the distance to the
-    trapezoidal rule.
+    F(t) = 1 − R(t) − ∫k_on F(s) S(t − s)ds at t = h/3 and h, R = ``early`` and ``late``, the integral by the two-stage
+    rule. It is of third order, and stable for any k_on h. The error is the distance to the trapezoidal rule.
     """
     z = rules.rebinding * step
     before = math.exp(-fresh_integral(-2.0 / 3.0 * step, speed, rules.law))

@@ -5,17 +5,15 @@ rate k and a sliding speed V that is constant over a step,
 
     ``dN/dt = k_on (1 - N) - N k(|x|)``,    ``dM/dt = N V - M k(|x|)``,    ``x = M/N``
 
-since new bonds are unstretched, every bond moves with the slider, and bonds that break take their
-stretch along. This is exact if k does not depend on the stretch. If it does, this is a mean field,
-because the bonds of a population differ: under Bell's rate it overpredicts the friction maximum by 27 to
-47 % for any step in time.
+since new bonds are unstretched, every bond moves with the slider, and bonds that break take their stretch along. This
+is exact if k does not depend on the stretch. If it does, this is a mean field, because the bonds of a population
+differ. With Bell's rate it overpredicts the friction maximum by 27 to 47 %, for any time step.
 
-A cut-off stretch l makes every bond break after the slip l. Its rates in this closure are ``V/l`` for N
-and ``2V/l`` for M. Bonds of all stretches up to l are equally many, bonds that break are stretched by l,
-and the mean is l/2, so a break takes twice the mean. The stress of steady sliding is then that of
-the renewal of such bonds, where k_on closes and nothing else opens: κ (l/2) N with N = 1/(1 + V/(l k_on)).
-(Losing the mean with every break would give κ l N.) As the speed goes to zero the stress does not vanish but keeps
-the sign of the speed: the Coulomb friction of bonds that only sliding breaks.
+A cut-off stretch l makes every bond break after the slip l. Its rates in this closure are ``V/l`` for N and twice as
+large for M, because bonds of all stretches up to l are equally frequent. Bonds that break have the stretch l, twice the
+mean. The stress of steady sliding is then that of the renewal of such bonds by k_on: κ (l/2) N with N = 1/(1 + V/(l
+k_on)). A loss of the mean with every break would give κ l times N instead. As the speed goes to zero, the stress does
+not vanish but keeps the sign of the speed. This is the Coulomb friction of bonds that break only by sliding.
 """
 
 import math

@@ -36,9 +36,7 @@ from sim.parts.bonds.tracked import CYCLES, Tracks
 from sim.parts.exchange import UNKNOWN, Array, Bonding, Motion, Part, Setting
 from sim.units.quantity import Quantity, keyed, tagged
 
-Area = Annotated[
-    Literal["present", "carried"], Field(description='"carried": area that the contact gains comes without bonds')
-]
+Area = Annotated[Literal["present", "carried"], Field(description='"carried": new contact area has no bonds')]
 
 #: Contact radius of a population that does not depend on the area, or has not had a contact yet.
 _NO_AREA = UNKNOWN
@@ -120,12 +118,12 @@ class _OverArea(_BondModel):
         return np.where(now > 0.0, share_kept(before, now), 0.0), now  # an open contact has no bonds to fill
 
 
-Stress = Annotated[float, Quantity("Pa", "shear stress with all bonds of rest bound", "tau_0", at_least=0)]
+Stress = Annotated[float, Quantity("Pa", "shear stress with the bonds of the contact at rest", "tau_0", at_least=0)]
 CriticalSpeed = Annotated[float, Quantity("m/s", "critical speed of the bonds", "V_c", above=0)]
 RebindingRate = Annotated[float, Quantity("1/s", "rate at which a free site binds", "h", above=0)]
 Start = Annotated[
     Literal["steady", "bonded", "empty"],
-    Field(alias="start", description='bonds at the start; "bonded": at every site, unstretched'),
+    Field(alias="start", description='bonds at the start; "bonded": all sites, unstretched'),
 ]
 Sites = Annotated[int, Quantity("1", "number of bond sites of the contact", at_least=1, at_most=10**9, whole=True)]
 
@@ -412,8 +410,8 @@ class _Stretched(_BondModel):
 
     def remarks(self, setting: Setting) -> list[str]:
         number = 1.0 / self.bound_at_rest
-        times = f"{number:.3g} times the bonds of rest"
-        remark = f'start = "bonded" binds every site, {times}, for which adhesion.work holds'
+        times = f"{number:.3g} times the bonds at rest"
+        remark = f'start = "bonded" binds all sites, {times}, for which adhesion.work holds'
         return [remark] if self.start_from == "bonded" and number > 1.01 else []
 
     def onset(self, speed: Array, body: Body) -> Onset:
@@ -567,7 +565,7 @@ class Tracked(_Separable):
     """
 
     sites: Annotated[
-        int, Quantity("1", "number of bond sites that are followed", at_least=1, at_most=10**6, whole=True)
+        int, Quantity("1", "number of bond sites in the simulation", at_least=1, at_most=10**6, whole=True)
     ] = Field(kw_only=True)
     start_from: Start = "steady"
     model: Literal["tracked"] = "tracked"
@@ -595,8 +593,8 @@ class Tracked(_Separable):
 
     def remarks(self, setting: Setting) -> list[str]:
         number, remarks = self.site_density * setting.cell**2, super().remarks(setting)
-        numbers = f"{self.sites} sites are followed, site_density times the area at rest is {number:.3g}"
-        remark = f"{numbers} ({number / self.sites:.3g} times as many): the first sets the noise, the second the force"
+        numbers = f"{self.sites} sites are simulated, site_density times the area at rest is {number:.3g}"
+        remark = f"{numbers} ({number / self.sites:.3g} times as many); the first sets the noise, the second the force"
         return [*remarks, remark] if abs(number / self.sites - 1.0) > 0.01 else remarks
 
     def bonding(self, state: Tracks) -> Bonding:
@@ -637,7 +635,7 @@ class Auto:
     rebinding_ratio: Ratio | None = None
     site_density: Density | None = None
     sites: Sites | None = None
-    tolerance: Annotated[float, Quantity("1", "noise of the bonds that may be left out", "", above=0, below=1)] = 0.01
+    tolerance: Annotated[float, Quantity("1", "tolerated noise of the bonds", "", above=0, below=1)] = 0.01
     start_from: Start = "steady"
     area: Area = "present"
     model: Literal["auto"] = "auto"
@@ -651,11 +649,11 @@ class Auto:
         missing = [name for name in (_WITH if with_ else _WITHOUT) if getattr(self, name) is None]
         if missing:
             are = "is" if len(missing) == 1 else "are"
-            raise PydanticCustomError("one_kind", f"{' and '.join(missing)} {are} missing, which bonds like these need")
+            raise PydanticCustomError("one_kind", f"{' and '.join(missing)} {are} missing, but required here")
         if not with_ and self.rebinding_rate == 0.0:
             raise PydanticCustomError("one_kind", "rebinding_rate must be above 0 1/s for bonds without a rupture")
         if with_ and self.stress:
-            raise PydanticCustomError("one_kind", "bonds with a rupture make their own stress; leave stress out")
+            raise PydanticCustomError("one_kind", "the stress of bonds with a rupture is computed; omit stress")
         return _one_way(self) if with_ else self
 
     def number(self, area: float) -> float:
@@ -698,9 +696,9 @@ class Auto:
         if self.area == "carried":
             size += "; a number of sites cannot be carried with the area"
         elif self.tolerance**2 * number < 1.0 and number > _MOST_TRACKED:
-            size += f"; more than {_MOST_TRACKED:,} bonds are not followed one by one"
+            size += f"; more than {_MOST_TRACKED:,} bonds are too many to be tracked"
         if model == "cohort":
-            return f"{size}; {'the forces of the bonds are read' if forces else 'the rupture depends on the stretch'}"
+            return f"{size}; {'the forces of the bonds are needed' if forces else 'the rupture depends on the stretch'}"
         return f"{size}; the rupture rate does not depend on the stretch"
 
 

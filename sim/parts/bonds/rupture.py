@@ -67,9 +67,9 @@ class _Law:
     """Attributes of all rupture laws.
 
     ``depends_on_stretch``: true if the rupture depends on the stretch, by a limit or below it. ``separable``: true if
-    ∫k dt of a bond is a factor of the bond times a clock common to all, as the first moment and tracked bonds need.
-    A subclass gives ``law``, its numbers for bonds of a stiffness [N/m], and ``closed_form``: share bound [1], mean
-    force [N] and mean square force [N²] per site in steady sliding at speeds [m/s].
+    ∫k dt of a bond is a factor of the bond times a common clock. The first moment and tracked bonds need this. A
+    subclass has ``law``, its numbers for bonds of a stiffness [N/m], and ``closed_form``. The latter returns share
+    bound [1], mean force [N] and mean square force [N²] per site in steady sliding at speeds [m/s].
     """
 
     depends_on_stretch: ClassVar[bool] = True
@@ -111,7 +111,7 @@ class Constant(_Law):
 ZeroForceRate = Annotated[
     float, Quantity("1/s", "rupture rate of an unstretched bond", "k_0", above=0, typical="1e4 1/s")
 ]
-HalfSpeed = Annotated[float, Quantity("m/s", "speed at which half of the bonds are left", "V_c", above=0)]
+HalfSpeed = Annotated[float, Quantity("m/s", "speed at which half of the bonds are intact", "V_c", above=0)]
 LargestStress = Annotated[float, Quantity("Pa", "largest shear stress in steady sliding", "tau", above=0)]
 
 
@@ -172,13 +172,13 @@ class Catch(_Law):
     separable: ClassVar[bool] = False
 
     catch_rate: Annotated[
-        float, Quantity("1/s", "rate of the pathway that force closes", "k_c", at_least=0, typical="1e5 1/s")
+        float, Quantity("1/s", "rate of the pathway that is slowed by force", "k_c", at_least=0, typical="1e5 1/s")
     ]
     catch_force: Annotated[
         float, Quantity("N", "force that divides the catch rate by e", "f_c", above=0, typical="4 pN")
     ]
     slip_rate: Annotated[
-        float, Quantity("1/s", "rate of the pathway that force opens", "k_s", above=0, typical="1e3 1/s")
+        float, Quantity("1/s", "rate of the pathway that is accelerated by force", "k_s", above=0, typical="1e3 1/s")
     ]
     slip_force: Annotated[
         float, Quantity("N", "force that multiplies the slip rate by e", "f_s", above=0, typical="8 pN")

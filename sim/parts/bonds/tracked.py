@@ -2,19 +2,19 @@
 
 Each site is free or bound. A bond is born unstretched, is stretched by the slider, and breaks when its integrated
 rupture reaches an exponential threshold. The site then waits an exponential time and binds again, at the position of
-the slider at that moment. None of this depends on the clock step: steps only cut the motion into pieces of constant
-speed, so the same motion in other steps gives the same lives but for rounding. The numbers of each life have an address
-of their own (seed, site, life, member). So members depend neither on the batch nor on restarts.
+the slider at that moment. None of this depends on the clock step, because steps only cut the motion into pieces of
+constant speed. The same motion in other steps gives the same lives except for rounding. The numbers of each life have
+an address of their own (seed, site, life, member). So members depend neither on the batch nor on restarts.
 
-A row is one member. All its sites follow one slider, so Bell's rupture separates: ∫k dt of bond i is
-e^(−s x_i) times a clock common to all, Φ(t) = ∫ rate e^(s x) dt, with s the softness, x the position of
-the slider and x_i that at the bond's birth. Positions are counted along the motion from where the frame was
-last set. A bond therefore breaks when Φ passes a number fixed at its birth, its ``due``. The cost of a step is its
-events: blocks of sites without an event in all the steps are passed over by their least due.
+A row is one member. All sites follow one slider, so Bell's rupture separates. ∫k dt of bond i is e^(−s x_i) times a
+common clock, Φ(t) = ∫ rate e^(s x) dt. Here s is the softness, x the slider position, and x_i the slider position at
+the formation of the bond. Positions are counted along the motion from where the frame was last set. A bond therefore
+breaks when Φ passes a number fixed at its birth, its ``due``. The cost of a step is its events: blocks of sites without
+an event in all the steps are passed over by their least due.
 
 If all stretches of a row have the sign of the motion, its bonds are stepped together. If the motion turns, or a step
-spans too many Bell forces for the common clock, each bond is stepped by itself until all stretches have the sign of the
-motion again. Its ``due`` is then the rest of its threshold.
+spans too many Bell forces for the common clock, each bond is stepped separately. This ends when all stretches have the
+sign of the motion again. Its ``due`` is then the rest of its threshold.
 
 One array holds two kinds of due: a bound site's, never negative, and minus the time at which a free
 site binds. Read as unsigned whole numbers, the bits of such floats have the first rupture as their
@@ -394,8 +394,8 @@ def live(tracks, slip, duration, law, seed, members, first, frames):
     """Advance all rows from step ``first`` on, in place; return the number of steps, ``SPENT`` or ``ENDLESS``.
 
     The new state has its own copy of the frame. ``frames``, of shape (rows, columns, steps), get the frame after each
-    step. A row with a step that is longer than some 300 lives of a site is left as it is before that step, with its
-    count of steps, and no row advances beyond it. Nothing is touched if the state is spent or a number endless.
+    step. A row stops before a step that is longer than about 300 lives of a site, and its count of steps is returned.
+    No row advances beyond this step. Nothing is touched if the state is spent or a number endless.
     """
     birth, due, life, soonest, stamp, frame = tracks
     rows, end = len(due), first
@@ -431,9 +431,9 @@ def live(tracks, slip, duration, law, seed, members, first, frames):
 def draw(tracks, chosen, speed, share, age, law, seed, members):
     """Draw chosen rows anew: a ``share`` of sites bound, their ages by the survival law of a bond of mean life ``age``.
 
-    The density of ages S(t)/⟨T⟩ is log-concave with its mode at 0: rejection under
-    min(1, e^(1 − t/⟨T⟩))/⟨T⟩ accepts every second proposal (Devroye, Non-Uniform Random Variate
-    Generation, 1986, VII.2). A bond of any age still has an exponential threshold ahead.
+    The density of ages S(t)/⟨T⟩ is log-concave with its mode at 0: rejection under min(1, e^(1 − t/⟨T⟩))/⟨T⟩ accepts
+    every second proposal (Devroye, Non-Uniform Random Variate Generation, 1986, VII.2). A bond of any age still has an
+    exponential threshold ahead.
     """
     (birth, due, life, soonest, stamp, frame), (rate, softness, limit, rebinding) = tracks, law
     for m in range(due.shape[0]):
@@ -514,7 +514,7 @@ def next_cut(tracks, direction, limit):
 
 
 #: Message about a state that is spent.
-AGAIN = "these tracks have been advanced already: go on from the newest state, or from copies"
+AGAIN = "these tracks have already been advanced: continue from the newest state, or from copies"
 
 
 class Tracks(NamedTuple):
@@ -718,7 +718,7 @@ def _draw(tracks, chosen, begin, speed, rupture, rebinding_rate, seed, members) 
     if begin == "steady":
         age = mean_life(speed, rupture)
         if np.any(np.isinf(age) & (speed != 0.0)):
-            raise ValueError("bonds that never break have no stationary stretch: start from bonded or empty")
+            raise ValueError("bonds that never break have no stationary stretch: start bonded or empty")
         with np.errstate(invalid="ignore", over="ignore"):
             share = np.where(np.isinf(age), 1.0, rebinding_rate * age / (rebinding_rate * age + 1.0))
     law, addresses = (*rupture[:3], rebinding_rate), np.asarray(members, dtype=np.uint64)

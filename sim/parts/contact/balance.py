@@ -308,11 +308,11 @@ def _widest(start, hertz, contact):
 def widest_crossings(contacts, bodies, share, radius):
     """Write the largest stable radius of contacts on discs to ``radius`` [m].
 
-    Rows of ``contacts``: radius without fluctuations [m], nan without a contact; Hertz's radius [m], nan under tension;
-    load [N] and displacement of the base [m], one of them 0; work of adhesion of the bonds left and energy of the
-    fluctuations [J/m²]; energy that the mean stress takes, over the radius [J/m³]. ``bodies``: curvature of the
-    sphere, contact modulus, stiffness, 0 at a load. ``share``: a ``Share``. The walk never goes below
-    1e-4 of its start.
+    Rows of ``contacts``: radius without fluctuations [m], nan without a contact, and Hertz radius [m], nan under
+    tension. Then load [N] and displacement of the base [m], one of them 0. Then work of adhesion of the intact bonds
+    and energy of the fluctuations [J/m²], and energy of the mean stress over the radius [J/m³]. ``bodies``: curvature
+    of the sphere, contact modulus, stiffness, 0 at a load. ``share``: a ``Share``. The walk never goes below 1e-4 of
+    its start.
     """
     for i in range(radius.size):
         terms = contacts[2, i], contacts[3, i], contacts[4, i], contacts[5, i], contacts[6, i]

@@ -1,10 +1,9 @@
 """Crack-front kinetics: motion of the edge of an adhesive contact over a block of clock steps.
 
-The edge of a contact of radius a moves at the speed at which its excess of energy release rate is
-dissipated, ``G - w = work (v/speed)^exponent sgn(v)``, v = -da/dt, opening where the energy release rate
-G exceeds the work of adhesion w and healing, with a speed and an exponent of its own, where it
-falls short (after Maugis & Barquins). Unlike the form with G/w this one stays finite and defined
-for w <= 0, where stress fluctuations outweigh adhesion. Limits: infinite speed is the JKR
+The edge of a contact of radius a moves at the speed v = -da/dt that dissipates the excess energy release rate. The law
+is ``G - w = work (v/speed)^exponent sgn(v)`` (after Maugis & Barquins). The edge opens if the energy release rate G
+exceeds the work of adhesion w. Otherwise it heals, with a separate speed and exponent. Unlike the form with G/w this
+one stays finite and defined for w <= 0, where stress fluctuations outweigh adhesion. Limits: infinite speed is the JKR
 equilibrium, zero speed a frozen edge.
 
 One formula serves every control. The sphere is pressed with ``P = load + stiffness (displacement - delta)``:
@@ -13,11 +12,11 @@ and ``mu = 1/(stiffness + 2 E* a)`` the indentation missing from Hertz's at this
 
     y = a^2/R - delta = lambda (a^2/R - displacement) + mu (4 E* a^3/(3R) - load),   G = E* y^2/(2 pi a).
 
-Integration. Radau IIA of three stages (order 5, L-stable; Hairer & Wanner, Solving ODEs II, IV.8)
-takes steps of its own choice inside the clock step. Where the edge runs open, the radius falls to
-zero in finite time with an infinite slope; there the same method advances the time over -ln a,
-which is smooth to the end. Within a clock step the work of adhesion changes linearly and the control piece by piece. A
-piece is cut where the work or the force on the bare contact changes sign.
+Integration. Radau IIA of three stages (order 5, L-stable; Hairer & Wanner, Solving ODEs II, IV.8) takes steps of its
+own choice inside the clock step. If the edge opens completely, the radius drops to zero in finite time with an infinite
+slope. The same method then advances the time over -ln a, which is smooth to the end. Within a clock step the work of
+adhesion changes linearly and the control piece by piece. A piece is cut where the work or the force on the bare contact
+changes sign.
 
 The contact never falls below Hertz's (y = 0): pressing alone makes that area, and linear
 elasticity has no smaller one. An edge that opens with w <= 0 stops there, and one that heals more
@@ -219,10 +218,9 @@ def _stages(running, x, y, h, z1, z2, z3, start, scene, front):
 def _radau(running, x, y, h, size, first, start, scene, front):
     """Return change of y, error over tolerance (nan: no solution) and energy/(2 pi work) of a step of Radau IIA.
 
-    Newton's steps are halved while they do not lower the residual. The error is that of the embedded
-    method, filtered by the slope at the end: a fast layer narrower than the tolerance is stepped
-    over, but not a turn from a fast edge to a slow one. The energy is the quadrature of the method,
-    of positive weights and signs.
+    Newton's steps are halved while they do not lower the residual. The error is that of the embedded method, filtered
+    by the slope at the end. The method steps over a fast layer narrower than the tolerance, but not over a turn from a
+    fast edge to a slow one. The energy is the quadrature of the method, of positive weights and signs.
     """
     f, j, f_x = first
     g1, g2, g3 = _C1 * h, _C2 * h, h
@@ -264,8 +262,8 @@ def _radau(running, x, y, h, size, first, start, scene, front):
 def _ride(t, a, end, least, scene, front):
     """Follow Hertz's contact from t to ``end`` at most, or until the edge leaves it; return time, radius and energy.
 
-    The energy is that of new area against G = 0, int w a da, exact by Gauss's three points because
-    work and force are linear in time. None is counted for w <= 0, because pressing pays for the area.
+    The energy is that of new area against G = 0, int w a da. Gauss's three points are exact because work and force are
+    linear in time. None is counted for w <= 0, because pressing pays for the area.
     """
     riding, b = pushed(end, scene, front)
     if not riding:

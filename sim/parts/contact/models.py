@@ -1,8 +1,8 @@
 """Bodies in contact, and models of the contact, whose radius follows from the work of adhesion left.
 
 The bodies are the solid, the sphere pressed on it, and their adhesion. The models are equilibrium and rate-dependent.
-Each is under a load, an indentation, or a displacement of the base behind a stiffness, each a number, a course
-or a table; ``sim.parts.contact.balance`` has the contact under each.
+Each is under a load, an indentation, or a displacement of the base behind a stiffness, each a number, a course or a
+table. ``sim.parts.contact.balance`` has the contact under each.
 """
 
 import math
@@ -159,10 +159,10 @@ _KINDS = ("load", "indentation", "displacement")
 
 _Load = over_time(Quantity("N", "normal load, compression positive", "P"), "load")
 _Indentation = over_time(Quantity("m", "indentation of the sphere", "delta"), "indentation")
-_Displacement = over_time(Quantity("m", "displacement of the base that holds the sphere", "Delta"), "displacement")
-_Healing = Annotated[float, Quantity("m/s", "speed of a healing edge, left out that of opening", "v_h", above=0)]
+_Displacement = over_time(Quantity("m", "displacement of the mount", "Delta"), "displacement")
+_Healing = Annotated[float, Quantity("m/s", "speed of a healing edge; if omitted, that of opening", "v_h", above=0)]
 _HealingExponent = Annotated[
-    float, Quantity("1", "exponent of healing, left out that of opening", "n_h", above=0, at_most=1)
+    float, Quantity("1", "exponent of healing; if omitted, that of opening", "n_h", above=0, at_most=1)
 ]
 _Policy = Annotated[Literal["stay_open", "reattach", "stop"], Field(description="what follows a pull-off")]
 
@@ -182,9 +182,9 @@ class _Controlled:
     load: _Load | None = None  # type: ignore[valid-type]
     indentation: _Indentation | None = None  # type: ignore[valid-type]
     displacement: _Displacement | None = None  # type: ignore[valid-type]
-    stiffness: Annotated[float, Quantity("N/m", "stiffness between base and sphere", "k", above=0)] | None = None
+    stiffness: Annotated[float, Quantity("N/m", "stiffness between mount and sphere", "k", above=0)] | None = None
     reversible: Annotated[
-        float, Quantity("1", "share of the mean stress's energy that adhesion pays", "alpha", at_least=0, at_most=1)
+        float, Quantity("1", "share of the mean-stress energy paid by adhesion", "alpha", at_least=0, at_most=1)
     ] = 0.0
     after_pull_off: _Policy = "stay_open"
 
@@ -193,15 +193,15 @@ class _Controlled:
         kinds = [name for name in _KINDS if getattr(self, name) is not None]
         message = ""
         if not kinds:
-            message = 'nothing holds the sphere; give a load such as "4 mN", an indentation such as "2 um", '
+            message = 'the sphere has no mount; give a load such as "4 mN", an indentation such as "2 um", '
             message += "or a displacement with a stiffness"
         elif len(kinds) > 1:
             names = " and ".join(f"an {name}" if name == "indentation" else f"a {name}" for name in kinds)
-            message = f"{names} cannot both hold the sphere; leave one of them out"
+            message = f"{names} exclude each other; omit one of them"
         elif self.displacement is not None and self.stiffness is None:
-            message = 'a displacement needs the stiffness between base and sphere, such as "1 kN/m"'
+            message = 'a displacement needs the stiffness between mount and sphere, such as "1 kN/m"'
         elif self.displacement is None and self.stiffness is not None:
-            message = "a stiffness belongs to a displacement; give contact.displacement, or leave it out"
+            message = "a stiffness needs a displacement; give contact.displacement, or omit the stiffness"
         if message:
             raise PydanticCustomError("control", message)
         return self
@@ -210,7 +210,7 @@ class _Controlled:
         remarks = []
         if setting.rest_radius > _LARGEST_SHARE * setting.sphere_radius:
             limit = f"{_LARGEST_SHARE} of the sphere's radius"
-            remarks.append(f"the contact exceeds {limit}: the theory is for small contacts")
+            remarks.append(f"the contact exceeds {limit}: the theory is valid for small contacts")
         if math.isnan(setting.rest_radius):
             never = "is open for the whole run: raise contact.{} to zero, where the sphere touches"
             jumps = "begins open and jumps in where contact.{} first reaches zero"

@@ -1,10 +1,11 @@
 """Slider and bonds whose stretches are resolved through one sub-step, over exact maps of the bonds.
 
-In a sub-step h the slider goes straight to a node at γ h and straight on to one at h, γ = 2 − √2 (TR-BDF2): speeds and
-accelerations at the nodes follow from the positions by the trapezoidal rule and by the second backward difference,
-and one scalar equation a node, the balance of forces, gives the slip. So the scheme is L-stable and the same for mass,
-damping, viscosity and 1/k_t of zero and of any size. What bonds survive on a straight path is exact; that the true path
-bends is taken into their mean stretch on it, with the curvature of the sub-step before, whose change is the error.
+In a sub-step h the slider goes straight to a node at γ h and then to a node at h, γ = 2 − √2 (TR-BDF2). Speeds and
+accelerations at the nodes follow from the positions by the trapezoidal rule and the second backward difference. At each
+node the balance of forces, a scalar equation, gives the slip. So the scheme is L-stable and the same for mass, damping,
+viscosity and 1/k_t of zero and of any size. The survival of bonds on a straight path is exact. The curvature of the
+true path is included in their mean stretch, with the curvature of the previous sub-step. The change of the curvature is
+the error.
 """
 
 import math

@@ -90,8 +90,8 @@ _SolvedBonds = _WITH_STRETCH | models.Unbroken | models.Steady | models.Rate | m
 def _units(drive: Force | Spring, bonds: _SolvedBonds, contact: StepContact, step: float) -> tuple[float, float]:
     """Return the units in which a step is computed: a stretch b [m], and a force over the area at rest [N].
 
-    The force is that of all sites at the stretch b, n κ b A0. In models without stretch it is their strength, τ A0, and
-    b is the displacement on which that loads the spring or on which sliding renews the bonds.
+    The force is that of all sites at the stretch b, n κ b A0. In models without stretch it is their strength, τ A0.
+    Then b is the displacement at which the strength loads the spring, or at which sliding renews the bonds.
     """
     most = max(map(abs, drive.course.extremes))
     if not isinstance(bonds, _WITH_STRETCH):
@@ -212,9 +212,8 @@ def _advanced(
 ) -> tuple[tuple[object, ...], Bonding]:  # fmt: skip
     """Return the bonds after some clock steps and their readings at each.
 
-    ``radius`` of the contact at the start [m]; ``outputs`` are filled with the rows and energies at the end of each
-    step, of which ``reached`` has the columns by name. Bonds without a stretch have the sense of the sliding in its
-    place.
+    ``radius`` of the contact at the start [m]; ``outputs`` receive the rows and energies at the end of each step.
+    ``reached`` has their columns by name. Bonds without a stretch have the sense of the sliding in its place.
     """
     shape, rows = outputs[0].shape[1:], inputs.rows.view(ROW)[:, 0]
     if isinstance(bonds, models.Cohort):

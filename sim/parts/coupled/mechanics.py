@@ -123,8 +123,9 @@ def _missing(a, load, base, contact):
 def contact_area(bound, moment, time, radius, contact):
     """Return the contact radius in equilibrium with these bonds, area over the reference's, its slopes over N and M.
 
-    Newton's method on the energy release rate, convex in the radius, from the last one: from the right of the root
-    it goes left. nan where there is none; Hertz's radius where adhesion does not pay for the mean stress there.
+    Newton's method on the energy release rate, which is convex in the radius, starts from the last radius and
+    approaches the root from the right. The result is nan if there is no root, and the Hertz radius if adhesion is too
+    weak for the mean stress there.
     """
     if contact.stays > 0.0:
         return radius, math.pi * radius * radius / contact.area, 0.0, 0.0

@@ -9,8 +9,8 @@ as it is, body X (mass m, damping c) and interface X_s = X − u obey
 where bonds without a stretch have M = ±N instead, with the sense of the sliding, and N = 1/(1 + |Ẋ_s|/V_c) if they
 follow the speed at once. The area A is that of the equilibrium contact with the work of adhesion that these bonds
 leave. Slip, u, N and M at the three nodes are the unknowns, error by Newton's method; speeds and accelerations follow
-from the positions by the method itself. So the equations are solved as they stand, whether mass, damping, viscosity
-and 1/k_t are zero (then they are of index 2) or not, and a stiff spring costs no steps.
+from the positions by the method itself. So the equations are solved directly, even if mass, damping, viscosity and
+1/k_t are zero (then they are of index 2). A stiff spring costs no additional steps.
 """
 
 import math
@@ -107,8 +107,8 @@ def sum_over(weights, i, values):
 def equations(row, nodes, start, step, slider, law, contact):
     """Compute the residuals at the three nodes for slip, u, N, M there, and their slopes at the middle one.
 
-    The slopes are those of the balance of forces over N, M and the speed, of u over the same, of Ṅ and of Ṁ; nan where
-    there is no equilibrium.
+    The slopes are those of the balance of forces over N, M and the speed, of u over the same, of Ṅ and of Ṁ. They are
+    nan if there is no equilibrium.
     """
     stiffness, mass, damping, viscosity = slider.stiffness, slider.mass, slider.damping, slider.viscosity
     over, gives = 1.0 / step, slider.yielding + slider.yielding_radius > 0.0

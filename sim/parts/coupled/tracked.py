@@ -1,9 +1,9 @@
 """Rows of sliders and bonds followed one by one through a clock step, from one rupture or binding to the next.
 
-Between two events the number of bonds stays and their force is linear in the slip, so that a sub-step of the scheme in
-``cohorts`` is tried on sums alone. The bonds, whose arrays are spent, are displaced once it is accepted. A sub-step
-ends at the next event. If nothing delays the slip, forces are balanced at once after an event: the slider slips as far
-as the bonds that are left allow, and bond after bond if slip itself breaks them.
+Between two events the number of bonds is constant and their force is linear in the slip. A sub-step of the scheme in
+``cohorts`` therefore needs only sums. The bonds, whose arrays are spent, are displaced once it is accepted. A sub-step
+ends at the next event. If nothing delays the slip, forces are balanced at once after an event. The slider slips as far
+as the remaining bonds allow, and the slip may break further bonds one after the other.
 """
 
 import math

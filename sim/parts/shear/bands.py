@@ -4,12 +4,11 @@ Mean energies of the mode pairs of a cell are listed near q = 0, and counted by 
 are 3 × 3 to 27 × 27 to a block of pixels. The sum and the sum of squares of the energies are kept for each block. So
 mean and variance of the cell's energy are right without a list of 10^8 pairs.
 
-ΔΓ is a sum over mode pairs of w ξ with ξ ~ Exp(1), of autocorrelation e^(−2λt). A *band* replaces
-pairs of similar w and λ by one squared Ornstein-Uhlenbeck process of weight S2/S1 and 2 S1²/S2
-degrees of freedom, rate Σw²λ/S2, where Sn = Σw^n: mean and variance of ΔΓ stay exact. The third and fourth cumulants
-come out low (Cauchy) and the correlation time short (Jensen): all errors have one sign and each is a
-sum over bands. So the band whose splitting gains most is split until every error is within the
-tolerance.
+ΔΓ is a sum over mode pairs of w ξ with ξ ~ Exp(1), of autocorrelation e^(−2λt). A *band* replaces pairs of similar w
+and λ by one squared Ornstein-Uhlenbeck process of weight S2/S1 and 2 S1²/S2 degrees of freedom, rate Σw²λ/S2, where Sn
+= Σw^n. Mean and variance of ΔΓ are exact. The third and fourth cumulants come out low (Cauchy) and the correlation time
+short (Jensen): all errors have one sign and each is a sum over bands. So the band whose splitting gains most is split
+until every error is within the tolerance.
 """
 
 import functools

@@ -1,8 +1,8 @@
 """A measured map of the stress as the field itself, carried with the slider, on the plane or under a disc.
 
-On the plane the map is periodic and its energy does not change. Under a disc only the stress in the contact counts:
-the pattern passes under the sphere, and a unit of new contact at the edge pays dE/dA of this very pattern, of either
-sign, which several radii may balance.
+On the plane the map is periodic and its energy does not change. On a disc only the stress in the contact counts, and
+the pattern passes under the sphere. A unit of new contact at the edge costs dE/dA of this pattern, of either sign.
+Several radii may then be in balance.
 """
 
 import math
@@ -44,7 +44,7 @@ class CarriedProcess(SmoothProcess):
         """Return stress maps τ1(x, y) of the first ``members``, shape (members, nx, ny) [Pa].
 
         At ``position`` X [m] the pattern has moved by X. Under a disc the contact is in the middle of the pattern,
-        and there is no stress beyond the pattern; else it is periodic.
+        without stress beyond the pattern. Otherwise the pattern is periodic.
         """
         lattice, ahead = self.field.lattice, self.field.middle - self.field.begin if self.on_disc else 0.0
         places = lattice.sides[0] / lattice.shape[0] * np.arange(lattice.shape[0])
@@ -72,9 +72,9 @@ class CarriedProcess(SmoothProcess):
 class Passing:
     """Share of a map's energy that a contact of finite radius pays when it grows, as the pattern passes under it.
 
-    Energies are found where the middle of the disc is at a whole number of pixels, at radii up to ``widest`` [m], with
-    cubics between; the share of new contact is the derivative of the energy's own cubics, so that its integral over
-    the area is the energy. ``position`` of the slider [m] has the shape (1,) or (steps, 1).
+    Energies are computed at whole pixels of the disc position and at radii up to ``widest`` [m], with cubics between
+    them. The share of new contact is the derivative of these cubics, so its integral over the area is the energy.
+    ``position`` of the slider [m] has the shape (1,) or (steps, 1).
     """
 
     field: StressMap

@@ -300,10 +300,10 @@ class Mapped(Modal):
 class Banded(_Fluctuating):
     """ΔΓ(t) of a periodic cell with its modes grouped into bands, every error known before the run. Limit: modal.
 
-    ``tolerance`` bounds what banding adds to the cell's own sum over modes: relative errors of the
-    third and fourth cumulant and of the integral correlation time, and the largest difference of the
-    autocorrelation; under amplitude that relaxes also the error of the mean while it does. Mean and
-    variance of the stationary field are exact.
+    ``tolerance`` bounds the errors of banding relative to the sum over the modes of the cell. These are relative errors
+    of the third and fourth cumulant and of the integral correlation time, and the largest difference of the
+    autocorrelation. With a relaxing amplitude, the error of the mean is included. Mean and variance of the stationary
+    field are exact.
     """
 
     pair_seconds: ClassVar[float] = 80e-9

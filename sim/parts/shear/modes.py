@@ -147,7 +147,7 @@ def modes(spectrum: Family, cell: float, points: int | None = None) -> Modes:
     reach, points = grid_reach(spectrum, cell, points)
     ix, iy, share = half_lattice(spectrum, cell, reach)
     if not len(ix):
-        message = f"no wave of the spectrum fits the cell of {cell:g} m; make the cell longer"
+        message = f"no wave of the spectrum fits in the cell of {cell:g} m; make the cell longer"
         raise PydanticCustomError("no_modes", message)
     order = np.lexsort((iy, ix, ix**2 + iy**2))
     ix, iy, share = ix[order], iy[order], share[order]
@@ -181,7 +181,7 @@ def _reach(needed: int | None, points: int | None) -> tuple[int, int]:
     reach = (points - 1) // 2
     if needed is not None and needed > reach:
         message = f"the shortest wavelength needs at least {2 * needed + 1} points, not {points}"
-        cure = "give more points or leave them out, a longer shortest wavelength or a smaller cell"
+        cure = "give more points or omit points, a longer shortest wavelength or a smaller cell"
         raise PydanticCustomError("grid_too_coarse", f"{message}; {cure}")
     return (reach if needed is None else needed), points
 

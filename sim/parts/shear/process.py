@@ -1,7 +1,7 @@
 """Processes of the shear-stress fluctuations: laws of their amplitude and correlation, and the energy in time.
 
 A process is a model of ``parts.shear`` on a given solid and cell. Each correlation law gives the integral of the rate λ
-of a mode over a step, in time, in slip or in both: amplitudes keep the share exp(−∫λdt) of themselves, their energy
+of a mode over a step, in time, in slip or in both. Amplitudes decay by the factor exp(−∫λdt), their energy by
 exp(−2∫λdt).
 """
 
@@ -19,9 +19,9 @@ from sim.parts.exchange import Array, Bonding, FieldLaw, Gammas, Memory, Motion
 from sim.units.quantity import Quantity, keyed
 
 _Memory = Annotated[
-    float, Quantity("m", "slip that the fluctuations remember, by default the correlation length", "l_m", above=0)
+    float, Quantity("m", "memory length of the fluctuations, by default the correlation length", "l_m", above=0)
 ]
-Relaxing = Annotated[bool, Field(description="true: only what the correlation renews has the new size")]
+Relaxing = Annotated[bool, Field(description="true: the amplitude changes only as the correlation renews the field")]
 #: Memory of a law that depends on the moment alone.
 NO_PAST = Memory()
 
@@ -100,9 +100,7 @@ class Stress(_OfTheMoment):
 
     reads_stress: ClassVar[bool] = True
 
-    reference: Annotated[
-        float, Quantity("Pa", "mean shear stress at which the rms is the spectrum's", "tau_ref", above=0)
-    ]
+    reference: Annotated[float, Quantity("Pa", "mean shear stress at the rms of the spectrum", "tau_ref", above=0)]
     relaxing: Relaxing = False
     model: Literal["stress"] = "stress"
 
@@ -233,7 +231,7 @@ class Wave:
     #: The rate goes with |q| to this power.
     power: ClassVar[int] = 1
 
-    waves: Annotated[float, Quantity("1", "own wavelengths after which a mode renews", "n", above=0)]
+    waves: Annotated[float, Quantity("1", "number of wavelengths after which a mode is renewed", "n", above=0)]
     model: Literal["wave"] = "wave"
 
     def exponents(self, wavenumber: Array, motion: Motion) -> Array:

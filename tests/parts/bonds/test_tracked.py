@@ -182,7 +182,7 @@ def test_a_state_that_has_been_advanced_is_spent_but_keeps_its_moments():
     go(before, 0.5, 0.5, BELL)
     for moment in (bound, mean_stretch, mean_square_stretch):
         assert np.array_equal(moment(before), moment(untouched))
-    with pytest.raises(RuntimeError, match="advanced already"):
+    with pytest.raises(RuntimeError, match="already been advanced"):
         go(before, 0.5, 0.5, BELL)
 
 
