@@ -147,7 +147,7 @@ def test_a_dataset_of_an_older_version_says_what_it_lacks_and_none_makes_a_figur
     for model in ("tabulated", "measured"):
         scenario = {"shear": {"spectrum": {"model": model, "file": "secret.csv"}, "amplitude": {}}}
         dataset = xr.Dataset(attrs={"scenario_resolved": json.dumps(scenario)})
-        with pytest.raises(ValueError, match="names a file"):
+        with pytest.raises(ValueError, match="rows of the spectrum file"):
             field._target(dataset, dataset, xr.DataArray())
 
 
