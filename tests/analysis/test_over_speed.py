@@ -80,9 +80,8 @@ def test_interpolated_speeds_hold_the_truth_however_many_speeds_there_are(count,
 def test_shares_of_a_loss_add_up_in_both_orders_and_are_those_of_the_laws_there():
     field = shear.Mean(spectrum=Band(rms=1e5, longest=60e-6, shortest=24e-6))
     parts = {"bonds": bonds.Steady(critical_speed=1e-2), "shear": field, "clock": Clock(duration=0.02, step=0.01)}
-    dataset = run(
-        scene(drive=drive.Steady(speed=1e-2), sweep={"drive.speed": list(np.geomspace(1e-5, 1.0, 41))}, **parts)
-    )
+    sweep = {"drive.speed": list(np.geomspace(1e-5, 1.0, 41))}
+    dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep=sweep, **parts))
     energy = float(dataset["fluctuation_energy"][0, 0])
     result = analysis.loss_speeds(dataset, ["20 %", 0.9, 1e-3])
     works = np.linspace(0.0, WORK, 200_001)
@@ -121,10 +120,8 @@ def test_area_that_a_contact_loses_as_it_comes_off_is_no_loss_to_a_speed():
 def test_branches_of_a_course_lag_both_ways_and_the_steady_speed_is_that_of_the_law(duration):
     """Bonds with a rate of 5 1/s are late; the bonds left tell the speed at which they would be steady."""
     course = drive.Table(time=(0.0, duration / 2.0, duration), speed=(1e-5, 2e-2, 1e-5))
-    late = bonds.Rate(critical_speed=5e-3, rebinding_rate=5.0)
-    result = analysis.loss_speeds(
-        run(scene(drive=course, bonds=late, shear=shear.Uniform(), clock=Clock(duration, duration / 2000)))
-    )
+    late, clock = bonds.Rate(critical_speed=5e-3, rebinding_rate=5.0), Clock(duration, duration / 2000)
+    result = analysis.loss_speeds(run(scene(drive=course, bonds=late, shear=shear.Uniform(), clock=clock)))
     assert result["branch"].values.tolist() == ["increasing speed", "decreasing speed"]
     hertz = jkr_area(0.0) / jkr_area(WORK)
     steady = 0.5 * speed_of_loss(0.5 * (1.0 - hertz))
@@ -179,11 +176,8 @@ def test_crossings_are_exact_on_straight_lines_and_a_ramp_is_read_in_pieces(monk
     ramp, read = lens.ramp().isel(member=[0]), []
     whole = analysis.loss_speeds(ramp)
     monkeypatch.setattr(dataset_module, "ROOM", 500)
-    monkeypatch.setattr(
-        over_speed,
-        "chosen_observables",
-        lambda some, names: read.append(some.sizes["t"]) or chosen_observables(some, names),
-    )
+    reading = lambda some, names: read.append(some.sizes["t"]) or chosen_observables(some, names)  # noqa: E731
+    monkeypatch.setattr(over_speed, "chosen_observables", reading)
     xr.testing.assert_identical(analysis.loss_speeds(ramp), whole)
     assert len(read) > 1 and sum(read) == ramp.sizes["t"] and math.isfinite(whole[NAMES[0]])
 

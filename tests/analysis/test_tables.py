@@ -119,10 +119,8 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
 
 
 def test_a_wide_csv_has_a_row_for_each_point_or_record_in_the_units_that_are_chosen(tmp_path):
-    path, names = (
-        tmp_path / "out.csv",
-        {"contact_area": ("mm^2", 1e6), "friction_force": ("mN", 1e3), "indentation": ("m", 1)},
-    )
+    path = tmp_path / "out.csv"
+    names = {"contact_area": ("mm^2", 1e6), "friction_force": ("mN", 1e3), "indentation": ("m", 1)}
     sweep = {"drive.speed": [1e-3, 1e-2]}
     dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep=sweep, ensemble=Ensemble(members=2)))
     for every in (False, True):

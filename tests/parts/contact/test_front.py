@@ -18,7 +18,6 @@ from scipy.integrate import quad, solve_ivp
 
 from sim.laws import jkr
 from sim.numerics.jit import kernel
-from sim.parts.contact import front
 from sim.parts.contact.front import Kinetics, moved_edge
 
 W = 1.0 / math.pi
@@ -158,24 +157,6 @@ def test_pull_off_force_grows_with_the_speed_of_a_hard_machine():
         # the lowest of samples is at most 1/8 of their second difference above the least value
         low = int(np.argmin(loads))
         assert lowest - 1e-6 < loads[low] < lowest + np.diff(loads[low - 1 : low + 2], 2)[0] / 8.0 + 1e-6
-
-
-def test_one_inner_step_is_of_order_five_per_unit_time():
-    scene = front.Scene(0.75, 1.0, 0.0, -1.0, -0.5, 0.0, 0.0, W, 0.1, W)
-    law = front.Front(1.0, 1.0 / 0.6, 1.0, 1.0 / 0.6)
-
-    def end(count):
-        t, a, h = 0.0, REST, 1.0 / count
-        for i in range(count):
-            t = i * h
-            rate, slope, drift, _ = front._slope(False, t, a, a, scene, law)
-            a += front._radau(False, t, a, h, a, (rate, slope, drift), a, scene, law)[0]
-        return a
-
-    exact = end(32)
-    errors = [abs(end(count) - exact) for count in (2, 4, 8)]
-    orders = [math.log2(coarse / fine) for coarse, fine in itertools.pairwise(errors)]
-    assert min(orders) > 4.5, orders
 
 
 def test_energy_is_balanced_at_a_fixed_control_and_along_ramps_of_displacement_and_work():

@@ -9,7 +9,6 @@ from numpy.testing import assert_allclose
 
 from sim.laws.schallamach import Body, first_moment_onset, first_moment_stress
 from sim.parts.bonds import Cohort, FirstMoment, Tracked
-from sim.parts.coupled import radau
 from sim.parts.drive import READINGS, Table
 
 #: Bonds whose stretch, life at rest and stiffness are units and which are remade as fast, at a site of unit area.
@@ -43,7 +42,7 @@ def test_the_energies_stay_balanced_over_many_steps(make, keys, steps, tolerance
     assert np.all(np.abs(read["energy_residual"]) <= 10.0 * tolerance * read["drive_work"][-1])
 
 
-def test_radau_splits_its_rates_is_exact_for_polynomials_and_follows_smooth_motion_to_order_five():
+def test_a_slider_follows_smooth_motion_to_order_five():
     for keys in [{}, {"damping": 0.05}, {"mass": 0.05, "damping": 0.05}]:
 
         def position(steps, tolerance):
@@ -58,14 +57,6 @@ def test_radau_splits_its_rates_is_exact_for_polynomials_and_follows_smooth_moti
             assert substeps < steps + 8  # the first clock step finds its length, all others are one sub-step each
             off.append(abs(last - exact))
         assert np.log(off[0] / off[1]) / np.log(8.0) > 4.5
-    turning = np.array([[radau.TURNING.real, -radau.TURNING.imag], [radau.TURNING.imag, radau.TURNING.real]])
-    modes = np.block([[np.full((1, 1), radau.PACE), np.zeros((1, 2))], [np.zeros((2, 1)), turning]])
-    assert_allclose(radau.FORTH @ radau.BACK, np.eye(3), atol=1e-14)
-    assert_allclose(radau.FORTH @ modes @ radau.BACK, radau.RATES, rtol=0, atol=1e-13)
-    places, powers = np.append(radau.NODES, 0.0), np.arange(4)[:, np.newaxis]
-    assert_allclose(places**powers @ radau.VALUES, radau.BETWEEN ** np.arange(4.0), rtol=1e-13)
-    slopes = np.arange(4.0) * radau.BETWEEN ** np.array([0.0, 0.0, 1.0, 2.0])
-    assert_allclose(places**powers @ radau.SLOPES, slopes, rtol=0, atol=1e-14)
 
 
 def jump(before, after, step, duration):

@@ -225,8 +225,6 @@ def test_a_contact_at_rest_keeps_its_energy_and_bad_input_is_refused_at_its_key(
     assert np.all(energies == energies[0])
     part = shear.Banded(spectrum=Ripple(amplitude=0.0, wavelength=24e-6), cell=CELL, correlation=Slip(length=1e-6))
     assert np.all(march_energies(part, drive.Steady(speed=1e-3))[1] == 0.0)
-    for keys, key in (
-        ({"mode_amplitudes": "fixed", "amplitude": Stress(reference=1.0, relaxing=True)}, "mode_amplitudes"),
-    ):
-        with pytest.raises(ValueError, match=key):
-            shear.Banded(spectrum=SPECTRUM, correlation=Slip(length=1e-6), cell=CELL, **keys)
+    keys = {"mode_amplitudes": "fixed", "amplitude": Stress(reference=1.0, relaxing=True)}
+    with pytest.raises(ValueError, match="mode_amplitudes"):
+        shear.Banded(spectrum=SPECTRUM, correlation=Slip(length=1e-6), cell=CELL, **keys)
