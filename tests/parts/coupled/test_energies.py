@@ -15,9 +15,7 @@ from sim.parts.bonds import Cohort, FirstMoment, Tracked
 from sim.parts.bonds.rupture import Bell, Constant
 from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.contact.models import Adhesion, Solid, Sphere
-from sim.parts.coupled import mechanics
 from sim.parts.drive import READINGS, Spring
-from sim.parts.exchange import FieldLaw
 from sim.parts.shear import Banded, Mean
 from sim.parts.shear.process import Slip, SlipRate
 from sim.scenario.clock import Clock
@@ -33,19 +31,6 @@ def masked(scene, share):
     """Return the scene with a stress that takes a share of the work of adhesion, by ΔΓ = 3√π/16 σ²ξ/G."""
     squared = share * WORK * 16.0 / (3.0 * math.sqrt(math.pi)) * MODULUS / 4.0 / 1e-5
     return replace(scene, shear=Mean(spectrum=Gaussian(rms=math.sqrt(squared), length=1e-5)))
-
-
-def test_the_area_in_the_sub_steps_is_that_of_jkr_also_from_the_radius_of_hertz_on():
-    # there the energy release rate has no slope
-    work, load = np.meshgrid(WORK * np.logspace(-24.0, 0.0, 49), LOAD * np.array([0.01, 1.0, 30.0]))
-    exact, hertz = (jkr.radius_at_load(load, share * work, R, MODULUS) for share in (1.0, 0.0))
-    for shift in (-1e-12, -1e-16, 0.0, 1e-16, 1e-12):
-        solid = 1.0 / R, MODULUS, 1.0, 0.0, 0.0, FieldLaw()
-        radii = [
-            mechanics.contact_area(0.0, 0.0, 0.0, a, mechanics.Contact(w, p, *[0.0] * 7, *solid))[0]
-            for w, p, a in zip(work.flat, load.flat, (hertz * (1.0 + shift)).flat, strict=True)
-        ]
-        assert_allclose(radii, exact.ravel(), rtol=1e-12)
 
 
 @pytest.mark.parametrize("load", [0.2, 1.0])
