@@ -112,7 +112,7 @@ def run(
 
 
 def check(scenario: "Scenario | Path | dict[str, Any]") -> "Text":
-    """Describe a run: models, quantities in SI, error estimates, and the time, memory and file that it takes."""
+    """Describe a run: models, quantities in SI, error estimates, and its time, memory and file size."""
     from sim.ensemble.preview import preview
 
     return Text(preview(_scene(scenario)))
@@ -132,7 +132,7 @@ def open(path: Path) -> "xarray.Dataset":
 
 
 def stats(dataset: "xarray.Dataset | Path", where: dict[str, Any] | None = None) -> "pandas.DataFrame":
-    """Ensemble statistics of a run in SI units, one row for each sweep value and time; ``attrs`` holds the units.
+    """Return ensemble statistics of a run in SI units, a row for each sweep value and time; units are in ``attrs``.
 
     ``where`` gives values of swept keys, ``{"contact.load": "4 mN"}``.
     """
@@ -150,7 +150,7 @@ def plot(
     ax: "Axes | None" = None,
     **choices: Any,
 ) -> "Figure | Axes":
-    """Draw a figure of a run, of the kind that fits or one of ``sim.plots.KINDS``, and save it if ``to`` is a file.
+    """Draw a figure of a run, by default of the kind that fits best. Save it if ``to`` is a file.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def plot(
 
 
 def converge(scenario: "Scenario | Path | dict[str, Any]", budget: float | str = "60 s") -> "xarray.Dataset":
-    """Speed against error of the models and settings that a scenario admits, in about ``budget`` [s] of computing."""
+    """Compare speed and error of the models and settings of a scenario, in about ``budget`` [s] of computing time."""
     from sim.study.converge import converge as study
     from sim.units.quantity import read_option
 
@@ -198,7 +198,7 @@ def fit(
     common: dict[str, float] | None = None,
     steady: bool = False,
 ) -> "Fit":
-    """Numbers of a scenario calibrated to measured curves.
+    """Calibrate keys of a scenario to measured curves.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def fit(
 
 
 class Text(str):
-    """A text that a prompt shows as it reads."""
+    """A text that a prompt shows without quotes."""
 
     __slots__ = ()
 

@@ -12,7 +12,7 @@ from sim.analysis.statistics import LEVEL, WIDE
 
 
 class Lifetime(NamedTuple):
-    """Median and rate of an event, with the ends of their 95 % intervals; nan what the runs are too short to tell.
+    """Median and rate of an event, with the ends of their 95 % intervals; nan if the runs are too short.
 
     ``half`` [s] is the time at which the event has occurred in half of the members. ``rate`` [1/s] is the number of
     events per exposure time.

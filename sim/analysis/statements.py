@@ -178,7 +178,7 @@ def reasons(group: xr.Dataset) -> dict[str, list[str]]:
 
 
 def relaxation(dataset: xr.Dataset, name: str, start: float = 0.0) -> Statement:
-    """Return the time in which a quantity relaxes by a factor of e, as after a start, a step of the speed or a load.
+    """Return the time in which a quantity relaxes by a factor of e, such as after a step of the speed.
 
     Parameters
     ----------

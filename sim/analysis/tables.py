@@ -203,8 +203,8 @@ def table(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None)
 def notes(
     dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, str]], stated: xr.Dataset | None = None
 ) -> list[str]:
-    """Return notes on the rows of ``table`` and ``highlights``: sample of the means, number of rows, symbols, and
-    reasons for missing statements.
+    """Return notes on the rows of ``table`` and ``highlights``: sample of the means, number of rows,
+    symbols, and reasons for missing statements.
     """
     one_row_each, points = _has_one_row_each(dataset), dataset["contact_modulus"].size
     phrases = [words] if (words := averaging(dataset, one_row_each)) else []
@@ -258,7 +258,7 @@ def _turning(dataset: xr.Dataset, stated: xr.Dataset) -> Iterator[str]:
 
 
 def highlights(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None) -> list[dict[str, str]]:
-    """Return the events of each point of the sweep, in a dozen rows at most; no rows if there are no events.
+    """Return the events of each point of the sweep, in at most a dozen rows; none without events.
 
     Parameters
     ----------
@@ -279,13 +279,13 @@ def highlights(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = 
 
 
 def losses(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None) -> list[dict[str, str]]:
-    """Return the speeds at which area is lost, a row for each point of the sweep of other keys, if any is lost."""
+    """Return the speeds of losses of area, with a row for each point of the sweep of other keys."""
     speeds = as_means(loss_speeds(dataset)) if stated is None else stated
     return _once(speeds, _of_losses(speeds, "stage" if speed_name(dataset) == "stage_speed" else "V"), rows)
 
 
 def phases(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None) -> list[dict[str, str]]:
-    """Return the slip events in each phase of the course of a stage, a row for each phase, if there are any."""
+    """Return the slip events in each phase of the course of a stage, with a row for each phase."""
     return _once(of_events(dataset) if stated is None else stated, _PHASES, rows)
 
 

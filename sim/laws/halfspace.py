@@ -36,7 +36,7 @@ def _softness(cosine, poisson_ratio):
 
 @law
 def compliance(qx, qy, shear_modulus, poisson_ratio=0.5):
-    """Surface displacement along x per unit shear stress along x, at wavevector q.
+    """Return the surface displacement along x per unit shear stress along x, at wavevector q.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def compliance(qx, qy, shear_modulus, poisson_ratio=0.5):
 
 
 def angular_compliance(poisson_ratio=0.5):
-    """Mean over the directions of G q G_x(q), and what multiplies cos 2 theta in it.
+    """Return the mean over the directions of G q G_x(q), and what multiplies cos 2 theta in it.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def angular_compliance(poisson_ratio=0.5):
 
 @law
 def point_displacement(x, y, shear_modulus, poisson_ratio=0.5):
-    """Displacement along x at (x, y) per unit force along x at the origin of the surface.
+    """Return the displacement along x at (x, y) per unit force along x at the origin of the surface.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def point_displacement(x, y, shear_modulus, poisson_ratio=0.5):
 
 @law
 def contact_modulus(shear_modulus, poisson_ratio=0.5):
-    """Modulus of normal contact E* = E/(1 - nu^2) = 2G/(1 - nu) [Pa]; 4G at nu = 1/2.
+    """Return the modulus of normal contact E* = E/(1 - nu^2) = 2G/(1 - nu) [Pa]; 4G at nu = 1/2.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def contact_modulus(shear_modulus, poisson_ratio=0.5):
 
 
 def in_series(shear_modulus_1, poisson_ratio_1, shear_modulus_2, poisson_ratio_2):
-    """Equivalent half-space of two elastic bodies in contact, whose compliances add.
+    """Return the equivalent half-space of two elastic bodies in contact, whose compliances add.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def _mixed(m):
 
 
 def disc_displacement(x, y, radius, stress, shear_modulus, poisson_ratio=0.5):
-    """Displacement along x of a surface with a uniform shear stress on a disc.
+    """Return the displacement along x of a surface with a uniform shear stress on a disc.
 
     Parameters
     ----------
@@ -253,7 +253,7 @@ def disc_displacement(x, y, radius, stress, shear_modulus, poisson_ratio=0.5):
 
 @law
 def disc_mean_displacement(radius, stress, shear_modulus, poisson_ratio=0.5):
-    """Mean displacement over a disc under uniform shear stress: v_m [m].
+    """Return the mean displacement over a disc under uniform shear stress: v_m [m].
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ def disc_mean_displacement(radius, stress, shear_modulus, poisson_ratio=0.5):
 
 @law
 def disc_edge_mean_displacement(radius, stress, shear_modulus, poisson_ratio=0.5):
-    """Mean displacement along the edge of a disc under uniform shear stress [m].
+    """Return the mean displacement along the edge of a disc under uniform shear stress [m].
 
     Parameters
     ----------
@@ -298,7 +298,7 @@ def disc_edge_mean_displacement(radius, stress, shear_modulus, poisson_ratio=0.5
 
 @law
 def disc_tangential_energy(radius, stress, shear_modulus, poisson_ratio=0.5):
-    """Elastic energy of a uniform shear stress on a disc: tau0 W/2 [J].
+    """Return the elastic energy of a uniform shear stress on a disc: tau0 W/2 [J].
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ def disc_tangential_energy(radius, stress, shear_modulus, poisson_ratio=0.5):
 
 @law
 def edge_work(radius, stress, shear_modulus, poisson_ratio=0.5):
-    """Change of MCD's potential per unit growth of the radius, at a uniform stress [J/m].
+    """Return the change of MCD's potential per unit growth of the radius, at a uniform stress [J/m].
 
     Parameters
     ----------
@@ -342,7 +342,7 @@ def edge_work(radius, stress, shear_modulus, poisson_ratio=0.5):
 
 @law
 def ripple_energy(amplitude, wavenumber, angle, shear_modulus, poisson_ratio=0.5):
-    """Elastic energy per area of a sinusoidal shear stress: the surface energy of one wave.
+    """Return the elastic energy per area of a sinusoidal shear stress: the surface energy of one wave.
 
     Parameters
     ----------
@@ -378,7 +378,7 @@ def ripple_energy(amplitude, wavenumber, angle, shear_modulus, poisson_ratio=0.5
 
 @law
 def masking_amplitude(work, wavelength, shear_modulus, angle=0.0, poisson_ratio=0.5):
-    """Amplitude of the sinusoidal shear stress whose energy equals the work of adhesion.
+    """Return the amplitude of the sinusoidal shear stress whose energy equals the work of adhesion.
 
     Parameters
     ----------
@@ -418,7 +418,7 @@ def masking_amplitude(work, wavelength, shear_modulus, angle=0.0, poisson_ratio=
 
 @law
 def noise_energy(rms, pixel, shear_modulus, poisson_ratio=0.5):
-    """Energy per area that white noise of a map's pixels seems to store.
+    """Return the energy per area that white noise of a map's pixels seems to store.
 
     Parameters
     ----------
@@ -461,7 +461,7 @@ def _sides(cell):
 
 
 def displacement(field, cell, shear_modulus, poisson_ratio=0.5):
-    """Displacement map w1 of a periodic shear-stress map, its mean stress removed.
+    """Return the displacement map w1 of a periodic shear-stress map, its mean stress removed.
 
     Parameters
     ----------
@@ -493,7 +493,7 @@ def displacement(field, cell, shear_modulus, poisson_ratio=0.5):
 
 
 def surface_energy(field, cell, shear_modulus, poisson_ratio=0.5):
-    """Elastic energy per area of the fluctuation of a periodic shear-stress map.
+    """Return the elastic energy per area of the fluctuation of a periodic shear-stress map.
 
     Parameters
     ----------
@@ -551,7 +551,7 @@ def _series(x, mean_growth, skew_growth):
 
 
 def energy_factors(x):
-    """Energy of a wave on a disc: its mean over directions, and the part that goes with cos 2 theta.
+    """Return the energy of a wave on a disc: its mean over directions, and the part that goes with cos 2 theta.
 
     Parameters
     ----------
@@ -589,7 +589,7 @@ def energy_factors(x):
 
 
 def marginal_factors(x):
-    """Factors as of ``energy_factors`` for dE/dA, the energy of a unit of new contact at the edge.
+    """Return the factors as of ``energy_factors`` for dE/dA, the energy of a unit of new contact at the edge.
 
     Parameters
     ----------
@@ -700,7 +700,7 @@ def _each(energy, field, cell, radius, poisson_ratio):
 
 
 def disc_energy_of_map(field, cell, radius, shear_modulus, poisson_ratio=0.5):
-    """Elastic energy per area of one shear-stress map on a disc at the middle of its cell.
+    """Return the elastic energy per area of one shear-stress map on a disc at the middle of its cell.
 
     Parameters
     ----------
@@ -745,7 +745,7 @@ def disc_energy_of_map(field, cell, radius, shear_modulus, poisson_ratio=0.5):
 
 
 def disc_energies_of_map(field, pixel, radii, shear_modulus, poisson_ratio=0.5, discs=None):
-    """Elastic energies per area of one shear-stress map on discs of several radii at its middle, smooth in the radius.
+    """Return the elastic energies per area of a shear-stress map on discs of several radii at its middle.
 
     Parameters
     ----------
@@ -784,7 +784,7 @@ def disc_energies_of_map(field, pixel, radii, shear_modulus, poisson_ratio=0.5, 
 
 
 def soft_disc(radius):
-    """Weights [1] of the samples around the middle of a disc of ``radius`` pixels: lattices do not feel its edge.
+    """Return the weights [1] of the samples around the middle of a smoothed disc of ``radius`` pixels.
 
     The disc is smoothed by a Gaussian, and the second moment of the smoothing is subtracted. Sums over samples then
     equal integrals over the plane except for about 1e-5 at any radius, so they can be differentiated over the radius.
@@ -804,7 +804,7 @@ def _energy(field, pixel, radius, poisson_ratio):
 
 
 def free_energy_of_map(field, pixel, shear_modulus, poisson_ratio=0.5):
-    """Elastic energy of a shear-stress map in a free half-space, per area of the map.
+    """Return the elastic energy of a shear-stress map in a free half-space, per area of the map.
 
     Parameters
     ----------
@@ -837,7 +837,7 @@ def free_energy_of_map(field, pixel, shear_modulus, poisson_ratio=0.5):
 
 
 def cross_energy_of_map(field, cell, radius, mean_stress, shear_modulus, poisson_ratio=0.5):
-    """Energy per area that a shear-stress map shares with the uniform stress on its disc.
+    """Return the energy per area that a shear-stress map shares with the uniform stress on its disc.
 
     Parameters
     ----------
@@ -891,7 +891,7 @@ def _cross_weight(points, radius, poisson_ratio):
 
 @law
 def pressure(r, radius, indentation, sphere_radius, modulus):
-    """Normal stress between sphere and half-space.
+    """Return the normal stress between sphere and half-space.
 
     Parameters
     ----------
@@ -933,7 +933,7 @@ def pressure(r, radius, indentation, sphere_radius, modulus):
 
 
 def normal_displacement(r, radius, indentation, sphere_radius):
-    """Displacement of the surface of the half-space along the normal, into it.
+    """Return the displacement of the surface of the half-space along the normal, into it.
 
     Parameters
     ----------
@@ -972,7 +972,7 @@ def normal_displacement(r, radius, indentation, sphere_radius):
 
 
 def gap(r, radius, indentation, sphere_radius):
-    """Distance between the surfaces of sphere and half-space along the normal.
+    """Return the distance between the surfaces of sphere and half-space along the normal.
 
     Parameters
     ----------
@@ -1005,7 +1005,7 @@ def gap(r, radius, indentation, sphere_radius):
 
 @law
 def shear_stress(r, radius, stress):
-    """The uniform shear stress of sliding: tau inside the contact, 0 outside [Pa].
+    """Return the uniform shear stress of sliding: tau inside the contact, 0 outside [Pa].
 
     Parameters
     ----------
@@ -1023,7 +1023,7 @@ def shear_stress(r, radius, stress):
 
 
 def tangential_profiles(distance, radius, stress, shear_modulus, poisson_ratio=0.5):
-    """Mean tangential displacement of a sliding contact along its two axes.
+    """Return the mean tangential displacement of a sliding contact along its two axes.
 
     Parameters
     ----------
@@ -1052,7 +1052,7 @@ def tangential_profiles(distance, radius, stress, shear_modulus, poisson_ratio=0
 
 
 def tangential_map(radius, stress, shear_modulus, poisson_ratio=0.5, points=129, extent=2.0):
-    """Mean tangential displacement of a sliding contact on a square around it.
+    """Return the mean tangential displacement of a sliding contact on a square around it.
 
     Parameters
     ----------

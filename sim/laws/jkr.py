@@ -25,19 +25,19 @@ from sim.numerics.special import cube_root, rough_cube_root
 
 @device
 def twice_pull_off(work, sphere_radius):
-    """3 pi w R [N], twice the pull-off force."""
+    """Return 3 pi w R [N], twice the pull-off force."""
     return 3.0 * math.pi * work * sphere_radius
 
 
 @device
 def fold_radius(work, sphere_radius, modulus):
-    """Radius at which the contact at a given indentation ends: (pi w R^2 / 8 E*)^(1/3) [m]; nan for w < 0."""
+    """Return the radius at the fold of a given indentation [m], (pi w R^2 / 8 E*)^(1/3); nan for w < 0."""
     return cube_root(math.pi * work * sphere_radius * (sphere_radius / (8.0 * modulus)))
 
 
 @device
 def series_shares(stiffness, contact):
-    """k/(k + b) and b/(k + b) for the stiffness k and b of spring and contact, each from 0 to inf; nan if k < 0."""
+    """Return k/(k + b) and b/(k + b) for the stiffness k of a spring and b of the contact; nan if k < 0."""
     stiffness = stiffness + 0.0 if stiffness >= 0.0 else math.nan  # no -0
     stiffer = stiffness > contact
     high = stiffness if stiffer else contact
@@ -52,7 +52,7 @@ def series_shares(stiffness, contact):
 
 @law
 def radius_at_load(load, work, sphere_radius, modulus):
-    """Contact radius at a given load.
+    """Return the contact radius at a given load.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def radius_at_load(load, work, sphere_radius, modulus):
 
 @law
 def load_at_radius(radius, work, sphere_radius, modulus):
-    """Load of the equilibrium contact with a given radius [N]; Hertz's where w <= 0.
+    """Return the load of the equilibrium contact with a given radius [N]; Hertz's where w <= 0.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def load_at_radius(radius, work, sphere_radius, modulus):
 
 @law
 def indentation_under_load(radius, load, sphere_radius, modulus):
-    """Indentation of any contact, in equilibrium or not, of given radius and load [m].
+    """Return the indentation of any contact, in equilibrium or not, of given radius and load [m].
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def indentation_under_load(radius, load, sphere_radius, modulus):
 
 @law
 def pull_off_load(work, sphere_radius):
-    """Lowest load that an adhesive contact bears [N]: ``-3/2 pi w R``; 0 where w <= 0.
+    """Return the lowest load that an adhesive contact bears [N]: ``-3/2 pi w R``; 0 where w <= 0.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def pull_off_load(work, sphere_radius):
 
 
 def hertz_radius_at_load(load, sphere_radius, modulus):
-    """Contact radius without adhesion at a load [m]: ``(3 P R / 4 E*)^(1/3)``; nan if pulled.
+    """Return the contact radius without adhesion at a load [m]: ``(3 P R / 4 E*)^(1/3)``; nan if pulled.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def hertz_radius_at_load(load, sphere_radius, modulus):
 
 @law
 def hertz_radius_at_indentation(indentation, sphere_radius):
-    """Contact radius without adhesion at an indentation [m]: ``sqrt(R delta)``; nan if lifted.
+    """Return the contact radius without adhesion at an indentation [m]: ``sqrt(R delta)``; nan if lifted.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def hertz_radius_at_indentation(indentation, sphere_radius):
 
 @law
 def energy_release_rate(radius, load, sphere_radius, modulus):
-    """Elastic energy released per area by a shrinking contact at a load [J/m^2].
+    """Return the elastic energy released per area by a shrinking contact at a load [J/m^2].
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def energy_release_rate(radius, load, sphere_radius, modulus):
 
 
 def energy_release_rate_at_indentation(radius, indentation, sphere_radius, modulus):
-    """Elastic energy released per area at an indentation [J/m^2]; otherwise as ``energy_release_rate``.
+    """Return the elastic energy released per area at an indentation [J/m^2]; otherwise as ``energy_release_rate``.
 
     Notes
     -----
@@ -246,7 +246,7 @@ def energy_release_rate_at_indentation(radius, indentation, sphere_radius, modul
 
 @law
 def potential_at_indentation(separation, stress, radius, work, sphere_radius, modulus):
-    """MCD's potential H of the contact at a fixed separation and uniform shear stress [J].
+    """Return MCD's potential H of the contact at a fixed separation and uniform shear stress [J].
 
     Parameters
     ----------
@@ -270,7 +270,7 @@ def potential_at_indentation(separation, stress, radius, work, sphere_radius, mo
 
 
 def potential_at_load(tractive_force, stress, radius, work, sphere_radius, modulus):
-    """MCD's potential G at a fixed tractive force F = -P [J]; otherwise as ``potential_at_indentation``.
+    """Return MCD's potential G at a fixed tractive force F = -P [J]; otherwise as ``potential_at_indentation``.
 
     Notes
     -----
@@ -289,7 +289,7 @@ def potential_at_load(tractive_force, stress, radius, work, sphere_radius, modul
 
 @law
 def potential_slope_at_indentation(separation, stress, radius, work, sphere_radius, modulus):
-    """dH/da at fixed separation and stress [J/m]; arguments as for ``potential_at_indentation``.
+    """Return dH/da at fixed separation and stress [J/m]; arguments as for ``potential_at_indentation``.
 
     Notes
     -----
@@ -307,7 +307,7 @@ def potential_slope_at_indentation(separation, stress, radius, work, sphere_radi
 
 
 def potential_slope_at_load(tractive_force, stress, radius, work, sphere_radius, modulus):
-    """dG/da at fixed load and stress [J/m]; arguments as for ``potential_at_load``.
+    """Return dG/da at fixed load and stress [J/m]; arguments as for ``potential_at_load``.
 
     Notes
     -----
@@ -328,7 +328,7 @@ def potential_slope_at_load(tractive_force, stress, radius, work, sphere_radius,
 
 @device
 def fold_root(grips, load):
-    """Minimum over x > 0 of F for g = ``grips`` and 1 - g = ``load``: from 1 at grips to 3^(1/3) at a load.
+    """Return the minimum over x > 0 of F for g = ``grips`` and 1 - g = ``load``: from 1 at grips to 3^(1/3) at a load.
 
     x is the root of ``2 g (x^3 - 1) + 3 (1 - g) x^2 (x^3 - 3)``. The start is a rational function with an error of
     5e-4. A step of Halley's method (1e-9) and one of Newton's follow. No branch and no call, for vector instructions.
@@ -347,7 +347,7 @@ def fold_root(grips, load):
 
 @device
 def fold_level(root, grips, load):
-    """F at the fold: from -9 at a load to -3 at fixed grips."""
+    """Return F at the fold: from -9 at a load to -3 at fixed grips."""
     cube = root * root * root
     return grips * root * (cube - 4.0) + load * cube * (cube - 6.0)
 
@@ -366,7 +366,7 @@ def _fold(stiffness, work, sphere_radius, modulus):
 
 @law
 def pull_off_displacement(stiffness, work, sphere_radius, modulus):
-    """Lowest displacement that an adhesive contact bears behind a spring [m]; 0 where w <= 0.
+    """Return the lowest displacement that an adhesive contact bears behind a spring [m]; 0 where w <= 0.
 
     Parameters
     ----------
@@ -394,7 +394,7 @@ def pull_off_displacement(stiffness, work, sphere_radius, modulus):
 
 @law
 def load_under_displacement(radius, displacement, stiffness, sphere_radius, modulus):
-    """Load of any contact, in equilibrium or not, of given radius behind a spring [N].
+    """Return the load of any contact, in equilibrium or not, of given radius behind a spring [N].
 
     Parameters
     ----------
@@ -423,7 +423,7 @@ def load_under_displacement(radius, displacement, stiffness, sphere_radius, modu
 
 @law
 def indentation_under_displacement(radius, displacement, stiffness, sphere_radius, modulus):
-    """Indentation of any contact, in equilibrium or not, of given radius behind a spring [m].
+    """Return the indentation of any contact, in equilibrium or not, of given radius behind a spring [m].
 
     Parameters
     ----------
@@ -446,7 +446,7 @@ def indentation_under_displacement(radius, displacement, stiffness, sphere_radiu
 
 @law
 def energy_release_rate_at_displacement(radius, displacement, stiffness, sphere_radius, modulus):
-    """Elastic energy released per area by a shrinking contact behind a spring [J/m^2].
+    """Return the elastic energy released per area by a shrinking contact behind a spring [J/m^2].
 
     Parameters
     ----------
@@ -548,7 +548,7 @@ def _solve(displacements, stiffnesses, works, sphere_radii, moduli, radii):
 
 
 def radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus):
-    """Contact radius at a prescribed displacement behind a spring of given stiffness.
+    """Return the contact radius at a prescribed displacement behind a spring of given stiffness.
 
     Parameters
     ----------
@@ -611,7 +611,7 @@ def radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus
 
 
 def radius_at_indentation(indentation, work, sphere_radius, modulus):
-    """Contact radius at a given indentation ("fixed grips").
+    """Return the contact radius at a given indentation ("fixed grips").
 
     Parameters
     ----------
@@ -655,7 +655,7 @@ def radius_at_indentation(indentation, work, sphere_radius, modulus):
 
 @law
 def indentation_at_radius(radius, work, sphere_radius, modulus):
-    """Indentation of the equilibrium contact with a given radius [m]; Hertz's where w <= 0.
+    """Return the indentation of the equilibrium contact with a given radius [m]; Hertz's where w <= 0.
 
     Parameters
     ----------
@@ -680,7 +680,7 @@ def indentation_at_radius(radius, work, sphere_radius, modulus):
 
 
 def load_under_indentation(radius, indentation, sphere_radius, modulus):
-    """Load of any contact, in equilibrium or not, of given radius and indentation [N].
+    """Return the load of any contact, in equilibrium or not, of given radius and indentation [N].
 
     Parameters
     ----------
@@ -702,7 +702,7 @@ def load_under_indentation(radius, indentation, sphere_radius, modulus):
 
 
 def pull_off_indentation(work, sphere_radius, modulus):
-    """Lowest indentation that an adhesive contact bears at fixed grips [m]; 0 where w <= 0.
+    """Return the lowest indentation that an adhesive contact bears at fixed grips [m]; 0 where w <= 0.
 
     Parameters
     ----------

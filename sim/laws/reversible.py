@@ -32,13 +32,13 @@ __all__ = [
 
 @device
 def compressible(poisson_ratio):
-    """Shear energy at a given stress and modulus E*, over that at nu = 1/2: (2 - nu)/(3 (1 - nu))."""
+    """Return the shear energy at a given stress and modulus E*, over that at nu = 1/2: (2 - nu)/(3 (1 - nu))."""
     return (2.0 - poisson_ratio) / (3.0 * (1.0 - poisson_ratio))
 
 
 @law
 def mean_stress_energy(radius, stress, modulus, poisson_ratio=0.5):
-    """Elastic energy of the mean shear stress per area of new contact [J/m^2].
+    """Return the elastic energy of the mean shear stress per area of new contact [J/m^2].
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def mean_stress_energy(radius, stress, modulus, poisson_ratio=0.5):
 
 @device
 def crossing(z, level, hard, m, s):
-    """Largest z with missing^2/z = m + s z and the slope there, from a z right of it; nan if none.
+    """Return the largest z with missing^2/z = m + s z and the slope there, from a z right of it; nan if none.
 
     missing = (hard z^2 + (2/3) soft z^3 - level)/(hard + soft z), soft = 1 - hard, is a^2/R - delta behind a spring of
     stiffness 2 E* hard/soft. An indentation has hard = 1, a load hard = 0. ``level`` is where missing is 0.
@@ -109,7 +109,7 @@ def _shrunk(jkr, hertz, control, level, hard, work, stress, reversible, held, sp
 
 @law
 def shrunk_at_load(jkr, hertz, load, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio):
-    """Contact radius at a load from those of JKR and Hertz; ``held`` as in ``shrunk_at_displacement``."""
+    """Return the contact radius at a load from those of JKR and Hertz; ``held`` as in ``shrunk_at_displacement``."""
     level = 0.5 * (load / modulus / jkr) * (sphere_radius / jkr / jkr)
     rest = (sphere_radius, modulus, poisson_ratio)
     return _shrunk(jkr, hertz, load, level, 0.0, work, stress, reversible, held, *rest)
@@ -119,7 +119,7 @@ def shrunk_at_load(jkr, hertz, load, work, stress, reversible, held, sphere_radi
 def shrunk_at_displacement(
     jkr, hertz, displacement, stiffness, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio
 ):
-    """Contact radius at a displacement behind a spring, from those of JKR and Hertz.
+    """Return the contact radius at a displacement behind a spring, from those of JKR and Hertz.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def shrunk_at_displacement(
 
 
 def radius_at_load_reversible(load, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at a load when adhesion pays a share of the energy of the mean stress.
+    """Return the contact radius at a load when adhesion pays a share of the energy of the mean stress.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def radius_at_load_reversible(load, work, stress, reversible, sphere_radius, mod
 
 
 def radius_at_indentation_reversible(indentation, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at an indentation [m]; otherwise as ``radius_at_load_reversible``.
+    """Return the contact radius at an indentation [m]; otherwise as ``radius_at_load_reversible``.
 
     Notes
     -----
@@ -214,7 +214,7 @@ def radius_at_indentation_reversible(indentation, work, stress, reversible, sphe
 def radius_at_displacement_reversible(
     displacement, stiffness, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5
 ):
-    """Contact radius at a displacement behind a spring [m]; otherwise as ``radius_at_load_reversible``.
+    """Return the contact radius at a displacement behind a spring [m]; otherwise as ``radius_at_load_reversible``.
 
     Examples
     --------

@@ -65,7 +65,7 @@ class Peak(NamedTuple):
 
 @law
 def rest_share(rupture_rate, rebinding_rate):
-    """Share of the sites that are bound at rest [1].
+    """Return the share of the sites that are bound at rest [1].
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def _reward(moment, reach, life, rebinding_rate):
 
 
 def renewal(life, half_square, third_cube, speed, bond_stiffness, rebinding_rate):
-    """Bound share and force moments in steady sliding from the moments of a bond's life.
+    """Return the bound share and force moments in steady sliding from the moments of a bond's life.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def renewal(life, half_square, third_cube, speed, bond_stiffness, rebinding_rate
 
 
 def constant_moments(speed, rate, bond_stiffness, rebinding_rate):
-    """Bound share and force moments in steady sliding of bonds that break at a constant rate.
+    """Return the bound share and force moments in steady sliding of bonds that break at a constant rate.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def _onset_behind(answer: Answer, speed: ArrayLike, stress: Array, between: tupl
     apart = np.where(stress == 0.0, math.inf, stress)  # an area at rest does not answer to a small stress
 
     def of_interface(frequency: Array) -> tuple[Complex, Complex]:
-        """Z, and k_t times the way of the body beyond that of the interface."""
+        """Return Z, and k_t times the way of the body beyond that of the interface."""
         stretched, bound = answer(frequency)
         spread = by_bonds * bound + by_stress * stretched / apart
         force = area * (stretched + 1j * frequency * viscosity) + bears * spread
@@ -275,7 +275,7 @@ def resolved_onset(
     speed: ArrayLike, pathways: Sequence[tuple[float, float]], bond_stiffness: float, rebinding_rate: float,
     site_density: float, body: Body,
 ) -> Onset:  # fmt: skip
-    """Stiffness of a spring below which bonds of a density over their stretch oscillate at a speed.
+    """Return the stiffness of a spring below which bonds of a density over their stretch oscillate at a speed.
 
     Parameters
     ----------
@@ -347,7 +347,7 @@ def resolved_onset(
 
 @law
 def steady_fraction(speed, critical_speed):
-    """Bond fraction in steady sliding.
+    """Return the bond fraction in steady sliding.
 
     Parameters
     ----------
@@ -372,7 +372,7 @@ def steady_fraction(speed, critical_speed):
 
 
 def linear_onset(speed, critical_speed, rebinding_rate, strength, damping, mass=0.0, area_growth=0.0):
-    """Stiffness of a spring below which a slider on bonds of the linear rate equation oscillates at a speed.
+    """Return the stiffness of a spring below which a slider on bonds of the linear rate equation oscillates at a speed.
 
     Parameters
     ----------
@@ -411,7 +411,7 @@ def linear_onset(speed, critical_speed, rebinding_rate, strength, damping, mass=
 
 @law
 def relax_fraction(fraction, path, duration, critical_speed, rebinding_rate):
-    """Bond fraction after a step: the exact solution of the linear rate equation.
+    """Return the bond fraction after a step: the exact solution of the linear rate equation.
 
     Parameters
     ----------
@@ -453,7 +453,7 @@ def relax_fraction(fraction, path, duration, critical_speed, rebinding_rate):
 
 @device
 def relaxed(fraction, path, duration, critical_speed, rebinding_rate):
-    """Body of ``relax_fraction``, for compiled loops."""
+    """Return the body of ``relax_fraction``, for compiled loops."""
     total = duration + path / critical_speed
     if total == 0.0:
         return fraction
@@ -462,7 +462,7 @@ def relaxed(fraction, path, duration, critical_speed, rebinding_rate):
 
 
 def transition_probabilities(path, duration, critical_speed, rebinding_rate):
-    """Transition probabilities of one site over a step, with rates h to close and h abs(V)/Vc to open.
+    """Return the transition probabilities of one site over a step, with rates h to close and h abs(V)/Vc to open.
 
     Parameters
     ----------
@@ -509,7 +509,7 @@ def _life(speed, zero_force_rate, bell_force, bond_stiffness, order):
 
 
 def bell_lives(speed, zero_force_rate, bell_force, bond_stiffness):
-    """Moments of the life of a Bell bond that is born unstretched and pulled at a constant speed.
+    """Return the moments of the life of a Bell bond that is born unstretched and pulled at a constant speed.
 
     Parameters
     ----------
@@ -545,7 +545,7 @@ def bell_lives(speed, zero_force_rate, bell_force, bond_stiffness):
 
 
 def bell_moments(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    """Bound share and force moments of Bell bonds in steady sliding.
+    """Return the bound share and force moments of Bell bonds in steady sliding.
 
     Parameters
     ----------
@@ -578,7 +578,7 @@ def bell_moments(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_r
 
 @law
 def bell_fraction(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    """Bond fraction of a Bell population in steady sliding: bonds over bonds at rest.
+    """Return the bond fraction of a Bell population in steady sliding: bonds over bonds at rest.
 
     Parameters
     ----------
@@ -607,7 +607,7 @@ def bell_fraction(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_
 
 
 def bell_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
-    """Shear stress of a Bell population in steady sliding [Pa]; odd in the speed.
+    """Return the shear stress of a Bell population in steady sliding [Pa]; odd in the speed.
 
     Parameters
     ----------
@@ -663,7 +663,7 @@ class BellNumbers(NamedTuple):
 
 
 def bell_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
-    """Friction maximum of a Bell population: the largest steady stress at any speed.
+    """Return the friction maximum of a Bell population: the largest steady stress at any speed.
 
     Parameters
     ----------
@@ -695,7 +695,7 @@ def bell_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_
 
 @law
 def bell_critical_speed(zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    """Speed at which half of the bonds of a Bell population are left [m/s].
+    """Return the speed at which half of the bonds of a Bell population are left [m/s].
 
     Parameters
     ----------
@@ -726,7 +726,7 @@ def bell_critical_speed(zero_force_rate, bell_force, bond_stiffness, rebinding_r
 
 
 def bell_numbers(critical_speed, stress, bell_force, bond_stiffness, rebinding_ratio):
-    """Rates and site density of a Bell population that has a given critical speed and friction maximum.
+    """Return the rates and site density of a Bell population that has a given critical speed and friction maximum.
 
     Parameters
     ----------
@@ -772,7 +772,7 @@ _LOWEST_RATE, _HIGHEST_RATE = 1e-4, 30.0
 
 @device
 def steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness):
-    """Steady stretch in units of f_b/kappa: W(eps)."""
+    """Return the steady stretch in units of f_b/kappa: W(eps)."""
     return lambert(bond_stiffness * math.fabs(speed) / (zero_force_rate * bell_force))
 
 
@@ -784,7 +784,7 @@ def _steady_rate(speed, zero_force_rate, bell_force, bond_stiffness):
 
 @law
 def first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness):
-    """Mean stretch of the bonds of a mean-field Bell population in steady sliding [m].
+    """Return the mean stretch of the bonds of a mean-field Bell population in steady sliding [m].
 
     Parameters
     ----------
@@ -807,7 +807,7 @@ def first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness):
 
 
 def first_moment_fraction(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    """Bond fraction of a mean-field Bell population in steady sliding: bonds over bonds at rest [1].
+    """Return the bond fraction of a mean-field Bell population in steady sliding: bonds over bonds at rest [1].
 
     Parameters
     ----------
@@ -830,7 +830,7 @@ def first_moment_fraction(speed, zero_force_rate, bell_force, bond_stiffness, re
 
 
 def first_moment_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
-    """Shear stress of a mean-field Bell population in steady sliding [Pa]; odd in the speed.
+    """Return the shear stress of a mean-field Bell population in steady sliding [Pa]; odd in the speed.
 
     Parameters
     ----------
@@ -855,7 +855,7 @@ def first_moment_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebi
 
 
 def first_moment_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
-    """Friction maximum of a mean-field Bell population.
+    """Return the friction maximum of a mean-field Bell population.
 
     Parameters
     ----------
@@ -886,7 +886,7 @@ def first_moment_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rat
 
 
 def first_moment_numbers(critical_speed, stress, bell_force, bond_stiffness, rebinding_ratio):
-    """Rates and site density of a mean-field Bell population of a given critical speed and friction maximum.
+    """Return the rates and site density of a mean-field Bell population of a given critical speed and friction maximum.
 
     Parameters
     ----------
@@ -917,7 +917,7 @@ def first_moment_numbers(critical_speed, stress, bell_force, bond_stiffness, reb
 
 
 def first_moment_onset(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density, body):
-    """Stiffness of a spring below which a mean-field Bell population oscillates at a speed.
+    """Return the stiffness of a spring below which a mean-field Bell population oscillates at a speed.
 
     Parameters
     ----------
@@ -1009,7 +1009,7 @@ def _site(speed, rate, stretch, bond_stiffness, rebinding_rate, power):
 
 
 def cut_off_moments(speed, rate, stretch, bond_stiffness, rebinding_rate):
-    """Bound share and force moments of bonds that break at a stretch, in steady sliding.
+    """Return the bound share and force moments of bonds that break at a stretch, in steady sliding.
 
     Parameters
     ----------
@@ -1048,7 +1048,7 @@ def cut_off_moments(speed, rate, stretch, bond_stiffness, rebinding_rate):
 
 
 def cut_off_fraction(speed, rate, stretch, rebinding_rate):
-    """Bond fraction of bonds that break at a stretch, in steady sliding: bonds over bonds at rest [1].
+    """Return the bond fraction of bonds that break at a stretch, in steady sliding: bonds over bonds at rest [1].
 
     Parameters
     ----------
@@ -1072,7 +1072,7 @@ def cut_off_fraction(speed, rate, stretch, rebinding_rate):
 
 
 def cut_off_stress(speed, rate, stretch, bond_stiffness, rebinding_rate, site_density):
-    """Shear stress of bonds that break at a stretch, in steady sliding [Pa].
+    """Return the shear stress of bonds that break at a stretch, in steady sliding [Pa].
 
     Parameters
     ----------
@@ -1105,7 +1105,7 @@ _CATCH_END = 60.0
 def catch_lives(
     speed: ArrayLike, catch_rate: float, catch_force: float, slip_rate: float, slip_force: float, bond_stiffness: float
 ) -> Lives:
-    """Moments of the life of a catch bond that is pulled at constant speed.
+    """Return the moments of the life of a catch bond that is pulled at constant speed.
 
     Parameters
     ----------
@@ -1156,7 +1156,7 @@ def catch_moments(
     speed: ArrayLike, catch_rate: float, catch_force: float, slip_rate: float, slip_force: float,
     bond_stiffness: float, rebinding_rate: float,
 ) -> SiteMoments:  # fmt: skip
-    """Bound share and force moments in steady sliding of catch bonds.
+    """Return the bound share and force moments in steady sliding of catch bonds.
 
     Parameters
     ----------
@@ -1204,7 +1204,7 @@ def _growth(tilt):
 
 @law
 def bell_rupture_force(loading_rate, zero_force_rate, bell_force):
-    """Mean force at which a Bell bond breaks under a force that grows at a constant rate [N].
+    """Return the mean force at which a Bell bond breaks under a force that grows at a constant rate [N].
 
     Parameters
     ----------
@@ -1231,7 +1231,7 @@ def bell_rupture_force(loading_rate, zero_force_rate, bell_force):
 
 @law
 def start_up_force(time, speed, zero_force_rate, bell_force, bond_stiffness):
-    """Mean force of bonds that were all unstretched when sliding began, none of which rebinds.
+    """Return the mean force of bonds that were all unstretched when sliding began, none of which rebinds.
 
     Parameters
     ----------
@@ -1263,7 +1263,7 @@ def start_up_force(time, speed, zero_force_rate, bell_force, bond_stiffness):
 
 
 def start_up_peak(speed, zero_force_rate, bell_force, bond_stiffness):
-    """Static peak: the largest force of bonds that were unstretched when sliding began, none of which rebinds.
+    """Return the static peak: the largest force of bonds that were unstretched at the start, without rebinding.
 
     Parameters
     ----------

@@ -160,7 +160,7 @@ def _mixed_at_depth(which, indentation, work, tangential_force, mixity, sphere_r
 
 
 def scaled_angle_at_load(load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at a load and a tangential force by ``f = 1 + tan^2((1 - lambda) psi)``.
+    """Return the contact radius at a load and a tangential force by ``f = 1 + tan^2((1 - lambda) psi)``.
 
     Parameters
     ----------
@@ -190,12 +190,12 @@ def scaled_angle_at_load(load, work, tangential_force, mixity, sphere_radius, mo
 
 
 def scaled_angle_at_indentation(indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at an indentation [m], with the tangential force held; otherwise as ``scaled_angle_at_load``."""
+    """Return the contact radius at an indentation and a tangential force [m], as ``scaled_angle_at_load``."""
     return _mixed_at_depth(_ANGLE, indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio)
 
 
 def shear_share_at_load(load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at a load and a tangential force by ``G + lambda G_s = w`` [m], as ``scaled_angle_at_load``.
+    """Return the contact radius at a load by ``G + lambda G_s = w`` [m], as ``scaled_angle_at_load``.
 
     Notes
     -----
@@ -206,12 +206,12 @@ def shear_share_at_load(load, work, tangential_force, mixity, sphere_radius, mod
 
 
 def shear_share_at_indentation(indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at an indentation [m], with the tangential force held; otherwise as ``shear_share_at_load``."""
+    """Return the contact radius at an indentation and a tangential force [m], as ``shear_share_at_load``."""
     return _mixed_at_depth(_SHARE, indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio)
 
 
 def scaled_tangent_at_load(load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at a load and a tangential force by ``f = 1 + (1 - lambda) tan^2 psi`` [m].
+    """Return the contact radius at a load and a tangential force by ``f = 1 + (1 - lambda) tan^2 psi`` [m].
 
     Otherwise as ``scaled_angle_at_load``. A share 1 - lambda of adhesion remains at any force. The radius therefore
     tends to the JKR radius at ``(1 - lambda) w`` and never to the Hertz radius. Only a contact with a pull beyond the
@@ -233,7 +233,7 @@ def scaled_tangent_at_load(load, work, tangential_force, mixity, sphere_radius, 
 def scaled_tangent_at_indentation(
     indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5
 ):
-    """Contact radius at an indentation [m], with the tangential force held; otherwise as ``scaled_tangent_at_load``."""
+    """Return the contact radius at an indentation and a tangential force [m], as ``scaled_tangent_at_load``."""
     return _mixed_at_depth(_TANGENT, indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio)
 
 
@@ -287,7 +287,7 @@ def _widened(normal, control, hard, work, stress, sphere_radius, modulus, poisso
 
 @law
 def uncorrected_at_load(load, work, stress, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at a load by MCD as first published in 2018: shear widens the contact.
+    """Return the contact radius at a load by MCD as first published in 2018: shear widens the contact.
 
     Parameters
     ----------
@@ -316,7 +316,7 @@ def uncorrected_at_load(load, work, stress, sphere_radius, modulus, poisson_rati
 
 @law
 def uncorrected_at_indentation(indentation, work, stress, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at an indentation [m]; otherwise as ``uncorrected_at_load``.
+    """Return the contact radius at an indentation [m]; otherwise as ``uncorrected_at_load``.
 
     Examples
     --------
@@ -328,7 +328,7 @@ def uncorrected_at_indentation(indentation, work, stress, sphere_radius, modulus
 
 
 def savkoor_briggs_at_load(load, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at a load and a tangential force, in full stick (Savkoor & Briggs 1977).
+    """Return the contact radius at a load and a tangential force, in full stick (Savkoor & Briggs 1977).
 
     Parameters
     ----------
@@ -358,7 +358,7 @@ def savkoor_briggs_at_load(load, work, tangential_force, sphere_radius, modulus,
 
 
 def savkoor_briggs_at_indentation(indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at an indentation [m]; otherwise as ``savkoor_briggs_at_load``.
+    """Return the contact radius at an indentation [m]; otherwise as ``savkoor_briggs_at_load``.
 
     Notes
     -----
@@ -369,7 +369,7 @@ def savkoor_briggs_at_indentation(indentation, work, tangential_force, sphere_ra
 
 @law
 def savkoor_briggs_limit(load, work, sphere_radius, poisson_ratio=0.5):
-    """Largest tangential force of a sticking contact at a load, by Savkoor & Briggs [N].
+    """Return the largest tangential force of a sticking contact at a load, by Savkoor & Briggs [N].
 
     Parameters
     ----------
@@ -398,7 +398,7 @@ def savkoor_briggs_limit(load, work, sphere_radius, poisson_ratio=0.5):
 
 @law
 def savkoor_briggs_shrinkage(load, work, sphere_radius, modulus, poisson_ratio=0.5):
-    """Coefficient alpha_SB of ``A = A0 - alpha_SB T^2`` at small forces in full stick [m^2/N^2].
+    """Return the coefficient alpha_SB of ``A = A0 - alpha_SB T^2`` at small forces in full stick [m^2/N^2].
 
     Parameters
     ----------
@@ -427,7 +427,7 @@ def savkoor_briggs_shrinkage(load, work, sphere_radius, modulus, poisson_ratio=0
 
 
 def reversible_force_at_load(load, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at a load under a uniformly spread tangential force whose energy adhesion pays.
+    """Return the contact radius at a load under a uniformly spread tangential force whose energy adhesion pays.
 
     Parameters
     ----------
@@ -454,7 +454,7 @@ def reversible_force_at_load(load, work, tangential_force, sphere_radius, modulu
 
 
 def reversible_force_at_indentation(indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at an indentation [m]; otherwise as ``reversible_force_at_load``."""
+    """Return the contact radius at an indentation [m]; otherwise as ``reversible_force_at_load``."""
     sticking = math.sqrt(_UNIFORM / _STICK) * np.asarray(tangential_force)  # the force with this energy in full stick
     return shear_share_at_indentation(indentation, work, sticking, 1.0, sphere_radius, modulus, poisson_ratio)
 
@@ -479,7 +479,7 @@ def _measured_at_stress(jkr, hertz, shrinkage, stress):
 
 
 def sahli_at_load(load, work, tangential_force, shrinkage, sphere_radius, modulus):
-    """Contact radius at a load by the empirical law of Sahli et al. (2018).
+    """Return the contact radius at a load by the empirical law of Sahli et al. (2018).
 
     Parameters
     ----------
@@ -508,7 +508,7 @@ def sahli_at_load(load, work, tangential_force, shrinkage, sphere_radius, modulu
 
 
 def mixities(shrinkage, load, work, sphere_radius, modulus, poisson_ratio=0.5):
-    """Mixity lambda of each mixed-mode theory that shrinks as the law of Sahli et al. at small forces.
+    """Return the mixity lambda of each mixed-mode theory that shrinks as the law of Sahli et al. at small forces.
 
     Parameters
     ----------
@@ -559,7 +559,7 @@ def _at_indentation(indentation, work, sphere_radius, modulus):
 def compare_at_load(
     stress, load, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, shrinkage=math.nan, mixity=0.5
 ):
-    """Contact radius at a load and a mean shear stress by every theory.
+    """Return the contact radius at a load and a mean shear stress by every theory.
 
     Parameters
     ----------
@@ -613,7 +613,7 @@ def compare_at_load(
 def compare_at_indentation(
     stress, indentation, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, mixity=0.5
 ):
-    """Contact radius [m] at an indentation by theory, as ``compare_at_load`` but for ``"sahli"``, measured at loads."""
+    """Return the contact radius at an indentation by theory [m], as ``compare_at_load``, without ``"sahli"``."""
     rest, stress = (sphere_radius, modulus, poisson_ratio), np.asarray(stress, dtype=float)
     jkr, hertz, *held = _at_indentation(indentation, work, sphere_radius, modulus)
     radii = {"jkr": jkr, "hertz": hertz, "uncorrected": uncorrected_at_indentation(indentation, work, stress, *rest)}

@@ -60,7 +60,7 @@ class BondMade(Isotropic):
     bond_made: ClassVar[bool] = True
 
     def stiffest(self, shear_modulus: float, poisson_ratio: float = 0.5) -> float:
-        """Stiffness of the half-space under one bond [N/m], π²Gb/2 for an incompressible one.
+        """Return the stiffness of the half-space under one bond [N/m], π²Gb/2 for an incompressible one.
 
         A bond's own stiffness is in series with it, so the two together cannot be stiffer.
         """
@@ -77,22 +77,22 @@ class BondMade(Isotropic):
         return 16.0 / (3.0 * math.pi * self.footprint)
 
     def radial_density(self, q: ArrayLike) -> Array:
-        """Density C at wavenumber q [rad/m], in Pa² m²."""
+        """Return the density C at wavenumber q [rad/m], in Pa² m²."""
         x = np.asarray(q, float) * self.footprint
         return np.square(np.where(x == 0.0, 1.0, 2.0 * scipy.special.j1(x) / np.where(x == 0.0, 1.0, x)))
 
     def cumulative(self, q: ArrayLike) -> Array:
-        """Variance within wavenumber q [Pa²]: (1 − J0² − J1²)/(πb²), by its series where that cancels."""
+        """Return the variance within wavenumber q [Pa²]: (1 − J0² − J1²)/(πb²), by its series where that cancels."""
         x = np.square(np.asarray(q, float) * self.footprint)
         series = x * (0.25 - x * (1.0 / 32.0 - x * (5.0 / 2304.0)))
         return self.variance * np.where(x < 1e-3, series, 1.0 - self._outside(q))
 
     def beyond(self, q: ArrayLike) -> Array:
-        """Variance beyond wavenumber q [Pa²]."""
+        """Return the variance beyond wavenumber q [Pa²]."""
         return self.variance * self._outside(q)
 
     def integrals(self, factors: Factors, radius: float) -> tuple[float, float]:
-        """Integrals over a disc in real space, because the field ends there and its spectrum oscillates.
+        """Return the integrals over a disc in real space, because the field ends there and its spectrum oscillates.
 
         That of J0(qs) q C/2π over q is the autocorrelation, the overlap of two footprints.
         """
@@ -167,11 +167,11 @@ class Ripple(Family):
         return self.density(step, reach)
 
     def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
-        """Mean energy per area [J/m²]: ``τ1² (1 - ν cos²θ) / (4 G q)``."""
+        """Return the mean energy per area [J/m²]: ``τ1² (1 - ν cos²θ) / (4 G q)``."""
         return ripple_energy(self.amplitude, self.support[0], self.angle, shear_modulus, poisson_ratio)
 
     def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
-        """Integrals over discs of the density's two peaks, see ``Family``."""
+        """Return the integrals over discs of the density's two peaks, see ``Family``."""
         q = self.support[0]
         mean, skew = factors(2 * q * radii)
         level = 2 * math.pi**2 * self.amplitude**2 / q
@@ -316,19 +316,19 @@ class Gaussian(_OfRms, Isotropic):
     model: Literal["gaussian"] = "gaussian"
 
     def reach(self, radius: float) -> tuple[float, float]:
-        """Wavenumbers [rad/m] between which the density varies."""
+        """Return the wavenumbers [rad/m] between which the density varies."""
         return 0.25 / self.length, 14.0 / self.length
 
     def radial_density(self, q: ArrayLike) -> Array:
-        """Density C at wavenumber q [rad/m], in Pa² m²."""
+        """Return the density C at wavenumber q [rad/m], in Pa² m²."""
         return np.pi * (self.length * self.rms) ** 2 * self._decay(q)
 
     def cumulative(self, q: ArrayLike) -> Array:
-        """Variance within wavenumber q [Pa²]."""
+        """Return the variance within wavenumber q [Pa²]."""
         return -self.variance * np.expm1(-((np.asarray(q) * self.length) ** 2) / 4)
 
     def beyond(self, q: ArrayLike) -> Array:
-        """Variance beyond wavenumber q [Pa²]."""
+        """Return the variance beyond wavenumber q [Pa²]."""
         return self.variance * self._decay(q)
 
     def _decay(self, q: ArrayLike) -> Array:
@@ -373,16 +373,16 @@ class VonKarman(_OfRms, Isotropic):
         return 0.25 / self.length, 1e13 / min(self.length, radius)
 
     def radial_density(self, q: ArrayLike) -> Array:
-        """Density C at wavenumber q [rad/m], in Pa² m²."""
+        """Return the density C at wavenumber q [rad/m], in Pa² m²."""
         level = 4 * np.pi * self.hurst * (self.length * self.rms) ** 2
         return level * np.exp(-(1 + self.hurst) * self._log(q))
 
     def cumulative(self, q: ArrayLike) -> Array:
-        """Variance within wavenumber q [Pa²]."""
+        """Return the variance within wavenumber q [Pa²]."""
         return -self.variance * np.expm1(-self.hurst * self._log(q))
 
     def beyond(self, q: ArrayLike) -> Array:
-        """Variance beyond wavenumber q [Pa²]."""
+        """Return the variance beyond wavenumber q [Pa²]."""
         return self.variance * np.exp(-self.hurst * self._log(q))
 
     def _log(self, q: ArrayLike) -> Array:
@@ -430,13 +430,13 @@ class AnisotropicGaussian(_OfRms, Waves):
     model: Literal["anisotropic_gaussian"] = "anisotropic_gaussian"
 
     def density(self, qx: ArrayLike, qy: ArrayLike) -> Array:
-        """Power spectral density C at wavevector (qx, qy) [rad/m], in Pa² m²."""
+        """Return the power spectral density C at wavevector (qx, qy) [rad/m], in Pa² m²."""
         level = np.pi * self.length_x * self.length_y * self.variance
         (xx, xy, yy), x, y = self._form, np.asarray(qx, float), np.asarray(qy, float)
         return level * np.exp(-(xx * x**2 + 2 * xy * x * y + yy * y**2))
 
     def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
-        """Mean energy per area [J/m²] stored in an infinite half-space (see Notes)."""
+        """Return the mean energy per area [J/m²] stored in an infinite half-space (see Notes)."""
         a, b, cosine = self.length_x, self.length_y, math.cos(self.angle)
         scale = self.variance * a * b / (3 * math.sqrt(math.pi))
         along = scale * b**2 * scipy.special.elliprd(0.0, a**2, b**2)
@@ -453,18 +453,18 @@ class AnisotropicGaussian(_OfRms, Waves):
         return a * cosine**2 + b * sine**2, (a - b) * cosine * sine, a * sine**2 + b * cosine**2
 
     def reach(self, radius: float) -> tuple[float, float]:
-        """Wavenumbers [rad/m] between which the density varies."""
+        """Return the wavenumbers [rad/m] between which the density varies."""
         return 0.25 / max(self.length_x, self.length_y), 14.0 / min(self.length_x, self.length_y)
 
     def harmonics(self, q: Array) -> tuple[Array, Array]:
-        """``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
+        """Return ``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
         a, b = self.length_x, self.length_y
         level = 2 * math.pi**2 * a * b * self.variance * np.exp(-((min(a, b) * q) ** 2) / 4)
         bend = (a - b) * (a + b) / 8 * q**2
         return level * scipy.special.ive(0, bend), -level * scipy.special.ive(1, bend) * math.cos(2 * self.angle)
 
     def pixels(self, step: float, reach: int) -> Array:
-        """Variance in the pixels of a wavevector lattice [Pa²], see ``Family``."""
+        """Return the variance in the pixels of a wavevector lattice [Pa²], see ``Family``."""
         level = self.variance * self.length_x * self.length_y / (4 * math.pi)
         edges = step * (np.arange(-reach, reach + 2) - 0.5)
         return level * gaussian_boxes(self._form, edges, edges[reach:])

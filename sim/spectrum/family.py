@@ -41,10 +41,10 @@ class Family(Protocol):
         """Mean square of the stress [Pa²]."""
 
     def density(self, qx: ArrayLike, qy: ArrayLike) -> Array:
-        """Power spectral density C at wavevector (qx, qy) [Pa² m²]; raises ValueError for a single wave."""
+        """Return the power spectral density C at wavevector (qx, qy) [Pa² m²]; raises ValueError for a single wave."""
 
     def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
-        """Mean elastic energy per area of an infinite half-space [J/m²] under this stress."""
+        """Return the mean elastic energy per area of an infinite half-space [J/m²] under this stress."""
 
     def pixels(self, step: float, reach: int) -> Array:
         """Variance in each pixel around the points of a square wavevector lattice [Pa²], its side ``step`` in rad/m.
@@ -69,14 +69,14 @@ class Radial(Family, Protocol):
     """An isotropic spectrum by its variance within and beyond a wavenumber q [rad/m]."""
 
     def cumulative(self, q: ArrayLike) -> Array:
-        """Variance within wavenumber q [Pa²]."""
+        """Return the variance within wavenumber q [Pa²]."""
 
     def beyond(self, q: ArrayLike) -> Array:
-        """Variance beyond wavenumber q [Pa²]."""
+        """Return the variance beyond wavenumber q [Pa²]."""
 
 
 def radial_quadrant(spectrum: Radial, step: float, reach: int) -> Array:
-    """Variance of an isotropic spectrum in the pixels of a wavevector lattice.
+    """Return the variance of an isotropic spectrum in the pixels of a wavevector lattice.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def _legendre(spectrum: Radial, step: float, line: Array, start: Array, end: Arr
 
 
 def gaussian_boxes(form: tuple[float, float, float], x_edges: NDArray, y_edges: NDArray) -> Array:
-    """∫∫ exp(-(xx qx² + 2 xy qx qy + yy qy²)) over each rectangle between the edges.
+    """Return ∫∫ exp(-(xx qx² + 2 xy qx qy + yy qy²)) over each rectangle between the edges.
 
     Parameters
     ----------

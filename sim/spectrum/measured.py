@@ -325,7 +325,7 @@ def _spacing(data: Any, axis: str) -> float | None:
 
 
 def periodogram(field: Array, cell: float | tuple[float, float], window: str = "none") -> Array:
-    """Power spectral density of maps, on the half spectrum of their lattice.
+    """Return the power spectral density of maps, on the half spectrum of their lattice.
 
     Parameters
     ----------
@@ -381,7 +381,7 @@ class RadialAverage(NamedTuple):
 
 
 def side_of_rings(lattice: Lattice) -> float:
-    """Length L whose wavenumber 2π/L is the width of a ring: the side of a square of the same area [m]."""
+    """Return the length L whose wavenumber 2π/L is the width of a ring: the side of a square of the same area [m]."""
     first, second = lattice.sides
     return first if first == second else math.sqrt(lattice.area)
 
@@ -484,7 +484,7 @@ class Measured(FromFile):
 
 
 def estimate(maps: Array, cell: float | tuple[float, float], window: str) -> tuple[Array, Array]:
-    """Rows of the radial spectrum of maps (maps, x, y), averaged over them."""
+    """Return the rows of the radial spectrum of maps (maps, x, y), averaged over them."""
     lattice = lattice_of(cell, maps.shape[-2:])
     ring = radial_average(np.mean(periodogram(maps, cell, window), axis=0), lattice)
     # the innermost ring begins at half its wavenumber and the outermost ends half a ring beyond: there they stay level

@@ -56,10 +56,10 @@ class Waves(Family, Protocol):
         return self.support
 
     def harmonics(self, q: Array) -> tuple[Array, Array]:
-        """``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
+        """Return ``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
 
     def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
-        """Integrals over discs of any radius, see ``Family``."""
+        """Return the integrals over discs of any radius, see ``Family``."""
 
         def sums(radius: float) -> tuple[float, float]:
             if radius == 0.0:
@@ -87,7 +87,7 @@ class Waves(Family, Protocol):
 
 
 def disc_energy(spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
-    """Mean elastic energy per area that a fluctuating shear stress stores on a disc of contact.
+    """Return the mean elastic energy per area that a fluctuating shear stress stores on a disc of contact.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def share_of_long_waves(spectrum: Family, wavelength: float, poisson_ratio: floa
 def marginal_energy(
     spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
 ) -> Array:
-    """Mean energy that a unit of new contact area stores at the edge of a growing disc: dE/dA.
+    """Return the mean energy that a unit of new contact area stores at the edge of a growing disc: dE/dA.
 
     Parameters
     ----------
@@ -253,11 +253,11 @@ class Margin:
         return self._share(radius, marginal_energy)
 
     def mean(self, radius: Array) -> Array:
-        """Mean of the share over the area of the disc: E/(πa²) over ΔΓ of the plane [1]."""
+        """Return the mean of the share over the area of the disc: E/(πa²) over ΔΓ of the plane [1]."""
         return self._share(radius, disc_energy)
 
     def at(self, position: Array) -> "Margin":
-        """The same share at any position of the slider."""
+        """Return the same share at any position of the slider."""
         return self
 
     def _share(self, radius: Array, law: Callable[..., Array]) -> Array:
@@ -297,7 +297,7 @@ class Margin:
 
 @device
 def share_of(radius, wave, ends, cubics):
-    """``Margin`` in compiled loops at a radius above 0, given its ``terms``."""
+    """Return ``Margin`` in compiled loops at a radius above 0, given its ``terms``."""
     double, level, lean = wave
     if double > 0.0:
         x = double * radius
@@ -322,18 +322,18 @@ class Isotropic(Waves, Radial, Protocol):
         """∫ C dq [Pa² m]."""
 
     def radial_density(self, q: ArrayLike) -> Array:
-        """Density C at wavenumber q [rad/m], in Pa² m²; zero outside ``support``."""
+        """Return the density C at wavenumber q [rad/m], in Pa² m²; zero outside ``support``."""
 
     def harmonics(self, q: Array) -> tuple[Array, Array]:
-        """``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
+        """Return ``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
         return 2 * math.pi * self.radial_density(q), np.zeros(())
 
     def density(self, qx: ArrayLike, qy: ArrayLike) -> Array:
-        """Power spectral density C at wavevector (qx, qy) [rad/m], in Pa² m²."""
+        """Return the power spectral density C at wavevector (qx, qy) [rad/m], in Pa² m²."""
         return self.radial_density(np.hypot(qx, qy))
 
     def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
-        """Mean elastic energy per area [J/m²] stored by the fluctuations in an infinite half-space.
+        """Return the mean elastic energy per area [J/m²] stored by the fluctuations in an infinite half-space.
 
         ``ΔΓ = (2 - nu) / (8 pi G) ∫ C dq``, the angular mean of ``½ G_x C``. The normal-tangential coupling for nu
         other than 1/2 is neglected.
@@ -342,7 +342,7 @@ class Isotropic(Waves, Radial, Protocol):
         return mean / (4 * np.pi * np.asarray(shear_modulus, float)) * self.line_integral
 
     def pixels(self, step: float, reach: int) -> Array:
-        """Variance in the pixels of a wavevector lattice [Pa²], see ``Family``."""
+        """Return the variance in the pixels of a wavevector lattice [Pa²], see ``Family``."""
         quadrant = radial_quadrant(self, step, reach)
         return np.concatenate([quadrant[:0:-1], quadrant])
 
@@ -366,18 +366,18 @@ class Rowed(Isotropic, Protocol):
     rows: Rows
 
     def radial_density(self, q: ArrayLike) -> Array:
-        """C(q), zero outside the rows."""
+        """Return C(q), zero outside the rows."""
         inside = (np.asarray(q) >= self.rows.q[0]) & (np.asarray(q) <= self.rows.q[-1])
         return np.where(inside, self._value(*self._locate(q)), 0.0)
 
     def cumulative(self, q: ArrayLike) -> Array:
-        """Variance within the circle of radius q: ``(1/2 pi) ∫ C q dq`` from 0 to q [Pa²]."""
+        """Return the variance within the circle of radius q: ``(1/2 pi) ∫ C q dq`` from 0 to q [Pa²]."""
         q, row = self._locate(q)
         held = np.concatenate([[0.0], np.cumsum(self._moments(1))])
         return (held[row] + self._piece(1, self.rows.q[row], self.rows.density[row], q, row)) / (2 * np.pi)
 
     def beyond(self, q: ArrayLike) -> Array:
-        """Variance outside the circle of radius q [Pa²], without cancellation at large q."""
+        """Return the variance outside the circle of radius q [Pa²], without cancellation at large q."""
         q, row = self._locate(q)
         left = np.concatenate([np.cumsum(self._moments(1)[::-1])[::-1], [0.0]])
         return (left[row + 1] + self._piece(1, q, self._value(q, row), self.rows.q[row + 1], row)) / (2 * np.pi)
