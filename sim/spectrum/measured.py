@@ -22,8 +22,8 @@ from sim.units.quantity import Quantity, keyed
 from sim.units.tables import LISTED, blamed, file_columns, file_path, file_text, matrix
 
 _WAVENUMBER = Quantity("rad/m", "wavenumber", "q", above=0)
-_HEIGHTS = 'it is a spectrum of heights; a stress is needed, whose density over the plane is in "Pa^2 m^2"'
-_LINE = 'it is the spectrum of a line; give that of the plane, whose density is in "Pa^2 m^2"'
+_HEIGHTS = 'it is a spectrum of heights; give a density of stress over the plane, in "Pa^2 m^2"'
+_LINE = 'it is the spectrum of a line; give the density over the plane, in "Pa^2 m^2"'
 _MISTAKEN = (("m^4", _HEIGHTS), ("m^3", _HEIGHTS), ("m^2", _HEIGHTS), ("Pa^2 m", _LINE))
 _DENSITY = Quantity("Pa^2 m^2", "power spectral density of the stress", "C", at_least=0, mistaken=_MISTAKEN)
 Wavenumbers = Annotated[tuple[Annotated[float, _WAVENUMBER], ...], LISTED]

@@ -561,20 +561,20 @@ def explanation(dataset: xr.Dataset) -> str:
     """Return the subject of the study and the meaning of the table's columns, in sentences."""
     swept, left_out = dataset.attrs["swept"], dataset.attrs["left_out"].replace("\n", "; ")
     return (
-        "Each row changes one thing of the scene (* marks it as it is written). time: CPU time of its run on one core."
+        "Each row changes one setting (* marks the scenario as written). time: CPU time of its run on one core."
         "\n(%): largest difference from a finer setting, its standard error; of ΔΓ beyond its mean in its own units."
         + f"\nThe values of {swept} are those of the tables; choose others by --set." * bool(swept)
-        + f"\nLeft out: {left_out}." * bool(left_out)
+        + f"\nOmitted: {left_out}." * bool(left_out)
     )
 
 
 def recommendation(dataset: xr.Dataset) -> str:
-    """Return the cheapest combination that keeps the accepted error, in words and with the lines to write.
+    """Return the cheapest combination that keeps the accepted error, as text and with the lines to write.
 
     Nothing is recommended if the result does not converge as the clock step decreases.
     """
     if trend := dataset.attrs.get("not_converging"):
-        text = f"The scene is not shown to converge. From quarter to quarter of the clock step {trend}.\nNo setting is"
+        text = f"Convergence is not shown. From quarter to quarter of the clock step {trend}.\nNo setting is"
         return f"{text} recommended. With a larger budget it may converge. See also sim check."
     tolerance, tried = float(dataset.attrs["tolerance"]), choices(dataset)
     written, (best, good) = tried[0], chosen(tried, tolerance)

@@ -171,7 +171,7 @@ def test_the_budget_is_kept_and_what_does_not_fit_is_named(budget):
     dataset = converge(scenario, budget)
     assert time.process_time() - began < 1.3 * budget
     fits = "modal" in dataset["row"].to_numpy()
-    assert fits == (budget > 5.0) == ("Left out: modal" not in explanation(dataset))
+    assert fits == (budget > 5.0) == ("Omitted: modal" not in explanation(dataset))
     assert fits or dataset.attrs["left_out"] == "modal: does not fit into the budget"
 
 

@@ -411,7 +411,7 @@ class _Stretched(_BondModel):
     def remarks(self, setting: Setting) -> list[str]:
         number = 1.0 / self.bound_at_rest
         times = f"{number:.3g} times the bonds at rest"
-        remark = f'start = "bonded" binds all sites, {times}, for which adhesion.work holds'
+        remark = f'start = "bonded" binds all sites, {times}; adhesion.work is valid for the bonds at rest'
         return [remark] if self.start_from == "bonded" and number > 1.01 else []
 
     def onset(self, speed: Array, body: Body) -> Onset:

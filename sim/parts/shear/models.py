@@ -35,7 +35,7 @@ _Cell = Annotated[float, Quantity("m", "side of the periodic cell", "L", above=0
 _Tolerance = Annotated[float, Quantity("1", "tolerance of the errors of banding", "", above=0, below=1)]
 Contact = Annotated[
     Literal["plane", "disc"],
-    Field(description='"disc": the energy that a contact of finite size pays when it grows, instead of the plane\'s'),
+    Field(description='"disc": energy per new area of a finite contact, instead of that of the plane'),
 ]
 _ModeAmplitudes = Annotated[
     Literal["gaussian", "fixed"], Field(description='"fixed": modes have a constant modulus, so the energy is constant')
