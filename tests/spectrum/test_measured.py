@@ -26,7 +26,7 @@ def read(files, **keys):
 
 
 def white_map(points, level, cell, seed=1):
-    """A stress map density over the plane ``level`` at every wavevector but zero, with random phases."""
+    """A stress map whose density is ``level`` at every wavevector but zero, with random phases."""
     generator = np.random.default_rng(seed)
     grid = Grid(cell, points)
     half = grid.forward(generator.normal(size=(points, points)))
