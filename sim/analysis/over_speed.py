@@ -462,7 +462,7 @@ def _in_words(reason: str, never: bool, most: float, steady: float, lags: bool, 
     """Return the reason why there is no speed or no error, from the largest loss [%] and the ``steady`` speed [m/s]."""
     if never:
         return f"never: at most {most:.3g} % of the area can be lost"
-    near = "" if math.isnan(steady) else f"lags: near {engineering(float(f'{steady:.3g}'), 'm/s')} in steady sliding"
+    near = "" if math.isnan(steady) else f"the course lags: {engineering(float(f'{steady:.3g}'), 'm/s')} if steady"
     words = near or reason, "the course lags" if lags else "", "a single member has no known error" if alone else ""
     return "; ".join(filter(None, words))
 

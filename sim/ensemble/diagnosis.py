@@ -233,7 +233,7 @@ def _mechanisms(point: Scenario, time: Array, speed: Array, at: str) -> Iterator
         first = f"bonds take {rest - bonds:.2g} points, fluctuations {bonds - both:.2g}"
         other = f" ({waves - both:.2g} and {rest - waves:.2g} if fluctuations are subtracted first)"
         yield f"the mean A/A_JKR at {at} is {both:.3g} %: {first}{other if bonds < rest else ''}"
-        yield f"by the paper's strict balance (shear.paid_by_adhesion = 0) fluctuations take none: {bonds:.3g} %"
+        yield f"by the paper's strict balance (shear.paid_by_adhesion = 0) A/A_JKR is {bonds:.3g} %"
 
 
 def lag(point: Scenario, slower: float = 1.0) -> tuple[float, float, float]:

@@ -208,7 +208,7 @@ def test_the_diagnosis_has_the_numbers_of_closed_forms_and_goes_with_the_dataset
         f"the mean A/A_JKR at contact.load = 5 mN, 1 µm/s is {both:.3g} %: bonds take {taken[0]:.2g} points,"
         f" fluctuations {taken[1]:.2g} ({taken[2]:.2g} and {taken[3]:.2g} if fluctuations are subtracted first)"
     )
-    assert strict.endswith(f"(shear.paid_by_adhesion = 0) fluctuations take none: {bonded:.3g} %")
+    assert strict.endswith(f"(shear.paid_by_adhesion = 0) A/A_JKR is {bonded:.3g} %")
     dataset = run(lens)
     printed = preview(lens)
     assert analysis.remarks(dataset) == [*remarks(plan), *texts]

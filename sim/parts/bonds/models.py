@@ -492,7 +492,7 @@ class FirstMoment(_OverArea, _Separable):
     def remarks(self, setting: Setting) -> list[str]:
         remarks, rebinding = super().remarks(setting), self.rebinding_rate
         excess = self.rupture.first_moment_excess(self.bond_stiffness, rebinding) if rebinding > 0.0 else 0.0
-        remark = f'the mean stretch overpredicts the friction maximum by {excess:.0%}: bonds.model = "cohort" does not'
+        remark = f'the mean stretch overpredicts the friction maximum by {excess:.0%}; bonds.model = "cohort" is exact'
         return [*remarks, remark] if excess and not self.has_stress else remarks
 
     def bonding(self, state: Stretches) -> Bonding:
