@@ -4,7 +4,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from sim.ensemble.variables import DISC_ENERGIES, KNOWN_ERRORS, LARGEST, MAP, NUMBERS, SYSTEMATIC, VARIABLES
+from sim.ensemble.variables import LARGEST, MAP, NUMBERS, SYSTEMATIC, VARIABLES
 
 TARGET = Path(__file__).with_name("dataset.md")
 HEAD = """# The variables of a dataset
@@ -169,17 +169,8 @@ def text() -> str:
                 for one in LARGEST
             ),
         ],
-        [
-            *((name, "1", "*sweep*", meaning, "") for name, meaning in KNOWN_ERRORS.items()),
-            *((name, unit, "*sweep*", meaning, "a periodic cell") for name, (unit, meaning) in SYSTEMATIC.items()),
-        ],
-        [
-            (MAP[0], MAP[1], f"{where}, x, y", MAP[2], MAPS),
-            *(
-                (name, unit, where, meaning, f'{MAPS}, shear.contact = "disc"')
-                for name, unit, meaning, _ in DISC_ENERGIES
-            ),
-        ],
+        [*((name, unit, "*sweep*", meaning, "a periodic cell") for name, (unit, meaning) in SYSTEMATIC.items())],
+        [(MAP[0], MAP[1], f"{where}, x, y", MAP[2], MAPS)],
     )
     lines = [HEAD]
     for (title, note), rows in zip(SECTIONS.items(), tables, strict=True):

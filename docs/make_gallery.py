@@ -351,22 +351,6 @@ def stress_map(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 @asks(
-    "uniform_stress",
-    "What is the shape of a sliding contact?",
-    """Adhesion pulls at the edge, and the sphere presses in the middle. Sliding at {stress:g} MPa displaces the
-    middle of the surface by {shift:.1f} µm along the sliding direction. That is {part:.0f} % of the contact radius.
-    Normal and tangential fields are independent in an incompressible half-space.""",
-    kind="profile",
-    where={"bonds.stress": "0.3 MPa", "contact.load": "4 mN"},
-)
-def profile(dataset: xr.Dataset) -> dict[str, Number]:
-    chosen = dataset.sel(bonds_stress=0.3e6, contact_load=4e-3).isel(t=-1)
-    radius, stress = float(chosen["contact_radius"]), float(chosen["shear_stress"])
-    shift = float(laws.halfspace.disc_displacement(0.0, 0.0, radius, stress, modulus_of(dataset)))
-    return {"stress": 1e-6 * stress, "shift": 1e6 * shift, "part": 100.0 * shift / radius}
-
-
-@asks(
     "friction_maximum",
     "Why does the friction of rubber first rise and then fall with speed?",
     """A bond that is pulled faster bears more before it breaks, but fewer sites hold a bond. Bonds under Bell's law

@@ -14,19 +14,7 @@ from typing import Any, NoReturn
 
 import click
 
-from sim.units.terminal import (
-    LOG,
-    Notes,
-    Stages,
-    note,
-    print_rows,
-    print_table,
-    progress_bar,
-    say,
-    signals,
-    slow_stage,
-    while_read,
-)
+from sim.units.terminal import LOG, Notes, Shown, note, print_rows, print_table, progress_bar, say, signals, while_read
 
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
 
@@ -172,14 +160,13 @@ def run(
     target = output or Path("outputs") / f"{scenario.stem}.nc"
     from sim.ensemble.store import BlockFiles, parts_of, shard_of
 
-    began, stages, share = time.time(), Stages(), shard_of("1/1" if shard is None else shard)
+    share = shard_of("1/1" if shard is None else shard)
     from sim.units.quantity import read_option
 
     _announce_compiling(quiet)
     until = time.monotonic() + read_option(max_time, "--max-time", "s", above=0, typical="8 h")
     memory = read_option(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
-    with slow_stage("loading the scenario", quiet):
-        scene = _load(scenario, **overrides, quiet=quiet)
+    scene = _load(scenario, **overrides, quiet=quiet)
     if force and resume:
         raise click.UsageError("--resume continues an unfinished run, --force deletes it: give one of them")
 
@@ -189,7 +176,7 @@ def run(
     if not any(plan.share(*share)):
         say(f"shard {shard} has no work, because the run has fewer groups of members than shards")
         return
-    simulate.claim(target, force or resume, simulate.files_read(scene), simulate.BESIDE)
+    simulate.claim(target, force or resume, simulate.files_read(scene))
     from sim.ensemble.execute import orders
 
     parts: Any = BlockFiles(parts_of(target)) if resume else ()
@@ -197,19 +184,15 @@ def run(
     for line in () if quiet else (*(f"note: {text}" for text in preview.remarks(plan)), *lines):
         note(line)
     how: dict[str, Any] = {"shard": share, "replace": force, "resume": resume, "jobs": jobs, "scheduler": scheduler}
-    with contextlib.ExitStack() as shown:
-        if not quiet:
-            stages.shown = shown.enter_context(progress_bar(plans.work(plan, *share)))
+    with contextlib.nullcontext(Shown()) if quiet else progress_bar(plans.work(plan, *share)) as shown:
         with orders() as ordered:
             how["stop"] = lambda: ordered() or time.monotonic() > until
             try:
-                simulate.run(scene, target, **how, memory=memory, stage=stages.begin, progress=stages.shown.advance)
+                simulate.run(scene, target, **how, memory=memory, stage=shown.begin, progress=shown.advance)
             except (simulate.Stopped, KeyboardInterrupt) as stopped:
-                simulate.log(target, began, stages.ended())
                 _fail(_STOPPED, getattr(stopped, "exit_code", INTERRUPTED))
-        shown.callback(lambda: simulate.log(target, began, stages.ended()))
         if tabulated := not (quiet or bare or shard) and preview.tabulated(plan):
-            stages.begin("table")
+            shown.begin("table")
             tables = _tables_of(target)
     if tabulated:
         _print_tables(*tables)
@@ -333,8 +316,7 @@ def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...
 @click.argument("output", type=_PATH)
 @click.option("-o", "--page", type=_PATH, help="The page. Default: beside the dataset.")
 @_WHERE
-@click.option("--data", type=_PATH, help="Add measured points from a CSV file and their chi^2.")
-@click.option("--fit", type=_PATH, help="Add the result of `sim fit`, STEM_fit.json.")
+@click.option("--data", type=_PATH, help="Add measured points from a CSV file.")
 @_LOST
 @_UNITS
 @_FORCE
@@ -366,11 +348,9 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     """Open a dataset at chosen values of its sweep."""
     _import_xarray()
     from sim import analysis
-    from sim.analysis.dataset import lacking, open as opened
+    from sim.analysis.dataset import open as opened
 
     with opened(path) as dataset:
-        if message := lacking(dataset):
-            say(f"note: {path}: {message}", err=True)
         yield analysis.where(dataset, _values(chosen, "--where"))
 
 

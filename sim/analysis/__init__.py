@@ -7,10 +7,10 @@ run, such as the detachment or the friction peak. ``summary`` returns statistics
 
 from sim.analysis.dataset import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
 from sim.analysis.errors import SystematicError, remarks, systematic_errors
-from sim.analysis.events import events, loop_energy, peaks, pull_offs, slip_sizes, slips, slips_by_phase, stick_slip
+from sim.analysis.events import events, loop_energy, peaks, pull_offs, slips, slips_by_phase, stick_slip
 from sim.analysis.lifetimes import Lifetime, lifetime
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
-from sim.analysis.over_speed import crossing, extremes, loss_speeds, speed_curves, steady_speeds
+from sim.analysis.over_speed import crossing, extremes, loss_speeds, steady_speeds
 from sim.analysis.statements import Statement, each, relaxation, statements, statistics
 from sim.analysis.statistics import (
     QUANTILES,
@@ -33,7 +33,7 @@ __all__ = [
     "highlights", "in_columns", "integral_time", "is_stationary", "is_steady", "lifetime",
     "loop_energy", "loss_speeds", "losses", "notes", "observables", "over_time", "peaks", "phases", "pull_offs",
     "reference_radii", "relaxation", "remarks", "scaled", "setting", "settled", "share_observables", "shares",
-    "slip_sizes", "slips", "slips_by_phase", "speed_curves", "spread", "statements", "statistics",
+    "slips", "slips_by_phase", "spread", "statements", "statistics",
     "steady_speeds", "stick_slip", "summary", "sweep_dims", "systematic_errors", "table", "tidy", "to_csv", "where",
 ]  # fmt: skip
 

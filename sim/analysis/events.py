@@ -98,8 +98,7 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
         Under a stage ``slip_count``, and the means over the slip events of what ``slips`` has of each; of a stage at
         one speed those that begin in the second half of the run, with ``…_least`` and ``…_largest`` of
         ``static_friction``, ``force_drop``, ``slip_amplitude`` and ``recurrence_time``. ``slip_spread`` [1]: the
-        standard deviation of their
-        displacements over its mean, see ``slip_sizes``. Of a stage at several speeds ``slips_from`` and
+        standard deviation of their displacements over its mean. Of a stage at several speeds ``slips_from`` and
         ``slips_down_to`` [m/s], its lowest speed on the way up at which a slip begins that another one follows, and on
         the way down at which one begins that follows another: a single one is the fall of friction beyond its maximum.
         ``kinetic_friction`` [N] is the work of the stage over its
@@ -184,33 +183,6 @@ def varies(dataset: xr.Dataset) -> bool:
         return True
     stage = abs(dataset["stage_speed"]).where(dataset["stage_speed"] != 0.0)
     return bool((stage.max("t") > (1.0 + _ROUNDING) * stage.min("t")).any())
-
-
-def slip_sizes(dataset: xr.Dataset, of: str = "slip_amplitude") -> xr.Dataset:
-    """Return the distribution of the sizes of slips of all members together.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it, of a drive ``spring`` with each member recorded.
-    of : str
-        Name of the size in ``slips``: ``"slip_amplitude"``, ``"force_drop"``, ``"recurrence_time"``, ...
-
-    Returns
-    -------
-    xarray.Dataset
-        The sizes, under their name and from the smallest on, with the dimension ``rank`` last (nan beyond those there
-        are), and ``share_as_large`` [1], the share of slips that are as large or larger. Of a stage at one speed those
-        that begin in the second half of the run.
-    """
-    each_slip = slips(dataset)
-    sizes = each_slip[of].where(each_slip["slip_time"] >= _beginning(dataset))
-    over = [name for name in (MEMBERS, "slip") if name in sizes.dims]
-    sizes = sizes.drop_vars(over, errors="ignore").stack(rank=over, create_index=False)
-    ascending = sizes.copy(data=np.sort(sizes.to_numpy(), axis=-1))
-    count, rank = ascending.count("rank"), xr.DataArray(np.arange(sizes.sizes["rank"]), dims="rank")
-    share = (1.0 - rank / count).where(ascending.notnull())
-    return xr.Dataset({of: ascending, "share_as_large": pure(share, "share of slip events of this size")})
 
 
 def _beginning(dataset: xr.Dataset) -> float:

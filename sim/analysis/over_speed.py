@@ -1,4 +1,4 @@
-"""Observables over the sliding speed, and the speeds at which sliding has taken the contact area, with their errors."""
+"""Speeds at which sliding has taken the contact area, with their errors, and extremes over a sweep."""
 
 import contextlib
 import itertools
@@ -14,9 +14,7 @@ from scipy import special
 
 from sim.analysis.dataset import (
     MEMBERS,
-    answered,
     in_pieces,
-    is_stationary,
     is_steady,
     resolved,
     setting,
@@ -34,7 +32,7 @@ from sim.analysis.observables import (
     reference_radii,
     restricted,
 )
-from sim.analysis.statistics import LEVEL, of_second_half, over_members
+from sim.analysis.statistics import LEVEL
 from sim.laws import schallamach
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
@@ -42,8 +40,6 @@ from sim.units.quantity import read_option
 
 #: Shares of JKR's area whose loss has a speed.
 _LOSSES = (0.05, 0.5)
-#: Observables whose curves over the speed are wanted, unless others are named.
-_CURVES = ("contact_area", "friction_force", "shear_stress")
 #: Shares of a loss, in both orders of charging.
 _CHARGED = (
     "lost_to_bonds", "lost_to_fluctuations", "lost_to_fluctuations_first", "lost_to_bonds_last", "lost_to_mean_stress",
@@ -68,48 +64,6 @@ _WAYS = {1.0: "increasing speed", -1.0: "decreasing speed"}
 _UNSEEN = 1e-3
 #: Largest relative lag along a course that is stated where there is no speed.
 _LATE = 0.02
-
-
-def speed_curves(dataset: xr.Dataset, *names: str) -> xr.Dataset:
-    """Return observables over the sliding speed, of a ramp or a sweep of steady speeds: A(V), F(V), τ(V) by default.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it.
-    *names : str
-        Such as ``"area_ratio"``; by default ``contact_area``, ``friction_force`` and ``shear_stress``.
-
-    Returns
-    -------
-    xarray.Dataset
-        Mean ``…_mean`` with ``…_sem``, ``…_low``, ``…_high``, ``…_std`` and more of each, over the dimension ``speed``
-        [m/s] and those of other swept keys: of a ramp over the members (see ``summary``), of steady speeds over members
-        and the second half of the run (see ``distribution``). Where other keys change the ramp, ``speed`` is a
-        coordinate beside ``t``.
-
-    Raises
-    ------
-    ValueError
-        If the speed neither changes nor is swept.
-    """
-    wanted, along, speed = names or _CURVES, "t", speed_of(dataset)
-    if not is_steady(dataset):
-        curves = over_members(dataset, wanted)
-    elif is_stationary(dataset) and (swept := speed_dim(dataset)) is not None:
-        along, speed, curves = swept, speed.isel(t=0, drop=True), of_second_half(dataset, wanted)
-    else:
-        raise ValueError("the speed neither changes nor is swept alone; curves over speed need one of both")
-    with answered():
-        curves[[f"{name}_mean" for name in wanted]]
-    prefixes = tuple(f"{name}_" for name in wanted)
-    chosen = [name for name in curves if str(name).startswith(prefixes)]
-    for name in set(speed.dims) - {along}:
-        if bool((speed == speed.isel({name: 0})).all()):
-            speed = speed.isel({name: 0}, drop=True)
-    curves = curves[chosen].assign_coords(speed=speed)
-    curves = curves.swap_dims({along: "speed"}) if speed.dims == (along,) else curves
-    return curves if along == "t" or "speed" not in curves.dims else curves.sortby("speed")
 
 
 class Crossing(NamedTuple):
@@ -233,7 +187,7 @@ def extremes(curves: xr.Dataset, name: str, along: str) -> xr.Dataset:
     Parameters
     ----------
     curves : xarray.Dataset
-        As of ``speed_curves`` or ``distribution``, with ``<name>_mean``, ``<name>_low`` and ``<name>_high``.
+        As of ``distribution``, with ``<name>_mean``, ``<name>_low`` and ``<name>_high``.
     name : str
         Such as ``"friction_force"``.
     along : str

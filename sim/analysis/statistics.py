@@ -261,7 +261,6 @@ _OF = {
     "sem": "standard error of the ensemble mean",
     "low": "lower end of the 95 % interval of the ensemble mean",
     "high": "upper end of the 95 % interval of the ensemble mean",
-    "skewness": "skewness",
     "effective_samples": "effective number of independent values of the mean",
     "correlation_time": "integral correlation time",
     "correlation_time_sem": "standard error of the integral correlation time",
@@ -271,7 +270,7 @@ _OF = {
 }
 
 #: Units of statistics that are not in that of their observable.
-_UNITS = {"skewness": "1", "effective_samples": "1", "correlation_time": "s", "correlation_time_sem": "s"}
+_UNITS = {"effective_samples": "1", "correlation_time": "s", "correlation_time_sem": "s"}
 
 #: How far from a swept value, in parts of it, one may be chosen: as far as rounding to three digits.
 _NEAR = 5e-3
@@ -331,7 +330,7 @@ def averaging(dataset: xr.Dataset, late: bool) -> str:
 
 
 def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
-    """Return mean, spread, quantiles and skewness over the members, each mean and quantile with its error.
+    """Return mean, spread and quantiles over the members, each mean and quantile with its error.
 
     Parameters
     ----------
@@ -345,7 +344,7 @@ def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
     -------
     xarray.Dataset
         For each observable ``…_mean``, ``…_std`` (standard deviation), ``…_sem`` (standard error of the mean),
-        ``…_low`` and ``…_high`` (95 % interval of the mean), ``…_skewness``, and ``…_quantile``, ``…_quantile_low``,
+        ``…_low`` and ``…_high`` (95 % interval of the mean), and ``…_quantile``, ``…_quantile_low``,
         ``…_quantile_high`` (with the dimension ``quantile``: 5, 50, 95 %). The errors of a single member are nan. A
         member that has no value (the indentation of an open contact) is left out.
 
@@ -353,8 +352,7 @@ def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
     -----
     The interval of a mean is Student's, that of a share of the members Wilson's (J. Am. Stat. Assoc. 22 (1927) 209).
     That of a quantile lies between order statistics, with linear interpolation, and holds for any law; where so few
-    members have none (a 5 % quantile of less than 59), it is nan. The skewness is corrected for the number of members;
-    of n members of a normal law it has about the standard error ``sqrt(6/n)``.
+    members have none (a 5 % quantile of less than 59), it is nan.
     """
     result: dict[str, xr.DataArray] = {}
     members: Any = float(trajectories.attrs.get("members", 1))
@@ -392,7 +390,7 @@ def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.Data
         levels = variable.expand_dims(quantile=list(QUANTILES))
         ends = ("quantile", "quantile_low", "quantile_high") if quantiles else ()
         alike = {"mean": variable, "std": none, "sem": none, "low": variable, "high": variable}
-        return alike | {"skewness": xr.full_like(none, np.nan)} | dict.fromkeys(ends, levels)
+        return alike | dict.fromkeys(ends, levels)
     values = np.moveaxis(variable.to_numpy(), variable.get_axis_num(MEMBERS), -1).copy()
     if quantiles:
         values.sort()  # nan last
@@ -410,16 +408,11 @@ def _moments(name: str, values: np.ndarray, count: np.ndarray) -> dict[str, np.n
     with np.errstate(invalid="ignore", divide="ignore"):  # nan is the answer where there are too few
         mean = np.nansum(values, axis=-1) / count
         deviations = values - mean[..., None]
-        powers = deviations * deviations
-        squares = np.nansum(powers, axis=-1)
+        squares = np.nansum(deviations * deviations, axis=-1)
         std = np.sqrt(squares / np.where(count > 1.0, count - 1.0, np.nan))
         error = std / np.sqrt(count)
-        powers *= deviations
-        third = np.nansum(powers, axis=-1) / count
-        biased = np.where(std > _ROUNDING * abs(mean), third / (squares / count) ** 1.5, np.nan)
-        skewness = np.where(count > 2.0, biased * np.sqrt(count * (count - 1.0)) / (count - 2.0), np.nan)
     low, high = interval(name, mean, error, count)
-    return {"mean": mean, "std": std, "sem": error, "low": low, "high": high, "skewness": skewness}
+    return {"mean": mean, "std": std, "sem": error, "low": low, "high": high}
 
 
 def interval(name: str, mean: np.ndarray, sem: np.ndarray, count: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
@@ -577,7 +570,7 @@ def over_time(values: np.ndarray, step: float = 1.0, name: str = "") -> dict[str
     Returns
     -------
     dict
-        ``mean``, ``sem``, ``low`` and ``high`` (95 % interval of the mean), ``std``, ``skewness``, ``quantile``,
+        ``mean``, ``sem``, ``low`` and ``high`` (95 % interval of the mean), ``std``, ``quantile``,
         ``quantile_low`` and ``quantile_high`` (three each), ``effective_samples``: so many independent values tell
         as much of the mean, and ``correlation_time`` with ``correlation_time_sem`` [s], see ``integral_time``. What is
         not known is nan, as the errors of a single run that is shorter than its memory.
@@ -624,7 +617,6 @@ def _over_time(
         means = _sum(values) / counts
         mean = np.nansum(means, axis=-1) / np.isfinite(means).sum(axis=-1)
         deviations = values - mean[:, np.newaxis, np.newaxis]
-        cubes = _sum(deviations**3).sum(axis=-1)
         np.square(deviations, out=deviations)
         spread = np.sqrt(_sum(deviations).sum(axis=-1) / total)
         below = [np.sum(values <= levels[:, k, np.newaxis, np.newaxis], axis=-1) / counts for k in range(len(_LEVELS))]
@@ -633,7 +625,6 @@ def _over_time(
         inflated, times = (np.array(column) for column in zip(*memory, strict=True))
         spreads = np.array([spread, *np.broadcast_to(np.sqrt(_LEVELS * (1.0 - _LEVELS)), (points, len(_LEVELS))).T])
         errors, freedoms = _errors(np.array([means, *below]), spreads, np.moveaxis(inflated, -1, 0), total)
-        skewness = np.where(spread > 1e-12 * abs(mean), cubes / total / spread**3, np.nan)
         effective = np.where(errors[0] > 1e-12 * abs(mean), (spread / errors[0]) ** 2, np.nan)
         each_point = zip(spreads.T, errors.T, freedoms.T, strict=True)
         ends = np.stack([_shares(*numbers, 1.0 if members >= _MANY else 0.5) for numbers in each_point], axis=1)
@@ -643,7 +634,7 @@ def _over_time(
         low, high = interval(name, mean, sem, freedom + 1.0)
     ends[:, ~noisy] = np.nan
     result = {"mean": mean, "std": spread, "sem": sem, "low": low, "high": high}
-    result |= {"skewness": skewness, "effective_samples": effective}
+    result |= {"effective_samples": effective}
     if complete.any():
         result |= {"correlation_time": times[:, 0], "correlation_time_sem": times[:, 1]}
     ranks = np.where((ends >= 0.0) & (ends <= 1.0), ends * (total[:, np.newaxis] - 1.0), np.nan)
@@ -836,10 +827,7 @@ def _openings(counts: np.ndarray, members: int, again: str, span: str) -> str:
 
 
 def distribution(
-    dataset: xr.Dataset,
-    names: Collection[str] | None = None,
-    span: tuple[float, float] | None = None,
-    minus: Mapping[str, Any] | None = None,
+    dataset: xr.Dataset, names: Collection[str] | None = None, minus: Mapping[str, Any] | None = None
 ) -> xr.Dataset:
     """Return statistics of observables over the members and the second half of the run, at each point of the sweep.
 
@@ -849,8 +837,6 @@ def distribution(
         As ``sim run`` writes it, with each member; of a stationary run (see ``is_stationary``).
     names : collection of str, optional
         The observables, all by default.
-    span : (float, float), optional
-        First and last time of another span in which drive and control are constant [s].
     minus : dict, optional
         Values of swept keys, see ``where``: statistics are those of the differences from these points. A member has the
         same noise at all of them, so the differences are of each member, and their error is often far below the errors.
@@ -858,7 +844,7 @@ def distribution(
     Returns
     -------
     xarray.Dataset
-        ``…_mean``, ``…_sem``, ``…_low``, ``…_high``, ``…_std``, ``…_skewness``, ``…_effective_samples``,
+        ``…_mean``, ``…_sem``, ``…_low``, ``…_high``, ``…_std``, ``…_effective_samples``,
         and with the dimension ``quantile`` ``…_quantile``, ``…_quantile_low``, ``…_quantile_high``; see ``over_time``.
         What the members have in common, and a run without noise, has no errors. What only a closed contact has (see
         ``closed_only``) is of the closed contacts.
@@ -868,7 +854,7 @@ def distribution(
         contacts close again. All else is then nan.
     """
     dataset = plain(dataset)
-    late, words = _span(dataset, span)
+    late, words = _late(dataset)
     step = float(late["t"][-1] - late["t"][0]) / max(late.sizes["t"] - 1, 1)
     sweep, result = xr.full_like(dataset["contact_modulus"], np.nan, float), dict[str, xr.DataArray]()
     noisy, base = has_noise(dataset).to_numpy().ravel(), where(late, minus) if minus else None
@@ -948,15 +934,10 @@ def _described(
     return result
 
 
-def _span(dataset: xr.Dataset, span: tuple[float, float] | None) -> tuple[xr.Dataset, str]:
-    """Return the records of a span, by default of the second half of the run, and words for it."""
-    if span is None:
-        first, _ = second_half(dataset.sizes["t"])
-        return dataset.isel(t=slice(first, None)), "the second half" if first else "the run"
-    rounding = _ROUNDING * float(dataset["t"][-1])
-    chosen = np.flatnonzero(abs(dataset["t"] - 0.5 * sum(span)) <= 0.5 * (span[1] - span[0]) + rounding)
-    begin, end = (engineering(time, "s") for time in span)
-    return dataset.isel(t=chosen), f"{begin} to {end}"
+def _late(dataset: xr.Dataset) -> tuple[xr.Dataset, str]:
+    """Return the records of the second half of the run, and words for it."""
+    first, _ = second_half(dataset.sizes["t"])
+    return dataset.isel(t=slice(first, None)), "the second half" if first else "the run"
 
 
 def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
@@ -967,7 +948,7 @@ def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) ->
     if "contact_radius" in dataset:
         return distribution(dataset, names)
     dataset = plain(dataset)
-    (late, words), sweep = _span(dataset, None), xr.full_like(dataset["contact_modulus"], np.nan, float)
+    (late, words), sweep = _late(dataset), xr.full_like(dataset["contact_modulus"], np.nan, float)
     points, members = sweep.size, int(dataset.attrs["members"])
     noisy, counts = has_noise(dataset).to_numpy().ravel(), np.full((points, late.sizes["t"]), members)
     if "in_contact_mean" in late:

@@ -503,7 +503,7 @@ def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
         row[f"{100.0 * level:.0f} %"] = concise(value, sem)
     time = float(means.get(f"{column.name}_correlation_time", math.nan))
     step, unit = scaled(time, "s")
-    row |= {"skewness": f"{of('skewness'):.2f}", "t_c": "–"}
+    row["t_c"] = "–"
     if time > 0.0:
         row["t_c"] = f"{concise(step * time, step * float(of('correlation_time_sem')))} {unit}"
     return row | {"free values": f"{of('effective_samples'):.3g}"}
@@ -513,7 +513,7 @@ def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
 
 
 #: Columns of statistics, and the endings of their names in a dataset in which each quantile is a variable.
-_ENDINGS = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": "std", "skewness": "skewness"}
+_ENDINGS = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": "std"}
 _ALIKE = [f"q{100 * level:02.0f}{end}" for level in QUANTILES for end in ("", "_low", "_high")]
 _ENDINGS |= {name: name for name in (*_ALIKE, "effective_samples", "correlation_time")}
 _ENDINGS |= {"correlation_time_error": "correlation_time_sem"}
@@ -582,7 +582,7 @@ def tidy(dataset: xr.Dataset, lost: Sequence[str] = ()) -> pd.DataFrame:
     pandas.DataFrame
         Columns: the swept keys; ``t`` [s], nan where a number is of the whole run or of its second half; the prescribed
         ``speed`` [m/s]; ``quantity``, its ``unit``, and what its ``mean`` is ``over``; ``error`` (standard error),
-        ``low`` and ``high`` (95 % interval) of the mean; ``sd``; ``skewness``; quantiles ``q05``, ``q50``, ``q95`` with
+        ``low`` and ``high`` (95 % interval) of the mean; ``sd``; quantiles ``q05``, ``q50``, ``q95`` with
         the ends of their intervals; ``effective_samples``, ``correlation_time`` and ``correlation_time_error`` [s].
     """
     members = averaging(dataset, False).removeprefix("mean over the ")

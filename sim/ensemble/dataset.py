@@ -21,7 +21,7 @@ from sim.ensemble.diagnosis import cure, systematic_errors, worst
 from sim.ensemble.execute import pool
 from sim.ensemble.plan import Plan, part_name
 from sim.ensemble.store import Blocks
-from sim.ensemble.variables import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, SYSTEMATIC, Variable
+from sim.ensemble.variables import MAP, NUMBERS, SYSTEMATIC, Variable
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice
 from sim.numerics.hdf5 import CHUNK_CACHE, Refused, opened, tables
@@ -287,7 +287,6 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
             described = quantity.unit, quantity.meaning, quantity.symbol, value
             content.add(variable_name(key), "f8", (), *described)
     described_as = {number.name: (number.unit, number.long_name, number.symbol) for number in NUMBERS}
-    described_as |= {name: ("1", text, "") for name, text in KNOWN_ERRORS.items()}
     described_as |= {name: (*unit_and_text, "") for name, unit_and_text in SYSTEMATIC.items()}
     derived: dict[str, list[float]] = {}
     errors = []
@@ -301,11 +300,9 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
             derived.setdefault(name, []).append(float(value))
         point.release()
     for name, values in derived.items():
-        if len(values) == len(plan.points):
+        if name in described_as and len(values) == len(plan.points):
             array = np.reshape(values, tuple(content.sweep.values()))
             content.add(name, "f8", tuple(content.sweep), *described_as[name], array)
-            if "error" in name and name in KNOWN_ERRORS:
-                content.attributes[name] = max(values, key=abs)
     if (most := worst(errors)) and "cell_error_area" in content.variables:
         content.variables["cell_error_area"].attributes["cure"] = cure(*most)
 
@@ -376,9 +373,6 @@ def _add_maps(content: Outline, plan: Plan) -> None:
     names = (*content.sweep, "map_member", "map_time", "x", "y")
     content.add(MAP[0], "f8", names, *MAP[1:], None, (1,) * (len(names) - 2) + lattice.shape)
     content.places[MAP[0]] = Place({"": MAP[0]})
-    for energy in DISC_ENERGIES if all(point.margin is not None for point in plan.points) else ():
-        content.add(energy[0], "f8", names[:-2], *energy[1:])
-        content.places[energy[0]] = Place({"": energy[0]})
 
 
 def in_memory(outline: Outline, parts: Blocks) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:

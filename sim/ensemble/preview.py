@@ -1,14 +1,12 @@
-"""Statements about a run before it starts: models, quantities, error estimates, time, memory and disk."""
+"""Statements about a run before it starts: models, quantities, error estimates, time, memory and file."""
 
 import itertools
 import math
 import os
 import re
-import shutil
 import time
 import tomllib
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -20,7 +18,6 @@ from sim.ensemble.variables import SOURCES
 from sim.laws import jkr
 from sim.laws.schallamach import Body
 from sim.numerics import jit
-from sim.numerics.files import StoreTrouble
 from sim.parts.bonds.models import Cohort, FirstMoment, Rate
 from sim.parts.drive import Spring
 from sim.parts.exchange import Parts
@@ -37,12 +34,11 @@ _START, _WORKER = 2.5, 1.2
 _BYTE, _MAP_BYTE = 48e-9, 2e-9
 _POINT, _MODE, _RECORD, _RECORD_OF_MEMBER = 4e-3, 5e-6, 5e-6, 2e-7
 # Rough memory [byte]: a process with its libraries, more of it for a table; a mode pair while it is made and while it
-# is used. Copies of a part while it is computed, and of the dataset while it is written or read.
-_PROCESS, _TABLE, _OF_MODE_MADE, _OF_MODE, _COPIES_OF_PART, _COPIES = 160e6, 100e6, 520.0, 160.0, 3.0, 2.0
+# is used. Copies of a part while it is computed, of a dataset while it is written or read, of one that stays in memory.
+_PROCESS, _TABLE, _OF_MODE_MADE, _OF_MODE = 160e6, 100e6, 520.0, 160.0
+_COPIES_OF_PART, _COPIES, _COPIES_IN_MEMORY = 3.0, 2.0, 3.0
 #: Largest dataset that is built in memory, and largest trajectories that are read back for a table [byte].
 _BUILT_IN_MEMORY, _MOST_TABULATED = 256e6, 1e8
-#: Bytes of a quantity's name in a part.
-_HEADER = 300.0
 
 _MOST_WORDS = 6
 #: Time for which steps are tried [s]; a run with a shorter estimate [s] is not tried, or not announced.
@@ -63,28 +59,26 @@ class _NotCompiledError(Exception):
 
 
 class Forecast(NamedTuple):
-    """Estimated needs of a run: time of all cores and by the clock [s], memory, dataset and room on disk [byte]."""
+    """Estimated needs of a run: time of all cores and by the clock [s], memory and dataset [byte]."""
 
     cpu: float
     clock: float
     memory: float
     file: float
-    disk: float
 
 
 def forecast(plan: Plan, jobs: int, pace: float = 1.0, shares: int = 1, left: float = 1.0) -> Forecast:
     """Estimate the needs of a run, or of one of some shares of it.
 
     ``pace`` is the measured time of some steps over their counted time, ``left`` the fraction of steps that are not
-    done yet. The disk also holds the parts of steps that are done. A share makes no dataset.
+    done yet. A share makes no dataset.
     """
     modes = _MODE * max(_mode_pairs(point) for point in spread(plan.points, 2))
     steps, whole = left * pace * counted(plan) / shares, shares == 1
     alone = _START + modes + len(plan.points) * _POINT + whole * plan.bytes * _BYTE
     started = _WORKER + modes if jobs > 1 else 0.0
     cpu, clock = alone + jobs * started + steps, alone + started + steps / jobs
-    disk = _parts(plan) / shares + whole * plan.file_bytes
-    return Forecast(cpu, clock, memory(plan, jobs), plan.file_bytes, disk)
+    return Forecast(cpu, clock, memory(plan, jobs), plan.file_bytes)
 
 
 def tabulated(plan: Plan) -> bool:
@@ -131,18 +125,6 @@ def _block(plan: Plan, point: Scenario) -> float:
     return max(_OF_MODE_MADE * pairs, _OF_MODE * pairs + states + _COPIES_OF_PART * part)
 
 
-def _parts(plan: Plan) -> float:
-    """Return the size of all parts [byte]: records in double precision, and the states between blocks."""
-    first, groups = plan.points[0], len(plan.groups)
-    blocks, each = len(plan.blocks(first)), plan.members if plan.per_member else 3 * groups
-    rows = sum(each if plan.varies(variable) else groups for variable in plan.variables)
-    states = (blocks - 1) * plan.members * state_numbers(first)
-    late = 0.5 * blocks * plan.late  # sums and counts of each member over two quarters
-    headers = _HEADER * len(plan.packs) * groups * (blocks * len(plan.variables) + late)
-    numbers = len(plan.points) * (rows * first.clock.records + states + 4 * late * plan.members)
-    return plan.maps + headers + 8.0 * numbers
-
-
 def memory_limit() -> tuple[float, str]:
     """Return the memory that a run may take [byte], and the source of this limit.
 
@@ -170,30 +152,13 @@ def fitting(plan: Plan, jobs: int, most: float = math.inf, in_memory: bool = Fal
         If memory is too small for one process; the message says how much the run takes.
     """
     limit, source = (most, "are allowed (--max-memory)") if most < math.inf else memory_limit()
-    dataset = _parts(plan) + plan.bytes if in_memory else 0.0
+    dataset = _COPIES_IN_MEMORY * plan.bytes if in_memory else 0.0
     for count in range(jobs, 0, -1):
         if memory(plan, count) + dataset <= limit:
             return count
     cure = "reduce modes, maps, records or points of a sweep (see `sim check`)"
     needed = size(memory(plan, 1) + dataset)
     raise NoRoom(f"the run needs at least {needed} of memory, but {size(limit)} {source}; {cure}")
-
-
-def refuse_full_disk(plan: Plan, target: Path, shares: int = 1) -> None:
-    """Refuse a run, or one of some shares of it, whose parts and dataset do not fit on the disk of its output.
-
-    Raises
-    ------
-    StoreTrouble
-        With the numbers and the cure.
-    """
-    folder = next(parent for parent in target.absolute().parents if parent.is_dir())
-    needed, free = forecast(plan, 1, shares=shares).disk, float(shutil.disk_usage(folder).free)
-    parts = Path(f"{target}.parts")  # of an unfinished run
-    free += sum(path.stat().st_size for path in parts.iterdir() if path.is_file()) if parts.is_dir() else 0.0
-    if needed > free:
-        text = f"parts and dataset need {size(needed)} until they are merged, but {size(free)} are free"
-        raise StoreTrouble(f"{folder}: {text}; reduce members, records or maps, or record statistics only")
 
 
 def size(count: float) -> str:
@@ -234,8 +199,7 @@ def processes(
     if jobs > 1 or left * counted(plan) > _LONG:
         needs = forecast(plan, jobs, tried(plan, compiling=True) or 1.0, shard[1], left)
         if jobs > 1 or needs.clock > _LONG:
-            room = f"{size(needs.memory)} of memory, {size(needs.disk)} of disk for a file of {size(needs.file)}"
-            lines.append(f"{_times(needs, jobs)}, {room}")
+            lines.append(f"{_times(needs, jobs)}, {size(needs.memory)} of memory, a file of {size(needs.file)}")
     return jobs, lines
 
 
@@ -316,7 +280,7 @@ def preview(scenario: Scenario) -> str:
         "errors of the result": _errors(plan, most),
         "slider": _slider([point for point in some if point.drive.solves_motion]),
         "diagnosis": [(text,) for text in diagnosis(plan)],
-        "notes": [(text,) for text in [*remarks(plan, most), *_lacking(plan)]],
+        "notes": [(text,) for text in remarks(plan, most)],
         "the run": _run(plan),
     }
     return "\n\n".join([scenario.name, *(f"{title}\n{_aligned(rows)}" for title, rows in blocks.items() if rows)])
@@ -474,17 +438,6 @@ def _slider(points: Sequence[Scenario]) -> Rows:
     return [(name, f"{_span(values)} {text}") for (name, text), values in rows.items()]
 
 
-def _lacking(plan: Plan) -> list[str]:
-    """Return a sentence if memory, and one if the disk, is too small for a run here."""
-    texts = []
-    for refuse in (lambda: fitting(plan, 1), lambda: refuse_full_disk(plan, Path("outputs") / "dataset.nc")):
-        try:
-            refuse()
-        except (NoRoom, StoreTrouble) as trouble:
-            texts.append(str(trouble))
-    return texts
-
-
 def _run(plan: Plan) -> Rows:
     """Return the size of a run: steps, members, time, memory and file."""
     scene, clock, jobs = plan.scenario, plan.points[0].clock, usual_jobs(plan)
@@ -494,13 +447,13 @@ def _run(plan: Plan) -> Rows:
     if scene.sweep:
         axes = " × ".join(f"{len(axis.values)} {axis.keys[0]}" for axis in scene.sweep)
         rows.append(("sweep", f"{axes} = {len(plan.points):,} points" if len(scene.sweep) > 1 else axes))
-    pace = tried(plan)
+    pace, (limit, source) = tried(plan), memory_limit()
     needs = forecast(plan, jobs, pace or 1.0)
+    short = f", but {size(limit)} {source}" if memory(plan, 1) > limit else ""
     before = "" if scene.record.compression == "none" else f", {size(plan.bytes)} before compression"
     return [
         *rows,
         ("work", f"{work(plan):,} member-steps, {_times(needs, jobs, pace is not None)}"),
-        ("memory", f"about {size(needs.memory)}{', all processes together' if jobs > 1 else ''}"),
+        ("memory", f"about {size(needs.memory)}{', all processes together' if jobs > 1 else ''}{short}"),
         ("file", f"about {size(needs.file)}{before}"),
-        ("disk", f"about {size(needs.disk)} during the run"),
     ]

@@ -1,15 +1,10 @@
 """Running a scenario: its sweep, its members, in memory or onto the disk."""
 
 import contextlib
-import datetime
 import itertools
-import json
 import math
 import os
-import platform
-import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, cast
@@ -20,11 +15,10 @@ from sim.engine import MemberNoise, State, Trajectory, follow
 from sim.ensemble.dataset import attributes, attributes_of, identity, in_memory, moments, outline, padded, write
 from sim.ensemble.execute import compute
 from sim.ensemble.plan import Block, Plan, Task, snapshots
-from sim.ensemble.preview import fitting, refuse_full_disk
+from sim.ensemble.preview import fitting
 from sim.ensemble.store import WHOLE, Arrays, BlockFiles, Blocks, MemoryBlocks, OutputBusy, Shard, Stopped, Unfinished
-from sim.ensemble.variables import DISC_ENERGIES, LARGEST, MAP, VARIABLES, Variable
-from sim.laws.halfspace import cross_energy_of_map, disc_energy_of_map
-from sim.numerics.files import DiskFull, OutputExists, StoreTrouble, claim, explained
+from sim.ensemble.variables import LARGEST, MAP, VARIABLES, Variable
+from sim.numerics.files import DiskFull, OutputExists, claim, explained
 from sim.numerics.hdf5 import located
 from sim.parts.drive import READINGS
 from sim.parts.shear.maps import CarriedProcess
@@ -33,13 +27,10 @@ from sim.parts.shear.process import Fluctuation
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read
 from sim.units.notation import CUMULATIVE, OF_CONTACT, second_half
-from sim.units.terminal import LOG
 
 Progress = Callable[[int], None]
 
 
-#: Ends of the names of what a run makes beside its output.
-BESIDE = (".parts", ".log")
 #: Shards of which a run holds the locks at once: systems limit the number of open files.
 _LOCKS = 100
 #: Steps that are computed together at most, up to the next record.
@@ -95,7 +86,7 @@ def run(
     Stopped
         If it was to end early; what is computed is kept.
     StoreTrouble
-        If the disk has too little room or a file makes trouble; an older output stays.
+        If the disk is full or a file makes trouble; an older output stays.
     NoRoom
         If there is too little memory, before anything is computed.
     WorkerDied
@@ -116,14 +107,12 @@ def run(
             stage("writing")
             content = outline(plan, blocks)
             return located(xarray.Dataset(in_memory(content, blocks), attrs=content.attributes))
-    claim(Path(to), replace or resume, files_read(scenario), BESIDE)
+    claim(Path(to), replace or resume, files_read(scenario))
     target = Path(to).resolve() if Path(to).is_symlink() else Path(to)
     if target.exists() and not target.is_file():
         raise OutputExists(f"{target} is not a regular file; name another output")
     with explained(target.parent):
         target.parent.mkdir(parents=True, exist_ok=True)
-    if replace or not target.exists():
-        refuse_full_disk(plan, target, shard[1])
     is_done = False
     try:
         while not is_done:
@@ -226,8 +215,7 @@ def _record(task: Task, point: Scenario, state: State | None, block: Block) -> t
                 part = rows[variable.name][:, first:last]
                 part[:] = np.broadcast_to(_read(variable, point, course), part.T.shape).T
         if drawn and steps[-1] in drawn_at:
-            for name, values in _maps(point, state, drawn).items():
-                maps[f"{name}@{drawn_at.index(steps[-1])}"] = values
+            maps[f"{MAP[0]}@{drawn_at.index(steps[-1])}"] = _maps(point, state, drawn)
     end = cast(State, state)
     if block.end == clock.steps:
         for largest in LARGEST:
@@ -268,37 +256,7 @@ def _read(variable: Variable, point: Scenario, course: Trajectory) -> np.ndarray
     return np.where(np.isnan(course.driven[..., READINGS.index("runaway_time")]), values, np.nan)
 
 
-def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:
-    """Maps of the first members, and in a contact of finite size the energies per area that they store on its disc.
-
-    ½⟨τ1 w1⟩, and ⟨τ1 w0⟩ with the displacement w0 of the mean stress [J/m²], shape (maps,).
-    """
+def _maps(point: Scenario, state: State, drawn: int) -> np.ndarray:
+    """Return the maps of the first members."""
     process = cast(ModalProcess | CarriedProcess, point.process)
-    maps = process.maps(cast(Fluctuation, state.shear), np.broadcast_to(state.drive.position, drawn), drawn)
-    if point.margin is None:
-        return {MAP[0]: maps}
-    solid, (square, cell) = point.solid.effective, process.centred(maps)
-    recorded = state.contact.radius, state.bonding.stress
-    radius, stress = (np.broadcast_to(values, max(len(values), drawn))[:drawn] for values in recorded)
-    radius = np.where(2.0 * radius > cell, np.nan, radius)  # a contact that has outgrown its map
-    alone = disc_energy_of_map(square, cell, radius, *solid)
-    cross = cross_energy_of_map(square, cell, radius, stress, *solid)
-    return {MAP[0]: maps, DISC_ENERGIES[0][0]: alone, DISC_ENERGIES[1][0]: cross}
-
-
-def log(target: Path, began: float, stages: dict[str, float]) -> None:
-    """Append to ``OUT.nc.log`` what may differ between equal runs: time, host, arguments, seconds of each stage.
-
-    Trouble with it is a note, as it does not harm the output.
-    """
-    when = datetime.datetime.fromtimestamp(began, datetime.UTC).isoformat(timespec="seconds")
-    machine = {"host": platform.node(), "platform": platform.platform(), "arguments": sys.argv[1:]}
-    entry = {"began": when, "seconds": round(time.time() - began, 2), "stages": stages, **machine}
-    path = target.with_name(f"{target.name}.log")
-    try:
-        if path.is_symlink() or (path.exists() and not path.is_file()):
-            raise StoreTrouble("it is not a regular file")
-        with explained(target.parent), path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(entry) + "\n")
-    except StoreTrouble as trouble:
-        LOG.warning("%s.log was not written: %s", target, trouble)
+    return process.maps(cast(Fluctuation, state.shear), np.broadcast_to(state.drive.position, drawn), drawn)

@@ -376,21 +376,6 @@ NUMBERS = (
           lambda scene: scene.contact.load is not None, "contact.load"),
 )  # fmt: skip
 
-#: Long names of what a process knows of its errors and spreads before the run, all relative but for two counts.
-KNOWN_ERRORS = {
-    "cell_error_variance": "error of the stress variance of the cell relative to the infinite plane",
-    "cell_error_energy": "error of the mean fluctuation energy of the cell relative to the infinite plane",
-    "member_spread_variance": "relative standard deviation of the stress variance of a member",
-    "member_spread_energy": "relative standard deviation of the fluctuation energy of a member",
-    "mode_pairs": "number of mode pairs of the cell",
-    "bands": "number of bands",
-    "banded_error_third_cumulant": "error of the third cumulant of the energy by banding",
-    "banded_error_fourth_cumulant": "error of the fourth cumulant of the energy by banding",
-    "banded_error_correlation_time": "error of the integral correlation time of the energy by banding",
-    "banded_error_autocorrelation": "largest error of the autocorrelation of the energy by banding",
-    "banded_error_relaxing_mean": "largest error of the mean energy by banding while the amplitude relaxes",
-}
-
 #: What leaves something out, by the first word of its errors.
 SOURCES = {"cell": "cell", "banded": "bands", "step": "clock step"}
 #: Unit and long name of the systematic errors of a run.
@@ -404,8 +389,3 @@ SYSTEMATIC["member_spread_area"] = "1", "standard deviation of A/A_JKR between m
 
 #: Name, unit, long name and symbol of what is recorded with each stress map.
 MAP = ("shear_map", "Pa", "shear-stress fluctuation", "tau_1")
-DISC_ENERGIES = (
-    ("disc_energy", "J/m^2", "energy of the map on the contact disc, per area", "DeltaGamma_d"),
-    ("cross_energy", "J/m^2", "energy between the map and the mean stress, per area of the disc",
-     "DeltaGamma_x"),
-)  # fmt: skip

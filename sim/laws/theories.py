@@ -10,7 +10,6 @@ tangential force, tau = T/(pi a^2) the mean shear stress and E* the contact modu
     ``G + 2 T^2/(pi^3 E* a^3) = w``     uniform stress, reversible, constant force: adhesion pays for all of it
     ``G + 6 tau^2 a/(pi E*) = w``       uniform stress, reversible, constant stress
     ``G + alpha 6 tau^2 a/(pi E*) = w`` a reversible share alpha (``sim.laws.reversible``)
-    ``A = A0 - alpha_S T^2``            Sahli et al. 2018, measured
     ``G + G_s = w f(psi)``              mixed-mode fracture, G_s as Savkoor & Briggs'
 
 MCD is Menga, Carbone & Dini. The two laws at a constant force differ by 32/(3 pi^2) = 1.08 in energy. Both have the
@@ -459,91 +458,6 @@ def reversible_force_at_indentation(indentation, work, tangential_force, sphere_
     return shear_share_at_indentation(indentation, work, sticking, 1.0, sphere_radius, modulus, poisson_ratio)
 
 
-@device
-def _not_below(hertz, square):
-    """Radius of a given square, never below Hertz's; nan where neither is."""
-    if hertz >= 0.0 and square <= hertz * hertz:
-        return hertz
-    return math.sqrt(square)
-
-
-@law
-def _measured_at_force(jkr, hertz, shrinkage, force):
-    return _not_below(hertz, jkr * jkr - shrinkage * force * force / math.pi)
-
-
-@law
-def _measured_at_stress(jkr, hertz, shrinkage, stress):
-    """A = A0 - alpha_S (tau A)^2 solved for A."""
-    return _not_below(hertz, 2.0 * jkr * jkr / (1.0 + math.sqrt(1.0 + 4.0 * math.pi * shrinkage * (stress * jkr) ** 2)))
-
-
-def sahli_at_load(load, work, tangential_force, shrinkage, sphere_radius, modulus):
-    """Return the contact radius at a load by the empirical law of Sahli et al. (2018).
-
-    Parameters
-    ----------
-    load, work, tangential_force, sphere_radius, modulus : float or array
-        P [N], w [J/m^2], T [N], R [m], E* [Pa].
-    shrinkage : float or array
-        alpha_S [m^2/N^2], measured for each contact; it fell with its area as A0^(-3/2).
-
-    Returns
-    -------
-    float or array
-        a [m], not below Hertz's radius; nan where a pulled contact has no area left.
-
-    Notes
-    -----
-    ``A = A0 - alpha_S T^2`` with A0 JKR's area; meant for forces up to the onset of sliding.
-
-    Examples
-    --------
-    >>> a = sahli_at_load(5.0, 1.0, [0.0, 1.0], 0.1 * math.pi, 1.0, 4.0)
-    >>> print(f"{a[0] ** 2 - a[1] ** 2:.3f}")
-    0.100
-    """
-    jkr, hertz, *_ = _at_load(load, work, sphere_radius, modulus)
-    return _measured_at_force(jkr, hertz, shrinkage, tangential_force)
-
-
-def mixities(shrinkage, load, work, sphere_radius, modulus, poisson_ratio=0.5):
-    """Return the mixity lambda of each mixed-mode theory that shrinks as the law of Sahli et al. at small forces.
-
-    Parameters
-    ----------
-    shrinkage : float or array
-        alpha_S of ``A = A0 - alpha_S T^2`` [m^2/N^2], measured at this load.
-    load, work, sphere_radius, modulus, poisson_ratio : float or array
-        P [N], w [J/m^2], R [m], E* [Pa], nu [1].
-
-    Returns
-    -------
-    dict of array
-        lambda [1] by theory: ``"scaled_angle"``, ``"shear_share"`` and ``"scaled_tangent"``; nan where the contact
-        shrinks more than by Savkoor & Briggs, or grows.
-
-    Notes
-    -----
-    ``alpha_S/alpha_SB`` is ``lambda (2 - lambda)`` of the first theory and lambda of the others. Contacts of other
-    loads on the same rig have given other lambdas: it is no constant of the interface.
-
-    Examples
-    --------
-    >>> half = 0.5 * savkoor_briggs_shrinkage(4e-3, 0.042, 2e-3, 6.4e6)
-    >>> for name, mixity in mixities(half, 4e-3, 0.042, 2e-3, 6.4e6).items():
-    ...     print(f"{name:14s} {mixity:.3f}")
-    scaled_angle   0.293
-    shear_share    0.500
-    scaled_tangent 0.500
-    """
-    full = savkoor_briggs_shrinkage(load, work, sphere_radius, modulus, poisson_ratio)
-    with np.errstate(all="ignore"):
-        share = np.asarray(shrinkage, dtype=float) / full
-    share = np.where((share >= 0.0) & (share <= 1.0), share, math.nan)
-    return {"scaled_angle": share / (1.0 + np.sqrt(1.0 - share)), "shear_share": share, "scaled_tangent": share}
-
-
 def _at_load(load, work, sphere_radius, modulus):
     """Radii of JKR and Hertz at a load, the load and the work."""
     adhesive = jkr.radius_at_load(load, work, sphere_radius, modulus)
@@ -556,9 +470,7 @@ def _at_indentation(indentation, work, sphere_radius, modulus):
     return adhesive, jkr.hertz_radius_at_indentation(indentation, sphere_radius), indentation, work
 
 
-def compare_at_load(
-    stress, load, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, shrinkage=math.nan, mixity=0.5
-):
+def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, mixity=0.5):
     """Return the contact radius at a load and a mean shear stress by every theory.
 
     Parameters
@@ -567,8 +479,6 @@ def compare_at_load(
         tau [Pa], P [N], w [J/m^2], R [m], E* [Pa], nu [1].
     reversible : float or array
         alpha of ``"fraction"`` [1].
-    shrinkage : float or array
-        alpha_S of ``"sahli"`` [m^2/N^2]; nan, unknown, leaves its radius nan.
     mixity : float or array
         lambda [1] of the mixed-mode theories.
 
@@ -576,7 +486,7 @@ def compare_at_load(
     -------
     dict of array
         a [m] by theory: ``"jkr"``, ``"hertz"``, ``"uncorrected"`` (MCD 2018), ``"savkoor_briggs"``,
-        ``"reversible_force"``, ``"reversible_stress"``, ``"fraction"``, ``"sahli"`` and the mixed-mode
+        ``"reversible_force"``, ``"reversible_stress"``, ``"fraction"`` and the mixed-mode
         ``"scaled_angle"``, ``"shear_share"`` and ``"scaled_tangent"``. Each theory's tangential force is
         ``pi a^2 tau`` with its own radius.
 
@@ -592,7 +502,6 @@ def compare_at_load(
     jkr               1.7371 1.7371
     hertz             0.9787 0.9787
     uncorrected       1.7371 2.0640
-    sahli             nan nan
     savkoor_briggs    1.7371 1.6333
     reversible_force  1.7371 1.6249
     reversible_stress 1.7371 1.3975
@@ -604,7 +513,6 @@ def compare_at_load(
     rest, stress = (sphere_radius, modulus, poisson_ratio), np.asarray(stress, dtype=float)
     jkr, hertz, *held = _at_load(load, work, sphere_radius, modulus)
     radii = {"jkr": jkr, "hertz": hertz, "uncorrected": uncorrected_at_load(load, work, stress, *rest)}
-    radii["sahli"] = _measured_at_stress(jkr, hertz, shrinkage, stress)
     _add_shares(radii, shrunk_at_load, (*held, stress), reversible, mixity, rest)
     laws = {"scaled_angle": scaled_angle_at_load, "scaled_tangent": scaled_tangent_at_load}
     return _with_own_forces(radii, laws, held, stress, mixity, rest)
@@ -613,7 +521,7 @@ def compare_at_load(
 def compare_at_indentation(
     stress, indentation, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, mixity=0.5
 ):
-    """Return the contact radius at an indentation by theory [m], as ``compare_at_load``, without ``"sahli"``."""
+    """Return the contact radius at an indentation by theory [m], as ``compare_at_load``."""
     rest, stress = (sphere_radius, modulus, poisson_ratio), np.asarray(stress, dtype=float)
     jkr, hertz, *held = _at_indentation(indentation, work, sphere_radius, modulus)
     radii = {"jkr": jkr, "hertz": hertz, "uncorrected": uncorrected_at_indentation(indentation, work, stress, *rest)}

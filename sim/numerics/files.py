@@ -65,7 +65,7 @@ class OutputExists(FileExistsError):
     exit_code = 73
 
 
-def claim(path: Path, replace: bool, inputs: Iterable[Path] = (), beside: tuple[str, ...] = ()) -> None:
+def claim(path: Path, replace: bool, inputs: Iterable[Path] = ()) -> None:
     """Refuse an output that would destroy an existing file or cannot be written, before anything is computed.
 
     Parameters
@@ -76,8 +76,6 @@ def claim(path: Path, replace: bool, inputs: Iterable[Path] = (), beside: tuple[
         True if an older file may be replaced; a scenario and ``inputs`` never are.
     inputs : iterable of Path
         Files that the command reads.
-    beside : tuple of str
-        Ends of the names of the other files that are written.
 
     Raises
     ------
@@ -95,9 +93,8 @@ def claim(path: Path, replace: bool, inputs: Iterable[Path] = (), beside: tuple[
             raise BadInput([f"{path} is a folder; name a file"])
         if os.sep == "/" and "\\" in str(path.absolute()):  # which HDF5 takes for the sign between folders
             raise BadInput([f"{path}: datasets cannot be read in a path with a backslash; name another file"])
-        names = [path, *(path.with_name(path.name + end) for end in beside)]
         folder = next(folder for folder in path.absolute().parents if folder.exists())
-        for name in {*path.parts, *(each.name for each in names)}:
+        for name in (*path.parts, f"{path.name}.parts"):
             with contextlib.suppress(FileNotFoundError):
                 os.stat(folder / name)  # which refuses names that are too long
         if not device:
@@ -107,7 +104,7 @@ def claim(path: Path, replace: bool, inputs: Iterable[Path] = (), beside: tuple[
         raise BadInput([f"{shown}: the name is not UTF-8 text; name another file"]) from None
     except OSError as trouble:
         raise StoreTrouble(f"{path}: {trouble.strerror}; name a file in another folder") from trouble
-    if any(name.exists() and each.exists() and name.samefile(each) for name in names for each in inputs):
+    if any(path.exists() and each.exists() and path.samefile(each) for each in inputs):
         raise BadInput([f"{path}: the command reads this file, too; name another file"])
     if path.is_file() and not device:
         if not replace:

@@ -1,6 +1,5 @@
 """Figures of the fluctuations: a map and its displacement, its spectrum, and C(q) before any run."""
 
-import contextlib
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -8,17 +7,11 @@ import scipy
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from pydantic import TypeAdapter
 
-from sim.analysis import setting
-from sim.analysis.dataset import resolved, where_recorded, word
+from sim.analysis.dataset import where_recorded, word
 from sim.laws.halfspace import angular_compliance, displacement
-from sim.numerics.grid import Grid, Lattice, lattice_of
-from sim.parts.shear.modes import Modes, modes
-from sim.parts.shear.process import Amplitude
+from sim.numerics.grid import Lattice, lattice_of
 from sim.plots import style
-from sim.spectrum.families import Spectrum
-from sim.spectrum.measured import periodogram, radial_average
 from sim.spectrum.radial import Rowed, Waves
 
 if TYPE_CHECKING:
@@ -125,87 +118,10 @@ def _image(panel: Axes, field: np.ndarray, extent: tuple, about: tuple) -> None:
         bar.ax.set_ylim(max(field.min(), -most), min(field.max(), most))
 
 
-def _target(dataset: xr.Dataset, point: xr.Dataset, stress: xr.DataArray) -> tuple[Any, float, str]:
-    """Return the spectrum at a point of a dataset, the factor of its density, and its name."""
-    try:
-        shear = resolved(dataset, "shear")
-    except KeyError:
-        raise ValueError("the spectrum is swept as a whole table; run the wanted spectrum on its own") from None
-    for table in ("spectrum", "amplitude"):
-        for key in shear[table]:
-            with contextlib.suppress(KeyError):
-                shear[table][key] = float(setting(point, f"shear.{table}.{key}"))
-    if shear["spectrum"].get("file") and not shear["spectrum"].get("wavenumbers"):
-        raise ValueError("the dataset lacks the rows of the spectrum file; run the scenario again")
-    spectrum: Any = TypeAdapter(Spectrum).validate_python(shear["spectrum"])
-    if spectrum.wavevector is not None:
-        raise ValueError("a ripple is a single wave without a spectral density; draw its map")
-    amplitude = TypeAdapter(Amplitude).validate_python(shear["amplitude"])
-    if amplitude.relaxing or amplitude.remembers:  # the amplitude has a past: only the shape can be compared
-        grid = cast(Grid, _lattice_of(stress))
-        cells = modes(spectrum, grid.cell, grid.points)
-        return spectrum, float(np.mean(stress.to_numpy() ** 2) / np.sum(cells.variance)), "target, scaled"
-    factor = amplitude.factor(*(_then(point, name, stress) for name in ("speed", "shear_stress")))
-    return spectrum, float(np.mean(factor**2)), "target"
-
-
 def _lattice_of(stress: xr.DataArray) -> Lattice:
     shape = stress.sizes["x"], stress.sizes["y"]
     sides = (float(stress[axis][1] - stress[axis][0]) * points for axis, points in zip("xy", shape, strict=True))
     return lattice_of(cast(tuple[float, float], tuple(sides)), shape)
-
-
-def mode_density(cells: Modes, grid: Grid) -> np.ndarray:
-    """Return the density of the cell's modes on the half spectrum of its grid [Pa^2 m^2]."""
-    density = np.zeros((grid.points, grid.points // 2 + 1))
-    each = 0.5 * cells.variance * grid.cell**2
-    density[cells.ix % grid.points, cells.iy] = each
-    edge = cells.iy == 0  # this column holds both of a pair
-    density[-cells.ix[edge] % grid.points, 0] = each[edge]
-    return density
-
-
-def spectrum_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
-    """Power spectrum of the stress maps at one time: target, discretised on the cell, and realised."""
-    where, words = style.first_point(dataset)
-    point = dataset.isel(where)
-    stress = _maps_of(point, at)
-    if not np.any(stress.to_numpy()):
-        raise ValueError("the map has no stress; record a map at a later time")
-    if word(dataset, "shear.spectrum.model", "") == "bonds":
-        raise ValueError("the field of the bonds has no given spectrum; draw the kind map")
-    if word(dataset, "shear.field.file", ""):
-        raise ValueError("a measured map has no target spectrum; `sim plot` of the scenario draws its spectrum")
-    (spectrum, raised, name), grid = _target(dataset, point, stress), cast(Grid, _lattice_of(stress))
-    expected = raised * radial_average(mode_density(modes(spectrum, grid.cell, grid.points), grid), grid).density
-    rings = [radial_average(density, grid) for density in periodogram(stress.to_numpy(), grid.cell)]
-    fine = np.geomspace(0.4 * rings[0].q[0], rings[0].q[-1], 2000)
-    density = raised * spectrum.harmonics(fine)[0] / (2.0 * np.pi)
-    least = np.min(density[density > 0.0], initial=np.max(expected))
-    held = expected > max(0.2 * least, 1e-12 * np.max(expected))  # not where a ring only touches the spectrum
-    q, expected = rings[0].q[held], expected[held]
-    measured = np.mean([ring.density for ring in rings], axis=0)[held]
-    error = np.sqrt(np.sum([ring.standard_error**2 for ring in rings], axis=0))[held] / len(rings)
-
-    length = style.Unit.of(2 * np.pi / q, "m")
-    q, fine = q / length.factor, fine / length.factor
-    figure, (panel, below) = style.rows([1.9, 1.1])
-    dots: Any = {"fmt": "o", "color": style.BOTH, "markersize": 2.2, "elinewidth": 0.7}
-    ring: Any = {"markersize": 4.5, "markerfacecolor": "none", "color": style.FLUCTUATIONS, "markeredgewidth": 0.7}
-    panel.loglog(fine, np.where(density > 0.0, density, np.nan), color=style.FLUCTUATIONS, label=name)
-    panel.plot(q, expected, "o", label="discretised", **ring)
-    panel.errorbar(q, measured, error, label=f"realised, {len(rings)} map{'s' * (len(rings) > 1)}", **dots)
-    panel.set_ylabel("spectral density $C$ (Pa² m²)")
-    panel.set_ylim(bottom=0.1 * min(np.min(expected), np.min(measured)))  # not down to where a cut-off ends
-    if np.max(measured) < 100.0 * np.min(measured):
-        style.plain_ticks(panel.yaxis)
-    then = f"$t$ = {style.text_of(stress['map_time'], 's')}"
-    style.legend(panel, ", ".join(filter(None, [words, then])))
-    below.axhline(1.0, color=style.FLUCTUATIONS)
-    below.errorbar(q, measured / expected, error / expected, **dots)
-    below.set_ylabel("realised/discretised")
-    style.across(below, q, f"wavenumber $q$ (rad/{length.name})", "log", 0.03)
-    return figure
 
 
 def density_figure(scene: "Scenario") -> Figure:

@@ -166,8 +166,6 @@ KINDS: dict[str, Kind] = {
     "time": Kind(curves.time_figure),
     "incipient": Kind(slider.incipient_figure, slider.needs_pull, reads=("spring_force", "contact_area")),
     "map": Kind(field.map_figure, field.needs_maps),
-    "spectrum": Kind(field.spectrum_figure, field.needs_maps),
-    "profile": Kind(theories.profile_figure, theories.closed_contact, lambda dataset: False),
 }
 
 

@@ -84,8 +84,7 @@ class Compared(NamedTuple):
 class Residuals(NamedTuple):
     """Distances of points of the column ``name`` from a curve over another variable, in standard errors of both.
 
-    If the curve has several ``branches``, back and forth, they are those to the nearest one, which underestimates them.
-    Branches that are nowhere a hundredth of an error apart count as one.
+    If the curve goes back and forth, they are those to its nearest branch, which underestimates them.
     """
 
     over: str
@@ -93,7 +92,6 @@ class Residuals(NamedTuple):
     line: Line
     x: np.ndarray
     values: np.ndarray
-    branches: int
 
 
 class Measured:
@@ -210,7 +208,7 @@ class Measured:
                 values, branches = _residuals(curve, x[rows], y[rows], high, log)
                 near = np.isfinite(values)
                 if np.any(near):
-                    self.residuals.append(Residuals(over[0], source, line, x[rows], values, branches))
+                    self.residuals.append(Residuals(over[0], source, line, x[rows], values))
                     label += rf", $\chi^2$ = {np.sum(values[near] ** 2):.4g} of {np.sum(near)}"
                     label += " (nearest branch)" * (branches > 1)
             look: Any = HOLLOW | {"color": line.colour, "elinewidth": 0.7, "zorder": 3}

@@ -7,12 +7,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from sim.analysis import control, is_steady, setting, settled, statements
 from sim.analysis.dataset import plain, stays_held
 from sim.analysis.events import cycles_of, pull_offs
-from sim.laws import halfspace, jkr
+from sim.laws import jkr
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.plots import style
 from sim.plots.curves import Scene, beside, colour_bar, mark_jumps, scene_along
@@ -175,152 +174,6 @@ def _panel(panel: Axes, case: Case, along: dict[str, np.ndarray], areas: dict[st
         if np.any(held) and not held[-1]:  # the branch ends at a fold
             end = np.flatnonzero(held)[-1]
             panel.plot(along[name][end], branch[end], "o", markersize=3, color=colour)
-
-
-# -- profiles across the contact -----------------------------------------------------------
-
-#: Points of a profile on one side, and how far it goes in contact radii.
-_SIDE, _REACH = 1500, 2.0
-
-#: Points on a side of the map.
-_MAP = 201
-
-
-class Profile(NamedTuple):
-    """Fields across a contact of a ``radius`` [m], over places ``x`` along the sliding [m], and the ``look`` of lines.
-
-    The pressure [Pa] is nan at the edge, where tension has no bound; ``low`` and ``high`` are the heights of half-space
-    and sphere [m].
-    """
-
-    radius: float
-    x: np.ndarray
-    pressure: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    look: dict[str, Any]
-
-
-def _profile(reach: float, radius: float, depth: float, sphere: float, modulus: float, **look: Any) -> Profile:
-    """Return the fields of a contact, dense on both sides of the edge, with the edge itself."""
-    near = np.geomspace(1e-6, 0.5, 200)
-    r = np.concatenate([np.linspace(0.0, reach, _SIDE), radius * (1.0 - near), radius * (1.0 + near), [radius]])
-    r = np.unique(r[r <= reach])
-    x = np.append(-r[:0:-1], r)
-    place = np.abs(x), radius, depth, sphere
-    pressure = np.where(np.abs(x) == radius, np.nan, halfspace.pressure(*place, modulus))
-    low = -halfspace.normal_displacement(*place)
-    return Profile(radius, x, pressure, low, low + halfspace.gap(*place), look)
-
-
-def closed_contact(dataset: xr.Dataset, time: float | None = None) -> xr.Dataset:
-    """Return the last record of the first member in contact, or that nearest to a time, at the first point of a sweep.
-
-    Raises
-    ------
-    ValueError
-        If the member is never in contact, or not at that time.
-    """
-    point = dataset.isel(style.first_point(dataset)[0] | {"member": 0}, missing_dims="ignore")
-    closed = style.recorded(point, "contact_radius").to_numpy() > 0.0
-    if not closed.any():
-        raise ValueError("the contact is never closed; raise the load or the indentation")
-    k = int(np.flatnonzero(closed)[-1] if time is None else np.abs(dataset["t"].to_numpy() - time).argmin())
-    if not closed[k]:
-        raise ValueError(f"the contact is open at t = {style.text_of(dataset['t'][k], 's')}; choose another time")
-    return point.isel(t=k)
-
-
-def profile_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
-    """Pressure, surfaces and tangential displacement across the contact, at the last or another time.
-
-    The surfaces are cut along the axis of the sphere; heights are not to the scale of the lengths. The
-    shear stress is the mean one, uniform over the contact; without any its displacement is left out.
-    """
-    point = closed_contact(dataset, at)
-    names = ("contact_radius", "indentation", "shear_stress", "speed")
-    radius, depth, stress, speed = (float(style.recorded(point, name)) for name in names)
-    sphere, work = (float(setting(point, key)) for key in ("sphere.radius", "adhesion.work"))
-    names = ("contact_modulus", "effective_shear_modulus", "effective_poisson_ratio", "radius_at_rest")
-    modulus, shear_modulus, poisson_ratio, full = (float(point[name]) for name in names)
-    reach = _REACH * max(radius, full)
-    shown = [_profile(reach, radius, depth, sphere, modulus, color=style.BOTH)]
-    if full > 0.0:
-        rest = jkr.indentation_at_radius(full, work, sphere, modulus)
-        look = style.GREY | {"linestyle": "--", "label": "at rest (JKR)"}
-        shown.append(_profile(reach, full, rest, sphere, modulus, **look))
-    length, count = style.Unit.of(np.array([reach]), "m"), 2 if stress != 0.0 else 1
-    figure, axes = style.pairs(0.35 + 2.4 * count, count)
-    _pressure_panel(axes[0], shown, length)
-    _surface_panel(axes[1], shown, length)
-    radial = "distance from the axis $r$"
-    for panel, words in zip(axes, (radial, radial, "distance from the axis"), strict=False):
-        style.across(panel, length.factor * np.array([-reach, reach]), length.label(words))
-    if count == 2:
-        contact = radius, stress, shear_modulus, poisson_ratio
-        _displacement_panel(axes[2], contact, reach, length)
-        _map_panel(axes[3], contact, reach, length)
-    remarks = [style.first_point(dataset)[1], f"$t$ = {style.text_of(point['t'], 's')}"]
-    if "$V$" not in remarks[0]:
-        remarks.append(f"$V$ = {style.text_of(speed, 'm/s')}")
-    axes[0].lines[0].set_label(", ".join(filter(None, remarks)))
-    style.legend(axes[0])
-    return figure
-
-
-def _pressure_panel(panel: Axes, shown: list[Profile], length: style.Unit) -> None:
-    middle = max((shape.pressure[shape.x.size // 2] for shape in shown), key=abs)
-    factor = style.in_unit(panel.yaxis, "normal pressure $p$", np.array([middle]), "Pa")
-    for shape in shown:
-        panel.plot(length.factor * shape.x, factor * shape.pressure, **shape.look)
-    panel.axhline(0.0, **style.GUIDE)
-    size = factor * abs(middle)
-    panel.set_ylim((-1.6 * size, 1.15 * size) if middle > 0.0 else (-4.0 * size, 0.5 * size))
-
-
-def _surface_panel(panel: Axes, shown: list[Profile], length: style.Unit) -> None:
-    """Draw sphere and half-space, cut along the axis, with the gap between them."""
-    factor = style.in_unit(panel.yaxis, "height $z$", np.concatenate([shape.high for shape in shown]), "m")
-    for shape in shown:
-        panel.plot(length.factor * shape.x, factor * np.transpose([shape.low, shape.high]), **shape.look)
-    last, ball = shown[0], factor * shown[0].high
-    bottom = np.min(ball) - 0.35 * np.ptp(ball)
-    look: Any = {"color": style.LINES[6], "alpha": 0.18, "linewidth": 0}
-    panel.fill_between(length.factor * last.x, bottom, factor * last.low, **look)
-    panel.set_ylim(bottom, np.max(ball))
-    for words, place in (("sphere", 0.8), ("half-space", 0.06)):
-        panel.text(0.5, place, words, transform=panel.transAxes, ha="center", fontsize=7)
-
-
-#: Contact radius [m], shear stress [Pa], shear modulus [Pa] and Poisson's ratio.
-_Sheared = tuple[float, float, float, float]
-
-
-def _displacement_panel(panel: Axes, contact: _Sheared, reach: float, length: style.Unit) -> None:
-    """Draw the tangential displacement along and across the sliding direction; thin lines are the edge."""
-    distance = reach * np.linspace(-1.0, 1.0, 801)
-    profiles = halfspace.tangential_profiles(distance, *contact)
-    factor = style.in_unit(panel.yaxis, "tangential displacement $u_x$", np.concatenate(profiles), "m")
-    for values, line, words in zip(profiles, ("-", "--"), ("along $x$ (sliding)", "along $y$ (across)"), strict=True):
-        panel.plot(length.factor * distance, factor * values, line, color=style.BOTH, label=words)
-    for edge in (-contact[0], contact[0]):
-        panel.axvline(length.factor * edge, **style.GUIDE)
-    style.legend(panel)
-
-
-def _map_panel(panel: Axes, contact: _Sheared, reach: float, length: style.Unit) -> None:
-    """Draw the tangential displacement of the surface around the contact circle."""
-    x, moved = halfspace.tangential_map(*contact, _MAP, reach / contact[0])
-    unit = style.Unit.of(moved, "m")
-    x, moved = length.factor * x, unit.factor * moved.T
-    side = x[-1] + 0.5 * (x[1] - x[0])
-    image = panel.imshow(moved, cmap="viridis", origin="lower", extent=(-side, side, -side, side))
-    levels = MaxNLocator(7).tick_values(np.min(moved), np.max(moved))
-    lines = panel.contour(x, x, moved, levels, colors="white", linewidths=0.4, linestyles="-")
-    panel.clabel(lines, fmt="%g", fontsize=5)
-    panel.figure.colorbar(image, ax=panel, pad=0.02).set_label(unit.label("displacement along $x$, $u_x$"))
-    style.contact_circle(panel, length.factor * contact[0])
-    panel.set(xlabel=length.label("$x$"), ylabel=length.label("$y$"))
 
 
 # -- loop of a JKR test --------------------------------------------------------------------

@@ -246,26 +246,3 @@ def _remarks_on_step(scene: Scene, path: Array) -> list[str]:
     least = scene.clock.stride / share
     count = next(count for k in range(99) for count in (10**k, 2 * 10**k, 5 * 10**k) if count >= least)
     return [f'{text}; give clock.step = "{engineering(between / count, "s").replace("µ", "u")}"']
-
-
-#: Speeds among which the largest steady stress of bonds is looked for, and that of a body above which a remark is made
-#: [m/s]; times at which the force is taken.
-_SPEEDS, _FAST, _INSTANTS = np.logspace(-10.0, 0.0, 51), 0.1, 1001
-
-
-def remarks_on_force(scene: Scene) -> list[str]:
-    """Return a remark if a force pulls a body without damping above the strength of its contact."""
-    body, times = scene.drive, scene.times
-    if not body.solves_motion or body.spring or body.damping + body.viscosity > 0.0 or body.mass == 0.0:
-        return []
-    instants = np.linspace(0.0, times.duration, _INSTANTS)
-    strength = scene.contact_area * np.max(scene.population.steady(_SPEEDS).strength)
-    excess = np.maximum(np.abs(body.course.at(instants, times.duration)) - strength, 0.0)
-    speed = np.mean(excess) * times.duration / body.mass
-    if speed < _FAST:
-        return []
-    begin = instants[np.argmax(excess > 0.0)]
-    return [
-        f"from {begin:.3g} s on the force exceeds the largest steady friction, {strength:.2g} N, and nothing damps the"
-        f" body: it reaches some {speed:.2g} m/s, which may take many sub-steps; give drive.damping or drive.viscosity"
-    ]

@@ -22,12 +22,12 @@ from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
 from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
-from sim.scenario.checks import faults_across, pulled, remarks_between, remarks_on_force
+from sim.scenario.checks import faults_across, pulled, remarks_between
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
 from sim.scenario.phases import Phases, phases
-from sim.scenario.schema import as_html, entries, quantities, with_models
+from sim.scenario.schema import quantities, with_models
 from sim.scenario.sweep import read_sweep, rows, set_key
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
@@ -89,10 +89,6 @@ class Scenario:
         models = ", ".join(f"{name} {part.model}" for name, part in zip(Parts._fields, parts, strict=True))
         points = math.prod(len(axis.values) for axis in self.sweep)
         return f'<Scenario "{self.name}": {models}; members {self.ensemble.members}, points {points}>'
-
-    def _repr_html_(self) -> str:
-        """Return every key with its value as HTML, for notebooks."""
-        return as_html(self.name, entries(self))
 
     @model_validator(mode="after")
     def _across_parts(self) -> "Scenario":
@@ -269,7 +265,7 @@ class Scenario:
     def remarks(self) -> list[str]:
         """Return one sentence for each assumption, error of the cell and implausible value."""
         remarks = [remark for part in self.chosen for remark in part.remarks(self.setting)]
-        remarks += [*remarks_between(self), *remarks_on_force(self)]
+        remarks += remarks_between(self)
         if self.ensemble.members > 1 and self.fluctuations.measured and not any(self.varies.values()):
             remarks.append("all members and seeds share the map and nothing else is random, so one member is enough")
         if self.solid.poisson_ratio != 0.5:

@@ -1,7 +1,6 @@
 """Keys of a scenario: tables, models, values with their units, the JSON schema, a starter file."""
 
 import functools
-import html
 import json
 from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import is_dataclass
@@ -130,18 +129,6 @@ def files_read(scenario: Any) -> list[Path]:
     path = Path(scenario.source.path)
     files = [path.parent / name for name in sorted(names.union(scenario.source.files))]
     return [path, *files] if scenario.source.path else files
-
-
-def as_html(title: str, listed: Iterable[Entry]) -> str:
-    """Return an HTML table of keys with their values, units and meanings."""
-    rows = []
-    for key, value, quantity in listed:
-        unit = "" if quantity is None or quantity.unit == "1" else quantity.unit
-        shown = f"{len(value)} values" if isinstance(value, tuple) else f"{value} {unit}"
-        if value not in (None, "", ()):
-            cells = (key, shown, quantity.meaning if quantity else "")
-            rows.append("".join(f"<td style='text-align:left'>{html.escape(cell)}</td>" for cell in cells))
-    return f"<b>{html.escape(title)}</b><table>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"
 
 
 def quantities(part: Any) -> dict[str, tuple[Quantity, float]]:

@@ -42,11 +42,6 @@ _THEORIES: dict[str, tuple[str, tuple[Free, ...]]] = {
 WHOLE = "the scenario as it is"
 #: Parts of it by their names, and what they leave out.
 _PARTS = {"bonds only": "fluctuations act", "fluctuations only": "bonds act"}
-#: What acts on the work of adhesion, each with an example of its table.
-_TABLES = (
-    ("bonds", '[bonds] model = "steady", critical_speed = "10 mm/s", stress = "0.3 MPa"'),
-    ("fluctuations", '[shear] model = "mean", spectrum = { model = "gaussian", rms = "150 kPa", length = "4 um" }'),
-)
 
 
 class Judged(NamedTuple):
@@ -102,7 +97,6 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
             rejected = p_value <= _RARE and aicc - (criteria[0] if name in _PARTS else min(criteria)) >= _WORSE
         judged.append(Judged(name, item.numbers(least.x), least.chi_square, aicc, p_value, rejected))
     sufficient, words = _verdict(judged)
-    words = "\n".join(filter(None, [words, _lacking(problem)]))
     return Verdict(tuple(sorted(judged, key=lambda item: item.aicc)), sufficient, words)
 
 
@@ -146,15 +140,6 @@ def _acting(problem: Problem) -> tuple[bool, bool]:
     scene, known = problem.groups[0][0].scenario, quantities(problem.groups[0][0].scenario)
     bonded = scene.adhesion.bond_share > 0.0 and scene.population.carries_stress
     return bonded, "shear.paid_by_adhesion" in known and scene.fluctuations.paid_by_adhesion > 0.0
-
-
-def _lacking(problem: Problem) -> str:
-    """Return advice if the curves or the scenario cannot distinguish bonds, fluctuations and theories; else ""."""
-    all_groups = [group for groups in problem.groups for group in groups]
-    if not any(group.scenario.drive.solves_motion or np.any(group.speed) for group in all_groups):
-        return 'curves at rest do not distinguish mechanisms; measure during sliding, with a column "speed [mm/s]"'
-    advice = "the scenario has no {}; to compare with them, add for example {}"
-    return "\n".join(advice.format(*item) for item, acts in zip(_TABLES, _acting(problem), strict=True) if not acts)
 
 
 def _less(problem: Problem, fixed: dict[str, float], *without: str) -> Problem:

@@ -5,7 +5,6 @@ import logging
 import os
 import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -15,8 +14,8 @@ import click
 #: What the Python interface tells: remarks as warnings, progress as information.
 LOG = logging.getLogger("sim")
 
-#: Seconds between two lines of progress without a terminal; seconds after which a slow stage is printed.
-_PAUSE, _SLOW = 30.0, 3.0
+#: Seconds between two lines of progress without a terminal.
+_PAUSE = 30.0
 #: Columns of a terminal on which no table is cut short.
 _WIDE = 100_000
 
@@ -95,27 +94,6 @@ class Shown(NamedTuple):
     begin: Callable[[str], None] = lambda stage: None
 
 
-class Stages:
-    """Stages of a run one after the other, and the ``seconds`` that each took."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self.shown = Shown()
-        self._stage, self._since = "loading", time.monotonic()
-
-    def begin(self, stage: str) -> None:
-        """End the present stage and begin another."""
-        now = time.monotonic()
-        self.seconds[self._stage] = round(now - self._since, 2)
-        self._stage, self._since = stage, now
-        self.shown.begin(stage)
-
-    def ended(self) -> dict[str, float]:
-        """End the present stage; return the seconds of all."""
-        self.begin("")
-        return self.seconds
-
-
 @contextlib.contextmanager
 def progress_bar(total: int, what: str = "member-steps") -> Iterator[Shown]:
     """Show the fraction of a total that is done: as a bar on a terminal, else as a line from time to time."""
@@ -153,18 +131,6 @@ def duration(seconds: float) -> str:
     if seconds < 90.0:
         return f"{max(seconds, 1.0):.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
-
-
-@contextlib.contextmanager
-def slow_stage(stage: str, quiet: bool) -> Iterator[None]:
-    """Print the name of a stage once it has taken some seconds."""
-    timer = threading.Timer(_SLOW, (lambda text: None) if quiet else note, [stage])
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
-        timer.join()
 
 
 def signals(*names: str) -> list[signal.Signals]:

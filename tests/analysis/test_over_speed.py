@@ -148,22 +148,6 @@ def test_an_extreme_inside_a_sweep_is_named_and_one_at_its_end_or_within_the_err
         assert math.isnan(result["F_least"]) and str(result["F_least_reason"].values)  # at the highest speed
 
 
-def test_curves_of_bonds_that_break_are_those_of_the_law():
-    for swept in [True, False]:
-        quiet = {"bonds": bonds.Steady(critical_speed=1e-2, stress=3e5), "clock": Clock(duration=0.4, step=0.01)}
-        if swept:
-            moved = {"drive": drive.Steady(speed=1e-2), "sweep": {"drive.speed": [1e-4, 1e-3, 1e-2]}}
-        else:
-            moved = {"drive": drive.Ramp(start=1e-4, stop=1e-2), "sweep": {"contact.load": [LOAD, 2.0 * LOAD]}}
-        result = analysis.speed_curves(run(scene(**moved, **quiet)))
-        assert result["contact_area_mean"].dims == (("speed",) if swept else ("contact_load", "speed"))
-        assert result["speed"].attrs["units"] == "m/s" and float(result["speed"][-1]) == 1e-2
-        law = 3e5 / (1.0 + result["speed"] / 1e-2)
-        assert_allclose(result["shear_stress_mean"], law.broadcast_like(result["shear_stress_mean"]), rtol=1e-12)
-        assert_allclose(result["friction_force_mean"], result["contact_area_mean"] * law, rtol=1e-12)
-        assert float(result["contact_area_sem"].max()) > 0.0 and bool((result["friction_force_low"] > 0.0).all())
-
-
 def test_crossings_are_exact_on_straight_lines_and_a_ramp_is_read_in_pieces(monkeypatch):
     curve = 1.0 - 0.1 * np.log(SPEEDS / SPEEDS[0])
     result = analysis.crossing(SPEEDS, curve[None], np.ones(1), 0.55)
@@ -206,13 +190,7 @@ def test_the_order_of_charging_changes_no_sum_and_fluctuations_alone_leave_the_a
     assert_allclose(charges(unbroken)["order_of_charging"], 0.0, atol=1e-14)
 
 
-def test_curves_and_speeds_of_loss_of_what_stays_or_is_missing_are_refused_or_left_out():
-    with pytest.raises(ValueError, match="nor is swept"):
-        analysis.speed_curves(run(scene(drive=drive.Steady(speed=1e-2))))
-    with pytest.raises(ValueError, match='add "friction_force" to record'):
-        analysis.speed_curves(run(scene(record=Record(quantities=["speed", "contact_area"]))))
-    (share,) = analysis.speed_curves(lens.ramp(), "lost_to_bonds")[["lost_to_bonds_mean"]].values()
-    assert share.dims == ("speed",) and 0.0 < float(share[-1]) < 1.0
+def test_speeds_of_loss_of_what_stays_or_is_missing_are_refused_or_left_out():
     result = analysis.loss_speeds(lens.ramp())
     low, at, high = (float(result[NAMES[0] + end]) for end in ("_low", "", "_high"))
     assert 1e-5 < low < at < high < 1e-1

@@ -91,7 +91,7 @@ def of(long, quantity):
 
 def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp_path):
     result, rows = analysis.statistics(ramp), of(long, "contact_radius")
-    names = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": "std", "skewness": "skewness"}
+    names = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": "std"}
     assert_array_equal(rows["t [s]"], ramp["t"])
     assert_array_equal(rows["speed [m/s]"], ramp["speed"])
     for column, kind in names.items():
@@ -158,7 +158,7 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
     result = {row["quantity"].partition(" (")[0]: row for row in analysis.spread(dataset)}
     assert set(result) == {"ΔΓ", "w", "a", "A/A_JKR", "lost to fluct.", "fluct. first", "F"}
     energy, law = result["ΔΓ"], analysis.distribution(dataset)
-    assert list(energy) == ["quantity", "mean", "sd", "5 %", "50 %", "95 %", "skewness", "t_c", "free values"]
+    assert list(energy) == ["quantity", "mean", "sd", "5 %", "50 %", "95 %", "t_c", "free values"]
     np.testing.assert_allclose(float(energy["sd"]), 1e3 * float(law["fluctuation_energy_std"]), rtol=5e-3)
     free_values = float(law["fluctuation_energy_effective_samples"])
     np.testing.assert_allclose(float(energy["free values"]), free_values, rtol=5e-3)

@@ -3,7 +3,6 @@
 import itertools
 import json
 import math
-import shutil
 import subprocess
 import sys
 import time
@@ -13,7 +12,7 @@ import psutil
 import pytest
 from helpers.commands import COUNTED, LENS
 from helpers.parts import Record, analysis, load, run
-from helpers.scenes import SHEARS, sample
+from helpers.scenes import sample
 from numpy.testing import assert_allclose
 
 from benchmarks.timing import child
@@ -21,7 +20,6 @@ from sim.ensemble import plan as plans, preview
 from sim.ensemble.dataset import identity
 from sim.ensemble.plan import Plan
 from sim.ensemble.preview import fitting, forecast, memory, remarks, size
-from sim.numerics.files import StoreTrouble
 
 
 def test_members_are_pooled_with_a_remark_if_their_file_would_be_too_large(monkeypatch):
@@ -71,33 +69,6 @@ def test_the_memory_limit_is_that_of_the_variable_else_of_the_job_else_what_is_f
     assert preview.memory_limit()[0] == 6000 * 2**20
     monkeypatch.setenv("SIM_MAX_MEMORY", "2 GB")
     assert preview.memory_limit()[0] == 2e9
-
-
-def test_the_room_on_disk_is_that_of_parts_and_dataset_and_too_little_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(plans, "_BLOCK_SECONDS", 2e-3)
-    mapped = sample(5, 60, shear=SHEARS["mapped, diffusion, constant"], record=Record(maps=(1e-3, 5e-2)))
-    for scenario in (sample(50, 200), sample(50, 200, record=Record(per_member=False)), mapped):
-        sizes = {}
-
-        def watch(stage, sizes=sizes):
-            if stage == "writing":
-                sizes["parts"] = sum(path.stat().st_size for path in (tmp_path / "x.nc.parts").iterdir())
-
-        dataset = run(scenario, tmp_path / "x.nc", replace=True, stage=watch).stat().st_size
-        disk = forecast(Plan.of(scenario), 1).disk
-        assert disk / 1.5 < sizes["parts"] + dataset < 1.5 * disk
-    scenario, folder = sample(50, 500), tmp_path / "outputs"
-    needed = forecast(Plan.of(scenario), 1).disk
-    monkeypatch.setattr(shutil, "disk_usage", lambda place: SimpleNamespace(total=10**12, free=0.9 * needed))
-    with pytest.raises(StoreTrouble, match=size(0.9 * needed)) as refused:
-        run(scenario, folder / "x.nc", progress=never_begun)
-    assert refused.value.exit_code == 74 and not list(folder.iterdir())
-    monkeypatch.chdir(tmp_path)
-    assert size(0.9 * needed) in preview.preview(scenario)
-    parts = folder / "x.nc.parts"
-    parts.mkdir()
-    (parts / "manifest.json").write_bytes(bytes(int(0.2 * needed)))  # of an unfinished run
-    preview.refuse_full_disk(Plan.of(scenario), folder / "x.nc")
 
 
 def test_more_members_take_more_time_and_no_more_memory_and_steps_that_are_done_none(monkeypatch):

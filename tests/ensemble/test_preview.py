@@ -184,16 +184,3 @@ def test_a_very_large_run_is_counted_without_a_name_for_each_of_its_parts(monkey
     monkeypatch.delattr("sim.ensemble.plan.part_name")
     run = blocks("pdms_lens", **{"clock.duration": "100 s", "ensemble.members": 10_000_000})["the run"]
     assert row(run, "work")[1].startswith("1,000,010,000,000 member-steps")
-
-
-def test_a_force_above_the_strength_of_the_contact_on_a_body_without_damping_is_noted_with_its_speed():
-    # Q = 10 mN t/s on 5 g and a friction of at most F: v = (10 mN − F)²/(2 · 10 mN/s · m)
-    stress, area = 1e4, load(FOLDER / "creep.toml", {"sweep": {}}).contact_area
-    steady = {"model": "steady", "critical_speed": "1 mm/s", "stress": f"{stress} Pa"}
-    drive = {"model": "force", "force": {"from": "0 N", "to": "10 mN"}, "mass": "5 g"}
-    drive["contact_stiffness"] = "rigid"
-    scene = {"sweep": {}, "drive": drive, "bonds": steady, "clock.duration": "1 s"}
-    speed = (10e-3 - stress * area) ** 2 / (2.0 * 10e-3 * 5e-3)
-    assert any(f"some {speed:.2g} m/s" in line and "damping" in line for line in blocks("creep", **scene)["notes"])
-    for calm in (drive | {"damping": "1 N s/m"}, drive | {"force": "0.1 mN"}):
-        assert not any("m/s" in line for line in blocks("creep", **scene | {"drive": calm}).get("notes", []))

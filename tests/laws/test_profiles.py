@@ -115,18 +115,3 @@ def test_the_surface_is_continuous_follows_the_sphere_inside_and_feels_the_load_
     far = float(halfspace.normal_displacement(r, radius, indentation, 2e-3))
     # the next term of the expansion is of relative order (a/r)^2 = 1e-8
     assert_allclose(far, 4e-3 / (math.pi * LENS["modulus"] * r), rtol=1e-7, atol=0)
-
-
-def test_profiles_and_map_of_the_shear_are_the_displacement_of_the_disc():
-    radius, stress, shear_modulus = 1.2e-4, 3e5, 1.6e6
-    assert_array_equal(halfspace.shear_stress([0.0, radius, 1.01 * radius], radius, stress), [stress, stress, 0.0])
-    assert np.isnan(halfspace.shear_stress(math.nan, radius, stress))
-    along, across = halfspace.tangential_profiles(np.linspace(-2.0, 2.0, 9) * radius, radius, stress, shear_modulus)
-    assert_array_equal(along, along[::-1])
-    assert_allclose(along[4], 0.75 * stress * radius / shear_modulus, rtol=1e-14, atol=0)
-    assert_allclose(across[6] / along[4], 0.424413181578387 / 0.75, rtol=1e-13, atol=0)
-    rest = radius, stress, shear_modulus, 0.3
-    x, v = halfspace.tangential_map(*rest, points=33, extent=3.0)
-    assert x[0] == -x[-1] == -3.0 * radius
-    assert_array_equal([v[:, 16], v[16]], halfspace.tangential_profiles(x, *rest))
-    assert_array_equal(v[20, 7], halfspace.disc_displacement(x[20], x[7], *rest))

@@ -58,15 +58,8 @@ def test_a_member_a_time_and_axes_are_those_chosen_in_their_units_and_what_does_
         draw(ramp, "time", member=6)
     with pytest.raises(ValueError, match="per_member = true"):
         draw(simulated(record=Record(per_member=False)), "time", member=1)
-    dataset = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())
-    closed = np.flatnonzero(dataset["in_contact"])
-    time = float(dataset["t"][closed[2]])
-    panel = draw(dataset, "profile", at=time + 1e-3).axes[0]
-    assert any(f"$t$ = {1e3 * time:g} ms" in name for name in legend_of(panel)[0])
-    with pytest.raises(ValueError, match="the contact is open at t = 400 ms; choose another time"):
-        draw(dataset, "profile", at="1 h")
     with pytest.raises(ValueError, match=r"^at 3 mm: "):
-        draw(dataset, "profile", at="3 mm")
+        draw(dataset, "map", at="3 mm")
     for x, variable, factor, label in [
         ("slider_position", "slider_position", 1e3, "displacement of the slider $X$ (mm)"),
         ("shear_stress", "shear_stress", 1e-3, r"mean shear stress at the interface $\tau_{0}$ (kPa)"),
@@ -209,7 +202,7 @@ def test_rows_without_a_load_are_of_no_one_curve_and_a_table_without_speeds_is_r
 def test_what_cannot_be_drawn_is_refused_and_given_axes_are_drawn_in(ramp, table, loads, tmp_path, monkeypatch):
     for kind, choices, words in (
         ("time", {"x": "slider_positon"}, '"slider_position"'), ("time", {"x": "zzz"}, "t, speed, .*contact_radius"),
-        ("profile", {"x": "t"}, "x; it takes: at$"), ("theories", {"data": "x.csv"}, "data; it takes only"),
+        ("stress", {"at": "1 s"}, "at; it takes: data, ax$"), ("theories", {"data": "x.csv"}, "data; it takes only"),
         ("curve", {"units": ("mm",)}, '"mm"'), ("curve", {"units": ("parsnip",)}, '"parsnip"'),
     ):  # fmt: skip
         with pytest.raises(ValueError, match=words):

@@ -1,4 +1,4 @@
-"""Figures of stress maps show the map, its displacement and its spectrum."""
+"""Figures of stress maps show the map and its displacement."""
 
 import tomllib
 from pathlib import Path
@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 from helpers.commands import LENS, sim
 from helpers.parts import Ensemble, Onset, Record, Stress, drive, load
-from helpers.pictured import CELL, STEADY, field, mapped, rendered, simulated
+from helpers.pictured import field, mapped, simulated
 from matplotlib.patches import Circle
 from numpy.testing import assert_allclose
 
-from sim.numerics.grid import Grid
 from sim.parts.shear import Carried, models as shear
-from sim.parts.shear.modes import modes
 from sim.plots import field as field_figures, kinds as plots
-from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple
+from sim.spectrum.families import AnisotropicGaussian, Ripple
 from sim.spectrum.measured import Tabulated
 from sim.spectrum.stress_map import StressMap
 
@@ -39,56 +37,11 @@ def test_a_ripple_and_its_displacement_have_the_closed_amplitudes_and_an_arrow_p
         assert text in [label.get_text() for label in plots.draw(dataset, "map").axes[0].texts]
 
 
-def test_a_measured_spectrum_is_the_one_asked_for_and_modes_on_the_grid_hold_their_variance():
-    # Each ring within five of the standard errors that Gaussian modes have, whatever the amplitude.
-    for spectrum, amplitude in [
-        (Band(rms=150e3, longest=60e-6, shortest=16e-6), Onset(speed=2.5e-3, width=0.3)),
-        (Gaussian(rms=1e5, length=20e-6), Stress(reference=1e5)),
-        (AnisotropicGaussian(rms=1e5, length_x=15e-6, length_y=25e-6, angle=0.4), Onset(speed=2.5e-3, width=0.3)),
-    ]:
-        members = 24
-        dataset = mapped(members, spectrum, amplitude=amplitude)
-        above, below = rendered(plots.draw(dataset, "spectrum")).axes
-        q, ratio = below.containers[0].lines[0].get_data()
-        cells = modes(spectrum, CELL, 32)
-        ring = np.floor(np.hypot(cells.ix, cells.iy) + 0.5)
-        shown = [cells.variance[ring == k] for k in np.rint(q * 1e6 * CELL / (2 * np.pi))]
-        # a mode's periodogram is exponentially distributed: its standard deviation is its mean
-        error = np.array([np.sqrt(np.sum(v**2)) / np.sum(v) for v in shown]) / np.sqrt(members)
-        assert len(q) > 5 and np.all(np.abs(ratio - 1.0) < 5.0 * error)
-        fine, asked = above.lines[0].get_data()
-        angle = 2 * np.pi * np.arange(360) / 360
-        along, across = (1e6 * fine[:, None] * share for share in (np.cos(angle), np.sin(angle)))
-        density = np.mean(spectrum.density(along, across), axis=1)
-        raised = amplitude.factor(np.array([4e-3]), dataset["shear_stress"].to_numpy()[-1:])[0] ** 2
-        assert_allclose(np.nan_to_num(asked), raised * density, rtol=1e-9)
-    for points in [32, 33]:
-        cells = modes(AnisotropicGaussian(rms=1e5, length_x=15e-6, length_y=25e-6, angle=0.4), CELL, points)
-        grid = Grid(CELL, points)
-        density = field_figures.mode_density(cells, grid)
-        assert_allclose(grid.mode_sum(density) / CELL**2, np.sum(cells.variance), rtol=1e-13)
-        np.testing.assert_array_equal(density[1:, 0], density[:0:-1, 0])  # q and -q alike
-    record = Record(maps=(0.4,))
-    dataset = simulated(
-        drive=STEADY, shear=field(shear.Mapped), record=record, ensemble=Ensemble(members=1),
-        sweep={"shear.spectrum.rms": [50e3, 100e3]},
-    )  # fmt: skip
-    base, swept = (plots.draw(d, "spectrum").axes[0].lines[0].get_ydata() for d in (mapped(), dataset))
-    assert_allclose(np.nanmax(swept), np.nanmax(base) / 9.0, rtol=1e-12)
-
-
-def test_maps_and_spectra_that_cannot_be_drawn_say_why():
+def test_maps_that_cannot_be_drawn_say_why():
     parts = {"shear": field(shear.Mapped), "record": Record(maps=(0.4,)), "ensemble": Ensemble(members=1)}
-    resting = simulated(drive=drive.Steady(), **parts)
-    for dataset, kind, words in (
-        (simulated(), "map", r'\[record\] maps = \["1 s"\]'),
-        (simulated(), "spectrum", r'\[record\] maps = \["1 s"\]'),
-        (mapped(spectrum=Ripple(amplitude=3e5, wavelength=24e-6)), "spectrum", "single wave"),
-        (resting, "spectrum", "no stress"),
-    ):
-        with pytest.raises(ValueError, match=words):
-            plots.draw(dataset, kind)
-    assert plots.draw(resting, "map").axes
+    with pytest.raises(ValueError, match=r'\[record\] maps = \["1 s"\]'):
+        plots.draw(simulated(), "map")
+    assert plots.draw(simulated(drive=drive.Steady(), **parts), "map").axes
 
 
 ANISOTROPIC = {"model": "anisotropic_gaussian", "rms": "100 kPa", "length_x": "12 um", "length_y": "40 um"}
@@ -170,5 +123,3 @@ def test_a_map_passes_through_every_sample_and_a_measured_one_is_drawn_as_it_is(
     assert_allclose((left, right, low, high), 9.0 * np.array([-20.5, 19.5, -16.5, 15.5]), rtol=1e-12)
     (circle,) = (patch for patch in panel.patches if isinstance(patch, Circle))
     assert circle.center == (0.0, 0.0)
-    with pytest.raises(ValueError, match="measured map has no target spectrum"):
-        plots.draw(dataset, "spectrum")

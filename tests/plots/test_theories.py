@@ -1,16 +1,14 @@
-"""The figure of the theories shows what each theory says, and the figure of profiles the fields of the contact."""
+"""The figure of the theories shows what each theory says."""
 
 import numpy as np
 import pytest
 from helpers.parts import Adhesion, Clock, Ensemble, Equilibrium, bonds, shear
-from helpers.pictured import STEADY, data_of, rendered, simulated
-from matplotlib.patches import Circle
+from helpers.pictured import STEADY, data_of, simulated
 from numpy.testing import assert_allclose
 
 from sim.analysis import where
-from sim.laws import halfspace, jkr, theories
+from sim.laws import jkr, theories
 from sim.plots import kinds as plots, style as pictures, theories as rival_figures
-from sim.plots.theories import closed_contact
 
 NUMBERS = (42e-3, 2e-3, 6.4e6, 0.5, 0.1)
 
@@ -97,55 +95,10 @@ def test_points_are_means_over_members_and_the_second_half_and_lie_on_the_theori
 
 def test_scenes_that_theories_do_not_describe_are_refused_with_the_cure():
     for changes, words in (
-        ({"contact": Equilibrium(displacement=1e-6, stiffness=100.0)}, "load = .*indentation; .*drawn as: .*profile"),
-        ({"contact": Equilibrium(load={"from": 0.0, "to": 4e-3})}, "load = .*indentation; .*drawn as: .*profile"),
+        ({"contact": Equilibrium(displacement=1e-6, stiffness=100.0)}, "load = .*indentation; .*drawn as: .*time"),
+        ({"contact": Equilibrium(load={"from": 0.0, "to": 4e-3})}, "load = .*indentation; .*drawn as: .*time"),
         ({"adhesion": Adhesion(work=0.0)}, "only with adhesion"),
         ({"contact": Equilibrium(load=-1.0)}, "no contact at rest.*drawn as: time$"),
     ):
         with pytest.raises(ValueError, match=words):
             plots.draw(plain(**changes), "theories")
-
-
-@pytest.fixture(scope="module")
-def slid():
-    return simulated(ensemble=Ensemble(members=2))
-
-
-def test_pressure_surfaces_and_tangential_displacement_are_those_of_the_first_member_at_the_last_time(slid):
-    pressure, surfaces, *panels = rendered(plots.draw(slid, "profile")).axes
-    radius, depth = (float(slid[name][0, -1]) for name in ("contact_radius", "indentation"))
-    (x, p), (_, rest) = data_of(pressure, pictures.BOTH)[0], data_of(pressure, pictures.REFERENCE, "--")[0]
-    inside = np.abs(1e-6 * x) < 0.999 * radius
-    exact = halfspace.pressure(np.abs(1e-6 * x[inside]), radius, depth, 2e-3, 6.4e6)
-    assert_allclose(p[inside], 1e-3 * exact, rtol=1e-9)
-    assert np.all(np.nan_to_num(p[np.abs(1e-6 * x) > 1.001 * radius]) == 0.0)
-    full = jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6)
-    depth = jkr.indentation_at_radius(full, 42e-3, 2e-3, 6.4e6)
-    assert_allclose(rest[len(rest) // 2], 1e-3 * halfspace.pressure(0.0, full, depth, 2e-3, 6.4e6), rtol=1e-12)
-    (x, low), (_, high) = data_of(surfaces, pictures.BOTH)
-    r = np.abs(1e-6 * x)
-    assert np.all(high[r < radius] == low[r < radius])
-    depth = float(slid["indentation"][0, -1])
-    assert_allclose(low, -1e6 * halfspace.normal_displacement(r, radius, depth, 2e-3), rtol=1e-9, atol=1e-12)
-    # outside the upper surface is the sphere's own; heights are some micrometres
-    out = r > radius
-    assert_allclose(high[out], 1e6 * (r[out] ** 2 / 4e-3 - depth), rtol=0, atol=1e-11)
-    stress = float(slid["shear_stress"][-1])
-    (x, along), (_, across) = (data_of(panels[0], pictures.BOTH, style)[0] for style in ("-", "--"))
-    exact = halfspace.tangential_profiles(1e-6 * x, radius, stress, 1.6e6)
-    assert_allclose([along, across], 1e6 * np.array(exact), rtol=1e-9)
-    shown = panels[1].images[0].get_array()
-    assert_allclose(shown.max(), along.max(), rtol=1e-9)
-    assert shown[100, 0] > shown[0, 100]  # x to the right: farther along the sliding than across
-    (circle,) = (patch for patch in panels[1].patches if isinstance(patch, Circle))
-    assert_allclose(circle.radius, 1e6 * radius, rtol=1e-14)
-
-
-def test_a_contact_that_came_off_is_drawn_as_it_last_was():
-    ramp = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())
-    closed = np.flatnonzero(ramp["in_contact"].to_numpy())
-    assert closed[-1] < ramp.sizes["t"] - 1
-    assert closed_contact(ramp).equals(ramp.isel(t=closed[-1]))
-    plots.draw(ramp, "profile")
-    with pytest.raises(ValueError, match=r"never closed; raise the load.*drawn as: stress, curve, time"):
-        plots.draw(simulated(contact=Equilibrium(load=-1.0), shear=shear.Uniform()), "profile")

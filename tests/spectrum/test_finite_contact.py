@@ -191,7 +191,6 @@ def test_a_uniform_map_stores_its_energy():
         # the edge is blurred over a pixel: 0.1 (pixel/a)^2 relative
         rtol = 0.1 * (2.0 / points / a) ** 2
         assert_allclose(halfspace.disc_energy_of_map(field, 2.0, a, 2.0, nu), exact, rtol=rtol, atol=0)
-        assert_allclose(halfspace.cross_energy_of_map(field, 2.0, a, 3.0, 2.0, nu), 2 * exact, rtol=rtol, atol=0)
 
 
 def wave_maps(points, k, angle, cell=2.0):
@@ -231,44 +230,15 @@ def test_discs_of_random_maps_average_to_the_overlap_integral_that_is_expected()
     assert_allclose(exact / plane, 0.939, rtol=0.01, atol=0)
 
 
-def test_the_cross_energy_belongs_to_the_square_of_a_sum_with_zero_mean_and_the_size_of_the_energy():
-    xi, members, cell = 0.1, 2000, 2.4
-    cross = halfspace.cross_energy_of_map(gaussian_maps(members, 48, cell, xi, seed=12), cell, 1.0, 2.0, 1.0)
-    assert abs(cross.mean()) < 5 * cross.std() / math.sqrt(members)
-    # its variance is integral of C(q) |w0(q)|^2, here from samples of w0 on a fine lattice
-    points, step = 480, cell / 480
-    x = (np.arange(points) - 239.5) * step
-    w0 = halfspace.disc_displacement(x[:, None], x, 1.0, 2.0, 1.0) * (np.hypot(x[:, None], x) < 1.0)
-    q = 2 * np.pi * np.fft.fftfreq(points, step)
-    density = np.pi * xi**2 * np.exp(-(xi**2) / 4 * (q[:, None] ** 2 + q**2))
-    power = np.abs(np.fft.fft2(w0) * step**2) ** 2
-    spread = math.sqrt(np.sum(power * density)) / cell / np.pi
-    # the edge of either lattice: less than (pixel/a)^2
-    assert abs(cross.std() - spread) < 5 * spread / math.sqrt(2 * members) + 0.05**2 * spread
-    # on vanishing patches C is flat: 1.93 tau0/sigma times the energy
-    flat = math.sqrt(np.pi * xi**2 * np.sum(w0**2) * step**2) / np.pi
-    assert_allclose(flat / Gaussian(1.0, xi).surface_energy(1.0) / 2.0, 1.93, rtol=0.005 / 1.93, atol=0)
-    # the rim, where patches stick out of the disc, takes some of it
-    assert 0.9 * flat < spread < flat
-    # (tau0 + tau1): E = E0 + cross + E1; the cross term by displacement and by convolution differ at the edge only
-    field = gaussian_maps(1, 96, 2.0, 0.3, seed=5)[0]
-    a, tau0 = 0.9, 0.7
-    fluctuation = halfspace.disc_energy_of_map(field, 2.0, a, 1.0)
-    mean = halfspace.disc_energy_of_map(np.full_like(field, tau0), 2.0, a, 1.0)
-    cross = halfspace.disc_energy_of_map(field + tau0, 2.0, a, 1.0) - fluctuation - mean
-    direct = halfspace.cross_energy_of_map(field, 2.0, a, tau0, 1.0)
-    assert abs(cross - direct) < 0.3 * (2 / 96 / a) ** 2 * 2 * math.sqrt(fluctuation * mean)
-
-
 def test_a_map_has_the_same_energy_alone_and_in_a_batch():
     maps, radius = gaussian_maps(5, 40, 2.0, 0.3, seed=3), np.array([0.4, 1.0, 0.0, 0.77, 0.4])
-    for energy in (
-        lambda field, a: halfspace.disc_energy_of_map(field, 2.0, a, 1.6e6),
-        lambda field, a: halfspace.cross_energy_of_map(field, 2.0, a, 3e5, 1.6e6),
-    ):
-        batch = energy(maps, radius)
-        assert_array_equal(batch, [energy(field, a) for field, a in zip(maps, radius, strict=True)])
-        assert_array_equal(batch[3:], energy(maps[3:], radius[3:]))
-        assert batch[2] == 0.0
-        assert energy(maps[:, None], radius[:2]).shape == (5, 2)
-        assert np.isnan(energy(maps[0], np.nan))
+
+    def energy(field, a):
+        return halfspace.disc_energy_of_map(field, 2.0, a, 1.6e6)
+
+    batch = energy(maps, radius)
+    assert_array_equal(batch, [energy(field, a) for field, a in zip(maps, radius, strict=True)])
+    assert_array_equal(batch[3:], energy(maps[3:], radius[3:]))
+    assert batch[2] == 0.0
+    assert energy(maps[:, None], radius[:2]).shape == (5, 2)
+    assert np.isnan(energy(maps[0], np.nan))

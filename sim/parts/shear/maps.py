@@ -61,12 +61,6 @@ class CarriedProcess(SmoothProcess):
                 map_[(before < 0.0) | (before >= lattice.sides[0])] = 0.0
         return moved
 
-    def centred(self, maps: Array) -> tuple[Array, float]:
-        """Return the squares of maps around the middle of a disc, and their side [m]."""
-        half = min(self.field.shape) // 2
-        first, second = (points // 2 - half for points in self.field.shape)
-        return maps[:, first : first + 2 * half, second : second + 2 * half], 2 * half * self.field.pixels[0]
-
 
 @dataclass(frozen=True)
 class Passing:

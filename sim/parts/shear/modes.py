@@ -302,10 +302,6 @@ class ModalProcess(Renewing):
         """The lattice of the maps."""
         return Grid(self.modes.cell, self.modes.points)
 
-    def centred(self, maps: Array) -> tuple[Array, float]:
-        """Return the squares of maps around the middle of a disc, here the whole maps, and their side [m]."""
-        return maps, self.modes.cell
-
     @cached_property
     def _spare(self) -> list[tuple[Array, Array]]:
         """Work arrays for half spectra that are not in use; the first of two is zero but at the modes."""
