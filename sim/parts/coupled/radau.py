@@ -1,7 +1,7 @@
 """Equations of slider and bonds at the nodes of Radau IIA, order 5, with positions as the unknowns.
 
-In units of a stretch b, of the force n κ b A0 that all sites bear at it over a reference area A0, and of the time
-as it is, body X (mass m, damping c) and interface X_s = X − u obey
+The unit of length is a stretch b. The unit of force is n κ b A0, the force of all sites at this stretch over a
+reference area A0. Body X (mass m, damping c) and interface X_s = X − u obey
 
     m Ẍ = S − c Ẋ − F,   F = A (M + η Ẋ_s),   u = F/k_t,   Ṡ = K (V − Ẋ) or S = Q(t),
     Ṅ = k_on (1 − N) − N (k + |Ẋ_s|/l),   Ṁ = N Ẋ_s − M (k + 2|Ẋ_s|/l),   k = k0 exp(|M/N|),
