@@ -1,7 +1,6 @@
 """Figures of statistics as curves over time, speed or a swept key: contact, energies and friction."""
 
 import contextlib
-import difflib
 import textwrap
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, cast
@@ -16,7 +15,6 @@ from matplotlib.figure import Figure
 from sim.analysis import bond_work, is_stationary, is_steady, setting, settled, slips, statements, sweep_dims
 from sim.analysis.dataset import MEMBERS, speed_name, speed_of, stays_held
 from sim.analysis.events import jumps
-from sim.analysis.observables import KEPT, chosen_observables
 from sim.analysis.over_speed import speed_dim
 from sim.analysis.statistics import averaging, of_second_half, over_members, summary
 from sim.plots import style
@@ -78,11 +76,6 @@ class Statistics:
             return result
         result = result.isel(t=0, drop=True, missing_dims="ignore")
         return result.assign(of_second_half(self.dataset, [name])) if self.late else result
-
-    def names(self) -> list[str]:
-        """Return the names of all observables."""
-        parts = (str(name).rpartition("_") for name in chosen_observables(self.dataset.isel(t=[0]), None))
-        return sorted({stem if kind in KEPT else f"{stem}{line}{kind}" for stem, line, kind in parts})
 
 
 class Scene(NamedTuple):
@@ -378,10 +371,8 @@ def over(dataset: xr.Dataset, name: str) -> Scene:
         return scene.placed("t", dataset["t"].to_numpy(), "time $t$", "s")
     mean = scene.statistics.get(f"{name}_mean")
     if mean is None:
-        known = scene.statistics.names()
-        near = difflib.get_close_matches(name, [*known, *swept], 1, 0.6)
-        cure = f'did you mean "{near[0]}"?' if near else f"choose of: t, speed, {', '.join([*swept, *known])}"
-        raise ValueError(f'there is no x axis "{name[:40]}"; {cure}')
+        axes = ", ".join(["t", "speed", *swept])
+        raise ValueError(f'there is no x axis "{name[:40]}"; choose {axes} or a recorded variable')
     return scene.placed(name, scene.all(f"{name}_mean"), named(mean), mean.attrs["units"], broken=True)
 
 

@@ -104,7 +104,7 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
     """Return the mechanism that is sufficient, "" if the data cannot tell, and that in words."""
     whole, *others = judged
     if not others:
-        return "", "there is no other mechanism to compare with"
+        return ("", "there is no other mechanism to compare with; give bonds a stress or a [shear] that fluctuates")
     if math.isinf(whole.aicc):
         return "", f"the data cannot tell: AICc of {WHOLE} needs two more points than free keys; measure more"
     left = [item for item in others if not item.rejected]
