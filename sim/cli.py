@@ -174,7 +174,7 @@ def run(
 
     plan = plans.Plan.of(scene)
     if not any(plan.share(*share)):
-        say(f"shard {shard} has no work, because the run has fewer groups of members than shards")
+        say(f"shard {shard} has nothing to compute: the run has too few members and sweep points for so many shards")
         return
     simulate.claim(target, force or resume, simulate.files_read(scene))
     from sim.ensemble.execute import orders

@@ -35,6 +35,8 @@ _WINDOW = 6.0
 _FEWEST = 2.0
 #: How many of its standard errors the correlation of neighbouring records is below that of ``_FEWEST``.
 _SURELY = 4.0
+#: Members with which a member may be below 5 % of all.
+FOR_TAILS = 20
 #: Numbers that are transformed at once, values that a correlation time is taken from, and records apart at most.
 _AT_ONCE, _VALUES, _LAGS = 2**19, 2**22, 2**16
 

@@ -31,7 +31,7 @@ from sim.analysis.events import varies
 from sim.analysis.observables import restricted, with_slips
 from sim.analysis.over_speed import extremes, loss_speeds
 from sim.analysis.statements import BOUNDED, COUNTS, as_means, each, of_events, reasons, statements, statistics
-from sim.analysis.statistics import QUANTILES, WIDE, averaging, correlation_time, over_members
+from sim.analysis.statistics import FOR_TAILS, QUANTILES, WIDE, averaging, correlation_time, over_members
 from sim.numerics.files import output
 from sim.units.notation import bounded, chosen_unit, concise, engineering, scaled, share
 
@@ -130,12 +130,15 @@ _LOSS = re.compile(r"((\w+?)_(?:at_(.+)_percent_lost|halfway_to_hertz))_mean")
 _LOSSES = {
     "speed": ("{long} at {V}", ""),
     "steady_speed": ("{short}, if\nsteady, at {V}", "about the speed of the same loss in steady sliding"),
-    "lost_to_bonds": ("of {short}:\nbonds", "share of that loss, subtracted first"),
-    "lost_to_fluctuations": ("of {short}:\nfluct.", "share of that loss, subtracted after the bonds"),
-    "lost_to_fluctuations_first": ("of {short}:\nfluct. first", "share of that loss, subtracted before the bonds"),
-    "lost_to_bonds_last": ("of {short}:\nbonds last", "share of that loss, subtracted after the fluctuations"),
-    "lost_to_mean_stress": ("of {short}:\nstress", "share of that loss"),
-    "lost_to_lag": ("of {short}:\nlag", "share of that loss"),
+    "lost_to_bonds": ("at {short} lost:\nto bonds", "share of A_JKR, subtracted first"),
+    "lost_to_fluctuations": ("at {short} lost:\nto fluct.", "share of A_JKR, subtracted after the bonds"),
+    "lost_to_fluctuations_first": (
+        "at {short} lost: to\nfluct. (first)",
+        "share of A_JKR, subtracted before the bonds",
+    ),
+    "lost_to_bonds_last": ("at {short} lost: to\nbonds (last)", "share of A_JKR, subtracted after the fluctuations"),
+    "lost_to_mean_stress": ("at {short} lost:\nto stress", "share of A_JKR"),
+    "lost_to_lag": ("at {short} lost:\nto lag", "share of A_JKR"),
 }
 
 #: Heading and meaning of the correlation time.
@@ -350,7 +353,9 @@ def _range(means: xr.Dataset, name: str, heading: str, points: Points) -> Column
     """Return the least and largest value of an event over its cycles, or the quantiles of a time over members."""
     if name == "first_detachment" and f"{name}_quantile" in means:
         low, high = (_at(means[f"{name}_quantile"].isel(quantile=end), points) for end in (0, -1))
-        heading = "5 to 95 %\nof members"
+        count = re.match(r"\d+(?= member)", means[f"{name}_mean"].attrs.get("over", ""))
+        fewest = float(count[0]) * np.nanmin(_at(means["ever_detached_mean"], points)) if count else math.inf
+        heading = "5 to 95 %\nof members" + (", interpolated" if fewest < FOR_TAILS else "")
     elif f"{name}_least_mean" in means:
         low, high = (_at(means[f"{name}_{end}_mean"], points) for end in ("least", "largest"))
         heading = f"{' '.join(heading.split())},\nleast to largest"

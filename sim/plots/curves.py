@@ -16,7 +16,7 @@ from sim.analysis import bond_work, is_stationary, is_steady, setting, settled, 
 from sim.analysis.dataset import MEMBERS, speed_name, speed_of, stays_held
 from sim.analysis.events import jumps
 from sim.analysis.over_speed import speed_dim
-from sim.analysis.statistics import averaging, of_second_half, over_members, summary
+from sim.analysis.statistics import FOR_TAILS, averaging, of_second_half, over_members, summary
 from sim.plots import style
 from sim.plots.measured import Compared, Line, Measured
 from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, named, swept_value
@@ -26,8 +26,6 @@ _MARKED = 25
 
 #: Largest number of curves of a panel: named in a legend, and along a colour bar.
 _NAMED, _MOST = 10, 20
-#: Members with which a member may be below 5 % of all.
-_FOR_TAILS = 20
 
 #: Variables that are zero while the contact is open: lines break there.
 _OF_CONTACT = ("contact_radius", "contact_area", "area_ratio", "friction_force")
@@ -197,7 +195,7 @@ def scene_along(dataset: xr.Dataset, along: str) -> Scene:
         lines = [lines[0]._replace(label=words or "simulated", colour=BOTH)]
     members = dataset.sizes.get(MEMBERS, 0)
     spread = "± 1 std. dev. of members" if "contact_radius_std" in dataset else "5–95 % of members"
-    if 0 < members < _FOR_TAILS and not statistics.late:
+    if 0 < members < FOR_TAILS and not statistics.late:
         spread = f"5–95 %, interpolated between {members} members"
     return Scene(statistics, lines, words, f"{spread} and records" if statistics.late else spread, left_out, bar)
 
