@@ -186,11 +186,14 @@ def _add_sweep_coordinates(content: Outline, plan: Plan, axis: Axis, stride: int
 
 
 def _last_rate(course: Any, duration: float) -> float:
-    """Return the rate of change in the last moving part of a course, in the unit of its value per second; 0 if none."""
+    """Return the rate of the last ramp of a course [per s]; 0 if there is none, or if its rate is not constant."""
     pieces = course.pieces(np.array([0.0, duration]), duration)
     span, change = pieces.stop - pieces.start, pieces.last - pieces.first
-    moving = np.flatnonzero((span > 0.0) & (change != 0.0))
-    return float(change[moving[-1]] / span[moving[-1]]) if moving.size else 0.0
+    rates = np.trim_zeros(change[span > 0.0] / span[span > 0.0], "b")
+    turns = np.flatnonzero(np.sign(rates) != np.sign(rates[-1:]))
+    ramp = slice(turns[-1] + 1 if turns.size else 0, rates.size)
+    straight = np.allclose(rates[ramp], rates[-1:], 1e-9, 0.0) and getattr(course, "scale", "linear") == "linear"
+    return float(rates[-1]) if rates.size and straight else 0.0
 
 
 def _is_course(value: Any) -> bool:

@@ -44,6 +44,11 @@ def test_swept_courses_have_short_names_a_key_below_the_figure_and_their_rates_a
     rates = np.array([2.0, 3.0]) / float(dataset["t"][-1])  # of the loads in mN, the slower one first
     assert_allclose(figure.axes[0].lines[0].get_xdata(), rates, rtol=1e-12)
     assert figure.axes[-1].get_xlabel() == "rate of the last change of contact.load (mN/s)"
+    for bent in ({"time": ["0 s", "0.2 s", "9 s"], "value": ["4 mN", "3 mN", "0 N"]}, courses[0] | {"scale": "log"}):
+        parts = {"drive": drive.Steady(speed=1e-3), "shear": shear.Uniform()}
+        dataset = run(scene(**parts, sweep={"contact.load": [courses[1], bent]}))
+        assert dataset["contact_load_rate"].values[1] == 0.0
+        assert "rate" not in kinds.draw(dataset, "sweep").axes[-1].get_xlabel()
 
 
 def test_size_range_and_time_of_a_figure_are_chosen(speeds):
