@@ -74,7 +74,7 @@ def test_a_map_has_the_unit_of_its_comment_or_key_and_an_area_that_of_a_spreadsh
     assert areas == [2e-6] * 3
 
 
-def test_measured_columns_are_all_named_at_once_with_proposals_and_without_units_the_largest_values(tmp_path, capsys):
+def test_measured_columns_are_all_named_at_once_with_proposals_and_without_units_the_largest_values(tmp_path, caplog):
     units = {"speed": "m/s", "contact_area": "m^2", "friction_force": "N", "contact_load": "N", "t": "s"}
     known, path = {name: Quantity(unit, name) for name, unit in units.items()}, tmp_path / "measured.csv"
     path.write_text("V (mm/s),A (mm2),A_error (%),Load,contact_aera,t_error,x\n1,2,3,4,5,6,7\n", encoding="utf-8")
@@ -87,7 +87,7 @@ def test_measured_columns_are_all_named_at_once_with_proposals_and_without_units
     path.write_bytes("\ufeffspeed;contact_area\r\n50,0;0,2\r\n-60;0,1\r\n".encode())
     result, remark = read_measured(path, known, known)
     assert result["speed"].values.tolist() == [50.0, -60.0] and "speed reaches 60 m/s" in remark
-    assert re.search(r"speed reaches 60 m/s, contact_area reaches 0\.2 m\^2", capsys.readouterr().err)
+    assert re.search(r"speed reaches 60 m/s, contact_area reaches 0\.2 m\^2", caplog.text)
     path.write_text("speed [m/s];contact_area [m2]\n50,0;0,2\n", encoding="utf-8")
     assert not read_measured(path, known, known)[1] and capsys.readouterr().err == ""
 

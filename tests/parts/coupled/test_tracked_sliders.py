@@ -108,5 +108,5 @@ def test_a_state_that_has_been_advanced_is_not_advanced_again():
     scene = tracked(1.0, 4, spring(1.0), 10)
     states = march(scene, np.arange(1), keep=False)
     first, _ = next(states), next(states)
-    with pytest.raises(RuntimeError, match="advanced already"):
+    with pytest.raises(RuntimeError, match="already been advanced"):
         list(march(scene, np.arange(1), first))
