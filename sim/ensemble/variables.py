@@ -358,6 +358,9 @@ VARIABLES += (
     _driven("runaway_time", "s", "time at which the slider lost stability", "t_r"),
 )  # fmt: skip
 
+#: Reading of each recorded quantity, by its name.
+READ = {variable.name: variable.read for variable in VARIABLES}
+
 #: Numbers of a scene, written for each point of the sweep.
 NUMBERS = (
     Variable("contact_modulus", "Pa", "contact modulus", "E*", "", lambda scene: scene.solid.contact_modulus),

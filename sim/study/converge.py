@@ -28,7 +28,7 @@ from scipy import special
 from sim.analysis import engineering
 from sim.engine import MemberNoise, follow
 from sim.ensemble.plan import seconds_a_step, together
-from sim.ensemble.variables import VARIABLES
+from sim.ensemble.variables import READ
 from sim.numerics import files
 from sim.parts.exchange import Array, Bonding, Gammas, Motion
 from sim.parts.shear.bands import cell_pairs
@@ -46,8 +46,6 @@ STATISTICS = ("mean", "spread", "skewness", "correlation time")
 _ENERGY, _RADIUS = 2, 3
 _SHORT = ("stress", "bonds", "ΔΓ", "radius", "friction")
 _WORDS = ("the shear stress", "the bond fraction", "ΔΓ", "the radius", "the friction force")
-READ = {variable.name: variable.read for variable in VARIABLES}
-
 _BANDS, _COHORTS = (0.3, 0.1, 0.03, 0.01, 0.003), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 #: Shares of the budget that are spent on times and on clock steps; the rest is spent on models and grids.

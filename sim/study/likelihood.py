@@ -22,12 +22,12 @@ from scipy import optimize, stats
 
 from sim.ensemble.dataset import variable_name
 from sim.ensemble.steady import Values, changed, steady_course
-from sim.ensemble.variables import VARIABLES, Variable
+from sim.ensemble.variables import READ, VARIABLES, Variable
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
-from sim.study.converge import READ, recorded
+from sim.study.converge import recorded
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity

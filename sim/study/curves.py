@@ -1,0 +1,76 @@
+"""Curves of steady sliding over the speed: variables of a dataset, shares of the lost area, and the speed of a loss."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from scipy import optimize
+
+from sim.ensemble.steady import steady_course
+from sim.ensemble.variables import READ, VARIABLES
+from sim.parts.exchange import Array
+from sim.scenario.scenario import Scenario
+
+#: Variables of a dataset that are curves of steady sliding.
+OVER_SPEED = (
+    "bond_fraction", "shear_stress", "fluctuation_energy", "work_of_adhesion", "contact_radius", "contact_area",
+    "friction_force",
+)  # fmt: skip
+#: Shares of JKR's area that follow from them.
+SHARES = {
+    "area_ratio": "contact area over JKR's",
+    "lost_to_bonds": "share of JKR's area lost to broken bonds, which are charged first",
+    "lost_to_fluctuations": "share of JKR's area lost to fluctuations, after the bonds",
+    "lost_to_mean_stress": "share of JKR's area lost to the mean stress, after bonds and fluctuations",
+    "lost_to_fluctuations_first": "share of JKR's area lost to fluctuations, which are charged first",
+    "lost_to_bonds_last": "share of JKR's area lost to broken bonds, after the fluctuations",
+}
+
+
+def curves(scenario: Scenario, speeds: Array, time: float = 0.0) -> dict[str, Array]:
+    """Return the curves of ``steady_curves`` by name, arrays like ``speeds`` [m/s]."""
+    course = steady_course(scenario, np.full((len(speeds), 1), time), speeds[:, np.newaxis])
+    radii = ["jkr_radius", "bonds_radius", *(["fluctuations_radius"] if scenario.contact.reversible else [])]
+    names = (*OVER_SPEED, *radii)
+    read = {name: np.broadcast_to(READ[name](scenario, course), (len(speeds), 1))[:, 0] for name in names}
+    full, *left = (np.pi * read.pop(name) ** 2 for name in radii)
+    full = np.where(full > 0.0, full, np.nan)
+    levels = [full, *left, read["contact_area"]]
+    lost = ("lost_to_bonds", "lost_to_fluctuations", "lost_to_mean_stress")
+    result = read | {"area_ratio": read["contact_area"] / full}
+    result |= {name: (levels[k] - levels[k + 1]) / full for k, name in enumerate(lost[: len(levels) - 1])}
+    if scenario.margin is None:  # on a disc the edge pays another energy than that on the contact
+        work = scenario.adhesion.work - scenario.fluctuations.paid_by_adhesion * course.energy
+        control = scenario.contact.control(course.time, scenario.clock.duration)
+        alone = np.nan_to_num(control.radius(work, np.zeros(1), 0.0, scenario.bodies))[:, 0]
+        result["lost_to_fluctuations_first"] = 1.0 - np.pi * alone**2 / full
+        both = result["lost_to_bonds"] + result["lost_to_fluctuations"]
+        result["lost_to_bonds_last"] = both - result["lost_to_fluctuations_first"]
+    return result
+
+
+def steady_curves(scenario: Scenario, speeds: Array, time: float = 0.0) -> xr.Dataset:
+    """Return the curves of steady sliding as a dataset; see ``sim.steady_curves``."""
+    described = {item.name: (item.unit, item.long_name) for item in VARIABLES}
+    described |= {name: ("1", text) for name, text in SHARES.items()}
+    axis = "speed", speeds, {"units": "m/s", "long_name": "sliding speed"}
+    result = xr.Dataset(coords={"speed": axis}, attrs={"title": scenario.name})
+    for name, values in curves(scenario, speeds, time).items():
+        unit, text = described[name]
+        result[name] = "speed", values, {"units": unit, "long_name": text}
+    return result
+
+
+def speeds_of_loss(scenario: Scenario, share: float, speeds: Array, time: float = 0.0) -> list[float]:
+    """Return the speeds [m/s] in steady sliding at which a share of JKR's area is lost, between some speeds.
+
+    Each crossing between two neighbours of ``speeds``, which grow, is solved to rounding in the logarithm of the speed.
+    """
+
+    def surplus(logarithm: float) -> float:
+        return float(curves(scenario, np.exp([logarithm]), time)["area_ratio"][0]) - (1.0 - share)
+
+    left = curves(scenario, speeds, time)["area_ratio"] - (1.0 - share)
+    places = np.flatnonzero((left[:-1] > 0.0) != (left[1:] > 0.0))
+    ends: Sequence[tuple[float, float]] = [(np.log(speeds[k]), np.log(speeds[k + 1])) for k in places]
+    return [float(np.exp(optimize.brentq(surplus, low, high, xtol=1e-12, rtol=1e-12))) for low, high in ends]
