@@ -37,14 +37,31 @@ if TYPE_CHECKING:  # what a function needs is imported where it is called, so th
     import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
+    from sim.explorer.server import Server
     from sim.scenario.scenario import Scenario
     from sim.study.fit import Fit
 
 Path = str | os.PathLike[str]
 _FROM = {"Scenario": "sim.scenario.scenario", "load": "sim.scenario.reader"}
 _FOLDERS = ("analysis", "laws", "plots", "report", "spectrum")
-__all__ = sorted([*_FROM, *_FOLDERS, "BadInput", "check", "converge", "fit", "open", "plot", "run", "stats"])
+__all__ = sorted(
+    [
+        *_FROM,
+        *_FOLDERS,
+        "BadInput",
+        "check",
+        "converge",
+        "explore",
+        "fit",
+        "open",
+        "plot",
+        "run",
+        "stats",
+        "steady_curves",
+    ]
+)
 
 
 def run(
@@ -223,6 +240,71 @@ def fit(
 
     paths = [data] if isinstance(data, str | os.PathLike) else list(data)
     return study(_scene(scenario), [pathlib.Path(path) for path in paths], free, common, steady)
+
+
+def steady_curves(
+    scenario: "Scenario | Path | dict[str, Any]", speeds: "ArrayLike", time: float = 0.0
+) -> "xarray.Dataset":
+    """Curves of steady sliding: contacts that have slid at one speed for ever, with the mean of the fluctuations.
+
+    Parameters
+    ----------
+    scenario : Scenario, path or dict
+        What slides; of a sweep the first point.
+    speeds : array_like, shape (speeds,)
+        Sliding speeds V [m/s], above 0.
+    time : float
+        Time of the run at which the sphere is held as in the curves [s].
+
+    Returns
+    -------
+    xarray.Dataset
+        Variables of a run's dataset and the shares of JKR's area that each mechanism takes, over the dimension
+        ``speed``. Shares are nan if JKR's contact is open.
+
+    Examples
+    --------
+    >>> scene = load("scenarios/pdms_lens.toml")
+    >>> print(f"{float(steady_curves(scene, [1e-3]).area_ratio[0]):.4f}")
+    0.9808
+    """
+    import numpy as np
+
+    from sim.study.curves import steady_curves as curves
+
+    values = np.atleast_1d(np.asarray(speeds, float))
+    if values.ndim != 1 or not np.all((values > 0.0) & np.isfinite(values)):
+        raise BadInput(["speeds: must be positive numbers in m/s, such as [1e-3, 1e-2]"])
+    return curves(_scene(scenario).points()[0], values, time)
+
+
+def explore(scenario: "Scenario | Path | dict[str, Any]", data: Path | None = None, *, port: int = 0) -> "Server":
+    """Explore a scenario with sliders, on a page in the notebook; it needs the extra ``explore``.
+
+    Parameters
+    ----------
+    scenario : Scenario, path or dict
+        Where the sliders start; of a sweep the first point.
+    data : path, optional
+        A CSV table of measured curves, as for ``fit``.
+    port : int
+        Port of this machine; 0 takes one that is free.
+
+    Returns
+    -------
+    Server
+        A notebook shows it as the page. ``address`` is that for a browser, ``close()`` ends it.
+
+    Raises
+    ------
+    BadInput
+        If the extra is not installed, the port is in use, or the scenario or the table cannot be used.
+    """
+    from sim.explorer.server import Server
+
+    server = Server(_scene(scenario), port, None if data is None else pathlib.Path(data), framed=True)
+    server.begin()
+    return server
 
 
 class Text(str):

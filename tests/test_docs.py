@@ -191,8 +191,9 @@ def test_the_findings_have_the_numbers_of_the_lens_behind_a_spring_at_a_16_times
             assert abs(mean - float(value)) < room, (name, mean)
 
 
-#: Pages whose blocks are run one after the other. A block that is marked ``cluster`` needs several machines and is only
-#: parsed. Lines of ``make`` and ``pip`` need a network: ``.ci/run`` runs ``make run`` and ``make test`` of README.
+#: Pages whose blocks are run one after the other. A block that is marked ``cluster`` needs several machines, and one of
+#: ``browser`` waits for its page: both are only parsed. Lines of ``make`` and ``pip`` need a network: ``.ci/run`` runs
+#: ``make run`` and ``make test`` of README.
 RUN = [page for page in PAGES if any("python" in words or command_lines(code) for words, code in blocks(page))]
 
 
@@ -204,10 +205,11 @@ def test_what_a_page_shows_runs(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
     for words, code in blocks(page):
+        is_parsed_only = {"cluster", "browser"} & {*words}
         if "python" in words and ">>>" not in code:  # which the test of the page for newcomers runs
             parsed = compile(code, page, "exec")
-            exec(parsed if "cluster" not in words else "", names)
-        for line in command_lines(code) if "cluster" not in words else ():
+            exec("" if is_parsed_only else parsed, names)
+        for line in () if is_parsed_only else command_lines(code):
             done = command_line(*line)
             assert done.exit_code == 0, (line, done.stderr)
 

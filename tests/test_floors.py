@@ -15,7 +15,7 @@ BESIDE |= {f"helpers.{path.stem}": path for path in sorted((ROOT.parent / "tests
 
 #: The folders and the two modules beside them, lowest first.
 FLOORS = ("units", "numerics", "laws", "spectrum", "parts", "scenario", "engine", "ensemble")
-FLOORS += ("analysis", "plots", "report", "study", "cli", "__main__")
+FLOORS += ("analysis", "plots", "report", "study", "explorer", "cli", "__main__")
 #: Floors that a floor must not import although they are below it.
 FORBIDDEN = {"analysis": {"parts", "scenario", "engine", "ensemble"}, "plots": {"engine", "ensemble"}}
 FORBIDDEN |= {"report": {"ensemble"}}

@@ -20,6 +20,7 @@ from sim.scenario.checks import renewed
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
 from sim.spectrum.families import Band
+from sim.spectrum.family import Family
 from sim.spectrum.radial import share_of_long_waves
 from sim.units.notation import engineering
 from sim.units.quantity import same_unit
@@ -214,14 +215,25 @@ def _fluctuating(point: Scenario, where: str) -> Iterator[str]:
     long_waves = share_of_long_waves(spectrum, 2.0 * point.rest_radius, point.solid.effective[1])
     if long_waves > _LAG:
         yield f"waves longer than the contact store {100.0 * long_waves:.2g} % of the energy"
-    if spectrum.model in ("gaussian", "von_karman"):
-        short, long = (factor * spectrum.length for factor in _BAND)
-        band = Band(rms=spectrum.rms, shortest=short, longest=long)
-        times = plane_energy(spectrum, 1.0, 0.5) / plane_energy(band, 1.0, 0.5)
+    if (times := over_band(spectrum)) is not None:
+        short, long = (engineering(factor * cast(Any, spectrum).length, "m") for factor in _BAND)
         yield (
-            f"shear.spectrum.length is a correlation length: wavelengths from {engineering(short, 'm')} to"
-            f" {engineering(long, 'm')} with the same rms store {times:.2g} times less energy"
+            f"shear.spectrum.length is a correlation length: wavelengths from {short} to {long} with the same rms store"
+            f" {times:.2g} times less energy"
         )
+
+
+def over_band(spectrum: Family) -> float | None:
+    """Return the energy of a spectrum over that of wavelengths near its correlation length with the same rms.
+
+    It is None for a spectrum without a correlation length. The energy grows with the length, so a pattern of the
+    wavelength λ has the energy of the correlation length λ over this number.
+    """
+    if getattr(spectrum, "model", "") not in ("gaussian", "von_karman"):
+        return None
+    short, long = (factor * cast(Any, spectrum).length for factor in _BAND)
+    band = Band(rms=cast(Any, spectrum).rms, shortest=short, longest=long)
+    return plane_energy(spectrum, 1.0, 0.5) / plane_energy(band, 1.0, 0.5)
 
 
 def _mechanisms(point: Scenario, time: Array, speed: Array, at: str) -> Iterator[str]:

@@ -1,0 +1,62 @@
+"""The contact to scale: profiles of sphere and half-space, and a map of the stress around the contact circle."""
+
+import math
+from typing import Any, cast
+
+import numpy as np
+
+from sim.ensemble.steady import plane_energy
+from sim.explorer.job import listed
+from sim.laws.halfspace import gap, normal_displacement
+from sim.parts.exchange import Array
+from sim.scenario.scenario import Scenario
+from sim.spectrum.families import Ripple
+from sim.study.curves import curves
+
+#: Points of a profile, and along a side of the map; sides over the radius of the contact.
+_PROFILE, _MAP, _WIDE = 161, 128, 4.0
+
+
+def contact(scenario: Scenario, speed: float) -> dict[str, Any]:
+    """Return what is drawn of the contact in steady sliding at a speed [m/s].
+
+    ``radius`` and ``jkr_radius`` are in m, 0 if the contact is open. ``x``, ``sphere`` and ``surface`` are profiles
+    [m], positive upwards from the undeformed half-space. ``stress`` is a map of one realisation of the shear stress
+    [Pa], its mean included, of the side ``side`` [m]; None if the stress is the same everywhere.
+    """
+    found = {name: float(values[0]) for name, values in curves(scenario, np.array([speed])).items()}
+    radius, share = found["contact_radius"], found["area_ratio"] or math.nan
+    full = math.sqrt(found["contact_area"] / math.pi / share)
+    wide = _WIDE / 2.0 * (radius or full or 0.0)
+    result: dict[str, Any] = {"speed": speed, "radius": radius, "jkr_radius": full if math.isfinite(full) else None}
+    if not wide > 0.0:
+        return result
+    x = np.linspace(-wide, wide, _PROFILE)
+    control, ball = scenario.contact.control(np.zeros((1, 1)), scenario.clock.duration), scenario.sphere.radius
+    indentation = float(np.squeeze(control.indentation(np.full((1, 1), radius), scenario.bodies))) if radius else 0.0
+    surface = -normal_displacement(np.abs(x), radius, indentation, ball) if radius else 0.0 * x
+    above = gap(np.abs(x), radius, indentation, ball) if radius else x**2 / (2.0 * ball)
+    profiles = {"x": listed(x), "surface": listed(surface), "sphere": listed(surface + above)}
+    stress = _stress(scenario, found, 2.0 * wide)
+    rows = None if stress is None else [listed(row) for row in np.round(stress, -1)]
+    return result | profiles | {"side": 2.0 * wide, "stress": rows}
+
+
+def _stress(scenario: Scenario, found: dict[str, float], side: float) -> Array | None:
+    """Return a map of a realisation of the stress on a square [Pa]; None without fluctuations, or of a measured map.
+
+    The amplitude is that at the speed of the curves ``found``. Waves shorter than two pixels are left out.
+    """
+    shear, full = scenario.fluctuations, plane_energy(scenario.fluctuations.spectrum, *scenario.solid.effective)
+    if shear.passes or not full > 0.0 or not found["fluctuation_energy"] > 0.0:
+        return None
+    pixel, white = side / _MAP, np.random.default_rng(scenario.seed).standard_normal((_MAP, _MAP))
+    q = 2.0 * math.pi * np.fft.fftfreq(_MAP, pixel)
+    try:
+        density = shear.spectrum.density(q[:, np.newaxis], q)
+        field = np.real(np.fft.ifft2(np.fft.fft2(white) * np.sqrt(density))) / pixel
+    except ValueError:  # of a single wave, which has no density
+        place = pixel * np.arange(_MAP)
+        qx, qy = cast(Ripple, shear.spectrum).wavevector
+        field = math.sqrt(2.0 * shear.spectrum.variance) * np.cos(qx * place[:, np.newaxis] + qy * place)
+    return np.asarray(found["shear_stress"] + math.sqrt(found["fluctuation_energy"] / full) * field)

@@ -1,0 +1,136 @@
+"""Jobs of a page, each in a process of its own: an ensemble of the scenario's own models, and a fit."""
+
+import contextlib
+import json
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import cloudpickle
+import numpy as np
+import xarray as xr
+
+from sim.ensemble.plan import Plan, work
+from sim.ensemble.simulate import run
+from sim.scenario.scenario import Scenario
+from sim.units.errors import BadInput
+
+#: Most points of a trace or a band that are drawn.
+_DRAWN = 1000
+#: Quantities that are drawn.
+_NAMES = ("contact_area", "friction_force")
+
+Say = Callable[[dict[str, Any]], None]
+
+
+def ensemble(scenes: list[Scenario], say: Say) -> dict[str, Any]:
+    """Run scenes that differ in their speed, and return what is drawn of them; ``say`` takes the share that is done."""
+    whole, done = sum(work(Plan.of(scene)) for scene in scenes), 0
+
+    def progress(steps: int) -> None:
+        nonlocal done
+        done += steps
+        say({"done": done / whole})
+
+    parts = [summary(scene, run(scene, progress=progress)) for scene in scenes]
+    if parts[0]["along"] != "speed" or len(parts) == 1:
+        return parts[0]
+    joined = {key: [x for part in parts for x in part[key]] for key in ("speed",)}
+    curves = {
+        name: {kind: [x for part in parts for x in part["curves"][name][kind]] for kind in parts[0]["curves"][name]}
+        for name in parts[0]["curves"]
+    }
+    return {"along": "speed", **joined, "curves": curves, "members": parts[0]["members"]}
+
+
+def fitted(scenario: Scenario, table: Any, free: list[str], say: Say) -> dict[str, Any]:
+    """Fit keys of a scenario to a table; return their values with 95 % intervals in SI and as text, and chi^2."""
+    from sim.study.fit import fit
+
+    say({"done": 0.0})
+    result = fit(scenario, [table], free)
+    numbers = {
+        item.free.key: {"value": item.value, "low": item.interval.low, "high": item.interval.high, "text": item.texts}
+        for item in result.numbers
+    }
+    return {"numbers": numbers, "chi_square": result.best.chi_square, "text": repr(result), "remarks": result.remarks}
+
+
+def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
+    """Return area and friction of a run as they are drawn [SI]: means with their 95 % intervals, or a trace.
+
+    Under a spring or a force it is the trace of the first member over time. If the speed changes, the means are over
+    members at each time; else they are over members and the second half of the run, a single point.
+    """
+    from scipy.stats import t as student
+
+    speed, members = dataset["speed"], dataset.sizes.get("member", 1)
+    columns = {name: dataset[name] for name in _NAMES} | {
+        "area_ratio": dataset["contact_area"] / (np.pi * dataset["jkr_radius"].where(dataset["jkr_radius"] > 0.0) ** 2)
+    }
+    if scene.drive.solves_motion or scene.contact.changes:
+        first = {name: values.isel(member=0) if "member" in values.dims else values for name, values in columns.items()}
+        every = slice(None, None, -(-dataset.sizes["t"] // _DRAWN))
+        curves = {name: {"mean": listed(values.isel(t=every))} for name, values in first.items()}
+        return {"along": "t", "t": listed(dataset["t"].isel(t=every)), "curves": curves, "members": 1}
+    half = dataset.sizes["t"] // 2
+    still = float(np.ptp(speed.to_numpy())) == 0.0
+    if still:
+        columns = {
+            name: values.isel(t=slice(half, None)).mean("t").expand_dims("t") for name, values in columns.items()
+        }
+    along = speed.isel(t=slice(-1, None)) if still else speed
+    curves = {}
+    for name, values in columns.items():
+        mean = values.mean("member") if "member" in values.dims else values
+        spread = xr.zeros_like(mean)
+        if members > 1 and "member" in values.dims:
+            spread = values.std("member", ddof=1) * float(student.ppf(0.975, members - 1)) / members**0.5
+        curves[name] = {"mean": listed(mean), "low": listed(mean - spread), "high": listed(mean + spread)}
+    return {"along": "speed", "speed": listed(np.abs(along)), "curves": curves, "members": members}
+
+
+def listed(values: Any) -> list[float | None]:
+    """Return numbers as JSON has them, None for one that is not finite."""
+    numbers = np.asarray(values, float)
+    return [float(x) if np.isfinite(x) else None for x in numbers]
+
+
+def command(task: Callable[[Say], dict[str, Any]]) -> tuple[list[str], bytes]:
+    """Return the command of a process that runs a task, and what it reads.
+
+    A task takes a function for its messages, and returns its result. The process writes each message as a line of JSON;
+    the last has ``result`` or ``fault``. It ends once nobody writes to it any more: with the process that began it.
+    """
+    pickled = cloudpickle.dumps(task)
+    return [sys.executable, "-m", "sim.explorer.job"], b"%d\n%s" % (len(pickled), pickled)
+
+
+def main() -> None:
+    """Run the task that standard input has."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends its jobs
+    given, messages = sys.stdin.buffer, os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # nothing else that is printed is taken for a message
+    task = cloudpickle.loads(given.read(int(given.readline())))
+
+    def say(message: dict[str, Any]) -> None:
+        messages.write(f"{json.dumps(message)}\n")
+        messages.flush()
+
+    def end_with_the_server() -> None:
+        given.read()
+        os._exit(1)
+
+    threading.Thread(target=end_with_the_server, daemon=True).start()
+    with contextlib.suppress(BrokenPipeError):
+        try:
+            say({"result": task(say)})
+        except (BadInput, RuntimeError, ValueError, MemoryError) as fault:
+            say({"fault": str(fault) or type(fault).__name__})
+
+
+if __name__ == "__main__":
+    main()

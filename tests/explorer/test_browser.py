@@ -1,0 +1,370 @@
+"""The page of ``sim explore`` in a browser: what it shows, what it asks for, keyboard, small screens and the dark."""
+
+import contextlib
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import psutil
+import pytest
+from helpers.commands import LENS, RAMP
+from numpy.testing import assert_allclose
+
+import sim
+
+playwright = pytest.importorskip("playwright.sync_api", reason="in the extra verify")
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), "")
+pytestmark = [
+    pytest.mark.verify,
+    pytest.mark.skipif(not CHROMIUM, reason="no Chromium"),
+    pytest.mark.filterwarnings("default"),  # those of the driver of the browser
+]
+
+BONDS = '[bonds]\nmodel = "steady"\ncritical_speed = "10 mm/s"\nstress = "0.3 MPa"\n'
+WAVES = '[shear]\nmodel = "mean"\nspectrum = { model = "gaussian", rms = "60 kPa", length = "4 um" }\n'
+SCENE = LENS.replace("a scene", "</title><script>alert(1)</script><img src=x onerror=alert(1)>") + RAMP + BONDS + WAVES
+RADIUS = "sphere.radius"
+#: The inputs of a page that are seen; their names with widths and heights; the least contrast of its texts.
+VISIBLE = '[...document.querySelectorAll("input, select, button")].filter((item) => item.offsetParent)'
+SIZES = f"""{VISIBLE}.map((item) => {{
+    const box = (item.type === "checkbox" ? item.labels[0] : item).getBoundingClientRect();
+    return [item.id || item.value, box.width, box.height];
+}})"""
+CONTRAST = """(() => {
+    const part = (value) => (value <= 10 ? value / 3294 : ((value / 255 + 0.055) / 1.055) ** 2.4);
+    const light = (colour) => { const [r, g, b] = colour.match(/[0-9]+/g).map(Number);
+        return 0.2126 * part(r) + 0.7152 * part(g) + 0.0722 * part(b); };
+    const back = light(getComputedStyle(document.body).backgroundColor);
+    const texts = [document.body, document.querySelector(".hint"), document.querySelector("small")];
+    return Math.min(...texts.map((item) => { const text = light(getComputedStyle(item).color);
+        return (Math.max(text, back) + 0.05) / (Math.min(text, back) + 0.05); }));
+})()"""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+def explored(path, *options):
+    """Start ``sim explore`` on a scenario; return its process and the address that it prints."""
+    command = [sys.executable, "-m", "sim", "explore", str(path), "--no-browser", *map(str, options)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    line = process.stdout.readline()
+    assert line.startswith("open http://127.0.0.1:"), line + process.stdout.read()
+    return process, line.split()[1]
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scene") / "scene.toml"
+    path.write_text(SCENE, encoding="utf-8")
+    process, address = explored(path)
+    yield address, process
+    process.kill()
+    process.wait()
+
+
+@pytest.fixture
+def shown(browser, served):
+    """A page of the scene, with all that its console said and all addresses that it asked for."""
+    with opened(browser, served[0]) as page:
+        yield page
+
+
+@contextlib.contextmanager
+def opened(browser, address, **options):
+    context = browser.new_context(**{"viewport": {"width": 1200, "height": 900}} | options)
+    page = context.new_page()
+    page.said, page.asked = [], []
+    page.on("console", lambda message: page.said.append(message.text))
+    page.on("pageerror", lambda fault: page.said.append(str(fault)))
+    page.on("dialog", lambda dialog: page.said.append(f"dialog: {dialog.message}"))
+    page.on("request", lambda request: page.asked.append(request.url))
+    page.goto(address)
+    settled(page)
+    yield page
+    context.close()
+
+
+def wait(page, holds, text):
+    """Wait until something holds on a page."""
+    for _ in range(300):
+        if holds():
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError(text)
+
+
+def settled(page):
+    wait(page, lambda: bool(page.locator("#scene").text_content()), "no contact")
+
+
+def value(page, key=RADIUS):
+    return page.locator(f"[id='text {key}']").input_value()
+
+
+def enter(page, text, key=RADIUS):
+    field = page.locator(f"[id='text {key}']")
+    field.fill(text)
+    field.press("Enter")
+
+
+def lost(page):
+    return page.locator("#lost").text_content()
+
+
+def test_a_page_asks_for_nothing_beyond_its_server_and_shows_a_hostile_name_as_text(shown):
+    assert "<script>alert(1)</script>" in shown.locator("#title").text_content()
+    assert shown.locator("h1 script, h1 img").count() == 0 and shown.locator("#plot svg a").count() == 0
+    shown.locator("#run").click()
+    wait(shown, lambda: "mean" in shown.locator("#ran").text_content(), "no ensemble")
+    assert {re.match(r"(blob:)?http://127\.0\.0\.1:\d+/", url) is not None for url in shown.asked} == {True}
+    assert [text for text in shown.said if "inline style" not in text] == []  # which plotly's full script asks for
+    assert "token" not in shown.url
+
+
+def test_a_slider_changes_curves_words_and_address_and_undo_takes_each_gesture_back(shown):
+    before, words = value(shown), lost(shown)
+    slider = shown.locator(f"[id='{RADIUS}']")
+    slider.focus()
+    for _ in range(3):
+        shown.keyboard.press("ArrowRight")
+    wait(shown, lambda: value(shown) != before and lost(shown) != words, "nothing changed")
+    wait(shown, lambda: RADIUS in shown.url, "not in the address")
+    assert slider.get_attribute("aria-valuetext") == value(shown)
+    for _ in range(3):
+        shown.locator("#undo").click()
+    wait(shown, lambda: (value(shown), lost(shown)) == (before, words), "not undone")
+    enter(shown, "3 mm")
+    wait(shown, lambda: f"{RADIUS}=0.003" in shown.url, "not read")
+    shown.reload()
+    settled(shown)
+    assert value(shown) == "3 mm"
+    shown.locator("#reset").click()
+    wait(shown, lambda: (value(shown), lost(shown)) == (before, words), "not reset")
+
+
+def test_a_text_that_cannot_be_read_leaves_the_value_and_states_the_reason(shown):
+    words = lost(shown)
+    enter(shown, "3 kg")
+    wait(shown, lambda: shown.locator("[role=alert]").count() == 1, "no message")
+    assert "is not a unit of m" in shown.locator("[role=alert]").text_content()
+    assert shown.locator(f"[id='text {RADIUS}']").get_attribute("aria-invalid") == "true"
+    assert lost(shown) == words and RADIUS not in shown.url
+    enter(shown, "2 mm")
+    wait(shown, lambda: shown.locator("[role=alert]").count() == 0, "the message stays")
+
+
+def saved(page, kind):
+    with page.expect_download() as download:
+        page.locator("#take").select_option(kind)
+    return Path(download.value.path())
+
+
+def test_the_curves_are_those_of_a_run_of_the_saved_scenario(shown, tmp_path):
+    enter(shown, "2.7 mm")
+    wait(shown, lambda: RADIUS in shown.url, "not read")
+    path = tmp_path / "saved.toml"
+    shutil.copy(saved(shown, "toml"), path)
+    curves = shown.evaluate("({ speed: shown.speed, ...shown.curves })")
+    for place in (0, 60, 120):
+        still = {"drive": {"model": "steady", "speed": curves["speed"][place]}}
+        run = sim.run(sim.load(path, still))
+        for name in ("contact_area", "friction_force", "fluctuation_energy"):
+            assert_allclose(curves[name][place], float(run[name][-1]), rtol=1e-12)
+    for kind, magic in (("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF"), ("csv", b"speed [m/s]")):
+        assert saved(shown, kind).read_bytes().startswith(magic)
+
+
+def test_a_table_with_decimal_commas_is_dropped_fitted_saved_and_opened_again(browser, tmp_path):
+    path = tmp_path / "lens.toml"
+    path.write_text(LENS + RAMP.replace("ramp", "ramp") + BONDS, encoding="utf-8")
+    exact = sim.steady_curves(sim.load(path, {"bonds.critical_speed": "5 mm/s"}), [1e-3, 3e-3, 1e-2, 1.9e-2])
+    rows = zip(exact["speed"].to_numpy(), exact["contact_area"].to_numpy(), strict=True)
+    lines = [f"{1e3 * v:.4f};{1e6 * a:.9f};1".replace(".", ",") for v, a in rows]
+    content = "\n".join(["speed [mm/s];contact_area [mm^2];contact_area_error [%]", *lines])
+    process, address = explored(path)
+    with opened(browser, address) as page:
+        page.evaluate(
+            """(content) => {
+            const data = new DataTransfer();
+            data.items.add(new File([content], "<img src=x onerror=alert(1)>.csv"));
+            dispatchEvent(new DragEvent("drop", { dataTransfer: data }));
+        }""",
+            content,
+        )
+        wait(page, lambda: "χ²" in page.locator("#judged").text_content(), "no points")
+        assert page.locator("#judged img").count() == 0
+        page.locator("#free input[value='bonds.critical_speed']").check()
+        page.locator("#fit").click()
+        wait(page, lambda: page.locator("#fitted").is_visible(), "no fit")
+        wait(page, lambda: value(page, "bonds.critical_speed") in ("5 mm/s", "5.000 mm/s"), "not the exact speed")
+        assert page.locator(".track svg").count() == 1
+        link, words = page.url, lost(page)
+    process.kill()
+    process.wait()
+    process, address = explored(path, "--state", link)
+    with opened(browser, address) as page:
+        assert lost(page) == words
+    process.kill()
+    process.wait()
+
+
+def jobs(process):
+    with contextlib.suppress(psutil.Error):
+        children = psutil.Process(process.pid).children(recursive=True)
+        return [child.pid for child in children if child.status() != psutil.STATUS_ZOMBIE]
+    return []
+
+
+def alive(pids):
+    return [pid for pid in pids if psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE]
+
+
+@pytest.fixture
+def long(tmp_path):
+    """A server of a scene whose ensembles take minutes."""
+    path = tmp_path / "long.toml"
+    counted = BONDS.replace("steady", "counted") + 'rebinding_rate = "500 1/s"\nsites = 50\n'
+    path.write_text(LENS.replace('duration = "1 s"', 'duration = "10000 s"') + RAMP + counted, encoding="utf-8")
+    process, address = explored(path)
+    yield process, address
+    process.kill()
+    process.wait()
+
+
+def begun(page, process):
+    page.locator("#members").fill("100000")
+    page.locator("#run").click()
+    wait(page, lambda: len(jobs(process)) == 1, "no job")
+    return jobs(process)
+
+
+@pytest.mark.parametrize("how", ["stop", "close", "reload"])
+def test_a_job_ends_with_stop_a_closed_tab_and_a_reload(browser, long, how):
+    process, address = long
+    with opened(browser, address) as page:
+        begun(page, process)
+        {"stop": page.locator("#stop").click, "close": page.close, "reload": page.reload}[how]()
+        end = time.monotonic() + 20.0
+        while jobs(process) and time.monotonic() < end:
+            time.sleep(0.05)
+        assert not jobs(process)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
+@pytest.mark.parametrize("order", [signal.SIGINT, signal.SIGKILL])
+def test_a_server_that_is_stopped_or_killed_takes_its_jobs_along(browser, long, order):
+    process, address = long
+    with opened(browser, address) as page:
+        pids = begun(page, process)
+        process.send_signal(order)
+        process.wait(20.0)
+        end = time.monotonic() + 20.0
+        while alive(pids) and time.monotonic() < end:
+            time.sleep(0.05)
+        assert not alive(pids)
+        if order == signal.SIGINT:
+            assert process.returncode == 0 and process.stdout.read().count("\n") == 1  # no trace, only the hint
+        enter(page, "3 mm")
+        wait(page, lambda: "server has ended" in page.locator("[role=alert]").first.text_content(), "no message")
+
+
+def test_the_whole_page_is_played_by_keyboard_and_all_inputs_have_names(shown):
+    names = shown.evaluate(
+        f"{VISIBLE}.map((item) => (item.labels?.[0]?.textContent || item.ariaLabel || item.textContent))"
+    )
+    assert len(names) > 30 and all(name.strip() for name in names)
+    shown.locator("body").click(position={"x": 2, "y": 2})
+    seen = []
+    for _ in range(60):
+        shown.keyboard.press("Tab")
+        seen.append(shown.evaluate("document.activeElement.id"))
+    for key in (
+        "undo",
+        "reset",
+        "take",
+        "level",
+        "absolute",
+        "first",
+        "loads",
+        RADIUS,
+        f"text {RADIUS}",
+        "members",
+        "run",
+        "file",
+    ):
+        assert key in seen or shown.locator(f"[id='{key}']").is_disabled(), key
+    assert seen.index(RADIUS) + 1 == seen.index(f"text {RADIUS}")
+    shown.locator("#absolute").focus()
+    shown.keyboard.press("Space")
+    wait(shown, lambda: "mm²" in shown.locator("#plot .ytitle").first.text_content(), "no areas")
+    shown.locator("#level").focus()
+    words = lost(shown)
+    shown.keyboard.press("ArrowRight")
+    wait(shown, lambda: lost(shown) != words and lost(shown).startswith("11 %"), "no other level")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_small_screen_has_no_sideways_scroll_large_targets_and_contrast(browser, served, scheme):
+    small = {"viewport": {"width": 390, "height": 800}, "color_scheme": scheme, "has_touch": True, "is_mobile": True}
+    with opened(browser, served[0], **small) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
+        assert [size for size in page.evaluate(SIZES) if min(size[1:]) < 24] == []
+        assert page.evaluate(CONTRAST) >= 4.5
+        title, back = page.locator("#plot .ytitle").first, "getComputedStyle(document.body).backgroundColor"
+        before = page.evaluate(back), title.evaluate("(item) => item.style.fill")
+        page.emulate_media(color_scheme={"light": "dark", "dark": "light"}[scheme])
+        wait(page, lambda: title.evaluate("(item) => item.style.fill") != before[1], "the figure stays")
+        assert page.evaluate(back) != before[0]
+
+
+def test_a_swipe_over_the_figure_scrolls_the_page(browser, served):
+    with opened(browser, served[0], viewport={"width": 390, "height": 800}, has_touch=True, is_mobile=True) as page:
+        session = page.context.new_cdp_session(page)
+        for kind, y in (("touchStart", 250), *(("touchMove", 250 - 10 * k) for k in range(1, 16)), ("touchEnd", None)):
+            points = [] if y is None else [{"x": 200, "y": y}]
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+            page.wait_for_timeout(16)
+        page.wait_for_timeout(400)
+        assert page.evaluate("scrollY") > 50
+
+
+@pytest.mark.parametrize("name", ["pdms_lens_spring", "own_map", "pull_off"])
+def test_a_scenario_that_steady_sliding_does_not_answer_is_called_a_preview(browser, name):
+    process, address = explored(Path(sim.__file__).parents[1] / "scenarios" / f"{name}.toml")
+    with opened(browser, address) as page:
+        assert page.locator("#preview").text_content().startswith("Preview: steady sliding is not what")
+    process.kill()
+    process.wait()
+
+
+def test_a_notebook_shows_pages_side_by_side_that_end_with_its_kernel(tmp_path, browser):
+    nbclient, nbformat = (pytest.importorskip(name, reason="in the extra verify") for name in ("nbclient", "nbformat"))
+    scene = tomllib.loads(LENS + RAMP + BONDS)
+    code = f"import json, sim\nscene = sim.load(json.loads({json.dumps(json.dumps(scene))}))\n"
+    code += "pages = [sim.explore(scene) for _ in range(3)]\nprint(*[page.address for page in pages])\npages[0]"
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(code)])
+    client = nbclient.NotebookClient(notebook, timeout=300, kernel_name="python3")
+    with client.setup_kernel():
+        client.execute_cell(notebook.cells[0], 0)
+        printed, result = notebook.cells[0]["outputs"]
+        assert "<iframe" in result["data"]["text/html"] and "ssh -L" in result["data"]["text/html"]
+        addresses = printed["text"].split()
+        assert len({*addresses}) == 3
+        for address in addresses:
+            with opened(browser, address) as page:
+                assert lost(page).startswith("10 %")
+    with pytest.raises(playwright.Error, match="ERR_CONNECTION_REFUSED"), opened(browser, addresses[0]):
+        pass

@@ -1,0 +1,253 @@
+"""The page of ``sim explore``: curves of steady sliding, sliders, what is taken away, and messages."""
+
+import csv
+import io
+import math
+
+import numpy as np
+import pytest
+from helpers.commands import sim as command
+from numpy.testing import assert_allclose
+
+import sim
+from sim.explorer import take
+from sim.explorer.data import Tables
+from sim.explorer.drawing import contact
+from sim.explorer.page import Page, Refused, previews
+from sim.explorer.server import Server, state_of
+from sim.laws import jkr
+from sim.study.curves import curves, speeds_of_loss
+
+SCENARIOS = ("pdms_lens", "friction_maximum", "masking", "stick_slip", "motor_clutch", "pull_off", "afm_tip", "jkr_fit")
+#: A lens on bonds alone, whose numbers have comments.
+LENS = """\
+# Which speed?
+name = "a lens"
+[clock]
+duration = "1 s"
+step = "0.1 s"
+[solid]
+shear_modulus = "1.6 MPa"  # of PDMS
+[sphere]
+radius = "2 mm"
+[adhesion]
+work = "42 mJ/m^2"
+[contact]
+load = "4 mN"
+[drive]
+model = "steady"
+speed = "1 mm/s"
+[bonds]
+model = "steady"
+critical_speed = "10 mm/s"  # assumed
+stress = "0.3 MPa"
+"""
+WAVES = """\
+[shear]
+model = "mean"
+spectrum = { model = "gaussian", rms = "60 kPa", length = "4 um" }
+"""
+
+
+@pytest.fixture
+def lens(tmp_path):
+    path = tmp_path / "lens.toml"
+    path.write_text(LENS + WAVES, encoding="utf-8")
+    return path
+
+
+def scene(text):
+    import tomllib
+
+    return sim.load(tomllib.loads(text))
+
+
+def test_curves_of_steady_sliding_are_the_closed_forms():
+    speeds = np.geomspace(1e-4, 1.0, 9)
+    found = sim.steady_curves(scene(LENS), speeds)
+    fraction = 1.0 / (1.0 + speeds / 1e-2)
+    radius = jkr.radius_at_load(4e-3, 42e-3 * fraction, 2e-3, 6.4e6)
+    assert_allclose(found["bond_fraction"], fraction, rtol=1e-12)
+    assert_allclose(found["contact_radius"], radius, rtol=1e-12)
+    assert_allclose(found["friction_force"], 3e5 * fraction * np.pi * radius**2, rtol=1e-12)
+    full = jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6)
+    assert_allclose(found["lost_to_bonds"], 1.0 - (radius / full) ** 2, rtol=1e-9, atol=1e-12)
+    assert found["contact_area"].attrs["units"] == "m^2" and found["speed"].attrs["units"] == "m/s"
+    for wrong in ([0.0], [-1e-3], [[1e-3]], [math.nan]):
+        with pytest.raises(sim.BadInput, match="speeds"):
+            sim.steady_curves(scene(LENS), wrong)
+
+
+@pytest.mark.parametrize("text", [LENS, LENS + WAVES, LENS.replace('load = "4 mN"', 'load = "4 mN"\nreversible = 0.3')])
+def test_the_shares_of_the_area_add_up_to_one_in_either_order(text):
+    found = curves(scene(text), np.geomspace(1e-4, 1.0, 7))
+    stress = found.get("lost_to_mean_stress", 0.0)
+    for bonds, waves in (
+        ("lost_to_bonds", "lost_to_fluctuations"),
+        ("lost_to_bonds_last", "lost_to_fluctuations_first"),
+    ):
+        assert_allclose(found["area_ratio"] + found[bonds] + found[waves] + stress, 1.0, rtol=1e-12)
+    alone = curves(scene(text).with_values({"adhesion.bond_share": 0.0, "contact.reversible": 0.0}), np.array([1.0]))
+    assert_allclose(found["lost_to_fluctuations_first"][-1], 1.0 - alone["area_ratio"][0], rtol=1e-9, atol=1e-12)
+
+
+def test_the_speed_of_a_loss_is_solved():
+    # without load a^3 is proportional to the work, so the area goes with its power 2/3
+    free = scene(LENS.replace('"4 mN"', '"0 mN"'))
+    (speed,) = speeds_of_loss(free, 0.1, np.geomspace(1e-4, 1.0, 5))
+    assert_allclose(speed, 1e-2 * (0.9**-1.5 - 1.0), rtol=1e-10)
+    assert speeds_of_loss(free, 0.999, np.geomspace(1e-4, 1e-2, 5)) == []
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_sliders_are_numbers_that_change_a_curve_between_ends_within_their_bounds(name):
+    page = Page(sim.load(f"scenarios/{name}.toml"))
+    assert page.sliders and sum(slider.marked for slider in page.sliders) <= 3
+    for slider in page.sliders:
+        assert slider.low <= slider.value <= slider.high and slider.low < slider.high
+        for end in (slider.low, slider.high):
+            try:
+                page.answer({slider.key: end}, 0.1)
+            except Refused as refused:  # an end may not go with other numbers, but is a number of its key
+                assert set(refused.faults) == {""}
+        if slider.logarithmic:
+            assert slider.low > 0.0
+    keys = {slider.key for slider in page.sliders}
+    assert not {key for key in keys if key.startswith(("clock", "drive", "ensemble", "record", "seed"))}
+    assert ("bonds.critical_speed" in keys) == (name in ("pdms_lens", "masking") and name != "masking")
+
+
+def test_a_value_that_cannot_be_used_is_refused_with_its_key(lens):
+    page = Page(sim.load(lens))
+    for value, reason in (("3 kg", "kg"), ("x", "cannot be read"), (-1.0, "above 0"), ("5", "without a unit")):
+        with pytest.raises(Refused) as refused:
+            page.read({"sphere.radius": value})
+        assert list(refused.value.faults) == ["sphere.radius"] and reason in refused.value.faults["sphere.radius"]
+    with pytest.raises(Refused) as refused:
+        page.read({"__class__": 1.0})
+    assert refused.value.faults == {"__class__": "is no slider of this page"}
+    assert page.read({"sphere.radius": "3 mm"}).sphere.radius == 3e-3
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({}, ""),
+        ({"contact.load": {"from": "4 mN", "to": "1 mN"}}, "changes in time"),
+        ({"drive": {"model": "table", "time": [0.0, 1.0], "speed": [1e-3, 2e-3]}}, "a course"),
+    ],
+)
+def test_a_page_states_why_its_curves_are_a_preview_alone(lens, changes, reason):
+    assert [reason in text for text in previews(sim.load(lens, changes))] == [True] * bool(reason)
+
+
+def test_a_saved_scenario_has_its_comments_and_the_numbers_of_the_page(lens):
+    values = {"sphere.radius": "3 mm", "bonds.critical_speed": 0.123456789, "shear.spectrum.rms": "70 kPa"}
+    for changes in ({}, {"seed": 7}, {"sweep": {"contact.load": ["1 mN", "2 mN"]}}):
+        page = Page(sim.load(lens, changes))
+        text = page.toml(values)
+        saved = lens.with_name("saved.toml")
+        saved.write_text(text, encoding="utf-8")
+        assert "# of PDMS" in text and "# assumed" in text and 'radius = "3 mm"' in text
+        again = sim.load(saved)
+        assert not again.sweep and again.seed == changes.get("seed", 0)
+        for name, column in curves(page.read(values), page.speeds).items():
+            assert_allclose(curves(again, page.speeds)[name], column, rtol=1e-14)
+    made = Page(scene(LENS))  # in Python, from no file
+    saved.write_text(made.toml({"contact.load": 3e-3}), encoding="utf-8")
+    assert sim.load(saved).contact.load == 3e-3
+
+
+def test_values_of_the_page_are_those_of_a_run_of_the_saved_scenario(lens):
+    page = Page(sim.load(lens))
+    values = {"sphere.radius": "2.7 mm", "shear.spectrum.length": "3.3 um", "contact.load": -1e-4}
+    answer = page.answer(values, 0.1)
+    saved = lens.with_name("saved.toml")
+    saved.write_text(page.toml(values), encoding="utf-8")
+    for place in (0, 60, 120):
+        run = sim.run(sim.load(saved, {"drive.speed": answer["speed"][place]}))
+        for name in ("contact_area", "friction_force", "fluctuation_energy", "work_of_adhesion"):
+            assert_allclose(answer["curves"][name][place], float(run[name][-1]), rtol=1e-12)
+
+
+def test_curves_are_taken_away_as_a_table_and_as_pictures(lens):
+    page = Page(sim.load(lens))
+    rows = list(csv.reader(io.StringIO(take.table(page.scenario, page.speeds))))
+    column = rows[0].index("contact_area [m^2]")
+    assert_allclose(
+        [float(row[column]) for row in rows[1:]], curves(page.scenario, page.speeds)["contact_area"], rtol=0
+    )
+    for kind, magic in (("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")):
+        assert take.picture(page.scenario, page.speeds, kind).startswith(magic)
+    area, energy, friction = take.figure(page.scenario, page.speeds).axes
+    assert_allclose(area.lines[0].get_ydata(), 100.0 * curves(page.scenario, page.speeds)["area_ratio"], rtol=1e-12)
+    assert friction.get_xscale() == "log" and "mJ" in energy.get_ylabel()
+
+
+def test_measured_curves_are_compared_with_the_curves(lens):
+    page = Page(sim.load(lens))
+    text = "speed [mm/s];contact_area [mm^2];contact_area_error [%]\n1,0;0,0445;1\n10,0;0,0350;1\n"
+    data = page.answer({}, 0.1, digest=page.add(text, "own.csv"))["data"]
+    exact = curves(page.scenario, np.array([1e-3, 1e-2]))["contact_area"]
+    off = (np.array([4.45e-8, 3.5e-8]) - exact) / (0.01 * np.array([4.45e-8, 3.5e-8]))
+    assert_allclose(data["chi_square"], np.sum(off**2), rtol=1e-9)
+    assert_allclose(data["points"]["contact_area"]["residuals"], off, rtol=1e-9)
+    assert data["count"] == 2 and data["name"] == "own.csv"
+
+
+def test_a_table_that_is_too_large_or_cannot_be_read_is_refused_by_its_own_name(lens):
+    point, tables = sim.load(lens), Tables()
+    heading = "speed [mm/s],contact_area [mm^2]\n"
+    for text, reason in (
+        (heading + "1,0.04\n" * 5001, "5000 rows"),
+        ("x" * 2_000_001, "2 MB"),
+        ("<img onerror=alert(1)> [mm]\n1\n", "heading"),
+        ("", ""),
+    ):
+        with pytest.raises(sim.BadInput) as fault:
+            tables.add(text, "<b>.csv", point)
+        assert str(fault.value).startswith("<b>.csv") and reason in str(fault.value)
+
+
+def test_the_drawing_has_the_contact_to_scale(lens):
+    found = contact(sim.load(lens), 1e-3)
+    exact = curves(sim.load(lens), np.array([1e-3]))
+    assert_allclose(found["radius"], exact["contact_radius"][0], rtol=1e-14)
+    x, sphere, surface = (np.array(found[name]) for name in ("x", "sphere", "surface"))
+    inside = np.abs(x) < found["radius"]
+    assert_allclose(sphere[inside], surface[inside], rtol=0, atol=1e-15)
+    outside = np.abs(x) > 1.01 * found["radius"]
+    assert np.all(sphere[outside] > surface[outside])
+    assert_allclose(sphere - sphere[80], x**2 / 4e-3, rtol=1e-6, atol=1e-15)  # the parabola of 2 mm
+    stress = np.array(found["stress"])
+    assert_allclose(stress.mean(), exact["shear_stress"][0], rtol=0.05)
+    # waves shorter than two pixels are left out, so the map has at most the rms of the spectrum
+    assert 0.2 * 6e4 < stress.std() < 1.1 * 6e4
+
+
+@pytest.mark.parametrize(
+    "link", ["http://127.0.0.1:1/#sphere.radius=0.003&share=0.2&token=x", "sphere.radius=0.003&share=0.2"]
+)
+def test_the_numbers_of_an_address_are_taken_and_its_token_is_not(lens, link):
+    assert state_of(link, Page(sim.load(lens))) == "sphere.radius=0.003&share=0.2"
+
+
+@pytest.mark.parametrize(
+    "link",
+    ["#sphere.radius=<img>", "#__proto__=1", "#sphere.radius=inf", "#sphere.radius=-1", "#path=/etc", "#a=" * 300],
+)
+def test_an_address_of_anything_but_numbers_is_refused(lens, link):
+    with pytest.raises(sim.BadInput, match="--state"):
+        state_of(link, Page(sim.load(lens)))
+
+
+def test_the_command_refuses_what_it_cannot_use_in_one_line_before_it_serves(lens, monkeypatch):
+    with Server(sim.load(lens))._socket as taken:
+        port = taken.getsockname()[1]
+        for arguments, message in (
+            (("nothing.toml",), "there is no such file"), ((lens, "--port", port), "the port is in use"),
+            ((lens, "--port", 70000), "70000"), ((lens, "--data", "nothing.csv"), "nothing.csv"),
+            ((lens, "--data", lens), "lens.toml"), ((lens, "--state", "#x=y"), "--state"),
+        ):  # fmt: skip
+            done = command("explore", *arguments, "--no-browser")
+            assert done.exit_code == 2 and message in done.stderr.splitlines()[-1], arguments
