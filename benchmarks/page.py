@@ -12,7 +12,7 @@ the page. To measure only some groups of rows:
     make bench ROWS="modal contact"
 
 The programs are in `benchmarks/`. Most rows compare ours with the best simple program that a user of
-numpy and scipy would write for the same work. Other rows compare it with a step that every program needs.
+numpy and scipy would write for the same work. Other rows compare ours with one step that every such program needs.
 
 - **Times** are CPU times on one core. The first column names the work: one step of one member, one field, one set of
   radii, or one whole command. Commands use one process.
@@ -22,13 +22,13 @@ numpy and scipy would write for the same work. Other rows compare it with a step
 - **"10 times faster"**: the other program takes 10 times our time.
 - **"1.1 times as long"**: ours takes 1.1 times the time of the other program.
 - **Slower rows**: ours is slower if a row reads "times slower", or more than 1 "times as long".
-- **Goals** for fields refer to the textbook program, which makes its noise by a transform. A leaner program draws only
-  the numbers that it needs. This leaner program stands in the next row, without a goal.
+- **Goals** for stress fields refer to the textbook program, which makes its noise by a Fourier transform. A leaner
+  program draws only the numbers that it needs. This leaner program stands in the next row, without a goal.
 - **Errors**, ours first, are those of one quantity: third cumulant of ΔΓ (bands), friction (bonds), position over its
   largest value (sliders), radius (contacts). No error is given if both programs are exact to rounding.
-- **Memory** that a program has freed stays with its process, for ours and the others alike. Otherwise the system's time
-  for new pages would decide the comparison. Commands of `sim` run as they do for a user,
-  without this setting.
+- **Memory** that a program has freed stays with its process, for ours and the others alike. Otherwise the time for new
+  memory from the operating system would dominate the comparison. Commands of `sim` run as they do for a user, without
+  this setting.
 
 """
 END = """

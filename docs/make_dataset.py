@@ -44,7 +44,7 @@ has four values:
 Radius, area, load and friction are averaged over the times at which the contact is closed.
 
 A member has the same noise at all points of a sweep. The error of a difference between two points is therefore that of
-the members' differences. It is often far below the two errors combined:
+the members' differences. It is often much smaller than the two errors added in quadrature:
 
 ```python
 import sim
@@ -74,9 +74,9 @@ accumulates under a load that cycles behind a stage at rest.
 
 Events are detected at the clock steps. They do not depend on the records.
 
-A *phase* of a run is an interval in which no prescribed course turns, stops, starts or jumps. No prescribed speed
-changes its sign in it, either. Examples are rest and sliding of a `start`, approach and retraction of each cycle. If a
-run has several phases (at most 1,000), the events of each phase are recorded, too.
+A *phase* of a run is an interval in which no prescribed course turns, stops, starts or jumps. Within a phase, no
+prescribed speed changes its sign. Examples are rest and sliding of a `start`, approach and retraction of each cycle.
+If a run has several phases (at most 1,000), the events of each phase are recorded, too.
 
 A *slip event* is a fall of the spring force from a maximum to the next minimum, under these conditions:
 
@@ -97,8 +97,8 @@ horizontal. The command `sim plot OUT.nc map` does the same.
 OTHERS = """
 ## Other programs
 
-**xarray** joins runs that differ in a key, as a sweep of that key would. It joins runs of different seeds along
-`member`. `sim.stats`, `sim.plot` and `sim.analysis` accept the joined dataset:
+**xarray** joins runs that differ in one key. The result has the form of a sweep of this key. Runs of
+different seeds are joined along `member`. `sim.stats`, `sim.plot` and `sim.analysis` accept the joined dataset:
 
 ```python
 import xarray

@@ -443,11 +443,11 @@ def creep(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "incipient_shear",
     "How does the contact area fall before sliding begins?",
-    """The loss of area grows about as the square of the tangential force, as measured on many contacts. It grows
-    faster when sliding begins. At the largest tangential force, {small:.1f} % of the area are lost under a load of
-    {least:g} mN, {large:.1f} % under {load:g} mN. Broken bonds cause all of it here. The coefficient α of the
-    square scales with the area at rest to the power {power:.2f}; measured contacts have about minus three
-    halves.""",
+    """The loss of area grows about as the square of the tangential force, as measured on many contacts. The
+    loss grows faster when sliding begins. At the largest tangential force, {small:.1f} % of the area are lost under
+    a load of {least:g} mN, {large:.1f} % under {load:g} mN. Broken bonds alone cause this loss here. The
+    coefficient α of the square scales with the area at rest to the power {power:.2f}; measured contacts have about
+    minus three halves.""",
     kind="incipient",
 )
 def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
@@ -462,10 +462,10 @@ def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "stick_slip",
     "At which speed does a lens behind a soft spring begin to stick and slip?",
-    """The onset is at {onset:.1f} mm/s as the stage speed increases. Nothing prescribes it. It lies above the
-    friction maximum, at {peak:.1f} mm/s in the mean-field theory. From then on the force falls by {drop:.1f} mN in
-    each slip event of {slip:.0f} µm. Slip events begin at {static:.1f} mN, and the mean force is {kinetic:.1f}
-    mN.""",
+    """The onset is at {onset:.1f} mm/s as the stage speed increases. Nothing prescribes it. The onset lies
+    above the speed of the friction maximum, which is {peak:.1f} mm/s in the mean-field theory. From then on the
+    force falls by {drop:.1f} mN in each slip event of {slip:.0f} µm. Slip events begin at {static:.1f} mN, and the
+    mean force is {kinetic:.1f} mN.""",
     kind="time",
 )
 def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
@@ -579,7 +579,7 @@ def fixed_grips(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "pull_off",
-    "At which load does a sphere pull off a soft and a stiff spring?",
+    "At which load does a sphere behind a soft or a stiff spring pull off?",
     """The largest pull is {pull:.3f} mN for all springs, as in JKR theory. The energy lost in a cycle differs:
     {soft:.2f} nJ behind {softest:g} N/m and {stiff:.2f} nJ behind {stiffest:g} N/m. Behind the soft spring the
     sphere jumps off far from the surface, behind the stiff spring close to it. The material itself dissipates
@@ -611,8 +611,9 @@ def peeling(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "afm_tip",
     "Is the friction of an AFM tip a measure of its contact area?",
-    """In the model it is. Friction is {stress:g} GPa times JKR's area. This holds in tension, too, down to the
-    pull-off at {off:.0f} nN, where friction is {friction:.0f} nN. Without load friction is {zero:.0f} nN.""",
+    """Yes, in the model friction is proportional to the area: it is {stress:g} GPa times JKR's area. This holds in
+    tension, too, down to the pull-off at {off:.0f} nN, where friction is {friction:.0f} nN. Without load friction
+    is {zero:.0f} nN.""",
 )
 def afm_tip(dataset: xr.Dataset) -> dict[str, Number]:
     last, load = dataset.isel(t=-1), dataset["contact_load"]

@@ -203,7 +203,7 @@ def radius_at_work(dataset: xr.Dataset, work: xr.DataArray) -> xr.DataArray:
 
 
 def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the share that fluctuations take if they are charged first; see ``charges``.
+    """Return the share that fluctuations take if they are subtracted first; see ``charges``.
 
     Raises
     ------
@@ -246,7 +246,7 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def charges(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the shares of the lost area in both orders of charging, as far as they are known.
+    """Return the shares of the lost area in both orders of subtraction, as far as they are known.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def charges(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         The ``share_observables``; ``lost_to_fluctuations_first`` and ``lost_to_bonds_last``, which add up to
         ``lost_to_bonds`` and ``lost_to_fluctuations``; and ``order_of_charging``, the share by which the fluctuations
-        take more if they are charged first. Both orders are of one member and share its noise, so the error of their
+        take more if they are subtracted first. Both orders are of one member and share its noise, so the error of their
         difference is that of the members' differences.
 
     Notes

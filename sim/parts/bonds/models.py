@@ -236,7 +236,7 @@ class Unbroken(_AtOnce):
 
 @keyed()
 class Steady(_AtOnce):
-    """The paper's law N/N0 = 1/(1 + V/Vc), at once at every speed. Limit: none as Vc -> infinity."""
+    """The paper's law N/N0 = 1/(1 + V/Vc), without delay if the speed changes. Limit: none as Vc -> infinity."""
 
     critical_speed: CriticalSpeed
     stress: Stress = 0.0

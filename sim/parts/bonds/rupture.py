@@ -117,7 +117,7 @@ LargestStress = Annotated[float, Quantity("Pa", "largest shear stress in steady 
 
 @keyed()
 class Bell(_Law):
-    """Force helps heat to open a bond: k = k0 exp(f/f_b) (Bell 1978). Limit: ``Constant`` as f_b -> infinity.
+    """Force accelerates rupture by heat: k = k0 exp(f/f_b) (Bell 1978). Limit: ``Constant`` as f_b -> infinity.
 
     ``critical_speed`` and ``stress`` beside ``bonds.rebinding_ratio`` take the place of ``zero_force_rate`` beside
     ``bonds.rebinding_rate`` and ``bonds.site_density``.

@@ -164,7 +164,7 @@ class ShearModel:
 
 @keyed()
 class Uniform(ShearModel):
-    """No fluctuation: a uniform shear stress, which stores nothing at the expense of adhesion."""
+    """No fluctuation: a uniform shear stress, which takes no energy from adhesion."""
 
     spectrum = Ripple(amplitude=0.0, wavelength=1.0)
     amplitude = Constant()
@@ -399,7 +399,7 @@ _passing = functools.lru_cache(maxsize=8)(lambda field, ratio, widest: Passing(f
 
 @keyed()
 class Carried(ShearModel):
-    """A measured map of the stress itself, carried with the slider. Limit: ``Mapped`` as its correlation never ends.
+    """A measured map of the stress itself, carried with the slider. Limit: ``Mapped`` without decay of its correlation.
 
     It is the same for all members and seeds. On the plane it is periodic; with ``contact = "disc"`` it passes under
     the sphere, without an end that meets its beginning.
