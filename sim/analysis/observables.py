@@ -161,7 +161,7 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
 
     Notes
     -----
-    The mechanisms are charged in this order, each by the equilibrium area that the work of adhesion left
+    The mechanisms are subtracted in this order, each by the equilibrium area that the work of adhesion left
     after it would give: ``bonds_radius``, ``fluctuations_radius``, ``equilibrium_radius`` and ``contact_radius``,
     as recorded.
     """

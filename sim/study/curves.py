@@ -19,10 +19,10 @@ OVER_SPEED = (
 #: Shares of JKR's area that follow from them.
 SHARES = {
     "area_ratio": "contact area over JKR's",
-    "lost_to_bonds": "share of JKR's area lost to broken bonds, which are charged first",
+    "lost_to_bonds": "share of JKR's area lost to broken bonds, which are subtracted first",
     "lost_to_fluctuations": "share of JKR's area lost to fluctuations, after the bonds",
     "lost_to_mean_stress": "share of JKR's area lost to the mean stress, after bonds and fluctuations",
-    "lost_to_fluctuations_first": "share of JKR's area lost to fluctuations, which are charged first",
+    "lost_to_fluctuations_first": "share of JKR's area lost to fluctuations, which are subtracted first",
     "lost_to_bonds_last": "share of JKR's area lost to broken bonds, after the fluctuations",
 }
 
