@@ -1,6 +1,5 @@
 """Damaged and foreign datasets and maps get one clear message; no message shows what stands in a file elsewhere."""
 
-import json
 import os
 import re
 import shutil
@@ -16,7 +15,6 @@ from helpers.commands import SCENE as SCENE_OF_A_SECOND, sim
 
 import sim as package
 from sim.numerics.lazy import Damaged
-from sim.plots import field
 
 SCENE = SCENE_OF_A_SECOND.replace('"1 s"', '"0.4 s"')
 MAP = """
@@ -135,7 +133,7 @@ def test_maps_of_netcdf_in_its_formats_are_read_and_other_files_are_refused(fold
     assert "map.nc: is not a netCDF file" in sim("check", "mapped.toml").stderr
 
 
-def test_a_dataset_of_an_older_version_says_what_it_lacks_and_none_makes_a_figure_read_a_file(folder):
+def test_a_dataset_of_an_older_version_says_what_it_lacks(folder):
     with package.open("out.nc") as dataset:
         dataset.load().drop_vars(["peak_friction", "bonds_radius"]).to_netcdf("old.nc")
     for command in (["stats"], ["plot", "time"]):
@@ -144,11 +142,6 @@ def test_a_dataset_of_an_older_version_says_what_it_lacks_and_none_makes_a_figur
         assert all(words in done.stderr for words in ("old.nc", "lost to bonds", "peak of friction"))
         assert "masked" not in done.stderr
     assert sim("stats", "out.nc").stderr == ""
-    for model in ("tabulated", "measured"):
-        scenario = {"shear": {"spectrum": {"model": model, "file": "secret.csv"}, "amplitude": {}}}
-        dataset = xr.Dataset(attrs={"scenario_resolved": json.dumps(scenario)})
-        with pytest.raises(ValueError, match="rows of the spectrum file"):
-            field._target(dataset, dataset, xr.DataArray())
 
 
 @pytest.mark.parametrize("text", ["alice,hunter2\nbob,swordfish\n", "time [s], speed [m/s]\n-31415,hunter2\n"])
