@@ -264,8 +264,11 @@ def steady_curves(
 
     Examples
     --------
-    >>> scene = load("scenarios/pdms_lens.toml")
-    >>> print(f"{float(steady_curves(scene, [1e-3]).area_ratio[0]):.4f}")
+    The area of the lens in README at 1 mm/s, over that of JKR:
+
+    >>> import sim
+    >>> scene = sim.load("scenarios/pdms_lens.toml")
+    >>> print(f"{float(sim.steady_curves(scene, [1e-3]).area_ratio[0]):.4f}")
     0.9808
     """
     import numpy as np
