@@ -163,17 +163,20 @@ def slips_by_phase(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _between_speeds(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the speeds of a stage between which slips follow each other."""
+    """Return the speeds of a stage between which slips follow each other, as it gets faster and slower."""
     turn, each_slip = abs(dataset["stage_speed"]).idxmax("t"), slips(dataset)
-    if "phase_name" in dataset:
-        turn = dataset["phase_end"].where(dataset["phase_name"].str.contains("increasing")).max("phase").fillna(0.0)
+    rises = falls = xr.DataArray(True)
+    if "phase_name" in dataset:  # a stage that jumps between speeds does neither
+        rises, falls = (dataset["phase_name"].str.contains(word) for word in ("increasing", "decreasing"))
+        turn = dataset["phase_end"].where(rises).max("phase").fillna(0.0)
+        rises, falls = rises.any("phase"), falls.any("phase")
     speed, time, later = each_slip["slip_speed"], each_slip["slip_time"], each_slip["recurrence_time"].notnull()
     after_another = later.shift(slip=1, fill_value=False) & (time > turn)
     begins = "lowest speed of the stage, as it gets {}, at which a slip begins that {}".format
     up, down = begins("faster", "another one follows"), begins("slower", "follows another one")
     return {
-        "slips_from": labelled(speed.where(later & (time <= turn)).min("slip"), "m/s", up),
-        "slips_down_to": labelled(speed.where(after_another).min("slip"), "m/s", down),
+        "slips_from": labelled(speed.where(later & (time <= turn) & rises).min("slip"), "m/s", up),
+        "slips_down_to": labelled(speed.where(after_another & falls).min("slip"), "m/s", down),
     }
 
 

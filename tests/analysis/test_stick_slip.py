@@ -269,3 +269,10 @@ def test_statistics_alone_have_the_means_of_slip_events_over_the_members_that_sl
 
 def test_a_settled_creep_without_noise_has_no_spread():
     assert analysis.spread(run(scenario(20.0, 60, force(0.05), make=Cohort, members=1))) == []
+
+
+def test_a_stage_that_jumps_between_speeds_has_no_onset_of_slips_and_no_end():
+    stage = {"time": ["0 s", "0.6 s", "0.6 s", "1.2 s"], "value": ["3 mm/s", "3 mm/s", "8 mm/s", "8 mm/s"]}
+    alone = {key: value for key, value in PULLED.items() if key != "sweep"}
+    result = analysis.stick_slip(run(sim.Scenario(**alone | {"drive": PULLED["drive"] | {"stage": stage}})))
+    assert result["slip_count"] > 10 and np.isnan(result["slips_from"]) and np.isnan(result["slips_down_to"])
