@@ -56,29 +56,31 @@ def browser():
         opened.close()
 
 
+@contextlib.contextmanager
 def explored(path, *options):
-    """Start ``sim explore`` on a scenario; return its process and the address that it prints."""
+    """The process of ``sim explore`` on a scenario, and the address that it prints."""
     command = [sys.executable, "-m", "sim", "explore", str(path), "--no-browser", *map(str, options)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    line = process.stdout.readline()
-    assert line.startswith("open http://127.0.0.1:"), line + process.stdout.read()
-    return process, line.split()[1]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        try:
+            line = process.stdout.readline()
+            assert line.startswith("open http://127.0.0.1:"), line
+            yield process, line.split()[1]
+        finally:
+            process.kill()
 
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory):
     path = tmp_path_factory.mktemp("scene") / "scene.toml"
     path.write_text(SCENE, encoding="utf-8")
-    process, address = explored(path)
-    yield address, process
-    process.kill()
-    process.wait()
+    with explored(path) as (_, address):
+        yield address
 
 
 @pytest.fixture
 def shown(browser, served):
     """A page of the scene, with all that its console said and all addresses that it asked for."""
-    with opened(browser, served[0]) as page:
+    with opened(browser, served) as page:
         yield page
 
 
@@ -194,8 +196,7 @@ def test_a_table_with_decimal_commas_is_dropped_fitted_saved_and_opened_again(br
     rows = zip(exact["speed"].to_numpy(), exact["contact_area"].to_numpy(), strict=True)
     lines = [f"{1e3 * v:.4f};{1e6 * a:.9f};1".replace(".", ",") for v, a in rows]
     content = "\n".join(["speed [mm/s];contact_area [mm^2];contact_area_error [%]", *lines])
-    process, address = explored(path)
-    with opened(browser, address) as page:
+    with explored(path) as (_, address), opened(browser, address) as page:
         page.evaluate(
             """(content) => {
             const data = new DataTransfer();
@@ -212,13 +213,8 @@ def test_a_table_with_decimal_commas_is_dropped_fitted_saved_and_opened_again(br
         wait(page, lambda: value(page, "bonds.critical_speed") in ("5 mm/s", "5.000 mm/s"), "not the exact speed")
         assert page.locator(".track svg").count() == 1
         link, words = page.url, lost(page)
-    process.kill()
-    process.wait()
-    process, address = explored(path, "--state", link)
-    with opened(browser, address) as page:
+    with explored(path, "--state", link) as (_, address), opened(browser, address) as page:
         assert lost(page) == words
-    process.kill()
-    process.wait()
 
 
 def jobs(process):
@@ -238,10 +234,8 @@ def long(tmp_path):
     path = tmp_path / "long.toml"
     counted = BONDS.replace("steady", "counted") + 'rebinding_rate = "500 1/s"\nsites = 50\n'
     path.write_text(LENS.replace('duration = "1 s"', 'duration = "10000 s"') + RAMP + counted, encoding="utf-8")
-    process, address = explored(path)
-    yield process, address
-    process.kill()
-    process.wait()
+    with explored(path) as served:
+        yield served
 
 
 def begun(page, process):
@@ -319,7 +313,7 @@ def test_the_whole_page_is_played_by_keyboard_and_all_inputs_have_names(shown):
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_small_screen_has_no_sideways_scroll_large_targets_and_contrast(browser, served, scheme):
     small = {"viewport": {"width": 390, "height": 800}, "color_scheme": scheme, "has_touch": True, "is_mobile": True}
-    with opened(browser, served[0], **small) as page:
+    with opened(browser, served, **small) as page:
         assert page.evaluate("document.documentElement.scrollWidth") == 390
         assert [size for size in page.evaluate(SIZES) if min(size[1:]) < 24] == []
         assert page.evaluate(CONTRAST) >= 4.5
@@ -331,7 +325,7 @@ def test_a_small_screen_has_no_sideways_scroll_large_targets_and_contrast(browse
 
 
 def test_a_swipe_over_the_figure_scrolls_the_page(browser, served):
-    with opened(browser, served[0], viewport={"width": 390, "height": 800}, has_touch=True, is_mobile=True) as page:
+    with opened(browser, served, viewport={"width": 390, "height": 800}, has_touch=True, is_mobile=True) as page:
         session = page.context.new_cdp_session(page)
         for kind, y in (("touchStart", 250), *(("touchMove", 250 - 10 * k) for k in range(1, 16)), ("touchEnd", None)):
             points = [] if y is None else [{"x": 200, "y": y}]
@@ -343,11 +337,9 @@ def test_a_swipe_over_the_figure_scrolls_the_page(browser, served):
 
 @pytest.mark.parametrize("name", ["pdms_lens_spring", "own_map", "pull_off"])
 def test_a_scenario_that_steady_sliding_does_not_answer_is_called_a_preview(browser, name):
-    process, address = explored(Path(sim.__file__).parents[1] / "scenarios" / f"{name}.toml")
-    with opened(browser, address) as page:
+    path = Path(sim.__file__).parents[1] / "scenarios" / f"{name}.toml"
+    with explored(path) as (_, address), opened(browser, address) as page:
         assert page.locator("#preview").text_content().startswith("Preview: steady sliding is not what")
-    process.kill()
-    process.wait()
 
 
 def test_a_notebook_shows_pages_side_by_side_that_end_with_its_kernel(tmp_path, browser):
