@@ -26,6 +26,8 @@ from sim.units.notation import SLIP_EVENT
 
 #: Relative changes below it are rounding.
 _ROUNDING = 1e-9
+#: Clock steps in a slip event that resolve it.
+_RESOLVED = 3
 #: Properties of slip events and the quantities of late ones of which the engine records moments.
 _LATE = {
     "static_friction": "force_before", "force_drop": "force_drop", "slip_amplitude": "amplitude",
@@ -131,6 +133,18 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
         errors |= of_late | {"kinetic_friction": 0.5 * of_late["force_drop"]}
         result = result.assign({f"{name}_reading": _WIDE * error for name, error in errors.items()})
     return result
+
+
+def unresolved_slips(dataset: xr.Dataset) -> str:
+    """Return a remark if slip events are hardly longer than a clock step, so that their means are off; "" if not."""
+    with contextlib.suppress(ValueError, KeyError):  # of a run without slips, or without single ones
+        lasting, step = slips(dataset)["slip_duration"].median(), setting(dataset, "clock.step")
+        if bool((lasting < _RESOLVED * step).any()):
+            return (
+                f"slip events last fewer than {_RESOLVED} clock steps: drop, duration and friction have an error that"
+                " the brackets do not hold; reduce clock.step"
+            )
+    return ""
 
 
 def slips_by_phase(dataset: xr.Dataset) -> xr.Dataset:

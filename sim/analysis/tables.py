@@ -27,7 +27,7 @@ from sim.analysis.dataset import (
     word,
 )
 from sim.analysis.errors import systematic_errors
-from sim.analysis.events import varies
+from sim.analysis.events import unresolved_slips, varies
 from sim.analysis.observables import restricted, with_slips
 from sim.analysis.over_speed import extremes, loss_speeds
 from sim.analysis.statements import BOUNDED, COUNTS, as_means, each, of_events, reasons, statements, statistics
@@ -234,6 +234,7 @@ def notes(
         if shown_names := [headed[name] for name in names if name in headed]:
             lines.append(f"* {', '.join(dict.fromkeys(shown_names))}: {reason}")
     lines += [f"systematic error: {error}" for error in systematic_errors(dataset) if error.matters]
+    lines += filter(None, [unresolved_slips(dataset)])
     lines += _turning(dataset, stated) if one_row_each and stated else []
     known = [c for c in (*_COLUMNS, _MEMORY, *_EVENTS) if c.meaning and c.heading in headings]
     if _spreads(dataset):

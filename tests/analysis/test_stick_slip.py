@@ -3,6 +3,7 @@
 import functools
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -276,3 +277,11 @@ def test_a_stage_that_jumps_between_speeds_has_no_onset_of_slips_and_no_end():
     alone = {key: value for key, value in PULLED.items() if key != "sweep"}
     result = analysis.stick_slip(run(sim.Scenario(**alone | {"drive": PULLED["drive"] | {"stage": stage}})))
     assert result["slip_count"] > 10 and np.isnan(result["slips_from"]) and np.isnan(result["slips_down_to"])
+
+
+@pytest.mark.parametrize(("step", "is_named"), [("4 ms", True), ("0.5 ms", False)])
+def test_slip_events_of_few_clock_steps_are_named_in_the_table(step, is_named):
+    path = Path(sim.__file__).parents[1] / "scenarios" / "stick_slip.toml"
+    dataset = run(sim.load(path, {"drive.stage": "5 mm/s", "clock.step": step, "clock.record": "20 ms"}))
+    lines = analysis.tables.notes(dataset, [], [])
+    assert any("slip events last fewer than 3 clock steps" in line for line in lines) is is_named
