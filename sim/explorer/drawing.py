@@ -14,7 +14,7 @@ from sim.spectrum.families import Ripple
 from sim.study.curves import curves
 
 #: Points of a profile, and along a side of the map; sides over the radius of the contact.
-_PROFILE, _MAP, _WIDE = 161, 128, 4.0
+_PROFILE, _MAP, _WIDE = 161, 64, 4.0
 
 
 def contact(scenario: Scenario, speed: float) -> dict[str, Any]:

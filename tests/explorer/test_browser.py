@@ -153,6 +153,11 @@ def test_a_slider_changes_curves_words_and_address_and_undo_takes_each_gesture_b
     shown.reload()
     settled(shown)
     assert value(shown) == "3 mm"
+    shown.locator("#level").focus()
+    shown.keyboard.press("ArrowRight")
+    wait(shown, lambda: lost(shown).startswith("11 %"), "no other level")
+    shown.locator("#undo").click()
+    wait(shown, lambda: lost(shown).startswith("10 %") and value(shown) == "3 mm", "another gesture is undone as well")
     shown.locator("#reset").click()
     wait(shown, lambda: (value(shown), lost(shown)) == (before, words), "not reset")
 

@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -251,3 +252,16 @@ def test_the_command_refuses_what_it_cannot_use_in_one_line_before_it_serves(len
         ):  # fmt: skip
             done = command("explore", *arguments, "--no-browser")
             assert done.exit_code == 2 and message in done.stderr.splitlines()[-1], arguments
+
+
+def test_the_command_names_the_extra_that_is_missing_and_a_browser_that_is(lens, monkeypatch):
+    monkeypatch.setattr("webbrowser.open", lambda link: False)
+    monkeypatch.setattr(Server, "run", lambda self: self._socket.close())
+    done = command("explore", lens)
+    assert done.exit_code == 0 and "no browser was found" in done.stdout.splitlines()[-1]
+    for name in [name for name in sys.modules if name.startswith("sim.explorer")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "plotly" else name)
+    done = command("explore", lens)
+    assert done.exit_code == 2 and len(done.stderr.splitlines()) == 1
+    assert "plotly" in done.stderr and "[explore]" in done.stderr

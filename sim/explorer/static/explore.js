@@ -591,11 +591,17 @@ $("reset").addEventListener("click", () => {
   keep();
   restore(JSON.stringify({ values: Object.fromEntries(sliders.map(({ key, value }) => [key, value])), share: 0.1, absolute: false, first: false, loads: false }));
 });
+let levelling = false;
 $("level").addEventListener("input", () => {
+  if (!levelling) keep();
+  levelling = true;
   state.share = Number($("level").value) / 100;
   draw();
 });
-$("level").addEventListener("change", remember);
+$("level").addEventListener("change", () => {
+  levelling = false;
+  remember();
+});
 for (const name of SHOWN) {
   $(name).addEventListener("change", () => {
     keep();
