@@ -262,6 +262,6 @@ def test_the_command_names_the_extra_that_is_missing_and_a_browser_that_is(lens,
     for name in [name for name in sys.modules if name.startswith("sim.explorer")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "plotly" else name)
-    done = command("explore", lens)
+    done = command("explore", "nothing.toml")
     assert done.exit_code == 2 and len(done.stderr.splitlines()) == 1
     assert "plotly" in done.stderr and "[explore]" in done.stderr
