@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from helpers.commands import sim as command
+from helpers.commands import LENS as MOUNTED, sim as command
 from numpy.testing import assert_allclose
 
 import sim
@@ -20,21 +20,10 @@ from sim.laws import jkr
 from sim.study.curves import curves, speeds_of_loss
 
 SCENARIOS = ("pdms_lens", "friction_maximum", "masking", "stick_slip", "motor_clutch", "pull_off", "afm_tip", "jkr_fit")
-#: A lens on bonds alone, whose numbers have comments.
-LENS = """\
-# Which speed?
-name = "a lens"
-[clock]
-duration = "1 s"
-step = "0.1 s"
-[solid]
-shear_modulus = "1.6 MPa"  # of PDMS
-[sphere]
-radius = "2 mm"
-[adhesion]
-work = "42 mJ/m^2"
-[contact]
-load = "4 mN"
+#: A lens on bonds alone, some of whose numbers have comments.
+LENS = (
+    MOUNTED.replace('"1.6 MPa"', '"1.6 MPa"  # of PDMS')
+    + """\
 [drive]
 model = "steady"
 speed = "1 mm/s"
@@ -43,6 +32,7 @@ model = "steady"
 critical_speed = "10 mm/s"  # assumed
 stress = "0.3 MPa"
 """
+)
 WAVES = """\
 [shear]
 model = "mean"
