@@ -215,10 +215,13 @@ def begun(server, token, **table):
 
 
 def workers():
-    """The processes of jobs that still run."""
-    children = psutil.Process().children(recursive=True)
-    running = (child for child in children if child.is_running() and child.status() != psutil.STATUS_ZOMBIE)
-    return [child for child in running if "sim.explorer.job" in " ".join(child.cmdline())]
+    """The processes of jobs that still run; one that ends while it is looked at does not."""
+    running = []
+    for child in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.NoSuchProcess):  # ZombieProcess is one of these
+            if "sim.explorer.job" in " ".join(child.cmdline()):
+                running.append(child)
+    return running
 
 
 def until(condition):
