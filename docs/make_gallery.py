@@ -6,6 +6,7 @@ answers are kept in ``gallery/numbers.json``, from which the pages are made.
 
 import io
 import json
+import shlex
 import sys
 import textwrap
 from collections.abc import Callable, Mapping
@@ -62,8 +63,8 @@ class Entry(NamedTuple):
     """A question to a scenario: ``numbers`` reads them from its dataset, ``answer`` has a place for each.
 
     ``changes`` are overrides of the scenario, ``kind`` is that of the figure, ``where`` the values of swept keys that
-    it shows and ``units`` some of its axes; ``name`` is that of the picture. With ``free`` keys the scenario is fitted
-    to the table of its name, and ``numbers`` reads the fit.
+    it shows, ``units`` some of its axes and ``choices`` further options; ``name`` is that of the picture. With ``free``
+    keys the scenario is fitted to the table of its name, and ``numbers`` reads the fit.
     """
 
     name: str
@@ -75,7 +76,13 @@ class Entry(NamedTuple):
     changes: Mapping[str, Any] = MappingProxyType({})
     where: Mapping[str, str] = MappingProxyType({})
     units: tuple[str, ...] = ()
+    choices: Mapping[str, Any] = MappingProxyType({})
     free: tuple[str, ...] = ()
+
+    @property
+    def picture(self) -> Path:
+        """The picture, which moves if its kind does."""
+        return FOLDER / f"{self.name}.{'gif' if self.kind == 'movie' else 'png'}"
 
     @property
     def commands(self) -> list[str]:
@@ -88,6 +95,10 @@ class Entry(NamedTuple):
         output = f" -o outputs/{self.name}.nc" if self.name != self.scenario else ""
         chosen = "".join(f" --where '{key}={value}'" for key, value in self.where.items())
         chosen += "".join(f" --units {unit}" for unit in self.units)
+        words = {"start": "from", "stop": "to"}
+        chosen += "".join(
+            f" --{words.get(name, name)} {shlex.quote(str(value))}" for name, value in self.choices.items()
+        )
         shown = " ".join(filter(None, ["sim plot", f"outputs/{self.name}.nc", self.kind]))
         return [f"sim run {path}.toml{options}{output}", f"{shown}{chosen}"]
 
@@ -100,7 +111,10 @@ class Entry(NamedTuple):
 
     def draw(self, result: Any) -> None:
         """Make the picture, of few colours and as many pixels as its size allows."""
-        chosen: Any = {"where": dict(self.where), "units": self.units}
+        chosen: Any = {"where": dict(self.where), "units": self.units, **self.choices}
+        if self.kind == "movie":
+            sim.plot(result, self.kind, self.picture, **chosen)
+            return
         figure = fitted(result.problem, result.best) if self.free else sim.plot(result, self.kind, **chosen)
         for dpi, colours in FINENESS:
             drawn, small = io.BytesIO(), io.BytesIO()
@@ -110,12 +124,12 @@ class Entry(NamedTuple):
             picture.quantize(colours, **palette).save(small, "png", optimize=True)
             if small.tell() < MOST_BYTES:
                 break
-        (FOLDER / f"{self.name}.png").write_bytes(small.getvalue())
+        self.picture.write_bytes(small.getvalue())
 
     def text(self, numbers: dict[str, Any]) -> str:
         """Return the page with the question, its figure, its answer and the commands."""
         commands = "\n".join(f"    {command}" for command in self.commands)
-        figure = f"![{self.question}]({self.name}.png)"
+        figure = f"![{self.question}]({self.picture.name})"
         scenario = f"[`{self.scenario}.toml`](../../scenarios/{self.scenario}.toml)"
         links = f"Scenario: {scenario}. [All questions](README.md)."
         answer = textwrap.fill(self.filled(numbers), 120, break_long_words=False, break_on_hyphens=False)
@@ -520,6 +534,30 @@ def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 @asks(
+    "pdms_lens_spring",
+    "What happens in a slip event?",
+    """The movie shows one member in slow motion. The stage pulls at {speed:g} mm/s through the spring. The dots lie on
+    the half-space. In a stick phase the slider hardly moves over them, and the spring force rises to {before:.1f} mN.
+    In the slip event that begins at {time:.0f} ms the slider moves by {slip:.0f} µm in {lasts:.0f} ms, and the force
+    falls to {after:.1f} mN. The area is smallest in this slip event: {small:.0f} % of JKR's, which is dotted. Broken
+    bonds take {bonds:.0f} % of it there, fluctuations {noise:.0f} %.""",
+    kind="movie",
+    where={"drive.stage": "3 mm/s"},
+    choices={"member": 0, "start": "1 s", "stop": "1.2 s"},
+)
+def slip_event(dataset: xr.Dataset) -> dict[str, Number]:
+    shown = dataset.sel(drive_stage=3e-3, member=0)
+    event = int(np.argmax(shown["slip_time"].to_numpy() > 1.0))
+    begin, end, moved = (float(shown[f"slip_{name}"][event]) for name in ("time", "end", "amplitude"))
+    force = {name: 1e3 * float(shown[f"slip_force_{name}"][event]) for name in ("before", "after")}
+    within = shown.sel(t=slice(begin, end))
+    least = within.isel(t=int(within["contact_radius"].argmin("t")))
+    area, left = (100.0 * float(least[name] / least["jkr_radius"]) ** 2 for name in ("contact_radius", "bonds_radius"))
+    return force | {"speed": 3.0, "time": 1e3 * begin, "slip": 1e6 * moved, "lasts": 1e3 * (end - begin),
+                    "small": area, "bonds": 100.0 - left, "noise": left - area}  # fmt: skip
+
+
+@asks(
     "motor_clutch",
     "On which substrate does a cell pull hardest: soft, stiff, or in between?",
     """In between. The stiffness of the contact stands for that of the substrate. At {best:g} pN/nm the clutches
@@ -735,12 +773,28 @@ def pattern(dataset: xr.Dataset) -> dict[str, Number]:
     return {"rms": 1e-3 * field.rms, "mean": 1e-3 * field.mean, "width": width}
 
 
+@asks(
+    "own_map",
+    "How does the contact move over the pattern?",
+    """The pattern moves from left to right under the sphere. The circle is the contact, and the dotted circle is JKR's
+    contact. In {time:.0f} ms the pattern moves by {moved:.0f} µm. The area is largest at {top:.0f} ms, with {large:.1f}
+    % of JKR's area. Each frame of the movie is one of {maps:g} recorded maps.""",
+    kind="movie",
+    changes={"record.maps": {"from": "0 s", "to": "295 ms", "count": 60}},
+)
+def moving_pattern(dataset: xr.Dataset) -> dict[str, Number]:
+    share, last = 100.0 * (dataset["contact_radius"] / dataset["jkr_radius"]) ** 2, dataset["map_time"][-1]
+    return {"time": 1e3 * float(last), "moved": 1e6 * float(dataset["slider_position"].sel(t=last, method="nearest")),
+            "large": float(share.max()), "top": 1e3 * float(share["t"][int(share.argmax("t"))]),
+            "maps": float(dataset.sizes["map_time"])}  # fmt: skip
+
+
 def pages(numbers: dict[str, dict[str, Any]]) -> dict[Path, str]:
     """Return the text of each page: the index and one page for each question."""
     index = HEAD
     for entry in ENTRIES:
         index += f"\n## {TOPICS[entry.name]}\n\n" if entry.name in TOPICS else ""
-        index += f'- [<img src="{entry.name}.png" alt="" width="160"> {entry.question}]({entry.name}.md)\n'
+        index += f'- [<img src="{entry.picture.name}" alt="" width="160"> {entry.question}]({entry.name}.md)\n'
     index += "\n```{toctree}\n:hidden:\n\n" + "".join(f"{entry.name}\n" for entry in ENTRIES) + "```\n"
     texts = {FOLDER / f"{entry.name}.md": entry.text(numbers[entry.name]) for entry in ENTRIES}
     return {FOLDER / "README.md": index} | texts

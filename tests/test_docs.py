@@ -16,6 +16,7 @@ from helpers.cases import posix
 from helpers.commands import sim as command_line
 from markdown_it import MarkdownIt
 from numpy.testing import assert_allclose
+from PIL import Image
 
 import sim
 from sim import analysis
@@ -148,7 +149,10 @@ def test_the_gallery_shows_the_numbers_that_were_computed():
     for entry in GALLERY.ENTRIES:  # and no number is typed
         typed = re.sub(r"\{.*?\}|`.*?`|\]\(.*?\)|[χα] = [01]|theory of 2018", "", entry.answer)
         assert not re.search(r"\d", typed), entry.name
-        assert 0 < (GALLERY.FOLDER / f"{entry.name}.png").stat().st_size < GALLERY.MOST_BYTES
+        moves = entry.kind == "movie"
+        assert 0 < entry.picture.stat().st_size < (2_000_000 if moves else GALLERY.MOST_BYTES)
+        with Image.open(entry.picture) as picture:
+            assert getattr(picture, "n_frames", 1) == (60 if moves else 1)
 
 
 @pytest.mark.verify

@@ -7,10 +7,10 @@ import scipy
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 
 from sim.analysis.dataset import where_recorded, word
 from sim.laws.halfspace import angular_compliance, displacement
-from sim.numerics.grid import Lattice, lattice_of
 from sim.plots import style
 from sim.spectrum.radial import Rowed, Waves
 
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 #: Pixels that a cell has at least in a picture.
 PIXELS = 384
 
-#: Share of the pixels that the colours tell apart.
+#: Share of the pixels that the colours tell apart; unit, words and colour map of the stress.
 _SHOWN = 0.999
+STRESS = "Pa", r"shear stress $\tau_1$", "RdBu_r"
 
 
 def needs_maps(dataset: xr.Dataset) -> None:
@@ -41,19 +42,20 @@ def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     where, words = style.first_point(dataset)
     point = dataset.isel(where)
     stress = _maps_of(point, at).isel(map_member=0)
-    sides, measured = _lattice_of(stress).sides, word(dataset, "shear.field.file", "")
+    sides, measured = sides_of(stress), bool(word(dataset, "shear.field.file", ""))
     solid = (float(point[f"effective_{name}"]) for name in ("shear_modulus", "poisson_ratio"))
     moved = displacement(stress.to_numpy(), sides, *solid)
     radius, speed = (float(_then(point, name, stress)) for name in ("contact_radius", "speed"))
     figure, axes = style.pairs(0.6 + 2.5 * min(1.0, sides[1] / sides[0]), shared=True)
     length = style.Unit.of(np.array(sides), "m")
     sizes = [length.factor * size for size in (*sides, radius)]
-    draw = _draw_measured if measured else _draw_map
-    draw(axes[0], stress.to_numpy(), sizes, ("Pa", r"shear stress $\tau_1$", "RdBu_r"))
-    draw(axes[1], moved, sizes, ("m", "displacement $w_1$", "PuOr_r"))
+    draw_field(axes[0], stress.to_numpy(), sizes, measured, STRESS)
+    draw_field(axes[1], moved, sizes, measured, ("m", "displacement $w_1$", "PuOr_r"))
     arrow = {-1.0: r"$\longleftarrow$ sliding", 0.0: "at rest", 1.0: r"sliding $\longrightarrow$"}
     box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.85, "linewidth": 0}
     for panel in axes:
+        if measured or 0.0 < sizes[2] < 1.5 * sizes[0]:
+            style.contact_circle(panel, sizes[2])
         panel.set_xlabel(length.label("$x$"))
         panel.text(0.04, 0.05, arrow[float(np.sign(speed))], transform=panel.transAxes, fontsize=7, bbox=box)
     axes[0].set_ylabel(length.label("$y$"))
@@ -70,11 +72,15 @@ def _then(point: xr.Dataset, name: str, stress: xr.DataArray) -> np.ndarray:
     return (values.sel(member=stress["map_member"]) if "member" in values.dims else values).to_numpy()
 
 
-def _draw_map(panel: Axes, field: np.ndarray, sizes: list[float], about: tuple) -> None:
-    """Draw a field around the contact, continued periodically if the contact is wider than the cell.
+def around(field: np.ndarray, sizes: list[float], measured: bool) -> tuple[np.ndarray, tuple, float]:
+    """Return pixels of a field around the contact, the extent of the pixels, and half the side of a square view.
 
-    ``sizes`` are the two sides of the cell and the radius of the contact, ``about`` is what is shown.
+    ``sizes`` are the two sides of the cell and the radius of the contact. A measured field is shown whole, pixel by
+    pixel. Any other field is continued periodically if the contact is wider than the cell.
     """
+    if measured:
+        firsts = [-(points // 2 + 0.5) * side / points for points, side in zip(field.shape, sizes, strict=False)]
+        return field, (firsts[0], firsts[0] + sizes[0], firsts[1], firsts[1] + sizes[1]), 0.0
     cell, _, radius = sizes
     # between its samples by its own Fourier series: nothing is smoothed
     points = field.shape[0] * -(-PIXELS // field.shape[0])
@@ -83,45 +89,40 @@ def _draw_map(panel: Axes, field: np.ndarray, sizes: list[float], about: tuple) 
     half = int(np.ceil(0.5 * side / cell * points))
     index = np.arange(-half, half + 1) % points
     reach = (half + 0.5) * cell / points
-    _image(panel, field[np.ix_(index, index)], (-reach, reach, -reach, reach), about)
-    if 0.0 < radius < 1.5 * cell:
-        style.contact_circle(panel, radius)
-    panel.set(xlim=(-0.5 * side, 0.5 * side), ylim=(-0.5 * side, 0.5 * side))
+    return field[np.ix_(index, index)], (-reach, reach, -reach, reach), 0.5 * side
 
 
-def _draw_measured(panel: Axes, field: np.ndarray, sizes: list[float], about: tuple) -> None:
-    """Draw a measured field pixel by pixel, with the contact in its middle."""
-    ends = []
-    for points, side in zip(field.shape, sizes, strict=False):
-        first = -(points // 2 + 0.5) * side / points
-        ends += [first, first + side]
-    _image(panel, field, tuple(ends), about)
-    style.contact_circle(panel, sizes[2])
+def draw_field(
+    panel: Axes, field: np.ndarray, sizes: list[float], measured: bool, about: tuple, among: np.ndarray | None = None
+) -> tuple[AxesImage, float]:
+    """Draw a field (x, y) around the contact with x to the right, and a colour bar; return the image and its factor.
 
-
-def _image(panel: Axes, field: np.ndarray, extent: tuple, about: tuple) -> None:
-    """Draw a field (x, y) with x to the right, and a colour bar; ``about`` holds its SI unit, words and colour map.
-
-    The bar has the colours of the field alone; few pixels beyond its ends do not rule it.
+    ``about`` holds the SI unit, words and colour map. The bar has the colours of the field alone, or of all fields
+    ``among`` which it is one. Few pixels beyond its ends do not rule it.
     """
     si, words, colours = about
-    unit = style.Unit.of(field, si)
-    field = unit.factor * field
-    most = np.quantile(np.abs(field), _SHOWN) or 1.0
+    shown, extent, half = around(field, sizes, measured)
+    among = shown if among is None else among
+    unit = style.Unit.of(among, si)
+    low, high, most = unit.factor * np.array([np.min(among), np.max(among), np.quantile(np.abs(among), _SHOWN)])
+    most = most or 1.0
     cut = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
-    extend = cut[bool(field.min() < -most), bool(field.max() > most)]
+    extend = cut[bool(low < -most), bool(high > most)]
     look: Any = {"cmap": style.part_of(colours, 0.05, 0.95), "vmin": -most, "vmax": most, "interpolation": "nearest"}
-    image = panel.imshow(field.T, extent=extent, origin="lower", **look)
+    image = panel.imshow(unit.factor * shown.T, extent=extent, origin="lower", **look)
     beside: Any = {"cax": panel.inset_axes((1.03, 0.0, 0.045, 1.0)), "label": unit.label(words), "extend": extend}
     bar = panel.figure.colorbar(image, extendfrac=0.03, **beside)
-    if np.ptp(field) > 0.0:
-        bar.ax.set_ylim(max(field.min(), -most), min(field.max(), most))
+    if high > low:
+        bar.ax.set_ylim(max(low, -most), min(high, most))
+    if half:
+        panel.set(xlim=(-half, half), ylim=(-half, half))
+    return image, unit.factor
 
 
-def _lattice_of(stress: xr.DataArray) -> Lattice:
-    shape = stress.sizes["x"], stress.sizes["y"]
-    sides = (float(stress[axis][1] - stress[axis][0]) * points for axis, points in zip("xy", shape, strict=True))
-    return lattice_of(cast(tuple[float, float], tuple(sides)), shape)
+def sides_of(maps: xr.DataArray) -> tuple[float, float]:
+    """Return the sides of the cell of maps along x and y [m]."""
+    along, across = (float(maps[axis][1] - maps[axis][0]) * maps.sizes[axis] for axis in "xy")
+    return along, across
 
 
 def density_figure(scene: "Scenario") -> Figure:

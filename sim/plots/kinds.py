@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from sim.analysis import engineering, statements, sweep_dims
 from sim.analysis.dataset import MEMBERS, answered, claim, plain, speed_name
 from sim.numerics.files import claim as claim_file, output
-from sim.plots import curves, field, slider, style, theories
+from sim.plots import curves, field, movie, slider, style, theories
 from sim.plots.measured import Measured
 from sim.plots.style import STYLE, recorded, swept_value
 from sim.units.errors import BadInput
@@ -25,7 +25,7 @@ from sim.units.notation import in_units
 from sim.units.quantity import read_option
 
 #: Kinds of figures over time, of which a part can be drawn.
-_OVER_TIME = ("time", "friction", "creep", "stress")
+_OVER_TIME = ("time", "friction", "creep", "stress", "movie")
 _SIZE = re.compile(r"(?P<width>[\d.]+) *[x×] *(?P<height>[\d.]+) *(?P<unit>in|cm|mm)")
 _INCHES = {"in": 1.0, "cm": 1.0 / 2.54, "mm": 0.1 / 2.54}
 
@@ -166,6 +166,7 @@ KINDS: dict[str, Kind] = {
     "time": Kind(curves.time_figure),
     "incipient": Kind(slider.incipient_figure, slider.needs_pull, reads=("spring_force", "contact_area")),
     "map": Kind(field.map_figure, field.needs_maps),
+    "movie": Kind(movie.movie_figure, movie.needs_one_contact, reads=movie.READS),
 }
 
 
@@ -263,7 +264,8 @@ def drawn(
         For an unknown kind or format, or a path that must not be written.
     """
     try:
-        target = path or source.with_name(f"{source.stem}{'-' + kind if kind else ''}.png")
+        suffix = ".gif" if kind == "movie" else ".png"
+        target = path or source.with_name(f"{source.stem}{'-' + kind if kind else ''}{suffix}")
         tables = [Path(choices.data)] if isinstance(choices.data, Path | str) else []
         claim(dataset, source, target, replace, *tables)
         figure = draw(dataset, kind, choices)

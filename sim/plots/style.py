@@ -154,11 +154,12 @@ def number_at(variable: xr.DataArray, at: dict[str, int]) -> float:
     return float(variable.isel(at, missing_dims="ignore"))
 
 
-def contact_circle(panel: Axes, radius: float) -> None:
-    """Draw the edge of the contact on a map."""
+def contact_circle(panel: Axes, radius: float) -> Circle:
+    """Draw the edge of the contact on a map and return it."""
     circle = Circle((0.0, 0.0), radius, fill=False, linewidth=1.0, color=BOTH)
     circle.set_path_effects([withStroke(linewidth=2.4, foreground="white", alpha=0.8)])
     panel.add_patch(circle)
+    return circle
 
 
 def text_of(value: Any, unit: str) -> str:

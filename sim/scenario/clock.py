@@ -1,13 +1,14 @@
 """Clock, ensemble and records of a scenario."""
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
+from sim.scenario.sweep import spaced
 from sim.units.notation import Recorded
 from sim.units.quantity import Quantity
 
@@ -79,6 +80,11 @@ class Ensemble:
     members: Annotated[int, Quantity("1", "members of the ensemble", at_least=1, at_most=10**7, whole=True)] = 1
 
 
+def _times(value: Any) -> Any:
+    """Return the times of a range, and anything else as it is."""
+    return spaced(value) if isinstance(value, dict) else value
+
+
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Record:
     """Content of the dataset: each member or the ensemble's mean, spread and standard error; maps at given times."""
@@ -90,7 +96,10 @@ class Record:
             " member, unless the file would exceed 20 GB"
         ),
     ] = None
-    maps: tuple[Annotated[float, Quantity("s", "time of a stress map", "t", at_least=0)], ...] = ()
+    maps: Annotated[
+        tuple[Annotated[float, Quantity("s", "times of stress maps, a list or { from, to, count }", at_least=0)], ...],
+        BeforeValidator(_times, list[float | str] | dict[str, float | str]),
+    ] = ()
     map_members: Annotated[int, Quantity("1", "members with recorded maps", at_least=1, at_most=10**4, whole=True)] = 1
     quantities: Annotated[
         tuple[Recorded, ...] | None, Field(description="quantities to record beside contact_radius; if omitted: all")

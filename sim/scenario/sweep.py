@@ -106,7 +106,7 @@ def _columns(table: dict[str, Any], above: str = "") -> Iterator[Axis]:
     for name, values in table.items():
         key = f"{above}{name}"
         if isinstance(values, dict) and any(type(values.get(word, [])) not in (list, dict) for word in _RANGE):
-            values = _spaced(key, values)
+            values = spaced(values, f"{key}: ")
         if isinstance(values, list) and values:
             yield Axis((key,), tuple((value,) for value in values))
         elif isinstance(values, dict) and values:
@@ -130,18 +130,18 @@ def _require_sweepable(key: str, keys: list[str]) -> None:
         raise _fault(f"{key}: is swept twice; remove one")
 
 
-def _spaced(key: str, values: dict[str, Any]) -> list[Any]:
-    """Return the values of a range, spaced evenly on a linear or logarithmic scale."""
+def spaced(values: dict[str, Any], before: str = "") -> list[Any]:
+    """Return the values of a range, spaced evenly on a linear or logarithmic scale; ``before`` begins a message."""
     low, high, count, scale = (values.get(word, "linear") for word in _RANGE)
     ends = same_unit(low, high)
     if not {"from", "to", "count"} <= values.keys() <= set(_RANGE) or scale not in ("linear", "log"):
-        raise _fault(f'{key}: write a range as {{ from = ..., to = ..., count = ..., scale = "linear" or "log" }}')
+        raise _fault(f'{before}write a range as {{ from = ..., to = ..., count = ..., scale = "linear" or "log" }}')
     if type(count) is not int or not 2 <= count <= _MOST_POINTS:
-        raise _fault(f"{key}: the count of the range must be a whole number from 2 to {_MOST_POINTS:,}")
+        raise _fault(f"{before}the count of the range must be a whole number from 2 to {_MOST_POINTS:,}")
     if ends is None:
-        raise _fault(f"{key}: both ends of the range must be finite numbers in units of one dimension")
+        raise _fault(f"{before}both ends of the range must be finite numbers in units of one dimension")
     first, last, unit = ends
     if scale == "log" and not (first > 0.0 and last > 0.0):
-        raise _fault(f'{key}: a range with scale = "log" needs both ends above zero')
+        raise _fault(f'{before}a range with scale = "log" needs both ends above zero')
     numbers = (np.geomspace if scale == "log" else np.linspace)(first, last, count).tolist()
     return numbers if unit is None else [f"{number!r} {unit}".strip() for number in numbers]

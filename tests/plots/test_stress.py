@@ -144,8 +144,8 @@ def test_peaks_after_rests_are_those_of_steps_beside_the_closed_form_and_hollow_
 def test_sliding_without_a_stress_over_speed_or_time_is_refused_with_the_cure():
     short = Clock(duration=0.1, step=0.1)
     for changes, cure in (
-        ({"population": bonds.Unbroken()}, r"\[bonds\] stress = .*drawn as: theories, curve, time$"),
-        ({"drive": drive.Steady(speed=1e-3)}, r'model = "start".*drawn as: .*friction, time$'),
+        ({"population": bonds.Unbroken()}, r"\[bonds\] stress = .*drawn as: theories, curve, time, movie$"),
+        ({"drive": drive.Steady(speed=1e-3)}, r'model = "start".*drawn as: .*friction, time, movie$'),
         ({"population": bonds.Unbroken(stress=3e5), "drive": drive.Start(rest=5.0, speed=1e-3)}, "clock.duration"),
     ):
         with pytest.raises(ValueError, match=cure):

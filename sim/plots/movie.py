@@ -1,0 +1,214 @@
+"""The contact in motion: its edge over the stress or behind a spring, beside area and force over time."""
+
+from collections.abc import Callable
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.animation import FFMpegWriter
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.patches import Circle
+from PIL import Image
+
+from sim.analysis import sweep_dims
+from sim.analysis.dataset import MEMBERS, word
+from sim.plots import field, style
+
+#: Most frames of a movie, frames a second, and dots an inch, by format.
+_FRAMES, _RATE, _FINENESS = {"gif": 60, "mp4": 120}, 20, {"gif": 100, "mp4": 150}
+#: Colours of a GIF, and least frames that a slip event needs.
+_COLOURS, _OF_SLIP = 128, 8
+#: Forces over time, the first that is recorded and changes.
+_FORCES = {"spring_force": "spring force $F$", "friction_force": "friction force $F$", "normal_load": "normal load $P$"}
+READS = "speed", "slider_position", "jkr_radius", "normal_load"
+#: Marks on the half-space, and the largest part of the view by which they may move between two frames.
+_MARKS, _MOST_MOVED = 60, 0.1
+
+
+class Movie(style.Picture):
+    """A picture that moves if it is saved as GIF or MP4; in any other format it is its first frame."""
+
+    #: Records at which there are frames, times of all records and of slip events [s], and the function for a frame.
+    places: np.ndarray
+    times: np.ndarray
+    slips: np.ndarray
+    show_frame: Callable[[int], None]
+
+    def savefig(self, fname: Any, **options: Any) -> None:
+        """Save as a movie (GIF, MP4) or as a picture of the first frame, by ``format`` or the extension.
+
+        Raises
+        ------
+        ValueError
+            If an MP4 is asked for and there is no ffmpeg.
+        """
+        form = options.get("format") or str(fname).rpartition(".")[2].lower()
+        if form not in _FRAMES:
+            super().savefig(fname, **options)
+            return
+        if form == "mp4" and not FFMpegWriter.isAvailable():
+            raise ValueError("an MP4 needs the program ffmpeg, which was not found; install it, or name a .gif file")
+        frames = np.unique(np.rint(np.linspace(0, len(self.places) - 1, _FRAMES[form])).astype(int))
+        first, last = self.times[self.places[frames[[0, -1]]]]
+        pace = f"{style.text_of(last - first, 's')} shown in {(len(frames) - 1) / _RATE:.1f} s"
+        if np.sum((self.slips >= first) & (self.slips <= last)) > len(frames) / _OF_SLIP:
+            pace += "; too few frames to show the slip events: choose less time by --from and --to"
+        with mpl.rc_context(style.STYLE):
+            self.supxlabel(pace, fontsize=7.0, x=0.01, ha="left")
+            self.set_dpi(options.get("dpi") or _FINENESS[form])
+            self.canvas.draw()
+            self.set_layout_engine("none")  # the panels stay in their places, which also saves most of the time
+            (self._save_gif if form == "gif" else self._save_mp4)(fname, frames)
+
+    def _save_gif(self, fname: Any, frames: np.ndarray) -> None:
+        """Write a GIF whose frames share one palette without dither, so that it is small and no colour flickers."""
+        pictures, canvas = [], FigureCanvasAgg(self)
+        for frame in frames:
+            self.show_frame(frame)
+            canvas.draw()
+            pictures.append(np.array(canvas.buffer_rgba())[..., :3])
+        few = Image.fromarray(np.vstack(pictures[:: max(len(pictures) // 6, 1)]))
+        palette = few.quantize(_COLOURS, Image.Quantize.MEDIANCUT)
+        shown = (Image.fromarray(each).quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures)
+        next(shown).save(fname, "gif", save_all=True, append_images=shown, duration=1000 // _RATE, loop=0)
+
+    def _save_mp4(self, fname: Any, frames: np.ndarray) -> None:
+        """Write an MP4 that browsers and presentations show."""
+        writer = FFMpegWriter(_RATE, "h264", extra_args=["-pix_fmt", "yuv420p", "-f", "mp4"])
+        with writer.saving(self, fname, self.dpi):
+            for frame in frames:
+                self.show_frame(frame)
+                writer.grab_frame()
+
+
+def needs_one_contact(dataset: xr.Dataset) -> None:
+    """Refuse a dataset of several contacts, or of their statistics alone."""
+    if swept := style.swept(dataset):
+        key = swept[0].replace("_", ".", 1)
+        raise ValueError(f"a movie shows one point of the sweep; choose it, such as by --where {key}=VALUE")
+    if dataset.sizes.get(MEMBERS, 1) > 1:
+        raise ValueError("a movie shows one member; choose it by --member, such as --member 0")
+    if "contact_radius" not in dataset:
+        raise ValueError("members were not recorded, only statistics; run again with [record] per_member = true")
+    if not (dataset["contact_radius"] > 0.0).any():
+        raise ValueError("the contact is always open; raise the load or the indentation")
+
+
+def movie_figure(dataset: xr.Dataset, absolute: bool = False) -> Movie:
+    """Movie (GIF, MP4) of one contact: its edge, over the stress if maps are recorded, with area and force over time.
+
+    With maps, each frame is a map.
+    """
+    point = dataset.isel(dict.fromkeys([*sweep_dims(dataset), MEMBERS, "map_member"], 0), missing_dims="ignore")
+    times, movie = point["t"].to_numpy(), Movie(figsize=(style.WIDE, 2.9), dpi=200, layout="constrained")
+    FigureCanvasAgg(movie)
+    grid = movie.add_gridspec(2, 2, width_ratios=[1.25, 1.0])
+    plan, *curves = (movie.add_subplot(place) for place in (grid[:, 0], grid[0, 1], grid[1, 1]))
+    movie.slips = point["slip_time"].to_numpy() if "slip_time" in point else np.empty(0)
+    movie.times, movie.places, time = times, np.arange(len(times)), style.Unit.of(times, "s")
+    if is_mapped := "shear_map" in point:
+        point = point.isel(map_time=(point["map_time"] >= times[0]) & (point["map_time"] <= times[-1]))
+        is_mapped = point.sizes["map_time"] > 1
+    if is_mapped:
+        movie.places = np.abs(times[:, np.newaxis] - point["map_time"].to_numpy()).argmin(axis=0)
+    move = (_over_stress if is_mapped else _sliding)(plan, point)
+    area, full = (np.pi * point[name].to_numpy() ** 2 for name in ("contact_radius", "jkr_radius"))
+    shown = (area, "contact area $A$", "m^2")
+    if not absolute and np.all(full > 0.0):
+        shown = (area / full, r"contact area $A/A_\mathrm{JKR}$", "1")
+    force = next((name for name in _FORCES if name in point and np.ptp(point[name].to_numpy()) > 0.0), "normal_load")
+    follow = [_curve(curves[0], times, *shown), _curve(curves[1], times, point[force].to_numpy(), _FORCES[force], "N")]
+    curves[0].tick_params(labelbottom=False)
+    curves[0].set_xlabel("")
+
+    def show(frame: int) -> None:
+        k = int(movie.places[frame])
+        speed = style.rounded(point["speed"][k], "m/s")
+        plan.set_title(f"$t$ = {time.factor * times[k]:.4g} {time.name}, sliding speed {speed}")
+        move(frame, k)
+        for mark in follow:
+            mark(k)
+
+    movie.show_frame = show
+    show(0)
+    return movie
+
+
+def _edge(panel: Axes, point: xr.Dataset, factor: float) -> Callable[[int, float], None]:
+    """Draw the edge of the contact, and dotted that of JKR's; return the function that moves both."""
+    dotted = Circle((0.0, 0.0), 0.0, fill=False, linestyle=":", linewidth=1.0, color=style.REFERENCE)
+    panel.add_patch(dotted)
+    circles = {"contact_radius": style.contact_circle(panel, 0.0), "jkr_radius": dotted}
+
+    def move(k: int, x: float) -> None:
+        for name, circle in circles.items():
+            circle.set_radius(factor * float(point[name][k]))
+            circle.set_center((factor * x, 0.0))
+
+    return move
+
+
+def _over_stress(panel: Axes, point: xr.Dataset) -> Callable[[int, int], None]:
+    """Draw the maps around the contact; return the function that shows one of them."""
+    maps, measured = point["shear_map"].transpose("map_time", "x", "y"), bool(word(point, "shear.field.file", ""))
+    stress, sides = maps.to_numpy(), field.sides_of(maps)
+    length = style.Unit.of(np.array(sides), "m")
+    sizes = [length.factor * size for size in (*sides, float(point["contact_radius"].max()))]
+    image, factor = field.draw_field(panel, stress[0], sizes, measured, field.STRESS, stress)
+    panel.set(xlabel=length.label("$x$"), ylabel=length.label("$y$"))
+    edge = _edge(panel, point, length.factor)
+
+    def move(frame: int, k: int) -> None:
+        image.set_data(factor * field.around(stress[frame], sizes, measured)[0].T)
+        edge(k, 0.0)
+
+    return move
+
+
+def _sliding(panel: Axes, point: xr.Dataset) -> Callable[[int, int], None]:
+    """Draw the contact on the half-space, and the spring that pulls it; return the function that shows a record.
+
+    Marks on the half-space pass where they move little between two frames.
+    """
+    pulled = "stage_position" in point
+    place, origin = (
+        point[name].to_numpy() for name in ("slider_position", "stage_position" if pulled else "slider_position")
+    )
+    behind, radius = place - origin, float(point["contact_radius"].max())
+    ends = np.array([min(behind.min(), 0.0) - 1.4 * radius, max(behind.max(), 0.0) + 1.4 * radius])
+    length = style.Unit.of(ends, "m")
+    panel.set(xlim=length.factor * ends, ylim=1.6 * length.factor * radius * np.array([-1.0, 1.0]), aspect="equal")
+    panel.set(xlabel=length.label("$x$ from the stage" if pulled else "$x$ from the slider"))
+    panel.set_ylabel(length.label("$y$"))
+    width, random = np.ptp(ends), np.random.default_rng(0)
+    along, across = random.uniform(0.0, width, _MARKS), random.uniform(-1.6, 1.6, _MARKS) * radius
+    is_slow = np.ptp(origin) < _MOST_MOVED * width * _FRAMES["gif"]
+    marks = panel.scatter(along, across, 3.0 if is_slow else 0.0, color=style.REFERENCE, linewidths=0)
+    coil, edge = panel.plot([], [], color=style.BONDS, linewidth=0.8)[0], _edge(panel, point, length.factor)
+    turns = np.resize([0.0, 1.0, 0.0, -1.0], 33) * 0.12 * radius
+
+    def move(frame: int, k: int) -> None:
+        passed = ends[0] + (along - origin[k]) % width
+        marks.set_offsets(length.factor * np.column_stack([passed, across]))
+        edge(k, behind[k])
+        if pulled:  # the stage is at the origin
+            coil.set_data(length.factor * np.linspace(behind[k], 0.0, turns.size), length.factor * turns)
+
+    return move
+
+
+def _curve(panel: Axes, times: np.ndarray, values: np.ndarray, words: str, si: str) -> Callable[[int], None]:
+    """Draw a curve over time; return the function that sets its cursor."""
+    time = style.Unit.of(times, "s")
+    times, values = time.factor * times, style.in_unit(panel.yaxis, words, values, si) * values
+    panel.plot(times, values, color=style.BOTH)
+    style.across(panel, times, time.label("time $t$"))
+    cursor, spot = panel.axvline(times[0], **style.GREY), panel.plot([], [], "o", color=style.FLUCTUATIONS, ms=4.0)[0]
+
+    def follow(k: int) -> None:
+        cursor.set_xdata([times[k]] * 2)
+        spot.set_data([times[k]], [values[k]])
+
+    return follow
