@@ -43,6 +43,9 @@ has four values:
 
 Radius, area, load and friction are averaged over the times at which the contact is closed.
 
+`speed` is the speed at the time of the record. In stick-slip it is mostly far below the speed of the stage, and rarely
+far above it. `sim.analysis.distribution(dataset, ["speed"])` has its mean over the second half of the run.
+
 A member has the same noise at all points of a sweep. The error of a difference between two points is therefore that of
 the members' differences. It is often much smaller than the two errors added in quadrature:
 

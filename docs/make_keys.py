@@ -21,7 +21,7 @@ contact.load = "4 mN"
 - **Models** of a table go from simple to full. If a table or its `model` is omitted, the first model is used. The last
   column names the models that have a key; it is empty if all have it.
 - **Sweeps**: `[sweep]` takes any of these keys with a list of values, or `{from, to, count, scale}`. Several keys form
-  the outer product. A list of tables is one axis.
+  the outer product. A list of tables is one axis. `--set 'sweep={}'` runs a scenario without its sweep.
 - **Editors** complete keys by the JSON schema that `sim new` writes beside the starter, as `sim.schema.json`. The
   first line of the starter, `#:schema ./sim.schema.json`, names it. `sim schema` prints the same schema.
 

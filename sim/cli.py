@@ -174,7 +174,8 @@ def run(
 
     plan = plans.Plan.of(scene)
     if not any(plan.share(*share)):
-        say(f"shard {shard} has nothing to compute: the run has too few members and sweep points for so many shards")
+        tasks = sum(1 for _ in plan.tasks())
+        say(f"shard {shard} has nothing to compute: the most shards of this run: {tasks}")
         return
     simulate.claim(target, force or resume, simulate.files_read(scene))
     from sim.ensemble.execute import orders
@@ -197,7 +198,11 @@ def run(
     if tabulated:
         _print_tables(*tables)
     if not quiet:
-        say(str(target) if target.exists() else f"shard {shard} is done; the last shard to finish writes {target}")
+        say(
+            str(target)
+            if target.exists()
+            else f"shard {shard} is done; the last shard writes {target} (after a failure: --resume)"
+        )
 
 
 def _tables(dataset: Any, most: int = _ROWS, lost: tuple[str, ...] = ()) -> tuple[list[Any], list[str]]:

@@ -16,7 +16,6 @@ from sim.ensemble.diagnosis import Worst, diagnosis, place as in_words, remarks,
 from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots, state_numbers, work
 from sim.ensemble.variables import SOURCES
 from sim.laws import jkr
-from sim.laws.schallamach import Body
 from sim.numerics import jit
 from sim.parts.bonds.models import Cohort, FirstMoment, Rate
 from sim.parts.drive import Spring
@@ -423,18 +422,14 @@ def _slider(points: Sequence[Scenario]) -> Rows:
         if drive.mass > 0.0:
             frequency = math.sqrt(drive.spring / drive.mass) / (2.0 * math.pi)
             rows.setdefault(("natural frequency", "Hz, of mass and spring"), []).append(frequency)
-        bonds, body = cast(Rate | Cohort | FirstMoment, point.population), slider_body(point, speeds)
-        delayed = bonds.onset(speeds, body)
-        alone = bonds.onset(speeds, Body(*body[:3])) if bonds.stretched else delayed
-        if np.isnan(alone.stiffness).all():
-            continue
-        worst = int(np.nanargmax(alone.stiffness))
-        at = f"at {speeds[worst]:.3g} m/s, with {alone.frequency[worst] / (2.0 * math.pi):.3g} Hz"
-        rows.setdefault(("oscillates below", f"N/m of the spring, {at}"), []).append(float(alone.stiffness[worst]))
-        if bonds.stretched:
-            text = "N/m of the spring; 0: never, inf: with any spring"
-            stiffness = float(np.nanmax([0.0, *delayed.stiffness]))
-            rows.setdefault(("with mass, damping, viscosity, k_t", text), []).append(stiffness)
+        onset = cast(Rate | Cohort | FirstMoment, point.population).onset(speeds, slider_body(point, speeds))
+        stiffness = np.where(np.isnan(onset.stiffness), 0.0, onset.stiffness)
+        worst = int(np.argmax(stiffness))
+        text = "N/m of the spring (0: never, inf: with any spring)"
+        rows.setdefault(("oscillates below", text), []).append(float(stiffness[worst]))
+        if stiffness[worst] > 0.0:
+            rows.setdefault(("sliding speed then", "m/s"), []).append(float(speeds[worst]))
+            rows.setdefault(("frequency then", "Hz"), []).append(float(onset.frequency[worst]) / (2.0 * math.pi))
     return [(name, f"{_span(values)} {text}") for (name, text), values in rows.items()]
 
 
