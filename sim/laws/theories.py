@@ -243,7 +243,7 @@ _STICK = 1.5  # of T^2 in the energy balance at a load: full stick,
 _UNIFORM = 16.0 / math.pi**2  # and uniform stress
 _AS_STICK = math.pi**2 / 32.0  # alpha at a constant stress that gives the same radii
 _AS_UNIFORM = 1.0 / 3.0
-_HALVINGS = 40  # at most, of a force, until it is that of a stress
+_STEPS, _ROUNDING = 100, 1e-14  # most steps to the force of a stress, every other a halving, and when it is known
 
 
 @device
@@ -470,7 +470,7 @@ def _at_indentation(indentation, work, sphere_radius, modulus):
     return adhesive, jkr.hertz_radius_at_indentation(indentation, sphere_radius), indentation, work
 
 
-def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, mixity=0.5):
+def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, mixity=0.5, only=()):
     """Return the contact radius at a load and a mean shear stress by every theory.
 
     Parameters
@@ -481,6 +481,8 @@ def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.
         alpha of ``"fraction"`` [1].
     mixity : float or array
         lambda [1] of the mixed-mode theories.
+    only : collection of str
+        Names of theories if some are enough; ``"jkr"`` and ``"hertz"`` are always computed.
 
     Returns
     -------
@@ -512,44 +514,55 @@ def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.
     """
     rest, stress = (sphere_radius, modulus, poisson_ratio), np.asarray(stress, dtype=float)
     jkr, hertz, *held = _at_load(load, work, sphere_radius, modulus)
-    radii = {"jkr": jkr, "hertz": hertz, "uncorrected": uncorrected_at_load(load, work, stress, *rest)}
-    _add_shares(radii, shrunk_at_load, (*held, stress), reversible, mixity, rest)
+    radii = {"jkr": jkr, "hertz": hertz}
+    if not only or "uncorrected" in only:
+        radii["uncorrected"] = uncorrected_at_load(load, work, stress, *rest)
+    _add_shares(radii, shrunk_at_load, (*held, stress), reversible, mixity, rest, only)
     laws = {"scaled_angle": scaled_angle_at_load, "scaled_tangent": scaled_tangent_at_load}
-    return _with_own_forces(radii, laws, held, stress, mixity, rest)
+    return _with_own_forces(radii, laws, held, stress, mixity, rest, only)
 
 
 def compare_at_indentation(
-    stress, indentation, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, mixity=0.5
+    stress, indentation, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, mixity=0.5, only=()
 ):
     """Return the contact radius at an indentation by theory [m], as ``compare_at_load``."""
     rest, stress = (sphere_radius, modulus, poisson_ratio), np.asarray(stress, dtype=float)
     jkr, hertz, *held = _at_indentation(indentation, work, sphere_radius, modulus)
-    radii = {"jkr": jkr, "hertz": hertz, "uncorrected": uncorrected_at_indentation(indentation, work, stress, *rest)}
-    _add_shares(radii, shrunk_at_displacement, (indentation, math.inf, work, stress), reversible, mixity, rest)
+    radii = {"jkr": jkr, "hertz": hertz}
+    if not only or "uncorrected" in only:
+        radii["uncorrected"] = uncorrected_at_indentation(indentation, work, stress, *rest)
+    _add_shares(radii, shrunk_at_displacement, (indentation, math.inf, work, stress), reversible, mixity, rest, only)
     laws = {"scaled_angle": scaled_angle_at_indentation, "scaled_tangent": scaled_tangent_at_indentation}
-    return _with_own_forces(radii, laws, held, stress, mixity, rest)
+    return _with_own_forces(radii, laws, held, stress, mixity, rest, only)
 
 
-def _add_shares(radii, shrunk, held, reversible, mixity, rest):
+def _add_shares(radii, shrunk, held, reversible, mixity, rest, only):
     """Radii by theory with those that differ in the reversible share and in what is held."""
     shares = {"savkoor_briggs": (_AS_STICK, 4.0), "reversible_force": (_AS_UNIFORM, 4.0)}
     shares |= {"reversible_stress": (1.0, 0.0), "fraction": (reversible, 0.0)}
     shares["shear_share"] = (_AS_STICK * np.asarray(mixity), 4.0)
     for name, share in shares.items():
-        radii[name] = shrunk(radii["jkr"], radii["hertz"], *held, *share, *rest)
+        if not only or name in only:
+            radii[name] = shrunk(radii["jkr"], radii["hertz"], *held, *share, *rest)
 
 
-def _with_own_forces(radii, laws, held, stress, mixity, rest):
+def _with_own_forces(radii, laws, held, stress, mixity, rest, only):
     """Radii by theory, all of one shape, with those by laws at a force, each with the force of its own radius."""
     stress = np.abs(stress)
     for name, radius_at in laws.items():
+        if only and name not in only:
+            continue
         with np.errstate(all="ignore"):
             high = np.pi * radii["jkr"] ** 2 * stress
             low = np.zeros_like(high)
-            for _ in range(_HALVINGS):
-                force = 0.5 * (low + high)
+            force = 0.5 * high
+            for step in range(_STEPS):
+                is_wide = high - low > _ROUNDING * high
+                if not is_wide.any():
+                    break
                 limit = np.pi * radius_at(*held, force, mixity, *rest) ** 2 * stress  # falls as the force grows
-                low = np.fmax(low, np.fmin(limit, force))
-                high = np.where(limit > force, np.fmin(high, limit), force)
+                ends = np.fmax(low, np.fmin(limit, force)), np.where(limit > force, np.fmin(high, limit), force)
+                low, high = (np.where(is_wide, *pair) for pair in zip(ends, (low, high), strict=True))
+                force = 0.5 * (low + high) if step % 2 else np.fmin(np.fmax(limit, low), high)
         radii[name] = radius_at(*held, high, mixity, *rest)
     return dict(zip(radii, (np.array(a) for a in np.broadcast_arrays(*radii.values())), strict=True))

@@ -201,7 +201,7 @@ def by_steady_sliding(group: Group, values: Values, names: list[str], theory: st
         compare: Callable[..., dict[str, Array]] = compare_at_load if at_load else compare_at_indentation
         numbers = {"reversible": values.get("alpha", 0.0), "mixity": values.get("lambda", 0.5)}
         rest = scenario.adhesion.work, *scenario.bodies
-        radii = compare(np.abs(course.stress), load if at_load else base, *rest, **numbers)
+        radii = compare(np.abs(course.stress), load if at_load else base, *rest, **numbers, only=(theory,))
         course = course._replace(radius=radii[theory])
     return {name: np.broadcast_to(READ[name](scenario, course), group.speed.shape)[:, 0] for name in names}
 

@@ -5,12 +5,14 @@ unchanged scenario. The keys of an omitted mechanism lie on their bounds or do n
 distribution. Its distribution is simulated: both models are fitted to curves of the poorer one.
 """
 
+import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import qmc
 
 from sim.parts.exchange import Array
 from sim.scenario.schema import quantities
@@ -20,8 +22,10 @@ from sim.units.quantity import Quantity
 #: Most draws of a likelihood ratio; ratios as large as the measured one that are enough (Besag & Clifford 1991);
 #: difference of AICc beyond which none is needed.
 DRAWS, _ENOUGH, _HOPELESS = 200, 20, 30.0
-#: Relative precision of a sum of squares of drawn curves, whose ratios are of order 1.
-_FINE = 1e-4
+#: Relative precision of a sum of squares of drawn curves, whose ratios are of order 1; residual of an open contact.
+_FINE, _FAR = 1e-3, 1e6
+#: Binary logarithm of the most places at which a search may start, and their range without bounds, in large changes.
+_SPREAD, _AROUND = 8, 3.0
 #: What rejects a mechanism: probability of a ratio at least as large, and difference of AICc.
 _RARE, _WORSE = 0.05, 4.0
 
@@ -72,6 +76,56 @@ class Verdict(NamedTuple):
     words: str
 
 
+class Search:
+    """Search for the least sums of squares of one mechanism, for many sets of values under the same conditions.
+
+    Each search starts at the known place whose curves are nearest to the values. Known are some starts, places spread
+    evenly between the bounds, and every minimum found so far. So a search is short, and a second minimum is not missed.
+
+    Parameters
+    ----------
+    problem : Problem
+        The mechanism with its conditions and errors; its values do not matter.
+    starts : sequence of array
+        Places that are known before.
+    """
+
+    def __init__(self, problem: Problem, starts: Sequence[Array]) -> None:
+        self.problem, self.places = problem, [*starts, *([] if problem.by_run else _spread(problem))]
+        self.curves = [problem.predicted(place) for place in self.places]
+
+    def least(self, values: Array, precision: float = _FINE) -> Minimum:
+        """Return the minimum of the sum of squares for some values, to a relative precision."""
+        off = (values - np.array(self.curves)) / np.hypot(self.problem.sigma, self.problem.noise)
+        nearest = int(np.argmin(np.sum(np.nan_to_num(off, nan=_FAR) ** 2, axis=1)))
+        result = minimum(replace(self.problem, values=values), self.places[nearest], precision=precision)
+        self.places.append(result.x)
+        self.curves.append(self.problem.predicted(result.x))
+        return result
+
+
+def _spread(problem: Problem) -> Array:
+    """Return places between the bounds of a problem, or as far from its start as a number may change much."""
+    count = len(problem.bounds)
+    if not count:
+        return np.empty((0, 0))
+    widths = [_AROUND * item.width for item in problem.free] + [_AROUND] * len(problem.common)
+    bounds = zip(problem.bounds, problem.start, widths, strict=True)
+    ends = [(max(low, x - width), min(high, x + width)) if math.isinf(high - low) else (low, high)
+            for (low, high), x, width in bounds]  # fmt: skip
+    shares = qmc.Sobol(count, rng=np.random.default_rng(0)).random_base2(min(2 + 2 * count, _SPREAD))
+    return qmc.scale(shares, *np.transpose(ends))
+
+
+def draws_of(problem: Problem, expected: Array, rng: np.random.Generator) -> Iterator[Array]:
+    """Yield curves with random errors, those that all points of a variable share included."""
+    while True:
+        values = expected + np.hypot(problem.sigma, problem.noise) * rng.standard_normal(len(expected))
+        for name, size in problem.common.items():
+            values = np.where(problem.of(name), values * (1.0 + size * rng.standard_normal()), values)
+        yield values
+
+
 def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> Verdict:
     """Judge mechanisms by the curves of a fit.
 
@@ -84,18 +138,21 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
     draws : int
         Curves drawn for each mechanism.
     """
-    fits = [(WHOLE, problem, best)]
-    fits += [(name, other, _least(other, _starts(other))) for name, other in _others(problem)]
-    criteria = [item.criterion(least.chi_square) for _, item, least in fits]
+    whole = Search(problem, [best.x])
+    fits = [(WHOLE, whole, min(best, whole.least(problem.values, 1e-8), key=lambda item: item.chi_square))]
+    for name, other in _others(problem):
+        search = Search(other, _starts(other))
+        fits.append((name, search, search.least(problem.values, 1e-8)))
+    best, criteria = fits[0][2], [item.problem.criterion(least.chi_square) for _, item, least in fits]
     worst = min(criteria) + _HOPELESS
     judged = []
     for place, ((name, item, least), aicc) in enumerate(zip(fits, criteria, strict=True)):
         p_value, rejected = math.nan, place > 0
         if place and aicc < worst:
             rng = np.random.default_rng([seed, place])
-            p_value = _p_value(item, least, problem, best, rng, draws)
+            p_value = _p_value(item, least, whole, best, rng, draws)
             rejected = p_value <= _RARE and aicc - (criteria[0] if name in _PARTS else min(criteria)) >= _WORSE
-        judged.append(Judged(name, item.numbers(least.x), least.chi_square, aicc, p_value, rejected))
+        judged.append(Judged(name, item.problem.numbers(least.x), least.chi_square, aicc, p_value, rejected))
     sufficient, words = _verdict(judged)
     return Verdict(tuple(sorted(judged, key=lambda item: item.aicc)), sufficient, words)
 
@@ -158,32 +215,20 @@ def _starts(problem: Problem) -> list[Array]:
     return [np.where(last, size, problem.start) for size in (0.01, 0.1, 0.5)]
 
 
-def _least(problem: Problem, starts: list[Array], precision: float = 1e-8) -> Minimum:
-    """Return the least of the minima from several starts."""
-    minima = (minimum(problem, start, precision=precision) for start in starts)
-    return min(minima, key=lambda item: item.chi_square)
-
-
 def _p_value(
-    poorer: Problem, least: Minimum, whole: Problem, best: Minimum, rng: np.random.Generator, draws: int
+    poorer: Search, least: Minimum, whole: Search, best: Minimum, rng: np.random.Generator, draws: int
 ) -> float:
-    """Share of curves made by the poorer mechanism whose likelihood ratio is at least the measured one.
+    """Return the share of curves made by the poorer mechanism whose likelihood ratio is at least the measured one.
 
-    Where the measured one is soon seen to be nothing rare, no more are drawn.
+    If the measured ratio is soon seen to be frequent, no more curves are drawn.
     """
-    measured, expected, larger = least.chi_square - best.chi_square, poorer.predicted(least.x), 0
+    measured, larger = least.chi_square - best.chi_square, 0
     if measured <= _FINE * least.chi_square:  # what more acts explains nothing, as precisely as draws are fitted
         return 1.0
-    shared = {item.key: x for item, x in zip(poorer.free, least.x, strict=False)}
-    alike = np.array([shared.get(item.key, x) for item, x in zip(whole.free, best.x, strict=False)])
-    alike = np.append(alike, best.x[len(whole.free) :])
-    for drawn_so_far in range(1, draws + 1):
-        values = expected + np.hypot(whole.sigma, whole.noise) * rng.standard_normal(len(expected))
-        for name, size in whole.common.items():
-            values = np.where(whole.of(name), values * (1.0 + size * rng.standard_normal()), values)
-        drawn, full = (replace(item, values=values) for item in (poorer, whole))
-        ratio = _least(drawn, [least.x], _FINE).chi_square - _least(full, [best.x, alike], _FINE).chi_square
-        larger += ratio >= measured
+    drawn = itertools.islice(draws_of(whole.problem, poorer.problem.predicted(least.x), rng), draws)
+    for drawn_so_far, values in enumerate(drawn, 1):
+        allowed = poorer.least(values).chi_square - measured
+        larger += allowed >= 0.0 and whole.least(values).chi_square <= allowed  # no sum of squares is below zero
         if larger == _ENOUGH:
             return larger / drawn_so_far
     return (1 + larger) / (1 + draws)

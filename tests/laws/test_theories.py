@@ -166,6 +166,10 @@ def test_compare_broadcasts_to_one_shape_and_holds_every_theory():
     lifted = theories.compare_at_indentation(STRESSES, 0.2 * load, **UNIT)
     assert {a.shape for a in [*radii.values(), *lifted.values()]} == {(3, 5)}
     assert set(radii) == set(lifted)
+    for name in radii:
+        alone = theories.compare_at_load(STRESSES, load, **UNIT, only=(name,))
+        assert alone.keys() <= {name, "jkr", "hertz"}
+        np.testing.assert_array_equal(alone[name], radii[name])
     names = ["jkr", "uncorrected", "savkoor_briggs", "reversible_force", "reversible_stress", "fraction"]
     for name in names:  # without shear all are one
         assert_allclose(radii[name][:, 0], radii["jkr"][:, 0], rtol=8 * U, atol=0)

@@ -1,8 +1,10 @@
 """Fits to made-up curves of a known truth, with intervals that hold it; every line of ``sim paper`` holds."""
 
+import itertools
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -458,6 +460,30 @@ def test_curves_are_doubted_beyond_errors_and_the_mechanism_that_made_them_exclu
     for aicc, sufficient in ((4.0, "JKR, independent of shear"), (8.0, "")):
         theory = ("JKR, independent of shear", aicc, 0.7, False)
         assert weighed(("bonds only", 40.0, 0.01, True), theory)[0] == sufficient
+
+
+def test_searches_for_drawn_curves_find_the_minima_of_many_full_refits_and_so_the_same_p_values():
+    slow, keys = np.geomspace(1e-5, 9e-4, 8), [key for key in MECHANISM_KEYS if key != "bonds.stress"]
+    made = drawn_of(load(LENS), 0.03, 1000, slow, ["contact_area"])
+    whole = problem_of(load(LENS), [made], [calibration._free(load(LENS), key) for key in keys], {})
+    search, steps = mechanisms.Search(whole, [whole.start]), 2.0 * np.eye(len(keys))
+    starts, rng, draws = [whole.start, *(whole.start + steps), *(whole.start - steps)], np.random.default_rng(3), 20
+    others = dict(mechanisms._others(whole))
+    for name in ("fluctuations only", "JKR, independent of shear"):
+        null = mechanisms.Search(others[name], [others[name].start])
+        expected, ratios, refitted = others[name].predicted(null.least(whole.values).x), [], []
+        for values in itertools.islice(mechanisms.draws_of(whole, expected, rng), draws):
+            drawn = replace(whole, values=values)
+            least = min(minimum(drawn, start, precision=1e-4).chi_square for start in starts)
+            poorer = minimum(replace(others[name], values=values), others[name].start).chi_square
+            ratios.append(null.least(values).chi_square - search.least(values).chi_square)
+            refitted.append(poorer - least)
+        for share in (0.5, 0.8):
+            measured = np.quantile(refitted, share)
+            # the draws are the same, so the difference is far below that of two sets of draws
+            assert abs(np.mean(np.array(ratios) >= measured) - (1.0 - share)) <= math.sqrt(
+                share * (1.0 - share) / draws
+            )
 
 
 @pytest.mark.verify
