@@ -166,7 +166,7 @@ KINDS: dict[str, Kind] = {
     "time": Kind(curves.time_figure),
     "incipient": Kind(slider.incipient_figure, slider.needs_pull, reads=("spring_force", "contact_area")),
     "map": Kind(field.map_figure, field.needs_maps),
-    "movie": Kind(movie.movie_figure, movie.needs_one_contact, reads=movie.READS),
+    "movie": Kind(movie.movie_figure, movie.needs_one_contact, lambda dataset: False, movie.READS),
 }
 
 
