@@ -565,4 +565,4 @@ def _with_own_forces(radii, laws, held, stress, mixity, rest, only):
                 low, high = (np.where(is_wide, *pair) for pair in zip(ends, (low, high), strict=True))
                 force = 0.5 * (low + high) if step % 2 else np.fmin(np.fmax(limit, low), high)
         radii[name] = radius_at(*held, high, mixity, *rest)
-    return dict(zip(radii, (np.array(a) for a in np.broadcast_arrays(*radii.values())), strict=True))
+    return dict(zip(radii, map(np.array, np.broadcast_arrays(*radii.values(), stress)), strict=False))
