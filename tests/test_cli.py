@@ -384,8 +384,8 @@ site_density = "1e16 1/m^2"
 
 
 @pytest.mark.parametrize("scene", [
-    PULLED, random_scene(9),  # backward creep in seed 1, waves of one size at an edge that lags in 9, tension in 21
-    *(pytest.param(random_scene(k), marks=pytest.mark.verify) for k in (0, 1, 2, 4, 7, 8, 10, 17, 18, 21, 22, 23)),
+    PULLED,  # backward creep in seed 1, waves of one size at an edge that lags in 9, tension in 21
+    *(pytest.param(random_scene(k), marks=pytest.mark.verify) for k in (0, 1, 2, 4, 7, 8, 9, 10, 17, 18, 21, 22, 23)),
 ])  # fmt: skip
 def test_no_warning_of_a_library_reaches_the_terminal_in_any_command(scene, here, request):
     Path("scene.toml").write_text(scene if isinstance(scene, str) else written(scene), encoding="utf-8")

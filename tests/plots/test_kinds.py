@@ -188,7 +188,8 @@ def test_branches_of_a_course_are_apart_and_shuffled_speeds_make_the_same_curves
             assert_array_equal(one, other)
 
 
-def test_every_shape_of_dataset_is_drawn_as_what_fits_it_and_a_quantity_not_recorded_is_named():
+@pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.verify)])
+def test_every_shape_of_dataset_is_drawn_as_what_fits_it_and_a_quantity_not_recorded_is_named(every):
     waves = {"model": "band", "rms": "10 kPa", "longest": "60 um", "shortest": "16 um"}
     shears = [{"model": "uniform"}, {"model": "mean", "spectrum": waves}]
     counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=5e2, sites=9)
@@ -197,7 +198,7 @@ def test_every_shape_of_dataset_is_drawn_as_what_fits_it_and_a_quantity_not_reco
     tracked = bonds.Tracked(rupture=Bell(zero_force_rate=1e4, bell_force=4e-12), bond_stiffness=4e-4,
                             rebinding_rate=1e5, site_density=9e16, sites=50)  # fmt: skip
     known = set()
-    for changes in [
+    shapes = [
         {"record": Record(per_member=False)}, {"ensemble": Ensemble(members=1)},
         {"record": Record(precision="float32")}, {"drive": drive.Ramp(start=-2e-3, stop=8e-3)},
         {"drive": drive.Table(time=(0.0, 0.2, 0.4), speed=(0.0, 0.02, 0.0))}, {"contact": Equilibrium(load=-3e-4)},
@@ -208,7 +209,8 @@ def test_every_shape_of_dataset_is_drawn_as_what_fits_it_and_a_quantity_not_reco
         {"shear": shear.Uniform(), "bonds": bonds.Unbroken()}, {"bonds": tracked, "record": Record(per_member=False)},
         {"contact": Equilibrium(indentation={"from": -4e-6, "to": -2e-6})}, {"sweep": {"contact": [moving, *contacts]}},
         {"drive": STEADY, "clock": Clock(duration=0.02, step=0.02)},
-    ]:  # fmt: skip
+    ]  # fmt: skip
+    for changes in shapes[::every]:
         dataset, scenes = simulated(**changes), repr([changes.get(key) for key in ("contact", "sweep", "shear")])
         for kind in plots.drawable(dataset):
             if kind == "theories" and (kind, scenes) in known:
