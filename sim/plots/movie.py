@@ -16,8 +16,8 @@ from sim.analysis import sweep_dims
 from sim.analysis.dataset import MEMBERS, word
 from sim.plots import field, style
 
-#: Most frames of a movie, frames a second, and dots an inch, by format.
-_FRAMES, _RATE, _FINENESS = {"gif": 60, "mp4": 120}, 20, {"gif": 100, "mp4": 150}
+#: Most frames of a movie by format, and least; frames a second; dots an inch by format.
+_FRAMES, _LEAST, _RATE, _FINENESS = {"gif": 60, "mp4": 120}, 5, 20, {"gif": 100, "mp4": 150}
 #: Colours of a GIF, and least frames that a slip event needs.
 _COLOURS, _OF_SLIP = 128, 8
 #: Forces over time, the first that is recorded and changes.
@@ -102,6 +102,7 @@ def movie_figure(dataset: xr.Dataset, absolute: bool = False) -> Movie:
     With maps, each frame is a map.
     """
     point = dataset.isel(dict.fromkeys([*sweep_dims(dataset), MEMBERS, "map_member"], 0), missing_dims="ignore")
+    point = point.isel(t=np.isfinite(point["slider_position"].to_numpy()))  # until the slider runs away
     times, movie = point["t"].to_numpy(), Movie(figsize=(style.WIDE, 2.9), dpi=200, layout="constrained")
     FigureCanvasAgg(movie)
     grid = movie.add_gridspec(2, 2, width_ratios=[1.25, 1.0])
@@ -113,13 +114,18 @@ def movie_figure(dataset: xr.Dataset, absolute: bool = False) -> Movie:
         is_mapped = point.sizes["map_time"] > 1
     if is_mapped:
         movie.places = np.abs(times[:, np.newaxis] - point["map_time"].to_numpy()).argmin(axis=0)
+    if len(movie.places) < _LEAST:
+        cure = 'record.maps = { from = "0 s", to = "1 s", count = 60 }' if is_mapped else "a smaller clock.record"
+        raise ValueError(f"there are {len(movie.places)} frames, too few for a movie; run again with {cure}")
     move = (_over_stress if is_mapped else _sliding)(plan, point)
     area, full = (np.pi * point[name].to_numpy() ** 2 for name in ("contact_radius", "jkr_radius"))
     shown = (area, "contact area $A$", "m^2")
     if not absolute and np.all(full > 0.0):
         shown = (area / full, r"contact area $A/A_\mathrm{JKR}$", "1")
-    force = next((name for name in _FORCES if name in point and np.ptp(point[name].to_numpy()) > 0.0), "normal_load")
-    follow = [_curve(curves[0], times, *shown), _curve(curves[1], times, point[force].to_numpy(), _FORCES[force], "N")]
+    forces = {name: point[name].to_numpy() for name in _FORCES if name in point}
+    changing = (name for name, values in forces.items() if np.ptp(values) > 1e-9 * np.max(np.abs(values)))
+    force = next(changing, "normal_load")
+    follow = [_curve(curves[0], times, *shown), _curve(curves[1], times, forces[force], _FORCES[force], "N")]
     curves[0].tick_params(labelbottom=False)
     curves[0].set_xlabel("")
 

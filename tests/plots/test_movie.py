@@ -99,6 +99,13 @@ def test_a_gif_has_a_frame_for_each_map_and_one_palette_and_other_formats_show_t
     assert not getattr(Image.open(still), "is_animated", False)
 
 
+def test_a_movie_ends_where_the_slider_runs_away(pulled):
+    runaway = pulled.isel(member=[0]).copy(deep=True)
+    runaway["slider_position"][:, 60:] = np.nan
+    movie = draw(runaway, "movie")
+    assert len(movie.places) == 60 and movie.times[-1] == runaway["t"][59]
+
+
 @pytest.mark.verify
 @pytest.mark.skipif(not shutil.which("ffprobe"), reason="ffmpeg is not installed")
 def test_an_mp4_has_a_frame_for_each_map(maps, tmp_path):
@@ -115,6 +122,13 @@ def test_what_a_movie_cannot_show_is_refused_in_one_line(maps, pulled, tmp_path,
         with pytest.raises(ValueError, match=words) as fault:
             draw(dataset, "movie")
         assert "\n" not in str(fault.value)
+    few = maps.isel(map_time=[0, 5])
+    for dataset, choices, cure in (
+        (few, Choices(), r"record\.maps = \{ from"),
+        (pulled, Choices(member=0, start="10 ms", stop="13 ms"), "clock.record"),
+    ):
+        with pytest.raises(ValueError, match=f"too few for a movie.*{cure}"):
+            draw(dataset, "movie", choices)
     monkeypatch.setenv("PATH", "")
     with pytest.raises(BadInput, match=r"needs the program ffmpeg, .* name a \.gif file"):
         drawn(maps, "movie", tmp_path / "x.nc", tmp_path / "x.mp4", False, Choices())
