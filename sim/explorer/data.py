@@ -1,55 +1,41 @@
-"""Measured curves on the page: points beside the curves, chi^2, and the table that is kept while the page is open."""
+"""Measured curves on the page: their table, points beside the curves, and chi^2."""
 
-import hashlib
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sim.explorer.job import listed
+from sim.explorer.drawing import listed
 from sim.scenario.scenario import Scenario
 from sim.study.likelihood import Measured, by_steady_sliding, problem_of, read
 from sim.units.errors import BadInput
 
-#: Bytes and rows that a table may have; tables that are kept.
-_MOST_BYTES, _MOST_ROWS, _KEPT = 2_000_000, 5_000, 8
+#: Bytes and rows that a table may have.
+_MOST_BYTES, _MOST_ROWS = 2_000_000, 5_000
 
 
-class Tables:
-    """Tables that were dropped on a page, by the digest of their text."""
+def table_of(source: str | Path, name: str, scenario: Scenario) -> Measured:
+    """Read a table of measured curves, its text or a file, as ``sim fit`` does.
 
-    def __init__(self) -> None:
-        self._tables: dict[str, Measured] = {}
-
-    def add(self, text: str, name: str, scenario: Scenario) -> str:
-        """Read a table of measured curves as ``sim fit`` does, and return the digest by which it is known.
-
-        Raises
-        ------
-        BadInput
-            If it is too large, or cannot be read.
-        """
-        if len(text.encode()) > _MOST_BYTES:
+    Raises
+    ------
+    BadInput
+        If it is too large, or cannot be read.
+    """
+    with tempfile.TemporaryDirectory(prefix="sim-explore-") as folder:
+        path = source if isinstance(source, Path) else Path(folder) / "table.csv"
+        if isinstance(source, str):
+            path.write_text(source, encoding="utf-8")
+        if path.is_file() and path.stat().st_size > _MOST_BYTES:
             raise BadInput([f"{name}: has more than 2 MB; leave out rows, or use sim fit"])
-        digest = hashlib.sha256(text.encode()).hexdigest()
-        with tempfile.TemporaryDirectory(prefix="sim-explore-") as folder:
-            path = Path(folder) / "table.csv"
-            path.write_text(text, encoding="utf-8")
-            try:
-                table = read(path, scenario)
-            except BadInput as fault:
-                raise BadInput([problem.replace(str(path), name) for problem in fault.problems]) from None
-        if table.rows > _MOST_ROWS:
-            raise BadInput([f"{name}: has more than {_MOST_ROWS} rows; leave out some, or use sim fit"])
-        self._tables[digest] = table._replace(path=Path(name))
-        while len(self._tables) > _KEPT:
-            del self._tables[next(iter(self._tables))]
-        return digest
-
-    def get(self, digest: Any) -> Measured | None:
-        """Return a table by its digest; None if there is none."""
-        return self._tables.get(digest) if isinstance(digest, str) else None
+        try:
+            table = read(path, scenario)
+        except BadInput as fault:
+            raise BadInput([problem.replace(str(path), name) for problem in fault.problems]) from None
+    if table.rows > _MOST_ROWS:
+        raise BadInput([f"{name}: has more than {_MOST_ROWS} rows; leave out some, or use sim fit"])
+    return table._replace(path=Path(name))
 
 
 def compared(scenario: Scenario, table: Measured) -> dict[str, Any]:

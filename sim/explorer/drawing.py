@@ -6,7 +6,6 @@ from typing import Any, cast
 import numpy as np
 
 from sim.ensemble.steady import plane_energy
-from sim.explorer.job import listed
 from sim.laws.halfspace import gap, normal_displacement
 from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
@@ -40,6 +39,11 @@ def contact(scenario: Scenario, speed: float) -> dict[str, Any]:
     stress = _stress(scenario, found, 2.0 * wide)
     rows = None if stress is None else [listed(row) for row in np.round(stress, -1)]
     return result | profiles | {"side": 2.0 * wide, "stress": rows}
+
+
+def listed(values: Any) -> list[float | None]:
+    """Return numbers as JSON has them, None for one that is not finite."""
+    return [float(x) if math.isfinite(x) else None for x in np.asarray(values, float)]
 
 
 def _stress(scenario: Scenario, found: dict[str, float], side: float) -> Array | None:

@@ -15,6 +15,7 @@ import xarray as xr
 
 from sim.ensemble.plan import Plan, work
 from sim.ensemble.simulate import run
+from sim.explorer.drawing import listed
 from sim.scenario.scenario import Scenario
 from sim.units.errors import BadInput
 
@@ -35,15 +36,13 @@ def ensemble(scenes: list[Scenario], say: Say) -> dict[str, Any]:
         done += steps
         say({"done": done / whole})
 
-    parts = [summary(scene, run(scene, progress=progress)) for scene in scenes]
-    if parts[0]["along"] != "speed" or len(parts) == 1:
-        return parts[0]
-    joined = {key: [x for part in parts for x in part[key]] for key in ("speed",)}
-    curves = {
-        name: {kind: [x for part in parts for x in part["curves"][name][kind]] for kind in parts[0]["curves"][name]}
-        for name in parts[0]["curves"]
-    }
-    return {"along": "speed", **joined, "curves": curves, "members": parts[0]["members"]}
+    first, *others = [summary(scene, run(scene, progress=progress)) for scene in scenes]
+    for other in others if first["along"] == "speed" else []:
+        first["speed"] += other["speed"]
+        for name, kinds in first["curves"].items():
+            for kind in kinds:
+                kinds[kind] += other["curves"][name][kind]
+    return first
 
 
 def fitted(scenario: Scenario, table: Any, free: list[str], say: Say) -> dict[str, Any]:
@@ -67,36 +66,25 @@ def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
     """
     from scipy.stats import t as student
 
-    speed, members = dataset["speed"], dataset.sizes.get("member", 1)
-    columns = {name: dataset[name] for name in _NAMES} | {
-        "area_ratio": dataset["contact_area"] / (np.pi * dataset["jkr_radius"].where(dataset["jkr_radius"] > 0.0) ** 2)
-    }
+    names = [*_NAMES, "jkr_radius", "speed"]
+    data = dataset[names] if "member" in dataset.dims else dataset[names].expand_dims("member")
+    data["area_ratio"] = data["contact_area"] / (np.pi * data["jkr_radius"].where(data["jkr_radius"] > 0.0) ** 2)
+    data, speed, members = data.drop_vars(["jkr_radius", "speed"]), dataset["speed"], data.sizes["member"]
+    every = slice(None, None, -(-data.sizes["t"] // _DRAWN))
     if scene.drive.solves_motion or scene.contact.changes:
-        first = {name: values.isel(member=0) if "member" in values.dims else values for name, values in columns.items()}
-        every = slice(None, None, -(-dataset.sizes["t"] // _DRAWN))
-        curves = {name: {"mean": listed(values.isel(t=every))} for name, values in first.items()}
-        return {"along": "t", "t": listed(dataset["t"].isel(t=every)), "curves": curves, "members": 1}
-    half = dataset.sizes["t"] // 2
-    still = float(np.ptp(speed.to_numpy())) == 0.0
-    if still:
-        columns = {
-            name: values.isel(t=slice(half, None)).mean("t").expand_dims("t") for name, values in columns.items()
-        }
-    along = speed.isel(t=slice(-1, None)) if still else speed
-    curves = {}
-    for name, values in columns.items():
-        mean = values.mean("member") if "member" in values.dims else values
-        spread = xr.zeros_like(mean)
-        if members > 1 and "member" in values.dims:
-            spread = values.std("member", ddof=1) * float(student.ppf(0.975, members - 1)) / members**0.5
-        curves[name] = {"mean": listed(mean), "low": listed(mean - spread), "high": listed(mean + spread)}
-    return {"along": "speed", "speed": listed(np.abs(along)), "curves": curves, "members": members}
-
-
-def listed(values: Any) -> list[float | None]:
-    """Return numbers as JSON has them, None for one that is not finite."""
-    numbers = np.asarray(values, float)
-    return [float(x) if np.isfinite(x) else None for x in numbers]
+        first = data.isel(member=0, t=every)
+        curves = {str(name): {"mean": listed(values)} for name, values in first.items()}
+        return {"along": "t", "t": listed(first["t"]), "curves": curves, "members": 1}
+    if float(np.ptp(speed.to_numpy())) == 0.0:
+        data = data.isel(t=slice(data.sizes["t"] // 2, None)).mean("t").expand_dims("t")
+        speed = speed.isel(t=slice(-1, None))
+    data, speed = data.isel(t=every), speed.isel(t=every)
+    mean, spread = data.mean("member"), xr.zeros_like(data.mean("member"))
+    if members > 1:
+        spread = data.std("member", ddof=1) * float(student.ppf(0.975, members - 1)) / members**0.5
+    sides = {"mean": mean, "low": mean - spread, "high": mean + spread}
+    curves = {str(name): {kind: listed(values[name]) for kind, values in sides.items()} for name in mean}
+    return {"along": "speed", "speed": listed(np.abs(speed)), "curves": curves, "members": members}
 
 
 def command(task: Callable[[Say], dict[str, Any]]) -> tuple[list[str], bytes]:

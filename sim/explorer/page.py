@@ -2,19 +2,18 @@
 
 import contextlib
 import math
+import secrets
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from sim.ensemble.diagnosis import diagnosis, over_band, remarks
 from sim.ensemble.plan import Plan
 from sim.ensemble.steady import sensitivities
-from sim.explorer import take
-from sim.explorer.data import Tables, compared
-from sim.explorer.job import ensemble, listed
+from sim.explorer.drawing import listed
 from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import entries, quantities
@@ -23,7 +22,9 @@ from sim.study.curves import curves, speeds_of_loss
 from sim.units.errors import BadInput
 from sim.units.notation import engineering, scaled
 from sim.units.quantity import Quantity
-from sim.units.tables import plain_text
+
+if TYPE_CHECKING:
+    from sim.study.likelihood import Measured
 
 #: Points of a curve, and speeds at which a key is tried; change of a curve that counts.
 _POINTS, _TRIED, _CHANGE = 121, 9, 1e-9
@@ -33,8 +34,8 @@ _NO_SLIDERS = ("clock", "drive", "ensemble", "record", "seed")
 _FACTOR, _TIMES = 30.0, 4.0
 #: Loads of further curves over the scenario's; members of the band, and time that it may take [s].
 _LOADS, _FEW, _QUICK = (0.25, 4.0), 8, 0.05
-#: Keys that matter most for the area and are marked.
-_MARKED = 3
+#: Keys that matter most for the area and are marked; tables that are kept.
+_MARKED, _KEPT = 3, 8
 #: Curves of the page that are not shares of an area, with their SI unit.
 _UNITS = {"work_of_adhesion": "J/m^2", "fluctuation_energy": "J/m^2", "friction_force": "N", "contact_area": "m^2"}
 
@@ -84,12 +85,12 @@ class Page:
     """
 
     def __init__(self, scenario: Scenario, data: Path | None = None) -> None:
-        self._asked, self.tables = scenario, Tables()
+        self._asked, self.tables = scenario, dict[str | None, "Measured"]()
         self.scenario = scenario.points()[0].with_values({})
         self.speeds = _speeds(self.scenario)
         self.sliders = list(self._sliders())
         self._times: list[float] = []
-        self._first = None if data is None else self.add(_text(data), data.name)
+        self._first = None if data is None else self.add(data, str(data))
 
     def start(self) -> dict[str, Any]:
         """Return what the page needs once: title, sliders, and why its curves are a preview alone."""
@@ -127,11 +128,11 @@ class Page:
             raise Refused({"": "; ".join(fault.problems)}) from None
 
     def answer(
-        self, values: Mapping[str, Any], share: float, loads: bool = False, digest: Any = None
+        self, values: Mapping[str, Any], share: float, loads: bool = False, table: str | None = None
     ) -> dict[str, Any]:
         """Return curves [SI] for values of the sliders, and the speeds at which a share of the area is lost in words.
 
-        ``loads`` adds curves at other loads, ``digest`` the points of a table.
+        ``loads`` adds curves at other loads, ``table`` the points of a table by its name.
         """
         scene = self.read(values)
         now, found = quantities(scene), curves(scene, self.speeds)
@@ -149,19 +150,24 @@ class Page:
         result["units"]["speed"] = scaled(float(np.sqrt(self.speeds[0] * self.speeds[-1])), "m/s")
         if loads and scene.contact.load is not None and not scene.contact.changes:
             result["loads"] = list(self._other_loads(scene))
-        if table := self.tables.get(digest):
-            result["data"] = compared(scene, table)
+        if measured := self.tables.get(table):
+            from sim.explorer.data import compared
+
+            result["data"] = compared(scene, measured)
         return result
 
     def _other_loads(self, scene: Scenario) -> Iterator[dict[str, Any]]:
         """Yield other loads, with their curves, at which the scenario can be run."""
         for load in (factor * float(scene.contact.load or 0.0) for factor in _LOADS):
             with contextlib.suppress(BadInput):
-                other = scene.with_values({"contact.load": load})
-                yield {"load": engineering(load, "N"), "curves": _drawn(curves(other, self.speeds))}
+                other = curves(scene.with_values({"contact.load": load}), self.speeds)
+                drawn = {name: listed(other[name]) for name in ("contact_area", "area_ratio", "friction_force")}
+                yield {"load": engineering(load, "N"), "curves": drawn}
 
     def band(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return the band of a few members of the scenario's own models; empty if that takes too long to follow."""
+        from sim.explorer.job import ensemble
+
         if len(self._times) > 1 and min(self._times) > _QUICK:  # the first run also loads and compiles
             return {}
         scenes = self.scenes(values, min(_FEW, self.scenario.ensemble.members))
@@ -178,16 +184,29 @@ class Page:
             return [scene.with_values({"drive.speed": speed}) for (speed,) in axes[0].values]
         return [scene]
 
-    def add(self, text: str, name: str) -> str:
-        """Read a table of measured curves, and return the digest by which an ``answer`` shows it."""
-        return self.tables.add(text, name, self.scenario)
+    def add(self, source: str | Path, name: str) -> str:
+        """Read a table of measured curves, its text or a file, and return the name by which an ``answer`` shows it."""
+        from sim.explorer.data import table_of
+
+        key, table = secrets.token_hex(8), table_of(source, name, self.scenario)
+        self.tables = dict([*self.tables.items()][1 - _KEPT :]) | {key: table}
+        return key
 
     def toml(self, values: Mapping[str, Any]) -> str:
         """Return the scenario as TOML with values of the sliders."""
+        from sim.explorer import take
+
         scene, known = self.read(values), quantities(self.scenario)
         changed = {key: value for key, (_, value) in quantities(scene).items() if value != known[key][1]}
         first = rows(self._asked.sweep)[0] if self._asked.sweep else {}
         return take.toml(self._asked, changed, self._asked.source.overrides | first)
+
+    def take(self, values: Mapping[str, Any], kind: str) -> Any:
+        """Return the curves for values of the sliders as a table for the kind "csv", else as a picture."""
+        from sim.explorer import take
+
+        scene = self.read(values)
+        return take.table(scene, self.speeds) if kind == "csv" else take.picture(scene, self.speeds, kind)
 
     def words(self, values: Mapping[str, Any]) -> dict[str, list[str]]:
         """Return the diagnosis and the remarks of ``sim check`` for values of the sliders."""
@@ -203,24 +222,13 @@ class Page:
         order = sorted(sensitivities(self.scenario, 0.0, middle).items(), key=lambda item: -abs(item[1][0]))
         marked = [key for key, (area, _) in order if key != "speed" and area][:_MARKED]
         for key, (quantity, value) in known.items():
-            if (
-                quantity.whole
-                or key.partition(".")[0] in _NO_SLIDERS
-                or not _changes(self.scenario, key, tried, before)
-            ):
+            known_to_stay = quantity.whole or key.partition(".")[0] in _NO_SLIDERS
+            if known_to_stay or not _changes(self.scenario, key, tried, before):
                 continue
             low, high, logarithmic = _ends(self.scenario, key, quantity, value)
             shown = quantity.meaning, quantity.symbol, quantity.unit, value, engineering(value, quantity.unit)
             more = over_band(self.scenario.fluctuations.spectrum) if key == "shear.spectrum.length" else None
             yield Slider(key, *shown, low, high, logarithmic, key in marked, None if more is None else 1.0 / more)
-
-
-def _text(path: Path) -> str:
-    """Return the text of a table."""
-    try:
-        return plain_text(path)
-    except (OSError, ValueError) as fault:
-        raise BadInput([f"{path}: {getattr(fault, 'strerror', None) or fault}; name a CSV table"]) from None
 
 
 def previews(scenario: Scenario) -> Iterator[str]:
@@ -255,10 +263,9 @@ def _changes(scenario: Scenario, key: str, speeds: Array, before: dict[str, Arra
             after = curves(scenario.with_values({key: other}), speeds)
         except BadInput:
             continue
-        same = after.keys() == before.keys() and all(
+        return after.keys() != before.keys() or not all(
             np.allclose(after[name], before[name], rtol=_CHANGE, atol=0.0, equal_nan=True) for name in before
         )
-        return not same
     return False
 
 
@@ -276,11 +283,6 @@ def _ends(scenario: Scenario, key: str, quantity: Quantity, value: float) -> tup
         pull_off = 1.5 * math.pi * scenario.adhesion.work * scenario.sphere.radius
         return -1.1 * pull_off, _TIMES * max(size, pull_off), False
     return -_TIMES * size, _TIMES * size, False
-
-
-def _drawn(found: dict[str, Array]) -> dict[str, list[float | None]]:
-    """Return the curves that are drawn of another load."""
-    return {name: listed(found[name]) for name in ("contact_area", "area_ratio", "friction_force")}
 
 
 def _loss(scenario: Scenario, share: float, speeds: list[float]) -> str:

@@ -5,7 +5,7 @@ import contextlib
 import functools
 import hmac
 import html
-import json
+import importlib
 import secrets
 import socket
 import tempfile
@@ -13,7 +13,6 @@ import threading
 import webbrowser
 from asyncio.subprocess import PIPE, Process
 from collections.abc import Callable, Iterator
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 from urllib.parse import parse_qsl, urlencode
@@ -22,11 +21,11 @@ import plotly
 import uvicorn
 from pydantic import BaseModel, Field, ValidationError
 from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException as Refused
+from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.types import Receive, Scope, Send
 
-from sim.explorer import take
 from sim.explorer.drawing import contact
-from sim.explorer.job import Say, command, ensemble, fitted
 from sim.explorer.page import Page, Refused as BadValues
 from sim.scenario.scenario import Scenario
 from sim.units.errors import BadInput
@@ -36,28 +35,15 @@ _MOST_BYTES, _MOST_JOBS = 4_200_000, 2
 _RUN = "/run"
 #: Words of an address that are none of a slider, and most words of an address.
 _VIEW, _MOST_FIELDS = ("share", "absolute", "first", "loads"), 200
-#: Type of each file of the page, by its address.
-_FILES = {
-    "/": ("page.html", "text/html; charset=utf-8"),
-    "/explore.js": ("explore.js", "text/javascript; charset=utf-8"),
-    "/explore.css": ("explore.css", "text/css; charset=utf-8"),
-    "/plotly.css": ("plotly.css", "text/css; charset=utf-8"),
-}
-_PLOTLY = "/plotly.js"
+#: Types of the files of the page, and of its pictures.
+_TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
+_PICTURES = {"png": "image/png", "svg": "image/svg+xml", "pdf": "application/pdf"}
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; style-src-attr 'unsafe-inline'; connect-src 'self';"
     " img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; require-trusted-types-for 'script';"
     " frame-ancestors "
 )
 _NOTEBOOKS = "http://localhost:* http://127.0.0.1:*"
-
-
-class Refused(Exception):
-    """A request that is not answered: its status, and the reason in words."""
-
-    def __init__(self, status: int, reason: str) -> None:
-        super().__init__(reason)
-        self.status = status
 
 
 class Asked(BaseModel, extra="forbid", allow_inf_nan=False, strict=True):
@@ -87,10 +73,12 @@ class Guarded:
         self.token = secrets.token_urlsafe(32)
         self._page, self._lock = page, threading.Lock()
         self._hosts = {f"{name}:{port}".encode() for name in ("127.0.0.1", "localhost")}
-        static = files("sim.explorer").joinpath("static")
-        self._files = {at: (static.joinpath(name).read_bytes(), kind) for at, (name, kind) in _FILES.items()}
-        script = Path(plotly.__file__).with_name("package_data") / "plotly.min.js"
-        self._files[_PLOTLY] = script.read_bytes(), "text/javascript; charset=utf-8"
+        script, static = (
+            Path(plotly.__file__).with_name("package_data") / "plotly.min.js",
+            Path(__file__).with_name("static"),
+        )
+        self._files = {"/plotly.js": script} | {f"/{path.name}": path for path in static.iterdir()}
+        self._files["/"] = self._files.pop("/page.html")
         self._headers = {
             "content-security-policy": _POLICY + (_NOTEBOOKS if framed else "'none'"),
             "x-content-type-options": "nosniff",
@@ -106,79 +94,66 @@ class Guarded:
             "/contact": lambda asked: contact(page.read(asked.values), asked.speed),
             "/data": lambda asked: {"data": page.add(asked.text, asked.name)},
             "/toml": lambda asked: {"text": page.toml(asked.values)},
-            "/csv": lambda asked: {"text": take.table(page.read(asked.values), page.speeds)},
-            "/picture": lambda asked: take.picture(page.read(asked.values), page.speeds, asked.kind),
+            "/csv": lambda asked: {"text": page.take(asked.values, "csv")},
+            "/picture": lambda asked: page.take(asked.values, asked.kind),
         }
-        self._running, self._jobs = 0, set[Process]()
+        self._places, self._jobs = asyncio.Semaphore(_MOST_JOBS), set[Process]()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request of the protocol ASGI."""
-        if scope["type"] != "http":
-            return
-        status, kind = 200, "application/json"
         try:
             headers = self._checked(scope)
-            if scope["method"] == "GET" and scope["path"] in self._files:
-                body, kind = self._files[scope["path"]]
+            if scope["method"] == "GET" and (path := self._files.get(scope["path"])):
+                answer = Response(path.read_bytes(), media_type=_TYPES[path.suffix[1:]])
             else:
                 self._check_answerable(scope, headers)
                 asked = Asked.model_validate_json(await _body(headers, receive))
                 if scope["path"] == _RUN:
-                    await self._stream(await run_in_threadpool(self._task, asked), receive, send)
+                    await self._stream(asked, scope, receive, send)
                     return
-                answer = await run_in_threadpool(self._answer, scope["path"], asked)
-                kind = kind if isinstance(answer, dict) else take.PICTURES[asked.kind]
-                body = json.dumps(answer).encode() if isinstance(answer, dict) else answer
+                found = await run_in_threadpool(self._answer, scope["path"], asked)
+                is_table = isinstance(found, dict)
+                answer = JSONResponse(found) if is_table else Response(found, media_type=_PICTURES[asked.kind])
         except Refused as fault:
-            status, body = fault.status, json.dumps({"message": str(fault)}).encode()
+            answer = JSONResponse({"message": fault.detail}, fault.status_code)
         except ValidationError:
-            status, body = 400, json.dumps({"message": "no request of this page"}).encode()
+            answer = JSONResponse({"message": "no request of this page"}, 400)
         except BadValues as fault:
-            body = json.dumps({"faults": fault.faults}).encode()
+            answer = JSONResponse({"faults": fault.faults})
         except BadInput as fault:
-            status, body = 422, json.dumps({"message": "; ".join(fault.problems)}).encode()
-        await self._begin(status, kind, send, len(body))
-        await send({"type": "http.response.body", "body": body})
+            answer = JSONResponse({"message": "; ".join(fault.problems)}, 422)
+        answer.headers.update(self._headers)
+        await answer(scope, receive, send)
 
-    async def _begin(self, status: int, kind: str, send: Send, length: int | None = None) -> None:
-        """Send the status and the headers of an answer."""
-        of_answer = {"content-type": kind} | ({} if length is None else {"content-length": str(length)})
-        lines = [(name.encode(), value.encode()) for name, value in (self._headers | of_answer).items()]
-        await send({"type": "http.response.start", "status": status, "headers": lines})
+    def _task(self, asked: Asked) -> tuple[list[str], bytes]:
+        """Return the command of the job that is asked for, and what it reads."""
+        from sim.explorer.job import command, ensemble, fitted
 
-    def _task(self, asked: Asked) -> Callable[[Say], dict[str, Any]]:
-        """Return the task of a job that is asked for."""
         if asked.task == "ensemble":
-            return functools.partial(ensemble, self._page.scenes(asked.values, asked.members))
+            return command(functools.partial(ensemble, self._page.scenes(asked.values, asked.members)))
         if (table := self._page.tables.get(asked.data)) is None or not asked.free:
             raise Refused(400, "a fit needs a table and numbers that are free")
-        return functools.partial(fitted, self._page.read(asked.values), table, asked.free)
+        return command(functools.partial(fitted, self._page.read(asked.values), table, asked.free))
 
-    async def _stream(self, task: Callable[[Say], dict[str, Any]], receive: Receive, send: Send) -> None:
-        """Run a task in a process of its own for as long as its reader stays, and send its messages as lines."""
-        if self._running >= _MOST_JOBS:
+    async def _stream(self, asked: Asked, scope: Scope, receive: Receive, send: Send) -> None:
+        """Run a job in a process of its own for as long as its reader stays, and send its messages as lines."""
+        if self._places.locked():
             raise Refused(429, f"{_MOST_JOBS} computations are under way; stop one of them")
-        self._running += 1
-        words, given = command(task)
-        try:
-            job = await asyncio.create_subprocess_exec(*words, stdin=PIPE, stdout=PIPE)
+        async with self._places:
+            words, given = await run_in_threadpool(self._task, asked)
+            job = await asyncio.create_subprocess_exec(*words, stdin=PIPE, stdout=PIPE, limit=_MOST_BYTES)
             writing, reading = cast(asyncio.StreamWriter, job.stdin), cast(asyncio.StreamReader, job.stdout)
             self._jobs.add(job)
-            gone = asyncio.ensure_future(_until_gone(receive))
-            gone.add_done_callback(lambda _: self._end(job))
             try:
                 writing.write(given)
-                await self._begin(200, "application/x-ndjson", send)
-                async for line in reading:
-                    await send({"type": "http.response.body", "body": line, "more_body": True})
-                self._jobs.discard(job)  # it ends by itself, or was ended
-                await send({"type": "http.response.body", "body": b""})
+                answer = StreamingResponse(reading, headers=self._headers, media_type="application/x-ndjson")
+                # without a version of the protocol it listens for a reader that leaves
+                await answer({**scope, "asgi": {}}, receive, send)
+                if reading.at_eof():  # it ends by itself, or was ended
+                    self._jobs.discard(job)
             finally:
-                gone.cancel()
                 self._end(job)
                 await job.wait()
-        finally:
-            self._running -= 1
 
     def stop(self) -> None:
         """End all jobs."""
@@ -231,12 +206,6 @@ async def _body(headers: dict[bytes, bytes], receive: Receive) -> bytes:
     raise Refused(413, "too large")
 
 
-async def _until_gone(receive: Receive) -> None:
-    """Return once the reader of an answer is gone."""
-    while (await receive())["type"] != "http.disconnect":
-        pass
-
-
 def bound(port: int) -> socket.socket:
     """Return a socket of this machine alone, at a port or, for 0, at one that is free.
 
@@ -245,15 +214,11 @@ def bound(port: int) -> socket.socket:
     BadInput
         If the port is in use.
     """
-    result = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)  # the number makes answers at once
-    exclusive = getattr(socket, "SO_EXCLUSIVEADDRUSE", None)
-    result.setsockopt(socket.SOL_SOCKET, exclusive or socket.SO_REUSEADDR, 1)
     try:
-        result.bind(("127.0.0.1", port))
-        result.listen(128)
+        result = socket.create_server(("127.0.0.1", port), backlog=128)
     except OSError:
-        result.close()
         raise BadInput([f"--port {port}: the port is in use; name another one, or none for one that is free"]) from None
+    result.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # of all its connections: answers go at once
     return result
 
 
@@ -338,6 +303,9 @@ class Server:
 
     def run(self) -> None:
         """Serve until the process is interrupted."""
+        # the modules of an answer are imported while the browser starts
+        for name in ("scipy.optimize", "sim.explorer.job"):
+            threading.Thread(target=importlib.import_module, args=[name], daemon=True).start()
         with self._socket, contextlib.suppress(KeyboardInterrupt):
             self._server.run([self._socket])
 

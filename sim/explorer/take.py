@@ -1,6 +1,5 @@
 """Files that a page saves: the scenario as TOML, the curves as CSV, and their figure."""
 
-import csv
 import io
 import json
 from collections.abc import Mapping
@@ -21,8 +20,12 @@ from sim.study.curves import steady_curves
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
 
-#: Kinds of pictures, with their types on the web.
-PICTURES = {"png": "image/png", "svg": "image/svg+xml", "pdf": "application/pdf"}
+#: Shares of the lost area, from the curve of the contact upwards, with their colours.
+_LOST = {
+    "lost_to_fluctuations": style.FLUCTUATIONS,
+    "lost_to_mean_stress": style.REFERENCE,
+    "lost_to_bonds": style.BONDS,
+}
 
 
 def toml(scenario: Scenario, changed: Mapping[str, float], fixed: Mapping[str, Any]) -> str:
@@ -60,16 +63,12 @@ def _shortest(value: float, unit: str) -> float | str:
 def table(scenario: Scenario, speeds: Array) -> str:
     """Return curves of steady sliding as CSV in SI, with the columns of ``sim.steady_curves``."""
     curves = steady_curves(scenario, speeds)
-    columns = [curves["speed"], *curves.data_vars.values()]
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow([f"{column.name} [{column.attrs['units']}]" for column in columns])
-    writer.writerows(zip(*(column.to_numpy().tolist() for column in columns), strict=True))
-    return file.getvalue()
+    names = [f"{name} [{column.attrs['units']}]" for name, column in curves.items()]
+    return curves.to_dataframe().to_csv(header=names, index_label="speed [m/s]", lineterminator="\n")
 
 
 def picture(scenario: Scenario, speeds: Array, kind: str) -> bytes:
-    """Return the figure of curves of steady sliding as a file of one of the ``PICTURES``."""
+    """Return the figure of curves of steady sliding as a file of a kind."""
     file = io.BytesIO()
     figure(scenario, speeds).savefig(file, format=kind)
     return file.getvalue()
@@ -80,24 +79,17 @@ def figure(scenario: Scenario, speeds: Array) -> Figure:
     curves = steady_curves(scenario, speeds)
     with mpl.rc_context(style.STYLE):
         result, (area, energy, friction) = style.rows([1.7, 1.0, 1.0])
-        unit = style.in_unit(friction.xaxis, "sliding speed $V$", speeds, "m/s")
-        x, left = speeds * unit, 100.0 * curves["area_ratio"].to_numpy()
-        parts = (
-            ("lost_to_fluctuations", "lost to fluctuations", style.FLUCTUATIONS),
-            ("lost_to_mean_stress", "lost to the mean stress", style.REFERENCE),
-            ("lost_to_bonds", "lost to bonds", style.BONDS),
-        )
-        area.plot(x, left, color=style.BOTH, label="contact")
-        for name, words, colour in parts:
-            if name in curves and np.any(curves[name] != 0.0):
-                above = left + 100.0 * curves[name].to_numpy()
-                area.fill_between(x, left, above, color=colour, alpha=0.3, linewidth=0.0, label=words)
-                left = above
+        x = speeds * style.in_unit(friction.xaxis, "sliding speed $V$", speeds, "m/s")
+        lost = [name for name in _LOST if name in curves and np.any(curves[name] != 0.0)]
+        levels = np.cumsum([100.0 * curves[name].to_numpy() for name in ("area_ratio", *lost)], axis=0)
+        area.plot(x, levels[0], color=style.BOTH, label="contact")
+        for name, low, high in zip(lost, levels, levels[1:], strict=False):
+            look: Any = {"color": _LOST[name], "alpha": 0.3, "linewidth": 0.0}
+            area.fill_between(x, low, high, label=name.replace("_", " "), **look)
         area.set_ylabel(r"$A/A_{\mathrm{JKR}}$ (%)")
         scale = style.in_unit(energy.yaxis, "energy", np.array([scenario.adhesion.work]), "J/m^2")
-        lines = ("work_of_adhesion", "$w$", style.BOTH), ("fluctuation_energy", r"$\Delta\Gamma$", style.FLUCTUATIONS)
-        for name, words, colour in lines:
-            energy.plot(x, scale * curves[name], color=colour, label=words)
+        energy.plot(x, scale * curves["work_of_adhesion"], color=style.BOTH, label="$w$")
+        energy.plot(x, scale * curves["fluctuation_energy"], color=style.FLUCTUATIONS, label=r"$\Delta\Gamma$")
         force = style.in_unit(friction.yaxis, "friction $F$", curves["friction_force"].to_numpy(), "N")
         friction.plot(x, force * curves["friction_force"], color=style.BOTH)
         friction.set_xscale("log")

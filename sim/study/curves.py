@@ -1,15 +1,17 @@
 """Curves of steady sliding over the speed: variables of a dataset, shares of the lost area, and the speed of a loss."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
-from scipy import optimize
 
 from sim.ensemble.steady import steady_course
 from sim.ensemble.variables import READ, VARIABLES
 from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Variables of a dataset that are curves of steady sliding.
 OVER_SPEED = (
@@ -49,8 +51,10 @@ def curves(scenario: Scenario, speeds: Array, time: float = 0.0) -> dict[str, Ar
     return result
 
 
-def steady_curves(scenario: Scenario, speeds: Array, time: float = 0.0) -> xr.Dataset:
+def steady_curves(scenario: Scenario, speeds: Array, time: float = 0.0) -> "xr.Dataset":
     """Return the curves of steady sliding as a dataset; see ``sim.steady_curves``."""
+    import xarray as xr
+
     described = {item.name: (item.unit, item.long_name) for item in VARIABLES}
     described |= {name: ("1", text) for name, text in SHARES.items()}
     axis = "speed", speeds, {"units": "m/s", "long_name": "sliding speed"}
@@ -66,6 +70,7 @@ def speeds_of_loss(scenario: Scenario, share: float, speeds: Array, time: float 
 
     Each crossing between two neighbours of ``speeds``, which grow, is solved to rounding in the logarithm of the speed.
     """
+    from scipy import optimize
 
     def surplus(logarithm: float) -> float:
         return float(curves(scenario, np.exp([logarithm]), time)["area_ratio"][0]) - (1.0 - share)

@@ -27,7 +27,6 @@ from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
-from sim.study.converge import recorded
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
@@ -273,6 +272,8 @@ def _records(point: Scenario, names: list[str]) -> tuple[Array, Array, Array]:
     If the speed is prescribed, the variables are the differences from steady sliding. A run that adds nothing has no
     error between its records.
     """
+    from sim.study.converge import recorded  # which draws figures
+
     count = point.ensemble.members if any(point.varies.values()) else 1
     steps = range(0, point.clock.steps + 1, point.clock.stride)
     speeds, *values = recorded(point, count, steps, ["speed", *names])

@@ -12,7 +12,6 @@ from numpy.testing import assert_allclose
 
 import sim
 from sim.explorer import take
-from sim.explorer.data import Tables
 from sim.explorer.drawing import contact
 from sim.explorer.page import Page, Refused, previews
 from sim.explorer.server import Server, state_of
@@ -178,7 +177,7 @@ def test_curves_are_taken_away_as_a_table_and_as_pictures(lens):
 def test_measured_curves_are_compared_with_the_curves(lens):
     page = Page(sim.load(lens))
     text = "speed [mm/s];contact_area [mm^2];contact_area_error [%]\n1,0;0,0445;1\n10,0;0,0350;1\n"
-    data = page.answer({}, 0.1, digest=page.add(text, "own.csv"))["data"]
+    data = page.answer({}, 0.1, table=page.add(text, "own.csv"))["data"]
     exact = curves(page.scenario, np.array([1e-3, 1e-2]))["contact_area"]
     off = (np.array([4.45e-8, 3.5e-8]) - exact) / (0.01 * np.array([4.45e-8, 3.5e-8]))
     assert_allclose(data["chi_square"], np.sum(off**2), rtol=1e-9)
@@ -187,7 +186,7 @@ def test_measured_curves_are_compared_with_the_curves(lens):
 
 
 def test_a_table_that_is_too_large_or_cannot_be_read_is_refused_by_its_own_name(lens):
-    point, tables = sim.load(lens), Tables()
+    page = Page(sim.load(lens))
     heading = "speed [mm/s],contact_area [mm^2]\n"
     for text, reason in (
         (heading + "1,0.04\n" * 5001, "5000 rows"),
@@ -196,7 +195,7 @@ def test_a_table_that_is_too_large_or_cannot_be_read_is_refused_by_its_own_name(
         ("", ""),
     ):
         with pytest.raises(sim.BadInput) as fault:
-            tables.add(text, "<b>.csv", point)
+            page.add(text, "<b>.csv")
         assert str(fault.value).startswith("<b>.csv") and reason in str(fault.value)
 
 

@@ -567,6 +567,9 @@ $("take").addEventListener("change", async () => {
 
 // Start
 
+const drawable = new Promise((ready) => $("plotly").addEventListener("load", ready));
+
+/** Ask for the sliders and the curves while the browser still reads plotly. */
 async function begin() {
   recall();
   if (!token) return complain("This page has lost its key. Open the address that sim explore printed.");
@@ -580,6 +583,7 @@ async function begin() {
   }
   if (data) useTable(data);
   ghost = await ask("/curves", { values: {}, share: state.share });
+  await drawable;
   recall();
   settle();
 }
