@@ -214,6 +214,7 @@ def fit(
     free: "Iterable[str]",
     common: dict[str, float] | None = None,
     steady: bool = False,
+    per_table: "Iterable[str]" = (),
 ) -> "Fit":
     """Calibrate keys of a scenario to measured curves.
 
@@ -230,16 +231,19 @@ def fit(
         Relative errors that all points of a variable share, ``{"contact_area": 0.02}``.
     steady : bool
         Whether steady sliding is enough; else the scenario's own models have the last word.
+    per_table : iterable of str
+        Keys with a value in each table, as those of ``free``. The files name the tables.
 
     Returns
     -------
     Fit
-        ``scenario`` with the ``values`` found, ``numbers`` with errors and intervals, ``correlations``, ``remarks``.
+        ``scenario`` with the ``values`` found, ``numbers`` with errors and intervals, ``correlations``, ``remarks``;
+        of values per table also ``differences``, ``no_difference`` and the ``scenarios``.
     """
     from sim.study.fit import fit as study
 
     paths = [data] if isinstance(data, str | os.PathLike) else list(data)
-    return study(_scene(scenario), [pathlib.Path(path) for path in paths], free, common, steady)
+    return study(_scene(scenario), [pathlib.Path(path) for path in paths], free, common, steady, per_table)
 
 
 def steady_curves(

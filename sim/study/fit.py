@@ -13,9 +13,10 @@ import itertools
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
@@ -23,6 +24,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy import stats
 from scipy.special import chdtrc
 
 from sim.ensemble.dataset import variable_name
@@ -54,6 +56,8 @@ _BESIDE, _MOST_ROWS = 0.5, 3
 POOR = 0.05
 #: Ratio of measured and fitted values beyond which a unit is asked for.
 _OTHER_UNIT = 100.0
+#: Most draws of curves without a difference, ratios as large as the measured one that are enough, and their precision.
+_DRAWS, _ENOUGH, _FINE = 200, 20, 1e-4
 #: Tables of keys that are not physical.
 _OTHER = ("clock", "record", "ensemble", "seed")
 
@@ -91,13 +95,37 @@ class Estimate(NamedTuple):
         return text, low, high, unit
 
 
+class NoDifference(NamedTuple):
+    """Test of one value of a key in all tables.
+
+    Attributes
+    ----------
+    p_value : float
+        Probability of a likelihood ratio as large or larger if the tables had one value; nan if it is not computed.
+    chi_square : float
+        Rise of the chi^2 by the single value.
+    freedom : int
+        Degrees of freedom: tables without the first.
+    draws : int
+        Curves that were drawn for the probability; 0 if the likelihood ratio has a known distribution.
+    """
+
+    p_value: float
+    chi_square: float
+    freedom: int
+    draws: int
+
+    def __str__(self) -> str:
+        return f"{self.p_value:.2g}" + " (simulated)" * (self.draws > 0)
+
+
 class Fit(NamedTuple):
     """A calibrated scenario. Its text is a line for each number, and the chi^2.
 
     Attributes
     ----------
     scenario : Scenario
-        The scenario with the numbers found.
+        The scenario with the numbers found, and with those of the first table if tables have their own.
     problem : Problem
         The curves with their errors: ``values``, ``sigma``, ``freedom``, ``predicted``.
     best : Minimum
@@ -112,6 +140,10 @@ class Fit(NamedTuple):
         Conditions on the numbers, a sentence each.
     lag : str
         Lag of the scenario's own run behind steady speeds, "" if it is within the errors.
+    differences : tuple of Estimate
+        Ratios and differences of the values per table to those of the first.
+    no_difference : dict of str to NoDifference
+        For each key with a value per table the test that all tables have one value.
     """
 
     scenario: Scenario
@@ -122,11 +154,14 @@ class Fit(NamedTuple):
     converged: bool
     remarks: tuple[str, ...]
     lag: str = ""
+    differences: tuple[Estimate, ...] = ()
+    no_difference: Mapping[str, NoDifference] = MappingProxyType({})
 
     def __repr__(self) -> str:
-        texts = ((item.free.key, *item.texts) for item in self.numbers)
+        texts = ((item.free.key, *item.texts) for item in (*self.numbers, *self.differences))
         lines = [f"{key} = {value} [{low}, {high}] {unit}".rstrip() for key, value, low, high, unit in texts]
-        return "\n".join([*lines, _quality(self)])
+        tests = [f"{key}: p of no difference {test}" for key, test in self.no_difference.items()]
+        return "\n".join([*lines, *tests, _quality(self)])
 
     @property
     def aicc(self) -> float:
@@ -141,13 +176,28 @@ class Fit(NamedTuple):
 
     @property
     def values(self) -> dict[str, float]:
-        """Values of the free keys [SI]."""
+        """Values of the free keys [SI]; a key with a value per table has the name of the table behind it."""
         return {item.free.key: item.value for item in self.numbers}
+
+    def of_table(self, place: int) -> dict[str, float]:
+        """Return the values of the keys in a table [SI], and its conditions but the speed that all rows share."""
+        table = self.problem.tables[place]
+        constant = {
+            key: float(x[0]) for key, x in table.conditions.items() if key not in ("t", "speed") and not np.ptp(x)
+        }
+        stated = {f"contact.{table.mount}" if key == "mount" else key: value for key, value in constant.items()}
+        return stated | {item.free.name: item.value for item in self.numbers if item.free.table in (-1, place)}
+
+    @property
+    def scenarios(self) -> dict[str, Scenario]:
+        """The scenario of each table by its name, with its values and with the conditions of all its rows."""
+        values = {table.path.stem: self.of_table(k) for k, table in enumerate(self.problem.tables)}
+        return {name: self.scenario.with_values(numbers) for name, numbers in values.items()}
 
 
 def fit(
     scenario: Scenario, data: Sequence[Path | likelihood.Measured], free: Iterable[str],
-    common: dict[str, float] | None = None, steady: bool = False,
+    common: dict[str, float] | None = None, steady: bool = False, per_table: Iterable[str] = (),
 ) -> Fit:  # fmt: skip
     """Find numbers of a scenario from measured curves.
 
@@ -163,6 +213,8 @@ def fit(
         Relative errors that all points of a variable share, as of one lens or one camera.
     steady : bool
         True if steady sliding is enough, so that the scenario's own models are not run.
+    per_table : iterable of str
+        Keys that have a value in each table, as those of ``free``.
 
     Raises
     ------
@@ -170,18 +222,26 @@ def fit(
         If a key cannot be fitted, a table cannot be read, or the curves depend on some keys only together.
     """
     base = scenario.with_values({"record": {}})
-    free_numbers = [_free(base, text) for text in free]
-    if len({item.key for item in free_numbers}) < len(free_numbers):
-        raise BadInput(["--free: a key is there twice; give each once"])
+    shared, split = [_free(base, text) for text in free], [_free(base, text, "--per-table") for text in per_table]
     tables = [likelihood.read(path, base) if isinstance(path, Path) else path for path in data]
-    problem = likelihood.problem_of(base, tables, free_numbers, common or {})
+    if faults := [*_conflicts(base, shared, split, tables)]:
+        raise BadInput(faults)
+    places = itertools.product(split, enumerate(tables))
+    split = [item._replace(key=f"{item.key} ({table.path.stem})", table=k) for item, (k, table) in places]
+    problem = likelihood.problem_of(base, tables, shared + split, common or {})
     if steady and base.drive.solves_motion:
         raise BadInput([f'--steady: drive.model = "{base.drive.model}" needs runs; omit --steady'])
     if base.drive.solves_motion or (not steady and idle(problem)):
         problem = replace(problem, by_run=True).compared(problem.start)
-    faults = [f"--free {key}: has no effect on what was measured; fix it" for key in idle(problem)]
+    without_effect = dict[str, list[str]]()
+    for name, _, table in (key.partition(" (") for key in idle(problem)):
+        without_effect.setdefault(name, []).append(table[:-1])
+    for name, names in without_effect.items():
+        option, place = ("--per-table", f" in {', '.join(names)}") if names[0] else ("--free", "")
+        faults.append(f"{option} {name}: has no effect on what was measured{place}; fix it")
     for keys in [] if faults else likelihood.entangled(problem):
-        faults.append(f"--free {', '.join(keys)}: the curves depend on them only together; free one of them")
+        options = " and --per-table" * bool(split)
+        faults.append(f"--free{options} {', '.join(keys)}: the curves depend on them only together; free one of them")
     if faults:
         raise BadInput(faults)
     problem, best = _searched(problem)
@@ -194,6 +254,23 @@ def fit(
             converged = alone.converged and best.converged
             break
     return _assembled(scenario, problem, best, alone, converged)
+
+
+def _conflicts(scenario: Scenario, shared: list[Free], split: list[Free], tables: Sequence[Measured]) -> Iterator[str]:
+    """Yield the faults of free keys and tables that do not go together."""
+    keys, names = [item.key for item in (*shared, *split)], [table.path.stem.lower() for table in tables]
+    for key in {key: None for key in keys if keys.count(key) > 1}:
+        yield f"--free{' or --per-table' * bool(split)}: {key} is there twice; give each key once"
+    if not keys:
+        yield "no key is free; give --free KEY, or --per-table KEY for a value in each table"
+    if split and len(tables) < 2:
+        yield f"--per-table {split[0].key}: there is one table only, {names[0]}; add tables, or use --free"
+    for name in {name: None for name in names if split and names.count(name) > 1}:
+        yield f'--per-table: several tables have the name "{name}"; rename their files, because files name the tables'
+    conditions = {"mount": f"contact.{scenario.contact.kind}", "speed": "drive.speed"}
+    for table, key in itertools.product(tables, keys):
+        if key in [conditions.get(name, name) for name in table.conditions]:
+            yield f"{table.path}: has values of {key}, which is free; omit them, or do not free this key"
 
 
 def _searched(problem: Problem) -> tuple[Problem, Minimum]:
@@ -221,18 +298,75 @@ def _assembled(scenario: Scenario, problem: Problem, best: Minimum, alone: Minim
     """Return the fit with its intervals and remarks."""
     count, size, known = len(problem.free), len(best.x), best.covariance is not None
     covariance = np.full((size, size), np.nan) if best.covariance is None else best.covariance
-    spread, estimates = np.sqrt(np.diag(covariance)), []
-    for k, item in enumerate(problem.free):
-        value, unshifted = (item.outer(float(least.x[k])) for least in (best, alone))
-        ends = likelihood.interval(problem, best, k) if known else Interval(math.nan, math.nan, True, True)
-        error = float(spread[k] * (value if item.logarithmic else 1.0))
-        estimates.append(Estimate(item, value, error, ends, unshifted))
+    spread, estimates = np.sqrt(np.diag(covariance)), [_estimate(problem, best, alone, k) for k in range(count)]
     alike = (covariance / np.outer(spread, spread))[:count, :count]
     result = Fit(scenario, problem, best, tuple(estimates), alike, known and converged, ())
     if not known:
         return result._replace(remarks=("the errors could not be computed: the data do not determine all keys",))
-    result = result._replace(scenario=scenario.with_values(result.values), lag=likelihood.lag(problem, best.x))
+    split = [item.name for item in problem.free if item.table >= 0]
+    places = {key: [k for k, item in enumerate(problem.free) if item.name == key] for key in split}
+    result = result._replace(
+        scenario=scenario.with_values(result.of_table(0) if split else result.values),
+        lag=likelihood.lag(problem, best.x),
+        differences=tuple(_between_tables(result, alone, [*places.values()])),
+        no_difference={key: _no_difference(result, numbers) for key, numbers in places.items()},
+    )
     return result._replace(remarks=tuple(_remarks(result)))
+
+
+def _between_tables(result: Fit, alone: Minimum, places: list[list[int]]) -> Iterator[Estimate]:
+    """Yield ratios and differences to the first table; a number that is not fitted in its logarithm has no ratio.
+
+    A bound that sets an end of either value's interval sets that of the ratio and of the difference.
+    """
+    for (first, *rest), is_ratio in itertools.product(places, (True, False)):
+        base = result.numbers[first]
+        for k in rest if base.free.logarithmic or not is_ratio else ():
+            (problem, best), (_, before) = (
+                likelihood.with_difference(result.problem, least, k, first, is_ratio) for least in (result.best, alone)
+            )
+            estimate, ends, others = _estimate(problem, best, before, k), result.numbers[k].interval, base.interval
+            low, high, *is_open = estimate.interval
+            is_open = [any(marks) for marks in zip(is_open, ends[2:], reversed(others[2:]), strict=True)]
+            yield estimate._replace(interval=Interval(low, high, *is_open))
+
+
+def _estimate(problem: Problem, best: Minimum, alone: Minimum, k: int) -> Estimate:
+    """Return one free number with its interval, if the errors are known."""
+    item, ends, spread = problem.free[k], Interval(math.nan, math.nan, True, True), math.nan
+    value, unshifted = (item.outer(float(least.x[k])) for least in (best, alone))
+    if best.covariance is not None:
+        ends, spread = likelihood.interval(problem, best, k), math.sqrt(best.covariance[k, k])
+    return Estimate(item, value, spread * (value if item.logarithmic else 1.0), ends, unshifted)
+
+
+def _no_difference(result: Fit, places: list[int]) -> NoDifference:
+    """Test that numbers of the tables are a single one.
+
+    The likelihood ratio has a chi-square distribution, and an F distribution if errors are estimated. If the interval
+    of any number reaches a bound, its distribution is simulated instead: both are fitted to curves of the single value.
+    """
+    problem, best, freedom = result.problem, result.best, len(places) - 1
+    merged, starts = likelihood.with_one_value(problem, best, places)
+    single = min((likelihood.minimum(merged, start) for start in starts), key=lambda item: item.chi_square)
+    rise, is_estimated = max(single.chi_square - best.chi_square, 0.0), problem.estimated.any()
+    measured = rise / best.chi_square if is_estimated else rise
+    if not any(item.interval.low_open or item.interval.high_open for item in result.numbers):
+        tail = stats.f.sf(rise / freedom, freedom, problem.freedom) if is_estimated else stats.chi2.sf(rise, freedom)
+        return NoDifference(float(tail), rise, freedom, 0)
+    if problem.by_run:
+        return NoDifference(math.nan, rise, freedom, 0)
+    spread = np.repeat(single.x, [len(places) if k == places[0] else 1 for k in range(len(single.x))])
+    expected, rng, larger = merged.predicted(single.x), np.random.default_rng([result.scenario.seed, places[0]]), 0
+    for count in range(1, _DRAWS + 1):
+        values = problem.drawn(expected, rng)
+        joint = likelihood.minimum(replace(merged, values=values), single.x, precision=_FINE).chi_square
+        drawn = replace(problem, values=values)
+        least = min(likelihood.minimum(drawn, start, precision=_FINE).chi_square for start in (best.x, spread))
+        larger += (joint - least) / (least if is_estimated else 1.0) >= measured
+        if larger == _ENOUGH:
+            return NoDifference(larger / count, rise, freedom, count)
+    return NoDifference((1 + larger) / (1 + _DRAWS), rise, freedom, _DRAWS)
 
 
 def _remarks(result: Fit) -> Iterator[str]:
@@ -265,22 +399,26 @@ def _remarks(result: Fit) -> Iterator[str]:
         places = ", ".join(map(problem.place, open_rows[:_MOST_ROWS]))
         yield f"the fit has an open contact at measured points: {places}"
     if problem.estimated.any():
-        yield "curves without errors: the scatter around the fit is used instead"
+        effect = ", so p of no difference follows from an F distribution" if result.no_difference else ""
+        yield f"curves without errors: the scatter around the fit is used instead{effect}"
+    for key, test in result.no_difference.items():
+        if math.isnan(test.p_value):
+            yield f"{key}: p of no difference is not computed, because a bound sets an interval; give wider bounds"
 
 
-def _free(scenario: Scenario, text: str) -> Free:
+def _free(scenario: Scenario, text: str, option: str = "--free") -> Free:
     """Return the free number of a text ``KEY`` or ``KEY=LOW:HIGH``."""
     key, sign, span = text.partition("=")
     physical = (item for item in quantities(scenario).items() if item[0].partition(".")[0] not in _OTHER)
     key, known = key.strip(), {name: number for name, number in physical if not number[0].whole}
     if key not in known:
         near = "".join(f'; did you mean "{name}"?' for name in difflib.get_close_matches(key, known, 1, 0.5))
-        raise BadInput([f"--free {key[:80]}: is not a physical key of the scenario{near}"])
+        raise BadInput([f"{option} {key[:80]}: is not a physical key of the scenario{near}"])
     quantity, start = known[key]
     low, high = max(quantity.at_least, quantity.above), min(quantity.at_most, quantity.below)
     if sign:
         bounds = {kind: getattr(quantity, kind) for kind in ("above", "at_least", "below", "at_most")}
-        name = f"--free {key}=LOW:HIGH, bound"
+        name = f"{option} {key}=LOW:HIGH, bound"
         low, high = (read_option(end, name, quantity.unit, **bounds) for end in span.partition(":")[::2])
     elif low >= 0.0 and math.isinf(high):
         low, high = start / _WIDE, start * _WIDE
@@ -289,7 +427,7 @@ def _free(scenario: Scenario, text: str) -> Free:
     if not low <= start <= high or low == high:
         shown = f"{engineering(low, quantity.unit)} to {engineering(high, quantity.unit)}"
         cure = "start inside, or give bounds, KEY=LOW:HIGH, the lower one first"
-        raise BadInput([f"--free {key}: the scenario's value does not lie within {shown}; {cure}"])
+        raise BadInput([f"{option} {key}: the scenario's value does not lie within {shown}; {cure}"])
     return Free(key, quantity, start, low, high)
 
 
@@ -312,6 +450,7 @@ def figure(problem: Problem, best: Minimum) -> Figure:
     """Draw each variable over the condition that varies most, with error bars and fit, above its residuals.
 
     Residuals are in standard errors. Rows of any table with the same other conditions have one colour and one curve.
+    If tables have values of their own, each has its own colours.
     Over the speed the curve has many speeds; otherwise it joins the rows. If the scenario's own models add to steady
     sliding, that alone is dashed.
     """
@@ -387,6 +526,9 @@ def _alike(problem: Problem) -> tuple[list[NDArray[np.int64]], list[str]]:
     """Return for each table the numbers of the conditions of its rows beside that along the axis, and their labels."""
     along, places = [_along(table) for table in problem.tables], np.cumsum([table.rows for table in problem.tables])
     numbers, texts = [np.zeros(places[-1], int)], [[""]]
+    if any(item.table >= 0 for item in problem.free):
+        numbers = [np.repeat(np.arange(len(problem.tables)), [table.rows for table in problem.tables])]
+        texts = [[table.path.stem for table in problem.tables]]
     for key, (quantity, columns) in problem.conditions().items():
         others = [np.where(axis.key == key, np.nan, values) for axis, values in zip(along, columns, strict=True)]
         means, level = _levels(np.concatenate(others))
@@ -406,39 +548,43 @@ _MADE = "# Made by sim fit"
 
 def carried_out(
     scenario: Scenario, data: Sequence[Path], free: Sequence[str], common: Sequence[str], stem: Path, replace: bool,
-    steady: bool, judged: bool, units: Sequence[str] = (),
+    steady: bool, judged: bool, units: Sequence[str] = (), per_table: Sequence[str] = (),
 ) -> tuple[Fit, list[Printed]]:  # fmt: skip
     """Fit, compare mechanisms if wanted, write the files, and return the tables to print.
 
     Arguments are those of ``sim.study.fit.fit``, with ``common`` as texts ``"COLUMN=2 %"``, and the ``units`` of the
-    figure. The files are ``<stem>_fit.toml``, ``.json`` and ``.png``. Older ones are refused unless ``replace`` is
-    True; a scenario is replaced only if a fit has written it.
+    figure. The files are ``<stem>_fit.toml``, ``.json`` and ``.png``. With keys ``per_table`` each table has a scenario
+    ``<stem>_fit_<table>.toml``. Older ones are refused unless ``replace`` is True; a scenario is replaced only if a fit
+    has written it.
     """
     pairs = [pair.partition("=")[::2] for pair in common]
     sizes = {name: read_option(size, f"--common {name}", "1", above=0, below=1) for name, size in pairs}
-    toml, *others = outputs = [stem.with_name(f"{stem.name}_fit.{ending}") for ending in ("toml", "json", "png")]
-    inputs = [*files_read(scenario), *data]
-    is_replaced = replace and toml.is_file() and _MADE.encode() in toml.read_bytes()
-    is_input = toml.resolve() in [path.resolve() for path in inputs]
-    for path in others if is_replaced and not is_input else outputs:
-        files.claim(path, replace, inputs)
+    endings = [*([f"_{path.stem}.toml" for path in data] if per_table else [".toml"]), ".json", ".png"]
+    outputs, inputs = [stem.with_name(f"{stem.name}_fit{ending}") for ending in endings], [*files_read(scenario), *data]
+    for path in outputs:
+        is_scenario = replace and path.suffix == ".toml" and path.is_file() and _MADE.encode() in path.read_bytes()
+        if not is_scenario or path.resolve() in [other.resolve() for other in inputs]:
+            files.claim(path, replace, inputs)
     tables = [likelihood.read(path, scenario) for path in data]
     with in_units(units):  # before anything is fitted
         for table in tables:
             for unit in (_along(table).unit, *(curve.variable.unit for curve in table.curves)):
                 scaled(1.0, unit)
-    result = fit(scenario, tables, free, sizes, steady)
+    result = fit(scenario, tables, free, sizes, steady, per_table)
     verdict = compare(result.problem, result.best, result.scenario.seed) if judged else None
     picture = io.BytesIO()
     with in_units(units):
         figure(result.problem, result.best).savefig(picture, format="png")
     numbers = json.dumps(document(result, data, verdict), indent=2, allow_nan=False) + "\n"
-    texts = scenario_text(scenario, result, toml.parent).encode(), numbers.encode(), picture.getvalue()
-    for path, content in zip(outputs, texts, strict=True):
+    scenarios = [scenario_text(scenario, result, stem.parent, k).encode() for k in range(len(outputs) - 2)]
+    for path, content in zip(outputs, [*scenarios, numbers.encode(), picture.getvalue()], strict=True):
         with files.output(path) as beside:
             beside.write_bytes(content)
     sources = [f"{table.path}: {table.rows} rows, {table.ranges}" for table in tables]
-    shown: list[Printed] = [(_table(result), "\n".join(["", _quality(result), *result.remarks, *sources, ""]))]
+    remarks = "\n".join(["", _quality(result), *result.remarks, *sources, ""])
+    shown: list[Printed] = [(_table(result), "" if result.differences else remarks)]
+    if result.differences:
+        shown.append((_differences(result), remarks))
     if verdict is not None:
         doubt = "; but even the unchanged scenario misses the data, so perhaps none of these is true"
         shown.append((_comparison(verdict), f"\n{verdict.words}{doubt if result.p_value <= POOR else ''}\n"))
@@ -455,6 +601,19 @@ def _table(fit: Fit) -> list[dict[str, str]]:
         rows.append({
             "key": item.free.key, "value": f"{value} {unit}".rstrip(), f"{LEVEL:.0%} interval": f"{low} to {high}",
             "start": engineering(item.free.start, si), "steady sliding alone": alone,
+        })  # fmt: skip
+    return rows
+
+
+def _differences(fit: Fit) -> list[dict[str, str]]:
+    """Return one row for each ratio or difference of values per table; the first of a key has the p of none."""
+    rows, tests = [], {**fit.no_difference}
+    for item in fit.differences:
+        value, low, high, unit = item.texts
+        test = tests.pop(item.free.name, "")
+        rows.append({
+            "ratio or difference": item.free.key, "value": f"{value} {unit}".rstrip(),
+            f"{LEVEL:.0%} interval": f"{low} to {high}", "p of no difference": str(test),
         })  # fmt: skip
     return rows
 
@@ -483,15 +642,19 @@ def _comparison(verdict: Verdict) -> list[dict[str, str]]:
 def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[str, Any]:
     """Return all numbers of a fit [SI]; those that are not known are None."""
     shares = fit.best.x[len(fit.numbers) :]
-    result: dict[str, Any] = {
-        "scenario": fit.scenario.source.path, "data": [str(path) for path in data], "level": LEVEL,
-        "numbers": {
+    numbers, differences = (
+        {
             item.free.key: {
                 "value": item.value, "unit": item.free.quantity.unit, "standard_error": item.error,
                 **item.interval._asdict(), "start": item.free.start, "steady_sliding_alone": item.steady,
             }
-            for item in fit.numbers
-        },
+            for item in items
+        }
+        for items in (fit.numbers, fit.differences)
+    )  # fmt: skip
+    result: dict[str, Any] = {
+        "scenario": fit.scenario.source.path, "data": [str(path) for path in data], "level": LEVEL, "numbers": numbers,
+        "differences": differences, "no_difference": {key: test._asdict() for key, test in fit.no_difference.items()},
         "correlations": {"keys": [item.free.key for item in fit.numbers], "matrix": fit.correlations.tolist()},
         "common_errors": {name: size * x for (name, size), x in zip(fit.problem.common.items(), shares, strict=True)},
         "chi_square": fit.best.chi_square, "degrees_of_freedom": fit.problem.freedom, "p_value": fit.p_value,
@@ -504,13 +667,17 @@ def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[st
     return known
 
 
-def scenario_text(scenario: Scenario, fit: Fit, folder: Path) -> str:
-    """Return a scenario file, its opening comment first, with the estimates, for a file in a folder."""
-    source = scenario.origin
+def scenario_text(scenario: Scenario, fit: Fit, folder: Path, table: int = 0) -> str:
+    """Return a scenario file, its opening comment first, with the estimates in a table, for a file in a folder.
+
+    If tables have values of their own, the file has the conditions of all rows of its table, too.
+    """
+    source, values = scenario.origin, fit.of_table(table) if fit.differences else fit.values
+    units = {key: quantity.unit for key, (quantity, _) in quantities(scenario).items()}
+    units |= {f"contact.{scenario.contact.kind}": MOUNT[scenario.contact.kind][1]}
     tables, numbers = parse(source.text, source.path), dict[str, Any]()
-    for item in fit.numbers:
-        unit = item.free.quantity.unit
-        numbers[item.free.key] = item.value if unit == "1" else f"{item.value:.12g} {unit}"
+    for key, value in values.items():
+        numbers[key] = value if units[key] == "1" else f"{value:.12g} {units[key]}"
     override(tables, source.overrides | numbers)
     above = Path(source.path).parent
     if above.resolve() != folder.resolve():
@@ -518,7 +685,9 @@ def scenario_text(scenario: Scenario, fit: Fit, folder: Path) -> str:
     comment = itertools.takewhile(lambda line: line.startswith("#"), source.text.splitlines())
     question = "".join(f"{line}\n" for line in comment if not line.startswith(_MADE)).removesuffix("#\n")
     opening = f"{question}#\n" if question else ""
-    return f"{opening}{_MADE}: {', '.join(numbers)} are calibrated to measured curves.\n{written(tables)}"
+    keys = {item.free.name: None for item in fit.numbers}
+    of = f" of {fit.problem.tables[table].path.name}" if fit.differences else ""
+    return f"{opening}{_MADE}: {', '.join(keys)} are calibrated to measured curves{of}.\n{written(tables)}"
 
 
 def _move(table: dict[str, Any], above: Path, folder: Path) -> None:

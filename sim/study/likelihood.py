@@ -89,9 +89,9 @@ def read(path: Path, scenario: Scenario) -> Measured:
         CSV with a header such as ``speed [mm/s], contact_area [mm^2], contact_area_error [mm^2]``: conditions,
         variables of a dataset, and beside these their standard errors, in the same dimension or in ``[%]``.
         Conditions are ``t``, ``speed``, the prescribed quantity of the mount (``normal_load``, ``indentation`` or
-        ``displacement``), or numbers of the scenario by their names in a dataset, such as ``solid_shear_modulus``. The
-        speed of a slider behind a spring or under a force is no condition but a curve; ``stage_speed`` is that of a
-        steady stage.
+        ``displacement``), or numbers of the scenario by their names in a dataset, such as ``solid_shear_modulus``. A
+        comment such as ``# solid.shear_modulus = 1 MPa`` states a condition of all rows. The speed of a slider behind a
+        spring or under a force is no condition but a curve; ``stage_speed`` is that of a steady stage.
     scenario : Scenario
         The scenario that is compared with the curves.
 
@@ -313,13 +313,24 @@ _EVALUATIONS = 100
 
 
 class Free(NamedTuple):
-    """A number of the scenario that is to be found between two bounds; ``start`` is the scenario's own."""
+    """A number of the scenario that is to be found between two bounds; ``start`` is the scenario's own.
+
+    A number of one ``table`` has its name behind the key, as in ``"bonds.stress (wet)"``. A number may also be the
+    ratio of a table's value to that of the number at the place ``base``, or the difference if it is not logarithmic.
+    """
 
     key: str
     quantity: Quantity
     start: float
     low: float
     high: float
+    table: int = -1
+    base: int = -1
+
+    @property
+    def name(self) -> str:
+        """Return the key without the table."""
+        return self.key.partition(" (")[0]
 
     @property
     def logarithmic(self) -> bool:
@@ -338,6 +349,16 @@ class Free(NamedTuple):
 
     def outer(self, x: float) -> float:
         return min(max(math.exp(x), self.low), self.high) if self.logarithmic else x
+
+    def related(self, base: float, x: float) -> float:
+        """Return the value that has this ratio or difference to a base."""
+        return base * math.exp(x) if self.logarithmic else base + x
+
+    def room(self, base: "Free", x: float) -> tuple[float, float]:
+        """Return the bounds of a base, as it is fitted, if this ratio or difference is x and both are within theirs."""
+        ends = (self.related(end, -x) for end in (base.low, base.high))
+        low, high = (min(max(end, base.low), base.high) for end in ends)
+        return base.inner(low), base.inner(high)
 
 
 @dataclass(frozen=True)
@@ -378,13 +399,23 @@ class Problem:
         """Return the values of the free keys and of those that make the mechanism."""
         return {item.key: item.outer(float(value)) for item, value in zip(self.free, x, strict=False)} | {**self.fixed}
 
+    def of_table(self, x: Array, table: int) -> dict[str, float]:
+        """Return the values of the keys in a table, and of those that make the mechanism."""
+        numbers = [item.outer(float(value)) for item, value in zip(self.free, x, strict=False)]
+        for k, item in enumerate(self.free):
+            if item.base >= 0:
+                base = self.free[item.base]
+                numbers[k] = min(max(item.related(numbers[item.base], float(x[k])), base.low), base.high)
+        applied = zip(self.free, numbers, strict=True)
+        return {item.name: value for item, value in applied if item.table in (-1, table)} | {**self.fixed}
+
     def steady(self, x: Array) -> Array:
         """Return all curves in steady sliding, or by runs."""
         if self.by_run:
             return self.sampled(x)[0]
-        numbers, result = self.numbers(x), []
-        for table, table_groups in zip(self.tables, self.groups, strict=True):
-            columns = np.empty((len(table.curves), table.rows))
+        result = []
+        for k, (table, table_groups) in enumerate(zip(self.tables, self.groups, strict=True)):
+            numbers, columns = self.of_table(x, k), np.empty((len(table.curves), table.rows))
             for group in table_groups:
                 columns[:, group.rows] = [*by_steady_sliding(group, numbers, table.names, self.theory).values()]
             result.append(columns.ravel())
@@ -392,8 +423,8 @@ class Problem:
 
     def sampled(self, x: Array) -> Array:
         """Return all curves by the scenario's own models and their standard errors, shape (2, numbers)."""
-        numbers, tables = self.numbers(x), zip(self.tables, self.groups, strict=True)
-        runs = [by_runs(groups, numbers, table.names, "t" in table.conditions) for table, groups in tables]
+        tables = zip(range(len(self.tables)), self.tables, self.groups, strict=True)
+        runs = [by_runs(rows, self.of_table(x, k), table.names, "t" in table.conditions) for k, table, rows in tables]
         return np.concatenate([rows.reshape(2, -1) for rows in runs], axis=1)
 
     def predicted(self, x: Array) -> Array:
@@ -414,7 +445,7 @@ class Problem:
             return None
         fine = np.geomspace(np.min(speeds), np.max(speeds), _DRAWN)[:, np.newaxis]
         course = group._replace(rows=np.arange(_DRAWN), time=group.time[k] + 0.0 * fine, speed=fine)
-        return fine[:, 0], by_steady_sliding(course, self.numbers(x), [name], self.theory)[name]
+        return fine[:, 0], by_steady_sliding(course, self.of_table(x, table), [name], self.theory)[name]
 
     def conditions(self) -> dict[str, tuple[Quantity, list[Array]]]:
         """Return the conditions but time that some table names, by key, with the values at the rows of each table.
@@ -430,6 +461,13 @@ class Problem:
                     own = {"speed": group.speed[:, 0], "mount": course.at(group.time[:, 0], duration)}
                     values[group.rows] = own[key] if key in own else quantities(group.scenario)[key][1]
         return result
+
+    def drawn(self, expected: Array, rng: np.random.Generator) -> Array:
+        """Return all curves around what is expected, with the errors, those of the runs and the common ones."""
+        values = expected + np.hypot(self.sigma, self.noise) * rng.standard_normal(len(expected))
+        for name, size in self.common.items():
+            values = np.where(self.of(name), values * (1.0 + size * rng.standard_normal()), values)
+        return values
 
     @property
     def names(self) -> list[str]:
@@ -500,7 +538,7 @@ def lag(problem: Problem, x: Array) -> str:
     table, name, row = problem.at(number)
     group, k = problem.group(table, row)
     alone = Group(_still(group.scenario, group, k), np.zeros(1, int), group.time[[k]], group.speed[[k]])
-    mean, noise = by_runs([alone], problem.numbers(x), [name], False)[:, 0, 0]
+    mean, noise = by_runs([alone], problem.of_table(x, table), [name], False)[:, 0, 0]
     off = ramp[number] - mean
     error = math.hypot(problem.sigma[number], 2.0 * noise, 2.0 * problem.noise[number])
     if mean == 0.0 or not abs(off) > error:
@@ -523,14 +561,22 @@ def minimum(
     problem: Problem, start: Array, fixed: dict[int, float] | None = None, errors: bool = False, precision: float = 1e-8
 ) -> Minimum:
     """The least sum of squares near a start, with some numbers fixed, to a relative precision."""
-    fixed = fixed or {}
+    fixed, bounds = dict(fixed or {}), problem.bounds
+    for k, item in enumerate(problem.free):
+        if k in fixed and (base := item.base) >= 0:
+            bounds[base] = low, high = item.room(problem.free[base], fixed[k])
+            if not low < high:
+                fixed[base] = low
     parameters = lmfit.Parameters()
-    for k, (low, high) in enumerate(problem.bounds):
+    for k, (low, high) in enumerate(bounds):
         room = 1e-3 * (high - low) if math.isfinite(high - low) else 0.0  # at a bound no step has an effect
-        value = fixed[k] if k in fixed else min(max(start[k], low + room), high - room)
-        if k not in fixed and abs(value - 0.5 * (low + high)) < _BESIDE * room:  # in the middle its steps are none
+        if k in fixed:
+            parameters.add(f"p{k}", value=fixed[k], vary=False)
+            continue
+        value = min(max(start[k], low + room), high - room)
+        if abs(value - 0.5 * (low + high)) < _BESIDE * room:  # in the middle its steps are none
             value = 0.5 * (low + high) + _BESIDE * room
-        parameters.add(f"p{k}", value=value, min=low, max=high, vary=k not in fixed)
+        parameters.add(f"p{k}", value=value, min=low, max=high)
 
     def numbers(current: Any) -> Array:
         return np.array([*current.valuesdict().values()])
@@ -626,6 +672,8 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
     lowest, highest = np.transpose(problem.bounds)
     bound, spread = (lowest if sign < 0.0 else highest)[k], math.sqrt(best.covariance[k, k])
     along = best.covariance[:, k] / spread  # where the rest goes with this number
+    item = problem.free[k]
+    base = problem.free[item.base] if item.base >= 0 else None
     room, near, far, start = abs(bound - best.x[k]), 0.0, rise * spread, best.x
 
     @functools.cache
@@ -635,8 +683,11 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
         if distance == 0.0:
             return -rise
         number = bound if distance == room else best.x[k] + sign * distance
-        starts = np.array([start, best.x + along * (number - best.x[k]) / spread])
+        starts = np.array([start, best.x + along * (number - best.x[k]) / spread, best.x, best.x][: 4 if base else 2])
         starts[:, k] = number
+        if base:  # in the last start the other value is kept instead of the base
+            other = item.related(base.outer(best.x[item.base]), best.x[k])
+            starts[-1, item.base] = base.inner(min(max(item.related(other, -number), base.low), base.high))
         # if the data do not bound a number, the straight way to it leads out of the bounds
         guess = min(np.clip(starts, lowest, highest), key=lambda x: float(np.sum(problem.residuals(x) ** 2)))
         result = minimum(problem, guess, {k: number}, precision=_END_SQUARES)
@@ -653,6 +704,31 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
         # the root of a parabola is a line
         near, far = far, far * min(1.1 * rise / max(rise + above(far), 1e-300), 3.0)
     return math.nan, True
+
+
+def with_one_value(problem: Problem, best: Minimum, places: Sequence[int]) -> tuple[Problem, list[Array]]:
+    """Return the problem in which neighbouring numbers, one of each table, are a single one, and starts for it."""
+    first, merged, x = places[0], [*problem.free], best.x
+    merged[first : places[-1] + 1] = [merged[first]._replace(key=merged[first].name, table=-1)]
+    values = [float(np.mean(x[list(places)])), *x[list(places)]]
+    starts = [np.where(np.isin(np.arange(len(x)), places), value, x) for value in values]
+    return replace(problem, free=merged), [np.delete(start, places[1:]) for start in starts]
+
+
+def with_difference(problem: Problem, best: Minimum, k: int, base: int, is_ratio: bool) -> tuple[Problem, Minimum]:
+    """Return the problem and its minimum if a number k of a table is fitted by its ratio or difference to another."""
+    item, free, x, slopes = problem.free[k], [*problem.free], best.x.copy(), np.eye(len(best.x))
+    value, reference = item.outer(float(x[k])), item.outer(float(x[base]))
+    table, other = (problem.tables[problem.free[j].table].path.stem for j in (k, base))
+    quantity, start, low, high = item.quantity, 0.0, item.low - item.high, item.high - item.low
+    x[k], slopes[k, [k, base]] = value - reference, (value, -reference) if item.logarithmic else (1.0, -1.0)
+    if is_ratio:
+        quantity, start, low, high = Quantity("1", "ratio"), 1.0, item.low / item.high, item.high / item.low
+        x[k], slopes[k, [k, base]] = math.log(value / reference), (1.0, -1.0)
+    name = f"{item.name} ({table} {'/' if is_ratio else '-'} {other})"
+    free[k] = Free(name, quantity, start, low, high, item.table, base)
+    covariance = None if best.covariance is None else slopes @ best.covariance @ slopes.T
+    return replace(problem, free=free), best._replace(x=x, covariance=covariance)
 
 
 def problem_of(

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 #: A name and its unit: "speed [mm/s]", "speed (mm/s)" or "speed in mm/s".
 _HEADING = re.compile(r"(?P<name>[^\[\]()]+?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]*?)\s*[\])]|\sin\s+(?P<other>\S+))?")
+#: A comment that states a condition of all rows: "# contact.load = 4 mN".
+_STATED = re.compile(r"^#[ \t]*([\w.]+)[ \t]*=[ \t]*([^;,\t\n]+)", re.MULTILINE)
 _MOST_BYTES = 2**28
 #: Unknown columns that a message names.
 _MOST_NAMED = 20
@@ -631,7 +633,8 @@ def read_measured(
     Parameters
     ----------
     path : Path
-        CSV with a header such as ``speed [mm/s], contact_area [mm^2], contact_area_error [mm^2]``.
+        CSV with a header such as ``speed [mm/s], contact_area [mm^2], contact_area_error [mm^2]``. A comment such as
+        ``# contact.load = 4 mN`` states a condition of all rows.
     known : dict of str to Quantity
         All names that a column may have.
     outcomes : dict of str to Quantity
@@ -681,7 +684,9 @@ def _measured_columns(
     units = dict(_headed(_cells(text))[1])
     if not units:
         raise TableError("the columns have no header; add one of names and units, such as speed [mm/s]")
-    _refuse_unknown(units, known, outcomes)
+    comments = {name.replace(".", "_"): (name, value.strip()) for name, value in _STATED.findall(text)}
+    stated = {n: comment for n, comment in comments.items() if "." in comment[0] or (n in known and n not in outcomes)}
+    _refuse_unknown([*units, *stated], known, outcomes)
     wanted: dict[str, Quantity] = {}
     for name, unit in units.items():
         if name in known:
@@ -694,6 +699,14 @@ def _measured_columns(
         cure = f'write "{bare[0]} [{wanted[bare[0]].unit}]" if that is its unit'
         raise TableError(f'column "{bare[0]}" has no unit, but others have one; {cure}')
     arrays = columns(text, wanted, gaps=gaps)
+    for name, (key, value) in stated.items():
+        if name in arrays:
+            raise TableError(f'"{key}" is a column and a comment; omit one of them')
+        try:
+            number = known[name].read(value)
+        except ValueError as fault:
+            raise TableError(f'the comment "# {key} = {value[:40]}": {fault}') from None
+        arrays[name] = np.full(len(next(iter(arrays.values()))), number)
     for base in (name for name in outcomes if {name, name + ERROR} <= wanted.keys()):
         if wanted[base + ERROR].unit != outcomes[base].unit:  # a share of the value
             arrays[base + ERROR] *= np.abs(arrays[base])

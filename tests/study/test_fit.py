@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from scipy import stats
+from scipy import optimize, stats
 
 import sim
 from sim.cli import cli
@@ -587,6 +587,196 @@ def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unaske
     toml.write_text("# not written by a fit\n", encoding="utf-8")
     assert isinstance(command(scenario, curves, *again).exception, BadInput)
     assert toml.read_text(encoding="utf-8") == "# not written by a fit\n"
+
+
+def condition_tables(scene, changes, error, seed, noise=1.0, **chosen):
+    """Tables named after conditions, each of the scene with its changes, with noise in units of the stated errors."""
+    tables = []
+    for k, (name, changed) in enumerate(changes.items()):
+        drawn, exact = (drawn_of(scene.with_values(changed), e, 2 * seed + k, **chosen) for e in (error, 1e-300))
+        pairs = zip(drawn.curves, exact.curves, strict=True)
+        curves = [c._replace(values=e.values + noise * (c.values - e.values)) for c, e in pairs]
+        tables.append(drawn._replace(path=Path(f"{name}.csv"), curves=tuple(curves)))
+    return tables
+
+
+SPEED = "bonds.critical_speed"
+THREE = {"dry": {SPEED: 0.01}, "wet": {SPEED: 0.015}, "oil": {SPEED: 0.01}}
+
+
+def test_tables_without_noise_give_their_exact_ratios_and_keys_all_per_table_give_the_separate_fits():
+    scene, start = load(LENS), load(LENS).with_values({SPEED: 0.012, "bonds.stress": 2.5e5})
+    tables = condition_tables(scene, THREE, 0.01, 1, 0.0)
+    result = fit(start, tables, ["bonds.stress"], steady=True, per_table=[SPEED])
+    wet, oil, by_wet, by_oil = result.differences
+    assert [item.free.key for item in (wet, by_oil)] == [f"{SPEED} (wet / dry)", f"{SPEED} (oil - dry)"]
+    assert_allclose([wet.value, oil.value, by_wet.value], [1.5, 1.0, 5e-3], rtol=1e-5)
+    assert abs(by_oil.value) < 1e-5 * by_oil.error
+    assert result.no_difference[SPEED].freedom == 2 and result.no_difference[SPEED].p_value < 1e-9
+    assert [scene.population.critical_speed for scene in result.scenarios.values()] == [
+        result.values[f"{SPEED} ({name})"] for name in THREE]  # fmt: skip
+    same = {name: {} for name in THREE}
+    tables = condition_tables(scene, same, 0.01, 1, 0.0)
+    result = fit(start, tables, ["bonds.stress"], steady=True, per_table=[SPEED])
+    assert result.no_difference[SPEED].p_value > 1.0 - 1e-5  # chi^2 is 0 to the precision of a minimum
+    tables = condition_tables(scene, {name: THREE[name] for name in ("dry", "wet")}, 0.01, 2)
+    result = fit(scene, tables, [], steady=True, per_table=KEYS)
+    alone = [fit(scene, [table], KEYS, steady=True) for table in tables]
+    separate = [alone[k % 2].numbers[k // 2] for k in range(2 * len(KEYS))]
+    assert_allclose(result.best.chi_square, sum(item.best.chi_square for item in alone), rtol=1e-7)
+    for item, other in zip(result.numbers, separate, strict=True):
+        assert_allclose(item.value, other.value, rtol=1e-3 * other.error / other.value)
+        assert_allclose(item.interval[:2], other.interval[:2], rtol=3e-3 * other.error / other.value)
+
+
+@pytest.mark.parametrize("case", ["plain", "bound", "without errors"])
+def test_intervals_and_p_of_a_force_proportional_to_a_stress_per_table_follow_from_closed_forms(case):
+    """Both estimates are normal, so the interval of the ratio is that of Fieller; a bound clips a parabola."""
+    scene = load(LENS).with_values({"adhesion.bond_share": 0.0, "shear": {"model": "uniform"}})
+    changes = {"dry": {"bonds.stress": 3e5}, "wet": {"bonds.stress": 3.1e5}}
+    tables = condition_tables(scene, changes, 0.03, 5, names=["friction_force"])
+    (unit,) = drawn_of(scene.with_values({"bonds.stress": 1.0}), 1e-300, 0, names=["friction_force"]).curves
+    is_bare, stresses, errors, bound = case == "without errors", [], [], math.inf
+    for k, ((curve,), table) in enumerate((table.curves, table) for table in tables):
+        weight = (unit.values / (1.0 if is_bare else curve.errors)) ** 2
+        stresses.append(np.sum(weight * curve.values / unit.values) / np.sum(weight))
+        left = np.sum((curve.values - stresses[k] * unit.values) ** 2) / (len(SPEEDS) - 1) if is_bare else 1.0
+        errors.append(math.sqrt(left / np.sum(weight)))
+        tables[k] = table._replace(curves=(curve._replace(errors=None if is_bare else curve.errors),))
+    (dry, wet), (of_dry, of_wet) = stresses, errors
+    if case == "bound":
+        bound = wet + 0.5 * of_wet
+    law = stats.f(1, 2 * len(SPEEDS) - 2) if is_bare else stats.chi2(1)
+
+    def above(slope, offset):  # the value of wet is slope times that of dry plus offset
+        weights = np.array([1.0 / of_dry**2, slope**2 / of_wet**2])
+        value = min(np.average([dry, (wet - offset) / slope], weights=weights), bound, (bound - offset) / slope)
+        return ((value - dry) / of_dry) ** 2 + ((slope * value + offset - wet) / of_wet) ** 2 - law.ppf(0.95)
+
+    text = f"bonds.stress=1 kPa:{bound:.17g}" if case == "bound" else "bonds.stress"
+    result = fit(scene, tables, [], steady=True, per_table=[text])
+    both = math.hypot(of_dry, of_wet)
+    for item, best, of in zip(result.differences, (wet / dry, wet - dry), (both / dry, both), strict=True):
+        assert_allclose(item.value, best, rtol=0, atol=1e-4 * of)
+        root = (lambda x: above(x, 0.0)) if item.free.quantity.unit == "1" else (lambda x: above(1.0, x))
+        ends = [optimize.brentq(root, best, best + sign * 9.0 * of) for sign in (-1.0, 1.0)]
+        assert_allclose(item.interval[:2], ends, rtol=0, atol=3e-3 * of)  # a thousandth of the half width is promised
+        assert item.interval[2:] == (False, case == "bound")
+    test = result.no_difference["bonds.stress"]
+    assert_allclose(test.chi_square, (wet - dry) ** 2 / both**2, rtol=1e-4)
+    if case != "bound":
+        assert test.draws == 0
+        assert_allclose(test.p_value, law.sf(test.chi_square), rtol=1e-12)
+    assert (case == "bound") == (test.draws > 0)
+    assert is_bare == any("F distribution" in remark for remark in result.remarks)
+
+
+@pytest.mark.parametrize(("seed", "is_excluded"), [(5003, False), (5004, True)])
+def test_differences_of_values_at_a_bound_agree_with_their_chi_square_and_mark_the_ends_that_it_sets(
+    seed, is_excluded, monkeypatch
+):
+    monkeypatch.setattr(calibration, "_DRAWS", 1)
+    key, changes = "shear.spectrum.rms", {name: {"shear.paid_by_adhesion": 0.0} for name in ("dry", "wet")}
+    tables = condition_tables(load(LENS), changes, 0.02, seed)
+    for order in (tables, tables[::-1]):
+        result = fit(load(LENS), order, [SPEED], steady=True, per_table=[key])
+        (of_ratio, of_difference), test = (item.interval for item in result.differences), result.no_difference[key]
+        assert (test.chi_square > stats.chi2.ppf(0.95, 1)) == is_excluded and test.draws == 1
+        assert (of_ratio.low < 1.0 < of_ratio.high) != is_excluded
+        assert (of_difference.low < 0.0 < of_difference.high) != is_excluded
+        base, other = (item.interval for item in result.numbers[1:])
+        assert [base.low_open, other.low_open] == [
+            not (is_excluded and order is tables),
+            not (is_excluded and order is not tables),
+        ]
+        assert of_ratio[2:] == of_difference[2:] == (other.low_open, base.low_open)
+
+
+def test_values_per_table_that_do_not_go_together_are_refused_in_one_line(scenario, tmp_path, truth):
+    def written_to(name, curves, text=""):
+        path = table(tmp_path / name, {"speed [m/s]": SPEEDS}, curves, 0.01)
+        path.write_text(text + path.read_text(encoding="utf-8"), encoding="utf-8")
+        return path
+
+    (tmp_path / "b").mkdir()
+    dry, twin = written_to("dry.csv", truth), written_to("b/Dry.csv", truth)
+    stress = written_to("stress.csv", {"shear_stress": np.full(len(SPEEDS), 3e5)})
+    load_of = written_to("load.csv", truth, "# contact.load = 8 mN\n")
+    wrong, unknown = written_to("m.csv", truth, "# load = 8 mm\n"), written_to("u.csv", truth, "#contact.laod=8 mN\n")
+    twice = written_to("t.csv", truth, "# speed = 1 mm/s\n")
+    split = ("--per-table", SPEED)
+    for words, cure in (
+        ((dry, *split), "one table only"), ((dry, twin, *split), "rename"), ((dry, stress), "--per-table"),
+        ((dry, stress, *split, "--free", SPEED), f"{SPEED} is there twice"),
+        ((dry, stress, "--per-table", "shear.spectrum.rms"), "rms: has no effect on what was measured in stress"),
+        ((dry, load_of, "--free", "contact.load"), f"{load_of}: has values of contact.load"),
+        ((dry, wrong, *split), 'not a unit of N'), ((dry, unknown, *split), "contact_laod → contact_load"),
+        ((dry, twice, *split), '"speed" is a column and a comment'),
+    ):  # fmt: skip
+        done = command(scenario, *words, "--steady")
+        assert isinstance(done.exception, BadInput), (words, done.output)
+        (line,) = done.exception.problems
+        assert cure in line and "\n" not in line
+    assert not [*tmp_path.glob("lens_fit*")]
+
+
+def test_the_command_writes_a_scenario_for_each_table_with_its_load_and_draws_a_colour_for_each(scenario, tmp_path):
+    conditions = {"dry": {}, "wet": {SPEED: 0.02, "contact.load": 8e-3, "solid.shear_modulus": 1e6}}
+    paths = []
+    for name, changes in conditions.items():
+        drawn = drawn_of(load(LENS).with_values(changes), 0.01, 3)
+        curves = {curve.name: curve.values for curve in drawn.curves}
+        paths.append(table(tmp_path / f"{name}.csv", {"speed [m/s]": SPEEDS}, curves, 0.01))
+    header = "# T = 25 C\n# contact.load = 8 mN\n# solid.shear_modulus = 1 MPa\n"
+    paths[1].write_text(header + paths[1].read_text(encoding="utf-8"), encoding="utf-8")
+    words = (scenario, *paths, "--free", "bonds.stress", "--per-table", SPEED, "--steady")
+    done = command(*words)
+    assert done.exit_code == 0, done.output
+    document = json.loads((tmp_path / "lens_fit.json").read_text(encoding="utf-8"))
+    ratio = document["differences"][f"{SPEED} (wet / dry)"]
+    assert ratio["low"] < 2.0 < ratio["high"] and document["no_difference"][SPEED]["p_value"] < 1e-6
+    for name, changes in conditions.items():
+        fitted, numbers = quantities(load(tmp_path / f"lens_fit_{name}.toml")), document["numbers"]
+        expected = {key: numbers[key]["value"] for key in ("bonds.stress", f"{SPEED} ({name})")} | changes
+        expected[SPEED] = expected.pop(f"{SPEED} ({name})")
+        assert_allclose([fitted[key][1] for key in expected], [*expected.values()], rtol=1e-11)
+    assert not (tmp_path / "lens_fit.toml").exists()
+    assert command(*words, "--force").exit_code == 0 and "(wet / dry)" in done.output
+    result = sim.fit(LENS, paths, ["bonds.stress"], steady=True, per_table=[SPEED])
+    assert f"{SPEED}: p of no difference {result.no_difference[SPEED]}" in repr(result).splitlines()
+    upper, *_ = figure(result.problem, result.best).axes
+    points, fits = drawn_by_colour(upper)
+    labels = [text.get_text().partition(",")[0] for text in upper.get_legend().get_texts()]
+    assert len(points) == 2 and points.keys() == fits.keys() and labels[-2:] == ["dry", "wet"]
+
+
+@pytest.mark.verify
+def test_the_interval_of_a_ratio_holds_it_and_no_difference_is_rejected_as_often_as_stated():
+    scene, held, rejected = load(LENS), 0, 0
+    for seed in range(200):
+        for ratio in (1.5, 1.0):
+            changes = {"dry": {SPEED: 0.01}, "wet": {SPEED: 0.01 * ratio}}
+            tables = condition_tables(scene, changes, 0.02, seed)
+            result = fit(scene, tables, ["bonds.stress"], steady=True, per_table=[SPEED])
+            low, high, *_ = result.differences[0].interval
+            held += ratio > 1.0 and low < ratio < high
+            rejected += ratio == 1.0 and result.no_difference[SPEED].p_value < 0.05
+    # all but 1 in 200 such series of 200 would lie in these ranges
+    assert 179 <= held <= 198 and 3 <= rejected <= 19, (held, rejected)
+
+
+@pytest.mark.verify
+def test_p_of_no_difference_is_as_often_small_as_it_says_if_values_stand_at_their_bounds():
+    scene, changes, values = load(LENS), {name: {"shear.paid_by_adhesion": 0.0} for name in ("dry", "wet")}, []
+    for seed in range(7000, 7060):
+        tables = condition_tables(scene, changes, 0.02, seed)
+        of_seed = scene.with_values({"seed": seed})
+        result = fit(of_seed, tables, [SPEED], steady=True, per_table=["shear.spectrum.rms"])
+        test = result.no_difference["shear.spectrum.rms"]
+        assert test.draws > 0 or not any(item.interval.low_open for item in result.numbers)
+        values.append(test.p_value)
+    assert stats.binom.ppf(0.0005, 60, 0.3) <= sum(p <= 0.3 for p in values) <= stats.binom.ppf(0.9995, 60, 0.3)
+    assert sum(p <= 0.05 for p in values) <= stats.binom.ppf(0.999, 60, 0.05)
 
 
 def test_every_line_of_the_paper_holds_and_a_wrong_value_or_law_fails(monkeypatch):
