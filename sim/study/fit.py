@@ -233,11 +233,8 @@ def fit(
         raise BadInput([f'--steady: drive.model = "{base.drive.model}" needs runs; omit --steady'])
     if base.drive.solves_motion or (not steady and idle(problem)):
         problem = replace(problem, by_run=True).compared(problem.start)
-    without_effect = dict[str, list[str]]()
     for name, _, table in (key.partition(" (") for key in idle(problem)):
-        without_effect.setdefault(name, []).append(table[:-1])
-    for name, names in without_effect.items():
-        option, place = ("--per-table", f" in {', '.join(names)}") if names[0] else ("--free", "")
+        option, place = ("--per-table", f" in {table[:-1]}") if table else ("--free", "")
         faults.append(f"{option} {name}: has no effect on what was measured{place}; fix it")
     for keys in [] if faults else likelihood.entangled(problem):
         options = " and --per-table" * bool(split)
@@ -581,10 +578,9 @@ def carried_out(
         with files.output(path) as beside:
             beside.write_bytes(content)
     sources = [f"{table.path}: {table.rows} rows, {table.ranges}" for table in tables]
-    remarks = "\n".join(["", _quality(result), *result.remarks, *sources, ""])
-    shown: list[Printed] = [(_table(result), "" if result.differences else remarks)]
+    shown: list[Printed] = [(_table(result), "\n".join(["", _quality(result), *result.remarks, *sources, ""]))]
     if result.differences:
-        shown.append((_differences(result), remarks))
+        shown.append((_differences(result), ""))
     if verdict is not None:
         doubt = "; but even the unchanged scenario misses the data, so perhaps none of these is true"
         shown.append((_comparison(verdict), f"\n{verdict.words}{doubt if result.p_value <= POOR else ''}\n"))
@@ -610,10 +606,9 @@ def _differences(fit: Fit) -> list[dict[str, str]]:
     rows, tests = [], {**fit.no_difference}
     for item in fit.differences:
         value, low, high, unit = item.texts
-        test = tests.pop(item.free.name, "")
         rows.append({
             "ratio or difference": item.free.key, "value": f"{value} {unit}".rstrip(),
-            f"{LEVEL:.0%} interval": f"{low} to {high}", "p of no difference": str(test),
+            f"{LEVEL:.0%} interval": f"{low} to {high}", "p of no difference": str(tests.pop(item.free.name, "")),
         })  # fmt: skip
     return rows
 

@@ -672,8 +672,7 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
     lowest, highest = np.transpose(problem.bounds)
     bound, spread = (lowest if sign < 0.0 else highest)[k], math.sqrt(best.covariance[k, k])
     along = best.covariance[:, k] / spread  # where the rest goes with this number
-    item = problem.free[k]
-    base = problem.free[item.base] if item.base >= 0 else None
+    base = problem.free[item.base] if (item := problem.free[k]).base >= 0 else None
     room, near, far, start = abs(bound - best.x[k]), 0.0, rise * spread, best.x
 
     @functools.cache
@@ -683,14 +682,17 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
         if distance == 0.0:
             return -rise
         number = bound if distance == room else best.x[k] + sign * distance
-        starts = np.array([start, best.x + along * (number - best.x[k]) / spread, best.x, best.x][: 4 if base else 2])
+        starts = np.array([start, best.x + along * (number - best.x[k]) / spread, best.x, best.x])
         starts[:, k] = number
         if base:  # in the last start the other value is kept instead of the base
             other = item.related(base.outer(best.x[item.base]), best.x[k])
             starts[-1, item.base] = base.inner(min(max(item.related(other, -number), base.low), base.high))
         # if the data do not bound a number, the straight way to it leads out of the bounds
-        guess = min(np.clip(starts, lowest, highest), key=lambda x: float(np.sum(problem.residuals(x) ** 2)))
-        result = minimum(problem, guess, {k: number}, precision=_END_SQUARES)
+        guesses = [*np.clip(starts, lowest, highest)]
+        if not base:
+            guesses = [min(guesses[:2], key=lambda x: float(np.sum(problem.residuals(x) ** 2)))]
+        minima = [minimum(problem, guess, {k: number}, precision=_END_SQUARES) for guess in guesses]
+        result = min(minima, key=lambda item: item.chi_square)
         root, start = math.sqrt(max(result.chi_square - best.chi_square, 0.0)), result.x
         return 0.0 if abs(root / rise - 1.0) < _END else root - rise
 

@@ -671,7 +671,7 @@ def test_intervals_and_p_of_a_force_proportional_to_a_stress_per_table_follow_fr
     assert is_bare == any("F distribution" in remark for remark in result.remarks)
 
 
-@pytest.mark.parametrize(("seed", "is_excluded"), [(5003, False), (5004, True)])
+@pytest.mark.parametrize(("seed", "is_excluded"), [(5003, False), (5004, True), (5008, False)])
 def test_differences_of_values_at_a_bound_agree_with_their_chi_square_and_mark_the_ends_that_it_sets(
     seed, is_excluded, monkeypatch
 ):
@@ -690,6 +690,9 @@ def test_differences_of_values_at_a_bound_agree_with_their_chi_square_and_mark_t
             not (is_excluded and order is not tables),
         ]
         assert of_ratio[2:] == of_difference[2:] == (other.low_open, base.low_open)
+        # a value at its bound has no effect, so the other one is free within its own interval, but for a correlation
+        assert not base.low_open or of_ratio.high > 0.5 * other.high / base.low
+        assert not other.low_open or of_ratio.low < 2.0 * other.low / base.high
 
 
 def test_values_per_table_that_do_not_go_together_are_refused_in_one_line(scenario, tmp_path, truth):
