@@ -39,7 +39,7 @@ from sim.scenario.schema import files_read, quantities
 from sim.study import likelihood
 from sim.study.converge import Printed
 from sim.study.likelihood import LEVEL, MOUNT, Curve, Free, Interval, Measured, Minimum, Problem, idle, with_errors
-from sim.study.mechanisms import WHOLE, Verdict, compare
+from sim.study.mechanisms import WHOLE, Search, Verdict, compare, draws_of
 from sim.units.errors import BadInput
 from sim.units.notation import concise, engineering, in_units, scaled
 from sim.units.quantity import read_option
@@ -56,8 +56,8 @@ _BESIDE, _MOST_ROWS = 0.5, 3
 POOR = 0.05
 #: Ratio of measured and fitted values beyond which a unit is asked for.
 _OTHER_UNIT = 100.0
-#: Most draws of curves without a difference, ratios as large as the measured one that are enough, and their precision.
-_DRAWS, _ENOUGH, _FINE = 200, 20, 1e-4
+#: Most draws of curves without a difference, and ratios as large as the measured one that are enough.
+_DRAWS, _ENOUGH = 200, 20
 #: Tables of keys that are not physical.
 _OTHER = ("clock", "record", "ensemble", "seed")
 
@@ -354,13 +354,11 @@ def _no_difference(result: Fit, places: list[int]) -> NoDifference:
     if problem.by_run:
         return NoDifference(math.nan, rise, freedom, 0)
     spread = np.repeat(single.x, [len(places) if k == places[0] else 1 for k in range(len(single.x))])
-    expected, rng, larger = merged.predicted(single.x), np.random.default_rng([result.scenario.seed, places[0]]), 0
-    for count in range(1, _DRAWS + 1):
-        values = problem.drawn(expected, rng)
-        joint = likelihood.minimum(replace(merged, values=values), single.x, precision=_FINE).chi_square
-        drawn = replace(problem, values=values)
-        least = min(likelihood.minimum(drawn, start, precision=_FINE).chi_square for start in (best.x, spread))
-        larger += (joint - least) / (least if is_estimated else 1.0) >= measured
+    joint, separate, larger = Search(merged, [single.x]), Search(problem, [best.x, spread]), 0
+    drawn = draws_of(problem, merged.predicted(single.x), np.random.default_rng([result.scenario.seed, places[0]]))
+    for count, values in enumerate(itertools.islice(drawn, _DRAWS), 1):
+        one_value, least = joint.least(values).chi_square, separate.least(values).chi_square
+        larger += (one_value - least) / (least if is_estimated else 1.0) >= measured
         if larger == _ENOUGH:
             return NoDifference(larger / count, rise, freedom, count)
     return NoDifference((1 + larger) / (1 + _DRAWS), rise, freedom, _DRAWS)

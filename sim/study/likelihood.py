@@ -462,13 +462,6 @@ class Problem:
                     values[group.rows] = own[key] if key in own else quantities(group.scenario)[key][1]
         return result
 
-    def drawn(self, expected: Array, rng: np.random.Generator) -> Array:
-        """Return all curves around what is expected, with the errors, those of the runs and the common ones."""
-        values = expected + np.hypot(self.sigma, self.noise) * rng.standard_normal(len(expected))
-        for name, size in self.common.items():
-            values = np.where(self.of(name), values * (1.0 + size * rng.standard_normal()), values)
-        return values
-
     @property
     def names(self) -> list[str]:
         """Return the names of all curves."""
