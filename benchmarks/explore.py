@@ -1,20 +1,24 @@
 """Latency of the page of ``sim explore`` in Chromium: ``python -m benchmarks.explore``.
 
 The page shows twelve sliders or more, measured points and the ghost of the start. A latency reaches from the event of
-an input to the frame after the drawing. The load of the machine is printed, because latencies depend on it.
+an input to the frame after the drawing. The end of a job reaches from a click, a closed tab, a reload or a signal to the
+end of its process. The load of the machine is printed, because latencies depend on it.
 """
 
+import contextlib
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from playwright.sync_api import Page, sync_playwright
+import psutil
+from playwright.sync_api import Browser, Page, sync_playwright
 
 import sim
 
@@ -72,11 +76,7 @@ def main() -> None:
         table.write_text(points(), encoding="utf-8")
         browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         began = time.time()
-        command = [sys.executable, "-m", "sim", "explore", SCENARIO, "--no-browser", "--data", table]
-        server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-        try:
-            assert server.stdout is not None
-            address = server.stdout.readline().split()[1]
+        with served("--data", table) as (server, address):
             row("from the command to the painted page", [painted(browser.new_page(), address, began)])
             row("load of a warm server", [painted(browser.new_page(), address, time.time()) for _ in range(5)])
             page = browser.new_page(viewport={"width": 1200, "height": 900})
@@ -90,10 +90,49 @@ def main() -> None:
             until(page, lambda: float(page.locator("#progress").get_attribute("value") or 0.0) > 0.0)
             row("key press beside an ensemble", presses(page))
             assert page.locator("#stop").is_enabled(), "the ensemble ended before the last press"
+        for name in ENDS:
+            row(f"end of a job by {name}", [ended(browser, name) for _ in range(3)])
+        browser.close()
+
+
+@contextlib.contextmanager
+def served(*options: object) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """The process of ``sim explore``, and the address that it prints."""
+    command = [sys.executable, "-m", "sim", "explore", SCENARIO, "--no-browser", *map(str, options)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        try:
+            yield server, server.stdout.readline().split()[1]
         finally:
             server.kill()
-            server.wait()
-            browser.close()
+
+
+def ended(browser: Browser, name: str) -> float:
+    """Begin a job and end it; return the time to the end of its process, or of the server after Ctrl-C [ms]."""
+    with served("--set", "clock.duration=10000 s") as (server, address):
+        page = browser.new_page()
+        page.goto(address)
+        until(page, page.locator("#scene").text_content)
+        page.locator("#members").fill("100000")
+        page.locator("#run").click()
+        parent = psutil.Process(server.pid)
+        until(page, parent.children)
+        page.wait_for_timeout(3000)  # it computes by then
+        processes = parent.children(recursive=True) + [parent] * (name == "Ctrl-C")
+        began = time.perf_counter()
+        ENDS[name](page, server)
+        psutil.wait_procs(processes, timeout=60.0)
+        return 1e3 * (time.perf_counter() - began)
+
+
+#: Ways in which a job ends.
+ENDS: dict[str, Callable[[Page, subprocess.Popen[str]], object]] = {
+    "a click on stop": lambda page, server: page.locator("#stop").click(),
+    "a closed tab": lambda page, server: page.close(),
+    "a reload": lambda page, server: page.reload(wait_until="commit"),
+    "Ctrl-C": lambda page, server: server.send_signal(signal.SIGINT),
+    "kill -9 of the server": lambda page, server: server.kill(),
+}
 
 
 def points() -> str:
@@ -103,7 +142,7 @@ def points() -> str:
     return "\n".join(["speed [m/s],contact_area [m^2],contact_area_error [%]", *(f"{v},{a},1" for v, a in rows)])
 
 
-def until(page: Page, holds: Callable[[], bool]) -> None:
+def until(page: Page, holds: Callable[[], object]) -> None:
     """Wait until something holds on a page."""
     for _ in range(6000):
         if holds():

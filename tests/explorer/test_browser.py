@@ -14,7 +14,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from helpers.commands import LENS, RAMP
+from helpers.commands import COUNTED, LENS, RAMP
 from numpy.testing import assert_allclose
 
 import sim
@@ -30,22 +30,32 @@ pytestmark = [
 BONDS = '[bonds]\nmodel = "steady"\ncritical_speed = "10 mm/s"\nstress = "0.3 MPa"\n'
 WAVES = '[shear]\nmodel = "mean"\nspectrum = { model = "gaussian", rms = "60 kPa", length = "4 um" }\n'
 SCENE = LENS.replace("a scene", "</title><script>alert(1)</script><img src=x onerror=alert(1)>") + RAMP + BONDS + WAVES
+#: A scene whose ensembles take minutes.
+LONG = LENS.replace('duration = "1 s"', 'duration = "10000 s"') + RAMP + COUNTED
 RADIUS = "sphere.radius"
-#: The inputs of a page that are seen; their names with widths and heights; the least contrast of its texts.
+#: The inputs of a page that are seen; their names with widths and heights; its texts with their contrasts.
 VISIBLE = '[...document.querySelectorAll("input, select, button")].filter((item) => item.offsetParent)'
 SIZES = f"""{VISIBLE}.map((item) => {{
     const box = (item.type === "checkbox" ? item.labels[0] : item).getBoundingClientRect();
     return [item.id || item.value, box.width, box.height];
 }})"""
-CONTRAST = """(() => {
+CONTRAST = """[...document.querySelectorAll("body, body *")].flatMap((item) => {
     const part = (value) => (value <= 10 ? value / 3294 : ((value / 255 + 0.055) / 1.055) ** 2.4);
-    const light = (colour) => { const [r, g, b] = colour.match(/[0-9]+/g).map(Number);
-        return 0.2126 * part(r) + 0.7152 * part(g) + 0.0722 * part(b); };
-    const back = light(getComputedStyle(document.body).backgroundColor);
-    const texts = [document.body, document.querySelector(".hint"), document.querySelector("small")];
-    return Math.min(...texts.map((item) => { const text = light(getComputedStyle(item).color);
-        return (Math.max(text, back) + 0.05) / (Math.min(text, back) + 0.05); }));
-})()"""
+    const light = ([r, g, b]) => 0.2126 * part(r) + 0.7152 * part(g) + 0.0722 * part(b);
+    const parts = (colour) => { const found = colour.match(/[0-9.]+/g).map(Number);
+        return [...found.slice(0, 3), found[3] ?? 1]; };
+    const over = ([r, g, b, a], low) => [r, g, b].map((value, k) => a * value + (1 - a) * low[k]);
+    const back = (at) => { const colour = parts(getComputedStyle(at).backgroundColor);
+        return colour[3] === 1 || !at.parentElement ? colour : over(colour, back(at.parentElement)); };
+    const own = [...item.childNodes].filter((node) => node.nodeType === 3).map((node) => node.data).join("").trim();
+    const text = own || (/^(range|checkbox)$/.test(item.type) ? "" : item.value || "");
+    const look = getComputedStyle(item);
+    const isShown = item.getClientRects().length && !["NOSCRIPT", "SCRIPT", "STYLE", "OPTION"].includes(item.tagName);
+    if (!text || !isShown) return [];
+    const low = back(item).slice(0, 3);
+    const ink = light(over(parts(item instanceof SVGElement ? look.fill : look.color), low));
+    return [[text, (Math.max(ink, light(low)) + 0.05) / (Math.min(ink, light(low)) + 0.05)]];
+})"""
 
 
 @pytest.fixture(scope="module")
@@ -57,9 +67,9 @@ def browser():
 
 
 @contextlib.contextmanager
-def explored(path, *options):
+def explored(path, *options, browse="--no-browser"):
     """The process of ``sim explore`` on a scenario, and the address that it prints."""
-    command = [sys.executable, "-m", "sim", "explore", str(path), "--no-browser", *map(str, options)]
+    command = [sys.executable, "-m", "sim", "explore", str(path), browse, *map(str, options)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         try:
             line = process.stdout.readline()
@@ -173,6 +183,17 @@ def test_a_text_that_cannot_be_read_leaves_the_value_and_states_the_reason(shown
     wait(shown, lambda: shown.locator("[role=alert]").count() == 0, "the message stays")
 
 
+def drop(page, content, name):
+    page.evaluate(
+        """([content, name]) => {
+            const data = new DataTransfer();
+            data.items.add(new File([content], name));
+            dispatchEvent(new DragEvent("drop", { dataTransfer: data }));
+        }""",
+        [content, name],
+    )
+
+
 def saved(page, kind):
     with page.expect_download() as download:
         page.locator("#take").select_option(kind)
@@ -202,14 +223,7 @@ def test_a_table_with_decimal_commas_is_dropped_fitted_saved_and_opened_again(br
     lines = [f"{1e3 * v:.4f};{1e6 * a:.9f};1".replace(".", ",") for v, a in rows]
     content = "\n".join(["speed [mm/s];contact_area [mm^2];contact_area_error [%]", *lines])
     with explored(path) as (_, address), opened(browser, address) as page:
-        page.evaluate(
-            """(content) => {
-            const data = new DataTransfer();
-            data.items.add(new File([content], "<img src=x onerror=alert(1)>.csv"));
-            dispatchEvent(new DragEvent("drop", { dataTransfer: data }));
-        }""",
-            content,
-        )
+        drop(page, content, "<img src=x onerror=alert(1)>.csv")
         wait(page, lambda: "χ²" in page.locator("#judged").text_content(), "no points")
         assert page.locator("#judged img").count() == 0
         page.locator("#free input[value='bonds.critical_speed']").check()
@@ -220,6 +234,54 @@ def test_a_table_with_decimal_commas_is_dropped_fitted_saved_and_opened_again(br
         link, words = page.url, lost(page)
     with explored(path, "--state", link) as (_, address), opened(browser, address) as page:
         assert lost(page) == words
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_every_text_has_contrast(browser, served, scheme):
+    with opened(browser, served, color_scheme=scheme) as page:
+        drop(page, "speed [mm/s],contact_area [mm^2],contact_area_error [%]\n1,0.04,1\n9,0.03,1", "own.csv")
+        wait(page, lambda: page.locator("#free input").count() > 5, "no points")
+        enter(page, "3 kg")
+        page.locator("#run").click()
+        wait(page, lambda: "mean" in page.locator("#ran").text_content(), "no ensemble")
+        wait(page, lambda: page.locator("[role=alert]").count() == 1, "no message")
+        texts = page.evaluate(CONTRAST)
+        assert len(texts) > 100 and {"Numbers", "measured", "3 kg", "Undo"} <= {text for text, _ in texts}
+        assert [text for text in texts if text[1] < 4.5] == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
+def test_the_token_is_in_no_process_list_log_or_address(browser, tmp_path, monkeypatch):
+    path, profile = tmp_path / "long.toml", tmp_path / "profile"
+    path.write_text(LONG, encoding="utf-8")
+    options = f"--headless --no-sandbox --remote-debugging-port=0 --user-data-dir={profile}"
+    monkeypatch.setenv("BROWSER", f"{CHROMIUM} {options} %s &")  # as the command opens a browser by itself
+    with explored(path, browse="--browser") as (process, address):
+        token = address.partition("token=")[2]
+        end = time.monotonic() + 60.0
+        while not (port := profile / "DevToolsActivePort").exists() and time.monotonic() < end:
+            time.sleep(0.1)
+        context = browser.browser_type.connect_over_cdp(f"http://127.0.0.1:{port.read_text().split()[0]}").contexts[0]
+        page = context.pages[0]
+        settled(page)
+        page.locator("#run").click()
+        wait(page, lambda: any("sim.explorer.job" in line for line in command_lines()), "no job")
+        shown = command_lines()
+        assert len(token) > 40 and any("open.html" in line for line in shown)
+        assert not [line for line in shown if token in line] and "token" not in page.url
+        visited = context.new_cdp_session(page).send("Page.getNavigationHistory")["entries"]
+        assert not [entry for entry in visited if token in entry["url"]]
+        children = psutil.Process(process.pid).children(recursive=True)
+        process.send_signal(signal.SIGINT)
+        for child in children:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                child.kill()
+        assert token not in process.stdout.read()
+
+
+def command_lines():
+    """The process list, as any user of the machine reads it."""
+    return [" ".join(process.info["cmdline"] or ()) for process in psutil.process_iter(["cmdline"])]
 
 
 def jobs(process):
@@ -237,8 +299,7 @@ def alive(pids):
 def long(tmp_path):
     """A server of a scene whose ensembles take minutes."""
     path = tmp_path / "long.toml"
-    counted = BONDS.replace("steady", "counted") + 'rebinding_rate = "500 1/s"\nsites = 50\n'
-    path.write_text(LENS.replace('duration = "1 s"', 'duration = "10000 s"') + RAMP + counted, encoding="utf-8")
+    path.write_text(LONG, encoding="utf-8")
     with explored(path) as served:
         yield served
 
@@ -321,7 +382,6 @@ def test_a_small_screen_has_no_sideways_scroll_large_targets_and_contrast(browse
     with opened(browser, served, **small) as page:
         assert page.evaluate("document.documentElement.scrollWidth") == 390
         assert [size for size in page.evaluate(SIZES) if min(size[1:]) < 24] == []
-        assert page.evaluate(CONTRAST) >= 4.5
         title, back = page.locator("#plot .ytitle").first, "getComputedStyle(document.body).backgroundColor"
         before = page.evaluate(back), title.evaluate("(item) => item.style.fill")
         page.emulate_media(color_scheme={"light": "dark", "dark": "light"}[scheme])

@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+import subprocess
 import sys
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.testing import assert_allclose
 import sim
 from sim.explorer import take
 from sim.explorer.drawing import contact
+from sim.explorer.job import ensemble
 from sim.explorer.page import Page, Refused, previews
 from sim.explorer.server import Server, state_of
 from sim.laws import jkr
@@ -160,6 +162,18 @@ def test_values_of_the_page_are_those_of_a_run_of_the_saved_scenario(lens):
             assert_allclose(answer["curves"][name][place], float(run[name][-1]), rtol=1e-12)
 
 
+@pytest.mark.parametrize("name", ["own_psd", "soft_lens", "ten_wavelengths"])
+def test_values_of_the_page_lie_within_the_error_of_the_scenarios_own_models(name):
+    # the interval is of 95 %: twice its half are four standard errors
+    page = Page(sim.load(f"scenarios/{name}.toml"))
+    own = ensemble(page.scenes({}, 64), lambda message: None)
+    found = curves(page.scenario, np.array(own["speed"]))
+    for quantity in ("contact_area", "friction_force"):
+        mean, low, high = (np.array(own["curves"][quantity][kind]) for kind in ("mean", "low", "high"))
+        assert np.all(np.abs(found[quantity] - mean) <= high - low)
+        assert np.all(high > low) or found[quantity] == 0.0
+
+
 def test_curves_are_taken_away_as_a_table_and_as_pictures(lens):
     page = Page(sim.load(lens))
     rows = list(csv.reader(io.StringIO(take.table(page.scenario, page.speeds))))
@@ -241,6 +255,16 @@ def test_the_command_refuses_what_it_cannot_use_in_one_line_before_it_serves(len
         ):  # fmt: skip
             done = command("explore", *arguments, "--no-browser")
             assert done.exit_code == 2 and message in done.stderr.splitlines()[-1], arguments
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["check", "scenarios/pdms_lens.toml"]])
+def test_another_command_imports_nothing_of_the_page(arguments):
+    code = "import atexit, sys\natexit.register(lambda: print(*sys.modules, file=sys.stderr))\n"
+    code += f"import sim.cli\nsys.argv[1:] = {arguments}\nsim.cli.main()"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    modules = done.stderr.split()
+    assert "sim.cli" in modules and done.stdout
+    assert not [n for n in modules if n.startswith(("sim.explorer", "starlette", "uvicorn", "plotly", "tomlkit"))]
 
 
 def test_the_command_names_the_extra_that_is_missing_and_a_browser_that_is(lens, monkeypatch):
