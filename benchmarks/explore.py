@@ -1,8 +1,8 @@
 """Latency of the page of ``sim explore`` in Chromium: ``python -m benchmarks.explore``.
 
 The page shows twelve sliders or more, measured points and the ghost of the start. A latency reaches from the event of
-an input to the frame after the drawing. The end of a job reaches from a click, a closed tab, a reload or a signal to the
-end of its process. The load of the machine is printed, because latencies depend on it.
+an input to the frame after the drawing. The end of a job reaches from a click, a closed tab, a reload or a signal to
+the end of its process. The load of the machine is printed, because latencies depend on it.
 """
 
 import contextlib
@@ -76,7 +76,7 @@ def main() -> None:
         table.write_text(points(), encoding="utf-8")
         browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         began = time.time()
-        with served("--data", table) as (server, address):
+        with served("--data", table) as (_, address):
             row("from the command to the painted page", [painted(browser.new_page(), address, began)])
             row("load of a warm server", [painted(browser.new_page(), address, time.time()) for _ in range(5)])
             page = browser.new_page(viewport={"width": 1200, "height": 900})
@@ -121,8 +121,16 @@ def ended(browser: Browser, name: str) -> float:
         processes = parent.children(recursive=True) + [parent] * (name == "Ctrl-C")
         began = time.perf_counter()
         ENDS[name](page, server)
-        psutil.wait_procs(processes, timeout=60.0)
+        while any(is_alive(process) for process in processes):
+            time.sleep(0.005)
         return 1e3 * (time.perf_counter() - began)
+
+
+def is_alive(process: psutil.Process) -> bool:
+    """Return True if a process runs; one that has ended may still be in the list, if nobody asks for its result."""
+    with contextlib.suppress(psutil.NoSuchProcess):
+        return bool(process.status() != psutil.STATUS_ZOMBIE)
+    return False
 
 
 #: Ways in which a job ends.

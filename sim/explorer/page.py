@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from sim.ensemble.diagnosis import diagnosis, over_band, remarks
-from sim.ensemble.plan import Plan
+from sim.ensemble.plan import Plan, seconds_a_step
 from sim.ensemble.steady import sensitivities
 from sim.explorer.drawing import listed
 from sim.parts.exchange import Array
@@ -168,9 +168,11 @@ class Page:
         """Return the band of a few members of the scenario's own models; empty if that takes too long to follow."""
         from sim.explorer.job import ensemble
 
-        if len(self._times) > 1 and min(self._times) > _QUICK:  # the first run also loads and compiles
-            return {}
         scenes = self.scenes(values, min(_FEW, self.scenario.ensemble.members))
+        estimate = sum(scene.clock.steps * seconds_a_step(scene, scene.ensemble.members) for scene in scenes)
+        # the first run also loads and compiles, and the estimate is rough
+        if estimate > 10.0 * _QUICK or (len(self._times) > 1 and min(self._times) > _QUICK):
+            return {}
         began = time.perf_counter()
         result = ensemble(scenes, lambda message: None)
         self._times = [*self._times[-1:], time.perf_counter() - began]

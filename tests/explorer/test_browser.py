@@ -76,6 +76,9 @@ def explored(path, *options, browse="--no-browser"):
             assert line.startswith("open http://127.0.0.1:"), line
             yield process, line.split()[1]
         finally:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                for child in psutil.Process(process.pid).children(recursive=True):  # a browser that it opened
+                    child.kill()
             process.kill()
 
 
@@ -261,21 +264,18 @@ def test_the_token_is_in_no_process_list_log_or_address(browser, tmp_path, monke
         end = time.monotonic() + 60.0
         while not (port := profile / "DevToolsActivePort").exists() and time.monotonic() < end:
             time.sleep(0.1)
-        context = browser.browser_type.connect_over_cdp(f"http://127.0.0.1:{port.read_text().split()[0]}").contexts[0]
-        page = context.pages[0]
+        driven = browser.browser_type.connect_over_cdp(f"http://127.0.0.1:{port.read_text().split()[0]}")
+        page = driven.contexts[0].pages[0]
         settled(page)
         page.locator("#run").click()
         wait(page, lambda: any("sim.explorer.job" in line for line in command_lines()), "no job")
         shown = command_lines()
         assert len(token) > 40 and any("open.html" in line for line in shown)
         assert not [line for line in shown if token in line] and "token" not in page.url
-        visited = context.new_cdp_session(page).send("Page.getNavigationHistory")["entries"]
+        visited = page.context.new_cdp_session(page).send("Page.getNavigationHistory")["entries"]
         assert not [entry for entry in visited if token in entry["url"]]
-        children = psutil.Process(process.pid).children(recursive=True)
+        driven.new_browser_cdp_session().send("Browser.close")
         process.send_signal(signal.SIGINT)
-        for child in children:
-            with contextlib.suppress(psutil.NoSuchProcess):
-                child.kill()
         assert token not in process.stdout.read()
 
 

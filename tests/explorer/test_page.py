@@ -229,6 +229,11 @@ def test_the_drawing_has_the_contact_to_scale(lens):
     assert 0.2 * 6e4 < stress.std() < 1.1 * 6e4
 
 
+def test_a_band_that_takes_too_long_is_not_begun(lens):
+    short, long = (Page(sim.load(lens, {"clock.duration": seconds})) for seconds in (1.0, 1e5))
+    assert short.band({})["along"] == "speed" and long.band({}) == {}
+
+
 @pytest.mark.parametrize(
     "link", ["http://127.0.0.1:1/#sphere.radius=0.003&share=0.2&token=x", "sphere.radius=0.003&share=0.2"]
 )
