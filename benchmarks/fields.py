@@ -54,7 +54,22 @@ def banded(bench: Bench) -> list[Row]:
                 share=members * steps,
                 turns=7,
             )
-    return rows
+    members, steps = bench.of((1024, 200), (2, 4))
+    scene = lens(members, steps, **parts)
+    weights, shapes, *_ = sim.load(scene).process.gammas
+    theirs, random = plain.BandsNumpy(members, weights, shapes, 1), np.random.default_rng(1)
+    return rows + bench.compare(
+        "banded at 1 %, 512²: a member-step in memory, ours with bonds and contact, 1024 members × 200 steps",
+        followed(scene),
+        Beside("numpy with the same bands, ΔΓ alone", lambda: theirs.step(EXPONENT), members, bound=True),
+        Beside(
+            "compiled (numba) with the same bands, ΔΓ alone",
+            lambda: plain.bands_compiled(members, steps, weights, shapes, EXPONENT, random),
+            members * steps,
+            bound=True,
+        ),
+        share=members * steps,
+    )
 
 
 def modal(bench: Bench) -> list[Row]:

@@ -21,9 +21,10 @@ numpy and scipy would write for the same work. Other rows compare ours with one 
   depend on the machine and its load.
 - **"10 times faster"**: the other program takes 10 times our time.
 - **"1.1 times as long"**: ours takes 1.1 times the time of the other program.
-- **Slower rows**: ours is slower if a row reads "times slower", or more than 1 "times as long".
 - **Goals** for stress fields refer to the textbook program, which makes its noise by a Fourier transform. A leaner
-  program draws only the numbers that it needs. This leaner program stands in the next row, without a goal.
+  program, in the next row, draws only the numbers that it needs.
+- **Bands**: the factor beside programs that compute all modes is the gain of the algorithm. The rows with the same
+  bands show the gain of the code alone.
 - **Errors**, ours first, are those of one quantity: third cumulant of ΔΓ (bands), friction (bonds), position over its
   largest value (sliders), radius (contacts). No error is given if both programs are exact to rounding.
 - **Memory** that a program has freed stays with its process, for ours and the others alike. Otherwise the time for new

@@ -1,5 +1,8 @@
 """The programs that a user of numpy and scipy would write for fields of shear stress, clear and without waste."""
 
+import math
+
+import numba
 import numpy as np
 from scipy import fft
 
@@ -89,3 +92,34 @@ class HalfSpectrumMap:
         self.modes *= np.exp(-exponent)
         self.modes += renewed
         return fft.irfft2(self.modes, s=(self.points, self.points))
+
+
+class BandsNumpy:
+    """ΔΓ of the same bands as ours by numpy: each band a gamma number, renewed as the sum of squares that it is."""
+
+    def __init__(self, members, weights, shapes, seed):
+        self.random, self.weights, self.shapes = np.random.default_rng(seed), weights, shapes - 0.5
+        self.bands = self.random.standard_gamma(shapes, (members, shapes.size))
+
+    def step(self, exponent):
+        keep, renew = np.exp(-exponent), np.sqrt(-np.expm1(-2 * exponent))
+        moved = keep * np.sqrt(2 * self.bands) + renew * self.random.standard_normal(self.bands.shape)
+        self.bands = 0.5 * moved**2 + renew**2 * self.random.standard_gamma(self.shapes, self.bands.shape)
+        return self.bands @ self.weights
+
+
+@numba.njit(cache=True)
+def bands_compiled(members, steps, weights, shapes, exponent, random):
+    """The steps of ``BandsNumpy`` in compiled loops; ΔΓ of all members at all steps."""
+    keep, renew = math.exp(-exponent), math.sqrt(-math.expm1(-2.0 * exponent))
+    bands, energy = np.empty((members, weights.size)), np.zeros((steps, members))
+    for m in range(members):
+        for k in range(weights.size):
+            bands[m, k] = random.standard_gamma(shapes[k])
+    for step in range(steps):
+        for m in range(members):
+            for k in range(weights.size):
+                moved = keep * math.sqrt(2.0 * bands[m, k]) + renew * random.standard_normal()
+                bands[m, k] = 0.5 * moved * moved + renew * renew * random.standard_gamma(shapes[k] - 0.5)
+                energy[step, m] += weights[k] * bands[m, k]
+    return energy

@@ -29,7 +29,7 @@ GROUPS: dict[str, Callable[[Bench], list[Row]]] = {
     group.__name__: group
     for group in (
         fields.banded, fields.modal, fields.mapped, bonds.counted, bonds.tracked,
-        bonds.cohorts, spring.spring, contact.radii, whole.commands, whole.first, whole.gallery,
+        spring.spring, contact.radii, whole.commands, whole.first, whole.gallery,
         whole.statistics,
     )
 }  # fmt: skip

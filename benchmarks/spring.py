@@ -22,8 +22,8 @@ SPEED, SOFT = 10.0, 0.02
 TOLERANCE = 4e-7
 
 
-def scene(duration: float, steps: int, tolerance: float) -> Scenario:
-    """Return a lens of constant area; stretch and life of its bonds at rest are units."""
+def scene(duration: float, steps: int, tolerance: float, mass: float = 0.0, damping: float = 0.0) -> Scenario:
+    """Return a lens of constant area; stretch and life of its bonds at rest are units, and so is the force of all."""
     keys: dict[str, Any] = {
         "clock": Clock(duration=duration, step=duration / steps),
         "solid": Solid(shear_modulus=1.6e6),
@@ -33,7 +33,7 @@ def scene(duration: float, steps: int, tolerance: float) -> Scenario:
         "bonds": FirstMoment(site_density=1.0, start_from="bonded", **BELL),
     }
     area = Scenario(**keys).contact_area
-    body = {"stiffness": SOFT * area, "tolerance": tolerance}
+    body = {"stiffness": SOFT * area, "tolerance": tolerance, "mass": mass * area, "damping": damping * area}
     return Scenario(**keys, drive=Spring(stage=SPEED, contact_stiffness="rigid", **body))
 
 
@@ -47,19 +47,33 @@ def apart(positions: np.ndarray, exact: np.ndarray) -> float:
     return float(np.max(np.abs(positions - exact)) / np.max(np.abs(exact)))
 
 
+#: Sliders by name: mass and damping over those of all sites, slips or as much time, and tolerances of the others.
+SLIDERS: dict[str, tuple[float, float, int, dict[str, float]]] = {
+    "massless": (0.0, 0.0, 100, {"LSODA": 7e-9, "pair": 1e-6}),
+    "ringing": (1e-3, 0.01, 20, {"LSODA": 1e-7, "pair": 1e-5}),
+    "damped": (1e-3, 1.0, 20, {"LSODA": 1e-7, "pair": 1e-5}),
+    "heavy": (10.0, 0.1, 20, {"LSODA": 1e-7, "pair": 1e-5}),
+}
+
+
 def spring(bench: Bench) -> list[Row]:
-    """A massless slider through 100 slips beside scipy's solvers, and through 1000 slips with 10⁵ records."""
+    """Sliders beside LSODA and a compiled explicit pair, and one through 1000 slips with 10⁵ records."""
     rows = []
-    for method, tolerance, slips in (("LSODA", 7e-9, 100), ("Radau", 1e-6, 10)):
+    for name, (mass, damping, slips, tolerances) in SLIDERS.items():
         duration = bench.of(2.4 * slips, 1.0)
         records = bench.of(round(duration), 2)
-        of, times = scene(duration, records, TOLERANCE), np.linspace(0.0, duration, records + 1)
-        exact = followed(scene(duration, records, bench.of(1e-12, 1e-9))).position[:, 0]
-        theirs = functools.partial(bonds_plain.pulled_slider, times, SOFT, SPEED, method, tolerance)
-        errors = f"position {apart(followed(of).position[:, 0], exact):.0e}; {apart(theirs()[1:], exact):.0e}"
-        beside = Beside(f"scipy's solve_ivp, {method}", theirs, goal=50, errors=errors)
-        work = f"slider behind a spring through {slips} slips, {slips * 2.4:.0f} records"
-        rows += bench.compare(work, functools.partial(followed, of), beside, turns=7)
+        of, times = scene(duration, records, TOLERANCE, mass, damping), np.linspace(0.0, duration, records + 1)
+        exact = followed(scene(duration, records, bench.of(1e-12, 1e-9), mass, damping)).position[:, 0]
+        ours, body, others = apart(followed(of).position[:, 0], exact), (SOFT, SPEED, mass, damping), []
+        for label, program in (
+            ("scipy's LSODA, compiled slopes", functools.partial(bonds_plain.by_scipy, "LSODA", tolerances["LSODA"])),
+            ("compiled Dormand–Prince (numba)", functools.partial(bonds_plain.dormand_prince, tolerances["pair"])),
+        ):
+            theirs = functools.partial(program, times, body)
+            errors = f"position {ours:.0e}; {apart(theirs()[1:], exact):.0e}"
+            others.append(Beside(label, theirs, errors=errors, bound="scipy" not in label))
+        work = f"{name} slider behind a spring, {slips * 2.4:.0f} records"
+        rows += bench.compare(work, functools.partial(followed, of), *others, turns=7)
 
     long = scene(bench.of(2400.0, 1.0), bench.of(10**5, 10), TOLERANCE)
     seconds = [spent(lambda: followed(long)) for _ in range(bench.of(5, 1))]
