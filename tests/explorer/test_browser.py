@@ -226,6 +226,7 @@ def test_a_table_with_decimal_commas_is_dropped_fitted_saved_and_opened_again(br
     lines = [f"{1e3 * v:.4f};{1e6 * a:.9f};1".replace(".", ",") for v, a in rows]
     content = "\n".join(["speed [mm/s];contact_area [mm^2];contact_area_error [%]", *lines])
     with explored(path) as (_, address), opened(browser, address) as page:
+        assert not page.get_by_text("Fit these numbers").is_visible()
         drop(page, content, "<img src=x onerror=alert(1)>.csv")
         wait(page, lambda: "χ²" in page.locator("#judged").text_content(), "no points")
         assert page.locator("#judged img").count() == 0

@@ -7,6 +7,8 @@ const dark = matchMedia("(prefers-color-scheme: dark)");
 const STEPS = 300;
 const COLOURS = { bonds: "#0072B2", fluctuations: "#D55E00", stress: "#8b6bb1", rest: "#8a8a8a", own: "#009E73" };
 
+const GREEK = { alpha: "α", chi: "χ", delta: "δ", Delta: "Δ", kappa: "κ", nu: "ν", tau: "τ" };
+
 let token = "";
 let sliders = [];
 let ghost = null;
@@ -141,8 +143,9 @@ function settle() {
 
 function build(slider) {
   const box = element("div", "", { class: "slider" });
-  const label = element("label", `${slider.marked ? "★ " : ""}${slider.meaning}${slider.symbol ? `, ${slider.symbol}` : ""} `, { for: slider.key });
-  label.append(element("small", slider.key));
+  const label = element("label", `${slider.marked ? "★ " : ""}${slider.meaning}${slider.symbol ? ", " : ""}`, { for: slider.key });
+  const [letter, index] = slider.symbol.split("_");
+  label.append(GREEK[letter] || letter, element("sub", index || ""), " ", element("small", slider.key));
   const range = element("input", "", { type: "range", id: slider.key, min: 0, max: STEPS, step: 1 });
   const text = element("input", "", { type: "text", id: `text ${slider.key}`, "aria-label": `${slider.meaning}, with its unit`, autocomplete: "off", spellcheck: "false" });
   let gesture = false;
@@ -273,7 +276,7 @@ function line(answer, name, words, axis, more = {}) {
   const [factor, unit] = unitOf(name);
   return {
     x: times(answer.speed || shown.speed, shown.units.speed[0]), y: times(answer.curves[name], factor), name: words, yaxis: axis,
-    mode: "lines", hovertemplate: `%{y:.4~g} ${unit}`, ...more,
+    mode: "lines", hovertemplate: `%{y:.4~g} ${unit}`, ...more, line: { ...more.line, simplify: false },
   };
 }
 
