@@ -1,4 +1,4 @@
-"""Rows of the bonds: counted, tracked one by one, cohorts."""
+"""Rows of the bonds: counted, and tracked one by one."""
 
 from collections.abc import Callable
 from typing import Any

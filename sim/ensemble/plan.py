@@ -17,8 +17,8 @@ _GROUP = 256
 _PART_NUMBERS = 2**22
 _STATE_NUMBERS = 2**23
 # Rough costs of one core [s]: a step of a batch, more if it is advanced step by step; of a member, of a counted
-# population, an event of a bond that is followed.
-_STEP, _ALONE, _OF_MEMBER, _COUNTED, _EVENT = 5e-6, 150e-6, 5e-8, 3e-7, 1e-7
+# population, an event of a bond that is followed, more behind a spring.
+_STEP, _ALONE, _OF_MEMBER, _COUNTED, _EVENT, _DRIVEN_EVENT = 5e-6, 150e-6, 5e-8, 3e-7, 1e-7, 3e-5
 #: A dataset without its trajectories [byte], and a variable over the sweep alone; number of statistics of each pooled
 #: variable.
 _SCENARIO_BYTES, _VARIABLE_BYTES, _STATISTICS = 1.6e5, 3.6e3, 3
@@ -297,7 +297,8 @@ def seconds_a_step(point: Scenario, members: int, speeds: np.ndarray | None = No
     bonds, batch = point.population, _STEP + _ALONE * point.by_steps + point.population.step_seconds
     member = _OF_MEMBER + point.process.pairs * point.fluctuations.pair_seconds + point.contact.edge_seconds
     if bonds.per_member and not bonds.feeds_back:
-        member += _COUNTED + _EVENT * bonds.followed(point.speeds(21) if speeds is None else speeds, point.clock.step)
+        event = _DRIVEN_EVENT if point.drive.solves_motion else _EVENT
+        member += _COUNTED + event * bonds.followed(point.speeds(21) if speeds is None else speeds, point.clock.step)
     return batch + members * member
 
 

@@ -95,6 +95,11 @@ def long_scene(steps, record):
 
 
 @pytest.mark.verify
+def test_a_slider_on_tracked_bonds_is_worth_more_than_one_process():
+    # on one core it takes some twenty seconds, of which each process may have four
+    assert Plan.of(load("scenarios/motor_clutch.toml")).worthwhile() > 1
+
+
 def test_a_member_of_a_hundred_million_steps_is_kept_in_blocks_and_goes_on_from_the_last(tmp_path):
     (tmp_path / "scene.toml").write_text(long_scene(steps=10**8, record=10**7), encoding="utf-8")
     parts = tmp_path / "x.nc.parts"
