@@ -7,8 +7,17 @@ run, such as the detachment or the friction peak. ``summary`` returns statistics
 
 from sim.analysis.dataset import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
 from sim.analysis.errors import SystematicError, remarks, systematic_errors
-from sim.analysis.events import events, loop_energy, peaks, pull_offs, slips, slips_by_phase, stick_slip
-from sim.analysis.lifetimes import Lifetime, lifetime
+from sim.analysis.events import (
+    Lifetime,
+    events,
+    lifetime,
+    loop_energy,
+    peaks,
+    pull_offs,
+    slips,
+    slips_by_phase,
+    stick_slip,
+)
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
 from sim.analysis.over_speed import crossing, extremes, loss_speeds, steady_speeds
 from sim.analysis.statements import Statement, each, relaxation, statements, statistics

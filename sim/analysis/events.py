@@ -1,10 +1,12 @@
-"""Events of a run: slips, onset of sliding, detachment, masking, friction peaks, cycles."""
+"""Events of a run: slips, onset of sliding, detachment, masking, friction peaks, cycles, lifetimes of members."""
 
 import contextlib
-from typing import Any
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from scipy import special
 
 from sim.analysis.dataset import (
     MEMBERS,
@@ -15,6 +17,7 @@ from sim.analysis.dataset import (
     is_stationary,
     plain,
     setting,
+    speed_of,
     stays_held,
     sweep_dims,
     where_recorded,
@@ -22,7 +25,8 @@ from sim.analysis.dataset import (
     word,
 )
 from sim.analysis.observables import ENDINGS, labelled, pure
-from sim.units.notation import SLIP_EVENT
+from sim.analysis.statistics import LEVEL, WIDE, observable_of
+from sim.units.notation import SLIP_EVENT, engineering
 
 #: Relative changes below it are rounding.
 _ROUNDING = 1e-9
@@ -123,8 +127,8 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
         return xr.Dataset({"slip_count": count} | (_between_speeds(dataset) if varies(dataset) else {}))
     text = "standard deviation of slip displacements over their mean"
     result["slip_spread"] = pure(dataset["late_amplitude_std"] / dataset["late_amplitude_mean"], text)
-    counted = dataset["slip_time"] >= _beginning(dataset)
-    each = slips(dataset).where(counted)[["slip_duration", "stick_duration", "stress_drop"]]
+    late_half = dataset["slip_time"] >= 0.5 * float(dataset["t"][-1])
+    each = slips(dataset).where(late_half)[["slip_duration", "stick_duration", "stress_drop"]]
     result = result.merge(each.mean("slip", keep_attrs=True), compat="no_conflicts")
     if dataset.sizes.get(MEMBERS, 1) == 1:  # there is no other error than the scatter between slip events
         events, squares = each.count("slip"), ((each - each.mean("slip")) ** 2).sum("slip")
@@ -200,11 +204,6 @@ def varies(dataset: xr.Dataset) -> bool:
         return True
     stage = abs(dataset["stage_speed"]).where(dataset["stage_speed"] != 0.0)
     return bool((stage.max("t") > (1.0 + _ROUNDING) * stage.min("t")).any())
-
-
-def _beginning(dataset: xr.Dataset) -> float:
-    """Return the time from which on slips count [s]: half of the run if the stage has one speed."""
-    return float(dataset["t"][-1]) / 2.0 if is_stationary(dataset) else 0.0
 
 
 def runaways(dataset: xr.Dataset) -> xr.Dataset:
@@ -549,3 +548,286 @@ def cycles_of(dataset: xr.Dataset) -> xr.DataArray:
     with contextlib.suppress(KeyError):
         return setting(dataset, f"contact.{control(dataset).kind}.cycles")
     return xr.DataArray(0.0)
+
+
+# --- peaks of the mean of members with noise, with errors, or the reason for none ---
+
+#: Quantities whose peak is stated, with the beginnings of the names of its time and speed.
+_PEAKS_OF_MEAN = {"peak_stress": ("shear_stress", "peak"), "peak_friction": ("friction_force", "peak_friction")}
+#: Chance of a peak out of noise; resampled ensembles for the error of its time; share of the records after it.
+_CHANCE, _RESAMPLED, _AFTER = 0.01, 200, 8
+#: Standard errors by which estimates of a peak over different numbers of records may differ.
+_ALIKE = 2.0
+#: Dimensions of a quantity of each member.
+_EACH = [MEMBERS, "t"]
+#: Records that a peak needs: an eighth of them are its end.
+_FEWEST = 8
+
+
+class Peak(NamedTuple):
+    """Peak of the mean of members, its standard error, time, and the ends of both intervals; or why there is none."""
+
+    reason: str
+    value: float = math.nan
+    sem: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
+    time: float = math.nan
+    first: float = math.nan
+    last: float = math.nan
+
+
+def peak_of_mean(values: np.ndarray, times: np.ndarray, unit: str = "1") -> Peak:
+    """Return the peak of the mean of members with noise, after the first of their records.
+
+    Parameters
+    ----------
+    values : array, shape (members, records)
+        All known.
+    times : array, shape (records,)
+        Since the first record [s], evenly spaced.
+    unit : str
+        Of the values, for the reason.
+
+    Notes
+    -----
+    The mean must rise above the first record and above the mean over the last eighth by more than noise does in one of
+    a hundred runs: by Student's law for the largest of as many values as there are records. A parabola through the
+    records about the largest moving average gives value and time. Its width is doubled as long as the estimates agree
+    within two of the standard errors of their differences (Lepski's rule). The error is that of the members under these
+    weights; that of the time is from ensembles drawn from these members, and at least half a record.
+    """
+    members, records = values.shape
+    mean, free, tail = values.mean(axis=0), members - 1.0, np.zeros(records)
+    tail[-max(1, records // _AFTER) :] = 1.0 / max(1, records // _AFTER)
+    last = records - max(1, records // _AFTER)
+
+    def error(weights: np.ndarray) -> float:
+        return float(np.std(values @ weights, ddof=1)) / math.sqrt(members) if members > 1 else math.nan
+
+    weights, _ = _top(mean, 0, last)
+    place = int(np.argmax(weights))
+    surely = float(special.stdtrit(free, 1.0 - _CHANCE / records))
+    for base in (tail, np.eye(1, records)[0]):
+        if not (weights - base) @ mean > surely * error(weights - base):
+            most, end, when = (engineering(*number) for number in (
+                (mean[place], unit), (float(tail @ mean), unit), (float(times[place]), "s")
+            ))  # fmt: skip
+            return Peak(f"no peak above the noise: at most {most} after {when}, {end} at the end")
+    if place < 3:
+        step = engineering(float(times[place]) / 4.0, "s")
+        return Peak(f"too few records to resolve the peak: record every {step} or more often")
+    tried, width = [_top(mean, 0, last)], 1
+    while 2 * width <= place:
+        weights, at = _top(mean, width, last)
+        if any(abs((weights - other) @ mean) > _ALIKE * error(weights - other) for other, _ in tried):
+            break
+        tried, width = [*tried, (weights, at)], 2 * width
+    (weights, at), width = tried[-1], width // 2
+    rng = np.random.default_rng(0)  # the same interval each time
+    drawn = rng.multinomial(members, np.full(members, 1.0 / members), size=_RESAMPLED) / members @ values
+    ends = np.quantile([_top(each, width, last)[1] for each in drawn], [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
+    value, sem, records_at = float(weights @ mean), error(weights), np.arange(records)
+    half = float(special.stdtrit(free, 0.5 + 0.5 * LEVEL)) * sem
+    between = max(0.0, 0.125 * float(np.array([-1.0, 2.0, -1.0]) @ mean[place - 1 : place + 2])) * (width < 2)
+    time, first, stop = np.interp([at, ends[0] - 0.5, ends[1] + 0.5], records_at, times)
+    return Peak("", value, sem, value - half, value + half + between, float(time), float(first), float(stop))
+
+
+def _top(mean: np.ndarray, width: int, last: int) -> tuple[np.ndarray, float]:
+    """Return the weights of the records whose sum is the peak before the record ``last``, and its place.
+
+    It is the largest value, or if the ``width`` is two or more records to both sides the vertex of a parabola.
+    """
+    sums = np.append(0.0, np.cumsum(mean))
+    averages = sums[2 * width + 1 : last + width] - sums[: last - width - 1]  # of centres width, ..., last - 1
+    begin = 1 if width == 0 else 0
+    place = width + begin + int(np.argmax(averages[begin:]))
+    weights, at = np.zeros(len(mean)), float(place)
+    if width < 2:
+        weights[place] = 1.0
+        return weights, at
+    chosen = slice(place - width, place + width + 1)
+    fit = np.linalg.pinv(np.vander(np.linspace(-1.0, 1.0, 2 * width + 1), 3))
+    curvature, slope, _ = fit @ mean[chosen]
+    vertex = float(np.clip(-0.5 * slope / curvature, -1.0, 1.0)) if curvature < 0.0 else 0.0
+    weights[chosen] = np.array([vertex**2, vertex, 1.0]) @ fit
+    return weights, at + vertex * width
+
+
+def ensemble_peaks(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the peaks of stress and friction of members with noise, while sliding after a rest or along a ramp.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``peak_stress_mean`` [Pa] and ``peak_friction_mean`` [N] with ``…_sem``, ``…_low``, ``…_high`` and ``…_reason``,
+        see ``peak_of_mean``; time since sliding starts, ``peak_time_mean`` and ``peak_friction_time_mean`` [s], and
+        speed then, ``peak_speed_mean`` and ``peak_friction_speed_mean`` [m/s], with ``…_low``, ``…_high``. Empty under
+        any other drive, and of members that do not differ. Peaks of friction are of the contacts that stay closed.
+    """
+    dataset = plain(dataset)
+    drive, result = word(dataset, "drive.model", ""), xr.Dataset()
+    if not bool(((drive == "ramp") | (drive == "start")).any()) or "speed" not in dataset:
+        return result
+    rest = xr.DataArray(0.0)
+    with contextlib.suppress(KeyError):
+        rest = setting(dataset, "drive.rest").where(drive == "start", 0.0)
+    times, sweep = dataset["t"], xr.zeros_like(dataset["contact_modulus"], float)
+    onset, speeds = (times >= rest - 1e-6 * times[-1]).argmax("t"), abs(speed_of(dataset)) + sweep
+    for name, (source, prefix) in _PEAKS_OF_MEAN.items():
+        is_recorded = source in dataset
+        if f"{source}_mean" not in dataset and not (is_recorded and MEMBERS in dataset[source].dims):
+            continue
+        unit = dataset[source if is_recorded else f"{source}_mean"].attrs.get("units", "1")
+        values = observable_of(dataset, source) if is_recorded else xr.DataArray(np.empty((0, times.size)), dims=_EACH)
+        how: Any = {"input_core_dims": [_EACH, ["t"], [], ["t"]], "output_core_dims": [[]] * 11, "vectorize": True}
+        how |= {"output_dtypes": [object, *"dddddddddd"], "kwargs": {"unit": unit}}
+        reason, *numbers = xr.apply_ufunc(_peak_since, values, speeds, onset, times, **how)
+        text = f"peak of the mean of the {source.replace('_', ' ')}"
+        described: dict[str, Any] = {f"{name}_{kind}": (unit, text) for kind in ("mean", "sem", "low", "high")}
+        for of, *about in (("time", "s", f"time of sliding to the {text}"), ("speed", "m/s", f"speed at the {text}")):
+            described |= {f"{prefix}_{of}_{end}": about for end in ("mean", "low", "high")}
+        for (key, about), column in zip(described.items(), numbers, strict=True):
+            result[key] = labelled(column, *about)
+        result[f"{name}_reason"] = reason.drop_attrs(deep=False).assign_attrs(long_name=f"reason for no {text}")
+    return result
+
+
+def _peak_since(values: np.ndarray, speeds: np.ndarray, first: int, times: np.ndarray, unit: str) -> tuple[Any, ...]:
+    """Return the fields of the ``Peak`` of the members after a record, and the speed at its time and interval."""
+    if not len(values):
+        return *Peak("the peak of members with noise needs every member: [record] per_member = true"), *[math.nan] * 3
+    known, since = np.abs(values[:, first:]), times[first:] - times[first]
+    known = known[np.isfinite(known).all(axis=-1)]
+    is_enough = len(known) > 1 and known.shape[1] >= _FEWEST
+    peak = peak_of_mean(known, since, unit) if is_enough else Peak("too few records or members")
+    return *peak, *np.interp(peak[-3:], since, speeds[first:])
+
+
+# --- lifetimes of members, of which some are longer than the run: medians and rates ---
+
+
+class Lifetime(NamedTuple):
+    """Median and rate of an event, with the ends of their 95 % intervals; nan if the runs are too short.
+
+    ``half`` [s] is the time at which the event has occurred in half of the members. ``rate`` [1/s] is the number of
+    events per exposure time.
+    """
+
+    half: float
+    half_low: float
+    half_high: float
+    rate: float
+    rate_low: float
+    rate_high: float
+
+
+def lifetime(times: np.ndarray, ends: np.ndarray | float, begins: np.ndarray | float = 0.0) -> Lifetime:
+    """Return the median and the rate of an event that may come after a run's end.
+
+    Parameters
+    ----------
+    times : array, shape (members,)
+        When it happened [s]; nan where it did not.
+    ends : float or array
+        Until when each member was watched [s]; nan if it could not happen in a member, which then does not count.
+    begins : float or array
+        From when on it could happen in each member [s], such as the time at which its contact closed; nan as above.
+
+    Notes
+    -----
+    Members are at risk from when on it could happen, and count only from then on (left truncation). The median is that
+    of Kaplan and Meier's survival; its interval, after Brookmeyer and Crowley, holds the times at which the log-log
+    interval of the survival has one half. The interval of the rate is that of a Poisson process, from chi-square.
+
+    Examples
+    --------
+    Three of four members detach within 10 s:
+
+    >>> result = lifetime(np.array([2.0, 5.0, 7.0, np.nan]), 10.0)
+    >>> print(f"{result.half:.0f} s, {result.rate:.3f} /s, {result.rate_low:.2f} to {result.rate_high:.2f} /s")
+    5 s, 0.125 /s, 0.03 to 0.37 /s
+    """
+    watched = np.where(np.isfinite(times), times, ends)
+    since = np.broadcast_to(begins, watched.shape)
+    counts = (watched > since) | ((since == 0.0) & ~np.isnan(watched))
+    happened, watched, since = np.isfinite(times)[counts], watched[counts], since[counts]
+    half = low = high = np.nan
+    if np.any(happened) and np.all(np.isfinite(watched)):
+        half, low, high = _halves(watched, happened, since)
+    count, exposure, tail = float(happened.sum()), float(np.sum(watched - since)) or np.nan, 0.5 - 0.5 * LEVEL
+    least = special.gammaincinv(count, tail) if count else 0.0
+    most = special.gammaincinv(count + 1.0, 1.0 - tail)
+    return Lifetime(half, low, high, count / exposure, least / exposure, most / exposure)
+
+
+def _halves(watched: np.ndarray, happened: np.ndarray, begins: np.ndarray) -> list[float]:
+    """Return the times at which a survival, and the ends of its interval, first are one half or less, or nan.
+
+    The numbers are those of ``scipy.stats.ecdf``, whose import would make the start of ``sim run`` a quarter longer.
+    """
+    times, places, counts = np.unique(watched, return_inverse=True, return_counts=True)
+    events, at_risk = np.bincount(places, happened), watched.size - np.cumsum(counts) + counts
+    at_risk = at_risk - np.sum((begins > 0.0) & (begins >= times[:, np.newaxis]), axis=1)
+    left = at_risk - events
+    if np.any(left[:-1] <= 0):  # nobody was watched for a while
+        return [np.nan] * 3
+    survival = left / watched.size if np.all(happened) and not np.any(begins) else np.cumprod(left / at_risk)
+    with np.errstate(divide="ignore", invalid="ignore"):  # there is no interval if the survival is 1 or 0
+        logarithm = np.log(survival)
+        width = WIDE * np.sqrt(np.cumsum(events / (at_risk * left))) / np.abs(logarithm)
+        ends = [np.exp(-np.exp(np.log(-logarithm) + side * width)) for side in (1.0, -1.0)]
+    curves = [survival, *ends] if happened.sum() > 1 else [survival]
+    below = [np.flatnonzero(curve <= 0.5) for curve in curves]
+    halves = [float(times[first[0]]) if first.size else np.nan for first in below]
+    return halves + [np.nan] * (3 - len(halves))
+
+
+def half_lives(dataset: xr.Dataset, event_times: xr.Dataset) -> xr.Dataset:
+    """Return median times of first detachment and masking from ``events``, and rates if the run is stationary."""
+    result = xr.Dataset()
+    happened = {"first_detachment": ("detached", "detached"), "first_masked": ("masked", "had their adhesion masked")}
+    for event, words in happened.items():
+        result.update(lifetimes(dataset, event_times[event], *words) if event in event_times else {})
+    return result if is_stationary(dataset) else result.drop_vars([name for name in result if "_rate" in str(name)])
+
+
+def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -> xr.Dataset:
+    """Return the median and the rate of an event, at each point of the sweep.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+    times : xarray.DataArray
+        When it first happened in each member [s], nan where it did not: ``events(dataset)["first_detachment"]``.
+    name, words : str
+        What the variables are named by, and what has happened: ``"detached"``, ``"detached"``.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``half_<name>`` and ``<name>_rate``, with ``…_low`` and ``…_high``; see ``lifetime``. Members that are open from
+        the start count from the time at which they close, and never if they are never in contact. Empty where
+        members do not differ.
+    """
+    if MEMBERS not in times.dims:
+        return xr.Dataset()
+    start, end = (float(dataset["t"][record]) for record in (0, -1))
+    begins = xr.zeros_like(times, float)
+    if {"contact_radius", "first_closing"} <= dataset.keys():
+        closed = dataset["contact_radius"].isel(t=0, drop=True) > 0.0
+        begins = (dataset["first_closing"] - start).where(~closed, 0.0)
+    how: Any = {"input_core_dims": [[MEMBERS]] * 3, "output_core_dims": [[]] * 6, "vectorize": True}
+    watched = xr.full_like(times, end - start, float)
+    estimates = iter(xr.apply_ufunc(lifetime, times - start, watched, begins.broadcast_like(times), **how))
+    result = xr.Dataset()
+    for key, unit, text in (
+        (f"half_{name}", "s", f"time at which half of the members have {words}"),
+        (f"{name}_rate", "1/s", f"rate at which members have {words}"),
+    ):
+        for side in ("", "low", "high"):
+            about = f"{side} end of the 95 % interval of the {text}" if side else text
+            result[f"{key}_{side}" if side else key] = labelled(next(estimates), unit, about)
+    return result

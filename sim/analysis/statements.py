@@ -8,9 +8,7 @@ import scipy
 import xarray as xr
 
 from sim.analysis.dataset import MEMBERS, is_stationary, plain, sweep_dims
-from sim.analysis.ensemble_peaks import ensemble_peaks
-from sim.analysis.events import events, slips_by_phase
-from sim.analysis.lifetimes import half_lives
+from sim.analysis.events import ensemble_peaks, events, half_lives, slips_by_phase
 from sim.analysis.over_speed import loss_speeds
 from sim.analysis.statistics import WIDE, averaging, correlation_time, of_second_half, over_members, summary
 from sim.units.errors import BadInput

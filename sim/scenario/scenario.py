@@ -5,7 +5,7 @@ import math
 from dataclasses import fields, replace
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, model_validator
@@ -26,11 +26,11 @@ from sim.scenario.checks import faults_across, pulled, remarks_between
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
-from sim.scenario.phases import Phases, phases
 from sim.scenario.schema import quantities, with_models
 from sim.scenario.sweep import read_sweep, rows, set_key
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
+from sim.units.tables import Pieces
 
 _Title = Annotated[str, Field(max_length=200, description="subject of the scenario and title of the dataset")]
 #: Points of a sweep whose shear processes are all tried.
@@ -46,6 +46,74 @@ _adapter: Any = cache(TypeAdapter)
 #: Columns that a part has read from its file, read anew where its table changes but for keys of their use.
 _FILE_COLUMNS = ("time", "speed", "wavenumbers", "densities", "values", "shape")
 _OF_USE = ("rms", "normalization")
+
+
+#: Phases of a run that are told apart at most.
+_MOST_PHASES = 1000
+#: Times nearer than this share of the run, and values nearer than this share of the largest, are the same.
+_SAME = 1e-9
+
+
+class Phases(NamedTuple):
+    """Phases of a run: their starts [s], names, and the first clock step of each."""
+
+    starts: tuple[float, ...]
+    names: tuple[str, ...]
+    steps: tuple[int, ...]
+
+
+def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
+    """Return the phases of a run: maximal intervals in which no prescribed course turns, stops, starts or jumps.
+
+    The speed of a drive keeps its sign, too. A phase that is shorter than a clock step is none.
+    """
+    whole = np.array([0.0, times.duration])
+    slider, kind = cast(Any, drive), contact.kind
+    forced = slider.solves_motion and not slider.spring
+    course = slider.driven if slider.solves_motion else slider.pieces
+    moved = _turns(course(whole, times.duration), signed=True)
+    pressed = _turns(contact.course.pieces(whole, times.duration), signed=False)
+    words = "force" if forced else "speed"
+    of_drive = {
+        0.0: f"constant {words}" if forced else "sliding",
+        1.0: f"increasing {words}",
+        -1.0: f"decreasing {words}",
+    }
+    of_contact = {0.0: f"constant {kind}", 1.0: "approach", -1.0: "retraction"}
+    starts = sorted({*moved, *pressed})
+    result: dict[int, tuple[float, str]] = {}
+    for start in starts:
+        place = [max(at for at in course if at <= start) for course in (moved, pressed)]
+        sense, trend = moved[place[0]]
+        names = ["rest" if sense == 0.0 else of_drive[trend], of_contact[pressed[place[1]][1]]]
+        shown = [name for name, course in zip(names, (moved, pressed), strict=True) if len(course) > 1]
+        step = math.floor(start / times.step + 0.5) + 1  # the first whose middle is later
+        if step <= times.steps:
+            result[step] = start, ", ".join(shown or names[:1])
+    kept = sorted(result)[:_MOST_PHASES]
+    return Phases(tuple(result[step][0] for step in kept), tuple(result[step][1] for step in kept), tuple(kept))
+
+
+def _turns(pieces: Pieces, signed: bool) -> dict[float, tuple[float, float]]:
+    """Return the starts of intervals [s] in which a course keeps its sense and its trend, with both.
+
+    The sense of a course that is not ``signed`` is 1; the trend of one that is that of its magnitude.
+    """
+    largest = max(np.abs(pieces.first).max(), np.abs(pieces.last).max())
+    result: dict[float, tuple[float, float]] = {}
+    before, value = (math.nan, math.nan), math.nan
+    for start, stop, first, last in zip(*pieces[1:5], strict=True):
+        crossing = start + (stop - start) * first / (first - last) if signed and first * last < 0.0 else stop
+        for at, low, high in (
+            ((start, first, 0.0), (crossing, 0.0, last)) if crossing < stop else ((start, first, last),)
+        ):
+            sense = float(np.sign(low + high)) if signed else 1.0
+            change = (high - low) * sense
+            now = sense, float(np.sign(change)) if abs(change) > _SAME * largest else 0.0
+            if now != before or abs(low - value) > _SAME * largest:
+                result[float(at)] = now
+            before, value = now, high
+    return result
 
 
 @plain_spoken

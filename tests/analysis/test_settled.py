@@ -11,7 +11,7 @@ from helpers.parts import Bell, Clock, Ensemble, Equilibrium, Record, Time, anal
 from numpy.testing import assert_allclose
 
 import sim
-from sim.analysis.ensemble_peaks import peak_of_mean
+from sim.analysis.events import peak_of_mean
 from sim.analysis.statistics import closed_only, of_second_half, settlement
 from sim.ensemble import plan as plans
 from sim.parts.contact.models import Adhesion

@@ -13,7 +13,7 @@ from helpers.parts import Adhesion, Clock, Ensemble, Equilibrium, Time, analysis
 from numpy.testing import assert_allclose
 from scipy import special, stats
 
-from sim.analysis.lifetimes import lifetimes
+from sim.analysis.events import lifetimes
 from sim.analysis.statistics import QUANTILES, quantile_ranks
 from sim.parts.contact.models import Solid, Sphere
 from sim.spectrum.families import Gaussian

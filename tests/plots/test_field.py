@@ -14,8 +14,7 @@ from numpy.testing import assert_allclose
 from sim.parts.shear import Carried, models as shear
 from sim.plots import field as field_figures, kinds as plots
 from sim.spectrum.families import AnisotropicGaussian, Ripple
-from sim.spectrum.measured import Tabulated
-from sim.spectrum.stress_map import StressMap
+from sim.spectrum.measured import StressMap, Tabulated
 
 STARTER = Path(__file__).parents[2] / "sim" / "starter.toml"
 

@@ -16,9 +16,8 @@ from sim.laws import halfspace
 from sim.scenario.files import Files
 from sim.scenario.reader import load
 from sim.spectrum.families import Ripple
-from sim.spectrum.measured import Measured
+from sim.spectrum.measured import Measured, StressMap
 from sim.spectrum.radial import disc_energy
-from sim.spectrum.stress_map import StressMap
 
 G, NU = 1.6e6, 0.3
 FIELD = np.random.default_rng(7).normal(size=(24, 16)) * 1e5 + 4e4

@@ -16,8 +16,8 @@ from sim.laws.halfspace import disc_energies_of_map, soft_disc
 from sim.numerics.grid import Lattice
 from sim.parts.exchange import Array
 from sim.parts.shear.process import Fluctuation, SmoothProcess
+from sim.spectrum.measured import StressMap
 from sim.spectrum.radial import Terms
-from sim.spectrum.stress_map import StressMap
 
 #: Radius [pixels] below which a disc is not resolved, and most radii at which energies are found.
 _RESOLVED, _MOST_RADII = 5.0, 48

@@ -23,9 +23,8 @@ from sim.parts.shear.modes import FixedProcess, ModalProcess, SiteMean, SiteMode
 from sim.parts.shear.process import Amplitude, Constant, Correlation, SmoothProcess
 from sim.spectrum.families import Ripple, Spectrum
 from sim.spectrum.family import Family
-from sim.spectrum.measured import Measured
+from sim.spectrum.measured import Measured, StressMap
 from sim.spectrum.radial import Margin, marginal_energy
-from sim.spectrum.stress_map import StressMap
 from sim.units.quantity import Quantity, keyed, tagged
 
 #: Side and points of a cell, Poisson's ratio; power of the rates, tolerance, and whether the amplitude relaxes.

@@ -17,8 +17,8 @@ from sim.parts.shear import Carried, Mapped
 from sim.parts.shear.maps import Passing
 from sim.scenario.clock import Record
 from sim.spectrum.families import Ripple
+from sim.spectrum.measured import StressMap
 from sim.spectrum.radial import disc_energy, marginal_energy
-from sim.spectrum.stress_map import StressMap
 from sim.study.converge import converge
 from sim.units.errors import BadInput
 from tests.test_total import check_cuts, run
