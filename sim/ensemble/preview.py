@@ -16,7 +16,6 @@ from sim.ensemble.diagnosis import Worst, diagnosis, place as in_words, remarks,
 from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots, state_numbers, work
 from sim.ensemble.variables import SOURCES
 from sim.laws import jkr
-from sim.numerics import jit
 from sim.parts.bonds.models import Cohort, FirstMoment, Rate
 from sim.parts.drive import Spring
 from sim.parts.exchange import Parts
@@ -51,10 +50,6 @@ class NoRoom(RuntimeError):
     """A run needs more memory than there is."""
 
     exit_code = 1
-
-
-class _NotCompiledError(Exception):
-    """A kernel is not in the cache."""
 
 
 class Forecast(NamedTuple):
@@ -196,31 +191,21 @@ def processes(
         lines.append("note: the dataset is large; `sim stats` prints its table")
     left = 1.0 - sum(task.done(parts) for task in plan.share(*shard)) / work(plan, *shard) if parts else 1.0
     if jobs > 1 or left * counted(plan) > _LONG:
-        needs = forecast(plan, jobs, tried(plan, compiling=True) or 1.0, shard[1], left)
+        needs = forecast(plan, jobs, tried(plan), shard[1], left)
         if jobs > 1 or needs.clock > _LONG:
             lines.append(f"{_times(needs, jobs)}, {size(needs.memory)} of memory, a file of {size(needs.file)}")
     return jobs, lines
 
 
-def tried(plan: Plan, compiling: bool = False) -> float | None:
-    """Return the pace of this machine: measured time of some steps over their counted time.
+def tried(plan: Plan) -> float:
+    """Return the pace of this machine: measured time of some steps over their counted time; 1 for a short run.
 
-    It is 1 for a short run. It is None if kernels are not in the cache and ``compiling`` them is not wanted.
+    Kernels that are not in the cache are compiled.
     """
-
-    def refuse(name: str) -> None:
-        raise _NotCompiledError(name)
-
     if counted(plan) < _WORTH_TRYING:
         return 1.0
-    before, ends = list(jit.on_compiling), spread(plan.points, 3)
-    jit.on_compiling[:] = before if compiling else [refuse]
-    try:
-        trials = [_tried(plan, point, _TRIED / len(ends)) for point in ends]
-    except _NotCompiledError:
-        return None
-    finally:
-        jit.on_compiling[:] = before
+    ends = spread(plan.points, 3)
+    trials = [_tried(plan, point, _TRIED / len(ends)) for point in ends]
     return sum(measured for measured, _ in trials) / sum(expected for _, expected in trials)
 
 
@@ -249,11 +234,10 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
     return max(end - start, 1e-9), counted_block(point, members, block, speeds)
 
 
-def _times(needs: Forecast, jobs: int, compiled: bool = True) -> str:
+def _times(needs: Forecast, jobs: int) -> str:
     """Return CPU time and time by the clock as text."""
     clock = f", {duration(needs.clock)} of wall time in {jobs} processes" if jobs > 1 else ""
-    compiling = "" if compiled else " (rough estimate), and once up to half a minute to compile"
-    return f"about {duration(needs.cpu)} of CPU time{clock}{compiling}"
+    return f"about {duration(needs.cpu)} of CPU time{clock}"
 
 
 def preview(scenario: Scenario) -> str:
@@ -442,13 +426,12 @@ def _run(plan: Plan) -> Rows:
     if scene.sweep:
         axes = " × ".join(f"{len(axis.values)} {axis.keys[0]}" for axis in scene.sweep)
         rows.append(("sweep", f"{axes} = {len(plan.points):,} points" if len(scene.sweep) > 1 else axes))
-    pace, (limit, source) = tried(plan), memory_limit()
-    needs = forecast(plan, jobs, pace or 1.0)
+    needs, (limit, source) = forecast(plan, jobs, tried(plan)), memory_limit()
     short = f", but {size(limit)} {source}" if memory(plan, 1) > limit else ""
     before = "" if scene.record.compression == "none" else f", {size(plan.bytes)} before compression"
     return [
         *rows,
-        ("work", f"{work(plan):,} member-steps, {_times(needs, jobs, pace is not None)}"),
+        ("work", f"{work(plan):,} member-steps, {_times(needs, jobs)}"),
         ("memory", f"about {size(needs.memory)}{', all processes together' if jobs > 1 else ''}{short}"),
         ("file", f"about {size(needs.file)}{before}"),
     ]

@@ -78,7 +78,7 @@ def test_more_members_take_more_time_and_no_more_memory_and_steps_that_are_done_
     assert_allclose(forecast(many, 1).cpu, 10 * forecast(few, 1).cpu, rtol=0.1)
     assert_allclose([memory(many, jobs) for jobs in (1, 4)], [memory(few, jobs) for jobs in (1, 4)], rtol=0.1)
     plan = Plan.of(sample(2000, 50_000, record=Record(per_member=False)))
-    monkeypatch.setattr(preview, "tried", lambda plan, compiling: 1.0)
+    monkeypatch.setattr(preview, "tried", lambda plan: 1.0)
     done = {name for task in itertools.islice(plan.tasks(), 3) for name in task.names}
     left = 1.0 - 3 * plan.group / plan.members
     whole, rest = (forecast(plan, 2, left=share) for share in (1.0, left))
