@@ -248,22 +248,11 @@ def _mechanisms(point: Scenario, time: Array, speed: Array, at: str) -> Iterator
         yield f"by the paper's strict balance (shear.paid_by_adhesion = 0) A/A_JKR is {bonds:.3g} %"
 
 
-def lag(point: Scenario, slower: float = 1.0) -> tuple[float, float, float]:
-    """Return how far the mean along a prescribed course of the speed is from that along a very slow one, and where.
+def _along_course(point: Scenario, slower: float) -> Array:
+    """Return A/A_JKR, the friction over that of A_JKR [Pa] and the speed [m/s] along a course, shape (3, steps).
 
     The run is followed in 1000 steps without noise, from steady bonds, ``slower`` by a factor.
-
-    Returns
-    -------
-    area, friction, speed : float
-        Largest differences of A/A_JKR, and of the friction over its largest [1]; the speed at which both together are
-        largest [m/s]. They are nan without a contact.
     """
-    return _behind(_along_course(point, slower), _along_course(point, _VERY_SLOW))
-
-
-def _along_course(point: Scenario, slower: float) -> Array:
-    """Return A/A_JKR, the friction over that of A_JKR [Pa] and the speed [m/s] along a course, shape (3, steps)."""
     shear, duration = cast(Any, point.fluctuations), slower * point.clock.duration
     values: dict[str, Any] = {"bonds.start": "steady"} if point.population.stretched else {}
     values |= {"drive.time": tuple(slower * time for time in point.drive.time)} if point.drive.model == "table" else {}
@@ -276,7 +265,19 @@ def _along_course(point: Scenario, slower: float) -> Array:
 
 
 def _behind(course: Array, steady: Array) -> tuple[float, float, float]:
-    """Return the differences of ``lag`` between two results of ``_along_course``."""
+    """Return how far the mean along a prescribed course of the speed is from that along a very slow one, and where.
+
+    Parameters
+    ----------
+    course, steady : array
+        Results of ``_along_course`` for both.
+
+    Returns
+    -------
+    area, friction, speed : float
+        Largest differences of A/A_JKR, and of the friction over its largest [1]; the speed at which both together are
+        largest [m/s]. They are nan without a contact.
+    """
     area, friction = np.abs(course - steady)[:2]
     friction = friction / max(np.max(steady[1]), 1e-300)
     return float(np.max(area)), float(np.max(friction)), float(np.abs(course[2, np.argmax(area + friction)]))
@@ -285,7 +286,7 @@ def _behind(course: Array, steady: Array) -> tuple[float, float, float]:
 def _lagging(point: Scenario) -> Iterator[str]:
     """Yield how far values along a ramp or table are from steady ones, and how far they would be along a slower one.
 
-    There is no statement for few bonds and for a relaxing amplitude, which ``lag`` does not include, nor for a part
+    There is no statement for few bonds and for a relaxing amplitude, which the course leaves out, nor for a part
     with feedback, which is slow. Nothing is said of a table with a jump or beside a changing load.
     """
     left_out = point.population.per_member or point.fluctuations.law.relaxing or point.by_steps

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from sim.numerics.disk_cache import digest
-from sim.numerics.files import OutputExists, StoreTrouble, explained, move, read_whole, whole
+from sim.numerics.files import OutputExists, StoreTrouble, explained, move, whole
 from sim.units.errors import BadInput
 
 Arrays = dict[str, np.ndarray]
@@ -272,7 +272,7 @@ class Unfinished:
     def _manifest(self) -> Manifest:
         """Return the manifest of the folder; empty if there is none, or a damaged one."""
         try:
-            manifest = json.loads(read_whole(self.folder / _MANIFEST))
+            manifest = json.loads((self.folder / _MANIFEST).read_bytes())
         except (FileNotFoundError, RecursionError, ValueError):
             return {}
         known = isinstance(manifest, dict) and manifest.get("format") == _FORMAT

@@ -140,13 +140,6 @@ def whole(path: Path) -> Iterator[Path]:
         raise
 
 
-def read_whole(path: Path) -> bytes:
-    """Return the bytes of a plain file, never those of a pipe, which may have no end."""
-    if path.exists() and not path.is_file():
-        raise OSError(errno.EINVAL, "not a plain file", str(path))
-    return path.read_bytes()
-
-
 def move(path: Path, target: Path) -> None:
     """Rename a file, in place of an older one."""
     try:

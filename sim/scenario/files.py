@@ -126,11 +126,6 @@ class Source:
         others = {key: value for key, value in self.overrides.items() if not key.startswith(inside)}
         return Source(self.path, self.text, others | values, self.files)
 
-    @property
-    def written(self) -> dict[str, Any]:
-        """Return path, text, overrides and files, from which another process makes the same source."""
-        return {"path": self.path, "text": self.text, "overrides": self.overrides, "files": self.files}
-
 
 @dataclass(frozen=True)
 class Files:
