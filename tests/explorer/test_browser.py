@@ -352,20 +352,7 @@ def test_the_whole_page_is_played_by_keyboard_and_all_inputs_have_names(shown):
     for _ in range(60):
         shown.keyboard.press("Tab")
         seen.append(shown.evaluate("document.activeElement.id"))
-    for key in (
-        "undo",
-        "reset",
-        "take",
-        "level",
-        "absolute",
-        "first",
-        "loads",
-        RADIUS,
-        f"text {RADIUS}",
-        "members",
-        "run",
-        "file",
-    ):
+    for key in f"undo reset take level absolute first loads {RADIUS} members run file".split():
         assert key in seen or shown.locator(f"[id='{key}']").is_disabled(), key
     assert seen.index(RADIUS) + 1 == seen.index(f"text {RADIUS}")
     shown.locator("#absolute").focus()

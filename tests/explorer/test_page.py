@@ -5,6 +5,7 @@ import io
 import math
 import subprocess
 import sys
+import tomllib
 
 import numpy as np
 import pytest
@@ -49,8 +50,6 @@ def lens(tmp_path):
 
 
 def scene(text):
-    import tomllib
-
     return sim.load(tomllib.loads(text))
 
 

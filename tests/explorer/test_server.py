@@ -6,6 +6,7 @@ import json
 import os
 import socket
 import time
+import tomllib
 
 import psutil
 import pytest
@@ -21,11 +22,13 @@ HUGE = 5_000_000
 COUNTED = {"model": "counted", "critical_speed": 1e-2, "rebinding_rate": 500.0, "sites": 50, "stress": 3e5}
 
 
+def _scene():
+    return tomllib.loads(SCENE)
+
+
 @pytest.fixture(scope="module")
 def server():
-    import tomllib
-
-    served = Server(sim.load(tomllib.loads(SCENE)))
+    served = Server(sim.load(_scene()))
     served.begin()
     yield served
     served.close()
@@ -182,12 +185,6 @@ def test_the_server_is_bound_to_this_machine_alone_and_a_port_is_taken_once(serv
     assert {address.ip for address in listening} == {"127.0.0.1"}
     with pytest.raises(sim.BadInput, match="in use"):
         Server(sim.load(_scene()), server.port)
-
-
-def _scene():
-    import tomllib
-
-    return tomllib.loads(SCENE)
 
 
 def test_the_browser_is_led_by_a_file_that_only_its_user_reads():
