@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -49,9 +49,6 @@ class IntegralTime(NamedTuple):
     below: float = math.nan
 
 
-_NOTHING = IntegralTime(math.nan, math.nan)
-
-
 def integral_time(values: np.ndarray, step: float) -> IntegralTime:
     """Return the integral correlation time of stationary trajectories: the integral of the autocorrelation.
 
@@ -95,31 +92,43 @@ def integral_time(values: np.ndarray, step: float) -> IntegralTime:
     >>> integral_time(x[:, ::10], step=10.0)
     IntegralTime(time=nan, sem=nan, below=20.0)
     """
-    members, records = values.shape
-    if records < 2 or not np.all(np.isfinite(values)):
-        return _NOTHING
-    return time_of(autocovariance(values), members, records, step, max(values.max(), -values.min()))
+    return IntegralTime(*map(float, _times_of(values, step)))
 
 
-def time_of(covariance: np.ndarray, members: int, records: int, step: float, largest: float) -> IntegralTime:
-    """Return the ``integral_time`` of an autocovariance of values whose largest magnitude is ``largest``."""
-    free, lags = max(members - 1, 1), np.arange(len(covariance))
-    if records < 2 or not covariance[0] > (1e-10 * largest) ** 2:
-        return _NOTHING
-    correlation = covariance / covariance[0]
-    coarse = math.exp(-1.0 / _FEWEST)
-    if correlation[1] < coarse:
-        sure = correlation[1] < coarse - _SURELY / math.sqrt(free * records)
-        return IntegralTime(math.nan, math.nan, _FEWEST * step if sure else math.nan)
-    weights = np.where(lags % 2, 4.0, 2.0) / 3.0
-    weights[0] /= 2.0
-    sums = np.cumsum(weights * correlation)
-    windows = np.flatnonzero(lags >= _WINDOW * sums)
-    if len(windows) == 0:
-        return _NOTHING
-    window = int(windows[0])
-    time = step * float(sums[window])
-    return IntegralTime(time, time * math.sqrt(2.0 * (2.0 * window + 1.0) / (free * records)))
+def _times_of(values: np.ndarray, step: float) -> np.ndarray:
+    """Return the numbers of ``integral_time``, shape (3, ...), of values with the shape (..., members, records)."""
+    *points, members, records = values.shape
+    values, result = values.reshape(-1, members, records), np.empty((3, math.prod(points)))
+    for at in _batches(len(result[0]), members * records):
+        largest = np.maximum(values[at].max(axis=(1, 2)), -values[at].min(axis=(1, 2)))
+        result[:, at] = time_of(autocovariance(values[at]), members, records, step, largest)
+    return result.reshape(3, *points)
+
+
+def time_of(covariance: np.ndarray, members: int, records: int, step: float, largest: np.ndarray) -> np.ndarray:
+    """Return the numbers of ``integral_time`` from autocovariances of values whose largest magnitude is ``largest``."""
+    if records < 2:
+        return np.full((3, *largest.shape), math.nan)
+    free, lags, coarse = max(members - 1, 1), np.arange(covariance.shape[-1]), math.exp(-1.0 / _FEWEST)
+    with np.errstate(invalid="ignore", divide="ignore"):  # nan is the answer if nothing fluctuates
+        known = covariance[..., 0] > (1e-10 * largest) ** 2
+        correlation = covariance / covariance[..., :1]
+        weights = np.where(lags % 2, 4.0, 2.0) / 3.0
+        weights[0] /= 2.0
+        sums = np.cumsum(weights * correlation, axis=-1)
+        inside = lags >= _WINDOW * sums
+    window, is_coarse = inside.argmax(axis=-1), correlation[..., 1] < coarse
+    time = step * np.take_along_axis(sums, window[..., np.newaxis], axis=-1)[..., 0]
+    time = np.where(known & ~is_coarse & inside.any(axis=-1), time, math.nan)
+    is_sure = known & (correlation[..., 1] < coarse - _SURELY / math.sqrt(free * records))
+    below = np.where(is_sure, _FEWEST * step, math.nan)
+    return np.array([time, time * np.sqrt(2.0 * (2.0 * window + 1.0) / (free * records)), below])
+
+
+def _batches(points: int, numbers: int) -> Iterator[slice]:
+    """Yield the points of a sweep in batches, because each of them has so many ``numbers``."""
+    size = max(1, _AT_ONCE // (2 * numbers))
+    yield from (slice(start, start + size) for start in range(0, points, size))
 
 
 def members_for_memory(members: int, records: int) -> int:
@@ -132,12 +141,12 @@ def autocovariance(values: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    values : array, shape (members, records)
+    values : array, shape (..., members, records)
         Independent members of one process. Deviations are those from the ensemble mean at each record, of a single
         member from its own mean in time; and one member less counts as free.
     """
-    members = len(values)
-    mean = values.mean(axis=0) if members > 1 else values.mean()
+    members = values.shape[-2]
+    mean = values.mean(axis=-2 if members > 1 else -1)
     return covariance_of(values, mean, max(members - 1.0, 1.0))
 
 
@@ -146,29 +155,30 @@ def covariance_of(values: np.ndarray, mean: np.ndarray | float, free: float) -> 
 
     Parameters
     ----------
-    values : array, shape (members, records)
+    values : array, shape (..., members, records)
         Series; of long ones no more than 65,536 records between two are looked at.
-    mean : float or array, shape (records,)
+    mean : float or array, shape (..., records) or (..., 1)
         Value from which deviations are taken.
     free : float
         Number of independent series.
     """
-    members, records = values.shape
+    *points, members, records = values.shape
     lags = min(records, _LAGS)
     length = scipy.fft.next_fast_len(lags, real=True)
-    power, rows = np.zeros((2, length + 1), complex), max(1, _AT_ONCE // (2 * length))
-    mean = np.broadcast_to(mean, records)
+    rows = max(1, _AT_ONCE // (2 * length * math.prod(points)))
+    power, mean = np.zeros((2, *points, length + 1), complex), np.broadcast_to(mean, (*points, records))
     for first in range(0, members, rows):
         before = None
         for start in range(0, records, length):  # stretches; each with itself and with the one before
             stretch = slice(start, start + length)
-            spectrum = scipy.fft.rfft(values[first : first + rows, stretch] - mean[stretch], 2 * length)
-            power[0] += np.sum(spectrum.real**2 + spectrum.imag**2, axis=0)
+            some = values[..., first : first + rows, stretch] - mean[..., np.newaxis, stretch]
+            spectrum = scipy.fft.rfft(some, 2 * length)
+            power[0] += np.sum(spectrum.real**2 + spectrum.imag**2, axis=-2)
             if before is not None:
-                power[1] += np.sum(spectrum * before.conj(), axis=0)
+                power[1] += np.sum(spectrum * before.conj(), axis=-2)
             before = spectrum
     total = power[0] + (-1.0) ** np.arange(length + 1) * power[1]  # the second is half the length later
-    return scipy.fft.irfft(total, 2 * length)[:lags] / (free * np.arange(records, records - lags, -1))
+    return scipy.fft.irfft(total, 2 * length)[..., :lags] / (free * np.arange(records, records - lags, -1))
 
 
 #: Degrees of freedom below which a single series is too short for its error: it seems to forget faster than it does,
@@ -176,7 +186,7 @@ def covariance_of(values: np.ndarray, mean: np.ndarray | float, free: float) -> 
 _TOO_FEW = 3.0
 
 
-def inflation(covariance: np.ndarray, members: int, records: int) -> tuple[float, float]:
+def inflation(covariance: np.ndarray, members: int, records: int) -> np.ndarray:
     """Return the variance of a mean over correlated records, in that of a mean over as many independent ones.
 
     Parameters
@@ -188,7 +198,7 @@ def inflation(covariance: np.ndarray, members: int, records: int) -> tuple[float
 
     Returns
     -------
-    records, freedom : float
+    array, shape (..., 2)
         ``1 + 2 sum of the autocorrelation`` over records up to Sokal's window (see ``integral_time``), and the degrees
         of freedom of a variance that is estimated with it, ``n/(2W + 1)``; nan where there is no window, or if a single
         series spans fewer than three.
@@ -198,18 +208,16 @@ def inflation(covariance: np.ndarray, members: int, records: int) -> tuple[float
     Of a single series the sum is corrected for the deviations being from its own mean (U. Wolff, Comput. Phys. Commun.
     156 (2004) 143).
     """
-    if not covariance[0] > 0.0:
-        return math.nan, math.nan
-    sums = 2.0 * np.cumsum(covariance / covariance[0]) - 1.0
-    windows = np.flatnonzero(np.arange(len(sums)) >= 0.5 * _WINDOW * sums)
-    if len(windows) == 0:
-        return math.nan, math.nan
-    window, free = int(windows[0]), max(members - 1, 1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        sums = 2.0 * np.cumsum(covariance / covariance[..., :1], axis=-1) - 1.0
+        inside = np.arange(sums.shape[-1]) >= 0.5 * _WINDOW * sums
+    window = inside.argmax(axis=-1)
     wide = (2.0 * window + 1.0) / records
-    if members == 1 and wide * _TOO_FEW > 1.0:
-        return math.nan, math.nan
-    ratio = max(float(sums[window]), 1.0 / records) * (1.0 + wide if members == 1 else 1.0)
-    return ratio, free / wide
+    ratio = np.maximum(np.take_along_axis(sums, window[..., np.newaxis], axis=-1)[..., 0], 1.0 / records)
+    known = (covariance[..., 0] > 0.0) & inside.any(axis=-1)
+    if members == 1:
+        ratio, known = ratio * (1.0 + wide), known & (wide * _TOO_FEW <= 1.0)
+    return np.where(known[..., np.newaxis], np.stack([ratio, max(members - 1, 1) / wide], axis=-1), math.nan)
 
 
 def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
@@ -231,9 +239,10 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
         step = float(dataset["t"][1] - dataset["t"][0])
         energy = energy.isel({MEMBERS: slice(members_for_memory(energy.sizes[MEMBERS], energy.sizes["t"]))})
         steady = steady_points(dataset).broadcast_like(sweep).transpose(*sweep.dims).to_numpy()
-        for point in (point for point in np.ndindex(steady.shape) if steady[point]):
-            values = energy.isel(dict(zip(sweep.dims, point, strict=True))).to_numpy()
-            times[:, *point] = integral_time(values.astype(float, copy=False), step)
+        whole = [()] if energy.nbytes <= ROOM else np.ndindex(steady.shape)  # a large file is read point by point
+        for point in (point for point in whole if np.any(steady[point])):
+            values = energy.isel(dict(zip(sweep.dims, point, strict=False))).transpose(..., MEMBERS, "t").to_numpy()
+            times[:, *point] = np.where(steady[point], _times_of(values.astype(float, copy=False), step), math.nan)
     about = "integral correlation time of the fluctuation energy"
     texts = {"": about, "_sem": f"standard error of the {about}", "_below": f"upper limit of the {about}"}
     result = xr.Dataset()
@@ -543,7 +552,7 @@ _LEVELS = np.array(QUANTILES)
 def _shares(
     spreads: np.ndarray, errors: np.ndarray, freedoms: np.ndarray, surely: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the shares of the ordered values between which each quantile of the law lies.
+    """Return the shares of the ordered values between which each quantile of the law lies, at each point of a sweep.
 
     The number of free values follows from the error of the share of values below the quantile. It is smaller if that
     error is not well known. There are none if the mean, which is first in each array, has too few free values. Twice as
@@ -552,8 +561,8 @@ def _shares(
     wider = errors * special.stdtrit(freedoms, 0.5 + 0.5 * LEVEL) / WIDE
     with np.errstate(divide="ignore", invalid="ignore"):  # what does not spread is known without end
         count = np.where(np.isnan(wider) & (spreads > 0.0), np.nan, np.fmin(spreads**2 / wider**2, 1e12))
-    none = np.isnan(quantile_ranks(surely * count[0], _LEVELS)[0])
-    low, high = np.where(none, np.nan, quantile_ranks(count[1:], _LEVELS)) / (count[1:] - 1.0)
+    none = np.isnan(quantile_ranks(surely * count[0, :, np.newaxis], _LEVELS)[0])
+    low, high = np.where(none, np.nan, quantile_ranks(count[1:].T, _LEVELS)) / (count[1:].T - 1.0)
     return low, high
 
 
@@ -623,13 +632,11 @@ def _over_time(
         spread = np.sqrt(_sum(deviations).sum(axis=-1) / total)
         below = [np.sum(values <= levels[:, k, np.newaxis, np.newaxis], axis=-1) / counts for k in range(len(_LEVELS))]
         del deviations, known
-        memory = [_memory(*point, step) for point in zip(values, levels, mean, complete, strict=True)]
-        inflated, times = (np.array(column) for column in zip(*memory, strict=True))
+        inflated, times = _memory(values, levels, mean, complete, step)
         spreads = np.array([spread, *np.broadcast_to(np.sqrt(_LEVELS * (1.0 - _LEVELS)), (points, len(_LEVELS))).T])
-        errors, freedoms = _errors(np.array([means, *below]), spreads, np.moveaxis(inflated, -1, 0), total)
+        errors, freedoms = _errors(np.array([means, *below]), spreads, inflated, total)
         effective = np.where(errors[0] > 1e-12 * abs(mean), (spread / errors[0]) ** 2, np.nan)
-        each_point = zip(spreads.T, errors.T, freedoms.T, strict=True)
-        ends = np.stack([_shares(*numbers, 1.0 if members >= _MANY else 0.5) for numbers in each_point], axis=1)
+        ends = np.array(_shares(spreads, errors, freedoms, 1.0 if members >= _MANY else 0.5))
         if members >= _SEVERAL:
             errors, freedoms = _errors(means[np.newaxis], spreads[:1], np.full((1, points, 2), np.nan), total)
         sem, freedom = np.where(noisy, errors[0], np.nan), freedoms[0]
@@ -638,7 +645,7 @@ def _over_time(
     result = {"mean": mean, "std": spread, "sem": sem, "low": low, "high": high}
     result |= {"effective_samples": effective}
     if complete.any():
-        result |= {"correlation_time": times[:, 0], "correlation_time_sem": times[:, 1]}
+        result |= {"correlation_time": times[0], "correlation_time_sem": times[1]}
     ranks = np.where((ends >= 0.0) & (ends <= 1.0), ends * (total[:, np.newaxis] - 1.0), np.nan)
     lowest, highest = (values_at_ranks(ordered, end) for end in ranks)
     return result | {"quantile": levels, "quantile_low": lowest, "quantile_high": highest}, freedom
@@ -651,30 +658,32 @@ def _sum(values: np.ndarray) -> np.ndarray:
 
 
 def _memory(
-    values: np.ndarray, levels: np.ndarray, mean: float, complete: bool, step: float
-) -> tuple[np.ndarray, tuple[float, float]]:
+    values: np.ndarray, levels: np.ndarray, mean: np.ndarray, complete: np.ndarray, step: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return how many records count as one, for the mean and each quantile, with degrees of freedom; and the memory.
 
-    nan if values are missing, and of many members, whose means give the errors.
+    The shapes are (quantities, points, 2) and (3, points). nan at points that are not ``complete``, and of many
+    members, whose means give the errors.
     """
-    inflated = np.full((2, 1 + len(levels)), np.nan)
-    if not complete:
-        return inflated, (np.nan, np.nan)
-    (members, records), free = values.shape, max(len(values) - 1, 1)
+    (points, members, records), free = values.shape, max(values.shape[1] - 1, 1)
+    inflated, times = np.full((1 + len(_LEVELS), points, 2), np.nan), np.full((3, points), np.nan)
     some = members if members < _MANY else members_for_memory(members, records)
-    common = values.mean(axis=0) if members > 1 else mean
-    covariance = covariance_of(values[:some], common, some * free / members)
-    if members < _MANY:
-        inflated[:, 0] = inflation(covariance, members, records)
-        for k, (level, share) in enumerate(zip(levels, _LEVELS, strict=True)):
-            flags = (values <= level).astype(float)
-            if members > 1:
-                flag_covariance = autocovariance(flags)
-            else:
-                flag_covariance = covariance_of(flags, share, 1.0) - (flags.mean() - share) ** 2
-            inflated[:, 1 + k] = inflation(flag_covariance, members, records)
-    time = time_of(covariance, some, records, step, float(np.max(np.abs(values))))
-    return inflated, (time.time, time.sem)
+    for at in _batches(points, members * records) if complete.any() else ():
+        part = values[at]
+        common = part.mean(axis=1) if members > 1 else mean[at, np.newaxis]
+        covariance = covariance_of(part[:, :some], common, some * free / members)
+        times[:, at] = time_of(covariance, some, records, step, np.max(np.abs(part), axis=(1, 2)))
+        for k in range(1 + len(_LEVELS)) if members < _MANY else ():
+            if k:
+                flags, share = (part <= levels[at, k - 1, np.newaxis, np.newaxis]).astype(float), _LEVELS[k - 1]
+                if members > 1:
+                    covariance = autocovariance(flags)
+                else:
+                    off = flags.mean(axis=(1, 2)) - share
+                    covariance = covariance_of(flags, share, 1.0) - off[:, np.newaxis] ** 2
+            inflated[k, at] = inflation(covariance, members, records)
+    inflated[:, ~complete] = times[:, ~complete] = np.nan
+    return inflated, times
 
 
 def _errors(
@@ -753,39 +762,72 @@ def settlement(values: np.ndarray, sem: float = math.nan, freedom: float = math.
     >>> settlement((2.0 + np.sin(70.0 * time))[np.newaxis], noisy=False).verdict
     ''
     """
-    known = np.isfinite(values)
-    course, half = np.nanmean(values[:, known.any(axis=0)], axis=0), values.shape[1] // 2
+    one = (np.array([number]) for number in (sem, freedom, noisy))
+    return _settlements(values[np.newaxis], *one)[0]
+
+
+def _settlements(values: np.ndarray, sem: np.ndarray, freedom: np.ndarray, noisy: np.ndarray) -> list[Settlement]:
+    """Return the ``settlement`` at each point of a sweep; values have the shape (points, members, records)."""
+    half = values.shape[-1] // 2
     with np.errstate(invalid="ignore", divide="ignore"):
-        first, second = (_sum(part) / np.isfinite(part).sum(axis=-1) for part in (values[:, :half], values[:, half:]))
-    drifts = (second - first)[np.isfinite(second - first)]
-    error, free = 2.0 * sem, freedom
-    if drifts.size > 1 and not (drifts.size < _SEVERAL and freedom > drifts.size - 1.0):
-        error, free = float(np.std(drifts, ddof=1)) / math.sqrt(drifts.size), drifts.size - 1.0
-    return _settled(course, float(drifts.mean()) if drifts.size else math.nan, error, free, noisy)
+        course = np.nansum(values, axis=1) / np.isfinite(values).sum(axis=1)
+        first, second = (_sum(part) / np.isfinite(part).sum(-1) for part in (values[..., :half], values[..., half:]))
+        drifts = second - first
+        count = np.isfinite(drifts).sum(axis=-1)
+        drift = np.nansum(drifts, axis=-1) / count
+        squares = np.nansum((drifts - drift[:, np.newaxis]) ** 2, axis=-1)
+        error = np.sqrt(squares / (count - 1.0)) / np.sqrt(count)
+    of_members = (count > 1) & ((count >= _SEVERAL) | ~(freedom > count - 1.0))
+    return _settled(
+        course, drift, np.where(of_members, error, 2.0 * sem), np.where(of_members, count - 1.0, freedom), noisy
+    )
 
 
-def _settled(course: np.ndarray, drift: float, error: float, free: float, noisy: bool) -> Settlement:
-    """Return the ``settlement`` of the members' mean over time, with their drift, its error and degrees of freedom."""
-    course = course[np.isfinite(course)]
-    if not course.size:
-        return Settlement("", math.nan, math.nan, math.nan)
-    few = max(1, int(_ENDS_SHARE * course.size)) if noisy else 1
-    begin, end = float(course[:few].mean()), float(course[-few:].mean())
-    mean, change, bound = _cycles(course) or (end, math.inf, 0.0)
-    if course.size == 1 or np.ptp(course) <= (_UNSEEN if noisy else _STILL) * np.max(np.abs(course)):
-        return Settlement("", end, begin, end)
-    limit = error * float(special.stdtrit(free, 1.0 - 0.5 * _FALSE_ALARM)) if noisy else _STILL * abs(mean)
-    is_short = math.isnan(limit) or (not noisy and course.size < _FEW_RECORDS)
-    steps = np.diff(course)
-    is_one_way = course.size >= _ONE_WAY and (steps.min() >= 0.0 or steps.max() <= 0.0)
-    is_still = abs(drift) <= limit and not is_one_way if noisy else abs(change) <= limit
-    if not is_short and (is_still or abs(change) <= bound):
-        between = 0.5 * bound * WIDE / float(special.ndtri(1.0 - 0.5 * _FALSE_ALARM))
-        return Settlement("", mean, begin, end, between if between > 0.0 else math.nan)
-    off = course > course.mean()
-    if is_short or (not noisy and np.count_nonzero(off[1:] > off[:-1]) > 1):
-        return Settlement("too short to show that it has settled", float(course.mean()), begin, end)
-    return Settlement("not settled", end, begin, end)
+def _settled(
+    courses: np.ndarray, drift: np.ndarray, error: np.ndarray, free: np.ndarray, noisy: np.ndarray
+) -> list[Settlement]:
+    """Return the settlements of the members' means over time, with drifts, their errors and degrees of freedom.
+
+    ``courses`` have the shape (points, records); unknown records are left out.
+    """
+    result = [Settlement("", math.nan, math.nan, math.nan)] * len(courses)
+    patterns, pattern = np.unique(np.isfinite(courses), axis=0, return_inverse=True)
+    for number, known in enumerate(patterns):
+        places = np.flatnonzero(pattern.ravel() == number)
+        if known.any():
+            states = _settled_alike(courses[places][:, known], *(each[places] for each in (drift, error, free, noisy)))
+            for place, state in zip(places, states, strict=True):
+                result[place] = state
+    return result
+
+
+def _settled_alike(
+    course: np.ndarray, drift: np.ndarray, error: np.ndarray, free: np.ndarray, noisy: np.ndarray
+) -> Iterator[Settlement]:
+    """Yield the settlements of ``_settled`` of courses that are known throughout."""
+    records, chance = course.shape[1], 1.0 - 0.5 * _FALSE_ALARM
+    few = max(1, int(_ENDS_SHARE * records))
+    begin = np.where(noisy, course[:, :few].mean(axis=1), course[:, 0])
+    end = np.where(noisy, course[:, -few:].mean(axis=1), course[:, -1])
+    whole, change, bound = _cycles(course)
+    mean = np.where(np.isfinite(change), whole, end)
+    is_still = np.ptp(course, axis=1) <= np.where(noisy, _UNSEEN, _STILL) * np.max(np.abs(course), axis=1)
+    limit = np.where(noisy, error * special.stdtrit(free, chance), _STILL * np.abs(mean))
+    is_short = np.isnan(limit) | (~noisy & (records < _FEW_RECORDS))
+    steps, off = np.diff(course, axis=1), course > course.mean(axis=1, keepdims=True)
+    is_one_way = np.zeros(len(course), bool)
+    if records >= _ONE_WAY:
+        is_one_way = np.all(steps >= 0.0, axis=1) | np.all(steps <= 0.0, axis=1)
+    lasts = np.where(noisy, (np.abs(drift) <= limit) & ~is_one_way, np.abs(change) <= limit)
+    has_settled = ~is_short & (lasts | (np.abs(change) <= bound))
+    is_short |= ~noisy & (np.count_nonzero(off[:, 1:] > off[:, :-1], axis=1) > 1)
+    still = is_still | (records == 1)
+    verdicts = np.select([still | has_settled, is_short], ["", "too short to show that it has settled"], "not settled")
+    values = np.select([still, has_settled, is_short], [end, mean, course.mean(axis=1)], end)
+    half = 0.5 * bound * WIDE / float(special.ndtri(chance))
+    halves = np.where(~still & has_settled & (half > 0.0), half, math.nan)
+    columns = (column.tolist() for column in (verdicts, values, begin, end, halves))
+    return itertools.starmap(Settlement, zip(*columns, strict=True))
 
 
 def _of_two(states: list[Settlement], noisy: np.ndarray) -> list[Settlement]:
@@ -796,27 +838,37 @@ def _of_two(states: list[Settlement], noisy: np.ndarray) -> list[Settlement]:
     return [end if is_unknown and state.begin != state.end else state for is_unknown, end, state in every]
 
 
-def _cycles(course: np.ndarray) -> tuple[float, float, float] | None:
+def _cycles(course: np.ndarray) -> np.ndarray:
     """Return the mean over whole cycles, its change from the first half to the second, and the 99 % bound of that.
 
-    A cycle is from one rise through the mean to the next; None if either half has fewer than two.
+    ``course`` has the shape (points, records). A cycle is from one rise through the mean to the next. If either half
+    has fewer than two, the mean is nan, the change is infinite, and the bound is 0.
     """
-    off = course - course.mean()
-    up = np.flatnonzero((off[:-1] < 0.0) & (off[1:] >= 0.0))
-    places = up + off[up] / (off[up] - off[up + 1])
-    sums = np.append(0.0, np.cumsum(0.5 * (off[1:] + off[:-1])))
-    at, middle = np.interp(places, np.arange(off.size), sums), 0.5 * (off.size - 1)
-    means, error = [], 0.0
-    for chosen in (places <= middle, places >= middle):
-        lengths, areas = np.diff(places[chosen]), np.diff(at[chosen])
-        if lengths.size < _CYCLES:
-            return None
-        means.append(areas.sum() / lengths.sum())
-        rest = np.sum((areas - means[-1] * lengths) ** 2) / lengths.sum() ** 2
-        error += rest * lengths.size / (lengths.size - 1.0)
-    bound = float(special.ndtri(1.0 - 0.5 * _FALSE_ALARM)) * math.sqrt(error)
-    mean = course.mean() + (at[-1] - at[0]) / (places[-1] - places[0])
-    return float(mean), float(means[1] - means[0]), bound
+    points, records = course.shape
+    average = course.mean(axis=1)
+    off, middle = course - average[:, np.newaxis], 0.5 * (records - 1)
+    row, up = np.nonzero((off[:, :-1] < 0.0) & (off[:, 1:] >= 0.0))
+    share = off[row, up] / (off[row, up] - off[row, up + 1])
+    places, sums = up + share, np.cumsum(0.5 * (off[:, 1:] + off[:, :-1]), axis=1)
+    sums = np.concatenate([np.zeros((points, 1)), sums], axis=1)
+    at = sums[row, up] + share * (sums[row, up + 1] - sums[row, up])
+
+    def total(numbers: np.ndarray) -> np.ndarray:
+        return np.bincount(row[:-1][pair], numbers, points)
+
+    means, error, known = [], np.zeros(points), np.ones(points, bool)
+    with np.errstate(invalid="ignore", divide="ignore"):  # without cycles
+        for chosen in (places <= middle, places >= middle):
+            pair = (row[1:] == row[:-1]) & chosen[1:] & chosen[:-1]
+            lengths, areas, count = np.diff(places)[pair], np.diff(at)[pair], total(pair[pair])
+            means.append(total(areas) / total(lengths))
+            rest = total((areas - means[-1][row[:-1][pair]] * lengths) ** 2) / total(lengths) ** 2
+            error, known = error + rest * count / (count - 1.0), known & (count >= _CYCLES)
+    first, last = (np.searchsorted(row, np.flatnonzero(known), side) for side in ("left", "right"))
+    average[known] += (at[last - 1] - at[first]) / (places[last - 1] - places[first])
+    bound = float(special.ndtri(1.0 - 0.5 * _FALSE_ALARM)) * np.sqrt(error)
+    nothing = np.array([[np.nan], [np.inf], [0.0]])
+    return np.where(known, [average, means[1] - means[0], bound], nothing)
 
 
 def _openings(counts: np.ndarray, members: int, again: str, span: str) -> str:
@@ -879,8 +931,7 @@ def distribution(
             values = values - _series(base, readers[1](name), step)
         values = values.reshape(-1, *values.shape[-2:])
         numbers, freedom = _over_time(values, step, name, differ)
-        known = zip(values, numbers["sem"], freedom, map(bool, differ), strict=True)
-        states = [settlement(*point) for point in known]
+        states = _settlements(values, numbers["sem"], freedom, differ)
         states = _of_two(states, differ) if words == "the run" else states
         result |= _described(variable.rename(name), numbers, sweep, states, openings, words, differ)
     return xr.Dataset(result)
@@ -971,9 +1022,8 @@ def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) ->
         sem = np.where(differ, sem, np.nan)
         low, high = interval(name, mean, sem, free[:, 0] + 1.0)
         course = rows_of(courses[key], sweep).reshape(points, -1)
-        known = zip(course, after - mean, error, free[:, free.shape[1] // 2], map(bool, differ), strict=True)
         numbers = {"mean": mean, "sem": sem, "low": low, "high": high}
-        states = [_settled(*point) for point in known]
+        states = _settled(course, after - mean, error, free[:, free.shape[1] // 2], differ)
         states = _of_two(states, differ) if words == "the run" else states
         result |= _described(courses[key].rename(name), numbers, sweep, states, openings, words, differ)
     return xr.Dataset(result)
