@@ -66,8 +66,8 @@ def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
     """
     from scipy.stats import t as student
 
-    names = [*_NAMES, "jkr_radius", "speed"]
-    data = dataset[names] if "member" in dataset.dims else dataset[names].expand_dims("member")
+    (data,) = xr.broadcast(dataset[[*_NAMES, "jkr_radius", "speed"]])
+    data = data if "member" in data.dims else data.expand_dims("member")
     data["area_ratio"] = data["contact_area"] / (np.pi * data["jkr_radius"].where(data["jkr_radius"] > 0.0) ** 2)
     data, speed, members = data.drop_vars(["jkr_radius", "speed"]), dataset["speed"], data.sizes["member"]
     every = slice(None, None, -(-data.sizes["t"] // _DRAWN))

@@ -73,12 +73,10 @@ class Guarded:
         self.token = secrets.token_urlsafe(32)
         self._page, self._lock = page, threading.Lock()
         self._hosts = {f"{name}:{port}".encode() for name in ("127.0.0.1", "localhost")}
-        script, static = (
-            Path(plotly.__file__).with_name("package_data") / "plotly.min.js",
-            Path(__file__).with_name("static"),
-        )
-        self._files = {"/plotly.js": script} | {f"/{path.name}": path for path in static.iterdir()}
+        static = Path(__file__).with_name("static").iterdir()
+        self._files = {f"/{path.name}": path for path in static if path.suffix[1:] in _TYPES}
         self._files["/"] = self._files.pop("/page.html")
+        self._files["/plotly.js"] = Path(plotly.__file__).with_name("package_data") / "plotly.min.js"
         self._headers = {
             "content-security-policy": _POLICY + (_NOTEBOOKS if framed else "'none'"),
             "x-content-type-options": "nosniff",
