@@ -578,6 +578,8 @@ async function begin() {
   if (!token) return complain("This page has lost its key. Open the address that sim explore printed.");
   const { title, sliders: known, preview, data } = await ask("/start", {});
   $("title").textContent = document.title = title;
+  ghost = await ask("/curves", { values: {}, share: state.share });
+  await drawable; // before there is a slider to move
   sliders = known;
   sliders.forEach(build);
   if (preview.length) {
@@ -585,8 +587,6 @@ async function begin() {
     $("preview").textContent = `Preview: steady sliding is not what this scenario computes, because ${preview.join(", and ")}. Run the scenario's own models below.`;
   }
   if (data) useTable(data);
-  ghost = await ask("/curves", { values: {}, share: state.share });
-  await drawable;
   recall();
   settle();
 }
