@@ -479,6 +479,6 @@ def schema() -> None:
 @click.option("-j", "--jobs", type=click.IntRange(1), help="Number of processes. Default: one per core.")
 def warm(jobs: int | None) -> None:
     """Compile all kernels now. Otherwise a run compiles each at its first use."""
-    from sim.ensemble.warm import compile_missing
+    from sim.ensemble.execute import compile_missing
 
     say(compile_missing(jobs))

@@ -9,6 +9,7 @@ import bisect
 import concurrent.futures
 import contextlib
 import functools
+import importlib
 import os
 import pickle
 import signal
@@ -25,9 +26,11 @@ from typing import Any, NamedTuple
 from sim.engine import State, pack, unpack
 from sim.ensemble.plan import Task
 from sim.ensemble.store import Arrays, Blocks
+from sim.numerics import jit
 from sim.numerics.disk_cache import digest
+from sim.numerics.files import StoreTrouble
 from sim.units.errors import BadInput
-from sim.units.terminal import signals
+from sim.units.terminal import progress_bar, signals
 
 #: Broken pools after which a block is given up.
 _TRIES = 3
@@ -365,3 +368,46 @@ def orders() -> Iterator[Callable[[], bool]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+# Kernels that are compiled before a run, by the same processes.
+
+
+def missing_kernels() -> list[str]:
+    """Return the kernels and laws whose code is not in the cache; first those of long modules, which take longest."""
+    texts = jit.sources()
+    for module in texts:
+        importlib.import_module(module)
+    names = [name for name in jit.compiled if _module(name) in texts]
+    return [name for name in sorted(names, key=lambda name: -len(texts[_module(name)])) if not jit.cached(name)]
+
+
+def compile_missing(jobs: int | None) -> str:
+    """Compile what is not in the cache in some processes, by default one a core; return a text about it.
+
+    Raises
+    ------
+    StoreTrouble
+        If code could not be stored.
+    """
+    import loky  # slow to import
+
+    lacking = missing_kernels()
+    if lacking:
+        processes = min(jobs or loky.cpu_count(), len(lacking))
+        with progress_bar(len(lacking), "kernels") as shown, pool(processes) as executor:
+            for future in concurrent.futures.as_completed([executor.submit(_compile_kernel, name) for name in lacking]):
+                future.result()
+                shown.advance(1)
+    if left := sum(not jit.cached(name) for name in lacking):
+        raise StoreTrouble(f"{left} kernels could not be stored; set SIM_CACHE_DIR to a writable folder")
+    return f"{len(lacking)} of {len(jit.compiled)} kernels and laws compiled; the others are in the cache"
+
+
+def _compile_kernel(name: str) -> None:
+    importlib.import_module(_module(name))
+    jit.compiled[name]()
+
+
+def _module(name: str) -> str:
+    return name.rpartition(".")[0]

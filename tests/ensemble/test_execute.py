@@ -19,7 +19,7 @@ from helpers.scenes import CONTACTS, LOADS
 
 import sim
 from sim.cli import cli
-from sim.ensemble import execute, plan as plans, simulate as ensemble, warm
+from sim.ensemble import execute, plan as plans, simulate as ensemble
 from sim.ensemble.execute import WorkerDied, compute
 from sim.ensemble.plan import Plan
 from sim.ensemble.store import BlockFiles, MemoryBlocks, Stopped
@@ -284,22 +284,22 @@ def test_every_kernel_and_law_of_the_sources_is_compiled_once(cold, monkeypatch)
             for mark in getattr(node, "decorator_list", ()):
                 if getattr(mark, "id", getattr(getattr(mark, "func", None), "id", "")) in ("kernel", "law"):
                     decorated.add(f"{module}.{node.name}")
-    assert set(warm.missing()) == decorated and len(decorated) > 50
-    missing = warm.missing()
-    monkeypatch.setattr(warm, "missing", lambda: [name for name in SOME if not jit.cached(name)])
+    assert set(execute.missing_kernels()) == decorated and len(decorated) > 50
+    missing = execute.missing_kernels()
+    monkeypatch.setattr(execute, "missing_kernels", lambda: [name for name in SOME if not jit.cached(name)])
     done = CliRunner().invoke(cli, ["warm", "--jobs", "2"])
     assert done.exit_code == 0 and done.stdout.startswith(f"3 of {len(jit.compiled)} kernels and laws compiled")
     monkeypatch.undo()
     monkeypatch.setenv("SIM_CACHE_DIR", str(cold))
-    assert set(missing) - set(warm.missing()) == set(SOME)
+    assert set(missing) - set(execute.missing_kernels()) == set(SOME)
     before = {path: path.stat().st_mtime_ns for path in cold.rglob("*") if path.is_file()}
-    monkeypatch.setattr(warm, "missing", lambda: SOME)
-    warm.compile_missing(1)
+    monkeypatch.setattr(execute, "missing_kernels", lambda: SOME)
+    execute.compile_missing(1)
     assert {path: path.stat().st_mtime_ns for path in cold.rglob("*") if path.is_file()} == before
 
 
 def test_a_cache_that_cannot_be_written_is_no_success(cold, monkeypatch):
     (cold / "sliding-sim").write_text("no folder", encoding="utf-8")
-    monkeypatch.setattr(warm, "missing", lambda: SOME[:1])
+    monkeypatch.setattr(execute, "missing_kernels", lambda: SOME[:1])
     done = CliRunner().invoke(cli, ["warm"])
     assert done.exception.exit_code == 74 and "SIM_CACHE_DIR" in str(done.exception)
