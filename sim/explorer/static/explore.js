@@ -409,7 +409,7 @@ function paintContact(found) {
     const most = Math.max(Math.abs(ends[0]), Math.abs(ends[ends.length - 1]));
     traces.push({
       type: "heatmap", z: found.stress[0].map((_, k) => times(found.stress.map((row) => row[k]), 1e-3)), x0: -half, dx: (2 * half) / found.stress.length,
-      y0: -half, dy: (2 * half) / found.stress.length, xaxis: "x", yaxis: "y2", colorscale: "RdBu", reversescale: true, zmin: -most, zmax: most,
+      y0: -half, dy: (2 * half) / found.stress.length, xaxis: "x", yaxis: "y2", colorscale: "RdBu", zmin: -most, zmax: most,
       colorbar: { title: { text: "stress (kPa)" }, len: 0.66, y: 0.33, thickness: 12 }, hovertemplate: "%{z:.3~g} kPa<extra></extra>",
     });
   }
