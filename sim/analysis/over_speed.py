@@ -170,8 +170,8 @@ def crossing(
         return values[:, a] + rows[:, a] / (rows[:, a] - rows[:, b]) * (values[:, b] - values[:, a])
 
     others = [[over_the_fall(values, k - a, k + b) for a, b in ((1, 0), (2, 0), (1, 1))] for values in whole[1:]]
-    found = [(each[0][0], each[0][0] - half(*each), each[0][0] + half(*each)) for each in others]
-    return Crossing(math.exp(at), math.exp(ends[0]), math.exp(ends[1]), "", np.reshape(found, (-1, 3)))
+    intervals = [(each[0][0], each[0][0] - half(*each), each[0][0] + half(*each)) for each in others]
+    return Crossing(math.exp(at), math.exp(ends[0]), math.exp(ends[1]), "", np.reshape(intervals, (-1, 3)))
 
 
 def speed_dim(dataset: xr.Dataset) -> str | None:

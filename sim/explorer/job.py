@@ -100,9 +100,9 @@ def command(task: Callable[[Say], dict[str, Any]]) -> tuple[list[str], bytes]:
 def main() -> None:
     """Run the task that standard input has."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends its jobs
-    given, messages = sys.stdin.buffer, os.fdopen(os.dup(1), "w", encoding="utf-8")
+    source, messages = sys.stdin.buffer, os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # nothing else that is printed is taken for a message
-    task = cloudpickle.loads(given.read(int(given.readline())))
+    task = cloudpickle.loads(source.read(int(source.readline())))
 
     def say(message: dict[str, Any]) -> None:
         messages.write(f"{json.dumps(message)}\n")

@@ -135,15 +135,15 @@ class Page:
         ``loads`` adds curves at other loads, ``table`` the points of a table by its name.
         """
         scene = self.read(values)
-        now, found = quantities(scene), curves(scene, self.speeds)
-        largest = {name: float(np.nanmax(np.abs(found[name]), initial=0.0)) for name in _UNITS}
+        now, columns = quantities(scene), curves(scene, self.speeds)
+        largest = {name: float(np.nanmax(np.abs(columns[name]), initial=0.0)) for name in _UNITS}
         energies = ("work_of_adhesion", "fluctuation_energy")
         largest |= dict.fromkeys(energies, max(largest[name] for name in energies))
         crossings = speeds_of_loss(scene, share, self.speeds)
         result: dict[str, Any] = {
             "values": {key: (now[key][1], engineering(now[key][1], unit)) for key, _, _, unit, *_ in self.sliders},
             "speed": self.speeds.tolist(),
-            "curves": {name: listed(column) for name, column in found.items()},
+            "curves": {name: listed(column) for name, column in columns.items()},
             "units": {name: scaled(largest[name], unit) for name, unit in _UNITS.items()},
             "level": {"speeds": crossings, "words": _loss(scene, share, crossings)},
         }

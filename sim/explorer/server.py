@@ -46,7 +46,7 @@ _POLICY = (
 _NOTEBOOKS = "http://localhost:* http://127.0.0.1:*"
 
 
-class Asked(BaseModel, extra="forbid", allow_inf_nan=False, strict=True):
+class Query(BaseModel, extra="forbid", allow_inf_nan=False, strict=True):
     """A request for an answer: values of sliders [SI], or as text with units, and what else the answer needs."""
 
     values: Annotated[dict[str, float | str], Field(max_length=100)] = {}
@@ -84,16 +84,16 @@ class Guarded:
             "cross-origin-resource-policy": "same-origin",
             "cache-control": "no-store",
         }
-        self._answers: dict[str, Callable[[Asked], Any]] = {
-            "/start": lambda asked: page.start(),
-            "/curves": lambda asked: page.answer(asked.values, asked.share, asked.loads, asked.data),
-            "/words": lambda asked: page.words(asked.values),
-            "/band": lambda asked: page.band(asked.values),
-            "/contact": lambda asked: contact(page.read(asked.values), asked.speed),
-            "/data": lambda asked: {"data": page.add(asked.text, asked.name)},
-            "/toml": lambda asked: {"text": page.toml(asked.values)},
-            "/csv": lambda asked: {"text": page.take(asked.values, "csv")},
-            "/picture": lambda asked: page.take(asked.values, asked.kind),
+        self._answers: dict[str, Callable[[Query], Any]] = {
+            "/start": lambda query: page.start(),
+            "/curves": lambda query: page.answer(query.values, query.share, query.loads, query.data),
+            "/words": lambda query: page.words(query.values),
+            "/band": lambda query: page.band(query.values),
+            "/contact": lambda query: contact(page.read(query.values), query.speed),
+            "/data": lambda query: {"data": page.add(query.text, query.name)},
+            "/toml": lambda query: {"text": page.toml(query.values)},
+            "/csv": lambda query: {"text": page.take(query.values, "csv")},
+            "/picture": lambda query: page.take(query.values, query.kind),
         }
         self._places, self._jobs = asyncio.Semaphore(_MOST_JOBS), set[Process]()
 
@@ -105,13 +105,13 @@ class Guarded:
                 answer = Response(path.read_bytes(), media_type=_TYPES[path.suffix[1:]])
             else:
                 self._check_answerable(scope, headers)
-                asked = Asked.model_validate_json(await _body(headers, receive))
+                query = Query.model_validate_json(await _body(headers, receive))
                 if scope["path"] == _RUN:
-                    await self._stream(asked, scope, receive, send)
+                    await self._stream(query, scope, receive, send)
                     return
-                found = await run_in_threadpool(self._answer, scope["path"], asked)
-                is_table = isinstance(found, dict)
-                answer = JSONResponse(found) if is_table else Response(found, media_type=_PICTURES[asked.kind])
+                content = await run_in_threadpool(self._answer, scope["path"], query)
+                is_table = isinstance(content, dict)
+                answer = JSONResponse(content) if is_table else Response(content, media_type=_PICTURES[query.kind])
         except Refused as fault:
             answer = JSONResponse({"message": fault.detail}, fault.status_code)
         except ValidationError:
@@ -123,27 +123,27 @@ class Guarded:
         answer.headers.update(self._headers)
         await answer(scope, receive, send)
 
-    def _task(self, asked: Asked) -> tuple[list[str], bytes]:
+    def _task(self, query: Query) -> tuple[list[str], bytes]:
         """Return the command of the job that is asked for, and what it reads."""
         from sim.explorer.job import command, ensemble, fitted
 
-        if asked.task == "ensemble":
-            return command(functools.partial(ensemble, self._page.scenes(asked.values, asked.members)))
-        if (table := self._page.tables.get(asked.data)) is None or not asked.free:
+        if query.task == "ensemble":
+            return command(functools.partial(ensemble, self._page.scenes(query.values, query.members)))
+        if (table := self._page.tables.get(query.data)) is None or not query.free:
             raise Refused(400, "a fit needs a table and numbers that are free")
-        return command(functools.partial(fitted, self._page.read(asked.values), table, asked.free))
+        return command(functools.partial(fitted, self._page.read(query.values), table, query.free))
 
-    async def _stream(self, asked: Asked, scope: Scope, receive: Receive, send: Send) -> None:
+    async def _stream(self, query: Query, scope: Scope, receive: Receive, send: Send) -> None:
         """Run a job in a process of its own for as long as its reader stays, and send its messages as lines."""
         if self._places.locked():
             raise Refused(429, f"{_MOST_JOBS} computations are under way; stop one of them")
         async with self._places:
-            words, given = await run_in_threadpool(self._task, asked)
+            words, task_bytes = await run_in_threadpool(self._task, query)
             job = await asyncio.create_subprocess_exec(*words, stdin=PIPE, stdout=PIPE, limit=_MOST_BYTES)
             writing, reading = cast(asyncio.StreamWriter, job.stdin), cast(asyncio.StreamReader, job.stdout)
             self._jobs.add(job)
             try:
-                writing.write(given)
+                writing.write(task_bytes)
                 answer = StreamingResponse(reading, headers=self._headers, media_type="application/x-ndjson")
                 # without a version of the protocol it listens for a reader that leaves
                 await answer({**scope, "asgi": {}}, receive, send)
@@ -188,15 +188,15 @@ class Guarded:
         if headers.get(b"content-type") != b"application/json":
             raise Refused(403, "no JSON")
 
-    def _answer(self, path: str, asked: Asked) -> Any:
+    def _answer(self, path: str, query: Query) -> Any:
         with self._lock:  # the caches of the laws and matplotlib are not made for several threads
-            return self._answers[path](asked)
+            return self._answers[path](query)
 
 
 async def _body(headers: dict[bytes, bytes], receive: Receive) -> bytes:
     """Return the body of a request, which is read whole."""
-    announced, read = headers.get(b"content-length", b"0"), bytearray()
-    while announced.isdigit() and int(announced) <= _MOST_BYTES and len(read) <= _MOST_BYTES:
+    length, read = headers.get(b"content-length", b"0"), bytearray()
+    while length.isdigit() and int(length) <= _MOST_BYTES and len(read) <= _MOST_BYTES:
         message = await receive()
         read += message.get("body", b"")
         if not message.get("more_body"):  # also if the reader is gone
@@ -321,8 +321,8 @@ class Server:
         return f"{frame}<p>If the frame stays empty: {html.escape(repr(self))}</p>"
 
     def __repr__(self) -> str:
-        there = f"from another machine: ssh -L {self.port}:127.0.0.1:{self.port} HOST"
-        return f"a page to explore at {self.address}; {there}; close() ends it"
+        remote = f"from another machine: ssh -L {self.port}:127.0.0.1:{self.port} HOST"
+        return f"a page to explore at {self.address}; {remote}; close() ends it"
 
 
 def serve(server: Server, browser: bool, say: Callable[[str], None]) -> None:

@@ -37,8 +37,8 @@ def toml(scenario: Scenario, changed: Mapping[str, float], fixed: Mapping[str, A
     text = scenario.source.text
     if not text:
         resolved = scenario_json(scenario.with_values(dict(changed)))
-        given = json.loads(resolved, object_hook=lambda table: {k: v for k, v in table.items() if v is not None})
-        return written(given)
+        document = json.loads(resolved, object_hook=lambda table: {k: v for k, v in table.items() if v is not None})
+        return written(document)
     result, known = tomlkit.parse(text), quantities(scenario)
     result.pop("sweep", None)
     fixed = {key: value for key, value in fixed.items() if key.partition(".")[0] != "sweep"}

@@ -186,11 +186,11 @@ class Measured:
         first, count = np.argmax(matches, axis=0), matches.sum(axis=0)
         y = np.take_along_axis(places, first[np.newaxis], 0)[0]
         differs = np.any(matches & (np.abs(places - y) > 1e-9 * np.abs(y)), axis=0)
-        given = [self.table[each].values for each in (source, *self.conditions)]
+        row_values = [self.table[each].values for each in (source, *self.conditions)]
         ends = [np.all(np.isnan(curve.at(x, curve.mean)[0]), axis=0) for curve in curves]
         errors = self.table[source].errors
         faults = {
-            "with an empty cell": ~np.all(np.isfinite([x, *given]), axis=0), _NO_CURVE: count == 0,
+            "with an empty cell": ~np.all(np.isfinite([x, *row_values]), axis=0), _NO_CURVE: count == 0,
             _SEVERAL[1]: differs, "at or below 0 on a logarithmic axis": (x <= 0.0) & log,
             "without JKR's area": ~np.isfinite(y), _APART[0]: count > 1, _APART[1]: np.all(ends | ~matches, axis=0),
             _APART[2]: errors is not None and np.isnan(errors),

@@ -196,8 +196,8 @@ def _sliding(panel: Axes, point: xr.Dataset) -> Callable[[int, int], None]:
     turns = np.resize([0.0, 1.0, 0.0, -1.0], 33) * 0.12 * radius
 
     def move(frame: int, k: int) -> None:
-        passed = ends[0] + (along - origin[k]) % width
-        marks.set_offsets(length.factor * np.column_stack([passed, across]))
+        shifted = ends[0] + (along - origin[k]) % width
+        marks.set_offsets(length.factor * np.column_stack([shifted, across]))
         edge(k, behind[k])
         if pulled:  # the stage is at the origin
             coil.set_data(length.factor * np.linspace(behind[k], 0.0, turns.size), length.factor * turns)

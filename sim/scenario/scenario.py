@@ -198,11 +198,13 @@ class Scenario:
     @property
     def derived(self) -> dict[str, tuple[Quantity, float]]:
         """Return the numbers of bonds that follow from their critical speed and stress, by key."""
-        given = quantities(self.bonds)
-        derived = quantities(self.population).items() if "rebinding_ratio" in given else ()
+        keys_of_file = quantities(self.bonds)
+        derived = quantities(self.population).items() if "rebinding_ratio" in keys_of_file else ()
         text = "{}, by critical_speed and stress"
-        named = ((key, replace(made, meaning=text.format(made.meaning)), value) for key, (made, value) in derived)
-        return {f"bonds.{key}": (made, value) for key, made, value in named if key not in given}
+        renamed = (
+            (key, replace(quantity, meaning=text.format(quantity.meaning)), value) for key, (quantity, value) in derived
+        )
+        return {f"bonds.{key}": (quantity, value) for key, quantity, value in renamed if key not in keys_of_file}
 
     @property
     def _bond_conditions(self) -> tuple[float, bool]:

@@ -113,9 +113,9 @@ def _units(drive: Force | Spring, bonds: _SolvedBonds, contact: StepContact, ste
 def _of_columns(stretch: float, force: float) -> Array:
     """Return the units of the columns of a row, from those of a stretch [m] and a force [N]."""
     scales = np.ones(COLUMNS)
-    named = scales.view(ROW)
-    named["spring_force"], named["spread"] = force, stretch**2
-    named[_STRETCHED] = stretch
+    columns = scales.view(ROW)
+    columns["spring_force"], columns["spread"] = force, stretch**2
+    columns[_STRETCHED] = stretch
     return scales
 
 
