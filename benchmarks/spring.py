@@ -13,8 +13,7 @@ from sim.parts.bonds import FirstMoment
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import Spring
-from sim.scenario.clock import Clock
-from sim.scenario.scenario import Scenario
+from sim.scenario.scenario import Clock, Scenario
 
 #: Speed of the stage in Bell's stretches a life at rest, and spring over that of all sites: half of the onset's.
 SPEED, SOFT = 10.0, 0.02

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from sim.parts.bonds import models as bonds, tracked as tracks
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
-from sim.scenario.clock import Record
+from sim.scenario.scenario import Record
 
 RAMP = drive.Ramp(start=1e-4, stop=3e-2, scale="log")
 

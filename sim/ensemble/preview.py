@@ -20,8 +20,7 @@ from sim.parts.bonds.models import Cohort, FirstMoment, Rate
 from sim.parts.drive import Spring
 from sim.parts.exchange import Parts
 from sim.parts.shear.modes import ModalProcess
-from sim.scenario.clock import Record
-from sim.scenario.scenario import Scenario
+from sim.scenario.scenario import Record, Scenario
 from sim.scenario.schema import Entry, distinct, entries
 from sim.units.quantity import read_option
 from sim.units.terminal import duration

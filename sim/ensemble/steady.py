@@ -90,7 +90,7 @@ def sensitivities(scenario: Scenario, time: float, speed: float) -> dict[str, tu
 
     >>> from sim.parts.contact import Equilibrium
     >>> from sim.parts.contact.models import Adhesion, Solid, Sphere
-    >>> from sim.scenario.clock import Clock
+    >>> from sim.scenario.scenario import Clock
     >>> bodies = Solid(shear_modulus=1e6), Sphere(radius=2e-3), Adhesion(work=0.04)
     >>> lens = Scenario(Clock(duration=1.0, step=0.1), *bodies, Equilibrium(load=0.0))
     >>> print(f"{sensitivities(lens, 0.0, 0.0)['sphere.radius'][0]:.5f}")

@@ -14,8 +14,7 @@ from sim.parts.bonds.rupture import Bell
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import READINGS, Force, Spring
-from sim.scenario.clock import Clock, Ensemble
-from sim.scenario.scenario import Scenario
+from sim.scenario.scenario import Clock, Ensemble, Scenario
 
 #: Bonds whose unit of stretch is 10 nm and of time 1 s.
 STRETCH, DENSITY, KAPPA = 1e-8, 1e15, 4e-4

@@ -6,7 +6,7 @@ from sim.ensemble.simulate import run
 from sim.parts import drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Onset, Time
-from sim.scenario.clock import Ensemble, Record
+from sim.scenario.scenario import Ensemble, Record
 from sim.spectrum.families import Band
 
 CELL = 0.24e-3

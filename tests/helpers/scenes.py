@@ -16,8 +16,7 @@ from sim.parts.drive import Force, Spring
 from sim.parts.exchange import Motion
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Constant as ConstantAmplitude, Diffusion, Onset, Slip, SlipRate, Stress, Time, Wave
-from sim.scenario.clock import Clock, Ensemble
-from sim.scenario.scenario import Scenario
+from sim.scenario.scenario import Clock, Ensemble, Scenario
 from sim.scenario.sweep import read_sweep
 from sim.spectrum.families import Band, Gaussian, Ripple, SelfAffine
 

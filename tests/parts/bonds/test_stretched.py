@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from sim.laws.schallamach import start_up_peak
 from sim.numerics.noise import Noise
 from sim.parts.bonds.rupture import Constant
-from sim.scenario.clock import Clock
+from sim.scenario.scenario import Clock
 from sim.spectrum.families import Band, BondMade
 from sim.units.errors import BadInput
 

@@ -18,8 +18,7 @@ from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import READINGS, Spring
 from sim.parts.shear import Banded, Mean
 from sim.parts.shear.process import Slip, SlipRate
-from sim.scenario.clock import Clock
-from sim.scenario.scenario import Scenario
+from sim.scenario.scenario import Clock, Scenario
 from sim.spectrum.families import Gaussian
 
 COHORTS = functools.partial(Cohort, tolerance=1e-5)

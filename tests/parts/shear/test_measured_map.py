@@ -15,7 +15,7 @@ from sim.numerics.grid import Grid
 from sim.parts.bonds.models import Counted, Unbroken
 from sim.parts.shear import Carried, Mapped
 from sim.parts.shear.maps import Passing
-from sim.scenario.clock import Record
+from sim.scenario.scenario import Record
 from sim.spectrum.families import Ripple
 from sim.spectrum.measured import StressMap
 from sim.spectrum.radial import disc_energy, marginal_energy
