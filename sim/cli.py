@@ -271,14 +271,33 @@ def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None, 
             say(str(csv))
 
 
+#: Kinds of figures with their content and options, here because the help must not import what draws them.
+_KINDS = {
+    "loop": "Load and contact radius over displacement with the energy lost per cycle, and radius over load. --data",
+    "theories": "Contact area, simulated and by each theory, over shear stress and tangential force.",
+    "stress": "Shear stress with its maximum, and bonds, over speed. After a start from rest: the static peaks. --data",
+    "stability": "Force amplitude of the spring over speed and stiffness, at increasing and decreasing speed,"
+    " with theory.",
+    "creep": "Displacement and speed of the slider over time under a prescribed force. A cross marks a runaway. --data",
+    "friction": "Friction force over time and over the slider's position: the friction loop. --data",
+    "curve": "Contact area with the loss by each mechanism, energies and friction, over speed. --x --absolute --data",
+    "sweep": "Contact radius, energies and friction over the first swept key. Each value of a further key is a"
+    " curve. --x --absolute --data",
+    "time": "Contact radius, energies, friction, and changing speed, load and displacement, over time. --x"
+    " --absolute --data",
+    "incipient": "Contact area over the tangential force before sliding, with the law A0 − αQ². --absolute",
+    "map": "Last stress map of a member, or the map nearest to a time, and the displacement by this stress. --at",
+    "movie": "Movie (GIF, MP4) of one contact: its edge, over the stress if maps are recorded, with area and"
+    " force over time. --absolute",
+}  # fmt: skip
+
+
 class _Plot(click.Command):
     """The command whose help lists the kinds of figures."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        from sim.plots.kinds import KINDS
-
         with formatter.section("Kinds"):
-            formatter.write_dl([(name, kind.help) for name, kind in KINDS.items()])
+            formatter.write_dl(list(_KINDS.items()))
 
 
 @cli.command(cls=_Plot)

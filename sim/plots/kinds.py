@@ -141,11 +141,6 @@ class Kind(NamedTuple):
         return (self.draw.__doc__ or "").partition("\n")[0]
 
     @property
-    def help(self) -> str:
-        """Content of the figure and its options, for the command's help."""
-        return " ".join([self.shows, *(f"--{name}" for name in self.takes if name != "ax")])
-
-    @property
     def takes(self) -> tuple[str, ...]:
         """Choices that the kind takes beside a member and units."""
         return tuple(inspect.signature(self.draw).parameters)[1:]

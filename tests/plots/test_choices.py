@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 
 import sim
+from sim.cli import _KINDS
 from sim.plots import Choices, kinds as plots, style as pictures
 from sim.plots.field import PIXELS
 from sim.plots.measured import Compared, Line
@@ -238,3 +239,5 @@ def test_what_cannot_be_drawn_is_refused_and_given_axes_are_drawn_in(ramp, table
     assert refused.strip().endswith("it takes: x, absolute, data, ax")
     listed = " ".join(command("plot", "--help").stdout.split())
     assert "over speed. --x --absolute --data" in listed
+    for name, kind in plots.KINDS.items():
+        assert _KINDS[name] == " ".join([kind.shows, *(f"--{choice}" for choice in kind.takes if choice != "ax")])
