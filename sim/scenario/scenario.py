@@ -440,6 +440,9 @@ class Scenario:
         remarks += remarks_between(self)
         if self.ensemble.members > 1 and self.fluctuations.measured and not any(self.varies.values()):
             remarks.append("all members and seeds share the map and nothing else is random, so one member is enough")
+        if (lattice := self.map_lattice) and not self.fluctuations.measured and (points := lattice.faster):
+            slow = f"{lattice.shape[0]} points along a side have a large prime factor, so each map needs more time"
+            remarks.append(f"{slow}: shear.points = {points}")
         if self.solid.poisson_ratio != 0.5:
             remarks.append("poisson_ratio is not 0.5: the normal-tangential coupling is neglected")
         return list(dict.fromkeys(remarks))

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 from sim.laws import halfspace
 from sim.parts.shear.process import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
+from sim.scenario.clock import Record
 
 G = 1.6e6
 MEMORIES = {
@@ -65,6 +66,13 @@ def test_a_contact_at_rest_keeps_its_pattern_and_the_floor_of_its_amplitude():
     for amplitude, floor in ((Onset(speed=1e-3, width=0.3, floor=0.05), 0.05), (Constant(), 1.0)):
         assert_allclose(amplitude.factor(np.zeros(1), np.zeros(1)), floor, rtol=1e-15)
     assert Stress(reference=1e5).factor(np.zeros(1), np.zeros(1)) == 0.0
+
+
+def test_recorded_maps_on_a_grid_with_a_large_prime_factor_are_remarked_with_the_next_good_size():
+    for points, maps, expected in ((106, (1e-3,), 108), (106, (), 0), (104, (1e-3,), 0)):
+        part = shear.Mapped(**ON_CELL, points=points, correlation=Slip(length=3e-6))
+        remarks = [text for text in scene(shear=part, record=Record(maps=maps)).remarks() if "prime" in text]
+        assert [text.rpartition(" ")[2] for text in remarks] == [str(expected)] * bool(expected)
 
 
 def test_a_map_is_the_sum_of_its_waves_and_stores_the_energy_of_the_modes_by_the_greens_function():
