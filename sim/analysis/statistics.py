@@ -632,16 +632,16 @@ def _over_time(
         spread = np.sqrt(_sum(deviations).sum(axis=-1) / total)
         below = [np.sum(values <= levels[:, k, np.newaxis, np.newaxis], axis=-1) / counts for k in range(len(_LEVELS))]
         del deviations, known
-        inflated, times = _memory(values, levels, mean, complete, step)
+        inflated, times = _memory(values, levels, mean, complete, step, bool(noisy.any()))
         spreads = np.array([spread, *np.broadcast_to(np.sqrt(_LEVELS * (1.0 - _LEVELS)), (points, len(_LEVELS))).T])
         errors, freedoms = _errors(np.array([means, *below]), spreads, inflated, total)
         effective = np.where(errors[0] > 1e-12 * abs(mean), (spread / errors[0]) ** 2, np.nan)
-        ends = np.array(_shares(spreads, errors, freedoms, 1.0 if members >= _MANY else 0.5))
+        ends, surely = np.full((2, points, len(_LEVELS)), np.nan), 1.0 if members >= _MANY else 0.5
+        ends[:, noisy] = _shares(spreads[:, noisy], errors[:, noisy], freedoms[:, noisy], surely)
         if members >= _SEVERAL:
             errors, freedoms = _errors(means[np.newaxis], spreads[:1], np.full((1, points, 2), np.nan), total)
         sem, freedom = np.where(noisy, errors[0], np.nan), freedoms[0]
         low, high = interval(name, mean, sem, freedom + 1.0)
-    ends[:, ~noisy] = np.nan
     result = {"mean": mean, "std": spread, "sem": sem, "low": low, "high": high}
     result |= {"effective_samples": effective}
     if complete.any():
@@ -658,12 +658,12 @@ def _sum(values: np.ndarray) -> np.ndarray:
 
 
 def _memory(
-    values: np.ndarray, levels: np.ndarray, mean: np.ndarray, complete: np.ndarray, step: float
+    values: np.ndarray, levels: np.ndarray, mean: np.ndarray, complete: np.ndarray, step: float, noisy: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return how many records count as one, for the mean and each quantile, with degrees of freedom; and the memory.
 
-    The shapes are (quantities, points, 2) and (3, points). nan at points that are not ``complete``, and of many
-    members, whose means give the errors.
+    The shapes are (quantities, points, 2) and (3, points). nan at points that are not ``complete``, of many members,
+    whose means give the errors, and of quantiles if nothing is ``noisy``.
     """
     (points, members, records), free = values.shape, max(values.shape[1] - 1, 1)
     inflated, times = np.full((1 + len(_LEVELS), points, 2), np.nan), np.full((3, points), np.nan)
@@ -673,7 +673,7 @@ def _memory(
         common = part.mean(axis=1) if members > 1 else mean[at, np.newaxis]
         covariance = covariance_of(part[:, :some], common, some * free / members)
         times[:, at] = time_of(covariance, some, records, step, np.max(np.abs(part), axis=(1, 2)))
-        for k in range(1 + len(_LEVELS)) if members < _MANY else ():
+        for k in range(1 + len(_LEVELS) * noisy) if members < _MANY else ():
             if k:
                 flags, share = (part <= levels[at, k - 1, np.newaxis, np.newaxis]).astype(float), _LEVELS[k - 1]
                 if members > 1:
