@@ -372,9 +372,11 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     """Open a dataset at chosen values of its sweep."""
     _import_xarray()
     from sim import analysis
-    from sim.analysis.dataset import open as opened
+    from sim.analysis.dataset import lacking, open as opened
 
     with opened(path) as dataset:
+        if message := lacking(dataset):
+            note(f"note: {path}: {message}")
         yield analysis.where(dataset, _values(chosen, "--where"))
 
 

@@ -23,6 +23,13 @@ from sim.units.notation import Recorded
 MEMBERS = "member"
 #: Trajectories that are read and worked on at once [byte].
 ROOM = 2**26
+#: Quantities that every run records unless its scenario chooses some, and the statements that need them.
+_STATEMENTS = {
+    "contact_area": "contact area", "friction_force": "friction", "in_contact": "open contacts",
+    "time_masked": "masked contacts", "first_detachment": "detachment", "jkr_radius": "area ratio",
+    "bonds_radius": "area lost to bonds and fluctuations", "peak_stress": "peak of stress",
+    "peak_friction": "peak of friction",
+}  # fmt: skip
 #: A missing variable in the words of xarray, without the ending of a statistic.
 _MISSING = re.compile(r"(?:^|named ')(\w+?)(?:_mean|_std|_sem)?(?:'|$)")
 _CONTROLS = ("load", "indentation", "displacement")
@@ -85,6 +92,16 @@ def _fault(dataset: xr.Dataset) -> str:
         return "the attribute scenario_resolved does not hold a scenario"
     missing = [name for name in ("contact_modulus", "t") if name not in dataset or dataset[name].dtype.kind != "f"]
     return f"lacks the numbers {missing[0]}" if missing else ""
+
+
+def lacking(dataset: xr.Dataset) -> str:
+    """Return which statements a dataset of an older version cannot make, in one sentence; "" if it makes all."""
+    if hdf5.tables(dataset.attrs["scenario_resolved"]).get("record", {}).get("quantities") is not None:
+        return ""
+    recorded = {re.sub("_(mean|std|sem)$", "", str(name)) for name in dataset.variables}
+    lost = [statement for name, statement in _STATEMENTS.items() if name not in recorded]
+    text = f"made by sim {dataset.attrs['sim_version']}, which did not record all"
+    return f"{text}: no {', no '.join(lost)}; run the scenario again for these" if lost else ""
 
 
 def with_trajectories(dataset: xr.Dataset, *names: str) -> xr.Dataset:

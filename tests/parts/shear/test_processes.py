@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from sim.laws import halfspace
 from sim.parts.shear.process import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
-from sim.scenario.clock import Record
+from sim.scenario.scenario import Record
 
 G = 1.6e6
 MEMORIES = {
