@@ -42,6 +42,7 @@ if TYPE_CHECKING:  # what a function needs is imported where it is called, so th
     from sim.explorer.server import Server
     from sim.scenario.scenario import Scenario
     from sim.study.fit import Fit
+    from sim.study.plan import Plan
 
 Path = str | os.PathLike[str]
 _FROM = {"Scenario": "sim.scenario.scenario", "load": "sim.scenario.reader"}
@@ -56,6 +57,7 @@ __all__ = sorted(
         "explore",
         "fit",
         "open",
+        "plan",
         "plot",
         "run",
         "stats",
@@ -244,6 +246,51 @@ def fit(
 
     paths = [data] if isinstance(data, str | os.PathLike) else list(data)
     return study(_scene(scenario), [pathlib.Path(path) for path in paths], free, common, steady, per_table)
+
+
+def plan(
+    scenario: "Scenario | Path | dict[str, Any]",
+    points: Path,
+    free: "Iterable[str]",
+    candidates: Path | None = None,
+    common: dict[str, float] | None = None,
+    sims: int = 400,
+    seed: int | None = None,
+) -> "Plan":
+    """Return what a planned measurement can tell, and which further point helps most to tell mechanisms apart.
+
+    Parameters
+    ----------
+    scenario : Scenario, path or dict
+        The truth that is assumed.
+    points : path
+        A CSV table of conditions and standard errors, ``speed [mm/s], contact_area_error [%]``, without values.
+    free : iterable of str
+        Keys that will be fitted, as for ``fit``.
+    candidates : path, optional
+        A CSV table of further points; by default twenty speeds, from a tenth of the least to ten times the largest.
+    common : dict, optional
+        Relative errors that all points of a variable share, as for ``fit``.
+    sims : int
+        Simulated data sets for each truth.
+    seed : int, optional
+        Of the simulated errors, by default that of the scenario.
+
+    Returns
+    -------
+    Plan
+        ``numbers`` with the interval to expect for each key, ``told`` with the probability that the mechanisms are told
+        apart, ``points`` with the best further point first, and ``remarks``.
+
+    Raises
+    ------
+    BadInput
+        If a key has no effect, the table cannot be read or has no errors, or the drive needs runs.
+    """
+    from sim.study.plan import plan as study
+
+    further = None if candidates is None else pathlib.Path(candidates)
+    return study(_scene(scenario), pathlib.Path(points), free, further, common, sims, seed)
 
 
 def steady_curves(

@@ -416,6 +416,12 @@ def converge(
 @click.option("--common", multiple=True, metavar="COLUMN=SIZE", help="Error shared by all points, such as 2 %.")
 @click.option("--steady", is_flag=True, help="Fit steady sliding only, without corrections by runs.")
 @click.option("--compare", "judged", is_flag=True, help="Also compare mechanisms and theories by the data.")
+@click.option("--plan", "is_plan", is_flag=True, help="Plan a measurement at the conditions of DATA instead.")
+@click.option("--candidates", type=_PATH, help="With --plan: further points to choose from. Default: twenty speeds.")
+@click.option(
+    "--sims", type=click.IntRange(50), default=400, show_default=True, help="With --plan: data sets per truth."
+)
+@click.option("--seed", type=click.IntRange(0), help="With --plan: seed of the errors. Default: that of the scenario.")
 @click.option("-o", "--output", type=_PATH, help="STEM of STEM_fit.toml, .json and .png. Default: scenario name.")
 @_UNITS
 @_SET
@@ -423,10 +429,23 @@ def converge(
 def fit(scenario: Path, output: Path | None, changes: tuple[str, ...], force: bool, **options: Any) -> None:
     """Calibrate keys of a scenario to measured curves.
 
-    DATA are CSV files with units. Their columns have names of variables of a dataset, such as contact_area.
+    DATA are CSV files with units. Their columns have names of variables of a dataset, such as contact_area. With --plan
+    DATA needs conditions and errors only, and STEM_plan.json and .png are written.
     """
     _announce_compiling()
     scene, stem = _load(scenario, changes), output or scenario.with_suffix("")
+    planned = {name: options.pop(name) for name in ("candidates", "sims", "seed")}
+    if options.pop("is_plan"):
+        from sim.study import plan
+        from sim.units.errors import BadInput
+
+        if len(options["data"]) > 1 or options["judged"] or options["steady"] or options["per_table"]:
+            raise BadInput(["--plan: takes one table, without --compare, --steady and --per-table; omit these"])
+        chosen = {name: options[name] for name in ("free", "common", "units")}
+        shown = plan.carried_out(scene, options["data"][0], stem=stem, replaced=force, **chosen, **planned)
+        for rows, text in shown:
+            print_table(rows, text)
+        return
     from sim.study import fit
 
     result, shown = fit.carried_out(scene, stem=stem, replace=force, **options)

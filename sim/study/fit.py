@@ -222,9 +222,12 @@ def fit(
         If a key cannot be fitted, a table cannot be read, or the curves depend on some keys only together.
     """
     base = scenario.with_values({"record": {}})
-    shared, split = [_free(base, text) for text in free], [_free(base, text, "--per-table") for text in per_table]
+    shared, split = (
+        [free_number(base, text) for text in free],
+        [free_number(base, text, "--per-table") for text in per_table],
+    )
     tables = [likelihood.read(path, base) if isinstance(path, Path) else path for path in data]
-    if faults := [*_conflicts(base, shared, split, tables)]:
+    if faults := [*conflicts(base, shared, split, tables)]:
         raise BadInput(faults)
     places = itertools.product(split, enumerate(tables))
     split = [item._replace(key=f"{item.key} ({table.path.stem})", table=k) for item, (k, table) in places]
@@ -233,14 +236,7 @@ def fit(
         raise BadInput([f'--steady: drive.model = "{base.drive.model}" needs runs; omit --steady'])
     if base.drive.solves_motion or (not steady and idle(problem)):
         problem = replace(problem, by_run=True).compared(problem.start)
-    for name, _, table in (key.partition(" (") for key in idle(problem)):
-        option, place = ("--per-table", f" in {table[:-1]}") if table else ("--free", "")
-        faults.append(f"{option} {name}: has no effect on what was measured{place}; fix it")
-    for keys in [] if faults else likelihood.entangled(problem):
-        options = " and --per-table" * bool(split)
-        faults.append(f"--free{options} {', '.join(keys)}: the curves depend on them only together; free one of them")
-    if faults:
-        raise BadInput(faults)
+    likelihood.refuse_undetermined(problem)
     problem, best = _searched(problem)
     alone, steady = best, steady or problem.by_run
     converged = steady and best.converged
@@ -253,7 +249,7 @@ def fit(
     return _assembled(scenario, problem, best, alone, converged)
 
 
-def _conflicts(scenario: Scenario, shared: list[Free], split: list[Free], tables: Sequence[Measured]) -> Iterator[str]:
+def conflicts(scenario: Scenario, shared: list[Free], split: list[Free], tables: Sequence[Measured]) -> Iterator[str]:
     """Yield the faults of free keys and tables that do not go together."""
     keys, names = [item.key for item in (*shared, *split)], [table.path.stem.lower() for table in tables]
     for key in {key: None for key in keys if keys.count(key) > 1}:
@@ -401,7 +397,7 @@ def _remarks(result: Fit) -> Iterator[str]:
             yield f"{key}: p of no difference is not computed, because a bound sets an interval; give wider bounds"
 
 
-def _free(scenario: Scenario, text: str, option: str = "--free") -> Free:
+def free_number(scenario: Scenario, text: str, option: str = "--free") -> Free:
     """Return the free number of a text ``KEY`` or ``KEY=LOW:HIGH``."""
     key, sign, span = text.partition("=")
     physical = (item for item in quantities(scenario).items() if item[0].partition(".")[0] not in _OTHER)
@@ -537,6 +533,12 @@ def _alike(problem: Problem) -> tuple[list[NDArray[np.int64]], list[str]]:
     return np.split(number.ravel(), places[:-1]), labels
 
 
+def common_errors(texts: Sequence[str]) -> dict[str, float]:
+    """Return relative errors by the variable from texts ``"COLUMN=2 %"``."""
+    pairs = [text.partition("=")[::2] for text in texts]
+    return {name: read_option(size, f"--common {name}", "1", above=0, below=1) for name, size in pairs}
+
+
 #: First words of a line of the scenarios that are written here, by which they may be replaced.
 _MADE = "# Made by sim fit"
 
@@ -552,8 +554,7 @@ def carried_out(
     ``<stem>_fit_<table>.toml``. Older ones are refused unless ``replace`` is True; a scenario is replaced only if a fit
     has written it.
     """
-    pairs = [pair.partition("=")[::2] for pair in common]
-    sizes = {name: read_option(size, f"--common {name}", "1", above=0, below=1) for name, size in pairs}
+    sizes = common_errors(common)
     endings = [*([f"_{path.stem}.toml" for path in data] if per_table else [".toml"]), ".json", ".png"]
     outputs, inputs = [stem.with_name(f"{stem.name}_fit{ending}") for ending in endings], [*files_read(scenario), *data]
     for path in outputs:

@@ -100,24 +100,18 @@ def read(path: Path, scenario: Scenario) -> Measured:
     BadInput
         With one line.
     """
-    at, by_run = _conditions(scenario), scenario.drive.solves_motion
-    outcomes = {
-        item.name: Quantity(item.unit, item.long_name, at_least=0 if item.name in _SIZES else -math.inf)
-        for item in VARIABLES
-        if item.name not in _NOT_MEASURED and item.applies(scenario)
-        and (item.part != "drive" or (by_run and item.name in _OF_SLIDER))
-    }  # fmt: skip
+    at, outcomes = conditions_of(scenario), outcomes_of(scenario)
     known = {name: quantity for name, (_, quantity) in at.items()} | outcomes
     result, _ = read_measured(path, known, outcomes)
     conditions = {at[name][0]: points.values for name, points in result.items() if name in at}
     curves = tuple(Curve(name, *points) for name, points in result.items() if name not in at)
-    for fault in _faults(scenario, conditions, curves):
+    for fault in faults_of(scenario, conditions, curves):
         raise BadInput([f"{path}: {fault}"])
     ranges = [f"{name} {np.min(x):.4g} to {np.max(x):.4g} {known[name].unit}" for name, (x, _) in result.items()]
     return Measured(path, scenario.contact.kind, conditions, curves, ", ".join(ranges))
 
 
-def _faults(scenario: Scenario, conditions: dict[str, Array], curves: tuple[Curve, ...]) -> Iterator[str]:
+def faults_of(scenario: Scenario, conditions: dict[str, Array], curves: tuple[Curve, ...]) -> Iterator[str]:
     """Yield the faults of a table: missing conditions, curves without information and opposite signs."""
     if not curves:
         yield 'no column was measured; name one as a variable of a dataset, such as "contact_area [mm^2]"'
@@ -135,7 +129,18 @@ def _faults(scenario: Scenario, conditions: dict[str, Array], curves: tuple[Curv
             yield f"{name} is 0 in all rows, so it has no scatter; give errors, or omit it"
 
 
-def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
+def outcomes_of(scenario: Scenario) -> dict[str, Quantity]:
+    """Return the declarations of the variables that can be measured, by name."""
+    by_run = scenario.drive.solves_motion
+    return {
+        item.name: Quantity(item.unit, item.long_name, at_least=0 if item.name in _SIZES else -math.inf)
+        for item in VARIABLES
+        if item.name not in _NOT_MEASURED and item.applies(scenario)
+        and (item.part != "drive" or (by_run and item.name in _OF_SLIDER))
+    }  # fmt: skip
+
+
+def conditions_of(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
     """Return condition and declaration by the name of a column."""
     kind = scenario.contact.kind
     result = {variable_name(key): (key, quantity) for key, (quantity, _) in quantities(scenario).items()}
@@ -452,7 +457,7 @@ class Problem:
 
         They are nan along a run over time, and those of the scenario if a table does not name the condition.
         """
-        declared, result = dict(_conditions(self.groups[0][0].scenario).values()), dict[str, Any]()
+        declared, result = dict(conditions_of(self.groups[0][0].scenario).values()), dict[str, Any]()
         for key in (key for table in self.tables for key in table.conditions if key != "t"):
             result[key] = declared[key], [np.full(table.rows, np.nan) for table in self.tables]
             for values, table, groups in zip(result[key][1], self.tables, self.groups, strict=True):
@@ -580,7 +585,7 @@ def minimum(
     options: dict[str, Any] = {"calc_covar": errors, "scale_covar": False, "max_nfev": _EVALUATIONS * (len(start) + 1)}
     if problem.by_run:  # steps of the minimizer's own would be lost in the rounding of a run
         varied, precision = [k for k in range(len(parameters)) if k not in fixed], _RUN_PRECISION
-        options["Dfun"] = lambda current: _derivatives(problem, numbers(current), varied)
+        options["Dfun"] = lambda current: derivatives(problem, numbers(current), varied)
     result = lmfit.Minimizer(lambda current: problem.residuals(numbers(current)), parameters, **options).leastsq(
         ftol=precision, xtol=precision
     )
@@ -606,7 +611,7 @@ def with_errors(problem: Problem, start: Array) -> tuple[Problem, Minimum]:
 
 def idle(problem: Problem) -> list[str]:
     """Free keys that have no effect on the curves."""
-    sizes = np.sqrt(np.sum(_derivatives(problem, problem.start, range(len(problem.free))) ** 2, axis=0))
+    sizes = np.sqrt(np.sum(derivatives(problem, problem.start, range(len(problem.free))) ** 2, axis=0))
     least = _NO_EFFECT * math.sqrt(len(problem.values))
     return [item.key for item, size in zip(problem.free, sizes, strict=True) if size < least]
 
@@ -617,7 +622,7 @@ def entangled(problem: Problem) -> list[list[str]]:
     for share in (0.05, 0.16):  # off the bounds, and what holds at two places is no accident of one
         inside = [x + share * (0.5 * (low + high) - x) if math.isfinite(high - low) else x
                   for x, (low, high) in zip(problem.start, problem.bounds, strict=True)]  # fmt: skip
-        columns = _derivatives(problem, np.array(inside), range(count))
+        columns = derivatives(problem, np.array(inside), range(count))
         _, sizes, rows = np.linalg.svd(columns / np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300))
         nothing = (_RUN_NOTHING if problem.by_run else _NOTHING) * sizes[0]
         spaces.append([rows[k] for k in range(count) if k >= len(sizes) or sizes[k] < nothing])
@@ -626,7 +631,20 @@ def entangled(problem: Problem) -> list[list[str]]:
     return [[problem.free[k].key for k in range(count) if abs(row[k]) > 0.1] for row in spaces[0]]
 
 
-def _derivatives(problem: Problem, x: Array, places: Iterable[int]) -> Array:
+def refuse_undetermined(problem: Problem) -> None:
+    """Raise ``BadInput`` if curves do not depend on a free key, or on some only together."""
+    faults, split = [], any(item.table >= 0 for item in problem.free)
+    for name, _, table in (key.partition(" (") for key in idle(problem)):
+        option, place = ("--per-table", f" in {table[:-1]}") if table else ("--free", "")
+        faults.append(f"{option} {name}: has no effect on what was measured{place}; fix it")
+    for keys in [] if faults else entangled(problem):
+        options = "--free" + " and --per-table" * split
+        faults.append(f"{options} {', '.join(keys)}: the curves depend on them only together; free one of them")
+    if faults:
+        raise BadInput(faults)
+
+
+def derivatives(problem: Problem, x: Array, places: Iterable[int]) -> Array:
     """Derivatives of the residuals over what is free, a column for each place in it."""
     columns, share = [], _RUN_STEP if problem.by_run else _STEP
     for k in places:

@@ -22,12 +22,14 @@ from sim.units.quantity import Quantity
 #: Most draws of a likelihood ratio; ratios as large as the measured one that are enough (Besag & Clifford 1991);
 #: difference of AICc beyond which none is needed.
 DRAWS, _ENOUGH, _HOPELESS = 200, 20, 30.0
-#: Relative precision of a sum of squares of drawn curves, whose ratios are of order 1; residual of an open contact.
-_FINE, _FAR = 1e-3, 1e6
+#: Relative precision of a sum of squares of drawn curves, whose ratios are of order 1.
+_FINE = 1e-3
+#: Residual of an open contact, and distance of curves that are alike, both in standard errors.
+_FAR, _BESIDE = 1e6, 0.3
 #: Binary logarithm of the most places at which a search may start, and their range without bounds, in large changes.
 _SPREAD, _AROUND = 8, 3.0
 #: What rejects a mechanism: probability of a ratio at least as large, and difference of AICc.
-_RARE, _WORSE = 0.05, 4.0
+RARE, WORSE = 0.05, 4.0
 
 _ALPHA = Free("alpha", Quantity("1", "reversible share", at_least=0, at_most=1), 0.1, 0.0, 1.0)
 _LAMBDA = Free("lambda", Quantity("1", "mixity", at_least=0, at_most=1), 0.5, 0.0, 1.0)
@@ -45,7 +47,7 @@ _THEORIES: dict[str, tuple[str, tuple[Free, ...]]] = {
 }
 WHOLE = "the scenario as it is"
 #: Parts of it by their names, and what they leave out.
-_PARTS = {"bonds only": "fluctuations act", "fluctuations only": "bonds act"}
+PARTS = {"bonds only": "fluctuations act", "fluctuations only": "bonds act"}
 
 
 class Judged(NamedTuple):
@@ -92,16 +94,33 @@ class Search:
 
     def __init__(self, problem: Problem, starts: Sequence[Array]) -> None:
         self.problem, self.places = problem, [*starts, *([] if problem.by_run else _spread(problem))]
-        self.curves = [problem.predicted(place) for place in self.places]
+        self.error = np.hypot(problem.sigma, problem.noise)
+        self.curves = np.array([self._curve(place) for place in self.places])
+
+    def _curve(self, place: Array) -> Array:
+        """Return all curves in standard errors, and the common errors in their sizes."""
+        return np.append(self.problem.predicted(place) / self.error, place[len(self.problem.free) :])
+
+    def _nearest(self, values: Array) -> tuple[int, float]:
+        """Return the number of the known place nearest to values, and its sum of squares."""
+        off = self.curves - np.append(values / self.error, np.zeros(len(self.problem.common)))
+        sums = np.sum(np.nan_to_num(off, nan=_FAR) ** 2, axis=1)
+        nearest = int(np.argmin(sums))
+        return nearest, float(sums[nearest])
 
     def least(self, values: Array, precision: float = _FINE) -> Minimum:
         """Return the minimum of the sum of squares for some values, to a relative precision."""
-        off = (values - np.array(self.curves)) / np.hypot(self.problem.sigma, self.problem.noise)
-        nearest = int(np.argmin(np.sum(np.nan_to_num(off, nan=_FAR) ** 2, axis=1)))
+        nearest, _ = self._nearest(values)
         result = minimum(replace(self.problem, values=values), self.places[nearest], precision=precision)
-        self.places.append(result.x)
-        self.curves.append(self.problem.predicted(result.x))
+        curve = self._curve(result.x)
+        if not np.sum((curve - self.curves[nearest]) ** 2) < _BESIDE**2:
+            self.places.append(result.x)
+            self.curves = np.append(self.curves, [curve], axis=0)
         return result
+
+    def reaches(self, values: Array, level: float) -> bool:
+        """Return True if the least sum of squares for some values is at most a level."""
+        return level >= 0.0 and (self._nearest(values)[1] <= level or self.least(values).chi_square <= level)
 
 
 def _spread(problem: Problem) -> Array:
@@ -140,7 +159,7 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
     """
     whole = Search(problem, [best.x])
     fits = [(WHOLE, whole, min(best, whole.least(problem.values, 1e-8), key=lambda item: item.chi_square))]
-    for name, other in _others(problem):
+    for name, other in others(problem):
         search = Search(other, _starts(other))
         fits.append((name, search, search.least(problem.values, 1e-8)))
     best, criteria = fits[0][2], [item.problem.criterion(least.chi_square) for _, item, least in fits]
@@ -151,7 +170,7 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
         if place and aicc < worst:
             rng = np.random.default_rng([seed, place])
             p_value = _p_value(item, least, whole, best, rng, draws)
-            rejected = p_value <= _RARE and aicc - (criteria[0] if name in _PARTS else min(criteria)) >= _WORSE
+            rejected = p_value <= RARE and aicc - (criteria[0] if name in PARTS else min(criteria)) >= WORSE
         judged.append(Judged(name, item.problem.numbers(least.x), least.chi_square, aicc, p_value, rejected))
     sufficient, words = _verdict(judged)
     return Verdict(tuple(sorted(judged, key=lambda item: item.aicc)), sufficient, words)
@@ -168,16 +187,16 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
     if not left:
         return WHOLE, f"the data prefer {WHOLE}: every other mechanism is rejected"
     first, ahead = left[0], whole.aicc - left[0].aicc
-    if len(left) > 1 or (first.name not in _PARTS and ahead < _WORSE):
+    if len(left) > 1 or (first.name not in PARTS and ahead < WORSE):
         return "", f"the data cannot tell: not rejected are {WHOLE}, {', '.join(item.name for item in left)}"
     evidence = f"(p = {first.p_value:.2g}, AICc {-ahead:+.2g} from {WHOLE})"
     words = f"the data prefer {first.name} {evidence} and reject the others"
-    if first.name in _PARTS:
-        words = f"{first.name} is sufficient; the data cannot tell whether {_PARTS[first.name]} as well {evidence}"
+    if first.name in PARTS:
+        words = f"{first.name} is sufficient; the data cannot tell whether {PARTS[first.name]} as well {evidence}"
     return first.name, words
 
 
-def _others(problem: Problem) -> Iterator[tuple[str, Problem]]:
+def others(problem: Problem) -> Iterator[tuple[str, Problem]]:
     """Mechanisms beside the scenario as it is, each with the keys that it has."""
     scene, known = problem.groups[0][0].scenario, quantities(problem.groups[0][0].scenario)
     still = {"shear.paid_by_adhesion": 0.0} if "shear.paid_by_adhesion" in known else {}
@@ -227,8 +246,7 @@ def _p_value(
         return 1.0
     drawn = itertools.islice(draws_of(whole.problem, poorer.problem.predicted(least.x), rng), draws)
     for drawn_so_far, values in enumerate(drawn, 1):
-        allowed = poorer.least(values).chi_square - measured
-        larger += allowed >= 0.0 and whole.least(values).chi_square <= allowed  # no sum of squares is below zero
+        larger += whole.reaches(values, poorer.least(values).chi_square - measured)
         if larger == _ENOUGH:
             return larger / drawn_so_far
     return (1 + larger) / (1 + draws)

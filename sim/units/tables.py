@@ -625,6 +625,21 @@ class Points(NamedTuple):
     errors: Array | None
 
 
+def units_of(path: Path) -> dict[str, str]:
+    """Return the names of the columns of a table with the texts of their units, "" without one.
+
+    Raises
+    ------
+    BadInput
+        With one line.
+    """
+    try:
+        with blamed(str(path)):
+            return dict(_headed(_cells(plain_text(path)))[1])
+    except PydanticCustomError as fault:
+        raise BadInput([str(fault)]) from None
+
+
 def read_measured(
     path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity], gaps: bool = False
 ) -> tuple[dict[str, Points], str]:

@@ -399,7 +399,7 @@ def test_keys_that_data_cannot_tell_apart_are_remarked_or_refused(curves, tmp_pa
 
 
 def judged(scene, made, keys, draws, seed=LENS["seed"]):
-    free = [calibration._free(scene, key) for key in keys]
+    free = [calibration.free_number(scene, key) for key in keys]
     problem = problem_of(scene, [made], free, {})
     return mechanisms.compare(problem, minimum(problem, problem.start, errors=True), seed, draws)
 
@@ -423,7 +423,7 @@ ONE_ALONE = {"bonds only": {"shear.paid_by_adhesion": 0.0}, "fluctuations only":
 def test_curves_are_doubted_beyond_errors_and_the_mechanism_that_made_them_excludes_no_other(tmp_path, truth, curves):
     scene = load(SPRUNG)
     made = drawn_of(scene, 0.01, 3)
-    problem = problem_of(scene, [made], [calibration._free(scene, "bonds.stress")], {})
+    problem = problem_of(scene, [made], [calibration.free_number(scene, "bonds.stress")], {})
     best = minimum(problem, problem.start, errors=True)
     for less in (0.0, 1e-6, -1e-6):  # as precisely as a minimum is known
         least = best._replace(chi_square=best.chi_square * (1.0 + less))
@@ -465,10 +465,10 @@ def test_curves_are_doubted_beyond_errors_and_the_mechanism_that_made_them_exclu
 def test_searches_for_drawn_curves_find_the_minima_of_many_full_refits_and_so_the_same_p_values():
     slow, keys = np.geomspace(1e-5, 9e-4, 8), [key for key in MECHANISM_KEYS if key != "bonds.stress"]
     made = drawn_of(load(LENS), 0.03, 1000, slow, ["contact_area"])
-    whole = problem_of(load(LENS), [made], [calibration._free(load(LENS), key) for key in keys], {})
+    whole = problem_of(load(LENS), [made], [calibration.free_number(load(LENS), key) for key in keys], {})
     search, steps = mechanisms.Search(whole, [whole.start]), 2.0 * np.eye(len(keys))
     starts, rng, draws = [whole.start, *(whole.start + steps), *(whole.start - steps)], np.random.default_rng(3), 20
-    others = dict(mechanisms._others(whole))
+    others = dict(mechanisms.others(whole))
     for name in ("fluctuations only", "JKR, independent of shear"):
         null = mechanisms.Search(others[name], [others[name].start])
         expected, ratios, refitted = others[name].predicted(null.least(whole.values).x), [], []
