@@ -24,10 +24,11 @@ from sim.units.quantity import Quantity
 DRAWS, _ENOUGH, _HOPELESS = 200, 20, 30.0
 #: Relative precision of a sum of squares of drawn curves, whose ratios are of order 1.
 _FINE = 1e-3
-#: Residual of an open contact, and distance of curves that are alike, both in standard errors.
-_FAR, _BESIDE = 1e6, 0.3
-#: Binary logarithm of the most places at which a search may start, and their range without bounds, in large changes.
-_SPREAD, _AROUND = 8, 3.0
+#: Residual of an open contact, and distances of curves that are alike and that differ, all in standard errors.
+_FAR, _BESIDE, _APART = 1e6, 0.3, 3.0
+#: Binary logarithm of the most places at which a search may start, their range without bounds, in large changes, and
+#: how many of them are tried for measured curves.
+_SPREAD, _AROUND, _STARTS = 8, 3.0, 3
 #: What rejects a mechanism: probability of a ratio at least as large, and difference of AICc.
 RARE, WORSE = 0.05, 4.0
 
@@ -93,7 +94,8 @@ class Search:
     """
 
     def __init__(self, problem: Problem, starts: Sequence[Array]) -> None:
-        self.problem, self.places = problem, [*starts, *([] if problem.by_run else _spread(problem))]
+        self.problem, self.given = problem, len(starts)
+        self.places = [*starts, *([] if problem.by_run else _spread(problem))]
         self.error = np.hypot(problem.sigma, problem.noise)
         self.curves = np.array([self._curve(place) for place in self.places])
 
@@ -101,26 +103,38 @@ class Search:
         """Return all curves in standard errors, and the common errors in their sizes."""
         return np.append(self.problem.predicted(place) / self.error, place[len(self.problem.free) :])
 
-    def _nearest(self, values: Array) -> tuple[int, float]:
-        """Return the number of the known place nearest to values, and its sum of squares."""
+    def _sums(self, values: Array) -> Array:
+        """Return the sums of squares of some values at all known places."""
         off = self.curves - np.append(values / self.error, np.zeros(len(self.problem.common)))
-        sums = np.sum(np.nan_to_num(off, nan=_FAR) ** 2, axis=1)
-        nearest = int(np.argmin(sums))
-        return nearest, float(sums[nearest])
+        return np.sum(np.nan_to_num(off, nan=_FAR) ** 2, axis=1)
 
-    def least(self, values: Array, precision: float = _FINE) -> Minimum:
-        """Return the minimum of the sum of squares for some values, to a relative precision."""
-        nearest, _ = self._nearest(values)
-        result = minimum(replace(self.problem, values=values), self.places[nearest], precision=precision)
+    def _from(self, values: Array, starts: Sequence[int], precision: float) -> Minimum:
+        """Return the least of the minima from some known places, and remember it if its curves are new."""
+        problem = replace(self.problem, values=values)
+        minima = [minimum(problem, self.places[k], precision=precision) for k in starts]
+        result = min(minima, key=lambda item: item.chi_square)
         curve = self._curve(result.x)
-        if not np.sum((curve - self.curves[nearest]) ** 2) < _BESIDE**2:
+        if not np.sum((curve - self.curves[starts[0]]) ** 2) < _BESIDE**2:
             self.places.append(result.x)
             self.curves = np.append(self.curves, [curve], axis=0)
         return result
 
+    def least(self, values: Array) -> Minimum:
+        """Return the minimum of the sum of squares for simulated values, coarsely, from the nearest known place."""
+        return self._from(values, [int(np.argmin(self._sums(values)))], _FINE)
+
+    def exact(self, values: Array) -> Minimum:
+        """Return the minimum to eight digits, from the given starts and the nearest places that differ."""
+        starts = list(range(self.given))
+        for k in np.argsort(self._sums(values), kind="stable").tolist():
+            off = np.nan_to_num(self.curves[starts] - self.curves[k], nan=_FAR)
+            if len(starts) < self.given + _STARTS and np.all(np.sum(off**2, axis=1) > _APART**2):
+                starts.append(k)
+        return self._from(values, starts, 1e-8)
+
     def reaches(self, values: Array, level: float) -> bool:
-        """Return True if the least sum of squares for some values is at most a level."""
-        return level >= 0.0 and (self._nearest(values)[1] <= level or self.least(values).chi_square <= level)
+        """Return True if the least sum of squares for simulated values is at most a level."""
+        return level >= 0.0 and bool(np.min(self._sums(values)) <= level or self.least(values).chi_square <= level)
 
 
 def _spread(problem: Problem) -> Array:
@@ -132,7 +146,7 @@ def _spread(problem: Problem) -> Array:
     bounds = zip(problem.bounds, problem.start, widths, strict=True)
     ends = [(max(low, x - width), min(high, x + width)) if math.isinf(high - low) else (low, high)
             for (low, high), x, width in bounds]  # fmt: skip
-    shares = qmc.Sobol(count, rng=np.random.default_rng(0)).random_base2(min(2 + 2 * count, _SPREAD))
+    shares = qmc.Sobol(count, rng=np.random.default_rng(0)).random_base2(min(4 + 2 * count, _SPREAD))
     return qmc.scale(shares, *np.transpose(ends))
 
 
@@ -158,10 +172,10 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
         Curves drawn for each mechanism.
     """
     whole = Search(problem, [best.x])
-    fits = [(WHOLE, whole, min(best, whole.least(problem.values, 1e-8), key=lambda item: item.chi_square))]
+    fits = [(WHOLE, whole, min(best, whole.exact(problem.values), key=lambda item: item.chi_square))]
     for name, other in others(problem):
         search = Search(other, _starts(other))
-        fits.append((name, search, search.least(problem.values, 1e-8)))
+        fits.append((name, search, search.exact(problem.values)))
     best, criteria = fits[0][2], [item.problem.criterion(least.chi_square) for _, item, least in fits]
     worst = min(criteria) + _HOPELESS
     judged = []

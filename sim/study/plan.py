@@ -42,10 +42,8 @@ from sim.units.terminal import progress_bar
 
 #: Simulated data sets of each truth, speeds of further points by default, and how many points are simulated.
 SIMS, _SPEEDS, _BEST = 400, 20, 3
-#: Precision of fits to values without errors, and least noncentrality, for which scipy has a distribution.
-_EXACT, _LEAST = 1e-5, 1e-9
-#: Spread of a number that no point determines, in large changes of it.
-_UNKNOWN = 1e3
+#: Least noncentrality that scipy knows, and spread of a number without information, in large changes.
+_LEAST, _UNKNOWN = 1e-9, 1e3
 _LOOKS = {WHOLE: style.BOTH, "bonds only": style.BONDS, "fluctuations only": style.FLUCTUATIONS}
 
 
@@ -158,7 +156,7 @@ class _Design:
         self.parts = {name: Search(other, [other.start]) for name, other in others(problem) if name in PARTS}
         self.expected = {WHOLE: curves}
         for name, search in self.parts.items():
-            self.expected[name] = search.problem.predicted(search.least(curves, _EXACT).x)
+            self.expected[name] = search.problem.predicted(search.exact(curves).x)
 
     @cached_property
     def penalties(self) -> dict[str, float]:
@@ -192,10 +190,10 @@ class _Design:
         """Return the probability by a non-central chi-square distribution if these ratios are rare, by truth."""
         result = {}
         for truth, curves in self.expected.items():
-            least, chances = self.whole.least(curves).chi_square, []
+            least, chances = self.whole.exact(curves).chi_square, []
             for part in self.parts.keys() - {truth}:
                 search, enough = self.parts[part], max(rare[part], WORSE - self.penalties[part])
-                away = max(search.least(curves).chi_square - least, _LEAST)
+                away = max(search.exact(curves).chi_square - least, _LEAST)
                 freedom = max(len(self.problem.free) - len(search.problem.free), 1)
                 chances.append(float(stats.ncx2.sf(enough, freedom, away)))
             result[truth] = min(chances)
