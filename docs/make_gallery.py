@@ -24,6 +24,8 @@ from sim.analysis import concise, distribution, shares, statistics
 from sim.analysis.events import incipient_law
 from sim.study.fit import Fit, figure as fitted
 from sim.study.likelihood import LEVEL
+from sim.study.mechanisms import WHOLE
+from sim.study.plan import Plan, figure as planned
 
 ROOT = Path(__file__).parent.parent
 FOLDER = Path(__file__).with_name("gallery")
@@ -64,7 +66,8 @@ class Entry(NamedTuple):
 
     ``changes`` are overrides of the scenario, ``kind`` is that of the figure, ``where`` the values of swept keys that
     it shows, ``units`` some of its axes and ``choices`` further options; ``name`` is that of the picture. With ``free``
-    keys the scenario is fitted to the table of its name, and ``numbers`` reads the fit.
+    keys the scenario is fitted to the table of its name, and ``numbers`` reads the fit. With a table of
+    ``points`` as well, ``numbers`` reads the plan of a measurement.
     """
 
     name: str
@@ -78,6 +81,7 @@ class Entry(NamedTuple):
     units: tuple[str, ...] = ()
     choices: Mapping[str, Any] = MappingProxyType({})
     free: tuple[str, ...] = ()
+    points: str = ""
 
     @property
     def picture(self) -> Path:
@@ -90,7 +94,8 @@ class Entry(NamedTuple):
         path = f"scenarios/{self.scenario}"
         if self.free:
             free = "".join(f" --free {key}" for key in self.free)
-            return [f"sim fit {path}.toml {path}.csv{free} -o outputs/{self.name}"]
+            table = f"--plan scenarios/{self.points}.csv" if self.points else f"{path}.csv"
+            return [f"sim fit {path}.toml {table}{free} -o outputs/{self.name}"]
         options = "".join(f" --set '{key}={_toml(value)}'" for key, value in self.changes.items())
         output = f" -o outputs/{self.name}.nc" if self.name != self.scenario else ""
         chosen = "".join(f" --where '{key}={value}'" for key, value in self.where.items())
@@ -105,6 +110,8 @@ class Entry(NamedTuple):
     def run(self) -> Any:
         """Return the dataset of the question, or the fit."""
         path = ROOT / "scenarios" / f"{self.scenario}.toml"
+        if self.points:
+            return sim.plan(path, path.with_name(f"{self.points}.csv"), self.free)
         if self.free:
             return sim.fit(path, path.with_suffix(".csv"), self.free)
         return sim.run(sim.load(path, dict(self.changes)))
@@ -115,7 +122,10 @@ class Entry(NamedTuple):
         if self.kind == "movie":
             sim.plot(result, self.kind, self.picture, **chosen)
             return
-        figure = fitted(result.problem, result.best) if self.free else sim.plot(result, self.kind, **chosen)
+        if self.points:
+            figure = planned(result)
+        else:
+            figure = fitted(result.problem, result.best) if self.free else sim.plot(result, self.kind, **chosen)
         for dpi, colours in FINENESS:
             drawn, small = io.BytesIO(), io.BytesIO()
             figure.savefig(drawn, format="png", dpi=dpi)
@@ -695,6 +705,24 @@ def jkr_fit(fit: Fit) -> dict[str, Number]:
             "least": 1e3 * work.interval.low, "most": 1e3 * work.interval.high,
             "modulus": (contact * young.value, contact * young.error), "softest": contact * young.interval.low,
             "stiffest": contact * young.interval.high, "together": float(fit.correlations[0, 1])}  # fmt: skip
+
+
+@asks(
+    "pdms_lens",
+    "Which speed shall be measured next, so that broken bonds and fluctuations are told apart?",
+    """A speed above the onset of the fluctuations, such as {speed:.1f} mm/s. Eight areas below the onset, with errors
+    of {error:g} %, tell the mechanisms apart with a probability of {bonds} if only bonds break, and of {fluctuations}
+    if the stress only fluctuates. With one more area it is {bonds_next} and {fluctuations_next}. If both act, it rises
+    from {both} to {both_next}. The dashed lines only rank the speeds.""",
+    free=("bonds.critical_speed", "shear.spectrum.rms"),
+    points="pdms_lens_points",
+)
+def next_point(plan: Plan) -> dict[str, Number]:
+    best, names = plan.points[0], {"both": WHOLE, "bonds": "bonds only", "fluctuations": "fluctuations only"}
+    told = {name: tuple(plan.told[truth]) for name, truth in names.items()}
+    further = {f"{name}_next": tuple(best.told[truth]) for name, truth in names.items()}
+    error = 100.0 * float(np.median(plan.problem.sigma / plan.problem.values))
+    return {"speed": 1e3 * best.conditions["speed"], "error": error, **told, **further}
 
 
 @asks(

@@ -111,8 +111,10 @@ class Search:
     def _from(self, values: Array, starts: Sequence[int], precision: float) -> Minimum:
         """Return the least of the minima from some known places, and remember it if its curves are new."""
         problem = replace(self.problem, values=values)
-        minima = [minimum(problem, self.places[k], precision=precision) for k in starts]
+        minima = [minimum(problem, self.places[k], precision=_FINE) for k in starts]
         result = min(minima, key=lambda item: item.chi_square)
+        if precision < _FINE:
+            result = minimum(problem, result.x, precision=precision)
         curve = self._curve(result.x)
         if not np.sum((curve - self.curves[starts[0]]) ** 2) < _BESIDE**2:
             self.places.append(result.x)

@@ -371,12 +371,17 @@ def _words(scenario: Scenario, conditions: dict[str, float], table: Measured) ->
     return ", ".join(texts) or "the same conditions"
 
 
+def covariance_at(problem: Problem, x: Array) -> Array:
+    """Return the covariance of what is free at a place, finite for numbers without information, too."""
+    slopes = likelihood.derivatives(problem, x, range(len(x)))
+    widths = np.array([item.width for item in problem.free] + [1.0] * len(problem.common))
+    return np.asarray(np.linalg.inv(slopes.T @ slopes + np.diag((_UNKNOWN * widths) ** -2.0)), float)
+
+
 def _interval(problem: Problem, k: int, values: Array, sums: Array, advance: Callable[[int], None]) -> Expected:
     """Return the interval to expect for a free number, by simulated values and their least sums of squares."""
-    item, slopes = problem.free[k], likelihood.derivatives(problem, problem.start, range(len(problem.start)))
-    widths = np.array([free.width for free in problem.free] + [1.0] * len(problem.common))
-    covariance = np.linalg.inv(slopes.T @ slopes + np.diag((_UNKNOWN * widths) ** -2.0))
-    interval = likelihood.interval(problem, Minimum(problem.start, 0.0, np.asarray(covariance, float), True), k)
+    item, covariance = problem.free[k], covariance_at(problem, problem.start)
+    interval = likelihood.interval(problem, Minimum(problem.start, 0.0, covariance, True), k)
     rise, rest, chances = float(stats.chi2.ppf(LEVEL, 1)), [*problem.free[:k], *problem.free[k + 1 :]], []
     for end in (item.low, item.high):
         held = replace(problem, free=rest, fixed={**problem.fixed, item.key: end})
