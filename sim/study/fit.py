@@ -56,8 +56,8 @@ _BESIDE, _MOST_ROWS = 0.5, 3
 POOR = 0.05
 #: Ratio of measured and fitted values beyond which a unit is asked for.
 _OTHER_UNIT = 100.0
-#: Most draws of curves without a difference, and ratios as large as the measured one that are enough.
-_DRAWS, _ENOUGH = 200, 20
+#: Most draws of curves without a difference, ratios as large as the measured one that are enough, and their precision.
+_DRAWS, _ENOUGH, _FINE = 200, 20, 1e-4
 #: Tables of keys that are not physical.
 _OTHER = ("clock", "record", "ensemble", "seed")
 
@@ -347,14 +347,17 @@ def _no_difference(result: Fit, places: list[int]) -> NoDifference:
     if not any(item.interval.low_open or item.interval.high_open for item in result.numbers):
         tail = stats.f.sf(rise / freedom, freedom, problem.freedom) if is_estimated else stats.chi2.sf(rise, freedom)
         return NoDifference(float(tail), rise, freedom, 0)
-    if problem.by_run:
-        return NoDifference(math.nan, rise, freedom, 0)
-    spread = np.repeat(single.x, [len(places) if k == places[0] else 1 for k in range(len(single.x))])
-    joint, separate, larger = Search(merged, [single.x]), Search(problem, [best.x, spread]), 0
+    if problem.by_run or rise <= _FINE * best.chi_square:  # as precisely as drawn curves are fitted
+        return NoDifference(math.nan if problem.by_run else 1.0, rise, freedom, 0)
+    times = [len(places) if k == places[0] else 1 for k in range(len(single.x))]
+    joint, separate, larger = Search(merged, [single.x]), Search(problem, [best.x]), 0
     drawn = draws_of(problem, merged.predicted(single.x), np.random.default_rng([result.scenario.seed, places[0]]))
     for count, values in enumerate(itertools.islice(drawn, _DRAWS), 1):
-        one_value, least = joint.least(values).chi_square, separate.least(values).chi_square
-        larger += (one_value - least) / (least if is_estimated else 1.0) >= measured
+        shared, drawn_problem = replace(merged, values=values), replace(problem, values=values)
+        one_value = likelihood.minimum(shared, joint.least(values).x, precision=_FINE)
+        starts = [np.repeat(one_value.x, times), separate.least(values).x]  # no worse than one value
+        least = min(likelihood.minimum(drawn_problem, start, precision=_FINE).chi_square for start in starts)
+        larger += (one_value.chi_square - least) / (least if is_estimated else 1.0) >= measured
         if larger == _ENOUGH:
             return NoDifference(larger / count, rise, freedom, count)
     return NoDifference((1 + larger) / (1 + _DRAWS), rise, freedom, _DRAWS)
