@@ -791,11 +791,13 @@ def _settled(
     ``courses`` have the shape (points, records); unknown records are left out.
     """
     result = [Settlement("", math.nan, math.nan, math.nan)] * len(courses)
-    patterns, pattern = np.unique(np.isfinite(courses), axis=0, return_inverse=True)
-    for number, known in enumerate(patterns):
-        places = np.flatnonzero(pattern.ravel() == number)
-        if known.any():
-            states = _settled_alike(courses[places][:, known], *(each[places] for each in (drift, error, free, noisy)))
+    known, alike = np.isfinite(courses), dict[bytes, list[int]]()
+    for place, records in enumerate(known):
+        alike.setdefault(records.tobytes(), []).append(place)
+    for places in alike.values():
+        if (records := known[places[0]]).any():
+            numbers = (each[places] for each in (drift, error, free, noisy))
+            states = _settled_alike(courses[places][:, records], *numbers)
             for place, state in zip(places, states, strict=True):
                 result[place] = state
     return result
