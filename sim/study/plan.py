@@ -112,6 +112,15 @@ class Plan(NamedTuple):
     points: tuple[Point, ...]
     remarks: tuple[str, ...]
 
+    @property
+    def best(self) -> list[Point]:
+        """Return the best further point, and those that are not worse by two standard errors of their difference."""
+        told = [(item, [*item.told.values()]) for item in self.points if item.told]
+        sums = [
+            (item, sum(p for p, _ in chances), math.hypot(*(error for _, error in chances))) for item, chances in told
+        ]
+        return [item for item, total, error in sums if sums[0][1] - total <= 2.0 * math.hypot(error, sums[0][2])]
+
     def __repr__(self) -> str:
         lines = [" ".join(map(str, row.values())) for rows in self.rows for row in rows]
         return "\n".join([*lines, *self.remarks])
@@ -444,7 +453,7 @@ def carried_out(
     for path, content in zip(written, contents, strict=False):
         with files.output(path) as beside:
             beside.write_bytes(content)
-    best = f"\nmeasure next at {result.points[0].words}\n" if result.points else ""
+    best = f"\nmeasure next at {' or '.join(point.words for point in result.best)}\n" if result.points else ""
     tables: list[Printed] = [(shown, "\n".join(["", *result.remarks, ""]))]
     return [*tables, *([(truths, best)] if truths else []), ([], "\n".join(map(str, written)))]
 

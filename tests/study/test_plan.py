@@ -98,6 +98,14 @@ def test_points_without_errors_drives_with_a_slider_and_keys_without_effect_are_
         assert "\n" not in line
 
 
+def test_points_that_two_standard_errors_do_not_tell_from_the_best_are_proposed_as_well():
+    told = [(0.9, 0.8), (0.86, 0.8), (0.8, 0.77), None]
+    points = [planning.Point({}, str(k), {}, {str(n): planning.Chance(p, 0.02) for n, p in enumerate(pair or ())})
+              for k, pair in enumerate(told)]  # fmt: skip
+    # the error of a sum of two is 0.02 √2, and of a difference of two sums 0.04
+    assert [item.words for item in planning.Plan(None, (), {}, tuple(points), ()).best] == ["0", "1"]
+
+
 def test_the_command_proposes_a_point_above_the_onset_and_draws_what_it_prints(tmp_path, monkeypatch):
     scenario, further = tmp_path / "lens.toml", tmp_path / "further.csv"
     scenario.write_text(written(SPRUNG), encoding="utf-8")
