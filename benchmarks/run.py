@@ -30,7 +30,7 @@ GROUPS: dict[str, Callable[[Bench], list[Row]]] = {
     for group in (
         fields.banded, fields.modal, fields.mapped, bonds.counted, bonds.tracked,
         spring.spring, contact.radii, whole.commands, whole.first, whole.gallery,
-        whole.statistics,
+        whole.statistics, whole.sweeps,
     )
 }  # fmt: skip
 

@@ -8,6 +8,7 @@ import numpy as np
 import sim
 from benchmarks.scenes import BANDED, RATE, lens, tiled
 from benchmarks.timing import Bench, Beside, Row, absolute, middle, self_timed
+from sim.scenario.files import toml
 
 #: Modules that a command cannot do without.
 CHECKED = "tomllib, click, numpy, numba, pydantic, scipy.special, pint"
@@ -74,4 +75,36 @@ def statistics(bench: Bench) -> list[Row]:
     return [
         Row(f"{name}: time", "xarray loads all of it once", "as long", 3.0, middle(ours / plain), medians),
         absolute(f"{name}: peak memory", list(megabytes), "MB", 1500.0),
+    ]
+
+
+def sweeps(bench: Bench) -> list[Row]:
+    """Commands on large sweeps, whose time and memory grow with the points, and the help that lists the figures."""
+    points, many, few = bench.of((1000, 10_000, 10), (4, 6, 2))
+    with tempfile.TemporaryDirectory() as folder:
+
+        def run(count: int, *options: str) -> tuple[float, float]:
+            scene = lens(1, 20, drive={"model": "steady", "speed": 1e-3}, bonds=RATE)
+            scene["sweep"] = {"drive.speed": np.geomspace(1e-5, 0.1, count).tolist()}
+            path = Path(folder) / f"{count}.toml"
+            path.write_text("\n".join(f"{key} = {toml(value)}" for key, value in scene.items()), encoding="utf-8")
+            return bench.command("run", str(path), "-o", f"{path}.nc", "--force", "-j", "1", *options)
+
+        def of(command: str, count: int) -> float:
+            return bench.command(command, f"{folder}/{count}.toml.nc", *["--force"] * (command == "report"))[0]
+
+        turns = range(bench.of(3, 1))
+        pairs = [(run(many), run(many, "--no-table")) for _ in turns]
+        run(points), run(few)
+        each_point = [1e3 * abs(of("stats", many) - of("stats", few)) / (many - few) for _ in turns]
+        pages = [of("report", points) for _ in turns]
+    helps = [bench.command("plot", "--help")[0] for _ in turns]
+    (tabled, megabytes), (bare, _) = np.transpose(pairs, (1, 2, 0))
+    medians, name = [float(np.median(tabled)), float(np.median(bare))], "`sim run` of a sweep of 10,000 points"
+    return [
+        Row(f"{name}: time", "without its table", "as long", 1.5, middle(tabled / bare), medians),
+        absolute(f"{name}: peak memory", list(megabytes), "MB", 300.0),
+        absolute("`sim stats` of 10,000 points, a point", each_point, "ms", 0.3, "`sim stats` of 10 points subtracted"),
+        absolute("`sim report` of 1,000 points", pages, "s", 10.0),
+        absolute("`sim plot --help`", helps, "s", 0.1),
     ]

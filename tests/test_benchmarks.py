@@ -15,7 +15,7 @@ RESULTS = json.loads(run.RESULTS.read_text(encoding="utf-8"))
 
 
 #: Groups that start many processes, or run many scenes.
-LONG = {"commands", "statistics"}
+LONG = {"commands", "statistics", "sweeps"}
 
 
 @pytest.mark.parametrize("group", some(run.GROUPS, *run.GROUPS.keys() - LONG))
