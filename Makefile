@@ -74,7 +74,8 @@ lint: $(STAMP)
 	$(BIN)/mypy
 	$(BIN)/python docs/readability.py --check
 
-# uv installs in a tenth of pip's time. Without uv, pip installs it into the environment first.
+# uv installs in a tenth of pip's time. Without uv, pip installs it into the environment first. If uv fails, such as
+# behind a mirror that pip alone knows, pip installs all.
 $(VENV)/.installed-%: pyproject.toml constraints.txt
 	@command -v uv >/dev/null 2>&1 || command -v $(PYTHON) >/dev/null 2>&1 || \
 	  { echo "make: needs uv or Python 3.11 or later ($(PYTHON) was not found; set PYTHON=...)"; exit 1; }
@@ -85,9 +86,10 @@ $(VENV)/.installed-%: pyproject.toml constraints.txt
 	else \
 	  test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || \
 	    { echo "make: python venv is missing; install it (Debian: python3-venv) or uv"; exit 1; }; \
-	  test -x $(BIN)/uv || $(BIN)/python -m pip install -q --disable-pip-version-check uv; \
+	  test -x $(BIN)/uv || $(BIN)/python -m pip install -q --disable-pip-version-check uv || true; \
 	fi
-	@PATH="$$PATH:$(BIN)" uv pip install -q --python $(BIN)/python -c constraints.txt -e '.$(EXTRAS_OF)'
+	@PATH="$$PATH:$(BIN)" uv pip install -q --python $(BIN)/python -c constraints.txt -e '.$(EXTRAS_OF)' || \
+	  $(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.$(EXTRAS_OF)'
 	@touch $@
 
 clean:
