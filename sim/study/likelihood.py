@@ -611,6 +611,8 @@ def with_errors(problem: Problem, start: Array) -> tuple[Problem, Minimum]:
 
 def idle(problem: Problem) -> list[str]:
     """Free keys that have no effect on the curves."""
+    if not problem.free:  # as of a mechanism that has none of the keys
+        return []
     sizes = np.sqrt(np.sum(derivatives(problem, problem.start, range(len(problem.free))) ** 2, axis=0))
     least = _NO_EFFECT * math.sqrt(len(problem.values))
     return [item.key for item, size in zip(problem.free, sizes, strict=True) if size < least]

@@ -98,6 +98,13 @@ def test_points_without_errors_drives_with_a_slider_and_keys_without_effect_are_
         assert "\n" not in line
 
 
+def test_a_mechanism_that_has_none_of_the_free_keys_has_no_idle_ones(tmp_path):
+    (tmp_path / "points.csv").write_text("speed [mm/s],contact_area_error [%]\n0.1,1\n1,1\n3,1\n", encoding="utf-8")
+    lens = load("scenarios/pdms_lens.toml")
+    result = sim.plan(lens, tmp_path / "points.csv", ["shear.spectrum.rms"], sims=50)
+    assert set(result.told) == {WHOLE, "bonds only", "fluctuations only"}
+
+
 def test_points_that_two_standard_errors_do_not_tell_from_the_best_are_proposed_as_well():
     told = [(0.9, 0.8), (0.86, 0.8), (0.8, 0.77), None]
     points = [planning.Point({}, str(k), {}, {str(n): planning.Chance(p, 0.02) for n, p in enumerate(pair or ())})
