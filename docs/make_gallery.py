@@ -713,7 +713,8 @@ def jkr_fit(fit: Fit) -> dict[str, Number]:
     """A speed above the onset of the fluctuations, such as {speed:.1f} mm/s. Eight areas below the onset, with errors
     of {error:g} %, tell the mechanisms apart with a probability of {bonds} if only bonds break, and of {fluctuations}
     if the stress only fluctuates. With one more area it is {bonds_next} and {fluctuations_next}. If both act, it rises
-    from {both} to {both_next}. The dashed lines only rank the speeds.""",
+    from {both} to {both_next}. The fastest candidates
+    are the best here, so still faster ones may be better. The dashed lines only rank the speeds.""",
     free=("bonds.critical_speed", "shear.spectrum.rms"),
     points="pdms_lens_points",
 )

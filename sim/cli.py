@@ -418,9 +418,7 @@ def converge(
 @click.option("--compare", "judged", is_flag=True, help="Also compare mechanisms and theories by the data.")
 @click.option("--plan", "is_plan", is_flag=True, help="Plan a measurement at the conditions of DATA instead.")
 @click.option("--candidates", type=_PATH, help="With --plan: further points to choose from. Default: twenty speeds.")
-@click.option(
-    "--sims", type=click.IntRange(50), default=400, show_default=True, help="With --plan: data sets per truth."
-)
+@click.option("--sims", type=click.IntRange(50), help="With --plan: data sets per truth. Default: 400.")
 @click.option("--seed", type=click.IntRange(0), help="With --plan: seed of the errors. Default: that of the scenario.")
 @click.option("-o", "--output", type=_PATH, help="STEM of STEM_fit.toml, .json and .png. Default: scenario name.")
 @_UNITS
@@ -430,11 +428,14 @@ def fit(scenario: Path, output: Path | None, changes: tuple[str, ...], force: bo
     """Calibrate keys of a scenario to measured curves.
 
     DATA are CSV files with units. Their columns have names of variables of a dataset, such as contact_area. With --plan
-    DATA needs conditions and errors only, and STEM_plan.json and .png are written.
+    DATA needs conditions and errors only. STEM_plan.json is written, and STEM_plan.png if there are further points.
     """
     _announce_compiling()
     scene, stem = _load(scenario, changes), output or scenario.with_suffix("")
     planned = {name: options.pop(name) for name in ("candidates", "sims", "seed")}
+    planned = {name: value for name, value in planned.items() if value is not None}
+    if planned and not options["is_plan"]:
+        raise click.UsageError(f"--{min(planned)} belongs to --plan, which is missing")
     if options.pop("is_plan"):
         from sim.study import plan
         from sim.units.errors import BadInput

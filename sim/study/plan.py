@@ -40,8 +40,8 @@ from sim.units.quantity import Quantity
 from sim.units.tables import ERROR, read_measured, units_of
 from sim.units.terminal import progress_bar
 
-#: Simulated data sets of each truth, speeds of further points by default, and how many points are simulated.
-SIMS, _SPEEDS, _BEST = 400, 20, 3
+#: Simulated data sets of each truth, and fewest; speeds of further points by default; points that are simulated.
+SIMS, LEAST_SIMS, _SPEEDS, _BEST = 400, 50, 20, 3
 #: Least noncentrality that scipy knows, and spread of a number without information, in large changes.
 _LEAST, _UNKNOWN = 1e-9, 1e3
 _LOOKS = {WHOLE: style.BOTH, "bonds only": style.BONDS, "fluctuations only": style.FLUCTUATIONS}
@@ -121,9 +121,20 @@ class Plan(NamedTuple):
         ]
         return [item for item, total, error in sums if sums[0][1] - total <= 2.0 * math.hypot(error, sums[0][2])]
 
+    @property
+    def advice(self) -> str:
+        """Return where to measure next, or that no candidate helps; "" without a simulated point."""
+        if not self.best:
+            return ""
+        pairs = [(chance, self.told[truth]) for truth, chance in self.best[0].told.items()]
+        error = math.hypot(*(chance.error for pair in pairs for chance in pair))
+        if sum(new.probability - old.probability for new, old in pairs) <= 2.0 * error:
+            return "no candidate raises these probabilities by more than two standard errors"
+        return f"measure next at {' or '.join(point.words for point in self.best)}"
+
     def __repr__(self) -> str:
         lines = [" ".join(map(str, row.values())) for rows in self.rows for row in rows]
-        return "\n".join([*lines, *self.remarks])
+        return "\n".join(filter(None, [*lines, self.advice, *self.remarks]))
 
     @property
     def rows(self) -> tuple[list[dict[str, str]], list[dict[str, str]]]:
@@ -240,6 +251,8 @@ def plan(
         If a key has no effect, the table cannot be read or has no errors, or the drive needs runs.
     """
     base, seed = scenario.with_values({"record": {}}), scenario.seed if seed is None else seed
+    if sims < LEAST_SIMS:
+        raise BadInput([f"sims: {sims} simulated data sets do not show a probability; give {LEAST_SIMS} or more"])
     if base.drive.solves_motion:
         raise BadInput([f'--plan: drive.model = "{base.drive.model}" needs runs; plan with a prescribed speed'])
     remarks = ["curves are those of steady sliding"]
@@ -267,14 +280,19 @@ def plan(
         for row in further:
             beside = _Design(_predicted(base, _joined(table, row, problem), numbers, common or {}))
             conditions = {key: float(values[0]) for key, values in row.conditions.items()}
-            point = Point(conditions, _words(base, conditions, table), beside.estimate(first.rare), {})
+            point = Point(conditions, _words(base, conditions, table, row), beside.estimate(first.rare), {})
             ranked.append((point, beside))
         ranked.sort(key=lambda item: -sum(item[0].estimate.values()))
         proposed = [point for point, _ in ranked]
         for k, (point, beside) in enumerate(ranked[:_BEST]):
             proposed[k] = point._replace(told=beside.simulated(sims, seed + 1 + k, shown.advance).told)
     proposed.sort(key=lambda item: -sum(chance.probability for chance in item.told.values()))
-    return Plan(problem, tuple(expected), first.told if design.parts else {}, tuple(proposed), tuple(remarks))
+    result = Plan(problem, tuple(expected), first.told if design.parts else {}, tuple(proposed), tuple(remarks))
+    tried = [point.conditions["speed"] for point in proposed] if candidates is None else []
+    if any(point.conditions["speed"] in (min(tried), max(tried)) for point in result.best if tried):
+        end = "a best speed is the first or last candidate; speeds beyond may be better: give them by --candidates"
+        result = result._replace(remarks=(*result.remarks, end))
+    return result
 
 
 def _read(path: Path, scenario: Scenario, template: Sequence[Curve] = ()) -> tuple[Measured, bool]:
@@ -369,15 +387,16 @@ def _joined(table: Measured, row: Measured, problem: Problem) -> list[Measured]:
     return [table._replace(conditions=conditions, curves=tuple(curves))]
 
 
-def _words(scenario: Scenario, conditions: dict[str, float], table: Measured) -> str:
-    """Return the conditions of a further point in which the table varies, or that it lacks, for people."""
+def _words(scenario: Scenario, conditions: dict[str, float], table: Measured, row: Measured) -> str:
+    """Return conditions and variables of a further point that are not the same in the whole table, for people."""
     declared = dict(likelihood.conditions_of(scenario).values())
     texts = [
         f"{declared[key].symbol or key} = {engineering(value, declared[key].unit)}"
         for key, value in sorted(conditions.items(), key=lambda item: item[0] != "speed")
         if key == "speed" or key not in table.conditions or np.ptp(table.conditions[key]) > 0.0
     ]
-    return ", ".join(texts) or "the same conditions"
+    variables = "" if row.names == table.names else f" ({', '.join(row.names)})"
+    return (", ".join(texts) or "the same conditions") + variables
 
 
 def covariance_at(problem: Problem, x: Array) -> Array:
@@ -434,8 +453,8 @@ def figure(result: Plan) -> Figure:
 
 
 def carried_out(
-    scenario: Scenario, points: Path, free: Sequence[str], candidates: Path | None, common: Sequence[str], sims: int,
-    seed: int | None, stem: Path, replaced: bool, units: Sequence[str] = (),
+    scenario: Scenario, points: Path, free: Sequence[str], common: Sequence[str], stem: Path, replaced: bool,
+    units: Sequence[str] = (), candidates: Path | None = None, sims: int = SIMS, seed: int | None = None,
 ) -> list[Printed]:  # fmt: skip
     """Plan, write ``<stem>_plan.json`` and ``.png``, and return the tables to print."""
     outputs = [stem.with_name(f"{stem.name}_plan.{ending}") for ending in ("json", "png")]
@@ -450,12 +469,13 @@ def carried_out(
             figure(result).savefig(picture, format="png")
     contents = [(json.dumps(document(result), indent=2) + "\n").encode(), picture.getvalue()]
     written = outputs[: 2 if result.points else 1]
+    for path in outputs[len(written) :]:
+        path.unlink(missing_ok=True)  # of an older plan, which may be replaced
     for path, content in zip(written, contents, strict=False):
         with files.output(path) as beside:
             beside.write_bytes(content)
-    best = f"\nmeasure next at {' or '.join(point.words for point in result.best)}\n" if result.points else ""
-    tables: list[Printed] = [(shown, "\n".join(["", *result.remarks, ""]))]
-    return [*tables, *([(truths, best)] if truths else []), ([], "\n".join(map(str, written)))]
+    below = "\n".join(["", *filter(None, [result.advice]), *result.remarks, "", *map(str, written)])
+    return [(shown, ""), (truths, below)] if truths else [(shown, below)]
 
 
 def document(result: Plan) -> dict[str, Any]:
@@ -474,5 +494,5 @@ def document(result: Plan) -> dict[str, Any]:
         },
         "told_apart": chances(result.told),
         "points": [item._asdict() | {"told": chances(item.told)} for item in result.points],
-        "remarks": result.remarks,
+        "advice": result.advice, "remarks": result.remarks,
     }  # fmt: skip

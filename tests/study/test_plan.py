@@ -110,7 +110,13 @@ def test_points_that_two_standard_errors_do_not_tell_from_the_best_are_proposed_
     points = [planning.Point({}, str(k), {}, {str(n): planning.Chance(p, 0.02) for n, p in enumerate(pair or ())})
               for k, pair in enumerate(told)]  # fmt: skip
     # the error of a sum of two is 0.02 √2, and of a difference of two sums 0.04
-    assert [item.words for item in planning.Plan(None, (), {}, tuple(points), ()).best] == ["0", "1"]
+    plan = planning.Plan(
+        None, (), {"0": planning.Chance(0.84, 0.02), "1": planning.Chance(0.77, 0.02)}, tuple(points), ()
+    )
+    assert [item.words for item in plan.best] == ["0", "1"] and plan.advice == "measure next at 0 or 1"
+    near = {"0": planning.Chance(0.86, 0.02), "1": planning.Chance(0.77, 0.02)}  # 0.07 less, not 0.09
+    assert "no candidate" in plan._replace(told=near).advice
+    assert planning.Plan(None, (), near, (), ()).advice == ""
 
 
 def test_the_command_proposes_a_point_above_the_onset_and_draws_what_it_prints(tmp_path, monkeypatch):
@@ -127,7 +133,7 @@ def test_the_command_proposes_a_point_above_the_onset_and_draws_what_it_prints(t
     assert "measure next at V = 3 mm/s" in done.output and "(open)" in done.output
     numbers = json.loads((tmp_path / "lens_plan.json").read_text(encoding="utf-8"))
     best = numbers["points"][0]
-    assert best["conditions"]["speed"] == pytest.approx(3e-3)
+    assert_allclose(best["conditions"]["speed"], 3e-3, rtol=1e-12)
     for truth in ("bonds only", "fluctuations only"):
         assert best["told"][truth]["probability"] > numbers["told_apart"][truth]["probability"]
     assert (tmp_path / "lens_plan.png").read_bytes().startswith(b"\x89PNG")
