@@ -102,8 +102,8 @@ class Page:
             "data": self._first,
         }
 
-    def read(self, values: Mapping[str, Any]) -> Scenario:
-        """Return the scenario with numbers [SI], or text with units, by key.
+    def read(self, values: Mapping[str, Any], built: bool = True) -> Scenario:
+        """Return the scenario with numbers [SI], or text with units, by key; ``built`` as of ``Scenario.with_values``.
 
         Raises
         ------
@@ -123,7 +123,7 @@ class Page:
         if faults:
             raise Refused(faults)
         try:
-            return self.scenario.with_values(changed)
+            return self.scenario.with_values(changed, built)
         except BadInput as fault:
             raise Refused({"": "; ".join(fault.problems)}) from None
 
@@ -134,7 +134,7 @@ class Page:
 
         ``loads`` adds curves at other loads, ``table`` the points of a table by its name.
         """
-        scene = self.read(values)
+        scene = self.read(values, built=False)
         now, columns = quantities(scene), curves(scene, self.speeds)
         largest = {name: float(np.nanmax(np.abs(columns[name]), initial=0.0)) for name in _UNITS}
         energies = ("work_of_adhesion", "fluctuation_energy")

@@ -71,7 +71,7 @@ class Guarded:
 
     def __init__(self, page: Page, port: int, framed: bool = False) -> None:
         self.token = secrets.token_urlsafe(32)
-        self._page, self._lock = page, threading.Lock()
+        self._page, self._locks = page, {True: threading.Lock(), False: threading.Lock()}
         self._hosts = {f"{name}:{port}".encode() for name in ("127.0.0.1", "localhost")}
         static = Path(__file__).with_name("static").iterdir()
         self._files = {f"/{path.name}": path for path in static if path.suffix[1:] in _TYPES}
@@ -189,7 +189,8 @@ class Guarded:
             raise Refused(403, "no JSON")
 
     def _answer(self, path: str, query: Query) -> Any:
-        with self._lock:  # the caches of the laws and matplotlib are not made for several threads
+        # curves wait for no slow answer; the rest take turns, because matplotlib is not made for several threads
+        with self._locks[path == "/curves"]:
             return self._answers[path](query)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, cast
 
 import numpy as np
-from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, ValidationInfo, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
@@ -261,8 +261,8 @@ class Scenario:
         return f'<Scenario "{self.name}": {models}; members {self.ensemble.members}, points {points}>'
 
     @model_validator(mode="after")
-    def _across_parts(self) -> "Scenario":
-        self._check_across()
+    def _across_parts(self, info: ValidationInfo) -> "Scenario":
+        self._check_across(not (info.context or {}).get("unbuilt"))
         return self
 
     def _check_across(self, built: bool = True) -> None:
@@ -447,8 +447,10 @@ class Scenario:
             remarks.append("poisson_ratio is not 0.5: the normal-tangential coupling is neglected")
         return list(dict.fromkeys(remarks))
 
-    def with_values(self, values: dict[str, Any]) -> "Scenario":
+    def with_values(self, values: dict[str, Any], built: bool = True) -> "Scenario":
         """Return this scenario without its sweep and with some keys changed, ``{"contact.load": 1e-3}``.
+
+        Without ``built`` the process of the shear part is not tried, which may take half a second.
 
         Raises
         ------
@@ -458,7 +460,8 @@ class Scenario:
         document = {name: getattr(self, name) for name in _FIELDS if name != "sweep"} | self._changed(values)
         document["source"] = self.origin.changed(values | ({"sweep": {}} if self.sweep else {}))
         with in_plain_words(Scenario):
-            return _adapter(Scenario).validate_python(with_models(Scenario, document), context={"files": self._files})
+            context = {"files": self._files, "unbuilt": not built}
+            return _adapter(Scenario).validate_python(with_models(Scenario, document), context=context)
 
     def points(self) -> list["Scenario"]:
         """Return the scenario at each point of its sweep, the last axis fastest; without a sweep the only point.

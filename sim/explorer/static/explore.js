@@ -227,16 +227,25 @@ function showControls(texts = {}) {
 
 const draw = latest(async () => {
   show(await ask("/curves", { values: state.values, share: state.share, loads: state.loads, data: table }));
-  if (!slow) {
-    const found = await ask("/band", { values: state.values });
-    slow = !found.along;
-    own = slow ? null : found;
-    paint();
-  }
+  follow();
+});
+
+const follow = latest(async () => {
+  if (slow) return;
+  const values = { ...state.values };
+  const band = await ask("/band", { values });
+  if (Object.keys(values).some((key) => values[key] !== state.values[key])) return;
+  slow = !band.along && !band.faults;
+  own = band.along ? band : null;
+  paint();
 });
 
 const tell = latest(async () => {
-  const { diagnosis, remarks } = await ask("/words", { values: state.values });
+  const { diagnosis, remarks, faults } = await ask("/words", { values: state.values });
+  if (faults) {
+    complain(Object.values(faults).join("; "));
+    return;
+  }
   for (const [id, lines] of Object.entries({ diagnosis, remarks })) $(id).replaceChildren(...lines.map((line) => element("li", line)));
   const speed = shown.level.speeds[0] || shown.speed[Math.floor(shown.speed.length / 2)];
   paintContact(await ask("/contact", { values: state.values, speed }));
