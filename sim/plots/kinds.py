@@ -261,6 +261,8 @@ def drawn(
     try:
         suffix = ".gif" if kind == "movie" else ".png"
         target = path or source.with_name(f"{source.stem}{'-' + kind if kind else ''}{suffix}")
+        if kind == "movie" and target.suffix.lower() not in (".gif", ".mp4"):
+            raise ValueError(f"a movie is a .gif or .mp4 file, not {target.name}")
         tables = [Path(choices.data)] if isinstance(choices.data, Path | str) else []
         claim(dataset, source, target, replace, *tables)
         figure = draw(dataset, kind, choices)

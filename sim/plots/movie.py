@@ -1,7 +1,7 @@
 """The contact in motion: its edge over the stress or behind a spring, beside area and force over time."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import matplotlib as mpl
 import numpy as np
@@ -15,6 +15,7 @@ from PIL import Image
 from sim.analysis import sweep_dims
 from sim.analysis.dataset import MEMBERS, word
 from sim.plots import field, style
+from sim.units.terminal import LOG
 
 #: Most frames of a movie by format, and least; frames a second; dots an inch by format.
 _FRAMES, _LEAST, _RATE, _FINENESS = {"gif": 60, "mp4": 120}, 5, 20, {"gif": 100, "mp4": 150}
@@ -30,10 +31,12 @@ _MARKS, _MOST_MOVED = 60, 0.1
 class Movie(style.Picture):
     """A picture that moves if it is saved as GIF or MP4; in any other format it is its first frame."""
 
-    #: Records at which there are frames, times of all records and of slip events [s], and the function for a frame.
+    #: Records at which there are frames, times of all records and of slip events [s], the meaning of dots, and the
+    #: function that shows a frame.
     places: np.ndarray
     times: np.ndarray
     slips: np.ndarray
+    legend_text: str
     show_frame: Callable[[int], None]
 
     def savefig(self, fname: Any, **options: Any) -> None:
@@ -54,9 +57,9 @@ class Movie(style.Picture):
         first, last = self.times[self.places[frames[[0, -1]]]]
         pace = f"{style.text_of(last - first, 's')} shown in {(len(frames) - 1) / _RATE:.1f} s"
         if np.sum((self.slips >= first) & (self.slips <= last)) > len(frames) / _OF_SLIP:
-            pace += "; too few frames to show the slip events: choose less time by --from and --to"
+            LOG.warning("%s: too few frames to show the slip events; choose less time by --from and --to", pace)
         with mpl.rc_context(style.STYLE):
-            self.supxlabel(pace, fontsize=7.0, x=0.01, ha="left")
+            self.supxlabel(f"{pace}; {self.legend_text}", fontsize=7.0, x=0.01, ha="left")
             self.set_dpi(options.get("dpi") or _FINENESS[form])
             self.canvas.draw()
             self.set_layout_engine("none")  # the panels stay in their places, which also saves most of the time
@@ -115,9 +118,15 @@ def movie_figure(dataset: xr.Dataset, absolute: bool = False) -> Movie:
     if is_mapped:
         movie.places = np.abs(times[:, np.newaxis] - point["map_time"].to_numpy()).argmin(axis=0)
     if len(movie.places) < _LEAST:
-        cure = 'record.maps = { from = "0 s", to = "1 s", count = 60 }' if is_mapped else "a smaller clock.record"
-        raise ValueError(f"there are {len(movie.places)} frames, too few for a movie; run again with {cure}")
+        cure = "choose more time by --from and --to, or run again with a smaller clock.step and clock.record"
+        if is_mapped and len(times) >= _LEAST:
+            some = times[:: -(-len(times) // _FRAMES["gif"])]
+            ends = f'from = "{some[0]:g} s", to = "{some[-1]:g} s"'
+            cure = f"run again with record.maps = {{ {ends}, count = {len(some)} }}"
+        raise ValueError(f"frames: {len(movie.places)}, too few for a movie; {cure}")
     move = (_over_stress if is_mapped else _sliding)(plan, point)
+    has_marks = any(np.any(cast(Any, item).get_sizes()) for item in plan.collections)
+    movie.legend_text = "dotted: the contact of JKR" + "; dots: marks on the half-space" * has_marks
     area, full = (np.pi * point[name].to_numpy() ** 2 for name in ("contact_radius", "jkr_radius"))
     shown = (area, "contact area $A$", "m^2")
     if not absolute and np.all(full > 0.0):
@@ -190,7 +199,7 @@ def _sliding(panel: Axes, point: xr.Dataset) -> Callable[[int, int], None]:
     panel.set_ylabel(length.label("$y$"))
     width, random = np.ptp(ends), np.random.default_rng(0)
     along, across = random.uniform(0.0, width, _MARKS), random.uniform(-1.6, 1.6, _MARKS) * radius
-    is_slow = np.ptp(origin) < _MOST_MOVED * width * _FRAMES["gif"]
+    is_slow = 0.0 < np.ptp(origin) < _MOST_MOVED * width * _FRAMES["gif"]
     marks = panel.scatter(along, across, 3.0 if is_slow else 0.0, color=style.REFERENCE, linewidths=0)
     coil, edge = panel.plot([], [], color=style.BONDS, linewidth=0.8)[0], _edge(panel, point, length.factor)
     turns = np.resize([0.0, 1.0, 0.0, -1.0], 33) * 0.12 * radius

@@ -124,22 +124,25 @@ def test_what_a_movie_cannot_show_is_refused_in_one_line(maps, pulled, tmp_path,
         assert "\n" not in str(fault.value)
     few = maps.isel(map_time=[0, 5])
     for dataset, choices, cure in (
-        (few, Choices(), r"record\.maps = \{ from"),
-        (pulled, Choices(member=0, start="10 ms", stop="13 ms"), "clock.record"),
+        (few, Choices(), r'record\.maps = \{ from = "0 s", to = "0.24 s", count = 25 \}'),
+        (pulled, Choices(member=0, start="10 ms", stop="13 ms"), "--from and --to"),
     ):
         with pytest.raises(ValueError, match=f"too few for a movie.*{cure}"):
             draw(dataset, "movie", choices)
     monkeypatch.setenv("PATH", "")
     with pytest.raises(BadInput, match=r"needs the program ffmpeg, .* name a \.gif file"):
         drawn(maps, "movie", tmp_path / "x.nc", tmp_path / "x.mp4", False, Choices())
+    with pytest.raises(BadInput, match=r"\.gif or \.mp4 file, not x\.txt"):
+        drawn(maps, "movie", tmp_path / "x.nc", tmp_path / "x.txt", False, Choices())
     assert not list(tmp_path.iterdir())
 
 
-def test_a_movie_with_too_few_frames_for_its_slip_events_says_so(pulled):
+def test_a_movie_with_too_few_frames_for_its_slip_events_says_so(pulled, caplog):
     movie = draw(pulled, "movie", Choices(member=0))
     movie.places = movie.places[::10]  # eleven frames
     for slips, is_said in (([0.04], False), ([], False), ([0.04, 0.06], True)):
         movie.slips = np.array(slips)
+        caplog.clear()
         movie.savefig(io.BytesIO(), format="gif", dpi=20)
-        assert movie.get_supxlabel().startswith("100 ms shown in 0.5 s")
-        assert ("--from" in movie.get_supxlabel()) == is_said
+        assert movie.get_supxlabel().startswith("100 ms shown in 0.5 s; dotted: ")
+        assert ("--from" in caplog.text) == is_said
