@@ -625,6 +625,16 @@ class Points(NamedTuple):
     errors: Array | None
 
 
+@contextlib.contextmanager
+def _refusing(path: Path) -> Iterator[None]:
+    """Raise trouble with a table of measured values as ``BadInput`` with one line."""
+    try:
+        with blamed(str(path)):
+            yield
+    except PydanticCustomError as fault:
+        raise BadInput([str(fault)]) from None
+
+
 def units_of(path: Path) -> dict[str, str]:
     """Return the names of the columns of a table with the texts of their units, "" without one.
 
@@ -633,11 +643,8 @@ def units_of(path: Path) -> dict[str, str]:
     BadInput
         With one line.
     """
-    try:
-        with blamed(str(path)):
-            return dict(_headed(_cells(plain_text(path)))[1])
-    except PydanticCustomError as fault:
-        raise BadInput([str(fault)]) from None
+    with _refusing(path):
+        return dict(_headed(_cells(plain_text(path)))[1])
 
 
 def read_measured(
@@ -662,11 +669,8 @@ def read_measured(
     BadInput
         With one line.
     """
-    try:
-        with blamed(str(path)):
-            result, bare = _measured_columns(plain_text(path), known, outcomes, gaps)
-    except PydanticCustomError as fault:
-        raise BadInput([str(fault)]) from None
+    with _refusing(path):
+        result, bare = _measured_columns(plain_text(path), known, outcomes, gaps)
     reach = [f"{name} reaches {np.nanmax(np.abs(result[name].values)):.4g} {known[name].unit}" for name in bare]
     remark = f"no units: SI assumed; {', '.join(reach)}" if bare else ""
     if remark:
