@@ -720,10 +720,10 @@ def jkr_fit(fit: Fit) -> dict[str, Number]:
 )
 def next_point(plan: Plan) -> dict[str, Number]:
     best, names = plan.points[0], {"both": WHOLE, "bonds": "bonds only", "fluctuations": "fluctuations only"}
-    told = {name: tuple(plan.told[truth]) for name, truth in names.items()}
-    further = {f"{name}_next": tuple(best.told[truth]) for name, truth in names.items()}
+    probabilities = {name: tuple(plan.probabilities[truth]) for name, truth in names.items()}
+    further = {f"{name}_next": tuple(best.probabilities[truth]) for name, truth in names.items()}
     error = 100.0 * float(np.median(plan.problem.sigma / plan.problem.values))
-    return {"speed": 1e3 * best.conditions["speed"], "error": error, **told, **further}
+    return {"speed": 1e3 * best.conditions["speed"], "error": error, **probabilities, **further}
 
 
 @asks(

@@ -279,8 +279,8 @@ def plan(
     Returns
     -------
     Plan
-        ``numbers`` with the interval to expect for each key, ``told`` with the probability that the mechanisms are told
-        apart, ``points`` with the best further point first, and ``remarks``.
+        ``numbers`` with the interval to expect for each key, ``probabilities`` of telling the mechanisms apart for each
+        truth, ``points`` with the best further point first, ``advice`` in a sentence, and ``remarks``.
 
     Raises
     ------

@@ -118,8 +118,8 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     late = {"slip_count": "slip_count_late", "kinetic_friction": "kinetic_friction"}
     late |= {name: f"late_{quantity}_mean" for name, quantity in _LATE.items()}
     late |= {f"{name}_{kind}": f"late_{of}_{kind}" for name, of in _LATE.items() for kind in ("least", "largest")}
-    named = {name + ending: source + ending for ending in ENDINGS for name, source in late.items()}
-    result = xr.Dataset({name: dataset[source].astype(float) for name, source in named.items() if source in dataset})
+    sources = {name + ending: source + ending for ending in ENDINGS for name, source in late.items()}
+    result = xr.Dataset({name: dataset[source].astype(float) for name, source in sources.items() if source in dataset})
     if "slip_time" not in dataset or not result:
         return result
     if not is_stationary(dataset):

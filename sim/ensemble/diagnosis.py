@@ -240,11 +240,11 @@ def _mechanisms(point: Scenario, time: Array, speed: Array, at: str) -> Iterator
     """Yield the points of A/A_JKR that each mechanism takes, in both orders, and the area without fluctuations."""
     whole, none = changed(point, {"adhesion.bond_share": 0.0}), np.zeros((1, 1))
     scenes = (whole, none), (point, none), (whole, None), (point, None)
-    rest, bonds, waves, both = (100.0 * float(_areas(scene, time, speed, stored)[0, 0]) for scene, stored in scenes)
-    if bonds > both:
-        first = f"bonds take {rest - bonds:.2g} points, fluctuations {bonds - both:.2g}"
-        other = f" ({waves - both:.2g} and {rest - waves:.2g} if fluctuations are subtracted first)"
-        yield f"the mean A/A_JKR at {at} is {both:.3g} %: {first}{other if bonds < rest else ''}"
+    rest, bonds, waves, left = (100.0 * float(_areas(scene, time, speed, stored)[0, 0]) for scene, stored in scenes)
+    if bonds > left:
+        first = f"bonds take {rest - bonds:.2g} points, fluctuations {bonds - left:.2g}"
+        other = f" ({waves - left:.2g} and {rest - waves:.2g} if fluctuations are subtracted first)"
+        yield f"the mean A/A_JKR at {at} is {left:.3g} %: {first}{other if bonds < rest else ''}"
         yield f"by the paper's strict balance (shear.paid_by_adhesion = 0) A/A_JKR is {bonds:.3g} %"
 
 
@@ -330,10 +330,13 @@ def _outside(point: Scenario) -> Iterator[str]:
         speeds = np.abs(point.speeds(_TIMES))
         bonds, body = cast(Rate | Cohort | FirstMoment, point.population), slider_body(point, speeds)
         with np.errstate(all="ignore"):  # of a contact that is open
-            needed, own = bonds.onset(speeds, Body(*body[:3])).stiffness, np.asarray(body.contact_stiffness, float)
-        if np.any(needed > own):
-            worst = int(np.nanargmax(needed / own))
-            high, low = (engineering(float(values[worst]), "N/m") for values in (needed, own))
+            needed, of_contact = (
+                bonds.onset(speeds, Body(*body[:3])).stiffness,
+                np.asarray(body.contact_stiffness, float),
+            )
+        if np.any(needed > of_contact):
+            worst = int(np.nanargmax(needed / of_contact))
+            high, low = (engineering(float(values[worst]), "N/m") for values in (needed, of_contact))
             yield (
                 f"the model of a rigid slider does not hold: at {engineering(float(speeds[worst]), 'm/s')} stable"
                 f" sliding needs {high}, but the stiffness of the contact is {low}, so the half-space would oscillate"

@@ -314,7 +314,7 @@ def _quantities(points: Sequence[Scenario]) -> Rows:
     columns: dict[str, tuple[str, str, list[Any]]] = {}
     tables = (entries(part, f"{name}.") for name, part in distinct(points))
     plain = (entry for entry in entries(points[0]) if "." not in entry.key)
-    derived = (Entry(key, value, made) for point in points for key, (made, value) in point.derived.items())
+    derived = (Entry(key, value, quantity) for point in points for key, (quantity, value) in point.derived.items())
     for key, value, quantity in itertools.chain(*tables, derived, plain):
         unrecorded = key.startswith("record.") and points[0].record == Record()
         if value in (None, "", ()) or key in _ELSEWHERE or unrecorded:

@@ -192,8 +192,12 @@ def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
         step = math.floor(start / times.step + 0.5) + 1  # the first whose middle is later
         if step <= times.steps:
             result[step] = start, ", ".join(shown or names[:1])
-    kept = sorted(result)[:_MOST_PHASES]
-    return Phases(tuple(result[step][0] for step in kept), tuple(result[step][1] for step in kept), tuple(kept))
+    first_steps = sorted(result)[:_MOST_PHASES]
+    return Phases(
+        tuple(result[step][0] for step in first_steps),
+        tuple(result[step][1] for step in first_steps),
+        tuple(first_steps),
+    )
 
 
 def _turns(pieces: Pieces, signed: bool) -> dict[float, tuple[float, float]]:

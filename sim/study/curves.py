@@ -46,8 +46,8 @@ def curves(scenario: Scenario, speeds: Array, time: float = 0.0) -> dict[str, Ar
         control = scenario.contact.control(course.time, scenario.clock.duration)
         alone = np.nan_to_num(control.radius(work, np.zeros(1), 0.0, scenario.bodies))[:, 0]
         result["lost_to_fluctuations_first"] = 1.0 - np.pi * alone**2 / full
-        both = result["lost_to_bonds"] + result["lost_to_fluctuations"]
-        result["lost_to_bonds_last"] = both - result["lost_to_fluctuations_first"]
+        lost_to_either = result["lost_to_bonds"] + result["lost_to_fluctuations"]
+        result["lost_to_bonds_last"] = lost_to_either - result["lost_to_fluctuations_first"]
     return result
 
 

@@ -463,8 +463,8 @@ class Problem:
             for values, table, groups in zip(result[key][1], self.tables, self.groups, strict=True):
                 for group in () if "t" in table.conditions else groups:
                     course, duration = group.scenario.contact.course, group.scenario.clock.duration
-                    own = {"speed": group.speed[:, 0], "mount": course.at(group.time[:, 0], duration)}
-                    values[group.rows] = own[key] if key in own else quantities(group.scenario)[key][1]
+                    of_course = {"speed": group.speed[:, 0], "mount": course.at(group.time[:, 0], duration)}
+                    values[group.rows] = of_course[key] if key in of_course else quantities(group.scenario)[key][1]
         return result
 
     @property

@@ -6,7 +6,7 @@ Curves are those of steady sliding, which has the means of all noise.
 
 Three truths are simulated: the scenario as it is, bonds only and fluctuations only. A single mechanism has the values
 that reproduce the curves of the scenario best, because values that are easy to reject would promise too much. The
-mechanisms are told apart if the verdict of ``sim.study.mechanisms`` is the truth. Theories of the sheared contact are
+mechanisms are told apart if the verdict of ``sim.study.mechanisms`` names the truth. Theories of the sheared contact are
 left out. The likelihood ratio of a mechanism has the distribution of the data sets that this mechanism made.
 """
 
@@ -80,13 +80,13 @@ class Point(NamedTuple):
     """A further point: its conditions [SI], those in words, and the chance of telling the mechanisms apart with it.
 
     ``estimate`` is the probability for each truth by a non-central chi-square distribution, which only ranks points.
-    ``told`` is simulated for the best points, and empty for the others.
+    ``probabilities`` are simulated for the best points, and empty for the others.
     """
 
     conditions: dict[str, float]
     words: str
     estimate: dict[str, float]
-    told: dict[str, Chance]
+    probabilities: dict[str, Chance]
 
 
 class Plan(NamedTuple):
@@ -98,7 +98,7 @@ class Plan(NamedTuple):
         Conditions, predicted values and errors.
     numbers : tuple of Expected
         Interval to expect for each free key.
-    told : dict of str to Chance
+    probabilities : dict of str to Chance
         Probability for each truth that the mechanisms are told apart; empty if the scenario has only one.
     points : tuple of Point
         Further points, the one that raises the mean of these probabilities most first.
@@ -108,16 +108,17 @@ class Plan(NamedTuple):
 
     problem: Problem
     numbers: tuple[Expected, ...]
-    told: dict[str, Chance]
+    probabilities: dict[str, Chance]
     points: tuple[Point, ...]
     remarks: tuple[str, ...]
 
     @property
     def best(self) -> list[Point]:
         """Return the best further point, and those that are not worse by two standard errors of their difference."""
-        told = [(item, [*item.told.values()]) for item in self.points if item.told]
+        probabilities = [(item, [*item.probabilities.values()]) for item in self.points if item.probabilities]
         sums = [
-            (item, sum(p for p, _ in chances), math.hypot(*(error for _, error in chances))) for item, chances in told
+            (item, sum(p for p, _ in chances), math.hypot(*(error for _, error in chances)))
+            for item, chances in probabilities
         ]
         return [item for item, total, error in sums if sums[0][1] - total <= 2.0 * math.hypot(error, sums[0][2])]
 
@@ -126,7 +127,7 @@ class Plan(NamedTuple):
         """Return where to measure next, or that no candidate helps; "" without a simulated point."""
         if not self.best:
             return ""
-        pairs = [(chance, self.told[truth]) for truth, chance in self.best[0].told.items()]
+        pairs = [(chance, self.probabilities[truth]) for truth, chance in self.best[0].probabilities.items()]
         error = math.hypot(*(chance.error for pair in pairs for chance in pair))
         if sum(new.probability - old.probability for new, old in pairs) <= 2.0 * error:
             return "no candidate raises these probabilities by more than two standard errors"
@@ -149,8 +150,10 @@ class Plan(NamedTuple):
                 f"{LEVEL:.0%} interval to expect": f"{' to '.join(ends)} {unit}".rstrip(),
                 "P(lower end open)": str(item.low_open), "P(upper end open)": str(item.high_open),
             })  # fmt: skip
-        for truth, chance in self.told.items():
-            further = {f"with {point.words}": str(point.told[truth]) for point in self.points if point.told}
+        for truth, chance in self.probabilities.items():
+            further = {
+                f"with {point.words}": str(point.probabilities[truth]) for point in self.points if point.probabilities
+            }
             truths.append({"truth": truth, "P(told apart)": str(chance)} | further)
         return keys, truths
 
@@ -161,7 +164,7 @@ class _Simulated(NamedTuple):
     ``values`` are the data sets of the scenario as it is, ``sums`` its least sums of squares for them.
     """
 
-    told: dict[str, Chance]
+    probabilities: dict[str, Chance]
     rare: dict[str, float]
     values: Array
     sums: Array
@@ -195,7 +198,7 @@ class _Design:
                 least = [self.parts[truth].least(item).chi_square for item in values[truth]]
                 rare[truth] = float(np.sort(least - sums[truth])[-math.floor(RARE * (sims + 1))])
                 advance(sims)
-        told = dict[str, Chance]()
+        probabilities = dict[str, Chance]()
         for truth in self.expected:
             is_truth = np.ones(sims, bool)
             for part, search in self.parts.items():
@@ -203,8 +206,8 @@ class _Design:
                 rejected = [not search.reaches(*item) for item in zip(values[truth], levels, strict=True)]
                 is_truth &= np.array(rejected) == (part != truth)
                 advance(sims)
-            told[truth] = Chance.of(is_truth)
-        return _Simulated(told, rare, values[WHOLE], sums[WHOLE])
+            probabilities[truth] = Chance.of(is_truth)
+        return _Simulated(probabilities, rare, values[WHOLE], sums[WHOLE])
 
     def estimate(self, rare: dict[str, float]) -> dict[str, float]:
         """Return the probability by a non-central chi-square distribution if these ratios are rare, by truth."""
@@ -285,9 +288,13 @@ def plan(
         ranked.sort(key=lambda item: -sum(item[0].estimate.values()))
         proposed = [point for point, _ in ranked]
         for k, (point, beside) in enumerate(ranked[:_BEST]):
-            proposed[k] = point._replace(told=beside.simulated(sims, seed + 1 + k, shown.advance).told)
-    proposed.sort(key=lambda item: -sum(chance.probability for chance in item.told.values()))
-    result = Plan(problem, tuple(expected), first.told if design.parts else {}, tuple(proposed), tuple(remarks))
+            proposed[k] = point._replace(
+                probabilities=beside.simulated(sims, seed + 1 + k, shown.advance).probabilities
+            )
+    proposed.sort(key=lambda item: -sum(chance.probability for chance in item.probabilities.values()))
+    result = Plan(
+        problem, tuple(expected), first.probabilities if design.parts else {}, tuple(proposed), tuple(remarks)
+    )
     tried = [point.conditions["speed"] for point in proposed] if candidates is None else []
     if any(point.conditions["speed"] in (min(tried), max(tried)) for point in result.best if tried):
         end = "a best speed is the first or last candidate; speeds beyond may be better: give them by --candidates"
@@ -380,8 +387,8 @@ def _joined(table: Measured, row: Measured, problem: Problem) -> list[Measured]:
         return [table, row]
     conditions = {key: np.append(values, row.conditions[key]) for key, values in table.conditions.items()}
     errors = [
-        np.append(np.asarray(one.errors), np.asarray(other.errors))
-        for one, other in zip(table.curves, curves, strict=True)
+        np.append(np.asarray(planned_curve.errors), np.asarray(other.errors))
+        for planned_curve, other in zip(table.curves, curves, strict=True)
     ]
     curves = [Curve(name, np.ones(table.rows + 1), item) for name, item in zip(table.names, errors, strict=True)]
     return [table._replace(conditions=conditions, curves=tuple(curves))]
@@ -434,14 +441,19 @@ def figure(result: Plan) -> Figure:
     unit = style.Unit.of(speeds, "m/s" if "speed" in drawn[0].conditions else "1", scale == "log")
     with mpl.rc_context(style.STYLE):
         picture, (panel,) = style.rows([2.1])
-        for truth, chance in result.told.items():
+        for truth, chance in result.probabilities.items():
             look: Any = {"color": _LOOKS[truth]}
             panel.axhline(chance.probability, linestyle=":", linewidth=0.9, **look)
             panel.plot(unit.factor * speeds, [item.estimate[truth] for item in drawn], "--", linewidth=0.7, **look)
             for place, item in zip(speeds, drawn, strict=True):
-                if item.told:
+                if item.probabilities:
                     bars: Any = style.HOLLOW | look | {"label": truth, "elinewidth": 0.7}
-                    panel.errorbar(unit.factor * place, item.told[truth].probability, item.told[truth].error, **bars)
+                    panel.errorbar(
+                        unit.factor * place,
+                        item.probabilities[truth].probability,
+                        item.probabilities[truth].error,
+                        **bars,
+                    )
         panel.plot([], [], ":", color=style.REFERENCE, label="without it")
         panel.plot([], [], "--", color=style.REFERENCE, label="estimate for ranking")
         panel.set_ylim(-0.03, 1.03)
@@ -481,8 +493,8 @@ def carried_out(
 def document(result: Plan) -> dict[str, Any]:
     """Return all numbers of a plan [SI]."""
 
-    def chances(told: dict[str, Chance]) -> dict[str, Any]:
-        return {truth: chance._asdict() for truth, chance in told.items()}
+    def chances(probabilities: dict[str, Chance]) -> dict[str, Any]:
+        return {truth: chance._asdict() for truth, chance in probabilities.items()}
 
     return {
         "numbers": {
@@ -492,7 +504,7 @@ def document(result: Plan) -> dict[str, Any]:
             }
             for item in result.numbers
         },
-        "told_apart": chances(result.told),
-        "points": [item._asdict() | {"told": chances(item.told)} for item in result.points],
+        "probabilities": chances(result.probabilities),
+        "points": [item._asdict() | {"probabilities": chances(item.probabilities)} for item in result.points],
         "advice": result.advice, "remarks": result.remarks,
     }  # fmt: skip

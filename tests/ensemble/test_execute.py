@@ -127,7 +127,9 @@ def test_processes_need_no_guard_in_what_starts_them_and_import_nothing_of_the_p
         (folder / f"{name}.py").write_text("raise SystemExit('wrong')", encoding="utf-8")
     (tmp_path / "script.py").write_text(script(path), encoding="utf-8")
     if way == "notebook":
-        nbformat, nbclient = (pytest.importorskip(name, reason="in the extra verify") for name in ("nbformat", "nbclient"))
+        nbformat, nbclient = (
+            pytest.importorskip(name, reason="in the extra verify") for name in ("nbformat", "nbclient")
+        )
         cell = nbformat.v4.new_code_cell(script(path))
         nbclient.NotebookClient(nbformat.v4.new_notebook(cells=[cell]), timeout=300).execute()
     else:

@@ -51,7 +51,7 @@ def test_the_interval_to_expect_from_areas_at_rest_is_the_closed_form_of_jkr(tmp
     ends = np.log([item.interval.low, item.interval.high]) - math.log(42e-3)
     assert_allclose(ends, 1.959964 * spread * np.array([-1.0, 1.0]), rtol=0.02)  # curved by the errors over 3
     assert item.low_open.probability == item.high_open.probability == 0.0 < item.low_open.error
-    assert not result.told and not result.points
+    assert not result.probabilities and not result.points
     assert any("do not act" in remark for remark in result.remarks)
     assert any("no column has the speed" in remark for remark in result.remarks)
 
@@ -102,20 +102,20 @@ def test_a_mechanism_that_has_none_of_the_free_keys_has_no_idle_ones(tmp_path):
     (tmp_path / "points.csv").write_text("speed [mm/s],contact_area_error [%]\n0.1,1\n1,1\n3,1\n", encoding="utf-8")
     lens = load("scenarios/pdms_lens.toml")
     result = sim.plan(lens, tmp_path / "points.csv", ["shear.spectrum.rms"], sims=50)
-    assert set(result.told) == {WHOLE, "bonds only", "fluctuations only"}
+    assert set(result.probabilities) == {WHOLE, "bonds only", "fluctuations only"}
 
 
 def test_points_that_two_standard_errors_do_not_tell_from_the_best_are_proposed_as_well():
-    told = [(0.9, 0.8), (0.86, 0.8), (0.8, 0.77), None]
+    probabilities = [(0.9, 0.8), (0.86, 0.8), (0.8, 0.77), None]
     points = [planning.Point({}, str(k), {}, {str(n): planning.Chance(p, 0.02) for n, p in enumerate(pair or ())})
-              for k, pair in enumerate(told)]  # fmt: skip
+              for k, pair in enumerate(probabilities)]  # fmt: skip
     # the error of a sum of two is 0.02 √2, and of a difference of two sums 0.04
     plan = planning.Plan(
         None, (), {"0": planning.Chance(0.84, 0.02), "1": planning.Chance(0.77, 0.02)}, tuple(points), ()
     )
     assert [item.words for item in plan.best] == ["0", "1"] and plan.advice == "measure next at 0 or 1"
     near = {"0": planning.Chance(0.86, 0.02), "1": planning.Chance(0.77, 0.02)}  # 0.07 less, not 0.09
-    assert "no candidate" in plan._replace(told=near).advice
+    assert "no candidate" in plan._replace(probabilities=near).advice
     assert planning.Plan(None, (), near, (), ()).advice == ""
 
 
@@ -135,15 +135,18 @@ def test_the_command_proposes_a_point_above_the_onset_and_draws_what_it_prints(t
     best = numbers["points"][0]
     assert_allclose(best["conditions"]["speed"], 3e-3, rtol=1e-12)
     for truth in ("bonds only", "fluctuations only"):
-        assert best["told"][truth]["probability"] > numbers["told_apart"][truth]["probability"]
+        assert best["probabilities"][truth]["probability"] > numbers["probabilities"][truth]["probability"]
     assert (tmp_path / "lens_plan.png").read_bytes().startswith(b"\x89PNG")
     (result,) = results
-    assert [point.told for point in result.points] == [
-        {truth: planning.Chance(**chance) for truth, chance in point["told"].items()} for point in numbers["points"]
+    assert [point.probabilities for point in result.points] == [
+        {truth: planning.Chance(**chance) for truth, chance in point["probabilities"].items()}
+        for point in numbers["points"]
     ]
     (panel,) = planning.figure(result).axes
     bars = [bar.lines[0].get_data() for bar in panel.containers]
-    assert {float(y[0]) for _, y in bars} == {told.probability for p in result.points for told in p.told.values()}
+    assert {float(y[0]) for _, y in bars} == {
+        chance.probability for p in result.points for chance in p.probabilities.values()
+    }
     again = CliRunner().invoke(cli, list(map(str, [*words, "--compare"])))
     assert isinstance(again.exception, BadInput)
 
@@ -154,7 +157,7 @@ def test_probabilities_are_those_of_the_verdict_over_200_data_sets(tmp_path, tru
     scene, count = load(SPRUNG), 200
     problem = problem_of(scene, points(tmp_path / "points.csv", ACROSS, error), AREA_KEYS)
     design = planning._Design(problem)
-    predicted = design.simulated(400, 1, lambda done: None).told[truth]
+    predicted = design.simulated(400, 1, lambda done: None).probabilities[truth]
     hits = 0
     for seed, values in enumerate(drawn(problem, design.expected[truth], count, 0)):
         data = replace(problem, values=values)
@@ -212,6 +215,6 @@ def test_the_proposed_point_is_among_the_best_three_of_twenty_by_simulation(tmp_
     means = {}
     for row in planning._speeds(table):
         design = planning._Design(planning._predicted(scene, planning._joined(table, row, problem), free, {}))
-        told = design.simulated(200, 9, lambda done: None).told
-        means[float(row.conditions["speed"][0])] = sum(chance.probability for chance in told.values())
+        probabilities = design.simulated(200, 9, lambda done: None).probabilities
+        means[float(row.conditions["speed"][0])] = sum(chance.probability for chance in probabilities.values())
     assert best.conditions["speed"] in sorted(means, key=means.__getitem__)[-3:]
