@@ -6,8 +6,8 @@ Curves are those of steady sliding, which has the means of all noise.
 
 Three truths are simulated: the scenario as it is, bonds only and fluctuations only. A single mechanism has the values
 that reproduce the curves of the scenario best, because values that are easy to reject would promise too much. The
-mechanisms are told apart if the verdict of ``sim.study.mechanisms`` names the truth. Theories of the sheared contact are
-left out. The likelihood ratio of a mechanism has the distribution of the data sets that this mechanism made.
+mechanisms are told apart if the verdict of ``sim.study.mechanisms`` names the truth. Theories of the sheared contact
+are left out. The likelihood ratio of a mechanism has the distribution of the data sets that this mechanism made.
 """
 
 import io
