@@ -148,7 +148,8 @@ def _spread(problem: Problem) -> Array:
     bounds = zip(problem.bounds, problem.start, widths, strict=True)
     ends = [(max(low, x - width), min(high, x + width)) if math.isinf(high - low) else (low, high)
             for (low, high), x, width in bounds]  # fmt: skip
-    shares = qmc.Sobol(count, rng=np.random.default_rng(0)).random_base2(min(4 + 2 * count, _SPREAD))
+    # scipy has the name rng since 1.15 only
+    shares = qmc.Sobol(count, seed=np.random.default_rng(0)).random_base2(min(4 + 2 * count, _SPREAD))
     return qmc.scale(shares, *np.transpose(ends))
 
 
