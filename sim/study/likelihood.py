@@ -175,7 +175,7 @@ def groups(scenario: Scenario, table: Measured) -> list[Group]:
     for place in np.unique(columns, axis=1, return_index=True)[1] if keyed else [0]:
         rows = np.flatnonzero(np.all(columns == columns[:, place : place + 1], axis=0))
         try:
-            item = scenario.with_values({key: float(values[place]) for key, values in keyed.items()})
+            item = scenario.with_values({key: float(values[place]) for key, values in keyed.items()}, built=False)
         except BadInput as fault:
             raise BadInput([f"{table.path}: row {place + 1}: {message}" for message in fault.problems]) from None
         conditions = {name: values[rows] for name, values in table.conditions.items()}
@@ -183,7 +183,7 @@ def groups(scenario: Scenario, table: Measured) -> list[Group]:
         time = conditions.get("t", np.linspace(0.0, duration, count))  # a course of the rows, as long as the run
         if (mount := conditions.get("mount")) is not None:
             course = float(mount[0]) if np.all(mount == mount[0]) else {"time": time, "value": mount}
-            item = item.with_values({f"contact.{table.mount}": course})
+            item = item.with_values({f"contact.{table.mount}": course}, built=False)
         instants = np.repeat(conditions.get("t", np.zeros(count)), 2)
         speed = conditions.get("speed", item.drive.pieces(instants, duration).joined.last[::2])
         result.append(Group(item, rows, time[:, np.newaxis], speed[:, np.newaxis]))

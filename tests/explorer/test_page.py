@@ -19,6 +19,7 @@ from sim.explorer.job import ensemble
 from sim.explorer.page import Page, Refused, previews
 from sim.explorer.server import Server, state_of
 from sim.laws import jkr
+from sim.parts.shear.models import Banded
 from sim.study.curves import curves, speeds_of_loss
 
 SCENARIOS = ("pdms_lens", "friction_maximum", "masking", "stick_slip", "motor_clutch", "pull_off", "afm_tip", "jkr_fit")
@@ -185,6 +186,14 @@ def test_curves_are_taken_away_as_a_table_and_as_pictures(lens):
     area, energy, friction = take.figure(page.scenario, page.speeds).axes
     assert_allclose(area.lines[0].get_ydata(), 100.0 * curves(page.scenario, page.speeds)["area_ratio"], rtol=1e-12)
     assert friction.get_xscale() == "log" and "mJ" in energy.get_ylabel()
+
+
+def test_curves_and_their_comparison_with_a_table_need_no_process_of_the_fluctuations(monkeypatch):
+    page = Page(sim.load("scenarios/pdms_lens.toml"))
+    table = page.add("speed [mm/s],contact_area [mm^2],contact_area_error [%]\n0.1,0.045,1\n1,0.044,1\n", "x.csv")
+    monkeypatch.setattr(Banded, "process", None)  # it takes half a second for a new spectrum
+    answer = page.answer({"shear.spectrum.hurst": 0.7}, 0.1, table=table)
+    assert answer["data"]["count"] == 2 and answer["values"]["shear.spectrum.hurst"][0] == 0.7
 
 
 def test_measured_curves_are_compared_with_the_curves(lens):
