@@ -15,12 +15,14 @@ from sim.parts.contact.balance import Balance
 from sim.parts.coupled import coupled
 from sim.parts.coupled.coupled import StepContact
 from sim.parts.drive import Driven
-from sim.parts.exchange import Array, Bonding, ContactState, Indices, Motion, Sliding, Storing, during
+from sim.parts.exchange import NO_DRAWS, Array, Bonding, ContactState, Indices, Motion, Sliding, Storing, during
 from sim.scenario.scenario import Scenario
 
 Arrays = dict[str, Array]
 #: Most numbers of one quantity in a block of steps: they stay in the cache.
 _BLOCK_NUMBERS = 2**16
+#: Steps of the first block of a contact that follows the fluctuations; twice as many after one that did not end early.
+_FIRST_BLOCK = 256
 #: Mode pairs of a process whose step takes much longer than the rest.
 _MANY_PAIRS = 64
 
@@ -103,8 +105,9 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
     slider: Sliding
     if drive.solves_motion:
         step_contact = _step_contact(scenario, state.contact, state.shear, steps)
+        draws = process.draws(state.shear, steps.start, noise.shear) if scenario.draws_within else NO_DRAWS
         sliders, motions, bonds, bonding = coupled.advance(
-            scenario.parts, state.drive, state.bonds, step_contact, scenario.times, steps, noise.bonds
+            scenario.parts, state.drive, state.bonds, step_contact, scenario.times, steps, noise.bonds, draws
         )
         slider, driven = sliders.at(-1), drive.readings(sliders)
     else:
@@ -158,11 +161,13 @@ def follow(scenario: Scenario, noise: MemberNoise, state: State | None, steps: r
         blocks += [trajectory_of(scenario, state)] if steps.start == 0 else []
     rows, numbers = len(noise.shear.members), 1 + scenario.process.pairs // _MANY_PAIRS
     longest = 1 if scenario.by_steps else max(1, _BLOCK_NUMBERS // (rows * numbers))
+    ahead = _FIRST_BLOCK if scenario.draws_within else longest  # what a block holds beyond its end is computed in vain
     starts = (*scenario.phases.steps, scenario.times.steps + 1)
     while state.step < steps[-1]:
         phase = starts[bisect.bisect_right(starts, state.step + 1)] - 1
-        block = range(state.step + 1, min(state.step + longest, steps[-1], phase) + 1)
+        block = range(state.step + 1, min(state.step + min(ahead, longest), steps[-1], phase) + 1)
         state, trajectory = advance(scenario, state, noise, block)
+        ahead = 2 * ahead if state.step == block[-1] else max(1, state.step - block.start)
         wanted = slice((steps.start - block.start) % steps.step, None, steps.step)
         blocks.append(Trajectory(*(values[wanted] for values in trajectory)))
     return state, Trajectory(*map(np.concatenate, zip(*blocks, strict=True)))

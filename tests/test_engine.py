@@ -6,10 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from helpers.scenes import BONDS, CONTACTS, DRIVES, SHEARS, go_together, march, scene
+from helpers.scenes import BONDS, BY_SLIP, BY_WAVES, CONTACTS, DRIVES, IN_TIME, SHEARS, go_together, march, scene
 from numpy.testing import assert_allclose
 
 from sim.engine import MemberNoise, follow, pack, trajectory_of, unpack
+from sim.parts import shear
+from sim.parts.shear.process import SlipRate
 
 DEPTHS = {"drive": DRIVES, "bonds": BONDS, "shear": SHEARS, "contact": CONTACTS}
 
@@ -128,6 +130,30 @@ def test_more_fronts_between_bonds_of_one_limit_than_there_is_room_for_are_given
 
 def test_an_open_contact_has_no_area_at_the_largest_stress_that_all_members_share():
     check_case({"drive": "steady", "contact": "lifted", "shear": "banded, slip, onset", "bonds": "rate"})
+
+
+DRAWN = {
+    "in time": shear.Banded(**IN_TIME),
+    "by waves, slip rate": shear.Banded(**BY_WAVES, tolerance=0.1, amplitude=SlipRate(memory_length=1e-5, floor=0.1)),
+    "by slip, slip rate": shear.Banded(**BY_SLIP, amplitude=SlipRate(floor=0.1)),
+    "relaxing in time": shear.Banded(**IN_TIME, amplitude=SlipRate(memory_length=1e-5, relaxing=True)),
+}
+
+
+@pytest.mark.parametrize(
+    ("drive", "bonds"), [("spring with mass", "rate"), ("spring", "rate, bell"), ("spring", "cohort")]
+)
+@pytest.mark.parametrize("name", DRAWN)
+def test_the_loop_of_a_drive_draws_the_fluctuations_as_their_process_does(name, drive, bonds):
+    """In blocks of steps, or by single steps, of a contact that opens and closes meanwhile."""
+    contact = CONTACTS["load there and back"]
+    of = scene(3, 40, drive=DRIVES[drive], bonds=BONDS[bonds], shear=DRAWN[name], contact=contact)
+    assert of.draws_within
+    assert not scene(3, 40, drive=DRIVES[drive], bonds=BONDS[bonds], shear=SHEARS["mean on a disc"]).draws_within
+    states = list(march(of, np.arange(3)))
+    is_open = np.isnan([state.contact.radius for state in states])
+    assert is_open.any() and not is_open[-1].any()
+    check_blocks(of, states, 3)
 
 
 @pytest.mark.verify

@@ -137,6 +137,48 @@ class FieldLaw(NamedTuple):
     follows: float = 0.0
 
 
+class Draws(NamedTuple):
+    """Fluctuations that the loop of a drive draws at the end of each clock step, as their process does.
+
+    Attributes
+    ----------
+    values : array, shape (members, bands)
+        Numbers of the process, advanced in place.
+    last : array, shape (members,)
+        Energy of the field after the last draw, not scaled by g² [J/m²], advanced in place.
+    shapes, half_weight : array, shape (bands,)
+        Shape of a band's gamma number, and its energy for a number of 1 [J/m²].
+    factors : array, shape (1,) or (bands,)
+        Wavenumber of a band to the power of the correlation law; one if all bands have the same rate.
+    span : tuple of float
+        Distance [m] and time [s] in which a band of factor 1 keeps 1/e.
+    mean : float
+        Mean of the energy at amplitude 1 [J/m²].
+    relaxing : bool
+        True if only what is renewed has the new size.
+    forgets : bool
+        True if sliding renews the field, so that the interface answers what was drawn at once.
+    address : tuple
+        Seed, part, members and number of the first step, as of ``Noise.at``.
+    """
+
+    values: Array
+    last: Array
+    shapes: Array
+    half_weight: Array
+    factors: Array
+    span: tuple[float, float]
+    mean: float
+    relaxing: bool
+    forgets: bool
+    address: tuple[np.uint64, np.uint64, NDArray[np.uint64], int]
+
+
+_NO_ADDRESS = np.uint64(0), np.uint64(0), np.empty(0, np.uint64), 0
+#: Draws where the loop of a drive draws nothing.
+NO_DRAWS = Draws(np.empty((0, 0)), _EMPTY, _EMPTY, _EMPTY, _EMPTY, (math.inf, math.inf), 0.0, False, False, _NO_ADDRESS)
+
+
 class Motion(NamedTuple):
     """Sliding during a block of clock steps, each array of shape (steps, 1) or (steps, members).
 
@@ -395,6 +437,9 @@ class Shear(Protocol[State]):
     @property
     def field_law(self) -> FieldLaw:
         """Numbers by which sub-steps of a drive follow the memory of the fluctuations."""
+
+    def draws(self, state: State, step: int, noise: Noise) -> Draws:
+        """What the loop of a drive needs to draw the fluctuations itself from a step on, of a model ``in_blocks``."""
 
     @property
     def gammas(self) -> Gammas:

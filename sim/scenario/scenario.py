@@ -432,11 +432,21 @@ class Scenario:
         """Return True if a part feeds back, so that a run goes step by step and not by blocks of steps.
 
         With a drive that solves the motion, bonds and an equilibrium contact are solved within its sub-steps. A block
-        of such steps needs fluctuations that are constant or do not affect the contact.
+        of such steps needs fluctuations that do not affect the contact, or that the loop over the steps can draw.
         """
         _, bonds, shear, contact = self.chosen
-        alone = contact.lags or not (shear.paid_by_adhesion == 0.0 or shear.stays) or not bonds.in_blocks
+        alone = contact.lags or not (self._contact_stays or shear.in_blocks) or not bonds.in_blocks
         return any(part.feeds_back for part in self.chosen[1:]) or (self.drive.solves_motion and alone)
+
+    @property
+    def draws_within(self) -> bool:
+        """Return True if the loop of a drive that solves the motion draws the fluctuations that the contact feels."""
+        return self.drive.solves_motion and not (self.by_steps or self._contact_stays)
+
+    @property
+    def _contact_stays(self) -> bool:
+        """Return True if fluctuations never change the contact."""
+        return self.fluctuations.paid_by_adhesion == 0.0 or self.fluctuations.stays
 
     def remarks(self) -> list[str]:
         """Return one sentence for each assumption, error of the cell and implausible value."""

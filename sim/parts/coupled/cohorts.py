@@ -17,6 +17,7 @@ from sim.numerics.jit import device, kernel
 from sim.parts.bonds.cohorts import RULES, Rules, carry, inside, read_row, settle, steepen, sum_row, try_step, write_row
 from sim.parts.bonds.rupture import hazard_integral, hazard_time, rate_at
 from sim.parts.coupled import mechanics
+from sim.parts.coupled.redraw import DRAWS, redraw
 from sim.parts.drive import ENERGY
 from sim.parts.exchange import record
 
@@ -542,10 +543,10 @@ def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, ro
 
 
 @kernel(
-    f"void({mechanics.ARGUMENTS}, float64[::1], {RULES},"
+    f"void({mechanics.ARGUMENTS}, {DRAWS}, float64[::1], {RULES},"
     " float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1])"
 )
-def advance_cohorts(inputs, numbers, outputs, share, rules, weight, stretch, width, lattice, sums):
+def advance_cohorts(inputs, numbers, outputs, draws, share, rules, weight, stretch, width, lattice, sums):
     """Advance all rows, their energies and cohorts through some clock steps, each row by itself.
 
     ``share`` of each row's bonds that is left at the start; ``sums`` get those of the cohorts after each step. The rest
@@ -556,19 +557,20 @@ def advance_cohorts(inputs, numbers, outputs, share, rules, weight, stretch, wid
     rules, most, unit = Rules(*rules), weight.shape[1] + 520, units[mechanics.SLIP]
     columns, booked, nodes = np.empty(mechanics.COLUMNS), np.empty(mechanics.ENERGIES), np.zeros(3, NODE)
     row, energy = columns.view(mechanics.ROW)[0], booked.view(ENERGY)[0]
-    room = np.empty((9, most)), np.empty((3, most)), nodes
+    room, of_draws = (np.empty((9, most)), np.empty((3, most)), nodes), np.empty((2, draws[4].size))
     for m in range(len(rows)):
         stop, left = 0, share[m % share.size]
         bonds = weight[m], stretch[m], width[m], lattice[m]
         for k in range(len(clock)):
             start, stop = stop, mechanics.pieces_to(k, stop, pieces)
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
+            now = mechanics.contact_at(contact, clock[k], row)
             if math.isnan(row.runaway_time):
-                now = mechanics.contact_at(contact, clock[k], row)
                 time, going = _through(row, energy, pieces[start:stop], slider, now, unit, left, rules, bonds, room)
                 if not going:
                     mechanics.run_away(row, booked, clock[k, 0] + time)
                 left = 1.0
             mechanics.from_units(columns, booked, rows[m], energies[m], units, work)
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
+            redraw(row, rows[m], m, k, clock, now, draws, of_draws, reached)
             sum_row(weight[m], stretch[m], width[m], rules, room[0][4], sums[:, k, m])

@@ -23,7 +23,20 @@ from sim.parts.coupled.mean_field import advance_rows
 from sim.parts.coupled.mechanics import COLUMNS, ROW, Inputs, Law, Slider
 from sim.parts.coupled.tracked import advance_tracks
 from sim.parts.drive import ENERGY, Driven, Force, Spring
-from sim.parts.exchange import Array, Bonding, Flags, Memory, Motion, Mount, Parts, Sliding, Storing, Times
+from sim.parts.exchange import (
+    NO_DRAWS,
+    Array,
+    Bonding,
+    Draws,
+    Flags,
+    Memory,
+    Motion,
+    Mount,
+    Parts,
+    Sliding,
+    Storing,
+    Times,
+)
 
 #: Stretch by which the motion of bonds is measured that neither force nor stretch breaks, in a run without motion [m].
 _STRETCH = 1e-9
@@ -149,12 +162,13 @@ def with_contact_stress(parts: Parts, bonding: Bonding, speed: Array) -> Bonding
 
 def advance(
     parts: Parts, slider: Sliding, population: tuple[object, ...], contact: StepContact, times: Times, steps: range,
-    noise: Noise,
+    noise: Noise, draws: Draws = NO_DRAWS,
 ) -> tuple[Driven, Motion, tuple[object, ...], Bonding]:  # fmt: skip
     """Return the slider at the end of each of some clock steps, its motion, the bonds at the end and their readings.
 
-    The contact is that at the start, except for its equilibrium with the bonds; ``steps_until_contact_changes`` counts
-    the valid steps. ``counted`` bonds stay as well: they are drawn at the end of a step, with the slip in it.
+    The contact is that at the start, except for its equilibrium with the bonds, and with the fluctuations that the loop
+    over the steps ``draws``; ``steps_until_contact_changes`` counts the valid steps. ``counted`` bonds stay as well:
+    they are drawn at the end of a step, with the slip in it.
     """
     drive, bonds, slider = cast(Force | Spring, parts.drive), cast(_SolvedBonds, parts.bonds), cast(Driven, slider)
     ends, members = times.at(np.arange(steps.start - 1.0, steps.stop)), len(slider.speed)
@@ -166,7 +180,7 @@ def advance(
     if steps.start == 1 and not drive.spring:  # a force acts at once
         rows["spring_force"] = 0.0
     rows["radius"] = contact.radius
-    if not contact.stays:  # an equilibrium contact goes on with the radius of the sub-steps
+    if len(draws.values) or not contact.stays:  # an equilibrium contact goes on with the radius of the loop
         rows["radius"] = np.where(_agree(slider.radius, contact.radius), slider.radius, contact.radius)
     pieces, duration = drive.driven(ends, times.duration), ends[1:] - ends[:-1]
     scale = 1.0 / (stretch if drive.spring else force)
@@ -186,7 +200,8 @@ def advance(
     columns, energies = np.empty((COLUMNS, len(steps), members)), np.empty((len(steps), *slider.energies.shape))
     numbers = *_numbers(drive, bonds, contact, units), tuple(law)
     reached = dict(zip(_NAMES, columns, strict=True))
-    end, bonding = _advanced(bonds, population, contact.radius, inputs, numbers, (columns, energies), reached, noise)
+    loop = tuple(inputs), numbers, (columns, energies), tuple(draws._replace(forgets=draws.forgets and bool(answers)))
+    end, bonding = _advanced(bonds, population, contact.radius, inputs, loop, reached, noise)
     stage, stage_speed = np.zeros((2, len(steps), members))
     if drive.spring:
         whole = pieces.joined
@@ -207,28 +222,29 @@ def advance(
 
 
 def _advanced(
-    bonds: _SolvedBonds, population: tuple[object, ...], radius: Array, inputs: Inputs, numbers: _Numbers,
-    outputs: tuple[Array, Array], reached: dict[str, Array], noise: Noise,
+    bonds: _SolvedBonds, population: tuple[object, ...], radius: Array, inputs: Inputs, loop: tuple[tuple, ...],
+    reached: dict[str, Array], noise: Noise,
 ) -> tuple[tuple[object, ...], Bonding]:  # fmt: skip
     """Return the bonds after some clock steps and their readings at each.
 
-    ``radius`` of the contact at the start [m]; ``outputs`` receive the rows and energies at the end of each step.
-    ``reached`` has their columns by name. Bonds without a stretch have the sense of the sliding in its place.
+    ``radius`` of the contact at the start [m]; ``loop``: arguments of ``advance_rows``, of which the outputs receive
+    the rows and energies at the end of each step. ``reached`` has their columns by name. Bonds without a stretch have
+    the sense of the sliding in its place.
     """
-    shape, rows = outputs[0].shape[1:], inputs.rows.view(ROW)[:, 0]
+    shape, rows = loop[2][0].shape[1:], inputs.rows.view(ROW)[:, 0]
     if isinstance(bonds, models.Cohort):
         ages = cast(models.Ages, population)
         share, area_radius = bonds.diluted(ages.area_radius, radius)
         cohorts, sums = Cohorts(*(array.copy() for array in ages.cohorts)), np.empty((5, *shape))
         rules = numbers_of(bonds.law, bonds.rebinding_rate, bonds.tolerance)
-        advance_cohorts(tuple(inputs), numbers, outputs, share, rules, *cohorts, sums)
+        advance_cohorts(*loop, share, rules, *cohorts, sums)
         return models.Ages(cohorts, area_radius), bonds.read(sums)
     if isinstance(bonds, models.Tracked):
         tracks = cast(Tracks, population)
         tracks = tracks._replace(frame=tracks.frame.copy())
         frames = np.empty((*shape, tracks.frame.shape[1]))
         lives = (*bonds.law[:3], bonds.rebinding_rate), noise.seed, np.asarray(noise.members, dtype=np.uint64)
-        if advance_tracks(tuple(inputs), numbers, outputs, tuple(tracks), *lives, frames):
+        if advance_tracks(*loop[:3], tuple(tracks), *lives, frames):
             raise RuntimeError(AGAIN)
         return tracks, bonds.read(frames)
     if isinstance(bonds, models.FirstMoment):
@@ -239,7 +255,7 @@ def _advanced(
         before = cast(models.Population, population)
         share, area_radius = bonds.diluted(before.area_radius, radius)
         rows["bound"] = bonds.bonding(before).fraction * share
-    advance_rows(tuple(inputs), numbers, outputs)
+    advance_rows(*loop)
     bound, moment = reached["bound"], reached["moment"]
     if isinstance(bonds, models.FirstMoment):
         end = models.Stretches(bound[-1].copy(), moment[-1].copy(), area_radius)
@@ -288,10 +304,10 @@ def _numbers(drive: Force | Spring, bonds: _SolvedBonds, contact: StepContact, u
 
 
 def _clock(contact: StepContact, ends: Array) -> Array:
-    """Return the beginning of each step, its load and base, each with its rate; shape (steps, 5)."""
+    """Return the beginning of each step, its load and base, each with its rate, and its length; shape (steps, 6)."""
     duration = ends[1:] - ends[:-1]
-    clock = np.zeros((len(duration), 5))
-    clock[:, 0] = ends[:-1]
+    clock = np.zeros((len(duration), 6))
+    clock[:, 0], clock[:, 5] = ends[:-1], duration
     for column, (first, last) in enumerate(zip(*(mount[:2] for mount in contact.mounts), strict=True)):
         clock[:, 2 * column + 1], clock[:, 2 * column + 2] = first, (last - first) / duration
     return clock

@@ -8,6 +8,7 @@ from sim.numerics.jit import device, kernel
 from sim.parts.bonds.mean_field import regula_falsi
 from sim.parts.coupled import mechanics, radau
 from sim.parts.coupled.radau import accept, try_sub_step  # by name: numba inlines no attribute of a module
+from sim.parts.coupled.redraw import DRAWS, redraw
 from sim.parts.drive import ENERGY
 
 #: Slip over the cut-off stretch on which bonds are tried, and that within which they may slip at once.
@@ -377,13 +378,13 @@ def _clock_step(line, slider, law, contact, pieces, nodes, books):
     return time, True
 
 
-@kernel(f"void({mechanics.ARGUMENTS})")
-def advance_rows(inputs, numbers, outputs):
+@kernel(f"void({mechanics.ARGUMENTS}, {DRAWS})")
+def advance_rows(inputs, numbers, outputs, draws):
     """Advance all rows and their energies through some clock steps, each row by itself.
 
     ``numbers``: those of ``Slider``, ``Law``, ``Contact`` and ``FieldLaw``. ``outputs``: columns and
-    energies at the end of each step, shape (columns, steps, rows) and (steps, rows, energies). A row that nothing holds
-    any longer ends there.
+    energies at the end of each step, shape (columns, steps, rows) and (steps, rows, energies). ``draws``: ``Draws``,
+    none if their ``values`` have no rows. A row that nothing holds any longer ends there.
     """
     rows, energies, pieces, clock, units, work = inputs
     slider, law, contact = mechanics.Slider(*numbers[0]), mechanics.Law(*numbers[1]), mechanics.contact_of(numbers)
@@ -391,6 +392,7 @@ def advance_rows(inputs, numbers, outputs):
     both, nodes = (np.empty(2 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES)), np.empty(1, radau.NODE_VALUES)
     line, books = both[0].view(mechanics.ROW), both[1].view(ENERGY)  # as they are, and before the last sub-step
     columns, booked, row = both[0][: mechanics.COLUMNS], both[1][: mechanics.ENERGIES], line[0]
+    room = np.empty((2, draws[4].size))
     for m in range(len(rows)):
         stop = 0
         for k in range(len(clock)):
@@ -398,10 +400,11 @@ def advance_rows(inputs, numbers, outputs):
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
             if law.sense != 0.0:
                 row.moment = math.copysign(row.bound, row.speed) if row.speed != 0.0 else 0.0
+            now = mechanics.contact_at(contact, clock[k], row)
             if math.isnan(row.runaway_time):
-                now = mechanics.contact_at(contact, clock[k], row)
                 time, going = _clock_step(line, slider, law, now, pieces[start:stop], nodes[0], books)
                 if not going:
                     mechanics.run_away(row, booked, clock[k, 0] + time)
             mechanics.from_units(columns, booked, rows[m], energies[m], units, work)
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
+            redraw(row, rows[m], m, k, clock, now, draws, room, reached)

@@ -19,7 +19,7 @@ ROW = record(
     "weight mean spread renewed energy recalled paid felt drawn worked missed elapsed"
 )
 COLUMNS = len(ROW.names or ())
-SLIP = (ROW.names or ()).index("slip")
+SLIP, RADIUS = (ROW.names or ()).index("slip"), (ROW.names or ()).index("radius")
 ENERGIES = len(ENERGY.names or ())
 _STORED = (ENERGY.names or ()).index("stored")
 #: Types of ``Inputs``, of the numbers of slider, bonds, contact and fluctuations, and of rows and energies at the end
@@ -96,7 +96,7 @@ class Inputs(NamedTuple):
 
     ``rows`` and ``energies`` have the columns of ``ROW`` and ``ENERGY`` and are advanced in place. ``pieces``: number
     of the clock step, then the first four of ``Slider``. ``clock``: beginning of each step, load and its rate, base and
-    its rate. ``units`` of the columns and of ``work``: the equations have none.
+    its rate, duration. ``units`` of the columns and of ``work``: the equations have none.
     """
 
     rows: Array

@@ -20,11 +20,11 @@ from functools import cached_property
 import numpy as np
 
 from sim.laws.halfspace import compliance
-from sim.numerics.jit import kernel
+from sim.numerics.jit import device, kernel
 from sim.numerics.noise import Noise, gamma, normal, stream
-from sim.parts.exchange import Array, Gammas, Indices
+from sim.parts.exchange import Array, Draws, Gammas, Indices
 from sim.parts.shear.modes import grid_reach, half_lattice, modes
-from sim.parts.shear.process import Amplitude, Correlation, Renewing
+from sim.parts.shear.process import Amplitude, Correlation, Fluctuation, Renewing, factors
 from sim.spectrum.family import Family
 
 #: Squares handled at a time.
@@ -415,9 +415,32 @@ class BandedProcess(Renewing):
     def gammas(self) -> Gammas:
         return Gammas(self.bands.weight, 0.5 * self.bands.freedom, self.wavenumber)
 
+    def draws(self, state: Fluctuation, step: int, noise: Noise) -> Draws:
+        of_bands = self.shapes, self.half_weight, factors(self.correlation, self.wavenumber), self.correlation.span
+        rules = *of_bands, self.mean, self.amplitude.relaxing, self._forgets_by_slip
+        return Draws(state.values.copy(), state.past.energy.copy(), *rules, noise.at(step))
+
     def known_errors(self) -> dict[str, float]:
         """Return the errors that banding adds to the mode sum of the cell, and the errors of the cell."""
         return self.cell_errors | self.bands.errors | {"bands": float(self.bands.weight.size)}
+
+
+@device
+def renew_member(values, keep, renew, unit, shapes, half_weight, numbers):
+    """Advance the bands of a member in place by an exact step; return their energy. Shares of all bands, or of each."""
+    total, many = 0.0, keep.size > 1
+    for k in range(shapes.size):
+        i = k if many else 0
+        x, share = values[k], renew[i]
+        if share != 0.0:  # else nothing has passed: not even a rounding
+            first, numbers = normal(numbers)
+            rest, numbers = gamma(shapes[k], numbers)
+            kick = share * unit
+            moved = kick * first + keep[i] * math.sqrt(x)
+            x = moved * moved + 2.0 * kick * kick * rest
+        values[k] = x
+        total += half_weight[k] * x
+    return total
 
 
 @kernel(
@@ -426,21 +449,8 @@ class BandedProcess(Renewing):
 )
 def _renew_bands(values, keep, renew, size, shapes, half_weight, seed, part, members, step, energy):
     """Advance all bands of all members in place by exact steps, and write their energy after each step."""
-    many = keep.shape[2] > 1
     for m in range(members.size):
         row = m % keep.shape[1]
         for s in range(len(keep)):
-            numbers = stream(seed, part, members[m], step + s, 0)
-            total, unit = 0.0, size[s, m % size.shape[1]]
-            for k in range(shapes.size):
-                i = k if many else 0
-                x, share = values[m, k], renew[s, row, i]
-                if share != 0.0:  # else nothing has passed: not even a rounding
-                    first, numbers = normal(numbers)
-                    rest, numbers = gamma(shapes[k], numbers)
-                    kick = share * unit
-                    moved = kick * first + keep[s, row, i] * math.sqrt(x)
-                    x = moved * moved + 2.0 * kick * kick * rest
-                values[m, k] = x
-                total += half_weight[k] * x
-            energy[s, m] = total
+            numbers, unit = stream(seed, part, members[m], step + s, 0), size[s, m % size.shape[1]]
+            energy[s, m] = renew_member(values[m], keep[s, row], renew[s, row], unit, shapes, half_weight, numbers)

@@ -64,6 +64,8 @@ class ShearModel:
     passes: ClassVar[bool] = False
     #: True if the energy that the contact reads is the same at all times.
     stays: ClassVar[bool] = False
+    #: True if a drive that solves its motion can draw the energy that the contact reads in its own loop.
+    in_blocks: ClassVar[bool] = False
     #: Correlation length of the field [m]; nan if its modes have none in common.
     _memory: ClassVar[float] = math.nan
     #: Rough time that one step of a mode pair takes on one core, for estimates [s].
@@ -91,6 +93,11 @@ class ShearModel:
             cure = "leave it out"
             raise PydanticCustomError("bond_made", f'bonds at random places make mode_amplitudes = "gaussian"; {cure}')
         return self
+
+    @property
+    def _on_the_plane(self) -> bool:
+        """True if ΔΓ on the plane follows from the numbers of the field and the memory of the sliding alone."""
+        return self.contact == "plane" and self.amplitude.model in ("constant", "slip_rate")
 
     @property
     def law(self) -> Amplitude:
@@ -197,6 +204,10 @@ class Mean(ShearModel):
     @property
     def stays(self) -> bool:  # type: ignore[override]
         return self.amplitude.model == "constant" and self.contact == "plane" and not self.spectrum.bond_made
+
+    @property
+    def in_blocks(self) -> bool:  # type: ignore[override]
+        return self._on_the_plane and not self.spectrum.bond_made
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
         kind = SiteMean if self.spectrum.bond_made else SmoothProcess
@@ -309,6 +320,10 @@ class Banded(_Fluctuating):
 
     tolerance: _Tolerance = 0.01
     model: Literal["banded"] = "banded"
+
+    @property
+    def in_blocks(self) -> bool:  # type: ignore[override]
+        return self._on_the_plane and not (self.amplitude.relaxing and self.correlation.power)
 
     @model_validator(mode="after")
     def _not_of_bonds(self) -> "Banded":

@@ -26,7 +26,7 @@ from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise, normal, stream
 from sim.parts.exchange import Array, Bonding, FieldLaw, Gammas, Indices, Motion
-from sim.parts.shear.process import Amplitude, Correlation, Fluctuation, Renewing, Slip, SmoothProcess, Wave
+from sim.parts.shear.process import Amplitude, Correlation, Fluctuation, Renewing, Slip, SmoothProcess, Wave, exponents
 from sim.spectrum.family import Family
 
 #: Pairs below this share of the variance are left out: all of them together would not change a bit.
@@ -326,7 +326,7 @@ class FixedProcess(ModalProcess):
     def advance(self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[Fluctuation, Array]:
         past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
         phases = state.values.copy()
-        turn_phases(phases, self.correlation.exponents(self.wavenumber, motions), *noise.at(motions.step))
+        turn_phases(phases, exponents(self.correlation, self.wavenumber, motions), *noise.at(motions.step))
         energy = self._energy(amplitude)
         return Fluctuation(energy[-1], amplitude[-1], phases, past), energy
 

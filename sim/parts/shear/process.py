@@ -15,7 +15,7 @@ from pydantic import Field
 
 from sim.numerics.jit import device, kernel, law
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Array, Bonding, FieldLaw, Gammas, Memory, Motion
+from sim.parts.exchange import Array, Bonding, Draws, FieldLaw, Gammas, Memory, Motion
 from sim.units.quantity import Quantity, keyed
 
 _Memory = Annotated[
@@ -144,7 +144,7 @@ class SlipRate(_OfTheMoment):
     def followed(self, past: Memory, motions: Motion, stress: Array) -> tuple[Memory, Array]:
         if motions.memory.weight.size:
             past, (weight, mean, spread, *_) = Memory(*(values[-1] for values in motions.memory)), motions.memory
-            unsteady = np.where(spread > 0.0, spread, 0.0) / np.where(spread > 0.0, spread + weight * mean**2, 1.0)
+            unsteady = np.where(spread > 0.0, spread, 0.0) / np.where(spread > 0.0, spread + weight * mean * mean, 1.0)
         else:
             columns, unsteady = np.stack(past[:3], axis=1), np.empty(motions.path.shape)
             spread = motions.unsteady + np.zeros(motions.path.shape)
@@ -202,12 +202,10 @@ class Time:
     time: Annotated[float, Quantity("s", "correlation time of the fluctuations", "t_m", above=0)]
     model: Literal["time"] = "time"
 
-    def exponents(self, wavenumber: Array, motion: Motion) -> Array:
-        """Return ∫λdt over a step, shape (1, 1) or (members, 1), or (members, wavenumbers) [rad/m].
-
-        For a block of steps the step is the first axis.
-        """
-        return motion.duration[..., np.newaxis] / self.time
+    @property
+    def span(self) -> tuple[float, float]:
+        """Distance [m] and time [s] in which a mode keeps 1/e, both times the wavenumber [rad/m] to the power."""
+        return math.inf, self.time
 
 
 @keyed()
@@ -220,8 +218,9 @@ class Slip:
     length: Annotated[float, Quantity("m", "correlation length of the fluctuations", "l", above=0)]
     model: Literal["slip"] = "slip"
 
-    def exponents(self, wavenumber: Array, motion: Motion) -> Array:
-        return motion.path[..., np.newaxis] / self.length
+    @property
+    def span(self) -> tuple[float, float]:
+        return self.length, math.inf
 
 
 @keyed()
@@ -234,8 +233,9 @@ class Wave:
     waves: Annotated[float, Quantity("1", "number of wavelengths after which a mode is renewed", "n", above=0)]
     model: Literal["wave"] = "wave"
 
-    def exponents(self, wavenumber: Array, motion: Motion) -> Array:
-        return wavenumber * (motion.path / (2.0 * np.pi * self.waves))[..., np.newaxis]
+    @property
+    def span(self) -> tuple[float, float]:
+        return 2.0 * np.pi * self.waves, math.inf
 
 
 @keyed()
@@ -248,11 +248,26 @@ class Diffusion:
     diffusivity: Annotated[float, Quantity("m^2/s", "diffusivity of the fluctuations", "D", above=0)]
     model: Literal["diffusion"] = "diffusion"
 
-    def exponents(self, wavenumber: Array, motion: Motion) -> Array:
-        return wavenumber**2 * (self.diffusivity * motion.duration[..., np.newaxis])
+    @property
+    def span(self) -> tuple[float, float]:
+        return math.inf, 1.0 / self.diffusivity
 
 
 Correlation = Annotated[Time | Slip | Wave | Diffusion, Field(discriminator="model")]
+
+
+def exponents(law: Correlation, wavenumber: Array, motion: Motion) -> Array:
+    """Return ∫λdt over a step, shape (1, 1) or (members, 1), or (members, wavenumbers) [rad/m].
+
+    For a block of steps the step is the first axis.
+    """
+    distance, time = law.span
+    return factors(law, wavenumber) * (motion.path / distance + motion.duration / time)[..., np.newaxis]
+
+
+def factors(law: Correlation, wavenumber: Array) -> Array:
+    """Return the wavenumbers [rad/m] to the power of a law, shape (1,) if all modes have one rate."""
+    return wavenumber**law.power if law.power else np.ones(1)
 
 
 class Fluctuation(NamedTuple):
@@ -306,6 +321,12 @@ class SmoothProcess:
     def field_law(self) -> FieldLaw:
         return self.amplitude.field_law(self.energy)
 
+    def draws(self, state: Fluctuation, step: int, noise: Noise) -> Draws:
+        """Return what a compiled loop needs to follow the energy from a ``step`` on, which it does not draw."""
+        none, members = np.empty(0), len(noise.members)
+        constant = (math.inf, math.inf), self.energy, self.amplitude.relaxing, False
+        return Draws(np.empty((members, 0)), np.empty(members), none, none, none, *constant, noise.at(step))
+
     @property
     def gammas(self) -> Gammas:
         return Gammas(constant=self.energy)
@@ -345,15 +366,13 @@ class Renewing:
         """
         terms, none = self.gammas, np.zeros(path.shape)
         motion = Motion(0, none, np.full(path.shape, duration), path, path, none, none)
-        renewed = -np.expm1(-2.0 * self.correlation.exponents(terms.wavenumber, motion))
+        renewed = -np.expm1(-2.0 * exponents(self.correlation, terms.wavenumber, motion))
         return np.asarray(np.sqrt(2.0 * np.sum(terms.shape * terms.weight**2 * renewed, axis=-1)))
 
     @cached_property
     def field_law(self) -> FieldLaw:
-        law, rates = self.correlation, None
-        if isinstance(law, Time | Slip):
-            rates = (1.0 / law.length, 0.0) if isinstance(law, Slip) else (0.0, 1.0 / law.time)
-        return self.amplitude.field_law(self.mean, rates)
+        distance, time = self.correlation.span
+        return self.amplitude.field_law(self.mean, None if self.correlation.power else (1.0 / distance, 1.0 / time))
 
     def _empty(self, members: int) -> Array:
         """Return the numbers of a state without any fluctuation."""
@@ -393,9 +412,9 @@ class Renewing:
 
     def _shares(self, motions: Motion) -> tuple[Array, Array]:
         """Return the shares of a number that a step keeps and renews, whose squares add up to one."""
-        exponents = self.correlation.exponents(self.wavenumber, motions)
-        keep, renew = np.empty_like(exponents), np.empty_like(exponents)
-        _shares(exponents.ravel(), keep.ravel(), renew.ravel())
+        lost = exponents(self.correlation, self.wavenumber, motions)
+        keep, renew = np.empty_like(lost), np.empty_like(lost)
+        _shares(lost.ravel(), keep.ravel(), renew.ravel())
         return keep, renew
 
     def _scaled(self, amplitude: Array, energy: Array) -> Array:
@@ -418,9 +437,15 @@ def renewed_size(law: Amplitude, state: Fluctuation, motions: Motion, amplitude:
     return np.sqrt(0.5 * (amplitude**2 + before**2))
 
 
+@device
+def shares(exponent):
+    """Return the shares of a number that stay and are renewed over an exponent ∫λdt; their squares add up to one."""
+    lost = -math.expm1(-exponent)
+    return 1.0 - lost, math.sqrt(lost * (2.0 - lost))
+
+
 @kernel("void(float64[:], float64[:], float64[:])")
 def _shares(exponents, keep, renew):
-    """Write the shares of a number that stay and are renewed over exponents ∫λdt; their squares add up to one."""
+    """Write ``shares`` of many exponents."""
     for k in range(exponents.size):
-        lost = -math.expm1(-exponents[k])
-        keep[k], renew[k] = 1.0 - lost, math.sqrt(lost * (2.0 - lost))
+        keep[k], renew[k] = shares(exponents[k])
