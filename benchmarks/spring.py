@@ -1,10 +1,12 @@
 """Rows of the slider behind a spring, which friction feeds back into."""
 
 import functools
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import sim
 from benchmarks import bonds_plain
 from benchmarks.bonds import BELL
 from benchmarks.timing import Bench, Beside, Row, absolute, spent
@@ -36,15 +38,19 @@ def scene(duration: float, steps: int, tolerance: float, mass: float = 0.0, damp
     return Scenario(**keys, drive=Spring(stage=SPEED, contact_stiffness="rigid", **body))
 
 
-def followed(of: Scenario) -> Trajectory:
+def followed(of: Scenario, members: int = 1) -> Trajectory:
     """Return the trajectory of a slider at each clock step."""
-    return follow(of, MemberNoise.of(of.seed, np.arange(1)), None, range(1, of.clock.steps + 1))[1]
+    return follow(of, MemberNoise.of(of.seed, np.arange(members)), None, range(1, of.clock.steps + 1))[1]
 
 
 def apart(positions: np.ndarray, exact: np.ndarray) -> float:
     """Return the largest difference of positions over the largest position."""
     return float(np.max(np.abs(positions - exact)) / np.max(np.abs(exact)))
 
+
+#: A lens whose contact follows ΔΓ; its speed [mm/s], members, clock steps and the goal for a member's step [µs].
+LENS = Path(__file__).parent.parent / "scenarios" / "pdms_lens_spring.toml"
+FEELING = ((2, 1, 4000, 4.0), (2, 4, 1000, 4.0), (2, 256, 100, 3.5), (3, 1, 4000, None), (20, 1, 4000, None))
 
 #: Sliders by name: mass and damping over those of all sites, slips or as much time, and tolerances of the others.
 SLIDERS: dict[str, tuple[float, float, int, dict[str, float]]] = {
@@ -56,7 +62,7 @@ SLIDERS: dict[str, tuple[float, float, int, dict[str, float]]] = {
 
 
 def spring(bench: Bench) -> list[Row]:
-    """Sliders beside LSODA and a compiled explicit pair, and one through 1000 slips with 10⁵ records."""
+    """Sliders beside LSODA and a compiled explicit pair, those that feel ΔΓ, and 1000 slips with 10⁵ records."""
     rows = []
     for name, (mass, damping, slips, tolerances) in SLIDERS.items():
         duration = bench.of(2.4 * slips, 1.0)
@@ -73,6 +79,15 @@ def spring(bench: Bench) -> list[Row]:
             others.append(Beside(label, theirs, errors=errors, bound="scipy" not in label))
         work = f"{name} slider behind a spring, {slips * 2.4:.0f} records"
         rows += bench.compare(work, functools.partial(followed, of), *others, turns=7)
+
+    lens = sim.load(LENS).points()[0]
+    for stage, members, steps, goal in FEELING:
+        values = {"drive.stage": f"{stage} mm/s", "clock.duration": f"{bench.of(steps, 2)} ms"}
+        program, share = functools.partial(followed, lens.with_values(values), members), 1e6 / (members * steps)
+        program()  # it may compile
+        microseconds = [share * spent(program) for _ in range(bench.of(7, 1))]
+        work = f"a member's step of 1 ms: spring lens at {stage} mm/s, {members} members"
+        rows.append(absolute(work, microseconds, "µs", goal))
 
     long = scene(bench.of(2400.0, 1.0), bench.of(10**5, 10), TOLERANCE)
     seconds = [spent(lambda: followed(long)) for _ in range(bench.of(5, 1))]
