@@ -150,8 +150,10 @@ class Draws(NamedTuple):
         Shape of a band's gamma number, and its energy for a number of 1 [J/m²].
     factors : array, shape (1,) or (bands,)
         Wavenumber of a band to the power of the correlation law; one if all bands have the same rate.
-    span : tuple of float
-        Distance [m] and time [s] in which a band of factor 1 keeps 1/e.
+    by_slip : bool
+        True if bands renew with the path, False if in time.
+    span : float
+        Distance [m] or time [s] in which a band of factor 1 keeps 1/e.
     mean : float
         Mean of the energy at amplitude 1 [J/m²].
     relaxing : bool
@@ -167,7 +169,8 @@ class Draws(NamedTuple):
     shapes: Array
     half_weight: Array
     factors: Array
-    span: tuple[float, float]
+    by_slip: bool
+    span: float
     mean: float
     relaxing: bool
     forgets: bool
@@ -176,7 +179,7 @@ class Draws(NamedTuple):
 
 _NO_ADDRESS = np.uint64(0), np.uint64(0), np.empty(0, np.uint64), 0
 #: Draws where the loop of a drive draws nothing.
-NO_DRAWS = Draws(np.empty((0, 0)), _EMPTY, _EMPTY, _EMPTY, _EMPTY, (math.inf, math.inf), 0.0, False, False, _NO_ADDRESS)
+NO_DRAWS = Draws(np.empty((0, 0)), _EMPTY, _EMPTY, _EMPTY, _EMPTY, True, 1.0, 0.0, False, False, _NO_ADDRESS)
 
 
 class Motion(NamedTuple):

@@ -10,7 +10,7 @@ from sim.parts.shear.process import shares, unsteadiness
 
 #: Type of ``Draws``.
 DRAWS = (
-    "Tuple((float64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], UniTuple(float64, 2), float64, "
+    "Tuple((float64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], boolean, float64, float64, "
     "boolean, boolean, Tuple((uint64, uint64, uint64[::1], int64))))"
 )
 
@@ -25,9 +25,11 @@ def redraw(row, columns, m, k, clock, contact, draws, room, reached):
     """
     if len(draws[0]) == 0:
         return
-    values, last, shapes, half_weight, factors, span, mean, relaxing, answers, (seed, part, members, first) = draws
+    values, last, shapes, half_weight, factors, by_slip, span, mean, relaxing, answers, (seed, part, members, first) = (
+        draws
+    )
     state = columns.view(mechanics.ROW)[0]
-    field, spent = contact.field, state.path / span[0] + clock[k, 5] / span[1]
+    field, spent = contact.field, (state.path if by_slip else clock[k, 5]) / span
     size, energy, expected = 1.0, mean, last[m]
     if field.length < math.inf and not relaxing:
         size = math.sqrt(field.floor + (1.0 - field.floor) * unsteadiness(state.weight, state.mean, state.spread))

@@ -416,7 +416,8 @@ class BandedProcess(Renewing):
         return Gammas(self.bands.weight, 0.5 * self.bands.freedom, self.wavenumber)
 
     def draws(self, state: Fluctuation, step: int, noise: Noise) -> Draws:
-        of_bands = self.shapes, self.half_weight, factors(self.correlation, self.wavenumber), self.correlation.span
+        law = self.correlation
+        of_bands = self.shapes, self.half_weight, factors(law, self.wavenumber), law.by_slip, law.span
         rules = *of_bands, self.mean, self.amplitude.relaxing, self._forgets_by_slip
         return Draws(state.values.copy(), state.past.energy.copy(), *rules, noise.at(step))
 

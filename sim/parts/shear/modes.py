@@ -26,7 +26,7 @@ from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise, normal, stream
 from sim.parts.exchange import Array, Bonding, FieldLaw, Gammas, Indices, Motion
-from sim.parts.shear.process import Amplitude, Correlation, Fluctuation, Renewing, Slip, SmoothProcess, Wave, exponents
+from sim.parts.shear.process import Amplitude, Correlation, Fluctuation, Renewing, SmoothProcess, exponents
 from sim.spectrum.family import Family
 
 #: Pairs below this share of the variance are left out: all of them together would not change a bit.
@@ -432,7 +432,7 @@ class SiteModes(ModalProcess):
         parts, sizes = state.values.copy(), _sizes(bonding)
         energy = np.empty((len(motions.time), len(parts)))
         _renew_sites(parts, *self._shares(motions), sizes, self.weights, *noise.at(motions.step), energy)
-        expected = state.energy if isinstance(self.correlation, Slip | Wave) else energy[-1]
+        expected = state.energy if self.correlation.by_slip else energy[-1]
         return Fluctuation(energy[-1], sizes[:, -1].T, parts, expected=expected), energy
 
     def _standard(self, state: Fluctuation) -> tuple[Array, Array]:

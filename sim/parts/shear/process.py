@@ -196,61 +196,62 @@ Amplitude = Annotated[Constant | Onset | Stress | SlipRate, Field(discriminator=
 class Time:
     """Modes renew in time: λ = 1/time."""
 
-    #: The rate goes with |q| to this power.
+    #: The rate goes with |q| to this power, and with the speed or not.
     power: ClassVar[int] = 0
+    by_slip: ClassVar[bool] = False
 
     time: Annotated[float, Quantity("s", "correlation time of the fluctuations", "t_m", above=0)]
     model: Literal["time"] = "time"
 
     @property
-    def span(self) -> tuple[float, float]:
-        """Distance [m] and time [s] in which a mode keeps 1/e, both times the wavenumber [rad/m] to the power."""
-        return math.inf, self.time
+    def span(self) -> float:
+        """Distance [m] or time [s] in which a mode keeps 1/e, times the wavenumber [rad/m] to the power."""
+        return self.time
 
 
 @keyed()
 class Slip:
     """Modes renew by sliding: λ = \\|V\\|/length, so a contact at rest keeps its pattern."""
 
-    #: The rate goes with |q| to this power.
     power: ClassVar[int] = 0
+    by_slip: ClassVar[bool] = True
 
     length: Annotated[float, Quantity("m", "correlation length of the fluctuations", "l", above=0)]
     model: Literal["slip"] = "slip"
 
     @property
-    def span(self) -> tuple[float, float]:
-        return self.length, math.inf
+    def span(self) -> float:
+        return self.length
 
 
 @keyed()
 class Wave:
     """A mode renews after sliding ``waves`` of its own wavelengths: λ = \\|V\\| q/(2π waves)."""
 
-    #: The rate goes with |q| to this power.
     power: ClassVar[int] = 1
+    by_slip: ClassVar[bool] = True
 
     waves: Annotated[float, Quantity("1", "number of wavelengths after which a mode is renewed", "n", above=0)]
     model: Literal["wave"] = "wave"
 
     @property
-    def span(self) -> tuple[float, float]:
-        return 2.0 * np.pi * self.waves, math.inf
+    def span(self) -> float:
+        return 2.0 * np.pi * self.waves
 
 
 @keyed()
 class Diffusion:
     """Modes diffuse away in time: λ = D q²."""
 
-    #: The rate goes with |q| to this power.
     power: ClassVar[int] = 2
+    by_slip: ClassVar[bool] = False
 
     diffusivity: Annotated[float, Quantity("m^2/s", "diffusivity of the fluctuations", "D", above=0)]
     model: Literal["diffusion"] = "diffusion"
 
     @property
-    def span(self) -> tuple[float, float]:
-        return math.inf, 1.0 / self.diffusivity
+    def span(self) -> float:
+        return 1.0 / self.diffusivity
 
 
 Correlation = Annotated[Time | Slip | Wave | Diffusion, Field(discriminator="model")]
@@ -261,8 +262,8 @@ def exponents(law: Correlation, wavenumber: Array, motion: Motion) -> Array:
 
     For a block of steps the step is the first axis.
     """
-    distance, time = law.span
-    return factors(law, wavenumber) * (motion.path / distance + motion.duration / time)[..., np.newaxis]
+    passed = motion.path if law.by_slip else motion.duration
+    return factors(law, wavenumber) * (passed / law.span)[..., np.newaxis]
 
 
 def factors(law: Correlation, wavenumber: Array) -> Array:
@@ -324,7 +325,7 @@ class SmoothProcess:
     def draws(self, state: Fluctuation, step: int, noise: Noise) -> Draws:
         """Return what a compiled loop needs to follow the energy from a ``step`` on, which it does not draw."""
         none, members = np.empty(0), len(noise.members)
-        constant = (math.inf, math.inf), self.energy, self.amplitude.relaxing, False
+        constant = True, 1.0, self.energy, self.amplitude.relaxing, False
         return Draws(np.empty((members, 0)), np.empty(members), none, none, none, *constant, noise.at(step))
 
     @property
@@ -352,7 +353,7 @@ class Renewing:
 
     @cached_property
     def _forgets_by_slip(self) -> bool:
-        return isinstance(self.correlation, Slip | Wave) or self.amplitude.remembers
+        return self.correlation.by_slip or self.amplitude.remembers
 
     @cached_property
     def mean(self) -> float:
@@ -371,8 +372,10 @@ class Renewing:
 
     @cached_property
     def field_law(self) -> FieldLaw:
-        distance, time = self.correlation.span
-        return self.amplitude.field_law(self.mean, None if self.correlation.power else (1.0 / distance, 1.0 / time))
+        law, rates = self.correlation, None
+        if law.power == 0:
+            rates = (1.0 / law.span, 0.0) if law.by_slip else (0.0, 1.0 / law.span)
+        return self.amplitude.field_law(self.mean, rates)
 
     def _empty(self, members: int) -> Array:
         """Return the numbers of a state without any fluctuation."""
