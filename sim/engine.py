@@ -17,6 +17,7 @@ from sim.parts.coupled.coupled import StepContact
 from sim.parts.drive import Driven
 from sim.parts.exchange import NO_DRAWS, Array, Bonding, ContactState, Indices, Motion, Sliding, Storing, during
 from sim.scenario.scenario import Scenario
+from sim.spectrum.radial import PLANE
 
 Arrays = dict[str, Array]
 #: Most numbers of one quantity in a block of steps: they stay in the cache.
@@ -104,8 +105,12 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
     drive, population, process, contact = scenario.parts
     slider: Sliding
     if drive.solves_motion:
-        step_contact = _step_contact(scenario, state.contact, state.shear, steps)
-        draws = process.draws(state.shear, steps.start, noise.shear) if scenario.draws_within else NO_DRAWS
+        of_loop = state.contact.radius if scenario.contact.lags else coupled.of_loop(state.drive, state.contact.radius)
+        step_contact = _step_contact(scenario, state.contact._replace(radius=of_loop), state.shear, steps)
+        draws = NO_DRAWS
+        if scenario.draws_within:
+            of_edge = scenario.fluctuations.paid_by_adhesion, scenario.margin.each[0] if scenario.margin else PLANE
+            draws = process.draws(state.shear, steps.start, noise.shear)._replace(paid=of_edge[0], share=of_edge[1])
         sliders, motions, bonds, bonding = coupled.advance(
             scenario.parts, state.drive, state.bonds, step_contact, scenario.times, steps, noise.bonds, draws
         )

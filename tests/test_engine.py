@@ -6,7 +6,19 @@ import math
 
 import numpy as np
 import pytest
-from helpers.scenes import BONDS, BY_SLIP, BY_WAVES, CONTACTS, DRIVES, IN_TIME, SHEARS, go_together, march, scene
+from helpers.scenes import (
+    BONDS,
+    BY_SLIP,
+    BY_WAVES,
+    CONTACTS,
+    DRIVES,
+    IN_TIME,
+    SHEARS,
+    SPECTRUM,
+    go_together,
+    march,
+    scene,
+)
 from numpy.testing import assert_allclose
 
 from sim import engine
@@ -138,6 +150,8 @@ DRAWN = {
     "by waves, slip rate": shear.Banded(**BY_WAVES, tolerance=0.1, amplitude=SlipRate(memory_length=1e-5, floor=0.1)),
     "by slip, slip rate": shear.Banded(**BY_SLIP, amplitude=SlipRate(floor=0.1)),
     "relaxing in time": shear.Banded(**IN_TIME, amplitude=SlipRate(memory_length=1e-5, relaxing=True)),
+    "on a disc": shear.Banded(**BY_SLIP, amplitude=SlipRate(floor=0.1, relaxing=True), contact="disc"),
+    "mean, on a disc": shear.Mean(spectrum=SPECTRUM, amplitude=SlipRate(memory_length=2e-6), contact="disc"),
 }
 
 

@@ -24,7 +24,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from sim.laws.halfspace import angular_compliance, energy_factors, marginal_factors
-from sim.numerics.jit import device
+from sim.numerics.jit import device, kernel
 from sim.numerics.special import erf_between, si
 from sim.spectrum.family import Array, Factors, Family, Radial, radial_quadrant
 
@@ -46,6 +46,8 @@ _POINTS, _DECADES = 513, 4
 #: Inputs of ``share_of`` at a position of the slider: wave, ends and cubics; a wave without strength means cubics.
 Terms = tuple[tuple[float, float, float], tuple[float, float, float], Array]
 _NONE = 0.0, 0.0, 0.0
+#: Those of a contact on the whole plane, whose share is 1.
+PLANE: Terms = _NONE, _NONE, np.empty((0, 4))
 
 
 class Waves(Family, Protocol):
@@ -250,23 +252,22 @@ class Margin:
 
     def __call__(self, radius: Array) -> Array:
         """Share at contact radii [m]; nan at nan."""
-        return self._share(radius, marginal_energy)
+        shares = np.empty(radius.size)
+        _shares(np.ravel(radius), *self.each[0], shares)
+        return shares.reshape(radius.shape)
 
     def mean(self, radius: Array) -> Array:
         """Return the mean of the share over the area of the disc: E/(πa²) over ΔΓ of the plane [1]."""
-        return self._share(radius, disc_energy)
+        if self.spectrum.wavevector is not None and self._plane > 0.0:
+            share = disc_energy(self.spectrum, np.nan_to_num(radius), *self.solid) / self._plane
+            return np.where(np.isnan(radius), np.nan, share)
+        low, high = self._ends
+        share = self._spline(disc_energy)(np.log(np.clip(radius, low, high)))
+        return np.where(radius < low, share * np.maximum(radius, 0.0) / low, share)
 
     def at(self, position: Array) -> "Margin":
         """Return the same share at any position of the slider."""
         return self
-
-    def _share(self, radius: Array, law: Callable[..., Array]) -> Array:
-        if self.spectrum.wavevector is not None and self._plane > 0.0:
-            share = law(self.spectrum, np.nan_to_num(radius), *self.solid) / self._plane
-            return np.where(np.isnan(radius), np.nan, share)
-        low, high = self._ends
-        share = self._spline(law)(np.log(np.clip(radius, low, high)))
-        return np.where(radius < low, share * np.maximum(radius, 0.0) / low, share)
 
     @cached_property
     def each(self) -> list[Terms]:
@@ -309,6 +310,13 @@ def share_of(radius, wave, ends, cubics):
     s = place - i
     share = ((cubics[i, 0] * s + cubics[i, 1]) * s + cubics[i, 2]) * s + cubics[i, 3]
     return share if radius >= low else share * radius / low
+
+
+@kernel("void(float64[:], UniTuple(float64, 3), UniTuple(float64, 3), float64[:, ::1], float64[::1])")
+def _shares(radii, wave, ends, cubics, shares):
+    """Write ``share_of`` many radii; 0 and nan stay as they are."""
+    for i in range(radii.size):
+        shares[i] = share_of(radii[i], wave, ends, cubics) if radii[i] > 0.0 else radii[i]
 
 
 # Isotropic spectra: a radial density, the variance within a circle, the energy.

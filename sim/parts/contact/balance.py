@@ -284,7 +284,7 @@ def _narrowed(inside, outside, contact):
 
 
 @device
-def _widest(start, hertz, contact):
+def widest(start, hertz, contact):
     """Return the radius of one contact, see ``widest_crossings``."""
     if not start > 0.0 or contact[0][3] == 0.0 or _surplus(start, contact) <= 0.0:
         return start  # fluctuations do not reduce the work
@@ -316,4 +316,4 @@ def widest_crossings(contacts, bodies, share, radius):
     """
     for i in range(radius.size):
         terms = contacts[2, i], contacts[3, i], contacts[4, i], contacts[5, i], contacts[6, i]
-        radius[i] = _widest(contacts[0, i], contacts[1, i], (terms, bodies, share))
+        radius[i] = widest(contacts[0, i], contacts[1, i], (terms, bodies, share))

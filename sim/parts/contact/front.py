@@ -35,7 +35,7 @@ from sim.numerics.jit import device, kernel
 from sim.numerics.special import cube_root
 from sim.parts.contact.balance import SHARE, Balance
 from sim.parts.exchange import Array, ContactState
-from sim.spectrum.radial import share_of
+from sim.spectrum.radial import PLANE, share_of
 from sim.units.tables import Pieces
 
 #: Relative distance from equilibrium that rounding leaves.
@@ -487,8 +487,6 @@ def moved_edge(a, works, loads, bases, stiffness, duration, kinetics, bodies, le
 #: Radius of a first touch over the length (w R²/E*)^(1/3) of adhesive contacts.
 _SPOT = 1e-3
 _READ = "Array(float64, 2, 'A', readonly=True)"
-#: ``Share`` of a contact on the whole plane.
-_PLANE = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.empty((0, 4))
 
 
 @device
@@ -607,6 +605,6 @@ def follow(
     _follow(
         before, durations, opening, np.array([pieces.stop, shares, pieces.first, pieces.last]),
         *(np.broadcast_to(values, out.shape[1:]) for values in of_steps), stiffness, tuple(kinetics),
-        (sphere_radius, modulus), spot, again, _PLANE if balance.margin is None else balance.margin.each[0], out,
+        (sphere_radius, modulus), spot, again, PLANE if balance.margin is None else balance.margin.each[0], out,
     )  # fmt: skip
     return out

@@ -180,8 +180,6 @@ def advance(
     if steps.start == 1 and not drive.spring:  # a force acts at once
         rows["spring_force"] = 0.0
     rows["radius"] = contact.radius
-    if len(draws.values) or not contact.stays:  # an equilibrium contact goes on with the radius of the loop
-        rows["radius"] = np.where(_agree(slider.radius, contact.radius), slider.radius, contact.radius)
     pieces, duration = drive.driven(ends, times.duration), ends[1:] - ends[:-1]
     scale = 1.0 / (stretch if drive.spring else force)
     course = np.array([pieces.interval, pieces.stop - pieces.start, *pieces[3:6]])
@@ -271,6 +269,12 @@ def steps_until_contact_changes(slider: Driven, radius: Array) -> int:
         return 1
     apart = ~np.all(_agree(slider.radius, radius), axis=1)
     return int(np.argmax(apart)) + 1 if apart[:-1].any() else len(apart)
+
+
+def of_loop(slider: Sliding, radius: Array) -> Array:
+    """Return the radius [m] with which an equilibrium contact goes on: that of the loop if both are the same."""
+    reached = cast(Driven, slider).radius
+    return np.where(_agree(reached, radius) & (radius > 0.0), reached, radius)
 
 
 def _agree(slider_radius: Array, radius: Array) -> Flags:

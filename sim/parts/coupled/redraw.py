@@ -4,15 +4,38 @@ import math
 
 from sim.numerics.jit import device
 from sim.numerics.noise import stream
+from sim.parts.contact.balance import SHARE, widest
 from sim.parts.coupled import mechanics
 from sim.parts.shear.bands import renew_member
 from sim.parts.shear.process import shares, unsteadiness
+from sim.spectrum.radial import share_of
 
 #: Type of ``Draws``.
 DRAWS = (
     "Tuple((float64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], boolean, float64, float64, "
-    "boolean, boolean, Tuple((uint64, uint64, uint64[::1], int64))))"
+    f"boolean, boolean, Tuple((uint64, uint64, uint64[::1], int64)), float64, {SHARE}))"
 )
+
+
+@device
+def _radius(row, time, paid, contact, share):
+    """Return the radius in equilibrium with the energy that fluctuations take for many waves in the contact.
+
+    On a disc it is found as ``balance.widest_crossings`` has it.
+    """
+    load, base = contact.load + contact.load_rate * time, contact.base + contact.base_rate * time
+    mount, body = (load, 0.0, base, 0.0, 0.0), contact[8:12]
+    on_disc = len(share[2]) > 0
+    fluctuating = 0.0 if on_disc else paid
+    bound, moment, tilt, radius = contact.bonded, row.moment, contact.mean_stress, row.radius
+    free = mechanics.Contact(contact.bare, *mount, bound, tilt, *body, fluctuating, 0.0, contact.field)
+    wide, _, _, _ = mechanics.contact_area(row.bound, moment, 0.0, radius, free)
+    if not on_disc:
+        return wide
+    none = mechanics.Contact(0.0, *mount, 0.0, 0.0, *body, 0.0, 0.0, contact.field)
+    hertz, _, _, _ = mechanics.contact_area(0.0, 0.0, 0.0, radius, none)
+    terms = load, base, contact.bare + bound * row.bound, paid, tilt * moment * moment
+    return widest(wide, hertz, (terms, (contact.curvature, contact.modulus, contact.stiffness), share))
 
 
 @device
@@ -23,30 +46,32 @@ def redraw(row, columns, m, k, clock, contact, draws, room, reached):
     step begins. ``contact`` is as at the start of the step, ``room`` for the shares of all factors, shape (2, factors).
     Nothing is drawn without ``values``.
     """
-    if len(draws[0]) == 0:
+    values, last, shapes, half_weight, factors, by_slip, span, mean, relaxing, answers, address, paid, share = draws
+    if len(values) == 0:
         return
-    values, last, shapes, half_weight, factors, by_slip, span, mean, relaxing, answers, (seed, part, members, first) = (
-        draws
-    )
-    state = columns.view(mechanics.ROW)[0]
-    field, spent = contact.field, (state.path if by_slip else clock[k, 5]) / span
+    state, field, duration = columns.view(mechanics.ROW)[0], contact.field, clock[k, 5]
     size, energy, expected = 1.0, mean, last[m]
     if field.length < math.inf and not relaxing:
         size = math.sqrt(field.floor + (1.0 - field.floor) * unsteadiness(state.weight, state.mean, state.spread))
     if shapes.size > 0:
         keep, renew = room[0], room[1]
+        passed = (state.path if by_slip else duration) / span
         for i in range(factors.size):
-            keep[i], renew[i] = shares(factors[i] * spent)
+            keep[i], renew[i] = shares(factors[i] * passed)
         if relaxing:
             renew[0] = math.sqrt(state.renewed)
+        seed, part, members, first = address
         numbers = stream(seed, part, members[m], first + k, 0)
         energy = renew_member(values[m], keep, renew, 1.0, shapes, half_weight, numbers)
         if factors.size == 1:
             expected = keep[0] * keep[0] * expected + renew[0] * renew[0] * mean
     last[m], state.energy = energy, energy
-    state.drawn = state.paid * (size * size * energy)
-    state.felt = state.paid * (size * size * expected) if answers else state.drawn
+    drawn, expected = size * size * energy, size * size * expected
     if row.radius > 0.0:
-        contact = mechanics.later(mechanics.drawn(contact, state, 0), clock[k, 5], 0.0)
-        state.radius, _, _, _ = mechanics.contact_area(row.bound, row.moment, 0.0, row.radius, contact)
+        state.radius = _radius(row, duration, paid * drawn, contact, share)
         reached[mechanics.RADIUS, k, m] = state.radius
+    state.paid = paid
+    if len(share[2]) > 0:
+        state.paid = paid * (share_of(state.radius, share[0], share[1], share[2]) if state.radius > 0.0 else 0.0)
+    state.drawn = state.paid * drawn
+    state.felt = state.paid * expected if answers else state.drawn

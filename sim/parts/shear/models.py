@@ -44,6 +44,8 @@ _Points = Annotated[int, Quantity("1", "grid points along a side of the cell", a
 #: Mode pairs of a cell beyond which neither time nor memory suffices: those of a grid of 2048 × 2048.
 _MOST_PAIRS = 2**21
 _MOST_WAVES = 1e9
+#: Amplitudes that a drive can follow in its own loop: they depend on the sliding alone.
+_FOLLOWED = "constant", "slip_rate"
 
 Process = SmoothProcess | BandedProcess | ModalProcess
 
@@ -93,11 +95,6 @@ class ShearModel:
             cure = "leave it out"
             raise PydanticCustomError("bond_made", f'bonds at random places make mode_amplitudes = "gaussian"; {cure}')
         return self
-
-    @property
-    def _on_the_plane(self) -> bool:
-        """True if ΔΓ on the plane follows from the numbers of the field and the memory of the sliding alone."""
-        return self.contact == "plane" and self.amplitude.model in ("constant", "slip_rate")
 
     @property
     def law(self) -> Amplitude:
@@ -207,7 +204,7 @@ class Mean(ShearModel):
 
     @property
     def in_blocks(self) -> bool:  # type: ignore[override]
-        return self._on_the_plane and not self.spectrum.bond_made
+        return self.amplitude.model in _FOLLOWED and not self.spectrum.bond_made
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
         kind = SiteMean if self.spectrum.bond_made else SmoothProcess
@@ -323,7 +320,7 @@ class Banded(_Fluctuating):
 
     @property
     def in_blocks(self) -> bool:  # type: ignore[override]
-        return self._on_the_plane and not (self.amplitude.relaxing and self.correlation.power)
+        return self.amplitude.model in _FOLLOWED and not (self.amplitude.relaxing and self.correlation.power)
 
     @model_validator(mode="after")
     def _not_of_bonds(self) -> "Banded":
