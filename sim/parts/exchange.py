@@ -449,7 +449,7 @@ class Shear(Protocol[State]):
         """Numbers by which sub-steps of a drive follow the memory of the fluctuations."""
 
     def draws(self, state: State, step: int, noise: Noise) -> Draws:
-        """Numbers by which the loop of a drive draws the fluctuations itself from a step on, of a model ``in_blocks``."""
+        """Numbers by which the loop of a drive draws the fluctuations from a step on, of a model ``in_blocks``."""
 
     @property
     def gammas(self) -> Gammas:
