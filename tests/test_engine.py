@@ -151,7 +151,9 @@ DRAWN = {
     "by slip, slip rate": shear.Banded(**BY_SLIP, amplitude=SlipRate(floor=0.1)),
     "relaxing in time": shear.Banded(**IN_TIME, amplitude=SlipRate(memory_length=1e-5, relaxing=True)),
     "on a disc": shear.Banded(**BY_SLIP, amplitude=SlipRate(floor=0.1, relaxing=True), contact="disc"),
-    "mean, on a disc": shear.Mean(spectrum=SPECTRUM, amplitude=SlipRate(memory_length=2e-6), contact="disc"),
+    "mean, on a disc": shear.Mean(
+        spectrum=SPECTRUM, amplitude=SlipRate(memory_length=2e-6), contact="disc", paid_by_adhesion=0.5
+    ),
 }
 
 
