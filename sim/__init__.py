@@ -192,7 +192,8 @@ def plot(
     matplotlib.figure.Figure or matplotlib.axes.Axes
         The figure, whose ``axes`` are its panels, or the axes given.
     """
-    from sim.plots.kinds import Choices, draw, save
+    from sim.plots.kinds import Choices, draw
+    from sim.plots.style import save
 
     if unknown := choices.keys() - {*Choices._fields}:
         raise BadInput([f"{sorted(unknown)[0]}: is no choice of a figure; there are: {', '.join(Choices._fields)}"])

@@ -16,10 +16,10 @@ from matplotlib.figure import Figure
 
 from sim.analysis import engineering, statements, sweep_dims
 from sim.analysis.dataset import MEMBERS, answered, claim, plain, speed_name
-from sim.numerics.files import claim as claim_file, output
+from sim.numerics.files import claim as claim_file
 from sim.plots import curves, field, movie, slider, style, theories
 from sim.plots.measured import Measured
-from sim.plots.style import STYLE, recorded, swept_value
+from sim.plots.style import STYLE, recorded, save, swept_value
 from sim.units.errors import BadInput
 from sim.units.notation import in_units
 from sim.units.quantity import read_option
@@ -298,9 +298,3 @@ def planned(source: Path, kind: str | None, path: Path | None, replace: bool, ch
     except ValueError as lack:
         raise BadInput([f"{source}: {lack}"]) from None
     return target
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure in the format of the path's suffix, by default PNG, whole or not at all."""
-    with output(path) as beside:
-        figure.savefig(beside, format=path.suffix.removeprefix(".").lower() or "png")

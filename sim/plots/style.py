@@ -9,6 +9,7 @@ import itertools
 import re
 import string
 import textwrap
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
@@ -23,6 +24,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from sim.analysis import engineering, scaled, sweep_dims
+from sim.numerics.files import output
 
 COLUMN, WIDE = 3.4, 7.0  # inches: one column, both columns
 _ON_SCREEN = 120  # dots an inch
@@ -77,6 +79,12 @@ class Picture(Figure):
         shown = io.BytesIO()
         self.savefig(shown, format="png", dpi=_ON_SCREEN)
         return shown.getvalue()
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure in the format of the path's suffix, by default PNG, whole or not at all."""
+    with output(path) as beside:
+        figure.savefig(beside, format=path.suffix.removeprefix(".").lower() or "png")
 
 
 def rows(heights: list[float], shared: bool = True) -> tuple[Figure, list[Axes]]:

@@ -33,7 +33,7 @@ from sim.numerics import files
 from sim.parts.exchange import Array, Bonding, Gammas, Motion
 from sim.parts.shear.bands import cell_pairs
 from sim.parts.shear.process import Fluctuation
-from sim.plots.style import BONDS, FLUCTUATIONS, LINES, REFERENCE, STYLE, legend, rows
+from sim.plots.style import BONDS, FLUCTUATIONS, LINES, REFERENCE, STYLE, legend, rows, save
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read, keys, model, tables
 from sim.units.errors import BadInput
@@ -634,6 +634,5 @@ def study(scenario: Scenario, target: Path, replace: bool, seconds: float, toler
     dataset = converge(scenario, seconds, tolerance)
     with files.output(target) as beside:
         dataset.to_netcdf(beside)
-    with files.output(picture) as beside:
-        figure(dataset).savefig(beside, format="png")
+    save(figure(dataset), picture)
     return table(dataset), f"{explanation(dataset)}\n\n{recommendation(dataset)}\n\n{target}\n{picture}"

@@ -8,7 +8,6 @@ the motion of the slider.
 """
 
 import difflib
-import io
 import itertools
 import json
 import math
@@ -571,14 +570,14 @@ def carried_out(
                 scaled(1.0, unit)
     result = fit(scenario, tables, free, sizes, steady, per_table)
     verdict = compare(result.problem, result.best, result.scenario.seed) if judged else None
-    picture = io.BytesIO()
     with in_units(units):
-        figure(result.problem, result.best).savefig(picture, format="png")
+        picture = figure(result.problem, result.best)
     numbers = json.dumps(document(result, data, verdict), indent=2, allow_nan=False) + "\n"
-    scenarios = [scenario_text(scenario, result, stem.parent, k).encode() for k in range(len(outputs) - 2)]
-    for path, content in zip(outputs, [*scenarios, numbers.encode(), picture.getvalue()], strict=True):
+    scenarios = [scenario_text(scenario, result, stem.parent, k) for k in range(len(outputs) - 2)]
+    for path, text in zip(outputs[:-1], [*scenarios, numbers], strict=True):
         with files.output(path) as beside:
-            beside.write_bytes(content)
+            beside.write_bytes(text.encode())
+    style.save(picture, outputs[-1])
     sources = [f"{table.path}: {table.rows} rows, {table.ranges}" for table in tables]
     shown: list[Printed] = [(_table(result), "\n".join(["", _quality(result), *result.remarks, *sources, ""]))]
     if result.differences:

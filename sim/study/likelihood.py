@@ -80,7 +80,7 @@ class Measured(NamedTuple):
         return [curve.name for curve in self.curves]
 
 
-def read(path: Path, scenario: Scenario) -> Measured:
+def read(path: Path, scenario: Scenario, planned: Sequence[str] = ()) -> Measured:
     """Read a table of measured curves.
 
     Parameters
@@ -94,6 +94,9 @@ def read(path: Path, scenario: Scenario) -> Measured:
         spring or under a force is no condition but a curve; ``stage_speed`` is that of a steady stage.
     scenario : Scenario
         The scenario that is compared with the curves.
+    planned : sequence of str
+        Variables of a plan, of which a table has the errors and needs no values, which are then nan. Relative errors
+        are negative numbers. A table without curves has these variables, without errors.
 
     Raises
     ------
@@ -101,10 +104,14 @@ def read(path: Path, scenario: Scenario) -> Measured:
         With one line.
     """
     at, outcomes = conditions_of(scenario), outcomes_of(scenario)
+    if planned:
+        outcomes = {name: quantity for name, quantity in outcomes.items() if name not in at}
     known = {name: quantity for name, (_, quantity) in at.items()} | outcomes
-    result, _ = read_measured(path, known, outcomes)
+    result, _ = read_measured(path, known, outcomes, is_planned=bool(planned))
     conditions = {at[name][0]: points.values for name, points in result.items() if name in at}
     curves = tuple(Curve(name, *points) for name, points in result.items() if name not in at)
+    unknown = np.full(len(next(iter(result.values())).values), np.nan)
+    curves = curves or tuple(Curve(name, unknown, None) for name in planned)
     for fault in faults_of(scenario, conditions, curves):
         raise BadInput([f"{path}: {fault}"])
     ranges = [f"{name} {np.min(x):.4g} to {np.max(x):.4g} {known[name].unit}" for name, (x, _) in result.items()]

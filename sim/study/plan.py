@@ -10,13 +10,11 @@ mechanisms are told apart if the verdict of ``sim.study.mechanisms`` names the t
 are left out. The likelihood ratio of a mechanism has the distribution of the data sets that this mechanism made.
 """
 
-import io
 import itertools
 import json
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,8 +34,7 @@ from sim.study.likelihood import LEVEL, Curve, Free, Interval, Measured, Minimum
 from sim.study.mechanisms import PARTS, RARE, WHOLE, WORSE, Search, draws_of, others
 from sim.units.errors import BadInput
 from sim.units.notation import concise, engineering, in_units, scaled
-from sim.units.quantity import Quantity
-from sim.units.tables import ERROR, read_measured, units_of
+from sim.units.tables import ERROR
 from sim.units.terminal import progress_bar
 
 #: Simulated data sets of each truth, and fewest; speeds of further points by default; points that are simulated.
@@ -113,23 +110,22 @@ class Plan(NamedTuple):
     remarks: tuple[str, ...]
 
     @property
+    def simulated(self) -> list[Point]:
+        """Return the further points whose probabilities are simulated, the best first."""
+        return [point for point in self.points if point.probabilities]
+
+    @property
     def best(self) -> list[Point]:
         """Return the best further point, and those that are not worse by two standard errors of their difference."""
-        probabilities = [(item, [*item.probabilities.values()]) for item in self.points if item.probabilities]
-        sums = [
-            (item, sum(p for p, _ in chances), math.hypot(*(error for _, error in chances)))
-            for item, chances in probabilities
-        ]
-        return [item for item, total, error in sums if sums[0][1] - total <= 2.0 * math.hypot(error, sums[0][2])]
+        points = self.simulated
+        return [item for item in points if not _is_more(points[0].probabilities, item.probabilities)]
 
     @property
     def advice(self) -> str:
         """Return where to measure next, or that no candidate helps; "" without a simulated point."""
         if not self.best:
             return ""
-        pairs = [(chance, self.probabilities[truth]) for truth, chance in self.best[0].probabilities.items()]
-        error = math.hypot(*(chance.error for pair in pairs for chance in pair))
-        if sum(new.probability - old.probability for new, old in pairs) <= 2.0 * error:
+        if not _is_more(self.best[0].probabilities, self.probabilities):
             return "no candidate raises these probabilities by more than two standard errors"
         return f"measure next at {' or '.join(point.words for point in self.best)}"
 
@@ -151,11 +147,16 @@ class Plan(NamedTuple):
                 "P(lower end open)": str(item.low_open), "P(upper end open)": str(item.high_open),
             })  # fmt: skip
         for truth, chance in self.probabilities.items():
-            further = {
-                f"with {point.words}": str(point.probabilities[truth]) for point in self.points if point.probabilities
-            }
+            further = {f"with {point.words}": str(point.probabilities[truth]) for point in self.simulated}
             truths.append({"truth": truth, "P(told apart)": str(chance)} | further)
         return keys, truths
+
+
+def _is_more(probabilities: dict[str, Chance], others: dict[str, Chance]) -> bool:
+    """Return True if the sum of some probabilities exceeds that of others by two standard errors of the difference."""
+    chances, other_chances = (np.array([*item.values()]) for item in (probabilities, others))
+    more, _ = np.sum(chances, axis=0) - np.sum(other_chances, axis=0)
+    return bool(more > 2.0 * np.linalg.norm([chances[:, 1], other_chances[:, 1]]))
 
 
 class _Simulated(NamedTuple):
@@ -181,10 +182,15 @@ class _Design:
         for name, search in self.parts.items():
             self.expected[name] = search.problem.predicted(search.exact(curves).x)
 
-    @cached_property
-    def penalties(self) -> dict[str, float]:
-        """Return the difference of AICc from the whole scenario at the same sum of squares, by mechanism."""
-        return {name: item.problem.criterion(0.0) - self.problem.criterion(0.0) for name, item in self.parts.items()}
+    @property
+    def fits(self) -> int:
+        """Return the fits of each simulated data set, for all truths together."""
+        return 1 + len(self.parts) * (3 + len(self.parts))
+
+    def level(self, part: str, rare: dict[str, float]) -> float:
+        """Return the rise of the sum of squares from the whole scenario that rejects a mechanism."""
+        penalty = self.parts[part].problem.criterion(0.0) - self.problem.criterion(0.0)
+        return max(rare[part], WORSE - penalty)
 
     def simulated(self, sims: int, seed: int, advance: Callable[[int], None]) -> "_Simulated":
         """Return the results of a number of simulated data sets for each truth."""
@@ -202,7 +208,7 @@ class _Design:
         for truth in self.expected:
             is_truth = np.ones(sims, bool)
             for part, search in self.parts.items():
-                levels = sums[truth] + max(rare[part], WORSE - self.penalties[part])
+                levels = sums[truth] + self.level(part, rare)
                 rejected = [not search.reaches(*item) for item in zip(values[truth], levels, strict=True)]
                 is_truth &= np.array(rejected) == (part != truth)
                 advance(sims)
@@ -215,10 +221,9 @@ class _Design:
         for truth, curves in self.expected.items():
             least, chances = self.whole.exact(curves).chi_square, []
             for part in self.parts.keys() - {truth}:
-                search, enough = self.parts[part], max(rare[part], WORSE - self.penalties[part])
-                away = max(search.exact(curves).chi_square - least, _LEAST)
-                freedom = max(len(self.problem.free) - len(search.problem.free), 1)
-                chances.append(float(stats.ncx2.sf(enough, freedom, away)))
+                away = max(self.parts[part].exact(curves).chi_square - least, _LEAST)
+                freedom = max(len(self.problem.free) - len(self.parts[part].problem.free), 1)
+                chances.append(float(stats.ncx2.sf(self.level(part, rare), freedom, away)))
             result[truth] = min(chances)
         return result
 
@@ -261,26 +266,26 @@ def plan(
     remarks = ["curves are those of steady sliding"]
     if base.is_random:
         remarks = ["the models of the scenario have noise; curves are those of steady sliding with its means"]
-    numbers, (table, is_measured) = [fits.free_number(base, text) for text in free], _read(points, base)
-    if is_measured:
+    numbers, table = [fits.free_number(base, text) for text in free], _read(points, base)
+    if not all(np.isnan(item.values).all() for item in table.curves):
         remarks.append(f"{points}: measured values are not used; a plan predicts them")
     if faults := [*fits.conflicts(base, numbers, [], [table])]:
         raise BadInput(faults)
     problem = _predicted(base, [table], numbers, common or {})
     likelihood.refuse_undetermined(problem)
-    further = _speeds(table) if candidates is None else _rows(_read(candidates, base, table.curves)[0])
-    if not further:
+    further = _speeds(table) if candidates is None else _read(candidates, base, table.names)
+    if further is None:
         remarks.append(f"{points}: no column has the speed, so no further point is proposed; give --candidates")
     design = _Design(problem)
     if not design.parts:
-        further, cause = [], "bonds or fluctuations do not act in the scenario as it is"
+        further, cause = None, "bonds or fluctuations do not act in the scenario as it is"
         remarks.append(f"no mechanisms are told apart, because {cause}")
-    fits_of_design = 1 + len(design.parts) * (3 + len(design.parts)) if design.parts else 1
-    total = sims * (fits_of_design * (1 + min(len(further), _BEST)) + 2 * len(numbers))
+    candidate_rows = [_rows(further, [row]) for row in range(further.rows)] if further else []
+    total = sims * (design.fits * (1 + min(len(candidate_rows), _BEST)) + 2 * len(numbers))
     with progress_bar(total, "fits of simulated data") as shown:
         first, ranked = design.simulated(sims, seed, shown.advance), list[tuple[Point, _Design]]()
         expected = [_interval(problem, k, first.values, first.sums, shown.advance) for k in range(len(numbers))]
-        for row in further:
+        for row in candidate_rows:
             beside = _Design(_predicted(base, _joined(table, row, problem), numbers, common or {}))
             conditions = {key: float(values[0]) for key, values in row.conditions.items()}
             point = Point(conditions, _words(base, conditions, table, row), beside.estimate(first.rare), {})
@@ -288,13 +293,11 @@ def plan(
         ranked.sort(key=lambda item: -sum(item[0].estimate.values()))
         proposed = [point for point, _ in ranked]
         for k, (point, beside) in enumerate(ranked[:_BEST]):
-            proposed[k] = point._replace(
-                probabilities=beside.simulated(sims, seed + 1 + k, shown.advance).probabilities
-            )
+            simulated = beside.simulated(sims, seed + 1 + k, shown.advance)
+            proposed[k] = point._replace(probabilities=simulated.probabilities)
     proposed.sort(key=lambda item: -sum(chance.probability for chance in item.probabilities.values()))
-    result = Plan(
-        problem, tuple(expected), first.probabilities if design.parts else {}, tuple(proposed), tuple(remarks)
-    )
+    probabilities = first.probabilities if design.parts else {}
+    result = Plan(problem, tuple(expected), probabilities, tuple(proposed), tuple(remarks))
     tried = [point.conditions["speed"] for point in proposed] if candidates is None else []
     if any(point.conditions["speed"] in (min(tried), max(tried)) for point in result.best if tried):
         end = "a best speed is the first or last candidate; speeds beyond may be better: give them by --candidates"
@@ -302,34 +305,14 @@ def plan(
     return result
 
 
-def _read(path: Path, scenario: Scenario, template: Sequence[Curve] = ()) -> tuple[Measured, bool]:
-    """Return conditions and errors of a table, and True if it has values, too.
-
-    Relative errors are negative numbers. A table without errors has the curves of a template with errors of zero.
-    """
-    at, units = likelihood.conditions_of(scenario), units_of(path)
-    outcomes = {name: item for name, item in likelihood.outcomes_of(scenario).items() if name not in at}
-    known = {name: quantity for name, (_, quantity) in at.items()} | outcomes
-    for name, quantity in outcomes.items():
-        is_share = units.get(name + ERROR) == "%" and quantity.unit != "1"
-        known[name + ERROR] = Quantity("1" if is_share else quantity.unit, name + ERROR, above=0)
-    columns, _ = read_measured(path, known, {})
-    measured = [name for name in columns if name in outcomes]
-    planned = [name for name in outcomes if name + ERROR in columns]
-    lacking = [name for name in measured if name not in planned]
-    for name in lacking or ([] if planned or template else ["contact_area"]):
-        cure = f'a plan needs them; add a column "{name}{ERROR} [%]" of numbers above 0'
-        raise BadInput([f"{path}: {name} has no standard errors; {cure}"])
-    conditions = {at[name][0]: points.values for name, points in columns.items() if name in at}
-    rows = len(next(iter(columns.values())).values)
-    curves = [] if planned else [Curve(item.name, np.ones(rows), np.zeros(rows)) for item in template]
-    for name in planned:
-        size = columns[name + ERROR].values
-        is_share = units[name + ERROR] == "%" and outcomes[name].unit != "1"
-        curves.append(Curve(name, conditions.get("speed", np.ones(rows)), -size if is_share else size))
-    for fault in likelihood.faults_of(scenario, conditions, tuple(curves)):
-        raise BadInput([f"{path}: {fault}"])
-    return Measured(path, scenario.contact.kind, conditions, tuple(curves)), bool(measured)
+def _read(path: Path, scenario: Scenario, template: Sequence[str] = ()) -> Measured:
+    """Return conditions and errors of a table. One without curves has the variables of a template, without errors."""
+    table = likelihood.read(path, scenario, template or ["contact_area"])
+    for name, values, errors in table.curves:
+        if errors is None and not (template and np.isnan(values).all()):
+            cure = f'a plan needs them; add a column "{name}{ERROR} [%]" of numbers above 0'
+            raise BadInput([f"{path}: {name} has no standard errors; {cure}"])
+    return table
 
 
 def _predicted(
@@ -340,38 +323,29 @@ def _predicted(
     values = problem.predicted(problem.start)
     sigma = np.where(problem.sigma < 0.0, -problem.sigma * np.abs(values), problem.sigma)
     for number in np.flatnonzero(~(sigma > 0.0)):
+        place, cure = problem.place(int(number)), "omit the row, or give an error in units"
         cause = "is predicted as 0 or without a contact, so a relative error is undefined"
-        raise BadInput(
-            [f"{tables[0].path}: {problem.place(int(number))} {cause}; omit the row, or give an error in units"]
-        )
+        raise BadInput([f"{tables[0].path}: {place} {cause}; {cure}"])
     return replace(problem, values=values, sigma=sigma)
 
 
-def _rows(table: Measured) -> list[Measured]:
-    """Return a table for each row of a table."""
-    result = []
-    for row in range(table.rows):
-        conditions = {key: values[[row]] for key, values in table.conditions.items()}
-        curves = [Curve(name, values[[row]], None if errors is None else errors[[row]])
-                  for name, values, errors in table.curves]  # fmt: skip
-        result.append(table._replace(conditions=conditions, curves=tuple(curves)))
-    return result
+def _rows(table: Measured, rows: Sequence[int]) -> Measured:
+    """Return some rows of a table."""
+    conditions = {key: values[rows] for key, values in table.conditions.items()}
+    curves = [(name, values[rows], None if errors is None else errors[rows]) for name, values, errors in table.curves]
+    return table._replace(conditions=conditions, curves=tuple(Curve(*curve) for curve in curves))
 
 
-def _speeds(table: Measured) -> list[Measured]:
-    """Return tables of one row at speeds beyond those of a table, with each set of its other conditions."""
+def _speeds(table: Measured) -> Measured | None:
+    """Return points at speeds beyond those of a table, with each set of its other conditions and without errors."""
     if not np.any(speeds := np.abs(table.conditions.get("speed", np.zeros(1)))):
-        return []
-    least, most = speeds[speeds > 0.0].min(), speeds.max()
-    held = {key: values for key, values in table.conditions.items() if key != "speed"}
-    columns = np.array([*held.values()]).reshape(len(held), table.rows)
-    places = np.unique(columns, axis=1, return_index=True)[1] if held else [0]
-    curves = tuple(Curve(item.name, np.ones(1), np.zeros(1)) for item in table.curves)
-    others_at = [{key: values[[place]] for key, values in held.items()} for place in places]
-    speeds = np.geomspace(0.1 * least, 10.0 * most, _SPEEDS)
-    return [
-        table._replace(curves=curves, conditions=item | {"speed": np.array([v])}) for item in others_at for v in speeds
-    ]
+        return None
+    held = [values for key, values in table.conditions.items() if key != "speed"]
+    places = np.unique([np.zeros(table.rows), *held], axis=1, return_index=True)[1]
+    result = _rows(table, np.repeat(places, _SPEEDS).tolist())
+    beyond = np.geomspace(0.1 * speeds[speeds > 0.0].min(), 10.0 * speeds.max(), _SPEEDS)
+    conditions = result.conditions | {"speed": np.tile(beyond, len(places))}
+    return result._replace(conditions=conditions, curves=tuple(item._replace(errors=None) for item in result.curves))
 
 
 def _joined(table: Measured, row: Measured, problem: Problem) -> list[Measured]:
@@ -380,17 +354,14 @@ def _joined(table: Measured, row: Measured, problem: Problem) -> list[Measured]:
     It is a row of the same table if its columns are the same, because a table is computed at once.
     """
     shares = problem.sigma / np.abs(problem.values)
-    medians = {name: np.median(shares[problem.of(name)], keepdims=True) for name in problem.names}
-    curves = [item if np.any(item.errors) else item._replace(errors=-medians[item.name]) for item in row.curves]
+    medians = {name: -np.median(shares[problem.of(name)], keepdims=True) for name in problem.names}
+    curves = [item if item.errors is not None else item._replace(errors=medians[item.name]) for item in row.curves]
     row = row._replace(curves=tuple(curves))
     if row.names != table.names or row.conditions.keys() != table.conditions.keys():
         return [table, row]
     conditions = {key: np.append(values, row.conditions[key]) for key, values in table.conditions.items()}
-    errors = [
-        np.append(np.asarray(planned_curve.errors), np.asarray(other.errors))
-        for planned_curve, other in zip(table.curves, curves, strict=True)
-    ]
-    curves = [Curve(name, np.ones(table.rows + 1), item) for name, item in zip(table.names, errors, strict=True)]
+    pairs: Any = zip(table.curves, curves, strict=True)
+    curves = [Curve(name, *map(np.append, planned, further)) for (name, *planned), (_, *further) in pairs]
     return [table._replace(conditions=conditions, curves=tuple(curves))]
 
 
@@ -436,30 +407,23 @@ def figure(result: Plan) -> Figure:
     held = {key: value for key, value in result.points[0].conditions.items() if key != "speed"}
     drawn = [item for item in result.points if {**item.conditions, **held} == item.conditions]
     drawn.sort(key=lambda item: item.conditions.get("speed", 0.0))
+    words, si = ("sliding speed $V$", "m/s") if "speed" in drawn[0].conditions else ("number", "1")
     speeds = np.array([item.conditions.get("speed", k) for k, item in enumerate(drawn)])
-    scale = style.axis_scale(speeds)
-    unit = style.Unit.of(speeds, "m/s" if "speed" in drawn[0].conditions else "1", scale == "log")
+    scale, simulated = style.axis_scale(speeds), [k for k, item in enumerate(drawn) if item.probabilities]
+    unit = style.Unit.of(speeds, si, scale == "log")
+    x = unit.factor * speeds
     with mpl.rc_context(style.STYLE):
         picture, (panel,) = style.rows([2.1])
         for truth, chance in result.probabilities.items():
             look: Any = {"color": _LOOKS[truth]}
             panel.axhline(chance.probability, linestyle=":", linewidth=0.9, **look)
-            panel.plot(unit.factor * speeds, [item.estimate[truth] for item in drawn], "--", linewidth=0.7, **look)
-            for place, item in zip(speeds, drawn, strict=True):
-                if item.probabilities:
-                    bars: Any = style.HOLLOW | look | {"label": truth, "elinewidth": 0.7}
-                    panel.errorbar(
-                        unit.factor * place,
-                        item.probabilities[truth].probability,
-                        item.probabilities[truth].error,
-                        **bars,
-                    )
+            panel.plot(x, [item.estimate[truth] for item in drawn], "--", linewidth=0.7, **look)
+            points, errors = np.transpose([drawn[k].probabilities[truth] for k in simulated])
+            panel.errorbar(x[simulated], points, errors, label=truth, elinewidth=0.7, **style.HOLLOW, **look)
         panel.plot([], [], ":", color=style.REFERENCE, label="without it")
         panel.plot([], [], "--", color=style.REFERENCE, label="estimate for ranking")
-        panel.set_ylim(-0.03, 1.03)
-        panel.set_ylabel("P(mechanisms told apart)")
-        words = "sliding speed $V$ of the next point" if "speed" in drawn[0].conditions else "number of the next point"
-        style.across(panel, unit.factor * speeds, unit.label(words), scale, 0.05)
+        panel.set(ylim=(-0.03, 1.03), ylabel="P(mechanisms told apart)")
+        style.across(panel, x, unit.label(f"{words} of the next point"), scale, 0.05)
         style.legend(panel, columns=2)
     return picture
 
@@ -470,23 +434,19 @@ def carried_out(
 ) -> list[Printed]:  # fmt: skip
     """Plan, write ``<stem>_plan.json`` and ``.png``, and return the tables to print."""
     outputs = [stem.with_name(f"{stem.name}_plan.{ending}") for ending in ("json", "png")]
-    inputs = [*files_read(scenario), points, *([candidates] if candidates else [])]
     for path in outputs:
-        files.claim(path, replaced, inputs)
+        files.claim(path, replaced, [*files_read(scenario), points, *filter(None, [candidates])])
     result = plan(scenario, points, free, candidates, fits.common_errors(common), sims, seed)
-    picture = io.BytesIO()
     with in_units(units):
         shown, truths = result.rows
-        if result.points:
-            figure(result).savefig(picture, format="png")
-    contents = [(json.dumps(document(result), indent=2) + "\n").encode(), picture.getvalue()]
-    written = outputs[: 2 if result.points else 1]
-    for path in outputs[len(written) :]:
-        path.unlink(missing_ok=True)  # of an older plan, which may be replaced
-    for path, content in zip(written, contents, strict=False):
-        with files.output(path) as beside:
-            beside.write_bytes(content)
-    below = "\n".join(["", *filter(None, [result.advice]), *result.remarks, "", *map(str, written)])
+        picture = figure(result) if result.points else None
+    with files.output(outputs[0]) as beside:
+        beside.write_bytes((json.dumps(document(result), indent=2) + "\n").encode())
+    if picture:
+        style.save(picture, outputs[1])
+    else:
+        outputs.pop().unlink(missing_ok=True)  # of an older plan, which may be replaced
+    below = "\n".join(["", *filter(None, [result.advice]), *result.remarks, "", *map(str, outputs)])
     return [(shown, ""), (truths, below)] if truths else [(shown, below)]
 
 

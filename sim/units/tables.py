@@ -625,31 +625,10 @@ class Points(NamedTuple):
     errors: Array | None
 
 
-@contextlib.contextmanager
-def _refusing(path: Path) -> Iterator[None]:
-    """Raise trouble with a table of measured values as ``BadInput`` with one line."""
-    try:
-        with blamed(str(path)):
-            yield
-    except PydanticCustomError as fault:
-        raise BadInput([str(fault)]) from None
-
-
-def units_of(path: Path) -> dict[str, str]:
-    """Return the names of the columns of a table with the texts of their units, "" without one.
-
-    Raises
-    ------
-    BadInput
-        With one line.
-    """
-    with _refusing(path):
-        return dict(_headed(_cells(plain_text(path)))[1])
-
-
 def read_measured(
-    path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity], gaps: bool = False
-) -> tuple[dict[str, Points], str]:
+    path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity], gaps: bool = False,
+    is_planned: bool = False,
+) -> tuple[dict[str, Points], str]:  # fmt: skip
     """Return the columns of a table of measured values, and a remark if it has no units, which is printed, too.
 
     Parameters
@@ -663,14 +642,19 @@ def read_measured(
         Those that may have a column of standard errors beside them, in the same dimension or in ``[%]``.
     gaps : bool
         True if cells may be empty, which are then nan.
+    is_planned : bool
+        True if errors need no values beside them, which are then nan. Relative errors are negative numbers.
 
     Raises
     ------
     BadInput
         With one line.
     """
-    with _refusing(path):
-        result, bare = _measured_columns(plain_text(path), known, outcomes, gaps)
+    try:
+        with blamed(str(path)):
+            result, bare = _measured_columns(plain_text(path), known, outcomes, gaps, is_planned)
+    except PydanticCustomError as fault:
+        raise BadInput([str(fault)]) from None
     reach = [f"{name} reaches {np.nanmax(np.abs(result[name].values)):.4g} {known[name].unit}" for name in bare]
     remark = f"no units: SI assumed; {', '.join(reach)}" if bare else ""
     if remark:
@@ -697,7 +681,7 @@ def measured_points(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -
 
 
 def _measured_columns(
-    text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity], gaps: bool
+    text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity], gaps: bool, is_planned: bool
 ) -> tuple[dict[str, Points], list[str]]:
     """Return the columns, and the names of those that would need a unit if none has one."""
     units = dict(_headed(_cells(text))[1])
@@ -705,7 +689,7 @@ def _measured_columns(
         raise TableError("the columns have no header; add one of names and units, such as speed [mm/s]")
     comments = {name.replace(".", "_"): (name, value.strip()) for name, value in _STATED.findall(text)}
     stated = {n: comment for n, comment in comments.items() if "." in comment[0] or (n in known and n not in outcomes)}
-    _refuse_unknown([*units, *stated], known, outcomes)
+    _refuse_unknown([*units, *stated, *(outcomes if is_planned else ())], known, outcomes)
     wanted: dict[str, Quantity] = {}
     for name, unit in units.items():
         if name in known:
@@ -726,10 +710,11 @@ def _measured_columns(
         except ValueError as fault:
             raise TableError(f'the comment "# {key} = {value[:40]}": {fault}') from None
         arrays[name] = np.full(len(next(iter(arrays.values()))), number)
-    for base in (name for name in outcomes if {name, name + ERROR} <= wanted.keys()):
+    for base in (name for name in outcomes if name + ERROR in wanted):
+        values = arrays.setdefault(base, np.full(len(arrays[base + ERROR]), np.nan))
         if wanted[base + ERROR].unit != outcomes[base].unit:  # a share of the value
-            arrays[base + ERROR] *= np.abs(arrays[base])
-        if np.any(arrays[base + ERROR] <= 0.0):
+            arrays[base + ERROR] *= -1.0 if is_planned else np.abs(values)
+        if not is_planned and np.any(arrays[base + ERROR] <= 0.0):
             raise TableError(f'column "{base}" has a value of 0, so a relative error is undefined; give it in units')
     return measured_points(arrays, known), [name for name in bare if name in known]
 

@@ -34,7 +34,7 @@ def points(path, speeds, error, names=("contact_area",)):
 
 
 def problem_of(scene, path, keys):
-    table, _ = planning._read(path, scene)
+    table = planning._read(path, scene)
     return planning._predicted(scene, [table], [fits.free_number(scene, key) for key in keys], {})
 
 
@@ -144,9 +144,8 @@ def test_the_command_proposes_a_point_above_the_onset_and_draws_what_it_prints(t
     ]
     (panel,) = planning.figure(result).axes
     bars = [bar.lines[0].get_data() for bar in panel.containers]
-    assert {float(y[0]) for _, y in bars} == {
-        chance.probability for p in result.points for chance in p.probabilities.values()
-    }
+    probabilities = {chance.probability for point in result.points for chance in point.probabilities.values()}
+    assert {float(y) for _, places in bars for y in places} == probabilities
     again = CliRunner().invoke(cli, list(map(str, [*words, "--compare"])))
     assert isinstance(again.exception, BadInput)
 
@@ -210,10 +209,12 @@ def test_intervals_to_expect_are_those_of_200_fits(tmp_path, changes, speeds, er
 def test_the_proposed_point_is_among_the_best_three_of_twenty_by_simulation(tmp_path):
     scene, path = load(SPRUNG), points(tmp_path / "points.csv", BELOW_ONSET, 3.0)
     best = sim.plan(scene, path, AREA_KEYS, sims=200).points[0]
-    (table, _), free = planning._read(path, scene), [fits.free_number(scene, key) for key in AREA_KEYS]
+    table, free = planning._read(path, scene), [fits.free_number(scene, key) for key in AREA_KEYS]
     problem = planning._predicted(scene, [table], free, {})
     means = {}
-    for row in planning._speeds(table):
+    further = planning._speeds(table)
+    for place in range(further.rows):
+        row = planning._rows(further, [place])
         design = planning._Design(planning._predicted(scene, planning._joined(table, row, problem), free, {}))
         probabilities = design.simulated(200, 9, lambda done: None).probabilities
         means[float(row.conditions["speed"][0])] = sum(chance.probability for chance in probabilities.values())
