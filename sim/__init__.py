@@ -47,23 +47,8 @@ if TYPE_CHECKING:  # what a function needs is imported where it is called, so th
 Path = str | os.PathLike[str]
 _FROM = {"Scenario": "sim.scenario.scenario", "load": "sim.scenario.reader"}
 _FOLDERS = ("analysis", "laws", "plots", "report", "spectrum")
-__all__ = sorted(
-    [
-        *_FROM,
-        *_FOLDERS,
-        "BadInput",
-        "check",
-        "converge",
-        "explore",
-        "fit",
-        "open",
-        "plan",
-        "plot",
-        "run",
-        "stats",
-        "steady_curves",
-    ]
-)
+_FUNCTIONS = ("check", "converge", "explore", "fit", "open", "plan", "plot", "run", "stats", "steady_curves")
+__all__ = sorted([*_FROM, *_FOLDERS, *_FUNCTIONS, "BadInput"])
 
 
 def run(

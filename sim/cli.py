@@ -198,11 +198,8 @@ def run(
     if tabulated:
         _print_tables(*tables)
     if not quiet:
-        say(
-            str(target)
-            if target.exists()
-            else f"shard {shard} is done; the last shard writes {target} (after a failure: --resume)"
-        )
+        waits = f"shard {shard} is done; the last shard writes {target} (after a failure: --resume)"
+        say(str(target) if target.exists() else waits)
 
 
 def _tables(dataset: Any, most: int = _ROWS, lost: tuple[str, ...] = ()) -> tuple[list[Any], list[str]]:
@@ -444,15 +441,15 @@ def fit(scenario: Path, output: Path | None, changes: tuple[str, ...], force: bo
             raise BadInput(["--plan: takes one table, without --compare, --steady and --per-table; omit these"])
         chosen = {name: options[name] for name in ("free", "common", "units")}
         shown = plan.carried_out(scene, options["data"][0], stem=stem, replaced=force, **chosen, **planned)
-        for rows, text in shown:
-            print_table(rows, text)
-        return
-    from sim.study import fit
+        has_converged = True
+    else:
+        from sim.study import fit
 
-    result, shown = fit.carried_out(scene, stem=stem, replace=force, **options)
+        result, shown = fit.carried_out(scene, stem=stem, replace=force, **options)
+        has_converged = result.converged
     for rows, text in shown:
         print_table(rows, text)
-    sys.exit(DONE if result.converged else FAILED)
+    sys.exit(DONE if has_converged else FAILED)
 
 
 @cli.command()

@@ -38,7 +38,7 @@ from sim.scenario.schema import files_read, quantities
 from sim.study import likelihood
 from sim.study.converge import Printed
 from sim.study.likelihood import LEVEL, MOUNT, Curve, Free, Interval, Measured, Minimum, Problem, idle, with_errors
-from sim.study.mechanisms import WHOLE, Search, Verdict, compare, draws_of
+from sim.study.mechanisms import DRAWS, WHOLE, Search, Verdict, compare, draws_of, share_of_larger
 from sim.units.errors import BadInput
 from sim.units.notation import concise, engineering, in_units, scaled
 from sim.units.quantity import read_option
@@ -55,8 +55,8 @@ _BESIDE, _MOST_ROWS = 0.5, 3
 POOR = 0.05
 #: Ratio of measured and fitted values beyond which a unit is asked for.
 _OTHER_UNIT = 100.0
-#: Most draws of curves without a difference, ratios as large as the measured one that are enough, and their precision.
-_DRAWS, _ENOUGH, _FINE = 200, 20, 1e-4
+#: Relative precision of a sum of squares of curves that are drawn without a difference.
+_FINE = 1e-4
 #: Tables of keys that are not physical.
 _OTHER = ("clock", "record", "ensemble", "seed")
 
@@ -181,10 +181,8 @@ class Fit(NamedTuple):
     def of_table(self, place: int) -> dict[str, float]:
         """Return the values of the keys in a table [SI], and its conditions but the speed that all rows share."""
         table = self.problem.tables[place]
-        constant = {
-            key: float(x[0]) for key, x in table.conditions.items() if key not in ("t", "speed") and not np.ptp(x)
-        }
-        stated = {f"contact.{table.mount}" if key == "mount" else key: value for key, value in constant.items()}
+        held = {f"contact.{table.mount}" if key == "mount" else key: x for key, x in table.conditions.items()}
+        stated = {key: float(x[0]) for key, x in held.items() if key not in ("t", "speed") and not np.ptp(x)}
         return stated | {item.free.name: item.value for item in self.numbers if item.free.table in (-1, place)}
 
     @property
@@ -221,10 +219,8 @@ def fit(
         If a key cannot be fitted, a table cannot be read, or the curves depend on some keys only together.
     """
     base = scenario.with_values({"record": {}})
-    shared, split = (
-        [free_number(base, text) for text in free],
-        [free_number(base, text, "--per-table") for text in per_table],
-    )
+    shared = [free_number(base, text) for text in free]
+    split = [free_number(base, text, "--per-table") for text in per_table]
     tables = [likelihood.read(path, base) if isinstance(path, Path) else path for path in data]
     if faults := [*conflicts(base, shared, split, tables)]:
         raise BadInput(faults)
@@ -314,9 +310,8 @@ def _between_tables(result: Fit, alone: Minimum, places: list[list[int]]) -> Ite
     for (first, *rest), is_ratio in itertools.product(places, (True, False)):
         base = result.numbers[first]
         for k in rest if base.free.logarithmic or not is_ratio else ():
-            (problem, best), (_, before) = (
-                likelihood.with_difference(result.problem, least, k, first, is_ratio) for least in (result.best, alone)
-            )
+            problem, best = likelihood.with_difference(result.problem, result.best, k, first, is_ratio)
+            _, before = likelihood.with_difference(result.problem, alone, k, first, is_ratio)
             estimate, ends, others = _estimate(problem, best, before, k), result.numbers[k].interval, base.interval
             low, high, *is_open = estimate.interval
             is_open = [any(marks) for marks in zip(is_open, ends[2:], reversed(others[2:]), strict=True)]
@@ -349,17 +344,18 @@ def _no_difference(result: Fit, places: list[int]) -> NoDifference:
     if problem.by_run or rise <= _FINE * best.chi_square:  # as precisely as drawn curves are fitted
         return NoDifference(math.nan if problem.by_run else 1.0, rise, freedom, 0)
     times = [len(places) if k == places[0] else 1 for k in range(len(single.x))]
-    joint, separate, larger = Search(merged, [single.x]), Search(problem, [best.x]), 0
-    drawn = draws_of(problem, merged.predicted(single.x), np.random.default_rng([result.scenario.seed, places[0]]))
-    for count, values in enumerate(itertools.islice(drawn, _DRAWS), 1):
+    joint, separate = Search(merged, [single.x]), Search(problem, [best.x])
+
+    def ratio(values: Array) -> float:
         shared, drawn_problem = replace(merged, values=values), replace(problem, values=values)
         one_value = likelihood.minimum(shared, joint.least(values).x, precision=_FINE)
         starts = [np.repeat(one_value.x, times), separate.least(values).x]  # no worse than one value
         least = min(likelihood.minimum(drawn_problem, start, precision=_FINE).chi_square for start in starts)
-        larger += (one_value.chi_square - least) / (least if is_estimated else 1.0) >= measured
-        if larger == _ENOUGH:
-            return NoDifference(larger / count, rise, freedom, count)
-    return NoDifference((1 + larger) / (1 + _DRAWS), rise, freedom, _DRAWS)
+        return (one_value.chi_square - least) / (least if is_estimated else 1.0)
+
+    drawn = draws_of(problem, merged.predicted(single.x), np.random.default_rng([result.scenario.seed, places[0]]))
+    p_value, draws = share_of_larger((ratio(values) >= measured for values in drawn), DRAWS)
+    return NoDifference(p_value, rise, freedom, draws)
 
 
 def _remarks(result: Fit) -> Iterator[str]:
@@ -588,30 +584,28 @@ def carried_out(
     return result, [*shown, ([], "\n".join(map(str, outputs)))]
 
 
+def _row(heading: str, item: Estimate) -> dict[str, str]:
+    """Return the key, the value and the interval of an estimate, in units that suit it."""
+    value, low, high, unit = item.texts
+    return {heading: item.free.key, "value": f"{value} {unit}".rstrip(), f"{LEVEL:.0%} interval": f"{low} to {high}"}
+
+
 def _table(fit: Fit) -> list[dict[str, str]]:
-    """Return one row for each estimate, in units that suit it."""
+    """Return one row for each estimate."""
     rows = []
     for item in fit.numbers:
-        (value, low, high, unit), si = item.texts, item.free.quantity.unit
+        start, alone = (engineering(value, item.free.quantity.unit) for value in (item.free.start, item.steady))
         shift = (item.steady - item.value) / item.error if item.error > 0.0 else math.nan
-        alone = engineering(item.steady, si) + (f" ({shift:+.1f} errors)" if abs(shift) > 0.05 else "")
-        rows.append({
-            "key": item.free.key, "value": f"{value} {unit}".rstrip(), f"{LEVEL:.0%} interval": f"{low} to {high}",
-            "start": engineering(item.free.start, si), "steady sliding alone": alone,
-        })  # fmt: skip
+        alone += f" ({shift:+.1f} errors)" if abs(shift) > 0.05 else ""
+        rows.append(_row("key", item) | {"start": start, "steady sliding alone": alone})
     return rows
 
 
 def _differences(fit: Fit) -> list[dict[str, str]]:
     """Return one row for each ratio or difference of values per table; the first of a key has the p of none."""
-    rows, tests = [], {**fit.no_difference}
-    for item in fit.differences:
-        value, low, high, unit = item.texts
-        rows.append({
-            "ratio or difference": item.free.key, "value": f"{value} {unit}".rstrip(),
-            f"{LEVEL:.0%} interval": f"{low} to {high}", "p of no difference": str(tests.pop(item.free.name, "")),
-        })  # fmt: skip
-    return rows
+    tests = {name: str(test) for name, test in fit.no_difference.items()}
+    rows = [(item.free.name, _row("ratio or difference", item)) for item in fit.differences]
+    return [row | {"p of no difference": tests.pop(name, "")} for name, row in rows]
 
 
 def _quality(fit: Fit) -> str:

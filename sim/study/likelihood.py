@@ -593,9 +593,8 @@ def minimum(
     if problem.by_run:  # steps of the minimizer's own would be lost in the rounding of a run
         varied, precision = [k for k in range(len(parameters)) if k not in fixed], _RUN_PRECISION
         options["Dfun"] = lambda current: derivatives(problem, numbers(current), varied)
-    result = lmfit.Minimizer(lambda current: problem.residuals(numbers(current)), parameters, **options).leastsq(
-        ftol=precision, xtol=precision
-    )
+    minimizer = lmfit.Minimizer(lambda current: problem.residuals(numbers(current)), parameters, **options)
+    result = minimizer.leastsq(ftol=precision, xtol=precision)
     covariance = getattr(result, "covar", None) if errors else None
     return Minimum(numbers(result.params), float(result.chisqr), covariance, bool(result.success))
 

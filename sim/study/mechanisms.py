@@ -7,7 +7,7 @@ distribution. Its distribution is simulated: both models are fitted to curves of
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -254,16 +254,23 @@ def _starts(problem: Problem) -> list[Array]:
 def _p_value(
     poorer: Search, least: Minimum, whole: Search, best: Minimum, rng: np.random.Generator, draws: int
 ) -> float:
-    """Return the share of curves made by the poorer mechanism whose likelihood ratio is at least the measured one.
-
-    If the measured ratio is soon seen to be frequent, no more curves are drawn.
-    """
-    measured, larger = least.chi_square - best.chi_square, 0
+    """Return the share of curves made by the poorer mechanism whose likelihood ratio is at least the measured one."""
+    measured = least.chi_square - best.chi_square
     if measured <= _FINE * least.chi_square:  # what more acts explains nothing, as precisely as draws are fitted
         return 1.0
-    drawn = itertools.islice(draws_of(whole.problem, poorer.problem.predicted(least.x), rng), draws)
-    for drawn_so_far, values in enumerate(drawn, 1):
-        larger += whole.reaches(values, poorer.least(values).chi_square - measured)
+    drawn = draws_of(whole.problem, poorer.problem.predicted(least.x), rng)
+    flags = (whole.reaches(values, poorer.least(values).chi_square - measured) for values in drawn)
+    return share_of_larger(flags, draws)[0]
+
+
+def share_of_larger(are_larger: Iterable[bool], draws: int) -> tuple[float, int]:
+    """Return the probability of a ratio as large as the measured one, by drawn ratios, and the number of draws.
+
+    If the measured ratio is soon seen to be frequent, no more are drawn.
+    """
+    larger = 0
+    for count, is_larger in enumerate(itertools.islice(are_larger, draws), 1):
+        larger += is_larger
         if larger == _ENOUGH:
-            return larger / drawn_so_far
-    return (1 + larger) / (1 + draws)
+            return larger / count, count
+    return (1 + larger) / (1 + draws), draws

@@ -675,7 +675,7 @@ def test_intervals_and_p_of_a_force_proportional_to_a_stress_per_table_follow_fr
 def test_differences_of_values_at_a_bound_agree_with_their_chi_square_and_mark_the_ends_that_it_sets(
     seed, is_excluded, monkeypatch
 ):
-    monkeypatch.setattr(calibration, "_DRAWS", 1)
+    monkeypatch.setattr(calibration, "DRAWS", 1)
     key, changes = "shear.spectrum.rms", {name: {"shear.paid_by_adhesion": 0.0} for name in ("dry", "wet")}
     tables = condition_tables(load(LENS), changes, 0.02, seed)
     for order in (tables, tables[::-1]):
