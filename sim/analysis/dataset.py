@@ -78,9 +78,8 @@ def _joined(dataset: xr.Dataset) -> dict[str, Any]:
     keys = {key.replace(".", "_") for key in (sweep[0] if isinstance(sweep, list) else sweep)}
     texts = [f"joined along {name}" for name in sweep_dims(dataset) if name not in keys]
     if count != recorded:
-        texts.append(
-            f"{count} members" + (f" joined, {recorded} of one run" if count > recorded else f" of {recorded}")
-        )
+        rest = f"joined, {recorded} of one run" if count > recorded else f"of {recorded}"
+        texts.append(f"{count} members {rest}")
     return {"members": np.int32(count), "joined": "; ".join(texts)} if texts else {}
 
 

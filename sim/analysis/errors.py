@@ -43,11 +43,8 @@ def systematic_errors(dataset: xr.Dataset) -> list[SystematicError]:
     The cure of an error of the cell leaves about a tenth of it. It is "" if the error is less than 1 % of the JKR area.
     """
     names = [f"{source}_error_{of}" for of in _UNITS for source in ("cell", "banded", "step")]
-    return [
-        _largest(dataset, name)
-        for name in (*names, "pull_off_error")
-        if name in dataset and bool((abs(dataset[name]) > 0.0).any())
-    ]
+    known = [name for name in (*names, "pull_off_error") if name in dataset]
+    return [_largest(dataset, name) for name in known if bool((abs(dataset[name]) > 0.0).any())]
 
 
 def _largest(dataset: xr.Dataset, name: str) -> SystematicError:

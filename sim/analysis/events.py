@@ -144,10 +144,8 @@ def unresolved_slips(dataset: xr.Dataset) -> str:
     with contextlib.suppress(ValueError, KeyError):  # of a run without slips, or without single ones
         lasting, step = slips(dataset)["slip_duration"].median(), setting(dataset, "clock.step")
         if bool((lasting < _RESOLVED * step).any()):
-            return (
-                f"slip events last fewer than {_RESOLVED} clock steps: drop, duration and friction have an error that"
-                " the brackets do not hold; reduce clock.step"
-            )
+            effect = "drop, duration and friction have an error that the brackets do not hold"
+            return f"slip events last fewer than {_RESOLVED} clock steps: {effect}; reduce clock.step"
     return ""
 
 

@@ -208,9 +208,8 @@ def extremes(curves: xr.Dataset, name: str, along: str) -> xr.Dataset:
         inside = near.isel({along: index}) > far.isel({along: [0, last]}).max(along)
         for end, step, values in (("", 0, mean), ("_low", -1, low), ("_high", 1, high)):
             place = curves[along].isel({along: (index + step).clip(0, last)}).where(inside)
-            result[f"{name}_{kind}{end}"] = (
-                values.isel({along: index}, drop=True).where(inside).assign_attrs(mean.attrs)
-            )
+            extreme = values.isel({along: index}, drop=True).where(inside)
+            result[f"{name}_{kind}{end}"] = extreme.assign_attrs(mean.attrs)
             result[f"{name}_{kind}_at{end}"] = place.drop_vars(along, errors="ignore").assign_attrs(curves[along].attrs)
         result[f"{name}_{kind}_reason"] = xr.where(inside, "", "at an end of the sweep, within the errors")
     return result.drop_vars(along, errors="ignore")
@@ -401,12 +400,10 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
             for (end, words), values in zip(_ENDS.items(), numbers, strict=True):
                 known = ~never & ~(is_known & alone) if end else ~never
                 result[f"{stem}_{name}{end}"] = labelled(values.where(known), unit, words + text)
-            further = [math.nan, False, False] if key == "steady_speed" else [*lag, is_known & alone]
+            further = [*reasons, *lag, is_known & alone]
             if key == "steady_speed":  # a reason of the course says nothing of steady sliding
                 unmet = f"unknown, because the course has no speed with a loss of {loss}"
-                further = [xr.where(is_known, why, unmet), *reasons[1:], *further]
-            else:
-                further = [*reasons, *further]
+                further = [xr.where(is_known, why, unmet), *reasons[1:], math.nan, False, False]
             reason = xr.apply_ufunc(_in_words, *further, vectorize=True, output_dtypes=[object])
             result[f"{stem}_{name}_reason"] = reason.drop_attrs(deep=False)
     return result.assign_coords({name: dataset[name] for name in sweep_dims(dataset)})  # with their units

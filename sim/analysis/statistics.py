@@ -778,9 +778,8 @@ def _settlements(values: np.ndarray, sem: np.ndarray, freedom: np.ndarray, noisy
         squares = np.nansum((drifts - drift[:, np.newaxis]) ** 2, axis=-1)
         error = np.sqrt(squares / (count - 1.0)) / np.sqrt(count)
     of_members = (count > 1) & ((count >= _SEVERAL) | ~(freedom > count - 1.0))
-    return _settled(
-        course, drift, np.where(of_members, error, 2.0 * sem), np.where(of_members, count - 1.0, freedom), noisy
-    )
+    error, free = np.where(of_members, error, 2.0 * sem), np.where(of_members, count - 1.0, freedom)
+    return _settled(course, drift, error, free, noisy)
 
 
 def _settled(
@@ -956,14 +955,9 @@ def _series(dataset: xr.Dataset, variable: xr.DataArray, step: float) -> np.ndar
 
 
 def _described(
-    variable: xr.DataArray,
-    numbers: dict[str, np.ndarray],
-    sweep: xr.DataArray,
-    states: list[Settlement],
-    openings: list[str],
-    span: str,
-    noisy: np.ndarray,
-) -> dict[str, xr.DataArray]:
+    variable: xr.DataArray, numbers: dict[str, np.ndarray], sweep: xr.DataArray, states: list[Settlement],
+    openings: list[str], span: str, noisy: np.ndarray,
+) -> dict[str, xr.DataArray]:  # fmt: skip
     """Return statistics of an observable over the sweep, with the reasons where there is no mean.
 
     ``numbers`` of each statistic have the points of the sweep first.

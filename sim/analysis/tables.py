@@ -544,9 +544,8 @@ def to_csv(
         True for a wide table of a row for each record, with all statistics.
     """
     rows = in_columns(dataset, every, lost) if wide else tidy(dataset, lost)
-    units = {str(name): variable.attrs.get("units", "1") for name, variable in dataset.coords.items()} | {
-        "speed": "m/s"
-    }
+    units = {str(name): variable.attrs.get("units", "1") for name, variable in dataset.coords.items()}
+    units |= {"speed": "m/s"}
     header = list(rows) if wide else [_with_unit(name, units.get(name, "1")) for name in rows]
     with output(Path(path)) as beside:
         rows.to_csv(beside, header=header, index=False, na_rep="nan", lineterminator="\n")

@@ -1,6 +1,7 @@
 """The state of a page and its answers: sliders of a scenario, curves of steady sliding, and sentences about them."""
 
 import contextlib
+import functools
 import math
 import secrets
 import time
@@ -265,9 +266,8 @@ def _changes(scenario: Scenario, key: str, speeds: Array, before: dict[str, Arra
             after = curves(scenario.with_values({key: other}, built=False), speeds)
         except BadInput:
             continue
-        return after.keys() != before.keys() or not all(
-            np.allclose(after[name], before[name], rtol=_CHANGE, atol=0.0, equal_nan=True) for name in before
-        )
+        close = functools.partial(np.allclose, rtol=_CHANGE, atol=0.0, equal_nan=True)
+        return after.keys() != before.keys() or not all(close(after[name], before[name]) for name in before)
     return False
 
 

@@ -230,9 +230,8 @@ def _opener(address: str) -> Iterator[str]:
     with tempfile.TemporaryDirectory(prefix="sim-explore-") as folder:
         path = Path(folder) / "open.html"
         path.touch(mode=0o600)
-        path.write_text(
-            f'<!doctype html><meta http-equiv="refresh" content="0;url={html.escape(address)}">', encoding="utf-8"
-        )
+        text = f'<!doctype html><meta http-equiv="refresh" content="0;url={html.escape(address)}">'
+        path.write_text(text, encoding="utf-8")
         yield path.as_uri()
 
 
@@ -250,9 +249,8 @@ def state_of(link: str, page: Page) -> str:
         numbers = {key: float(word) for key, word in words.items()}
         page.read({key: number for key, number in numbers.items() if key not in _VIEW})
     except ValueError as fault:
-        raise BadInput(
-            [f"--state: cannot be used ({fault}); copy the whole address of a page of this scenario"]
-        ) from None
+        cure = "copy the whole address of a page of this scenario"
+        raise BadInput([f"--state: cannot be used ({fault}); {cure}"]) from None
     return urlencode(words)
 
 

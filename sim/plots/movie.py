@@ -187,10 +187,8 @@ def _sliding(panel: Axes, point: xr.Dataset) -> Callable[[int, int], None]:
 
     Marks on the half-space pass where they move little between two frames.
     """
-    pulled = "stage_position" in point
-    place, origin = (
-        point[name].to_numpy() for name in ("slider_position", "stage_position" if pulled else "slider_position")
-    )
+    pulled, place = "stage_position" in point, point["slider_position"].to_numpy()
+    origin = point["stage_position"].to_numpy() if pulled else place
     behind, radius = place - origin, float(point["contact_radius"].max())
     ends = np.array([min(behind.min(), 0.0) - 1.4 * radius, max(behind.max(), 0.0) + 1.4 * radius])
     length = style.Unit.of(ends, "m")

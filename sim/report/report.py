@@ -110,10 +110,8 @@ def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
     shown = [best, *(kind for kind in others if not less.get(kind, False))]
     if points is not None and of_points not in shown:
         shown.insert(0, of_points)
-    return [
-        _drawing(dataset, kind, f"f{number}-", points, kind == of_points)
-        for number, kind in enumerate(dict.fromkeys(shown))
-    ]
+    numbered = enumerate(dict.fromkeys(shown))
+    return [_drawing(dataset, kind, f"f{number}-", points, kind == of_points) for number, kind in numbered]
 
 
 def _drawing(dataset: xr.Dataset, kind: str, prefix: str, points: Measured | None, needed: bool) -> Drawing:

@@ -175,12 +175,8 @@ def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
     course = slider.driven if slider.solves_motion else slider.pieces
     moved = _turns(course(whole, times.duration), signed=True)
     pressed = _turns(contact.course.pieces(whole, times.duration), signed=False)
-    words = "force" if forced else "speed"
-    of_drive = {
-        0.0: f"constant {words}" if forced else "sliding",
-        1.0: f"increasing {words}",
-        -1.0: f"decreasing {words}",
-    }
+    steady, words = ("constant force", "force") if forced else ("sliding", "speed")
+    of_drive = {0.0: steady, 1.0: f"increasing {words}", -1.0: f"decreasing {words}"}
     of_contact = {0.0: f"constant {kind}", 1.0: "approach", -1.0: "retraction"}
     starts = sorted({*moved, *pressed})
     result: dict[int, tuple[float, str]] = {}
@@ -192,12 +188,8 @@ def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
         step = math.floor(start / times.step + 0.5) + 1  # the first whose middle is later
         if step <= times.steps:
             result[step] = start, ", ".join(shown or names[:1])
-    first_steps = sorted(result)[:_MOST_PHASES]
-    return Phases(
-        tuple(result[step][0] for step in first_steps),
-        tuple(result[step][1] for step in first_steps),
-        tuple(first_steps),
-    )
+    columns: Any = zip(*((*result[step], step) for step in sorted(result)[:_MOST_PHASES]), strict=True)
+    return Phases(*columns)
 
 
 def _turns(pieces: Pieces, signed: bool) -> dict[float, tuple[float, float]]:
@@ -210,9 +202,8 @@ def _turns(pieces: Pieces, signed: bool) -> dict[float, tuple[float, float]]:
     before, value = (math.nan, math.nan), math.nan
     for start, stop, first, last in zip(*pieces[1:5], strict=True):
         crossing = start + (stop - start) * first / (first - last) if signed and first * last < 0.0 else stop
-        for at, low, high in (
-            ((start, first, 0.0), (crossing, 0.0, last)) if crossing < stop else ((start, first, last),)
-        ):
+        parts = ((start, first, 0.0), (crossing, 0.0, last)) if crossing < stop else ((start, first, last),)
+        for at, low, high in parts:
             sense = float(np.sign(low + high)) if signed else 1.0
             change = (high - low) * sense
             now = sense, float(np.sign(change)) if abs(change) > _SAME * largest else 0.0
