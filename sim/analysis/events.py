@@ -25,7 +25,7 @@ from sim.analysis.dataset import (
     word,
 )
 from sim.analysis.observables import ENDINGS, labelled, pure
-from sim.analysis.statistics import LEVEL, WIDE, observable_of
+from sim.analysis.statistics import LEVEL, WIDE, Array, observable_of
 from sim.units.notation import SLIP_EVENT, engineering
 
 #: Relative changes below it are rounding.
@@ -243,7 +243,7 @@ _FALL = 0.02
 _FITTED = 0.5
 
 
-def jumps(speed: np.ndarray, turns: bool = False) -> np.ndarray:
+def jumps(speed: Array, turns: bool = False) -> Array:
     """Return records before which the speed has jumped: its change stands out from those before and after.
 
     With ``turns`` also those before which it has changed its sign.
@@ -259,7 +259,7 @@ def jumps(speed: np.ndarray, turns: bool = False) -> np.ndarray:
     return np.flatnonzero(np.pad(jumped, (0, change.size - jumped.size)) | turned) + 1
 
 
-def incipient_law(force: np.ndarray, area: np.ndarray) -> tuple[int, float]:
+def incipient_law(force: Array, area: Array) -> tuple[int, float]:
     """Return the record of the largest force [N] before its first fall by 2 %, and alpha of A0 - alpha Q^2 [m^2/N^2].
 
     That is fitted to the area [m^2] by least squares up to half of the largest force.
@@ -575,7 +575,7 @@ class Peak(NamedTuple):
     last: float = math.nan
 
 
-def peak_of_mean(values: np.ndarray, times: np.ndarray, unit: str = "1") -> Peak:
+def peak_of_mean(values: Array, times: Array, unit: str = "1") -> Peak:
     """Return the peak of the mean of members with noise, after the first of their records.
 
     Parameters
@@ -600,7 +600,7 @@ def peak_of_mean(values: np.ndarray, times: np.ndarray, unit: str = "1") -> Peak
     tail[-max(1, records // _AFTER) :] = 1.0 / max(1, records // _AFTER)
     last = records - max(1, records // _AFTER)
 
-    def error(weights: np.ndarray) -> float:
+    def error(weights: Array) -> float:
         return float(np.std(values @ weights, ddof=1)) / math.sqrt(members) if members > 1 else math.nan
 
     weights, _ = _top(mean, 0, last)
@@ -632,7 +632,7 @@ def peak_of_mean(values: np.ndarray, times: np.ndarray, unit: str = "1") -> Peak
     return Peak("", value, sem, value - half, value + half + between, float(time), float(first), float(stop))
 
 
-def _top(mean: np.ndarray, width: int, last: int) -> tuple[np.ndarray, float]:
+def _top(mean: Array, width: int, last: int) -> tuple[Array, float]:
     """Return the weights of the records whose sum is the peak before the record ``last``, and its place.
 
     It is the largest value, or if the ``width`` is two or more records to both sides the vertex of a parabola.
@@ -692,7 +692,7 @@ def ensemble_peaks(dataset: xr.Dataset) -> xr.Dataset:
     return result
 
 
-def _peak_since(values: np.ndarray, speeds: np.ndarray, first: int, times: np.ndarray, unit: str) -> tuple[Any, ...]:
+def _peak_since(values: Array, speeds: Array, first: int, times: Array, unit: str) -> tuple[Any, ...]:
     """Return the fields of the ``Peak`` of the members after a record, and the speed at its time and interval."""
     if not len(values):
         return *Peak("the peak of members with noise needs every member: [record] per_member = true"), *[math.nan] * 3
@@ -721,7 +721,7 @@ class Lifetime(NamedTuple):
     rate_high: float
 
 
-def lifetime(times: np.ndarray, ends: np.ndarray | float, begins: np.ndarray | float = 0.0) -> Lifetime:
+def lifetime(times: Array, ends: Array | float, begins: Array | float = 0.0) -> Lifetime:
     """Return the median and the rate of an event that may come after a run's end.
 
     Parameters
@@ -760,7 +760,7 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float, begins: np.ndarray | f
     return Lifetime(half, low, high, count / exposure, least / exposure, most / exposure)
 
 
-def _halves(watched: np.ndarray, happened: np.ndarray, begins: np.ndarray) -> list[float]:
+def _halves(watched: Array, happened: Array, begins: Array) -> list[float]:
     """Return the times at which a survival, and the ends of its interval, first are one half or less, or nan.
 
     The numbers are those of ``scipy.stats.ecdf``, whose import would make the start of ``sim run`` a quarter longer.

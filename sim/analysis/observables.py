@@ -11,17 +11,7 @@ from collections.abc import Collection
 import numpy as np
 import xarray as xr
 
-from sim.analysis.dataset import (
-    MEMBERS,
-    answered,
-    control,
-    plain,
-    setting,
-    stays_held,
-    where_recorded,
-    with_trajectories,
-    word,
-)
+from sim.analysis.dataset import MEMBERS, control, plain, setting, stays_held, where_recorded, with_trajectories, word
 from sim.laws import jkr
 from sim.units.notation import OF_CONTACT
 
@@ -266,7 +256,7 @@ def charges(dataset: xr.Dataset) -> xr.Dataset:
     Fluctuations alone leave w = Δγ(1) - χ ΔΓ. Where no equilibrium with that exists, the area is 0.
     """
     shares = xr.Dataset()
-    with contextlib.suppress(ValueError), answered():
+    with contextlib.suppress(ValueError), where_recorded():
         shares = share_observables(dataset)
         first, later = _charged_first(dataset), shares["lost_to_fluctuations"]
         last = shares["lost_to_bonds"] + later - first
@@ -298,6 +288,11 @@ def chosen_observables(dataset: xr.Dataset, names: Collection[str] | None) -> xr
         return result
     wanted = {f"{name}{ending}" for name in names for ending in ENDINGS}
     return result[[name for name in result if name in wanted]]
+
+
+def closed_observables(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset:
+    """Return the ``chosen_observables``; what only a closed contact has is nan if the contact is open."""
+    return chosen_observables(closed_only(dataset), names)
 
 
 def _shares_among(names: Collection[str]) -> bool:

@@ -24,15 +24,8 @@ from sim.analysis.dataset import (
     sweep_dims,
     word,
 )
-from sim.analysis.observables import (
-    chosen_observables,
-    closed_only,
-    labelled,
-    radius_at_work,
-    reference_radii,
-    restricted,
-)
-from sim.analysis.statistics import LEVEL
+from sim.analysis.observables import closed_observables, labelled, radius_at_work, reference_radii, restricted
+from sim.analysis.statistics import LEVEL, Array
 from sim.laws import schallamach
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
@@ -77,12 +70,10 @@ class Crossing(NamedTuple):
     low: float
     high: float
     reason: str
-    beside: np.ndarray
+    beside: Array
 
 
-def crossing(
-    speeds: np.ndarray, groups: np.ndarray, sizes: np.ndarray, level: float, beside: np.ndarray | None = None
-) -> Crossing:
+def crossing(speeds: Array, groups: Array, sizes: Array, level: float, beside: Array | None = None) -> Crossing:
     """Return the speed at which the mean of a falling quantity has first fallen to a level.
 
     Parameters
@@ -128,10 +119,10 @@ def crossing(
     if free:  # in the first row the mean, then those without each group
         whole = np.concatenate([whole, (whole - weight * curves) / (1.0 - weight)], axis=1)
 
-    def error(rows: np.ndarray) -> np.ndarray:
+    def error(rows: Array) -> Array:
         return np.sqrt(free * np.var(rows[1:], axis=0)) if free else np.zeros(rows.shape[1:])
 
-    def half(rows: np.ndarray, *coarser: np.ndarray) -> float:
+    def half(rows: Array, *coarser: Array) -> float:
         off = (each - rows for each in coarser)
         return math.hypot(student * error(rows), *(math.sqrt(max(0.0, d[0] ** 2 - error(d) ** 2)) for d in off))
 
@@ -166,7 +157,7 @@ def crossing(
     if ends == (low, high) and width > 0.0:
         return bracket
 
-    def over_the_fall(values: np.ndarray, a: int, b: int) -> np.ndarray:
+    def over_the_fall(values: Array, a: int, b: int) -> Array:
         return values[:, a] + rows[:, a] / (rows[:, a] - rows[:, b]) * (values[:, b] - values[:, a])
 
     others = [[over_the_fall(values, k - a, k + b) for a, b in ((1, 0), (2, 0), (1, 1))] for values in whole[1:]]
@@ -247,7 +238,7 @@ def _course(dataset: xr.Dataset) -> tuple[str, xr.DataArray]:
     if is_steady(dataset) and (along := speed_dim(dataset)) is not None:
         return along, speed.isel(t=0, drop=True)
     speed = speed.transpose(..., "t")
-    values, branches = speed.to_numpy(), dict[str, np.ndarray]()
+    values, branches = speed.to_numpy(), dict[str, Array]()
     for point in np.ndindex(values.shape[:-1]):
         way, number = np.sign(np.nan_to_num(np.diff(values[point]))), {1.0: 0, -1.0: 0}
         turns = [0, *np.flatnonzero(np.diff(way)) + 1, len(way)]
@@ -430,7 +421,7 @@ def _group_means(dataset: xr.Dataset, along: str, charged: bool) -> tuple[xr.Dat
     names = ["area_ratio", *(_CHARGED if charged and not pooled else ())]
 
     def values(piece: xr.Dataset) -> xr.Dataset:
-        result = chosen_observables(closed_only(piece), names)
+        result = closed_observables(piece, names)
         return result if along == "t" else result.mean("t", keep_attrs=True)
 
     def means(piece: xr.Dataset) -> xr.Dataset:

@@ -10,7 +10,7 @@ import xarray as xr
 from sim.analysis.dataset import MEMBERS, is_stationary, plain, sweep_dims
 from sim.analysis.events import ensemble_peaks, events, half_lives, slips_by_phase
 from sim.analysis.over_speed import loss_speeds
-from sim.analysis.statistics import WIDE, averaging, correlation_time, of_second_half, over_members, summary
+from sim.analysis.statistics import WIDE, Array, averaging, correlation_time, of_second_half, over_members, summary
 from sim.units.errors import BadInput
 from sim.units.notation import bounded, scaled, share
 
@@ -214,7 +214,7 @@ def relaxation(dataset: xr.Dataset, name: str, start: float = 0.0) -> Statement:
         return result._replace(reason="it does not change, or is not known at all times")
     courses = (np.array([mean, *((number * mean - values) / (number - 1) if is_noisy else ())]) - mean[-1]) / change
 
-    def missed(numbers: np.ndarray, course: np.ndarray) -> np.ndarray:
+    def missed(numbers: Array, course: Array) -> Array:
         return np.asarray(numbers[0] + numbers[1] * np.exp(-past * np.exp(-numbers[2])) - course)
 
     first = 0.0, 1.0, np.log(past[np.argmax(courses[0] < 0.37)])

@@ -17,6 +17,7 @@ from sim.analysis.observables import (
     KEPT,
     charges,
     chosen_observables,
+    closed_observables,
     closed_only,
     is_of_contact,
     labelled,
@@ -29,6 +30,7 @@ from sim.units.errors import BadInput
 from sim.units.notation import CUMULATIVE, engineering, scaled, second_half
 from sim.units.quantity import read_option
 
+Array = np.ndarray
 #: How many correlation times the autocorrelation is summed over: what is cut off is e^-6 of it.
 _WINDOW = 6.0
 #: Records that a correlation time must span: Simpson's rule is then right to (1/2)^4/180, 0.03 %.
@@ -49,7 +51,7 @@ class IntegralTime(NamedTuple):
     below: float = math.nan
 
 
-def integral_time(values: np.ndarray, step: float) -> IntegralTime:
+def integral_time(values: Array, step: float) -> IntegralTime:
     """Return the integral correlation time of stationary trajectories: the integral of the autocorrelation.
 
     Parameters
@@ -95,7 +97,7 @@ def integral_time(values: np.ndarray, step: float) -> IntegralTime:
     return IntegralTime(*map(float, _times_of(values, step)))
 
 
-def _times_of(values: np.ndarray, step: float) -> np.ndarray:
+def _times_of(values: Array, step: float) -> Array:
     """Return the numbers of ``integral_time``, shape (3, ...), of values with the shape (..., members, records)."""
     *points, members, records = values.shape
     values, result = values.reshape(-1, members, records), np.empty((3, math.prod(points)))
@@ -105,7 +107,7 @@ def _times_of(values: np.ndarray, step: float) -> np.ndarray:
     return result.reshape(3, *points)
 
 
-def time_of(covariance: np.ndarray, members: int, records: int, step: float, largest: np.ndarray) -> np.ndarray:
+def time_of(covariance: Array, members: int, records: int, step: float, largest: Array) -> Array:
     """Return the numbers of ``integral_time`` from autocovariances of values whose largest magnitude is ``largest``."""
     if records < 2:
         return np.full((3, *largest.shape), math.nan)
@@ -136,7 +138,7 @@ def members_for_memory(members: int, records: int) -> int:
     return min(members, max(2, _VALUES // records))
 
 
-def autocovariance(values: np.ndarray) -> np.ndarray:
+def autocovariance(values: Array) -> Array:
     """Return the covariance by the number of records between values, averaged over members and times.
 
     Parameters
@@ -150,7 +152,7 @@ def autocovariance(values: np.ndarray) -> np.ndarray:
     return covariance_of(values, mean, max(members - 1.0, 1.0))
 
 
-def covariance_of(values: np.ndarray, mean: np.ndarray | float, free: float) -> np.ndarray:
+def covariance_of(values: Array, mean: Array | float, free: float) -> Array:
     """Return the mean product of deviations by the number of records between them.
 
     Parameters
@@ -186,7 +188,7 @@ def covariance_of(values: np.ndarray, mean: np.ndarray | float, free: float) -> 
 _TOO_FEW = 3.0
 
 
-def inflation(covariance: np.ndarray, members: int, records: int) -> np.ndarray:
+def inflation(covariance: Array, members: int, records: int) -> Array:
     """Return the variance of a mean over correlated records, in that of a mean over as many independent ones.
 
     Parameters
@@ -414,7 +416,7 @@ def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.Data
     return result
 
 
-def _moments(name: str, values: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
+def _moments(name: str, values: Array, count: Array) -> dict[str, Array]:
     """Return the statistics over the last axis, of ``count`` numbers each, that need no order."""
     with np.errstate(invalid="ignore", divide="ignore"):  # nan is the answer where there are too few
         mean = np.nansum(values, axis=-1) / count
@@ -426,7 +428,7 @@ def _moments(name: str, values: np.ndarray, count: np.ndarray) -> dict[str, np.n
     return {"mean": mean, "std": std, "sem": error, "low": low, "high": high}
 
 
-def interval(name: str, mean: np.ndarray, sem: np.ndarray, count: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+def interval(name: str, mean: Array, sem: Array, count: Array | float) -> tuple[Array, Array]:
     """Return the ends of the 95 % interval of a mean over ``count`` members; nan for a single member."""
     count = np.asarray(count, float)
     if name not in _COUNTED:
@@ -441,7 +443,7 @@ def interval(name: str, mean: np.ndarray, sem: np.ndarray, count: np.ndarray | f
     return np.maximum(middle - half, 0.0) * (mean != 0.0), np.minimum(middle + half, 1.0)
 
 
-def _quantiles(ordered: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
+def _quantiles(ordered: Array, count: Array) -> dict[str, Array]:
     """Return quantiles of the first ``count`` numbers, which are in order, and the ends of their intervals."""
     levels = np.array(QUANTILES)
     counts, indices = np.unique(count, return_inverse=True)
@@ -453,7 +455,7 @@ def _quantiles(ordered: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-def quantile_ranks(count: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def quantile_ranks(count: Array, level: Array) -> tuple[Array, Array]:
     """Return the places in ``count`` ordered numbers between which a quantile of their law lies, from 0 on.
 
     The number of them below the quantile is binomial. If one tail cannot be as small as half of the excluded
@@ -474,7 +476,7 @@ def quantile_ranks(count: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np
     return np.where(none, np.nan, low), np.where(none, np.nan, high)
 
 
-def values_at_ranks(ordered: np.ndarray, places: np.ndarray) -> np.ndarray:
+def values_at_ranks(ordered: Array, places: Array) -> Array:
     """Return the values at places along the last axis, from 0 on and between; nan where a place is nan."""
     known = places >= 0.0
     below = np.where(known, places, 0.0).astype(np.intp)
@@ -486,11 +488,8 @@ def values_at_ranks(ordered: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 def over_members(dataset: xr.Dataset, names: Collection[str] | None = None, quantiles: bool = True) -> xr.Dataset:
     """Return the ``summary`` of observables at each sweep value and time, by default of all."""
-
-    def reduce(piece: xr.Dataset) -> xr.Dataset:
-        return summary(chosen_observables(closed_only(piece), names), quantiles)
-
-    return in_pieces(restricted(dataset, names), ("t",), reduce)
+    needed = restricted(dataset, names)
+    return in_pieces(needed, ("t",), lambda piece: summary(closed_observables(piece, names), quantiles))
 
 
 def shares(dataset: xr.Dataset) -> xr.Dataset:
@@ -549,9 +548,7 @@ _FEW_RECORDS = 4
 _LEVELS = np.array(QUANTILES)
 
 
-def _shares(
-    spreads: np.ndarray, errors: np.ndarray, freedoms: np.ndarray, surely: float
-) -> tuple[np.ndarray, np.ndarray]:
+def _shares(spreads: Array, errors: Array, freedoms: Array, surely: float) -> tuple[Array, Array]:
     """Return the shares of the ordered values between which each quantile of the law lies, at each point of a sweep.
 
     The number of free values follows from the error of the share of values below the quantile. It is smaller if that
@@ -566,7 +563,7 @@ def _shares(
     return low, high
 
 
-def over_time(values: np.ndarray, step: float = 1.0, name: str = "") -> dict[str, Any]:
+def over_time(values: Array, step: float = 1.0, name: str = "") -> dict[str, Any]:
     """Return statistics of a stationary observable over members and records together.
 
     Parameters
@@ -609,9 +606,7 @@ def over_time(values: np.ndarray, step: float = 1.0, name: str = "") -> dict[str
     return {kind: numbers[0] if kind.startswith("quantile") else float(numbers[0]) for kind, numbers in result.items()}
 
 
-def _over_time(
-    values: np.ndarray, step: float, name: str, noisy: np.ndarray
-) -> tuple[dict[str, np.ndarray], np.ndarray]:
+def _over_time(values: Array, step: float, name: str, noisy: Array) -> tuple[dict[str, Array], Array]:
     """Return the statistics of ``over_time`` at each point of a sweep, and the degrees of freedom of the error.
 
     Values have the shape (points, members, records). There are no errors at points that are not ``noisy``.
@@ -651,15 +646,15 @@ def _over_time(
     return result | {"quantile": levels, "quantile_low": lowest, "quantile_high": highest}, freedom
 
 
-def _sum(values: np.ndarray) -> np.ndarray:
+def _sum(values: Array) -> Array:
     """Return the sum over the last axis of the values that are not nan."""
     sums = values.sum(axis=-1)
     return sums if np.isfinite(sums).all() else np.nansum(values, axis=-1)
 
 
 def _memory(
-    values: np.ndarray, levels: np.ndarray, mean: np.ndarray, complete: np.ndarray, step: float, noisy: bool
-) -> tuple[np.ndarray, np.ndarray]:
+    values: Array, levels: Array, mean: Array, complete: Array, step: float, noisy: bool
+) -> tuple[Array, Array]:
     """Return how many records count as one, for the mean and each quantile, with degrees of freedom; and the memory.
 
     The shapes are (quantities, points, 2) and (3, points). nan at points that are not ``complete``, of many members,
@@ -686,9 +681,7 @@ def _memory(
     return inflated, times
 
 
-def _errors(
-    means: np.ndarray, spreads: np.ndarray, inflated: np.ndarray, count: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _errors(means: Array, spreads: Array, inflated: Array, count: Array) -> tuple[Array, Array]:
     """Return standard errors of means and their degrees of freedom, from the members' means or the autocorrelation.
 
     Parameters
@@ -734,7 +727,7 @@ class Settlement(NamedTuple):
         return f"{self.verdict}: {begin} → {end} {shown}".rstrip() + f" over {span}"
 
 
-def settlement(values: np.ndarray, sem: float = math.nan, freedom: float = math.nan, noisy: bool = True) -> Settlement:
+def settlement(values: Array, sem: float = math.nan, freedom: float = math.nan, noisy: bool = True) -> Settlement:
     """Return if values have settled: if their drift over the span is not larger than its error.
 
     Parameters
@@ -766,7 +759,7 @@ def settlement(values: np.ndarray, sem: float = math.nan, freedom: float = math.
     return _settlements(values[np.newaxis], *one)[0]
 
 
-def _settlements(values: np.ndarray, sem: np.ndarray, freedom: np.ndarray, noisy: np.ndarray) -> list[Settlement]:
+def _settlements(values: Array, sem: Array, freedom: Array, noisy: Array) -> list[Settlement]:
     """Return the ``settlement`` at each point of a sweep; values have the shape (points, members, records)."""
     half = values.shape[-1] // 2
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -782,9 +775,7 @@ def _settlements(values: np.ndarray, sem: np.ndarray, freedom: np.ndarray, noisy
     return _settled(course, drift, error, free, noisy)
 
 
-def _settled(
-    courses: np.ndarray, drift: np.ndarray, error: np.ndarray, free: np.ndarray, noisy: np.ndarray
-) -> list[Settlement]:
+def _settled(courses: Array, drift: Array, error: Array, free: Array, noisy: Array) -> list[Settlement]:
     """Return the settlements of the members' means over time, with drifts, their errors and degrees of freedom.
 
     ``courses`` have the shape (points, records); unknown records are left out.
@@ -802,9 +793,7 @@ def _settled(
     return result
 
 
-def _settled_alike(
-    course: np.ndarray, drift: np.ndarray, error: np.ndarray, free: np.ndarray, noisy: np.ndarray
-) -> Iterator[Settlement]:
+def _settled_alike(course: Array, drift: Array, error: Array, free: Array, noisy: Array) -> Iterator[Settlement]:
     """Yield the settlements of ``_settled`` of courses that are known throughout."""
     records, chance = course.shape[1], 1.0 - 0.5 * _FALSE_ALARM
     few = max(1, int(_ENDS_SHARE * records))
@@ -831,7 +820,7 @@ def _settled_alike(
     return itertools.starmap(Settlement, zip(*columns, strict=True))
 
 
-def _of_two(states: list[Settlement], noisy: np.ndarray) -> list[Settlement]:
+def _of_two(states: list[Settlement], noisy: Array) -> list[Settlement]:
     """Return the settlements of two records, the first of which is the start of the run: the values at its end."""
     unknown = [bool(noise) or state.verdict.startswith("too short") for noise, state in zip(noisy, states, strict=True)]
     ends = [state._replace(verdict="too few records", value=state.end) for state in states]
@@ -839,7 +828,7 @@ def _of_two(states: list[Settlement], noisy: np.ndarray) -> list[Settlement]:
     return [end if is_unknown and state.begin != state.end else state for is_unknown, end, state in every]
 
 
-def _cycles(course: np.ndarray) -> np.ndarray:
+def _cycles(course: Array) -> Array:
     """Return the mean over whole cycles, its change from the first half to the second, and the 99 % bound of that.
 
     ``course`` has the shape (points, records). A cycle is from one rise through the mean to the next. If either half
@@ -854,7 +843,7 @@ def _cycles(course: np.ndarray) -> np.ndarray:
     sums = np.concatenate([np.zeros((points, 1)), sums], axis=1)
     at = sums[row, up] + share * (sums[row, up + 1] - sums[row, up])
 
-    def total(numbers: np.ndarray) -> np.ndarray:
+    def total(numbers: Array) -> Array:
         return np.bincount(row[:-1][pair], numbers, points)
 
     means, error, known = [], np.zeros(points), np.ones(points, bool)
@@ -872,7 +861,7 @@ def _cycles(course: np.ndarray) -> np.ndarray:
     return np.where(known, [average, means[1] - means[0], bound], nothing)
 
 
-def _openings(counts: np.ndarray, members: int, again: str, span: str) -> str:
+def _openings(counts: Array, members: int, again: str, span: str) -> str:
     """Return why contacts give no mean of what only a closed one has, by their count at each record; "" if they do."""
     if again or np.any(np.diff(counts) > 0):
         return f"{again or 'some'} of {members} contacts close again in {span}"
@@ -933,7 +922,6 @@ def distribution(
         values = values.reshape(-1, *values.shape[-2:])
         numbers, freedom = _over_time(values, step, name, differ)
         states = _settlements(values, numbers["sem"], freedom, differ)
-        states = _of_two(states, differ) if words == "the run" else states
         result |= _described(variable.rename(name), numbers, sweep, states, openings, words, differ)
     return xr.Dataset(result)
 
@@ -942,10 +930,10 @@ def _reader(dataset: xr.Dataset, names: Collection[str] | None) -> Callable[[str
     """Return a function that returns an observable; all are computed at once if the dataset is small."""
     if dataset.nbytes > ROOM:
         return partial(observable_of, dataset)
-    return chosen_observables(closed_only(dataset.compute()), names).__getitem__
+    return closed_observables(dataset.compute(), names).__getitem__
 
 
-def _series(dataset: xr.Dataset, variable: xr.DataArray, step: float) -> np.ndarray:
+def _series(dataset: xr.Dataset, variable: xr.DataArray, step: float) -> Array:
     """Return values of an observable, shape (..., members, records); the speed of a slider that may slip by its way."""
     sweep = dataset["contact_modulus"]
     fewest = 1 if "bonds_sites" in dataset.variables else 2  # single bonds slip without duration
@@ -955,14 +943,15 @@ def _series(dataset: xr.Dataset, variable: xr.DataArray, step: float) -> np.ndar
 
 
 def _described(
-    variable: xr.DataArray, numbers: dict[str, np.ndarray], sweep: xr.DataArray, states: list[Settlement],
-    openings: list[str], span: str, noisy: np.ndarray,
+    variable: xr.DataArray, numbers: dict[str, Array], sweep: xr.DataArray, states: list[Settlement],
+    openings: list[str], span: str, noisy: Array,
 ) -> dict[str, xr.DataArray]:  # fmt: skip
     """Return statistics of an observable over the sweep, with the reasons where there is no mean.
 
     ``numbers`` of each statistic have the points of the sweep first.
     """
     name, unit = str(variable.name), variable.attrs.get("units", "1")
+    states = _of_two(states, noisy) if span == "the run" else states
     opened = np.array(openings if is_of_contact(name) else [""] * sweep.size, object)
     drifts = np.array([state.reason(unit, span) for state in states], object)
     reasons = np.where(opened != "", opened, drifts)
@@ -1005,7 +994,7 @@ def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) ->
     reattach = (word(dataset, "contact.after_pull_off", "stop") == "reattach").broadcast_like(sweep).to_numpy().ravel()
     again = np.where(reattach & (counts.min(axis=-1) < members), "some", "")
     openings = [_openings(count, members, may, words) for count, may in zip(counts, again, strict=True)]
-    courses = chosen_observables(closed_only(late), names)
+    courses = closed_observables(late, names)
     whole, later = (chosen_observables(_as_last(late, with_drift), names) for with_drift in (False, True))
     result: dict[str, xr.DataArray] = {}
     for key in (str(key) for key in courses if not str(key).endswith(("_std", "_sem"))):
@@ -1020,7 +1009,6 @@ def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) ->
         course = rows_of(courses[key], sweep).reshape(points, -1)
         numbers = {"mean": mean, "sem": sem, "low": low, "high": high}
         states = _settled(course, after - mean, error, free[:, free.shape[1] // 2], differ)
-        states = _of_two(states, differ) if words == "the run" else states
         result |= _described(courses[key].rename(name), numbers, sweep, states, openings, words, differ)
     return xr.Dataset(result)
 
@@ -1045,14 +1033,10 @@ def observable_of(dataset: xr.Dataset, name: str) -> xr.DataArray:
     """Return an observable of a dataset in memory."""
     if name in dataset and not is_of_contact(name):
         return dataset[name].compute()  # load would keep each variable in the dataset
-
-    def of_piece(piece: xr.Dataset) -> xr.Dataset:
-        return chosen_observables(closed_only(piece), [name])
-
-    return in_pieces(restricted(dataset, [name]), ("t",), of_piece)[name]
+    return in_pieces(restricted(dataset, [name]), ("t",), lambda piece: closed_observables(piece, [name]))[name]
 
 
-def rows_of(variable: xr.DataArray, sweep: xr.DataArray) -> np.ndarray:
+def rows_of(variable: xr.DataArray, sweep: xr.DataArray) -> Array:
     """Return values of an observable at all points of the sweep, shape (..., members, records)."""
     sizes = {name: sweep.sizes.get(name, 1) for name in (*sweep.dims, MEMBERS) if name not in variable.dims}
     rows = variable.drop_vars(sizes, errors="ignore").expand_dims(sizes).transpose(*sweep.dims, MEMBERS, "t")

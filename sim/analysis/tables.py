@@ -31,7 +31,7 @@ from sim.analysis.events import unresolved_slips, varies
 from sim.analysis.observables import restricted, with_slips
 from sim.analysis.over_speed import extremes, loss_speeds
 from sim.analysis.statements import BOUNDED, COUNTS, as_means, each, of_events, reasons, statements, statistics
-from sim.analysis.statistics import FOR_TAILS, QUANTILES, WIDE, averaging, correlation_time, over_members
+from sim.analysis.statistics import FOR_TAILS, QUANTILES, WIDE, Array, averaging, correlation_time, over_members
 from sim.numerics.files import output
 from sim.units.notation import bounded, chosen_unit, concise, engineering, scaled, share
 
@@ -394,7 +394,7 @@ def _shown(means: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Col
     return cells
 
 
-def _at(variable: xr.DataArray | None, points: Points) -> np.ndarray:
+def _at(variable: xr.DataArray | None, points: Points) -> Array:
     """Return the values of a variable at each row; nan if there is no such variable."""
     count = next(iter(points.values())).size if points else 1
     values = np.nan if variable is None else variable.isel(points, missing_dims="ignore").to_numpy()
@@ -458,13 +458,13 @@ def _thinned(sizes: Mapping[Any, int], rows: int) -> dict[str, int]:
     return counts
 
 
-def _spread(size: int, count: int) -> np.ndarray:
+def _spread(size: int, count: int) -> Array:
     """Return at most ``count`` indices evenly over ``size``, the last included."""
     count = min(size, count)
     return np.rint(np.linspace(0 if count > 1 else size - 1, size - 1, count)).astype(int)
 
 
-def _cells(heading: str, unit: str, values: np.ndarray, errors: Any = 0.0, *ends: np.ndarray) -> Columns:
+def _cells(heading: str, unit: str, values: Array, errors: Any = 0.0, *ends: Array) -> Columns:
     """Return a column's cells in the unit of its largest value, under its heading with that unit."""
     if values.dtype.kind not in "fi":
         return {heading: [str(value) for value in values]}
@@ -497,7 +497,7 @@ def _spreads(dataset: xr.Dataset) -> bool:
 def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
     """Return a row of ``spread``."""
 
-    def of(kind: str) -> np.ndarray:
+    def of(kind: str) -> Array:
         return means[f"{column.name}_{kind}"].to_numpy()
 
     unit = means[f"{column.name}_mean"].attrs.get("units", "1")

@@ -16,7 +16,7 @@ from sim.analysis import bond_work, is_stationary, is_steady, setting, settled, 
 from sim.analysis.dataset import MEMBERS, speed_name, speed_of, stays_held
 from sim.analysis.events import jumps
 from sim.analysis.over_speed import speed_dim
-from sim.analysis.statistics import FOR_TAILS, averaging, of_second_half, over_members, summary
+from sim.analysis.statistics import FOR_TAILS, Array, averaging, of_second_half, over_members, summary
 from sim.plots import style
 from sim.plots.measured import Compared, Line, Measured
 from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, named, swept_value
@@ -95,7 +95,7 @@ class Scene(NamedTuple):
     over: str = ""
     heading: str = ""
     measured: Measured | None = None
-    x: np.ndarray = np.empty((0, 0))
+    x: Array = np.empty((0, 0))
     unit: Unit = Unit(1.0, "")
     words: str = ""
     scale: str = "linear"
@@ -120,30 +120,28 @@ class Scene(NamedTuple):
         """The heading, or a statement of the means of several curves; the name of a single curve states its own."""
         return self.heading or ("" if self.single else "; ".join(filter(None, [self.averaged, self.left_out])))
 
-    def placed(
-        self, over: str, x: np.ndarray, words: str, si: str, scale: str = "linear", broken: bool = False
-    ) -> "Scene":
+    def placed(self, over: str, x: Array, words: str, si: str, scale: str = "linear", broken: bool = False) -> "Scene":
         """Return the scene over values ``x`` [SI] of a variable, of shape (points,) or (curves, points)."""
         unit = Unit.of(x, si, scale == "log")
         x = np.broadcast_to(unit.factor * x, (len(self.lines), self.statistics.dataset.sizes[self.statistics.along]))
         return self._replace(over=over, x=x, unit=unit, words=unit.label(words), scale=scale, broken=broken)
 
     @property
-    def reach(self) -> np.ndarray:
+    def reach(self) -> Array:
         """Places on the x axis of the curves and of the measured points."""
         points = self.measured.column(self.over) if self.measured else None
         return self.x if points is None else np.append(self.x, self.unit.factor * points.values)
 
-    def opened(self, line: Line) -> np.ndarray:
+    def opened(self, line: Line) -> Array:
         """True where the contacts of all members are open."""
         return self.values("fraction_detached_mean", line.whole) >= 1.0
 
-    def openings(self, line: Line) -> tuple[np.ndarray, np.ndarray]:
+    def openings(self, line: Line) -> tuple[Array, Array]:
         """Return the records after which the contact opens, and those at which it has closed again."""
         gone = self.opened(line) & self.over_time
         return np.flatnonzero(~gone[:-1] & gone[1:]), np.flatnonzero(gone[:-1] & ~gone[1:]) + 1
 
-    def values(self, name: str, line: Line) -> np.ndarray:
+    def values(self, name: str, line: Line) -> Array:
         """Return a statistic along a curve; nan where it is not known."""
         points, known = self.statistics.dataset.sizes[self.statistics.along], self.statistics.get(name)
         if known is None:
@@ -151,11 +149,11 @@ class Scene(NamedTuple):
         values = np.broadcast_to(known.isel(line.point, missing_dims="ignore").to_numpy(), points)
         return values if line.shown is None else np.where(line.shown, values, np.nan)
 
-    def all(self, *names: str) -> np.ndarray:
+    def all(self, *names: str) -> Array:
         """Return statistics of all curves, of shape (statistics * curves, points)."""
         return np.stack([self.values(name, line) for name in names for line in self.lines])
 
-    def drawn(self, name: str, line: Line) -> list[np.ndarray]:
+    def drawn(self, name: str, line: Line) -> list[Array]:
         """Return the mean, its standard error, and both sides of the band.
 
         The band is between the 5 and 95 % quantiles, or one standard deviation to both sides if only that is recorded.
@@ -166,12 +164,12 @@ class Scene(NamedTuple):
             low, _, high = quantiles.isel(line.point).transpose("quantile", ...).to_numpy()
         return [mean, error, low, high]
 
-    def parted(self, line: Line, *along: np.ndarray) -> list[np.ndarray]:
+    def parted(self, line: Line, *along: Array) -> list[Array]:
         """Return the x values of a curve and values over them, with a nan at each gap of the line."""
         at = jumps(self.speeds(line), self.over.endswith("speed")) if self.broken else ()
         return [np.insert(values, at, np.nan) for values in (self.x[line.number], *along)]
 
-    def speeds(self, line: Line) -> np.ndarray:
+    def speeds(self, line: Line) -> Array:
         """Return the prescribed speed along a curve [m/s], of the stage if there is one."""
         staged = self.statistics.get("stage_speed_mean") is not None
         return self.values("stage_speed_mean" if staged else "speed_mean", line.whole)
@@ -181,7 +179,7 @@ class Scene(NamedTuple):
         return _changes(self.all(f"{name}_mean"))
 
 
-def _changes(values: np.ndarray) -> bool:
+def _changes(values: Array) -> bool:
     known = values[np.isfinite(values)]
     return known.size > 0 and bool(np.ptp(known) > 1e-12 * np.max(np.abs(known)))
 
@@ -417,7 +415,7 @@ def series(name: str, words: str, si: str, usual: bool = False) -> Panel:
 friction_panel = series("friction_force", "friction $F$", "N")
 
 
-def _size_panel(name: str, words: str, si: str, of_radius: Callable[[np.ndarray], np.ndarray]) -> Panel:
+def _size_panel(name: str, words: str, si: str, of_radius: Callable[[Array], Array]) -> Panel:
     """Return a panel of the size of the contact between Hertz's and JKR's, a function of the radius."""
 
     def panel_of(panel: Axes, scene: Scene) -> None:
@@ -435,11 +433,11 @@ radius_panel = _size_panel("contact_radius", "contact radius $a$", "m", lambda r
 area_panel = _size_panel("contact_area", "contact area $A$", "m^2", lambda radius: np.pi * radius**2)
 
 
-def _same(curves: Sequence[np.ndarray]) -> bool:
+def _same(curves: Sequence[Array]) -> bool:
     return all(np.array_equal(values, curves[0], equal_nan=True) for values in curves)
 
 
-def _reference(panel: Axes, scene: Scene, curves: list[np.ndarray], dashes: str, name: str, **look: Any) -> None:
+def _reference(panel: Axes, scene: Scene, curves: list[Array], dashes: str, name: str, **look: Any) -> None:
     """Draw lines of a closed form: one grey line if all curves have the same, else lines in their colours."""
     known = [_broken(values) for values in curves]
     if not np.any(np.isfinite(known)):
@@ -455,7 +453,7 @@ def _reference(panel: Axes, scene: Scene, curves: list[np.ndarray], dashes: str,
     panel.plot([], [], dashes, label=name, **style.GREY)
 
 
-def _broken(values: np.ndarray) -> np.ndarray:
+def _broken(values: Array) -> Array:
     """Return values without the zeros of an open contact; a zero beside a closed contact begins a line."""
     none = ~(values > 0.0)
     alone = none & np.append(True, none[:-1]) & np.append(none[1:], True)
@@ -529,7 +527,7 @@ def _stacked_shares(panel: Axes, scene: Scene) -> None:
         style.fill(panel, x, ratio, bonds, color=style.FLUCTUATIONS, alpha=_SHADE, label="lost to fluctuations")
 
 
-def stacked(scene: Scene, panels: list[tuple[float, Panel]], ax: Axes | None = None) -> tuple[Figure, list[Axes]]:
+def stacked(scene: Scene, panels: Sequence[tuple[float, Panel]], ax: Axes | None = None) -> tuple[Figure, list[Axes]]:
     """Return panels of given heights [in] above each other with one x axis, lettered, and a colour bar if there is one.
 
     Below them are residuals of measured points, if any. With ``ax`` the first panel alone is drawn, there.
@@ -704,7 +702,7 @@ def statement_curves(panel: Axes, scene: Scene, name: str) -> float:
     return factor
 
 
-def _interval(panel: Axes, scene: Scene, line: Line, curves: list[np.ndarray]) -> None:
+def _interval(panel: Axes, scene: Scene, line: Line, curves: list[Array]) -> None:
     """Draw values with the ends of their intervals, and arrows where an end is a bound."""
     x, (mean, low, high), label = scene.x[line.number], curves, "" if scene.single else line.label
     look: Any = {"color": line.colour, "elinewidth": 0.8, "capsize": 1.5, "linestyle": "none"}

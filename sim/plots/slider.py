@@ -17,17 +17,7 @@ from sim.analysis.observables import with_slips
 from sim.analysis.over_speed import population_of, speed_dim
 from sim.laws import schallamach
 from sim.plots import style
-from sim.plots.curves import (
-    Panel,
-    Scene,
-    contact_curves,
-    over_key,
-    over_speed,
-    scene_along,
-    series,
-    stacked,
-    statement_curves,
-)
+from sim.plots.curves import Scene, contact_curves, over_key, over_speed, scene_along, series, stacked, statement_curves
 from sim.plots.measured import Line, Measured
 from sim.units.errors import BadInput
 
@@ -270,7 +260,7 @@ def stress_figure(dataset: xr.Dataset, data: Measured | None = None, ax: Axes | 
         contact_curves(panel, scene, "bond_fraction", 1.0)
         panel.set_ylabel("bond fraction $N/N_0$")
 
-    panels: list[tuple[float, Panel]] = [(2.1, stress_panel), (1.3, fraction_panel)]
+    panels = [(2.1, stress_panel), (1.3, fraction_panel)]
     return stacked(scene, panels if scene.varies("bond_fraction") else panels[:1], ax=ax)[0]
 
 

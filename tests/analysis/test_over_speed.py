@@ -11,7 +11,7 @@ from helpers.parts import Adhesion, Band, Clock, Equilibrium, RateDependent, Rec
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.analysis import dataset as dataset_module, over_speed
-from sim.analysis.observables import charges, chosen_observables
+from sim.analysis.observables import charges, closed_observables
 from sim.laws import jkr
 from sim.units.errors import BadInput
 
@@ -160,8 +160,8 @@ def test_crossings_are_exact_on_straight_lines_and_a_ramp_is_read_in_pieces(monk
     ramp, read = lens.ramp().isel(member=[0]), []
     whole = analysis.loss_speeds(ramp)
     monkeypatch.setattr(dataset_module, "ROOM", 500)
-    reading = lambda some, names: read.append(some.sizes["t"]) or chosen_observables(some, names)  # noqa: E731
-    monkeypatch.setattr(over_speed, "chosen_observables", reading)
+    reading = lambda some, names: read.append(some.sizes["t"]) or closed_observables(some, names)  # noqa: E731
+    monkeypatch.setattr(over_speed, "closed_observables", reading)
     xr.testing.assert_identical(analysis.loss_speeds(ramp), whole)
     assert len(read) > 1 and sum(read) == ramp.sizes["t"] and math.isfinite(whole[NAMES[0]])
 
