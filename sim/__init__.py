@@ -52,14 +52,9 @@ __all__ = sorted([*_FROM, *_FOLDERS, *_FUNCTIONS, "BadInput"])
 
 
 def run(
-    scenario: "Scenario | Path | dict[str, Any]",
-    to: Path | None = None,
-    *,
-    replace: bool = False,
-    resume: bool = False,
-    jobs: int = 1,
-    progress: bool | Callable[[int], None] = False,
-) -> Any:
+    scenario: "Scenario | Path | dict[str, Any]", to: Path | None = None, *, replace: bool = False,
+    resume: bool = False, jobs: int = 1, progress: bool | Callable[[int], None] = False,
+) -> Any:  # fmt: skip
     """Run a scenario with its ensemble and its sweep.
 
     Parameters
@@ -146,14 +141,9 @@ def stats(dataset: "xarray.Dataset | Path", where: dict[str, Any] | None = None)
 
 
 def plot(
-    dataset: "xarray.Dataset | Path",
-    kind: str | None = None,
-    to: Path | None = None,
-    where: dict[str, Any] | None = None,
-    *,
-    ax: "Axes | None" = None,
-    **choices: Any,
-) -> "Figure | Axes":
+    dataset: "xarray.Dataset | Path", kind: str | None = None, to: Path | None = None,
+    where: dict[str, Any] | None = None, *, ax: "Axes | None" = None, **choices: Any,
+) -> "Figure | Axes":  # fmt: skip
     """Draw a figure of a run, by default of the kind that fits best. Save it if ``to`` is a file.
 
     Parameters
@@ -197,13 +187,9 @@ def converge(scenario: "Scenario | Path | dict[str, Any]", budget: float | str =
 
 
 def fit(
-    scenario: "Scenario | Path | dict[str, Any]",
-    data: "Path | Sequence[Path]",
-    free: "Iterable[str]",
-    common: dict[str, float] | None = None,
-    steady: bool = False,
-    per_table: "Iterable[str]" = (),
-) -> "Fit":
+    scenario: "Scenario | Path | dict[str, Any]", data: "Path | Sequence[Path]", free: "Iterable[str]",
+    common: dict[str, float] | None = None, steady: bool = False, per_table: "Iterable[str]" = (),
+) -> "Fit":  # fmt: skip
     """Calibrate keys of a scenario to measured curves.
 
     Parameters
@@ -235,14 +221,9 @@ def fit(
 
 
 def plan(
-    scenario: "Scenario | Path | dict[str, Any]",
-    points: Path,
-    free: "Iterable[str]",
-    candidates: Path | None = None,
-    common: dict[str, float] | None = None,
-    sims: int = 400,
-    seed: int | None = None,
-) -> "Plan":
+    scenario: "Scenario | Path | dict[str, Any]", points: Path, free: "Iterable[str]", candidates: Path | None = None,
+    common: dict[str, float] | None = None, sims: int = 400, seed: int | None = None,
+) -> "Plan":  # fmt: skip
     """Return what a planned measurement can tell, and which further point helps most to tell mechanisms apart.
 
     Parameters

@@ -468,14 +468,10 @@ def paper() -> None:
 @click.argument("scenario", required=False, type=_PATH)
 @_SET
 @click.option("--data", type=_PATH, help="A CSV of measured curves, with columns as those of `sim fit`.")
-@click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, help="Port of this machine; default one that is free."
-)
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port of this machine. Default: a free one.")
 @click.option("--state", default="", metavar="LINK", help="Numbers from the address of another page.")
 @click.option("--browser/--no-browser", default=True, help="Open the page in a browser.")
-def explore(
-    scenario: Path | None, changes: tuple[str, ...], data: Path | None, port: int, state: str, browser: bool
-) -> None:
+def explore(scenario: Path | None, changes: tuple[str, ...], browser: bool, **page: Any) -> None:
     """Explore a scenario with sliders, on a page in the browser.
 
     Without SCENARIO it is the starter scenario. The page is open to this machine only. Needs the extra `explore`.
@@ -486,7 +482,7 @@ def explore(
 
     with contextlib.nullcontext(scenario) if scenario else as_file(files("sim").joinpath("starter.toml")) as path:
         scene = _load(path, changes)
-    serve(Server(scene, port, data, state), browser, say)
+    serve(Server(scene, **page), browser, say)
 
 
 @cli.command()

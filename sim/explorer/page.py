@@ -96,12 +96,9 @@ class Page:
     def start(self) -> dict[str, Any]:
         """Return what the page needs once: title, sliders, and why its curves are a preview alone."""
         return {
-            "title": self.scenario.name,
-            "sliders": [slider._asdict() for slider in self.sliders],
-            "preview": list(previews(self.scenario)),
-            "members": self.scenario.ensemble.members,
-            "data": self._first,
-        }
+            "title": self.scenario.name, "sliders": [slider._asdict() for slider in self.sliders],
+            "preview": list(previews(self.scenario)), "members": self.scenario.ensemble.members, "data": self._first,
+        }  # fmt: skip
 
     def read(self, values: Mapping[str, Any], built: bool = True) -> Scenario:
         """Return the scenario with numbers [SI], or text with units, by key; ``built`` as of ``Scenario.with_values``.

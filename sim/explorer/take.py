@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from sim.ensemble.dataset import scenario_json
 from sim.parts.exchange import Array
 from sim.plots import style
+from sim.plots.style import BONDS, BOTH, FLUCTUATIONS, REFERENCE
 from sim.scenario.files import written
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
@@ -21,11 +22,7 @@ from sim.units.notation import engineering
 from sim.units.quantity import Quantity
 
 #: Shares of the lost area, from the curve of the contact upwards, with their colours.
-_LOST = {
-    "lost_to_fluctuations": style.FLUCTUATIONS,
-    "lost_to_mean_stress": style.REFERENCE,
-    "lost_to_bonds": style.BONDS,
-}
+_LOST = {"lost_to_fluctuations": FLUCTUATIONS, "lost_to_mean_stress": REFERENCE, "lost_to_bonds": BONDS}
 
 
 def toml(scenario: Scenario, changed: Mapping[str, float], fixed: Mapping[str, Any]) -> str:
@@ -82,16 +79,16 @@ def figure(scenario: Scenario, speeds: Array) -> Figure:
         x = speeds * style.in_unit(friction.xaxis, "sliding speed $V$", speeds, "m/s")
         lost = [name for name in _LOST if name in curves and np.any(curves[name] != 0.0)]
         levels = np.cumsum([100.0 * curves[name].to_numpy() for name in ("area_ratio", *lost)], axis=0)
-        area.plot(x, levels[0], color=style.BOTH, label="contact")
+        area.plot(x, levels[0], color=BOTH, label="contact")
         for name, low, high in zip(lost, levels, levels[1:], strict=False):
             look: Any = {"color": _LOST[name], "alpha": 0.3, "linewidth": 0.0}
             area.fill_between(x, low, high, label=name.replace("_", " "), **look)
         area.set_ylabel(r"$A/A_{\mathrm{JKR}}$ (%)")
         scale = style.in_unit(energy.yaxis, "energy", np.array([scenario.adhesion.work]), "J/m^2")
-        energy.plot(x, scale * curves["work_of_adhesion"], color=style.BOTH, label="$w$")
-        energy.plot(x, scale * curves["fluctuation_energy"], color=style.FLUCTUATIONS, label=r"$\Delta\Gamma$")
+        energy.plot(x, scale * curves["work_of_adhesion"], color=BOTH, label="$w$")
+        energy.plot(x, scale * curves["fluctuation_energy"], color=FLUCTUATIONS, label=r"$\Delta\Gamma$")
         force = style.in_unit(friction.yaxis, "friction $F$", curves["friction_force"].to_numpy(), "N")
-        friction.plot(x, force * curves["friction_force"], color=style.BOTH)
+        friction.plot(x, force * curves["friction_force"], color=BOTH)
         friction.set_xscale("log")
         for panel in (area, energy):
             style.legend(panel)
