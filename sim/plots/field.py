@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from sim.analysis.dataset import where_recorded, word
+from sim.analysis.dataset import sweep_dims, where_recorded, word
 from sim.laws.halfspace import angular_compliance, displacement
 from sim.plots import style
 from sim.spectrum.radial import Rowed, Waves
@@ -31,17 +31,11 @@ def needs_maps(dataset: xr.Dataset) -> None:
         raise ValueError('there are no stress maps; record some: [shear] model = "mapped" and [record] maps = ["1 s"]')
 
 
-def _maps_of(point: xr.Dataset, at: float | None) -> xr.DataArray:
-    """Return the last maps, or those nearest to a time [s], of all members that have some."""
-    number = -1 if at is None else int(np.abs(point["map_time"].to_numpy() - at).argmin())
-    return point["shear_map"].isel(map_time=number).transpose("map_member", "x", "y")
-
-
 def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     """Last stress map of a member, or the map nearest to a time, and the displacement by this stress."""
-    where, words = style.first_point(dataset)
-    point = dataset.isel(where)
-    stress = _maps_of(point, at).isel(map_member=0)
+    point = dataset.isel(dict.fromkeys(sweep_dims(dataset), 0))
+    number = -1 if at is None else int(np.abs(point["map_time"].to_numpy() - at).argmin())
+    stress = point["shear_map"].isel(map_time=number, map_member=0).transpose("x", "y")
     sides, measured = sides_of(stress), bool(word(dataset, "shear.field.file", ""))
     solid = (float(point[f"effective_{name}"]) for name in ("shear_modulus", "poisson_ratio"))
     moved = displacement(stress.to_numpy(), sides, *solid)
@@ -62,7 +56,7 @@ def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     then = f"$t$ = {style.text_of(stress['map_time'], 's')}, $V$ = {style.text_of(speed, 'm/s')}"
     with where_recorded():
         then += rf", mean $\tau_0$ = {style.rounded(_then(point, 'shear_stress', stress), 'Pa')}"
-    axes[0].set_title(", ".join(filter(None, [words, then])))
+    axes[0].set_title(", ".join([*(style.swept_value(dataset, name, 0) for name in style.swept(dataset)), then]))
     return figure
 
 

@@ -140,12 +140,6 @@ def swept(dataset: xr.Dataset) -> list[str]:
     return [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
 
 
-def first_point(dataset: xr.Dataset) -> tuple[dict[str, int], str]:
-    """Return the first point of a sweep, by index and in words."""
-    words = ", ".join(swept_value(dataset, name, 0) for name in swept(dataset))
-    return dict.fromkeys(sweep_dims(dataset), 0), words
-
-
 def recorded(dataset: xr.Dataset, name: str) -> xr.DataArray:
     """Return a variable of each member, or its mean if only statistics are recorded."""
     return dataset[name if name in dataset else f"{name}_mean"].astype(float)

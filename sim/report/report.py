@@ -90,11 +90,8 @@ def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
     best, of_points = kinds.default(dataset), kinds.default(dataset, points)
     could = kinds.drawable(dataset)
     speeds = speed_of(dataset).to_numpy() if speed_name(dataset) in dataset else np.zeros(1)
-    both_ways = bool(np.all(speeds > 0.0) or np.all(speeds < 0.0)) and np.unique(speeds).size > _SPEEDS
-    others = [
-        kind for kind in could
-        if kind in _ALSO or kinds.KINDS[kind].fits(dataset) or (kind == "curve" and both_ways)
-    ]  # fmt: skip
+    moves = bool(np.all(speeds > 0.0) or np.all(speeds < 0.0)) and np.unique(speeds).size > _SPEEDS
+    others = [kind for kind in could if kind in _ALSO or kinds.KINDS[kind].fits(dataset) or (kind == "curve" and moves)]
     # theories have an axis of their own; the end of a run that is on its way says little, and over the speed a sweep
     # is a curve already; only bonds with a rupture law have a maximum of the stress, which transients after steps
     # between few speeds do not show, nor many springs upon each other

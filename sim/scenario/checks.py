@@ -154,10 +154,8 @@ def remarks_between(scene: Scene) -> list[str]:
     _, bonds, shear, contact = scene.chosen
     speeds, varies = scene.speeds(41), scene.varies["shear"]
     remarks = []
-    if scene.sphere.radius > _LARGEST_SPHERE:
-        remarks.append(
-            f'sphere.radius is {scene.sphere.radius:g} m: a number without a unit is in metres, write "5 mm"'
-        )
+    if (radius := scene.sphere.radius) > _LARGEST_SPHERE:
+        remarks.append(f'sphere.radius is {radius:g} m: a number without a unit is in metres, write "5 mm"')
     if varies and bonds.feeds_back and not contact.lags:
         remarks.append('carried area does not converge in a fluctuating contact: use model = "rate_dependent"')
     if contact.after_pull_off == "reattach" and bonds.stretched and not bonds.feeds_back:

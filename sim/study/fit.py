@@ -665,9 +665,8 @@ def scenario_text(scenario: Scenario, fit: Fit, folder: Path, table: int = 0) ->
     source, values = scenario.origin, fit.of_table(table) if fit.differences else fit.values
     units = {key: quantity.unit for key, (quantity, _) in quantities(scenario).items()}
     units |= {f"contact.{scenario.contact.kind}": MOUNT[scenario.contact.kind][1]}
-    tables, numbers = parse(source.text, source.path), dict[str, Any]()
-    for key, value in values.items():
-        numbers[key] = value if units[key] == "1" else f"{value:.12g} {units[key]}"
+    tables = parse(source.text, source.path)
+    numbers = {key: value if units[key] == "1" else f"{value:.12g} {units[key]}" for key, value in values.items()}
     override(tables, source.overrides | numbers)
     above = Path(source.path).parent
     if above.resolve() != folder.resolve():

@@ -752,9 +752,7 @@ def with_difference(problem: Problem, best: Minimum, k: int, base: int, is_ratio
     return replace(problem, free=free), best._replace(x=x, covariance=covariance)
 
 
-def problem_of(
-    scenario: Scenario, tables: Sequence[Measured], free: Sequence[Free], common: dict[str, float]
-) -> Problem:
+def problem_of(scenario: Scenario, tables: Sequence[Measured], free: list[Free], common: dict[str, float]) -> Problem:
     """Return the problem of some tables; ``BadInput`` if they hold fewer numbers than are free."""
     curves = [curve for table in tables for curve in table.curves]
     names = [curve.name for curve in curves]

@@ -218,7 +218,8 @@ def others(problem: Problem) -> Iterator[tuple[str, Problem]]:
     scene, known = problem.groups[0][0].scenario, quantities(problem.groups[0][0].scenario)
     still = {"shear.paid_by_adhesion": 0.0} if "shear.paid_by_adhesion" in known else {}
     share = {"adhesion.bond_share": 0.0}
-    if all(_acting(problem)):
+    is_bonded = scene.adhesion.bond_share > 0.0 and scene.population.carries_stress
+    if is_bonded and "shear.paid_by_adhesion" in known and scene.fluctuations.paid_by_adhesion > 0.0:
         yield "bonds only", _less(problem, still, "shear.")
         yield "fluctuations only", _less(problem, share, "adhesion.bond_share")
     if scene.contact.kind == "displacement" or not scene.population.carries_stress or problem.by_run:
@@ -226,13 +227,6 @@ def others(problem: Problem) -> Iterator[tuple[str, Problem]]:
     for theory, (words, more) in _THEORIES.items():
         other = _less(problem, still | share, "shear.", "adhesion.bond_share")
         yield words, replace(other, free=(*other.free, *more), theory=theory)
-
-
-def _acting(problem: Problem) -> tuple[bool, bool]:
-    """Return True for bonds and for fluctuations if they change the work of adhesion in the scenario as it is."""
-    scene, known = problem.groups[0][0].scenario, quantities(problem.groups[0][0].scenario)
-    bonded = scene.adhesion.bond_share > 0.0 and scene.population.carries_stress
-    return bonded, "shear.paid_by_adhesion" in known and scene.fluctuations.paid_by_adhesion > 0.0
 
 
 def _less(problem: Problem, fixed: dict[str, float], *without: str) -> Problem:

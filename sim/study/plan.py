@@ -263,9 +263,8 @@ def plan(
         raise BadInput([f"sims: {sims} simulated data sets do not show a probability; give {LEAST_SIMS} or more"])
     if base.drive.solves_motion:
         raise BadInput([f'--plan: drive.model = "{base.drive.model}" needs runs; plan with a prescribed speed'])
-    remarks = ["curves are those of steady sliding"]
-    if base.is_random:
-        remarks = ["the models of the scenario have noise; curves are those of steady sliding with its means"]
+    noise = "the models of the scenario have noise; curves are those of steady sliding with its means"
+    remarks = [noise if base.is_random else "curves are those of steady sliding"]
     numbers, table = [fits.free_number(base, text) for text in free], _read(points, base)
     if not all(np.isnan(item.values).all() for item in table.curves):
         remarks.append(f"{points}: measured values are not used; a plan predicts them")
@@ -315,9 +314,7 @@ def _read(path: Path, scenario: Scenario, template: Sequence[str] = ()) -> Measu
     return table
 
 
-def _predicted(
-    scenario: Scenario, tables: Sequence[Measured], free: Sequence[Free], common: dict[str, float]
-) -> Problem:
+def _predicted(scenario: Scenario, tables: Sequence[Measured], free: list[Free], common: dict[str, float]) -> Problem:
     """Return the problem of some tables, with the values that the scenario predicts and their errors."""
     problem = likelihood.problem_of(scenario, tables, free, common)
     values = problem.predicted(problem.start)
