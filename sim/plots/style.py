@@ -95,9 +95,9 @@ def rows(heights: list[float], shared: bool = True) -> tuple[Figure, list[Axes]]
     return figure, axes
 
 
-def pairs(height: float, count: int = 1, shared: bool = False) -> tuple[Figure, list[Axes]]:
-    """Return a picture of two columns and a height [in]: lettered pairs of panels, with one y axis if shared."""
-    return _panels((WIDE, height), (count, 2), sharey=shared)
+def pairs(height: float, shared: bool = False) -> tuple[Figure, list[Axes]]:
+    """Return a picture of two columns and a height [in]: a lettered pair of panels, with one y axis if shared."""
+    return _panels((WIDE, height), (1, 2), sharey=shared)
 
 
 def _panels(size: tuple[float, float], count: tuple[int, int], **options: Any) -> tuple[Figure, list[Axes]]:

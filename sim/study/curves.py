@@ -65,7 +65,7 @@ def steady_curves(scenario: Scenario, speeds: Array, time: float = 0.0) -> "xr.D
     return result
 
 
-def speeds_of_loss(scenario: Scenario, share: float, speeds: Array, time: float = 0.0) -> list[float]:
+def speeds_of_loss(scenario: Scenario, share: float, speeds: Array) -> list[float]:
     """Return the speeds [m/s] in steady sliding at which a share of JKR's area is lost, between some speeds.
 
     Each crossing between two neighbours of ``speeds``, which grow, is solved to rounding in the logarithm of the speed.
@@ -73,9 +73,9 @@ def speeds_of_loss(scenario: Scenario, share: float, speeds: Array, time: float 
     from scipy import optimize
 
     def surplus(logarithm: float) -> float:
-        return float(curves(scenario, np.exp([logarithm]), time)["area_ratio"][0]) - (1.0 - share)
+        return float(curves(scenario, np.exp([logarithm]))["area_ratio"][0]) - (1.0 - share)
 
-    left = curves(scenario, speeds, time)["area_ratio"] - (1.0 - share)
+    left = curves(scenario, speeds)["area_ratio"] - (1.0 - share)
     places = np.flatnonzero((left[:-1] > 0.0) != (left[1:] > 0.0))
     ends: Sequence[tuple[float, float]] = [(np.log(speeds[k]), np.log(speeds[k + 1])) for k in places]
     return [float(np.exp(optimize.brentq(surplus, low, high, xtol=1e-12, rtol=1e-12))) for low, high in ends]
