@@ -28,7 +28,7 @@ _FINE = 1e-3
 _FAR, _BESIDE, _APART = 1e6, 0.3, 3.0
 #: Binary logarithm of the most places at which a search may start, their range without bounds, in large changes, and
 #: how many of them are tried for measured curves.
-_SPREAD, _AROUND, _STARTS = 8, 3.0, 3
+_SPREAD, _AROUND, _STARTS = 8, 3.0, 12
 #: What rejects a mechanism: probability of a ratio at least as large, and difference of AICc.
 RARE, WORSE = 0.05, 4.0
 

@@ -150,6 +150,16 @@ def test_the_command_proposes_a_point_above_the_onset_and_draws_what_it_prints(t
     assert isinstance(again.exception, BadInput)
 
 
+def test_the_search_of_a_verdict_leaves_the_minimum_of_the_fit_for_a_lower_one(tmp_path):
+    """Curves of fluctuations alone, with errors for which few bonds that break early are better than all."""
+    problem = problem_of(load(SPRUNG), points(tmp_path / "points.csv", ACROSS, 4.0), AREA_KEYS)
+    expected = planning._Design(problem).expected["fluctuations only"]
+    (values,) = itertools.islice(drawn(problem, expected, 103, 0), 102, None)
+    data = replace(problem, values=values)
+    best = likelihood.minimum(data, data.start, errors=True)
+    assert mechanisms.Search(data, [best.x]).exact(values).chi_square < best.chi_square - 3.0
+
+
 @pytest.mark.verify
 @pytest.mark.parametrize(("truth", "error"), [("bonds only", 4.0), ("fluctuations only", 4.0), (WHOLE, 2.3)])
 def test_probabilities_are_those_of_the_verdict_over_200_data_sets(tmp_path, truth, error):
