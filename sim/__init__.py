@@ -30,7 +30,7 @@ import pathlib
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from sim.units.errors import BadInput
+from sim.units.errors import BadInput, naming
 
 if TYPE_CHECKING:  # what a function needs is imported where it is called, so that importing the package costs nothing
     import pandas
@@ -347,13 +347,8 @@ def _plainly(function: Callable[..., Any], dataset: "xarray.Dataset | Path", whe
     """Return the result of a function of a dataset, or of a file with one; its faults become ``BadInput``."""
     from sim.analysis.statistics import where as chosen
 
-    try:
-        with open(dataset) if isinstance(dataset, str | os.PathLike) else contextlib.nullcontext(dataset) as opened:
-            return function(chosen(opened, where or {}))
-    except BadInput:
-        raise
-    except ValueError as fault:
-        raise BadInput([str(fault)]) from None
+    with naming(), open(dataset) if isinstance(dataset, str | os.PathLike) else contextlib.nullcontext(dataset) as data:
+        return function(chosen(data, where or {}))
 
 
 def __getattr__(name: str) -> Any:

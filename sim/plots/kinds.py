@@ -20,7 +20,7 @@ from sim.numerics.files import claim as claim_file
 from sim.plots import curves, field, movie, slider, style, theories
 from sim.plots.measured import Measured
 from sim.plots.style import STYLE, recorded, save, swept_value
-from sim.units.errors import BadInput
+from sim.units.errors import BadInput, naming
 from sim.units.notation import in_units
 from sim.units.quantity import read_option
 
@@ -258,7 +258,7 @@ def drawn(
     BadInput
         For an unknown kind or format, or a path that must not be written.
     """
-    try:
+    with naming(source):
         suffix = ".gif" if kind == "movie" else ".png"
         target = path or source.with_name(f"{source.stem}{'-' + kind if kind else ''}{suffix}")
         if kind == "movie" and target.suffix.lower() not in (".gif", ".mp4"):
@@ -267,10 +267,6 @@ def drawn(
         claim(dataset, source, target, replace, *tables)
         figure = draw(dataset, kind, choices)
         save(figure, target)
-    except BadInput:
-        raise
-    except ValueError as fault:
-        raise BadInput([f"{source}: {fault}"]) from None
     return target, " ".join(figure.get_supxlabel().split()) if choices.data is not None else ""
 
 
@@ -292,9 +288,6 @@ def planned(source: Path, kind: str | None, path: Path | None, replace: bool, ch
         fault = f"a figure before a run takes no options ({', '.join(chosen)})"
         raise BadInput([f"{source}: {fault}; name the dataset that `sim run` writes"])
     claim_file(target, replace, files_read(scene))
-    try:
-        with mpl.rc_context(STYLE):
-            save(field.density_figure(scene), target)
-    except ValueError as lack:
-        raise BadInput([f"{source}: {lack}"]) from None
+    with naming(source), mpl.rc_context(STYLE):
+        save(field.density_figure(scene), target)
     return target

@@ -29,7 +29,7 @@ from sim.plots.kinds import Choices
 from sim.plots.measured import Measured
 from sim.plots.style import STYLE
 from sim.scenario.files import toml
-from sim.units.errors import BadInput
+from sim.units.errors import naming
 from sim.units.terminal import plain
 
 #: Measured points: a CSV table, or columns in SI by name.
@@ -186,12 +186,8 @@ def written(
     """
     target = path or source.with_suffix(".html")
     claim(dataset, source, target, replace, *filter(None, [data]))
-    try:
+    with naming(source):
         text = html(dataset, source, data, lost)
-    except BadInput:
-        raise
-    except ValueError as fault:
-        raise BadInput([f"{source}: {fault}"]) from None
     with output(target) as beside:
         beside.write_text(text, encoding="utf-8")
     return target

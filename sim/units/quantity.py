@@ -19,7 +19,7 @@ from typing import Any, TypeVar, dataclass_transform
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, dataclasses
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from sim.units.errors import BadInput
+from sim.units.errors import naming
 
 T = TypeVar("T")
 _NUMBER = r"[+-]?(?:(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?|inf(?:inity)?|nan)"
@@ -296,7 +296,5 @@ def read_option(value: float | str | None, name: str, unit: str, **bounds: Any) 
     number: float | str = value
     with contextlib.suppress(ValueError):
         number = float(value)
-    try:
+    with naming(f"{name} {value}"):
         return Quantity(unit, name, **bounds).read(number)
-    except ValueError as fault:
-        raise BadInput([f"{name} {value}: {fault}"]) from None
