@@ -87,6 +87,27 @@ def _cast(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
 
 
+@intrinsic
+def borrowed(typing: Any, arrays: Any) -> Any:
+    """An array, or a tuple of arrays, whose references are not counted because the caller holds the array.
+
+    To count the references of the arguments of a short helper takes longer than the helper.
+    """
+    return arrays(arrays), _without_owner
+
+
+def _without_owner(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    kind, value = signature.return_type, arguments[0]
+    if isinstance(kind, numba.types.Array):
+        array = context.make_array(kind)(context, builder, value)
+        array.meminfo = array.meminfo.type(None)
+        return array._getvalue()
+    for place, inner in enumerate(getattr(kind, "types", ())):
+        part = _without_owner(context, builder, inner(inner), (builder.extract_value(value, place),))
+        value = builder.insert_value(value, part, place)
+    return value
+
+
 #: Every kernel and law that was imported, by its name in the cache; calling one compiles or loads it.
 compiled: dict[str, Callable[[], Callable]] = {}
 #: Called with the name of each kernel or law that is about to be compiled, as it is not in the cache.

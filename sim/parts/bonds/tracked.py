@@ -56,7 +56,7 @@ TINY = 2.2250738585072014e-308
 #: its ratio to ``rate``, relative growth of that rate in unit time, length and speed.
 _STEP = record("x time clock rate grown pace duration speed")
 #: Rows of the ends of a step: bonds of less due, free sites of less time and bonds of less birth have had an event.
-_RUPTURE, _BINDING, _CUT = range(3)
+RUPTURE, BINDING, _CUT = range(3)
 #: Bits of a number that are left out where a step is looked up, 128 ranges for each power of two; most ranges.
 _LEFT_OUT, _RANGES = np.int64(45), 4096
 
@@ -112,7 +112,7 @@ def lay_out(step, slip, duration, x, time, clock, law, space):
     at = steps[step]
     at.x, at.time, at.clock, at.rate = x, time, clock, first
     at.grown, at.pace, at.duration, at.speed = grown, speed * softness, duration, speed
-    ends[_RUPTURE, step], ends[_BINDING, step], ends[_CUT, step] = after, time + duration, x + slip - limit
+    ends[RUPTURE, step], ends[BINDING, step], ends[_CUT, step] = after, time + duration, x + slip - limit
     return after
 
 
@@ -155,7 +155,7 @@ def follow(bonds, soonest, count, law, address, space):
     (birth, due, life), (steps, ends, changes, index, lowest), (_, _, limit, rebinding) = bonds, space, law
     bits, bounded, (seed, member) = views(due, soonest), limit < math.inf, address
     signed, unsigned, binding, rupture, rear = bits
-    clock, time, cut = ends[_RUPTURE, count - 1], ends[_BINDING, count - 1], ends[_CUT, count - 1]
+    clock, time, cut = ends[RUPTURE, count - 1], ends[BINDING, count - 1], ends[_CUT, count - 1]
     clock_bits, time_bits = np.float64(clock).view(np.uint64), np.float64(-time).view(np.int64)
     changes[:, :count] = 0.0
     for block in range(rear.size):
@@ -167,7 +167,7 @@ def follow(bonds, soonest, count, law, address, space):
             at, x, k, events, number = due[i], birth[i], 0, 0, life[i]
             bound = signed[i] >= 0
             while True:
-                row, value, next_ = (_RUPTURE if bound else _BINDING), math.fabs(at), count
+                row, value, next_ = (RUPTURE if bound else BINDING), math.fabs(at), count
                 if value <= ends[row, count - 1]:
                     place = min(max(_range(value) - lowest[row], 0), _RANGES - 1)
                     next_ = max(k, np.int64(index[row, place]))
@@ -466,26 +466,81 @@ def draw(tracks, chosen, speed, share, age, law, seed, members):
 
 
 @device
-def next_event(tracks, speed, most, law):
+def _rank(place, winners, soonest):
+    """Write the first rupture and the first binding at one place of the ``winners``: of a block or of two places."""
+    block = place - winners.shape[1] // 2
+    for row in range(2):
+        soon = soonest[row, block] if 0 <= block < soonest.shape[1] else math.nan
+        value = math.fabs(soon) if math.copysign(1.0, soon) == 1.0 - 2.0 * row and soon == soon else math.inf
+        winners[row, place] = value if block >= 0 else min(winners[row, 2 * place], winners[row, 2 * place + 1])
+
+
+@device
+def rank(tracks, law, winners):
+    """Set the frame anew if it is far from its origin, and write the ``winners`` if they are not those of the frame.
+
+    Place 1 has the first rupture and the first binding of all blocks. Each place has the earlier of the two places at
+    twice its number, so an event changes few of them. Place 0 has the number of steps.
+    """
+    bonds, soonest, frame = tracks
+    if _far(frame[SLIDER], frame[TIME], law):
+        _set(bonds, soonest, frame, law, False, False)
+        winners[0, 0] = -1.0
+    if winners[0, 0] != frame[STEPS]:
+        for place in range(winners.shape[1] - 1, 0, -1):
+            _rank(place, winners, soonest)
+        winners[0, 0] = frame[STEPS]
+
+
+@device
+def let_pass(frame, slip, duration, clock, winners):
+    """Advance a row whose bonds are stepped together, by a slip and to a ``clock``, while nothing happens to them."""
+    frame[SLIDER], frame[TIME], frame[CLOCK] = frame[SLIDER] + slip, frame[TIME] + duration, clock
+    frame[STEPS] += 1.0
+    winners[0, 0] = frame[STEPS]
+
+
+@device
+def happen(tracks, event, law, address, winners):
+    """Break the bond, or bind the site, that is first among the ``winners``: at the place and time of the frame."""
+    ((birth, due, life), soonest, frame), (_, softness, limit, rebinding), (seed, member) = tracks, law, address
+    place, value, x, sign = 1, winners[event, 1], frame[SLIDER], 1.0
+    while place < winners.shape[1] // 2:
+        place = 2 * place if winners[event, 2 * place] == value else 2 * place + 1
+    block = place - winners.shape[1] // 2
+    i, value = block * BLOCK, -value if event == BINDING else value
+    while due[i] != value:
+        i += 1
+    if event == BINDING:
+        due[i], birth[i] = frame[CLOCK] + birth[i] * math.exp(softness * x), x
+    else:
+        x, sign = birth[i], -1.0
+        life[i] += np.uint32(1)
+        first, second, _, _ = words_at(seed, PART, _U(i + 1), _U(life[i]), member, _U(0))
+        birth[i], wait = exponential(first), exponential(second) / rebinding
+        due[i] = -max(frame[TIME] + wait, TINY) if rebinding > 0.0 else -math.inf
+    frame[BOUND], frame[SUM], frame[SQUARES] = frame[BOUND] + sign, frame[SUM] + sign * x, frame[SQUARES] + sign * x * x
+    least(views(due, soonest), birth, block, limit < math.inf)
+    while place > 0:
+        _rank(place, winners, soonest)
+        place //= 2
+
+
+@device
+def next_event(tracks, speed, most, law, winners):
     """Return the time to the next rupture or binding at a speed [m/s], at most ``most``."""
     ((birth, due, _), soonest, frame), (rate, softness, limit, _) = tracks, law
-    along, x, clock, time = frame[SENSE] * speed, frame[SLIDER], frame[CLOCK], frame[TIME] + most
+    along = frame[SENSE] * speed
     if frame[SINGLY] == 0.0 and along >= 0.0:
-        first, rearmost = math.inf, math.inf
-        for block in range(soonest.shape[1]):
-            rupture, binding = soonest[0, block], soonest[1, block]
-            if math.copysign(1.0, rupture) > 0.0:
-                first = min(first, rupture)
-            if math.copysign(1.0, binding) < 0.0:
-                time = min(time, -binding)
-            rearmost = min(rearmost, soonest[2, block])
-        soon = time - frame[TIME]
+        rank(tracks, law, winners)
+        x, soon, first = frame[SLIDER], min(most, winners[BINDING, 1] - frame[TIME]), winners[RUPTURE, 1]
         if first < math.inf and rate > 0.0:
             grown = rate * math.exp(softness * x)
-            soon = min(soon, moment(first - clock, grown, along * softness, math.inf, most))
-        if along > 0.0 and rearmost < math.inf:
-            soon = min(soon, (rearmost + limit - x) / along)
+            soon = min(soon, moment(first - frame[CLOCK], grown, along * softness, math.inf, most))
+        if along > 0.0 and limit < math.inf:
+            soon = min(soon, (np.min(soonest[2]) + limit - x) / along)
         return max(soon, 0.0)
+    x, clock = frame[SLIDER], frame[CLOCK]
     soon = most
     for i in range(due.size):
         if math.copysign(1.0, due[i]) < 0.0:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.numerics.jit import device, kernel
+from sim.numerics.jit import borrowed, device, kernel
 from sim.parts.bonds import tracked
 from sim.parts.coupled import mechanics
 from sim.parts.coupled.cohorts import NODE, accept_nodes, balance, before_node, begin_sub_step, bend_of, stored_energy
@@ -22,6 +22,13 @@ from sim.parts.exchange import Array
 _ROUNDING = 1e-13
 #: Length over a clock step's in which bonds are displaced at once.
 _AT_ONCE = 1e-18
+#: Places and shares of Gauss's rule in a unit of time; largest growth of a rate and relaxation of a speed within it.
+_GAUSS = np.polynomial.legendre.leggauss(6)
+_PLACES, _SHARES, _MOST = 0.5 * (1.0 + _GAUSS[0]), 0.5 * _GAUSS[1], 2.0
+#: Force over those that balance, and change of a speed or a rate of force over it, below which each is a rounding.
+_BALANCED, _STEADY = 1e-14, 1e-9
+#: Change of a time over it after which Newton's method has no more than roundings left.
+_LAST_TURN = 1e-7
 #: Turns in which a node or an event is found, and trials of a sub-step.
 _TURNS, _TRIALS = 20, 200
 #: Share of a sub-step before its end in which an event is at the end.
@@ -36,6 +43,7 @@ class Ground(NamedTuple):
     law: tuple[float, ...]
     address: tuple[int, int]
     space: tuple[Array, ...]
+    winners: Array
 
 
 @device
@@ -58,6 +66,17 @@ def _go(tracks, shift, duration, ground):
 
 
 @device
+def _go_at_once(tracks, shift, length, ground):
+    """Displace the slider in no time; bonds whose stretch is limited may break."""
+    frame, along = tracks[2], tracks[2][tracked.SENSE] * shift * ground.unit
+    if frame[tracked.SINGLY] > 0.0 or along < 0.0 or ground.law[2] < math.inf:
+        _go(tracks, shift, _AT_ONCE * length, ground)
+        return
+    tracked.rank(tracks, ground.law, ground.winners)
+    tracked.let_pass(frame, along, 0.0, frame[tracked.CLOCK], ground.winners)
+
+
+@device
 def _same(node, bound, total):
     """True if number and stretch of the bonds of a node are these, except for rounding."""
     return node.bound == bound and math.fabs(node.moment - total) <= 1e-9 * (math.fabs(total) + bound)
@@ -66,22 +85,22 @@ def _same(node, bound, total):
 @device
 def _rebalance(line, time, tracks, slider, contact, ground, energy, node):
     """Slip at once to where bonds bear the pull, as far as nothing delays it; True if there is such a place."""
-    row, trial, worked, unit, limit = line[0], np.empty(1, mechanics.ROW), energy.work, ground.unit, ground.law[2]
+    row, trial, worked, unit, limit = line[0], line[2], energy.work, ground.unit, ground.law[2]
     for _ in range(mechanics.MOST_STEPS):
         energy.work = worked
         _sums(tracks, ground, node)
         row.bound, row.moment = node.bound, node.moment
-        trial[0] = row
-        if not mechanics.elastic(trial[0], time, slider, contact, energy):
+        line[2] = row
+        if not mechanics.elastic(trial, time, slider, contact, energy):
             return False
-        slip, square = trial[0].slip - row.slip, node.square
+        slip, square = trial.slip - row.slip, node.square
         if not math.fabs(slip) > _ROUNDING * (math.fabs(node.moment) + node.bound):
-            line[0] = trial[0]
+            line[0] = trial
             return True
         nearest = tracked.next_cut(tracks, slip, limit) / unit if limit < math.inf else math.inf
         whole = nearest >= math.fabs(slip)
         slip = slip if whole else math.copysign(nearest * (1.0 + 1e-12) + 1e-12 * limit / unit, slip)
-        _go(tracks, slip, _AT_ONCE * slider.length, ground)
+        _go_at_once(tracks, slip, slider.length, ground)
         total, expected = row.moment + row.bound * slip, square + slip * (2.0 * row.moment + row.bound * slip)
         _, area, _, _ = mechanics.contact_area(row.bound, row.moment, time, row.radius, contact)
         _sums(tracks, ground, node)
@@ -89,7 +108,7 @@ def _rebalance(line, time, tracks, slider, contact, ground, energy, node):
         if broken:
             energy.rupture += 0.5 * area * (expected - node.square)
         if whole:
-            line[0] = trial[0]
+            line[0] = trial
             worked = energy.work
             if not broken:
                 return True
@@ -153,6 +172,117 @@ def _after_event(line, time, tracks, slider, contact, ground, energy, nodes):
 
 
 @device
+def _is_closed(slider, contact, limit):
+    """True if the motion between events has a closed form: pull linear in time, area constant, stretch not limited."""
+    first, last, length = slider.first, slider.last, slider.length
+    size = _STEADY * (math.fabs(first) + math.fabs(last))
+    is_linear = math.fabs(slider.integral / length - 0.5 * (first + last)) <= size
+    is_linear = is_linear and (slider.forced > 0.0 or math.fabs(last - first) <= size)
+    changes = contact.load_rate != 0.0 or contact.base_rate != 0.0 or contact.mean_stress != 0.0
+    is_held = contact.field.length == math.inf and (contact.stays > 0.0 or not changes)
+    return is_linear and is_held and slider.mass + slider.viscosity == 0.0 and limit == math.inf
+
+
+@device
+def _relaxed(x):
+    """Return (1 - e^-x)/x."""
+    return -math.expm1(-x) / x if x > 0.0 else 1.0
+
+
+@device
+def _clock(time, motion, pace):
+    """Return the integral of e^(pace slip) over a time, by Gauss's rule, and the last of the values.
+
+    A ``motion`` is the first speed of the interface, the one to which it relaxes, and the rate of that.
+    """
+    first, last, rate = motion
+    mean = 0.0
+    for i in range(len(_PLACES)):
+        part = _PLACES[i] * time
+        mean += _SHARES[i] * math.exp(pace * part * (last + (first - last) * _relaxed(rate * part)))
+    return time * mean, math.exp(pace * time * (last + (first - last) * _relaxed(rate * time)))
+
+
+@device
+def _time_of(value, most, whole, grown, motion, pace):
+    """Return the time at which the clock has a value, by Newton's method; ``whole`` and ``grown``: as at ``most``.
+
+    The first guess is a cubic in the clock, by its slopes at both ends.
+    """
+    share, left = value / whole, 1.0 - value / whole
+    time = share * share * (most * (1.0 + 2.0 * left) - whole / grown * left) + share * left * left * whole
+    for _ in range(_TURNS):
+        time = min(max(time, 0.0), most)
+        passed, slope = _clock(time, motion, pace)
+        time -= (passed - value) / slope
+        if math.fabs(passed - value) <= _LAST_TURN * slope * time:
+            break
+    return min(max(time, 0.0), most)
+
+
+@device
+def _to_event(row, start, left, tracks, slider, ground, energy, node):
+    """Advance row and bonds in closed form to the next event, or as far as Gauss's rule is exact.
+
+    Return the time that has passed, below zero if bonds are not stretched along the motion, and the event, or -1.
+    """
+    frame, (rate, softness, _, _), winners, event = tracks[2], ground.law, ground.winners, -1
+    if frame[tracked.SINGLY] > 0.0 or not node.area >= 0.0:
+        return -1.0, event
+    pull, bears = mechanics.pull_on(start, start, 0.0, row, slider), node.area * node.bound
+    body, force = 1.0 + mechanics.compliance(node.radius, slider)[0] * bears, node.area * node.moment
+    growth = (slider.last - slider.first if slider.forced > 0.0 else slider.stiffness * slider.integral) / slider.length
+    stiffness, damping = slider.stiffness * body + bears, slider.damping * body  # of the slip: it moves the body more
+    last = growth / stiffness if stiffness > 0.0 else 0.0
+    first, relaxes, sense = last, 0.0, frame[tracked.SENSE]
+    if damping > 0.0:
+        over, relaxes = pull - force, stiffness / damping
+        first = over / damping if math.fabs(over) > _BALANCED * (math.fabs(pull) + math.fabs(force)) else 0.0
+        last = last if stiffness > 0.0 else first
+    if sense * first < 0.0 or sense * last < 0.0 or (stiffness == 0.0 and (damping == 0.0 or growth != 0.0)):
+        return -1.0, event
+    tracked.rank(tracks, ground.law, winners)
+    motion, bent, clock, pace = (
+        (first, last, relaxes),
+        first - last,
+        frame[tracked.CLOCK],
+        softness * ground.unit * sense,
+    )
+    binding, rupture = max(winners[tracked.BINDING, 1] - frame[tracked.TIME], 0.0), winners[tracked.RUPTURE, 1]
+    time, fastest = min(left, binding), math.fabs(pace) * max(math.fabs(first), math.fabs(last))
+    time = time if fastest * time <= _MOST else _MOST / fastest
+    if relaxes * time > _MOST:  # the error of the rule is of order 13 in the time, and of first order in this change
+        change = min(max(math.fabs(pace * bent) / relaxes, 1e-16), 1.0)
+        time = min(time, _MOST * change ** (-1.0 / 13.0) / relaxes)
+    event = tracked.BINDING if time == binding else event
+    grown, (whole, slope) = rate * math.exp(softness * frame[tracked.SLIDER]), _clock(time, motion, pace)
+    if rupture <= clock + grown * whole:
+        event, waits, clock = tracked.RUPTURE, rupture - clock, max(rupture, clock)
+        time = _time_of(waits / grown, time, whole, slope, motion, pace) if waits > 0.0 else 0.0
+    else:
+        clock += grown * whole
+    x = relaxes * time
+    early, twice = _relaxed(x), _relaxed(2.0 * x)
+    late = (1.0 - early) / x if x > 1e-3 else 0.5 - x / 6.0 + x * x / 24.0 - x * x * x / 120.0
+    slip, travelled = time * (last + bent * early), body * time * time * (0.5 * last + bent * late)
+    if slider.forced > 0.0:
+        energy.work += body * slip * (pull + growth * time) - growth * travelled
+    else:
+        pulled = time * (pull + 0.5 * growth * time) - slider.stiffness * travelled
+        energy.work += slider.integral / slider.length * pulled
+    energy.damping += damping * body * time * (last * (last + 2.0 * bent * early) + bent * bent * twice)
+    row.spring_force = mechanics.pull_on(start + time, start, 0.0, row, slider)
+    mechanics.displace(row, slip, body * slip, slider)
+    row.speed, row.acceleration = last + bent * (1.0 - x * early), -relaxes * bent * (1.0 - x * early)
+    row.body_speed, row.sheared, row.substeps = body * row.speed, row.sheared + (body - 1.0) * slip, row.substeps + 1.0
+    row.radius = node.radius
+    tracked.let_pass(frame, math.fabs(slip) * ground.unit, time, clock, winners)
+    if event >= 0:
+        tracked.happen(tracks, event, ground.law, ground.address, winners)
+    return time, event
+
+
+@device
 def _piece(line, tracks, slider, contact, ground, nodes, books):
     """Go through one piece of a clock step; return the time of its end or of lost stability.
 
@@ -161,6 +291,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
     """
     start, length, unit, law = 0.0, slider.length, ground.unit, ground.law
     row, energy, first, last = line[0], books[0], nodes[0], nodes[2]
+    is_closed = _is_closed(slider, contact, law[2])
     for _ in range(mechanics.MOST_STEPS):
         left = length - start
         if left <= mechanics.LEAST * length:
@@ -168,6 +299,22 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
         _sums(tracks, ground, first)
         row.bound, row.moment = first.bound, first.moment
         at_start = begin_sub_step(row, first, start, slider, contact)
+        if is_closed:
+            slid = row.slip
+            time, event = _to_event(row, start, left, tracks, slider, ground, energy, first)
+            if time >= 0.0:
+                start = length if event < 0 and time == left else start + time
+                slip, last.area = row.slip - slid, first.area
+                square = first.square + slip * (2.0 * first.moment + first.bound * slip)
+                _sums(tracks, ground, first)
+                row.bound, row.moment = first.bound, first.moment
+                if event == tracked.RUPTURE:
+                    energy.rupture += 0.5 * last.area * (square - first.square)
+                if event == tracked.RUPTURE or (event >= 0 and contact.stays == 0.0 and contact.bonded != 0.0):
+                    is_balanced, contact = _after_event(line, start, tracks, slider, contact, ground, energy, nodes)
+                    if not is_balanced:
+                        return start, contact.stays
+                continue
         step = mechanics.next_step(row, left, length, math.inf)
         whole, bend, grows, cut, turns = step, 0.0, 0.0, False, 0
         for _ in range(_TRIALS):
@@ -185,7 +332,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
                 step, cut = step * grows, False
                 continue
             whole = step if not cut else whole
-            soon = tracked.next_event(tracks, last.slip * unit / step, whole, law)
+            soon = tracked.next_event(tracks, last.slip * unit / step, whole, law, ground.winners)
             if turns < _TURNS and (soon < (1.0 - _NEAR) * step or (cut and soon > step)):
                 cut, turns = soon < whole, turns + 1
                 step = min(max(soon * (1.0 + 0.5 * _NEAR), 2.0 * mechanics.LEAST * length), whole)
@@ -194,7 +341,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
         if not step > mechanics.LEAST * length:
             slid, row.next_step = row.slip, 0.0
             if law[2] == math.inf and mechanics.snap(row, first.square, start, slider, contact, energy):
-                _go(tracks, row.slip - slid, _AT_ONCE * length, ground)
+                _go_at_once(tracks, row.slip - slid, length, ground)
                 row.acceleration = 0.0
                 continue
             if contact.stays > 0.0:
@@ -274,12 +421,16 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
         if stamp[m] != np.int64(frame[m, tracked.STEPS]):
             return tracked.SPENT
     space = tracked.room(), np.empty(1), np.empty(1), np.empty(tracked.COLUMNS + 1), np.empty((tracked.COLUMNS, 1))
-    both, nodes = (np.empty(2 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES)), np.zeros(3, NODE)
-    line, books = both[0].view(mechanics.ROW), both[1].view(ENERGY)  # as they are, and before the last sub-step
-    columns, booked = both[0][: mechanics.COLUMNS], both[1][: mechanics.ENERGIES]
+    width = 2
+    while width < 2 * soonest.shape[2]:
+        width *= 2
+    rooms = np.empty(3 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES), np.zeros(3, NODE), np.empty((2, width))
     for m in range(len(rows)):
-        stop, bonds = 0, ((birth[m], due[m], life[m]), soonest[m], frame[m])
-        ground = Ground(units[mechanics.SLIP], np.float64(due.shape[1]), law, (seed, members[m]), space)
+        (columns, booked, nodes, winners), work_room = borrowed(rooms), borrowed(space)
+        line, books = columns.view(mechanics.ROW), booked.view(ENERGY)  # as they are, before a sub-step, in a trial
+        stop, bonds = 0, borrowed(((birth[m], due[m], life[m]), soonest[m], frame[m]))
+        ground = Ground(units[mechanics.SLIP], np.float64(due.shape[1]), law, (seed, members[m]), work_room, winners)
+        columns, booked, winners[0, 0] = columns[: mechanics.COLUMNS], booked[: mechanics.ENERGIES], -1.0
         for k in range(len(clock)):
             start, stop = stop, mechanics.pieces_to(k, stop, pieces)
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)

@@ -1,17 +1,21 @@
 """Slider and bonds followed one by one, solved together, against closed forms, cohorts and their own statistics."""
 
+import dataclasses
 import functools
 import math
 
 import numpy as np
 import pytest
-from helpers.driven import AREA, STRETCH, UNIT, force, march, marched, residual, scenario, spring
+from helpers.driven import AREA, LOAD, STRETCH, UNIT, force, march, marched, reached, residual, scenario, spring
+from helpers.scenes import IN_TIME
 from numpy.testing import assert_allclose
 
 from sim import run
 from sim.analysis import stick_slip
 from sim.parts.bonds import Cohort, Tracked
 from sim.parts.bonds.rupture import Constant, CutOff
+from sim.parts.drive import Force
+from sim.parts.shear import Banded
 
 
 def tracked(duration, steps, drive, sites, **keys):
@@ -48,6 +52,27 @@ def test_the_energies_of_every_slider_are_balanced_and_bonds_snap_where_nothing_
         assert missing[1] < max(0.3 * missing[0], 1e-10)
         slips_at_once = "viscosity" not in keys and ("contact" in keys or not keys)
         assert (read["dissipated_by_snaps"][-1] > 1e-12 * read["drive_work"][-1]) == slips_at_once
+
+
+@pytest.mark.parametrize("rupture", [{}, {"rupture": Constant(rate=1.0)}])
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_the_closed_form_from_event_to_event_is_the_limit_of_short_sub_steps(rupture, share):
+    # the area changes with the bonds and with the fluctuations; a load that hardly changes takes the sub-steps
+    fluctuating, firm = Banded(**IN_TIME), {"damping": 0.3 * UNIT / STRETCH, "tolerance": 1e-10}
+    slow, grows = {"stiffness": 0.2, "tolerance": 1e-10}, {"from": 0.1 * UNIT, "to": UNIT}
+    of_spring = {}, {"damping": 0.05}, {"contact": 0.2}, {"contact": 0.2, "damping": 0.3}
+    drives = [spring(**slow, **keys) for keys in of_spring] + [force(0.5, **firm), Force(force=grows, **firm)]
+    for drive in drives:
+        still, moving = (
+            dataclasses.replace(tracked(3.0, 6, drive, 20, share=share, load=load, **rupture), shear=fluctuating)
+            for load in (LOAD, {"from": LOAD, "to": LOAD * (1.0 + 1e-12)})
+        )
+        (closed, read), (stepped, other) = marched(still), marched(moving)
+        ends = [reached(states, "position") for states in (closed, stepped)]
+        assert_allclose(*ends, rtol=1e-6, atol=1e-8)
+        assert all(np.array_equal(*lives) for lives in zip(closed[-1].bonds.life, stepped[-1].bonds.life, strict=True))
+        assert share > 0.0 or drive.damping == 0.0 or read["substeps"][-1] < 0.5 * other["substeps"][-1]
+        assert residual(read) < 1e-9
 
 
 def test_many_bonds_above_the_onset_fluctuate_as_one_over_the_root_of_their_number_about_the_cohorts():
