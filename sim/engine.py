@@ -199,11 +199,10 @@ def _step_contact(scenario: Scenario, contact_state: ContactState, shear: Storin
     share = 1.0 if scenario.margin is None else scenario.margin(np.nan_to_num(contact_state.radius, nan=0.0))
     bare, paid = adhesion.work_of_bonds(0.0), scenario.fluctuations.paid_by_adhesion * share
     bonded = adhesion.work_of_bonds(1.0) - adhesion.work_of_bonds(0.0)
-    stays = contact.lags or not (contact.changes or bonded or contact.reversible)
     mounts = first.mount, last.mount
     bodies, shear_modulus, area = scenario.bodies, scenario.solid.effective[0], scenario.contact_area
     of_contact = contact_state.radius, bare, paid, shear, bonded, contact.reversible
-    return StepContact(*of_contact, mounts, stays, bodies, shear_modulus, area)
+    return StepContact(*of_contact, mounts, scenario.holds_contact, bodies, shear_modulus, area)
 
 
 def _pull(scenario: Scenario, time: float | Array, radius: Array) -> Array:

@@ -24,6 +24,7 @@ from numpy.testing import assert_allclose
 from sim import engine
 from sim.engine import MemberNoise, follow, pack, trajectory_of, unpack
 from sim.parts import shear
+from sim.parts.contact.models import Adhesion
 from sim.parts.shear.process import SlipRate
 
 DEPTHS = {"drive": DRIVES, "bonds": BONDS, "shear": SHEARS, "contact": CONTACTS}
@@ -68,8 +69,8 @@ def same(one, two):
     return left.keys() == right.keys() and all(np.array_equal(left[k], right[k], equal_nan=True) for k in left)
 
 
-def check_case(case, members=3, steps=6):
-    scenario = scene(members, steps, **{part: DEPTHS[part][name] for part, name in case.items()})
+def check_case(case, members=3, steps=6, **parts):
+    scenario = scene(members, steps, **parts, **{part: DEPTHS[part][name] for part, name in case.items()})
     straight = list(march(scenario, np.arange(members)))
     assert len(straight) == steps + 1
     restarted = list(march(scenario, np.arange(members), unpack(scenario, pack(straight[2]))))
@@ -119,7 +120,8 @@ def balance_of(scenario, state):
     mean = 0.0  # a stress is unknown once nothing holds the body
     if scenario.contact.reversible:
         mean = scenario.contact.reversible * 6.0 * stress**2 * radius / (np.pi * scenario.solid.contact_modulus)
-    return 42e-3 * state.bonding.fraction - paid - mean
+    work, of_bonds = scenario.adhesion.work, scenario.adhesion.bond_share
+    return work * (1.0 - of_bonds + of_bonds * state.bonding.fraction) - paid - mean
 
 
 def check_cases(cases):
@@ -137,6 +139,14 @@ def test_any_depth_runs_with_any_depth(name):
 
 
 @pytest.mark.timeout(120)
+@pytest.mark.parametrize("drive", ["spring", "force"])
+def test_bonds_followed_one_by_one_go_through_blocks_of_steps_in_a_contact_that_stays(drive):
+    rigid = Adhesion(work=42e-3, bond_share=0.0)
+    assert scene(drive=DRIVES[drive], bonds=BONDS["tracked"]).by_steps
+    assert not scene(drive=DRIVES[drive], bonds=BONDS["tracked"], adhesion=rigid).by_steps
+    check_case({"drive": drive, "bonds": "tracked"}, adhesion=rigid)
+
+
 def test_more_fronts_between_bonds_of_one_limit_than_there_is_room_for_are_given_up():
     check_case({"drive": "spring", "contact": "machine", "bonds": "cohort, cut-off", "shear": "mapped, fixed, stress"})
 

@@ -424,15 +424,23 @@ class Scenario:
 
         With a drive that solves the motion, bonds and an equilibrium contact are solved within its sub-steps. A block
         of such steps needs fluctuations that do not affect the contact, or that the loop over the steps can draw.
+        Bonds followed one by one are advanced in place, so the contact must not end a block early: it stays throughout.
         """
         _, bonds, shear, contact = self.chosen
-        alone = contact.lags or not (self._contact_stays or shear.in_blocks) or not bonds.in_blocks
+        in_blocks = bonds.in_blocks or (self._contact_stays and self.holds_contact)
+        alone = contact.lags or not (self._contact_stays or shear.in_blocks) or not in_blocks
         return any(part.feeds_back for part in self.chosen[1:]) or (self.drive.solves_motion and alone)
 
     @property
     def draws_within(self) -> bool:
         """Return True if the loop of a drive that solves the motion draws the fluctuations that the contact feels."""
         return self.drive.solves_motion and not (self.by_steps or self._contact_stays)
+
+    @property
+    def holds_contact(self) -> bool:
+        """Return True if neither bonds nor the mount change the contact within the sub-steps of a slider."""
+        contact, work = self.contact, self.adhesion.work_of_bonds
+        return contact.lags or not (contact.changes or contact.reversible or work(1.0) != work(0.0))
 
     @property
     def _contact_stays(self) -> bool:
