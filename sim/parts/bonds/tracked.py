@@ -558,9 +558,7 @@ def next_cut(tracks, direction, limit):
     along, x = frame[SENSE] * direction, frame[SLIDER]
     nearest = math.inf
     if frame[SINGLY] == 0.0 and along >= 0.0:
-        for block in range(soonest.shape[1]):
-            nearest = min(nearest, soonest[2, block] + limit - x)
-        return max(nearest, 0.0)
+        return max(np.min(soonest[2]) + limit - x, 0.0)
     for i in range(due.size):
         if math.copysign(1.0, due[i]) > 0.0:
             stretch = x - birth[i] if along >= 0.0 else birth[i] - x

@@ -27,8 +27,8 @@ _GAUSS = np.polynomial.legendre.leggauss(6)
 _PLACES, _SHARES, _MOST = 0.5 * (1.0 + _GAUSS[0]), 0.5 * _GAUSS[1], 2.0
 #: Force over those that balance, and change of a speed or a rate of force over it, below which each is a rounding.
 _BALANCED, _STEADY = 1e-14, 1e-9
-#: Change of a time over it after which Newton's method has no more than roundings left.
-_LAST_TURN = 1e-7
+#: Change of a time over it after which Newton's method, whose error is then of the order of its square, has converged.
+_LAST_TURN = 1e-5
 #: Turns in which a node or an event is found, and trials of a sub-step.
 _TURNS, _TRIALS = 20, 200
 #: Share of a sub-step before its end in which an event is at the end.
@@ -174,10 +174,9 @@ def _after_event(line, time, tracks, slider, contact, ground, energy, nodes):
 @device
 def _is_closed(slider, contact, limit):
     """True if the motion between events has a closed form: pull linear in time, area constant, stretch not limited."""
-    first, last, length = slider.first, slider.last, slider.length
-    size = _STEADY * (math.fabs(first) + math.fabs(last))
-    is_linear = math.fabs(slider.integral / length - 0.5 * (first + last)) <= size
-    is_linear = is_linear and (slider.forced > 0.0 or math.fabs(last - first) <= size)
+    first, last, mean = slider.first, slider.last, slider.integral / slider.length
+    bends = math.fabs(mean - 0.5 * (first + last)) + (0.0 if slider.forced > 0.0 else math.fabs(last - first))
+    is_linear = bends <= _STEADY * (math.fabs(first) + math.fabs(last))
     changes = contact.load_rate != 0.0 or contact.base_rate != 0.0 or contact.mean_stress != 0.0
     is_held = contact.field.length == math.inf and (contact.stays > 0.0 or not changes)
     return is_linear and is_held and slider.mass + slider.viscosity == 0.0 and limit == math.inf
@@ -212,12 +211,12 @@ def _time_of(value, most, whole, grown, motion, pace):
     share, left = value / whole, 1.0 - value / whole
     time = share * share * (most * (1.0 + 2.0 * left) - whole / grown * left) + share * left * left * whole
     for _ in range(_TURNS):
-        time = min(max(time, 0.0), most)
         passed, slope = _clock(time, motion, pace)
-        time -= (passed - value) / slope
-        if math.fabs(passed - value) <= _LAST_TURN * slope * time:
+        change = (value - passed) / slope
+        time = min(max(time + change, 0.0), most)
+        if math.fabs(change) <= _LAST_TURN * time:
             break
-    return min(max(time, 0.0), most)
+    return time
 
 
 @device
@@ -256,11 +255,10 @@ def _to_event(row, start, left, tracks, slider, ground, energy, node):
         time = min(time, _MOST * change ** (-1.0 / 13.0) / relaxes)
     event = tracked.BINDING if time == binding else event
     grown, (whole, slope) = rate * math.exp(softness * frame[tracked.SLIDER]), _clock(time, motion, pace)
-    if rupture <= clock + grown * whole:
-        event, waits, clock = tracked.RUPTURE, rupture - clock, max(rupture, clock)
+    waits, clock = rupture - clock, clock + grown * whole
+    if rupture <= clock:
         time = _time_of(waits / grown, time, whole, slope, motion, pace) if waits > 0.0 else 0.0
-    else:
-        clock += grown * whole
+        event, clock = tracked.RUPTURE, rupture
     x = relaxes * time
     early, twice = _relaxed(x), _relaxed(2.0 * x)
     late = (1.0 - early) / x if x > 1e-3 else 0.5 - x / 6.0 + x * x / 24.0 - x * x * x / 120.0
@@ -421,9 +419,7 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
         if stamp[m] != np.int64(frame[m, tracked.STEPS]):
             return tracked.SPENT
     space = tracked.room(), np.empty(1), np.empty(1), np.empty(tracked.COLUMNS + 1), np.empty((tracked.COLUMNS, 1))
-    width = 2
-    while width < 2 * soonest.shape[2]:
-        width *= 2
+    width = 2 << np.int64(math.ceil(math.log2(soonest.shape[2])))
     rooms = np.empty(3 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES), np.zeros(3, NODE), np.empty((2, width))
     for m in range(len(rows)):
         (columns, booked, nodes, winners), work_room = borrowed(rooms), borrowed(space)
