@@ -2,6 +2,8 @@
 
 import bisect
 import contextlib
+import csv
+import io
 import math
 import os
 import re
@@ -148,6 +150,8 @@ _MEMORY = _Column("correlation_time", "t_c", meaning="integral correlation time 
 _TURNS = 3
 #: Shares below it are nothing; spread over the mean below which a motion without noise has settled.
 _ROUNDING, _SETTLED = 1e-13, 1e-3
+#: Rows of a CSV file that are written at once.
+_LINES = 2**15
 
 
 def stated(dataset: xr.Dataset, lost: Sequence[str] = ()) -> xr.Dataset:
@@ -547,8 +551,30 @@ def to_csv(
     units = {str(name): variable.attrs.get("units", "1") for name, variable in dataset.coords.items()}
     units |= {"speed": "m/s"}
     header = list(rows) if wide else [_with_unit(name, units.get(name, "1")) for name in rows]
-    with output(Path(path)) as beside:
-        rows.to_csv(beside, header=header, index=False, na_rep="nan", lineterminator="\n")
+    with output(Path(path)) as beside, beside.open("w", encoding="utf-8", newline="") as file:
+        file.write(",".join(_quoted(header)) + "\n")
+        for start in range(0, len(rows), _LINES):  # because the texts of all rows together take much memory
+            part = rows.iloc[start : start + _LINES]
+            file.writelines(map("{}\n".format, map(",".join, zip(*(_texts(part[name]) for name in part), strict=True))))
+
+
+def _texts(column: pd.Series) -> list[str]:
+    """Return the texts of a column in CSV, each of which is made once, because most values of a sweep repeat."""
+    values = column.to_numpy()
+    bits = values.view(np.int64) if values.dtype == np.float64 else values  # 0.0 and -0.0 differ
+    places, alike = pd.factorize(bits, use_na_sentinel=False)
+    texts = _quoted(alike) if bits is values else list(map(repr, alike.view(np.float64).tolist()))
+    return list(map(texts.__getitem__, places.tolist()))
+
+
+def _quoted(values: Iterable[Any]) -> list[str]:
+    """Return values as fields of CSV, with quotation marks if they are needed."""
+    fields: list[str] = []
+    for value in values:
+        line = io.StringIO()
+        csv.writer(line, lineterminator="").writerow(["nan" if pd.isna(value) else value, ""])
+        fields.append(line.getvalue()[:-1])
+    return fields
 
 
 def _with_unit(name: str, unit: str) -> str:

@@ -116,6 +116,8 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
     read = rows[["contact_load [N]", "adhesion_bond_share", "t [s]"]].itertuples(index=False, name=None)
     assert list(read) == list(expected)
     assert_array_equal(rows["mean"], dataset["contact_area"].to_numpy().ravel())
+    text, how = (tmp_path / "out.csv").read_bytes().decode(), {"index": False, "na_rep": "nan", "lineterminator": "\n"}
+    assert text == analysis.tidy(dataset).to_csv(header=text.partition("\n")[0].split(","), **how)
 
 
 def test_a_wide_csv_has_a_row_for_each_point_or_record_in_the_units_that_are_chosen(tmp_path):
