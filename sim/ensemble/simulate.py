@@ -33,8 +33,9 @@ Progress = Callable[[int], None]
 
 #: Shards of which a run holds the locks at once: systems limit the number of open files.
 _LOCKS = 100
-#: Steps that are computed together at most, up to the next record.
-_STEPS = 1024
+#: Member-steps and steps that are computed together at most; many members still take so many steps, because each call
+#: has a cost.
+_MEMBER_STEPS, _STEPS = 2**16, 2**10
 
 
 def run(
@@ -207,7 +208,8 @@ def _record(task: Task, point: Scenario, state: State | None, block: Block) -> t
     rows = {variable.name: np.empty((rows_of[variable.name], len(records))) for variable in variables}
     maps: dict[str, np.ndarray] = {}
     drawn, drawn_at = int(np.sum(members < point.record.map_members)), snapshots(point)
-    for steps in block.pieces(max(1, _STEPS // clock.stride), drawn_at):
+    most = max(_STEPS, _MEMBER_STEPS // len(members))
+    for steps in block.pieces(max(1, most // clock.stride), drawn_at):
         state, course = follow(point, noise, state, steps)
         if steps[-1] % clock.stride == 0:
             first, last = steps[0] // clock.stride - records[0], steps[-1] // clock.stride + 1 - records[0]

@@ -58,6 +58,9 @@ def test_blocks_hold_every_step_once_even_if_a_record_takes_longer_than_a_block(
     assert plan.records_of_block(plan.points[0]) == 0 and len(plan.blocks(plan.points[0])) > 4
     monkeypatch.undo()
     xr.testing.assert_identical(ensemble.run(scenario), many)
+    monkeypatch.setattr(ensemble, "_MEMBER_STEPS", 1)
+    monkeypatch.setattr(ensemble, "_STEPS", 1)  # each record alone
+    xr.testing.assert_identical(ensemble.run(scenario), many)
     for stride, most in itertools.product((1, 2, 5, 20), (1, 2, 3, 4, 7, 100)):
         monkeypatch.setattr(Plan, "_pieces", (2, most))
         plan = Plan.of(scene(3, clock=Clock(duration=20e-3, step=1e-3, record=stride * 1e-3)))
