@@ -193,6 +193,7 @@ def run(
             except (simulate.Stopped, KeyboardInterrupt) as stopped:
                 _fail(_STOPPED, getattr(stopped, "exit_code", INTERRUPTED))
         if tabulated := not (quiet or bare or shard) and preview.tabulated(plan):
+            del plan, scene  # the points of a large sweep take as much memory as its table
             shown.begin("table")
             tables = _tables_of(target)
     if tabulated:
