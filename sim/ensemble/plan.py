@@ -18,7 +18,7 @@ _PART_NUMBERS = 2**22
 _STATE_NUMBERS = 2**23
 # Rough costs of one core [s]: a step of a batch, more if it is advanced step by step; of a member, of a counted
 # population, an event of a bond that is followed, more behind a spring.
-_STEP, _ALONE, _OF_MEMBER, _COUNTED, _EVENT, _DRIVEN_EVENT = 5e-6, 150e-6, 5e-8, 3e-7, 1e-7, 3e-5
+_STEP, _ALONE, _OF_MEMBER, _COUNTED, _EVENT, _DRIVEN_EVENT = 5e-6, 150e-6, 5e-8, 3e-7, 1e-7, 3e-6
 #: A dataset without its trajectories [byte], and a variable over the sweep alone; number of statistics of each pooled
 #: variable.
 _SCENARIO_BYTES, _VARIABLE_BYTES, _STATISTICS = 1.6e5, 3.6e3, 3
