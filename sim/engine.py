@@ -22,8 +22,9 @@ from sim.spectrum.radial import PLANE
 Arrays = dict[str, Array]
 #: Most numbers of one quantity in a block of steps: they stay in the cache.
 _BLOCK_NUMBERS = 2**16
-#: Steps of the first block of a contact that follows the fluctuations; twice as many after one that did not end early.
-_FIRST_BLOCK = 256
+#: Member steps of the first block of a contact that follows the fluctuations. Later ones have as many steps as have
+#: passed since a block ended early, or the share of so few members over all.
+_FIRST_BLOCK, _FEW_MEMBERS = 256, 64
 #: Mode pairs of a process whose step takes much longer than the rest.
 _MANY_PAIRS = 64
 
@@ -166,13 +167,15 @@ def follow(scenario: Scenario, noise: MemberNoise, state: State | None, steps: r
         blocks += [trajectory_of(scenario, state)] if steps.start == 0 else []
     rows, numbers = len(noise.shear.members), 1 + scenario.process.pairs // _MANY_PAIRS
     longest = 1 if scenario.by_steps else max(1, _BLOCK_NUMBERS // (rows * numbers))
-    ahead = _FIRST_BLOCK if scenario.draws_within else longest  # what a block holds beyond its end is computed in vain
+    # a block that ends early was computed in part in vain, which costs most with many members
+    share = min(1.0, _FEW_MEMBERS / rows)
+    calm = _FIRST_BLOCK // rows if scenario.draws_within else longest / share
     starts = (*scenario.phases.steps, scenario.times.steps + 1)
     while state.step < steps[-1]:
         phase = starts[bisect.bisect_right(starts, state.step + 1)] - 1
-        block = range(state.step + 1, min(state.step + min(ahead, longest), steps[-1], phase) + 1)
+        block = range(state.step + 1, min(state.step + min(1 + int(share * calm), longest), steps[-1], phase) + 1)
         state, trajectory = advance(scenario, state, noise, block)
-        ahead = 2 * ahead if state.step == block[-1] else max(1, state.step - block.start)
+        calm = calm + len(block) if state.step == block[-1] else 0
         wanted = slice((steps.start - block.start) % steps.step, None, steps.step)
         blocks.append(Trajectory(*(values[wanted] for values in trajectory)))
     return state, Trajectory(*map(np.concatenate, zip(*blocks, strict=True)))
