@@ -292,7 +292,7 @@ def first(bonding: Bonding, contact: ContactState, pull: Array, stage: Array) ->
     rows = np.zeros((len(contact.radius), 1, len(CONTACT.names or ())))
     rows[:, 0, _LAST], rows[..., _DETACHED], rows[..., _OPENING:] = contact.radius, -np.inf, np.nan
     rows[:, 0, _MASKED] = np.where((contact.work <= 0.0) & (contact.radius > 0.0), 0.0, np.nan)
-    started = [_started(np.nan_to_num(values)) for values in (stress, friction, pull)]
+    started = [_started(np.where(np.isnan(values), 0.0, values)) for values in (stress, friction, pull)]
     return Events._make([*started, rows, np.zeros(1), Slips.none(stage)])
 
 

@@ -140,7 +140,7 @@ def _renewing(bonds: _SolvedBonds) -> float:
 def load(parts: Parts, slider: Sliding, bonding: Bonding, contact: StepContact, duration: float) -> Driven:
     """Return the slider at t = 0, with its spring loaded for its motion, and the stored energy."""
     drive, slider = cast(Force | Spring, parts.drive), cast(Driven, slider)
-    speed, radius = slider.speed, np.nan_to_num(contact.radius, nan=0.0)
+    speed, radius = slider.speed, np.fmax(contact.radius, 0.0)
     area, (yields, slope) = np.pi * radius**2, drive.yields(contact.shear_modulus, contact.bodies.poisson_ratio)
     friction = area * bonding.stress
     sheared = friction * (yields + np.divide(slope, radius, out=np.zeros(radius.shape), where=radius > 0.0))

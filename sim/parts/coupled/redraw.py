@@ -44,11 +44,8 @@ def redraw(row, columns, m, k, clock, contact, draws, room, reached):
 
     ``row`` is that of member ``m`` in the units of the equations. ``columns`` are the same [SI], with which the next
     step begins. ``contact`` is as at the start of the step, ``room`` for the shares of all factors, shape (2, factors).
-    Nothing is drawn without ``values``.
     """
     values, last, shapes, half_weight, factors, by_slip, span, mean, relaxing, answers, address, paid, share = draws
-    if len(values) == 0:
-        return
     state, field, duration = columns.view(mechanics.ROW)[0], contact.field, clock[k, 5]
     size, energy, expected = 1.0, mean, last[m]
     if field.length < math.inf and not relaxing:
