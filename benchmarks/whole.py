@@ -91,20 +91,35 @@ def sweeps(bench: Bench) -> list[Row]:
             return bench.command("run", str(path), "-o", f"{path}.nc", "--force", "-j", "1", *options)
 
         def of(command: str, count: int) -> float:
-            return bench.command(command, f"{folder}/{count}.toml.nc", *["--force"] * (command == "report"))[0]
+            further = {"report": ["--force"], "stats": []}.get(command, ["--csv", f"{folder}/out.csv", "--force"])
+            return bench.command(command.split()[0], f"{folder}/{count}.toml.nc", *further)[0]
 
         turns = range(bench.of(3, 1))
         pairs = [(run(many), run(many, "--no-table")) for _ in turns]
+        growing = np.transpose(
+            [(bare, *(run(count, "--no-table")[0] for count in (points, few))) for _, (bare, _) in pairs]
+        )
         run(points), run(few)
         each_point = [1e3 * abs(of("stats", many) - of("stats", few)) / (many - few) for _ in turns]
-        pages = [of("report", points) for _ in turns]
+        pages = np.transpose([[of("report", count) for count in (points, few)] for _ in turns])
+        tables = [of("stats --csv", points) for _ in turns]
     helps = [bench.command("plot", "--help")[0] for _ in turns]
+    growths, growth = abs(growing[0] - growing[2]) / abs(growing[1] - growing[2]), "`sim run --no-table`: growth"
     (tabled, megabytes), (bare, _) = np.transpose(pairs, (1, 2, 0))
     medians, name = [float(np.median(tabled)), float(np.median(bare))], "`sim run` of a sweep of 10,000 points"
     return [
         Row(f"{name}: time", "without its table", "as long", 1.5, middle(tabled / bare), medians),
         absolute(f"{name}: peak memory", list(megabytes), "MB", 300.0),
         absolute("`sim stats` of 10,000 points, a point", each_point, "ms", 0.3, "`sim stats` of 10 points subtracted"),
-        absolute("`sim report` of 1,000 points", pages, "s", 10.0),
+        absolute("`sim stats --csv` of 1,000 points", tables, "s", 2.0),
+        absolute("`sim report` of 1,000 points", pages[0].tolist(), "s", 10.0),
+        absolute(
+            f"{growth} from 1,000 to 10,000 points",
+            growths.tolist(),
+            "times",
+            11.0,
+            "`sim run` of 10 points subtracted",
+        ),
+        absolute("`sim report`: growth from 10 to 1,000 points", (pages[0] / pages[1]).tolist(), "times", 100.0),
         absolute("`sim plot --help`", helps, "s", 0.1),
     ]
