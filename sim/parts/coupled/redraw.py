@@ -6,7 +6,7 @@ from sim.numerics.jit import device
 from sim.numerics.noise import stream
 from sim.parts.contact.balance import SHARE, widest
 from sim.parts.coupled import mechanics
-from sim.parts.shear.bands import renew_member
+from sim.parts.shear.bands import renew_band
 from sim.parts.shear.process import shares, unsteadiness
 from sim.spectrum.radial import share_of
 
@@ -59,7 +59,12 @@ def redraw(row, columns, m, k, clock, contact, draws, room, reached):
             renew[0] = math.sqrt(state.renewed)
         seed, part, members, first = address
         numbers = stream(seed, part, members[m], first + k, 0)
-        energy = renew_member(values[m], keep, renew, 1.0, shapes, half_weight, numbers)
+        energy = 0.0
+        for j in range(shapes.size):
+            i = j if factors.size > 1 else 0
+            x, numbers = renew_band(values[m, j], keep[i], renew[i], 1.0, shapes[j], numbers)
+            values[m, j] = x
+            energy += half_weight[j] * x
         if factors.size == 1:
             expected = keep[0] * keep[0] * expected + renew[0] * renew[0] * mean
     last[m], state.energy = energy, energy

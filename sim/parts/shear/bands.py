@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 
 from sim.laws.halfspace import compliance
-from sim.numerics.jit import device, kernel
+from sim.numerics.jit import inlined, kernel
 from sim.numerics.noise import Noise, gamma, normal, stream
 from sim.parts.exchange import Array, Draws, Gammas, Indices
 from sim.parts.shear.modes import grid_reach, half_lattice, modes
@@ -426,22 +426,16 @@ class BandedProcess(Renewing):
         return self.cell_errors | self.bands.errors | {"bands": float(self.bands.weight.size)}
 
 
-@device
-def renew_member(values, keep, renew, unit, shapes, half_weight, numbers):
-    """Advance the bands of a member in place by an exact step; return their energy. Shares of all bands, or of each."""
-    total, many = 0.0, keep.size > 1
-    for k in range(shapes.size):
-        i = k if many else 0
-        x, share = values[k], renew[i]
-        if share != 0.0:  # else nothing has passed: not even a rounding
-            first, numbers = normal(numbers)
-            rest, numbers = gamma(shapes[k], numbers)
-            kick = share * unit
-            moved = kick * first + keep[i] * math.sqrt(x)
-            x = moved * moved + 2.0 * kick * kick * rest
-        values[k] = x
-        total += half_weight[k] * x
-    return total
+@inlined
+def renew_band(x, keep, share, unit, shape, numbers):
+    """Return X of a band after an exact step, by the shares that stay and are renewed, and the stream of numbers."""
+    if share != 0.0:  # else nothing has passed: not even a rounding
+        first, numbers = normal(numbers)
+        rest, numbers = gamma(shape, numbers)
+        kick = share * unit
+        moved = kick * first + keep * math.sqrt(x)
+        x = moved * moved + 2.0 * kick * kick * rest
+    return x, numbers
 
 
 @kernel(
@@ -450,8 +444,15 @@ def renew_member(values, keep, renew, unit, shapes, half_weight, numbers):
 )
 def _renew_bands(values, keep, renew, size, shapes, half_weight, seed, part, members, step, energy):
     """Advance all bands of all members in place by exact steps, and write their energy after each step."""
+    many = keep.shape[2] > 1
     for m in range(members.size):
         row = m % keep.shape[1]
         for s in range(len(keep)):
-            numbers, unit = stream(seed, part, members[m], step + s, 0), size[s, m % size.shape[1]]
-            energy[s, m] = renew_member(values[m], keep[s, row], renew[s, row], unit, shapes, half_weight, numbers)
+            numbers = stream(seed, part, members[m], step + s, 0)
+            total, unit = 0.0, size[s, m % size.shape[1]]
+            for k in range(shapes.size):
+                i = k if many else 0
+                x, numbers = renew_band(values[m, k], keep[s, row, i], renew[s, row, i], unit, shapes[k], numbers)
+                values[m, k] = x
+                total += half_weight[k] * x
+            energy[s, m] = total
