@@ -22,8 +22,8 @@ from sim.spectrum.radial import PLANE
 Arrays = dict[str, Array]
 #: Most numbers of one quantity in a block of steps: they stay in the cache.
 _BLOCK_NUMBERS = 2**16
-#: Member steps of the first block of a contact that follows the fluctuations. Later ones have as many steps as have
-#: passed since a block ended early, or the share of so few members over all.
+#: Member steps of the first block of a contact that follows the fluctuations. Later ones have one step more than have
+#: passed since a block ended early, or of these the share of so few members in all.
 _FIRST_BLOCK, _FEW_MEMBERS = 256, 64
 #: Mode pairs of a process whose step takes much longer than the rest.
 _MANY_PAIRS = 64
@@ -101,7 +101,7 @@ def start(scenario: Scenario, noise: MemberNoise) -> State:
 def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) -> tuple[State, Trajectory]:
     """Return the state after a block of clock steps in one phase of the run, and the trajectory in it.
 
-    Where a drive feels the friction the block ends, perhaps earlier, where the contact opens or closes.
+    Where a drive feels the friction the block ends, perhaps earlier, where the contact opens, closes or jumps.
     """
     drive, population, process, contact = scenario.parts
     slider: Sliding

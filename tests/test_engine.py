@@ -185,6 +185,14 @@ def test_the_loop_of_a_drive_draws_the_fluctuations_as_their_process_does(name, 
     assert len(asked) < 20  # with another draw than that of the process, each of the 40 steps ends a block
 
 
+def test_counted_bonds_of_a_slider_are_drawn_at_each_step_in_a_contact_that_stays():
+    rigid = Adhesion(work=42e-3, bond_share=0.0)
+    of = scene(3, 40, drive=DRIVES["spring with mass"], bonds=BONDS["counted"], shear=SHEARS["uniform"], adhesion=rigid)
+    states = list(march(of, np.arange(3)))
+    assert len({float(state.bonding.fraction[0]) for state in states}) > 5
+    check_blocks(of, states, 3)
+
+
 @pytest.mark.verify
 @pytest.mark.parametrize("name", BONDS)
 def test_every_depth_runs_with_every_depth(name):

@@ -159,8 +159,8 @@ class Draws(NamedTuple):
         Mean of the energy at amplitude 1 [J/m²].
     relaxing : bool
         True if only what is renewed has the new size.
-    forgets : bool
-        True if sliding renews the field, so that the interface answers what was drawn at once.
+    answers : bool
+        True if the interface slips at once in answer to what was drawn.
     address : tuple
         Seed, part, members and number of the first step, as of ``Noise.at``.
     paid : float
@@ -178,7 +178,7 @@ class Draws(NamedTuple):
     span: float
     mean: float
     relaxing: bool
-    forgets: bool
+    answers: bool
     address: tuple[np.uint64, np.uint64, NDArray[np.uint64], int]
     paid: float = 0.0
     share: Share = PLANE

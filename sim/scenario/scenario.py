@@ -420,21 +420,22 @@ class Scenario:
 
     @property
     def by_steps(self) -> bool:
-        """Return True if a part feeds back, so that a run goes step by step and not by blocks of steps.
+        """Return True if a run goes step by step and not by blocks of steps.
 
-        With a drive that solves the motion, bonds and an equilibrium contact are solved within its sub-steps. A block
-        of such steps needs fluctuations that do not affect the contact, or that the loop over the steps can draw.
-        Bonds followed one by one are advanced in place, so the contact must not end a block early: it stays throughout.
+        It does so if a part feeds back. With a drive that solves the motion, bonds and an equilibrium contact are
+        solved within its sub-steps. A block of such steps needs fluctuations that do not affect the contact, or that
+        the loop over the steps can draw. Bonds that are advanced in place need a contact that stays, as it would end a
+        block early. Bonds drawn at the end of a step need single steps.
         """
         _, bonds, shear, contact = self.chosen
-        in_blocks = bonds.in_blocks or (self._contact_stays and self.holds_contact)
-        alone = contact.lags or not (self._contact_stays or shear.in_blocks) or not in_blocks
+        in_blocks = bonds.in_blocks or (bonds.in_place and self._fluctuations_leave_contact and self.holds_contact)
+        alone = contact.lags or not (self._fluctuations_leave_contact or shear.in_blocks) or not in_blocks
         return any(part.feeds_back for part in self.chosen[1:]) or (self.drive.solves_motion and alone)
 
     @property
     def draws_within(self) -> bool:
         """Return True if the loop of a drive that solves the motion draws the fluctuations that the contact feels."""
-        return self.drive.solves_motion and not (self.by_steps or self._contact_stays)
+        return self.drive.solves_motion and not (self.by_steps or self._fluctuations_leave_contact)
 
     @property
     def holds_contact(self) -> bool:
@@ -443,7 +444,7 @@ class Scenario:
         return contact.lags or not (contact.changes or contact.reversible or work(1.0) != work(0.0))
 
     @property
-    def _contact_stays(self) -> bool:
+    def _fluctuations_leave_contact(self) -> bool:
         """Return True if fluctuations never change the contact."""
         return self.fluctuations.paid_by_adhesion == 0.0 or self.fluctuations.stays
 

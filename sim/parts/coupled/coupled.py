@@ -1,9 +1,9 @@
-"""Drive and bonds inside one clock step, where the friction feeds back into the motion.
+"""Drive and bonds inside clock steps, where the friction feeds back into the motion.
 
-The two are solved together in sub-steps (``radau``, ``cohorts``) that depend on the member alone. The radius of an
-equilibrium contact follows the bonds within them, and the conditional mean of fluctuations ΔΓ that remember the
-sliding. Other fluctuations, a ``rate_dependent`` edge and the share of ΔΓ that a disc pays stay as they were at the
-start of the clock step.
+The two are solved together in sub-steps (``radau``, ``cohorts``, ``tracked``) that depend on the member alone. The
+radius of an equilibrium contact follows the bonds within them, and the conditional mean of fluctuations ΔΓ that
+remember the sliding. Other fluctuations, a ``rate_dependent`` edge and the share of ΔΓ that a disc pays stay as they
+were at the start of the clock step.
 """
 
 import functools
@@ -198,7 +198,7 @@ def advance(
     columns, energies = np.empty((COLUMNS, len(steps), members)), np.empty((len(steps), *slider.energies.shape))
     numbers = *_numbers(drive, bonds, contact, units), tuple(law)
     reached = dict(zip(_NAMES, columns, strict=True))
-    loop = tuple(inputs), numbers, (columns, energies), tuple(draws._replace(forgets=draws.forgets and bool(answers)))
+    loop = tuple(inputs), numbers, (columns, energies), tuple(draws._replace(answers=draws.answers and bool(answers)))
     end, bonding = _advanced(bonds, population, contact.radius, inputs, loop, reached, noise)
     stage, stage_speed = np.zeros((2, len(steps), members))
     if drive.spring:

@@ -88,7 +88,7 @@ def slip_event(row, time, reach, slider, law, contact, nodes, energy):
 def break_all(row, time, brief, slider, law, contact, energy):
     """Break all bonds at once and slip, where nothing delays it, if they last less than a ``brief`` time.
 
-    Bonds that are stretched the more the fewer are left break ever faster, all of them in no time; whether that is so.
+    Bonds that are stretched the more the fewer are left break ever faster, all of them in no time. True if they broke.
     """
     _, _, _, _, k, _ = radau.kinetics(row.bound, row.moment, 0.0, law)
     if not (k * brief > 1.0 and mechanics.slips_free(row, slider)):

@@ -18,15 +18,15 @@ DRAWS = (
 
 
 @device
-def _radius(row, time, paid, contact, share):
-    """Return the radius in equilibrium with the energy that fluctuations take for many waves in the contact.
+def _radius(row, time, energy, contact, share):
+    """Return the radius in equilibrium with the ``energy`` that fluctuations take for many waves in the contact.
 
     On a disc it is found as ``balance.widest_crossings`` has it.
     """
     load, base = contact.load + contact.load_rate * time, contact.base + contact.base_rate * time
     mount, body = (load, 0.0, base, 0.0, 0.0), contact[8:12]
     on_disc = len(share[2]) > 0
-    fluctuating = 0.0 if on_disc else paid
+    fluctuating = 0.0 if on_disc else energy
     bound, moment, tilt, radius = contact.bonded, row.moment, contact.mean_stress, row.radius
     free = mechanics.Contact(contact.bare, *mount, bound, tilt, *body, fluctuating, 0.0, contact.field)
     wide, _, _, _ = mechanics.contact_area(row.bound, moment, 0.0, radius, free)
@@ -34,7 +34,7 @@ def _radius(row, time, paid, contact, share):
         return wide
     none = mechanics.Contact(0.0, *mount, 0.0, 0.0, *body, 0.0, 0.0, contact.field)
     hertz, _, _, _ = mechanics.contact_area(0.0, 0.0, 0.0, radius, none)
-    terms = load, base, contact.bare + bound * row.bound, paid, tilt * moment * moment
+    terms = load, base, contact.bare + bound * row.bound, energy, tilt * moment * moment
     return widest(wide, hertz, (terms, (contact.curvature, contact.modulus, contact.stiffness), share))
 
 
@@ -44,6 +44,7 @@ def redraw(row, columns, m, k, clock, contact, draws, room, reached):
 
     ``row`` is that of member ``m`` in the units of the equations. ``columns`` are the same [SI], with which the next
     step begins. ``contact`` is as at the start of the step, ``room`` for the shares of all factors, shape (2, factors).
+    The process draws the same numbers again for the records, bit for bit.
     """
     values, last, shapes, half_weight, factors, by_slip, span, mean, relaxing, answers, address, paid, share = draws
     state, field, duration = columns.view(mechanics.ROW)[0], contact.field, clock[k, 5]

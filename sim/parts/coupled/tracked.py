@@ -1,9 +1,10 @@
 """Rows of sliders and bonds followed one by one through a clock step, from one rupture or binding to the next.
 
-Between two events the number of bonds is constant and their force is linear in the slip. A sub-step of the scheme in
-``cohorts`` therefore needs only sums. The bonds, whose arrays are spent, are displaced once it is accepted. A sub-step
-ends at the next event. If nothing delays the slip, forces are balanced at once after an event. The slider slips as far
-as the remaining bonds allow, and the slip may break further bonds one after the other.
+Between two events the number of bonds is constant and their force is linear in the slip. A massless slider goes to the
+next event in closed form. Otherwise a sub-step of the scheme in ``cohorts`` needs only sums. The bonds, whose arrays
+are spent, are displaced once it is accepted. A sub-step ends at the next event. If nothing delays the slip, forces are
+balanced at once after an event. The slider slips as far as the remaining bonds allow, and the slip may break further
+bonds one after the other.
 """
 
 import math
@@ -223,7 +224,7 @@ def _time_of(value, most, whole, grown, motion, pace):
 def _to_event(row, start, left, tracks, slider, ground, energy, node):
     """Advance row and bonds in closed form to the next event, or as far as Gauss's rule is exact.
 
-    Return the time that has passed, below zero if bonds are not stretched along the motion, and the event, or -1.
+    Return the time that has passed, below zero if the closed form does not apply, and the event, or -1.
     """
     frame, (rate, softness, _, _), winners, event = tracks[2], ground.law, ground.winners, -1
     if frame[tracked.SINGLY] > 0.0 or not node.area >= 0.0:
