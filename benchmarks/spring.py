@@ -86,7 +86,7 @@ def spring(bench: Bench) -> list[Row]:
         program, share = functools.partial(followed, lens.with_values(values), members), 1e6 / (members * steps)
         program()  # it may compile
         microseconds = [share * spent(program) for _ in range(bench.of(7, 1))]
-        work = f"a member's step of 1 ms: spring lens at {stage} mm/s, {members} members"
+        work = f"a member's step of 1 ms: spring lens at {stage} mm/s, members: {members}"
         rows.append(absolute(work, microseconds, "µs", goal))
 
     long = scene(bench.of(2400.0, 1.0), bench.of(10**5, 10), TOLERANCE)
