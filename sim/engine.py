@@ -110,8 +110,9 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
         step_contact = _step_contact(scenario, state.contact._replace(radius=of_loop), state.shear, steps)
         draws = NO_DRAWS
         if scenario.draws_within:
-            of_edge = scenario.fluctuations.paid_by_adhesion, scenario.margin.each[0] if scenario.margin else PLANE
-            draws = process.draws(state.shear, steps.start, noise.shear)._replace(paid=of_edge[0], share=of_edge[1])
+            share = PLANE if scenario.margin is None else scenario.margin.each[0]
+            draws = process.draws(state.shear, steps.start, noise.shear)
+            draws = draws._replace(paid=scenario.fluctuations.paid_by_adhesion, share=share)
         sliders, motions, bonds, bonding = coupled.advance(
             scenario.parts, state.drive, state.bonds, step_contact, scenario.times, steps, noise.bonds, draws
         )

@@ -330,10 +330,8 @@ def _outside(point: Scenario) -> Iterator[str]:
         speeds = np.abs(point.speeds(_TIMES))
         bonds, body = cast(Rate | Cohort | FirstMoment, point.population), slider_body(point, speeds)
         with np.errstate(all="ignore"):  # of a contact that is open
-            needed, of_contact = (
-                bonds.onset(speeds, Body(*body[:3])).stiffness,
-                np.asarray(body.contact_stiffness, float),
-            )
+            needed = bonds.onset(speeds, Body(*body[:3])).stiffness
+            of_contact = np.asarray(body.contact_stiffness, float)
         if np.any(needed > of_contact):
             worst = int(np.nanargmax(needed / of_contact))
             high, low = (engineering(float(values[worst]), "N/m") for values in (needed, of_contact))

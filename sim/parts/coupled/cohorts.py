@@ -558,7 +558,7 @@ def advance_cohorts(inputs, numbers, outputs, draws, share, rules, weight, stret
     columns, booked, nodes = np.empty(mechanics.COLUMNS), np.empty(mechanics.ENERGIES), np.zeros(3, NODE)
     row, energy = columns.view(mechanics.ROW)[0], booked.view(ENERGY)[0]
     room, of_draws = (np.empty((9, most)), np.empty((3, most)), nodes), np.empty((2, draws[4].size))
-    draws_any = len(draws[0]) > 0
+    has_draws = len(draws[0]) > 0
     for m in range(len(rows)):
         stop, left = 0, share[m % share.size]
         bonds = weight[m], stretch[m], width[m], lattice[m]
@@ -573,6 +573,6 @@ def advance_cohorts(inputs, numbers, outputs, draws, share, rules, weight, stret
                 left = 1.0
             mechanics.from_units(columns, booked, rows[m], energies[m], units, work)
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
-            if draws_any:
+            if has_draws:
                 redraw(row, rows[m], m, k, clock, now, draws, of_draws, reached)
             sum_row(weight[m], stretch[m], width[m], rules, room[0][4], sums[:, k, m])

@@ -392,7 +392,7 @@ def advance_rows(inputs, numbers, outputs, draws):
     both, nodes = (np.empty(2 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES)), np.empty(1, radau.NODE_VALUES)
     line, books = both[0].view(mechanics.ROW), both[1].view(ENERGY)  # as they are, and before the last sub-step
     columns, booked, row = both[0][: mechanics.COLUMNS], both[1][: mechanics.ENERGIES], line[0]
-    room, draws_any = np.empty((2, draws[4].size)), len(draws[0]) > 0
+    room, has_draws = np.empty((2, draws[4].size)), len(draws[0]) > 0
     for m in range(len(rows)):
         stop = 0
         for k in range(len(clock)):
@@ -407,5 +407,5 @@ def advance_rows(inputs, numbers, outputs, draws):
                     mechanics.run_away(row, booked, clock[k, 0] + time)
             mechanics.from_units(columns, booked, rows[m], energies[m], units, work)
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
-            if draws_any:
+            if has_draws:
                 redraw(row, rows[m], m, k, clock, now, draws, room, reached)

@@ -242,12 +242,8 @@ def _to_event(row, start, left, tracks, slider, ground, energy, node):
     if sense * first < 0.0 or sense * last < 0.0 or (stiffness == 0.0 and (damping == 0.0 or growth != 0.0)):
         return -1.0, event
     tracked.rank(tracks, ground.law, winners)
-    motion, bent, clock, pace = (
-        (first, last, relaxes),
-        first - last,
-        frame[tracked.CLOCK],
-        softness * ground.unit * sense,
-    )
+    motion, bent = (first, last, relaxes), first - last
+    clock, pace = frame[tracked.CLOCK], softness * ground.unit * sense
     binding, rupture = max(winners[tracked.BINDING, 1] - frame[tracked.TIME], 0.0), winners[tracked.RUPTURE, 1]
     time, fastest = min(left, binding), math.fabs(pace) * max(math.fabs(first), math.fabs(last))
     time = time if fastest * time <= _MOST else _MOST / fastest
