@@ -288,15 +288,25 @@ _FEW = 10.0  # mean up to which numbers are counted up; the constants of rejecti
 
 
 @device
-def binomial(trials, chance, numbers):
+def success(chance):
+    """Return the constants of a ``chance`` of a single success, which all binomial numbers with this chance share.
+
+    These are the chance p [1], the smaller one of p and 1 − p, the logarithm of the larger one, and their ratio.
+    """
+    p = chance if chance <= 0.5 else 1.0 - chance
+    return chance, p, _log1p(-p), p / (1.0 - p)
+
+
+@device
+def binomial(trials, constants, numbers):
     """A binomial number as a float, and the stream of random numbers after it.
 
     Parameters
     ----------
     trials : float
         n, a whole number from 0 to 1e9.
-    chance : float
-        p of a single success [1]; what is outside of [0, 1] is taken as its nearest end.
+    constants : tuple
+        The ``success`` of the chance p; what is outside of [0, 1] is taken as its nearest end.
     numbers : tuple
         Stream of random numbers, as of ``sim.numerics.noise.stream``; nothing is drawn where the result is certain.
 
@@ -306,22 +316,25 @@ def binomial(trials, chance, numbers):
     is as Loader (2000) takes it, without a cancellation; below by counting up the distribution function. Where p is
     above 1/2 the failures are counted instead. nan where an argument is.
     """
+    chance, p, log, odds = constants
     if not (trials == trials and chance == chance):
         return math.nan, numbers
     if trials <= 0.0 or chance <= 0.0:
         return 0.0, numbers
     if chance >= 1.0:
         return trials, numbers
-    p = chance if chance <= 0.5 else 1.0 - chance
-    number, numbers = _rejected(trials, p, numbers) if trials * p >= _FEW else _counted_up(trials, p, numbers)
+    number, numbers = _rejected(trials, p, numbers) if trials * p >= _FEW else _counted_up(trials, log, odds, numbers)
     return (number if chance <= 0.5 else trials - number), numbers
 
 
 @device
-def _counted_up(n, p, numbers):
-    """A binomial number of a mean below ten and p <= 1/2, the inverse of the distribution function."""
+def _counted_up(n, log, odds, numbers):
+    """A binomial number of a mean below ten and p <= 1/2, the inverse of the distribution function.
+
+    ``log`` is ln(1 − p), ``odds`` p/(1 − p).
+    """
     left, numbers = uniform(numbers)
-    k, term, odds = 0.0, math.exp(n * _log1p(-p)), p / (1.0 - p)
+    k, term = 0.0, math.exp(n * log)
     while left >= term and k < min(n, 200.0):  # beyond, chances are below 1e-150
         left -= term
         term *= (n - k) * odds / (k + 1.0)

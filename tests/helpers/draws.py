@@ -5,7 +5,7 @@ from scipy.stats import chi2, poisson
 
 from sim.numerics import noise
 from sim.numerics.jit import kernel
-from sim.numerics.noise import _log_chance, binomial
+from sim.numerics.noise import _log_chance, binomial, success
 
 #: Two-sided probability of five standard deviations.
 FIVE_SIGMA = 5.7e-7
@@ -40,7 +40,7 @@ def _binomials(trials, chance, seed, part, members, step, drawn):
     for m in range(members.size):
         numbers = noise.stream(seed, part, members[m], step, 0)
         for k in range(drawn.shape[1]):
-            drawn[m, k], numbers = binomial(trials, chance, numbers)
+            drawn[m, k], numbers = binomial(trials, success(chance), numbers)
 
 
 @kernel("void(float64[::1], float64, float64, float64[::1])")

@@ -29,7 +29,7 @@ import sim.parts.bonds.tracked as tracks
 from sim.laws import schallamach
 from sim.laws.schallamach import Body, Onset, linear_onset, relaxed, steady_fraction, transition_probabilities
 from sim.numerics.jit import kernel
-from sim.numerics.noise import Noise, binomial, stream
+from sim.numerics.noise import Noise, binomial, stream, success
 from sim.parts.bonds.cohorts import Cohorts
 from sim.parts.bonds.rupture import Bell, Derivable, Rupture, RuptureRate
 from sim.parts.bonds.tracked import CYCLES, Tracks
@@ -331,13 +331,16 @@ class Counted(_WithoutStretch):
 @kernel("void(float64[:], float64[:, :], float64[:, :], float64, uint64, uint64, uint64[::1], int64, float64[:, ::1])")
 def _count(bound, stay, bind, sites, seed, part, members, step, counted):
     """Write the bound sites of all members at the end of each step."""
-    for m in range(members.size):
-        before, row = bound[m], m % stay.shape[1]
-        for k in range(len(stay)):
+    for k in range(len(stay)):
+        staying, binding = success(stay[k, 0]), success(bind[k, 0])
+        for m in range(members.size):
+            if stay.shape[1] > 1:
+                staying, binding = success(stay[k, m]), success(bind[k, m])
+            before = counted[k - 1, m] if k > 0 else bound[m]
             numbers = stream(seed, part, members[m], step + k, 0)
-            still_bound, numbers = binomial(before, stay[k, row], numbers)
-            new, numbers = binomial(sites - before, bind[k, row], numbers)
-            counted[k, m] = before = still_bound + new
+            still_bound, numbers = binomial(before, staying, numbers)
+            new, numbers = binomial(sites - before, binding, numbers)
+            counted[k, m] = still_bound + new
 
 
 Stiffness = Annotated[float, Quantity("N/m", "stiffness of a bond", "kappa", above=0, typical="0.4 mN/m")]
