@@ -9,6 +9,9 @@ comma := ,
 ANY = $(firstword $(wildcard $(VENV)/.installed-*) $(VENV)/.installed-run)
 EXTRAS_OF = $(if $(filter run,$*),,[$(subst -,$(comma),$*)])
 
+# Commands and tests start many processes, which would compile each source anew without its bytecode.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: run test verify bench gallery docs lint lines clean
 
 run: $(ANY)

@@ -1,6 +1,7 @@
 """The house: folders are floors, and a module imports only from floors below its own."""
 
 import ast
+import functools
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -33,13 +34,17 @@ def module_name(path):
 
 
 MODULES = {module_name(path): path for path in sorted(ROOT.rglob("*.py")) if path != ROOT / "__init__.py"}
-TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in (*MODULES.values(), *BESIDE.values())}
+
+
+@functools.cache
+def tree(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def imports(path):
     """Names of modules, and of what is taken from them, that a file imports anywhere."""
     names = set()
-    for node in ast.walk(TREES[path]):
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         if isinstance(node, ast.ImportFrom) and node.module:
@@ -87,7 +92,7 @@ def asks_a_class(call, taken):
 def test_outside_its_folder_no_part_is_asked_for_its_class():
     for name in MODULES:
         if floor(name) != "parts" and name != "scenario.reader":
-            nodes = list(ast.walk(TREES[MODULES[name]]))
+            nodes = list(ast.walk(tree(MODULES[name])))
             froms = (node for node in nodes if isinstance(node, ast.ImportFrom) and node.module)
             aliases = (alias for node in froms if node.module.startswith("sim.parts") for alias in node.names)
             taken = {alias.asname or alias.name for alias in aliases}
@@ -98,7 +103,7 @@ def test_outside_its_folder_no_part_is_asked_for_its_class():
 def test_no_module_hands_open_files_to_another_process():
     # ruff forbids the other names that only some systems have
     for path in MODULES.values():
-        keywords = {node.arg for node in ast.walk(TREES[path]) if isinstance(node, ast.keyword)}
+        keywords = {node.arg for node in ast.walk(tree(path)) if isinstance(node, ast.keyword)}
         assert "pass_fds" not in keywords, path
 
 

@@ -13,7 +13,7 @@ from sim.ensemble.variables import LARGEST
 from sim.parts.drive import READINGS
 
 #: Seeds of the scenes: six, and scenes whose energies, sub-steps or messages have been wrong.
-SEEDS = [*range(6), 45, 59, 75, 202, 214, 266, 310, 319, 445, 689, 730, 807, 1042, 1240, 1293, 1319, 1768]
+SEEDS = [*range(6), 45, 59, 75, 202, 214, 266, 310, 319, 445, 689, 730, 807, 1042, 1240, 1293, 1319]
 #: Those that are looked at with finer steps as well.
 FINER = 59, 445, 807
 #: Energies of a driven slider, none of which exceeds ten times the larger of work and stored energy.
@@ -182,7 +182,7 @@ def test_random_scenes_close_their_energy_and_have_the_same_numbers_however_they
 
 
 @pytest.mark.verify
-@pytest.mark.parametrize("seed", range(int(os.environ.get("SCENES", "300"))))
+@pytest.mark.parametrize("seed", [*range(int(os.environ.get("SCENES", "300"))), 1768])  # which takes three seconds
 def test_a_random_scene_keeps_all_rules_also_at_finer_steps(seed):
     if not check_scene(seed, finer=True):
         pytest.skip("the scene is refused with a reason")

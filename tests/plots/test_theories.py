@@ -28,12 +28,13 @@ def curve_of(panel, name):
 
 
 def test_every_theory_is_drawn_as_far_as_adhesion_holds_with_a_dot_at_its_end():
+    drawn_at = {}
     for contact, law, value in [
         (Equilibrium(load=4e-3), theories.compare_at_load, 4e-3),
         (Equilibrium(indentation=2e-6), theories.compare_at_indentation, 2e-6),
         (Equilibrium(load=-3e-4), theories.compare_at_load, -3e-4),
     ]:
-        stresses, forces = plots.draw(plain(contact=contact), "theories").axes
+        stresses, forces = drawn_at[value] = plots.draw(plain(contact=contact), "theories").axes
         factor = 1e3 if "kPa" in stresses.get_xlabel() else 1.0
         drawn, _ = curve_of(stresses, "uncorrected")
         radii = law(factor * drawn, value, *NUMBERS)
@@ -50,14 +51,13 @@ def test_every_theory_is_drawn_as_far_as_adhesion_holds_with_a_dot_at_its_end():
             assert_allclose(again, area, rtol=1e-14)
             newton = {"mN": 1e3, "µN": 1e6}[forces.get_xlabel()[-3:-1]]
             assert_allclose(force[held], newton * factor * stress[held] * area[held] / per_area, rtol=1e-12)
-    panel = plots.draw(plain(), "theories").axes[1]
+    at_stress, panel = drawn_at[4e-3]
     _, colour, _ = rival_figures._THEORIES["savkoor_briggs"]
     (dot,) = (line for line in panel.lines if line.get_color() == colour and line.get_marker() == "o")
     limit = 1e3 * float(theories.savkoor_briggs_limit(4e-3, 42e-3, 2e-3))
     # 1500 stresses over the axis's decades; the force is flat at its largest, so a step costs its square
     assert limit * 0.999 < dot.get_xdata()[0] <= limit * (1.0 + 1e-12)
-    panel = plots.draw(plain(), "theories").axes[0]
-    grey = [line for line in panel.lines if line.get_color() == pictures.REFERENCE]
+    grey = [line for line in at_stress.lines if line.get_color() == pictures.REFERENCE]
     lines = {line.get_linestyle(): line.get_ydata()[0] for line in grey}
     at = {"--": jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6), ":": jkr.hertz_radius_at_load(4e-3, 2e-3, 6.4e6)}
     for style, radius in at.items():

@@ -100,8 +100,9 @@ def test_points_without_errors_drives_with_a_slider_and_keys_without_effect_are_
 
 def test_a_mechanism_that_has_none_of_the_free_keys_has_no_idle_ones(tmp_path):
     (tmp_path / "points.csv").write_text("speed [mm/s],contact_area_error [%]\n0.1,1\n1,1\n3,1\n", encoding="utf-8")
-    lens = load("scenarios/pdms_lens.toml")
-    result = sim.plan(lens, tmp_path / "points.csv", ["shear.spectrum.rms"], sims=50)
+    (tmp_path / "further.csv").write_text("speed [mm/s]\n2\n", encoding="utf-8")
+    files = tmp_path / "points.csv", ["shear.spectrum.rms"], tmp_path / "further.csv"
+    result = sim.plan("scenarios/pdms_lens.toml", *files, sims=50)
     assert set(result.probabilities) == {WHOLE, "bonds only", "fluctuations only"}
 
 
