@@ -727,16 +727,16 @@ class Settlement(NamedTuple):
         return f"{self.verdict}: {begin} → {end} {shown}".rstrip() + f" over {span}"
 
 
-def settlement(values: Array, sem: float = math.nan, freedom: float = math.nan, noisy: bool = True) -> Settlement:
-    """Return if values have settled: if their drift over the span is not larger than its error.
+def settlements(values: Array, sem: Array, freedom: Array, noisy: Array) -> list[Settlement]:
+    """Return at each point of a sweep if values have settled: if their drift over the span is not above its error.
 
     Parameters
     ----------
-    values : array, shape (members, records)
+    values : array, shape (points, members, records)
         nan where there is none.
-    sem, freedom : float
+    sem, freedom : array, shape (points,)
         Standard error of the mean over all values and its degrees of freedom, see ``over_time``.
-    noisy : bool
+    noisy : array, shape (points,)
         False if all members are equal and only cycles fluctuate.
 
     Notes
@@ -749,18 +749,14 @@ def settlement(values: Array, sem: float = math.nan, freedom: float = math.nan, 
 
     Examples
     --------
-    >>> time = np.linspace(0.0, 1.0, 200)
-    >>> settlement(np.exp(-time)[np.newaxis], noisy=False).reason("N", "the second half")
+    >>> time, unknown = np.linspace(0.0, 1.0, 200), np.full(2, np.nan)
+    >>> courses = np.stack([np.exp(-time), 2.0 + np.sin(70.0 * time)])[:, np.newaxis]
+    >>> falling, turning = settlements(courses, unknown, unknown, np.array([False, False]))
+    >>> falling.reason("N", "the second half")
     'not settled: 1 → 0.3679 N over the second half'
-    >>> settlement((2.0 + np.sin(70.0 * time))[np.newaxis], noisy=False).verdict
+    >>> turning.verdict
     ''
     """
-    one = (np.array([number]) for number in (sem, freedom, noisy))
-    return _settlements(values[np.newaxis], *one)[0]
-
-
-def _settlements(values: Array, sem: Array, freedom: Array, noisy: Array) -> list[Settlement]:
-    """Return the ``settlement`` at each point of a sweep; values have the shape (points, members, records)."""
     half = values.shape[-1] // 2
     with np.errstate(invalid="ignore", divide="ignore"):
         course = np.nansum(values, axis=1) / np.isfinite(values).sum(axis=1)
@@ -893,7 +889,7 @@ def distribution(
         What the members have in common, and a run without noise, has no errors. What only a closed contact has (see
         ``closed_only``) is of the closed contacts.
 
-        ``…_reason`` is "" or the reason why there is no mean. If values have not settled (see ``settlement``), the
+        ``…_reason`` is "" or the reason why there is no mean. If values have not settled (see ``settlements``), the
         mean is the value at the end of the span. It is nan if some contacts have opened and at most two are left, or
         contacts close again. All else is then nan.
     """
@@ -921,7 +917,7 @@ def distribution(
             values = values - _series(base, readers[1](name), step)
         values = values.reshape(-1, *values.shape[-2:])
         numbers, freedom = _over_time(values, step, name, differ)
-        states = _settlements(values, numbers["sem"], freedom, differ)
+        states = settlements(values, numbers["sem"], freedom, differ)
         result |= _described(variable.rename(name), numbers, sweep, states, openings, words, differ)
     return xr.Dataset(result)
 

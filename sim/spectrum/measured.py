@@ -351,7 +351,7 @@ def periodogram(field: Array, cell: float | tuple[float, float], window: str = "
     >>> from sim.numerics.grid import Grid
     >>> field = np.random.default_rng(1).normal(size=(16, 16))
     >>> grid = Grid(cell=2.0, points=16)
-    >>> total = grid.mode_sum(periodogram(field, 2.0)) / 2.0**2
+    >>> total = np.sum(grid.multiplicity * periodogram(field, 2.0)) / 2.0**2
     >>> print(f"{float(total / np.var(field)):.12f}")
     1.000000000000
     """

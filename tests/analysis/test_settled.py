@@ -12,13 +12,18 @@ from numpy.testing import assert_allclose
 
 import sim
 from sim.analysis.events import peak_of_mean
-from sim.analysis.statistics import closed_only, of_second_half, settlement
+from sim.analysis.statistics import closed_only, of_second_half, settlements
 from sim.ensemble import plan as plans
 from sim.parts.contact.models import Adhesion
 from tests.analysis.test_invariance import SCENES
 
 ENSEMBLES, LEAST, MOST = 1000, 0.92, 0.98
 TIME = np.linspace(0.0, 1.0, 400)
+
+
+def settlement(values, sem=math.nan, freedom=math.nan, noisy=True):
+    (state,) = settlements(values[np.newaxis], *(np.array([number]) for number in (sem, freedom, noisy)))
+    return state
 
 
 def series(rng, members, times):

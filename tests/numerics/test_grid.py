@@ -18,11 +18,15 @@ def test_a_half_spectrum_holds_its_field_and_every_wavevector_once_by_the_integr
         grid.superpose(spectrum, np.empty_like(spectrum), back)
         assert np.max(np.abs(back - field)) < 1e-13
         power = np.abs(grid.forward(field + 0.3)) ** 2
-        assert_allclose(grid.mode_sum(power) / grid.area**2, np.mean((field + 0.3) ** 2), rtol=1e-12, atol=0)
+        assert_allclose(
+            np.sum(grid.multiplicity * power) / grid.area**2, np.mean((field + 0.3) ** 2), rtol=1e-12, atol=0
+        )
         assert grid.multiplicity.sum() * points == points**2
         full = 2.0 * np.pi * np.fft.fftfreq(points, grid.spacing)
         exact = np.sum(np.cos(1e-5 * np.hypot(full[:, None], full[None, :])))
-        assert_allclose(grid.mode_sum(np.cos(1e-5 * np.hypot(*grid.wavevectors))), exact, rtol=1e-12, atol=0)
+        assert_allclose(
+            np.sum(grid.multiplicity * np.cos(1e-5 * np.hypot(*grid.wavevectors))), exact, rtol=1e-12, atol=0
+        )
     for points in [8, 9]:
         grid = Grid(cell=0.3, points=points)
         field = fields(points)
@@ -37,8 +41,5 @@ def test_members_have_the_same_bits_in_any_batch():
     for points in [31, 64]:
         grid = Grid(cell=1.0, points=points)
         spectra = grid.forward(fields(points, 13))
-        sums = grid.mode_sum(np.abs(spectra) ** 2)
         for member in (0, 6, 12):
             assert_array_equal(grid.forward(fields(points, 13)[member]), spectra[member])
-            assert grid.mode_sum(np.abs(spectra[member]) ** 2) == sums[member]
-        assert_array_equal(grid.mode_sum(np.abs(spectra[3:6]) ** 2), sums[3:6])
