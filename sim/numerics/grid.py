@@ -79,14 +79,14 @@ class Lattice:
         """Half spectrum [unit of the field x m^2] of a field, over the last two axes."""
         return scipy.fft.rfft2(field) * self.pixel
 
-    def superpose(self, amplitudes: np.ndarray, between: np.ndarray, field: np.ndarray) -> None:
+    def superpose(self, amplitudes: np.ndarray, field: np.ndarray) -> None:
         """Write the sum over all wavevectors of amplitude × exp(i q.x), of a half spectrum, to ``field``.
 
-        ``between`` has the shape of the amplitudes and is overwritten. Arrays used again save the system's time
-        for new ones, as long as the transforms themselves.
+        The amplitudes are overwritten. Arrays used again save the system's time for new ones, as long as the
+        transforms themselves.
         """
-        np.fft.ifft(amplitudes, axis=0, norm="forward", out=between)
-        np.fft.irfft(between, self.shape[1], axis=1, norm="forward", out=field)
+        columns = scipy.fft.ifft(amplitudes, axis=0, norm="forward", overwrite_x=True)  # several columns at once
+        np.fft.irfft(columns, self.shape[1], axis=1, norm="forward", out=field)
 
     def weighted_power(self, fields: np.ndarray, weight: np.ndarray) -> np.ndarray:
         """Sum over all wavevectors of ``weight`` \\|f(q)\\|², for each field (..., m, n) of no more samples.

@@ -288,13 +288,13 @@ class ModalProcess(Renewing):
         points, shift = self.modes.points, 2.0 * np.pi / self.modes.cell * position
         maps, shifts, sizes = np.empty((members, points, points)), *(np.broadcast_to(a, members) for a in (shift, size))
         try:
-            half, between = self._spare.pop()
-        except IndexError:  # the first map, or another thread has them
-            half, between = np.zeros((2, points, points // 2 + 1), dtype=complex)
+            half = self._spare.pop()
+        except IndexError:  # the first map, or another thread has it
+            half = np.empty((points, points // 2 + 1), dtype=complex)
         for part, shift, amplitude, field in zip(parts, shifts, sizes, maps, strict=True):
-            spread_modes(part, amplitude, self.deviation, self.modes.ix, self.modes.iy, shift, half)
-            self.lattice.superpose(half, between, field)
-        self._spare.append((half, between))
+            spread_modes(part, amplitude, self.deviation, *self._places, shift, half)
+            self.lattice.superpose(half, field)
+        self._spare.append(half)
         return maps
 
     @cached_property
@@ -303,8 +303,15 @@ class ModalProcess(Renewing):
         return Grid(self.modes.cell, self.modes.points)
 
     @cached_property
-    def _spare(self) -> list[tuple[Array, Array]]:
-        """Work arrays for half spectra that are not in use; the first of two is zero but at the modes."""
+    def _places(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Row of each pair in a half spectrum and its place there, counted row by row; short, as reading takes time."""
+        rows = self.modes.ix % self.modes.points
+        places = rows * (self.modes.points // 2 + 1) + self.modes.iy
+        return rows.astype(np.int32), places.astype(np.int32)
+
+    @cached_property
+    def _spare(self) -> list[Array]:
+        """Work arrays for half spectra that are not in use."""
         return []
 
     @property
@@ -364,11 +371,12 @@ def renew_modes(values, keep, renew, size, weights, seed, part, members, step, e
         for s in range(len(keep)):
             numbers = stream(seed, part, members[m], step + s, 0)
             total, unit = 0.0, size[s, m if size.shape[1] > 1 else 0]
+            keeping, kick = keep[s, step_row, 0], renew[s, step_row, 0] * unit
             for k in range(weights.size):
                 first, numbers = normal(numbers)
                 second, numbers = normal(numbers)
-                i = k if many else 0
-                keeping, kick = keep[s, step_row, i], renew[s, step_row, i] * unit
+                if many:
+                    keeping, kick = keep[s, step_row, k], renew[s, step_row, k] * unit
                 x = keeping * values[m, 0, k] + kick * first
                 y = keeping * values[m, 1, k] + kick * second
                 values[m, 0, k], values[m, 1, k] = x, y
@@ -389,21 +397,21 @@ def turn_phases(phases, exponents, seed, part, members, step):
                 phases[m, k] += math.sqrt(2.0 * exponents[s, row, k if many else 0]) * turn
 
 
-@kernel(
-    "void(float64[:,::1], float64, float64[::1], Array(int64, 1, 'C', readonly=True),"
-    " Array(int64, 1, 'C', readonly=True), float64, complex128[:,::1])"
-)
-def spread_modes(parts, size, deviation, ix, iy, shift, half):
-    """Write the amplitudes of mode pairs, each turned by exp(−i ix shift), at their places in a half spectrum."""
+@kernel("void(float64[:,::1], float64, float64[::1], int32[::1], int32[::1], float64, complex128[:,::1])")
+def spread_modes(parts, size, deviation, rows, places, shift, half):
+    """Write a half spectrum that has the amplitudes of mode pairs at their places, each turned by exp(−i ix shift)."""
     points = len(half)
-    turns = np.empty(2 * points + 1, np.complex128)
-    for j in range(turns.size):
-        turns[j] = complex(math.cos((j - points) * shift), -math.sin((j - points) * shift))
-    for k in range(ix.size):
-        value = size * deviation[k] * complex(parts[0, k], parts[1, k]) * turns[ix[k] + points]
-        half[ix[k] if ix[k] >= 0 else ix[k] + points, iy[k]] = value
-        if iy[k] == 0:  # this column holds both of a pair
-            half[-ix[k] if ix[k] <= 0 else points - ix[k], 0] = value.conjugate()
+    turns, flat = np.empty(points, np.complex128), half.reshape(-1)
+    for j in range(points // 2 + 1):
+        turn = complex(math.cos(j * shift), -math.sin(j * shift))
+        turns[-j], turns[j] = turn.conjugate(), turn
+    half[:] = 0.0
+    for k in range(places.size):
+        turn, unit = turns[np.uint64(rows[k])], size * deviation[k]
+        x, y = unit * parts[0, k], unit * parts[1, k]
+        flat[np.uint64(places[k])] = complex(x * turn.real - y * turn.imag, x * turn.imag + y * turn.real)
+    for j in range(1, (points + 1) // 2):  # the first column holds both of a pair
+        half[points - j, 0] = half[j, 0].conjugate()
 
 
 @dataclass(frozen=True)
