@@ -179,7 +179,7 @@ def follow(scenario: Scenario, noise: MemberNoise, state: State | None, steps: r
         calm = calm + len(block) if state.step == block[-1] else 0
         wanted = slice((steps.start - block.start) % steps.step, None, steps.step)
         blocks.append(Trajectory(*(values[wanted] for values in trajectory)))
-    return state, Trajectory(*map(np.concatenate, zip(*blocks, strict=True)))
+    return state, blocks[0] if len(blocks) == 1 else Trajectory(*map(np.concatenate, zip(*blocks, strict=True)))
 
 
 def trajectory_of(scenario: Scenario, state: State) -> Trajectory:

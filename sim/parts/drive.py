@@ -291,7 +291,10 @@ class _Driven(Part):
         work, *spent, stored, first = (state.energies[..., k] for k in range(state.energies.shape[-1]))
         residual = work - (stored - first) - sum(spent)
         stage = state.stage_position, state.stage_speed, state.spring_force
-        return np.stack([*stage, work, stored, *spent, residual, state.substeps, state.runaway_time], axis=-1)
+        readings = np.empty((*work.shape, len(READINGS)))
+        for k, column in enumerate((*stage, work, stored, *spent, residual, state.substeps, state.runaway_time)):
+            readings[..., k] = column
+        return readings
 
 
 @keyed(kw_only=True)
@@ -309,7 +312,7 @@ class Force(_Driven):
         return tables.prescribed(self.force)
 
     def pieces(self, ends: Array, duration: float) -> tables.Pieces:
-        return _zeros(ends)
+        return tables.Number(0.0).pieces(ends, duration)
 
 
 @keyed(kw_only=True)
@@ -348,27 +351,21 @@ class Spring(_Driven):
 
     def pieces(self, ends: Array, duration: float) -> tables.Pieces:
         """Return the speed of the stage in the intervals between some times [s], in pieces."""
-        after = self.start_after
+        after, still = self.start_after, tables.Number(0.0)
         if after <= ends[0]:
             return _shifted(self.course.pieces(ends - after, duration - after), after)
         if after >= ends[-1]:
-            return _zeros(ends)
+            return still.pieces(ends, duration)
         rests, cut = ends[ends < after], ends[ends > after]
-        still = _zeros(np.append(rests, after))
         moving = _shifted(self.course.pieces(np.append(0.0, cut - after), duration - after), after)
-        pieces = tables.Pieces(*(np.concatenate(pair) for pair in zip(still, moving, strict=True)))
+        pairs = zip(still.pieces(np.append(rests, after), duration), moving, strict=True)
+        pieces = tables.Pieces(*(np.concatenate(pair) for pair in pairs))
         return pieces._replace(interval=np.searchsorted(ends, 0.5 * (pieces.start + pieces.stop)) - 1)
 
 
 def _shifted(pieces: tables.Pieces, time: float) -> tables.Pieces:
     """Return pieces that begin later by a time [s]."""
-    return pieces._replace(start=pieces.start + time, stop=pieces.stop + time)
-
-
-def _zeros(ends: Array) -> tables.Pieces:
-    """Return pieces of zero in the intervals between some times [s]."""
-    none = np.zeros(len(ends) - 1)
-    return tables.linear_pieces(np.arange(len(none)), ends[:-1], ends[1:], none, none)
+    return pieces._replace(start=pieces.start + time, stop=pieces.stop + time) if time else pieces
 
 
 Drive = Annotated[Steady | Start | Ramp | Table | Force | Spring, Field(discriminator="model")]

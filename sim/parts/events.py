@@ -24,6 +24,7 @@ EXTREME = record("largest time speed area")
 #: Row of a running maximum: the last value but one, the last value, 1 if the value fell at both ends of the last step
 #: by its slopes, and the maximum of the phase so far.
 MAXIMUM = record("before last falls " + " ".join(EXTREME.names or ()))
+_NO_MAXIMUM = np.array([-math.inf, 0.0, 0.0, *(-math.inf for _ in EXTREME.names or ())])
 #: Time of the first opening and of the first closing of a contact [s], and the radius after that closing [m].
 TURN = record("opening closing radius")
 #: Row of a contact: radius [m] when it last opened or closed, and time of the last detachment [s]; number of
@@ -298,8 +299,8 @@ def first(bonding: Bonding, contact: ContactState, pull: Array, stage: Array) ->
 
 def _started(values: Array) -> Array:
     """Return running maxima before the first step of a phase, from the values at its start."""
-    rows = np.full((len(values), 1, len(MAXIMUM.names or ())), -np.inf)
-    rows[:, 0, 1], rows[:, 0, 2] = values, 0.0
+    rows = np.empty((len(values), 1, len(_NO_MAXIMUM)))
+    rows[:], rows[:, 0, 1] = _NO_MAXIMUM, values
     return rows
 
 

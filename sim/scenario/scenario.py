@@ -327,7 +327,7 @@ class Scenario:
         except PydanticCustomError as fault:  # of a point inside a long sweep, which was not tried before
             raise BadInput([f"shear: {fault.message()}"]) from None
 
-    @property
+    @cached_property
     def contact_area(self) -> float:
         """Return the area of the contact at rest [m²]; of one without equilibrium, that of radius R/100."""
         radius = self.rest_radius if self.rest_radius > 0.0 else 0.01 * self.sphere.radius
@@ -418,7 +418,7 @@ class Scenario:
         varies = self.fluctuations.per_member and self.fluctuations.spectrum.variance > 0.0
         return varies and (self.contact.lags or pulled(self))
 
-    @property
+    @cached_property
     def by_steps(self) -> bool:
         """Return True if a run goes step by step and not by blocks of steps.
 
@@ -432,12 +432,12 @@ class Scenario:
         alone = contact.lags or not (self._fluctuations_leave_contact or shear.in_blocks) or not in_blocks
         return any(part.feeds_back for part in self.chosen[1:]) or (self.drive.solves_motion and alone)
 
-    @property
+    @cached_property
     def draws_within(self) -> bool:
         """Return True if the loop of a drive that solves the motion draws the fluctuations that the contact feels."""
         return self.drive.solves_motion and not (self.by_steps or self._fluctuations_leave_contact)
 
-    @property
+    @cached_property
     def holds_contact(self) -> bool:
         """Return True if neither bonds nor the mount change the contact within the sub-steps of a slider."""
         contact, work = self.contact, self.adhesion.work_of_bonds

@@ -326,11 +326,9 @@ class Pieces(NamedTuple):
     @property
     def joined(self) -> "Pieces":
         """Return one piece for each interval; its sums are rounded once."""
-        if len(self.interval) == 1:
+        if len(self.interval) == self.interval[-1] - self.interval[0] + 1:
             return self
         opening = np.flatnonzero(np.diff(self.interval, prepend=-1))
-        if len(opening) == len(self.interval):
-            return self
         closing = np.append(opening[1:], len(self.interval)) - 1
         squares = self.unsteady + _steady_square(self.path, self.stop - self.start)
         integral, path, square = np.add.reduceat([self.integral, self.path, squares], opening, axis=1)
@@ -397,8 +395,9 @@ class Number(NamedTuple):
 
     def pieces(self, ends: Array, duration: float) -> Pieces:
         """Return the pieces of the intervals between some times [s], cut where the value turns or jumps."""
-        values = self.at(ends, duration)
-        return linear_pieces(np.arange(len(ends) - 1), ends[:-1], ends[1:], values[:-1], values[1:])
+        span = ends[1:] - ends[:-1]
+        value, unsteady, integral = np.full(len(span), self.value), np.zeros(len(span)), self.value * span
+        return Pieces(np.arange(len(span)), ends[:-1], ends[1:], value, value, integral, np.abs(integral), unsteady)
 
 
 @keyed(kw_only=True)

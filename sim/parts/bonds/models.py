@@ -408,7 +408,7 @@ class _Stretched(_BondModel):
         """Rupture rate as a function of the stretch of a bond."""
         return self.rupture.law(self.bond_stiffness)
 
-    @property
+    @cached_property
     def bound_at_rest(self) -> float:
         """Share of sites bound at a bond fraction of 1 [1]: that at rest, or all if no bond can form."""
         return self.rebinding_rate / (self.rebinding_rate + self.law.at_rest) if self.rebinding_rate > 0.0 else 1.0

@@ -39,7 +39,8 @@ class RuptureRate(NamedTuple):
     def at(self, stretch: Array) -> Array:
         """Return the rupture rate of bonds of a stretch [m] below any limit [1/s]."""
         size = np.abs(stretch)
-        return self.rate * np.exp(size * self.softness) + self.catch * np.exp(-size * self.relief)
+        rate = self.rate * np.exp(size * self.softness)
+        return rate + self.catch * np.exp(-size * self.relief) if self.catch > 0.0 else rate
 
     @property
     def steepness(self) -> float:

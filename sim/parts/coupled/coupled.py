@@ -147,11 +147,11 @@ def load(parts: Parts, slider: Sliding, bonding: Bonding, contact: StepContact, 
     first = drive.first(duration)
     pull = friction + drive.damping * speed if drive.spring else first + 0.0 * friction
     ahead, stage = (pull / drive.spring, first + 0.0 * pull) if drive.spring else (0.0 * pull, 0.0 * pull)
-    energies = np.zeros(slider.energies.shape)
+    energies = np.zeros((len(speed), 1), ENERGY)
     stored = 0.5 * (ahead * pull + drive.mass * speed**2 + sheared * friction) + area * bonding.stored
-    energies.view(ENERGY)[:, 0]["stored"] = energies.view(ENERGY)[:, 0]["first"] = stored
+    energies["stored"] = energies["first"] = stored[:, np.newaxis]
     loaded = {"spring_force": pull, "sheared": sheared, "stage_position": ahead, "stage_speed": stage}
-    return slider._replace(**loaded, energies=energies)
+    return slider._replace(**loaded, energies=energies.view(float))
 
 
 def with_contact_stress(parts: Parts, bonding: Bonding, speed: Array) -> Bonding:
@@ -182,8 +182,7 @@ def advance(
     rows["radius"] = contact.radius
     pieces, duration = drive.driven(ends, times.duration), ends[1:] - ends[:-1]
     scale = 1.0 / (stretch if drive.spring else force)
-    course = np.array([pieces.interval, pieces.stop - pieces.start, *pieces[3:6]])
-    course[2:] *= scale
+    course = np.stack([pieces.interval, pieces.stop - pieces.start, *(scale * piece for piece in pieces[3:6])], axis=1)
     law, shear = parts.shear.field_law, contact.shear
     rows["paid"], rows["drawn"] = contact.paid, contact.paid * shear.energy
     answers = isinstance(bonds, _WITH_STRETCH) and shear.expected.size  # others hold a contact that is rigid
@@ -194,7 +193,7 @@ def advance(
         law = law._replace(length=law.length / stretch, by_slip=law.by_slip * stretch)
     state = rows.view(float).reshape(members, COLUMNS)
     clock, work = _clock(contact, ends), stretch * force
-    inputs = Inputs(state, slider.energies.copy(), np.ascontiguousarray(course.T), clock, _of_columns(*units), work)
+    inputs = Inputs(state, slider.energies.copy(), course, clock, _of_columns(*units), work)
     columns, energies = np.empty((COLUMNS, len(steps), members)), np.empty((len(steps), *slider.energies.shape))
     numbers = *_numbers(drive, bonds, contact, units), tuple(law)
     reached = dict(zip(_NAMES, columns, strict=True))
@@ -267,8 +266,8 @@ def steps_until_contact_changes(slider: Driven, radius: Array) -> int:
     """Return the number of clock steps up to the first that ends with another contact radius [m] than its sub-steps."""
     if len(radius) == 1:
         return 1
-    apart = ~np.all(_agree(slider.radius, radius), axis=1)
-    return int(np.argmax(apart)) + 1 if apart[:-1].any() else len(apart)
+    same = _agree(slider.radius, radius)
+    return len(same) if same[:-1].all() else int(np.argmin(same.all(axis=1))) + 1
 
 
 def of_loop(slider: Sliding, radius: Array) -> Array:
@@ -310,8 +309,8 @@ def _numbers(drive: Force | Spring, bonds: _SolvedBonds, contact: StepContact, u
 def _clock(contact: StepContact, ends: Array) -> Array:
     """Return the beginning of each step, its load and base, each with its rate, and its length; shape (steps, 6)."""
     duration = ends[1:] - ends[:-1]
-    clock = np.zeros((len(duration), 6))
-    clock[:, 0], clock[:, 5] = ends[:-1], duration
-    for column, (first, last) in enumerate(zip(*(mount[:2] for mount in contact.mounts), strict=True)):
-        clock[:, 2 * column + 1], clock[:, 2 * column + 2] = first, (last - first) / duration
+    (load, base, _), last = contact.mounts
+    clock = np.empty((len(duration), 6))
+    clock[:, 0], clock[:, 1], clock[:, 3], clock[:, 5] = ends[:-1], load, base, duration
+    clock[:, 2], clock[:, 4] = (last.load - load) / duration, (last.base - base) / duration
     return clock
