@@ -185,19 +185,19 @@ def simulate(
 
 def advance(task: Task, number: int, state: State | None) -> tuple[State, Arrays]:
     """Advance a group of members by one block from the state before; return the state at its end and the records."""
-    recorded = []
-    for point in task.points:  # several only if the run is one block
+    result: Arrays = {}
+    for place, point in enumerate(task.points):  # several only if the run is one block
         end, arrays = _record(task, point, state, task.blocks[number])
-        recorded.append(arrays)
-    if len(recorded) == 1:  # without a copy, as maps may be large
-        return end, {key: values[np.newaxis] for key, values in recorded[0].items()}
-    return end, {key: _stacked([arrays[key] for arrays in recorded]) for key in recorded[0]}
-
-
-def _stacked(arrays: list[np.ndarray]) -> np.ndarray:
-    """Return arrays along a new first axis, each padded by nan to the longest last axis."""
-    longest = max(values.shape[-1] for values in arrays)
-    return np.stack([padded(values, longest) for values in arrays])
+        if len(task.points) == 1:  # without a copy, as maps may be large
+            return end, {key: values[np.newaxis] for key, values in arrays.items()}
+        for key, values in arrays.items():
+            longest = values.shape[-1]
+            if not place:
+                result[key] = np.full((len(task.points), *values.shape), np.nan)
+            elif result[key].shape[-1] < longest:
+                result[key] = padded(result[key], longest)
+            result[key][place, ..., :longest] = values
+    return end, result
 
 
 def _record(task: Task, point: Scenario, state: State | None, block: Block) -> tuple[State, dict[str, np.ndarray]]:
@@ -215,7 +215,7 @@ def _record(task: Task, point: Scenario, state: State | None, block: Block) -> t
             first, last = steps[0] // clock.stride - records[0], steps[-1] // clock.stride + 1 - records[0]
             for variable in variables:
                 part = rows[variable.name][:, first:last]
-                part[:] = np.broadcast_to(_read(variable, point, course), part.T.shape).T
+                part.T[:] = _read(variable, point, course)
         if drawn and steps[-1] in drawn_at:
             maps[f"{MAP[0]}@{drawn_at.index(steps[-1])}"] = _maps(point, state, drawn)
     end = cast(State, state)
