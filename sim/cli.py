@@ -36,8 +36,6 @@ _CODES = (
 
 #: Rows of a table on the terminal.
 _ROWS = 12
-#: A dataset of fewer bytes is read at once.
-_SMALL = 10_000_000
 
 
 def main() -> None:
@@ -203,11 +201,11 @@ def run(
         say(str(target) if target.exists() else waits)
 
 
-def _tables(dataset: Any, most: int = _ROWS, lost: tuple[str, ...] = ()) -> tuple[list[Any], list[str]]:
+def _tables(dataset: Any, most: int = _ROWS, lost: tuple[str, ...] = (), every: Any = None) -> tuple[Any, list[str]]:
     """Return the tables of statistics of a dataset, and notes on their numbers."""
     from sim import analysis
 
-    stated = analysis.tables.stated(dataset, lost)
+    stated = analysis.tables.stated(dataset, lost, every)
     rows, once = analysis.table(dataset, most, stated), analysis.highlights(dataset, most, stated)
     further = [of(dataset, most, stated) for of in (analysis.losses, analysis.phases)]
     further.append(analysis.spread(dataset, stated))
@@ -218,7 +216,8 @@ def _tables_of(target: Path) -> tuple[list[list[dict[str, str]]], list[str]]:
     """Return the tables of a run that is done; trouble with them is a note."""
     try:
         with _opened(target) as dataset:
-            return _tables(dataset.load() if dataset.nbytes < _SMALL else dataset)
+            trajectories = dataset.drop_dims("map_time", errors="ignore").load()
+        return _tables(trajectories)  # of a closed file, because an open one keeps what was read in its cache
     except (MemoryError, OSError) as trouble:
         return [], [f"the output is complete, but its table could not be made: {trouble or 'not enough memory'}"]
 
@@ -254,17 +253,20 @@ def check(scenario: Path, **overrides: Any) -> None:
 @_FORCE
 def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None, force: bool, **form: Any) -> None:
     """Print tables of ensemble statistics over time and sweep."""
+    _import_xarray()
     from sim import analysis
     from sim.units.notation import in_units
 
     if form["wide"] and csv is None:
         raise click.UsageError("--wide is a form of --csv FILE, which is missing")
     with _opened(output, chosen) as dataset, in_units(form["units"]):
+        every = None
         if csv is not None:
             analysis.dataset.claim(dataset, output, csv, force)
+            every = analysis.statements(dataset, lost=form["lost"])
             # before any printing, as nobody may read it to its end
-            analysis.to_csv(dataset, csv, form["wide"], whole, form["lost"])
-        _print_tables(*_tables(dataset, sys.maxsize if whole else _ROWS, form["lost"]))
+            analysis.to_csv(dataset, csv, form["wide"], whole, form["lost"], every)
+        _print_tables(*_tables(dataset, sys.maxsize if whole else _ROWS, form["lost"], every))
         if csv is not None:
             say(str(csv))
 
@@ -321,6 +323,7 @@ def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...
     scenario (.toml), its spectrum is drawn before any run. Every kind takes --where, --member, --units, --size
     and --xlim, and the options beside its name. Kinds over time also take --from and --to.
     """
+    _import_xarray()
     from sim.plots import kinds as plots
 
     choice = plots.Choices(**choices)
@@ -346,6 +349,7 @@ def report(
     output: Path, page: Path | None, chosen: tuple[str, ...], units: tuple[str, ...], force: bool, **beside: Any
 ) -> None:
     """Write an HTML page on a run: question, key figures, remarks, figures, errors and commands."""
+    _import_xarray()
     from sim.report import written
     from sim.units.notation import in_units
 

@@ -4,7 +4,6 @@ A number of the scenario is a variable, a swept one a coordinate; the resolved s
 """
 
 import contextlib
-import hashlib
 import json
 import os
 import re
@@ -33,7 +32,6 @@ _STATEMENTS = {
 #: A missing variable in the words of xarray, without the ending of a statistic.
 _MISSING = re.compile(r"(?:^|named ')(\w+?)(?:_mean|_std|_sem)?(?:'|$)")
 _CONTROLS = ("load", "indentation", "displacement")
-_MOST_BYTES = 2**28
 
 
 def open(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -155,13 +153,14 @@ def claim(dataset: xr.Dataset, path: Path, target: Path, replace: bool, *others:
     files.claim(target, replace, [path, *others])
     if not target.is_file() or target.is_relative_to("/dev"):
         return
+    files_read = hdf5.tables(dataset.attrs.get("scenario_files")).values()
+    texts = [str(entry.get("text")) for entry in (*files_read, {"text": dataset.attrs.get("scenario_toml")})]
     with target.open("rb") as file:
-        content = file.read(_MOST_BYTES)
+        content = file.read(10 + 2 * max(len(text.encode()) for text in texts))  # a mark, and line ends of two letters
     text = content.decode("utf-8-sig", "replace").replace("\r\n", "\n")
     if content.startswith((b"\x89HDF", b"CDF")):
         raise BadInput([f"{target} is a dataset, which is never replaced; name another file"])
-    recorded = str(dataset.attrs.get("scenario_files")), dataset.attrs.get("scenario_toml")
-    if content and (hashlib.sha256(text.encode()).hexdigest() in recorded[0] or text == recorded[1]):
+    if content and text in texts:
         raise BadInput([f"{target} is the scenario of this dataset, or a table of it; name another file"])
 
 

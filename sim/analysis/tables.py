@@ -154,9 +154,15 @@ _ROUNDING, _SETTLED = 1e-13, 1e-3
 _LINES = 2**15
 
 
-def stated(dataset: xr.Dataset, lost: Sequence[str] = ()) -> xr.Dataset:
-    """Return the statements that the tables print, with speeds at which shares of the area are ``lost``."""
-    return statements(dataset, [column.name for column in _COLUMNS], lost)
+def stated(dataset: xr.Dataset, lost: Sequence[str] = (), every: xr.Dataset | None = None) -> xr.Dataset:
+    """Return the statements that the tables print, with speeds at which shares of the area are ``lost``.
+
+    If ``every`` statement has been computed before, they are chosen from these.
+    """
+    if every is None:
+        return statements(dataset, [column.name for column in _COLUMNS], lost)
+    printed = tuple(f"{column.name}_" for column in (*_COLUMNS, *_EVENTS, *_PHASES, *_of_losses(every)))
+    return every.drop_vars([name for name in every if not str(name).startswith(printed)])
 
 
 def _of_losses(stated: xr.Dataset, symbol: str = "V") -> list[_Column]:
@@ -256,7 +262,8 @@ def _turning(dataset: xr.Dataset, stated: xr.Dataset) -> Iterator[str]:
     for name in (name for name in ("contact_area", "friction_force") if f"{name}_mean" in stated):
         if bool((stated.get(f"{name}_reason", xr.DataArray("")) != "").any()):
             continue  # values at an end are no means
-        inside = extremes(stated.isel({n: 0 for n in sweep_dims(dataset) if n != swept[0]}), name, swept[0])
+        curves = stated[[f"{name}_{end}" for end in ("mean", "low", "high")]]
+        inside = extremes(curves.isel({n: 0 for n in sweep_dims(dataset) if n != swept[0]}), name, swept[0])
         for extreme in ("largest", "least"):
             if math.isfinite(value := float(inside[f"{name}_{extreme}"])):
                 places = (inside[f"{name}_{extreme}_at{end}"] for end in ("", "_low", "_high"))
@@ -522,6 +529,7 @@ def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
 # --- a long table for other programs, and a data frame ---
 
 
+_TEXTS = "quantity", "unit", "over"
 #: Columns of statistics, and the endings of their names in a dataset in which each quantile is a variable.
 _ENDINGS = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": "std"}
 _ALIKE = [f"q{100 * level:02.0f}{end}" for level in QUANTILES for end in ("", "_low", "_high")]
@@ -530,8 +538,9 @@ _ENDINGS |= {"correlation_time_error": "correlation_time_sem"}
 
 
 def to_csv(
-    dataset: xr.Dataset, path: str | os.PathLike, wide: bool = False, every: bool = False, lost: Sequence[str] = ()
-) -> None:
+    dataset: xr.Dataset, path: str | os.PathLike, wide: bool = False, every: bool = False, lost: Sequence[str] = (),
+    stated: xr.Dataset | None = None,
+) -> None:  # fmt: skip
     """Write all statistics as one long table, as ``tidy`` gives them, or as a wide one.
 
     Parameters
@@ -546,25 +555,52 @@ def to_csv(
         units of ``in_units``, else in SI.
     every : bool
         True for a wide table of a row for each record, with all statistics.
+    stated : xarray.Dataset, optional
+        Its ``statements``, if they have been computed before.
     """
-    rows = in_columns(dataset, every, lost) if wide else tidy(dataset, lost)
-    units = {str(name): variable.attrs.get("units", "1") for name, variable in dataset.coords.items()}
-    units |= {"speed": "m/s"}
-    header = list(rows) if wide else [_with_unit(name, units.get(name, "1")) for name in rows]
+    if wide:
+        rows = in_columns(dataset, every, lost, stated)
+        names = header = list(rows)
+        parts = [{name: rows[name].to_numpy() for name in names}]
+    else:
+        names, parts = _long(dataset, lost, stated)
+        units = {str(name): variable.attrs.get("units", "1") for name, variable in dataset.coords.items()}
+        header = [_with_unit(name, (units | {"speed": "m/s"}).get(name, "1")) for name in names]
     with output(Path(path)) as beside, beside.open("w", encoding="utf-8", newline="") as file:
         file.write(",".join(_quoted(header)) + "\n")
-        for start in range(0, len(rows), _LINES):  # because the texts of all rows together take much memory
-            part = rows.iloc[start : start + _LINES]
-            file.writelines(map("{}\n".format, map(",".join, zip(*(_texts(part[name]) for name in part), strict=True))))
+        for part in parts:
+            columns = [part.get(name, np.array(np.nan)).ravel() for name in names]
+            for start in range(0, max(map(len, columns)), _LINES):  # because the texts of all rows take much memory
+                some = (slice(start if len(values) > 1 else 0, start + _LINES) for values in columns)
+                file.write(_lines([values[at] for values, at in zip(columns, some, strict=True)]))
 
 
-def _texts(column: pd.Series) -> list[str]:
-    """Return the texts of a column in CSV, each of which is made once, because most values of a sweep repeat."""
-    values = column.to_numpy()
-    bits = values.view(np.int64) if values.dtype == np.float64 else values  # 0.0 and -0.0 differ
+def _lines(columns: list[Array]) -> str:
+    """Return rows of CSV. Neighbouring columns that change in the same rows are joined before, because many repeat."""
+    groups: list[tuple[Array, list[list[str]]]] = []
+    before: tuple[Array, Array, list[str]] = np.empty(0), np.empty(0), [""]
+    for values in columns:
+        bits = values.view(np.int64) if values.dtype == np.float64 else values  # 0.0 and -0.0 differ
+        places, texts = before[1:] if np.array_equal(bits, before[0]) else _texts(values, bits)
+        if groups and len(texts) == 1:
+            groups[-1][1].append(texts * len(groups[-1][1][0]))
+            continue
+        before = bits, places, texts
+        if groups and np.array_equal(groups[-1][0], places):
+            groups[-1][1].append(texts)
+        else:
+            groups.append((places, [texts]))
+    joined = [list(map(",".join, zip(*texts, strict=True))) for _, texts in groups]
+    joined[-1] = [f"{text}\n" for text in joined[-1]]
+    every = (np.broadcast_to(places, max(map(len, columns))).tolist() for places, _ in groups)
+    rows = (map(texts.__getitem__, places) for places, texts in zip(every, joined, strict=True))
+    return "".join(map(",".join, zip(*rows, strict=True)))
+
+
+def _texts(values: Array, bits: Array) -> tuple[Array, list[str]]:
+    """Return the place of each row among the different values of a column, and these as fields of CSV."""
     places, alike = pd.factorize(bits, use_na_sentinel=False)
-    texts = _quoted(alike) if bits is values else list(map(repr, alike.view(np.float64).tolist()))
-    return list(map(texts.__getitem__, places.tolist()))
+    return places, _quoted(alike) if bits is values else list(map(repr, alike.view(np.float64).tolist()))
 
 
 def _quoted(values: Iterable[Any]) -> list[str]:
@@ -581,7 +617,9 @@ def _with_unit(name: str, unit: str) -> str:
     return name if unit in ("1", "") else f"{name} [{unit}]"
 
 
-def in_columns(dataset: xr.Dataset, every: bool = False, lost: Sequence[str] = ()) -> pd.DataFrame:
+def in_columns(
+    dataset: xr.Dataset, every: bool = False, lost: Sequence[str] = (), stated: xr.Dataset | None = None
+) -> pd.DataFrame:
     """Return the statements of a run, a row for each point of the sweep; with ``every`` all statistics at each record.
 
     Returns
@@ -590,7 +628,7 @@ def in_columns(dataset: xr.Dataset, every: bool = False, lost: Sequence[str] = (
         A column ``name [unit]`` for each swept key and statement, and if they are known ``name_error``, ``name_low``
         and ``name_high`` (95 % interval) and ``name_reason``. Units are those of ``in_units``, else SI.
     """
-    stated = xr.Dataset() if every else statements(dataset, lost=lost)
+    stated = xr.Dataset() if every else statements(dataset, lost=lost) if stated is None else stated
     wanted = re.compile("(?!.*_(quantile|correlation_time)).*_(mean|sem|low|high|reason)")
     stated = stated.drop_dims("phase", errors="ignore")
     rows = frame(dataset) if every else _framed(dataset, stated[[n for n in stated if wanted.fullmatch(str(n))]])
@@ -616,30 +654,36 @@ def tidy(dataset: xr.Dataset, lost: Sequence[str] = ()) -> pd.DataFrame:
         ``low`` and ``high`` (95 % interval) of the mean; ``sd``; quantiles ``q05``, ``q50``, ``q95`` with
         the ends of their intervals; ``effective_samples``, ``correlation_time`` and ``correlation_time_error`` [s].
     """
-    members = averaging(dataset, False).removeprefix("mean over the ")
-    groups = [(over_members(dataset), members), (statements(dataset, lost=lost), "")]
-    frames = []
-    for group, over in groups:
-        flat = _flat(group)
-        keys = [str(key) for key in flat if str(key).endswith("_mean")]
-        frames += [_long(dataset, flat, key, flat[key].attrs.get("over", over) or "one run") for key in keys]
-    places = [*map(str, dataset["contact_modulus"].coords), "branch", "phase", "t", "speed"]
-    columns = [*places, "quantity", "unit", "over", *_ENDINGS]
-    rows = pd.concat(frames, ignore_index=True)
-    return rows[[name for name in columns if name in rows]]
+    names, parts = _long(dataset, lost)
+    wholes = ({n: np.broadcast_to(v, part["mean"].shape).ravel() for n, v in part.items()} for part in parts)
+    return pd.concat(map(pd.DataFrame, wholes), ignore_index=True)[names]
 
 
-def _long(dataset: xr.Dataset, group: xr.Dataset, key: str, over: str) -> pd.DataFrame:
-    """Return rows of the statistics of a quantity, of which ``key`` is the mean."""
-    name, every = key.removesuffix("_mean"), (*sweep_dims(dataset), "branch", "phase", "t")
-    dims = [dim for dim in every if dim in group[key].dims]
-    columns = {column: group[f"{name}_{end}"] for column, end in _ENDINGS.items() if f"{name}_{end}" in group}
+def _long(
+    dataset: xr.Dataset, lost: Sequence[str], stated: xr.Dataset | None = None
+) -> tuple[list[str], list[dict[str, Array]]]:
+    """Return the columns of ``tidy``, and those of each quantity over its dimensions; a text is shared by all rows."""
+    places, parts, speeds = [*map(str, dataset["contact_modulus"].coords), "branch", "phase", "t"], [], {}
+    stated, members = statements(dataset, lost=lost) if stated is None else stated, averaging(dataset, False)
     if speed_name(dataset) in dataset:
-        speed = speed_of(dataset)
-        speed = speed if "t" in dims else speed.isel(t=0, drop=True).where(steady_points(dataset))
-        columns |= {"speed": speed} if set(speed.dims) <= set(dims) else {}
-    rows = xr.Dataset(columns).expand_dims("row").to_dataframe(dim_order=["row", *dims]).reset_index()
-    return rows.assign(quantity=name, unit=group[key].attrs.get("units", "1"), over=over)
+        speed = speed_of(dataset).compute()
+        speeds = {True: speed, False: speed.isel(t=0, drop=True).where(steady_points(dataset))}
+    for group, sample in ((over_members(dataset), members.removeprefix("mean over the ")), (stated, "")):
+        group, dims = _flat(group), (*sweep_dims(dataset), *places[-3:])
+        known = {name: group.coords[name].variable for name in places if name in group.coords}
+        known |= {name: phase.astype(float) for name, phase in known.items() if phase.dtype.kind == "i"}  # or none
+        for key in (str(key) for key in group if str(key).endswith("_mean")):
+            name, mean = key.removesuffix("_mean"), group.variables[key]
+            columns: dict[str, Any] = known | ({"speed": speeds["t" in mean.dims].variable} if speeds else {})
+            columns |= {column: group.variables.get(f"{name}_{end}") for column, end in _ENDINGS.items()}
+            sizes = {dim: mean.sizes[dim] for dim in dims if dim in mean.dims}
+            texts = name, mean.attrs.get("units", "1"), mean.attrs.get("over", sample) or "one run"
+            parts.append(dict(zip(_TEXTS, (np.array(text, object) for text in texts), strict=True)))
+            for column, values in columns.items():
+                if values is not None and set(values.dims) <= sizes.keys():
+                    parts[-1][column] = values.to_base_variable().set_dims(sizes).to_numpy()
+    names = (*places, "speed", *_TEXTS, *_ENDINGS)
+    return [name for name in names if any(name in part for part in parts)], parts
 
 
 def frame(dataset: xr.Dataset) -> pd.DataFrame:
@@ -658,10 +702,10 @@ def _framed(dataset: xr.Dataset, statistics: xr.Dataset) -> pd.DataFrame:
 
 def _flat(statistics: xr.Dataset) -> xr.Dataset:
     """Return statistics in which each quantile is a variable."""
-    flat: dict[str, xr.DataArray] = {}
-    for key, variable in statistics.data_vars.items():
-        stem, _, end = str(key).rpartition("_quantile")
+    flat: dict[str, xr.Variable] = {}
+    for key in map(str, statistics):
+        variable, (stem, _, end) = statistics.variables[key], key.rpartition("_quantile")
         levels = QUANTILES if "quantile" in variable.dims else ()
-        flat |= {f"{stem}_q{100 * level:02.0f}{end}": variable.sel(quantile=level, drop=True) for level in levels}
-        flat |= {} if levels else {str(key): variable}
-    return xr.Dataset(flat)
+        flat |= {f"{stem}_q{100 * level:02.0f}{end}": variable.isel(quantile=k) for k, level in enumerate(levels)}
+        flat |= {} if levels else {key: variable}
+    return xr.Dataset(coords=statistics.coords.drop_vars("quantile", errors="ignore")).assign(flat)
