@@ -543,6 +543,7 @@ _NO_FORCE = 1e-24
 _FALSE_ALARM = 0.01
 #: Whole cycles that each half of a span needs; share of a span over which its begin and its end are averaged.
 _CYCLES, _ENDS_SHARE = 2, 0.125
+_SHORT = "too short to show that it has settled"
 #: Records of a run without noise from which on it can be said to have settled.
 _FEW_RECORDS = 4
 _LEVELS = np.array(QUANTILES)
@@ -708,14 +709,18 @@ class Settlement(NamedTuple):
 
     ``verdict`` is "" if the values have settled. The value is that at the end, of cycles the mean over whole ones, and
     the mean over the span if it is too short to tell. ``half`` is half of the 95 % interval by the scatter between
-    cycles, nan without cycles.
+    cycles, nan without cycles. All of them may be arrays over the points of a sweep.
     """
 
-    verdict: str
-    value: float
-    begin: float
-    end: float
-    half: float = math.nan
+    verdict: Any
+    value: Any
+    begin: Any
+    end: Any
+    half: Any
+
+    def at(self, place: int) -> "Settlement":
+        """Return the answer at one point of a sweep."""
+        return Settlement(*(column[place] for column in self))
 
     def reason(self, unit: str, span: str) -> str:
         """Return why a span gives no mean, with the values at its ends in a unit; "" if it does."""
@@ -727,7 +732,7 @@ class Settlement(NamedTuple):
         return f"{self.verdict}: {begin} → {end} {shown}".rstrip() + f" over {span}"
 
 
-def settlements(values: Array, sem: Array, freedom: Array, noisy: Array) -> list[Settlement]:
+def settlements(values: Array, sem: Array, freedom: Array, noisy: Array) -> Settlement:
     """Return at each point of a sweep if values have settled: if their drift over the span is not above its error.
 
     Parameters
@@ -751,10 +756,10 @@ def settlements(values: Array, sem: Array, freedom: Array, noisy: Array) -> list
     --------
     >>> time, unknown = np.linspace(0.0, 1.0, 200), np.full(2, np.nan)
     >>> courses = np.stack([np.exp(-time), 2.0 + np.sin(70.0 * time)])[:, np.newaxis]
-    >>> falling, turning = settlements(courses, unknown, unknown, np.array([False, False]))
-    >>> falling.reason("N", "the second half")
+    >>> states = settlements(courses, unknown, unknown, np.array([False, False]))
+    >>> states.at(0).reason("N", "the second half")
     'not settled: 1 → 0.3679 N over the second half'
-    >>> turning.verdict
+    >>> states.verdict[1]
     ''
     """
     half = values.shape[-1] // 2
@@ -771,26 +776,24 @@ def settlements(values: Array, sem: Array, freedom: Array, noisy: Array) -> list
     return _settled(course, drift, error, free, noisy)
 
 
-def _settled(courses: Array, drift: Array, error: Array, free: Array, noisy: Array) -> list[Settlement]:
+def _settled(courses: Array, drift: Array, error: Array, free: Array, noisy: Array) -> Settlement:
     """Return the settlements of the members' means over time, with drifts, their errors and degrees of freedom.
 
     ``courses`` have the shape (points, records); unknown records are left out.
     """
-    result = [Settlement("", math.nan, math.nan, math.nan)] * len(courses)
-    known, alike = np.isfinite(courses), dict[bytes, list[int]]()
-    for place, records in enumerate(known):
-        alike.setdefault(records.tobytes(), []).append(place)
-    for places in alike.values():
-        if (records := known[places[0]]).any():
-            numbers = (each[places] for each in (drift, error, free, noisy))
-            states = _settled_alike(courses[places][:, records], *numbers)
-            for place, state in zip(places, states, strict=True):
-                result[place] = state
+    result = Settlement(np.full(len(courses), "", object), *np.full((4, len(courses)), math.nan))
+    patterns, which = np.unique(np.isfinite(courses), axis=0, return_inverse=True)
+    for number in np.flatnonzero(patterns.any(axis=1)):
+        points = which.ravel() == number
+        numbers = (each[points] for each in (drift, error, free, noisy))
+        states = _settled_alike(courses[points][:, patterns[number]], *numbers)
+        for column, values in zip(result, states, strict=True):
+            column[points] = values
     return result
 
 
-def _settled_alike(course: Array, drift: Array, error: Array, free: Array, noisy: Array) -> Iterator[Settlement]:
-    """Yield the settlements of ``_settled`` of courses that are known throughout."""
+def _settled_alike(course: Array, drift: Array, error: Array, free: Array, noisy: Array) -> Settlement:
+    """Return the settlements of ``_settled`` of courses that are known throughout."""
     records, chance = course.shape[1], 1.0 - 0.5 * _FALSE_ALARM
     few = max(1, int(_ENDS_SHARE * records))
     begin = np.where(noisy, course[:, :few].mean(axis=1), course[:, 0])
@@ -808,20 +811,18 @@ def _settled_alike(course: Array, drift: Array, error: Array, free: Array, noisy
     has_settled = ~is_short & (lasts | (np.abs(change) <= bound))
     is_short |= ~noisy & (np.count_nonzero(off[:, 1:] > off[:, :-1], axis=1) > 1)
     still = is_still | (records == 1)
-    verdicts = np.select([still | has_settled, is_short], ["", "too short to show that it has settled"], "not settled")
+    verdicts = np.select([still | has_settled, is_short], ["", _SHORT], "not settled")
     values = np.select([still, has_settled, is_short], [end, mean, course.mean(axis=1)], end)
     half = 0.5 * bound * WIDE / float(special.ndtri(chance))
     halves = np.where(~still & has_settled & (half > 0.0), half, math.nan)
-    columns = (column.tolist() for column in (verdicts, values, begin, end, halves))
-    return itertools.starmap(Settlement, zip(*columns, strict=True))
+    return Settlement(verdicts, values, begin, end, halves)
 
 
-def _of_two(states: list[Settlement], noisy: Array) -> list[Settlement]:
+def _of_two(states: Settlement, noisy: Array) -> Settlement:
     """Return the settlements of two records, the first of which is the start of the run: the values at its end."""
-    unknown = [bool(noise) or state.verdict.startswith("too short") for noise, state in zip(noisy, states, strict=True)]
-    ends = [state._replace(verdict="too few records", value=state.end) for state in states]
-    every = zip(unknown, ends, states, strict=True)
-    return [end if is_unknown and state.begin != state.end else state for is_unknown, end, state in every]
+    unknown = (noisy | (states.verdict == _SHORT)) & (states.begin != states.end)
+    verdict, value = np.where(unknown, "too few records", states.verdict), np.where(unknown, states.end, states.value)
+    return states._replace(verdict=verdict, value=value)
 
 
 def _cycles(course: Array) -> Array:
@@ -896,7 +897,7 @@ def distribution(
     dataset = plain(dataset)
     late, words = _late(dataset)
     step = float(late["t"][-1] - late["t"][0]) / max(late.sizes["t"] - 1, 1)
-    sweep, result = xr.full_like(dataset["contact_modulus"], np.nan, float), dict[str, xr.DataArray]()
+    sweep, result = dataset["contact_modulus"], {"quantile": xr.Variable("quantile", list(QUANTILES))}
     noisy, base = has_noise(dataset).to_numpy().ravel(), where(late, minus) if minus else None
     openings = [""] * sweep.size
     if "in_contact" in late:
@@ -919,7 +920,7 @@ def distribution(
         numbers, freedom = _over_time(values, step, name, differ)
         states = settlements(values, numbers["sem"], freedom, differ)
         result |= _described(variable.rename(name), numbers, sweep, states, openings, words, differ)
-    return xr.Dataset(result)
+    return xr.Dataset(result, sweep.coords)
 
 
 def _reader(dataset: xr.Dataset, names: Collection[str] | None) -> Callable[[str], xr.DataArray]:
@@ -939,32 +940,35 @@ def _series(dataset: xr.Dataset, variable: xr.DataArray, step: float) -> Array:
 
 
 def _described(
-    variable: xr.DataArray, numbers: dict[str, Array], sweep: xr.DataArray, states: list[Settlement],
+    variable: xr.DataArray, numbers: dict[str, Array], sweep: xr.DataArray, states: Settlement,
     openings: list[str], span: str, noisy: Array,
-) -> dict[str, xr.DataArray]:  # fmt: skip
+) -> dict[str, xr.Variable]:  # fmt: skip
     """Return statistics of an observable over the sweep, with the reasons where there is no mean.
 
     ``numbers`` of each statistic have the points of the sweep first.
     """
     name, unit = str(variable.name), variable.attrs.get("units", "1")
     states = _of_two(states, noisy) if span == "the run" else states
-    opened = np.array(openings if is_of_contact(name) else [""] * sweep.size, object)
-    drifts = np.array([state.reason(unit, span) for state in states], object)
-    reasons = np.where(opened != "", opened, drifts)
-    ends = np.where(opened != "", np.nan, [state.value for state in states])
+    reasons = np.array(openings if is_of_contact(name) else [""] * sweep.size, object)
+    is_open = reasons != ""
+    for place in np.flatnonzero(~is_open & (states.verdict != "")).tolist():
+        reasons[place] = states.at(place).reason(unit, span)
+    ends = np.where(is_open, np.nan, states.value)
     numbers["mean"] = np.where((reasons != "") | ~noisy, ends, numbers["mean"])
-    halves = np.where(noisy, math.nan, [state.half for state in states])  # without noise cycles differ, if anything
+    halves = np.where(noisy, math.nan, states.half)  # without noise cycles differ, if anything
     for kind, sign in (("low", -1.0), ("high", 1.0)):
         numbers[kind] = np.where(np.isnan(halves), numbers[kind], numbers["mean"] + sign * halves)
-    result: dict[str, xr.DataArray] = {}
+    result: dict[str, xr.Variable] = {}
     for kind, values in numbers.items():
         if kind != "mean":
             values[reasons != ""] = np.nan
-        shaped = sweep.expand_dims(quantile=list(QUANTILES), axis=-1) if values.ndim > 1 else sweep
-        shaped = shaped.copy(data=values.reshape(shaped.shape))
-        result[f"{name}_{kind}"] = shaped.assign_attrs(_attributes(kind, variable))
+        if np.isnan(values).all():  # one nan for all points, because large sweeps often have no noise
+            values = np.broadcast_to(np.nan, values.shape)
+        dims = (*sweep.dims, "quantile")[: sweep.ndim + values.ndim - 1]
+        shaped = values.reshape(sweep.shape + values.shape[1:])
+        result[f"{name}_{kind}"] = xr.Variable(dims, shaped, _attributes(kind, variable))
     text = {"long_name": f"reason why there is no {_OF['mean']} of {variable.attrs.get('long_name', name)}"}
-    result[f"{name}_reason"] = xr.DataArray(reasons.reshape(sweep.shape), sweep.coords, sweep.dims, attrs=text)
+    result[f"{name}_reason"] = xr.Variable(sweep.dims, reasons.reshape(sweep.shape), text)
     return result
 
 
@@ -982,7 +986,7 @@ def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) ->
     if "contact_radius" in dataset:
         return distribution(dataset, names)
     dataset = plain(dataset)
-    (late, words), sweep = _late(dataset), xr.full_like(dataset["contact_modulus"], np.nan, float)
+    (late, words), sweep = _late(dataset), dataset["contact_modulus"]
     points, members = sweep.size, int(dataset.attrs["members"])
     noisy, counts = has_noise(dataset).to_numpy().ravel(), np.full((points, late.sizes["t"]), members)
     if "in_contact_mean" in late:
@@ -992,7 +996,7 @@ def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) ->
     openings = [_openings(count, members, may, words) for count, may in zip(counts, again, strict=True)]
     courses = closed_observables(late, names)
     whole, later = (chosen_observables(_as_last(late, with_drift), names) for with_drift in (False, True))
-    result: dict[str, xr.DataArray] = {}
+    result: dict[str, xr.Variable] = {}
     for key in (str(key) for key in courses if not str(key).endswith(("_std", "_sem"))):
         name, differ = key.removesuffix("_mean"), noisy & key.endswith("_mean")
         if name in CUMULATIVE:
@@ -1006,7 +1010,7 @@ def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) ->
         numbers = {"mean": mean, "sem": sem, "low": low, "high": high}
         states = _settled(course, after - mean, error, free[:, free.shape[1] // 2], differ)
         result |= _described(courses[key].rename(name), numbers, sweep, states, openings, words, differ)
-    return xr.Dataset(result)
+    return xr.Dataset(result, sweep.coords)
 
 
 def _as_last(late: xr.Dataset, with_drift: bool) -> xr.Dataset:

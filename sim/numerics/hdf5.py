@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 #: Reason for refusing a file that cannot be read.
 BROKEN = "is not a netCDF file, or is truncated or damaged"
 #: Cache of HDF5 for each variable [byte]; its default of 64 MiB holds every variable of a usual run whole.
-CHUNK_CACHE = 4 * 2**20
+CHUNK_CACHE = 2**20
 
 
 class Refused(ValueError):

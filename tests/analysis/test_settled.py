@@ -22,8 +22,7 @@ TIME = np.linspace(0.0, 1.0, 400)
 
 
 def settlement(values, sem=math.nan, freedom=math.nan, noisy=True):
-    (state,) = settlements(values[np.newaxis], *(np.array([number]) for number in (sem, freedom, noisy)))
-    return state
+    return settlements(values[np.newaxis], *(np.array([number]) for number in (sem, freedom, noisy))).at(0)
 
 
 def series(rng, members, times):
