@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, get_args
 
 import numpy as np
-import scipy  # which imports the slow scipy.interpolate when speeds need it
 import xarray as xr
 from pydantic import TypeAdapter
 from scipy import special
@@ -147,12 +146,10 @@ def crossing(speeds: Array, groups: Array, sizes: Array, level: float, beside: A
         return bracket._replace(reason=_BEYOND[k > 0 and 1 + ends_early]) if k in (0, len(x)) else bracket
     near = slice(max(k - _REACH, 0), k + _REACH)
     x, whole, rows, k = x[near], whole[..., near], rows[:, near], k - near.start
-    pchip = scipy.interpolate.PchipInterpolator
-    curve = pchip(x, rows[0])
-    at = next(root for root in curve.solve(extrapolate=False) if root >= x[k - 1])
-    halves = (pchip(x[first::2], rows[:, first::2], axis=1)(at) for first in (0, 1))
-    width = half(pchip(x, rows, axis=1)(at), *halves)
-    above, below = (curve.solve(end, extrapolate=False) for end in (width, -width))
+    at = next(place for place in _places(x, rows[0], 0.0) if place >= x[k - 1])
+    halves = (_interpolated(x[first::2], rows[:, first::2], at) for first in (0, 1))
+    width = half(_interpolated(x, rows, at), *halves)
+    above, below = (_places(x, rows[0], end) for end in (width, -width))
     ends = np.fmax(low, max(above[above <= at], default=low)), np.fmin(high, min(below[below >= at], default=high))
     if ends == (low, high) and width > 0.0:
         return bracket
@@ -163,6 +160,44 @@ def crossing(speeds: Array, groups: Array, sizes: Array, level: float, beside: A
     others = [[over_the_fall(values, k - a, k + b) for a, b in ((1, 0), (2, 0), (1, 1))] for values in whole[1:]]
     intervals = [(each[0][0], each[0][0] - half(*each), each[0][0] + half(*each)) for each in others]
     return Crossing(math.exp(at), math.exp(ends[0]), math.exp(ends[1]), "", np.reshape(intervals, (-1, 3)))
+
+
+def cubics(x: Array, y: Array) -> Array:
+    """Return the coefficients of a monotone cubic (PCHIP) from point to point, the highest power first.
+
+    The slopes are those of F. N. Fritsch and J. Butland (SIAM J. Sci. Stat. Comput. 5 (1984) 300), at both ends by
+    three points. ``scipy.interpolate`` gives the same, but its import takes longer than the statistics of a thousand
+    points, and more memory.
+    """
+    step, rise = np.diff(x), np.diff(y) / np.diff(x)
+    (before, after), (left, right) = (step[:-1], step[1:]), (rise[..., :-1], rise[..., 1:])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inner = 3.0 * (before + after) / ((before + 2.0 * after) / left + (2.0 * before + after) / right)
+    slopes = np.zeros(y.shape)
+    slopes[..., 1:-1] = np.where(left * right > 0.0, inner, 0.0)
+    for end, two in ((0, slice(2)), (-1, slice(-1, -3, -1))):
+        (near, *_, far), first, second = step[two].repeat(2), rise[..., two][..., 0], rise[..., two][..., -1]
+        slope = ((2.0 * near + far) * first - near * second) / (near + far)
+        slope = np.where(slope * first > 0.0, slope, 0.0)
+        slopes[..., end] = np.where((first * second <= 0.0) & (abs(slope) > 3.0 * abs(first)), 3.0 * first, slope)
+    left, excess = slopes[..., :-1], slopes[..., :-1] + slopes[..., 1:] - 2.0 * rise
+    return np.stack([excess / step**2, (rise - left - excess) / step, left, y[..., :-1]])
+
+
+def _interpolated(x: Array, y: Array, at: float) -> Array:
+    """Return the values of ``cubics`` at a place."""
+    k = int(np.clip(np.searchsorted(x, at) - 1, 0, len(x) - 2))
+    return np.asarray(np.polyval(cubics(x, y)[..., k], at - x[k]))
+
+
+def _places(x: Array, y: Array, level: float) -> Array:
+    """Return the places at which ``cubics`` are at a level, in their order."""
+    places = []
+    for k in np.flatnonzero((y[:-1] - level) * (y[1:] - level) <= 0.0):
+        roots = np.roots(cubics(x, y)[:, k] - [0.0, 0.0, 0.0, level])
+        inside = np.clip(roots.real, 0.0, x[k + 1] - x[k])
+        places += [x[k] + inside[np.argmin(abs(roots - inside))]] if roots.size else []
+    return np.array(places)
 
 
 def speed_dim(dataset: xr.Dataset) -> str | None:
@@ -368,7 +403,7 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
     means, sizes, alone = _group_means(dataset, along, bool(wanted))
     if along == "t" and bool(((steady := steady_speeds(dataset)) != abs(speed_of(dataset))).any()):
         means["steady_speed"] = np.log(steady.where(steady > 0.0)) + 0.0 * means["area_ratio"]
-    beside, result = means.to_array("quantity").drop_vars("quantity"), xr.Dataset()
+    beside, result = means.to_array("quantity").drop_vars("quantity"), dict[str, xr.DataArray]()
     how: Any = {"input_core_dims": [[along], ["group", along], ["group"], [], ["quantity", "group", along]]}
     how |= {"output_core_dims": [[], [], [], [], ["quantity", "end"]], "output_dtypes": [*"dddOd"], "vectorize": True}
     for name, level, loss in left:
@@ -397,7 +432,7 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
                 further = [xr.where(is_known, why, unmet), *reasons[1:], math.nan, False, False]
             reason = xr.apply_ufunc(_in_words, *further, vectorize=True, output_dtypes=[object])
             result[f"{stem}_{name}_reason"] = reason.drop_attrs(deep=False)
-    return result.assign_coords({name: dataset[name] for name in sweep_dims(dataset)})  # with their units
+    return xr.Dataset(result).assign_coords({name: dataset[name] for name in sweep_dims(dataset)})  # with their units
 
 
 def _in_words(reason: str, never: bool, most: float, steady: float, lags: bool, alone: bool) -> str:

@@ -9,6 +9,7 @@ from helpers import lens
 from helpers.lens import LOAD, MODULUS, RADIUS, WORK, scene
 from helpers.parts import Adhesion, Band, Clock, Equilibrium, RateDependent, Record, analysis, bonds, drive, run, shear
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.interpolate import PchipInterpolator
 
 from sim.analysis import dataset as dataset_module, over_speed
 from sim.analysis.observables import charges, closed_observables
@@ -146,6 +147,14 @@ def test_an_extreme_inside_a_sweep_is_named_and_one_at_its_end_or_within_the_err
         assert_array_equal(result["F_largest"], 1.034 if named else math.nan)
         assert (str(result["F_largest_reason"].values) == "") == named
         assert math.isnan(result["F_least"]) and str(result["F_least_reason"].values)  # at the highest speed
+
+
+def test_cubics_between_speeds_are_the_monotone_ones_of_scipy():
+    rng = np.random.default_rng(5)
+    for count in (2, 3, 9):
+        x, y = np.cumsum(rng.uniform(0.5, 2.0, count)), rng.integers(-3, 4, (99, count)).astype(float)
+        expected = np.moveaxis(PchipInterpolator(x, y, axis=1).c, 1, 2)
+        assert_allclose(over_speed.cubics(x, y), expected, rtol=0.0, atol=1e-14 * np.abs(expected).max())
 
 
 def test_crossings_are_exact_on_straight_lines_and_a_ramp_is_read_in_pieces(monkeypatch):
