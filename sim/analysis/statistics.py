@@ -782,11 +782,12 @@ def _settled(courses: Array, drift: Array, error: Array, free: Array, noisy: Arr
     ``courses`` have the shape (points, records); unknown records are left out.
     """
     result = Settlement(np.full(len(courses), "", object), *np.full((4, len(courses)), math.nan))
-    patterns, which = np.unique(np.isfinite(courses), axis=0, return_inverse=True)
-    for number in np.flatnonzero(patterns.any(axis=1)):
-        points = which.ravel() == number
+    known, alike = np.isfinite(courses), dict[bytes, list[int]]()
+    for place in np.flatnonzero(known.any(axis=1)).tolist():
+        alike.setdefault(known[place].tobytes(), []).append(place)
+    for points in alike.values():
         numbers = (each[points] for each in (drift, error, free, noisy))
-        states = _settled_alike(courses[points][:, patterns[number]], *numbers)
+        states = _settled_alike(courses[points][:, known[points[0]]], *numbers)
         for column, values in zip(result, states, strict=True):
             column[points] = values
     return result
