@@ -590,11 +590,11 @@ def _lines(columns: list[Array]) -> str:
             groups[-1][1].append(texts)
         else:
             groups.append((places, [texts]))
-    joined = [list(map(",".join, zip(*texts, strict=True))) for _, texts in groups]
-    joined[-1] = [f"{text}\n" for text in joined[-1]]
-    every = (np.broadcast_to(places, max(map(len, columns))).tolist() for places, _ in groups)
-    rows = (map(texts.__getitem__, places) for places, texts in zip(every, joined, strict=True))
-    return "".join(map(",".join, zip(*rows, strict=True)))
+    fields, count = [], max(map(len, columns))
+    for places, lists in groups:
+        joined = list(map(",".join, zip(*lists, strict=True)))
+        fields.append(map(joined.__getitem__, np.broadcast_to(places, count).tolist()))
+    return "\n".join(map(",".join, zip(*fields, strict=True))) + "\n"
 
 
 def _texts(values: Array, bits: Array) -> tuple[Array, list[str]]:
