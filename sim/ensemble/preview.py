@@ -29,7 +29,7 @@ from sim.units.terminal import duration
 # is compressed, of a map that is drawn; a point of a sweep; a mode pair that is made; a record of a batch, of a member.
 _START, _WORKER = 1.2, 1.2
 _BYTE, _MAP_BYTE = 48e-9, 2e-9
-_POINT, _MODE, _RECORD, _RECORD_OF_MEMBER = 1.5e-3, 5e-6, 5e-6, 2e-7
+_POINT, _MODE, _RECORD, _RECORD_OF_MEMBER = 1e-3, 5e-6, 5e-6, 2e-7
 # Rough memory [byte]: a process with its libraries, more of it for a table; a mode pair while it is made and while it
 # is used. Copies of a part while it is computed, of a dataset while it is written or read, of one that stays in memory.
 _PROCESS, _TABLE, _OF_MODE_MADE, _OF_MODE = 160e6, 100e6, 520.0, 160.0
