@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -39,8 +39,10 @@ _FEWEST = 2.0
 _SURELY = 4.0
 #: Members with which a member may be below 5 % of all.
 FOR_TAILS = 20
-#: Numbers that are transformed at once, values that a correlation time is taken from, and records apart at most.
-_AT_ONCE, _VALUES, _LAGS = 2**19, 2**22, 2**16
+#: Numbers that are transformed at once, and values that a correlation time is taken from.
+_AT_ONCE, _VALUES = 2**19, 2**22
+#: Records between two values at first, and at most; times the window that must be inside at first.
+_LAGS, _SAFELY = (2**13, 2**16), 2.0
 
 
 class IntegralTime(NamedTuple):
@@ -99,12 +101,9 @@ def integral_time(values: Array, step: float) -> IntegralTime:
 
 def _times_of(values: Array, step: float) -> Array:
     """Return the numbers of ``integral_time``, shape (3, ...), of values with the shape (..., members, records)."""
-    *points, members, records = values.shape
-    values, result = values.reshape(-1, members, records), np.empty((3, math.prod(points)))
-    for at in _batches(len(result[0]), members * records):
-        largest = np.maximum(values[at].max(axis=(1, 2)), -values[at].min(axis=(1, 2)))
-        result[:, at] = time_of(autocovariance(values[at]), members, records, step, largest)
-    return result.reshape(3, *points)
+    points = values.reshape(-1, *values.shape[-2:])
+    ends = np.stack([points.min(axis=(1, 2)), points.max(axis=(1, 2))], axis=-1)
+    return _memory(points, points, points.mean(axis=(1, 2)), ends, step, False)[1].reshape(3, *values.shape[:-2])
 
 
 def time_of(covariance: Array, members: int, records: int, step: float, largest: Array) -> Array:
@@ -127,29 +126,9 @@ def time_of(covariance: Array, members: int, records: int, step: float, largest:
     return np.array([time, time * np.sqrt(2.0 * (2.0 * window + 1.0) / (free * records)), below])
 
 
-def _batches(points: int, numbers: int) -> Iterator[slice]:
-    """Yield the points of a sweep in batches, because each of them has so many ``numbers``."""
-    size = max(1, _AT_ONCE // (2 * numbers))
-    yield from (slice(start, start + size) for start in range(0, points, size))
-
-
 def members_for_memory(members: int, records: int) -> int:
     """Return the number of members that are enough for a correlation time."""
     return min(members, max(2, _VALUES // records))
-
-
-def autocovariance(values: Array) -> Array:
-    """Return the covariance by the number of records between values, averaged over members and times.
-
-    Parameters
-    ----------
-    values : array, shape (..., members, records)
-        Independent members of one process. Deviations are those from the ensemble mean at each record, of a single
-        member from its own mean in time; and one member less counts as free.
-    """
-    members = values.shape[-2]
-    mean = values.mean(axis=-2 if members > 1 else -1)
-    return covariance_of(values, mean, max(members - 1.0, 1.0))
 
 
 def covariance_of(values: Array, mean: Array | float, free: float) -> Array:
@@ -158,17 +137,27 @@ def covariance_of(values: Array, mean: Array | float, free: float) -> Array:
     Parameters
     ----------
     values : array, shape (..., members, records)
-        Series; of long ones no more than 65,536 records between two are looked at.
+        Series; of long ones no more than 65,536 records between two are looked at, and 8192 if the memory ends before.
     mean : float or array, shape (..., records) or (..., 1)
         Value from which deviations are taken.
     free : float
         Number of independent series.
     """
+    mean, records = np.broadcast_to(mean, (*values.shape[:-2], values.shape[-1])), values.shape[-1]
+    for lags in np.unique(np.minimum(records, _LAGS)):
+        result = _products(values, mean, lags) / (free * np.arange(records, records - lags, -1))
+        sums = np.cumsum(result, axis=-1)
+        if np.all(np.any(np.arange(lags) * result[..., :1] >= _SAFELY * _WINDOW * sums, axis=-1)):
+            break
+    return result
+
+
+def _products(values: Array, mean: Array, lags: int) -> Array:
+    """Return the sums of products of deviations by the number of records between them."""
     *points, members, records = values.shape
-    lags = min(records, _LAGS)
     length = scipy.fft.next_fast_len(lags, real=True)
     rows = max(1, _AT_ONCE // (2 * length * math.prod(points)))
-    power, mean = np.zeros((2, *points, length + 1), complex), np.broadcast_to(mean, (*points, records))
+    power = np.zeros((2, *points, length + 1), complex)
     for first in range(0, members, rows):
         before = None
         for start in range(0, records, length):  # stretches; each with itself and with the one before
@@ -180,7 +169,7 @@ def covariance_of(values: Array, mean: Array | float, free: float) -> Array:
                 power[1] += np.sum(spectrum * before.conj(), axis=-2)
             before = spectrum
     total = power[0] + (-1.0) ** np.arange(length + 1) * power[1]  # the second is half the length later
-    return scipy.fft.irfft(total, 2 * length)[..., :lags] / (free * np.arange(records, records - lags, -1))
+    return scipy.fft.irfft(total, 2 * length)[..., :lags]
 
 
 #: Degrees of freedom below which a single series is too short for its error: it seems to forget faster than it does,
@@ -194,7 +183,7 @@ def inflation(covariance: Array, members: int, records: int) -> Array:
     Parameters
     ----------
     covariance : array
-        As of ``autocovariance``.
+        As of ``covariance_of``.
     members, records : int
         Of how many members and records it is.
 
@@ -628,7 +617,7 @@ def _over_time(values: Array, step: float, name: str, noisy: Array) -> tuple[dic
         spread = np.sqrt(_sum(deviations).sum(axis=-1) / total)
         below = [np.sum(values <= levels[:, k, np.newaxis, np.newaxis], axis=-1) / counts for k in range(len(_LEVELS))]
         del deviations, known
-        inflated, times = _memory(values, levels, mean, complete, step, bool(noisy.any()))
+        inflated, times = _memory(values, levels, mean, ordered[:, [0, -1]], step, bool(noisy.any()))
         spreads = np.array([spread, *np.broadcast_to(np.sqrt(_LEVELS * (1.0 - _LEVELS)), (points, len(_LEVELS))).T])
         errors, freedoms = _errors(np.array([means, *below]), spreads, inflated, total)
         effective = np.where(errors[0] > 1e-12 * abs(mean), (spread / errors[0]) ** 2, np.nan)
@@ -638,8 +627,7 @@ def _over_time(values: Array, step: float, name: str, noisy: Array) -> tuple[dic
             errors, freedoms = _errors(means[np.newaxis], spreads[:1], np.full((1, points, 2), np.nan), total)
         sem, freedom = np.where(noisy, errors[0], np.nan), freedoms[0]
         low, high = interval(name, mean, sem, freedom + 1.0)
-    result = {"mean": mean, "std": spread, "sem": sem, "low": low, "high": high}
-    result |= {"effective_samples": effective}
+    result = {"mean": mean, "std": spread, "sem": sem, "low": low, "high": high, "effective_samples": effective}
     if complete.any():
         result |= {"correlation_time": times[0], "correlation_time_sem": times[1]}
     ranks = np.where((ends >= 0.0) & (ends <= 1.0), ends * (total[:, np.newaxis] - 1.0), np.nan)
@@ -647,38 +635,41 @@ def _over_time(values: Array, step: float, name: str, noisy: Array) -> tuple[dic
     return result | {"quantile": levels, "quantile_low": lowest, "quantile_high": highest}, freedom
 
 
-def _sum(values: Array) -> Array:
-    """Return the sum over the last axis of the values that are not nan."""
-    sums = values.sum(axis=-1)
-    return sums if np.isfinite(sums).all() else np.nansum(values, axis=-1)
+def _sum(values: Array, axis: int = -1) -> Array:
+    """Return the sum over an axis of the values that are not nan."""
+    sums = values.sum(axis=axis)
+    return sums if np.isfinite(sums).all() else np.nansum(values, axis=axis)
 
 
 def _memory(
-    values: Array, levels: Array, mean: Array, complete: Array, step: float, noisy: bool
+    values: Array, levels: Array, mean: Array, extremes: Array, step: float, noisy: bool
 ) -> tuple[Array, Array]:
     """Return how many records count as one, for the mean and each quantile, with degrees of freedom; and the memory.
 
-    The shapes are (quantities, points, 2) and (3, points). nan at points that are not ``complete``, of many members,
-    whose means give the errors, and of quantiles if nothing is ``noisy``.
+    The shapes are (quantities, points, 2) and (3, points). nan at points whose values are not all known or all equal,
+    as their least and largest value say, of many members, whose means give the errors, and of quantiles if nothing is
+    ``noisy``.
     """
     (points, members, records), free = values.shape, max(values.shape[1] - 1, 1)
     inflated, times = np.full((1 + len(_LEVELS), points, 2), np.nan), np.full((3, points), np.nan)
     some = members if members < _MANY else members_for_memory(members, records)
-    for at in _batches(points, members * records) if complete.any() else ():
-        part = values[at]
+    changes, largest = extremes[:, 0] < extremes[:, 1], np.max(np.abs(extremes), axis=1)
+    size = max(1, _AT_ONCE // (2 * members * records))
+    for start in range(0, points, size) if changes.any() else ():
+        part = values[at := slice(start, start + size)]
         common = part.mean(axis=1) if members > 1 else mean[at, np.newaxis]
         covariance = covariance_of(part[:, :some], common, some * free / members)
-        times[:, at] = time_of(covariance, some, records, step, np.max(np.abs(part), axis=(1, 2)))
+        times[:, at] = time_of(covariance, some, records, step, largest[at])
         for k in range(1 + len(_LEVELS) * noisy) if members < _MANY else ():
             if k:
-                flags, share = (part <= levels[at, k - 1, np.newaxis, np.newaxis]).astype(float), _LEVELS[k - 1]
+                flags, share = part <= levels[at, k - 1, np.newaxis, np.newaxis], _LEVELS[k - 1]
                 if members > 1:
-                    covariance = autocovariance(flags)
+                    covariance = covariance_of(flags, flags.mean(axis=1), free)
                 else:
                     off = flags.mean(axis=(1, 2)) - share
                     covariance = covariance_of(flags, share, 1.0) - off[:, np.newaxis] ** 2
             inflated[k, at] = inflation(covariance, members, records)
-    inflated[:, ~complete] = times[:, ~complete] = np.nan
+    inflated[:, ~changes] = times[:, ~changes] = np.nan
     return inflated, times
 
 
@@ -764,8 +755,9 @@ def settlements(values: Array, sem: Array, freedom: Array, noisy: Array) -> Sett
     """
     half = values.shape[-1] // 2
     with np.errstate(invalid="ignore", divide="ignore"):
-        course = np.nansum(values, axis=1) / np.isfinite(values).sum(axis=1)
-        first, second = (_sum(part) / np.isfinite(part).sum(-1) for part in (values[..., :half], values[..., half:]))
+        known = np.isfinite(values)
+        course = _sum(values, 1) / known.sum(axis=1)
+        first, second = (_sum(values[at]) / known[at].sum(axis=-1) for at in (np.s_[..., :half], np.s_[..., half:]))
         drifts = second - first
         count = np.isfinite(drifts).sum(axis=-1)
         drift = np.nansum(drifts, axis=-1) / count

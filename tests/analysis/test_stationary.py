@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from scipy import special, stats
 
 from sim.analysis.events import lifetimes
-from sim.analysis.statistics import QUANTILES, quantile_ranks
+from sim.analysis.statistics import QUANTILES, covariance_of, quantile_ranks
 from sim.parts.contact.models import Solid, Sphere
 from sim.spectrum.families import Gaussian
 
@@ -224,6 +224,16 @@ def test_a_covariance_is_the_mean_of_products_of_deviations_and_sees_nothing_tha
     energy = squared_ornstein_uhlenbeck(np.random.default_rng(8), 64, 400, 0.8)
     drift = np.linspace(0.0, 100.0, 400)
     assert_allclose(analysis.integral_time(energy + drift, 1.0), analysis.integral_time(energy, 1.0), rtol=1e-9)
+
+
+@pytest.mark.parametrize(("lags", "known"), [((40, 600), 600), ((200, 600), 200), ((5000,), 2000)])
+def test_products_are_summed_over_as_many_records_as_the_window_needs_in_stretches_and_groups(monkeypatch, lags, known):
+    monkeypatch.setitem(covariance_of.__globals__, "_LAGS", lags)
+    monkeypatch.setitem(covariance_of.__globals__, "_AT_ONCE", 2000)  # groups of less than all members
+    values = ornstein_uhlenbeck(np.random.default_rng(12), (7, 2000), 0.9)  # the window is 6 / 0.1 records
+    off = values - values.mean(axis=0)
+    products = [sum(member[k:] @ member[: 2000 - k] for member in off) / (6.0 * (2000 - k)) for k in range(known)]
+    assert_allclose(covariance_of(values, values.mean(axis=0), 6.0), products, rtol=0.0, atol=1e-12)
 
 
 def censored(rng, end, members=64):
