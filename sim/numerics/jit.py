@@ -213,7 +213,11 @@ def kernel(signature: str) -> Callable[[Callable], Callable]:
     def decorate(function: Callable) -> Callable:
         def make() -> tuple[Callable, Callable]:
             dispatcher = numba.njit(signature, **_OPTIONS)(function)
-            return dispatcher, next(iter(dispatcher.overloads.values()))._reduce
+            return dispatcher, lambda: without_numba(*next(iter(dispatcher.overloads.values()))._reduce())
+
+        def without_numba(*parts: Any) -> Any:
+            """Leave out names that only messages of numba's own functions use; to import them takes 50 ms."""
+            return *parts[:-1], [names for names in parts[-1] if not names.globals["__name__"].startswith("numba.")]
 
         def load(*code: Any) -> Callable:
             dispatcher = numba.njit(**_OPTIONS)(function)
