@@ -11,7 +11,7 @@ from benchmarks import bonds_plain
 from benchmarks.bonds import BELL
 from benchmarks.timing import Bench, Beside, Row, absolute, spent
 from sim.engine import MemberNoise, Trajectory, follow
-from sim.parts.bonds import FirstMoment
+from sim.parts.bonds.models import FirstMoment
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import Spring

@@ -12,7 +12,7 @@ from sim.ensemble.plan import Plan
 from sim.ensemble.steady import changed, plane_energy, sensitivities, steady_course
 from sim.ensemble.variables import SYSTEMATIC
 from sim.laws.schallamach import Body
-from sim.parts.bonds import Cohort, FirstMoment, Rate
+from sim.parts.bonds.models import Cohort, FirstMoment, Rate
 from sim.parts.drive import Spring
 from sim.parts.exchange import Array
 from sim.parts.shear import Mean

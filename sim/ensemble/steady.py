@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from sim.engine import Trajectory, balance
-from sim.parts.bonds import Model
+from sim.parts.bonds.models import Model
 from sim.parts.exchange import Array, Bonding, Motion
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
 from sim.laws import jkr
-from sim.parts.bonds import Cohort, Tracked
+from sim.parts.bonds.models import Cohort, Tracked
 from sim.parts.exchange import Array
 from sim.spectrum.families import BondMade, Measured
 from sim.units.notation import engineering

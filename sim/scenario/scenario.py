@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from sim.numerics.grid import Lattice
-from sim.parts.bonds import Bonds, Model as BondModel, Unbroken
+from sim.parts.bonds.models import Bonds, Model as BondModel, Unbroken
 from sim.parts.contact import Contact
 from sim.parts.contact.balance import Bodies, Shares
 from sim.parts.contact.models import Adhesion, Solid, Sphere

@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
 from sim.ensemble.dataset import moments, pooled as pooled_moments
-from sim.parts.bonds import Cohort, FirstMoment, Steady, Unbroken
+from sim.parts.bonds.models import Cohort, FirstMoment, Steady, Unbroken
 from sim.parts.events import LATE, SLIP, Slips
 from tests.analysis.test_invariance import LENS, SCENES, STRETCHED
 

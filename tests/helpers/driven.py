@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from sim.engine import MemberNoise as MemberNoise, follow as follow
 from sim.laws import jkr
-from sim.parts.bonds import FirstMoment
+from sim.parts.bonds.models import FirstMoment
 from sim.parts.bonds.rupture import Bell
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.models import Adhesion, Solid, Sphere

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from PIL import Image
 
 import sim
-from sim.parts.bonds import FirstMoment
+from sim.parts.bonds.models import FirstMoment
 from sim.parts.shear import models as shear
 from sim.plots import draw
 from sim.plots.kinds import Choices, drawn

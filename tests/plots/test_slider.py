@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 import sim
 from sim.analysis import slips
 from sim.laws.schallamach import Body, first_moment_onset, first_moment_peak, resolved_onset
-from sim.parts.bonds import Cohort, FirstMoment
+from sim.parts.bonds.models import Cohort, FirstMoment
 from sim.plots import curves, draw
 
 #: Bonds of a unit of stretch of 5 µm, and their numbers as the laws take them; the area stays.

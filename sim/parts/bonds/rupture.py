@@ -11,10 +11,9 @@ import numpy as np
 from pydantic import Field
 
 from sim.laws import schallamach
-from sim.laws.schallamach import Body, Onset, SiteMoments
+from sim.laws.schallamach import Array, Body, Onset, SiteMoments
 from sim.numerics.jit import device
 from sim.numerics.special import exp
-from sim.parts.exchange import Array
 from sim.units.quantity import Quantity, keyed
 
 

@@ -8,7 +8,7 @@ from helpers.driven import DENSITY, KAPPA, STRETCH, UNIT, MemberNoise, follow, s
 from numpy.testing import assert_allclose
 
 from sim.laws.schallamach import Body, first_moment_onset, first_moment_stress
-from sim.parts.bonds import Cohort, FirstMoment, Tracked
+from sim.parts.bonds.models import Cohort, FirstMoment, Tracked
 from sim.parts.drive import READINGS, Table
 
 #: Bonds whose stretch, life at rest and stiffness are units and which are remade as fast, at a site of unit area.

@@ -15,7 +15,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 import sim
 from sim.laws.reversible import mean_stress_energy, radius_at_load_reversible
-from sim.parts.bonds import Cohort, FirstMoment, Rate, Steady, Tracked
+from sim.parts.bonds.models import Cohort, FirstMoment, Rate, Steady, Tracked
 from sim.parts.bonds.rupture import Bell
 from sim.parts.drive import Start, Steady as AtSpeed
 from tests.test_total import check_cuts, run

@@ -11,7 +11,7 @@ from helpers.driven import AREA, ENERGY, STRETCH, UNIT, force, march, marched, r
 from numpy.testing import assert_allclose
 
 from sim.laws.schallamach import Body
-from sim.parts.bonds import Cohort
+from sim.parts.bonds.models import Cohort
 from sim.parts.bonds.rupture import Catch, Constant, CutOff
 from sim.parts.shear import Mean
 from sim.spectrum.families import BondMade

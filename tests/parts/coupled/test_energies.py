@@ -11,7 +11,7 @@ from helpers.driven import AREA, LOAD, MODULUS, STIFF, UNIT, WORK, R, jkr, march
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from sim.parts.bonds import Cohort, FirstMoment, Tracked
+from sim.parts.bonds.models import Cohort, FirstMoment, Tracked
 from sim.parts.bonds.rupture import Bell, Constant
 from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.contact.models import Adhesion, Solid, Sphere

@@ -16,7 +16,7 @@ from sim.analysis.tables import notes
 from sim.engine import MemberNoise, follow
 from sim.ensemble.preview import slider_body
 from sim.laws.schallamach import Body, first_moment_onset
-from sim.parts.bonds import FirstMoment, Steady, Unbroken
+from sim.parts.bonds.models import FirstMoment, Steady, Unbroken
 from sim.parts.bonds.rupture import Constant, CutOff
 from sim.parts.contact.models import Adhesion
 from sim.parts.drive import Force

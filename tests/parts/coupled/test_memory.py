@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 import sim
 from sim.engine import _step_contact
 from sim.laws import jkr
-from sim.parts.bonds import Cohort, FirstMoment, Tracked
+from sim.parts.bonds.models import Cohort, FirstMoment, Tracked
 from sim.parts.coupled import coupled
 from sim.parts.drive import READINGS, Force, Spring
 from sim.parts.exchange import Times

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 import sim
 from sim.laws.reversible import radius_at_load_reversible
 from sim.laws.schallamach import linear_onset
-from sim.parts.bonds import Counted, Rate, Steady, Unbroken
+from sim.parts.bonds.models import Counted, Rate, Steady, Unbroken
 
 #: Rate at which free sites bind, and critical speed in stretches a second.
 BINDING, CRITICAL = 2.0, 0.5

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from sim import run
 from sim.analysis import stick_slip
-from sim.parts.bonds import Cohort, Tracked
+from sim.parts.bonds.models import Cohort, Tracked
 from sim.parts.bonds.rupture import Constant, CutOff
 from sim.parts.drive import Force
 from sim.parts.shear import Banded

@@ -9,7 +9,7 @@ from helpers.scenes import CELL, SPECTRUM, Clock, Gaussian, Slip, SlipRate, Wave
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
-from sim.parts.bonds import Unbroken
+from sim.parts.bonds.models import Unbroken
 from sim.parts.drive import Ramp, Spring, Steady
 from sim.parts.exchange import Motion
 from sim.parts.shear import Banded, Mean
