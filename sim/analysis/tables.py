@@ -150,8 +150,6 @@ _MEMORY = _Column("correlation_time", "t_c", meaning="integral correlation time 
 _TURNS = 3
 #: Shares below it are nothing; spread over the mean below which a motion without noise has settled.
 _ROUNDING, _SETTLED = 1e-13, 1e-3
-#: Rows of a CSV file that are written at once.
-_LINES = 2**15
 
 
 def stated(dataset: xr.Dataset, lost: Sequence[str] = (), every: xr.Dataset | None = None) -> xr.Dataset:
@@ -570,37 +568,17 @@ def to_csv(
         file.write(",".join(_quoted(header)) + "\n")
         for part in parts:
             columns = [part.get(name, np.array(np.nan)).ravel() for name in names]
-            for start in range(0, max(map(len, columns)), _LINES):  # because the texts of all rows take much memory
-                some = (slice(start if len(values) > 1 else 0, start + _LINES) for values in columns)
-                file.write(_lines([values[at] for values, at in zip(columns, some, strict=True)]))
+            count = max(map(len, columns))
+            fields = (_texts(values) * (count // len(values)) for values in columns)
+            file.writelines(f"{line}\n" for line in map(",".join, zip(*fields, strict=True)))
 
 
-def _lines(columns: list[Array]) -> str:
-    """Return rows of CSV. Neighbouring columns that change in the same rows are joined before, because many repeat."""
-    groups: list[tuple[Array, list[list[str]]]] = []
-    before: tuple[Array, Array, list[str]] = np.empty(0), np.empty(0), [""]
-    for values in columns:
-        bits = values.view(np.int64) if values.dtype == np.float64 else values  # 0.0 and -0.0 differ
-        places, texts = before[1:] if np.array_equal(bits, before[0]) else _texts(values, bits)
-        if groups and len(texts) == 1:
-            groups[-1][1].append(texts * len(groups[-1][1][0]))
-            continue
-        before = bits, places, texts
-        if groups and np.array_equal(groups[-1][0], places):
-            groups[-1][1].append(texts)
-        else:
-            groups.append((places, [texts]))
-    fields, count = [], max(map(len, columns))
-    for places, lists in groups:
-        joined = list(map(",".join, zip(*lists, strict=True)))
-        fields.append(map(joined.__getitem__, np.broadcast_to(places, count).tolist()))
-    return "\n".join(map(",".join, zip(*fields, strict=True))) + "\n"
-
-
-def _texts(values: Array, bits: Array) -> tuple[Array, list[str]]:
-    """Return the place of each row among the different values of a column, and these as fields of CSV."""
+def _texts(values: Array) -> list[str]:
+    """Return a column as fields of CSV, each different value written once."""
+    bits = values.view(np.int64) if values.dtype == np.float64 else values  # 0.0 and -0.0 differ
     places, alike = pd.factorize(bits, use_na_sentinel=False)
-    return places, _quoted(alike) if bits is values else list(map(repr, alike.view(np.float64).tolist()))
+    texts = _quoted(alike) if bits is values else list(map(repr, alike.view(np.float64).tolist()))
+    return list(map(texts.__getitem__, places.tolist()))
 
 
 def _quoted(values: Iterable[Any]) -> list[str]:
