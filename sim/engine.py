@@ -111,7 +111,7 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
         draws = NO_DRAWS
         if scenario.draws_within:
             share = PLANE if scenario.margin is None else scenario.margin.each[0]
-            draws = process.draws(state.shear, steps.start, noise.shear)
+            draws = process.draws(state.shear, steps, noise.shear)
             draws = draws._replace(paid=scenario.fluctuations.paid_by_adhesion, share=share)
         sliders, motions, bonds, bonding = coupled.advance(
             scenario.parts, state.drive, state.bonds, step_contact, scenario.times, steps, noise.bonds, draws

@@ -145,8 +145,8 @@ class Draws(NamedTuple):
     ----------
     values : array, shape (members, bands)
         Numbers of the process, advanced in place.
-    last : array, shape (members,)
-        Energy of the field after the last draw, not scaled by g² [J/m²], advanced in place.
+    energy : array, shape (steps + 1, members)
+        Energy of the field at the start and after each draw, not scaled by g² [J/m²]; the draws are written in place.
     shapes, half_weight : array, shape (bands,)
         Shape of a band's gamma number, and its energy for a number of 1 [J/m²].
     factors : array, shape (1,) or (bands,)
@@ -170,7 +170,7 @@ class Draws(NamedTuple):
     """
 
     values: Array
-    last: Array
+    energy: Array
     shapes: Array
     half_weight: Array
     factors: Array
@@ -186,7 +186,7 @@ class Draws(NamedTuple):
 
 _NO_ADDRESS = np.uint64(0), np.uint64(0), np.empty(0, np.uint64), 0
 #: Draws where the loop of a drive draws nothing.
-NO_DRAWS = Draws(np.empty((0, 0)), _EMPTY, _EMPTY, _EMPTY, _EMPTY, True, 1.0, 0.0, False, False, _NO_ADDRESS)
+NO_DRAWS = Draws(np.empty((0, 0)), np.empty((0, 0)), _EMPTY, _EMPTY, _EMPTY, True, 1.0, 0.0, False, False, _NO_ADDRESS)
 
 
 class Motion(NamedTuple):
@@ -216,6 +216,8 @@ class Motion(NamedTuple):
         Displacement of the slider since the start, at the end of each step [m].
     memory : Memory
         Memory of the fluctuations at the end of each step, if the drive solves its motion.
+    draws : Draws
+        Fluctuations that the loop of the drive has drawn in these steps, without rows if it draws none.
     """
 
     step: int
@@ -228,6 +230,7 @@ class Motion(NamedTuple):
     unsteady: Array = _NONE[np.newaxis]
     position: Array = _NONE[np.newaxis]
     memory: Memory = Memory()
+    draws: Draws = NO_DRAWS
 
 
 def during(values: Array, steps: int) -> Array:
@@ -448,8 +451,8 @@ class Shear(Protocol[State]):
     def field_law(self) -> FieldLaw:
         """Numbers by which sub-steps of a drive follow the memory of the fluctuations."""
 
-    def draws(self, state: State, step: int, noise: Noise) -> Draws:
-        """Numbers by which the loop of a drive draws the fluctuations from a step on, of a model ``in_blocks``."""
+    def draws(self, state: State, steps: range, noise: Noise) -> Draws:
+        """Numbers by which the loop of a drive draws the fluctuations in some steps, of a model ``in_blocks``."""
 
     @property
     def gammas(self) -> Gammas:

@@ -208,9 +208,9 @@ def advance(
     shared = {name: reached[name] for name in _SHARED}
     after = Driven(**shared, stage_position=stage, stage_speed=stage_speed, energies=energies)
     first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
-    way, spans = (reached["slip"], reached["path"], first, after.speed), duration[:, np.newaxis]
+    way = duration[:, np.newaxis], reached["slip"], reached["path"], first, after.speed
     memory = Memory(*(reached[name] for name in Memory._fields)) if law.length < math.inf else Memory()
-    motions = Motion(steps.start, ends[1:, np.newaxis], spans, *way, position=after.position, memory=memory)
+    motions = Motion(steps.start, ends[1:, np.newaxis], *way, position=after.position, memory=memory, draws=draws)
     if isinstance(bonds, models.Counted):
         end, drawn = bonds.advance(cast(models.Population, population), motions, contact.radius, noise)
         stress = np.where(after.speed != 0.0, drawn.stress, bonding.stress)

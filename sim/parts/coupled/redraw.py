@@ -12,7 +12,7 @@ from sim.spectrum.radial import share_of
 
 #: Type of ``Draws``.
 DRAWS = (
-    "Tuple((float64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], boolean, float64, float64, "
+    "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1], boolean, float64, float64, "
     f"boolean, boolean, Tuple((uint64, uint64, uint64[::1], int64)), float64, {SHARE}))"
 )
 
@@ -44,11 +44,10 @@ def redraw(row, columns, m, k, clock, contact, draws, room, reached):
 
     ``row`` is that of member ``m`` in the units of the equations. ``columns`` are the same [SI], with which the next
     step begins. ``contact`` is as at the start of the step, ``room`` for the shares of all factors, shape (2, factors).
-    The process draws the same numbers again for the records, bit for bit.
     """
-    values, last, shapes, half_weight, factors, by_slip, span, mean, relaxing, answers, address, paid, share = draws
+    values, energies, shapes, half_weight, factors, by_slip, span, mean, relaxing, answers, address, paid, share = draws
     state, field, duration = columns.view(mechanics.ROW)[0], contact.field, clock[k, 5]
-    size, energy, expected = 1.0, mean, last[m]
+    size, energy, expected = 1.0, mean, energies[k, m]
     if field.length < math.inf and not relaxing:
         size = math.sqrt(field.floor + (1.0 - field.floor) * unsteadiness(state.weight, state.mean, state.spread))
     if shapes.size > 0:
@@ -68,7 +67,7 @@ def redraw(row, columns, m, k, clock, contact, draws, room, reached):
             energy += half_weight[j] * x
         if factors.size == 1:
             expected = keep[0] * keep[0] * expected + renew[0] * renew[0] * mean
-    last[m], state.energy = energy, energy
+    energies[k + 1, m], state.energy = energy, energy
     drawn, expected = size * size * energy, size * size * expected
     if row.radius > 0.0:
         state.radius = _radius(row, duration, paid * drawn, contact, share)

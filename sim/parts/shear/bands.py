@@ -22,7 +22,7 @@ import numpy as np
 from sim.laws.halfspace import compliance
 from sim.numerics.jit import inlined, kernel
 from sim.numerics.noise import Noise, gamma, normal, stream
-from sim.parts.exchange import Array, Draws, Gammas, Indices
+from sim.parts.exchange import Array, Draws, Gammas, Indices, during
 from sim.parts.shear.modes import grid_reach, half_lattice, modes
 from sim.parts.shear.process import Amplitude, Correlation, Fluctuation, Renewing, factors
 from sim.spectrum.family import Family
@@ -415,11 +415,11 @@ class BandedProcess(Renewing):
     def gammas(self) -> Gammas:
         return Gammas(self.bands.weight, 0.5 * self.bands.freedom, self.wavenumber)
 
-    def draws(self, state: Fluctuation, step: int, noise: Noise) -> Draws:
+    def draws(self, state: Fluctuation, steps: range, noise: Noise) -> Draws:
         law = self.correlation
         of_bands = self.shapes, self.half_weight, factors(law, self.wavenumber), law.by_slip, law.span
         rules = *of_bands, self.mean, self.amplitude.relaxing, self._forgets_by_slip
-        return Draws(state.values.copy(), state.past.energy.copy(), *rules, noise.at(step))
+        return Draws(state.values.copy(), during(state.past.energy, len(steps) + 1), *rules, noise.at(steps.start))
 
     def known_errors(self) -> dict[str, float]:
         """Return the errors that banding adds to the mode sum of the cell, and the errors of the cell."""

@@ -322,11 +322,11 @@ class SmoothProcess:
     def field_law(self) -> FieldLaw:
         return self.amplitude.field_law(self.energy)
 
-    def draws(self, state: Fluctuation, step: int, noise: Noise) -> Draws:
-        """Return what a compiled loop needs to follow the energy from a ``step`` on, which it does not draw."""
+    def draws(self, state: Fluctuation, steps: range, noise: Noise) -> Draws:
+        """Return what a compiled loop needs to follow the energy in some ``steps``, which it does not draw."""
         none, members = np.empty(0), len(noise.members)
-        constant = True, 1.0, self.energy, self.amplitude.relaxing, False
-        return Draws(np.empty((members, 0)), np.empty(members), none, none, none, *constant, noise.at(step))
+        energy, constant = np.empty((len(steps) + 1, members)), (True, 1.0, self.energy, self.amplitude.relaxing, False)
+        return Draws(np.empty((members, 0)), energy, none, none, none, *constant, noise.at(steps.start))
 
     @property
     def gammas(self) -> Gammas:
@@ -399,12 +399,13 @@ class Renewing:
 
     def advance(self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[Fluctuation, Array]:
         past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
-        values = state.values.copy()
         size, (keep, renew) = renewed_size(self.amplitude, state, motions, amplitude), self._shares(motions)
         if self.amplitude.relaxing and self.field_law.follows and motions.memory.renewed.size:
             renew, size = np.sqrt(motions.memory.renewed)[..., np.newaxis], np.ones((1, 1))
             keep, size = keep + np.zeros(renew.shape), size + np.zeros((len(renew), 1))
-        drawn = self._renew(values, keep, renew, size, motions.step, noise)
+        draws = motions.draws  # without rows if the loop of the drive draws nothing
+        values = draws.values if len(draws.values) else state.values.copy()
+        drawn = draws.energy[1:] if len(draws.values) else self._renew(values, keep, renew, size, motions.step, noise)
         energy = expected = self._scaled(amplitude, drawn)
         if self._forgets_by_slip:
             before = drawn[-2] if len(drawn) > 1 else state.past.energy

@@ -20,8 +20,9 @@ from sim.laws import jkr
 from sim.parts.bonds.models import Cohort, FirstMoment, Tracked
 from sim.parts.coupled import coupled
 from sim.parts.drive import READINGS, Force, Spring
-from sim.parts.exchange import Times
+from sim.parts.exchange import NO_DRAWS, Times
 from sim.parts.shear import Banded, Mean
+from sim.parts.shear.bands import BandedProcess
 from sim.parts.shear.process import Slip, SlipRate, Time
 
 #: Square over 12 of the slip between two nodes, 0.49 of half a memory at most: the error where weights are averaged.
@@ -104,6 +105,22 @@ def slipping(step, duration, speed, members=1, **keys):
     """The spring-driven lens, in clock steps of some ms."""
     values = {"clock.step": f"{step} ms", "clock.duration": f"{duration} s", "drive.stage": f"{speed} mm/s"}
     return sim.load(LENS).with_values(values | {"ensemble.members": members} | keys)
+
+
+@pytest.mark.parametrize("keys", [{}, {"shear.amplitude.relaxing": False}, {"bonds.model": "cohort"}])
+def test_the_loop_of_the_drive_draws_the_numbers_of_the_process_bit_for_bit(keys, monkeypatch):
+    drawn, advance = [], BandedProcess.advance
+
+    def by_both(process, state, motions, *others):
+        drawn.extend(motions.draws.values)
+        by_process = advance(process, state, motions._replace(draws=NO_DRAWS), *others)
+        by_loop = advance(process, state, motions, *others)
+        np.testing.assert_equal(by_loop, by_process)
+        return by_loop
+
+    monkeypatch.setattr(BandedProcess, "advance", by_both)
+    follow(slipping(1.0, 0.1, 20, 2, **keys), MemberNoise.of(1, np.arange(2)), None, range(1, 101))
+    assert len(drawn) >= 2
 
 
 def losses(lens, first):
