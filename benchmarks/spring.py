@@ -1,6 +1,7 @@
 """Rows of the slider behind a spring, which friction feeds back into."""
 
 import functools
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +11,23 @@ import sim
 from benchmarks import bonds_plain
 from benchmarks.bonds import BELL
 from benchmarks.timing import Bench, Beside, Row, absolute, spent
-from sim.engine import MemberNoise, Trajectory, follow
-from sim.parts.bonds.models import FirstMoment
+from sim.engine import MemberNoise, State, Trajectory, follow
+from sim.parts.bonds.models import FirstMoment, Tracked
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.models import Adhesion, Solid, Sphere
-from sim.parts.drive import Spring
+from sim.parts.drive import READINGS, Spring
 from sim.scenario.scenario import Clock, Scenario
 
 #: Speed of the stage in Bell's stretches a life at rest, and spring over that of all sites: half of the onset's.
 SPEED, SOFT = 10.0, 0.02
 #: Tolerance of ours that leads to an error of the positions of 1e-6 of the largest.
 TOLERANCE = 4e-7
+MEAN = FirstMoment(site_density=1.0, start_from="bonded", **BELL)
 
 
-def scene(duration: float, steps: int, tolerance: float, mass: float = 0.0, damping: float = 0.0) -> Scenario:
+def scene(
+    duration: float, steps: int, tolerance: float, mass: float = 0.0, damping: float = 0.0, bonds: Any = MEAN
+) -> Scenario:
     """Return a lens of constant area; stretch and life of its bonds at rest are units, and so is the force of all."""
     keys: dict[str, Any] = {
         "clock": Clock(duration=duration, step=duration / steps),
@@ -31,16 +35,21 @@ def scene(duration: float, steps: int, tolerance: float, mass: float = 0.0, damp
         "sphere": Sphere(radius=2e-3),
         "adhesion": Adhesion(work=0.042, bond_share=0.0),
         "contact": Equilibrium(load=4e-3),
-        "bonds": FirstMoment(site_density=1.0, start_from="bonded", **BELL),
+        "bonds": bonds,
     }
     area = Scenario(**keys).contact_area
     body = {"stiffness": SOFT * area, "tolerance": tolerance, "mass": mass * area, "damping": damping * area}
     return Scenario(**keys, drive=Spring(stage=SPEED, contact_stiffness="rigid", **body))
 
 
+def ended(of: Scenario, members: int = 1) -> tuple[State, Trajectory]:
+    """Return the state of a slider at the end, and its trajectory at each clock step."""
+    return follow(of, MemberNoise.of(of.seed, np.arange(members)), None, range(1, of.clock.steps + 1))
+
+
 def followed(of: Scenario, members: int = 1) -> Trajectory:
     """Return the trajectory of a slider at each clock step."""
-    return follow(of, MemberNoise.of(of.seed, np.arange(members)), None, range(1, of.clock.steps + 1))[1]
+    return ended(of, members)[1]
 
 
 def apart(positions: np.ndarray, exact: np.ndarray) -> float:
@@ -50,7 +59,13 @@ def apart(positions: np.ndarray, exact: np.ndarray) -> float:
 
 #: A lens whose contact follows ΔΓ; its speed [mm/s], members, clock steps and the goal for a member's step [µs].
 LENS = Path(__file__).parent.parent / "scenarios" / "pdms_lens_spring.toml"
-FEELING = ((2, 1, 4000, 4.0), (2, 4, 1000, 4.0), (2, 256, 100, 3.5), (3, 1, 4000, None), (20, 1, 4000, None))
+FEELING = (
+    (2, 1, 4000, 4.0), (2, 4, 1000, 4.0), (2, 256, 100, 3.5), (2, 10_000, 40, 3.5), (3, 1, 4000, None),
+    (20, 1, 4000, None),
+)  # fmt: skip
+#: Speeds of the lens in stick-slip [mm/s], its clock steps [ms], and tolerances of its bands; goals [µs] for its parts.
+SLIPPING = tuple(itertools.product((3, 20), (1.0, 0.125), (0.01, 0.001)))
+PARTS = {"a sub-step": 1.8, "a draw of ΔΓ": 0.3, "a clock step": 1.0}
 
 #: Sliders by name: mass and damping over those of all sites, slips or as much time, and tolerances of the others.
 SLIDERS: dict[str, tuple[float, float, int, dict[str, float]]] = {
@@ -88,8 +103,35 @@ def spring(bench: Bench) -> list[Row]:
         microseconds = [share * spent(program) for _ in range(bench.of(7, 1))]
         work = f"a member's step of 1 ms: spring lens at {stage} mm/s, members: {members}"
         rows.append(absolute(work, microseconds, "µs", goal))
+    rows += parts(bench, lens)
+    for sites in (50, 50_000):
+        tracked = Tracked(sites=bench.of(sites, 5), site_density=1.0, start_from="bonded", **BELL)
+        duration = bench.of(max(6.0, 6e4 / sites), 1.0)
+        program = functools.partial(ended, scene(duration, round(duration), 1e-4, bonds=tracked))
+        share = 1e6 / np.sum(program()[0].bonds.life + 1.0)
+        microseconds = [share * spent(program) for _ in range(bench.of(5, 1))]
+        work = f"a bond's life: slider on {sites:,} tracked bonds behind a spring"
+        rows.append(absolute(work, microseconds, "µs", 1.5))
 
     long = scene(bench.of(2400.0, 1.0), bench.of(10**5, 10), TOLERANCE)
     seconds = [spent(lambda: followed(long)) for _ in range(bench.of(5, 1))]
     rows.append(absolute("slider behind a spring through 10³ slips, 10⁵ records", seconds, "s", 5.0))
     return rows
+
+
+def parts(bench: Bench, lens: Scenario) -> list[Row]:
+    """Rows of the times of a lens in stick-slip, split by least squares over speeds, clock steps and tolerances."""
+    programs, counts, steps = [], [], bench.of(20_000, 4)
+    for stage, step, tolerance in SLIPPING:
+        clock = {"clock.step": f"{step} ms", "clock.record": f"{step} ms", "clock.duration": f"{steps * step} ms"}
+        of = lens.with_values({"drive.stage": f"{stage} mm/s", "shear.tolerance": tolerance} | clock)
+        programs.append(functools.partial(followed, of))
+        substeps = programs[-1]().driven[-1, 0, READINGS.index("substeps")]
+        counts.append([substeps, steps * len(of.process.shapes) / len(lens.process.shapes), steps])
+    turns = []
+    for _ in range(bench.of(7, 1)):
+        seconds = np.array([spent(program) for program in programs])[:, np.newaxis]
+        turns.append(1e6 * np.abs(np.linalg.lstsq(counts / seconds, np.ones(len(seconds)))[0]))
+    work = f"spring lens in stick-slip, {len(lens.process.shapes)} bands"
+    named = zip(PARTS.items(), np.transpose(turns), strict=True)
+    return [absolute(f"{part}: {work}", values.tolist(), "µs", goal) for (part, goal), values in named]
