@@ -1,6 +1,7 @@
 """Rows of the bonds: counted, and tracked one by one."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -84,21 +85,17 @@ def tracked(bench: Bench) -> list[Row]:
     ):
         steps, fine = bench.of(steps, 5), step / per_output
         ours, theirs = population(part, members, steps, BELL_SPEED, step), stepped((members, sites), fine, per_output)
+        law, edges = (members * sites, 1.0, 1.0, 1.0, random), step * np.arange(steps + 1)
+        any_motion = partial(bonds_plain.renewal_in_steps, edges, np.full(steps, BELL_SPEED), *law)
+        one_speed = partial(bonds_plain.renewal, steps, step, BELL_SPEED, *law)
         label = "numpy, second order, in the same steps" if per_output == 1 else "numpy, second order, steps of 0.02"
         mean = float(np.mean([theirs() for _ in range(bench.of(200 // per_output, 1))]))
         rows += bench.compare(
             f"tracked, 20 members of 10⁴ bonds, {name}",
             ours,
             Beside(label, theirs, goal=4 if per_output == 1 else None, errors=errors(ours(), mean)),
-            Beside(
-                "compiled renewals (numba)",
-                lambda steps=steps, step=step: bonds_plain.renewal(
-                    members * sites, steps, step, BELL_SPEED, 1.0, 1.0, 1.0, random
-                ),
-                steps,
-                goal=1.1,
-                bound=True,
-            ),
+            Beside("compiled renewals (numba), any motion", any_motion, steps, goal=1.1, bound=True),
+            Beside("compiled renewals (numba), only steady sliding", one_speed, steps, bound=True),
             share=steps,
             turns=7,
         )

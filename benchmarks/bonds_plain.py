@@ -43,22 +43,50 @@ def binomials(members, steps, sites, stay, bind, random):
 
 
 @numba.njit(cache=True)
-def renewal(sites, outputs, step, speed, rate, softness, rebinding_rate, random):
+def renewal(outputs, step, speed, sites, rate, softness, rebinding_rate, random):
     """Bonds under Bell's rupture in steady sliding, one after the other and life by life: exact, compiled.
 
     A life ends where its integrated rupture k0 (e^(gt) − 1)/g, g = softness × speed, reaches an exponential number.
     """
-    sums, growth, end = np.zeros((3, outputs)), softness * speed, outputs * step
+    sums, growth, end = np.zeros((outputs, 3)), softness * speed, outputs * step
     for _ in range(sites):
         birth = random.standard_exponential() / rebinding_rate
         while birth < end:
             life = math.log1p(random.standard_exponential() * growth / rate) / growth
             for k in range(int(birth / step), min(int((birth + life) / step), outputs)):
                 stretch = speed * ((k + 1) * step - birth)
-                sums[0, k] += 1.0
-                sums[1, k] += stretch
-                sums[2, k] += stretch * stretch
+                sums[k, 0] += 1.0
+                sums[k, 1] += stretch
+                sums[k, 2] += stretch * stretch
             birth += life + random.standard_exponential() / rebinding_rate
+    return sums
+
+
+@numba.njit(cache=True)
+def renewal_in_steps(edges, speeds, sites, rate, softness, rebinding_rate, random):
+    """Bonds as in ``renewal``, under any motion forwards in steps of constant speed, by one clock for all bonds."""
+    sums, (x, clock, grown), paces = np.zeros((speeds.size, 3)), np.zeros((3, edges.size)), softness * speeds
+    for k in range(speeds.size):
+        grown[k], span = rate * math.exp(softness * x[k]), edges[k + 1] - edges[k]
+        x[k + 1], clock[k + 1] = x[k] + speeds[k] * span, clock[k] + grown[k] * math.expm1(paces[k] * span) / paces[k]
+    for _ in range(sites):
+        time, k = random.standard_exponential() / rebinding_rate, 0
+        while time < edges[-1]:
+            while edges[k + 1] <= time:
+                k += 1
+            after = time - edges[k]
+            birth, now = x[k] + speeds[k] * after, clock[k] + grown[k] * math.expm1(paces[k] * after) / paces[k]
+            due = now + random.standard_exponential() * math.exp(softness * birth)
+            while k < speeds.size and clock[k + 1] <= due:
+                stretch = x[k + 1] - birth
+                sums[k, 0] += 1.0
+                sums[k, 1] += stretch
+                sums[k, 2] += stretch * stretch
+                k += 1
+            if k == speeds.size:
+                break
+            life = math.log1p((due - clock[k]) * paces[k] / grown[k]) / paces[k]
+            time = edges[k] + life + random.standard_exponential() / rebinding_rate
     return sums
 
 

@@ -97,13 +97,16 @@ def mapped(bench: Bench) -> list[Row]:
             scene.process.maps(states[0].shear, states[0].drive.position, 1)
 
         textbook = plain.TextbookModes(*known(size), SHEAR_MODULUS, 1)
-        half = plain.HalfSpectrumMap(*known(size), 1)
+        half, compiled = plain.HalfSpectrumMap(*known(size), 1), plain.CompiledMap(*known(size), SHEAR_MODULUS, 1)
         still = half.modes.copy()
         rows += bench.compare(
             f"mapped, {points}²: a step and its map",
             step,
             Beside(f"{TEXTBOOK}, scipy's irfft2", lambda of=textbook: of.map(EXPONENT), goal=goal),
             Beside("numpy, half spectrum drawn, scipy's irfft2", lambda of=half: of.map(EXPONENT)),
+            Beside(
+                "compiled (numba), scipy's irfft2", lambda of=compiled: of.map(EXPONENT, CELL / 7), goal=1, bound=True
+            ),
             Beside("scipy's irfft2 alone", lambda still=still: fft.irfft2(still), bound=True),
         )
     return rows

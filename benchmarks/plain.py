@@ -94,6 +94,41 @@ class HalfSpectrumMap:
         return fft.irfft2(self.modes, s=(self.points, self.points))
 
 
+@numba.njit(cache=True)
+def renew_half(modes, size, weights, keep, renew, turns, moved, random):
+    """Renew the modes that have power, write them as ``turns`` move them, and return their energy."""
+    points, energy = len(modes), 0.0
+    for i in range(points):
+        for j in range(modes.shape[1]):
+            if size[i, j] > 0.0:
+                kick = renew * size[i, j]
+                noise = complex(kick * random.standard_normal(), kick * random.standard_normal())
+                modes[i, j] = keep * modes[i, j] + noise
+                energy += weights[i, j] * (modes[i, j].real ** 2 + modes[i, j].imag ** 2)
+                moved[i, j] = modes[i, j] * turns[i]
+    for i in range(1, (points + 1) // 2):  # the first column holds both of a pair
+        moved[points - i, 0] = moved[i, 0].conjugate()
+    return energy
+
+
+class CompiledMap:
+    """The field of ``HalfSpectrumMap``, renewed in a compiled loop, carried by a slider, with its ΔΓ."""
+
+    def __init__(self, points, cell, density, shear_modulus, seed):
+        (qy, q), self.random = half_spectrum(points, cell), np.random.default_rng(seed)
+        self.qx = 2 * np.pi * np.fft.fftfreq(points, cell / points)
+        drawn = ((qy > 0) | (self.qx[:, np.newaxis] > 0)) & (qy < qy.max()) & (self.qx > self.qx.min())[:, np.newaxis]
+        self.size = np.where(drawn, np.sqrt(0.5 * density(q)) / cell * points**2, 0.0)
+        self.weights = energy_weights(points, cell, shear_modulus) * np.where(qy > 0, 1.0, 2.0)
+        self.modes, self.moved = np.zeros((2, *self.size.shape), complex)
+        self.map(np.inf, 0.0)
+
+    def map(self, exponent, position):
+        factors = np.exp(-exponent), np.sqrt(-np.expm1(-2 * exponent)), np.exp(-1j * self.qx * position)
+        energy = renew_half(self.modes, self.size, self.weights, *factors, self.moved, self.random)
+        return energy, fft.irfft2(self.moved)
+
+
 class BandsNumpy:
     """ΔΓ of the same bands as ours by numpy: each band a gamma number, renewed as the sum of squares that it is."""
 
