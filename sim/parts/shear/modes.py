@@ -190,7 +190,8 @@ def _single(spectrum: Family, cell: float, points: int | None, wavevector: tuple
     """Return the single pair of a ripple, at the wavevector of the ripple."""
     qx, qy = wavevector
     size = math.hypot(qx, qy)
-    qx, qy = (0.0 if abs(part) < 1e-12 * size else part for part in (qx, qy))
+    # as for the lattice below, because a half spectrum holds a wave along x at a positive index only
+    qx, qy = (0.0 if abs(part) <= _TOUCH * size else part for part in (qx, qy))
     if qy < 0.0 or (qy == 0.0 and qx < 0.0):
         qx, qy = -qx, -qy
     exact = np.array([qx, qy]) * cell / (2 * math.pi)

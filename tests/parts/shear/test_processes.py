@@ -114,6 +114,15 @@ def test_a_ripple_of_fixed_amplitude_stores_the_papers_energy_and_fixed_phases_d
     assert abs(turns.var() - 1.0) < 5.0 * np.sqrt(2.0 / turns.size)
 
 
+@pytest.mark.parametrize("angle", [0.0, np.pi - 1e-10, np.pi + 1e-10, -1e-10, 6.283185307])
+def test_a_map_shows_a_ripple_along_the_sliding_whatever_the_rounding_of_its_angle(angle):
+    ripple = Ripple(amplitude=1e5, wavelength=CELL / 10.0, angle=angle)
+    part = shear.Mapped(spectrum=ripple, cell=CELL, points=32, correlation=Slip(length=1e-6), mode_amplitudes="fixed")
+    scenario, course = states(part, 1, Clock(duration=1e-3, step=1e-3))
+    (pattern,) = scenario.process.maps(course[-1].shear, np.zeros(1), 1)
+    assert_allclose(pattern.std(), 1e5 / np.sqrt(2.0), rtol=1e-12)
+
+
 def test_relaxing_amplitude_follows_the_exact_second_moment():
     # with g constant after a jump of the speed, the mean energy relaxes as 1 + (g^2 - 1) (1 - exp(-2 t/t_m))
     onset = Onset(speed=1e-3, width=0.05, floor=0.5, relaxing=True)
