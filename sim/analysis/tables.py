@@ -150,6 +150,8 @@ _MEMORY = _Column("correlation_time", "t_c", meaning="integral correlation time 
 _TURNS = 3
 #: Shares below it are nothing; spread over the mean below which a motion without noise has settled.
 _ROUNDING, _SETTLED = 1e-13, 1e-3
+#: Rows of a CSV file that are written at once.
+_LINES = 2**15
 
 
 def stated(dataset: xr.Dataset, lost: Sequence[str] = (), every: xr.Dataset | None = None) -> xr.Dataset:
@@ -568,9 +570,11 @@ def to_csv(
         file.write(",".join(_quoted(header)) + "\n")
         for part in parts:
             columns = [part.get(name, np.array(np.nan)).ravel() for name in names]
-            count = max(map(len, columns))
-            fields = (_texts(values) * (count // len(values)) for values in columns)
-            file.writelines(f"{line}\n" for line in map(",".join, zip(*fields, strict=True)))
+            count = max(map(len, columns), default=0)
+            for start in range(0, count, _LINES):  # because the texts of all rows together take much memory
+                rows = slice(start, start + _LINES)
+                fields = (_texts(np.broadcast_to(values, count)[rows]) for values in columns)
+                file.writelines(f"{line}\n" for line in map(",".join, zip(*fields, strict=True)))
 
 
 def _texts(values: Array) -> list[str]:

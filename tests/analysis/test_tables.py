@@ -14,6 +14,7 @@ from helpers.parts import Adhesion, Bell, Clock, Ensemble, Equilibrium, Record, 
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
+from sim.analysis import tables
 from sim.analysis.observables import with_slips
 from sim.units.errors import BadInput
 from sim.units.notation import in_units
@@ -118,6 +119,18 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
     assert_array_equal(rows["mean"], dataset["contact_area"].to_numpy().ravel())
     text, how = (tmp_path / "out.csv").read_bytes().decode(), {"index": False, "na_rep": "nan", "lineterminator": "\n"}
     assert text == analysis.tidy(dataset).to_csv(header=text.partition("\n")[0].split(","), **how)
+
+
+def test_a_large_csv_is_written_in_pieces_and_an_empty_one_has_no_rows(tmp_path, monkeypatch):
+    texts, lengths = tables._texts, []
+    monkeypatch.setattr(tables, "_texts", lambda values: lengths.append(len(values)) or texts(values))
+    numbers = pd.DataFrame({"a": np.arange(70_000) / 7.0, "b": np.arange(70_000)})
+    for rows in (numbers, pd.DataFrame()):
+        monkeypatch.setattr(tables, "in_columns", lambda *_, rows=rows: rows)
+        tables.to_csv(None, tmp_path / "out.csv", wide=True)
+        text = (tmp_path / "out.csv").read_bytes().decode()
+        assert text == (rows.to_csv(index=False, lineterminator="\n") if rows.size else "\n")
+    assert max(lengths) < 50_000 and sum(lengths) == numbers.size
 
 
 def test_a_wide_csv_has_a_row_for_each_point_or_record_in_the_units_that_are_chosen(tmp_path):
