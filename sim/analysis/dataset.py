@@ -154,7 +154,8 @@ def claim(dataset: xr.Dataset, path: Path, target: Path, replace: bool, *others:
     if not target.is_file() or target.is_relative_to("/dev"):
         return
     files_read = hdf5.tables(dataset.attrs.get("scenario_files")).values()
-    texts = [str(entry.get("text")) for entry in (*files_read, {"text": dataset.attrs.get("scenario_toml")})]
+    texts = [str(entry.get("text")) for entry in files_read if isinstance(entry, dict)]
+    texts.append(str(dataset.attrs.get("scenario_toml")))
     with target.open("rb") as file:
         content = file.read(10 + 2 * max(len(text.encode()) for text in texts))  # a mark, and line ends of two letters
     text = content.decode("utf-8-sig", "replace").replace("\r\n", "\n")

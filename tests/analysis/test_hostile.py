@@ -157,3 +157,10 @@ def test_no_message_shows_what_stands_in_a_file_elsewhere(folder, text):
             scenario.write_text(head + drive.format(name) + rest, encoding="utf-8")
             message = sim("check", scenario).stderr.replace(str(folder), "")
             assert message and not any(word in message for word in ("alice", "hunter2", "swordfish", "31415"))
+
+
+def test_files_of_a_scenario_without_texts_do_not_keep_an_output_from_being_replaced(folder):
+    edited(lambda file: file.setncattr("scenario_files", '{"map.csv": 1}'))()
+    Path("rows.csv").write_text("a, b\n", encoding="utf-8")
+    result = sim("stats", "out.nc", "--csv", "rows.csv", "--force")
+    assert result.exit_code == 0 and Path("rows.csv").stat().st_size > 100
