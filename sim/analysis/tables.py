@@ -572,8 +572,11 @@ def to_csv(
             columns = [part.get(name, np.array(np.nan)).ravel() for name in names]
             count = max(map(len, columns), default=0)
             for start in range(0, count, _LINES):  # because the texts of all rows together take much memory
-                rows = slice(start, start + _LINES)
-                fields = (_texts(np.broadcast_to(values, count)[rows]) for values in columns)
+                rows = slice(start, min(start + _LINES, count))
+                fields = (
+                    _texts(values[rows]) if len(values) == count else _texts(values) * (rows.stop - start)
+                    for values in columns
+                )
                 file.writelines(f"{line}\n" for line in map(",".join, zip(*fields, strict=True)))
 
 
