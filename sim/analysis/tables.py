@@ -693,4 +693,4 @@ def _flat(statistics: xr.Dataset) -> xr.Dataset:
         levels = QUANTILES if "quantile" in variable.dims else ()
         flat |= {f"{stem}_q{100 * level:02.0f}{end}": variable.isel(quantile=k) for k, level in enumerate(levels)}
         flat |= {} if levels else {key: variable}
-    return xr.Dataset(coords=statistics.coords.drop_vars("quantile", errors="ignore")).assign(flat)
+    return statistics.drop_vars([*statistics, "quantile"], errors="ignore").assign(flat)
