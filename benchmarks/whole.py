@@ -61,17 +61,21 @@ def gallery(bench: Bench) -> list[Row]:
 
 
 def statistics(bench: Bench) -> list[Row]:
-    """Statistics of many members (4 GB) and of few long ones, beside the time of loading the dataset by xarray."""
+    """Statistics of many members (4 GB) and of few long ones, beside the time of loading the dataset by xarray.
+
+    The first is not compressed, because its repeated records would be so too well; the second is as a run writes it.
+    """
     rows = []
     for name, size, goal in (
         ("4 GB, 1024 members × 43,056 records", (1024, 468, 92), 3.0),
-        ("4 members × 2,000,000 records", (4, 2000, 1000), 2.5),
+        ("4 members × 2,000,000 records", (4, 2_000_000, 1), 2.5),
     ):
-        members, records, times = bench.of(size, (2, 20, 2))
+        members, records, times = bench.of(size, (2, 20, min(size[2], 2)))
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "long.nc"
             slow = {"model": "steady", "speed": "10 um/s"}
-            tiled(sim.run(lens(members, records - 1, drive=slow, bonds=RATE, shear=BANDED)), path, times)
+            scene = lens(members, records - 1, drive=slow, bonds=RATE, shear=BANDED)
+            sim.run(scene, path) if times == 1 else tiled(sim.run(scene), path, times)
             load = f"import xarray; xarray.open_dataset({str(path)!r}).load()"
             turns = [(*bench.command("stats", str(path)), bench.python(load)) for _ in range(bench.of(3, 1))]
         ours, megabytes, plain = np.transpose(turns)
