@@ -342,6 +342,6 @@ def stays_held(dataset: xr.Dataset) -> xr.DataArray:
     still = xr.ones_like(dataset["contact_modulus"], bool)
     with contextlib.suppress(KeyError):
         still = still & (not isinstance(resolved(dataset, f"contact.{control(dataset).kind}"), dict))
-    for name in {"jkr_radius", "hertz_radius"} & dataset.keys():
-        still = still & (dataset[name] == dataset[name].isel(t=0)).all("t")
+    for radius in (dataset.variables[name] for name in ("jkr_radius", "hertz_radius") if name in dataset):
+        still = still & (radius == radius.isel(t=0)).all("t")
     return still

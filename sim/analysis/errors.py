@@ -51,7 +51,8 @@ def _largest(dataset: xr.Dataset, name: str) -> SystematicError:
     variable = dataset[name]
     size = np.nan_to_num(np.abs(variable.to_numpy()))
     place = dict(zip(variable.dims, np.unravel_index(np.argmax(size), size.shape), strict=True))
-    point, values = dataset.isel(place), float(variable.isel(place))
+    known = [at for at in (*sweep_dims(dataset), "error_speed") if at in dataset]
+    point, values = dataset[known].isel(place, missing_dims="ignore"), float(variable.isel(place))
     unit, factor = _UNITS.get(name.rpartition("_")[2], (variable.units, 1.0))
     swept = [point[dim] for dim in sweep_dims(dataset)]
     words = [f"{at.name} = {engineering(float(at), at.units) if at.dtype.kind == 'f' else at.item()}" for at in swept]

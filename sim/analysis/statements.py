@@ -96,9 +96,8 @@ def statements(
     result = xr.Dataset()
     for group, late in groups:
         over = averaging(dataset, late).removeprefix("mean over the ")
-        for key in (key for key in group if str(key).endswith("_mean")):
-            group[key] = group[key].assign_attrs(over=over)
-        result = result.merge(group, compat="no_conflicts", join="outer")
+        means = {key: group[key].assign_attrs(over=over) for key in group if str(key).endswith("_mean")}
+        result = result.merge(group.assign(means), compat="no_conflicts", join="outer")
     return result.assign_coords({name: dataset[name] for name in sweep_dims(dataset)})  # with their units
 
 
