@@ -40,7 +40,7 @@ from sim.units.notation import bounded, chosen_unit, concise, engineering, scale
 #: Cells of columns by heading.
 Columns = dict[str, list[str]]
 #: The index of each row along the dimensions of sweep and time.
-Points = dict[str, xr.DataArray]
+Points = dict[str, xr.Variable]
 
 
 class _Column(NamedTuple):
@@ -408,7 +408,7 @@ def _shown(means: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Col
 def _at(variable: xr.DataArray | None, points: Points) -> Array:
     """Return the values of a variable at each row; nan if there is no such variable."""
     count = next(iter(points.values())).size if points else 1
-    values = np.nan if variable is None else variable.isel(points, missing_dims="ignore").to_numpy()
+    values = np.nan if variable is None else variable.variable.isel(points, missing_dims="ignore").to_numpy()
     return np.broadcast_to(values, count)
 
 
@@ -458,7 +458,7 @@ def _last(dataset: xr.Dataset) -> int:
 def _points(sizes: Mapping[Any, int], counts: dict[str, int]) -> Points:
     """Return the index of each row in every dimension."""
     chosen = np.meshgrid(*(_spread(sizes[name], count) for name, count in counts.items()), indexing="ij")
-    return {name: xr.DataArray(index.ravel(), dims="row") for name, index in zip(counts, chosen, strict=True)}
+    return {name: xr.Variable("row", index.ravel()) for name, index in zip(counts, chosen, strict=True)}
 
 
 def _thinned(sizes: Mapping[Any, int], rows: int) -> dict[str, int]:
