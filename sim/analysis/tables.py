@@ -213,6 +213,24 @@ def table(dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None)
     return _rows(cells)
 
 
+def unresolved(dataset: xr.Dataset) -> str:
+    """Return a sentence on the trajectories whose motion was not resolved to the end, and its cure; "" without any."""
+    if "unresolved_time" in dataset:
+        times = dataset["unresolved_time"]
+        count, total = int(times.notnull().sum()), times.size
+    elif "unresolved_time_count" in dataset:  # statistics over the members
+        numbers = dataset["unresolved_time_count"]
+        count, total = int(numbers.sum()), numbers.size * int(dataset.attrs["members"])
+    else:
+        return ""
+    if not count:
+        return ""
+    return (
+        f"{count} of {total} trajectories could not be resolved: their values are missing from unresolved_time on; set"
+        " a shorter clock.step, or drive.viscosity or drive.damping, which delay a slip"
+    )
+
+
 def notes(
     dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, str]], stated: xr.Dataset | None = None
 ) -> list[str]:
@@ -222,10 +240,12 @@ def notes(
     one_row_each, points = _has_one_row_each(dataset), dataset["contact_modulus"].size
     phrases = [words] if (words := averaging(dataset, one_row_each)) else []
     if "runaway_time" in dataset and (gone := int(dataset["runaway_time"].isel(t=-1).notnull().sum())):
-        why = "the slider lost stability"
-        if "stage_speed" in dataset:
-            why = 'a slip was too fast to resolve; set drive.viscosity, or contact_stiffness = "rigid"'
-        phrases.append(f"{gone} of {dataset['runaway_time'].isel(t=-1).size} trajectories end in a runaway: {why}")
+        phrases.append(
+            f"{gone} of {dataset['runaway_time'].isel(t=-1).size} trajectories end in a runaway: the slider lost"
+            " stability"
+        )
+    if sentence := unresolved(dataset):
+        phrases.append(sentence)
     if any("(" in cell for row in rows for cell in row.values()):
         phrases.append("brackets: standard error in the last digits, larger if there are few members")
     if any(" to " in cell for row in (*rows, *once) for cell in row.values() if "(" in cell):

@@ -20,7 +20,6 @@ from sim.ensemble.store import WHOLE, Arrays, BlockFiles, Blocks, MemoryBlocks, 
 from sim.ensemble.variables import LARGEST, MAP, VARIABLES, Variable
 from sim.numerics.files import DiskFull, OutputExists, claim, explained
 from sim.numerics.hdf5 import located
-from sim.parts.drive import READINGS
 from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
 from sim.parts.shear.process import Fluctuation
@@ -250,12 +249,12 @@ def _late_sums(name: str, rows: dict[str, np.ndarray], records: range, count: in
 
 
 def _read(variable: Variable, point: Scenario, course: Trajectory) -> np.ndarray:
-    """A recorded quantity, nan once nothing has held the body any longer; a flag or a count, without symbol, stays."""
+    """Return a recorded quantity, nan once the motion of the slider has ended; a flag or a count stays."""
     values = variable.read(point, course)
     ends = point.varies["drive"] and point.varies[variable.part] and variable.symbol
     if not ends or variable.name == "runaway_time":
         return cast(np.ndarray, values)
-    return np.where(np.isnan(course.driven[..., READINGS.index("runaway_time")]), values, np.nan)
+    return np.where(np.isnan(course.position), np.nan, values)
 
 
 def _maps(point: Scenario, state: State, drawn: int) -> np.ndarray:

@@ -151,10 +151,7 @@ def _masked_share(scene: Scenario, state: State) -> Any:
 
 
 def _runaway_force(scene: Scenario, state: State) -> Any:
-    drive, slider = cast(Force, scene.drive), cast(Driven, state.drive)
-    when = slider.runaway_time
-    if drive.spring:
-        return np.where(np.isfinite(when), slider.spring_force, np.nan)
+    drive, when = cast(Force, scene.drive), cast(Driven, state.drive).runaway_time
     return np.where(np.isfinite(when), drive.course.at(np.nan_to_num(when), scene.clock.duration), np.nan)
 
 
@@ -220,7 +217,11 @@ LARGEST: tuple[Variable, ...] = (
     Variable("time_masked", "1", "share of the closed time in which the contact is masked", "", "contact",
              _masked_share),
     Variable("runaway_force", "N", "force at which the slider lost stability; nan if it never did", "",
-             "drive", _runaway_force, lambda scene: scene.drive.solves_motion, 'drive.model = "spring" or "force"'),
+             "drive", _runaway_force, lambda scene: scene.drive.model == "force", 'drive.model = "force"'),
+    Variable("unresolved_time", "s", "time from which on the motion of the slider could not be resolved, so that its"
+             " values are missing; nan if it was resolved to the end", "", "drive",
+             lambda scene, state: cast(Driven, state.drive).unresolved_time,
+             lambda scene: scene.drive.solves_motion, 'drive.model = "spring" or "force"'),
     Variable("step_renewal", "1", "largest share of the variance of DeltaGamma renewed in a clock step", "", "drive",
           lambda scene, state: renewed(scene, state.events.path),
           lambda scene: scene.feels_steps, "an edge that lags, or tension"),
@@ -332,11 +333,16 @@ VARIABLES: tuple[Variable, ...] = (
 
 
 def _driven(name: str, unit: str, long_name: str, symbol: str) -> Variable:
-    """Return a quantity of a drive that solves the motion of the slider; those of the stage need a spring."""
+    """Return a quantity of a drive that solves the motion of the slider.
+
+    Those of the stage need a spring, and stability is lost under a prescribed force only.
+    """
     place = READINGS.index(name)
     described = name, unit, long_name, symbol, "drive", lambda scene, course: course.driven[..., place]
     if name.startswith("stage_"):
         return Variable(*described, lambda scene: scene.drive.model == "spring", 'drive.model = "spring"')
+    if name == "runaway_time":
+        return Variable(*described, lambda scene: scene.drive.model == "force", 'drive.model = "force"')
     return Variable(*described, lambda scene: scene.drive.solves_motion, 'drive.model = "spring" or "force"')
 
 

@@ -192,6 +192,8 @@ class Driven(NamedTuple):
         Sub-steps since the start.
     runaway_time : array
         Time at which the slider lost stability [s], nan if never.
+    unresolved_time : array
+        Time from which on the motion could not be resolved [s], nan if never.
     energies : array, shape (members, 8)
         Energies since the start [J], columns of ``ENERGY``.
     acceleration : array
@@ -209,6 +211,7 @@ class Driven(NamedTuple):
     next_step: Array
     substeps: Array
     runaway_time: Array
+    unresolved_time: Array
     energies: Array
     acceleration: Array
 
@@ -260,8 +263,9 @@ class _Driven(Part):
     def begin(self, times: Times, members: int) -> tuple[Driven, Motion]:
         speed = np.full(members, self._first_speed(times.duration))
         zero = np.zeros(members)
+        never = np.full(members, np.nan)
         state = Driven(*(zero for _ in Driven._fields))._replace(
-            body_speed=speed, speed=speed, runaway_time=np.full(members, np.nan), energies=np.zeros((members, 8))
+            body_speed=speed, speed=speed, runaway_time=never, unresolved_time=never, energies=np.zeros((members, 8))
         )
         return state, Motion(0, np.zeros(1), np.zeros(1), zero, zero, speed, speed)
 

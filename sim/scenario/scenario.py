@@ -146,8 +146,8 @@ class Record:
     ] = "zlib"
 
     def keeps(self, name: str) -> bool:
-        """Return True if a quantity is recorded; the contact radius always is."""
-        return self.quantities is None or name in ("contact_radius", *self.quantities)
+        """Return True if a quantity is recorded; the contact radius and the time of an unresolved motion always are."""
+        return self.quantities is None or name in ("contact_radius", "unresolved_time", *self.quantities)
 
 
 #: Phases of a run that are told apart at most.

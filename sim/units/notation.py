@@ -30,7 +30,7 @@ Recorded = Literal[
     "peak_friction", "peak_friction_time", "peak_friction_speed", "peak_friction_area",
     "pull_off_load", "pull_off_time", "pull_off_displacement",
     "first_detachment", "first_closing", "detachments", "closing_displacement", "closing_load",
-    "first_masked", "time_masked", "runaway_force",
+    "first_masked", "time_masked", "runaway_force", "unresolved_time",
     "step_renewal", "pull_off_error",
     "phase_peak_stress", "phase_peak_time", "phase_peak_speed", "phase_peak_area",
     "phase_peak_friction", "phase_peak_friction_time", "phase_peak_friction_speed", "phase_peak_friction_area",

@@ -36,6 +36,10 @@ _TURNS, _FALLING = 25, 0.02
 _FLAT = 1e-7
 #: Largest mean bend of a path [stretch].
 _MOST_BENT = 0.2
+#: Least stretch by which errors are measured, for the first motion from a state without any.
+_LEAST_SCALE = 1e-9
+#: Share of a stretch by which the errors of a body that rings are measured.
+_RINGING = 0.02
 #: Births in a sub-step over the tolerance of the bonds below which its length is no matter to them.
 _FEW_BIRTHS = 0.1
 
@@ -128,7 +132,8 @@ def begin_sub_step(row, node, start, slider, contact):
 class Approach(NamedTuple):
     """Way to a node: its duration and end; speeds as ``rate`` times a displacement less an offset; a first guess.
 
-    ``momentum`` is the momentum over time that a body with mass brings along.
+    ``momentum`` is the momentum over time that a body with mass brings along. The slip is found to a share of ``none``,
+    its tolerance.
     """
 
     duration: float
@@ -138,22 +143,24 @@ class Approach(NamedTuple):
     body_offset: float
     momentum: float
     slip: float
+    none: float
 
 
 @device
-def before_node(place, nodes, at_start, start, step, row, slider):
-    """Return the ``Approach`` to a node."""
+def before_node(place, nodes, at_start, start, step, scale, row, slider):
+    """Return the ``Approach`` to a node; ``scale`` is the stretch by which errors are measured."""
+    none = scale * slider.tolerance
     mass, (speed, body_speed, force_on_mass) = slider.mass, at_start
     duration = (GAMMA if place == 1 else 1.0 - GAMMA) * step
     time, rate, share = start + PLACES[place] * step, 2.0 / (GAMMA * step), 1.0 / (GAMMA * (1.0 - GAMMA) * step)
     if place == 1:
         momentum = mass * rate * body_speed + force_on_mass
         slip = duration * (speed + 0.5 * row.acceleration * duration)
-        return Approach(duration, time, rate, speed, body_speed, momentum, slip)
+        return Approach(duration, time, rate, speed, body_speed, momentum, slip, none)
     before = nodes[1]
     momentum = mass * (rate * body_speed + share * (before.body_speed - body_speed))
     slip = duration * (before.slip / (GAMMA * step) + 0.5 * row.acceleration * step)
-    return Approach(duration, time, rate, share * before.slip, share * before.body, momentum, slip)
+    return Approach(duration, time, rate, share * before.slip, share * before.body, momentum, slip, none)
 
 
 @device
@@ -183,7 +190,7 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
         after.body_speed = (momentum + pull - force) / (damping + mass * rate)
     firmest, bears = max(stiffness, mechanics.stiffness_of(radius, slider)), area * (bound + mechanics.SOME)
     firm = firmest / bears if area > 0.0 else 1.0
-    none, slope = 1e-3 * tolerance / max(1.0, firm), grows + loads * (1.0 + softer + yields * grows)
+    none, slope = 1e-3 * approach.none / max(1.0, firm), grows + loads * (1.0 + softer + yields * grows)
     if mass + damping > 0.0:  # what is left of the forces is work on the body, whose displacement may be the longer
         none = min(none, 1e-3 * tolerance * (math.fabs(force) + math.fabs(pull)) / slope)
     roundings = math.fabs(slip) + yields * math.fabs(force) + math.fabs(row.sheared)
@@ -192,12 +199,12 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
 
 
 @device
-def go_to_node(place, nodes, at_start, pool, count, start, step, row, slider, contact, unit, rules):
+def go_to_node(place, nodes, at_start, pool, count, start, step, scale, row, slider, contact, unit, rules):
     """Find the slip to a node and move the bonds; return their number, and the factor of the step for births.
 
     A number below zero where there is no balance of forces or its slope is not that of a short sub-step.
     """
-    approach = before_node(place, nodes, at_start, start, step, row, slider)
+    approach = before_node(place, nodes, at_start, start, step, scale, row, slider)
     duration, shift = approach.duration, approach.slip
     before, after = nodes[place - 1], nodes[place]
     bent = -row.acceleration * duration * duration / 12.0
@@ -276,15 +283,32 @@ def longest(row, unit, rules):
 
 
 @device
-def bend_of(nodes, step, row, slider):
+def bend_of(nodes, step, scale, row, slider):
     """Return the acceleration of the interface in a sub-step, and the error of its slip by the change of that.
 
-    The error is relative to the tolerance.
+    The error is over the tolerance and over the larger of the slip and a ``scale`` of the stretch.
     """
     slip = nodes[2].slip
     early, late = nodes[1].slip / GAMMA, (slip - nodes[1].slip) / (1.0 - GAMMA)
     bend = 2.0 / step * (late - early) / step
-    return bend, step * step / 24.0 * math.fabs(bend - row.acceleration) / (1.0 + math.fabs(slip)) / slider.tolerance
+    return bend, step * step / 24.0 * math.fabs(bend - row.acceleration) / (scale + math.fabs(slip)) / slider.tolerance
+
+
+@device
+def stretch_scale(row, node, slider):
+    """Return the stretch by which errors of a sub-step from a node are measured; at most 1, the unit.
+
+    It is the stretch of the bonds at rest under the present pull and the present momentum, or their mean stretch if
+    that is larger: a body may ring with a small part of the unit. The errors of a body that rings add up over many
+    periods, so that a fiftieth of the stretch counts.
+    """
+    bears = node.area * node.bound + slider.stiffness
+    part = _RINGING if slider.damping * slider.damping < 4.0 * slider.mass * bears else 1.0
+    mean = node.moment / node.bound if node.bound > 0.0 else 0.0
+    square = row.spring_force * row.spring_force + bears * slider.mass * row.body_speed * row.body_speed
+    if not mean * mean * bears * bears + square < bears * bears:
+        return part
+    return part * max(math.sqrt(mean * mean + square / (bears * bears)), _LEAST_SCALE)
 
 
 @device
@@ -423,18 +447,22 @@ def _break_all(row, pool, time, brief, slider, contact, unit, rules, node, energ
 
 
 @device
-def _piece(row, bonds, slider, contact, unit, rules, room, energy):
+def _piece(line, bonds, slider, contact, unit, rules, room, books):
     """Go through one piece of a clock step; return the time of its end or of lost stability, and the bonds.
 
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step: then the last
     number returned is 1, else 0.
     """
     pool, saved, nodes = room
+    row, energy = line[0], books[0]
     count, travelled, settled = bonds
-    start, length = 0.0, slider.length
+    start, length, turns, checked = 0.0, slider.length, 0, 0.0
+    # the energies of the bonds are good to their own tolerance
+    balanced = mechanics.Slider(*slider[:-1], max(slider.tolerance, rules.tolerance))
     brittle = slider.mass + slider.damping + slider.viscosity == 0.0
     sums_at(pool, count, unit, rules, nodes[0])
-    for _ in range(mechanics.MOST_STEPS):
+    while turns >= 0:
+        turns, checked = mechanics.judged(turns, checked, start, length)
         left = length - start
         step = mechanics.next_step(row, left, length, longest(row, unit, rules))
         if left <= mechanics.LEAST * length:
@@ -458,16 +486,19 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
         saved[:, :count] = pool[:3, :count]
         first, contact = nodes[0], mechanics.following(contact, row, start, step)
         at_start = begin_sub_step(row, first, start, slider, contact)
-        new_count, factor = go_to_node(1, nodes, at_start, pool, count, start, step, row, slider, contact, unit, rules)
+        scale = stretch_scale(row, first, slider)
+        new_count, factor = go_to_node(
+            1, nodes, at_start, pool, count, start, step, scale, row, slider, contact, unit, rules
+        )
         if new_count >= 0:
             new_count, other = go_to_node(
-                2, nodes, at_start, pool, new_count, start, step, row, slider, contact, unit, rules
+                2, nodes, at_start, pool, new_count, start, step, scale, row, slider, contact, unit, rules
             )
             factor = min(factor, other)
         shift, bend, error = nodes[2].slip, 0.0, math.inf
         within = mechanics.within_reach(shift, step, row, contact)
         if new_count >= 0:
-            bend, error = bend_of(nodes, step, row, slider)
+            bend, error = bend_of(nodes, step, scale, row, slider)
         grows = min(factor, 4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else min(factor, 4.0)
         grows = min(grows, 0.9 * within)
         if not (error <= 1.0 and factor >= 1.0 and within >= 1.0):
@@ -485,7 +516,16 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
                     count, row.next_step = new_count, 1e-6 * length
                     travelled += unit * (row.slip - slid)
             continue
+        line[1], books[1] = row, energy
+        before = stored_energy(row, first.square, start, slider, contact)
         accept_nodes(row, nodes, start, step, slider, contact, rules.limit / unit, energy)
+        after = stored_energy(row, nodes[2].square, start + step, slider, contact)
+        if mechanics.misses(before, after, books[1], energy, row, balanced, step):
+            pool[:3, :count] = saved[:, :count]
+            line[0], books[0], row.next_step = line[1], books[1], 0.25 * step
+            continue
+        if step <= mechanics.BRIEF * length and contact.stays == 0.0:  # an area that jumps takes the missing energy
+            energy.area += mechanics.retained(energy) - mechanics.retained(books[1]) - (after - before)
         count, row.acceleration = new_count, bend
         travelled += unit * shift
         if count > 1.25 * settled + 16.0 or count + 4 > pool.shape[1]:
@@ -503,9 +543,10 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
 
 
 @device
-def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, room):
+def _through(line, books, pieces, slider, contact, unit, share, rules, bonds, room):
     """Take a row and its cohorts through a clock step; return the time reached, and False if stability is lost."""
     pool, _, nodes = room
+    row, energy = line[0], books[0]
     count = read_row(pool, bonds[0], bonds[1], bonds[2], share)
     time, going, travelled, settled, stays = 0.0, True, bonds[3][0], bonds[3][1], contact.stays
     for p in range(len(pieces)):
@@ -528,7 +569,7 @@ def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, ro
             left = stored_energy(row, nodes[0].square, 0.0, slider, from_here)
             mechanics.book_slip(energy.work - worked - left + before, before - unslipped, jumps, energy)
             reached, count, travelled, settled, stays = _piece(
-                row, (count, travelled, settled), slider, from_here, unit, rules, room, energy
+                line, (count, travelled, settled), slider, from_here, unit, rules, room, books
             )
         time += reached
         going = going and reached == slider.length
@@ -555,8 +596,9 @@ def advance_cohorts(inputs, numbers, outputs, draws, share, rules, weight, stret
     rows, energies, pieces, clock, units, work = inputs
     slider, contact, (reached, spent) = mechanics.Slider(*numbers[0]), mechanics.contact_of(numbers), outputs
     rules, most, unit = Rules(*rules), weight.shape[1] + 520, units[mechanics.SLIP]
-    columns, booked, nodes = np.empty(mechanics.COLUMNS), np.empty(mechanics.ENERGIES), np.zeros(3, NODE)
-    row, energy = columns.view(mechanics.ROW)[0], booked.view(ENERGY)[0]
+    both, nodes = (np.empty(2 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES)), np.zeros(3, NODE)
+    line, books = both[0].view(mechanics.ROW), both[1].view(ENERGY)  # as they are, and before the last sub-step
+    columns, booked, row = both[0][: mechanics.COLUMNS], both[1][: mechanics.ENERGIES], line[0]
     room, of_draws = (np.empty((9, most)), np.empty((3, most)), nodes), np.empty((2, draws[4].size))
     has_draws = len(draws[0]) > 0
     for m in range(len(rows)):
@@ -566,10 +608,10 @@ def advance_cohorts(inputs, numbers, outputs, draws, share, rules, weight, stret
             start, stop = stop, mechanics.pieces_to(k, stop, pieces)
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
             now = mechanics.contact_at(contact, clock[k], row)
-            if math.isnan(row.runaway_time):
-                time, going = _through(row, energy, pieces[start:stop], slider, now, unit, left, rules, bonds, room)
+            if not mechanics.has_ended(row):
+                time, going = _through(line, books, pieces[start:stop], slider, now, unit, left, rules, bonds, room)
                 if not going:
-                    mechanics.run_away(row, booked, clock[k, 0] + time)
+                    mechanics.end(row, booked, clock[k, 0] + time, slider)
                 left = 1.0
             mechanics.from_units(columns, booked, rows[m], energies[m], units, work)
             reached[:, k, m], spent[k, m] = rows[m], energies[m]

@@ -70,7 +70,8 @@ def slip_event(row, time, reach, slider, law, contact, nodes, energy):
         _, bound, moment, radius, area, sheared, body = _lacking(sense * high, row, time, slider, law, contact)
         if area >= 0.0:
             break
-        lacks, _, _, row.radius, _, _, _ = _lacking(sense * low, row, time, slider, law, contact)
+        lacks, _, _, last_radius, _, _, _ = _lacking(sense * low, row, time, slider, law, contact)
+        row.radius = last_radius if last_radius > 0.0 else row.radius
         contact = mechanics.later(contact, 0.0, 1.0)
     # in a slip ds the share ds/l of the bonds breaks, stretched by twice the mean: 3/2 n κ M²/(N l) is lost with it
     left, mean = math.exp(-high * law.cuts), sense * row.moment
@@ -102,11 +103,14 @@ def break_all(row, time, brief, slider, law, contact, energy):
     return True
 
 
+#: Changes between stick and slip without any time between them after which there is no solution to go on with.
+_STUCK = 100
+#: Factor between neighbouring speeds at which a balance of forces is looked for.
+_SLOWER = 0.95
 #: Places in a piece at which a slider that sticks is looked at, and halvings that place when it leaves.
 _PLACES, _HALVINGS = 32, 60
-#: Shares of bonds and of a piece beyond which equilibrium is looked for where no sub-step is accepted, and most changes
-#: between stick and slip in a piece.
-_NEXT_TO, _CHANGES = 1e-6, 10_000
+#: Shares of bonds and of a piece beyond which equilibrium is looked for where no sub-step is accepted.
+_NEXT_TO = 1e-6
 #: Turns in which area and stress of a slider at rest settle.
 _FEW_TURNS = 20
 
@@ -153,7 +157,9 @@ def _piece(line, slider, law, contact, nodes, books):
     start, length, row, energy = 0.0, slider.length, line[0], books[0]
     yields, _ = mechanics.compliance(row.radius, slider)
     brittle = law.cuts > 0.0 and slider.viscosity == 0.0 and (slider.mass + slider.damping == 0.0 or yields > 0.0)
-    for _ in range(mechanics.MOST_STEPS):
+    turns, checked = 0, 0.0
+    while turns >= 0:
+        turns, checked = mechanics.judged(turns, checked, start, length)
         left = length - start
         step = mechanics.next_step(row, left, length, math.inf)
         if not step > mechanics.LEAST * length:
@@ -182,7 +188,8 @@ def _piece(line, slider, law, contact, nodes, books):
                 continue
         line[1], books[1] = row, energy
         before, after = accept(row, start, step, slider, law, contact, nodes, energy)
-        if mechanics.misses(before, after, books[1], energy, row, slider, step):
+        is_lost = math.isnan(row.radius)  # at its end the contact has no equilibrium
+        if is_lost or mechanics.misses(before, after, books[1], energy, row, slider, step):
             line[0], books[0], nodes.last_step, row.next_step = line[1], books[1], 0.0, 0.25 * step
             continue
         row.next_step = ahead
@@ -242,44 +249,73 @@ def _rest(row, start, settles, slider, law, contact, energy):
 
 
 @device
+def _unbalanced(speed, row, time, slider, law, contact):
+    """Return the resistance of a body without mass at a speed less the pull, and its slope over the speed."""
+    damping, viscosity = slider.damping, slider.viscosity
+    share = row.bound * radau.share_left(law.sense * speed, law)
+    _, area, by_bound, by_moment = mechanics.area_or_last(share, share, time, row, contact)
+    bears = damping + area * viscosity
+    slope = bears - law.slows * share * share * (area + (by_bound + by_moment) * (share + viscosity * speed))
+    return bears * speed + area * share - math.fabs(row.spring_force), slope
+
+
+@device
 def _jump(row, time, slider, law, contact):
     """Return the speed at which a body without mass begins to slip: the highest in balance with the pull.
 
-    Newton's method from above: friction is convex in the speed.
+    Newton's method from above, because friction is convex in the speed at constant area. Bonds that carry adhesion
+    change the area with the speed. The balance is then bracketed if a step goes past it, or if resistance falls with
+    the speed.
     """
-    damping, viscosity = slider.damping, slider.viscosity
-    pull, speed = math.fabs(row.spring_force), 0.0
     _, area, _, _ = mechanics.area_or_last(0.0, 0.0, time, row, contact)
-    if not damping + area * viscosity > 0.0:  # an open contact
+    bears = slider.damping + area * slider.viscosity
+    if not bears > 0.0:  # an open contact
         return 0.0
-    speed = pull / (damping + area * viscosity)
+    speed = high = math.fabs(row.spring_force) / bears
     for _ in range(100):
-        share = row.bound * radau.share_left(law.sense * speed, law)
-        _, area, by_bound, by_moment = mechanics.area_or_last(share, share, time, row, contact)
-        bears = damping + area * viscosity
-        slope = bears - law.slows * share * share * (area + (by_bound + by_moment) * (share + viscosity * speed))
-        change = (bears * speed + area * share - pull) / slope
-        if not (slope > 0.0 and change > 1e-15 * speed):
+        over, slope = _unbalanced(speed, row, time, slider, law, contact)
+        if math.fabs(over) <= 1e-15 * speed * math.fabs(slope):
+            return speed
+        if over < 0.0 or not slope > 0.0:
             break
-        speed = max(speed - change, 0.0)
-    return speed
+        high, speed = speed, max(speed - over / slope, 0.0)
+    return _below(high, row, time, slider, law, contact)
+
+
+@device
+def _below(high, row, time, slider, law, contact):
+    """Return the highest speed below another one at which the resistance of a body without mass equals the pull."""
+    while _unbalanced(high, row, time, slider, law, contact)[0] < 0.0:
+        high *= 2.0
+    low = _SLOWER * high
+    while low > 0.0 and _unbalanced(low, row, time, slider, law, contact)[0] > 0.0:
+        high, low = low, _SLOWER * low
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if _unbalanced(middle, row, time, slider, law, contact)[0] > 0.0:
+            high = middle
+        else:
+            low = middle
+    return high
 
 
 @device
 def _slide(line, start, slider, along, contact, nodes, books):
-    """Slip until the speed comes to zero or the piece ends. Return the time reached; negative without a solution."""
+    """Slip until the speed comes to zero or the piece ends. Return the time reached, and False without a solution."""
     length, row, energy = slider.length, line[0], books[0]
-    for _ in range(mechanics.MOST_STEPS):
+    turns, checked = 0, start
+    while turns >= 0:
+        turns, checked = mechanics.judged(turns, checked, start, length)
         left = length - start
         step = mechanics.next_step(row, left, length, math.inf)
         if not step > mechanics.LEAST * length:
             row.next_step = 0.0
-            left = row.bound * (1.0 - _NEXT_TO), start + _NEXT_TO * length
-            _, area, _, _ = mechanics.contact_area(left[0], row.moment, left[1], row.radius, contact)
+            bound, later = row.bound * (1.0 - _NEXT_TO), start + _NEXT_TO * length
+            _, area, _, _ = mechanics.contact_area(bound, row.moment, later, row.radius, contact)
             if not area >= 0.0:  # lost: the radius stays for the rest of the clock step
                 contact = mechanics.later(contact, 0.0, 1.0)
                 continue
-            return start if slider.mass == 0.0 or row.speed == 0.0 else -1.0
+            return start, slider.mass == 0.0 or row.speed == 0.0
         contact = mechanics.following(contact, row, start, step)
         grows, accepted = try_sub_step(row, start, step, slider, along, contact, nodes)
         if not accepted:
@@ -293,7 +329,8 @@ def _slide(line, start, slider, along, contact, nodes, books):
             continue
         line[1], books[1] = row, energy
         before, after = accept(row, start, step, slider, along, contact, nodes, energy)
-        if mechanics.misses(before, after, books[1], energy, row, slider, step):
+        is_lost = math.isnan(row.radius)  # at its end the contact has no equilibrium
+        if is_lost or mechanics.misses(before, after, books[1], energy, row, slider, step):
             line[0], books[0], nodes.last_step, row.next_step = line[1], books[1], 0.0, 0.25 * step
             continue
         row.next_step = max(row.next_step, step * grows) if step == left else step * grows
@@ -301,28 +338,24 @@ def _slide(line, start, slider, along, contact, nodes, books):
         if stops:
             row.speed, row.body_speed = 0.0, 0.0
         if stops or start >= length:
-            return start
-    return -1.0
+            return start, True
+    return start, False
 
 
 @device
 def _sticking_piece(line, slider, law, contact, nodes, books):
     """Go through one piece with bonds that bear any pull up to their strength at rest. Return the time reached."""
     start, length, row, energy = 0.0, slider.length, line[0], books[0]
-    stuck, sense = 0, 0.0
-    for _ in range(_CHANGES):
-        if start >= length:
-            return length
+    sense, going, stuck, turns, checked = 0.0, True, 0, 0, 0.0
+    while going and start < length and turns >= 0 and stuck <= _STUCK:
+        turns, checked = mechanics.judged(turns, checked, start, length)
+        before = start
         contact, rests = mechanics.feeling(contact, row), row.speed == 0.0
         if rests:
-            before = start
             settles = sense * row.spring_force > 0.0
             start = _rest(row, start, settles, slider, law, contact, energy)
             if start >= length:
-                return length
-            stuck = stuck + 1 if start == before else 0
-            if stuck > 100:
-                return start
+                break
         sense = math.copysign(1.0, row.spring_force if rests else row.speed)
         along = mechanics.Law(law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows)
         if rests:
@@ -330,12 +363,11 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
             row.speed, row.body_speed, nodes.last_step = speed, speed, 0.0  # no guess from the slip before
             row.bound *= radau.share_left(speed, along)
             row.moment = sense * row.bound
-        start = _slide(line, start, slider, along, contact, nodes, books)
-        if start < 0.0:
-            return 0.0
-        if start < length:
+        start, going = _slide(line, start, slider, along, contact, nodes, books)
+        if going and start < length:
             row.speed = row.body_speed = 0.0
-    return start
+        stuck = stuck + 1 if start == before else 0
+    return length if start >= length else start
 
 
 @device
@@ -401,10 +433,10 @@ def advance_rows(inputs, numbers, outputs, draws):
             if law.sense != 0.0:
                 row.moment = math.copysign(row.bound, row.speed) if row.speed != 0.0 else 0.0
             now = mechanics.contact_at(contact, clock[k], row)
-            if math.isnan(row.runaway_time):
+            if not mechanics.has_ended(row):
                 time, going = _clock_step(line, slider, law, now, pieces[start:stop], nodes[0], books)
                 if not going:
-                    mechanics.run_away(row, booked, clock[k, 0] + time)
+                    mechanics.end(row, booked, clock[k, 0] + time, slider)
             mechanics.from_units(columns, booked, rows[m], energies[m], units, work)
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
             if has_draws:

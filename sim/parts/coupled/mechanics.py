@@ -9,13 +9,14 @@ from sim.parts.exchange import Array, FieldLaw, record
 from sim.parts.shear.process import remembered, unsteadiness
 
 #: Row of slider and bonds: spring force S, speed of the body, u, N, M, speed of the interface, displacement of the
-#: body, slip and path of the clock step, contact radius, next sub-step, number of sub-steps, time of a runaway,
-#: acceleration of the interface. Then ``Memory``, and the path of the clock step up to which it reaches; the share of
-#: ΔΓ that adhesion pays, the energy it pays in the sub-steps, and that after the draw at the start of the clock step.
-#: Last the work since the start of the run, the energy that is missing, and the time: at the start of the clock step.
+#: body, slip and path of the clock step, contact radius, next sub-step, number of sub-steps, times at which stability
+#: was lost and from which on the motion is not resolved, acceleration of the interface. Then ``Memory``, and the path
+#: of the clock step up to which it reaches; the share of ΔΓ that adhesion pays, the energy it pays in the sub-steps,
+#: and that after the draw at the start of the clock step. Last the work since the start of the run, the energy that
+#: is missing, and the time: at the start of the clock step.
 ROW = record(
     "spring_force body_speed sheared bound moment speed position slip path radius "
-    "next_step substeps runaway_time acceleration "
+    "next_step substeps runaway_time unresolved_time acceleration "
     "weight mean spread renewed energy recalled paid felt drawn worked missed elapsed"
 )
 COLUMNS = len(ROW.names or ())
@@ -167,8 +168,10 @@ def contact_area(bound, moment, time, radius, contact):
 
 @device
 def compliance(radius, slider):
-    """Return 1/k_t of the contact and its slope over the radius; 0 for an open one."""
-    if slider.yielding_radius == 0.0 or not radius > 0.0:
+    """Return 1/k_t of the contact and its slope over the radius; both are 0 if it is open, as nothing shears it."""
+    if not radius > 0.0:
+        return 0.0, 0.0
+    if slider.yielding_radius == 0.0:
         return slider.yielding, 0.0
     return slider.yielding + slider.yielding_radius / radius, -slider.yielding_radius / (radius * radius)
 
@@ -214,7 +217,8 @@ LEAST = 1e-13
 _MOST_SLID, _STEADY, _NO_TIME = 0.5, 1e-3, 1e-6
 #: Share of the error of the last estimates of ΔΓ that a sub-step corrects, over its part of the memory.
 _CORRECTED = 4.0
-MOST_STEPS = 2_000_000
+#: Turns after which the progress of a loop over sub-steps is judged, and the share of a piece that is too little then.
+_TURNS, _PROGRESS = 2_000_000, 1e-4
 
 
 @device
@@ -363,6 +367,18 @@ def displace(row, slip, body, slider):
 
 
 @device
+def judged(turns, checked, start, length):
+    """Return the turns of a loop over sub-steps since its progress was judged, and the time reached then.
+
+    The number of sub-steps in a piece has no limit. The turns are negative if the loop hardly advances: at its pace a
+    piece would take more than ``_TURNS / _PROGRESS`` turns, which is some hours, or for ever.
+    """
+    if turns < _TURNS:
+        return turns + 1, checked
+    return (0 if start - checked > _PROGRESS * length else -1), start
+
+
+@device
 def pieces_to(step, start, pieces):
     """Return the end of the pieces of a clock step that begin at ``start``."""
     stop = start
@@ -402,9 +418,24 @@ def from_units(columns, spent, state, totals, units, work):
 
 
 @device
-def run_away(row, spent, time):
-    """End a row that has lost stability; bonds and contact stay as they are."""
-    row.runaway_time, row.position, row.speed, row.body_speed = time, math.nan, math.nan, math.nan
+def has_ended(row):
+    """True if the motion of a row has lost stability or is not resolved any longer."""
+    return not (math.isnan(row.runaway_time) and math.isnan(row.unresolved_time))
+
+
+@device
+def end(row, spent, time, slider):
+    """End the motion of a row at a time; bonds and contact stay as they are.
+
+    A slider loses stability only under a prescribed force, and only if neither mass, damping nor the viscosity of a
+    closed contact limits its speed. In all other scenes the equations have a solution, which has not been found.
+    """
+    is_limited = slider.mass + slider.damping > 0.0 or (slider.viscosity > 0.0 and row.radius > 0.0)
+    if slider.forced > 0.0 and not is_limited:
+        row.runaway_time = time
+    else:
+        row.unresolved_time = time
+    row.position, row.speed, row.body_speed = math.nan, math.nan, math.nan
     spent[:] = math.nan
 
 
@@ -543,6 +574,22 @@ def book_slip(lost, by_area, jumps, energy):
 
 
 @device
+def _come_off(row, slider):
+    """Slip at once at an open contact to where no force acts on the interface; True if anything stops the body.
+
+    Mass and damping hold the body, a spring without them pulls it to where the spring is relaxed.
+    """
+    is_held = slider.mass + slider.damping > 0.0
+    if not is_held and slider.stiffness == 0.0:
+        return row.spring_force == 0.0
+    slip, body = free_shifts(row, slider)
+    row.moment += row.bound * slip
+    row.sheared = 0.0
+    displace(row, slip, body, slider)
+    return True
+
+
+@device
 def elastic(row, time, slider, contact, energy):
     """Slip at once where the area or the force has jumped and neither mass, damping nor viscosity delays it.
 
@@ -552,7 +599,9 @@ def elastic(row, time, slider, contact, energy):
     stiffness, forced, held_back = slider.stiffness, slider.forced, slider.mass + slider.damping > 0.0
     yields, _ = compliance(row.radius, slider)
     row.spring_force = driven(time, slider)[1] if forced > 0.0 else row.spring_force
-    if slider.viscosity > 0.0 and row.radius > 0.0:
+    if not row.radius > 0.0:
+        return _come_off(row, slider)
+    if slider.viscosity > 0.0:
         if forced > 0.0 or slider.yielding_radius > 0.0:
             row.radius, _, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
             yields, _ = compliance(row.radius, slider)

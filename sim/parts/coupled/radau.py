@@ -355,8 +355,9 @@ def error_of(row, start, step, slider, law, contact, nodes):
         error = max(error, math.fabs(row.sheared + body - slip - sheared) / law.scale)
     stiffest = max(stiffness, mechanics.stiffness_of(radius, slider))
     firm = max(1.0, stiffest / (area * (bound + mechanics.SOME))) if mass > 0.0 and area > 0.0 else 1.0
-    # an open contact bears nothing: then what is missing from the spring counts
-    error = max(error, firm * math.fabs(balance) / (bears if bears > 0.0 else stiffness) / law.scale)
+    # an open contact or the last bonds bear next to nothing: then the force that is missing displaces the spring
+    bears += stiffness * mechanics.FEW / (area * bound + mechanics.FEW)
+    error = max(error, firm * math.fabs(balance) / bears / law.scale) if bears > 0.0 else error
     return max(error, firm * step * math.fabs(going - pace) / law.scale) if mass > 0.0 else error
 
 
@@ -442,6 +443,9 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
     row.sheared += nodes.sheared[2]
     row.bound = min(row.bound + nodes.bound[2], 1.0)
     row.moment += nodes.moment[2]
+    if law.binding == 0.0 and law.sense == 0.0 and row.bound < mechanics.FEW:  # the last bonds, which none replaces
+        energy.rupture += 0.5 * nodes.areas[2] * row.moment * row.moment / row.bound if row.bound > 0.0 else 0.0
+        row.bound, row.moment = 0.0, 0.0
     row.position += nodes.slip[2] + nodes.sheared[2]
     row.slip += nodes.slip[2]
     row.substeps += 1.0

@@ -32,6 +32,8 @@ _BALANCED, _STEADY = 1e-14, 1e-9
 _LAST_TURN = 1e-5
 #: Turns in which a node or an event is found, and trials of a sub-step.
 _TURNS, _TRIALS = 20, 200
+#: Turns beyond one for each site in which forces are balanced at once.
+_SETTLING = 1000
 #: Share of a sub-step before its end in which an event is at the end.
 _NEAR = 1e-8
 
@@ -87,7 +89,7 @@ def _same(node, bound, total):
 def _rebalance(line, time, tracks, slider, contact, ground, energy, node):
     """Slip at once to where bonds bear the pull, as far as nothing delays it; True if there is such a place."""
     row, trial, worked, unit, limit = line[0], line[2], energy.work, ground.unit, ground.law[2]
-    for _ in range(mechanics.MOST_STEPS):
+    for _ in range(_SETTLING + int(ground.sites)):  # each turn but the last ones breaks a bond
         energy.work = worked
         _sums(tracks, ground, node)
         row.bound, row.moment = node.bound, node.moment
@@ -128,7 +130,7 @@ def _try(nodes, at_start, start, step, row, slider, contact):
     still be a speed.
     """
     for place in (1, 2):
-        approach = before_node(place, nodes, at_start, start, step, row, slider)
+        approach = before_node(place, nodes, at_start, start, step, 1.0, row, slider)
         before, after = nodes[place - 1], nodes[place]
         shift, bound, is_solved = approach.slip, before.bound, False
         for turn in range(_TURNS):
@@ -287,7 +289,9 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
     start, length, unit, law = 0.0, slider.length, ground.unit, ground.law
     row, energy, first, last = line[0], books[0], nodes[0], nodes[2]
     is_closed = _is_closed(slider, contact, law[2])
-    for _ in range(mechanics.MOST_STEPS):
+    turns, checked = 0, 0.0
+    while turns >= 0:
+        turns, checked = mechanics.judged(turns, checked, start, length)
         left = length - start
         if left <= mechanics.LEAST * length:
             return length, contact.stays
@@ -311,7 +315,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
                         return start, contact.stays
                 continue
         step = mechanics.next_step(row, left, length, math.inf)
-        whole, bend, grows, cut, turns = step, 0.0, 0.0, False, 0
+        whole, bend, grows, cut, cuts = step, 0.0, 0.0, False, 0
         for _ in range(_TRIALS):
             if not step > mechanics.LEAST * length:
                 break
@@ -320,7 +324,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
                 step, cut = 0.25 * step, False
                 continue
             within = mechanics.within_reach(last.slip, step, row, contact)
-            bend, error = bend_of(nodes, step, row, slider)
+            bend, error = bend_of(nodes, step, 1.0, row, slider)
             grows = min(4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else 4.0
             grows = min(grows, 0.9 * within)
             if not (error <= 1.0 and within >= 1.0):
@@ -328,8 +332,8 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
                 continue
             whole = step if not cut else whole
             soon = tracked.next_event(tracks, last.slip * unit / step, whole, law, ground.winners)
-            if turns < _TURNS and (soon < (1.0 - _NEAR) * step or (cut and soon > step)):
-                cut, turns = soon < whole, turns + 1
+            if cuts < _TURNS and (soon < (1.0 - _NEAR) * step or (cut and soon > step)):
+                cut, cuts = soon < whole, cuts + 1
                 step = min(max(soon * (1.0 + 0.5 * _NEAR), 2.0 * mechanics.LEAST * length), whole)
                 continue
             break
@@ -427,11 +431,11 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
         for k in range(len(clock)):
             start, stop = stop, mechanics.pieces_to(k, stop, pieces)
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
-            if math.isnan(line[0].runaway_time):
+            if not mechanics.has_ended(line[0]):
                 now = mechanics.contact_at(contact, clock[k], line[0])
                 time, going = _through(line, books, pieces[start:stop], slider, now, bonds, ground, nodes)
                 if not going:
-                    mechanics.run_away(line[0], booked, clock[k, 0] + time)
+                    mechanics.end(line[0], booked, clock[k, 0] + time, slider)
             mechanics.from_units(columns, booked, rows[m], energies[m], units, work)
             reached[:, k, m], spent[k, m], frames[k, m] = rows[m], energies[m], frame[m]
         stamp[m] = np.int64(frame[m, tracked.STEPS])
