@@ -75,7 +75,7 @@ lint: $(STAMP)
 	$(BIN)/ruff check --preview --select PLW1514 sim
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python docs/readability.py --check
+	$(BIN)/python docs/readability.py
 
 # uv installs in a tenth of pip's time. Without uv, pip installs it into the environment first. If uv fails, such as
 # behind a mirror that pip alone knows, pip installs all.

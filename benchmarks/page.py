@@ -42,7 +42,7 @@ def text(results: dict[str, Any]) -> str:
     """The page."""
     machines = sorted({f"{group['date']}, {group['machine']}" for group in results.values()})
     lines = [TITLE, "Measured: ", "; ".join(machines), ".\n\n"]
-    lines += [f"| {' | '.join(cells)} |\n" for cells in (HEADINGS, ["---"] * len(HEADINGS))]
+    lines += [f"| {' | '.join(line)} |\n" for line in (HEADINGS, ["---"] * len(HEADINGS))]
     lines += [f"| {' | '.join(cells(row))} |\n" for row in rows_of(results)]
     return "".join([*lines, END])
 

@@ -7,6 +7,8 @@ import math
 import re
 import shlex
 import shutil
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -55,6 +57,21 @@ def anchors(page):
     """The anchors that a code host gives to the headings of a page."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.M)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_sentences_above_35_words_are_listed_and_no_text_is_a_fault(tmp_path):
+    (tmp_path / "docs").mkdir()
+    script = tmp_path / "docs" / "readability.py"
+    script.write_bytes((ROOT / "docs" / "readability.py").read_bytes())
+    page = f"Long {'word ' * 34}end. Short {'word ' * 33}end. {'Many sentences. ' * 20_000}"
+    (tmp_path / "README.md").write_text(page)
+    (tmp_path / "CONTRIBUTING.md").write_text("# A heading alone")
+    (tmp_path / "sim").mkdir()
+    (tmp_path / "sim" / "module.py").write_text('"""What opens as a question."""')
+    printed = subprocess.run([sys.executable, script], capture_output=True, encoding="utf-8", check=True).stdout
+    assert "README.md, 36 words: Long word" in printed
+    assert "Short" not in printed
+    assert "question word: What opens" in printed
 
 
 def test_links_between_pages_lead_to_files_and_headings():

@@ -115,3 +115,28 @@ def test_nothing_imports_in_a_circle_benchmarks_and_tests_included():
     graph = {f"sim.{name}": path for name, path in MODULES.items()} | BESIDE
     # raises a CycleError that names the circle
     assert tuple(TopologicalSorter({name: imports(path) for name, path in graph.items()}).static_order())
+
+
+def names(node, context):
+    return {part.id for part in ast.walk(node) if isinstance(part, ast.Name) and isinstance(part.ctx, context)}
+
+
+def comprehensions(node):
+    """The comprehensions of a function that are in no other one."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.ListComp | ast.SetComp | ast.DictComp):
+            yield child
+        else:
+            yield from comprehensions(child)
+
+
+def test_a_variable_of_a_comprehension_is_no_function_that_another_one_calls():
+    # CPython 3.12.1 takes such a function for a local variable without a value
+    for path in (*MODULES.values(), *BESIDE.values()):
+        functions = {node.name for node in tree(path).body if isinstance(node, ast.FunctionDef)}
+        for node in tree(path).body:
+            variables, reads = set(), set()
+            for inner in comprehensions(node):
+                variables |= names(inner, ast.Store)
+                reads |= names(inner, ast.Load) - names(inner, ast.Store)
+            assert not functions & variables & reads, f"{path.name}, line {node.lineno}"

@@ -64,9 +64,9 @@ def variables(path):
 
 
 @on_linux
-def test_the_emulated_system_hides_its_names_from_the_package_alone():
+def test_the_emulated_system_hides_its_names_from_the_package_alone(tmp_path):
     program = """
-import os, signal
+import os, pathlib, signal
 for name in ("sim.somewhere", "elsewhere"):
     for text in ("import fcntl", "os.fork", "os.getuid", "signal.SIGHUP"):
         try:
@@ -78,12 +78,21 @@ try:
     os.open(".", os.O_RDONLY)
 except PermissionError:
     print("folders are refused")
+for name in ("sim.somewhere", "filelock._native", "elsewhere"):
+    with open(path := name + ".held", "wb"):
+        try:
+            exec("pathlib.Path(path).unlink()", {"__name__": name, "pathlib": pathlib, "path": path})
+            print(name, "removes")
+        except PermissionError:
+            print(name, "does not remove")
+print(getattr(os, "process_cpu_count", os.cpu_count)() > 0)
 """
     environment = {**os.environ, "PYTHONPATH": str(ELSEWHERE)}
     printed = subprocess.run(
-        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+        [sys.executable, "-c", program], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
     )
     seen = ["sim.somewhere does not see"] * 4 + ["elsewhere sees"] * 4 + ["folders are refused"]
+    seen += ["sim.somewhere does not remove", "filelock._native removes", "elsewhere does not remove", "True"]
     assert printed.stdout.splitlines() == seen
 
 

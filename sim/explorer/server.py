@@ -25,6 +25,7 @@ from starlette.exceptions import HTTPException as Refused
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.types import Receive, Scope, Send
 
+from sim.explorer.connection import Connection
 from sim.explorer.drawing import contact
 from sim.explorer.page import Page, Refused as BadValues
 from sim.scenario.scenario import Scenario
@@ -254,6 +255,15 @@ def state_of(link: str, page: Page) -> str:
     return urlencode(words)
 
 
+def _import_answers() -> None:
+    """Import the modules that the first answers need, one after the other.
+
+    Imports compile sources, and CPython 3.11 raises a SystemError if several threads convert syntax trees at once.
+    """
+    for name in ("scipy.optimize", "sim.explorer.job"):
+        importlib.import_module(name)
+
+
 class _Stopping(uvicorn.Server):
     """A server that ends the jobs of its application when it is stopped, so that it need not wait for their readers."""
 
@@ -295,14 +305,12 @@ class Server:
         application = Guarded(page, self.port, framed)
         self.address = f"http://127.0.0.1:{self.port}/#token={application.token}" + f"&{numbers}" * bool(numbers)
         options: Any = {"proxy_headers": False, "server_header": False, "ws": "none", "access_log": False}
-        options |= {"log_level": "error", "lifespan": "off", "timeout_graceful_shutdown": 1}
+        options |= {"log_level": "error", "lifespan": "off", "timeout_graceful_shutdown": 1, "http": Connection}
         self._server = _Stopping(uvicorn.Config(application, **options))
 
     def run(self) -> None:
         """Serve until the process is interrupted."""
-        # the modules of an answer are imported while the browser starts
-        for name in ("scipy.optimize", "sim.explorer.job"):
-            threading.Thread(target=importlib.import_module, args=[name], daemon=True).start()
+        threading.Thread(target=_import_answers, daemon=True).start()  # while the browser starts
         with self._socket, contextlib.suppress(KeyboardInterrupt):
             self._server.run([self._socket])
 

@@ -1,10 +1,14 @@
 """The server of ``sim explore``: who gets an answer, and who does not."""
 
 import contextlib
+import functools
 import http.client
 import json
+import logging
 import os
 import socket
+import sys
+import threading
 import time
 import tomllib
 
@@ -53,8 +57,8 @@ def request(server, method="POST", path="/curves", body=b"{}", headers=(), host=
         connection.endheaders()
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):  # of a body that is refused before its end
             connection.send(body or b"")
-        answer = connection.getresponse()
-        return answer.status, answer.read()
+        with connection.getresponse() as answer:  # which holds the socket of a connection that the server ends
+            return answer.status, answer.read()
 
 
 def good(token, **changes):
@@ -126,6 +130,95 @@ def test_other_paths_have_nothing(server, token, path):
         assert request(server, method, path, b"{}", good(token))[0] in (400, 403, 405)
 
 
+REFUSED = {
+    "no host": ("", 400), "two hosts": ("Host: {host}\r\nHost: x\r\n", 400),
+    "no header": ("Host: {host}\r\nno header\r\n", 400), "long": ("X: " + "x" * 100_000 + "\r\n", 400),
+    "another host, closed": ("Host: x\r\nConnection: close\r\n", 403),
+    "no token, closed": ("Host: {host}\r\nConnection: close\r\n", 403),
+    "too large, closed": ("Host: {host}\r\n{token}Connection: close\r\n", 413),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("lines", "status"), REFUSED.values(), ids=REFUSED)
+def test_a_refusal_is_read_although_its_request_was_not(server, token, lines, status):
+    own = "".join(f"{name}: {value}\r\n" for name, value in good(token))
+    lines = lines.replace("{host}", f"127.0.0.1:{server.port}").replace("{token}", own)
+    head = f"POST /curves HTTP/1.1\r\n{lines}Content-Length: {HUGE}\r\n\r\n"
+    with socket.create_connection(("127.0.0.1", server.port), timeout=30) as connection:
+        connection.sendall(head.encode() + b"x" * HUGE)  # of which the server reads 256 KiB at once
+        answer = b"".join(iter(functools.partial(connection.recv, 65536), b""))
+    assert answer.startswith(f"HTTP/1.1 {status} ".encode())
+
+
+@pytest.fixture
+def log(caplog):
+    """The log, with that of the server, which hands nothing on to other loggers."""
+    logger = logging.getLogger("uvicorn.error")
+    logger.addHandler(caplog.handler)
+    yield caplog
+    logger.removeHandler(caplog.handler)
+
+
+@pytest.mark.parametrize("host", ["{host}", "x"])
+@pytest.mark.parametrize("wait", [False, True])
+def test_a_body_that_is_no_http_ends_in_one_refusal_without_a_trace(server, token, host, wait, log):
+    own = "".join(f"{name}: {value}\r\n" for name, value in good(token))
+    head = f"POST /curves HTTP/1.1\r\nHost: {host.format(host=f'127.0.0.1:{server.port}')}\r\n{own}"
+    with socket.create_connection(("127.0.0.1", server.port), timeout=30) as connection:
+        head += "Transfer-Encoding: chunked\r\n\r\n"
+        connection.sendall(head.encode() + b"no length\r\n" * (not wait))
+        if wait:
+            time.sleep(0.2)  # the application has begun, or has refused
+            connection.sendall(b"no length\r\n")
+        answer = b"".join(iter(functools.partial(connection.recv, 65536), b""))
+    assert answer.count(b"HTTP/1.1 4") == 1
+    assert asked(server, token)["speed"]
+    assert not log.records
+
+
+def test_a_reader_that_stays_after_a_refusal_is_left_after_a_time(server):
+    with socket.create_connection(("127.0.0.1", server.port), timeout=30) as connection:
+        connection.sendall(b"POST / HTTP/1.1\r\n\r\n")
+        assert b"".join(iter(functools.partial(connection.recv, 65536), b"")).startswith(b"HTTP/1.1 400 ")
+
+        def is_reset():
+            try:
+                connection.sendall(b"x")
+            except (ConnectionError, OSError):
+                return True
+            return False
+
+        assert not is_reset()
+        assert until(is_reset)
+
+
+def test_modules_are_imported_in_one_thread_beside_the_server(monkeypatch):
+    threads, started = [], threading.Thread.start
+    monkeypatch.setattr(threading.Thread, "start", lambda thread: (threads.append(thread), started(thread)))
+    server = Server(sim.load(_scene()))
+    server.close()  # before it begins: it ends at once
+    server.run()
+    for thread in threads:
+        thread.join(timeout=60)
+    assert len(threads) == 1
+    assert {"scipy.optimize", "sim.explorer.job"} <= sys.modules.keys()
+
+
+def test_a_server_that_stops_waits_for_no_reader(log):
+    server = Server(sim.load(_scene()))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    connect = functools.partial(socket.create_connection, ("127.0.0.1", server.port), timeout=30)
+    with connect() as idle, connect() as refused:
+        idle.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n".encode())
+        refused.sendall(b"POST / HTTP/1.1\r\n\r\n")
+        assert idle.recv(9) == refused.recv(9) == b"HTTP/1.1 "
+        server.close()
+        thread.join(timeout=30)
+    assert not thread.is_alive()
+    assert not log.records
+
+
 def test_answers_are_not_for_get(server, token):
     for path in ("/start", "/curves", "/run", "/toml"):
         assert request(server, "GET", path, None, good(token))[0] == 403
@@ -171,11 +264,12 @@ def test_a_body_in_pieces_without_an_end_is_cut(server, token):
 
 
 def test_all_answers_forbid_other_scripts_frames_and_addresses(server, token):
-    connection = http.client.HTTPConnection("127.0.0.1", server.port)
-    connection.request("GET", "/")
-    policy = connection.getresponse().getheader("Content-Security-Policy")
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=30)
+    with contextlib.closing(connection):
+        connection.request("GET", "/")
+        with connection.getresponse() as answer:
+            policy = answer.getheader("Content-Security-Policy")
     assert "default-src 'none'" in policy and "script-src 'self';" in policy and "frame-ancestors 'none'" in policy
-    connection.close()
 
 
 def test_the_server_is_bound_to_this_machine_alone_and_a_port_is_taken_once(server):
@@ -203,11 +297,12 @@ def begun(server, token, **table):
     head += f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
     end = time.monotonic() + 30.0
     while time.monotonic() < end:
-        connection = socket.create_connection(("127.0.0.1", server.port), timeout=60)
-        connection.sendall(head.encode() + body)
-        if connection.recv(100).startswith(b"HTTP/1.1 200"):
-            return connection
-        connection.close()
+        with contextlib.ExitStack() as stack:
+            connection = stack.enter_context(socket.create_connection(("127.0.0.1", server.port), timeout=60))
+            connection.sendall(head.encode() + body)
+            if connection.recv(100).startswith(b"HTTP/1.1 200"):
+                stack.pop_all()
+                return connection
     raise AssertionError("no job began")
 
 

@@ -12,6 +12,7 @@ import signal
 import stat
 import sys
 import tempfile
+import types
 from pathlib import Path
 
 HIDDEN_MODULES = {"fcntl", "resource", "pwd", "grp", "termios"}
@@ -21,21 +22,34 @@ HIDDEN_NAMES = {
 }
 
 
+def _package(frame):
+    """Return the name of the package whose code runs in a frame."""
+    return frame.f_globals.get("__name__", "").split(".")[0]
+
+
 def _asks(depth):
     """True if the package asks, and not a library."""
-    return sys._getframe(depth + 1).f_globals.get("__name__", "").split(".")[0] == "sim"
+    return _package(sys._getframe(depth + 1)) == "sim"
+
+
+def _is_of_a_lock():
+    """True if filelock asks, which removes files of its own while it holds them open, but on Linux alone."""
+    frame = sys._getframe(2)
+    while frame and _package(frame) not in ("sim", "filelock"):
+        frame = frame.f_back
+    return bool(frame) and _package(frame) == "filelock"
 
 
 def _hide(module, names):
-    """Move names of a module out of the sight of the package."""
-    values = {name: vars(module).pop(name) for name in names if hasattr(module, name)}
+    """Hide names of a module from the package; the module itself and libraries use them."""
 
-    def found(name):
-        if name in values and not _asks(1):
-            return values[name]
-        raise AttributeError(f"module {module.__name__!r} has no attribute {name!r}")
+    class Hidden(types.ModuleType):
+        def __getattribute__(self, name):
+            if name in names and _asks(1):
+                raise AttributeError(f"module {module.__name__!r} has no attribute {name!r}")
+            return super().__getattribute__(name)
 
-    module.__getattr__ = found
+    module.__class__ = Hidden
 
 
 def _import(name, *arguments, real=builtins.__import__, **keywords):
@@ -64,7 +78,7 @@ def _refusing(real, places):
     """A function of os that refuses paths, at some places of its arguments, which a process has open."""
 
     def refuse(*arguments, **keywords):
-        for path in arguments[:places]:
+        for path in arguments[:places] if not _is_of_a_lock() else ():
             if keywords.get("dir_fd") is None and isinstance(path, str | os.PathLike) and _held(path):
                 raise PermissionError(13, "The file is used by another process", str(path))
         return real(*arguments, **keywords)
