@@ -38,6 +38,12 @@ class Refused(ValueError):
     """A file that is not read; the message gives the reason, not its name."""
 
 
+class Damaged(RuntimeError):
+    """A variable whose bytes do not match their checksum, or cannot be unpacked."""
+
+    exit_code = 2
+
+
 def opened(path: str | os.PathLike[str]) -> netCDF4.Dataset:
     """Open a netCDF file for reading.
 
@@ -64,7 +70,7 @@ def readable() -> Iterator[None]:
     """Turn every error of the libraries about a damaged file into ``Refused``."""
     try:
         yield
-    except Refused:
+    except (Refused, Damaged):
         raise
     except (OSError, RuntimeError, ValueError, ArithmeticError, AttributeError, LookupError, TypeError):
         raise Refused(BROKEN) from None
