@@ -43,6 +43,8 @@ _RECORDED = {
     *get_args(Recorded), "t", MEMBERS, "slip", "phase", "phase_start", "phase_end", "shear_map", "map_member",
     "map_time", "x", "y", "jkr_pull_off_load", "error_speed", "member_spread_area",
 }  # fmt: skip
+#: Numbers on slip events, which are recorded together unless a scenario chooses some.
+_SLIPS = [name for name in get_args(Recorded) if name.startswith(("slip_", "late_"))]
 #: Names of systematic errors.
 _ERRORS = re.compile("(cell|banded|step)_error_")
 _DIMENSIONS = ("t", "slip", "phase", "late", "map_member", "map_time", "x", "y")
@@ -113,6 +115,9 @@ def _fault(dataset: xr.Dataset) -> str:
     fixed = [key for key in numbers if key.partition(".")[0] not in whole and not key.startswith(tuple(swept))]
     keys = {key.replace(".", "_") for key in (*numbers, *swept)}
     for name in ("t", *_DERIVED, *(key.replace(".", "_") for key in fixed)):
+        if name not in dataset.variables:
+            return f"lacks the numbers {name}"
+    for name in _SLIPS if "slip_time" in dataset and not (scenario.get("record") or {}).get("quantities") else ():
         if name not in dataset.variables:
             return f"lacks the numbers {name}"
     if dataset.variables["t"].dims != ("t",):
