@@ -31,6 +31,23 @@ _STATEMENTS = {
 }  # fmt: skip
 #: A missing variable in the words of xarray, without the ending of a statistic.
 _MISSING = re.compile(r"(?:^|named ')(\w+?)(?:_mean|_std|_sem)?(?:'|$)")
+#: Ending of a statistic of the members in the name of a variable.
+_STATISTIC = re.compile("_(mean|std|sem|count)$")
+#: Numbers that every run derives from its scenario.
+_DERIVED = (
+    "contact_modulus", "effective_shear_modulus", "effective_poisson_ratio", "has_noise", "radius_at_rest",
+    "radius_without_adhesion",
+)  # fmt: skip
+#: Other numbers of a run, and the dimensions that a run has beside those of its sweep.
+_RECORDED = {
+    *get_args(Recorded), "t", MEMBERS, "slip", "phase", "phase_start", "phase_end", "shear_map", "map_member",
+    "map_time", "x", "y", "jkr_pull_off_load", "error_speed", "member_spread_area",
+}  # fmt: skip
+#: Numbers on slip events, which are recorded together unless a scenario chooses some.
+_SLIPS = [name for name in get_args(Recorded) if name.startswith(("slip_", "late_"))]
+#: Names of systematic errors.
+_ERRORS = re.compile("(cell|banded|step)_error_")
+_DIMENSIONS = ("t", "slip", "phase", "late", "map_member", "map_time", "x", "y")
 _CONTROLS = ("load", "indentation", "displacement")
 
 
@@ -43,8 +60,8 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
         If there is no such file, or no run wrote it.
     OSError
         If it cannot be read.
-    sim.numerics.lazy.Damaged
-        Later, if a variable that is read is damaged.
+    sim.numerics.hdf5.Damaged
+        Now or later, if a variable that is read is damaged.
     """
     if not os.path.exists(path) or os.path.isdir(path):
         reason = "is a folder" if os.path.isdir(path) else "there is no such file"
@@ -60,7 +77,7 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
         raise BadInput([f"{path}: {reason}"]) from None
     with contextlib.ExitStack() as refused:
         refused.callback(dataset.close)
-        if "sim_version" not in dataset.attrs:
+        if not {"sim_version", "scenario_resolved"} & dataset.attrs.keys():
             raise BadInput([f"{path}: was not written by `sim run`; name one of its outputs"])
         if reason := _fault(dataset):
             raise BadInput([f"{path}: {reason}: it was changed after the run; run the scenario again"])
@@ -72,8 +89,7 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
 def _joined(dataset: xr.Dataset) -> dict[str, Any]:
     """Return attributes of runs that were joined, or of selected members: their number, and in ``joined`` in words."""
     recorded, scenario = int(dataset.attrs["members"]), hdf5.tables(dataset.attrs["scenario_resolved"])
-    count, sweep = dataset.sizes.get(MEMBERS, recorded), scenario.get("sweep", {})
-    keys = {key.replace(".", "_") for key in (sweep[0] if isinstance(sweep, list) else sweep)}
+    count, keys = dataset.sizes.get(MEMBERS, recorded), {key.replace(".", "_") for key in _swept(scenario)}
     texts = [f"joined along {name}" for name in sweep_dims(dataset) if name not in keys]
     if count != recorded:
         rest = f"joined, {recorded} of one run" if count > recorded else f"of {recorded}"
@@ -82,13 +98,56 @@ def _joined(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def _fault(dataset: xr.Dataset) -> str:
-    """Return the first thing that every dataset of a run has and this one lacks; "" if there is none."""
-    if not isinstance(dataset.attrs.get("members"), np.integer):
-        return "lacks the attribute members"
-    if not hdf5.tables(dataset.attrs.get("scenario_resolved")):
+    """Return the first thing in which a dataset is not as a run writes it; "" if it is.
+
+    This is the only check of what is read: each number of the scenario, and each derived one, is a variable over the
+    sweep; each of these and of the recorded quantities holds numbers, and has no dimensions but those of a run.
+    Variables and attributes of others are left alone. Numbers of tables that are swept whole need not be there.
+    """
+    attributes = {"members": np.integer, "sim_version": str, "scenario_resolved": str}
+    for name, kind in attributes.items():
+        if not isinstance(dataset.attrs.get(name), kind):
+            return f"lacks the attribute {name}"
+    if not (scenario := hdf5.tables(dataset.attrs["scenario_resolved"])):
         return "the attribute scenario_resolved does not hold a scenario"
-    missing = [name for name in ("contact_modulus", "t") if name not in dataset or dataset[name].dtype.kind != "f"]
-    return f"lacks the numbers {missing[0]}" if missing else ""
+    swept, numbers = _swept(scenario), list(_numbers({key: scenario[key] for key in scenario if key != "sweep"}))
+    whole = {key.partition(".")[0] for key in swept if _label(dataset, key) is not None}  # tables that differ by point
+    fixed = [key for key in numbers if key.partition(".")[0] not in whole and not key.startswith(tuple(swept))]
+    keys = {key.replace(".", "_") for key in (*numbers, *swept)}
+    for name in ("t", *_DERIVED, *(key.replace(".", "_") for key in fixed)):
+        if name not in dataset.variables:
+            return f"lacks the numbers {name}"
+    for name in _SLIPS if "slip_time" in dataset and not (scenario.get("record") or {}).get("quantities") else ():
+        if name not in dataset.variables:
+            return f"lacks the numbers {name}"
+    if dataset.variables["t"].dims != ("t",):
+        return "the numbers t have other dimensions"
+    for name, variable in ((str(name), variable) for name, variable in dataset.variables.items()):
+        over_sweep = name in keys or name in _DERIVED
+        stem = name if name in _RECORDED else _STATISTIC.sub("", name).removeprefix("late_")
+        if not (over_sweep or stem in _RECORDED or _ERRORS.match(name)):
+            continue
+        is_label = name in keys and variable.dims and variable.dims[0] in dataset["contact_modulus"].dims
+        if variable.dtype.kind not in ("OUSTfiu" if is_label else "f" if over_sweep or name == "t" else "fiu"):
+            return f"the variable {name} has the type {variable.dtype}, which a run does not give it"
+        if unknown := set(variable.dims) - {*sweep_dims(dataset), MEMBERS, *(() if over_sweep else _DIMENSIONS)}:
+            return f"the variable {name} has the unknown dimension {min(map(str, unknown))}"
+    return ""
+
+
+def _swept(scenario: dict[str, Any]) -> set[str]:
+    """Return the dotted keys that a scenario sweeps, along axes or in rows of several keys."""
+    sweep = scenario.get("sweep", {})
+    return {str(key) for row in (sweep if isinstance(sweep, list) else [sweep]) for key in row}
+
+
+def _numbers(table: dict[str, Any], path: str = "") -> Iterator[str]:
+    """Give the dotted keys of the numbers in nested tables."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _numbers(value, f"{path}{key}.")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            yield f"{path}{key}"
 
 
 def lacking(dataset: xr.Dataset) -> str:

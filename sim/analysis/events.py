@@ -528,7 +528,7 @@ def _loops(dataset: xr.Dataset, suffix: str, count: int) -> xr.Dataset:
     put_in = done.fillna(0.0).cumsum("t")
     rounding = _NOTHING * abs(put_in).max("t")
     ends = period * xr.DataArray(np.arange(count + 1), dims="end")
-    ends = ends.where(ends <= dataset["t"][-1] + 1e-6 * period)
+    ends = ends.where(ends <= float(dataset["t"][-1]) + 1e-6 * period)
     series = done.isnull().cumsum("t"), put_in, dataset[f"dissipated_energy{suffix}"]
     missing, *gained = (_growth(values, dataset["t"], ends).rename(end="cycle") for values in series)
     texts = {"loop_energy": "closed integral of the load over the displacement"}

@@ -98,6 +98,7 @@ def statements(
         over = averaging(dataset, late).removeprefix("mean over the ")
         means = {key: group[key].assign_attrs(over=over) for key in group if str(key).endswith("_mean")}
         result = result.merge(group.assign(means), compat="no_conflicts", join="outer")
+    result = result.drop_vars("t", errors="ignore")  # of a record that a number was taken from: a statement has no time
     return result.assign_coords({name: dataset[name] for name in sweep_dims(dataset)})  # with their units
 
 

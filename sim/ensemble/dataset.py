@@ -8,6 +8,7 @@ import hashlib
 import importlib.metadata
 import json
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,15 +25,15 @@ from sim.ensemble.store import Blocks
 from sim.ensemble.variables import MAP, NUMBERS, SYSTEMATIC, Variable
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice
-from sim.numerics.hdf5 import CHUNK_CACHE, Refused, opened, tables
+from sim.numerics.hdf5 import CHUNK_CACHE, Refused, bytes_of, hdf5_gives_bytes, opened, tables
 from sim.scenario.files import Files
 from sim.scenario.messages import in_plain_words
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
 from sim.scenario.sweep import Axis, written
 
-#: A dataset of more bytes is not built in memory.
-_IN_MEMORY = 256 * 2**20
+#: A dataset of more bytes is not built in memory, where it is held twice for a moment.
+_IN_MEMORY = 128 * 2**20
 #: Options of netCDF for each ``record.compression``. Six digits are within 5e-7: 20 bits and the leading one, rounded
 #: to nearest, so that flags stay flags and equal numbers stay equal.
 _ZLIB: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
@@ -391,29 +392,35 @@ def in_memory(outline: Outline, parts: Blocks) -> dict[str, tuple[tuple[str, ...
 
 
 def write(outline: Outline, parts: Blocks, path: Path) -> None:
-    """Write the netCDF file: from memory at once, or if it is large part by part in a process that may crash by itself.
+    """Write the netCDF file. A large one is written part by part, in a process of its own that may crash.
 
-    HDF5 crashes at some limits of the size of files if it writes part by part, and gives no reason for its trouble.
+    HDF5 gives no reason if the disk fails, and netCDF crashes if that happens while it closes a file. A file that is
+    not large is therefore built in memory, and its bytes are written as those of any other file.
     """
     sizes = [math.prod(outline.sizes[size] for size in each.dimensions) for each in outline.variables.values()]
     try:
-        if 8 * sum(sizes) <= _IN_MEMORY:
-            _write(outline, parts, path, diskless=True, persist=True)
-            return
-        with pool(1) as executor:
-            executor.submit(_write, outline, parts, path).result()
+        if 8 * sum(sizes) > _IN_MEMORY:
+            with pool(1) as executor:
+                executor.submit(_write, outline, parts, os.fspath(path)).result()
+        elif hdf5_gives_bytes():
+            path.write_bytes(_write(outline, parts, f"{os.urandom(8).hex()}.nc", diskless=True))
+        else:
+            _write(outline, parts, os.fspath(path), diskless=True, persist=True)
     except RuntimeError:
-        with path.open("ab") as file:  # which raises what HDF5 does not tell
+        with path.open("ab") as file:  # which raises the reason that HDF5 does not give
             file.write(bytes(2**20))
         raise
 
 
-def _write(outline: Outline, parts: Blocks, path: Path, **how: Any) -> None:
-    with HDF5, netCDF4.Dataset(path, "w", format="NETCDF4", **how) as file:
+def _write(outline: Outline, parts: Blocks, path: str, **options: Any) -> bytearray:
+    """Write a netCDF file; return its bytes if it stays in memory, else none."""
+    with HDF5, netCDF4.Dataset(path, "w", format="NETCDF4", **options) as file:
         for name, size in outline.sizes.items():
             file.createDimension(name, size)
         file.setncatts(outline.attributes)
         _fill(outline, parts, {name: _variable(file, name, each) for name, each in outline.variables.items()})
+        file.sync()  # which raises an error if the disk fails, while closing the file would crash
+        return bytes_of(path) if options == {"diskless": True} else bytearray()
 
 
 def _variable(file: netCDF4.Dataset, name: str, described: Described) -> netCDF4.Variable:

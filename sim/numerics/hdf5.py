@@ -1,10 +1,14 @@
 """netCDF files as HDF5 keeps them, opened for reading; a file that is none is refused with one reason."""
 
 import contextlib
+import ctypes
+import functools
 import json
 import os
 import stat
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import netCDF4
@@ -19,9 +23,25 @@ BROKEN = "is not a netCDF file, or is truncated or damaged"
 #: Cache of HDF5 for each variable [byte]; its default of 64 MiB holds every variable of a usual run whole.
 CHUNK_CACHE = 2**20
 
+#: Number of an object of HDF5; those that stand for all files, and for the kind of files.
+_ID, _ALL, _FILES = ctypes.c_int64, 0x1F, 0x1
+#: Functions of HDF5 with the types of their arguments; each returns a size, or a number below 0.
+_FUNCTIONS: dict[str, tuple[Any, ...]] = {
+    "H5Fget_obj_count": (_ID, ctypes.c_uint),
+    "H5Fget_obj_ids": (_ID, ctypes.c_uint, ctypes.c_size_t, ctypes.c_void_p),
+    "H5Fget_name": (_ID, ctypes.c_char_p, ctypes.c_size_t),
+    "H5Fget_file_image": (_ID, ctypes.c_void_p, ctypes.c_size_t),
+}
+
 
 class Refused(ValueError):
     """A file that is not read; the message gives the reason, not its name."""
+
+
+class Damaged(RuntimeError):
+    """A variable whose bytes do not match their checksum, or cannot be unpacked."""
+
+    exit_code = 2
 
 
 def opened(path: str | os.PathLike[str]) -> netCDF4.Dataset:
@@ -50,10 +70,55 @@ def readable() -> Iterator[None]:
     """Turn every error of the libraries about a damaged file into ``Refused``."""
     try:
         yield
-    except Refused:
+    except (Refused, Damaged):
         raise
     except (OSError, RuntimeError, ValueError, ArithmeticError, AttributeError, LookupError, TypeError):
         raise Refused(BROKEN) from None
+
+
+@functools.cache
+def _hdf5() -> ctypes.CDLL | None:
+    """Return the HDF5 library that netCDF4 uses, None if it is not found; netCDF4 itself does not give bytes of a file.
+
+    Its own datasets in memory do not serve: they lose the order of variables, and hold the time of their making.
+    """
+    beside = Path(netCDF4.__file__).parent.with_name("netCDF4.libs")  # where Windows has the libraries of a wheel
+    for path in (str(sys.modules["netCDF4._netCDF4"].__file__), *map(str, sorted(beside.glob("hdf5*.dll")))):
+        with contextlib.suppress(OSError, AttributeError):
+            library = ctypes.CDLL(path)
+            for name, arguments in _FUNCTIONS.items():
+                function = getattr(library, name)
+                function.argtypes, function.restype = arguments, ctypes.c_ssize_t
+            return library
+    return None
+
+
+def hdf5_gives_bytes() -> bool:
+    """True if ``bytes_of`` can be used here."""
+    return _hdf5() is not None
+
+
+def bytes_of(name: str) -> bytearray:
+    """Return the bytes of the dataset that is open under a name, as they would be on the disk.
+
+    Raises
+    ------
+    RuntimeError
+        If HDF5 does not give them.
+    """
+    library = _hdf5()
+    if library is not None:
+        files = (_ID * max(0, library.H5Fget_obj_count(_ALL, _FILES)))()
+        library.H5Fget_obj_ids(_ALL, _FILES, len(files), files)
+        for file in files:
+            named = ctypes.create_string_buffer(len(os.fsencode(name)) + 1)
+            library.H5Fget_name(file, named, len(named))
+            size = library.H5Fget_file_image(file, None, 0) if named.value == os.fsencode(name) else 0
+            if size > 0:
+                content = bytearray(size)
+                if library.H5Fget_file_image(file, (ctypes.c_char * size).from_buffer(content), size) == size:
+                    return content
+    raise RuntimeError("HDF5 does not give the bytes of a dataset in memory")
 
 
 def located(dataset: "xarray.Dataset") -> "xarray.Dataset":

@@ -9,15 +9,9 @@ from xarray.backends.netCDF4_ import NetCDF4ArrayWrapper
 from xarray.core.indexing import LazilyIndexedArray
 
 from sim.numerics.files import HDF5
-from sim.numerics.hdf5 import Refused, opened, readable
+from sim.numerics.hdf5 import Damaged, Refused, opened, readable
 
 __all__ = ["Damaged", "Refused", "open_lazily"]
-
-
-class Damaged(RuntimeError):
-    """A variable whose bytes do not match their checksum, or cannot be unpacked."""
-
-    exit_code = 2
 
 
 class _Array(NetCDF4ArrayWrapper):
@@ -40,6 +34,9 @@ class _Store(NetCDF4DataStore):
 
     def open_store_variable(self, name: str, var: Any) -> Any:
         variable = super().open_store_variable(name, var)
+        for attribute in ("scale_factor", "add_offset", "_FillValue", "missing_value"):
+            if isinstance(variable.attrs.get(attribute), str) and variable.dtype.kind not in "OUS":
+                raise Refused(f"holds no number in {attribute} of the variable {name}")
         return xr.Variable(variable.dims, LazilyIndexedArray(_Array(name, self)), variable.attrs, variable.encoding)
 
 
@@ -53,7 +50,7 @@ def open_lazily(path: str | os.PathLike[str]) -> xr.Dataset:
     Refused
         If it is no plain file, no netCDF file, cut short or damaged.
     Damaged
-        Later, if a variable that is read is damaged.
+        If a coordinate is damaged; later, if a variable that is read is.
     """
     with HDF5, readable():
         file: Any = CachingFileManager(opened, os.path.abspath(path), lock=HDF5)  # type: ignore[type-var]

@@ -36,8 +36,8 @@ _LONGEST_TEXT, _LONGEST_UNIT = 200, 60
 _ANGLES = re.compile("rad|cycle|turn|rev|deg|°")
 _TYPESET = str.maketrans("−·⋅×⁄⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-***/-0123456789")
 
-# Beyond these nothing is measurable, and products of a few such numbers leave the range of floats.
-_LARGEST, _SMALLEST = 1e60, 1e-60
+# Beyond these nothing is measurable, and the sixth power of a larger stress leaves the range of floats.
+_LARGEST, SMALLEST = 1e40, 1e-40
 
 #: Each bound of a quantity: its name in a JSON schema, and how a number within it compares.
 _BOUNDS = {
@@ -140,9 +140,10 @@ def _digits(number: float) -> str:
 class Quantity:
     """Declaration of a number: its SI ``unit``, ``meaning``, ``symbol`` and bounds.
 
-    ``above`` and ``below`` exclude the bound, ``at_least`` and ``at_most`` include it. Beside its
-    own bounds no number may exceed 1e60, nor one that excludes zero fall below 1e-60. Messages show
-    ``typical`` as an example, without it a usual value of the unit. A ``whole`` number is read as an int.
+    ``above`` and ``below`` exclude the bound, ``at_least`` and ``at_most`` include it. Beside its own bounds no number
+    may exceed 1e40, nor be nearer to zero than 1e-40 unless it is zero, because powers and ratios of such numbers
+    leave the range of floats. Messages show ``typical`` as an example, without it a usual value of the unit. A
+    ``whole`` number is read as an int.
     ``mistaken`` are units of what is taken for this quantity, each with what to say of it. A unit of angle per length
     must name the angle: 1/m may count radians or cycles.
 
@@ -181,9 +182,11 @@ class Quantity:
             if not holds(number, bound):
                 unit = "" if self.unit == "1" else f" {self.unit}"
                 raise _fault(f"must be {name.replace('_', ' ')} {_digits(bound)}{unit}, not {_digits(number)}{unit}")
-        if abs(number) > _LARGEST or (self.above >= 0.0 and number < _SMALLEST):
-            size = "large" if abs(number) > 1.0 else "small"
-            raise _fault(f"is too {size} to be real; write for example {self.example}")
+        if abs(number) > _LARGEST:
+            raise _fault(f"is too large to be real; write for example {self.example}")
+        if 0.0 < abs(number) < SMALLEST:
+            zero = "0, or " if self._holds(0.0) else ""
+            raise _fault(f"is too small to be real; write {zero}for example {self.example}")
         return number
 
     def scaled(self, numbers: Any, unit: str) -> Any:

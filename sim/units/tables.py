@@ -18,7 +18,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo,
 from pydantic_core import PydanticCustomError
 
 from sim.units.errors import BadInput
-from sim.units.quantity import Quantity, keyed
+from sim.units.quantity import SMALLEST, Quantity, keyed
 from sim.units.terminal import LOG
 
 Array = NDArray[np.float64]
@@ -226,8 +226,19 @@ def _numbers(name: str, table: _Cells, cells: list[str], unit: str, quantity: Qu
     return numbers
 
 
+def _listed(values: Any) -> Any:
+    """Return an array or a list as a list, where numbers that are too small to be real are zero.
+
+    The last rows of a computed decay are such numbers, and no fault of their author.
+    """
+    listed = values.tolist() if isinstance(values, np.ndarray) else values
+    if not isinstance(listed, list | tuple):
+        return listed
+    return [0.0 if isinstance(value, float) and abs(value) < SMALLEST else value for value in listed]
+
+
 #: Validator that takes an array for the numbers in it.
-LISTED = BeforeValidator(lambda values: values.tolist() if isinstance(values, np.ndarray) else values)
+LISTED = BeforeValidator(_listed)
 
 
 def plain_text(path: Path) -> str:
@@ -512,7 +523,8 @@ class Table:
     def _rows_in_order(self, info: ValidationInfo) -> "Table":
         if self.file and not self.time:
             read = file_columns(self.file, info.context, {"time": _TIME, self.column: self.quantity})
-            vars(self).update({"time": tuple(read["time"].tolist()), self.values_in: tuple(read[self.column].tolist())})
+            columns_read = {"time": read["time"], self.values_in: read[self.column]}
+            vars(self).update({name: tuple(_listed(values)) for name, values in columns_read.items()})
         if len(self.time) != len(self.extremes):
             raise PydanticCustomError("short_table", "a table needs as many values as times")
         if len(self.time) < 2:

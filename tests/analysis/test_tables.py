@@ -186,6 +186,17 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
     assert slow < fast and analysis.losses(run(scene(drive=drive.Steady(speed=1e-3)))) == []
 
 
+@pytest.mark.parametrize("cycles", [0, 1])
+def test_rows_of_the_whole_run_have_no_time_whether_or_not_a_loop_is_closed(cycles):
+    course = Equilibrium(indentation={"from": 1e-6, "to": -2e-6, "cycles": cycles}, after_pull_off="reattach")
+    quiet = {"bonds": bonds.Unbroken(), "shear": shear.Uniform(), "drive": drive.Steady(speed=0.0)}
+    dataset = run(scene(contact=course, **quiet))
+    rows = analysis.tidy(dataset)
+    of_run = rows["quantity"].isin([name.removesuffix("_mean") for name in map(str, analysis.statements(dataset))])
+    assert ("loop_energy" in set(rows["quantity"])) == bool(cycles) and of_run.any() and not of_run.all()
+    assert rows["t"][of_run].isna().all() and rows["t"][~of_run].notna().all()
+
+
 @posix
 def test_csv_goes_through_a_link_to_where_it_points(ramp, tmp_path):
     (tmp_path / "out.csv").symlink_to(tmp_path / "far.csv")

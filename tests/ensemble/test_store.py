@@ -2,6 +2,7 @@
 
 import errno
 import functools
+import importlib.metadata
 import itertools
 import os
 import shutil
@@ -248,6 +249,27 @@ def test_runs_of_an_older_version_are_named_and_folders_of_another_format_stay(t
         with pytest.raises(OutputExists, match="is not the folder of a run; move it away"):
             ensemble.run(sample(), tmp_path / name, replace=True)
         assert list((tmp_path / f"{name}.parts").rglob("manifest.json"))
+
+
+@pytest.mark.parametrize("shard", [(1, 1), (1, 2)])
+def test_an_unfinished_run_of_an_older_version_is_refused_by_its_name_and_stays(tmp_path, monkeypatch, shard):
+    """Parts of two versions are not mixed even if scenario and code are the same: a library may have changed."""
+    path, newer = tmp_path / "out.nc", "9.9"
+    folder = stopped(path, after=1, shard=shard)
+    kept = {file: file.read_bytes() for file in folder.iterdir()}
+    assert any(file.suffix == ".npz" for file in kept)
+    version = importlib.metadata.version
+    with monkeypatch.context() as patched:
+        patched.setattr("sim.ensemble.dataset._version", lambda name: newer if name == "sliding-sim" else version(name))
+        with pytest.raises(BadInput) as refused:
+            ensemble.run(sample(), path, resume=True, shard=shard)
+        (message,) = refused.value.problems
+        assert message.startswith(f"{folder} was made by sim {version('sliding-sim')}: finish it by that version")
+        assert {file: file.read_bytes() for file in folder.iterdir()} == kept
+        done = ensemble.run(sample(), path, replace=True)
+        with xr.open_dataset(done, decode_times=False) as dataset:
+            assert dataset.attrs["sim_version"] == newer
+    assert same(path)
 
 
 @pytest.mark.parametrize("method", ["begin", "publish"])

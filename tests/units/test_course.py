@@ -87,6 +87,14 @@ def test_a_course_is_cut_where_it_turns_or_jumps_and_nowhere_else(name):
             assert len(pieces(name, turn - 0.1, time)) == len(pieces(name, time, turn + 0.1)) == 1
 
 
+def test_the_last_rows_of_a_computed_decay_are_zero_if_they_are_too_small_to_be_real():
+    kind = TypeAdapter(over_time(Quantity("N", "load", "P"), "load"))
+    for value in (np.array([1.0, 1e-87, -5e-324]), [1.0, 1e-87, -5e-324]):
+        table = kind.validate_python({"time": [0.0, 5e-324, 0.8], "value": value})
+        assert (table.time, table.value) == ((0.0, 0.0, 0.8), (1.0, 0.0, 0.0))
+        assert_array_equal(prescribed(table).at(np.array([0.4]), DURATION), [0.0])
+
+
 def test_an_instant_is_one_piece_with_the_value_after_a_jump():
     (piece,) = pieces("table", 0.5, 0.5)
     assert piece == (0, 0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0)

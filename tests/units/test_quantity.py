@@ -54,7 +54,7 @@ def test_a_decimal_prefix_costs_no_digit(number, unit):
     assert FORCE.read(f"{number} {name}") == float(f"{number}e-{power}")
 
 
-@given(st.floats(1e-50, 1e50))
+@given(st.floats(1e-40, 1e40))
 def test_a_bare_number_is_si_and_text_needs_a_unit(number):
     assert LENGTH.read(number) == number == LENGTH.read(f"{number!r} m")
     with pytest.raises(PydanticCustomError, match="without a unit"):
@@ -105,13 +105,14 @@ def test_what_cannot_be_read_is_refused_with_a_cure():
         (LENGTH, [0, "-0 mm", "-3 mm"], "above 0 m, not "),
         (SHARE, [1.5], "at most 1, not 1.5"),
         (Quantity("1", "x", below=2), [2], "below 2, not 2"),
-        (LENGTH, [1e61, 10**400], "too large"),
-        (LENGTH, [1e-61], "too small"),
+        (LENGTH, [1e41, 10**400], "too large"),
+        (LENGTH, [1e-41, "1e-300 mm", 5e-324], 'too small...write for example "2 mm"'),
+        (STRESS, [1e-41, 5e-324], 'too small...write 0, or for example "1.6 MPa"'),
     ):
         for value in values:
             message = refusal(declared, value)
             assert all(word in message for word in words.split("...")), message
-    assert (STRESS.read(0), STRESS.read(1e-300), SHARE.read("100 %")) == (0.0, 1e-300, 1.0)  # at a bound
+    assert (STRESS.read(0), STRESS.read(1e-40), SHARE.read("100 %")) == (0.0, 1e-40, 1.0)  # at a bound
 
 
 def test_a_declaration_validates_and_describes_itself():

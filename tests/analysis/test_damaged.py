@@ -1,0 +1,145 @@
+"""A dataset with one variable or attribute that no run writes is read, or refused in one line that names it."""
+
+import itertools
+import shutil
+import tomllib
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from helpers.commands import LENS, SCENE, sim
+
+import sim as package
+
+SHORT = SCENE.replace('"1 s"', '"0.4 s"')
+PULLED = """\
+[drive]
+model = "spring"
+stage = "1 mm/s"
+stiffness = "1 kN/m"
+damping = "10 N s/m"
+contact_stiffness = "rigid"
+[bonds]
+model = "rate"
+critical_speed = "10 mm/s"
+rebinding_rate = "500 1/s"
+stress = "0.3 MPa"
+"""
+MAPPED = """\
+[shear]
+model = "modal"
+points = 32
+[shear.spectrum]
+model = "gaussian"
+rms = "50 kPa"
+length = "10 um"
+[shear.correlation]
+model = "slip"
+length = "5 um"
+[record]
+quantities = ["contact_area", "friction_force", "fluctuation_energy"]
+[sweep]
+"contact.load" = ["2 mN", "4 mN"]
+"""
+SCENES = {
+    "ramp": SHORT,
+    "spring": LENS.replace('"1 s"', '"0.4 s"').replace('"0.1 s"', '"20 ms"') + PULLED,
+    "sweep": SHORT + MAPPED,
+}
+#: Ways in which a variable is not as it was written.
+KINDS = ("removed", "renamed", "shape", "type", "text")
+#: Attributes that are given to variables, and what a run writes as attributes of the file.
+ATTRIBUTES = {"scale_factor": "two", "add_offset": "none", "units": "furlong", "long_name": 5}
+OTHERWISE = {"no attribute": None, "another text": "some text", "no text": np.array([1.5, 2.5])}
+OF_THE_FILE = ("members", "scenario_resolved", "scenario_toml", "scenario_files", "sim_version", "seed", "title")
+
+
+def damaged(dataset, name, kind):
+    """The dataset with a variable changed in one way."""
+    values = dataset.variables[name]
+    if kind == "removed":
+        return dataset.drop_vars(name)
+    if kind == "renamed":
+        return dataset.rename_vars({name: f"{name}_x"})
+    if kind == "shape":
+        changed = xr.Variable(("other", *values.dims), values.to_numpy()[np.newaxis].repeat(2, 0), values.attrs)
+    elif kind == "text":
+        texts = np.full(values.shape, "some text", object)
+        changed = xr.Variable(values.dims, texts, {})
+    else:
+        is_text = values.dtype.kind in "OU"
+        changed = xr.Variable(values.dims, np.ones(values.shape, "f8" if is_text else "i4"), values.attrs)
+    return dataset.drop_vars(name).assign({name: changed})
+
+
+def cases(datasets):
+    """Every variable of each dataset, each in one way that differs between the datasets, and the attributes."""
+    for shift, (scene, dataset) in enumerate(datasets.items()):
+        for place, name in enumerate(dataset.variables):
+            yield scene, name, KINDS[(place + shift) % len(KINDS)]
+        for attribute, name in itertools.product(ATTRIBUTES, ("t", "contact_modulus", "contact_radius")):
+            yield scene, name, attribute
+        for name, kind in itertools.product(OF_THE_FILE, OTHERWISE):
+            yield scene, name, kind
+
+
+def write(dataset, scene, name, kind, path):
+    """Write the dataset of a scene with one variable or attribute changed."""
+    if kind in KINDS:
+        damaged(dataset, name, kind).to_netcdf(path)
+        return
+    shutil.copy(f"{scene}.nc", path)
+    with netCDF4.Dataset(path, "a") as file:
+        if kind in ATTRIBUTES:
+            file[name].setncattr(kind, ATTRIBUTES[kind])
+        elif OTHERWISE[kind] is None:
+            file.delncattr(name)
+        else:
+            file.setncattr(name, OTHERWISE[kind])
+
+
+@pytest.fixture(scope="module")
+def datasets(tmp_path_factory):
+    """The datasets as runs write them, in the present folder."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.chdir(tmp_path_factory.mktemp("datasets"))
+        result = {}
+        for scene, text in SCENES.items():
+            path = package.run(tomllib.loads(text), f"{scene}.nc")
+            with xr.open_dataset(path, decode_times=False, decode_coords=False) as dataset:
+                result[scene] = dataset.load()
+        yield result
+
+
+@pytest.mark.parametrize("apart", [61, pytest.param(1, marks=pytest.mark.verify)])
+@pytest.mark.parametrize("command", ["stats", "plot", "report"])
+def test_a_changed_variable_or_attribute_is_done_without_or_refused_in_one_line_that_names_it(datasets, command, apart):
+    wrong, refusals = [], 0
+    for number, (scene, name, kind) in enumerate(itertools.islice(cases(datasets), 0, None, apart)):
+        path = Path(f"{command}-{apart}-{number}.nc")
+        write(datasets[scene], scene, name, kind, path)
+        done = sim(command, path)
+        message = done.stderr.strip().splitlines()
+        if done.exception is not None and not isinstance(done.exception, SystemExit):
+            wrong.append((scene, name, kind, repr(done.exception)))
+        elif done.exit_code:
+            refusals += 1
+            if done.exit_code != 2 or not message or (str(path) not in done.stderr and name not in done.stderr):
+                wrong.append((scene, name, kind, done.exit_code, message))
+        path.unlink()
+    assert not wrong and refusals
+
+
+def test_a_flipped_byte_of_a_coordinate_is_named(datasets):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File("sweep.nc") as file:
+        place = file["t"].id.get_chunk_info(0)
+    content = bytearray(Path("sweep.nc").read_bytes())
+    content[place.byte_offset] ^= 1
+    Path("flipped.nc").write_bytes(content)
+    for command in ("stats", "plot", "report"):
+        done = sim(command, "flipped.nc")
+        assert (done.exit_code, done.stdout) == (2, "")
+        assert done.stderr.startswith("flipped.nc: variable t is damaged") and done.stderr.count("\n") == 1
