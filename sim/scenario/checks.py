@@ -10,7 +10,6 @@ from pydantic_core import PydanticCustomError
 
 from sim.laws import jkr
 from sim.parts.bonds.models import Cohort, Tracked
-from sim.parts.bonds.rupture import Catch
 from sim.parts.exchange import Array
 from sim.spectrum.families import BondMade, Measured
 from sim.units.notation import engineering
@@ -90,13 +89,11 @@ def _lacks_bonds(scene: Scene) -> Faults:
 
 
 def _catch_is_too_weak(scene: Scene) -> Faults:
-    rupture = getattr(scene.population, "rupture", None)
-    if isinstance(rupture, Catch) and rupture.catch_rate > 0.0:
-        least = rupture.slip_force / _LARGEST_FORCE_RATIO
-        if rupture.catch_force < least:
-            fault = f"is less than 1/{_LARGEST_FORCE_RATIO:,.0f} of slip_force; the time of a run grows as it falls"
-            cure = f"give at least {least:.3g} N, a smaller slip_force, or catch_rate = 0"
-            yield ("bonds", "rupture", "catch_force"), f"{fault}; {cure}"
+    bonds = scene.population
+    if bonds.stretched and bonds.law.catch > 0.0 and bonds.law.relief > _LARGEST_FORCE_RATIO * bonds.law.softness:
+        fault = f"is less than 1/{_LARGEST_FORCE_RATIO:,.0f} of slip_force; the time of a run grows as it falls"
+        cure = f"give at least {bonds.rupture.slip_force / _LARGEST_FORCE_RATIO:.3g} N, a smaller slip_force"
+        yield ("bonds", "rupture", "catch_force"), f"{fault}; {cure}, or catch_rate = 0"
 
 
 def _implausible(scene: Scene) -> Faults:
