@@ -4,8 +4,8 @@ A *setting* changes one thing of the scene: the shear model, the bond model or t
 setting and at a finer one, and the difference is the error of the setting. If members differ, both runs have the same
 members and differences are paired, so that part of the noise cancels. Errors of several changes add up.
 
-At a prescribed speed, means and standard deviations over the members are compared at all recorded times. Under a spring or a
-force single paths diverge, so averages over the second half of the run are compared.
+At a prescribed speed, means and standard deviations over the members are compared at all recorded times. Under a spring
+or a force single paths diverge, so averages over the second half of the run are compared.
 """
 
 import contextlib
@@ -54,7 +54,7 @@ _TIMING, _STEPS = 0.15, 0.3
 #: Fewest members that have a standard error, members that are wanted at least, and most of them.
 _LEAST, _FEWEST, _MOST = 2, 16, 2**14
 #: Most numbers of a sample of one setting: members, times and quantities.
-_SAMPLED = 2**23
+_SAMPLED = 2**22
 #: Pieces of a run between which the time is looked at, and factor by which a budget that is named exceeds the estimate.
 _PIECES, _MARGIN = 20, 1.3
 #: Most numbers that are kept of the finest of several clock steps, and most steps that are run at once.
@@ -364,9 +364,20 @@ def compared(scenario: Scenario, count: int, steps: range, first: int = 0, in_ti
     Under a spring or a force the only time is the mean over the second half of the steps, because single paths diverge.
     A member that has run away has the value zero.
     """
-    values = recorded(scenario, count, steps, first=first, in_time=in_time)
-    late = np.nan_to_num(values[:, :, len(steps) // 2 :])
-    return late.mean(axis=2, keepdims=True) if scenario.drive.solves_motion else values
+    if not scenario.drive.solves_motion:
+        return recorded(scenario, count, steps, first=first, in_time=in_time)
+    averages, most = list[Array](), max(_LEAST, _SAMPLED // (len(QUANTITIES) * len(steps)))
+    for begin in range(0, count, most):
+        values = recorded(scenario, min(most, count - begin), steps, first=first + begin, in_time=in_time)
+        averages.append(np.nan_to_num(values[:, :, len(steps) // 2 :]).mean(axis=2, keepdims=True))
+    return np.concatenate(averages, axis=1)
+
+
+def _most_sampled(scenario: Scenario, steps: range) -> int:
+    """Return the most members that are compared at some steps, so that their numbers stay small."""
+    return (
+        _MOST if scenario.drive.solves_motion else min(_MOST, max(_LEAST, _SAMPLED // (len(QUANTITIES) * len(steps))))
+    )
 
 
 def _known_errors(row: Setting, truth: Gammas, power: int) -> Array:
@@ -448,7 +459,7 @@ def _judged(
     order = sorted(settings, key=lambda row: (not row.own, row is not nearest, row.time))
     noisy = [row for row in settings if _fluctuates(row.scenario)]
     pace = {row.label: row.time / (base.ensemble.members if row in noisy else 1) for row in settings}
-    most = max(_LEAST, min(_MOST, _SAMPLED // (len(QUANTITIES) * len(steps))))
+    most = _most_sampled(base, steps)
     wanted = 0.5 * budget.left(until) / max(sum(pace[row.label] for row in noisy), _TICK)
     count = first = int(np.clip(max(0.25 * wanted, min(wanted, _FEWEST)), _LEAST, most))
     samples, expected, taken, slower = dict[str, Array](), 0.0, 0.0, 1.0
@@ -628,7 +639,7 @@ def _most(exact: Scenario) -> int:
     """Return the most members that are compared at several clock steps."""
     if _replays(exact):
         return max(_LEAST, min(_NUMBERS // exact.clock.steps, together(exact)))
-    return max(_LEAST, min(_MOST, _SAMPLED // (len(QUANTITIES) * len(_records(exact)))))
+    return _most_sampled(exact, _records(exact))
 
 
 def _trend(changes: Array, numbers: float, members: int, accepted: float) -> str:
