@@ -804,6 +804,7 @@ def figure(dataset: xr.Dataset) -> Figure:
     star the recommended combination, if there is one.
     """
     tolerance, combined = float(dataset.attrs["tolerance"]), choices(dataset)
+    times = dataset["time"].to_numpy()
     dataset = dataset.isel(row=dataset["members"].to_numpy() > 0)
     part, is_written, cost, members, error, deviation = (dataset[name].to_numpy() for name in _COLUMNS)
     size, best = np.nan_to_num(error).reshape(len(part), math.prod(error.shape[1:])), chosen(combined, tolerance)[0]
@@ -820,6 +821,8 @@ def figure(dataset: xr.Dataset) -> Figure:
         if math.isfinite(best.bound) and not dataset.attrs.get("not_converging"):
             panel.plot(best.time, max(best.bound, floor), "*", c="black", ms=7.0, zorder=5, label="recommended")
         panel.axhline(tolerance, color=REFERENCE, linestyle="--", linewidth=0.8, label="accepted")
+        if not part.size:  # logarithmic axes need a range
+            panel.set(xlim=(0.5 * times.min(), 2.0 * times.max()), ylim=(0.1 * tolerance, 10.0 * tolerance))
         panel.set(xscale="log", yscale="log", xlabel="CPU time of the run (s)", ylabel="largest error (bottom: exact)")
         legend(panel)
     return picture

@@ -43,7 +43,7 @@ def quick(monkeypatch):
 
 @pytest.fixture(scope="module")
 def steady():
-    return converge(scene(**STEADY, members=64), 0.5)
+    return converge(scene(**STEADY, members=64), 3.0)  # in which modes are made, too
 
 
 def of(dataset, row, quantity, statistic="mean", name="error"):
@@ -193,7 +193,9 @@ def test_a_scene_that_does_not_fit_into_its_budget_has_its_cost_no_error_and_no_
     text = recommendation(dataset)
     assert "No setting is recommended" in text and "cohort 0.001, step 100 ns" in text and "[" not in text
     assert study.engineering(dataset.attrs["budget"], "s") in text
-    assert "recommended" not in study.figure(dataset).axes[0].get_legend_handles_labels()[1]
+    picture = study.figure(dataset.isel(row=dataset["members"].to_numpy() == 0))
+    study.save(picture, tmp_path / "empty.png")
+    assert "recommended" not in picture.axes[0].get_legend_handles_labels()[1]
     assert {line["stress\n(%)"] for line in table(dataset) if "*" in line["setting"]} == {"–"}
 
 
