@@ -405,8 +405,9 @@ def converge(
 ) -> None:
     """Compare speed and error of models, tolerances and clock steps, and recommend a setting.
 
-    With a spring or a prescribed force, averages over the second half of the run are compared. Nothing is recommended
-    if the results are not shown to converge as the clock step decreases.
+    Means and standard deviations are compared at all recorded times. With a spring or a prescribed force, averages over
+    the second half of the run are compared. Peaks and slip events are not. Nothing is recommended if the results are
+    not shown to converge as the clock step decreases. If the budget is spent, the output names a larger one.
 
     Only one core is used, because simultaneous runs would disturb the measured times.
     """

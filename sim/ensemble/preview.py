@@ -4,16 +4,15 @@ import itertools
 import math
 import os
 import re
-import time
 import tomllib
 from collections.abc import Sequence
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from sim.engine import MemberNoise, follow
 from sim.ensemble.diagnosis import Worst, diagnosis, place as in_words, remarks, slider_body, spread, worst_of_sweep
-from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots, state_numbers, work
+from sim.ensemble.pace import counted, pace as pace_of
+from sim.ensemble.plan import Plan, map_bytes, state_numbers, work
 from sim.ensemble.variables import SOURCES
 from sim.laws import jkr
 from sim.parts.bonds.models import Cohort, FirstMoment, Rate
@@ -26,10 +25,10 @@ from sim.units.quantity import read_option
 from sim.units.terminal import duration
 
 # Rough costs of one core [s]: a start with its table, a process that shares the work; a byte of the dataset that
-# is compressed, of a map that is drawn; a point of a sweep; a mode pair that is made; a record of a batch, of a member.
+# is compressed; a point of a sweep; a mode pair that is made.
 _START, _WORKER = 1.2, 1.2
-_BYTE, _MAP_BYTE = 48e-9, 2e-9
-_POINT, _MODE, _RECORD, _RECORD_OF_MEMBER = 1e-3, 5e-6, 5e-6, 2e-7
+_BYTE = 48e-9
+_POINT, _MODE = 1e-3, 5e-6
 # Rough memory [byte]: a process with its libraries, more of it for a table; a mode pair while it is made and while it
 # is used. Copies of a part while it is computed, of a dataset while it is written or read, of one that stays in memory.
 _PROCESS, _TABLE, _OF_MODE_MADE, _OF_MODE = 160e6, 100e6, 520.0, 160.0
@@ -38,8 +37,8 @@ _COPIES_OF_PART, _COPIES, _COPIES_IN_MEMORY = 3.0, 2.0, 3.0
 _BUILT_IN_MEMORY, _MOST_TABULATED = 256e6, 1e8
 
 _MOST_WORDS = 6
-#: Time for which steps are tried [s]; a run with a shorter estimate [s] is not tried, or not announced.
-_TRIED, _WORTH_TRYING, _LONG = 0.25, 1.0, 10.0
+#: Estimate [s] of a run that is announced.
+_LONG = 10.0
 #: Keys that are listed elsewhere than among the quantities.
 _ELSEWHERE = ("name", "sweep", *(f"{part}.model" for part in Parts._fields))
 Rows = list[tuple[str, ...]]
@@ -77,25 +76,6 @@ def forecast(plan: Plan, jobs: int, pace: float = 1.0, shares: int = 1, left: fl
 def tabulated(plan: Plan) -> bool:
     """True if a run ends with a table of its dataset, for which the dataset is read as a whole."""
     return plan.trajectories <= _MOST_TABULATED
-
-
-def counted(plan: Plan) -> float:
-    """Return the counted time of all steps and records on one core [s]."""
-    some, groups = spread(plan.points), plan.groups
-    first, last = (
-        sum(counted_block(point, group, Block(-1, point.clock.steps, point.clock.stride)) for point in some)
-        for group in (np.array(groups[0]), np.array(groups[-1]))
-    )
-    return len(plan.points) * ((len(groups) - 1) * first + last) / len(some)
-
-
-def counted_block(point: Scenario, members: np.ndarray, block: Block, speeds: np.ndarray | None = None) -> float:
-    """Return the counted time of the steps of a block and of the records and maps in it [s]."""
-    steps = block.end - block.start
-    maps = map_bytes(point, int(np.sum(members < point.record.map_members)))
-    maps *= sum(block.start < step <= block.end for step in snapshots(point)) / max(1, len(point.record.maps))
-    records = steps / block.stride * (_RECORD + len(members) * _RECORD_OF_MEMBER)
-    return steps * seconds_a_step(point, len(members), speeds) + records + _MAP_BYTE * maps
 
 
 def memory(plan: Plan, jobs: int) -> float:
@@ -190,47 +170,10 @@ def processes(
         lines.append("note: the dataset is large; `sim stats` prints its table")
     left = 1.0 - sum(task.done(parts) for task in plan.share(*shard)) / work(plan, *shard) if parts else 1.0
     if jobs > 1 or left * counted(plan) > _LONG:
-        needs = forecast(plan, jobs, tried(plan), shard[1], left)
+        needs = forecast(plan, jobs, pace_of(plan), shard[1], left)
         if jobs > 1 or needs.clock > _LONG:
             lines.append(f"{_times(needs, jobs)}, {size(needs.memory)} of memory, a file of {size(needs.file)}")
     return jobs, lines
-
-
-def tried(plan: Plan) -> float:
-    """Return the pace of this machine: measured time of some steps over their counted time; 1 for a short run.
-
-    Kernels that are not in the cache are compiled.
-    """
-    if counted(plan) < _WORTH_TRYING:
-        return 1.0
-    ends = spread(plan.points, 3)
-    trials = [_tried(plan, point, _TRIED / len(ends)) for point in ends]
-    return sum(measured for measured, _ in trials) / sum(expected for _, expected in trials)
-
-
-def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
-    """Return measured and counted time [s] of the last of some blocks of steps at one point.
-
-    Each block is twice as long as the one before; all together take about ``most`` [s].
-    """
-    members = np.arange(min(plan.group, max(1, int(most / 10.0 / seconds_a_step(point, 1)))))
-    stride, last = point.clock.stride, point.clock.steps
-    dice, state, block, began = MemberNoise.of(point.seed, members), None, Block(-1, 0, stride), time.perf_counter()
-    for count in itertools.count():
-        start = time.perf_counter()
-        for steps in block.pieces(1024, []):
-            state, course = follow(point, dice, state, steps)
-            for variable in plan.variables if steps[-1] % stride == 0 else ():
-                variable.read(point, course)
-        end = time.perf_counter()
-        if block.end == last or (count > 2 and end - began + 2.0 * (end - start) > most):
-            break
-        following = max(1, 2 * block.end)  # a long block ends at a record
-        following = stride * math.ceil(following / stride) if following > stride else following
-        block = Block(block.end, min(last, following), stride)
-    point.release()
-    speeds = point.speeds(5, block.end / last)[2:]
-    return max(end - start, 1e-9), counted_block(point, members, block, speeds)
 
 
 def _times(needs: Forecast, jobs: int) -> str:
@@ -425,7 +368,7 @@ def _run(plan: Plan) -> Rows:
     if scene.sweep:
         axes = " × ".join(f"{len(axis.values)} {axis.keys[0]}" for axis in scene.sweep)
         rows.append(("sweep", f"{axes} = {len(plan.points):,} points" if len(scene.sweep) > 1 else axes))
-    needs, (limit, source) = forecast(plan, jobs, tried(plan)), memory_limit()
+    needs, (limit, source) = forecast(plan, jobs, pace_of(plan)), memory_limit()
     short = f", but {size(limit)} {source}" if memory(plan, 1) > limit else ""
     before = "" if scene.record.compression == "none" else f", {size(plan.bytes)} before compression"
     return [

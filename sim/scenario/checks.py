@@ -19,6 +19,10 @@ _STEPS_A_CYCLE = 2
 _MOST_SLIPS = 2**16
 #: Contact radius over that of the sphere above which some unit must be wrong.
 _WIDEST = 10.0
+#: Slip force over catch force of a bond above which no two lengths of a molecule explain it. A thermal pathway has the
+#: force kT over the distance to its barrier: from the 0.1 nm of a chemical bond to the 100 nm of a stretched protein.
+#: The number of sub-steps of a bond's life, and so the time of a run, grows with this ratio.
+_LARGEST_FORCE_RATIO = 1000.0
 _TOO_SHORT = "the table ends at {:g} s, before clock.duration ({:g} s); add rows or shorten the run"
 
 Faults = Iterator[tuple[tuple[str, ...], str]]
@@ -36,7 +40,7 @@ def faults_across(scene: Scene, built: bool = True) -> Faults:
     except (PydanticCustomError, ValidationError) as fault:
         yield ("shear",), fault.message() if isinstance(fault, PydanticCustomError) else fault.errors()[0]["msg"]
         return
-    for check in (_too_short, _cannot_be_driven, _lacks_bonds, _implausible, _wrong_maps):
+    for check in (_too_short, _cannot_be_driven, _lacks_bonds, _catch_is_too_weak, _implausible, _wrong_maps):
         yield from check(scene)
     yield from _shear_faults(scene, built)
     yield from _off_the_map(scene)
@@ -82,6 +86,14 @@ def _lacks_bonds(scene: Scene) -> Faults:
         if cast(Cohort | Tracked, bonds).bond_stiffness > stiffest * (1.0 + 1e-9):
             fault = f"the half-space under a bond of this footprint has a stiffness of {stiffest:.3g} N/m in series"
             yield ("bonds", "bond_stiffness"), f"{fault}: give at most that, or a larger shear.spectrum.footprint"
+
+
+def _catch_is_too_weak(scene: Scene) -> Faults:
+    bonds = scene.population
+    if bonds.stretched and bonds.law.catch > 0.0 and bonds.law.relief > _LARGEST_FORCE_RATIO * bonds.law.softness:
+        fault = f"is less than 1/{_LARGEST_FORCE_RATIO:,.0f} of slip_force; the time of a run grows as it falls"
+        cure = f"give at least {bonds.rupture.slip_force / _LARGEST_FORCE_RATIO:.3g} N, a smaller slip_force"
+        yield ("bonds", "rupture", "catch_force"), f"{fault}; {cure}, or catch_rate = 0"
 
 
 def _implausible(scene: Scene) -> Faults:
@@ -152,11 +164,11 @@ _LARGEST_SPHERE = 1.0
 def remarks_between(scene: Scene) -> list[str]:
     """Return assumptions and limits of the parts together."""
     _, bonds, shear, contact = scene.chosen
-    speeds, varies = scene.speeds(41), scene.varies["shear"]
+    speeds = scene.speeds(41)
     remarks = []
     if (radius := scene.sphere.radius) > _LARGEST_SPHERE:
         remarks.append(f'sphere.radius is {radius:g} m: a number without a unit is in metres, write "5 mm"')
-    if varies and bonds.feeds_back and not contact.lags:
+    if scene.fluctuations_move_contact and bonds.feeds_back and not contact.lags:
         remarks.append('carried area does not converge in a fluctuating contact: use model = "rate_dependent"')
     if contact.after_pull_off == "reattach" and bonds.stretched and not bonds.feeds_back:
         remarks.append('bonds continue to slide while the contact is open; bonds.area = "carried" starts without bonds')

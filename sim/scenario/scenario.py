@@ -444,6 +444,12 @@ class Scenario:
         return contact.lags or not (contact.changes or contact.reversible or work(1.0) != work(0.0))
 
     @property
+    def fluctuations_move_contact(self) -> bool:
+        """Return True if random fluctuations change the area of the contact."""
+        shear = self.fluctuations
+        return shear.per_member and shear.spectrum.variance > 0.0 and not self._fluctuations_leave_contact
+
+    @property
     def _fluctuations_leave_contact(self) -> bool:
         """Return True if fluctuations never change the contact."""
         return self.fluctuations.paid_by_adhesion == 0.0 or self.fluctuations.stays

@@ -4,16 +4,16 @@ A *setting* changes one thing of the scene: the shear model, the bond model or t
 setting and at a finer one, and the difference is the error of the setting. If members differ, both runs have the same
 members and differences are paired, so that part of the noise cancels. Errors of several changes add up.
 
-At a prescribed speed, means and standard deviations over the members are compared at each time. Under a spring or a
-force single paths diverge, so averages over the second half of the run are compared.
+At a prescribed speed, means and standard deviations over the members are compared at all recorded times. Under a spring
+or a force single paths diverge, so averages over the second half of the run are compared.
 """
 
+import contextlib
 import importlib.metadata
 import itertools
 import json
 import math
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -30,6 +30,7 @@ from sim.engine import MemberNoise, follow
 from sim.ensemble.plan import seconds_a_step, together
 from sim.ensemble.variables import READ
 from sim.numerics import files
+from sim.numerics.stopwatch import stopwatch
 from sim.parts.exchange import Array, Bonding, Gammas, Motion
 from sim.parts.shear.bands import cell_pairs
 from sim.parts.shear.process import Fluctuation
@@ -50,14 +51,21 @@ _BANDS, _COHORTS = (0.3, 0.1, 0.03, 0.01, 0.003), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 #: Shares of the budget that are spent on times and on clock steps; the rest is spent on models and grids.
 _TIMING, _STEPS = 0.15, 0.3
-#: Records at which runs without noise, and members, are compared; fewest and most members.
-_RECORDS, _TIMES, _FEWEST, _MOST = 500, 6, 16, 2**14
+#: Fewest members that have a standard error, members that are wanted at least, and most of them.
+_LEAST, _FEWEST, _MOST = 2, 16, 2**14
+#: Most numbers of a sample of one setting: members, times and quantities.
+_SAMPLED = 2**22
+#: Pieces of a run between which the time is looked at, and factor by which a budget that is named exceeds the estimate.
+_PIECES, _MARGIN = 20, 1.3
 #: Most numbers that are kept of the finest of several clock steps, and most steps that are run at once.
 _NUMBERS, _PIECE = 2**22, 512
 #: Finest clock step over the scene's; share of the tolerance below which an error is small enough.
 _FINEST_STEP, _SMALL = 2.0**-12, 0.1
 #: Least factor by which the change from quarter to quarter of the clock step falls: 4^p with the order p = 1/2.
 _FALL = 2.0
+_TOO_LONG = "does not fit into the budget"
+#: Shortest time that a piece of work takes [s].
+_TICK = 1e-9
 #: Errors below this are roundings.
 _ROUNDING = 1e-9
 
@@ -72,8 +80,8 @@ _DESCRIBED = {
     "part": ("", "part of the scenario that the setting changes"),
     "toml": ("", "lines of the scenario file that choose the setting"),
     "own": ("1", "1 if the scenario has this setting"),
-    "time": ("s", "CPU time of the run, median of three parts"),
-    "members": ("1", "members that were compared"),
+    "time": ("s", "CPU time of the run, of pieces of it"),
+    "members": ("1", "members that were compared; 0 if the budget was spent before"),
     "error": ("1", "largest error over the run"),
     "standard_error": ("1", "standard error of the error"),
 }
@@ -97,7 +105,7 @@ class Setting:
     time : float
         CPU time of the scene's run [s].
     members : int
-        Members that were compared.
+        Members that were compared; 0 if the budget was spent before.
     error, standard_error : array, shape (quantities, statistics)
         Largest error over the run and its standard error, in units of the largest mean, or for ΔΓ beyond its mean in
         units of its own value; nan if it is not known.
@@ -115,6 +123,42 @@ class Setting:
     standard_error: Array = field(default_factory=lambda: np.zeros((len(QUANTITIES), 4)))
 
 
+@dataclass
+class Budget:
+    """Time that a study may take, and the time that it would need.
+
+    Attributes
+    ----------
+    now : callable
+        The clock [s].
+    seconds, end, share : float
+        The time to spend [s], the time of ``now`` at its end, and the share of it for the settings in question.
+    slower : float
+        Largest time of a run over its estimate by a first piece.
+    needed : float
+        Budget that would answer what was left out [s]; 0 if nothing was.
+    """
+
+    now: Callable[[], float]
+    seconds: float
+    end: float = math.inf
+    share: float = 1.0
+    slower: float = 1.0
+    needed: float = 0.0
+
+    def left(self, until: float = math.inf) -> float:
+        """Return the time that is left until a time of ``now``, or until the end [s]."""
+        return min(until, self.end) - self.now()
+
+    def needs(self, seconds: float) -> None:
+        """Remember that something of this length [s] was left out."""
+        self.needed = max(self.needed, _MARGIN * self.slower * seconds / self.share, _MARGIN * self.seconds)
+
+
+class _Spent(Exception):
+    """The time is spent in the middle of a run."""
+
+
 def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None = None) -> xr.Dataset:
     """Run a scene at every admissible setting, and report the cost and the error of each.
 
@@ -123,7 +167,8 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     scenario : Scenario
         The scene, without its sweep: at the values that its tables give.
     budget_seconds : float
-        Computing time to spend [s]. Settings that do not fit into it are left out and named.
+        Computing time to spend [s]. Settings that do not fit into it are left out and named. The setting of the
+        scene is then a row without an error.
     tolerance : float, optional
         Accepted error, by default that of the scene.
 
@@ -131,15 +176,20 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     -------
     xarray.Dataset
         Along ``row``: the CPU time of the scene's run at each setting, and its largest ``error`` for each ``quantity``
-        and ``statistic`` with the ``standard_error``. The attribute ``not_converging`` names results without a limit.
+        and ``statistic`` with the ``standard_error``. The attribute ``not_converging`` names results without a limit,
+        and ``budget`` [s] is the time that would answer the rest, 0 if nothing was left out.
 
     Raises
     ------
     BadInput
-        If the field is a measured map, or the scene itself does not fit into the budget.
+        If the field is a measured map.
 
     Notes
     -----
+    All recorded times are compared. The error is that of the time at which error and noise together are largest. Its
+    bound holds at the time of the largest true error. This time is not random, so the number of times does not matter.
+    To show that a difference is no noise takes the quantile of the largest of so many differences instead.
+
     Errors are in units of the finest setting's value. Those of means are in units of the largest mean over the run,
     those of standard deviations as well, but for ΔΓ in units of its largest standard deviation. Skewness and
     correlation time are compared for ΔΓ alone, in closed form and at a prescribed speed.
@@ -157,26 +207,30 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     """
     if scenario.fluctuations.measured:
         raise BadInput(["shear.field: a map has no simpler model; study fields of its spectrum, shear.spectrum"])
-    began, left_out = time.process_time(), list[str]()
+    now = stopwatch()
+    began, left_out, budget = now(), list[str](), Budget(now, budget_seconds)
     chosen_models = {"shear": _table(scenario.fluctuations), "bonds": _table(scenario.population)}
     base = scenario.with_values(chosen_models | {"record": {}})
     accepted = tolerance or float(_table(scenario.shear).get("tolerance", 0.01))
     written, half = _at_step(base, 1.0), began + 0.5 * budget_seconds
-    settings = [row for changes in _tried(base) for row in _admitted(*changes, base, left_out, half)] + [written]
-    building = time.process_time() - began
+    settings = [row for changes in _tried(base) for row in _admitted(*changes, base, left_out, half, budget)]
+    settings.append(written)
+    building = now() - began
     for row in settings:  # compiles, which is not counted
-        follow(row.scenario, MemberNoise.of(base.seed, np.arange(1)), None, range(1, 2))
-    end = time.process_time() + budget_seconds - building
+        recorded(row.scenario, 1, range(2))
+    end = budget.end = now() + budget_seconds - building
     for row in settings:
         row.time = _timed(row.scenario, _TIMING * budget_seconds / len(settings))
     parts, judged = list(dict.fromkeys(row.part for row in settings[:-1])), list[Setting]()
     for place, part in enumerate(parts):
-        now = time.process_time()
-        until = now + (end - now - _STEPS * budget_seconds) / (len(parts) - place)
-        judged += _judged(base, [row for row in settings if row.part == part], until, left_out)
-    means = [row for row in judged if row.part == "bonds" and "sites" not in _table(row.scenario.bonds)]
+        at = now()
+        until = at + (end - at - _STEPS * budget_seconds) / (len(parts) - place)
+        budget.share = (1.0 - _TIMING - _STEPS) / len(parts)
+        judged += _judged(base, [row for row in settings if row.part == part], until, left_out, budget)
+    means = [row for row in judged if row.members and row.part == "bonds" and "sites" not in _table(row.scenario.bonds)]
     driven = scenario.drive.solves_motion  # its mean depends on the noise of the bonds, which other models lack
-    of_steps, trend = _judged_steps(written, written if driven else [written, *means][-1], accepted, end)
+    budget.share = _STEPS
+    of_steps, trend = _judged_steps(written, written if driven else [written, *means][-1], accepted, budget)
     judged += of_steps
     for row in judged if driven else ():
         row.error[:, 1:] = row.standard_error[:, 1:] = np.nan
@@ -188,6 +242,7 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     return xr.Dataset(variables, coordinates, {
         "Conventions": "CF-1.11", "title": f"speed against error: {scenario.name}", "not_converging": trend,
         "sim_version": importlib.metadata.version("sliding-sim"), "seed": str(scenario.seed), "tolerance": accepted,
+        "budget": float(f"{budget.needed:.1e}"), "averaged": int(driven),
         "swept": ", ".join(key for axis in scenario.sweep for key in axis.keys), "left_out": "\n".join(left_out),
     })  # fmt: skip
 
@@ -219,18 +274,21 @@ def _tried(scenario: Scenario) -> Iterator[tuple[str, dict[str, Any]]]:
         yield "bonds", {"model": last, "sites": round(sites)}
 
 
-def _admitted(part: str, changes: dict[str, Any], base: Scenario, left_out: list[str], end: float) -> list[Setting]:
+def _admitted(
+    part: str, changes: dict[str, Any], base: Scenario, left_out: list[str], end: float, budget: Budget | None = None
+) -> list[Setting]:
     """Return the scene with some keys of a part changed; nothing, but a reason in ``left_out``, if it refuses them.
 
-    After some CPU time of the process, ``end`` [s], only the setting of the scene itself is built.
+    After some time of a budget, ``end`` [s], only the setting of the scene itself is built.
     """
     table_now, label = _table(getattr(base, part)), " ".join(f"{value}" for value in changes.values())
     admitted = tables(keys(Scenario)[part].annotation).values()
     declared = {key for kind in admitted if model(kind) == changes["model"] for key in keys(kind)}
     is_written = table_now.items() >= changes.items()
     try:
-        if time.process_time() > end and not is_written:
-            raise ValueError("does not fit into the budget")
+        if budget is not None and budget.now() > end and not is_written:
+            budget.needed = max(budget.needed, 2.0 * budget.seconds)
+            raise ValueError(_TOO_LONG)
         changed = base.with_values({part: {key: table_now[key] for key in table_now.keys() & declared} | changes})
         changed.process  # noqa: B018 - some models are refused only when their modes are made
     except ValueError as fault:
@@ -255,47 +313,71 @@ def _fluctuates(scenario: Scenario) -> bool:
 
 
 def _timed(scenario: Scenario, seconds: float) -> float:
-    """Return the CPU time of the scene's run [s], by the last three of the pieces that are run in some seconds."""
+    """Return the CPU time of the scene's run [s], by all but the first of the pieces that are run in some seconds."""
     members, last = scenario.ensemble.members if _fluctuates(scenario) else 1, scenario.clock.steps
     full = min(together(scenario), members)
     batch = full if seconds_a_step(scenario, full) < 0.25 * seconds else min(full, _FEWEST)
-    noise, paces, piece, step, state = MemberNoise.of(scenario.seed, np.arange(batch)), list[float](), 1, 0, None
-    began = now = time.process_time()
-    while len(paces) < 4 or now < began + seconds:
-        steps = range(step + 1, min(step + piece, last) + 1)
+    noise, times, now = MemberNoise.of(scenario.seed, np.arange(batch)), list[tuple[int, float]](), stopwatch()
+    piece, step, state = 1, 0, None
+    began = now()
+    while not times or now() < began + seconds:
+        steps, before = range(step + 1, min(step + piece, last) + 1), now()
         state, _ = follow(scenario, noise, state if step else None, steps)
-        before, now = now, time.process_time()
-        paces.append((now - before) / len(steps))
+        times.append((len(steps), now() - before))
         step, piece = steps[-1] % last, min(2 * piece, _PIECE)
-    return -(-members // full) * last * full / batch * float(np.median(paces[-3:]))
+    done, spent = np.sum(times[1:] or times, axis=0)  # the first piece has loaded what is computed once
+    return -(-members // full) * last * full / batch * max(float(spent), _TICK) / float(done)
 
 
 def _records(scenario: Scenario) -> range:
-    """Return the clock steps at which runs are compared, the same times for any clock step."""
-    clock, few = scenario.clock, _fluctuates(scenario) and not scenario.drive.solves_motion
-    every = clock.stride * -(-clock.records // (_TIMES if few else _RECORDS))
+    """Return the clock steps at which runs are compared: those of all records, or evenly spaced ones of very many."""
+    clock = scenario.clock
+    numbers = clock.records * len(QUANTITIES) * (_FEWEST if _fluctuates(scenario) else 1)
+    every = clock.stride * -(-numbers // _SAMPLED)
     return range(clock.steps % every, clock.steps + 1, every)
 
 
-def recorded(scenario: Scenario, count: int, steps: range, names: Sequence[str] = QUANTITIES) -> Array:
-    """Return variables of the first members at some clock steps, shape (names, members, steps)."""
-    values = list[list[Array]]()
-    for members in np.array_split(np.arange(count), -(-count // together(scenario))):
-        _, course = follow(scenario, MemberNoise.of(scenario.seed, members), None, steps)
-        read, shape = (READ[name](scenario, course) for name in names), (len(steps), len(members))
-        values.append([np.broadcast_to(variable, shape).T for variable in read])
+def recorded(
+    scenario: Scenario, count: int, steps: range, names: Sequence[str] = QUANTITIES, first: int = 0, in_time: Any = None
+) -> Array:
+    """Return variables of some members, from the ``first`` one on, at some clock steps, shape (names, members, steps).
+
+    Between pieces of the run ``in_time`` is called, if it is given, which may raise an error.
+    """
+    values, whole = list[list[Array]](), max(1, len(steps) // _PIECES)
+    for members in np.array_split(first + np.arange(count), -(-count // together(scenario))):
+        state, pieces = None, list[list[Array]]()
+        for begin in range(0, len(steps), whole):
+            if in_time is not None:
+                in_time()
+            piece = steps[begin : begin + whole]
+            state, course = follow(scenario, MemberNoise.of(scenario.seed, members), state, piece)
+            read, shape = (READ[name](scenario, course) for name in names), (len(piece), len(members))
+            pieces.append([np.broadcast_to(variable, shape).T for variable in read])
+        values.append([np.concatenate(each, axis=1) for each in zip(*pieces, strict=True)])
     return np.concatenate(values, axis=1)
 
 
-def compared(scenario: Scenario, count: int, steps: range) -> Array:
-    """Return the ``QUANTITIES`` of the first members at some clock steps, shape (quantities, members, times).
+def compared(scenario: Scenario, count: int, steps: range, first: int = 0, in_time: Any = None) -> Array:
+    """Return the ``QUANTITIES`` of some members at some clock steps, shape (quantities, members, times).
 
     Under a spring or a force the only time is the mean over the second half of the steps, because single paths diverge.
     A member that has run away has the value zero.
     """
-    values = recorded(scenario, count, steps)
-    late = np.nan_to_num(values[:, :, len(steps) // 2 :])
-    return late.mean(axis=2, keepdims=True) if scenario.drive.solves_motion else values
+    if not scenario.drive.solves_motion:
+        return recorded(scenario, count, steps, first=first, in_time=in_time)
+    averages, most = list[Array](), max(_LEAST, _SAMPLED // (len(QUANTITIES) * len(steps)))
+    for begin in range(0, count, most):
+        values = recorded(scenario, min(most, count - begin), steps, first=first + begin, in_time=in_time)
+        averages.append(np.nan_to_num(values[:, :, len(steps) // 2 :]).mean(axis=2, keepdims=True))
+    return np.concatenate(averages, axis=1)
+
+
+def _most_sampled(scenario: Scenario, steps: range) -> int:
+    """Return the most members that are compared at some steps, so that their numbers stay small."""
+    return (
+        _MOST if scenario.drive.solves_motion else min(_MOST, max(_LEAST, _SAMPLED // (len(QUANTITIES) * len(steps))))
+    )
 
 
 def _known_errors(row: Setting, truth: Gammas, power: int) -> Array:
@@ -314,7 +396,7 @@ def _known_errors(row: Setting, truth: Gammas, power: int) -> Array:
 
 
 def _errors(values: Array, reference: Array, known: Array | None = None) -> Array:
-    """Return the largest differences over the run between two settings, and their standard errors.
+    """Return the differences between two settings at the time of their largest bound, and their standard errors.
 
     Parameters
     ----------
@@ -345,7 +427,8 @@ def _errors(values: Array, reference: Array, known: Array | None = None) -> Arra
     deviation = np.sqrt(np.sum(influence**2, axis=2) / (count * max(count - 1, 1)))
     unit = np.repeat(np.abs(exact[:, :1, 0]).max(axis=2), 2, axis=1)
     unit[_ENERGY, 1] = exact[_ENERGY, 1].max() or unit[_ENERGY, 1]
-    largest, result = size.argmax(axis=2)[..., np.newaxis], np.full((2, len(size), 4), np.nan)
+    bounds, result = size + students(count) * deviation, np.full((2, len(size), 4), np.nan)
+    largest = bounds.argmax(axis=2)[..., np.newaxis]
     at_largest = np.take_along_axis(np.stack([size, deviation]), largest[np.newaxis], axis=3)[..., 0]
     result[:, :, :2] = np.divide(at_largest, unit, out=np.zeros(at_largest.shape), where=unit > 0.0)
     if known is not None:
@@ -362,37 +445,76 @@ def _moments(sample: Array) -> tuple[Array, Array]:
     return np.stack([mean, spread], axis=1), np.stack([off, on_spread], axis=1)
 
 
-def _judged(base: Scenario, settings: list[Setting], end: float, left_out: list[str]) -> list[Setting]:
+def _judged(
+    base: Scenario, settings: list[Setting], until: float, left_out: list[str], budget: Budget
+) -> list[Setting]:
     """Return the settings of one part that fit into the time, with their errors against the finest of them.
 
-    As many members are compared as are estimated to fit into half of the time.
+    As many members are compared as are estimated to fit into half of the time. A first few of them show the time of a
+    run. Without a finer setting, that of the scene has no error, and none is returned but itself.
     """
-    steps, left = _records(max((row.scenario for row in settings), key=_fluctuates)), end - time.process_time()
-    fitting, part = sorted(settings, key=lambda row: (not row.own, row.time)), cast(Any, base.fluctuations)
-    # one member stands for all if members do not differ
-    share = {row.label: _FEWEST / base.ensemble.members if _fluctuates(row.scenario) else 1.0 for row in settings}
-    while sum(row.time * share[row.label] for row in fitting) > left:
-        _leave_out(fitting.pop(), left_out)
-    noisy = sum(row.time for row in fitting if _fluctuates(row.scenario)) / base.ensemble.members
-    count = int(np.clip(0.5 * left / max(noisy, 1e-12), _FEWEST, _MOST))
-    fitting = [row for row in settings if row in fitting]
-    samples = [compared(row.scenario, count if _fluctuates(row.scenario) else 1, steps) for row in fitting]
+    steps = _records(max((row.scenario for row in settings), key=_fluctuates))
+    finer = settings[1 + next(place for place, row in enumerate(settings) if row.own) :]
+    nearest = min(finer, key=lambda row: row.time, default=None)
+    order = sorted(settings, key=lambda row: (not row.own, row is not nearest, row.time))
+    noisy = [row for row in settings if _fluctuates(row.scenario)]
+    pace = {row.label: row.time / (base.ensemble.members if row in noisy else 1) for row in settings}
+    most = _most_sampled(base, steps)
+    wanted = 0.5 * budget.left(until) / max(sum(pace[row.label] for row in noisy), _TICK)
+    count = first = int(np.clip(max(0.25 * wanted, min(wanted, _FEWEST)), _LEAST, most))
+    samples, expected, taken, slower = dict[str, Array](), 0.0, 0.0, 1.0
+    for row in order:
+        number, limit = (first if row in noisy else 1), budget.end if row.own else until
+        if slower * pace[row.label] * number > budget.left(limit):
+            continue
+        before = budget.now()
+        with contextlib.suppress(_Spent):
+            samples[row.label] = _sample(row, number, steps, 0, limit, budget)
+        now = budget.now()
+        expected, taken = expected + pace[row.label] * number, taken + now - before
+        slower, pace[row.label] = max(slower, taken / expected), max(pace[row.label], (now - before) / number)
+    budget.slower = max(budget.slower, slower)
+    fitting = [row for row in settings if row.label in samples]
+    more = int(
+        min(
+            0.5 * budget.left(until) / max(sum(pace[row.label] for row in noisy if row in fitting), _TICK), most - count
+        )
+    )
+    if more > 0 and any(row in fitting for row in noisy):
+        with contextlib.suppress(_Spent):
+            added = {row.label: _sample(row, more, steps, count, until, budget) for row in fitting if row in noisy}
+            samples |= {label: np.concatenate([samples[label], rest], axis=1) for label, rest in added.items()}
+    if len(fitting) < len(settings):
+        budget.needs(2.0 * sum(pace[row.label] * (_FEWEST if row in noisy else 1) for row in settings))
+        left_out += [f"{row.label}: {_TOO_LONG}" for row in settings if row.label not in samples]
+    (own,) = (row for row in settings if row.own)
+    if not fitting or (finer and own is fitting[-1]):
+        return [own]
+    _compare(base, fitting, samples)
+    return [row for row in settings if row is own or row in fitting]
+
+
+def _sample(row: Setting, count: int, steps: range, first: int, until: float, budget: Budget) -> Array:
+    """Return the ``QUANTITIES`` of some members, as ``compared``; raise ``_Spent`` if the time is spent before."""
+
+    def in_time() -> None:
+        if budget.left(until) < 0.0:
+            raise _Spent
+
+    return compared(row.scenario, count, steps, first, in_time)
+
+
+def _compare(base: Scenario, fitting: list[Setting], samples: dict[str, Array]) -> None:
+    """Write the errors of the settings of one part against the last of them."""
+    part, finest = cast(Any, base.fluctuations), samples[fitting[-1].label]
     has_truth = fitting[0].part == "shear" and part.per_member and not (part.law.relaxing or base.drive.solves_motion)
     if has_truth:  # the distribution of ΔΓ by all modes of the cell
         pairs = cell_pairs(part.spectrum, part.side(base.setting.cell), part.points, *base.solid.effective)
         truth = Gammas(pairs.weight, pairs.count, pairs.wavenumber)
-    for row, sample in zip(fitting, samples, strict=True):
+    for row in fitting:
         known = _known_errors(row, truth, part.correlation.power) if has_truth else None
-        row.error, row.standard_error = _errors(sample, samples[-1], known)
-        row.members = max(sample.shape[1], samples[-1].shape[1])
-    return fitting
-
-
-def _leave_out(row: Setting, left_out: list[str]) -> None:
-    """Name a setting that does not fit into the budget; ``BadInput`` if it is that of the scene."""
-    if row.own:
-        raise BadInput([f'--budget: "{row.label}", as in the scenario, does not fit; give a larger budget'])
-    left_out.append(f"{row.label}: does not fit into the budget")
+        row.error, row.standard_error = _errors(samples[row.label], finest, known)
+        row.members = max(samples[row.label].shape[1], finest.shape[1])
 
 
 class _Replayed:
@@ -420,11 +542,11 @@ def _replays(scenario: Scenario) -> bool:
     return part.per_member and not (driven or part.law.relaxing or part.law.remembers or part.spectrum.bond_made)
 
 
-def _at_steps(rows: Sequence[Setting], count: int) -> list[Array]:
+def _at_steps(rows: Sequence[Setting], count: int, budget: Budget | None = None) -> list[Array]:
     """Return the ``QUANTITIES`` by several clock steps, the finest first.
 
     At a prescribed speed all have the fluctuations that the finest draws. Fluctuations have no error in time. Their
-    amplitude and the bonds have, so these are computed at each step.
+    amplitude and the bonds have, so these are computed at each step. ``_Spent`` is raised if a budget is spent before.
     """
     finest, *others = scenarios = [row.scenario for row in rows]
     if _replays(finest):
@@ -435,53 +557,109 @@ def _at_steps(rows: Sequence[Setting], count: int) -> list[Array]:
         scenarios[1:] = [scenario.with_values({}) for scenario in others]
         for scenario, row in zip(scenarios[1:], rows[1:], strict=True):
             scenario.__dict__["process"] = _Replayed(row.scenario, unit[:: round(row.ratio / rows[1].ratio)])
-    return [compared(scenario, count, _records(scenario)) for scenario in scenarios]
+
+    def in_time() -> None:
+        if budget is not None and budget.left() < 0.0:
+            raise _Spent
+
+    return [compared(scenario, count, _records(scenario), in_time=in_time) for scenario in scenarios]
 
 
-def _judged_steps(written: Setting, finest: Setting, accepted: float, end: float) -> tuple[list[Setting], str]:
+def _judged_steps(written: Setting, finest: Setting, accepted: float, budget: Budget) -> tuple[list[Setting], str]:
     """Return clock steps with their errors, and in words the results that do not converge.
 
     Steps are quartered until the bound is small, or until the next quarter does not fit into the time. If noise is the
     larger part of the bound, the members are multiplied by four instead. At a prescribed speed the bonds are those of
-    the finest model, which any model of small error resembles.
+    the finest model, which any model of small error resembles. If that does not fit, they are those of the scene.
     """
-    exact, noisy = finest.scenario, _fluctuates(finest.scenario)
-    rows = [_at_step(exact, ratio) for ratio in ((0.0625, 0.25, 1.0) if exact.clock.stride % 4 else (0.25, 1.0, 4.0))]
-    pace, left = finest.time / (exact.ensemble.members if noisy else 1), end - time.process_time()
-    most = min(_NUMBERS // exact.clock.steps, together(exact)) if _replays(exact) else _MOST
-    count = max(min(most, int(left / (32.0 * pace))), 4) if noisy else 1
-    if count * pace * sum(1.0 / row.ratio for row in rows) > left:
-        _leave_out(written, [])
+    first = None
+    for scene in (finest, written) if finest is not written else (written,):
+        coarser = scene.scenario.clock.stride % 4 == 0
+        for ratios in ((0.25, 1.0, 4.0), (1.0, 4.0)) if coarser else ((0.0625, 0.25, 1.0), (0.25, 1.0)):
+            first = first or _first_steps(scene, ratios, budget)
+    if first is None:
+        budget.needs(_FEWEST * 5.25 * _pace(written))
+        return [written], ""
+    exact, rows, runs, count, took = first
+    most = _most(exact)
     while True:
-        began = time.process_time()
-        runs = _at_steps(rows, count)
         changes = np.array([_errors(longer, shorter) for shorter, longer in itertools.pairwise(runs)])
         changes[:, :, :, 2 - exact.drive.solves_motion :] = 0.0
         # a change that is small by chance does not hide those before it, of first order
         sure, rest = students(count), np.max(changes / 4.0 ** np.arange(len(changes)).reshape(-1, 1, 1, 1), axis=0)
-        now, small = time.process_time(), float(np.max(rest[0] + sure * rest[1])) <= _SMALL * accepted
+        small = float(np.max(rest[0] + sure * rest[1])) <= _SMALL * accepted
         more_members = count < most and sure * float(np.max(rest[1])) > float(np.max(rest[0]))
-        if small or not (more_members or rows[0].ratio > _FINEST_STEP) or now + 4.2 * (now - began) > end:
+        if small or not (more_members or rows[0].ratio > _FINEST_STEP) or 4.2 * took > budget.left():
             break
-        count = min(4 * count, most) if more_members else count
-        rows = rows if more_members else [_at_step(exact, 0.25 * rows[0].ratio), *rows]
+        next_rows = rows if more_members else [_at_step(exact, 0.25 * rows[0].ratio), *rows]
+        following = _tried_steps(exact, next_rows, min(4 * count, most) if more_members else count, budget)
+        if following is None:
+            break
+        exact, rows, runs, count, took = following
     for row, run in zip(rows, runs, strict=True):  # the rest of a series that falls by _FALL is its last term here
         row.error, row.standard_error = _errors(run, runs[0]) + rest / (_FALL - 1.0)
         row.members, row.time = count, written.time / row.ratio
-    return rows[::-1], _trend(changes, 2.0 * runs[0].size / count, count, accepted)
+    trend = _trend(changes, 2.0 * runs[0].size / count, count, accepted)
+    if trend:
+        budget.needs(4.2 * took)
+    return rows[::-1], trend
+
+
+#: A scene, its clock steps, its runs with them, their members, and the time that they took [s].
+_Steps = tuple[Scenario, list[Setting], list[Array], int, float]
+
+
+def _first_steps(setting: Setting, ratios: tuple[float, ...], budget: Budget) -> _Steps | None:
+    """Return a scene at a few clock steps, with as many members as fit; None if too few do."""
+    exact, pace = setting.scenario, budget.slower * _pace(setting)
+    cost, count = pace * sum(1.0 / ratio for ratio in ratios), 1
+    if _fluctuates(exact):
+        count = max(min(_most(exact), int(budget.left() / (32.0 * pace))), 4)
+        count = max(min(count, int(budget.left() / cost)), _LEAST)
+    if count * cost > budget.left():
+        return None
+    return _tried_steps(exact, [_at_step(exact, ratio) for ratio in ratios], count, budget)
+
+
+def _tried_steps(exact: Scenario, rows: list[Setting], count: int, budget: Budget) -> _Steps | None:
+    """Return a scene at some clock steps with some members; None if the budget is spent before."""
+    began = budget.now()
+    try:
+        return exact, rows, _at_steps(rows, count, budget), count, budget.now() - began
+    except _Spent:
+        return None
+
+
+def _pace(setting: Setting) -> float:
+    """Return the estimated time of a run of one member [s]."""
+    return setting.time / (setting.scenario.ensemble.members if _fluctuates(setting.scenario) else 1)
+
+
+def _most(exact: Scenario) -> int:
+    """Return the most members that are compared at several clock steps."""
+    if _replays(exact):
+        return max(_LEAST, min(_NUMBERS // exact.clock.steps, together(exact)))
+    return _most_sampled(exact, _records(exact))
 
 
 def _trend(changes: Array, numbers: float, members: int, accepted: float) -> str:
     """Return in words the largest change that exceeds its noise and does not fall with the clock step; "" without one.
 
+    A single change does not show that it falls.
+
     Noise alone is larger than stated in one study of twenty, though many ``numbers`` are compared.
     """
-    (last, noise), (before, noise_before) = changes[:2]
+    last, noise = changes[0]
     shown = (last > students(members, numbers) * noise) & (_FALL * last > _SMALL * accepted)
+    before, noise_before = changes[1] if len(changes) > 1 else (last, noise)
     grown = np.where(shown & (before - last <= np.hypot(noise, noise_before)), last, 0.0)
+    if not grown.any():
+        return ""
     what, of = divmod(int(grown.argmax()), grown.shape[1])
     words = f"the {STATISTICS[of]} of {_WORDS[what]} changes by"
-    return f"{words} {100.0 * before[what, of]:.2g}, then by {100.0 * last[what, of]:.2g} %" if grown.any() else ""
+    if len(changes) == 1:
+        return f"{words} {100.0 * last[what, of]:.2g} %, and the next quarter does not fit into the budget"
+    return f"{words} {100.0 * before[what, of]:.2g}, then by {100.0 * last[what, of]:.2g} %"
 
 
 def students(members: int | Array, numbers: float = 1.0) -> Any:
@@ -518,7 +696,7 @@ def choices(dataset: xr.Dataset) -> list[Choice]:
         total = max(reference + sum(each - reference for each in changed), 0.2 * min([reference, *changed]))
         error = np.nan_to_num(errors[place]).sum(axis=0)
         noise = np.sqrt(np.nansum(noises[place] ** 2, axis=0))
-        bound = float(np.max(error + noise))
+        bound = float(np.max(error + noise)) if np.all(members[place] > 0) else math.inf
         combined.append(Choice((*place,), float(f"{total * step / reference:.2g}"), error, noise, bound))
     return combined
 
@@ -550,7 +728,8 @@ def table(dataset: xr.Dataset) -> list[dict[str, str]]:
         cells = {"changed": str(part), "setting": str(name) + " *" * int(own), "time": duration}
         for symbol, error, deviation in zip(_SHORT, *errors, strict=True):
             size, _, statistic = _worst(error[np.newaxis], deviation)
-            cells[f"{symbol}\n(%)"] = f"{size} {STATISTICS[statistic]}" if statistic and size != "0" else size
+            text = f"{size} {STATISTICS[statistic]}" if statistic and size != "0" else size
+            cells[f"{symbol}\n(%)"] = text if members else "–"
         lines.append(cells | {"members": f"{members:,}"})
     return lines
 
@@ -563,7 +742,23 @@ def explanation(dataset: xr.Dataset) -> str:
         "\n(%): largest difference from a finer setting, its standard error; of ΔΓ beyond its mean in its own units."
         + f"\nThe values of {swept} are those of the tables; choose others by --set." * bool(swept)
         + f"\nOmitted: {left_out}." * bool(left_out)
+        + _larger_budget(dataset, "answers what is missing")
+        + f"\nCompared: {_compared_in_words(dataset)}."
+        + "\nNot compared: peaks, drops of the force, slip events, position, speed, masked share, quantiles."
     )
+
+
+def _larger_budget(dataset: xr.Dataset, verb: str) -> str:
+    """Return a line with the budget that answers what the budget of the study did not; "" if it answered all."""
+    needed = float(dataset.attrs.get("budget", 0.0))
+    return f"\nA budget of about {engineering(needed, 's')} {verb}." if needed else ""
+
+
+def _compared_in_words(dataset: xr.Dataset) -> str:
+    """Return what is compared, in words."""
+    if dataset.attrs.get("averaged"):
+        return "means over the members and the second half of the run"
+    return "mean and spread over the members at all recorded times"
 
 
 def recommendation(dataset: xr.Dataset) -> str:
@@ -573,8 +768,13 @@ def recommendation(dataset: xr.Dataset) -> str:
     """
     if trend := dataset.attrs.get("not_converging"):
         text = f"Convergence is not shown. From quarter to quarter of the clock step {trend}.\nNo setting is"
-        return f"{text} recommended. With a larger budget it may converge. See also sim check."
+        return f"{text} recommended. See also sim check.{_larger_budget(dataset, 'tries a finer step')}"
     tolerance, tried = float(dataset.attrs["tolerance"]), choices(dataset)
+    if not math.isfinite(tried[0].bound):
+        unknown = dataset.isel(row=[row for row in tried[0].rows if not dataset["members"].values[row]])
+        names = ", ".join(str(name) for name in unknown["row"].values)
+        text = f"No setting is recommended, because the budget was spent before the error of {names} was known."
+        return text + _larger_budget(dataset, "shows it")
     written, (best, good) = tried[0], chosen(tried, tolerance)
     name = "It" if best is written else f"“{', '.join(dataset['row'].values[list(best.rows)])}”"
     verdict = "is the fastest combination within" if good else "has the smallest error; none is shown to be within"
@@ -603,9 +803,11 @@ def figure(dataset: xr.Dataset) -> Figure:
     Bars are the noise, at 95 %. Exact settings are drawn at a tenth of the smallest error. A ring marks the scene, a
     star the recommended combination, if there is one.
     """
+    tolerance, combined = float(dataset.attrs["tolerance"]), choices(dataset)
+    times = dataset["time"].to_numpy()
+    dataset = dataset.isel(row=dataset["members"].to_numpy() > 0)
     part, is_written, cost, members, error, deviation = (dataset[name].to_numpy() for name in _COLUMNS)
-    tolerance = float(dataset.attrs["tolerance"])
-    size, best = np.nan_to_num(error).reshape(len(part), -1), chosen(choices(dataset), tolerance)[0]
+    size, best = np.nan_to_num(error).reshape(len(part), math.prod(error.shape[1:])), chosen(combined, tolerance)[0]
     at = np.arange(len(part)), size.argmax(axis=1)
     off, bars = size[at], students(members) * np.nan_to_num(deviation).reshape(size.shape)[at]
     floor = 0.1 * min([tolerance, *off[off > _ROUNDING]])
@@ -616,9 +818,11 @@ def figure(dataset: xr.Dataset) -> Figure:
             if np.any(here := part == name):
                 panel.errorbar(cost[here], off[here], bars[here], c=color, marker=marker, ms=3.6, lw=0.6, label=words)
         panel.plot(cost[is_written == 1], off[is_written == 1], "o", c="none", mec="black", ms=7.5, label="as written")
-        if not dataset.attrs.get("not_converging"):
+        if math.isfinite(best.bound) and not dataset.attrs.get("not_converging"):
             panel.plot(best.time, max(best.bound, floor), "*", c="black", ms=7.0, zorder=5, label="recommended")
         panel.axhline(tolerance, color=REFERENCE, linestyle="--", linewidth=0.8, label="accepted")
+        if not part.size:  # logarithmic axes need a range
+            panel.set(xlim=(0.5 * times.min(), 2.0 * times.max()), ylim=(0.1 * tolerance, 10.0 * tolerance))
         panel.set(xscale="log", yscale="log", xlabel="CPU time of the run (s)", ylabel="largest error (bottom: exact)")
         legend(panel)
     return picture

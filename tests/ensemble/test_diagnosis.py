@@ -4,6 +4,7 @@ import itertools
 import math
 import re
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -266,6 +267,20 @@ def test_a_sweep_has_one_remark_with_the_range_of_its_values(scene):
     plan = Plan.of(scene(drive=spring, bonds=bonds, sweep={"drive.stage": ["20 mm/s", "10 mm/s"]}))
     (text,) = (text for text in remarks(plan) if "the model of a rigid slider does not hold" in text)
     assert "at 10 mm/s to 20 mm/s stable" in text
+
+
+@pytest.mark.parametrize("drive", ["steady", "spring", "force"])
+@pytest.mark.parametrize(("shear", "contact", "fluctuates"), [
+    ("banded, slip, onset", "load", True), ("modal, time, constant", "load", True), ("uniform", "load", False),
+    ("mean", "load", False), ("banded, slip, onset", "rate_dependent", False),
+])  # fmt: skip
+def test_a_carried_area_is_said_not_to_converge_only_if_fluctuations_move_it(drive, shear, contact, fluctuates):
+    lens = small(drive=DRIVES[drive], bonds=BONDS["rate, cut-off, carried"], shear=SHEARS[shear],
+                 contact=CONTACTS[contact])  # fmt: skip
+    assert any("carried area does not converge" in text for text in lens.remarks()) == fluctuates
+    free = small(drive=DRIVES[drive], bonds=BONDS["rate, cut-off, carried"], contact=CONTACTS[contact],
+                 shear=replace(SHEARS[shear], paid_by_adhesion=0.0)) if fluctuates else lens  # fmt: skip
+    assert not any("carried area does not converge" in text for text in free.remarks())
 
 
 @pytest.mark.parametrize("slider", ["spring with mass", "start", "table", "linear ramp", "force"])

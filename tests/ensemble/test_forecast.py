@@ -8,6 +8,7 @@ import sys
 import time
 from types import SimpleNamespace
 
+import numpy as np
 import psutil
 import pytest
 from helpers.commands import COUNTED, LENS
@@ -15,9 +16,12 @@ from helpers.parts import Record, analysis, load, run
 from helpers.scenes import sample
 from numpy.testing import assert_allclose
 
+import sim
 from benchmarks.timing import child
+from sim.engine import MemberNoise, follow
 from sim.ensemble import plan as plans, preview
 from sim.ensemble.dataset import identity
+from sim.ensemble.pace import counted, pace as pace_of
 from sim.ensemble.plan import Plan
 from sim.ensemble.preview import fitting, forecast, memory, remarks, size
 
@@ -78,7 +82,7 @@ def test_more_members_take_more_time_and_no_more_memory_and_steps_that_are_done_
     assert_allclose(forecast(many, 1).cpu, 10 * forecast(few, 1).cpu, rtol=0.1)
     assert_allclose([memory(many, jobs) for jobs in (1, 4)], [memory(few, jobs) for jobs in (1, 4)], rtol=0.1)
     plan = Plan.of(sample(2000, 50_000, record=Record(per_member=False)))
-    monkeypatch.setattr(preview, "tried", lambda plan: 1.0)
+    monkeypatch.setattr(preview, "pace_of", lambda plan: 1.0)
     done = {name for task in itertools.islice(plan.tasks(), 3) for name in task.names}
     left = 1.0 - 3 * plan.group / plan.members
     whole, rest = (forecast(plan, 2, left=share) for share in (1.0, left))
@@ -128,3 +132,48 @@ def test_the_largest_process_of_a_run_of_ten_times_the_members_is_as_large(tmp_p
         largest.append(child("-m", "sim", "run", *files, "--force", "--no-table", "-j", jobs)[1])
         assert 2**20 * largest[-1] < 1.5 * memory(Plan.of(load(tmp_path / "scene.toml")), 1)
     assert largest[1] < 1.1 * largest[0] + 512e6 / 2**20  # a dataset of up to 256 MB is built in memory
+
+
+BELL = {"model": "bell", "zero_force_rate": 20.0, "bell_force": 2e-11}
+#: Driven sliders whose clock steps take a second of sub-steps each, with a rest, rupture at a cut-off, bonds that are
+#: followed one by one, and a body on cohorts that grow from nothing.
+LONG = {
+    "a rest before fast sliding": {
+        "clock": {"duration": 0.01, "step": 2e-3},
+        "drive": {"model": "spring", "stage": 0.6, "stiffness": 7e-3, "start_after": 4e-3, "viscosity": 0.015,
+                  "contact_stiffness": "rigid"},
+        "bonds": {"model": "cohort", "rupture": {"model": "cut_off", "stretch": 6e-7, "rate": 16.0}, "tolerance": 1e-3,
+                  "bond_stiffness": 7e-7, "rebinding_rate": 2500.0, "site_density": 1.2e13},
+    },
+    "a heavy chain of tracked bonds": {
+        "clock": {"duration": 0.06, "step": 0.03}, "ensemble": {"members": 2},
+        "drive": {"model": "spring", "stage": -4e-4, "stiffness": 2e-3, "start": "steady", "mass": 5e-13,
+                  "damping": 2e-10},
+        "bonds": {"model": "tracked", "rupture": BELL, "bond_stiffness": 1e-7, "rebinding_rate": 11.0,
+                  "site_density": 8e13, "sites": 300, "start": "steady"},
+    },
+    "cohorts under a force": {
+        "clock": {"duration": 1e-3, "step": 1e-5}, "contact": {"load": 1e-5},
+        "drive": {"model": "force", "force": 8e-6, "damping": 1e-9, "contact_stiffness": "rigid"},
+        "bonds": {"model": "cohort", "rupture": BELL | {"zero_force_rate": 3.6e7, "bell_force": 9e-12},
+                  "bond_stiffness": 6e-7, "rebinding_rate": 2.7e5, "site_density": 3e17, "start": "empty"},
+    },
+}  # fmt: skip
+
+
+def long_run(name):
+    lens = {"solid": {"shear_modulus": 6e6}, "sphere": {"radius": 2e-3}, "adhesion": {"work": 0.09}, "seed": 3}
+    return Plan.of(sim.load({"contact": {"load": 1.5e-4}} | lens | LONG[name]))
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_the_time_of_a_run_in_sub_steps_is_foretold_within_a_factor_of_three(name):
+    plan = long_run(name)
+    pace_of(plan)  # loads kernels
+    begin = time.process_time()
+    foretold = pace_of(plan) * counted(plan)
+    assert time.process_time() - begin < 1.5
+    begin = time.process_time()
+    follow(plan.points[0], MemberNoise.of(3, np.arange(plan.members)), None, range(plan.points[0].clock.steps + 1))
+    took = time.process_time() - begin
+    assert took / 3.0 < foretold < 3.0 * took

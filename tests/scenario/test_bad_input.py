@@ -59,6 +59,14 @@ bond_stiffness = "0.8 uN/m"
 rebinding_ratio = 10
 """
 BY_NONE = BY_SPEED.replace(', critical_speed = "3 mm/s", stress = "0.2 MPa"', "")
+CATCH = (
+    BELL.replace(
+        '"bell", zero_force_rate = "200 1/s", bell_force = "4 pN"',
+        '"catch", slip_rate = "9 1/s", slip_force = "8 pN", catch_force = "{}", catch_rate = "{}"',
+    )
+    .replace("{ model", "{{ model")
+    .replace(" }\n", " }}\n")
+)
 #: Lines of the lens that the cases replace.
 RATE = 'model = "rate"\ncritical_speed = "10 mm/s"\nrebinding_rate = "500 1/s"\n'
 RAMP = 'model = "ramp"\nfrom = "10 um/s"\nto = "100 mm/s"\nscale = "log"'
@@ -154,6 +162,7 @@ TOGETHER = [
     (RATE, BELL.replace("cohort", "auto") + 'critical_speed = "1 mm/s"\n', "bonds", "either critical_speed"),
     (RATE, BELL.replace("cohort", "auto") + 'stress = "1 MPa"\n', "bonds", "omit stress"),
     (RATE, RATE.replace("500", "0").replace("rate", "auto", 1), "bonds", "rebinding_rate...above 0"),
+    (RATE, CATCH.format("7.9 fN", "100 1/s"), "bonds.rupture.catch_force", "at least 8e-15 N...catch_rate"),
     (SHEAR, '[shear]\nmodel = "mean"\nspectrum = { model = "bonds", footprint = "10 um" }\n', "shear.spectrum",
      'bonds.model = "cohort" or "tracked"'),
     ("members = 4", 'members = 4\n[shear.amplitude]\nmodel = "stress"\nreference = 1', "shear.amplitude",
@@ -167,6 +176,12 @@ def test_a_fault_is_reported_once_at_its_key_with_a_cure(refusal, cases):
     for old, new, key, words in cases:
         problems = refusal((old, new))
         assert len(problems) == 1 and agrees(problems[0], key, words), (new, problems)
+
+
+@pytest.mark.parametrize("catch", [("8.1 fN", "100 1/s"), ("1 aN", "0 1/s")], ids=["resolved", "no catch"])
+def test_a_weak_catch_is_read_if_it_is_resolved_or_never_opens_a_bond(tmp_path, catch):
+    (tmp_path / "x").write_text(LENS.replace(RATE, CATCH.format(*catch)), encoding="utf-8")
+    assert load(tmp_path / "x").bonds.rupture.model == "catch"
 
 
 def test_all_faults_of_values_come_in_one_pass(refusal):

@@ -1,0 +1,156 @@
+"""Pace of this machine: measured time of some steps of a run over their counted time.
+
+The counted time is the same on any machine, and it is right to a factor of two if a clock step is one piece of work. A
+driven slider and bonds with a stretch are advanced in sub-steps or from event to event, and their number is known only
+once they were made. So pieces of such a run are timed at several times of it.
+"""
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+
+from sim.engine import MemberNoise, State, follow, pack, start, unpack
+from sim.ensemble.diagnosis import spread
+from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots
+from sim.numerics.stopwatch import stopwatch
+from sim.scenario.scenario import Scenario
+from sim.units.errors import BadInput
+
+# Rough costs of one core [s]: a record of a batch, of a member, a byte of a map that is drawn.
+_RECORD, _RECORD_OF_MEMBER, _MAP_BYTE = 5e-6, 2e-7, 2e-9
+#: Time for which steps are tried [s]; a run of a shorter estimate [s] is tried only if it is made in sub-steps.
+_TRIED, _WORTH_TRYING = 0.25, 1.0
+#: Time for which pieces of a run in sub-steps are timed [s], and their times over the duration.
+_TIMED, _PLACES = 0.6, (0.0, 0.25, 0.5, 0.75, 1.0)
+#: Factor from the length of the pieces to the next, the largest number of steps into which a clock step is divided, and
+#: the most steps of a run so divided.
+_LONGER, _DIVISIONS, _MOST_STEPS = 4, 4**6, 10**9
+
+
+def counted(plan: Plan) -> float:
+    """Return the counted time of all steps and records on one core [s]."""
+    some, groups = spread(plan.points), plan.groups
+    first, last = (
+        sum(counted_block(point, group, Block(-1, point.clock.steps, point.clock.stride)) for point in some)
+        for group in (np.array(groups[0]), np.array(groups[-1]))
+    )
+    return len(plan.points) * ((len(groups) - 1) * first + last) / len(some)
+
+
+def counted_block(point: Scenario, members: np.ndarray, block: Block, speeds: np.ndarray | None = None) -> float:
+    """Return the counted time of the steps of a block and of the records and maps in it [s]."""
+    steps = block.end - block.start
+    maps = map_bytes(point, int(np.sum(members < point.record.map_members)))
+    maps *= sum(block.start < step <= block.end for step in snapshots(point)) / max(1, len(point.record.maps))
+    records = steps / block.stride * (_RECORD + len(members) * _RECORD_OF_MEMBER)
+    return steps * seconds_a_step(point, len(members), speeds) + records + _MAP_BYTE * maps
+
+
+def pace(plan: Plan) -> float:
+    """Return measured time of some steps over their counted time on this machine; 1 for a short run of known steps.
+
+    Kernels that are not in the cache are compiled.
+    """
+    ends = spread(plan.points, 3)
+    if any(map(in_substeps, ends)):
+        trials = [_timed(plan, point, _TIMED / len(ends)) for point in ends]
+    elif counted(plan) < _WORTH_TRYING:
+        return 1.0
+    else:
+        trials = [_tried(plan, point, _TRIED / len(ends)) for point in ends]
+    return sum(measured for measured, _ in trials) / sum(expected for _, expected in trials)
+
+
+def in_substeps(point: Scenario) -> bool:
+    """Return True if the time of a clock step depends on the solution: on sub-steps, or on events of bonds."""
+    return point.drive.solves_motion or point.population.stretched
+
+
+def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
+    """Return measured and counted time [s] of the last of some blocks of steps at one point.
+
+    Each block is twice as long as the one before; all together take about ``most`` [s].
+    """
+    members = np.arange(min(plan.group, max(1, int(most / 10.0 / seconds_a_step(point, 1)))))
+    stride, last, now = point.clock.stride, point.clock.steps, stopwatch()
+    dice, state, block, began = MemberNoise.of(point.seed, members), None, Block(-1, 0, stride), now()
+    for count in itertools.count():
+        begin = now()
+        for steps in block.pieces(1024, []):
+            state, course = follow(point, dice, state, steps)
+            for variable in plan.variables if steps[-1] % stride == 0 else ():
+                variable.read(point, course)
+        end = now()
+        if block.end == last or (count > 2 and end - began + 2.0 * (end - begin) > most):
+            break
+        following = max(1, 2 * block.end)  # a long block ends at a record
+        following = stride * math.ceil(following / stride) if following > stride else following
+        block = Block(block.end, min(last, following), stride)
+    point.release()
+    speeds = point.speeds(5, block.end / last)[2:]
+    return max(end - begin, 1e-9), counted_block(point, members, block, speeds)
+
+
+def _timed(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
+    """Return the time of a run of one group [s] by pieces that take about ``most`` [s], and its counted time.
+
+    A piece at each place is a small fraction of a clock step, because a whole one may take minutes. All are made four
+    times as long as often as the time allows. Behind a spring they begin in steady sliding, but for the first, because
+    a slider at rest needs no sub-steps before its spring is loaded.
+    """
+    members = np.arange(min(plan.group, max(1, int(most / 10.0 / seconds_a_step(point, 1)))))
+    noise, clock, division, count = MemberNoise.of(point.seed, members), point.clock, 1, 1
+    while division < _DIVISIONS and clock.steps * division * _LONGER <= _MOST_STEPS:
+        division *= _LONGER
+    scene = _divided(point, division)
+    first = follow(scene, noise, None, range(1, 2))[0]  # loads kernels
+    others = pack(_sliding(point, noise) or first)
+    states = [first, *(unpack(point, {name: array.copy() for name, array in others.items()}) for _ in _PLACES[1:])]
+    now = stopwatch()
+    end, rates = now() + most, np.ones(len(_PLACES))
+    while True:
+        began, longer = now(), list[float]()
+        for number, place in enumerate(_PLACES):
+            last = min(int(place * clock.steps * division) + count, scene.clock.steps)
+            steps, before = range(last - count + 1, last + 1), now()
+            states[number] = follow(scene, noise, states[number]._replace(step=last - count), steps)[0]
+            longer.append(max(now() - before, 1e-9) * division / count)
+            if now() > end:
+                break
+        number, after = len(longer), now()
+        # places without such long pieces change like those with them
+        rates = np.append(longer, rates[number:] * np.mean(longer) / np.mean(rates[:number]))
+        if count * len(_PLACES) * _LONGER > clock.steps * division or after + _LONGER * (after - began) > end:
+            break
+        division, count = (division // _LONGER, 1) if division > 1 else (1, _LONGER * count)
+        scene = _divided(point, division)
+    weights = np.where(np.isin(_PLACES, (0.0, 1.0)), 0.5, 1.0)  # trapezoidal rule
+    measured = clock.steps * float(np.average(rates, weights=weights))
+    block = Block(-1, clock.steps, clock.stride)
+    expected, whole = (counted_block(point, group, block) for group in (members, np.array(plan.groups[0])))
+    if measured > expected:  # sub-steps are made for each member
+        measured = whole + (measured - expected) * len(plan.groups[0]) / len(members)
+    else:
+        measured *= whole / expected
+    return measured, whole
+
+
+def _divided(point: Scenario, divisions: int) -> Scenario:
+    """Return a point with its clock steps divided, and the same shear process."""
+    if divisions == 1:
+        return point
+    clock = {"duration": point.clock.duration, "step": point.clock.step / divisions}
+    finer = point.with_values({"clock": clock | {"record": point.clock.step * point.clock.stride}}, built=False)
+    finer.__dict__["process"] = point.process
+    return finer
+
+
+def _sliding(point: Scenario, noise: MemberNoise) -> State | None:
+    """Return the state of steady sliding behind a spring, with steady bonds; None if there is no such state."""
+    changes: dict[str, Any] = {"drive.start": "steady", "drive.start_after": 0.0, "bonds.start": "steady"}
+    try:
+        return start(point.with_values(changes, built=False), noise)
+    except BadInput:
+        return None
