@@ -34,6 +34,7 @@ from sim.parts.exchange import (
     Mount,
     Parts,
     Sliding,
+    StickEnds,
     Storing,
     Times,
 )
@@ -211,11 +212,51 @@ def advance(
     way = duration[:, np.newaxis], reached["slip"], reached["path"], first, after.speed
     memory = Memory(*(reached[name] for name in Memory._fields)) if law.length < math.inf else Memory()
     motions = Motion(steps.start, ends[1:, np.newaxis], *way, position=after.position, memory=memory, draws=draws)
+    if not isinstance(bonds, _WITH_STRETCH):
+        plain = cast(models.Population, population)
+        start = bonds.bonding(plain).fraction * bonds.diluted(plain.area_radius, contact.radius)[0]
+        fractions = _from_start(start, bonding.fraction)
+        radii = np.fmax(_from_start(contact.radius, after.radius), 0.0)
+        motions = motions._replace(stick_ends=_stick_ends(drive, bonds, (slider, after), motions, fractions, radii))
     if isinstance(bonds, models.Counted):
         end, drawn = bonds.advance(cast(models.Population, population), motions, contact.radius, noise)
         stress = np.where(after.speed != 0.0, drawn.stress, bonding.stress)
         bonding = Bonding(drawn.fraction, stress, stress)
     return after, motions, end, with_contact_stress(parts, bonding, after.speed)
+
+
+def _from_start(start: Array, ends: Array) -> Array:
+    """Return values at the start of each of some clock steps, from those at the start of the first and at each end."""
+    values = np.empty_like(ends)
+    values[0], values[1:] = start, ends[:-1]
+    return values
+
+
+def _stick_ends(
+    drive: Force | Spring, bonds: models.Unbroken | models.Steady | models.Rate | models.Counted,
+    sliders: tuple[Driven, Driven], motions: Motion, fractions: Array, radii: Array,
+) -> StickEnds:  # fmt: skip
+    """Return the ends of stick phases in some clock steps of a slider on bonds without a stretch.
+
+    ``sliders`` are that at the start of the first step and that at the end of each, ``fractions`` and ``radii`` [m]
+    those of bonds and contact at the start of each step. Pull and strength are taken as linear in time to find the end
+    of the stick phase. An error of that time makes a small error of the stress, because the strength grows slowly. The
+    stress is the strength of the bonds at that time, so that it never exceeds that of all bonds.
+    """
+    before, after = sliders
+    rate = bonds.rebinding_rate if isinstance(bonds, models.Rate) else 0.0
+    free, area, sense = bonds.stress * (1.0 - fractions), np.pi * radii**2, np.sign(motions.slip)
+    forces = _from_start(before.spring_force, after.spring_force)
+    growth = after.spring_force - forces
+    if drive.spring:
+        growth = drive.spring * (after.stage_position - _from_start(before.stage_position, after.stage_position))
+    lacking = area * bonds.stress * fractions - sense * forces
+    gaining = sense * growth + area * free * np.expm1(-rate * motions.duration)
+    share = np.divide(lacking, gaining, out=np.zeros(area.shape), where=(lacking > 0.0) & (gaining > 0.0))
+    time = np.minimum(share, 1.0) * motions.duration
+    stress = bonds.stress * fractions - free * np.expm1(-rate * time)
+    ends = (motions.first == 0.0) & (motions.path > 0.0) & (area > 0.0)
+    return StickEnds(np.where(ends, stress, np.nan), np.where(ends, motions.duration - time, np.nan))
 
 
 def _advanced(
