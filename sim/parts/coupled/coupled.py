@@ -220,8 +220,10 @@ def advance(
         motions = motions._replace(stick_ends=_stick_ends(drive, bonds, (slider, after), motions, fractions, radii))
     if isinstance(bonds, models.Counted):
         end, drawn = bonds.advance(cast(models.Population, population), motions, contact.radius, noise)
-        stress = np.where(after.speed != 0.0, drawn.stress, bonding.stress)
-        bonding = Bonding(drawn.fraction, stress, stress)
+        strength = np.where(after.speed != 0.0, drawn.strength, np.abs(bonding.stress))
+        stress = bonding.stress if drive.mass == 0.0 else np.where(after.speed != 0.0, drawn.stress, bonding.stress)
+        bonding = with_contact_stress(parts, Bonding(drawn.fraction, stress, strength), after.speed)
+        return after, motions, end, bonding._replace(strength=strength)
     return after, motions, end, with_contact_stress(parts, bonding, after.speed)
 
 
@@ -257,6 +259,43 @@ def _stick_ends(
     stress = bonds.stress * fractions - free * np.expm1(-rate * time)
     ends = (motions.first == 0.0) & (motions.path > 0.0) & (area > 0.0)
     return StickEnds(np.where(ends, stress, np.nan), np.where(ends, motions.duration - time, np.nan))
+
+
+def with_contact(
+    parts: Parts, sliders: Driven, bonding: Bonding, contact: StepContact, radius: Array
+) -> tuple[Driven, Bonding]:
+    """Return slider and bonds at the end of each clock step in the contact of a ``radius`` [m] that is found there.
+
+    In the sub-steps the contact was that of the step, and ``counted`` bonds had not been drawn. The slider answers at
+    the start of the next step. A force that nothing can bear in the meantime is no friction:
+
+    - A contact that has closed bears the pull if the slider has neither mass nor damping, else that of its shear
+      displacement. If a stiff contact has closed on a body that is delayed, the body bears the stress of the bonds.
+    - A slider without mass on ``counted`` bonds bears the pull less the damping until the draw, whatever the draw adds
+      to the area. After it the slider sticks if the bonds have become stronger than the pull. If they are weaker, its
+      speed is that of the new balance.
+    """
+    drive, area = cast(Force | Spring, parts.drive), np.pi * np.fmax(radius, 0.0) ** 2
+    closes = (area > 0.0) & (sliders.radius == 0.0)
+    if closes.any():
+        yields, slope = drive.yields(contact.shear_modulus, contact.bodies.poisson_ratio)
+        force = area * bonding.stress
+        if drive.mass + drive.damping == 0.0:
+            force = sliders.spring_force
+        elif yields + slope > 0.0:
+            force = sliders.sheared / (yields + slope / radius)
+        stress = np.divide(force, area, out=bonding.stress + np.zeros(area.shape), where=closes)
+        bonding = bonding._replace(stress=stress)
+    if isinstance(parts.bonds, models.Counted) and drive.mass == 0.0:
+        pull, sense = sliders.spring_force, np.sign(sliders.speed)
+        grows = area > np.pi * sliders.radius**2
+        friction = pull - drive.damping * sliders.speed
+        bonding = bonding._replace(stress=np.divide(friction, area, out=bonding.stress.copy(), where=grows))
+        excess = np.maximum(sense * pull - area * parts.bonds.stress * bonding.fraction, 0.0)
+        drag = drive.damping + drive.viscosity * area
+        speed = np.divide(sense * excess, drag, out=np.where(excess > 0.0, sliders.speed, 0.0), where=drag > 0.0)
+        sliders = sliders._replace(speed=speed, body_speed=speed)
+    return sliders, bonding
 
 
 def _advanced(
