@@ -270,7 +270,8 @@ def with_contact(
     the start of the next step. A force that nothing can bear in the meantime is no friction:
 
     - A contact that has closed bears the pull if the slider has neither mass nor damping, else that of its shear
-      displacement. If a stiff contact has closed on a body that is delayed, the body bears the stress of the bonds.
+      displacement. Bonds without a stretch bear the pull less the damping of a slider without mass. If a stiff contact
+      has closed on another body that is delayed, the body bears the stress of the bonds.
     - A slider without mass on ``counted`` bonds bears the pull less the damping until the draw, whatever the draw adds
       to the area. After it the slider sticks if the bonds have become stronger than the pull. If they are weaker, its
       speed is that of the new balance.
@@ -280,8 +281,8 @@ def with_contact(
     if closes.any():
         yields, slope = drive.yields(contact.shear_modulus, contact.bodies.poisson_ratio)
         force = area * bonding.stress
-        if drive.mass + drive.damping == 0.0:
-            force = sliders.spring_force
+        if drive.mass == 0.0 and (drive.damping == 0.0 or not isinstance(parts.bonds, _WITH_STRETCH)):
+            force = sliders.spring_force - drive.damping * sliders.speed
         elif yields + slope > 0.0:
             force = sliders.sheared / (yields + slope / radius)
         stress = np.divide(force, area, out=bonding.stress + np.zeros(area.shape), where=closes)
