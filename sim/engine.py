@@ -127,6 +127,10 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
     valid = coupled.steps_until_contact_changes(sliders, contact_state.radius) if drive.solves_motion else len(steps)
     if valid < len(steps):
         return advance(scenario, state, noise, steps[:valid])
+    if drive.solves_motion:
+        reached = sliders, bonding, step_contact, contact_state.radius
+        sliders, bonding = coupled.with_contact(scenario.parts, *reached)
+        slider = sliders.at(-1)
     at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, contact_state.radius)
     history = state.events.next_phase() if steps.start in scenario.phases.steps[1:] else state.events
     with_area = scenario.varies["bonds"] == scenario.varies["contact"]

@@ -22,7 +22,7 @@ _RESOLVED = 5.0
 #: A maximum, its time [s], the sliding speed [m/s] and the contact area [m²] there.
 EXTREME = record("largest time speed area")
 #: Row of a running maximum: the last value but one, the last value, 1 if the value fell at both ends of the last step
-#: by its slopes, and the maximum of the phase so far.
+#: by its slopes and -1 if it may have a kink there, and the maximum of the phase so far.
 MAXIMUM = record("before last falls " + " ".join(EXTREME.names or ()))
 _NO_MAXIMUM = np.array([-math.inf, 0.0, 0.0, *(-math.inf for _ in EXTREME.names or ())])
 #: Time of the first opening and of the first closing of a contact [s], and the radius after that closing [m].
@@ -318,9 +318,14 @@ def after(
     The slope of the stress over time is ``stiffness`` × speed + ``relaxation``, and speed and area are taken as linear
     within a step. Where the slopes are known, a maximum between the ends is that of the cubic through values and
     slopes, of fourth order, if neither slope alone would change the value by more than five times its size within the
-    step. Where they are not, or contradict the values (bonds follow the mean speed of a step), and for the pull, a
-    sample above its two neighbours is refined by the parabola through the three, of third order, if both neighbours
-    have more than half of its value: a quantity that jumps is not smooth there.
+    step. It is at most what the tangents at both ends allow, because a kink between them would lift the cubic above
+    both. Where the slopes are unknown, or contradict the values (bonds follow the mean speed of a step), and for the
+    pull, a sample above its two neighbours is refined by the parabola through the three, of third order, if both
+    neighbours have more than half of its value: a quantity that jumps is not smooth there.
+
+    The stress of bonds without a stretch has kinks wherever the slider starts or stops, and jumps with its speed. Its
+    maximum is therefore that of the samples, of second order, and the strength at the end of a stick phase. The
+    friction is refined by a parabola only where it follows the contact area rather than the stress.
     """
     start, radius_before = before
     stress, stiffness, relaxation = (
@@ -332,8 +337,10 @@ def after(
     counts = rows, members, max(len(so_far.pull), pull.shape[1]), max(len(so_far.contact), radii.shape[1])
     now = [values + np.zeros((count, 1, 1)) for values, count in zip(so_far[:4], counts, strict=True)]
     here = (values[:, -1] for values in now)
-    ends = motions.first, motions.speed, motions.time[:, 0], motions.duration[:, 0]
-    _follow(stress, stiffness, relaxation, radii, pull, contact.work, contact.detached, *ends, 1.0 * with_area, *here)
+    ends = motions.first, motions.speed, *motions.stick_ends, motions.time[:, 0], motions.duration[:, 0]
+    bent = np.isnan(bonding.frozen).all()  # bonds without a stretch
+    traits = 1.0 * with_area, 1.0 * bent
+    _follow(stress, stiffness, relaxation, radii, pull, contact.work, contact.detached, *ends, *traits, *here)
     path = np.maximum(so_far.path, motions.path.max(axis=0)) if with_path else so_far.path
     return Events._make([*now, path, so_far.slips])
 
@@ -342,7 +349,7 @@ def _with_start(before: Array, values: Array, steps: int) -> Array:
     """Values at the start of a block and at the end of each step, shape (steps + 1, rows)."""
     if values.ndim == 1:
         return during(values, steps + 1)
-    return np.concatenate([before[np.newaxis], values])
+    return np.concatenate([np.broadcast_to(before, (1, *values.shape[1:])), values])
 
 
 @device
@@ -359,29 +366,33 @@ def _load(k, i, stress, stiffness, relaxation, speed, radius):
     return math.fabs(value), (slope if value > 0.0 else -slope if value < 0.0 else math.fabs(slope)), area
 
 
-@kernel(f"void({9 * _READ}{2 * 'float64[:], '}float64, {', '.join(4 * ['float64[:, :]'])})")
+@kernel(f"void({11 * _READ}{2 * 'float64[:], '}float64, float64, {', '.join(4 * ['float64[:, :]'])})")
 def _follow(
-    stresses, stiffness, relaxation, radii, pulls, works, detached, first, speed, times, steps, share,
-    stress, friction, pull, contact,
+    stresses, stiffness, relaxation, radii, pulls, works, detached, first, speed, strengths, since, times, steps,
+    share, bent, stress, friction, pull, contact,
 ):  # fmt: skip
-    bonds = stresses, stiffness, relaxation
+    bonds, none = (stresses, stiffness, relaxation), (0.0, math.nan, 0.0)
     for k in range(len(times)):
         time, step = times[k], steps[k]
         for i in range(len(friction)):
+            strength, place = _of(strengths, k, i), _of(since, k, i) / step
             speeds = _of(first, k, i), _of(speed, k, i)
             value0, slope0, area0 = _load(k, i, *bonds, speeds[0], radii)
             value1, slope1, area1 = _load(k + 1, i, *bonds, speeds[1], radii)
             around = time, step, speeds[0], speeds[1], area0, area1
             if i < len(stress):
                 areas = (area0, area1) if share > 0.0 else (0.0, 0.0)  # an open contact has none to leave out
-                _keep(value1, slope0, slope1, (*around[:4], areas[0], areas[1]), stress, i)
+                _keep(value1, slope0, slope1, (*around[:4], areas[0], areas[1]), (bent, strength, place), stress, i)
             growth = (area1 - area0) / step
             rise, slope = area0 * slope0 + growth * value0, area1 * slope1 + growth * value1
-            _keep(value1 * area1, rise, slope, around, friction, i)
+            of_stress = math.fabs(value1 - value0) * (area0 + area1)
+            of_area = math.fabs(area1 - area0) * (value0 + value1)
+            kink = (bent if of_stress > of_area else 0.0), strength * (area1 - place * (area1 - area0)), place
+            _keep(value1 * area1, rise, slope, around, kink, friction, i)
         for i in range(len(pull)):
             area0, area1 = math.pi * _of(radii, k, i) ** 2, math.pi * _of(radii, k + 1, i) ** 2
             around = time, step, _of(first, k, i), _of(speed, k, i), area0, area1
-            _keep(_of(pulls, k, i), math.nan, math.nan, around, pull, i)
+            _keep(_of(pulls, k, i), math.nan, math.nan, around, none, pull, i)
         for i in range(len(contact)):
             radius, work, opening = _of(radii, k + 1, i), _of(works, k, i), _of(detached, k, i)
             closed, was_closed = radius > 0.0, contact[i, _LAST] > 0.0
@@ -417,14 +428,16 @@ def _turn(time, step, radius, work, detached, row):
 
 
 @device
-def _keep(now, rise, slope, around, maxima, i):
+def _keep(now, rise, slope, around, kink, maxima, i):
     """Replace the maximum of a row by that after a value ``now``; slopes at both ends of the step, nan if unknown.
 
-    ``around``: time and length of the step [s], speeds and areas at both ends. Rows are taken by their number, because
-    a row that is an array, or a view of a record, costs twice the time.
+    ``around``: time and length of the step [s], speeds and areas at both ends. ``kink``: 1 if the value may have one in
+    the step, the value at a maximum that is one, nan without, and its place as share of the step before its end. Rows
+    are taken by their number, because a row that is an array, or a view of a record, costs twice the time.
     """
     time, step, speed0, speed1, area0, area1 = around
     before, last, fell, largest = maxima[i, 0], maxima[i, 1], maxima[i, 2], maxima[i, 3]
+    bent, top, place_of_top = kink
     now = 0.0 if math.isnan(now) else now
     place = -1.0  # of a new maximum, as share of the step before its end
     if last > largest:  # at the start of a phase
@@ -436,14 +449,19 @@ def _keep(now, rise, slope, around, maxima, i):
     if rise > 0.0 > slope and step * steepest < _RESOLVED * larger:
         peak, back = _top(last, now, step * rise, step * slope)
     elif (
-        (fell > 0.0 or math.isnan(rise + slope) or (rise > 0.0 and slope > 0.0))  # slopes are wrong or unknown
+        bent == 0.0
+        and fell >= 0.0
+        and (fell > 0.0 or math.isnan(rise + slope) or (rise > 0.0 and slope > 0.0))  # slopes are wrong or unknown
         and (last >= before and last > now and before > 0.5 * last and now > 0.5 * last)
     ):
         back = 1.0 - 0.5 * (before - now) / (before - 2.0 * last + now)
         peak = last - 0.25 * (before - now) * (1.0 - back)
+    if top > peak:
+        peak, back = top, place_of_top
     if peak > largest:
         largest, place = peak, back
-    maxima[i, 0], maxima[i, 1], maxima[i, 2] = last, now, 1.0 if rise < 0.0 and slope < 0.0 else 0.0
+    maxima[i, 0], maxima[i, 1] = last, now
+    maxima[i, 2] = -1.0 if bent > 0.0 else 1.0 if rise < 0.0 and slope < 0.0 else 0.0
     if place >= 0.0:
         maxima[i, 3], maxima[i, 4] = largest, time - place * step
         maxima[i, 5], maxima[i, 6] = speed1 - place * (speed1 - speed0), area1 - place * (area1 - area0)
@@ -453,9 +471,12 @@ def _keep(now, rise, slope, around, maxima, i):
 def _top(last, now, rise, slope):
     """Maximum of the cubic with these values and slopes, up then down, over a unit interval; how far before its end.
 
-    The derivative ``rise + 2 b s + c s²`` has one zero between the ends, since it changes its sign there.
+    The derivative ``rise + 2 b s + c s²`` has one zero between the ends, since it changes its sign there. The maximum
+    is lowered to the tangents at both ends where it exceeds one of them.
     """
     b, c = 3.0 * (now - last) - 2.0 * rise - slope, 3.0 * (rise + slope) - 6.0 * (now - last)
     square = b * b - rise * c
     s = rise / (math.sqrt(0.0 if square < 0.0 else square) - b)
-    return last + s * (rise + s * (b + s * c / 3.0)), 1.0 - s
+    peak, first, second = last + s * (rise + s * (b + s * c / 3.0)), last + s * rise, now - (1.0 - s) * slope
+    lower = first if first < second else second
+    return (peak if peak < lower else lower), 1.0 - s

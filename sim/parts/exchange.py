@@ -189,6 +189,25 @@ _NO_ADDRESS = np.uint64(0), np.uint64(0), np.empty(0, np.uint64), 0
 NO_DRAWS = Draws(np.empty((0, 0)), np.empty((0, 0)), _EMPTY, _EMPTY, _EMPTY, True, 1.0, 0.0, False, False, _NO_ADDRESS)
 
 
+class StickEnds(NamedTuple):
+    """End of the first stick phase in each step of a slider that starts it at rest, on bonds without a stretch.
+
+    The stress has a kink there, because it is the strength of the bonds from then on. Samples at the ends of the steps
+    do not show such a maximum. Both have the shape (steps, members) and are nan in a step without such an end, or of
+    the shape (1, 1) if nothing in the scene can stick.
+
+    Attributes
+    ----------
+    stress : array
+        Strength of the bonds then, which no stress in the stick phase exceeds [Pa].
+    time : array
+        Time from then to the end of the step [s].
+    """
+
+    stress: Array = UNKNOWN[np.newaxis]
+    time: Array = UNKNOWN[np.newaxis]
+
+
 class Motion(NamedTuple):
     """Sliding during a block of clock steps, each array of shape (steps, 1) or (steps, members).
 
@@ -218,6 +237,8 @@ class Motion(NamedTuple):
         Memory of the fluctuations at the end of each step, if the drive solves its motion.
     draws : Draws
         Fluctuations that the loop of the drive has drawn in these steps, without rows if it draws none.
+    stick_ends : StickEnds
+        Ends of stick phases, if the drive solves its motion.
     """
 
     step: int
@@ -231,6 +252,7 @@ class Motion(NamedTuple):
     position: Array = _NONE[np.newaxis]
     memory: Memory = Memory()
     draws: Draws = NO_DRAWS
+    stick_ends: StickEnds = StickEnds()
 
 
 def during(values: Array, steps: int) -> Array:

@@ -19,10 +19,12 @@ def contact(radius):
     return ContactState(zero + 1.0, radius, zero + np.nan, zero, zero)
 
 
-def followed(samples, step=0.5, slopes=None, radii=(ONE, ONE)):
+def followed(samples, step=0.5, slopes=None, radii=(ONE, ONE), stretched=True):
     """Running maximum of a stress given by its values, slopes where they are known; friction over a growing area."""
     zero, slopes = np.zeros(1), slopes or [np.full(1, np.nan)] * len(samples)
-    bondings = [Bonding(zero, np.asarray(one), zero, zero, slope) for one, slope in zip(samples, slopes, strict=True)]
+    forces = zero if stretched else zero + np.nan
+    pairs = zip(samples, slopes, strict=True)
+    bondings = [Bonding(zero, np.asarray(one), zero, zero, slope, forces) for one, slope in pairs]
     maxima = events.first(bondings[0], contact(radii[0]), zero, np.empty(0))
     whole = _after(maxima, bondings, radii, step, 1)
     for number in range(1, len(bondings)):
@@ -43,8 +45,8 @@ def _after(maxima, bondings, radii, step, number):
     return events.after(maxima, (bondings[0], radii[0]), bonding, contact(ends), still, motions)
 
 
-def stress(*course):
-    return followed(*course).stress[:, 0]
+def stress(*course, **kind):
+    return followed(*course, **kind).stress[:, 0]
 
 
 def test_parabolas_and_cubics_are_found_between_samples_and_friction_over_a_growing_area():
@@ -58,10 +60,10 @@ def test_parabolas_and_cubics_are_found_between_samples_and_friction_over_a_grow
     maxima = stress([top - 0.05 * u**2 * (1.5 - u) for u in away], 0.5, [0.15 * u * (u - 1.0) for u in away])
     assert_allclose(column("largest", maxima), top, rtol=1e-14)
     assert_allclose(column("time", maxima), where, rtol=1e-12)
-    # Hermite's cubic from 0 with slope 1 to 0.3 with slope −0.01, of either sign.
+    # Hermite's cubic from 0 with slope 1 to 0.5 with slope −0.5, of either sign.
     sign, t = np.array([1.0, -1.0]), np.linspace(0.0, 1.0, 100_001)
-    maxima = stress([np.zeros(2), 0.3 * sign], 1.0, [sign, -0.01 * sign])
-    cubic = 0.3 * t**2 * (3.0 - 2.0 * t) + t * (1.0 - t) ** 2 - 0.01 * t**2 * (t - 1.0)
+    maxima = stress([np.zeros(2), 0.5 * sign], 1.0, [sign, -0.5 * sign])
+    cubic = 0.5 * t**2 * (3.0 - 2.0 * t) + t * (1.0 - t) ** 2 - 0.5 * t**2 * (t - 1.0)
     assert_allclose(column("largest", maxima), cubic.max(), rtol=1e-9)
     # Stress 1 − (t − 1/2)² over an area that doubles in a step of 1: cubic, (1 + t)(3/4 + t − t²).
     values, slopes = [np.array([0.75]), np.array([0.75])], [np.array([1.0]), np.array([-1.0])]
@@ -82,6 +84,25 @@ def test_a_jump_keeps_its_sample_and_nothing_is_larger_than_nan():
     assert column("largest", maxima)[0] == 1.0
     samples = [np.array([1.0]), np.array([2.0]), np.array([1.5])]
     assert_array_equal(np.repeat(stress(samples), 3, axis=0), stress([np.repeat(values, 3) for values in samples]))
+
+
+def test_no_maximum_exceeds_a_kink_between_two_straight_courses():
+    # From the start up with slope 1 to a kink of height 1, from there down with slope −0.01.
+    place = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
+    samples, slopes = [1.0 - place, 1.0 - 0.01 * (1.0 - place)], [np.ones(5), np.full(5, -0.01)]
+    largest = column("largest", stress(samples, 1.0, slopes))
+    assert np.all(largest <= 1.0 + 1e-15) and np.all(largest >= samples[1])
+    # Hermite's cubic from 0 with slope 1 to 0.3 with slope −0.01 exceeds the tangent at its end.
+    largest = column("largest", stress([np.zeros(1), np.full(1, 0.3)], 1.0, [np.ones(1), np.full(1, -0.01)]))
+    assert 0.3 <= largest < 0.3 + 0.01 * 0.2
+
+
+def test_a_stress_of_bonds_without_a_stretch_is_never_refined_by_a_parabola():
+    for samples in ([0.8, 1.0, 0.98], [1.0, 1.0, 0.6]):  # the end of a stick phase, a jump of the speed
+        course = [np.full(1, value) for value in samples]
+        parabola = column("largest", stress(course))
+        largest = column("largest", stress(course, stretched=False))
+        assert parabola > 1.01 and largest == 1.0
 
 
 def peak_errors(counts, known):

@@ -34,6 +34,7 @@ from sim.parts.exchange import (
     Mount,
     Parts,
     Sliding,
+    StickEnds,
     Storing,
     Times,
 )
@@ -211,11 +212,91 @@ def advance(
     way = duration[:, np.newaxis], reached["slip"], reached["path"], first, after.speed
     memory = Memory(*(reached[name] for name in Memory._fields)) if law.length < math.inf else Memory()
     motions = Motion(steps.start, ends[1:, np.newaxis], *way, position=after.position, memory=memory, draws=draws)
+    if not isinstance(bonds, _WITH_STRETCH):
+        plain = cast(models.Population, population)
+        start = bonds.bonding(plain).fraction * bonds.diluted(plain.area_radius, contact.radius)[0]
+        fractions = _from_start(start, bonding.fraction)
+        radii = np.fmax(_from_start(contact.radius, after.radius), 0.0)
+        motions = motions._replace(stick_ends=_stick_ends(drive, bonds, (slider, after), motions, fractions, radii))
     if isinstance(bonds, models.Counted):
         end, drawn = bonds.advance(cast(models.Population, population), motions, contact.radius, noise)
-        stress = np.where(after.speed != 0.0, drawn.stress, bonding.stress)
-        bonding = Bonding(drawn.fraction, stress, stress)
+        strength = np.where(after.speed != 0.0, drawn.strength, np.abs(bonding.stress))
+        stress = bonding.stress if drive.mass == 0.0 else np.where(after.speed != 0.0, drawn.stress, bonding.stress)
+        bonding = with_contact_stress(parts, Bonding(drawn.fraction, stress, strength), after.speed)
+        return after, motions, end, bonding._replace(strength=strength)
     return after, motions, end, with_contact_stress(parts, bonding, after.speed)
+
+
+def _from_start(start: Array, ends: Array) -> Array:
+    """Return values at the start of each of some clock steps, from those at the start of the first and at each end."""
+    values = np.empty_like(ends)
+    values[0], values[1:] = start, ends[:-1]
+    return values
+
+
+def _stick_ends(
+    drive: Force | Spring, bonds: models.Unbroken | models.Steady | models.Rate | models.Counted,
+    sliders: tuple[Driven, Driven], motions: Motion, fractions: Array, radii: Array,
+) -> StickEnds:  # fmt: skip
+    """Return the ends of stick phases in some clock steps of a slider on bonds without a stretch.
+
+    ``sliders`` are that at the start of the first step and that at the end of each, ``fractions`` and ``radii`` [m]
+    those of bonds and contact at the start of each step. Pull and strength are taken as linear in time to find the end
+    of the stick phase. An error of that time makes a small error of the stress, because the strength grows slowly. The
+    stress is the strength of the bonds at that time, so that it never exceeds that of all bonds.
+    """
+    before, after = sliders
+    rate = bonds.rebinding_rate if isinstance(bonds, models.Rate) else 0.0
+    free, area, sense = bonds.stress * (1.0 - fractions), np.pi * radii**2, np.sign(motions.slip)
+    forces = _from_start(before.spring_force, after.spring_force)
+    growth = after.spring_force - forces
+    if drive.spring:
+        growth = drive.spring * (after.stage_position - _from_start(before.stage_position, after.stage_position))
+    lacking = area * bonds.stress * fractions - sense * forces
+    gaining = sense * growth + area * free * np.expm1(-rate * motions.duration)
+    share = np.divide(lacking, gaining, out=np.zeros(area.shape), where=(lacking > 0.0) & (gaining > 0.0))
+    time = np.minimum(share, 1.0) * motions.duration
+    stress = bonds.stress * fractions - free * np.expm1(-rate * time)
+    ends = (motions.first == 0.0) & (motions.path > 0.0) & (area > 0.0)
+    return StickEnds(np.where(ends, stress, np.nan), np.where(ends, motions.duration - time, np.nan))
+
+
+def with_contact(
+    parts: Parts, sliders: Driven, bonding: Bonding, contact: StepContact, radius: Array
+) -> tuple[Driven, Bonding]:
+    """Return slider and bonds at the end of each clock step in the contact of a ``radius`` [m] that is found there.
+
+    In the sub-steps the contact was that of the step, and ``counted`` bonds had not been drawn. The slider answers at
+    the start of the next step. A force that nothing can bear in the meantime is no friction:
+
+    - A contact that has closed bears the pull if the slider has neither mass nor damping, else that of its shear
+      displacement. Bonds without a stretch bear the pull less the damping of a slider without mass. If a stiff contact
+      has closed on another body that is delayed, the body bears the stress of the bonds.
+    - A slider without mass on ``counted`` bonds bears the pull less the damping until the draw, whatever the draw adds
+      to the area. After it the slider sticks if the bonds have become stronger than the pull. If they are weaker, its
+      speed is that of the new balance.
+    """
+    drive, area = cast(Force | Spring, parts.drive), np.pi * np.fmax(radius, 0.0) ** 2
+    closes = (area > 0.0) & (sliders.radius == 0.0)
+    if closes.any():
+        yields, slope = drive.yields(contact.shear_modulus, contact.bodies.poisson_ratio)
+        force = area * bonding.stress
+        if drive.mass == 0.0 and (drive.damping == 0.0 or not isinstance(parts.bonds, _WITH_STRETCH)):
+            force = sliders.spring_force - drive.damping * sliders.speed
+        elif yields + slope > 0.0:
+            force = sliders.sheared / (yields + slope / radius)
+        stress = np.divide(force, area, out=bonding.stress + np.zeros(area.shape), where=closes)
+        bonding = bonding._replace(stress=stress)
+    if isinstance(parts.bonds, models.Counted) and drive.mass == 0.0:
+        pull, sense = sliders.spring_force, np.sign(sliders.speed)
+        grows = area > np.pi * sliders.radius**2
+        friction = pull - drive.damping * sliders.speed
+        bonding = bonding._replace(stress=np.divide(friction, area, out=bonding.stress.copy(), where=grows))
+        excess = np.maximum(sense * pull - area * parts.bonds.stress * bonding.fraction, 0.0)
+        drag = drive.damping + drive.viscosity * area
+        speed = np.divide(sense * excess, drag, out=np.where(excess > 0.0, sliders.speed, 0.0), where=drag > 0.0)
+        sliders = sliders._replace(speed=speed, body_speed=speed)
+    return sliders, bonding
 
 
 def _advanced(

@@ -162,9 +162,10 @@ def _after_event(line, time, tracks, slider, contact, ground, energy, nodes):
         row.radius = radius
         energy.area -= mechanics.contact_energy(row, area, slider)
     before, worked, lost = stored_energy(row, node.square, time, slider, contact), energy.work, energy.rupture
-    yields, _ = mechanics.compliance(row.radius, slider)
-    if yields > 0.0 and slider.viscosity == 0.0:  # it is sheared as by the bonds before
+    yields, _ = mechanics.compliance(radius if radius > 0.0 else row.radius, slider)
+    if yields > 0.0 and slider.viscosity == 0.0:  # it is sheared as by the bonds before, in the area that there is now
         before += 0.5 * row.sheared * (row.sheared / yields - area * row.moment)
+        energy.area -= 0.5 * row.sheared * row.sheared * (1.0 / yields - mechanics.stiffness_of(row.radius, slider))
     is_balanced = _rebalance(line, time, tracks, slider, contact, ground, energy, node)
     if not is_balanced and contact.stays == 0.0:
         contact = mechanics.later(contact, 0.0, 1.0)

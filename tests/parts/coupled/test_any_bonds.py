@@ -119,9 +119,19 @@ def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_
     open_ = np.isnan([state.contact.radius[0] for state in states])
     assert open_[11 if callable(make) else 15 : 20].all() and not open_[21:].any()
     assert np.isnan(read["runaway_time"]).all() and residual(read) < 1e-5
+    if not callable(make) and "mass" not in keys:  # neither its place nor its pull shows a push back
+        positions = np.array([state.drive.position[0] for state in states])
+        assert np.min(np.diff(positions)[20:]) >= 0.0
+        friction = [state.bonding.stress[0] * np.pi * state.contact.radius[0] ** 2 for state in states]
+        pushed = np.where(open_, 0.0, friction - read["spring_force"])
+        assert np.max(pushed) <= 1e-5 * np.max(read["spring_force"])
     if not {"damping", "mass"} & keys.keys():  # nothing bears the force in an open contact
         assert_allclose(read["spring_force"][16:20], 0.0, atol=1e-12 * driven.UNIT)
         assert read["spring_force"][-1] > 0.05 * driven.UNIT
+        # the friction of a closed contact is what the spring bears, at the record of its closing as well
+        friction = [state.bonding.stress[0] * np.pi * state.contact.radius[0] ** 2 for state in states]
+        missing = np.where(open_, 0.0, friction - read["spring_force"])
+        assert_allclose(missing, 0.0, atol=1e-5 * np.max(read["spring_force"]))  # the motion has 1e-6
 
 
 @pytest.mark.parametrize(("make", "keys"), [(MOMENT, {"mass": 0.1, "damping": 0.1}),

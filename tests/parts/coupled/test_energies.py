@@ -77,6 +77,17 @@ def test_members_whose_adhesion_goes_and_returns_again_and_again_have_energies_a
         assert residual(dict(zip(READINGS, readings[:, member].T, strict=True))) < 1e-5
 
 
+@pytest.mark.parametrize("body", [{"damping": 0.3}, {"mass": 0.01}, {}])
+@pytest.mark.parametrize("contact", [2.0, "half_space"])
+def test_slips_at_once_after_events_only_dissipate_if_the_stiffness_of_the_contact_follows_its_area(body, contact):
+    drive = spring(0.5, contact=contact, **body)
+    states, read = marched(scenario(2.0, 100, drive, share=1.0, start="empty", make=SITES))
+    assert residual(read) < 1e-5
+    assert np.ptp([state.contact.radius[0] for state in states]) > 0.1 * math.sqrt(AREA / math.pi)
+    assert read["dissipated_by_snaps"][-1] > 1e-6 * read["drive_work"][-1]
+    assert np.min(np.diff(read["dissipated_by_snaps"])) >= -1e-12 * np.max(read["drive_work"])
+
+
 @pytest.mark.parametrize("make", [FirstMoment, COHORTS, SITES, CARRIED])
 @pytest.mark.parametrize("contact", [2.0, "half_space"])
 def test_energy_that_a_renewed_area_takes_along_is_that_stored_in_it_with_any_viscosity(make, contact):
