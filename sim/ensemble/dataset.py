@@ -24,7 +24,7 @@ from sim.ensemble.store import Blocks
 from sim.ensemble.variables import MAP, NUMBERS, SYSTEMATIC, Variable
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice
-from sim.numerics.hdf5 import CHUNK_CACHE, Refused, opened, tables
+from sim.numerics.hdf5 import CHUNK_CACHE, File, Refused, opened, tables
 from sim.scenario.files import Files
 from sim.scenario.messages import in_plain_words
 from sim.scenario.scenario import Scenario
@@ -409,7 +409,7 @@ def write(outline: Outline, parts: Blocks, path: Path) -> None:
 
 
 def _write(outline: Outline, parts: Blocks, path: Path, **how: Any) -> None:
-    with HDF5, netCDF4.Dataset(path, "w", format="NETCDF4", **how) as file:
+    with HDF5, File(path, "w", format="NETCDF4", **how) as file:
         for name, size in outline.sizes.items():
             file.createDimension(name, size)
         file.setncatts(outline.attributes)
