@@ -294,7 +294,8 @@ def pool(jobs: int) -> Iterator[Any]:
         if threading.current_thread() is threading.main_thread():
             before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # new processes inherit that
             try:
-                executor.submit(os.getpid)  # which starts all processes
+                with _ctrl_c_ignored():
+                    executor.submit(os.getpid)  # which starts all processes
             finally:
                 signal.signal(signal.SIGINT, before or signal.SIG_DFL)
         yield executor
@@ -304,14 +305,29 @@ def pool(jobs: int) -> Iterator[Any]:
         executor.shutdown(kill_workers=True)
 
 
+@contextlib.contextmanager
+def _ctrl_c_ignored() -> Iterator[None]:
+    """Let Windows ignore the Ctrl-C of a console. New processes inherit that there, but no handler of a signal."""
+    if sys.platform != "win32":
+        yield
+        return
+    import ctypes
+
+    ctypes.windll.kernel32.SetConsoleCtrlHandler(None, True)
+    try:
+        yield
+    finally:
+        ctypes.windll.kernel32.SetConsoleCtrlHandler(None, False)
+
+
 def _begin(parent: int) -> None:
     """Prepare a process of a pool: the parent alone decides about a stop, and the process does not outlive it."""
     for order in signals(*_STOPPING):
         signal.signal(order, signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    threading.Thread(target=end_with, args=(parent,), daemon=True).start()
 
 
-def _end_with(parent: int) -> None:
+def end_with(parent: int) -> None:
     """End this process when another one is gone."""
     import psutil
 
