@@ -158,6 +158,28 @@ def test_a_path_has_letters_of_the_systems_code_page(tmp_path):
     assert datasets.attributes_of(path)["sim_version"] == sim.__version__
 
 
+def test_an_output_that_another_program_holds_open_is_published_by_resume(tmp_path, monkeypatch):
+    path, changed, replace_file = tmp_path / "out.nc", sample(seed=4), os.replace
+    ensemble.run(sample(), path)
+    content = path.read_bytes()
+
+    def refusing(source, target):
+        if Path(target) == path:
+            raise PermissionError(13, "The file is used by another process", str(target))
+        replace_file(source, target)
+
+    with monkeypatch.context() as patched, path.open("rb"):
+        if os.name != "nt":  # which refuses by itself
+            patched.setattr("os.replace", refusing)
+        with pytest.raises(StoreTrouble, match=r"out\.nc cannot be replaced: close the program"):
+            ensemble.run(changed, path, replace=True)
+        assert path.read_bytes() == content
+    ensemble.run(changed, path, resume=True)
+    assert not path.with_name("out.nc.parts").exists()
+    with sim.open(path) as dataset:
+        assert dataset.attrs["seed"] == "4"
+
+
 def test_letters_that_the_code_page_lacks_are_refused_before_the_run_and_named_when_a_file_is_read(
     tmp_path, monkeypatch
 ):
@@ -185,7 +207,8 @@ def test_letters_that_the_code_page_lacks_are_refused_before_the_run_and_named_w
 
 def test_no_file_is_read_or_written_while_another_thread_reads_through_xarray(tmp_path):
     path, lock = ensemble.run(sample(), tmp_path / "out.nc"), xr.backends.netCDF4_.NETCDF4_PYTHON_LOCK
-    writes = [lambda: ensemble.run(sample(), path, replace=True), lambda: datasets.attributes_of(path)]
+    other = ensemble.run(sample(), tmp_path / "other.nc")  # because Windows replaces no file that is open
+    writes = [lambda: ensemble.run(sample(), other, replace=True), lambda: datasets.attributes_of(path)]
     with ThreadPoolExecutor(1) as pool, sim.open(path) as dataset:
         for work in (*writes, lambda: sim.open(path).close(), dataset.load):
             with lock:
