@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from sim.units.terminal import accept_all_letters, plain, say, while_read
+from sim.units.terminal import accept_all_letters, plain, print_rows, say, while_read
 
 
 @pytest.mark.parametrize("encoding", ["cp1252", "cp850", "ascii"])
@@ -20,6 +20,17 @@ def test_an_output_that_lacks_a_letter_keeps_the_sense_of_a_formula(encoding, st
     assert printed.startswith("N0 - N: ") and "?" not in printed
     assert "DeltaGamma/w" in printed or "ΔΓ/w" in printed
     assert "10^-" in printed and "m2" not in printed
+
+
+def test_columns_of_a_table_are_as_wide_as_what_is_written(monkeypatch):
+    screen = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", screen)
+    accept_all_letters()
+    print_rows([{"ΔΓ": "3", "a": "-1"}, {"ΔΓ": "1 → 2", "a": "−2"}])
+    screen.flush()
+    lines = screen.buffer.getvalue().decode().splitlines()
+    assert [line.split()[-1] for line in lines] == ["a", "-1", "-2"]
+    assert len({len(line.rstrip()) for line in lines}) == 1
 
 
 def test_a_utf_8_output_has_every_letter_as_it_is(monkeypatch):

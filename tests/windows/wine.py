@@ -87,10 +87,18 @@ class Windows:
         printed = process.communicate()[0].decode("cp1252", "replace").replace("\r", "")
         return process.returncode, printed
 
-    def end(self) -> None:
-        """End all processes of this folder, and wait for that."""
-        subprocess.run(["wineserver", "-k"], env=self.environment, check=False)
-        subprocess.run(["wineserver", "-w"], env=self.environment, check=False)
+    @contextlib.contextmanager
+    def started(self) -> Iterator[None]:
+        """Keep Wine's services alive by an idle process; they hold its output open, and not that of another process."""
+        idle = self.begin("-c", "print('ready', flush=True); input()", stdin=subprocess.PIPE)
+        idle.stdout.readline()
+        try:
+            yield
+        finally:
+            idle.kill()
+            for stream in (idle.stdin, idle.stdout):
+                stream.close()
+            idle.wait()
 
 
 # The making.
@@ -284,8 +292,13 @@ class Walk:
 
 def walk(folder: Path) -> int:
     """Go the way of a user; return the number of steps that went wrong."""
-    windows = Windows(folder)
-    user = Walk(windows)
+    user = Walk(Windows(folder))
+    with user.windows.started():
+        _go(user)
+    return user.faults
+
+
+def _go(user: Walk) -> None:
     user.asked("sim new", "new first.toml", "first.toml", "first.toml", "sim.schema.json")
     user.asked("sim check", "check first.toml", "JKR radius")
     printed = user.sim("run", "first.toml", "-j", "2")
@@ -302,8 +315,6 @@ def walk(folder: Path) -> int:
     _reader_that_leaves(user)
     _console(user)
     _page(user)
-    windows.end()
-    return user.faults
 
 
 def _fits(user: Walk) -> None:
@@ -426,7 +437,7 @@ def _page(user: Walk) -> None:
     ):
         printed = answer(path, question)
         user.step(name, has in printed, printed[-300:])
-    user.windows.end()
+    server.kill()
     server.wait()
     server.stdout.close()
 
@@ -440,19 +451,19 @@ def test(folder: Path, files: list[str]) -> int:
     if not files:
         found = (path for name in TESTED for path in (windows.checkout / "tests" / name).rglob("test_*.py"))
         files = sorted(path.relative_to(windows.checkout).as_posix() for path in found)
-    faults = 0
-    for file in files:
-        began = time.monotonic()
-        status, printed = windows.run("-m", "pytest", file, "--timeout=0", "-rs", cwd=windows.checkout)
-        is_right = status in (0, 5)  # 5: all tests of the file are for `make verify`
-        faults += not is_right
-        lines = printed.splitlines()
-        summary = lines[-1] if lines else "printed nothing"
-        print(f"{'ok   ' if is_right else 'FAULT'} {file} {summary} [{time.monotonic() - began:.0f} s]", flush=True)
-        shown = [line for line in lines if line.startswith("SKIPPED")] if is_right else lines[-60:]
-        print("".join(f"      | {line}\n" for line in shown), end="", flush=True)
-    windows.end()
-    return faults
+    with windows.started():
+        return sum(not _passes(windows, file) for file in files)
+
+
+def _passes(windows: Windows, file: str) -> bool:
+    """Return True if the tests of a file pass; print their summary, what was skipped, and the end of what failed."""
+    began = time.monotonic()
+    status, printed = windows.run("-m", "pytest", file, "--timeout=0", "-rs", cwd=windows.checkout)
+    is_right, lines = status in (0, 5), printed.splitlines() or ["printed nothing"]  # 5: all are for `make verify`
+    print(f"{'ok   ' if is_right else 'FAULT'} {file} {lines[-1]} [{time.monotonic() - began:.0f} s]", flush=True)
+    shown = [line for line in lines if line.startswith("SKIPPED")] if is_right else lines[-60:]
+    print("".join(f"      | {line}\n" for line in shown), end="", flush=True)
+    return is_right
 
 
 def main(what: str, folder: str, *words: str) -> int:
