@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import stat
+import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +23,7 @@ BROKEN = "is not a netCDF file, or is truncated or damaged"
 #: Cache of HDF5 for each variable [byte]; its default of 64 MiB holds every variable of a usual run whole.
 CHUNK_CACHE = 2**20
 #: Encoding of the names of files for the C library. On Windows it is the system's code page, which lacks some letters.
-ENCODING = "mbcs" if os.name == "nt" else "utf-8"
+ENCODING = "mbcs" if os.name == "nt" else sys.getfilesystemencoding()
 
 
 class Refused(ValueError):
@@ -55,8 +56,10 @@ def claim(path: Path, replace: bool, inputs: Iterable[Path] = ()) -> None:
 
 def _unnamable(path: str | os.PathLike[str]) -> str:
     """Return the reason for which the C library cannot be told a path; "" if there is none."""
+    if sys.getfilesystemencoding() == ENCODING:
+        return ""
     try:
-        os.path.abspath(path).encode(ENCODING, "surrogateescape" if ENCODING == "utf-8" else "strict")
+        os.path.abspath(path).encode(ENCODING)
     except UnicodeEncodeError as fault:
         letters = fault.object[fault.start : fault.end]
         return f"datasets cannot have {letters} in their path, which the code page of this system lacks"

@@ -38,7 +38,7 @@ def test_a_utf_8_output_has_every_letter_as_it_is(monkeypatch):
     monkeypatch.setattr(sys, "stdout", screen)
     accept_all_letters()
     say("N0 − N: ΔΓ µm² 测")
-    assert screen.buffer.getvalue().decode() == "N0 − N: ΔΓ µm² 测\n"
+    assert screen.buffer.getvalue().decode().splitlines() == ["N0 − N: ΔΓ µm² 测"]
 
 
 class Left(io.RawIOBase):
