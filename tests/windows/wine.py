@@ -198,8 +198,9 @@ def _check_signature(file: Path, signer: str) -> None:
     """End if a file is not as its signer signed it. The chain of certificates is not followed."""
     words = ["osslsigncode", "verify", "-in", str(file)]
     printed = subprocess.run(words, capture_output=True, text=True, check=False).stdout
-    digests = [line.split(":")[1].strip() for line in printed.splitlines() if "message digest" in line.lower()]
-    if len(digests) < 2 or len(set(digests)) > 1 or f"CN={signer}" not in printed.replace("CN = ", "CN="):
+    starts = "Current message digest", "Calculated message digest"
+    digests = [line.split(":")[1].strip() for line in printed.splitlines() if line.startswith(starts)]
+    if len(digests) != 2 or len(set(digests)) > 1 or f"CN={signer}" not in printed.replace("CN = ", "CN="):
         sys.exit(f"{file.name} is not as {signer} signed it")
 
 
@@ -385,31 +386,35 @@ def _console(user: Walk) -> None:
     process, terminal = pty.fork()
     if process == 0:
         os.chdir(user.here)
-        os.execvpe("wine", user.windows.command("-m", "sim", *words), user.windows.environment)
-    printed, pressed = b"", 0.0
-    end = time.monotonic() + 180.0
+        environment = user.windows.environment | {"WALKED": str(os.getpid())}
+        os.execvpe("wine", user.windows.command("-m", "sim", *words), environment)
+    printed, is_pressed, end = b"", False, time.monotonic() + 300.0
     while time.monotonic() < end:
         if select.select([terminal], [], [], 0.05)[0]:
             try:
                 printed += os.read(terminal, 4096)
             except OSError:  # of a terminal whose process has ended
                 break
-        if not pressed and any("LokyProcess" in line for line in _command_lines()):
-            pressed = time.monotonic()
+        if not is_pressed and _workers(process) == 3:  # two, and the one that loky has beside them
+            time.sleep(1.0)  # while the last one is started, Ctrl-C is ignored
+            is_pressed = True
             os.write(terminal, b"\x03")
     with contextlib.suppress(ProcessLookupError):
         os.kill(process, signal.SIGKILL)
     os.waitpid(process, 0)
     os.close(terminal)
     text = printed.decode("utf-8", "replace")
-    user.step("Ctrl-C while processes start", pressed > 0 and "stopp" in text and "Traceback" not in text, text)
+    is_right = is_pressed and "--resume continues" in text and "Traceback" not in text
+    user.step("Ctrl-C while processes start", is_right, text)
 
 
-def _command_lines() -> Iterator[str]:
-    """Yield the command line of each process of this machine."""
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
+def _workers(process: int) -> int:
+    """Return the number of processes that a process has started for its work: its environment marks them."""
+    mark, count = f"WALKED={process}".encode(), 0
+    for path in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
-            yield path.read_bytes().replace(b"\0", b" ").decode(errors="replace")
+            count += b"loky" in (path / "cmdline").read_bytes() and mark in (path / "environ").read_bytes()
+    return count
 
 
 def _page(user: Walk) -> None:
