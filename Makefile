@@ -12,7 +12,7 @@ EXTRAS_OF = $(if $(filter run,$*),,[$(subst -,$(comma),$*)])
 # Commands and tests start many processes, which would compile each source anew without its bytecode.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run test verify bench gallery docs lint lines clean
+.PHONY: run test verify windows bench gallery docs lint lines clean
 
 run: $(ANY)
 	$(BIN)/sim run scenarios/pdms_lens.toml --force
@@ -29,7 +29,7 @@ PARALLEL = -n 2 --dist worksteal
 GROUP ?= laws parts runs lowest
 laws = --doctest-modules --ignore=sim/__main__.py sim tests/laws tests/numerics tests/spectrum tests/units
 parts = tests/parts
-folders = $(filter-out tests/helpers tests/__pycache__, $(patsubst %/,%,$(wildcard tests/*/)))
+folders = $(filter-out tests/helpers tests/windows tests/__pycache__, $(patsubst %/,%,$(wildcard tests/*/)))
 runs = $(filter-out $(laws) $(parts), $(folders)) $(wildcard tests/test_*.py)
 
 verify:
@@ -50,6 +50,13 @@ LOWEST = .venv-lowest
 	$(LOWEST)/bin/python -m pip install -q --disable-pip-version-check --no-deps -e .
 	-$(LOWEST)/bin/sim warm
 	$(LOWEST)/bin/python -m pytest $(PARALLEL) tests
+
+# `make windows` makes a Windows Python under Wine, goes the way of a user in it, and runs tests in it. It takes about an
+# hour, and 1.6 GB in $(WINDOWS). Missing programs are installed with apt if the user is root. CI does not run it.
+WINDOWS = .windows
+PYTHON311 = python3.11
+windows:
+	$(PYTHON311) tests/windows/wine.py all $(WINDOWS)
 
 # `make bench` measures all rows of docs/speed.md, `make bench ROWS="modal disc"` those of some groups.
 bench: $(STAMP)
@@ -96,4 +103,4 @@ $(VENV)/.installed-%: pyproject.toml constraints.txt
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(LOWEST) docs/_build docs/_api build dist *.egg-info .mypy_cache .ruff_cache
+	rm -rf $(VENV) $(LOWEST) $(WINDOWS) docs/_build docs/_api build dist *.egg-info .mypy_cache .ruff_cache

@@ -4,7 +4,6 @@ import contextlib
 import io
 import math
 import os
-import resource
 import subprocess
 import sys
 import time
@@ -13,6 +12,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import psutil
 
 from sim.cli import cli
 
@@ -131,11 +131,20 @@ class Bench:
             return child("-m", "sim", *arguments, **environment)
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             seconds = spent(lambda: cli(list(arguments), standalone_mode=False))
-        return seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+        return seconds, _peak()
 
     def python(self, program: str) -> float:
         """CPU time [s] of a process that runs a program of Python."""
         return spent(lambda: exec(program)) if self.quick else child("-c", program)[0]
+
+
+def _peak() -> float:
+    """Return the peak memory of this process [MB]."""
+    if sys.platform == "win32":
+        return float(psutil.Process().memory_info().peak_wset) / 2**20
+    import resource
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
 
 def absolute(ours: str, values: list[float], unit: str, goal: float | None, beside: str = "–") -> Row:

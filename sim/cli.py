@@ -14,7 +14,19 @@ from typing import Any, NoReturn
 
 import click
 
-from sim.units.terminal import LOG, Notes, Shown, note, print_rows, print_table, progress_bar, say, signals, while_read
+from sim.units.terminal import (
+    LOG,
+    Notes,
+    Shown,
+    accept_all_letters,
+    note,
+    print_rows,
+    print_table,
+    progress_bar,
+    say,
+    signals,
+    while_read,
+)  # fmt: skip
 
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
 
@@ -46,8 +58,7 @@ def main() -> None:
     LOG.addHandler(notes := Notes())
     for order in signals("SIGTERM", "SIGHUP"):  # schedulers stop a run by these
         signal.signal(order, signal.default_int_handler)
-    if isinstance(sys.stdout, io.TextIOWrapper):  # letters that the terminal's encoding lacks end no command
-        sys.stdout.reconfigure(errors="replace")
+    accept_all_letters()
     try:
         cli.main(standalone_mode=False)
     except (click.Abort, KeyboardInterrupt):

@@ -18,6 +18,7 @@ from sim.numerics import files, hdf5
 from sim.numerics.lazy import Refused, open_lazily
 from sim.units.errors import BadInput
 from sim.units.notation import Recorded
+from sim.units.tables import decoded, same_line_ends
 
 MEMBERS = "member"
 #: Trajectories that are read and worked on at once [byte].
@@ -215,9 +216,10 @@ def claim(dataset: xr.Dataset, path: Path, target: Path, replace: bool, *others:
     files_read = hdf5.tables(dataset.attrs.get("scenario_files")).values()
     texts = [str(entry.get("text")) for entry in files_read if isinstance(entry, dict)]
     texts.append(str(dataset.attrs.get("scenario_toml")))
+    texts = [same_line_ends(text) for text in texts]  # of a dataset of an older version
     with target.open("rb") as file:
         content = file.read(10 + 2 * max(len(text.encode()) for text in texts))  # a mark, and line ends of two letters
-    text = content.decode("utf-8-sig", "replace").replace("\r\n", "\n")
+    text = decoded(content, "replace")
     if content.startswith((b"\x89HDF", b"CDF")):
         raise BadInput([f"{target} is a dataset, which is never replaced; name another file"])
     if content and text in texts:

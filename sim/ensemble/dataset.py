@@ -25,7 +25,7 @@ from sim.ensemble.store import Blocks
 from sim.ensemble.variables import MAP, NUMBERS, SYSTEMATIC, Variable
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice
-from sim.numerics.hdf5 import CHUNK_CACHE, Refused, bytes_of, hdf5_gives_bytes, opened, tables
+from sim.numerics.hdf5 import CHUNK_CACHE, File, Refused, bytes_of, hdf5_gives_bytes, opened, tables
 from sim.scenario.files import Files
 from sim.scenario.messages import in_plain_words
 from sim.scenario.scenario import Scenario
@@ -414,13 +414,13 @@ def write(outline: Outline, parts: Blocks, path: Path) -> None:
 
 def _write(outline: Outline, parts: Blocks, path: str, **options: Any) -> bytearray:
     """Write a netCDF file; return its bytes if it stays in memory, else none."""
-    with HDF5, netCDF4.Dataset(path, "w", format="NETCDF4", **options) as file:
+    with HDF5, File(path, "w", format="NETCDF4", **options) as file:
         for name, size in outline.sizes.items():
             file.createDimension(name, size)
         file.setncatts(outline.attributes)
         _fill(outline, parts, {name: _variable(file, name, each) for name, each in outline.variables.items()})
         file.sync()  # which raises an error if the disk fails, while closing the file would crash
-        return bytes_of(path) if options == {"diskless": True} else bytearray()
+        return bytes_of(os.path.abspath(path)) if options == {"diskless": True} else bytearray()
 
 
 def _variable(file: netCDF4.Dataset, name: str, described: Described) -> netCDF4.Variable:

@@ -289,29 +289,50 @@ def pool(jobs: int) -> Iterator[Any]:
     environment = {"PYTHONPATH": os.pathsep.join(folder or os.getcwd() for folder in sys.path), "PYTHONSAFEPATH": "1"}
     environment |= _ONE_THREAD | {"LOKY_MAX_MEMORY_LEAK_SIZE": "1e18"}
     how: dict[str, Any] = {"initializer": _begin, "initargs": (os.getpid(),), "env": environment}
-    executor = loky.ProcessPoolExecutor(jobs, context=get_context("loky"), **how)
+    executor = None
     try:
-        if threading.current_thread() is threading.main_thread():
-            before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # new processes inherit that
-            try:
-                executor.submit(os.getpid)  # which starts all processes
-            finally:
-                signal.signal(signal.SIGINT, before or signal.SIG_DFL)
+        with _ctrl_c_ignored():
+            executor = loky.ProcessPoolExecutor(jobs, context=get_context("loky"), **how)
+            executor.submit(os.getpid)  # which starts all processes
         yield executor
     except concurrent.futures.BrokenExecutor:
         raise WorkerDied("a process died: it was killed or crashed, or there was too little memory") from None
     finally:
-        executor.shutdown(kill_workers=True)
+        if executor is not None:
+            executor.shutdown(kill_workers=True)
+
+
+@contextlib.contextmanager
+def _ctrl_c_ignored() -> Iterator[None]:
+    """Ignore Ctrl-C in the main thread and in processes that are started meanwhile, which inherit that."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _ignore_console(True)
+    try:
+        yield
+    finally:
+        _ignore_console(False)
+        signal.signal(signal.SIGINT, before or signal.SIG_DFL)
+
+
+def _ignore_console(ignored: bool) -> None:
+    """Let Windows ignore Ctrl-C or not. New processes inherit that there, but no handler of a signal."""
+    if sys.platform == "win32":
+        import ctypes
+
+        ctypes.windll.kernel32.SetConsoleCtrlHandler(None, ignored)
 
 
 def _begin(parent: int) -> None:
     """Prepare a process of a pool: the parent alone decides about a stop, and the process does not outlive it."""
     for order in signals(*_STOPPING):
         signal.signal(order, signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    threading.Thread(target=end_with, args=(parent,), daemon=True).start()
 
 
-def _end_with(parent: int) -> None:
+def end_with(parent: int) -> None:
     """End this process when another one is gone."""
     import psutil
 

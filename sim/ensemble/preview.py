@@ -228,7 +228,7 @@ def _models(plan: Plan) -> Rows:
     """Return the model of each part, its origin, and its description."""
     source = plan.scenario.origin
     origins = dict.fromkeys(Parts._fields, "omitted: the simplest" if source.text else "given")
-    origins |= dict.fromkeys(tomllib.loads(source.text.removeprefix("\ufeff").replace("\r\n", "\n")), "in the file")
+    origins |= dict.fromkeys(tomllib.loads(source.text), "in the file")
     origins |= {key.partition(".")[0]: "changed by an override" for key in source.overrides}
     origins |= {key: "swept" for axis in plan.scenario.sweep for key in axis.keys}
     rows: Rows = []

@@ -18,8 +18,8 @@ from sim.ensemble.plan import Block, Plan, Task, snapshots
 from sim.ensemble.preview import fitting
 from sim.ensemble.store import WHOLE, Arrays, BlockFiles, Blocks, MemoryBlocks, OutputBusy, Shard, Stopped, Unfinished
 from sim.ensemble.variables import LARGEST, MAP, VARIABLES, Variable
-from sim.numerics.files import DiskFull, OutputExists, claim, explained
-from sim.numerics.hdf5 import located
+from sim.numerics.files import DiskFull, OutputExists, explained
+from sim.numerics.hdf5 import claim, located
 from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
 from sim.parts.shear.process import Fluctuation

@@ -1,9 +1,7 @@
 """Jobs of a page, each in a process of its own: an ensemble of the scenario's own models, and a fit."""
 
-import contextlib
 import json
 import os
-import signal
 import sys
 import threading
 from collections.abc import Callable
@@ -13,6 +11,7 @@ import cloudpickle
 import numpy as np
 import xarray as xr
 
+from sim.ensemble.execute import end_with
 from sim.ensemble.plan import Plan, work
 from sim.ensemble.simulate import run
 from sim.explorer.drawing import listed
@@ -23,6 +22,9 @@ from sim.units.errors import BadInput
 _DRAWN = 1000
 #: Quantities that are drawn.
 _NAMES = ("contact_area", "friction_force")
+
+#: Begins a job: the server alone decides about the end of it, also while its modules are imported.
+_BEGIN = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); from sim.explorer.job import main; main()"
 
 Say = Callable[[dict[str, Any]], None]
 
@@ -91,35 +93,31 @@ def command(task: Callable[[Say], dict[str, Any]]) -> tuple[list[str], bytes]:
     """Return the command of a process that runs a task, and what it reads.
 
     A task takes a function for its messages, and returns its result. The process writes each message as a line of JSON;
-    the last has ``result`` or ``fault``. It ends once nobody writes to it any more: with the process that began it.
+    the last has ``result`` or ``fault``. It does not outlive the present process.
     """
     pickled = cloudpickle.dumps(task)
-    return [sys.executable, "-m", "sim.explorer.job"], b"%d\n%s" % (len(pickled), pickled)
+    return [sys.executable, "-c", _BEGIN, str(os.getpid())], b"%d\n%s" % (len(pickled), pickled)
 
 
 def main() -> None:
-    """Run the task that standard input has."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server ends its jobs
+    """Run the task that standard input has, for the process whose number is the argument.
+
+    Nothing waits for the end of standard input, because Windows locks a pipe for as long as a thread reads of it, and
+    libraries that look at standard input when they are imported would wait, too.
+    """
     source, messages = sys.stdin.buffer, os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # nothing else that is printed is taken for a message
     task = cloudpickle.loads(source.read(int(source.readline())))
 
     def say(message: dict[str, Any]) -> None:
-        messages.write(f"{json.dumps(message)}\n")
-        messages.flush()
-
-    def end_with_the_server() -> None:
-        while os.read(0, 1):  # a buffered read would hold a lock when the task has ended
-            pass
-        os._exit(1)
-
-    threading.Thread(target=end_with_the_server, daemon=True).start()
-    with contextlib.suppress(BrokenPipeError):
         try:
-            say({"result": task(say)})
-        except (BadInput, RuntimeError, ValueError, MemoryError) as fault:
-            say({"fault": str(fault) or type(fault).__name__})
+            messages.write(f"{json.dumps(message)}\n")
+            messages.flush()
+        except OSError:  # the server is gone, which is another error on each system
+            os._exit(1)
 
-
-if __name__ == "__main__":
-    main()
+    threading.Thread(target=end_with, args=(int(sys.argv[1]),), daemon=True).start()
+    try:
+        say({"result": task(say)})
+    except (BadInput, RuntimeError, ValueError, MemoryError) as fault:
+        say({"fault": str(fault) or type(fault).__name__})

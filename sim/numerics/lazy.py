@@ -9,9 +9,9 @@ from xarray.backends.netCDF4_ import NetCDF4ArrayWrapper
 from xarray.core.indexing import LazilyIndexedArray
 
 from sim.numerics.files import HDF5
-from sim.numerics.hdf5 import Damaged, Refused, opened, readable
+from sim.numerics.hdf5 import Damaged, File, Refused, opened, readable
 
-__all__ = ["Damaged", "Refused", "open_lazily"]
+__all__ = ["Damaged", "Refused", "open_lazily", "save"]
 
 
 class _Array(NetCDF4ArrayWrapper):
@@ -57,3 +57,9 @@ def open_lazily(path: str | os.PathLike[str]) -> xr.Dataset:
         store: Any = _Store(file, lock=HDF5)
         store.path = path
         return xr.open_dataset(store, engine=StoreBackendEntrypoint, decode_times=False, decode_coords=False)
+
+
+def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write a dataset as a netCDF file. On Windows xarray itself writes no path with a letter outside of ASCII."""
+    with HDF5, File(path, "w", format="NETCDF4") as file:
+        dataset.dump_to_store(NetCDF4DataStore(file, lock=HDF5))

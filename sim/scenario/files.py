@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sim.units.errors import BadInput
-from sim.units.tables import plain_text
+from sim.units.tables import decoded, plain_text
 from sim.units.terminal import one_line
 
 _MOST_BYTES = 2**20
@@ -43,7 +43,7 @@ def read_text(path: Path) -> str:
     if len(content) > _MOST_BYTES:
         raise _refusal(f"{path}: is larger than 1 MiB; put long tables into CSV files and name those")
     try:
-        return content.decode("utf-8-sig")
+        return decoded(content)
     except UnicodeDecodeError:
         raise _refusal(f"{path}: is not UTF-8 text; save the file as UTF-8") from None
 

@@ -159,7 +159,7 @@ def write_starter(name: Path) -> Path:
     target = name if name.suffix else name.with_suffix(".toml")
     text = files("sim").joinpath("starter.toml").read_text(encoding="utf-8")
     try:
-        with target.open("x", encoding="utf-8") as file:
+        with target.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
     except FileExistsError:
         raise OutputExists(f"{target} exists; name another file") from None

@@ -29,7 +29,7 @@ from sim.analysis import engineering
 from sim.engine import MemberNoise, follow
 from sim.ensemble.plan import seconds_a_step, together
 from sim.ensemble.variables import READ
-from sim.numerics import files
+from sim.numerics import files, hdf5, lazy
 from sim.numerics.stopwatch import stopwatch
 from sim.parts.exchange import Array, Bonding, Gammas, Motion
 from sim.parts.shear.bands import cell_pairs
@@ -833,10 +833,10 @@ def study(scenario: Scenario, target: Path, replace: bool, seconds: float, toler
     picture = target.with_suffix(".png")
     if picture == target:
         raise BadInput([f"{target}: the dataset cannot have the name of its picture; end it in .nc"])
-    for path in (target, picture):
-        files.claim(path, replace, files_read(scenario))
+    hdf5.claim(target, replace, files_read(scenario))
+    files.claim(picture, replace, files_read(scenario))
     dataset = converge(scenario, seconds, tolerance)
     with files.output(target) as beside:
-        dataset.to_netcdf(beside)
+        lazy.save(dataset, beside)
     save(figure(dataset), picture)
     return table(dataset), f"{explanation(dataset)}\n\n{recommendation(dataset)}\n\n{target}\n{picture}"

@@ -670,7 +670,7 @@ def scenario_text(scenario: Scenario, fit: Fit, folder: Path, table: int = 0) ->
     override(tables, source.overrides | numbers)
     above = Path(source.path).parent
     if above.resolve() != folder.resolve():
-        _move(tables, above, folder)
+        _move(tables, above.absolute(), folder.absolute())
     comment = itertools.takewhile(lambda line: line.startswith("#"), source.text.splitlines())
     question = "".join(f"{line}\n" for line in comment if not line.startswith(_MADE)).removesuffix("#\n")
     opening = f"{question}#\n" if question else ""
@@ -680,9 +680,14 @@ def scenario_text(scenario: Scenario, fit: Fit, folder: Path, table: int = 0) ->
 
 
 def _move(table: dict[str, Any], above: Path, folder: Path) -> None:
-    """Name files from another folder."""
+    """Name files from another folder, with the sign between folders that all systems read.
+
+    Both folders are absolute. No way leads from one drive of Windows to another, so there a file has its whole path.
+    """
     for key, value in table.items():
         if isinstance(value, dict):
             _move(value, above, folder)
         elif key == "file" and isinstance(value, str):
-            table[key] = os.path.relpath(above / value, folder)
+            path = above / value
+            is_near = path.drive == folder.drive
+            table[key] = type(path)(os.path.relpath(path, folder) if is_near else path).as_posix()

@@ -241,13 +241,27 @@ def _listed(values: Any) -> Any:
 LISTED = BeforeValidator(_listed)
 
 
+def decoded(content: bytes, errors: str = "strict") -> str:
+    r"""Return the text of a file in UTF-8, without its mark; each line ends in the same way on all systems.
+
+    >>> decoded(b"\xef\xbb\xbfload\r\nspeed\r\n")
+    'load\nspeed\n'
+    """
+    return same_line_ends(content.decode("utf-8-sig", errors))
+
+
+def same_line_ends(text: str) -> str:
+    """Return a text in which each line ends as on Linux, because Windows and old spreadsheets end lines otherwise."""
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
 def plain_text(path: Path) -> str:
     """Return the text of a plain file of at most 256 MiB."""
     size = _plain(path).stat().st_size
     if size > _MOST_BYTES:
         raise OSError(errno.EFBIG, f"it is larger than {_MOST_BYTES // 2**20} MiB")
-    with path.open(encoding="utf-8-sig") as file:
-        return file.read(size)
+    with path.open("rb") as file:
+        return decoded(file.read(size))
 
 
 def _plain(path: Path) -> Path:

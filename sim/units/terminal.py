@@ -1,11 +1,15 @@
 """Output on a terminal: text without control characters, tables, and the progress of a run."""
 
+import codecs
 import contextlib
+import errno
+import io
 import logging
 import os
 import signal
 import sys
 import time
+import unicodedata
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -18,6 +22,13 @@ LOG = logging.getLogger("sim")
 _PAUSE = 30.0
 #: Columns of a terminal on which no table is cut short.
 _WIDE = 100_000
+#: Signs of formulas in ASCII, for an output whose encoding lacks them: a lost minus sign would change a number.
+_SIGNS = {
+    "−": "-", "–": "-", "—": "-", "×": "x", "·": "*", "⋅": "*", "±": "+-", "√": "sqrt", "½": "1/2", "⁄": "/",
+    "°": " deg", "∫": "integral ", "∮": "loop integral ", "→": "->", "►": ">", "─": "-", "≠": "!=", "≤": "<=",
+    "≥": ">=", "≈": "~", "∝": "~", "∞": "inf", "⟨": "<", "⟩": ">", "ℓ": "l", "µ": "u", "μ": "u", "…": "...", "“": '"',
+    "”": '"', "’": "'", "ß": "ss",
+}  # fmt: skip
 
 
 def one_line(text: str) -> str:
@@ -30,8 +41,55 @@ def one_line(text: str) -> str:
 
 
 def plain(text: str) -> str:
-    """Return a text of several lines, each as ``one_line`` writes it."""
-    return "\n".join(map(one_line, text.split("\n")))
+    """Return a text of several lines, each as ``one_line`` writes it; lines of older datasets end as on Windows."""
+    return "\n".join(map(one_line, text.replace("\r\n", "\n").split("\n")))
+
+
+def in_ascii(text: str) -> str:
+    """Return a text in ASCII: signs of formulas, Greek letters by their names, letters without accents, else "?".
+
+    >>> print(in_ascii("N0 − N: ΔΓ = 3×10⁻² mJ/m², Größe"))
+    N0 - N: DeltaGamma = 3x10^-2 mJ/m^2, Grosse
+    """
+    result = ""
+    for place, letter in enumerate(text):
+        if letter.isascii():
+            result += letter
+            continue
+        name, kind = unicodedata.name(letter, "").split(), unicodedata.decomposition(letter)
+        if letter in _SIGNS:
+            result += _SIGNS[letter]
+        elif name[:1] == ["GREEK"] and name[2:3] == ["LETTER"]:
+            result += name[3].capitalize() if name[1] == "CAPITAL" else name[3].lower()
+        elif unicodedata.combining(letter):
+            continue
+        else:
+            parts = unicodedata.normalize("NFKD", letter).replace("−", "-")
+            raised = "^" if kind.startswith("<super>") and not _is_raised(text[place - 1 : place]) else ""
+            result += raised + ("".join(c for c in parts if c.isascii()) or "?")
+    return result
+
+
+def _is_raised(letter: str) -> bool:
+    """Return True for a superscript."""
+    return letter != "" and unicodedata.decomposition(letter).startswith("<super>")
+
+
+def _replaced(fault: UnicodeError) -> tuple[str, int]:
+    """Return what an encoding writes for letters that it lacks, and the place where it goes on."""
+    if not isinstance(fault, UnicodeEncodeError):
+        raise fault
+    return in_ascii(fault.object[fault.start : fault.end]), fault.end
+
+
+codecs.register_error("sim.ascii", _replaced)
+
+
+def accept_all_letters() -> None:
+    """Let standard output and error write letters that their encoding lacks in ASCII, so that none ends a command."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="sim.ascii")
 
 
 def say(text: str = "", err: bool = False) -> None:
@@ -62,10 +120,16 @@ def print_rows(rows: list[dict[str, str]]) -> None:
 
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in rows[0]:
-        table.add_column(Text(plain(heading)), justify="right", no_wrap=True, vertical="bottom")
+        table.add_column(Text(_written(plain(heading))), justify="right", no_wrap=True, vertical="bottom")
     for row in rows:
-        table.add_row(*(Text(one_line(cell)) for cell in row.values()))
+        table.add_row(*(Text(_written(one_line(cell))) for cell in row.values()))
     Console(file=sys.stdout, width=_WIDE).print(table)
+
+
+def _written(text: str) -> str:
+    """Return a text as standard output writes it, whose letters decide how wide a column is."""
+    encoding = sys.stdout.encoding or "utf-8"
+    return text.encode(encoding, "sim.ascii").decode(encoding)
 
 
 def print_table(rows: list[dict[str, str]], text: str) -> None:
@@ -79,12 +143,25 @@ def while_read() -> Iterator[None]:
     """End the program with success if the reader of its output stops early."""
     try:
         yield
-    except (BrokenPipeError, SystemExit) as end:
-        if not isinstance(end, BrokenPipeError) and not isinstance(end.__context__, BrokenPipeError):
+    except (OSError, SystemExit) as end:
+        if not _is_unread(end) and not _is_unread(end.__context__):
             raise  # click and rich exit by themselves
         with open(os.devnull, "w", encoding="utf-8") as nowhere:
             os.dup2(nowhere.fileno(), 1)
         sys.exit(0)
+
+
+def _is_unread(fault: BaseException | None) -> bool:
+    """Return True if the reader of the output is gone.
+
+    Windows calls that an invalid argument, as much else, but then the text that waits cannot be written later either.
+    """
+    if isinstance(fault, OSError) and fault.errno == errno.EINVAL:
+        try:
+            sys.stdout.flush()
+        except OSError:
+            return True
+    return isinstance(fault, BrokenPipeError)
 
 
 class Shown(NamedTuple):

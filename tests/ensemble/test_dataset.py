@@ -1,6 +1,7 @@
 """From parts to a dataset: names and units, equal bytes, and trouble with the disk."""
 
 import json
+import os
 import pickle
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.commands import SCENE, sim as command
 from helpers.parts import Adhesion, Record, Slip, load, read_sweep, run, shear
 from helpers.scenes import BONDS, CELL, CONTACTS, DRIVES, SHEARS, SPECTRUM, march, scene
 from numpy.testing import assert_allclose
@@ -25,10 +27,12 @@ from sim.ensemble import dataset as datasets, plan as plans, simulate as ensembl
 from sim.ensemble.dataset import scenario_json, variable_name
 from sim.ensemble.plan import Plan
 from sim.ensemble.variables import LARGEST, VARIABLES
+from sim.numerics import hdf5, lazy
 from sim.numerics.files import HDF5, StoreTrouble
 from sim.parts.drive import READINGS
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import all_tables, keys, quantities, tables
+from sim.units.errors import BadInput
 from sim.units.notation import Recorded
 
 MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))
@@ -142,9 +146,69 @@ def test_datasets_can_be_computed_in_threads_and_pickled(tmp_path):
     xr.testing.assert_identical(pickle.loads(pickle.dumps(alone[0])), alone[0])
 
 
+def test_a_path_has_letters_of_the_systems_code_page(tmp_path):
+    path = tmp_path / "Müller µ" / "größe.nc"
+    ensemble.run(sample(), path)
+    with sim.open(path) as dataset:
+        assert "größe.nc" in dataset.encoding["source"]
+        lazy.save(dataset, beside := path.with_name("ñ.nc"))
+        with hdf5.opened(beside) as file:
+            assert file.filepath().endswith("ñ.nc")
+            assert_allclose(file["contact_area"][:], dataset["contact_area"], rtol=0, atol=0)
+    assert datasets.attributes_of(path)["sim_version"] == sim.__version__
+
+
+def test_an_output_that_another_program_holds_open_is_published_by_resume(tmp_path, monkeypatch):
+    path, changed, replace_file = tmp_path / "out.nc", sample(seed=4), os.replace
+    ensemble.run(sample(), path)
+    content = path.read_bytes()
+
+    def refusing(source, target):
+        if Path(target) == path:
+            raise PermissionError(13, "The file is used by another process", str(target))
+        replace_file(source, target)
+
+    with monkeypatch.context() as patched, path.open("rb"):
+        if os.name != "nt":  # which refuses by itself
+            patched.setattr("os.replace", refusing)
+        with pytest.raises(StoreTrouble, match=r"out\.nc cannot be replaced: close the program"):
+            ensemble.run(changed, path, replace=True)
+        assert path.read_bytes() == content
+    ensemble.run(changed, path, resume=True)
+    assert not path.with_name("out.nc.parts").exists()
+    with sim.open(path) as dataset:
+        assert dataset.attrs["seed"] == "4"
+
+
+def test_letters_that_the_code_page_lacks_are_refused_before_the_run_and_named_when_a_file_is_read(
+    tmp_path, monkeypatch
+):
+    path = ensemble.run(sample(), tmp_path / "out.nc")
+    if os.name != "nt":
+        monkeypatch.setattr(hdf5, "ENCODING", "cp1252")
+    other = tmp_path / "Δ µ" / "测试.nc"
+    other.parent.mkdir()
+    other.write_bytes(path.read_bytes())
+    before = sorted(other.parent.iterdir())
+    monkeypatch.setattr("sim.ensemble.simulate.simulate", None)  # computing would fail
+    monkeypatch.setattr("sim.study.converge.converge", None)
+    toml = tmp_path / "scene.toml"
+    toml.write_text(SCENE, encoding="utf-8")
+    for arguments in (
+        ["run", toml, "-o", other, "--force"], ["run", toml, "-o", other.with_name("new.nc")], ["stats", other],
+        ["converge", toml, "-o", other.with_name("new.nc")],
+    ):  # fmt: skip
+        done = command(*arguments)
+        assert done.exit_code == 2 and "code page" in done.stderr and "damaged" not in done.stderr, arguments
+    with pytest.raises(BadInput, match="code page"):
+        ensemble.run(sample(), other, replace=True)
+    assert sorted(other.parent.iterdir()) == before
+
+
 def test_no_file_is_read_or_written_while_another_thread_reads_through_xarray(tmp_path):
     path, lock = ensemble.run(sample(), tmp_path / "out.nc"), xr.backends.netCDF4_.NETCDF4_PYTHON_LOCK
-    writes = [lambda: ensemble.run(sample(), path, replace=True), lambda: datasets.attributes_of(path)]
+    other = ensemble.run(sample(), tmp_path / "other.nc")  # because Windows replaces no file that is open
+    writes = [lambda: ensemble.run(sample(), other, replace=True), lambda: datasets.attributes_of(path)]
     with ThreadPoolExecutor(1) as pool, sim.open(path) as dataset:
         for work in (*writes, lambda: sim.open(path).close(), dataset.load):
             with lock:

@@ -7,6 +7,7 @@ import json
 import logging
 import os
 import socket
+import subprocess
 import sys
 import threading
 import time
@@ -18,6 +19,7 @@ from helpers.commands import LENS
 from numpy.testing import assert_allclose
 
 import sim
+from sim.explorer.job import command, ensemble
 from sim.explorer.server import Server, _opener
 
 SCENE = f"{LENS}[drive]\nspeed = '1 mm/s'\n[bonds]\nmodel = 'steady'\ncritical_speed = '10 mm/s'\nstress = '0.3 MPa'\n"
@@ -343,6 +345,44 @@ def test_an_ensemble_is_computed_and_its_result_is_that_of_a_run(changes, drawn)
     assert_allclose(last["result"]["curves"]["contact_area"]["mean"], exact, rtol=1e-12)
     assert until(lambda: not workers())
     server.close()
+
+
+def test_a_job_does_not_wait_for_its_input(tmp_path):
+    words, content = command(functools.partial(ensemble, [sim.load(_scene())]))
+    process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    with process, process.stdin:
+        process.stdin.write(content)
+        process.stdin.flush()
+        printed = process.stdout.read()  # while the input is open, as that of the server's jobs
+    assert "result" in json.loads(printed.splitlines()[-1])
+    done = subprocess.run(words, input=content, stdout=subprocess.PIPE, timeout=120, check=True)
+    assert done.stdout.splitlines()[-1] == printed.splitlines()[-1]
+
+
+#: Begins a job that takes hours, and ends without a word to it.
+MORTAL = """
+import functools, os, subprocess, tomllib
+from helpers.commands import COUNTED, LENS
+import sim
+from sim.explorer.job import command, ensemble
+scene = sim.load(tomllib.loads(LENS + COUNTED), {"clock.duration": "1000 s", "ensemble.members": 100_000})
+words, content = command(functools.partial(ensemble, [scene]))
+job = subprocess.Popen(words, stdin=subprocess.PIPE)
+job.stdin.write(content)
+job.stdin.flush()
+print(job.pid, flush=True)
+os.read(0, 1)
+os._exit(1)  # as a process that is killed
+"""
+
+
+def test_a_job_does_not_outlive_the_process_that_began_it():
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", MORTAL], env=environment, **pipes) as process:
+        job = psutil.Process(int(process.stdout.readline()))
+        assert job.is_running()
+    assert until(lambda: not job.is_running() or job.status() == psutil.STATUS_ZOMBIE)
 
 
 def test_a_reader_that_leaves_ends_its_job_and_a_third_job_is_refused():

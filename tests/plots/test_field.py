@@ -76,7 +76,7 @@ def test_a_spectrum_is_drawn_before_any_run_also_by_the_command_which_replaces_n
     monkeypatch.chdir(tmp_path)
     Path("scene.toml").write_text(STARTER.read_text(encoding="utf-8"), encoding="utf-8")
     answer = sim("plot", "scene.toml")
-    assert (answer.exit_code, answer.stdout) == (0, "outputs/scene-spectrum.png\n")
+    assert (answer.exit_code, answer.stdout) == (0, f"{Path('outputs/scene-spectrum.png')}\n")
     made = Path("outputs/scene-spectrum.png").read_bytes()
     assert made.startswith(b"\x89PNG") and sim("plot", "scene.toml").exit_code == 73
     for arguments, words in (

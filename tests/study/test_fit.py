@@ -3,9 +3,11 @@
 import itertools
 import json
 import math
+import ntpath
 import re
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -602,6 +604,17 @@ def condition_tables(scene, changes, error, seed, noise=1.0, **chosen):
 
 SPEED = "bonds.critical_speed"
 THREE = {"dry": {SPEED: 0.01}, "wet": {SPEED: 0.015}, "oil": {SPEED: 0.01}}
+
+
+@pytest.mark.parametrize(("folder", "name"), [
+    (r"C:\lab\fits", "../data/psd.csv"),
+    (r"D:\fits", "C:/lab/data/psd.csv"),  # to which no way leads
+])  # fmt: skip
+def test_a_fitted_scenario_names_files_as_all_systems_read_them(folder, name, monkeypatch):
+    monkeypatch.setattr(calibration, "os", SimpleNamespace(path=ntpath))
+    tables = {"shear": {"spectrum": {"model": "tabulated", "file": r"data\psd.csv"}}}
+    calibration._move(tables, PureWindowsPath(r"C:\lab"), PureWindowsPath(folder))
+    assert tables["shear"]["spectrum"]["file"] == name
 
 
 def test_tables_without_noise_give_their_exact_ratios_and_keys_all_per_table_give_the_separate_fits():
