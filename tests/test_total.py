@@ -2,10 +2,23 @@
 
 import math
 import os
+from collections import Counter
 
 import numpy as np
 import pytest
+from helpers.corner_scenes import corner_scene
 from helpers.random_scenes import random_scene
+from helpers.slider_rules import (
+    check_dissipated,
+    check_ends,
+    check_open,
+    check_peaks,
+    check_spring,
+    check_turns,
+    column,
+    has_ended,
+    reached,
+)
 
 import sim
 from sim.engine import MemberNoise, follow, pack, unpack
@@ -13,17 +26,29 @@ from sim.ensemble.variables import LARGEST
 from sim.parts.drive import READINGS
 
 #: Seeds of the scenes: six, and scenes whose energies, sub-steps or messages have been wrong.
-SEEDS = [*range(6), 45, 59, 75, 202, 214, 266, 310, 319, 445, 689, 730, 807, 1042, 1240, 1293, 1319]
+SEEDS = [*range(6), 45, 59, 75, 202, 214, 310, 319, 445, 689, 730, 807, 1042, 1240, 1293, 1319]
 #: Those that are looked at with finer steps as well.
 FINER = 59, 445, 807
+#: Scenes at corners, and how often they reach each at least.
+CORNERS = 500
+LEAST_REACHED = {
+    "openings behind springs": 100,
+    "closings": 50,
+    "ringing bodies on cohorts": 50,
+    "clock steps with a million events": 20,
+}
 #: Energies of a driven slider, none of which exceeds ten times the larger of work and stored energy.
 ENERGIES = [name for name in READINGS if name.startswith(("dissipated", "stored"))]
 
+#: Largest residual of the energy over the largest energy of a run, with default tolerances; sub-steps above which a run
+#: is not repeated at finer clock steps.
+MOST_MISSING, EXPENSIVE = 1e-3, 2e5
 
-def admitted(seed):
-    """Return a random scenario, or None if its check refuses it with a reason."""
+
+def admitted(scene):
+    """Return the scenario of a scene, or None if its check refuses it with a reason."""
     try:
-        scenario = sim.Scenario(**random_scene(seed))
+        scenario = sim.Scenario(**scene)
         _ = scenario.process  # some fields are refused only when their modes are made
     except ValueError as refused:
         assert "nan" not in str(refused)
@@ -40,22 +65,9 @@ def largest_tolerance(scenario):
     return max(getattr(part, "tolerance", 0.0) for part in (scenario.drive, scenario.population))
 
 
-def column(scenario, course, name):
-    """Return a reading of a driven slider at each record, shape (records, members)."""
-    return course.driven[..., READINGS.index(name)]
-
-
-def ended(scenario, course):
-    """True where an event explains a missing value: the contact is open, or the slider has lost stability."""
-    is_open = np.isnan(course.radius)
-    if scenario.drive.solves_motion:
-        is_open = is_open | np.isfinite(column(scenario, course, "runaway_time"))
-    return is_open
-
-
 def largest_energy(scenario, course):
     """Return the larger of work and stored energy, the largest since the start, at each record."""
-    work, stored = (column(scenario, course, name) for name in ("drive_work", "stored_energy"))
+    work, stored = (column(course, name) for name in ("drive_work", "stored_energy"))
     return np.maximum.accumulate(np.nan_to_num(np.fmax(np.abs(work), stored)))
 
 
@@ -64,32 +76,44 @@ def check_energy(scenario, course):
 
     A body that rings may have given back nearly all of its energy at the end of each clock step. The largest energy
     within the steps is therefore read off a run at an eighth of the clock step, if the records do not show enough.
+    Exceptions, for which a thousandth of the largest energy of the run is the limit:
+
+    - ``tracked`` bonds, and a body that rings without damping, after thousands of sub-steps.
+
+    With the default tolerances no residual exceeds a thousandth of the largest energy of the run.
     """
-    path = np.max(np.abs(np.diff(column(scenario, course, "stage_position"), axis=0)))
+    path = np.max(np.abs(np.diff(column(course, "stage_position"), axis=0)))
     free = 1e-3 * scenario.drive.tolerance * scenario.drive.spring * path**2  # of a slider that nothing holds
     bound = max(1e-6, 10.0 * largest_tolerance(scenario))
     size = largest_energy(scenario, course) + free / bound + 1e-30
-    residual = np.nan_to_num(column(scenario, course, "energy_residual"))
-    over = np.flatnonzero(np.any(np.abs(residual) > bound * size, axis=1))
-    if len(over):
+    residual = np.abs(np.nan_to_num(column(course, "energy_residual")))
+    over, members = np.flatnonzero(np.any(residual > bound * size, axis=1)), residual.shape[1]
+    if len(over) and np.max(column(course, "substeps")) < EXPENSIVE:
         finer, records = scenario.with_values({"clock.step": scenario.clock.step / 8.0}), over[-1] + 1
-        _, within = run(finer, range(3), range(8 * over[-1] + 1))
+        _, within = run(finer, range(members), range(8 * over[-1] + 1))
         size[:records] = np.maximum(size[:records], largest_energy(finer, within)[::8])
-    assert np.all(np.abs(residual) <= bound * size), f"energy residual {np.max(np.abs(residual) / size):.1e}"
+    drive, limit = scenario.drive, bound * size
+    if scenario.population.model == "tracked" or (drive.mass and not drive.damping + drive.viscosity):
+        limit = np.maximum(limit, MOST_MISSING * size.max(axis=0))
+    if drive.tolerance <= 1e-6 and largest_tolerance(scenario) <= 1e-4:
+        limit = np.minimum(limit, MOST_MISSING * size.max(axis=0))
+    assert np.all(residual <= limit), f"energy residual {np.max(residual / size):.1e}"
     for name in ENERGIES:
-        largest = np.max(np.abs(np.nan_to_num(column(scenario, course, name))) / size)
+        largest = np.max(np.abs(np.nan_to_num(column(course, name))) / size)
         assert largest <= 10.0, f"{name} {largest:.1e} times the work"
+    check_dissipated(scenario, course, bound, size)
 
 
 def check_missing(scenario, course):
-    """A value is missing only where an event explains it."""
-    explained = ended(scenario, course)
+    """No value is missing, but after a loss of stability, which ``check_ends`` explains, and after a stop."""
+    stopped = np.isnan(course.radius) & (scenario.contact.after_pull_off == "stop")
+    explained = stopped | has_ended(course) if scenario.drive.solves_motion else stopped
     for name in ("position", "speed", "fraction", "stress", "strength", "energy", "work"):
         missing = np.isnan(getattr(course, name))
         assert not np.any(missing & ~explained), f"{name} is missing"
     if scenario.drive.solves_motion:
-        for name in (name for name in READINGS if name != "runaway_time"):
-            assert not np.any(np.isnan(column(scenario, course, name)) & ~explained), f"{name} is missing"
+        for name in (name for name in READINGS if name not in ("runaway_time", "unresolved_time")):
+            assert not np.any(np.isnan(column(course, name)) & ~explained), f"{name} is missing"
 
 
 def check_cuts(scenario, course, end, cut=None):
@@ -97,9 +121,10 @@ def check_cuts(scenario, course, end, cut=None):
     last = scenario.clock.steps
     cut = last // 3 if cut is None else cut
     single, alone = run(scenario, [1], range(last + 1))
-    middle, _ = run(scenario, range(3), range(cut + 1))
-    resumed, _ = run(scenario, range(3), range(cut + 1, last + 1), unpack(scenario, pack(middle)))
-    seldom, sparse = run(scenario, range(3), range(last % 5, last + 1, 5))
+    members = range(scenario.ensemble.members)
+    middle, _ = run(scenario, members, range(cut + 1))
+    resumed, _ = run(scenario, members, range(cut + 1, last + 1), unpack(scenario, pack(middle)))
+    seldom, sparse = run(scenario, members, range(last % 5, last + 1, 5))
     for name, values in pack(end).items():
         assert np.array_equal(values, pack(resumed)[name], equal_nan=True), f"{name} of a resumed run"
         assert np.array_equal(values, pack(seldom)[name], equal_nan=True), f"{name} of sparse records"
@@ -143,7 +168,7 @@ def check_steps(seed, scenario, course):
     Steps are looked at from 96 on, as errors of a few steps are no small ones; noise is allowed three standard errors.
     Left out: runs of more than 20,000 sub-steps, because of the time that they take.
     """
-    if scenario.drive.solves_motion and np.max(column(scenario, course, "substeps")) > 2e4:
+    if scenario.drive.solves_motion and np.max(column(course, "substeps")) > 2e4:
         return
     size = max(1, 96 // scenario.clock.steps)
     if scenario.population.model in ("counted", "tracked") or scenario.fluctuations.per_member:
@@ -158,31 +183,61 @@ def check_steps(seed, scenario, course):
     assert np.all(nearer <= bound), f"half a clock step is off by {nearer}, more than {bound}"
 
 
-def check_scene(seed, finer=False):
-    """Check all rules on the scene of one seed; return False if the scene is refused."""
-    scenario = admitted(seed)
+def check_scene(seed, finer=False, draw=random_scene):
+    """Check all rules on the scene of one seed; return the corners that it reached, None if the scene is refused."""
+    scenario = admitted(draw(seed))
     if scenario is None:
-        return False
-    try:
-        end, course = run(scenario, range(3), range(scenario.clock.steps + 1))
-        check_missing(scenario, course)
-        if scenario.drive.solves_motion:
-            check_energy(scenario, course)
-        check_cuts(scenario, course, end)
-        if finer:
-            check_steps(seed, scenario, course)
-    except Exception as fault:
-        fault.add_note(f"random_scene({seed})")
-        raise
-    return True
+        return None
+    end, course = run(scenario, range(scenario.ensemble.members), range(scenario.clock.steps + 1))
+    faults = []
+    for rule, arguments in rules(scenario, course, end, seed if finer else None):
+        try:
+            rule(*arguments)
+        except Exception as fault:
+            fault.add_note(f"{draw.__name__}({seed})")
+            faults.append(fault)
+    if faults:
+        raise ExceptionGroup(f"{draw.__name__}({seed})", faults)
+    return reached(scenario, course)
+
+
+def rules(scenario, course, end, seed=None):
+    """Return the rules of a run, each with its arguments; those of finer steps if there is a seed."""
+    checks = [(check_missing, (scenario, course)), (check_turns, (scenario, course))]
+    if scenario.drive.solves_motion:
+        checks += [(rule, (scenario, course)) for rule in (check_ends, check_energy, check_spring, check_open)]
+        checks.append((check_peaks, (scenario, course, end)))
+    checks.append((check_cuts, (scenario, course, end)))
+    if seed is not None:
+        checks.append((check_steps, (seed, scenario, course)))
+    return checks
 
 
 def test_random_scenes_close_their_energy_and_have_the_same_numbers_however_they_are_cut():
-    assert sum(check_scene(seed, finer=seed in FINER) for seed in SEEDS) > 0.8 * len(SEEDS)
+    checked = [check_scene(seed, finer=seed in FINER) is not None for seed in SEEDS]
+    assert sum(checked) > 0.8 * len(SEEDS)
 
 
 @pytest.mark.verify
 @pytest.mark.parametrize("seed", [*range(int(os.environ.get("SCENES", "300"))), 1768])  # which takes three seconds
 def test_a_random_scene_keeps_all_rules_also_at_finer_steps(seed):
-    if not check_scene(seed, finer=True):
+    if check_scene(seed, finer=True) is None:
         pytest.skip("the scene is refused with a reason")
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("seed", range(CORNERS))
+def test_a_scene_at_a_corner_keeps_all_rules(seed):
+    if check_scene(seed, draw=corner_scene) is None:
+        pytest.skip("the scene is refused with a reason")
+
+
+@pytest.mark.verify
+def test_scenes_at_the_corners_reach_them_as_often_as_they_must():
+    """Counts are those of the first members, read off their runs."""
+    counts = Counter()
+    for scenario in filter(None, (admitted(corner_scene(seed)) for seed in range(CORNERS))):
+        _, course = run(scenario, range(scenario.ensemble.members), range(scenario.clock.steps + 1))
+        counts += reached(scenario, course)
+    few = {name: f"{counts[name]} of {least}" for name, least in LEAST_REACHED.items() if counts[name] < least}
+    assert not few, f"corners that {CORNERS} scenes reach too seldom: {few}"

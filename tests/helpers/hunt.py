@@ -1,0 +1,99 @@
+"""Go through random scenes in two processes, and print each fault and how often the corners were reached.
+
+``PYTHONPATH=tests:. python -m helpers.hunt corner 0 500`` goes through 500 scenes at corners. With ``random`` it goes
+through those of ``random_scenes``, at finer clock steps, too. A last number sets the processes. A scene that takes
+longer than ``PATIENCE`` is stopped, which counts as a fault.
+"""
+
+import multiprocessing
+import sys
+import time
+import traceback
+from collections import Counter
+from multiprocessing.connection import wait
+
+#: Time of one scene with all its checks [s].
+PATIENCE = 120.0
+
+
+def faults_of(kind, seed):
+    """Return a text for each fault of a scene, and the corners that its run reached, None if it is refused."""
+    import test_total
+
+    draw = {"corner": test_total.corner_scene, "random": test_total.random_scene}[kind]
+    try:
+        return [], test_total.check_scene(seed, finer=kind == "random", draw=draw)
+    except ExceptionGroup as group:
+        return [short(fault) for fault in group.exceptions], Counter()
+    except Exception as fault:
+        return [short(fault)], Counter()
+
+
+def short(fault):
+    """Return a line for a fault: the rule that it broke, and its message."""
+    rule = [frame.name for frame in traceback.extract_tb(fault.__traceback__) if frame.name.startswith("check_")]
+    return f"{rule[-1] if rule else type(fault).__name__}: {' '.join(str(fault).split())[:160]}"
+
+
+def work(kind, pipe):
+    """Answer the seeds that come through a pipe."""
+    import warnings
+
+    warnings.simplefilter("error")
+    while (seed := pipe.recv()) is not None:
+        start = time.perf_counter()
+        pipe.send((*faults_of(kind, seed), time.perf_counter() - start))
+
+
+class Worker:
+    """A process that checks scenes, the seed that it is at, and the time when it began."""
+
+    def __init__(self, kind):
+        context = multiprocessing.get_context("spawn")
+        self.pipe, other = context.Pipe()
+        self.process = context.Process(target=work, args=(kind, other), daemon=True)
+        self.process.start()
+        self.seed, self.since = None, 0.0
+
+    def give(self, seed):
+        self.seed, self.since = seed, time.monotonic()
+        self.pipe.send(seed)
+
+
+def go_through(kind, seeds, processes=2, patience=PATIENCE, tell=print):
+    """Check the scenes of seeds; return the faults by their seeds, and the counts of corners."""
+    faults, counts, left = {}, Counter(), list(seeds)[::-1]
+    workers = [Worker(kind) for _ in range(processes)]
+    for worker in workers:
+        worker.give(left.pop() if left else None)
+    while busy := [worker for worker in workers if worker.seed is not None]:
+        ready = wait([worker.pipe for worker in busy], timeout=1.0)
+        for worker in busy:
+            late = time.monotonic() - worker.since > patience
+            if worker.pipe not in ready and not late:
+                continue
+            seed, ended = worker.seed, False
+            try:
+                texts, corners, seconds = worker.pipe.recv() if worker.pipe in ready else ([], Counter(), patience)
+            except EOFError:
+                texts, corners, seconds, ended = ["the process died"], Counter(), 0.0, True
+            if worker.pipe not in ready:
+                texts, ended = [f"takes longer than {patience:.0f} s"], True
+            if ended:
+                worker.process.kill()
+                worker.__init__(kind)
+            counts["refused" if corners is None else "ran"] += 1
+            counts["seconds"] += round(seconds, 2)
+            counts += corners or Counter()
+            if texts:
+                faults[seed] = texts
+                tell(f"{kind} {seed} ({seconds:.1f} s)", *texts, sep="\n    ", flush=True)
+            worker.give(left.pop() if left else None)
+    return faults, counts
+
+
+if __name__ == "__main__":
+    kind, first, last = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    faults, counts = go_through(kind, range(first, last), int(sys.argv[4]) if len(sys.argv) > 4 else 2)
+    print(f"{len(faults)} of {last - first} scenes have faults: {sorted(faults)}")
+    print(*(f"{name}: {count}" for name, count in sorted(counts.items())), sep="\n")
