@@ -403,7 +403,8 @@ def write(outline: Outline, parts: Blocks, path: Path) -> None:
             with pool(1) as executor:
                 executor.submit(_write, outline, parts, os.fspath(path)).result()
         elif hdf5_gives_bytes():
-            path.write_bytes(_write(outline, parts, f"{os.urandom(8).hex()}.nc", diskless=True))
+            beside = path.with_name(f"{os.urandom(8).hex()}.nc")  # no such file is made
+            path.write_bytes(_write(outline, parts, os.fspath(beside), diskless=True))
         else:
             _write(outline, parts, os.fspath(path), diskless=True, persist=True)
     except RuntimeError:
