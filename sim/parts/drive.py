@@ -165,7 +165,7 @@ ENERGY = record("work damping viscosity rupture snaps area stored first")
 READINGS = (
     "stage_position", "stage_speed", "spring_force", "drive_work", "stored_energy", "dissipated_by_damping",
     "dissipated_by_viscosity", "dissipated_by_rupture", "dissipated_by_snaps", "dissipated_by_area", "energy_residual",
-    "substeps", "runaway_time",
+    "substeps", "runaway_time", "unresolved_time",
 )  # fmt: skip
 
 
@@ -296,7 +296,8 @@ class _Driven(Part):
         residual = work - (stored - first) - sum(spent)
         stage = state.stage_position, state.stage_speed, state.spring_force
         readings = np.empty((*work.shape, len(READINGS)))
-        for k, column in enumerate((*stage, work, stored, *spent, residual, state.substeps, state.runaway_time)):
+        ends = state.runaway_time, state.unresolved_time
+        for k, column in enumerate((*stage, work, stored, *spent, residual, state.substeps, *ends)):
             readings[..., k] = column
         return readings
 

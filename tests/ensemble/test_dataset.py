@@ -264,13 +264,14 @@ def test_every_variable_has_unit_and_long_name_and_stands_where_its_condition_ho
         assert "units" in variable.attrs or "flag_values" in variable.attrs, name
     assert set(dataset.attrs) >= {"Conventions", "title", "history", "scenario_toml", "seed", "sim_version"}
     bell = {"bonds": BONDS["rate, bell"]}
-    driven, stage = set(READINGS), {"stage_position", "stage_speed"}
+    driven, stage, runaway = set(READINGS) - {"unresolved_time"}, {"stage_position", "stage_speed"}, {"runaway_time"}
     scenes = [
         (set(), sample()), ({"fluctuations_radius"}, sample(contact=CONTACTS["partly reversible"])),
         ({"equilibrium_radius"}, sample(contact=CONTACTS["rate_dependent"])),
         ({"edge_energy"}, sample(shear=SHEARS["modal on a disc"])),
         ({"applied_load"}, sample(contact=CONTACTS["load there and back"])),
-        (driven, sample(drive=DRIVES["spring"], **bell)), (driven - stage, sample(drive=DRIVES["force"], **bell)),
+        (driven - runaway, sample(drive=DRIVES["spring"], **bell)),
+        (driven - stage, sample(drive=DRIVES["force"], **bell)),
     ]  # fmt: skip
     some = set.union(*(names for names, _ in scenes))
     assert some == {variable.name for variable in VARIABLES if variable.condition}

@@ -341,12 +341,17 @@ def _at_once(pool, count, shift, unit, rules):
 
 @device
 def _lacking(shift, pool, count, row, time, slider, contact, unit, rules):
-    """Return the missing force after a displacement at once; area, radius, u, displacement of the body."""
+    """Return the missing force after a displacement at once; area, radius, u, displacement of the body.
+
+    A body that mass or damping holds stays. Then the displacement that is missing is returned instead of the force.
+    """
     bound, moment = _at_once(pool, count, shift, unit, rules)
     radius, area, _, _ = mechanics.contact_area(bound, moment, time, row.radius, contact)
     yields, _ = mechanics.compliance(radius, slider)
     sheared = yields * area * moment
     body = shift + sheared - row.sheared
+    if slider.mass + slider.damping > 0.0:
+        return -math.copysign(body, body * row.moment), area, radius, sheared, 0.0
     lacks = row.spring_force - slider.stiffness * body - area * moment
     return lacks if row.spring_force > 0.0 else -lacks, area, radius, sheared, body
 
@@ -357,11 +362,12 @@ def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, ener
 
     The first such place is looked for in steps of at most half the width to which stretches are resolved.
     """
-    sense, step, limit = math.copysign(1.0, row.spring_force), 0.5 * rules.cell / unit, rules.limit / unit
+    is_held, step, limit = slider.mass + slider.damping > 0.0, 0.5 * rules.cell / unit, rules.limit / unit
+    sense = math.copysign(1.0, row.moment if is_held else row.spring_force)
     here, area, _, _, _ = _lacking(0.0, pool, count, row, time, slider, contact, unit, rules)
     near, _, _, _, _ = _lacking(sense * _TRIED * limit, pool, count, row, time, slider, contact, unit, rules)
     # merged stretches reach a little beyond the limit
-    if not (near > here or here > _TRIED * math.fabs(row.spring_force)):
+    if not (near > here or here > _TRIED * (limit if is_held else math.fabs(row.spring_force))):
         return -1
     shift, low, high, begun = 0.0, 0.0, _TRIED * limit, near > 0.0
     while high < 2.0 * limit:
@@ -378,6 +384,8 @@ def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, ener
             lacks, _, _, _, _ = _lacking(sense * middle, pool, count, row, time, slider, contact, unit, rules)
             low, high = (middle, high) if lacks > 0.0 else (low, middle)
         shift = sense * high
+    elif is_held:
+        shift = row.sheared
     elif slider.stiffness > 0.0:
         shift = row.spring_force / slider.stiffness + row.sheared
     else:
@@ -459,7 +467,9 @@ def _piece(line, bonds, slider, contact, unit, rules, room, books):
     start, length, turns, checked = 0.0, slider.length, 0, 0.0
     # the energies of the bonds are good to their own tolerance
     balanced = mechanics.Slider(*slider[:-1], max(slider.tolerance, rules.tolerance))
-    brittle = slider.mass + slider.damping + slider.viscosity == 0.0
+    is_held = slider.mass + slider.damping > 0.0
+    yields, _ = mechanics.compliance(row.radius, slider)
+    brittle = slider.viscosity == 0.0 and (yields > 0.0 or not is_held)
     sums_at(pool, count, unit, rules, nodes[0])
     while turns >= 0:
         turns, checked = mechanics.judged(turns, checked, start, length)
@@ -506,9 +516,10 @@ def _piece(line, bonds, slider, contact, unit, rules, room, books):
             row.next_step = step * (grows if error < math.inf else 0.25)
             if rules.limit < math.inf and step < mechanics.BRIEF * length:
                 slid, reach = row.slip, _AROUND * step * math.fabs(row.speed) + _TRIED * rules.limit / unit
+                new_count = -1
                 if brittle:
                     new_count = _slip_event(row, pool, count, start, slider, contact, unit, rules, first, energy)
-                else:
+                if new_count < 0 and (is_held or slider.viscosity > 0.0):
                     new_count = _break_stretched(
                         row, pool, count, start, reach, slider, contact, unit, rules, first, energy
                     )

@@ -267,6 +267,8 @@ def test_a_slip_to_a_hertzian_contact_is_the_limit_of_ever_less_viscosity_and_ke
         keys = {"contact_stiffness": "7.5 N/m", "viscosity": viscosity, "tolerance": tolerance}
         dataset = sim.run(sim.load(lens | {"drive": drive | keys})).isel(member=0)
         assert_allclose(dataset["friction_force"][[89, 100]], exact, rtol=off)
-        assert residual({name: dataset[name].to_numpy() for name in driven.READINGS}) < 10.0 * tolerance
+        assert (
+            residual({name: dataset[name].to_numpy() for name in driven.READINGS if name in dataset}) < 10.0 * tolerance
+        )
         lost.append(float(dataset["dissipated_by_area"][-1]))
     assert_allclose(lost[1], lost[2], rtol=1e-3)
