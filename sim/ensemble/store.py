@@ -38,6 +38,8 @@ _OURS = re.compile(r"manifest\.json|dataset\.nc|.*\.(lock|held)(\..+)?|point\d+-
 _FORMAT = "parts of a run of sim, 4"
 #: Seconds for which a run that begins waits while another one begins.
 _PATIENCE = 10.0
+#: Seconds for which a file may be read by another process before its removal is given up.
+_READING = 1.0
 _MOST_NAMED, _LONGEST = 5, 40
 #: Errors of a file system without locks.
 _NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}
@@ -297,7 +299,7 @@ class Unfinished:
         """Remove what a run made in the folder, first the manifest, without which no run goes on; a held lock stays."""
         for path in sorted(self.folder.iterdir(), key=lambda path: path.name != _MANIFEST):
             if _OURS.fullmatch(path.name) and path.stem != "output":
-                path.unlink()
+                _unlink(path)
 
     @contextlib.contextmanager
     def _output_locked(self, patience: float | None) -> Iterator[None]:
@@ -353,6 +355,18 @@ def _lock(path: Path, wait: float = 0.0) -> Any:
                 if trouble.errno not in _NO_LOCKS:
                     raise StoreTrouble(f"{path}: {trouble.strerror}") from trouble
     raise StoreTrouble(f"{path}: the file system has no locks")
+
+
+def _unlink(path: Path) -> None:
+    """Remove a file. Windows refuses it while another process reads the file, as one that waits for the output does."""
+    end = time.monotonic() + _READING
+    while True:
+        try:
+            return path.unlink()
+        except PermissionError:
+            if time.monotonic() > end:
+                raise
+            time.sleep(0.01)
 
 
 def refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:

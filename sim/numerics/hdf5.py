@@ -152,11 +152,12 @@ def bytes_of(name: str) -> bytearray:
     if library is not None:
         files = (_ID * max(0, library.H5Fget_obj_count(_ALL, _FILES)))()
         library.H5Fget_obj_ids(_ALL, _FILES, len(files), files)
-        wanted = name.encode(ENCODING)
+        wanted = name.encode(ENCODING), name.encode("utf-8", "replace")  # on Windows netCDF gives HDF5 names in UTF-8
+        room = max(map(len, wanted)) + 2  # so that a longer name is not cut to one of them
         for file in files:
-            named = ctypes.create_string_buffer(len(wanted) + 1)
+            named = ctypes.create_string_buffer(room)
             library.H5Fget_name(file, named, len(named))
-            size = library.H5Fget_file_image(file, None, 0) if named.value == wanted else 0
+            size = library.H5Fget_file_image(file, None, 0) if named.value in wanted else 0
             if size > 0:
                 content = bytearray(size)
                 if library.H5Fget_file_image(file, (ctypes.c_char * size).from_buffer(content), size) == size:

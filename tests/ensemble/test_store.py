@@ -319,7 +319,7 @@ def test_a_folder_that_no_run_made_is_not_touched_nor_files_of_others_in_one(tmp
     assert names(folder) == ["notes.txt"]
 
 
-@pytest.mark.parametrize("trouble", [None, OSError(errno.ENOLCK, "no locks")])
+@pytest.mark.parametrize("trouble", [None, pytest.param(OSError(errno.ENOLCK, "no locks"), marks=posix)])
 def test_two_runs_do_not_share_an_output_even_on_a_file_system_without_locks(tmp_path, monkeypatch, trouble):
     path = tmp_path / "out.nc"
     with monkeypatch.context() as patched:
@@ -345,6 +345,19 @@ def test_a_waiter_that_finds_the_folder_gone_begins_anew(tmp_path):
     assert folder.publish([], 1, write)
     waiter.join()
     assert other == [None] and names(tmp_path) == ["out.nc"]
+
+
+def test_a_manifest_that_another_process_reads_is_removed_when_it_has_been_read(tmp_path, monkeypatch):
+    path, refusals, unlink = tmp_path / "out.nc", [PermissionError(errno.EACCES, "in use")] * 2, Path.unlink
+
+    def held(file, **how):
+        if file.name == "manifest.json" and refusals:
+            raise refusals.pop()
+        unlink(file, **how)
+
+    monkeypatch.setattr(Path, "unlink", held)
+    ensemble.run(sample(), path)
+    assert same(path) and not refusals
 
 
 shared = functools.partial(scenes.sample, members=7, sweep=LOADS_AND_SHARES)

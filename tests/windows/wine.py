@@ -21,9 +21,12 @@ clock's steps of 16 ms, the C library, and all wheels.
 
 Not seen here: rights of files and folders, links, long paths, names such as CON, virus scanners, the speed of Windows,
 other versions of Python, and processors other than x86-64. Two things are worse than on Windows. Standard output must
-be a pipe or a terminal, because a plain file of Linux is refused (WinError 6). A process may have 65,530 mappings, of
-which each thread takes some, so that long test processes fail with "can't start new thread": therefore each file of
-tests has a process, without threads for the time limits of tests.
+be a pipe or a terminal, because a plain file of Linux is refused (WinError 6). Wine does not free the mappings of a
+library that could not be loaded, and a process of Linux may have 65,530 mappings; ``artefacts.py`` shows this without
+the package. The plugins of the wheel of netCDF4 cannot be loaded on Windows either, because they lack their libraries,
+and HDF5 tries each of them again for each variable that xarray opens. After some thousand variables a process would
+end without a message, so plugins are turned off. Each file of tests has a process of its own, without threads for the
+time limits of tests, because threads take mappings, too.
 """
 
 import contextlib
@@ -71,6 +74,7 @@ class Windows:
         self.environment = {name: text for name, text in os.environ.items() if not name.startswith(FOREIGN)}
         self.environment |= {"WINEPREFIX": str(self.folder / "wine"), "WINEDEBUG": "-all", "TERM": "xterm"}
         self.environment["WINEDLLOVERRIDES"] = "mscoree=;mshtml=;ucrtbase=n,b"
+        self.environment["HDF5_PLUGIN_PRELOAD"] = "::"  # turns plugins off, because Wine leaks memory at each of them
 
     def command(self, *words: str) -> list[str]:
         """Return the command of a process of this Python."""
