@@ -185,20 +185,28 @@ def check_steps(seed, scenario, course):
 
 def check_scene(seed, finer=False, draw=random_scene):
     """Check all rules on the scene of one seed; return the corners that it reached, None if the scene is refused."""
-    scenario = admitted(draw(seed))
+    faults, corners = faults_in(seed, finer, draw)
+    if faults:
+        raise ExceptionGroup(f"{draw.__name__}({seed})", faults)
+    return corners
+
+
+def faults_in(seed, finer, draw):
+    """Return the rules that the scene of one seed breaks, as exceptions, and the corners that it reached.
+
+    The corners are None if the scene is refused.
+    """
+    scenario, faults = admitted(draw(seed)), []
     if scenario is None:
-        return None
+        return faults, None
     end, course = run(scenario, range(scenario.ensemble.members), range(scenario.clock.steps + 1))
-    faults = []
     for rule, arguments in rules(scenario, course, end, seed if finer else None):
         try:
             rule(*arguments)
         except Exception as fault:
             fault.add_note(f"{draw.__name__}({seed})")
             faults.append(fault)
-    if faults:
-        raise ExceptionGroup(f"{draw.__name__}({seed})", faults)
-    return reached(scenario, course)
+    return faults, reached(scenario, course)
 
 
 def rules(scenario, course, end, seed=None):

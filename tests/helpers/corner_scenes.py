@@ -43,14 +43,15 @@ class CornerDraw(Draw):
         model = self.choice(("cohort", "cohort", "cohort", "cohort", "rate", "tracked"))
         bonds = self.interface(scale, self.log(1e-4, 1.0) / scale.duration, model, stretched=True)
         period = scale.duration * (self.log(0.005, 0.1) if model != "tracked" else self.log(0.05, 0.2))
-        drive = self.pull(scale, bonds, self.choice(("force", "force", "spring")), body=False)
+        bonds.table["start"] = self.choice(("steady", "bonded"))
+        drive = self.pull(scale, bonds, self.choice(("force", "force", "force", "spring")), body=False)
         drive["mass"] = bonds.stiffness * (period / (2.0 * math.pi)) ** 2
         if self.chance(0.3):
             drive["damping"] = 2.0 * self.log(1e-5, 0.03) * math.sqrt(drive["mass"] * bonds.stiffness)
-        contact = {"load": scale.force * self.random.uniform(-0.3, 3.0)}
+        contact = {"load": scale.force * self.random.uniform(0.0, 3.0)}
         if self.chance(0.15):
             contact = self.opening_contact(scale)
-        return self.tables(scale, self.choice((12, 48, 48, 192)), bonds, drive, contact)
+        return self.tables(scale, self.choice((24, 48, 48, 192)), bonds, drive, contact)
 
     def decades(self):
         """Return a scene whose rates, speeds, sites and body are drawn over many decades."""
