@@ -26,9 +26,11 @@ from sim.ensemble.variables import LARGEST
 from sim.parts.drive import READINGS
 
 #: Seeds of the scenes: six, and scenes whose energies, sub-steps or messages have been wrong.
-SEEDS = [*range(6), 45, 59, 75, 202, 214, 310, 319, 445, 689, 730, 807, 1042, 1240, 1293, 1319]
+SEEDS = [*range(6), 45, 59, 75, 202, 214, 266, 310, 319, 445, 689, 730, 807, 1042, 1240, 1293, 1319]
 #: Those that are looked at with finer steps as well.
 FINER = 59, 445, 807
+#: Scenes at corners that have been wrong.
+AT_CORNERS = 6, 45, 75, 102, 225, 271
 #: Scenes at corners, and how often they reach each at least.
 CORNERS = 500
 LEAST_REACHED = {
@@ -237,6 +239,12 @@ def test_random_scenes_close_their_energy_and_have_the_same_numbers_however_they
 def test_a_random_scene_keeps_all_rules_also_at_finer_steps(seed):
     if check_scene(seed, finer=True) is None:
         pytest.skip("the scene is refused with a reason")
+
+
+@pytest.mark.parametrize("seed", AT_CORNERS)
+def test_a_scene_that_was_wrong_at_a_corner_keeps_all_rules(seed):
+    corners = check_scene(seed, draw=corner_scene)
+    assert corners is not None
 
 
 @pytest.mark.verify

@@ -1,0 +1,130 @@
+"""Driven sliders whose motion is known: bodies that ring on bonds, contacts that open or close behind a spring."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+import sim
+
+LENS = {"solid": {"shear_modulus": 1e6}, "sphere": {"radius": 1e-3}, "adhesion": {"work": 0.03, "bond_share": 0.0}}
+BELL = {"model": "bell", "zero_force_rate": 5.0, "bell_force": 4e-12}
+BONDS = {"rupture": BELL, "bond_stiffness": 1e-6, "rebinding_rate": 20.0, "site_density": 1e16}
+
+
+def run(duration, step, **tables):
+    return sim.run(sim.load(LENS | {"clock": {"duration": duration, "step": step}} | tables)).squeeze()
+
+
+@pytest.mark.parametrize(
+    "bonds, body",
+    [
+        ({"model": "rate"}, {"contact_stiffness": 50.0}),
+        ({"model": "rate"}, {"contact_stiffness": 50.0, "damping": 1e-2}),
+        ({"model": "cohort"}, {"damping": 1e-2}),
+        ({"model": "cohort"}, {"damping": 1e-2, "mass": 1e-5}),
+        ({"model": "tracked", "sites": 30}, {"damping": 1e-2, "mass": 1e-5}),
+    ],
+)
+def test_a_slider_whose_contact_came_off_lags_behind_the_stage_by_its_drag(bonds, body):
+    """Long after the opening the spring bears the damping alone, so X = V(t − c/K)."""
+    drive = {"model": "spring", "stage": 1e-5, "stiffness": 20.0} | body
+    course = run(1.0, 5e-3, drive=drive, bonds=BONDS | bonds, contact={"load": {"from": 1e-4, "to": -3e-4}})
+    assert course.in_contact.values[-1] == 0.0
+    assert np.isnan(course.runaway_time.values).all()
+    assert_allclose(course.slider_position[-1], 1e-5 * (1.0 - body.get("damping", 0.0) / 20.0), rtol=1e-6)
+
+
+@pytest.mark.parametrize("model", ["rate", "cohort"])
+def test_a_slider_whose_contact_begins_open_follows_the_stage(model):
+    drive = {"model": "spring", "stage": 1e-5, "stiffness": 20.0, "damping": 1e-2, "contact_stiffness": 50.0}
+    course = run(0.1, 5e-3, drive=drive, bonds=BONDS | {"model": model}, contact={"load": -3e-4})
+    assert_allclose(course.slider_position[-1], 1e-5 * (0.1 - 1e-2 / 20.0), rtol=1e-5)
+
+
+def ringing(time, force, mass, stiffness, bonds):
+    """Return the displacement of a body on bonds of a constant rupture rate, by an own solution of its equations.
+
+    The share bound N and the sum of the stretches M per site obey N' = k_on (1 − N) − k_0 N and M' = N V − k_0 M. The
+    interface follows the body at V = v − F'/k_t, with F = M × ``stiffness`` of all sites.
+    """
+    all_sites, yields = stiffness
+    broken, binding = bonds
+
+    def change(_, state):
+        _, speed, bound, moment = state
+        slip = (bound * speed - broken * moment) / (1.0 + bound * all_sites / yields)
+        return [speed, (force - all_sites * moment) / mass, binding * (1.0 - bound) - broken * bound, slip]
+
+    course = solve_ivp(change, (0.0, time[-1]), [0.0, 0.0, 1.0, 0.0], "DOP853", time, rtol=1e-11, atol=1e-18)
+    return course.y[0]
+
+
+@pytest.mark.parametrize("model", ["rate", "cohort"])
+@pytest.mark.parametrize("mass, step", [(1e-6, 1e-2), (1e-6, 1e-3), (1e-8, 1e-2)])
+def test_a_body_rings_on_its_bonds_as_by_an_own_solution(model, mass, step):
+    drive = {"model": "force", "force": 2e-4, "mass": mass, "contact_stiffness": 100.0}
+    bonds = BONDS | {"model": model, "rupture": {"model": "constant", "rate": 0.3}, "rebinding_rate": 0.003}
+    bonds |= {"site_density": 1e17, "start": "bonded"}
+    course = run(2e-2, step, drive=drive, bonds=bonds, contact={"load": 1e-4})
+    stiffness = 1e17 * 1e-6 * float(course.contact_area[0]), 100.0
+    exact = ringing(course.t.values, 2e-4, mass, stiffness, (0.3, 0.003))
+    assert_allclose(course.slider_position, exact, atol=0.01 * np.max(exact), rtol=0.0)
+    largest = max(np.max(np.abs(course.drive_work)), np.max(course.stored_energy))
+    assert np.max(np.abs(course.energy_residual)) < 1e-3 * largest
+
+
+@pytest.mark.parametrize("model", ["rate", "steady", "counted"])
+@pytest.mark.parametrize("step", [2e-3, 5e-4])
+def test_no_peak_of_bonds_without_a_stretch_exceeds_their_strength(model, step):
+    """A slider that comes to rest in a hold, and leaves it, has a kink of the stress over time at each of the two."""
+    stage = {"time": [0.0, 0.4, 0.4, 0.6, 0.6, 1.0], "value": [5e-3, 5e-3, 0.0, 0.0, 5e-3, 5e-3]}
+    drive = {"model": "spring", "stage": stage, "stiffness": 2e3, "damping": 1e-2, "contact_stiffness": "rigid"}
+    bonds = {"model": model, "critical_speed": 1e-2, "stress": 1e5}
+    bonds |= {"rebinding_rate": 20.0} if model != "steady" else {}
+    bonds |= {"sites": 10**6} if model == "counted" else {}
+    lens = {"solid": {"shear_modulus": 1.6e6}, "sphere": {"radius": 2e-3}, "adhesion": {"work": 42e-3}}
+    course = run(1.0, step, drive=drive, bonds=bonds, contact={"load": 4e-3}, **lens)
+    assert float(course.peak_stress) <= 1e5 * (1.0 + 1e-9)
+    assert float(course.peak_friction) <= 1e5 * float(course.contact_area.max()) * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("bonds", [{"model": "rate"}, {"model": "cohort"}, {"model": "tracked", "sites": 200}])
+def test_the_largest_friction_of_a_slider_without_mass_and_damping_is_a_force_that_the_spring_bore(bonds):
+    """The contact opens and closes again; the spring force rises by at most K V dt between two records."""
+    rupture = {"model": "bell", "zero_force_rate": 1.0, "bell_force": 4e-12}
+    bonds = BONDS | {"rupture": rupture, "rebinding_rate": 2.0} | bonds
+    contact = {"indentation": {"from": 3e-6, "to": -4e-6, "cycles": 1}, "after_pull_off": "reattach"}
+    drive = {"model": "spring", "stage": 1e-5, "stiffness": 10.0}
+    course = run(1.0, 1e-2, drive=drive, bonds=bonds, contact=contact)
+    borne = float(np.abs(course.spring_force).max()) + 10.0 * 1e-5 * 1e-2
+    assert math.isfinite(float(course.first_closing))
+    assert float(course.peak_friction) <= borne
+
+
+@pytest.mark.parametrize("sites", [5, 20])
+def test_counted_bonds_never_push_a_slider_back_nor_give_back_what_they_dissipated(sites):
+    """A strength that is drawn above the pull holds a slider that is pulled forwards; it does not move it."""
+    drive = {"model": "spring", "stage": 1e-4, "stiffness": 100.0, "damping": 1.0, "contact_stiffness": "rigid"}
+    bonds = {"model": "counted", "stress": 1e5, "critical_speed": 1e-3, "rebinding_rate": 100.0, "sites": sites}
+    bonds |= {"start": "empty"}
+    course = run(0.2, 1e-3, drive=drive, bonds=bonds, contact={"load": 1e-4}, ensemble={"members": 8})
+    assert float(course.slider_position.diff("t").min()) >= 0.0
+    assert float(course.dissipated_by_rupture.diff("t").min()) >= -1e-9 * float(course.drive_work.max())
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("step", [2.0, 5e-2])
+def test_a_clock_step_of_millions_of_ruptures_is_no_loss_of_stability(step):
+    """30,000 tracked bonds break and bind several million times in each of the long clock steps."""
+    rupture = {"model": "bell", "zero_force_rate": 25.0, "bell_force": 4e-12}
+    bonds = {"model": "tracked", "rupture": rupture, "bond_stiffness": 0.8e-6, "rebinding_rate": 250.0}
+    bonds |= {"site_density": 6.5e16, "sites": 30000}
+    lens = {"solid": {"shear_modulus": 1.6e6}, "sphere": {"radius": 2e-3}}
+    lens["adhesion"] = {"work": 42e-3, "bond_share": 0.0}
+    drive = {"model": "spring", "stage": 1e-3, "stiffness": 2e3}
+    course = run(4.0, step, drive=drive, bonds=bonds, contact={"load": 4e-3}, **lens)
+    assert np.isnan(course.runaway_time.values).all()
+    assert_allclose(course.friction_force[-1], 9.25e-3, rtol=0.02)
