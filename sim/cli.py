@@ -201,7 +201,7 @@ def run(
                 simulate.run(scene, target, **how, memory=memory, stage=shown.begin, progress=shown.advance)
             except (simulate.Stopped, KeyboardInterrupt) as stopped:
                 _fail(_STOPPED, getattr(stopped, "exit_code", INTERRUPTED))
-        feels_friction = scene.drive.solves_motion
+        solves_motion = scene.drive.solves_motion
         if tabulated := not (quiet or bare or shard) and preview.tabulated(plan):
             del plan, scene  # the points of a large sweep take as much memory as its table
             shown.begin("table")
@@ -211,7 +211,7 @@ def run(
     if not quiet:
         waits = f"shard {shard} is done; the last shard writes {target} (after a failure: --resume)"
         say(str(target) if target.exists() else waits)
-    if feels_friction and target.exists() and (sentence := _unresolved(target)):
+    if solves_motion and not shard and target.exists() and (sentence := _unresolved(target)):
         _fail(f"{target}: {sentence}", FAILED)
 
 

@@ -113,7 +113,8 @@ def _fault(dataset: xr.Dataset) -> str:
         return "the attribute scenario_resolved does not hold a scenario"
     swept, numbers = _swept(scenario), list(_numbers({key: scenario[key] for key in scenario if key != "sweep"}))
     whole = {key.partition(".")[0] for key in swept if _label(dataset, key) is not None}  # tables that differ by point
-    fixed = [key for key in numbers if key.partition(".")[0] not in whole and not key.startswith(tuple(swept))]
+    varied = tuple(f"{name}." for name in swept)
+    fixed = [key for key in numbers if key.partition(".")[0] not in whole and not f"{key}.".startswith(varied)]
     keys = {key.replace(".", "_") for key in (*numbers, *swept)}
     for name in ("t", *_DERIVED, *(key.replace(".", "_") for key in fixed)):
         if name not in dataset.variables:

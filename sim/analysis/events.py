@@ -215,7 +215,7 @@ def runaways(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``ran_away``, 1 where nothing held the body any longer; ``runaway_after`` [s] and ``static_friction`` [N],
+        ``ran_away``, 1 if the slider lost stability; ``runaway_after`` [s] and ``static_friction`` [N],
         the force at that time, nan where the body is held to the end.
     """
     when = dataset["runaway_time"].isel(t=-1, drop=True).astype(float)

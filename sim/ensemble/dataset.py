@@ -20,7 +20,7 @@ from pydantic import TypeAdapter
 
 from sim.ensemble.diagnosis import cure, systematic_errors, worst
 from sim.ensemble.execute import pool
-from sim.ensemble.plan import Plan, part_name
+from sim.ensemble.plan import IN_MEMORY, Plan, part_name
 from sim.ensemble.store import Blocks
 from sim.ensemble.variables import MAP, NUMBERS, SYSTEMATIC, Variable
 from sim.numerics.files import HDF5
@@ -32,8 +32,6 @@ from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
 from sim.scenario.sweep import Axis, written
 
-#: A dataset of more bytes is not built in memory, where it is held twice for a moment.
-_IN_MEMORY = 128 * 2**20
 #: Options of netCDF for each ``record.compression``. Six digits are within 5e-7: 20 bits and the leading one, rounded
 #: to nearest, so that flags stay flags and equal numbers stay equal.
 _ZLIB: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
@@ -399,7 +397,7 @@ def write(outline: Outline, parts: Blocks, path: Path) -> None:
     """
     sizes = [math.prod(outline.sizes[size] for size in each.dimensions) for each in outline.variables.values()]
     try:
-        if 8 * sum(sizes) > _IN_MEMORY:
+        if 8 * sum(sizes) > IN_MEMORY:
             with pool(1) as executor:
                 executor.submit(_write, outline, parts, os.fspath(path)).result()
         elif hdf5_gives_bytes():

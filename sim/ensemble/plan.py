@@ -30,6 +30,8 @@ _SMALLEST_GROUP = 16
 #: in which every member is kept by default [byte].
 _PACKED, _PACKED_MAPS = {"none": 1.0, "zlib": 0.4, "digits": 0.2}, 0.85
 _MOST_BYTES = 20e9
+#: A dataset of more bytes is not built in memory, where it is held twice for a moment.
+IN_MEMORY = 128 * 2**20
 
 
 class Block(NamedTuple):

@@ -12,7 +12,7 @@ import numpy as np
 
 from sim.ensemble.diagnosis import Worst, diagnosis, place as in_words, remarks, slider_body, spread, worst_of_sweep
 from sim.ensemble.pace import counted, pace as pace_of
-from sim.ensemble.plan import Plan, map_bytes, state_numbers, work
+from sim.ensemble.plan import IN_MEMORY, Plan, map_bytes, state_numbers, work
 from sim.ensemble.variables import SOURCES
 from sim.laws import jkr
 from sim.parts.bonds.models import Cohort, FirstMoment, Rate
@@ -33,8 +33,8 @@ _POINT, _MODE = 1e-3, 5e-6
 # is used. Copies of a part while it is computed, of a dataset while it is written or read, of one that stays in memory.
 _PROCESS, _TABLE, _OF_MODE_MADE, _OF_MODE = 160e6, 100e6, 520.0, 160.0
 _COPIES_OF_PART, _COPIES, _COPIES_IN_MEMORY = 3.0, 2.0, 3.0
-#: Largest dataset that is built in memory, and largest trajectories that are read back for a table [byte].
-_BUILT_IN_MEMORY, _MOST_TABULATED = 256e6, 1e8
+#: Largest trajectories that are read back for a table [byte].
+_MOST_TABULATED = 1e8
 
 _MOST_WORDS = 6
 #: Estimate [s] of a run that is announced.
@@ -81,7 +81,7 @@ def tabulated(plan: Plan) -> bool:
 def memory(plan: Plan, jobs: int) -> float:
     """Estimate the largest memory of all processes together [byte]: libraries, and blocks or the dataset."""
     block = max(_block(plan, point) for point in spread(plan.points, 2))
-    dataset = _COPIES * min(plan.bytes, _BUILT_IN_MEMORY) + (_TABLE if tabulated(plan) else 0.0)
+    dataset = _COPIES * min(plan.bytes, IN_MEMORY) + (_TABLE if tabulated(plan) else 0.0)
     return (jobs + 1 if jobs > 1 else 1) * _PROCESS + max(jobs * block, dataset)
 
 

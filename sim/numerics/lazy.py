@@ -63,3 +63,4 @@ def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """Write a dataset as a netCDF file. On Windows xarray itself writes no path with a letter outside of ASCII."""
     with HDF5, File(path, "w", format="NETCDF4") as file:
         dataset.dump_to_store(NetCDF4DataStore(file, lock=HDF5))
+        file.sync()  # which raises an error if the disk fails, while closing the file would crash

@@ -306,7 +306,8 @@ class _Driven(Part):
 class Force(_Driven):
     """A prescribed tangential force: creep, ageing under load, the static threshold. Limit: ``Spring`` as K -> 0.
 
-    Where nothing can bear the force any longer, the member ends there with the time of its runaway.
+    A member ends with the time of its runaway if the bonds no longer bear the force and neither mass, damping nor the
+    viscosity of a closed contact limits the speed.
     """
 
     force: tables.over_time(Quantity("N", "tangential force on the body", "Q"), "force")  # type: ignore[valid-type]

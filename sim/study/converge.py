@@ -26,11 +26,12 @@ from pydantic import TypeAdapter
 from scipy import special
 
 from sim.analysis import engineering
-from sim.engine import MemberNoise, follow
+from sim.engine import MemberNoise, State, follow
 from sim.ensemble.plan import seconds_a_step, together
 from sim.ensemble.variables import READ
 from sim.numerics import files, hdf5, lazy
 from sim.numerics.stopwatch import stopwatch
+from sim.parts.drive import Driven
 from sim.parts.exchange import Array, Bonding, Gammas, Motion
 from sim.parts.shear.bands import cell_pairs
 from sim.parts.shear.process import Fluctuation
@@ -337,6 +338,19 @@ def _records(scenario: Scenario) -> range:
     return range(clock.steps % every, clock.steps + 1, every)
 
 
+class Unresolved(RuntimeError):
+    """A motion that a setting does not resolve: its missing values are no numbers to compare."""
+
+    exit_code = 1
+
+
+def _refuse_unresolved(scenario: Scenario, state: State) -> None:
+    """Raise ``Unresolved`` if the motion of a member could not be resolved."""
+    if scenario.drive.solves_motion and np.isfinite(cast(Driven, state.drive).unresolved_time).any():
+        step = f"clock.step = {scenario.clock.step:.3g} s"
+        raise Unresolved(f"with {step} some members could not be resolved; set drive.viscosity or a shorter clock.step")
+
+
 def recorded(
     scenario: Scenario, count: int, steps: range, names: Sequence[str] = QUANTITIES, first: int = 0, in_time: Any = None
 ) -> Array:
@@ -352,6 +366,7 @@ def recorded(
                 in_time()
             piece = steps[begin : begin + whole]
             state, course = follow(scenario, MemberNoise.of(scenario.seed, members), state, piece)
+            _refuse_unresolved(scenario, state)
             read, shape = (READ[name](scenario, course) for name in names), (len(piece), len(members))
             pieces.append([np.broadcast_to(variable, shape).T for variable in read])
         values.append([np.concatenate(each, axis=1) for each in zip(*pieces, strict=True)])

@@ -113,7 +113,7 @@ def test_a_file_in_parts_equals_the_run_in_memory_and_an_older_one_survives_a_fa
         assert from_disk["speed"].dims == ("contact_load", "adhesion_bond_share", "t")
         xr.testing.assert_identical(from_disk.load(), whole)
     assert [file.name for file in tmp_path.iterdir()] == ["small.nc"]
-    monkeypatch.setattr(datasets, "_IN_MEMORY", 0)
+    monkeypatch.setattr(datasets, "IN_MEMORY", 0)
     monkeypatch.setattr(plans, "_GROUP", 2)
     monkeypatch.setattr(plans, "_PART_NUMBERS", 60)
     with sim.open(ensemble.run(scenario, tmp_path / "large.nc")) as large:

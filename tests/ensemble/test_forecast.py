@@ -131,7 +131,7 @@ def test_the_largest_process_of_a_run_of_ten_times_the_members_is_as_large(tmp_p
         files = str(tmp_path / "scene.toml"), "-o", str(tmp_path / "x.nc")
         largest.append(child("-m", "sim", "run", *files, "--force", "--no-table", "-j", jobs)[1])
         assert 2**20 * largest[-1] < 1.5 * memory(Plan.of(load(tmp_path / "scene.toml")), 1)
-    assert largest[1] < 1.1 * largest[0] + 512e6 / 2**20  # a dataset of up to 256 MB is built in memory
+    assert largest[1] < 1.1 * largest[0] + 256.0  # a dataset of up to 128 MiB is built in memory
 
 
 BELL = {"model": "bell", "zero_force_rate": 20.0, "bell_force": 2e-11}

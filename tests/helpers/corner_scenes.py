@@ -69,14 +69,14 @@ class CornerDraw(Draw):
     def events(self):
         """Return a scene of many tracked bonds and two clock steps, so long that each has a million events."""
         scale = self.scale(self.log(0.1, 10.0))
-        rate, ratio, sites = self.log(1e-2, 1e2) / scale.duration, self.log(0.1, 10.0), int(self.log(200.0, 3e4))
+        rate, ratio, sites = self.log(1e-2, 1e2) / scale.duration, self.log(0.1, 10.0), int(self.log(100.0, 3e3))
         wanted = self.log(*MANY_EVENTS)
         rate = wanted / (0.5 * scale.duration * sites) * (1.0 + ratio) / (2.0 * ratio)
         bonds = self.interface(scale, rate, "tracked", stretched=True, ratio=ratio, slow=True)
         bonds.table |= {"sites": sites, "start": "steady"}
         drive = self.pull(scale, bonds, self.choice(("spring", "spring", "force")), body=False)
-        if self.chance(0.3):
-            drive["damping"] = bonds.stiffness / rate * self.log(1e-3, 1.0)
+        if drive["model"] == "force":
+            drive["force"] = bonds.force * self.log(1e-3, 0.1)
         scene = self.tables(scale, 2, bonds, drive, {"load": scale.force * self.random.uniform(0.0, 3.0)})
         scene["adhesion"]["bond_share"] = 0.0  # otherwise each event costs a time that grows with the sites
         return scene | {"ensemble": {"members": 2}}

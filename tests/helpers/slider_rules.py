@@ -33,15 +33,6 @@ def most_of_drive(scenario, course):
     return least, most
 
 
-def contact_stiffness(scenario, radius):
-    """Return the tangential stiffness of the contact k_t [N/m]; infinite for a rigid one."""
-    given = scenario.drive.contact_stiffness
-    if given == "half_space":
-        modulus, ratio = scenario.solid.effective
-        return 3.0 * math.pi**2 * modulus * radius / (4.0 * (2.0 - ratio))
-    return math.inf if given == "rigid" else float(given)
-
-
 def check_ends(scenario, course):
     """No member is unresolved, and a runaway is one in which nothing could hold the slider."""
     unresolved = np.isfinite(column(course, "unresolved_time"))
@@ -61,16 +52,11 @@ def holds(scenario, course, member, record):
     Mass and damping leave a body a motion under any force. A spring leaves a slider a balance of forces with any bonds,
     at the latest where all of them are broken. So a runaway needs a prescribed force, and neither mass nor damping.
     Then an open contact holds nothing. In a closed contact a viscosity holds the slider at a finite speed. Otherwise
-    the bonds must bear the force. The exception is that of the theory: cohorts with a cut-off on a contact that is
-    softer than they are, ahead of a body that mass or damping delays, without a viscosity.
+    the bonds must bear the force.
     """
     drive, radius = scenario.drive, float(course.radius[record - 1, member % course.radius.shape[1]])
     area = math.pi * np.nan_to_num(radius) ** 2
     delays = drive.mass + drive.damping > 0.0
-    if delays and not drive.viscosity and scenario.bonds.model == "cohort" and scenario.bonds.law.limit < math.inf:
-        stiffness = scenario.bonds.site_density * scenario.bonds.bond_stiffness * area
-        if contact_stiffness(scenario, radius) < SOFT * stiffness:
-            return ""
     if drive.spring:
         return "the spring holds the slider"
     if delays:
@@ -98,8 +84,6 @@ def holds_finer(scenario, member, record):
 
 #: Holder of a slider under a force that its bonds bear.
 BORNE_BY_BONDS = "its bonds bear the force"
-#: Stiffness of a contact over that of all sites below which it may be softer than bonds on the verge of a slip.
-SOFT = 10.0
 #: Share of the strength below which bonds bear a stress, as the area within a clock step is known from its ends only;
 #: share of the cut-off stretch that the mean stretch has at least if bonds give way; ruptures of a bond in a clock step
 #: below which it outlasts some of the step.

@@ -456,7 +456,7 @@ def _break_all(row, pool, time, brief, slider, contact, unit, rules, node, energ
 
 @device
 def _piece(line, bonds, slider, contact, unit, rules, room, books):
-    """Go through one piece of a clock step; return the time of its end or of lost stability, and the bonds.
+    """Go through one piece of a clock step; return the time reached, before its end if the motion ends, and the bonds.
 
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step: then the last
     number returned is 1, else 0.
@@ -535,8 +535,8 @@ def _piece(line, bonds, slider, contact, unit, rules, room, books):
             pool[:3, :count] = saved[:, :count]
             line[0], books[0], row.next_step = line[1], books[1], 0.25 * step
             continue
-        if step <= mechanics.BRIEF * length and contact.stays == 0.0:  # an area that jumps takes the missing energy
-            energy.area += mechanics.retained(energy) - mechanics.retained(books[1]) - (after - before)
+        if step <= mechanics.BRIEF * length and contact.stays == 0.0:
+            mechanics.book_jump(line, after - before, books)
         count, row.acceleration = new_count, bend
         travelled += unit * shift
         if count > 1.25 * settled + 16.0 or count + 4 > pool.shape[1]:
@@ -555,7 +555,7 @@ def _piece(line, bonds, slider, contact, unit, rules, room, books):
 
 @device
 def _through(line, books, pieces, slider, contact, unit, share, rules, bonds, room):
-    """Take a row and its cohorts through a clock step; return the time reached, and False if stability is lost."""
+    """Take a row and its cohorts through a clock step; return the time reached, and False if the motion ends there."""
     pool, _, nodes = room
     row, energy = line[0], books[0]
     count = read_row(pool, bonds[0], bonds[1], bonds[2], share)

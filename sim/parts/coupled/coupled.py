@@ -269,15 +269,18 @@ def with_contact(
     In the sub-steps the contact was that of the step, and ``counted`` bonds had not been drawn. The slider answers at
     the start of the next step. A force that nothing can bear in the meantime is no friction:
 
-    - A contact that has closed bears the pull if the slider has neither mass nor damping, else that of its shear
-      displacement. Bonds without a stretch bear the pull less the damping of a slider without mass. If a stiff contact
-      has closed on another body that is delayed, the body bears the stress of the bonds.
+    - A contact that has closed, or that was lost in the step and has an equilibrium again, bears the pull if the slider
+      has neither mass nor damping, else that of its shear displacement. Bonds without a stretch bear the pull less the
+      damping of a slider without mass. If a stiff contact has closed on another body that is delayed, the body bears
+      the stress of the bonds.
     - A slider without mass on ``counted`` bonds bears the pull less the damping until the draw, whatever the draw adds
       to the area. After it the slider sticks if the bonds have become stronger than the pull. If they are weaker, its
       speed is that of the new balance.
     """
     drive, area = cast(Force | Spring, parts.drive), np.pi * np.fmax(radius, 0.0) ** 2
     closes = (area > 0.0) & (sliders.radius == 0.0)
+    if not contact.stays and not np.any(contact.shear.energy):  # where none is drawn, the loop follows the contact
+        closes = closes | ((area > 0.0) & ~_agree(sliders.radius, radius))
     if closes.any():
         yields, slope = drive.yields(contact.shear_modulus, contact.bodies.poisson_ratio)
         force = area * bonding.stress

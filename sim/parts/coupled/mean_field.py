@@ -105,8 +105,8 @@ def break_all(row, time, brief, slider, law, contact, energy):
 
 #: Changes between stick and slip without any time between them after which there is no solution to go on with.
 _STUCK = 100
-#: Factor between neighbouring speeds at which a balance of forces is looked for.
-_SLOWER = 0.95
+#: Factor between neighbouring speeds at which a balance of forces is looked for, and the least of them.
+_SLOWER, _SLOWEST = 0.95, 1e-12
 #: Places in a piece at which a slider that sticks is looked at, and halvings that place when it leaves.
 _PLACES, _HALVINGS = 32, 60
 #: Shares of bonds and of a piece beyond which equilibrium is looked for where no sub-step is accepted.
@@ -149,7 +149,7 @@ def _to_zero(row, start, step, none, slider, law, contact, nodes):
 
 @device
 def _piece(line, slider, law, contact, nodes, books):
-    """Go through one piece of a clock step. Return the time at which it ends or the slider loses stability.
+    """Go through one piece of a clock step. Return the time reached, before its end if the motion ends.
 
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step: then the last
     number returned is 1, else 0.
@@ -180,8 +180,8 @@ def _piece(line, slider, law, contact, nodes, books):
             continue
         ahead = max(row.next_step, step * grows) if step == left else step * grows
         none = _NONE * slider.tolerance * row.bound
-        turns = law.softness > 0.0 and math.fabs(row.moment) > none and _at_end(row, nodes, step, law) < 0.0
-        if turns:  # there the rupture rate has a kink, which no sub-step leads across
+        reverses = law.softness > 0.0 and math.fabs(row.moment) > none and _at_end(row, nodes, step, law) < 0.0
+        if reverses:  # there the rupture rate has a kink, which no sub-step leads across
             step, solved = _to_zero(row, start, step, none, slider, law, contact, nodes)
             if not solved:
                 row.next_step = 0.5 * step
@@ -193,9 +193,9 @@ def _piece(line, slider, law, contact, nodes, books):
             line[0], books[0], nodes.last_step, row.next_step = line[1], books[1], 0.0, 0.25 * step
             continue
         row.next_step = ahead
-        if step <= mechanics.BRIEF * length and contact.stays == 0.0:  # an area that jumps takes what is missing
-            energy.area += mechanics.retained(energy) - mechanics.retained(books[1]) - (after - before)
-        if turns:
+        if step <= mechanics.BRIEF * length and contact.stays == 0.0:
+            mechanics.book_jump(line, after - before, books)
+        if reverses:
             row.moment, nodes.last_step = 0.0, 0.0
         reach = NEAR if line[1].speed * row.speed < 0.0 else 0.0  # it turns in vain where the force of the bonds falls
         if brittle:
@@ -285,11 +285,13 @@ def _jump(row, time, slider, law, contact):
 @device
 def _below(high, row, time, slider, law, contact):
     """Return the highest speed below another one at which the resistance of a body without mass equals the pull."""
-    while _unbalanced(high, row, time, slider, law, contact)[0] < 0.0:
+    while high < math.inf and _unbalanced(high, row, time, slider, law, contact)[0] < 0.0:
         high *= 2.0
-    low = _SLOWER * high
-    while low > 0.0 and _unbalanced(low, row, time, slider, law, contact)[0] > 0.0:
+    low, least = _SLOWER * high, _SLOWEST * high
+    while low > least and _unbalanced(low, row, time, slider, law, contact)[0] > 0.0:
         high, low = low, _SLOWER * low
+    if not low > least:  # the pull is the strength at rest but for a rounding
+        return 0.0
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         if _unbalanced(middle, row, time, slider, law, contact)[0] > 0.0:
@@ -359,7 +361,9 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
         sense = math.copysign(1.0, row.spring_force if rests else row.speed)
         along = mechanics.Law(law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows)
         if rests:
+            contact = mechanics.leaving_rest(contact, row)
             speed = sense * _jump(row, start, slider, along, contact) if slider.mass == 0.0 else 0.0
+            mechanics.remember_first(row, speed, contact)
             row.speed, row.body_speed, nodes.last_step = speed, speed, 0.0  # no guess from the slip before
             row.bound *= radau.share_left(speed, along)
             row.moment = sense * row.bound
@@ -372,7 +376,7 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
 
 @device
 def _clock_step(line, slider, law, contact, pieces, nodes, books):
-    """Go through a clock step; return the time reached, and False if stability is lost."""
+    """Go through a clock step; return the time reached, and False if the motion ends there."""
     row, energy = line[0], books[0]
     is_open, time, going, stays = row.radius == 0.0, 0.0, True, contact.stays
     for p in range(len(pieces)):

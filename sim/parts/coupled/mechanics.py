@@ -215,6 +215,8 @@ LEAST = 1e-13
 #: Slip in a sub-step over the length that fluctuations remember; difference of speeds that are one; time of a slip at
 #: once, over the piece's.
 _MOST_SLID, _STEADY, _NO_TIME = 0.5, 1e-3, 1e-6
+#: Path over the length of a memory with which the memory begins.
+_FIRST_PATH = 1e-9
 #: Share of the error of the last estimates of ΔΓ that a sub-step corrects, over its part of the memory.
 _CORRECTED = 4.0
 #: Turns after which the progress of a loop over sub-steps is judged, and the share of a piece that is too little then.
@@ -333,6 +335,36 @@ def remember(row, slip, first_speed, last_speed, duration, contact):
 
 
 @device
+def _has_slipped(row, contact):
+    """True if the memory of the fluctuations holds any slip, or if fluctuations need none."""
+    field = contact.field
+    return row.mean > 0.0 or field.follows == 0.0 or field.relaxing > 0.0 or field.length == math.inf
+
+
+@device
+def leaving_rest(contact, row):
+    """Return the numbers of the contact at the first slip of all, however short.
+
+    The amplitude of fluctuations that remember slip alone jumps there from its floor to its largest, because all of
+    the remembered path is new.
+    """
+    if _has_slipped(row, contact):
+        return contact
+    row.felt = row.paid * row.energy
+    return feeling(contact, row)
+
+
+@device
+def remember_first(row, speed, contact):
+    """Begin the memory of the fluctuations with a slip that is next to nothing, at a speed above zero."""
+    if speed == 0.0 or _has_slipped(row, contact):
+        return
+    path = _FIRST_PATH * contact.field.length
+    before = row.weight, row.mean, row.spread
+    row.weight, row.mean, row.spread = remembered(before, path, path / math.fabs(speed), 0.0, contact.field.length)
+
+
+@device
 def settled(contact, row, slider):
     """Return the numbers of the contact at the end of a clock step.
 
@@ -371,7 +403,7 @@ def judged(turns, checked, start, length):
     """Return the turns of a loop over sub-steps since its progress was judged, and the time reached then.
 
     The number of sub-steps in a piece has no limit. The turns are negative if the loop hardly advances: at its pace a
-    piece would take more than ``_TURNS / _PROGRESS`` turns, which is some hours, or for ever.
+    piece would take more than ``_TURNS / _PROGRESS`` turns, which takes hours or never ends.
     """
     if turns < _TURNS:
         return turns + 1, checked
@@ -553,6 +585,21 @@ def misses(before, after, last, energy, row, slider, step):
     turned += 4.0 * step / (row.elapsed + slider.length) * size
     room = max(0.0, _MISSED * tolerance * size - excess) * _FEW
     return math.fabs(missing) > tolerance * turned + room + rounding
+
+
+#: Change of a radius over it, in a sub-step that is next to nothing, above which the area has jumped.
+_JUMPED = 1e-6
+
+
+@device
+def book_jump(line, gained, books):
+    """Book the energy that the last sub-step misses to the area, if the area has jumped in next to no time.
+
+    ``gained``: change of the stored energy.
+    """
+    row, before, energy = line[0], line[1], books[0]
+    if math.fabs(row.radius - before.radius) > _JUMPED * before.radius:
+        energy.area += retained(energy) - retained(books[1]) - gained
 
 
 #: Change of a force over it below which it is rounding.

@@ -282,7 +282,7 @@ def _to_event(row, start, left, tracks, slider, ground, energy, node):
 
 @device
 def _piece(line, tracks, slider, contact, ground, nodes, books):
-    """Go through one piece of a clock step; return the time of its end or of lost stability.
+    """Go through one piece of a clock step; return the time reached, before its end if the motion ends.
 
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step: then the last
     number returned is 1, else 0.
@@ -372,7 +372,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
 
 @device
 def _through(line, books, pieces, slider, contact, tracks, ground, nodes):
-    """Take a row and its bonds through a clock step; return the time reached, and False if stability is lost."""
+    """Take a row and its bonds through a clock step; return the time reached, and False if the motion ends there."""
     energy, row, time, first, stays = books[0], line[0], 0.0, nodes[0], contact.stays
     for p in range(len(pieces)):
         slider = mechanics.slider_in(slider, pieces[p])

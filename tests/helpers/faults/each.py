@@ -101,7 +101,7 @@ def main(state, calls, all_of_them, words, again, large):
     if large:  # a large dataset is written by a process of its own
         from sim.ensemble import dataset
 
-        dataset._IN_MEMORY = 0
+        dataset.IN_MEMORY = 0
     begin()
     assert not here(words)  # in this process, so that those of the faults have all modules and kernels
     begin()

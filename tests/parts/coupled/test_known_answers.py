@@ -128,3 +128,78 @@ def test_a_clock_step_of_millions_of_ruptures_is_no_loss_of_stability(step):
     course = run(4.0, step, drive=drive, bonds=bonds, contact={"load": 4e-3}, **lens)
     assert np.isnan(course.unresolved_time.values).all()
     assert_allclose(course.friction_force[-1], 9.25e-3, rtol=0.02)
+
+
+def test_a_body_that_turns_many_times_in_a_clock_step_comes_to_rest_by_dry_friction():
+    """Dry friction F takes 2 F/K of the amplitude in each half period; the body rests where the spring bears less."""
+    stiffness, mass, rest = 100.0, 2.5e-6, 0.1
+    stage = {"time": [0.0, rest, rest, 3.0 * rest], "value": [1e-4, 1e-4, 0.0, 0.0]}
+    drive = {"model": "spring", "stage": stage, "stiffness": stiffness, "mass": mass, "contact_stiffness": "rigid"}
+    bonds = {"model": "none", "stress": 1.0}
+    tables = {"drive": drive | {"start": "rest"}, "bonds": bonds, "contact": {"load": 1e-4}}
+    course = run(3.0 * rest, rest, **tables)
+    friction = 1.0 * float(course.contact_area[0])
+    lag = friction / stiffness
+    behind = float(course.slider_position[1] - course.stage_position[1])
+    speed, frequency = float(course.speed[1]), math.sqrt(stiffness / mass)
+    turn = math.copysign(lag, speed)  # the spring is balanced this far behind the centre
+    where, halves = math.copysign(math.hypot(behind + turn, speed / frequency), speed) - turn, 0
+    while abs(where) > lag:
+        where, halves = -where + math.copysign(2.0 * lag, where), halves + 1
+    assert halves > 100
+    assert np.isnan(course.unresolved_time.values).all()
+    assert_allclose(course.slider_position[2] - course.stage_position[2], where, atol=1e-5 * abs(behind) + lag)
+    assert float(course.speed[2]) == 0.0
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_a_slider_leaves_rest_at_a_speed_that_balances_the_pull_whatever_bonds_carry_of_adhesion(share):
+    """The area shrinks with the bonds that the slip breaks; spring force and friction are equal at each record."""
+    drive = {"model": "spring", "stage": 3.9e-9, "stiffness": 1180.0, "viscosity": 9.3e10, "contact_stiffness": "rigid"}
+    bonds = {"model": "steady", "stress": 634.0, "critical_speed": 2.5e-10}
+    lens = {"adhesion": {"work": 0.0125, "bond_share": share}, "sphere": {"radius": 2e-2}}
+    course = run(100.0, 1.0, drive=drive, bonds=bonds, contact={"load": 2.3e-4}, **lens)
+    assert np.isnan(course.unresolved_time.values).all()
+    assert float(course.speed[-1]) > 0.0
+    assert_allclose(course.friction_force, course.spring_force, rtol=1e-5, atol=1e-12)
+
+
+def test_a_slider_follows_its_stage_when_the_last_bonds_are_broken():
+    """Nothing resists a slider without mass and damping whose bonds are not remade."""
+    rupture = {"model": "bell", "zero_force_rate": 3.6e4, "bell_force": 4.8e-13}
+    bonds = {"model": "rate", "rupture": rupture, "bond_stiffness": 4.2e-7, "rebinding_rate": 0.0}
+    bonds |= {"site_density": 6.6e13, "start": "bonded"}
+    drive = {"model": "spring", "stage": 2.6e-7, "stiffness": 395.0, "contact_stiffness": "rigid"}
+    course = run(2.0, 0.5, drive=drive, bonds=bonds, contact={"load": 2.8e-6})
+    assert np.isnan(course.unresolved_time.values).all()
+    assert_allclose(course.slider_position[1:], course.stage_position[1:], rtol=1e-6)
+
+
+def test_a_body_under_a_force_drifts_when_its_contact_is_lost_within_a_clock_step():
+    """The contact is sheared most where it comes off; then damping alone resists, and the speed is Q/c."""
+    force, damping = -2.17e-12, 0.0132
+    rupture = {"model": "cut_off", "stretch": 2.4e-8, "rate": 0.0}
+    bonds = {"model": "rate", "rupture": rupture, "bond_stiffness": 4.3e-5, "rebinding_rate": 2.2e-7}
+    bonds |= {"site_density": 4.3e14, "start": "bonded"}
+    contact = {"displacement": {"from": 8.9e-8, "to": -1.5e-7, "cycles": 1}, "stiffness": 30.8}
+    lens = {"solid": {"shear_modulus": 1e7}, "sphere": {"radius": 3e-6}}
+    lens["adhesion"] = {"work": 3.3e-3, "bond_share": 0.6}
+    course = run(70.0, 3.5, drive={"model": "force", "force": force, "damping": damping}, bonds=bonds,
+                 contact=contact, **lens)  # fmt: skip
+    assert course.in_contact.values[-1] == 0.0
+    assert np.isnan(course.unresolved_time.values).all()
+    assert_allclose(course.speed[-1], force / damping, rtol=1e-9)
+
+
+def test_cohorts_with_a_cut_off_slip_ahead_of_a_body_that_damping_holds_as_with_ever_less_viscosity():
+    rupture = {"model": "cut_off", "rate": 0.0, "stretch": 1e-7}
+    drive = {"model": "spring", "stage": 1e-5, "stiffness": 20.0, "damping": 1e-2, "contact_stiffness": 1.0}
+    positions = []
+    for viscosity in (0.0, 1e2, 1e3):
+        tables = {"drive": drive | {"viscosity": viscosity}, "bonds": BONDS | {"model": "cohort", "rupture": rupture}}
+        course = run(1.0, 1e-2, contact={"load": 1e-4}, **tables)
+        assert np.isnan(course.unresolved_time.values).all()
+        positions.append(course.slider_position[-1].item())
+    none, less, more = positions
+    assert abs(none - less) < 1e-5 * none
+    assert abs(none - more) < 1e-4 * none
