@@ -2,7 +2,7 @@
 
 The counted time is the same on any machine, and it is right to a factor of two if a clock step is one piece of work. A
 driven slider and bonds with a stretch are advanced in sub-steps or from event to event, and their number is known only
-once they were made. So pieces of such a run are timed at several times of it.
+afterwards. Therefore pieces at several times of such a run are timed.
 """
 
 import itertools

@@ -65,7 +65,7 @@ def claim(path: Path, replace: bool, inputs: Iterable[Path] = ()) -> None:
     Raises
     ------
     BadInput
-        Also if the C library cannot be told the path.
+        Also if the path has a letter that the C library cannot encode.
     """
     files.claim(path, replace, inputs)
     if reason := _unnamable(path):

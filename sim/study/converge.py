@@ -563,20 +563,29 @@ def _at_steps(rows: Sequence[Setting], count: int, budget: Budget | None = None)
     At a prescribed speed all have the fluctuations that the finest draws. Fluctuations have no error in time. Their
     amplitude and the bonds have, so these are computed at each step. ``_Spent`` is raised if a budget is spent before.
     """
-    finest, *others = scenarios = [row.scenario for row in rows]
-    if _replays(finest):
-        steps = range(0, finest.clock.steps + 1, round(rows[1].ratio / rows[0].ratio))
-        _, course = follow(finest, MemberNoise.of(finest.seed, np.arange(count)), None, steps)
-        size = finest.fluctuations.law.factor(course.speed, course.strength) ** 2
-        unit = np.divide(course.energy, size, out=np.zeros(course.energy.shape), where=size > 0.0)
-        scenarios[1:] = [scenario.with_values({}) for scenario in others]
-        for scenario, row in zip(scenarios[1:], rows[1:], strict=True):
-            scenario.__dict__["process"] = _Replayed(row.scenario, unit[:: round(row.ratio / rows[1].ratio)])
 
     def in_time() -> None:
         if budget is not None and budget.left() < 0.0:
             raise _Spent
 
+    finest, *others = scenarios = [row.scenario for row in rows]
+    if _replays(finest):
+        steps, state, units = (
+            range(0, finest.clock.steps + 1, round(rows[1].ratio / rows[0].ratio)),
+            None,
+            list[Array](),
+        )
+        whole = max(1, len(steps) // _PIECES)
+        for begin in range(0, len(steps), whole):
+            in_time()
+            noise = MemberNoise.of(finest.seed, np.arange(count))
+            state, course = follow(finest, noise, state, steps[begin : begin + whole])
+            size = finest.fluctuations.law.factor(course.speed, course.strength) ** 2
+            units.append(np.divide(course.energy, size, out=np.zeros(course.energy.shape), where=size > 0.0))
+        unit = np.concatenate(units)
+        scenarios[1:] = [scenario.with_values({}) for scenario in others]
+        for scenario, row in zip(scenarios[1:], rows[1:], strict=True):
+            scenario.__dict__["process"] = _Replayed(row.scenario, unit[:: round(row.ratio / rows[1].ratio)])
     return [compared(scenario, count, _records(scenario), in_time=in_time) for scenario in scenarios]
 
 

@@ -302,6 +302,16 @@ def _below(high, row, time, slider, law, contact):
 
 
 @device
+def _set_off(row, time, slider, law, contact, nodes):
+    """Give a slider at the start of a slip its speed, which is zero with a mass, and its bonds their share there."""
+    row.bound = 1.0 if law.slows != 0.0 else row.bound
+    speed = law.sense * _jump(row, time, slider, law, contact) if slider.mass == 0.0 else 0.0
+    row.speed, row.body_speed, nodes.last_step = speed, speed, 0.0  # no guess from the slip before
+    row.bound *= radau.share_left(speed, law)
+    row.moment = law.sense * row.bound
+
+
+@device
 def _slide(line, start, slider, along, contact, nodes, books):
     """Slip until the speed comes to zero or the piece ends. Return the time reached, and False without a solution."""
     length, row, energy = slider.length, line[0], books[0]
@@ -316,6 +326,8 @@ def _slide(line, start, slider, along, contact, nodes, books):
             _, area, _, _ = mechanics.contact_area(bound, row.moment, later, row.radius, contact)
             if not area >= 0.0:  # lost: the radius stays for the rest of the clock step
                 contact = mechanics.later(contact, 0.0, 1.0)
+                if slider.mass == 0.0:
+                    _set_off(row, start, slider, along, contact, nodes)
                 continue
             return start, slider.mass == 0.0 or row.speed == 0.0
         contact = mechanics.following(contact, row, start, step)
@@ -362,11 +374,8 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
         along = mechanics.Law(law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows)
         if rests:
             contact = mechanics.leaving_rest(contact, row)
-            speed = sense * _jump(row, start, slider, along, contact) if slider.mass == 0.0 else 0.0
-            mechanics.remember_first(row, speed, contact)
-            row.speed, row.body_speed, nodes.last_step = speed, speed, 0.0  # no guess from the slip before
-            row.bound *= radau.share_left(speed, along)
-            row.moment = sense * row.bound
+            _set_off(row, start, slider, along, contact, nodes)
+            mechanics.remember_first(row, row.speed, contact)
         start, going = _slide(line, start, slider, along, contact, nodes, books)
         if going and start < length:
             row.speed = row.body_speed = 0.0
