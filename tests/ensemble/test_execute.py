@@ -39,7 +39,7 @@ def workers(parent=None):
     found = []
     for child in psutil.Process(parent).children(recursive=True):
         try:
-            if any("LokyProcess" in word for word in child.cmdline()):
+            if any("LokyProcess" in word or "popen_loky" in word for word in child.cmdline()):  # of POSIX, of Windows
                 found.append(child)
         except psutil.Error:  # one that ends now
             continue
