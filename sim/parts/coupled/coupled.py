@@ -279,7 +279,8 @@ def with_contact(
     """
     drive, area = cast(Force | Spring, parts.drive), np.pi * np.fmax(radius, 0.0) ** 2
     closes = (area > 0.0) & (sliders.radius == 0.0)
-    if not contact.stays and not np.any(contact.shear.energy):  # where none is drawn, the loop follows the contact
+    # where neither bonds nor fluctuations are drawn at the end of a step, the loop follows the contact
+    if not contact.stays and not isinstance(parts.bonds, models.Counted) and not np.any(contact.shear.energy):
         closes = closes | ((area > 0.0) & ~_agree(sliders.radius, radius))
     if closes.any():
         yields, slope = drive.yields(contact.shear_modulus, contact.bodies.poisson_ratio)

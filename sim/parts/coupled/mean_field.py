@@ -373,9 +373,12 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
         sense = math.copysign(1.0, row.spring_force if rests else row.speed)
         along = mechanics.Law(law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows)
         if rests:
+            felt, at_rest = row.felt, contact
             contact = mechanics.leaving_rest(contact, row)
             _set_off(row, start, slider, along, contact, nodes)
-            mechanics.remember_first(row, row.speed, contact)
+            if not mechanics.remember_first(row, slider, contact):
+                row.felt, contact = felt, at_rest
+                _set_off(row, start, slider, along, contact, nodes)
         start, going = _slide(line, start, slider, along, contact, nodes, books)
         if going and start < length:
             row.speed = row.body_speed = 0.0

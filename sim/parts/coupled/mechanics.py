@@ -355,13 +355,19 @@ def leaving_rest(contact, row):
 
 
 @device
-def remember_first(row, speed, contact):
-    """Begin the memory of the fluctuations with a slip that is next to nothing, at a speed above zero."""
-    if speed == 0.0 or _has_slipped(row, contact):
-        return
-    path = _FIRST_PATH * contact.field.length
+def remember_first(row, slider, contact):
+    """Begin the memory of the fluctuations with a slip that is next to nothing; False if it takes too long for that.
+
+    A slip that begins slowly begins the memory in its sub-steps.
+    """
+    if _has_slipped(row, contact):
+        return True
+    path, speed = _FIRST_PATH * contact.field.length, math.fabs(row.speed)
+    if not path < _NO_TIME * slider.length * speed:
+        return False
     before = row.weight, row.mean, row.spread
-    row.weight, row.mean, row.spread = remembered(before, path, path / math.fabs(speed), 0.0, contact.field.length)
+    row.weight, row.mean, row.spread = remembered(before, path, path / speed, 0.0, contact.field.length)
+    return True
 
 
 @device
