@@ -467,7 +467,8 @@ def test(folder: Path, files: list[str]) -> int:
 def _passes(windows: Windows, file: str) -> bool:
     """Return True if the tests of a file pass; print their summary, what was skipped, and the end of what failed."""
     began = time.monotonic()
-    status, printed = windows.run("-m", "pytest", file, "--timeout=0", "-rs", cwd=windows.checkout)
+    how = "--timeout=0", "--capture=sys", "-rs"  # processes that inherit a plain file as standard error die under Wine
+    status, printed = windows.run("-m", "pytest", file, *how, cwd=windows.checkout)
     is_right, lines = status in (0, 5), printed.splitlines() or ["printed nothing"]  # 5: all are for `make verify`
     print(f"{'ok   ' if is_right else 'FAULT'} {file} {lines[-1]} [{time.monotonic() - began:.0f} s]", flush=True)
     shown = [line for line in lines if line.startswith("SKIPPED")] if is_right else lines[-60:]
