@@ -65,8 +65,8 @@ With the drives `spring` and `force`, energies balance. `drive_work` is the sum 
 The residual is compared with the larger of work and stored energy, at its largest since the start. The slider may have
 returned nearly all of that energy at each record, if it rings. The ratio stays below ten times the largest `tolerance`
 of the scenario, with two exceptions after thousands of sub-steps: `tracked` bonds, and a slider that rings without
-damping. There the residual stays below 1e-3 of the largest energy of the run. `make verify` checks both limits on random
-scenes.
+damping. There the residual stays below 1e-3 of the largest energy of the run. `make verify` checks both limits on
+random scenes.
 
 No energy exceeds ten times the larger of work and stored energy, with one exception. `dissipated_by_area` is negative
 while the area grows, because bonds that are gained are stretched as the others are (`bonds.area = "present"`). It
