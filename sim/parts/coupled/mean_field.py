@@ -432,7 +432,7 @@ def advance_rows(inputs, numbers, outputs, draws):
 
     ``numbers``: those of ``Slider``, ``Law``, ``Contact`` and ``FieldLaw``. ``outputs``: columns and
     energies at the end of each step, shape (columns, steps, rows) and (steps, rows, energies). ``draws``: ``Draws``,
-    none if their ``values`` have no rows. A row that nothing holds any longer ends there.
+    none if their ``values`` have no rows. Values of a row are missing once its motion has ended (``mechanics.end``).
     """
     rows, energies, pieces, clock, units, work = inputs
     slider, law, contact = mechanics.Slider(*numbers[0]), mechanics.Law(*numbers[1]), mechanics.contact_of(numbers)
