@@ -163,14 +163,15 @@ _LARGEST_SPHERE = 1.0
 
 def remarks_between(scene: Scene) -> list[str]:
     """Return assumptions and limits of the parts together."""
-    _, bonds, shear, contact = scene.chosen
+    drive, bonds, shear, contact = scene.chosen
     speeds = scene.speeds(41)
     remarks = []
     if (radius := scene.sphere.radius) > _LARGEST_SPHERE:
         remarks.append(f'sphere.radius is {radius:g} m: a number without a unit is in metres, write "5 mm"')
     if scene.fluctuations_move_contact and bonds.feeds_back and not contact.lags:
         remarks.append('carried area does not converge in a fluctuating contact: use model = "rate_dependent"')
-    if contact.after_pull_off == "reattach" and bonds.stretched and not bonds.feeds_back:
+    reattaches = contact.after_pull_off == "reattach"
+    if reattaches and bonds.stretched and not (bonds.feeds_back or drive.solves_motion):
         remarks.append('bonds continue to slide while the contact is open; bonds.area = "carried" starts without bonds')
     strength = np.broadcast_to(bonds.steady(speeds).strength, speeds.shape)
     strain = strength.max() / scene.setting.shear_modulus

@@ -18,7 +18,7 @@ import numpy as np
 from sim.numerics.jit import device, kernel
 from sim.numerics.special import exp
 from sim.parts.bonds.rupture import RuptureRate, fresh_integral, growth, hazard_integral, hazard_time, rate_at
-from sim.parts.exchange import Array
+from sim.parts.exchange import Array, Flags
 
 
 @device
@@ -489,6 +489,14 @@ class Cohorts(NamedTuple):
     stretch: Array
     width: Array
     lattice: Array
+
+
+def relax(cohorts: Cohorts, rows: Flags) -> None:
+    """Take the stretch from all bonds of some ``rows``, in place: they become one cohort."""
+    bound = cohorts.weight[rows].sum(axis=1)
+    cohorts.weight[rows] = cohorts.stretch[rows] = cohorts.width[rows] = 0.0
+    cohorts.weight[rows, 0] = bound
+    cohorts.lattice[rows, 1] = 1.0
 
 
 def unstretched(rupture: RuptureRate, tolerance: float, share: float) -> Cohorts:

@@ -193,9 +193,10 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
     none, slope = 1e-3 * approach.none / max(1.0, firm), grows + loads * (1.0 + softer + yields * grows)
     if mass + damping > 0.0:  # what is left of the forces is work on the body, whose displacement may be the longer
         none = min(none, 1e-3 * tolerance * (math.fabs(force) + math.fabs(pull)) / slope)
-    roundings = math.fabs(slip) + yields * math.fabs(force) + math.fabs(row.sheared)
-    roundings *= loads / slope if slope < loads else 1.0
-    return over, slope, max(none, 1e-15 * roundings)
+    # roundings of the displacement of the body and of the forces matter less to a slip that viscosity makes stiff
+    roundings = loads * (math.fabs(slip) + yields * math.fabs(force) + math.fabs(row.sheared))
+    roundings += math.fabs(force) + math.fabs(pull)
+    return over, slope, max(none, 1e-15 * (math.fabs(slip) + roundings / slope))
 
 
 @device
@@ -624,7 +625,7 @@ def advance_cohorts(inputs, numbers, outputs, draws, share, rules, weight, stret
                 if not going:
                     mechanics.end(row, booked, clock[k, 0] + time, slider)
                 left = 1.0
-            mechanics.from_units(columns, booked, rows[m], energies[m], units, work)
+            mechanics.from_units(columns, booked, rows[m], energies[m], units, work, pieces[start:stop], slider.stiffness)
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
             if has_draws:
                 redraw(row, rows[m], m, k, clock, now, draws, of_draws, reached)

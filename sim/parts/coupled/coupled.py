@@ -14,8 +14,8 @@ import numpy as np
 
 from sim.laws.reversible import mean_stress_energy
 from sim.numerics.noise import Noise
-from sim.parts.bonds import models
-from sim.parts.bonds.cohorts import Cohorts, numbers_of
+from sim.parts.bonds import models, tracked
+from sim.parts.bonds.cohorts import Cohorts, numbers_of, relax
 from sim.parts.bonds.tracked import AGAIN, Tracks
 from sim.parts.contact.balance import Bodies
 from sim.parts.coupled.cohorts import advance_cohorts
@@ -199,7 +199,8 @@ def advance(
     numbers = *_numbers(drive, bonds, contact, units), tuple(law)
     reached = dict(zip(_NAMES, columns, strict=True))
     loop = tuple(inputs), numbers, (columns, energies), tuple(draws._replace(answers=draws.answers and bool(answers)))
-    end, bonding = _advanced(bonds, population, contact.radius, inputs, loop, reached, noise)
+    closes = (slider.radius == 0.0) & (contact.radius > 0.0) & np.full(members, steps.start > 1)
+    end, bonding = _advanced(bonds, population, contact.radius, closes, inputs, loop, reached, noise)
     stage, stage_speed = np.zeros((2, len(steps), members))
     if drive.spring:
         whole = pieces.joined
@@ -272,7 +273,7 @@ def with_contact(
     - A contact that has closed, or that was lost in the step and has an equilibrium again, bears the pull if the slider
       has neither mass nor damping, else that of its shear displacement. Bonds without a stretch bear the pull less the
       damping of a slider without mass. If a stiff contact has closed on another body that is delayed, the body bears
-      the stress of the bonds.
+      the stress of the bonds; those with a stretch are unstretched.
     - A slider without mass on ``counted`` bonds bears the pull less the damping until the draw, whatever the draw adds
       to the area. After it the slider sticks if the bonds have become stronger than the pull. If they are weaker, its
       speed is that of the new balance.
@@ -284,11 +285,13 @@ def with_contact(
         closes = closes | ((area > 0.0) & ~_agree(sliders.radius, radius))
     if closes.any():
         yields, slope = drive.yields(contact.shear_modulus, contact.bodies.poisson_ratio)
-        force = area * bonding.stress
-        if drive.mass == 0.0 and (drive.damping == 0.0 or not isinstance(parts.bonds, _WITH_STRETCH)):
+        force, is_stretched = area * bonding.stress, isinstance(parts.bonds, _WITH_STRETCH)
+        if drive.mass == 0.0 and (drive.damping == 0.0 or not is_stretched):
             force = sliders.spring_force - drive.damping * sliders.speed
         elif yields + slope > 0.0:
             force = sliders.sheared / (yields + slope / radius)
+        elif is_stretched:
+            force = np.where(sliders.radius > 0.0, force, area * drive.viscosity * sliders.speed)
         stress = np.divide(force, area, out=bonding.stress + np.zeros(area.shape), where=closes)
         bonding = bonding._replace(stress=stress)
     if isinstance(parts.bonds, models.Counted) and drive.mass == 0.0:
@@ -304,26 +307,28 @@ def with_contact(
 
 
 def _advanced(
-    bonds: _SolvedBonds, population: tuple[object, ...], radius: Array, inputs: Inputs, loop: tuple[tuple, ...],
-    reached: dict[str, Array], noise: Noise,
+    bonds: _SolvedBonds, population: tuple[object, ...], radius: Array, closes: Flags, inputs: Inputs,
+    loop: tuple[tuple, ...], reached: dict[str, Array], noise: Noise,
 ) -> tuple[tuple[object, ...], Bonding]:  # fmt: skip
     """Return the bonds after some clock steps and their readings at each.
 
-    ``radius`` of the contact at the start [m]; ``loop``: arguments of ``advance_rows``, of which the outputs receive
-    the rows and energies at the end of each step. ``reached`` has their columns by name. Bonds without a stretch have
-    the sense of the sliding in its place.
+    ``radius`` of the contact at the start [m]; its bonds are unstretched if it ``closes`` there. ``loop``: arguments of
+    ``advance_rows``, of which the outputs receive the rows and energies at the end of each step. ``reached`` has their
+    columns by name. Bonds without a stretch have the sense of the sliding in its place.
     """
     shape, rows = loop[2][0].shape[1:], inputs.rows.view(ROW)[:, 0]
     if isinstance(bonds, models.Cohort):
         ages = cast(models.Ages, population)
         share, area_radius = bonds.diluted(ages.area_radius, radius)
         cohorts, sums = Cohorts(*(array.copy() for array in ages.cohorts)), np.empty((5, *shape))
+        relax(cohorts, closes)
         rules = numbers_of(bonds.law, bonds.rebinding_rate, bonds.tolerance)
         advance_cohorts(*loop, share, rules, *cohorts, sums)
         return models.Ages(cohorts, area_radius), bonds.read(sums)
     if isinstance(bonds, models.Tracked):
         tracks = cast(Tracks, population)
         tracks = tracks._replace(frame=tracks.frame.copy())
+        tracked.relax(tuple(tracks), closes, tuple(bonds.law[:3]))
         frames = np.empty((*shape, tracks.frame.shape[1]))
         lives = (*bonds.law[:3], bonds.rebinding_rate), noise.seed, np.asarray(noise.members, dtype=np.uint64)
         if advance_tracks(*loop[:3], tuple(tracks), *lives, frames):
@@ -332,7 +337,7 @@ def _advanced(
     if isinstance(bonds, models.FirstMoment):
         stretches = cast(models.Stretches, population)
         share, area_radius = bonds.diluted(stretches.area_radius, radius)
-        rows["bound"], rows["moment"] = stretches.bound * share, stretches.stretch * share
+        rows["bound"], rows["moment"] = stretches.bound * share, np.where(closes, 0.0, stretches.stretch * share)
     else:
         before = cast(models.Population, population)
         share, area_radius = bonds.diluted(before.area_radius, radius)

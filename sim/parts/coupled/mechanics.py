@@ -444,10 +444,17 @@ def to_units(columns, spent, state, totals, units, work):
 
 
 @device
-def from_units(columns, spent, state, totals, units, work):
-    """Convert a row and its energies from the units of the equations, after a clock step."""
-    before = state.view(ROW)[0]
-    position, substeps = before.position, before.substeps
+def from_units(columns, spent, state, totals, units, work, pieces, stiffness):
+    """Convert a row and its energies from the units of the equations, after a clock step of some ``pieces``.
+
+    The displacement of a body that goes farther than its spring is stretched follows from stage and spring, because a
+    sum over millions of sub-steps rounds. That of a body that hardly moves is the sum, which has no difference.
+    """
+    before, row = state.view(ROW)[0], columns.view(ROW)[0]
+    position, substeps, units_of = before.position, before.substeps, units.view(ROW)[0]
+    if stiffness > 0.0 and math.fabs(row.position) * stiffness > math.fabs(row.spring_force):
+        lengthened = (row.spring_force - before.spring_force / units_of.spring_force) / stiffness
+        row.position = pieces[:, 4].sum() - lengthened
     state[:] = columns * units
     before.position += position
     before.substeps += substeps

@@ -104,6 +104,24 @@ def test_the_largest_friction_of_a_slider_without_mass_and_damping_is_a_force_th
     assert float(course.peak_friction) <= borne
 
 
+@pytest.mark.parametrize("bonds", [{"model": "rate"}, {"model": "cohort"}, {"model": "tracked", "sites": 50}])
+@pytest.mark.parametrize("viscosity", [0.0, 10.0])
+def test_a_contact_that_closes_begins_with_bonds_without_a_stretch(bonds, viscosity):
+    """Bonds that do not break are stretched by the displacement since the closing, so τ = n κ (X − X_closing) + η V."""
+    rupture = {"model": "constant", "rate": 1e-9}
+    bonds = BONDS | bonds | {"rupture": rupture, "site_density": 1e13, "start": "bonded"}
+    contact = {"indentation": {"from": 3e-6, "to": -4e-6, "cycles": 1}, "after_pull_off": "reattach"}
+    drive = {"model": "spring", "stage": 1e-5, "stiffness": 10.0, "damping": 1e-2, "contact_stiffness": "rigid"}
+    course = run(1.0, 1e-2, drive=drive | {"viscosity": viscosity}, bonds=bonds, contact=contact)
+    after = course.isel(t=slice(int(np.argmax(course.t.values >= float(course.first_closing))), None))
+    assert after.sizes["t"] > 10 and (after.in_contact == 1.0).all()
+    slid = after.slider_position - after.slider_position[0]
+    bonded = 1e13 * 1e-6 * slid
+    assert float(bonded[-1]) > 10.0 * viscosity * 1e-5
+    assert_allclose(after.shear_stress, bonded + viscosity * after.speed, rtol=1e-6, atol=1e-6 * float(bonded[-1]))
+    assert float(course.dissipated_by_area.min()) >= 0.0
+
+
 @pytest.mark.parametrize("sites", [5, 20])
 def test_counted_bonds_never_push_a_slider_back_nor_give_back_what_they_dissipated(sites):
     """A strength that is drawn above the pull holds a slider that is pulled forwards; it does not move it."""
