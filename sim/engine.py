@@ -210,7 +210,8 @@ def _step_contact(scenario: Scenario, contact_state: ContactState, shear: Storin
     mounts = first.mount, last.mount
     bodies, shear_modulus, area = scenario.bodies, scenario.solid.effective[0], scenario.contact_area
     of_contact = contact_state.radius, bare, paid, shear, bonded, contact.reversible
-    return StepContact(*of_contact, mounts, scenario.holds_contact, bodies, shear_modulus, area)
+    fixed = scenario.holds_contact, scenario.fluctuations_leave_contact
+    return StepContact(*of_contact, mounts, *fixed, bodies, shear_modulus, area)
 
 
 def _pull(scenario: Scenario, time: float | Array, radius: Array) -> Array:

@@ -428,14 +428,14 @@ class Scenario:
         block early. Bonds drawn at the end of a step need single steps.
         """
         _, bonds, shear, contact = self.chosen
-        in_blocks = bonds.in_blocks or (bonds.in_place and self._fluctuations_leave_contact and self.holds_contact)
-        alone = contact.lags or not (self._fluctuations_leave_contact or shear.in_blocks) or not in_blocks
+        in_blocks = bonds.in_blocks or (bonds.in_place and self.fluctuations_leave_contact and self.holds_contact)
+        alone = contact.lags or not (self.fluctuations_leave_contact or shear.in_blocks) or not in_blocks
         return any(part.feeds_back for part in self.chosen[1:]) or (self.drive.solves_motion and alone)
 
     @cached_property
     def draws_within(self) -> bool:
         """Return True if the loop of a drive that solves the motion draws the fluctuations that the contact feels."""
-        return self.drive.solves_motion and not (self.by_steps or self._fluctuations_leave_contact)
+        return self.drive.solves_motion and not (self.by_steps or self.fluctuations_leave_contact)
 
     @cached_property
     def holds_contact(self) -> bool:
@@ -447,10 +447,10 @@ class Scenario:
     def fluctuations_move_contact(self) -> bool:
         """Return True if random fluctuations change the area of the contact."""
         shear = self.fluctuations
-        return shear.per_member and shear.spectrum.variance > 0.0 and not self._fluctuations_leave_contact
+        return shear.per_member and shear.spectrum.variance > 0.0 and not self.fluctuations_leave_contact
 
     @property
-    def _fluctuations_leave_contact(self) -> bool:
+    def fluctuations_leave_contact(self) -> bool:
         """Return True if fluctuations never change the contact."""
         return self.fluctuations.paid_by_adhesion == 0.0 or self.fluctuations.stays
 

@@ -1,8 +1,9 @@
 """Go through random scenes in two processes, and print each fault and how often the corners were reached.
 
 ``PYTHONPATH=tests:. python -m helpers.hunt corner 0 500`` goes through 500 scenes at corners. With ``random`` it goes
-through those of ``random_scenes``, at finer clock steps, too. A last number sets the processes. A scene that takes
-longer than ``PATIENCE`` is stopped, which counts as a fault. Times are those of the processor.
+through those of ``random_scenes``, and with ``finer`` it compares their runs at several clock steps, too, which takes
+ten times as long. A last number sets the processes. A scene that takes longer than ``PATIENCE`` is stopped, which
+counts as a fault. Times are those of the processor.
 """
 
 import multiprocessing
@@ -22,9 +23,9 @@ def faults_of(kind, seed):
     """Return a text for each fault of a scene, and the corners that its run reached, None if it is refused."""
     import test_total
 
-    draw = {"corner": test_total.corner_scene, "random": test_total.random_scene}[kind]
+    draw = test_total.corner_scene if kind == "corner" else test_total.random_scene
     try:
-        faults, corners = test_total.faults_in(seed, kind == "random", draw)
+        faults, corners = test_total.faults_in(seed, kind == "finer", draw)
     except Exception as fault:
         return [short(fault)], Counter()
     return [short(fault) for fault in faults], corners

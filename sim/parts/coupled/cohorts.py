@@ -34,6 +34,9 @@ NODE = record("slip body area sheared radius bound moment square lost cut body_s
 _TURNS, _FALLING = 25, 0.02
 #: The same where slip alone breaks bonds: their force may hardly rise.
 _FLAT = 1e-7
+#: Turns after which two near trials give a slope, too, and their least distance over the tolerance of the slip. Bonds
+#: that are cut in a sub-step change the slope, and the first one then hardly converges in the shortest sub-steps.
+_SLOW, _RESOLVED = 3, 10.0
 #: Largest mean bend of a path [stretch].
 _MOST_BENT = 0.2
 #: Least stretch by which errors are measured, for the first motion from a state without any.
@@ -222,7 +225,7 @@ def go_to_node(place, nodes, at_start, pool, count, start, step, scale, row, sli
         over, elasticity, none = balance(shift, bound, moment, before, after, approach, start, row, slider, contact)
         if turn == 0:
             slope = elasticity
-        elif math.fabs(shift - last_shift) > 1e-9 * (1.0 + math.fabs(shift)):
+        elif math.fabs(shift - last_shift) > (1e-9 * (1.0 + math.fabs(shift)) if turn < _SLOW else _RESOLVED * none):
             slope = (over - last_over) / (shift - last_shift)
         if not slope > (_FALLING if rules.limit == math.inf else _FLAT) * elasticity:
             return -1, 0.0

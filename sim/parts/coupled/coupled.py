@@ -75,6 +75,8 @@ class StepContact(NamedTuple):
         Mount of the sphere at the start and at the end of each step.
     stays : bool
         True if the radius stays during a step.
+    undisturbed : bool
+        True if fluctuations never change the contact.
     bodies : Bodies
         R [m], E* [Pa], ν [1].
     shear_modulus : float
@@ -91,6 +93,7 @@ class StepContact(NamedTuple):
     reversible: float
     mounts: tuple[Mount, Mount]
     stays: bool
+    undisturbed: bool
     bodies: Bodies
     shear_modulus: float
     area: float
@@ -281,7 +284,7 @@ def with_contact(
     drive, area = cast(Force | Spring, parts.drive), np.pi * np.fmax(radius, 0.0) ** 2
     closes = (area > 0.0) & (sliders.radius == 0.0)
     # where neither bonds nor fluctuations are drawn at the end of a step, the loop follows the contact
-    if not contact.stays and not isinstance(parts.bonds, models.Counted) and not np.any(contact.shear.energy):
+    if contact.undisturbed and not contact.stays and not isinstance(parts.bonds, models.Counted):
         closes = closes | ((area > 0.0) & ~_agree(sliders.radius, radius))
     if closes.any():
         yields, slope = drive.yields(contact.shear_modulus, contact.bodies.poisson_ratio)

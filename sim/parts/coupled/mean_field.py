@@ -371,6 +371,9 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
             if start >= length:
                 break
         sense = math.copysign(1.0, row.spring_force if rests else row.speed)
+        if rests and stuck > 0:  # the pull is a rounding, so that its sign is tried before the opposite one
+            sense = -sense if stuck % 2 == 1 else sense
+            row.next_step = 0.0
         along = mechanics.Law(law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows)
         if rests:
             felt, at_rest = row.felt, contact

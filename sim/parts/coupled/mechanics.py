@@ -125,8 +125,8 @@ def contact_area(bound, moment, time, radius, contact):
     """Return the contact radius in equilibrium with these bonds, area over the reference's, its slopes over N and M.
 
     Newton's method on the energy release rate, which is convex in the radius, starts from the last radius and
-    approaches the root from the right. The result is nan if there is no root, and the Hertz radius if adhesion is too
-    weak for the mean stress there.
+    approaches the root from the right. The result is nan if there is no root, as for an open contact, and the Hertz
+    radius if adhesion is too weak for the mean stress there.
     """
     if contact.stays > 0.0:
         return radius, math.pi * radius * radius / contact.area, 0.0, 0.0
@@ -144,6 +144,8 @@ def contact_area(bound, moment, time, radius, contact):
         if not work - tilt * a > 0.0:
             return a, math.pi * a * a / unit, 0.0, 0.0
         a = max(a, radius)
+    elif not (work > 0.0 or load + base > 0.0):  # nothing presses a contact without adhesion together
+        return math.nan, math.nan, 0.0, 0.0
     for _ in range(60):
         missing, growth = _missing(a, load, base, contact)
         if work > 0.0:
