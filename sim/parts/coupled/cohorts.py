@@ -628,7 +628,9 @@ def advance_cohorts(inputs, numbers, outputs, draws, share, rules, weight, stret
                 if not going:
                     mechanics.end(row, booked, clock[k, 0] + time, slider)
                 left = 1.0
-            mechanics.from_units(columns, booked, rows[m], energies[m], units, work, pieces[start:stop], slider.stiffness)
+            mechanics.from_units(
+                columns, booked, rows[m], energies[m], units, work, pieces[start:stop], slider.stiffness
+            )
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
             if has_draws:
                 redraw(row, rows[m], m, k, clock, now, draws, of_draws, reached)

@@ -456,7 +456,9 @@ def advance_rows(inputs, numbers, outputs, draws):
                 time, going = _clock_step(line, slider, law, now, pieces[start:stop], nodes[0], books)
                 if not going:
                     mechanics.end(row, booked, clock[k, 0] + time, slider)
-            mechanics.from_units(columns, booked, rows[m], energies[m], units, work, pieces[start:stop], slider.stiffness)
+            mechanics.from_units(
+                columns, booked, rows[m], energies[m], units, work, pieces[start:stop], slider.stiffness
+            )
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
             if has_draws:
                 redraw(row, rows[m], m, k, clock, now, draws, room, reached)

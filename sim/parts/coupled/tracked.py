@@ -437,7 +437,9 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
                 time, going = _through(line, books, pieces[start:stop], slider, now, bonds, ground, nodes)
                 if not going:
                     mechanics.end(line[0], booked, clock[k, 0] + time, slider)
-            mechanics.from_units(columns, booked, rows[m], energies[m], units, work, pieces[start:stop], slider.stiffness)
+            mechanics.from_units(
+                columns, booked, rows[m], energies[m], units, work, pieces[start:stop], slider.stiffness
+            )
             reached[:, k, m], spent[k, m], frames[k, m] = rows[m], energies[m], frame[m]
         stamp[m] = np.int64(frame[m, tracked.STEPS])
     return 0
