@@ -1,5 +1,6 @@
 """What the benchmarks compute: rows and their page, intervals of ratios, and lines of code."""
 
+import ast
 import json
 import math
 import random
@@ -10,6 +11,7 @@ from helpers.cases import some
 
 from benchmarks import page, run, timing
 from benchmarks.compare import interval
+from benchmarks.lines import called_once, long_lists, nested_conditionals, size, solids_as_floats
 
 RESULTS = json.loads(run.RESULTS.read_text(encoding="utf-8"))
 
@@ -44,3 +46,47 @@ def test_the_interval_of_twenty_ratios_reaches_from_the_sixth_to_the_fifteenth()
     assert interval(ratios, confidence=0.88) == (7.0, 14.0)
     assert interval([1.0] * 5) == (-math.inf, math.inf)
     assert interval([3.0, 1.0, 2.0, 5.0, 4.0, 6.0]) == (1.0, 6.0)
+
+
+DENSE = '''"""A module."""
+
+def radius(load, modulus): return {"load": load, "modulus": modulus}
+'''
+WIDE = '''"""A module whose docstring
+has another length."""
+
+
+def radius(
+    load,
+    modulus,
+):
+    """Return nothing of interest."""
+    # a comment
+    return {
+        "load": load,
+        "modulus": modulus,
+    }
+'''
+
+
+def test_the_size_of_a_module_in_tokens_does_not_depend_on_its_layout_and_words():
+    assert size(DENSE).tokens == size(WIDE).tokens > 15
+    assert size(DENSE).lines == 1 < size(WIDE).lines
+
+
+def test_places_that_make_code_hard_to_change_are_found():
+    text = """
+class Solid:
+    def at(self, a, b, c, d, e, f, g, h): return _once(a)
+    def many(self, a, b, c, d, e, f, g, h, i): return _twice(a) + _twice(b)
+
+def _once(a): return 1 if a else 2 if a is None else 3
+def _twice(a): return (1 if a else 2) + (3 if a else 4)
+def energy(spectrum, shear_modulus, *, poisson_ratio): return spectrum
+def stress(shear_modulus): return shear_modulus
+"""
+    tree = ast.parse(text)
+    assert long_lists(tree) == ["many (9)"]
+    assert called_once([tree]) == ["_once"]
+    assert nested_conditionals(tree) == 1
+    assert solids_as_floats(tree) == ["energy"]

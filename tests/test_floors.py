@@ -6,7 +6,6 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import sim
-from benchmarks.lines import MOST, size
 
 ROOT = Path(sim.__file__).parent
 #: Modules of the tree outside of the package, by the name under which they import each other.
@@ -105,10 +104,6 @@ def test_no_module_hands_open_files_to_another_process():
     for path in MODULES.values():
         keywords = {node.arg for node in ast.walk(tree(path)) if isinstance(node, ast.keyword)}
         assert "pass_fds" not in keywords, path
-
-
-def test_a_module_is_one_noun_of_about_600_lines_of_code():
-    assert not {name for name, path in MODULES.items() if size(path.read_text(encoding="utf-8"))[0] > MOST}
 
 
 def test_nothing_imports_in_a_circle_benchmarks_and_tests_included():
