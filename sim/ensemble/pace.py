@@ -22,6 +22,8 @@ from sim.units.errors import BadInput
 _RECORD, _RECORD_OF_MEMBER, _MAP_BYTE = 5e-6, 2e-7, 2e-9
 #: Time for which steps are tried [s]; a run of a shorter estimate [s] is tried only if it is made in sub-steps.
 _TRIED, _WORTH_TRYING = 0.25, 1.0
+#: Number of points of a sweep at which steps are tried.
+_POINTS = 3
 #: Time for which pieces of a run in sub-steps are timed [s], and their times over the duration.
 _TIMED, _PLACES = 0.6, (0.0, 0.25, 0.5, 0.75, 1.0)
 #: Factor from the length of the pieces to the next, the largest number of steps into which a clock step is divided, and
@@ -53,14 +55,21 @@ def pace(plan: Plan) -> float:
 
     Kernels that are not in the cache are compiled.
     """
-    ends = spread(plan.points, 3)
-    if any(map(in_substeps, ends)):
-        trials = [_timed(plan, point, _TIMED / len(ends)) for point in ends]
-    elif counted(plan) < _WORTH_TRYING:
+    expected, unknown = counted(plan), any(map(in_substeps, spread(plan.points, _POINTS)))
+    if expected < _WORTH_TRYING and not unknown:
         return 1.0
-    else:
-        trials = [_tried(plan, point, _TRIED / len(ends)) for point in ends]
-    return sum(measured for measured, _ in trials) / sum(expected for _, expected in trials)
+    return run_seconds(plan, _TIMED if unknown else _TRIED) / expected
+
+
+def run_seconds(plan: Plan, seconds: float) -> float:
+    """Return the time of all steps and records on one core [s], by steps that are tried for some seconds."""
+    trials, ends = [], spread(plan.points, _POINTS)
+    for point in ends:
+        trials.append((_timed if in_substeps(point) else _tried)(plan, point, seconds / len(ends)))
+        if len(ends) > 1:
+            point.release()
+    measured, expected = np.sum(trials, axis=0).tolist()
+    return counted(plan) * measured / expected
 
 
 def in_substeps(point: Scenario) -> bool:
@@ -88,7 +97,6 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
         following = max(1, 2 * block.end)  # a long block ends at a record
         following = stride * math.ceil(following / stride) if following > stride else following
         block = Block(block.end, min(last, following), stride)
-    point.release()
     speeds = point.speeds(5, block.end / last)[2:]
     return max(end - begin, 1e-9), counted_block(point, members, block, speeds)
 
