@@ -603,16 +603,16 @@ def _series(rows: list[Setting], members: int, budget: Budget) -> _Series | None
     return None
 
 
-def _first_series(scene: Setting, ratios: Sequence[float], budget: Budget) -> _Series | None:
-    """Return a scene at a few clock steps, with as many members as fit; None if too few do."""
-    pace, left, count = budget.slower * scene.pace, budget.left(), 1
+def _first_series(setting: Setting, ratios: Sequence[float], budget: Budget) -> _Series | None:
+    """Return runs at a few clock steps, with as many members as fit; None if too few do."""
+    scene, pace, left, members = setting.scenario, budget.slower * setting.pace, budget.left(), 1
     cost = pace * sum(1.0 / ratio for ratio in ratios)
-    if _fluctuates(scene.scenario):
-        count = max(min(_most_in_series(scene.scenario), int(left / (32.0 * pace))), 4)
-        count = max(min(count, int(left / cost)), _LEAST)
-    if count * cost > left:
+    if _fluctuates(scene):
+        members = max(min(_most_in_series(scene), int(left / (32.0 * pace))), 4)
+        members = max(min(members, int(left / cost)), _LEAST)
+    if members * cost > left:
         return None
-    return _series([_at_step(scene.scenario, ratio) for ratio in ratios], count, budget)
+    return _series([_at_step(scene, ratio) for ratio in ratios], members, budget)
 
 
 def _most_in_series(exact: Scenario) -> int:
@@ -715,7 +715,7 @@ def choices(dataset: xr.Dataset) -> list[Choice]:
     for chosen_rows in itertools.product(*groups):
         place = [int(row) for row in chosen_rows]
         *changed, step = cost[place].tolist()
-        total = max(reference + sum(each - reference for each in changed), 0.2 * min([reference, *changed]))
+        total = max(sum(changed) - (len(changed) - 1) * reference, 0.2 * min([reference, *changed]))
         error = np.nan_to_num(errors[place]).sum(axis=0)
         noise = np.sqrt(np.nansum(noises[place] ** 2, axis=0))
         bound = float(np.max(error + noise)) if np.all(members[place] > 0) else math.inf
@@ -750,8 +750,8 @@ def table(dataset: xr.Dataset) -> list[dict[str, str]]:
         cells = {"changed": str(part), "setting": str(name) + " *" * int(own), "time": duration}
         for symbol, error, deviation in zip(_SHORT, *errors, strict=True):
             size, _, statistic = _worst(error[np.newaxis], deviation)
-            text = f"{size} {STATISTICS[statistic]}" if statistic and size != "0" else size
-            cells[f"{symbol}\n(%)"] = text if members else "–"
+            in_words = f" {STATISTICS[statistic]}" if statistic and size != "0" else ""
+            cells[f"{symbol}\n(%)"] = size + in_words if members else "–"
         lines.append(cells | {"members": f"{members:,}"})
     return lines
 
@@ -821,26 +821,25 @@ def figure(dataset: xr.Dataset) -> Figure:
     Bars are the noise, at 95 %. Exact settings are drawn at a tenth of the smallest error. A ring marks the scene, a
     star the recommended combination, if there is one.
     """
-    tolerance, combined = float(dataset.attrs["tolerance"]), choices(dataset)
-    times = dataset["time"].to_numpy()
-    dataset = dataset.isel(row=dataset["members"].to_numpy() > 0)
-    part, is_written, cost, members, error, deviation = (dataset[name].to_numpy() for name in _COLUMNS)
-    size, best = np.nan_to_num(error).reshape(len(part), math.prod(error.shape[1:])), chosen(combined, tolerance)[0]
-    at = np.arange(len(part)), size.argmax(axis=1)
-    off, bars = size[at], students(members) * np.nan_to_num(deviation).reshape(size.shape)[at]
+    tolerance = float(dataset.attrs["tolerance"])
+    best, _ = chosen(choices(dataset), tolerance)
+    part, is_written, cost, members, *errors = (dataset[name].to_numpy() for name in _COLUMNS)
+    error, deviation = (np.nan_to_num(each).reshape(len(part), -1) for each in errors)
+    at = np.arange(len(part)), error.argmax(axis=1)
+    off, bars = np.where(members > 0, error[at], np.nan), students(members) * deviation[at]
     floor = 0.1 * min([tolerance, *off[off > _ROUNDING]])
     off = np.maximum(off, floor)
     with mpl.rc_context(STYLE):
         picture, (panel,) = rows([3.0])
         for name, (words, _, color, marker) in _PARTS.items():
-            if np.any(here := part == name):
+            if np.any(here := (part == name) & (members > 0)):
                 panel.errorbar(cost[here], off[here], bars[here], c=color, marker=marker, ms=3.6, lw=0.6, label=words)
         panel.plot(cost[is_written == 1], off[is_written == 1], "o", c="none", mec="black", ms=7.5, label="as written")
         if math.isfinite(best.bound) and not dataset.attrs.get("not_converging"):
             panel.plot(best.time, max(best.bound, floor), "*", c="black", ms=7.0, zorder=5, label="recommended")
         panel.axhline(tolerance, color=REFERENCE, linestyle="--", linewidth=0.8, label="accepted")
-        if not part.size:  # logarithmic axes need a range
-            panel.set(xlim=(0.5 * times.min(), 2.0 * times.max()), ylim=(0.1 * tolerance, 10.0 * tolerance))
+        if not np.any(members > 0):  # logarithmic axes need a range
+            panel.set(xlim=(0.5 * cost.min(), 2.0 * cost.max()), ylim=(0.1 * tolerance, 10.0 * tolerance))
         panel.set(xscale="log", yscale="log", xlabel="CPU time of the run (s)", ylabel="largest error (bottom: exact)")
         legend(panel)
     return picture
