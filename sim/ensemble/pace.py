@@ -20,8 +20,6 @@ from sim.units.errors import BadInput
 _RECORD, _RECORD_OF_MEMBER, _MAP_BYTE = 5e-6, 2e-7, 2e-9
 #: Time for which steps are tried [s]; a run of a shorter estimate [s] is tried only if it is made in sub-steps.
 _TRIED, _WORTH_TRYING = 0.6, 1.0
-#: Number of points of a sweep at which steps are tried.
-_POINTS = 3
 #: Times over the duration at which pieces of a run are tried.
 _PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
 #: Factor from the length of the pieces to the next, the largest number of steps into which a clock step is divided, and
@@ -53,21 +51,14 @@ def pace(plan: Plan) -> float:
 
     Kernels that are not in the cache are compiled.
     """
-    expected = counted(plan)
-    if expected < _WORTH_TRYING and not any(map(in_substeps, spread(plan.points, _POINTS))):
+    trials, ends = [], spread(plan.points, 3)
+    if not any(map(in_substeps, ends)) and counted(plan) < _WORTH_TRYING:
         return 1.0
-    return run_seconds(plan, _TRIED) / expected
-
-
-def run_seconds(plan: Plan, seconds: float) -> float:
-    """Return the time of all steps and records on one core [s], by steps that are tried for some seconds."""
-    trials, ends = [], spread(plan.points, _POINTS)
     for point in ends:
-        trials.append(_tried(plan, point, seconds / len(ends)))
-        if len(ends) > 1:
-            point.release()
-    measured, expected = np.sum(trials, axis=0).tolist()
-    return counted(plan) * measured / expected
+        trials.append(_tried(plan, point, _TRIED / len(ends)))
+        point.release()
+    measured, expected = np.sum(trials, axis=0)
+    return float(measured / expected)
 
 
 def in_substeps(point: Scenario) -> bool:

@@ -28,8 +28,7 @@ from scipy import special
 
 from sim.analysis import engineering
 from sim.engine import MemberNoise, Trajectory, follow
-from sim.ensemble.pace import run_seconds
-from sim.ensemble.plan import Plan, together
+from sim.ensemble.plan import seconds_a_step, together
 from sim.ensemble.variables import READ
 from sim.numerics import files, hdf5, lazy
 from sim.numerics.stopwatch import stopwatch
@@ -65,8 +64,8 @@ _LEAST, _FEWEST, _MOST = 2, 16, 2**14
 _SAMPLED = 2**22
 #: Pieces of a run between which the time is looked at, and factor by which a budget that is named exceeds the estimate.
 _PIECES, _MARGIN = 20, 1.3
-#: Most numbers that are kept of the finest of several clock steps.
-_NUMBERS = 2**22
+#: Most numbers that are kept of the finest of several clock steps, and most steps that are timed at once.
+_NUMBERS, _PIECE = 2**22, 512
 #: Finest clock step over the scene's; share of the tolerance below which an error is small enough.
 _FINEST_STEP, _SMALL = 2.0**-12, 0.1
 #: Least factor by which the change from quarter to quarter of the clock step falls: 4^p with the order p = 1/2.
@@ -241,7 +240,7 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
         recorded(row.scenario, range(1), range(2))
     budget.end = now() + budget_seconds - building
     for row in [*settings, written]:
-        row.time = run_seconds(Plan.of(row.scenario), _TIMING * budget_seconds / (len(settings) + 1))
+        row.time = _timed(row.scenario, _TIMING * budget_seconds / (len(settings) + 1))
     parts = [list(rows) for _, rows in itertools.groupby(settings, key=lambda row: row.part)]
     judged = list[Setting]()
     for place, rows_of_part in enumerate(parts):
@@ -329,6 +328,23 @@ def _at_step(scenario: Scenario, ratio: float) -> Setting:
 def _fluctuates(scenario: Scenario) -> bool:
     """True if a part of the scene is random. Members behind a spring differ only then."""
     return scenario.population.per_member or scenario.fluctuations.per_member
+
+
+def _timed(scenario: Scenario, seconds: float) -> float:
+    """Return the CPU time of the scene's run [s], by all but the first of the pieces that are run in some seconds."""
+    members, last = scenario.ensemble.members if _fluctuates(scenario) else 1, scenario.clock.steps
+    full = min(together(scenario), members)
+    batch = full if seconds_a_step(scenario, full) < 0.25 * seconds else min(full, _FEWEST)
+    noise, now, state = MemberNoise.of(scenario.seed, np.arange(batch)), stopwatch(), None
+    times, end, step, length = list[tuple[int, float]](), now() + seconds, 0, 1
+    while not times or now() < end:
+        steps, before = range(step + 1, min(step + length, last) + 1), now()
+        state, _ = follow(scenario, noise, state if step else None, steps)
+        times.append((len(steps), now() - before))
+        step, length = steps[-1] % last, min(2 * length, _PIECE)
+    done, spent = np.sum(times[1:] or times, axis=0).tolist()  # the first piece has loaded what is computed once
+    batches = -(-members // full) * full / batch
+    return batches * last * max(spent, _TICK) / done
 
 
 def _records(scenario: Scenario) -> range:

@@ -39,7 +39,7 @@ class CountedTime:
     def __init__(self, monkeypatch, slower=1.0, factors=()):
         self.seconds, self.slower, self.factors, self.follow = 0.0, slower, dict(factors), study.follow
         monkeypatch.setattr(study, "stopwatch", lambda: lambda: self.seconds)
-        monkeypatch.setattr(study, "run_seconds", lambda plan, seconds: self.of_run(plan.scenario))
+        monkeypatch.setattr(study, "_timed", lambda scenario, seconds: self.of_run(scenario))
         monkeypatch.setattr(study, "follow", self.counted)
 
     def of_run(self, scenario):
