@@ -237,7 +237,8 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     settings = [row for changes in _tried(base) if (row := _admitted(*changes, base, budget))]
     building = now() - began
     for row in [*settings, written]:  # compiles, which is not counted
-        recorded(row.scenario, range(1), range(2))
+        with contextlib.suppress(Unresolved):
+            recorded(row.scenario, range(1), range(2))
     budget.end = now() + budget_seconds - building
     for row in [*settings, written]:
         row.time = _timed(row.scenario, _TIMING * budget_seconds / (len(settings) + 1))
