@@ -65,7 +65,9 @@ def quick(monkeypatch):
 
 @pytest.fixture(scope="module")
 def steady():
-    return converge(scene(**STEADY, members=64), 3.0)  # in which modes are made, too
+    with pytest.MonkeyPatch.context() as patched:
+        CountedTime(patched)
+        return converge(scene(**STEADY, members=64), 3.0)
 
 
 def of(dataset, row, quantity, statistic="mean", name="error"):
