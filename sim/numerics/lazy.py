@@ -1,6 +1,7 @@
 """netCDF files as lazy datasets of xarray; damage that appears while numbers are read is named by its variable."""
 
 import os
+from pathlib import Path
 from typing import Any
 
 import xarray as xr
@@ -9,7 +10,7 @@ from xarray.backends.netCDF4_ import NetCDF4ArrayWrapper
 from xarray.core.indexing import LazilyIndexedArray
 
 from sim.numerics.files import HDF5
-from sim.numerics.hdf5 import Damaged, File, Refused, opened, readable
+from sim.numerics.hdf5 import Damaged, Refused, opened, readable, write_in_memory
 
 __all__ = ["Damaged", "Refused", "open_lazily", "save"]
 
@@ -59,8 +60,6 @@ def open_lazily(path: str | os.PathLike[str]) -> xr.Dataset:
         return xr.open_dataset(store, engine=StoreBackendEntrypoint, decode_times=False, decode_coords=False)
 
 
-def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
+def save(dataset: xr.Dataset, path: Path) -> None:
     """Write a dataset as a netCDF file. On Windows xarray itself writes no path with a letter outside of ASCII."""
-    with HDF5, File(path, "w", format="NETCDF4") as file:
-        dataset.dump_to_store(NetCDF4DataStore(file, lock=HDF5))
-        file.sync()  # which raises an error if the disk fails, while closing the file would crash
+    write_in_memory(path, lambda file: dataset.dump_to_store(NetCDF4DataStore(file, lock=HDF5)))
