@@ -45,7 +45,7 @@ def faults(shim, state, folder, task):
     return summary
 
 
-@pytest.mark.timeout(7200)  # because each of some hundred faults of a large dataset starts a process
+@pytest.mark.timeout(3600)  # because each of some hundred faults of a large dataset starts a process
 @pytest.mark.parametrize("all_of_them", [False, pytest.param(True, marks=pytest.mark.verify)], ids=["last", "all"])
 @pytest.mark.parametrize("large", [False, True], ids=["built in memory", "written part by part"])
 def test_a_run_whose_disk_fails_ends_in_a_message_and_goes_on_with_resume(tmp_path, shim, large, all_of_them):

@@ -371,7 +371,7 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
             if start >= length:
                 break
         sense = math.copysign(1.0, row.spring_force if rests else row.speed)
-        if rests and stuck > 0:  # the pull is a rounding, so that its sign is tried before the opposite one
+        if rests and stuck > 0 and not row.radius > 0.0:  # the pull is a rounding, which may have the wrong sign
             sense = -sense if stuck % 2 == 1 else sense
             row.next_step = 0.0
         along = mechanics.Law(law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows)

@@ -18,6 +18,8 @@ from pathlib import Path
 CALLS = ("open", "write", "pwrite", "ftruncate", "rename", "fsync", "mkdir", "unlink", "link", "flock")
 _WRITES = ("write", "pwrite", "ftruncate", "rename", "fsync")
 ERRORS = (errno.ENOSPC, errno.EIO)
+#: Calls of a large dataset of which one fails, because each fault of it takes seconds.
+THINNED = 12
 STATE = struct.Struct(f"={4 + len(CALLS)}i")
 #: Exit code of a command whose disk fails.
 FAILED = 74
@@ -88,12 +90,19 @@ def wrong(ended, text, output, whole):
     return ""
 
 
-def cases(counts, calls, all_of_them):
-    """Faults of some calls: all of them, or one of each kind, of the calls that write the output the last one."""
+def cases(counts, calls, all_of_them, thinned=1):
+    """Faults of some calls: all of them, or one of each kind, of the calls that write the output the last one.
+
+    All are ``thinned``: of each kind every so many calls fail, and the last ones.
+    """
     every = [
         (call, number, onward, error)
-        for call in calls for number in range(1, counts[call] + 1) for onward in (False, True) for error in ERRORS
-    ]  # fmt: skip
+        for call in calls
+        for number in range(1, counts[call] + 1)
+        for onward in (False, True)
+        for error in ERRORS
+        if number % thinned == 1 % thinned or number > counts[call] - thinned
+    ]
     chosen = {call: counts[call] if call in _WRITES else 1 for call in calls}
     return every if all_of_them else [case for case in every if case[1:] == (chosen[case[0]], False, errno.ENOSPC)]
 
@@ -125,7 +134,7 @@ def main(state, calls, all_of_them, words, again, large):
     ended, text = command(words)
     assert not ended, text
     counts, whole = faults.counts(), output.read_bytes()
-    for case in cases(counts, calls, all_of_them):
+    for case in cases(counts, calls, all_of_them, THINNED if large else 1):
         begin()
         faults.arm(*case)
         ended, text = command(words)
