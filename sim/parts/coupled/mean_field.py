@@ -168,8 +168,8 @@ def _piece(line, slider, law, contact, nodes, books):
                 gone = mechanics.snap(row, row.moment * row.moment / row.bound, start, slider, contact, energy)
             if contact.stays > 0.0 and not gone:
                 return start, contact.stays
-            contact, nodes.last_step = (contact, 0.0) if gone else (mechanics.later(contact, 0.0, 1.0), nodes.last_step)
-            row.next_step = 0.0
+            contact = contact if gone else mechanics.later(contact, 0.0, 1.0)
+            nodes.last_step, row.next_step = 0.0, 0.0
             continue
         contact = mechanics.following(contact, row, start, step)
         grows, accepted = try_sub_step(row, start, step, slider, law, contact, nodes)
