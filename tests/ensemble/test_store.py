@@ -358,7 +358,7 @@ def test_a_folder_that_goes_just_as_a_waiter_finds_it_is_made_anew(tmp_path, mon
 
     monkeypatch.setattr(os, "mkdir", mkdir)
     assert Unfinished(path, {"scenario": {}}, [], lambda path: {}).publish([], 1, Path.touch) is None
-    assert len(makes) == 2 and not names(tmp_path)
+    assert len(makes) > 1 and not names(tmp_path)
 
 
 def test_a_manifest_that_another_process_reads_is_removed_when_it_has_been_read(tmp_path, monkeypatch):
