@@ -79,7 +79,9 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
         division *= _LONGER
     scene = _divided(point, division)
     first = follow(scene, noise, None, range(1, 2))[0]  # loads kernels
-    others = pack(_sliding(point, noise) or first)
+    sliding = _sliding(point, noise)
+    # its first step is made as such, because at any other the bonds of a contact that was open begin without a stretch
+    others = pack(first if sliding is None else follow(scene, noise, sliding, range(1, 2))[0])
     states = [first, *(unpack(point, {name: array.copy() for name, array in others.items()}) for _ in _PLACES[1:])]
     now = stopwatch()
     end, rates = now() + most, np.ones(len(_PLACES))

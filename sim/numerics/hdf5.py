@@ -53,7 +53,12 @@ class File(netCDF4.Dataset):
 
     def __init__(self, path: str | os.PathLike[str], mode: Any = "r", **how: Any) -> None:
         whole = os.path.abspath(path)  # because a relative path may look like an address in the network
-        super().__init__(whole, mode, encoding=ENCODING, **how)
+        try:
+            super().__init__(whole, mode, encoding=ENCODING, **how)
+        except BaseException:
+            if self.isopen():  # it was opened, and what it holds cannot be read
+                self.close()
+            raise
 
     def filepath(self, encoding: str | None = None) -> str:
         return str(super().filepath(encoding or ENCODING))

@@ -1,5 +1,6 @@
 """netCDF files as lazy datasets of xarray; damage that appears while numbers are read is named by its variable."""
 
+import contextlib
 import os
 from pathlib import Path
 from typing import Any
@@ -53,11 +54,14 @@ def open_lazily(path: str | os.PathLike[str]) -> xr.Dataset:
     Damaged
         If a coordinate is damaged; later, if a variable that is read is.
     """
-    with HDF5, readable():
+    with HDF5, readable(), contextlib.ExitStack() as refused:
         file: Any = CachingFileManager(opened, os.path.abspath(path), lock=HDF5)  # type: ignore[type-var]
+        refused.callback(file.close)  # because nobody can delete or replace an open file on Windows
         store: Any = _Store(file, lock=HDF5)
         store.path = path
-        return xr.open_dataset(store, engine=StoreBackendEntrypoint, decode_times=False, decode_coords=False)
+        dataset = xr.open_dataset(store, engine=StoreBackendEntrypoint, decode_times=False, decode_coords=False)
+        refused.pop_all()
+    return dataset
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
