@@ -47,7 +47,9 @@ def faults(shim, state, folder, task):
 
 @pytest.mark.timeout(3600)  # because each of some hundred faults of a large dataset starts a process
 @pytest.mark.parametrize("all_of_them", [False, pytest.param(True, marks=pytest.mark.verify)], ids=["last", "all"])
-@pytest.mark.parametrize("large", [False, True], ids=["built in memory", "written part by part"])
+@pytest.mark.parametrize(
+    "large", [False, pytest.param(True, marks=pytest.mark.verify)], ids=["built in memory", "written part by part"]
+)
 def test_a_run_whose_disk_fails_ends_in_a_message_and_goes_on_with_resume(tmp_path, shim, large, all_of_them):
     """A large dataset is written by HDF5 in a process of its own; all other calls are as for a small one."""
     scenario, state, folder = tmp_path / "scene.toml", tmp_path / "state", tmp_path / "out"
