@@ -87,6 +87,7 @@ print(getattr(os, "process_cpu_count", os.cpu_count)() > 0)
     assert printed.stdout.splitlines() == seen
 
 
+@pytest.mark.verify
 @on_linux
 def test_a_user_goes_from_a_scenario_to_a_fit(elsewhere):
     sim, scene = elsewhere, "szene µ.toml"

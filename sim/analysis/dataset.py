@@ -82,9 +82,10 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
             raise BadInput([f"{path}: was not written by `sim run`; name one of its outputs"])
         if reason := _fault(dataset):
             raise BadInput([f"{path}: {reason}: it was changed after the run; run the scenario again"])
+        dataset.attrs |= _joined(dataset)  # a copy would not close the file
+        result = hdf5.located(dataset)
         refused.pop_all()
-    dataset.attrs |= _joined(dataset)  # a copy would not close the file
-    return hdf5.located(dataset)
+    return result
 
 
 def _joined(dataset: xr.Dataset) -> dict[str, Any]:
@@ -124,6 +125,9 @@ def _fault(dataset: xr.Dataset) -> str:
             return f"lacks the numbers {name}"
     if dataset.variables["t"].dims != ("t",):
         return "the numbers t have other dimensions"
+    for name in sweep_dims(dataset):  # which are those of this variable; each has its values
+        if name not in dataset.variables:
+            return f"the variable contact_modulus has the unknown dimension {name}"
     for name, variable in ((str(name), variable) for name, variable in dataset.variables.items()):
         over_sweep = name in keys or name in _DERIVED
         stem = name if name in _RECORDED else _STATISTIC.sub("", name).removeprefix("late_")

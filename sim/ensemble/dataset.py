@@ -8,7 +8,6 @@ import hashlib
 import importlib.metadata
 import json
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,7 +24,7 @@ from sim.ensemble.store import Blocks
 from sim.ensemble.variables import MAP, NUMBERS, SYSTEMATIC, Variable
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice
-from sim.numerics.hdf5 import CHUNK_CACHE, File, Refused, bytes_of, hdf5_gives_bytes, opened, tables
+from sim.numerics.hdf5 import CHUNK_CACHE, File, Refused, opened, tables, write_in_memory
 from sim.scenario.files import Files
 from sim.scenario.messages import in_plain_words
 from sim.scenario.scenario import Scenario
@@ -392,34 +391,34 @@ def in_memory(outline: Outline, parts: Blocks) -> dict[str, tuple[tuple[str, ...
 def write(outline: Outline, parts: Blocks, path: Path) -> None:
     """Write the netCDF file. A large one is written part by part, in a process of its own that may crash.
 
-    HDF5 gives no reason if the disk fails, and netCDF crashes if that happens while it closes a file. A file that is
-    not large is therefore built in memory, and its bytes are written as those of any other file.
+    HDF5 gives no reason if the disk fails.
     """
     sizes = [math.prod(outline.sizes[size] for size in each.dimensions) for each in outline.variables.values()]
     try:
         if 8 * sum(sizes) > IN_MEMORY:
             with pool(1) as executor:
-                executor.submit(_write, outline, parts, os.fspath(path)).result()
-        elif hdf5_gives_bytes():
-            beside = path.with_name(f"{os.urandom(8).hex()}.nc")  # no such file is made
-            path.write_bytes(_write(outline, parts, os.fspath(beside), diskless=True))
+                executor.submit(_write, outline, parts, path).result()
         else:
-            _write(outline, parts, os.fspath(path), diskless=True, persist=True)
+            write_in_memory(path, lambda file: _put(outline, parts, file))
     except RuntimeError:
         with path.open("ab") as file:  # which raises the reason that HDF5 does not give
             file.write(bytes(2**20))
         raise
 
 
-def _write(outline: Outline, parts: Blocks, path: str, **options: Any) -> bytearray:
-    """Write a netCDF file; return its bytes if it stays in memory, else none."""
-    with HDF5, File(path, "w", format="NETCDF4", **options) as file:
-        for name, size in outline.sizes.items():
-            file.createDimension(name, size)
-        file.setncatts(outline.attributes)
-        _fill(outline, parts, {name: _variable(file, name, each) for name, each in outline.variables.items()})
+def _write(outline: Outline, parts: Blocks, path: Path) -> None:
+    """Write a netCDF file part by part."""
+    with HDF5, File(path, "w", format="NETCDF4") as file:
+        _put(outline, parts, file)
         file.sync()  # which raises an error if the disk fails, while closing the file would crash
-        return bytes_of(os.path.abspath(path)) if options == {"diskless": True} else bytearray()
+
+
+def _put(outline: Outline, parts: Blocks, file: File) -> None:
+    """Put dimensions, attributes and variables into a netCDF file."""
+    for name, size in outline.sizes.items():
+        file.createDimension(name, size)
+    file.setncatts(outline.attributes)
+    _fill(outline, parts, {name: _variable(file, name, each) for name, each in outline.variables.items()})
 
 
 def _variable(file: netCDF4.Dataset, name: str, described: Described) -> netCDF4.Variable:

@@ -5,8 +5,6 @@ driven slider and bonds with a stretch are advanced in sub-steps or from event t
 afterwards. Therefore pieces at several times of such a run are timed.
 """
 
-import itertools
-import math
 from typing import Any
 
 import numpy as np
@@ -21,9 +19,9 @@ from sim.units.errors import BadInput
 # Rough costs of one core [s]: a record of a batch, of a member, a byte of a map that is drawn.
 _RECORD, _RECORD_OF_MEMBER, _MAP_BYTE = 5e-6, 2e-7, 2e-9
 #: Time for which steps are tried [s]; a run of a shorter estimate [s] is tried only if it is made in sub-steps.
-_TRIED, _WORTH_TRYING = 0.25, 1.0
-#: Time for which pieces of a run in sub-steps are timed [s], and their times over the duration.
-_TIMED, _PLACES = 0.6, (0.0, 0.25, 0.5, 0.75, 1.0)
+_TRIED, _WORTH_TRYING = 0.6, 1.0
+#: Times over the duration at which pieces of a run are tried.
+_PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
 #: Factor from the length of the pieces to the next, the largest number of steps into which a clock step is divided, and
 #: the most steps of a run so divided.
 _LONGER, _DIVISIONS, _MOST_STEPS = 4, 4**6, 10**9
@@ -39,13 +37,13 @@ def counted(plan: Plan) -> float:
     return len(plan.points) * ((len(groups) - 1) * first + last) / len(some)
 
 
-def counted_block(point: Scenario, members: np.ndarray, block: Block, speeds: np.ndarray | None = None) -> float:
+def counted_block(point: Scenario, members: np.ndarray, block: Block) -> float:
     """Return the counted time of the steps of a block and of the records and maps in it [s]."""
     steps = block.end - block.start
     maps = map_bytes(point, int(np.sum(members < point.record.map_members)))
     maps *= sum(block.start < step <= block.end for step in snapshots(point)) / max(1, len(point.record.maps))
     records = steps / block.stride * (_RECORD + len(members) * _RECORD_OF_MEMBER)
-    return steps * seconds_a_step(point, len(members), speeds) + records + _MAP_BYTE * maps
+    return steps * seconds_a_step(point, len(members)) + records + _MAP_BYTE * maps
 
 
 def pace(plan: Plan) -> float:
@@ -53,14 +51,14 @@ def pace(plan: Plan) -> float:
 
     Kernels that are not in the cache are compiled.
     """
-    ends = spread(plan.points, 3)
-    if any(map(in_substeps, ends)):
-        trials = [_timed(plan, point, _TIMED / len(ends)) for point in ends]
-    elif counted(plan) < _WORTH_TRYING:
+    trials, ends = [], spread(plan.points, 3)
+    if not any(map(in_substeps, ends)) and counted(plan) < _WORTH_TRYING:
         return 1.0
-    else:
-        trials = [_tried(plan, point, _TRIED / len(ends)) for point in ends]
-    return sum(measured for measured, _ in trials) / sum(expected for _, expected in trials)
+    for point in ends:
+        trials.append(_tried(plan, point, _TRIED / len(ends)))
+        point.release()
+    measured, expected = np.sum(trials, axis=0)
+    return float(measured / expected)
 
 
 def in_substeps(point: Scenario) -> bool:
@@ -69,44 +67,21 @@ def in_substeps(point: Scenario) -> bool:
 
 
 def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
-    """Return measured and counted time [s] of the last of some blocks of steps at one point.
+    """Return the time of the steps of one group [s] by pieces that take about ``most`` [s], and their counted time.
 
-    Each block is twice as long as the one before; all together take about ``most`` [s].
-    """
-    members = np.arange(min(plan.group, max(1, int(most / 10.0 / seconds_a_step(point, 1)))))
-    stride, last, now = point.clock.stride, point.clock.steps, stopwatch()
-    dice, state, block, began = MemberNoise.of(point.seed, members), None, Block(-1, 0, stride), now()
-    for count in itertools.count():
-        begin = now()
-        for steps in block.pieces(1024, []):
-            state, course = follow(point, dice, state, steps)
-            for variable in plan.variables if steps[-1] % stride == 0 else ():
-                variable.read(point, course)
-        end = now()
-        if block.end == last or (count > 2 and end - began + 2.0 * (end - begin) > most):
-            break
-        following = max(1, 2 * block.end)  # a long block ends at a record
-        following = stride * math.ceil(following / stride) if following > stride else following
-        block = Block(block.end, min(last, following), stride)
-    point.release()
-    speeds = point.speeds(5, block.end / last)[2:]
-    return max(end - begin, 1e-9), counted_block(point, members, block, speeds)
-
-
-def _timed(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
-    """Return the time of a run of one group [s] by pieces that take about ``most`` [s], and its counted time.
-
-    A piece at each place is a small fraction of a clock step, because a whole one may take minutes. All are made four
-    times as long as often as the time allows. Behind a spring they begin in steady sliding, but for the first, because
-    a slider at rest needs no sub-steps before its spring is loaded.
+    If sub-steps are made, a piece at each place is a small fraction of a clock step, because a whole one may take
+    minutes. All are made four times as long as often as the time allows. Behind a spring they begin in steady sliding,
+    but for the first, because a slider at rest needs no sub-steps before its spring is loaded.
     """
     members = np.arange(min(plan.group, max(1, int(most / 10.0 / seconds_a_step(point, 1)))))
     noise, clock, division, count = MemberNoise.of(point.seed, members), point.clock, 1, 1
-    while division < _DIVISIONS and clock.steps * division * _LONGER <= _MOST_STEPS:
+    while in_substeps(point) and division < _DIVISIONS and clock.steps * division * _LONGER <= _MOST_STEPS:
         division *= _LONGER
     scene = _divided(point, division)
     first = follow(scene, noise, None, range(1, 2))[0]  # loads kernels
-    others = pack(_sliding(point, noise) or first)
+    sliding = _sliding(point, noise)
+    # its first step is made as such, because at any other the bonds of a contact that was open begin without a stretch
+    others = pack(first if sliding is None else follow(scene, noise, sliding, range(1, 2))[0])
     states = [first, *(unpack(point, {name: array.copy() for name, array in others.items()}) for _ in _PLACES[1:])]
     now = stopwatch()
     end, rates = now() + most, np.ones(len(_PLACES))
@@ -122,7 +97,7 @@ def _timed(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
         number, after = len(longer), now()
         # places without such long pieces change like those with them
         rates = np.append(longer, rates[number:] * np.mean(longer) / np.mean(rates[:number]))
-        if count * len(_PLACES) * _LONGER > clock.steps * division or after + _LONGER * (after - began) > end:
+        if count * _LONGER > clock.steps * division or after + _LONGER * (after - began) > end:
             break
         division, count = (division // _LONGER, 1) if division > 1 else (1, _LONGER * count)
         scene = _divided(point, division)
@@ -130,11 +105,9 @@ def _timed(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
     measured = clock.steps * float(np.average(rates, weights=weights))
     block = Block(-1, clock.steps, clock.stride)
     expected, whole = (counted_block(point, group, block) for group in (members, np.array(plan.groups[0])))
-    if measured > expected:  # sub-steps are made for each member
-        measured = whole + (measured - expected) * len(plan.groups[0]) / len(members)
-    else:
-        measured *= whole / expected
-    return measured, whole
+    if in_substeps(point) and measured > expected:  # sub-steps are made for each member
+        return whole + (measured - expected) * len(plan.groups[0]) / len(members), whole
+    return measured * whole / expected, whole
 
 
 def _divided(point: Scenario, divisions: int) -> Scenario:

@@ -291,16 +291,13 @@ def state_numbers(point: Scenario) -> int:
     return 2 * point.process.pairs + point.population.numbers
 
 
-def seconds_a_step(point: Scenario, members: int, speeds: np.ndarray | None = None) -> float:
-    """Return the rough time of one core for a step of a batch [s], the same on any machine.
-
-    It is an average over the run, or over some ``speeds`` [m/s].
-    """
+def seconds_a_step(point: Scenario, members: int) -> float:
+    """Return the rough time of one core for a step of a batch, averaged over the run [s], the same on any machine."""
     bonds, batch = point.population, _STEP + _ALONE * point.by_steps + point.population.step_seconds
     member = _OF_MEMBER + point.process.pairs * point.fluctuations.pair_seconds + point.contact.edge_seconds
     if bonds.per_member and not bonds.feeds_back:
         event = _DRIVEN_EVENT if point.drive.solves_motion else _EVENT
-        member += _COUNTED + event * bonds.followed(point.speeds(21) if speeds is None else speeds, point.clock.step)
+        member += _COUNTED + event * bonds.followed(point.speeds(21), point.clock.step)
     return batch + members * member
 
 

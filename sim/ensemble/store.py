@@ -307,7 +307,12 @@ class Unfinished:
         began, path, lock = time.monotonic(), self.folder / _LOCK, None
         while not lock:
             with explained(self.folder.parent):
-                self.folder.mkdir(parents=True, exist_ok=True)
+                self.folder.parent.mkdir(parents=True, exist_ok=True)
+                try:
+                    self.folder.mkdir()
+                except FileExistsError:  # or it did: another process may have removed the folder since
+                    if self.folder.is_file():
+                        raise
             with contextlib.suppress(FileNotFoundError):  # the folder of a run that was done meanwhile
                 self._refuse_foreign()
                 lock = _lock(path, 1.0)

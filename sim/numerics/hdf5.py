@@ -7,7 +7,7 @@ import json
 import os
 import stat
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,7 +53,12 @@ class File(netCDF4.Dataset):
 
     def __init__(self, path: str | os.PathLike[str], mode: Any = "r", **how: Any) -> None:
         whole = os.path.abspath(path)  # because a relative path may look like an address in the network
-        super().__init__(whole, mode, encoding=ENCODING, **how)
+        try:
+            super().__init__(whole, mode, encoding=ENCODING, **how)
+        except BaseException:
+            if self.isopen():  # it was opened, and what it holds cannot be read
+                self.close()
+            raise
 
     def filepath(self, encoding: str | None = None) -> str:
         return str(super().filepath(encoding or ENCODING))
@@ -163,6 +168,21 @@ def bytes_of(name: str) -> bytearray:
                 if library.H5Fget_file_image(file, (ctypes.c_char * size).from_buffer(content), size) == size:
                     return content
     raise RuntimeError("HDF5 does not give the bytes of a dataset in memory")
+
+
+def write_in_memory(path: Path, fill: Callable[[File], None]) -> None:
+    """Build a netCDF file in memory, and write its bytes as those of any other file.
+
+    HDF5 gives no reason if the disk fails, and netCDF crashes if that happens while it closes a file.
+    """
+    gives_bytes = hdf5_gives_bytes()
+    name = os.path.abspath(path.with_name(f"{os.urandom(8).hex()}.nc") if gives_bytes else path)
+    with HDF5, File(name, "w", format="NETCDF4", diskless=True, persist=not gives_bytes) as file:
+        fill(file)
+        file.sync()
+        content = bytes_of(name) if gives_bytes else None
+    if content is not None:  # else closing the file has written it
+        path.write_bytes(content)
 
 
 def located(dataset: "xarray.Dataset") -> "xarray.Dataset":

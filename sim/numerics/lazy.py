@@ -1,6 +1,8 @@
 """netCDF files as lazy datasets of xarray; damage that appears while numbers are read is named by its variable."""
 
+import contextlib
 import os
+from pathlib import Path
 from typing import Any
 
 import xarray as xr
@@ -9,7 +11,7 @@ from xarray.backends.netCDF4_ import NetCDF4ArrayWrapper
 from xarray.core.indexing import LazilyIndexedArray
 
 from sim.numerics.files import HDF5
-from sim.numerics.hdf5 import Damaged, File, Refused, opened, readable
+from sim.numerics.hdf5 import Damaged, Refused, opened, readable, write_in_memory
 
 __all__ = ["Damaged", "Refused", "open_lazily", "save"]
 
@@ -52,15 +54,16 @@ def open_lazily(path: str | os.PathLike[str]) -> xr.Dataset:
     Damaged
         If a coordinate is damaged; later, if a variable that is read is.
     """
-    with HDF5, readable():
+    with HDF5, readable(), contextlib.ExitStack() as refused:
         file: Any = CachingFileManager(opened, os.path.abspath(path), lock=HDF5)  # type: ignore[type-var]
+        refused.callback(file.close)  # because nobody can delete or replace an open file on Windows
         store: Any = _Store(file, lock=HDF5)
         store.path = path
-        return xr.open_dataset(store, engine=StoreBackendEntrypoint, decode_times=False, decode_coords=False)
+        dataset = xr.open_dataset(store, engine=StoreBackendEntrypoint, decode_times=False, decode_coords=False)
+        refused.pop_all()
+    return dataset
 
 
-def save(dataset: xr.Dataset, path: str | os.PathLike[str]) -> None:
+def save(dataset: xr.Dataset, path: Path) -> None:
     """Write a dataset as a netCDF file. On Windows xarray itself writes no path with a letter outside of ASCII."""
-    with HDF5, File(path, "w", format="NETCDF4") as file:
-        dataset.dump_to_store(NetCDF4DataStore(file, lock=HDF5))
-        file.sync()  # which raises an error if the disk fails, while closing the file would crash
+    write_in_memory(path, lambda file: dataset.dump_to_store(NetCDF4DataStore(file, lock=HDF5)))

@@ -9,6 +9,7 @@ or a force single paths diverge, so averages over the second half of the run are
 """
 
 import contextlib
+import functools
 import importlib.metadata
 import itertools
 import json
@@ -26,7 +27,7 @@ from pydantic import TypeAdapter
 from scipy import special
 
 from sim.analysis import engineering
-from sim.engine import MemberNoise, State, follow
+from sim.engine import MemberNoise, Trajectory, follow
 from sim.ensemble.plan import seconds_a_step, together
 from sim.ensemble.variables import READ
 from sim.numerics import files, hdf5, lazy
@@ -45,6 +46,11 @@ from sim.units.notation import concise
 Printed = tuple[list[dict[str, str]], str]
 QUANTITIES = ("shear_stress", "bond_fraction", "fluctuation_energy", "contact_radius", "friction_force")
 STATISTICS = ("mean", "spread", "skewness", "correlation time")
+#: A function that raises an error if the time of a run is spent.
+Check = Callable[[], None]
+#: A reading of a variable of a run.
+Read = Callable[[Scenario, Trajectory], Array]
+_READS = tuple(READ[name] for name in QUANTITIES)
 _ENERGY, _RADIUS = 2, 3
 _SHORT = ("stress", "bonds", "ΔΓ", "radius", "friction")
 _WORDS = ("the shear stress", "the bond fraction", "ΔΓ", "the radius", "the friction force")
@@ -58,7 +64,7 @@ _LEAST, _FEWEST, _MOST = 2, 16, 2**14
 _SAMPLED = 2**22
 #: Pieces of a run between which the time is looked at, and factor by which a budget that is named exceeds the estimate.
 _PIECES, _MARGIN = 20, 1.3
-#: Most numbers that are kept of the finest of several clock steps, and most steps that are run at once.
+#: Most numbers that are kept of the finest of several clock steps, and most steps that are timed at once.
 _NUMBERS, _PIECE = 2**22, 512
 #: Finest clock step over the scene's; share of the tolerance below which an error is small enough.
 _FINEST_STEP, _SMALL = 2.0**-12, 0.1
@@ -89,7 +95,7 @@ _DESCRIBED = {
 _COLUMNS = ("part", "own", "time", "members", "error", "standard_error")
 
 
-@dataclass
+@dataclass(eq=False)
 class Setting:
     """One setting of the scene, with its cost and its error.
 
@@ -120,13 +126,18 @@ class Setting:
     ratio: float = 1.0
     time: float = math.nan
     members: int = 0
-    error: Array = field(default_factory=lambda: np.full((len(QUANTITIES), 4), np.nan))
-    standard_error: Array = field(default_factory=lambda: np.zeros((len(QUANTITIES), 4)))
+    error: Array = field(default_factory=lambda: np.full((len(QUANTITIES), len(STATISTICS)), np.nan))
+    standard_error: Array = field(default_factory=lambda: np.zeros((len(QUANTITIES), len(STATISTICS))))
+
+    @property
+    def pace(self) -> float:
+        """Return the estimated time of a run of one member [s]."""
+        return self.time / (self.scenario.ensemble.members if _fluctuates(self.scenario) else 1)
 
 
 @dataclass
 class Budget:
-    """Time that a study may take, and the time that it would need.
+    """Time that a study may take, what did not fit into it, and the time that this would need.
 
     Attributes
     ----------
@@ -138,18 +149,26 @@ class Budget:
         Largest time of a run over its estimate by a first piece.
     needed : float
         Budget that would answer what was left out [s]; 0 if nothing was.
+    left_out : list of str
+        Settings that were left out, with the reason.
     """
 
     now: Callable[[], float]
     seconds: float
-    end: float = math.inf
+    end: float
     share: float = 1.0
     slower: float = 1.0
     needed: float = 0.0
+    left_out: list[str] = field(default_factory=list)
 
     def left(self, until: float = math.inf) -> float:
         """Return the time that is left until a time of ``now``, or until the end [s]."""
         return min(until, self.end) - self.now()
+
+    def check(self, until: float = math.inf) -> None:
+        """Raise ``_Spent`` if no time is left until a time of ``now``."""
+        if self.left(until) < 0.0:
+            raise _Spent
 
     def needs(self, seconds: float) -> None:
         """Remember that something of this length [s] was left out."""
@@ -209,25 +228,26 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     if scenario.fluctuations.measured:
         raise BadInput(["shear.field: a map has no simpler model; study fields of its spectrum, shear.spectrum"])
     now = stopwatch()
-    began, left_out, budget = now(), list[str](), Budget(now, budget_seconds)
+    began = now()
+    budget = Budget(now, budget_seconds, began + 0.5 * budget_seconds)
     chosen_models = {"shear": _table(scenario.fluctuations), "bonds": _table(scenario.population)}
     base = scenario.with_values(chosen_models | {"record": {}})
     accepted = tolerance or float(_table(scenario.shear).get("tolerance", 0.01))
-    written, half = _at_step(base, 1.0), began + 0.5 * budget_seconds
-    settings = [row for changes in _tried(base) for row in _admitted(*changes, base, left_out, half, budget)]
-    settings.append(written)
+    written = _at_step(base, 1.0)
+    settings = [row for changes in _tried(base) if (row := _admitted(*changes, base, budget))]
     building = now() - began
-    for row in settings:  # compiles, which is not counted
-        recorded(row.scenario, 1, range(2))
-    end = budget.end = now() + budget_seconds - building
-    for row in settings:
-        row.time = _timed(row.scenario, _TIMING * budget_seconds / len(settings))
-    parts, judged = list(dict.fromkeys(row.part for row in settings[:-1])), list[Setting]()
-    for place, part in enumerate(parts):
-        at = now()
-        until = at + (end - at - _STEPS * budget_seconds) / (len(parts) - place)
+    for row in [*settings, written]:  # compiles, which is not counted
+        with contextlib.suppress(Unresolved):
+            recorded(row.scenario, range(1), range(2))
+    budget.end = now() + budget_seconds - building
+    for row in [*settings, written]:
+        row.time = _timed(row.scenario, _TIMING * budget_seconds / (len(settings) + 1))
+    parts = [list(rows) for _, rows in itertools.groupby(settings, key=lambda row: row.part)]
+    judged = list[Setting]()
+    for place, rows_of_part in enumerate(parts):
+        left = budget.left() - _STEPS * budget_seconds
         budget.share = (1.0 - _TIMING - _STEPS) / len(parts)
-        judged += _judged(base, [row for row in settings if row.part == part], until, left_out, budget)
+        judged += _judged(rows_of_part, now() + left / (len(parts) - place), budget)
     means = [row for row in judged if row.members and row.part == "bonds" and "sites" not in _table(row.scenario.bonds)]
     driven = scenario.drive.solves_motion  # its mean depends on the noise of the bonds, which other models lack
     budget.share = _STEPS
@@ -243,8 +263,8 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     return xr.Dataset(variables, coordinates, {
         "Conventions": "CF-1.11", "title": f"speed against error: {scenario.name}", "not_converging": trend,
         "sim_version": importlib.metadata.version("sliding-sim"), "seed": str(scenario.seed), "tolerance": accepted,
-        "budget": float(f"{budget.needed:.1e}"), "averaged": int(driven),
-        "swept": ", ".join(key for axis in scenario.sweep for key in axis.keys), "left_out": "\n".join(left_out),
+        "budget": float(f"{budget.needed:.1e}"), "averaged": int(driven), "left_out": "\n".join(budget.left_out),
+        "swept": ", ".join(key for axis in scenario.sweep for key in axis.keys),
     })  # fmt: skip
 
 
@@ -275,28 +295,26 @@ def _tried(scenario: Scenario) -> Iterator[tuple[str, dict[str, Any]]]:
         yield "bonds", {"model": last, "sites": round(sites)}
 
 
-def _admitted(
-    part: str, changes: dict[str, Any], base: Scenario, left_out: list[str], end: float, budget: Budget | None = None
-) -> list[Setting]:
-    """Return the scene with some keys of a part changed; nothing, but a reason in ``left_out``, if it refuses them.
+def _admitted(part: str, changes: dict[str, Any], base: Scenario, budget: Budget) -> Setting | None:
+    """Return the scene with some keys of a part changed; None, with a reason in ``left_out``, if it refuses them.
 
-    After some time of a budget, ``end`` [s], only the setting of the scene itself is built.
+    If the time is spent, only the setting of the scene itself is built.
     """
     table_now, label = _table(getattr(base, part)), " ".join(f"{value}" for value in changes.values())
     admitted = tables(keys(Scenario)[part].annotation).values()
     declared = {key for kind in admitted if model(kind) == changes["model"] for key in keys(kind)}
     is_written = table_now.items() >= changes.items()
     try:
-        if budget is not None and budget.now() > end and not is_written:
-            budget.needed = max(budget.needed, 2.0 * budget.seconds)
+        if budget.left() < 0.0 and not is_written:
+            budget.needs(2.0 * budget.seconds)
             raise ValueError(_TOO_LONG)
         changed = base.with_values({part: {key: table_now[key] for key in table_now.keys() & declared} | changes})
         changed.process  # noqa: B018 - some models are refused only when their modes are made
     except ValueError as fault:
-        left_out.append(f"{label}: " + str(fault).partition("\n")[0])
-        return []
+        budget.left_out.append(f"{label}: " + str(fault).partition("\n")[0])
+        return None
     toml = "\n".join(f"{key} = {json.dumps(value)}" for key, value in changes.items())
-    return [Setting(label, part, changed, toml, int(is_written))]
+    return Setting(label, part, changed, toml, int(is_written))
 
 
 def _at_step(scenario: Scenario, ratio: float) -> Setting:
@@ -318,16 +336,16 @@ def _timed(scenario: Scenario, seconds: float) -> float:
     members, last = scenario.ensemble.members if _fluctuates(scenario) else 1, scenario.clock.steps
     full = min(together(scenario), members)
     batch = full if seconds_a_step(scenario, full) < 0.25 * seconds else min(full, _FEWEST)
-    noise, times, now = MemberNoise.of(scenario.seed, np.arange(batch)), list[tuple[int, float]](), stopwatch()
-    piece, step, state = 1, 0, None
-    began = now()
-    while not times or now() < began + seconds:
-        steps, before = range(step + 1, min(step + piece, last) + 1), now()
+    noise, now, state = MemberNoise.of(scenario.seed, np.arange(batch)), stopwatch(), None
+    times, end, step, length = list[tuple[int, float]](), now() + seconds, 0, 1
+    while not times or now() < end:
+        steps, before = range(step + 1, min(step + length, last) + 1), now()
         state, _ = follow(scenario, noise, state if step else None, steps)
         times.append((len(steps), now() - before))
-        step, piece = steps[-1] % last, min(2 * piece, _PIECE)
-    done, spent = np.sum(times[1:] or times, axis=0)  # the first piece has loaded what is computed once
-    return -(-members // full) * last * full / batch * max(float(spent), _TICK) / float(done)
+        step, length = steps[-1] % last, min(2 * length, _PIECE)
+    done, spent = np.sum(times[1:] or times, axis=0).tolist()  # the first piece has loaded what is computed once
+    batches = -(-members // full) * full / batch
+    return batches * last * max(spent, _TICK) / done
 
 
 def _records(scenario: Scenario) -> range:
@@ -338,76 +356,74 @@ def _records(scenario: Scenario) -> range:
     return range(clock.steps % every, clock.steps + 1, every)
 
 
+def _unlimited() -> None:
+    """Check nothing: the time of a run is not limited."""
+
+
 class Unresolved(RuntimeError):
     """A motion that a setting does not resolve: its missing values are no numbers to compare."""
 
     exit_code = 1
 
 
-def _refuse_unresolved(scenario: Scenario, state: State) -> None:
-    """Raise ``Unresolved`` if the motion of a member could not be resolved."""
-    if scenario.drive.solves_motion and np.isfinite(cast(Driven, state.drive).unresolved_time).any():
-        step = f"clock.step = {scenario.clock.step:.3g} s"
-        raise Unresolved(f"with {step} some members could not be resolved; set drive.viscosity or a shorter clock.step")
-
-
 def recorded(
-    scenario: Scenario, count: int, steps: range, names: Sequence[str] = QUANTITIES, first: int = 0, in_time: Any = None
+    scenario: Scenario, members: range, steps: range, reads: Sequence[Read] = _READS, check: Check = _unlimited
 ) -> Array:
-    """Return variables of some members, from the ``first`` one on, at some clock steps, shape (names, members, steps).
+    """Return variables of some members at some clock steps, shape (variables, members, steps).
 
-    Between pieces of the run ``in_time`` is called, if it is given, which may raise an error.
+    Before each piece of the run ``check`` is called, which may raise an error.
     """
-    values, whole = list[list[Array]](), max(1, len(steps) // _PIECES)
-    for members in np.array_split(first + np.arange(count), -(-count // together(scenario))):
-        state, pieces = None, list[list[Array]]()
-        for begin in range(0, len(steps), whole):
-            if in_time is not None:
-                in_time()
-            piece = steps[begin : begin + whole]
-            state, course = follow(scenario, MemberNoise.of(scenario.seed, members), state, piece)
-            _refuse_unresolved(scenario, state)
-            read, shape = (READ[name](scenario, course) for name in names), (len(piece), len(members))
-            pieces.append([np.broadcast_to(variable, shape).T for variable in read])
-        values.append([np.concatenate(each, axis=1) for each in zip(*pieces, strict=True)])
+    values, length = list[Array](), max(1, len(steps) // _PIECES)
+    for batch in np.array_split(members, -(-len(members) // together(scenario))):
+        noise, state, pieces = MemberNoise.of(scenario.seed, batch), None, list[list[Array]]()
+        for begin in range(0, len(steps), length):
+            check()
+            state, course = follow(scenario, noise, state, steps[begin : begin + length])
+            if scenario.drive.solves_motion and np.isfinite(cast(Driven, state.drive).unresolved_time).any():
+                cure = "set drive.viscosity or a shorter clock.step"
+                step = f"clock.step = {scenario.clock.step:.3g} s"
+                raise Unresolved(f"with {step} some members could not be resolved; {cure}")
+            shape = course.time.size, len(batch)
+            pieces.append([np.broadcast_to(read(scenario, course), shape).T for read in reads])
+        values.append(np.concatenate(pieces, axis=2))
     return np.concatenate(values, axis=1)
 
 
-def compared(scenario: Scenario, count: int, steps: range, first: int = 0, in_time: Any = None) -> Array:
+def compared(scenario: Scenario, members: range, steps: range, check: Check = _unlimited) -> Array:
     """Return the ``QUANTITIES`` of some members at some clock steps, shape (quantities, members, times).
 
     Under a spring or a force the only time is the mean over the second half of the steps, because single paths diverge.
     A member that has run away has the value zero.
     """
     if not scenario.drive.solves_motion:
-        return recorded(scenario, count, steps, first=first, in_time=in_time)
-    averages, most = list[Array](), max(_LEAST, _SAMPLED // (len(QUANTITIES) * len(steps)))
-    for begin in range(0, count, most):
-        values = recorded(scenario, min(most, count - begin), steps, first=first + begin, in_time=in_time)
+        return recorded(scenario, members, steps, check=check)
+    averages, most = list[Array](), _most_at_once(steps)
+    for begin in range(0, len(members), most):
+        values = recorded(scenario, members[begin : begin + most], steps, check=check)
         averages.append(np.nan_to_num(values[:, :, len(steps) // 2 :]).mean(axis=2, keepdims=True))
     return np.concatenate(averages, axis=1)
 
 
-def _most_sampled(scenario: Scenario, steps: range) -> int:
-    """Return the most members that are compared at some steps, so that their numbers stay small."""
-    return (
-        _MOST if scenario.drive.solves_motion else min(_MOST, max(_LEAST, _SAMPLED // (len(QUANTITIES) * len(steps))))
-    )
+def _most_at_once(steps: range) -> int:
+    """Return the most members whose numbers at some steps are kept."""
+    return min(_MOST, max(_LEAST, _SAMPLED // (len(QUANTITIES) * len(steps))))
 
 
-def _known_errors(row: Setting, truth: Gammas, power: int) -> Array:
-    """Return relative errors of mean, spread, skewness and correlation time of ΔΓ at amplitude 1, in closed form.
+def _most_members(scenario: Scenario, steps: range) -> int:
+    """Return the most members that are compared at some steps; of driven ones only averages are kept."""
+    return _MOST if scenario.drive.solves_motion else _most_at_once(steps)
+
+
+def _known(terms: Gammas, power: int) -> Array:
+    """Return mean, spread, skewness and correlation time of ΔΓ at amplitude 1, in closed form.
 
     ΔΓ is a weighted sum of independent gamma numbers, whose n-th cumulant is ``(n − 1)! Σ shape wⁿ``. The rate of a
     mode grows with a ``power`` of its wavenumber.
     """
-    sums = []
-    for terms in (row.scenario.process.gammas, truth):
-        mean, variance, third = (np.sum(terms.shape * terms.weight**n) for n in (1, 2, 3))
-        lives = np.sum(terms.shape * terms.weight**2 * terms.wavenumber ** -float(power))
-        of_spread = (2.0 * third / variance**1.5, lives / variance) if variance > 0.0 else (0.0, 0.0)
-        sums.append((mean + terms.constant, math.sqrt(variance), *of_spread))
-    return np.array([value / exact - 1.0 if exact else 0.0 for value, exact in zip(*sums, strict=True)])
+    mean, variance, third = (np.sum(terms.shape * terms.weight**n) for n in (1, 2, 3))
+    lives = np.sum(terms.shape * terms.weight**2 * terms.wavenumber ** -float(power))
+    of_spread = (2.0 * third / variance**1.5, lives / variance) if variance > 0.0 else (0.0, 0.0)
+    return np.array([mean + terms.constant, math.sqrt(variance), *of_spread])
 
 
 def _errors(values: Array, reference: Array, known: Array | None = None) -> Array:
@@ -427,109 +443,109 @@ def _errors(values: Array, reference: Array, known: Array | None = None) -> Arra
         Error and standard error by quantity and statistic, in units of the largest mean, for the
         spread of ΔΓ of its largest spread.
     """
-    (moments, of_moments), (exact, of_exact) = _moments(values), _moments(reference)
-    difference, influence = moments - exact, of_moments - of_exact
+    changed, exact = map(_moments, np.broadcast_arrays(values, reference))
+    difference = changed - exact
     if known is not None:
-        off = of_exact[:, 0]
-        along, variance = (np.sum(off[of] * off[_ENERGY], axis=0) for of in (_RADIUS, _ENERGY))
-        slope = np.zeros(difference.shape)
-        slope[_RADIUS, 0, 0] = np.divide(along, variance, out=np.zeros(variance.shape), where=variance > 0.0)
-        slope[_RADIUS, 1] = np.abs(slope[_RADIUS, 0])
-        of_mean_and_spread = known[:2, np.newaxis, np.newaxis]
-        difference = difference + slope * (of_mean_and_spread * exact[_ENERGY] - difference[_ENERGY])
-        influence = influence + slope * (of_mean_and_spread * of_exact[_ENERGY] - influence[_ENERGY])
-    count, size = influence.shape[2], np.abs(difference[:, :, 0])
+        of_energy, of_radius = exact[_ENERGY, 0, 1:], exact[_RADIUS, 0, 1:]
+        along, variance = np.sum(of_radius * of_energy, axis=0), np.sum(of_energy**2, axis=0)
+        slope = np.divide(along, variance, out=np.zeros(variance.shape), where=variance > 0.0)
+        slopes = np.stack([slope, np.abs(slope)])[:, np.newaxis]
+        lacking = known[:2, np.newaxis, np.newaxis] * exact[_ENERGY] - difference[_ENERGY]
+        difference[_RADIUS] += slopes * lacking
+    size, influence = np.abs(difference[:, :, 0]), difference[:, :, 1:]
+    count = influence.shape[2]
     deviation = np.sqrt(np.sum(influence**2, axis=2) / (count * max(count - 1, 1)))
     unit = np.repeat(np.abs(exact[:, :1, 0]).max(axis=2), 2, axis=1)
-    unit[_ENERGY, 1] = exact[_ENERGY, 1].max() or unit[_ENERGY, 1]
-    bounds, result = size + students(count) * deviation, np.full((2, len(size), 4), np.nan)
-    largest = bounds.argmax(axis=2)[..., np.newaxis]
-    at_largest = np.take_along_axis(np.stack([size, deviation]), largest[np.newaxis], axis=3)[..., 0]
+    unit[_ENERGY, 1] = exact[_ENERGY, 1, 0].max() or unit[_ENERGY, 1]
+    largest = (size + students(count) * deviation).argmax(axis=2)[np.newaxis, ..., np.newaxis]
+    at_largest = np.take_along_axis(np.stack([size, deviation]), largest, axis=3)[..., 0]
+    result = np.full((2, len(QUANTITIES), len(STATISTICS)), np.nan)
     result[:, :, :2] = np.divide(at_largest, unit, out=np.zeros(at_largest.shape), where=unit > 0.0)
     if known is not None:
-        result[:, _ENERGY] = np.abs(known), np.zeros(4)
+        result[:, _ENERGY] = np.abs(known), np.zeros(len(STATISTICS))
     return result
 
 
-def _moments(sample: Array) -> tuple[Array, Array]:
-    """Return mean and spread over the members, shape (quantities, 2, 1, times), and each member's influence on them."""
+def _moments(sample: Array) -> Array:
+    """Return mean and spread over the members, each followed by each member's influence on it.
+
+    The shape is (quantities, 2, 1 + members, times).
+    """
     mean, spread = (np.nan_to_num(of(sample, axis=1, keepdims=True)) for of in (np.mean, np.std))
     spread = np.where(spread > 1e-12 * np.abs(mean), spread, 0.0)
     off = np.where(spread > 0.0, sample - mean, 0.0)
     on_spread = np.divide(off**2 - spread**2, 2.0 * spread, out=np.zeros(off.shape), where=spread > 0.0)
-    return np.stack([mean, spread], axis=1), np.stack([off, on_spread], axis=1)
+    return np.stack([np.concatenate([mean, off], axis=1), np.concatenate([spread, on_spread], axis=1)], axis=1)
 
 
-def _judged(
-    base: Scenario, settings: list[Setting], until: float, left_out: list[str], budget: Budget
-) -> list[Setting]:
+def _judged(settings: list[Setting], until: float, budget: Budget) -> list[Setting]:
     """Return the settings of one part that fit into the time, with their errors against the finest of them.
 
     As many members are compared as are estimated to fit into half of the time. A first few of them show the time of a
     run. Without a finer setting, that of the scene has no error, and none is returned but itself.
     """
-    steps = _records(max((row.scenario for row in settings), key=_fluctuates))
-    finer = settings[1 + next(place for place, row in enumerate(settings) if row.own) :]
-    nearest = min(finer, key=lambda row: row.time, default=None)
-    order = sorted(settings, key=lambda row: (not row.own, row is not nearest, row.time))
+    (own,) = (row for row in settings if row.own)
+    nearest = min(settings[settings.index(own) + 1 :], key=lambda row: row.time, default=own)
+    order = sorted(settings, key=lambda row: (row is not own, row is not nearest, row.time))
     noisy = [row for row in settings if _fluctuates(row.scenario)]
-    pace = {row.label: row.time / (base.ensemble.members if row in noisy else 1) for row in settings}
-    most = _most_sampled(base, steps)
-    wanted = 0.5 * budget.left(until) / max(sum(pace[row.label] for row in noisy), _TICK)
-    count = first = int(np.clip(max(0.25 * wanted, min(wanted, _FEWEST)), _LEAST, most))
-    samples, expected, taken, slower = dict[str, Array](), 0.0, 0.0, 1.0
+    steps = _records([own, *noisy][-1].scenario)
+    most, wanted = _most_members(own.scenario, steps), _affordable(noisy, until, budget)
+    first = int(np.clip(max(0.25 * wanted, min(wanted, _FEWEST)), _LEAST, most))
+    samples, reasons = dict[Setting, Array](), dict.fromkeys(settings, _TOO_LONG)
+    expected = taken = 0.0
     for row in order:
-        number, limit = (first if row in noisy else 1), budget.end if row.own else until
-        if slower * pace[row.label] * number > budget.left(limit):
+        members, limit = range(first if row in noisy else 1), budget.end if row is own else until
+        if budget.slower * row.pace * len(members) > budget.left(limit):
             continue
         before = budget.now()
-        with contextlib.suppress(_Spent):
-            samples[row.label] = _sample(row, number, steps, 0, limit, budget)
-        now = budget.now()
-        expected, taken = expected + pace[row.label] * number, taken + now - before
-        slower, pace[row.label] = max(slower, taken / expected), max(pace[row.label], (now - before) / number)
-    budget.slower = max(budget.slower, slower)
-    fitting = [row for row in settings if row.label in samples]
-    more = int(
-        min(
-            0.5 * budget.left(until) / max(sum(pace[row.label] for row in noisy if row in fitting), _TICK), most - count
-        )
-    )
-    if more > 0 and any(row in fitting for row in noisy):
-        with contextlib.suppress(_Spent):
-            added = {row.label: _sample(row, more, steps, count, until, budget) for row in fitting if row in noisy}
-            samples |= {label: np.concatenate([samples[label], rest], axis=1) for label, rest in added.items()}
-    if len(fitting) < len(settings):
-        budget.needs(2.0 * sum(pace[row.label] * (_FEWEST if row in noisy else 1) for row in settings))
-        left_out += [f"{row.label}: {_TOO_LONG}" for row in settings if row.label not in samples]
-    (own,) = (row for row in settings if row.own)
-    if not fitting or (finer and own is fitting[-1]):
+        try:
+            samples[row] = compared(row.scenario, members, steps, functools.partial(budget.check, limit))
+        except Unresolved as fault:
+            if row is own:
+                raise
+            reasons[row] = str(fault)
+        except _Spent:
+            pass
+        expected, taken = expected + row.pace * len(members), taken + budget.now() - before
+        budget.slower = max(budget.slower, taken / expected)
+    fitting, costly = [row for row in settings if row in samples], [row for row in noisy if row in samples]
+    more = range(first, first + int(min(_affordable(costly, until, budget), most - first)))
+    if costly and more:
+        check = functools.partial(budget.check, until)
+        with contextlib.suppress(_Spent, Unresolved):
+            rest = [compared(row.scenario, more, steps, check) for row in costly]
+            samples |= {
+                row: np.concatenate([samples[row], values], axis=1) for row, values in zip(costly, rest, strict=True)
+            }
+    left_out = {row.label: reasons[row] for row in settings if row not in samples}
+    budget.left_out += map(": ".join, left_out.items())
+    if _TOO_LONG in left_out.values():
+        budget.needs(2.0 * sum(row.pace * (_FEWEST if row in noisy else 1) for row in settings))
+    if not fitting or (own is fitting[-1] and own is not settings[-1]):
         return [own]
-    _compare(base, fitting, samples)
-    return [row for row in settings if row is own or row in fitting]
+    _compare(own.scenario, fitting, samples)
+    return [row for row in settings if row is own or row in samples]
 
 
-def _sample(row: Setting, count: int, steps: range, first: int, until: float, budget: Budget) -> Array:
-    """Return the ``QUANTITIES`` of some members, as ``compared``; raise ``_Spent`` if the time is spent before."""
-
-    def in_time() -> None:
-        if budget.left(until) < 0.0:
-            raise _Spent
-
-    return compared(row.scenario, count, steps, first, in_time)
+def _affordable(rows: list[Setting], until: float, budget: Budget) -> float:
+    """Return the members of some settings whose runs are estimated to take half of the time that is left."""
+    return 0.5 * budget.left(until) / max(budget.slower * sum(row.pace for row in rows), _TICK)
 
 
-def _compare(base: Scenario, fitting: list[Setting], samples: dict[str, Array]) -> None:
+def _compare(scene: Scenario, fitting: list[Setting], samples: dict[Setting, Array]) -> None:
     """Write the errors of the settings of one part against the last of them."""
-    part, finest = cast(Any, base.fluctuations), samples[fitting[-1].label]
-    has_truth = fitting[0].part == "shear" and part.per_member and not (part.law.relaxing or base.drive.solves_motion)
+    part, finest, known = cast(Any, scene.fluctuations), samples[fitting[-1]], None
+    driven = scene.drive.solves_motion
+    has_truth = fitting[0].part == "shear" and part.per_member and not (part.law.relaxing or driven)
     if has_truth:  # the distribution of ΔΓ by all modes of the cell
-        pairs = cell_pairs(part.spectrum, part.side(base.setting.cell), part.points, *base.solid.effective)
-        truth = Gammas(pairs.weight, pairs.count, pairs.wavenumber)
+        pairs = cell_pairs(part.spectrum, part.side(scene.setting.cell), part.points, *scene.solid.effective)
+        truth = _known(Gammas(pairs.weight, pairs.count, pairs.wavenumber), part.correlation.power)
     for row in fitting:
-        known = _known_errors(row, truth, part.correlation.power) if has_truth else None
-        row.error, row.standard_error = _errors(samples[row.label], finest, known)
-        row.members = max(samples[row.label].shape[1], finest.shape[1])
+        if has_truth:
+            approximate = _known(row.scenario.process.gammas, part.correlation.power)
+            known = np.divide(approximate, truth, out=np.ones(truth.shape), where=truth != 0.0) - 1.0
+        row.error, row.standard_error = _errors(samples[row], finest, known)
+        row.members = max(samples[row].shape[1], finest.shape[1])
 
 
 class _Replayed:
@@ -557,36 +573,70 @@ def _replays(scenario: Scenario) -> bool:
     return part.per_member and not (driven or part.law.relaxing or part.law.remembers or part.spectrum.bond_made)
 
 
-def _at_steps(rows: Sequence[Setting], count: int, budget: Budget | None = None) -> list[Array]:
-    """Return the ``QUANTITIES`` by several clock steps, the finest first.
+def _unit_energy(scenario: Scenario, course: Trajectory) -> Array:
+    """Return ΔΓ at amplitude 1 [J/m²]."""
+    size = scenario.fluctuations.law.factor(course.speed, course.strength) ** 2
+    return np.divide(course.energy, size, out=np.zeros(course.energy.shape), where=size > 0.0)
+
+
+def _at_steps(rows: Sequence[Setting], count: int, check: Check = _unlimited) -> list[Array]:
+    """Return the ``QUANTITIES`` by several clock steps, the finest first; ``check`` as of ``recorded``.
 
     At a prescribed speed all have the fluctuations that the finest draws. Fluctuations have no error in time. Their
-    amplitude and the bonds have, so these are computed at each step. ``_Spent`` is raised if a budget is spent before.
+    amplitude and the bonds have, so these are computed at each step.
     """
+    (finest, *others), members = (row.scenario for row in rows), range(count)
+    if not _replays(finest):
+        return [compared(scenario, members, _records(scenario), check) for scenario in (finest, *others)]
+    records, steps = _records(finest), range(0, finest.clock.steps + 1, round(rows[1].ratio / rows[0].ratio))
+    values = recorded(finest, members, steps, [*_READS, _unit_energy], check)
+    result = [values[:-1, :, records.start // steps.step :: records.step // steps.step]]
+    for row in rows[1:]:
+        energy = np.ascontiguousarray(values[-1, :, :: round(row.ratio / rows[1].ratio)].T)
+        scenario = row.scenario.with_values({}, built=False)
+        scenario.__dict__["process"] = _Replayed(row.scenario, energy)
+        result.append(compared(scenario, members, _records(scenario), check))
+    return result
 
-    def in_time() -> None:
-        if budget is not None and budget.left() < 0.0:
-            raise _Spent
 
-    finest, *others = scenarios = [row.scenario for row in rows]
-    if _replays(finest):
-        steps, state, units = (
-            range(0, finest.clock.steps + 1, round(rows[1].ratio / rows[0].ratio)),
-            None,
-            list[Array](),
-        )
-        whole = max(1, len(steps) // _PIECES)
-        for begin in range(0, len(steps), whole):
-            in_time()
-            noise = MemberNoise.of(finest.seed, np.arange(count))
-            state, course = follow(finest, noise, state, steps[begin : begin + whole])
-            size = finest.fluctuations.law.factor(course.speed, course.strength) ** 2
-            units.append(np.divide(course.energy, size, out=np.zeros(course.energy.shape), where=size > 0.0))
-        unit = np.concatenate(units)
-        scenarios[1:] = [scenario.with_values({}) for scenario in others]
-        for scenario, row in zip(scenarios[1:], rows[1:], strict=True):
-            scenario.__dict__["process"] = _Replayed(row.scenario, unit[:: round(row.ratio / rows[1].ratio)])
-    return [compared(scenario, count, _records(scenario), in_time=in_time) for scenario in scenarios]
+class _Series(NamedTuple):
+    """Runs of a scene at several clock steps, the finest first, their members, and the time that they took [s]."""
+
+    rows: list[Setting]
+    runs: list[Array]
+    members: int
+    seconds: float
+
+
+def _series(rows: list[Setting], members: int, budget: Budget) -> _Series | None:
+    """Return runs at several clock steps; None if the budget is spent before, or if a motion is not resolved."""
+    began = budget.now()
+    try:
+        return _Series(rows, _at_steps(rows, members, budget.check), members, budget.now() - began)
+    except Unresolved as fault:
+        budget.left_out.append(str(fault))
+    except _Spent:
+        pass
+    return None
+
+
+def _first_series(setting: Setting, ratios: Sequence[float], budget: Budget) -> _Series | None:
+    """Return runs at a few clock steps, with as many members as fit; None if too few do."""
+    scene, pace, left, members = setting.scenario, budget.slower * setting.pace, budget.left(), 1
+    cost = pace * sum(1.0 / ratio for ratio in ratios)
+    if _fluctuates(scene):
+        members = max(min(_most_in_series(scene), int(left / (32.0 * pace))), 4)
+        members = max(min(members, int(left / cost)), _LEAST)
+    if members * cost > left:
+        return None
+    return _series([_at_step(scene, ratio) for ratio in ratios], members, budget)
+
+
+def _most_in_series(exact: Scenario) -> int:
+    """Return the most members that are compared at several clock steps."""
+    if _replays(exact):
+        return max(_LEAST, min(_NUMBERS // exact.clock.steps, together(exact)))
+    return _most_members(exact, _records(exact))
 
 
 def _judged_steps(written: Setting, finest: Setting, accepted: float, budget: Budget) -> tuple[list[Setting], str]:
@@ -596,74 +646,39 @@ def _judged_steps(written: Setting, finest: Setting, accepted: float, budget: Bu
     larger part of the bound, the members are multiplied by four instead. At a prescribed speed the bonds are those of
     the finest model, which any model of small error resembles. If that does not fit, they are those of the scene.
     """
-    first = None
-    for scene in (finest, written) if finest is not written else (written,):
-        coarser = scene.scenario.clock.stride % 4 == 0
-        for ratios in ((0.25, 1.0, 4.0), (1.0, 4.0)) if coarser else ((0.0625, 0.25, 1.0), (0.25, 1.0)):
-            first = first or _first_steps(scene, ratios, budget)
-    if first is None:
-        budget.needs(_FEWEST * 5.25 * _pace(written))
+    coarser = written.scenario.clock.stride % 4 == 0
+    ratios = ((0.25, 1.0, 4.0), (1.0, 4.0), (0.25, 1.0)) if coarser else ((0.0625, 0.25, 1.0), (0.25, 1.0))
+    for scene, some in itertools.product(dict.fromkeys((finest, written)), ratios):
+        if series := _first_series(scene, some, budget):
+            exact, most = scene.scenario, _most_in_series(scene.scenario)
+            break
+    else:
+        budget.needs(_FEWEST * 5.25 * written.pace)
         return [written], ""
-    exact, rows, runs, count, took = first
-    most = _most(exact)
     while True:
+        rows, runs, count, seconds = series
         changes = np.array([_errors(longer, shorter) for shorter, longer in itertools.pairwise(runs)])
         changes[:, :, :, 2 - exact.drive.solves_motion :] = 0.0
         # a change that is small by chance does not hide those before it, of first order
         sure, rest = students(count), np.max(changes / 4.0 ** np.arange(len(changes)).reshape(-1, 1, 1, 1), axis=0)
         small = float(np.max(rest[0] + sure * rest[1])) <= _SMALL * accepted
         more_members = count < most and sure * float(np.max(rest[1])) > float(np.max(rest[0]))
-        if small or not (more_members or rows[0].ratio > _FINEST_STEP) or 4.2 * took > budget.left():
+        if small or not (more_members or rows[0].ratio > _FINEST_STEP) or 4.2 * seconds > budget.left():
             break
-        next_rows = rows if more_members else [_at_step(exact, 0.25 * rows[0].ratio), *rows]
-        following = _tried_steps(exact, next_rows, min(4 * count, most) if more_members else count, budget)
+        if more_members:
+            following = _series(rows, min(4 * count, most), budget)
+        else:
+            following = _series([_at_step(exact, 0.25 * rows[0].ratio), *rows], count, budget)
         if following is None:
             break
-        exact, rows, runs, count, took = following
+        series = following
     for row, run in zip(rows, runs, strict=True):  # the rest of a series that falls by _FALL is its last term here
         row.error, row.standard_error = _errors(run, runs[0]) + rest / (_FALL - 1.0)
         row.members, row.time = count, written.time / row.ratio
     trend = _trend(changes, 2.0 * runs[0].size / count, count, accepted)
     if trend:
-        budget.needs(4.2 * took)
+        budget.needs(4.2 * seconds)
     return rows[::-1], trend
-
-
-#: A scene, its clock steps, its runs with them, their members, and the time that they took [s].
-_Steps = tuple[Scenario, list[Setting], list[Array], int, float]
-
-
-def _first_steps(setting: Setting, ratios: tuple[float, ...], budget: Budget) -> _Steps | None:
-    """Return a scene at a few clock steps, with as many members as fit; None if too few do."""
-    exact, pace = setting.scenario, budget.slower * _pace(setting)
-    cost, count = pace * sum(1.0 / ratio for ratio in ratios), 1
-    if _fluctuates(exact):
-        count = max(min(_most(exact), int(budget.left() / (32.0 * pace))), 4)
-        count = max(min(count, int(budget.left() / cost)), _LEAST)
-    if count * cost > budget.left():
-        return None
-    return _tried_steps(exact, [_at_step(exact, ratio) for ratio in ratios], count, budget)
-
-
-def _tried_steps(exact: Scenario, rows: list[Setting], count: int, budget: Budget) -> _Steps | None:
-    """Return a scene at some clock steps with some members; None if the budget is spent before."""
-    began = budget.now()
-    try:
-        return exact, rows, _at_steps(rows, count, budget), count, budget.now() - began
-    except _Spent:
-        return None
-
-
-def _pace(setting: Setting) -> float:
-    """Return the estimated time of a run of one member [s]."""
-    return setting.time / (setting.scenario.ensemble.members if _fluctuates(setting.scenario) else 1)
-
-
-def _most(exact: Scenario) -> int:
-    """Return the most members that are compared at several clock steps."""
-    if _replays(exact):
-        return max(_LEAST, min(_NUMBERS // exact.clock.steps, together(exact)))
-    return _most_sampled(exact, _records(exact))
 
 
 def _trend(changes: Array, numbers: float, members: int, accepted: float) -> str:
@@ -717,7 +732,7 @@ def choices(dataset: xr.Dataset) -> list[Choice]:
     for chosen_rows in itertools.product(*groups):
         place = [int(row) for row in chosen_rows]
         *changed, step = cost[place].tolist()
-        total = max(reference + sum(each - reference for each in changed), 0.2 * min([reference, *changed]))
+        total = max(sum(changed) - (len(changed) - 1) * reference, 0.2 * min([reference, *changed]))
         error = np.nan_to_num(errors[place]).sum(axis=0)
         noise = np.sqrt(np.nansum(noises[place] ** 2, axis=0))
         bound = float(np.max(error + noise)) if np.all(members[place] > 0) else math.inf
@@ -752,8 +767,8 @@ def table(dataset: xr.Dataset) -> list[dict[str, str]]:
         cells = {"changed": str(part), "setting": str(name) + " *" * int(own), "time": duration}
         for symbol, error, deviation in zip(_SHORT, *errors, strict=True):
             size, _, statistic = _worst(error[np.newaxis], deviation)
-            text = f"{size} {STATISTICS[statistic]}" if statistic and size != "0" else size
-            cells[f"{symbol}\n(%)"] = text if members else "–"
+            in_words = f" {STATISTICS[statistic]}" if statistic and size != "0" else ""
+            cells[f"{symbol}\n(%)"] = size + in_words if members else "–"
         lines.append(cells | {"members": f"{members:,}"})
     return lines
 
@@ -761,13 +776,16 @@ def table(dataset: xr.Dataset) -> list[dict[str, str]]:
 def explanation(dataset: xr.Dataset) -> str:
     """Return the subject of the study and the meaning of the table's columns, in sentences."""
     swept, left_out = dataset.attrs["swept"], dataset.attrs["left_out"].replace("\n", "; ")
+    compared_values = "mean and spread over the members at all recorded times"
+    if dataset.attrs.get("averaged"):
+        compared_values = "means over the members and the second half of the run"
     return (
         "Each row changes one setting (* marks the scenario as written). time: CPU time of its run on one core."
         "\n(%): largest difference from a finer setting, its standard error; of ΔΓ beyond its mean in its own units."
         + f"\nThe values of {swept} are those of the tables; choose others by --set." * bool(swept)
         + f"\nOmitted: {left_out}." * bool(left_out)
         + _larger_budget(dataset, "answers what is missing")
-        + f"\nCompared: {_compared_in_words(dataset)}."
+        + f"\nCompared: {compared_values}."
         + "\nNot compared: peaks, drops of the force, slip events, position, speed, masked share, quantiles."
     )
 
@@ -776,13 +794,6 @@ def _larger_budget(dataset: xr.Dataset, verb: str) -> str:
     """Return a line with the budget that answers what the budget of the study did not; "" if it answered all."""
     needed = float(dataset.attrs.get("budget", 0.0))
     return f"\nA budget of about {engineering(needed, 's')} {verb}." if needed else ""
-
-
-def _compared_in_words(dataset: xr.Dataset) -> str:
-    """Return what is compared, in words."""
-    if dataset.attrs.get("averaged"):
-        return "means over the members and the second half of the run"
-    return "mean and spread over the members at all recorded times"
 
 
 def recommendation(dataset: xr.Dataset) -> str:
@@ -827,26 +838,25 @@ def figure(dataset: xr.Dataset) -> Figure:
     Bars are the noise, at 95 %. Exact settings are drawn at a tenth of the smallest error. A ring marks the scene, a
     star the recommended combination, if there is one.
     """
-    tolerance, combined = float(dataset.attrs["tolerance"]), choices(dataset)
-    times = dataset["time"].to_numpy()
-    dataset = dataset.isel(row=dataset["members"].to_numpy() > 0)
-    part, is_written, cost, members, error, deviation = (dataset[name].to_numpy() for name in _COLUMNS)
-    size, best = np.nan_to_num(error).reshape(len(part), math.prod(error.shape[1:])), chosen(combined, tolerance)[0]
-    at = np.arange(len(part)), size.argmax(axis=1)
-    off, bars = size[at], students(members) * np.nan_to_num(deviation).reshape(size.shape)[at]
+    tolerance = float(dataset.attrs["tolerance"])
+    best, _ = chosen(choices(dataset), tolerance)
+    part, is_written, cost, members, *errors = (dataset[name].to_numpy() for name in _COLUMNS)
+    error, deviation = (np.nan_to_num(each).reshape(len(part), -1) for each in errors)
+    at = np.arange(len(part)), error.argmax(axis=1)
+    off, bars = np.where(members > 0, error[at], np.nan), students(members) * deviation[at]
     floor = 0.1 * min([tolerance, *off[off > _ROUNDING]])
     off = np.maximum(off, floor)
     with mpl.rc_context(STYLE):
         picture, (panel,) = rows([3.0])
         for name, (words, _, color, marker) in _PARTS.items():
-            if np.any(here := part == name):
+            if np.any(here := (part == name) & (members > 0)):
                 panel.errorbar(cost[here], off[here], bars[here], c=color, marker=marker, ms=3.6, lw=0.6, label=words)
         panel.plot(cost[is_written == 1], off[is_written == 1], "o", c="none", mec="black", ms=7.5, label="as written")
         if math.isfinite(best.bound) and not dataset.attrs.get("not_converging"):
             panel.plot(best.time, max(best.bound, floor), "*", c="black", ms=7.0, zorder=5, label="recommended")
         panel.axhline(tolerance, color=REFERENCE, linestyle="--", linewidth=0.8, label="accepted")
-        if not part.size:  # logarithmic axes need a range
-            panel.set(xlim=(0.5 * times.min(), 2.0 * times.max()), ylim=(0.1 * tolerance, 10.0 * tolerance))
+        if not np.any(members > 0):  # logarithmic axes need a range
+            panel.set(xlim=(0.5 * cost.min(), 2.0 * cost.max()), ylim=(0.1 * tolerance, 10.0 * tolerance))
         panel.set(xscale="log", yscale="log", xlabel="CPU time of the run (s)", ylabel="largest error (bottom: exact)")
         legend(panel)
     return picture

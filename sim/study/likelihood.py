@@ -288,7 +288,7 @@ def _records(point: Scenario, names: list[str]) -> tuple[Array, Array, Array]:
 
     count = point.ensemble.members if any(point.varies.values()) else 1
     steps = range(0, point.clock.steps + 1, point.clock.stride)
-    speeds, *values = recorded(point, count, steps, ["speed", *names])
+    speeds, *values = recorded(point, range(count), steps, [READ[name] for name in ("speed", *names)])
     times = point.times.at(np.array(steps))
     if not point.drive.solves_motion:
         alone = steady_course(point, times[:, np.newaxis], speeds[:1].T)

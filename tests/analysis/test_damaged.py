@@ -1,5 +1,6 @@
 """A dataset with one variable or attribute that no run writes is read, or refused in one line that names it."""
 
+import gc
 import itertools
 import shutil
 import tomllib
@@ -7,11 +8,13 @@ from pathlib import Path
 
 import netCDF4
 import numpy as np
+import psutil
 import pytest
 import xarray as xr
 from helpers.commands import LENS, SCENE, sim
 
 import sim as package
+from sim.numerics.lazy import open_lazily
 
 SHORT = SCENE.replace('"1 s"', '"0.4 s"')
 PULLED = """\
@@ -111,6 +114,45 @@ def datasets(tmp_path_factory):
             with xr.open_dataset(path, decode_times=False, decode_coords=False) as dataset:
                 result[scene] = dataset.load()
         yield result
+
+
+@pytest.fixture
+def uncollected():
+    """Leave objects that refer to each other where they are, so that none of them closes its file by chance."""
+    gc.collect()
+    gc.disable()
+    yield
+    gc.enable()
+
+
+def is_open(name):
+    """True if this process has a file open."""
+    return str(Path(name).absolute()) in {file.path for file in psutil.Process().open_files()}
+
+
+@pytest.mark.parametrize("command", ["stats", "plot", "report"])
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("t", "scale_factor"), ("t", "removed"), ("contact_modulus", "shape"), ("members", "no attribute")],
+)
+def test_a_dataset_that_is_refused_is_closed_so_that_windows_lets_it_be_deleted(
+    datasets, uncollected, command, name, kind
+):
+    write(datasets["sweep"], "sweep", name, kind, "refused.nc")
+    assert sim(command, "refused.nc").exit_code == 2 and not is_open("refused.nc")
+    Path("refused.nc").unlink()
+
+
+def test_a_file_with_a_variable_that_netcdf_does_not_read_is_closed(datasets, uncollected):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File("opaque.nc", "w") as file:
+        file["opaque"] = np.zeros(2, "V5")
+    with pytest.raises(UserWarning, match="opaque"):
+        open_lazily("opaque.nc")
+    assert not is_open("opaque.nc")
+    with open_lazily("ramp.nc"):
+        assert is_open("ramp.nc")
+    assert not is_open("ramp.nc")
 
 
 @pytest.mark.parametrize("apart", [61, pytest.param(1, marks=pytest.mark.verify)])

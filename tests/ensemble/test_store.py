@@ -347,6 +347,20 @@ def test_a_waiter_that_finds_the_folder_gone_begins_anew(tmp_path):
     assert other == [None] and names(tmp_path) == ["out.nc"]
 
 
+def test_a_folder_that_goes_just_as_a_waiter_finds_it_is_made_anew(tmp_path, monkeypatch):
+    path, makes, make = tmp_path / "out.nc", [], os.mkdir
+
+    def mkdir(name, mode=0o777):
+        makes.extend([name] if Path(name) != tmp_path else [])
+        if makes == [name]:  # the run that was done removes its folder between this answer and the next question
+            raise FileExistsError(errno.EEXIST, "File exists", name)
+        make(name, mode)
+
+    monkeypatch.setattr(os, "mkdir", mkdir)
+    assert Unfinished(path, {"scenario": {}}, [], lambda path: {}).publish([], 1, Path.touch) is None
+    assert len(makes) > 1 and not names(tmp_path)
+
+
 def test_a_manifest_that_another_process_reads_is_removed_when_it_has_been_read(tmp_path, monkeypatch):
     path, refusals, unlink = tmp_path / "out.nc", [PermissionError(errno.EACCES, "in use")] * 2, Path.unlink
 

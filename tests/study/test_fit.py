@@ -685,7 +685,12 @@ def test_intervals_and_p_of_a_force_proportional_to_a_stress_per_table_follow_fr
 
 
 @pytest.mark.parametrize(
-    ("seed", "is_excluded"), [(5003, False), (5004, True), pytest.param(5008, False, marks=pytest.mark.verify)]
+    ("seed", "is_excluded"),
+    [
+        pytest.param(5003, False, marks=pytest.mark.verify),
+        (5004, True),
+        pytest.param(5008, False, marks=pytest.mark.verify),
+    ],
 )
 def test_differences_of_values_at_a_bound_agree_with_their_chi_square_and_mark_the_ends_that_it_sets(
     seed, is_excluded, monkeypatch

@@ -17,16 +17,17 @@ here, because no wheel has them: python.exe, python3.dll and bcryptprimitives.dl
 
 Seen here as on Windows: ``os.name`` and all that follows, paths with drives and backslashes, the code page cp1252,
 processes that are spawned, locks, files that are open elsewhere (WinError 32), pipes, the Ctrl-C of a console, the
-clock's steps of 16 ms, the C library, and all wheels.
+clocks' steps of 16 ms, the C library, and all wheels. The wall clock of Wine moves in finer steps, so that no cluster
+of dask would start; ``sitecustomize.py`` gives it those of Windows.
 
 Not seen here: rights of files and folders, links, long paths, names such as CON, virus scanners, the speed of Windows,
 other versions of Python, and processors other than x86-64. Two things are worse than on Windows. Standard output must
 be a pipe or a terminal, because a plain file of Linux is refused (WinError 6). Wine does not free the mappings of a
-library that could not be loaded, and a process of Linux may have 65,530 mappings; ``artefacts.py`` shows this without
-the package. The plugins of the wheel of netCDF4 cannot be loaded on Windows either, because they lack their libraries,
-and HDF5 tries each of them again for each variable that xarray opens. After some thousand variables a process would
-end without a message, so plugins are turned off. Each file of tests has a process of its own, without threads for the
-time limits of tests, because threads take mappings, too.
+library that could not be loaded, and a process of Linux may have 65,530 mappings; ``artefacts.py`` shows both artefacts
+without the package. The plugins of the wheel of netCDF4 cannot be loaded on Windows either, because they lack their
+libraries, and HDF5 tries each of them again for each variable that xarray opens. After some thousand variables a
+process would end without a message, so plugins are turned off. Each file of tests has a process of its own, without
+threads for the time limits of tests, because threads take mappings, too.
 """
 
 import contextlib
@@ -255,6 +256,7 @@ def _install_package(windows: Windows) -> None:
     _pip("wheel", "--no-deps", "-w", str(wheels), str(windows.checkout))
     with zipfile.ZipFile(next(wheels.glob("*.whl"))) as archive:
         archive.extractall(site)
+    shutil.copyfile(HERE / "sitecustomize.py", site / "sitecustomize.py")
     shutil.rmtree(windows.checkout / "build", ignore_errors=True)
 
 

@@ -494,8 +494,8 @@ def _piece(line, bonds, slider, contact, unit, rules, room, books):
                 row.acceleration = 0.0
             elif contact.stays > 0.0:
                 return start, count, travelled, settled, contact.stays
-            else:
-                contact = mechanics.later(contact, 0.0, 1.0)
+            else:  # the interface slips with the body from there on, however fast the contact was lost
+                contact, row.speed, row.acceleration = mechanics.later(contact, 0.0, 1.0), row.body_speed, 0.0
             continue
         saved[:, :count] = pool[:3, :count]
         first, contact = nodes[0], mechanics.following(contact, row, start, step)

@@ -168,8 +168,8 @@ def _piece(line, slider, law, contact, nodes, books):
                 gone = mechanics.snap(row, row.moment * row.moment / row.bound, start, slider, contact, energy)
             if contact.stays > 0.0 and not gone:
                 return start, contact.stays
-            contact, nodes.last_step = (contact, 0.0) if gone else (mechanics.later(contact, 0.0, 1.0), nodes.last_step)
-            row.next_step = 0.0
+            contact = contact if gone else mechanics.later(contact, 0.0, 1.0)
+            nodes.last_step, row.next_step = 0.0, 0.0
             continue
         contact = mechanics.following(contact, row, start, step)
         grows, accepted = try_sub_step(row, start, step, slider, law, contact, nodes)
@@ -371,7 +371,7 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
             if start >= length:
                 break
         sense = math.copysign(1.0, row.spring_force if rests else row.speed)
-        if rests and stuck > 0:  # the pull is a rounding, so that its sign is tried before the opposite one
+        if rests and stuck > 0 and not row.radius > 0.0:  # the pull is a rounding, which may have the wrong sign
             sense = -sense if stuck % 2 == 1 else sense
             row.next_step = 0.0
         along = mechanics.Law(law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows)

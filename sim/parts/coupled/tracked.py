@@ -346,7 +346,8 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
                 continue
             if contact.stays > 0.0:
                 return start, contact.stays
-            contact = mechanics.later(contact, 0.0, 1.0)
+            # the interface slips with the body from there on, however fast the contact was lost
+            contact, row.speed, row.acceleration = mechanics.later(contact, 0.0, 1.0), row.body_speed, 0.0
             continue
         line[1], books[1] = row, energy
         before = stored_energy(row, first.square, start, slider, contact)

@@ -1,7 +1,7 @@
 """Let each single call fail that touches the folder of an output, in processes that ``shim.c`` was loaded into.
 
-Run as a program with the arguments of ``main`` as JSON, it prints a line of JSON for each fault that ended wrong, and
-the number of faults.
+Run as a program with the arguments of ``main``, or of ``study``, as JSON, it prints a line of JSON for each fault that
+ended wrong, and the number of faults.
 """
 
 import contextlib
@@ -18,6 +18,8 @@ from pathlib import Path
 CALLS = ("open", "write", "pwrite", "ftruncate", "rename", "fsync", "mkdir", "unlink", "link", "flock")
 _WRITES = ("write", "pwrite", "ftruncate", "rename", "fsync")
 ERRORS = (errno.ENOSPC, errno.EIO)
+#: Calls of a large dataset of which one fails, because each fault of it takes seconds.
+THINNED = 12
 STATE = struct.Struct(f"={4 + len(CALLS)}i")
 #: Exit code of a command whose disk fails.
 FAILED = 74
@@ -88,6 +90,30 @@ def wrong(ended, text, output, whole):
     return ""
 
 
+def cases(counts, calls, all_of_them, thinned=1):
+    """Faults of some calls: all of them, or one of each kind, of the calls that write the output the last one.
+
+    All are ``thinned``: of each kind every so many calls fail, and the last ones.
+    """
+    every = [
+        (call, number, onward, error)
+        for call in calls
+        for number in range(1, counts[call] + 1)
+        for onward in (False, True)
+        for error in ERRORS
+        if number % thinned == 1 % thinned or number > counts[call] - thinned
+    ]
+    chosen = {call: counts[call] if call in _WRITES else 1 for call in calls}
+    return every if all_of_them else [case for case in every if case[1:] == (chosen[case[0]], False, errno.ENOSPC)]
+
+
+def tell(case, reason, text):
+    """Print a fault that ended wrong."""
+    call, number, onward, error = case
+    fault = f"{call} {number}{'+' if onward else ''} {errno.errorcode[error]}"
+    print(json.dumps({"fault": fault, "reason": reason, "text": text[-600:]}), flush=True)
+
+
 def main(state, calls, all_of_them, words, again, large):
     """Let calls fail, all of them or one of each kind, and then run ``again``, which must write the output."""
     folder, faults, failed, made = Path(os.environ["FAULTS_FOLDER"]), Faults(state), 0, 0
@@ -108,14 +134,7 @@ def main(state, calls, all_of_them, words, again, large):
     ended, text = command(words)
     assert not ended, text
     counts, whole = faults.counts(), output.read_bytes()
-    cases = [
-        (call, number, onward, error)
-        for call in calls for number in range(1, counts[call] + 1) for onward in (False, True) for error in ERRORS
-    ]  # fmt: skip
-    if not all_of_them:  # the last one of the calls that write the output
-        chosen = {call: counts[call] if call in _WRITES else 1 for call in calls}
-        cases = [case for case in cases if case[1:] == (chosen[case[0]], False, errno.ENOSPC)]
-    for case in cases:
+    for case in cases(counts, calls, all_of_them, THINNED if large else 1):
         begin()
         faults.arm(*case)
         ended, text = command(words)
@@ -130,11 +149,59 @@ def main(state, calls, all_of_them, words, again, large):
         made += met  # a lock that is asked for once more makes a call that others do not make
         failed += bool(reason)
         if reason:
-            call, number, onward, error = case
-            words_of = f"{call} {number}{'+' if onward else ''} {errno.errorcode[error]}"
-            print(json.dumps({"fault": words_of, "reason": reason, "text": text[-600:]}), flush=True)
+            tell(case, reason, text)
+    print(json.dumps({"faults": made, "counts": counts, "failed": failed}), flush=True)
+
+
+def study(state, all_of_them, words):
+    """Let calls of a study fail that replaces a dataset and a picture; each of them is the old one or the new one."""
+    from sim.study import converge
+
+    folder, faults, made, failed = Path(os.environ["FAULTS_FOLDER"]), Faults(state), 0, 0
+    older = {"out.nc": b"older dataset", "out.png": b"older picture"}
+
+    def content():
+        return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+    def begin():
+        faults.arm()
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+        for name, old in older.items():
+            (folder / name).write_bytes(old)
+
+    def keep(*arguments):
+        results.append(results[0] if results else compute(*arguments))
+        return results[0]
+
+    compute, results = converge.converge, []
+    converge.converge = keep  # because measured times differ from run to run
+    begin()
+    with contextlib.redirect_stdout(sys.stderr):  # because only faults are told on the standard output
+        assert not here(words)
+    begin()
+    ended, text = command(words)
+    assert not ended, text
+    counts, newer = faults.counts(), content()
+    for case in cases(counts, CALLS, all_of_them):
+        begin()
+        faults.arm(*case)
+        ended, text = command(words)
+        met = faults.counts()[case[0]] >= case[1]
+        faults.arm()
+        now = content()
+        reason = wrong(ended, text, folder / "out.nc", newer["out.nc"] if not ended else now["out.nc"])
+        if not reason and now.keys() != older.keys():
+            reason = f"left {sorted(now)}"
+        if not reason and not all(each in (older[name], newer[name]) for name, each in now.items()):
+            reason = "half a file"
+        made += met
+        failed += bool(reason)
+        if reason:
+            tell(case, reason, text)
     print(json.dumps({"faults": made, "counts": counts, "failed": failed}), flush=True)
 
 
 if __name__ == "__main__":
-    main(**json.loads(sys.argv[1]))
+    task = json.loads(sys.argv[1])
+    (main if "again" in task else study)(**task)

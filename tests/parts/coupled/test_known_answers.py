@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 import sim
+from sim.engine import MemberNoise, follow
 
 LENS = {"solid": {"shear_modulus": 1e6}, "sphere": {"radius": 1e-3}, "adhesion": {"work": 0.03, "bond_share": 0.0}}
 BELL = {"model": "bell", "zero_force_rate": 5.0, "bell_force": 4e-12}
@@ -146,6 +147,24 @@ def test_a_clock_step_of_millions_of_ruptures_is_no_loss_of_stability(step):
     course = run(4.0, step, drive=drive, bonds=bonds, contact={"load": 4e-3}, **lens)
     assert np.isnan(course.unresolved_time.values).all()
     assert_allclose(course.friction_force[-1], 9.25e-3, rtol=0.02)
+
+
+@pytest.mark.verify
+def test_a_slider_whose_contact_is_lost_within_a_clock_step_goes_on_with_the_radius_that_it_had():
+    """The interface slips ever faster as a fluctuation takes the contact away, since its stiffness falls with it."""
+    bonds = {"model": "cohort", "rupture": {"model": "bell", "zero_force_rate": 30.0, "bell_force": 3.6e-12}}
+    bonds |= {"bond_stiffness": 0.7e-6, "rebinding_rate": 220.0, "site_density": 7e16}
+    drive = {"model": "spring", "stage": 8e-3, "stiffness": 100.0, "mass": 3e-5, "damping": 0.05, "start": "steady"}
+    shear = {"model": "banded", "cell": 3e-4, "points": 256}
+    shear |= {"spectrum": {"model": "gaussian", "rms": 1.2e5, "length": 9e-6}}
+    shear |= {"correlation": {"model": "slip", "length": 6e-6}}
+    shear |= {"amplitude": {"model": "slip_rate", "floor": 0.05, "relaxing": True}}
+    lens = {"solid": {"shear_modulus": 1.6e6}, "sphere": {"radius": 2e-3}, "adhesion": {"work": 42e-3}}
+    scene = lens | {"clock": {"duration": 0.38, "step": 62.5e-6}, "drive": drive, "bonds": bonds, "shear": shear}
+    scenario = sim.load(scene | {"contact": {"load": 4e-3}, "seed": 7})
+    state, course = follow(scenario, MemberNoise.of(7, np.array([2])), None, range(scenario.clock.steps + 1))
+    assert np.isnan(state.drive.unresolved_time).all()
+    assert float(course.radius.min()) > 0.0
 
 
 def test_a_body_that_turns_many_times_in_a_clock_step_comes_to_rest_by_dry_friction():
