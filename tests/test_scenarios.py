@@ -107,7 +107,10 @@ def test_masking_is_the_closed_form_and_a_uniform_stress_changes_nothing():
 def test_the_made_up_jkr_test_gives_the_work_and_modulus_with_which_it_was_made():
     found = fit(FOLDER / "jkr_fit.toml", FOLDER / "jkr_fit.csv", ["adhesion.work", "solid.youngs_modulus"], steady=True)
     loads, radii, _ = np.loadtxt(FOLDER / "jkr_fit.csv", delimiter=",", skiprows=1, unpack=True)
-    radius_at = lambda load, work, modulus: 1e6 * jkr.radius_at_load(1e-3 * load, work, 2e-3, modulus)  # noqa: E731
+
+    def radius_at(load, work, modulus):
+        return 1e6 * jkr.radius_at_load(1e-3 * load, work, 2e-3, modulus)
+
     own, covariance = curve_fit(radius_at, loads, radii, [45e-3, 2e6], 0.01 * radii, absolute_sigma=True)
     for item, scale, value, variance, truth in zip(
         found.numbers, (1.0, 4.0 / 3.0), own, np.diag(covariance), (45e-3, 2e6), strict=True

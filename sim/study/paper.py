@@ -27,7 +27,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
@@ -154,7 +154,10 @@ def _disc() -> Iterator[Row]:
     unit = STRESS * RADIUS / SHEAR
     x_ends, y_ends = RADIUS * np.eye(2, 3, 1)
     v = halfspace.disc_displacement(x_ends, y_ends, *DISC) / unit
-    field = lambda r: halfspace.disc_displacement(r * np.cos(TURN), r * np.sin(TURN), 1.0, 1.0, 1.0)  # noqa: E731
+
+    def field(r: float) -> NDArray:
+        return halfspace.disc_displacement(r * np.cos(TURN), r * np.sin(TURN), 1.0, 1.0, 1.0)
+
     mean, _ = quad(lambda r: 2.0 * r * field(r).mean(), 0.0, 1.0, epsabs=1e-11)
     volume = np.pi * RADIUS**2 * halfspace.disc_mean_displacement(*DISC)
     displacement, direct = halfspace.disc_displacement(x, y, 1.0, 1.0, 1.0), np.vectorize(_convolved)(x, y)
@@ -186,7 +189,10 @@ def _fixed_separation() -> Iterator[Row]:
     s, a, hertz = -DEPTH, RADIUS, HERTZ_AT_DEPTH
     # (17)-(19): stress and displacement in the contact, integrated with r = a sin(t)
     first, second = MODULUS / np.pi * (s / a + a / SPHERE), -MODULUS / np.pi * 2.0 * a / SPHERE
-    ring = lambda t: 2.0 * np.pi * a * a * math.sin(t) * (first + second * math.cos(t) ** 2)  # noqa: E731
+
+    def ring(t: float) -> float:
+        return 2.0 * np.pi * a * a * math.sin(t) * (first + second * math.cos(t) ** 2)
+
     stressed, _ = quad(ring, 0.0, 0.5 * np.pi)
     stored, _ = quad(lambda t: 0.5 * ring(t) * (s + (a * math.sin(t)) ** 2 / (2.0 * SPHERE)), 0.0, 0.5 * np.pi)
     force = -jkr.load_under_indentation(a, -s, SPHERE, MODULUS)
@@ -294,7 +300,10 @@ def _fluctuation() -> Iterator[Row]:
     reduced = jkr.potential_at_indentation(-DEPTH, STRESS, RADIUS, WORK - mapped, SPHERE, MODULUS)
     total = _potential_h(-DEPTH, RADIUS) + mapped * np.pi * RADIUS**2
     radius = jkr.radius_at_indentation(DEPTH, WORK - energy, SPHERE, MODULUS)
-    balance = lambda a: MODULUS * (a * a / SPHERE - DEPTH) ** 2 - 2.0 * math.pi * (WORK - real) * a  # noqa: E731
+
+    def balance(a: float) -> float:
+        return MODULUS * (a * a / SPHERE - DEPTH) ** 2 - 2.0 * math.pi * (WORK - real) * a
+
     yield "Delta Gamma in real space, Gaussian", "39", energy, real, 1e-10
     yield "Delta Gamma in Fourier space, Gaussian", "45", energy, spectral, 1e-10
     yield "<tau1 w1>/2 of a random map", "38, 44", halfspace.surface_energy(stress, cell, SHEAR), mapped

@@ -169,7 +169,11 @@ def test_crossings_are_exact_on_straight_lines_and_a_ramp_is_read_in_pieces(monk
     ramp, read = lens.ramp().isel(member=[0]), []
     whole = analysis.loss_speeds(ramp)
     monkeypatch.setattr(dataset_module, "ROOM", 500)
-    reading = lambda some, names: read.append(some.sizes["t"]) or closed_observables(some, names)  # noqa: E731
+
+    def reading(some, names):
+        read.append(some.sizes["t"])
+        return closed_observables(some, names)
+
     monkeypatch.setattr(over_speed, "closed_observables", reading)
     xr.testing.assert_identical(analysis.loss_speeds(ramp), whole)
     assert len(read) > 1 and sum(read) == ramp.sizes["t"] and math.isfinite(whole[NAMES[0]])

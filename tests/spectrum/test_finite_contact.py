@@ -70,7 +70,10 @@ def test_waves_along_and_across_a_disc_store_the_tabulated_energy():
 
 
 def test_factors_are_the_bessel_integrals_of_the_overlap():
-    of_disc = lambda t: mpmath.acos(t) - t * mpmath.sqrt(1 - t * t)  # noqa: E731
+
+    def of_disc(t):
+        return mpmath.acos(t) - t * mpmath.sqrt(1 - t * t)
+
     for factors, area in ((halfspace.energy_factors, of_disc), (halfspace.marginal_factors, mpmath.acos)):
         for x in (1e-3, 0.7, 2.999, 3.001, 9.0, 40.0):
             cuts = mpmath.linspace(0, 1, 2 + int(x / 3))

@@ -473,7 +473,10 @@ def test_a_carried_area_that_fluctuates_is_not_shown_to_converge_and_nothing_is_
 def random_scene(seed):
     """Any drive, bonds, shear and contact for forty steps."""
     rng = np.random.default_rng(seed)
-    pick = lambda *options: options[rng.integers(len(options))]  # noqa: E731
+
+    def pick(*options):
+        return options[rng.integers(len(options))]
+
     times = np.sort(rng.uniform(0.0, 0.04, 3))
     speeds = rng.uniform(-1.0, 1.0, 6) * 10.0 ** rng.uniform(-3.5, -2.0, 6)
     turns = (0.0, times[0], times[0], times[1], times[2], times[2], 0.04)
