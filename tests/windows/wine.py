@@ -129,9 +129,8 @@ def make(folder: Path) -> None:
         mark.write_text(json.dumps(done), encoding="utf-8")
     _install_package(windows)
     names = "numpy", "scipy", "numba", "netCDF4", "sim"
-    code = (
-        f"import sys; print(sys.version, sys.platform)\nfor name in {names}: print(name, __import__(name).__version__)"
-    )
+    code = "import sys; print(sys.version, sys.platform)\n"
+    code += f"for name in {names}: print(name, __import__(name).__version__)"
     status, printed = windows.run("-c", code)
     print(printed, end="", flush=True)
     if status:

@@ -343,7 +343,9 @@ class Banded(_Fluctuating):
 def _of_unit_size(spectrum: Family) -> tuple[Family, float]:
     """Return the spectrum at an rms of 1 Pa and the factor of its density, or itself and 1 if no key sets its rms."""
     keys = {item.name for item in fields(spectrum)}  # type: ignore[arg-type]
-    return (replace(spectrum, rms=1.0), spectrum.variance) if "rms" in keys else (spectrum, 1.0)  # type: ignore[type-var]
+    if "rms" not in keys:
+        return spectrum, 1.0
+    return replace(spectrum, rms=1.0), spectrum.variance  # type: ignore[type-var]
 
 
 @functools.lru_cache(maxsize=20_000)  # as many as a sweep has points, each a few kilobytes
