@@ -17,7 +17,9 @@ class Repeatable(sdist):
     files were copied, and the time of the compression.
     """
 
-    def make_archive(self, base_name: str, format: str, *arguments: Any, **keywords: Any) -> str:  # type: ignore[override]
+    def make_archive(
+        self, base_name: str, format: str, *arguments: Any, **keywords: Any
+    ) -> str:  # type: ignore[override]
         """Write the archive of a folder that has been laid out, and return the path of the archive."""
         epoch = os.environ.get("SOURCE_DATE_EPOCH")
         folder = keywords.get("base_dir")
@@ -25,7 +27,13 @@ class Repeatable(sdist):
             return str(super().make_archive(base_name, format, *arguments, **keywords))
 
         def settle(member: tarfile.TarInfo) -> tarfile.TarInfo:
-            member.mtime, member.uid, member.gid, member.uname, member.gname = int(epoch), 0, 0, "", ""
+            member.mtime, member.uid, member.gid, member.uname, member.gname = (
+                int(epoch),
+                0,
+                0,
+                "",
+                "",
+            )
             member.mode = 0o755 if member.isdir() or member.mode & 0o100 else 0o644
             return member
 
@@ -33,7 +41,9 @@ class Repeatable(sdist):
         with (
             open(path, "wb") as file,
             gzip.GzipFile("", "wb", fileobj=file, mtime=int(epoch)) as stream,
-            tarfile.open(fileobj=stream, mode="w", format=tarfile.PAX_FORMAT) as archive,
+            tarfile.open(
+                fileobj=stream, mode="w", format=tarfile.PAX_FORMAT
+            ) as archive,
         ):
             for member in [Path(folder), *sorted(Path(folder).rglob("*"))]:
                 archive.add(member, member.as_posix(), recursive=False, filter=settle)

@@ -18,11 +18,17 @@ from sim.parts.exchange import Bonding
 #: Two-state bonds: V = Vc, and half a bond's life at rest a step.
 SPEED, STEP, RATE = 1e-2, 1e-3, 500.0
 #: Bonds with a rate at rest, a Bell force and a stiffness of 1; at a speed of 10 friction is near its maximum.
-BELL: Any = {"rupture": Bell(zero_force_rate=1.0, bell_force=1.0), "bond_stiffness": 1.0, "rebinding_rate": 1.0}
+BELL: Any = {
+    "rupture": Bell(zero_force_rate=1.0, bell_force=1.0),
+    "bond_stiffness": 1.0,
+    "rebinding_rate": 1.0,
+}
 BELL_SPEED = 10.0
 
 
-def population(part: Any, members: int, steps: int, speed: float, step: float) -> Callable[[], Bonding]:
+def population(
+    part: Any, members: int, steps: int, speed: float, step: float
+) -> Callable[[], Bonding]:
     """A program that advances bonds from their start by a block of steps of steady sliding, for a batch of members."""
     noise = Noise(1, "bonds", np.arange(members))
     first, motions = steady(speed, step, steps)
@@ -39,20 +45,38 @@ def counted(bench: Bench) -> list[Row]:
     ):
         sites, members, steps = bench.of(full, (20, 3, 4))
 
-        def binomials(sites: int = sites, members: int = members, steps: int = steps) -> None:
+        def binomials(
+            sites: int = sites, members: int = members, steps: int = steps
+        ) -> None:
             bound = np.full(members, sites // 2)
             for _ in range(steps):
-                bound = random.binomial(bound, stay) + random.binomial(sites - bound, bind)
+                bound = random.binomial(bound, stay) + random.binomial(
+                    sites - bound, bind
+                )
 
-        def compiled(sites: int = sites, members: int = members, steps: int = steps) -> None:
+        def compiled(
+            sites: int = sites, members: int = members, steps: int = steps
+        ) -> None:
             bonds_plain.binomials(members, steps, sites, stay, bind, random)
 
         part = bonds.Counted(critical_speed=SPEED, rebinding_rate=RATE, sites=sites)
         rows += bench.compare(
             f"counted, {name}",
             population(part, members, steps, SPEED, STEP),
-            Beside("numpy's Generator.binomial", binomials, steps * members, goal=1.1, bound=True),
-            Beside("compiled (numba), Generator.binomial", compiled, steps * members, goal=goal, bound=True),
+            Beside(
+                "numpy's Generator.binomial",
+                binomials,
+                steps * members,
+                goal=1.1,
+                bound=True,
+            ),
+            Beside(
+                "compiled (numba), Generator.binomial",
+                compiled,
+                steps * members,
+                goal=goal,
+                bound=True,
+            ),
             share=steps * members,
         )
     return rows
@@ -63,7 +87,9 @@ def stepped(shape: tuple[int, ...], step: float, count: int) -> Callable[[], flo
     theirs = bonds_plain.TrackedNumpy(shape, 1.0, 1.0, 1.0, np.random.default_rng(1))
 
     def program(count: int = count) -> float:
-        return float(np.mean([theirs.step(BELL_SPEED * step, step)[1] for _ in range(count)]))
+        return float(
+            np.mean([theirs.step(BELL_SPEED * step, step)[1] for _ in range(count)])
+        )
 
     program(round(5.0 / step))
     return program
@@ -78,24 +104,56 @@ def errors(ours: Bonding, theirs: float) -> str:
 def tracked(bench: Bench) -> list[Row]:
     """20 members of 10⁴ bonds over ten lives at rest, eps = 10 and beta = 1, at many outputs and at few."""
     sites, members = bench.of((10_000, 20), (50, 2))
-    part, rows, random = bonds.Tracked(sites=sites, site_density=1.0, **BELL), [], np.random.default_rng(1)
+    part, rows, random = (
+        bonds.Tracked(sites=sites, site_density=1.0, **BELL),
+        [],
+        np.random.default_rng(1),
+    )
     for name, step, steps, per_output in (
         ("at 1000 steps of 0.01 lives", 0.01, 1000, 1),
         ("at 100 steps of 0.1 lives", 0.1, 100, 5),
     ):
         steps, fine = bench.of(steps, 5), step / per_output
-        ours, theirs = population(part, members, steps, BELL_SPEED, step), stepped((members, sites), fine, per_output)
-        law, edges = (members * sites, 1.0, 1.0, 1.0, random), step * np.arange(steps + 1)
-        any_motion = partial(bonds_plain.renewal_in_steps, edges, np.full(steps, BELL_SPEED), *law)
+        ours, theirs = (
+            population(part, members, steps, BELL_SPEED, step),
+            stepped((members, sites), fine, per_output),
+        )
+        law, edges = (
+            (members * sites, 1.0, 1.0, 1.0, random),
+            step * np.arange(steps + 1),
+        )
+        any_motion = partial(
+            bonds_plain.renewal_in_steps, edges, np.full(steps, BELL_SPEED), *law
+        )
         one_speed = partial(bonds_plain.renewal, steps, step, BELL_SPEED, *law)
-        label = "numpy, second order, in the same steps" if per_output == 1 else "numpy, second order, steps of 0.02"
+        label = (
+            "numpy, second order, in the same steps"
+            if per_output == 1
+            else "numpy, second order, steps of 0.02"
+        )
         mean = float(np.mean([theirs() for _ in range(bench.of(200 // per_output, 1))]))
         rows += bench.compare(
             f"tracked, 20 members of 10⁴ bonds, {name}",
             ours,
-            Beside(label, theirs, goal=4 if per_output == 1 else None, errors=errors(ours(), mean)),
-            Beside("compiled renewals (numba), any motion", any_motion, steps, goal=1.1, bound=True),
-            Beside("compiled renewals (numba), only steady sliding", one_speed, steps, bound=True),
+            Beside(
+                label,
+                theirs,
+                goal=4 if per_output == 1 else None,
+                errors=errors(ours(), mean),
+            ),
+            Beside(
+                "compiled renewals (numba), any motion",
+                any_motion,
+                steps,
+                goal=1.1,
+                bound=True,
+            ),
+            Beside(
+                "compiled renewals (numba), only steady sliding",
+                one_speed,
+                steps,
+                bound=True,
+            ),
             share=steps,
             turns=7,
         )

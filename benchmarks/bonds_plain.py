@@ -15,19 +15,33 @@ class TrackedNumpy:
     """
 
     def __init__(self, shape, rate, softness, rebinding_rate, random):
-        self.rate, self.softness, self.rebinding_rate, self.random = rate, softness, rebinding_rate, random
+        self.rate, self.softness, self.rebinding_rate, self.random = (
+            rate,
+            softness,
+            rebinding_rate,
+            random,
+        )
         self.stretch, self.bound = np.zeros(shape), np.zeros(shape, bool)
 
     def step(self, slip, duration):
         """Advance by one step, and return the share of sites bound and the mean stretch per site."""
         first, later, last = self.random.standard_exponential((3, *self.stretch.shape))
         rise = self.softness * slip
-        rupture = self.rate * duration * np.expm1(rise) / rise * np.exp(self.softness * self.stretch)
+        rupture = (
+            self.rate
+            * duration
+            * np.expm1(rise)
+            / rise
+            * np.exp(self.softness * self.stretch)
+        )
         breaks = self.bound & (first < rupture)
-        free = np.where(self.bound, np.where(breaks, 1.0 - first / rupture, 0.0), 1.0)  # share of the step
+        # share of the step
+        free = np.where(self.bound, np.where(breaks, 1.0 - first / rupture, 0.0), 1.0)
         age = free - later / (self.rebinding_rate * duration)
         binds = (age > 0.0) & (last > self.rate * duration * age)
-        self.stretch = np.where(binds, slip * age, (self.stretch + slip) * (self.bound & ~breaks))
+        self.stretch = np.where(
+            binds, slip * age, (self.stretch + slip) * (self.bound & ~breaks)
+        )
         self.bound = (self.bound & ~breaks) | binds
         return self.bound.mean(), self.stretch.mean()
 
@@ -38,7 +52,9 @@ def binomials(members, steps, sites, stay, bind, random):
     bound = np.full(members, sites // 2)
     for _ in range(steps):
         for m in range(members):
-            bound[m] = random.binomial(bound[m], stay) + random.binomial(sites - bound[m], bind)
+            bound[m] = random.binomial(bound[m], stay) + random.binomial(
+                sites - bound[m], bind
+            )
     return bound
 
 
@@ -65,17 +81,27 @@ def renewal(outputs, step, speed, sites, rate, softness, rebinding_rate, random)
 @numba.njit(cache=True)
 def renewal_in_steps(edges, speeds, sites, rate, softness, rebinding_rate, random):
     """Bonds as in ``renewal``, under any motion forwards in steps of constant speed, by one clock for all bonds."""
-    sums, (x, clock, grown), paces = np.zeros((speeds.size, 3)), np.zeros((3, edges.size)), softness * speeds
+    sums, (x, clock, grown), paces = (
+        np.zeros((speeds.size, 3)),
+        np.zeros((3, edges.size)),
+        softness * speeds,
+    )
     for k in range(speeds.size):
         grown[k], span = rate * math.exp(softness * x[k]), edges[k + 1] - edges[k]
-        x[k + 1], clock[k + 1] = x[k] + speeds[k] * span, clock[k] + grown[k] * math.expm1(paces[k] * span) / paces[k]
+        x[k + 1], clock[k + 1] = (
+            x[k] + speeds[k] * span,
+            clock[k] + grown[k] * math.expm1(paces[k] * span) / paces[k],
+        )
     for _ in range(sites):
         time, k = random.standard_exponential() / rebinding_rate, 0
         while time < edges[-1]:
             while edges[k + 1] <= time:
                 k += 1
             after = time - edges[k]
-            birth, now = x[k] + speeds[k] * after, clock[k] + grown[k] * math.expm1(paces[k] * after) / paces[k]
+            birth, now = (
+                x[k] + speeds[k] * after,
+                clock[k] + grown[k] * math.expm1(paces[k] * after) / paces[k],
+            )
             due = now + random.standard_exponential() * math.exp(softness * birth)
             while k < speeds.size and clock[k + 1] <= due:
                 stretch = x[k + 1] - birth
@@ -106,7 +132,11 @@ def slopes(time, state, body, rates):
     if mass == 0.0:
         speed = (stiffness * stage + rupture * moment) / (stiffness + bound)
     rates[0], rates[2] = speed, 1.0 - bound - rupture * bound
-    rates[1] = (stiffness * (stage * time - position) - damping * speed - moment) / mass if mass > 0.0 else 0.0
+    rates[1] = (
+        (stiffness * (stage * time - position) - damping * speed - moment) / mass
+        if mass > 0.0
+        else 0.0
+    )
     rates[3] = speed * bound - rupture * moment
 
 
@@ -119,7 +149,9 @@ def by_scipy(method, tolerance, times, body):
         return rates
 
     tolerances = {"rtol": tolerance, "atol": 0.1 * tolerance}
-    return solve_ivp(of, times[[0, -1]], [0.0, 0.0, 1.0, 0.0], method, t_eval=times, **tolerances).y[0]
+    return solve_ivp(
+        of, times[[0, -1]], [0.0, 0.0, 1.0, 0.0], method, t_eval=times, **tolerances
+    ).y[0]
 
 
 _A = np.zeros((7, 6))
@@ -130,7 +162,9 @@ _A[4, :4] = 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729
 _A[5, :5] = 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656
 _A[6] = 35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
 _C = np.array([0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1, 1])
-_E = np.array([71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+_E = np.array(
+    [71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40]
+)
 
 
 @numba.njit(cache=True)
@@ -153,9 +187,16 @@ def dormand_prince(tolerance, times, body):
                 off = 0.0
                 for j in range(7):
                     off += taken * _E[j] * rates[j, i]
-                error = max(error, abs(off) / (tolerance * (0.1 + max(abs(state[i]), abs(trial[i])))))
+                error = max(
+                    error,
+                    abs(off) / (tolerance * (0.1 + max(abs(state[i]), abs(trial[i])))),
+                )
             step = taken * min(5.0, max(0.2, 0.9 * max(error, 1e-10) ** -0.2))
             if error <= 1.0:
-                time, state[:], rates[0] = times[k] if last else time + taken, trial, rates[6]
+                time, state[:], rates[0] = (
+                    times[k] if last else time + taken,
+                    trial,
+                    rates[6],
+                )
         positions[k] = state[0]
     return positions

@@ -18,7 +18,18 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.scenes import BANDED, COHORT, COUNTED, RAMP, RATE, TRACKED, Tables, field, lens, written
+from benchmarks.scenes import (
+    BANDED,
+    COHORT,
+    COUNTED,
+    RAMP,
+    RATE,
+    TRACKED,
+    Tables,
+    field,
+    lens,
+    written,
+)
 
 ROUNDS, TURNS = 4, 5
 #: CPU seconds that one measurement takes at least.
@@ -31,7 +42,12 @@ MOVED = {
 LAGGING = MOVED | {"model": "rate_dependent", "front_speed": "10 mm/s"}
 SLOW = {"model": "steady", "speed": "10 um/s"}
 RESTING = {"model": "bell", "zero_force_rate": "25 1/s", "bell_force": "4 pN"}
-CLUTCH = {"rupture": RESTING, "bond_stiffness": "0.8 uN/m", "rebinding_rate": "250 1/s", "site_density": "6.5e16 1/m^2"}
+CLUTCH = {
+    "rupture": RESTING,
+    "bond_stiffness": "0.8 uN/m",
+    "rebinding_rate": "250 1/s",
+    "site_density": "6.5e16 1/m^2",
+}
 PULLED = {"model": "spring", "stage": "5 mm/s", "stiffness": "300 N/m"}
 SLIPPING = BANDED | {"amplitude": {"model": "slip_rate", "floor": 0.05}}
 UNFELT = SLIPPING | {"paid_by_adhesion": 0.0}
@@ -44,15 +60,31 @@ SPRINGS = {
 #: Scenes whose steps are made as a run makes them.
 STEPS: dict[str, Tables] = {
     "banded step, 64 members": lens(64, 400, drive=RAMP, bonds=RATE, shear=BANDED),
-    "modal step, 256² modes": lens(1, 20, drive=RAMP, bonds=RATE, shear=field("modal", 256)),
-    "cohort step, 64 populations": lens(64, 100, drive=SLOW, bonds=COHORT | {"area": "carried"}, shear=BANDED),
-    "tracked step, 64 members of 1000": lens(64, 100, drive=SLOW, bonds=TRACKED | {"sites": 1000}, shear=BANDED),
-    "counted step, 64 members": lens(64, 400, drive=RAMP, bonds=COUNTED | {"sites": 10_000}),
-    "equilibrium step, 64 members": lens(64, 400, drive=RAMP, bonds=RATE, shear=BANDED, contact=MOVED),
-    "rate-dependent step, 64 members": lens(64, 400, drive=RAMP, bonds=RATE, shear=BANDED, contact=LAGGING),
+    "modal step, 256² modes": lens(
+        1, 20, drive=RAMP, bonds=RATE, shear=field("modal", 256)
+    ),
+    "cohort step, 64 populations": lens(
+        64, 100, drive=SLOW, bonds=COHORT | {"area": "carried"}, shear=BANDED
+    ),
+    "tracked step, 64 members of 1000": lens(
+        64, 100, drive=SLOW, bonds=TRACKED | {"sites": 1000}, shear=BANDED
+    ),
+    "counted step, 64 members": lens(
+        64, 400, drive=RAMP, bonds=COUNTED | {"sites": 10_000}
+    ),
+    "equilibrium step, 64 members": lens(
+        64, 400, drive=RAMP, bonds=RATE, shear=BANDED, contact=MOVED
+    ),
+    "rate-dependent step, 64 members": lens(
+        64, 400, drive=RAMP, bonds=RATE, shear=BANDED, contact=LAGGING
+    ),
 } | {
     f"spring, {name}{words}": lens(members, 40, drive=PULLED, bonds=bonds, shear=shear)
-    for words, shear in (("", SLIPPING), (", energy not felt", UNFELT), (", constant amplitude", BANDED))
+    for words, shear in (
+        ("", SLIPPING),
+        (", energy not felt", UNFELT),
+        (", constant amplitude", BANDED),
+    )
     for name, (members, bonds) in SPRINGS.items()
 }
 MAPS = {"maps": [f"{n} ms" for n in range(1, 21)]}
@@ -105,10 +137,18 @@ class Tree:
     def __init__(self, tree: Path, folder: Path) -> None:
         environment = {**os.environ, "PYTHONPATH": str(tree)}
         self.process = subprocess.Popen(
-            [sys.executable, "-c", SERVE], env=environment, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            [sys.executable, "-c", SERVE],
+            env=environment,
+            cwd=folder,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
             text=True,
-        )  # fmt: skip
-        print(json.dumps([STEPS | {"mapped": MAPPED}, PROGRAMS]), file=self.process.stdin, flush=True)
+        )
+        print(
+            json.dumps([STEPS | {"mapped": MAPPED}, PROGRAMS]),
+            file=self.process.stdin,
+            flush=True,
+        )
 
     def seconds(self, row: str, repeats: int = 1) -> float:
         """CPU time of a row."""
@@ -147,7 +187,9 @@ def slower(ratios: list[float]) -> bool:
     return float(np.median(ratios)) < 0.95 and interval(ratios)[1] < 1.0
 
 
-def measured(old: Path, new: Path, rows: tuple[str, ...]) -> dict[str, list[tuple[float, float]]]:
+def measured(
+    old: Path, new: Path, rows: tuple[str, ...]
+) -> dict[str, list[tuple[float, float]]]:
     """CPU seconds of each row in the old and the new tree, in turns."""
     times: dict[str, list[tuple[float, float]]] = {row: [] for row in rows}
     with tempfile.TemporaryDirectory() as folder:
@@ -160,14 +202,18 @@ def measured(old: Path, new: Path, rows: tuple[str, ...]) -> dict[str, list[tupl
     return times
 
 
-def _measure(pair: tuple[Tree, Tree], rows: tuple[str, ...], round_: int, times: dict[str, list]) -> None:
+def _measure(
+    pair: tuple[Tree, Tree], rows: tuple[str, ...], round_: int, times: dict[str, list]
+) -> None:
     """Add the CPU seconds of some turns of each row in two trees."""
     for row in rows:
         for tree in pair:
             tree.seconds(row)  # compiles or loads the kernels
         repeats = max(1, math.ceil(LEAST / max(pair[0].seconds(row), 1e-4)))
         for turn in range(TURNS):
-            first, second = (pair[0], pair[1]) if (round_ + turn) % 2 else (pair[1], pair[0])
+            first, second = (
+                (pair[0], pair[1]) if (round_ + turn) % 2 else (pair[1], pair[0])
+            )
             seconds = {tree: tree.seconds(row, repeats) for tree in (first, second)}
             times[row].append((seconds[pair[0]], seconds[pair[1]]))
 
@@ -176,13 +222,20 @@ def main() -> None:
     """Print a line a row; exit with 1 if any is slower."""
     old, new, *rows = sys.argv[1:]
     began, failed = time.time(), False
-    for row, pairs in measured(Path(old).resolve(), Path(new).resolve(), tuple(rows) or ROWS).items():
+    for row, pairs in measured(
+        Path(old).resolve(), Path(new).resolve(), tuple(rows) or ROWS
+    ).items():
         ratios = [first / second for first, second in pairs]
         low, high = interval(ratios)
         failed |= slower(ratios)
         seconds = " ".join(f"{value:9.2e} s" for value in np.median(pairs, axis=0))
-        print(f"{row:34} {np.median(ratios):6.3f}  {low:6.3f} to {high:6.3f}  {seconds}", "SLOWER" * slower(ratios))
-    print(f"ratio: CPU time of the old tree / of the new, median and 95 % interval; {time.time() - began:.0f} s")
+        print(
+            f"{row:34} {np.median(ratios):6.3f}  {low:6.3f} to {high:6.3f}  {seconds}",
+            "SLOWER" * slower(ratios),
+        )
+    print(
+        f"ratio: CPU time of the old tree / of the new, median and 95 % interval; {time.time() - began:.0f} s"
+    )
     sys.exit(failed)
 
 

@@ -17,16 +17,25 @@ def coefficients(stiffness, work, sphere_radius, modulus):
     """Of the displacement c6 x^6 + c4 x^4 - c3 x^3 - c1 x of an equilibrium, x the square root of its radius."""
     work = np.maximum(work, 0.0)
     c6, c4 = 4 * modulus / (3 * sphere_radius * stiffness), 1 / sphere_radius
-    return c6, c4, np.sqrt(8 * np.pi * work * modulus) / stiffness, np.sqrt(2 * np.pi * work / modulus)
+    return (
+        c6,
+        c4,
+        np.sqrt(8 * np.pi * work * modulus) / stiffness,
+        np.sqrt(2 * np.pi * work / modulus),
+    )
 
 
 def right_of_root(displacement, stiffness, work, sphere_radius, modulus):
     """A square root of the radius that is too large: no indentation or load is below its pull-off value."""
     unit = np.cbrt(np.pi * np.maximum(work, 0.0) * sphere_radius**2 / (8 * modulus))
     load = stiffness * (displacement + 3 * unit**2 / sphere_radius)
-    depth = displacement + 1.5 * np.pi * np.maximum(work, 0.0) * sphere_radius / stiffness
+    depth = (
+        displacement + 1.5 * np.pi * np.maximum(work, 0.0) * sphere_radius / stiffness
+    )
     at_load = np.sqrt(radius_at_load(load, work, sphere_radius, modulus))
-    at_grips = np.maximum(sphere_radius * depth, 0.0) ** 0.25 + np.sqrt(unit) * 4 ** (1 / 3)
+    at_grips = np.maximum(sphere_radius * depth, 0.0) ** 0.25 + np.sqrt(unit) * 4 ** (
+        1 / 3
+    )
     return np.fmin(at_load, at_grips)
 
 
@@ -53,7 +62,10 @@ def exact_radius(displacement, stiffness, work, sphere_radius, modulus):
         mpmath.mpf, map(float, (displacement, stiffness, work, sphere_radius, modulus))
     )
     c6, c4 = 4 * modulus / (3 * sphere_radius * stiffness), 1 / sphere_radius
-    c3, c1 = mpmath.sqrt(8 * mpmath.pi * work * modulus) / stiffness, mpmath.sqrt(2 * mpmath.pi * work / modulus)
+    c3, c1 = (
+        mpmath.sqrt(8 * mpmath.pi * work * modulus) / stiffness,
+        mpmath.sqrt(2 * mpmath.pi * work / modulus),
+    )
     x = mpmath.mpf(1)
     while True:
         value = x * (x**2 * (x * (c6 * x**2 + c4) - c3) - c1) - displacement
@@ -64,6 +76,13 @@ def exact_radius(displacement, stiffness, work, sphere_radius, modulus):
 
 
 def exact_radius_at_load(load, work, sphere_radius, modulus):
-    load, work, sphere_radius, modulus = map(mpmath.mpf, map(float, (load, work, sphere_radius, modulus)))
+    load, work, sphere_radius, modulus = map(
+        mpmath.mpf, map(float, (load, work, sphere_radius, modulus))
+    )
     pull = 3 * mpmath.pi * work * sphere_radius
-    return mpmath.cbrt(3 * sphere_radius / (4 * modulus) * (load + pull + mpmath.sqrt(pull * (2 * load + pull))))
+    return mpmath.cbrt(
+        3
+        * sphere_radius
+        / (4 * modulus)
+        * (load + pull + mpmath.sqrt(pull * (2 * load + pull)))
+    )

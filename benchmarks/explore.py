@@ -68,17 +68,30 @@ MOVE = """(item, places) => new Promise((done) => {
 
 def main() -> None:
     """Measure, and print a row for each kind of latency [ms]."""
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    chromium = next(
+        filter(
+            None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
+        ),
+        None,
+    )
     if chromium is None:
         sys.exit("no Chromium")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
         table = Path(folder) / "points.csv"
         table.write_text(points(), encoding="utf-8")
-        browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        browser = driver.chromium.launch(
+            executable_path=chromium, args=["--no-sandbox"]
+        )
         began = time.time()
         with served("--data", table) as (_, address):
-            row("from the command to the painted page", [painted(browser.new_page(), address, began)])
-            row("load of a warm server", [painted(browser.new_page(), address, time.time()) for _ in range(5)])
+            row(
+                "from the command to the painted page",
+                [painted(browser.new_page(), address, began)],
+            )
+            row(
+                "load of a warm server",
+                [painted(browser.new_page(), address, time.time()) for _ in range(5)],
+            )
             page = browser.new_page(viewport={"width": 1200, "height": 900})
             painted(page, address, 0.0)
             page.wait_for_timeout(3000)
@@ -87,9 +100,16 @@ def main() -> None:
             row("last move of a drag", [dragged(page) for _ in range(3)])
             page.locator("#members").fill("100000")
             page.locator("#run").click()
-            until(page, lambda: float(page.locator("#progress").get_attribute("value") or 0.0) > 0.0)
+            until(
+                page,
+                lambda: (
+                    float(page.locator("#progress").get_attribute("value") or 0.0) > 0.0
+                ),
+            )
             row("key press beside an ensemble", presses(page))
-            assert page.locator("#stop").is_enabled(), "the ensemble ended before the last press"
+            assert page.locator("#stop").is_enabled(), (
+                "the ensemble ended before the last press"
+            )
         for name in ENDS:
             row(f"end of a job by {name}", [ended(browser, name) for _ in range(3)])
         browser.close()
@@ -98,7 +118,15 @@ def main() -> None:
 @contextlib.contextmanager
 def served(*options: object) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """The process of ``sim explore``, and the address that it prints."""
-    command = [sys.executable, "-m", "sim", "explore", SCENARIO, "--no-browser", *map(str, options)]
+    command = [
+        sys.executable,
+        "-m",
+        "sim",
+        "explore",
+        SCENARIO,
+        "--no-browser",
+        *map(str, options),
+    ]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         assert server.stdout is not None
         try:
@@ -146,8 +174,15 @@ ENDS: dict[str, Callable[[Page, subprocess.Popen[str]], object]] = {
 def points() -> str:
     """Return a table of measured curves at twelve speeds."""
     curves = sim.steady_curves(SCENARIO, np.geomspace(1e-4, 1e-2, 12))
-    rows = zip(curves["speed"].to_numpy(), curves["contact_area"].to_numpy(), strict=True)
-    return "\n".join(["speed [m/s],contact_area [m^2],contact_area_error [%]", *(f"{v},{a},1" for v, a in rows)])
+    rows = zip(
+        curves["speed"].to_numpy(), curves["contact_area"].to_numpy(), strict=True
+    )
+    return "\n".join(
+        [
+            "speed [m/s],contact_area [m^2],contact_area_error [%]",
+            *(f"{v},{a},1" for v, a in rows),
+        ]
+    )
 
 
 def until(page: Page, holds: Callable[[], object]) -> None:
@@ -181,7 +216,11 @@ def presses(page: Page) -> list[float]:
         slider = sliders.nth(number % sliders.count())
         slider.focus()
         page.evaluate("timing.last = timing.painted = null")
-        page.keyboard.press("ArrowLeft" if slider.evaluate("(item) => item.value === item.max") else "ArrowRight")
+        page.keyboard.press(
+            "ArrowLeft"
+            if slider.evaluate("(item) => item.value === item.max")
+            else "ArrowRight"
+        )
         result.append(latency(page))
         page.wait_for_timeout(400)
     return result
@@ -198,7 +237,9 @@ def dragged(page: Page) -> float:
     seconds = slider.evaluate(MOVE, places) / 1e3
     result = latency(page)
     slider.dispatch_event("change")
-    print(f"  {MOVES} moves in {seconds:.2f} s, {page.evaluate('timing.redraws')} redraws")
+    print(
+        f"  {MOVES} moves in {seconds:.2f} s, {page.evaluate('timing.redraws')} redraws"
+    )
     page.wait_for_timeout(1000)
     return result
 
@@ -207,7 +248,10 @@ def row(name: str, values: list[float]) -> None:
     """Print the median and the 95th percentile of latencies, with the load of the machine."""
     load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
     low, high = np.percentile(values, [50.0, 95.0])
-    print(f"{name}: median {low:.0f} ms, 95 % {high:.0f} ms, of {len(values)}; load {load}", flush=True)
+    print(
+        f"{name}: median {low:.0f} ms, 95 % {high:.0f} ms, of {len(values)}; load {load}",
+        flush=True,
+    )
 
 
 if __name__ == "__main__":

@@ -23,7 +23,14 @@ MOST_PARAMETERS = 8
 SOLID = {"shear_modulus", "poisson_ratio"}
 #: Folders and modules whose booleans choose algorithms.
 CHOOSERS = ("parts", "scenario")
-_LAYOUT = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
+_LAYOUT = {
+    tokenize.COMMENT,
+    tokenize.NL,
+    tokenize.NEWLINE,
+    tokenize.INDENT,
+    tokenize.DEDENT,
+    tokenize.ENDMARKER,
+}
 _CLOSING = {")", "]", "}"}
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
@@ -40,7 +47,11 @@ def size(text: str) -> Size:
     """Return the size of a module without docstrings, comments, layout and trailing commas."""
     places = docstring_lines(ast.parse(text))
     stream = tokenize.generate_tokens(io.StringIO(text).readline)
-    code = [token for token in stream if token.type not in _LAYOUT and token.start[0] not in places]
+    code = [
+        token
+        for token in stream
+        if token.type not in _LAYOUT and token.start[0] not in places
+    ]
     lines = set[int]()
     for token in code:
         lines.update(range(token.start[0], token.end[0] + 1))
@@ -49,12 +60,16 @@ def size(text: str) -> Size:
     return Size(len(lines), len(code) - trailing)
 
 
-def is_trailing_comma(token: tokenize.TokenInfo, following: tokenize.TokenInfo | None) -> bool:
+def is_trailing_comma(
+    token: tokenize.TokenInfo, following: tokenize.TokenInfo | None
+) -> bool:
     """Return True if a token is a comma before a closing bracket.
 
     The comma of a tuple of one element counts as trailing, too, which makes no difference between two layouts.
     """
-    return token.string == "," and following is not None and following.string in _CLOSING
+    return (
+        token.string == "," and following is not None and following.string in _CLOSING
+    )
 
 
 def docstring_lines(tree: ast.Module) -> set[int]:
@@ -65,7 +80,11 @@ def docstring_lines(tree: ast.Module) -> set[int]:
             continue
         match node.body[0]:
             case ast.Expr(value=ast.Constant(value=str())) as docstring:
-                lines.update(range(docstring.lineno, (docstring.end_lineno or docstring.lineno) + 1))
+                lines.update(
+                    range(
+                        docstring.lineno, (docstring.end_lineno or docstring.lineno) + 1
+                    )
+                )
     return lines
 
 
@@ -87,7 +106,9 @@ def functions(tree: ast.Module) -> Iterator[Function]:
 def long_lists(tree: ast.Module) -> list[str]:
     """Return the functions with too many parameters, each with their number."""
     counts = {function.name: len(parameters(function)) for function in functions(tree)}
-    return [f"{name} ({count})" for name, count in counts.items() if count > MOST_PARAMETERS]
+    return [
+        f"{name} ({count})" for name, count in counts.items() if count > MOST_PARAMETERS
+    ]
 
 
 def nested_conditionals(tree: ast.Module) -> int:
@@ -99,16 +120,25 @@ def nested_conditionals(tree: ast.Module) -> int:
 
 def solids_as_floats(tree: ast.Module) -> list[str]:
     """Return the functions that take a half-space as two floats."""
-    return [function.name for function in functions(tree) if set(parameters(function)) >= SOLID]
+    return [
+        function.name
+        for function in functions(tree)
+        if set(parameters(function)) >= SOLID
+    ]
 
 
 def booleans(tree: ast.Module) -> int:
     """Return the number of methods and class variables of type ``bool``."""
     methods = sum(
-        isinstance(function.returns, ast.Name) and function.returns.id == "bool" for function in functions(tree)
+        isinstance(function.returns, ast.Name) and function.returns.id == "bool"
+        for function in functions(tree)
     )
-    annotated = (node.annotation for node in ast.walk(tree) if isinstance(node, ast.AnnAssign))
-    return methods + sum(ast.unparse(annotation) == "ClassVar[bool]" for annotation in annotated)
+    annotated = (
+        node.annotation for node in ast.walk(tree) if isinstance(node, ast.AnnAssign)
+    )
+    return methods + sum(
+        ast.unparse(annotation) == "ClassVar[bool]" for annotation in annotated
+    )
 
 
 def called_once(trees: Iterable[ast.Module]) -> list[str]:
@@ -129,7 +159,10 @@ def folder_of(path: Path) -> str:
 def main() -> None:
     """Print the size of each folder and of the whole package, and the places that make it hard to change."""
     package = Path(sys.argv[1] if len(sys.argv) > 1 else "sim")
-    texts = {path.relative_to(package): path.read_text(encoding="utf-8") for path in sorted(package.rglob("*.py"))}
+    texts = {
+        path.relative_to(package): path.read_text(encoding="utf-8")
+        for path in sorted(package.rglob("*.py"))
+    }
     trees = {path: ast.parse(text) for path, text in texts.items()}
     lines, tokens = Counter[str](), Counter[str]()
     for path, text in texts.items():
@@ -138,15 +171,32 @@ def main() -> None:
     for folder, count in tokens.most_common():
         print(f"{count:8,} tokens {lines[folder]:7,} lines  {folder}")
     density = tokens.total() / max(lines.total(), 1)
-    print(f"{tokens.total():8,} tokens {lines.total():7,} lines  in all, {density:.1f} tokens a line")
-    crowded = {path: long_lists(tree) for path, tree in trees.items() if long_lists(tree)}
-    print(f"{sum(map(len, crowded.values()))} functions with more than {MOST_PARAMETERS} parameters")
+    print(
+        f"{tokens.total():8,} tokens {lines.total():7,} lines  in all, {density:.1f} tokens a line"
+    )
+    crowded = {
+        path: long_lists(tree) for path, tree in trees.items() if long_lists(tree)
+    }
+    print(
+        f"{sum(map(len, crowded.values()))} functions with more than {MOST_PARAMETERS} parameters"
+    )
     for path, names in crowded.items():
         print(f"    {path}: {', '.join(names)}")
-    print(f"{sum(map(nested_conditionals, trees.values()))} conditional expressions with another one inside")
-    print(f"{len(called_once(trees.values()))} private functions with one caller in their module")
-    solids = [name for path, tree in trees.items() if path.parts[0] != "laws" for name in solids_as_floats(tree)]
-    print(f"{len(solids)} functions outside of laws that take a half-space as two floats")
+    print(
+        f"{sum(map(nested_conditionals, trees.values()))} conditional expressions with another one inside"
+    )
+    print(
+        f"{len(called_once(trees.values()))} private functions with one caller in their module"
+    )
+    solids = [
+        name
+        for path, tree in trees.items()
+        if path.parts[0] != "laws"
+        for name in solids_as_floats(tree)
+    ]
+    print(
+        f"{len(solids)} functions outside of laws that take a half-space as two floats"
+    )
     choosers = [tree for path, tree in trees.items() if path.parts[0] in CHOOSERS]
     print(f"{sum(map(booleans, choosers))} booleans of {' and '.join(CHOOSERS)}")
 

@@ -35,14 +35,26 @@ numpy and scipy would write for the same work. Other rows compare ours with one 
 END = """
 The command `sim converge SCENARIO.toml` measures the cost and the error of each model on a scenario of your own.
 """
-HEADINGS = ("work", "beside", "goal", "result", "met", "CPU time, ours; theirs", "errors, ours; theirs")
+HEADINGS = (
+    "work",
+    "beside",
+    "goal",
+    "result",
+    "met",
+    "CPU time, ours; theirs",
+    "errors, ours; theirs",
+)
 
 
 def text(results: dict[str, Any]) -> str:
     """The page."""
-    machines = sorted({f"{group['date']}, {group['machine']}" for group in results.values()})
+    machines = sorted(
+        {f"{group['date']}, {group['machine']}" for group in results.values()}
+    )
     lines = [TITLE, "Measured: ", "; ".join(machines), ".\n\n"]
-    lines += [f"| {' | '.join(line)} |\n" for line in (HEADINGS, ["---"] * len(HEADINGS))]
+    lines += [
+        f"| {' | '.join(line)} |\n" for line in (HEADINGS, ["---"] * len(HEADINGS))
+    ]
     lines += [f"| {' | '.join(cells(row))} |\n" for row in rows_of(results)]
     return "".join([*lines, END])
 
@@ -54,14 +66,28 @@ def rows_of(results: dict[str, Any]) -> list[Row]:
 
 def cells(row: Row) -> tuple[str, ...]:
     """A line of the table."""
-    goal = "" if row.goal is None else f"{'≥' if row.kind == 'faster' else '≤'} {number(row.goal)} {unit(row)}".strip()
+    goal = (
+        ""
+        if row.goal is None
+        else f"{'≥' if row.kind == 'faster' else '≤'} {number(row.goal)} {unit(row)}".strip()
+    )
     met = {None: "", True: "yes", False: "**no**"}[row.met]
-    return row.ours, row.beside, goal, result(row), met, "; ".join(map(seconds, row.seconds)), row.errors
+    return (
+        row.ours,
+        row.beside,
+        goal,
+        result(row),
+        met,
+        "; ".join(map(seconds, row.seconds)),
+        row.errors,
+    )
 
 
 def unit(row: Row) -> str:
     """The unit of a goal."""
-    return {"faster": "times faster", "as long": "times as long"}.get(row.kind, row.kind)
+    return {"faster": "times faster", "as long": "times as long"}.get(
+        row.kind, row.kind
+    )
 
 
 def result(row: Row) -> str:
@@ -70,7 +96,9 @@ def result(row: Row) -> str:
     if row.kind == "faster" and middle < 1.0:
         low, middle, high, words = 1.0 / high, 1.0 / middle, 1.0 / low, "times slower"
     else:
-        words = {"faster": "times faster", "as long": "times as long"}.get(row.kind, row.kind)
+        words = {"faster": "times faster", "as long": "times as long"}.get(
+            row.kind, row.kind
+        )
     spread = "" if low == middle == high else f"({number(low)} to {number(high)})"
     return " ".join(filter(None, (number(middle), words, spread)))
 

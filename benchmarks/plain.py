@@ -32,19 +32,28 @@ class TextbookModes:
 
     def __init__(self, points, cell, density, shear_modulus, seed):
         self.points, self.random = points, np.random.default_rng(seed)
-        self.size = np.sqrt(density(half_spectrum(points, cell)[1])) / cell * points  # of the transform of a field
+        # of the transform of a field
+        self.size = np.sqrt(density(half_spectrum(points, cell)[1])) / cell * points
         self.weights = energy_weights(points, cell, shear_modulus)
         self.modes = self.noise()
 
     def noise(self):
-        return self.size * fft.rfft2(self.random.standard_normal((self.points, self.points)))
+        return self.size * fft.rfft2(
+            self.random.standard_normal((self.points, self.points))
+        )
 
     def step(self, exponent):
-        self.modes = np.exp(-exponent) * self.modes + np.sqrt(-np.expm1(-2 * exponent)) * self.noise()
+        self.modes = (
+            np.exp(-exponent) * self.modes
+            + np.sqrt(-np.expm1(-2 * exponent)) * self.noise()
+        )
         return np.sum(self.weights * (self.modes.real**2 + self.modes.imag**2))
 
     def map(self, exponent):
-        self.modes = np.exp(-exponent) * self.modes + np.sqrt(-np.expm1(-2 * exponent)) * self.noise()
+        self.modes = (
+            np.exp(-exponent) * self.modes
+            + np.sqrt(-np.expm1(-2 * exponent)) * self.noise()
+        )
         return fft.irfft2(self.modes)
 
 
@@ -57,8 +66,11 @@ class HalfSpectrumModes:
         qx, qy = (q.ravel() for q in np.meshgrid(numbers, numbers, indexing="ij"))
         half = ((qy > 0) | ((qy == 0) & (qx > 0))) & (density(np.hypot(qx, qy)) > 0)
         q = np.hypot(qx[half], qy[half])
-        weights = (1 + (qy[half] / q) ** 2) / (2 * shear_modulus * q) * density(q) / cell**2
-        self.weights = 0.5 * np.repeat(weights, 2)  # of real and imaginary parts of unit variance
+        weights = (
+            (1 + (qy[half] / q) ** 2) / (2 * shear_modulus * q) * density(q) / cell**2
+        )
+        # of real and imaginary parts of unit variance
+        self.weights = 0.5 * np.repeat(weights, 2)
         self.parts, self.noise = self.random.standard_normal((2, self.weights.size))
 
     def step(self, exponent):
@@ -79,7 +91,9 @@ class HalfSpectrumMap:
 
     def __init__(self, points, cell, density, seed):
         self.points, self.random = points, np.random.default_rng(seed)
-        self.size = np.sqrt(0.5 * density(half_spectrum(points, cell)[1])) / cell * points**2
+        self.size = (
+            np.sqrt(0.5 * density(half_spectrum(points, cell)[1])) / cell * points**2
+        )
         self.size[:, [0, -1]] *= np.sqrt(2)
         self.noise = np.empty((points, points // 2 + 1, 2))
         self.random.standard_normal(out=self.noise)
@@ -102,9 +116,13 @@ def renew_half(modes, size, weights, keep, renew, turns, moved, random):
         for j in range(modes.shape[1]):
             if size[i, j] > 0.0:
                 kick = renew * size[i, j]
-                noise = complex(kick * random.standard_normal(), kick * random.standard_normal())
+                noise = complex(
+                    kick * random.standard_normal(), kick * random.standard_normal()
+                )
                 modes[i, j] = keep * modes[i, j] + noise
-                energy += weights[i, j] * (modes[i, j].real ** 2 + modes[i, j].imag ** 2)
+                energy += weights[i, j] * (
+                    modes[i, j].real ** 2 + modes[i, j].imag ** 2
+                )
                 moved[i, j] = modes[i, j] * turns[i]
     for i in range(1, (points + 1) // 2):  # the first column holds both of a pair
         moved[points - i, 0] = moved[i, 0].conjugate()
@@ -117,15 +135,27 @@ class CompiledMap:
     def __init__(self, points, cell, density, shear_modulus, seed):
         (qy, q), self.random = half_spectrum(points, cell), np.random.default_rng(seed)
         self.qx = 2 * np.pi * np.fft.fftfreq(points, cell / points)
-        drawn = ((qy > 0) | (self.qx[:, np.newaxis] > 0)) & (qy < qy.max()) & (self.qx > self.qx.min())[:, np.newaxis]
+        drawn = (
+            ((qy > 0) | (self.qx[:, np.newaxis] > 0))
+            & (qy < qy.max())
+            & (self.qx > self.qx.min())[:, np.newaxis]
+        )
         self.size = np.where(drawn, np.sqrt(0.5 * density(q)) / cell * points**2, 0.0)
-        self.weights = energy_weights(points, cell, shear_modulus) * np.where(qy > 0, 1.0, 2.0)
+        self.weights = energy_weights(points, cell, shear_modulus) * np.where(
+            qy > 0, 1.0, 2.0
+        )
         self.modes, self.moved = np.zeros((2, *self.size.shape), complex)
         self.map(np.inf, 0.0)
 
     def map(self, exponent, position):
-        factors = np.exp(-exponent), np.sqrt(-np.expm1(-2 * exponent)), np.exp(-1j * self.qx * position)
-        energy = renew_half(self.modes, self.size, self.weights, *factors, self.moved, self.random)
+        factors = (
+            np.exp(-exponent),
+            np.sqrt(-np.expm1(-2 * exponent)),
+            np.exp(-1j * self.qx * position),
+        )
+        energy = renew_half(
+            self.modes, self.size, self.weights, *factors, self.moved, self.random
+        )
         return energy, fft.irfft2(self.moved)
 
 
@@ -133,13 +163,21 @@ class BandsNumpy:
     """ΔΓ of the same bands as ours by numpy: each band a gamma number, renewed as the sum of squares that it is."""
 
     def __init__(self, members, weights, shapes, seed):
-        self.random, self.weights, self.shapes = np.random.default_rng(seed), weights, shapes - 0.5
+        self.random, self.weights, self.shapes = (
+            np.random.default_rng(seed),
+            weights,
+            shapes - 0.5,
+        )
         self.bands = self.random.standard_gamma(shapes, (members, shapes.size))
 
     def step(self, exponent):
         keep, renew = np.exp(-exponent), np.sqrt(-np.expm1(-2 * exponent))
-        moved = keep * np.sqrt(2 * self.bands) + renew * self.random.standard_normal(self.bands.shape)
-        self.bands = 0.5 * moved**2 + renew**2 * self.random.standard_gamma(self.shapes, self.bands.shape)
+        moved = keep * np.sqrt(2 * self.bands) + renew * self.random.standard_normal(
+            self.bands.shape
+        )
+        self.bands = 0.5 * moved**2 + renew**2 * self.random.standard_gamma(
+            self.shapes, self.bands.shape
+        )
         return self.bands @ self.weights
 
 
@@ -154,7 +192,13 @@ def bands_compiled(members, steps, weights, shapes, exponent, random):
     for step in range(steps):
         for m in range(members):
             for k in range(weights.size):
-                moved = keep * math.sqrt(2.0 * bands[m, k]) + renew * random.standard_normal()
-                bands[m, k] = 0.5 * moved * moved + renew * renew * random.standard_gamma(shapes[k] - 0.5)
+                moved = (
+                    keep * math.sqrt(2.0 * bands[m, k])
+                    + renew * random.standard_normal()
+                )
+                bands[m, k] = (
+                    0.5 * moved * moved
+                    + renew * renew * random.standard_gamma(shapes[k] - 0.5)
+                )
                 energy[step, m] += weights[k] * bands[m, k]
     return energy

@@ -28,7 +28,14 @@ TRACKED = STRETCHED | {"model": "tracked", "rupture": BELL, "sites": 30}
 
 SLIP = {"model": "slip", "length": 5e-6}
 ONSET = {"model": "onset", "speed": 2.5e-3, "width": 0.3, "floor": 0.05}
-ROUGH = {"model": "self_affine", "rms": 1e5, "hurst": 0.8, "longest": 60e-6, "rolloff": 24e-6, "shortest": 2.5e-6}
+ROUGH = {
+    "model": "self_affine",
+    "rms": 1e5,
+    "hurst": 0.8,
+    "longest": 60e-6,
+    "rolloff": 24e-6,
+    "shortest": 2.5e-6,
+}
 FIELD = {"spectrum": ROUGH, "cell": 0.24e-3, "correlation": SLIP, "amplitude": ONSET}
 BANDED = FIELD | {"model": "banded", "tolerance": 0.01}
 
@@ -37,9 +44,13 @@ def tables(name: str, changes: Tables) -> Tables:
     """Return the tables of a lens with changes in some of them."""
     scene = LENS | {"name": name}
     for key, table in changes.items():
-        scene[key] = {**scene.get(key, {}), **table} if isinstance(table, dict) else table
+        scene[key] = (
+            {**scene.get(key, {}), **table} if isinstance(table, dict) else table
+        )
     if {"displacement", "indentation"} & scene["contact"].keys():
-        scene["contact"] = {key: value for key, value in scene["contact"].items() if key != "load"}
+        scene["contact"] = {
+            key: value for key, value in scene["contact"].items() if key != "load"
+        }
     return scene
 
 
@@ -51,7 +62,15 @@ def lens(members: int, steps: int, every: int = 1, **parts: Tables) -> Tables:
 
 def field(model: str, points: int = 512, **more: Any) -> Tables:
     """Return the fluctuations on a grid, whose spectrum ends where the grid does: at 1 µm with 512 points."""
-    return FIELD | {"model": model, "points": points, "spectrum": ROUGH | {"shortest": 512e-6 / points}} | more
+    return (
+        FIELD
+        | {
+            "model": model,
+            "points": points,
+            "spectrum": ROUGH | {"shortest": 512e-6 / points},
+        }
+        | more
+    )
 
 
 def followed(scene: Tables) -> Callable[[], object]:
@@ -61,9 +80,12 @@ def followed(scene: Tables) -> Callable[[], object]:
     import sim
     from sim import engine
 
-    of, noise = sim.load(scene), getattr(engine, "MemberNoise", None) or engine.Dice  # as an older tree calls it
+    # as an older tree calls it
+    of, noise = sim.load(scene), getattr(engine, "MemberNoise", None) or engine.Dice
     members, end = np.arange(of.ensemble.members), of.clock.steps
-    return lambda: engine.follow(of, noise.of(of.seed, members), None, range(0, end + 1, of.clock.stride))
+    return lambda: engine.follow(
+        of, noise.of(of.seed, members), None, range(0, end + 1, of.clock.stride)
+    )
 
 
 def steady(speed: float, step: float, steps: int) -> tuple[Any, Any]:
@@ -90,11 +112,17 @@ def tiled(dataset: Any, path: Path, times: int) -> None:
     import numpy as np
 
     step = float(dataset.t[1] - dataset.t[0])
-    alone = dataset.drop_vars([name for name, variable in dataset.variables.items() if "t" in variable.dims])
+    alone = dataset.drop_vars(
+        [name for name, variable in dataset.variables.items() if "t" in variable.dims]
+    )
     alone.assign_coords(t=np.arange(times * dataset.sizes["t"]) * step).to_netcdf(path)
     with netCDF4.Dataset(path, "a") as file:
         for name, variable in dataset.variables.items():
             if "t" in variable.dims and name != "t":
-                target = file.createVariable(name, variable.dtype, variable.dims, fill_value=False)
+                target = file.createVariable(
+                    name, variable.dtype, variable.dims, fill_value=False
+                )
                 target.setncatts(variable.attrs)
-                target[...] = np.concatenate([variable.values] * times, axis=variable.dims.index("t"))
+                target[...] = np.concatenate(
+                    [variable.values] * times, axis=variable.dims.index("t")
+                )

@@ -26,7 +26,12 @@ MEAN = FirstMoment(site_density=1.0, start_from="bonded", **BELL)
 
 
 def scene(
-    duration: float, steps: int, tolerance: float, mass: float = 0.0, damping: float = 0.0, bonds: Any = MEAN
+    duration: float,
+    steps: int,
+    tolerance: float,
+    mass: float = 0.0,
+    damping: float = 0.0,
+    bonds: Any = MEAN,
 ) -> Scenario:
     """Return a lens of constant area; stretch and life of its bonds at rest are units, and so is the force of all."""
     keys: dict[str, Any] = {
@@ -38,13 +43,25 @@ def scene(
         "bonds": bonds,
     }
     area = Scenario(**keys).contact_area
-    body = {"stiffness": SOFT * area, "tolerance": tolerance, "mass": mass * area, "damping": damping * area}
-    return Scenario(**keys, drive=Spring(stage=SPEED, contact_stiffness="rigid", **body))
+    body = {
+        "stiffness": SOFT * area,
+        "tolerance": tolerance,
+        "mass": mass * area,
+        "damping": damping * area,
+    }
+    return Scenario(
+        **keys, drive=Spring(stage=SPEED, contact_stiffness="rigid", **body)
+    )
 
 
 def ended(of: Scenario, members: int = 1) -> tuple[State, Trajectory]:
     """Return the state of a slider at the end, and its trajectory at each clock step."""
-    return follow(of, MemberNoise.of(of.seed, np.arange(members)), None, range(1, of.clock.steps + 1))
+    return follow(
+        of,
+        MemberNoise.of(of.seed, np.arange(members)),
+        None,
+        range(1, of.clock.steps + 1),
+    )
 
 
 def followed(of: Scenario, members: int = 1) -> Trajectory:
@@ -60,9 +77,13 @@ def apart(positions: np.ndarray, exact: np.ndarray) -> float:
 #: A lens whose contact follows ΔΓ; its speed [mm/s], members, clock steps and the goal for a member's step [µs].
 LENS = Path(__file__).parent.parent / "scenarios" / "pdms_lens_spring.toml"
 FEELING = (
-    (2, 1, 4000, 4.0), (2, 4, 1000, 4.0), (2, 256, 100, 3.5), (2, 10_000, 40, 3.5), (3, 1, 4000, None),
+    (2, 1, 4000, 4.0),
+    (2, 4, 1000, 4.0),
+    (2, 256, 100, 3.5),
+    (2, 10_000, 40, 3.5),
+    (3, 1, 4000, None),
     (20, 1, 4000, None),
-)  # fmt: skip
+)
 #: Speeds of the lens in stick-slip [mm/s], its clock steps [ms], and tolerances of its bands; goals [µs] for its parts.
 SLIPPING = tuple(itertools.product((3, 20), (1.0, 0.125), (0.01, 0.001)))
 PARTS = {"a sub-step": 1.8, "a draw of ΔΓ": 0.3, "a clock step": 1.0}
@@ -82,32 +103,61 @@ def spring(bench: Bench) -> list[Row]:
     for name, (mass, damping, slips, tolerances) in SLIDERS.items():
         duration = bench.of(2.4 * slips, 1.0)
         records = bench.of(round(duration), 2)
-        of, times = scene(duration, records, TOLERANCE, mass, damping), np.linspace(0.0, duration, records + 1)
-        exact = followed(scene(duration, records, bench.of(1e-12, 1e-9), mass, damping)).position[:, 0]
-        ours, body, others = apart(followed(of).position[:, 0], exact), (SOFT, SPEED, mass, damping), []
+        of, times = (
+            scene(duration, records, TOLERANCE, mass, damping),
+            np.linspace(0.0, duration, records + 1),
+        )
+        exact = followed(
+            scene(duration, records, bench.of(1e-12, 1e-9), mass, damping)
+        ).position[:, 0]
+        ours, body, others = (
+            apart(followed(of).position[:, 0], exact),
+            (SOFT, SPEED, mass, damping),
+            [],
+        )
         for label, program in (
-            ("scipy's LSODA, compiled slopes", functools.partial(bonds_plain.by_scipy, "LSODA", tolerances["LSODA"])),
-            ("compiled Dormand–Prince (numba)", functools.partial(bonds_plain.dormand_prince, tolerances["pair"])),
+            (
+                "scipy's LSODA, compiled slopes",
+                functools.partial(bonds_plain.by_scipy, "LSODA", tolerances["LSODA"]),
+            ),
+            (
+                "compiled Dormand–Prince (numba)",
+                functools.partial(bonds_plain.dormand_prince, tolerances["pair"]),
+            ),
         ):
             theirs = functools.partial(program, times, body)
             errors = f"position {ours:.0e}; {apart(theirs()[1:], exact):.0e}"
-            others.append(Beside(label, theirs, errors=errors, bound="scipy" not in label))
+            others.append(
+                Beside(label, theirs, errors=errors, bound="scipy" not in label)
+            )
         work = f"{name} slider behind a spring, {slips * 2.4:.0f} records"
         rows += bench.compare(work, functools.partial(followed, of), *others, turns=7)
 
     lens = sim.load(LENS).points()[0]
     for stage, members, steps, goal in FEELING:
-        values = {"drive.stage": f"{stage} mm/s", "clock.duration": f"{bench.of(steps, 2)} ms"}
-        program, share = functools.partial(followed, lens.with_values(values), members), 1e6 / (members * steps)
+        values = {
+            "drive.stage": f"{stage} mm/s",
+            "clock.duration": f"{bench.of(steps, 2)} ms",
+        }
+        program, share = (
+            functools.partial(followed, lens.with_values(values), members),
+            1e6 / (members * steps),
+        )
         program()  # it may compile
         microseconds = [share * spent(program) for _ in range(bench.of(7, 1))]
-        work = f"a member's step of 1 ms: spring lens at {stage} mm/s, members: {members}"
+        work = (
+            f"a member's step of 1 ms: spring lens at {stage} mm/s, members: {members}"
+        )
         rows.append(absolute(work, microseconds, "µs", goal))
     rows += parts(bench, lens)
     for sites in (50, 50_000):
-        tracked = Tracked(sites=bench.of(sites, 5), site_density=1.0, start_from="bonded", **BELL)
+        tracked = Tracked(
+            sites=bench.of(sites, 5), site_density=1.0, start_from="bonded", **BELL
+        )
         duration = bench.of(max(6.0, 6e4 / sites), 1.0)
-        program = functools.partial(ended, scene(duration, round(duration), 1e-4, bonds=tracked))
+        program = functools.partial(
+            ended, scene(duration, round(duration), 1e-4, bonds=tracked)
+        )
         share = 1e6 / np.sum(program()[0].bonds.life + 1.0)
         microseconds = [share * spent(program) for _ in range(bench.of(5, 1))]
         work = f"a bond's life: slider on {sites:,} tracked bonds behind a spring"
@@ -115,7 +165,11 @@ def spring(bench: Bench) -> list[Row]:
 
     long = scene(bench.of(2400.0, 1.0), bench.of(10**5, 10), TOLERANCE)
     seconds = [spent(lambda: followed(long)) for _ in range(bench.of(5, 1))]
-    rows.append(absolute("slider behind a spring through 10³ slips, 10⁵ records", seconds, "s", 5.0))
+    rows.append(
+        absolute(
+            "slider behind a spring through 10³ slips, 10⁵ records", seconds, "s", 5.0
+        )
+    )
     return rows
 
 
@@ -123,15 +177,28 @@ def parts(bench: Bench, lens: Scenario) -> list[Row]:
     """Rows of the times of a lens in stick-slip, split by least squares over speeds, clock steps and tolerances."""
     programs, counts, steps = [], [], bench.of(20_000, 4)
     for stage, step, tolerance in SLIPPING:
-        clock = {"clock.step": f"{step} ms", "clock.record": f"{step} ms", "clock.duration": f"{steps * step} ms"}
-        of = lens.with_values({"drive.stage": f"{stage} mm/s", "shear.tolerance": tolerance} | clock)
+        clock = {
+            "clock.step": f"{step} ms",
+            "clock.record": f"{step} ms",
+            "clock.duration": f"{steps * step} ms",
+        }
+        of = lens.with_values(
+            {"drive.stage": f"{stage} mm/s", "shear.tolerance": tolerance} | clock
+        )
         programs.append(functools.partial(followed, of))
         substeps = programs[-1]().driven[-1, 0, READINGS.index("substeps")]
-        counts.append([substeps, steps * len(of.process.shapes) / len(lens.process.shapes), steps])
+        counts.append(
+            [substeps, steps * len(of.process.shapes) / len(lens.process.shapes), steps]
+        )
     turns = []
     for _ in range(bench.of(7, 1)):
         seconds = np.array([spent(program) for program in programs])[:, np.newaxis]
-        turns.append(1e6 * np.abs(np.linalg.lstsq(counts / seconds, np.ones(len(seconds)))[0]))
+        turns.append(
+            1e6 * np.abs(np.linalg.lstsq(counts / seconds, np.ones(len(seconds)))[0])
+        )
     work = f"spring lens in stick-slip, {len(lens.process.shapes)} bands"
     named = zip(PARTS.items(), np.transpose(turns), strict=True)
-    return [absolute(f"{part}: {work}", values.tolist(), "µs", goal) for (part, goal), values in named]
+    return [
+        absolute(f"{part}: {work}", values.tolist(), "µs", goal)
+        for (part, goal), values in named
+    ]

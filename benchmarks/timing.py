@@ -52,12 +52,19 @@ class Row:
         """True if the median reaches the goal; None without a goal."""
         if self.goal is None:
             return None
-        return self.result[1] >= self.goal if self.kind == "faster" else self.result[1] <= self.goal
+        return (
+            self.result[1] >= self.goal
+            if self.kind == "faster"
+            else self.result[1] <= self.goal
+        )
 
     @property
     def stored(self) -> dict[str, Any]:
         """The row for a file, its numbers to four digits."""
-        return asdict(self) | {"result": _short(self.result), "seconds": _short(self.seconds)}
+        return asdict(self) | {
+            "result": _short(self.result),
+            "seconds": _short(self.seconds),
+        }
 
 
 def _short(numbers: list[float]) -> list[float]:
@@ -104,20 +111,43 @@ class Bench:
         return small if self.quick else full
 
     def compare(
-        self, ours: str, program: Callable, *others: Beside,
-        share: float = 1.0, turns: int = 15, clock: Callable = spent,
-    ) -> list[Row]:  # fmt: skip
+        self,
+        ours: str,
+        program: Callable,
+        *others: Beside,
+        share: float = 1.0,
+        turns: int = 15,
+        clock: Callable = spent,
+    ) -> list[Row]:
         """Rows of a program beside others; in each turn all are timed, after two calls of each that do not count."""
         programs = [Beside(ours, program, share), *others]
-        repeats = [1 if self.quick else self._repeats(other.program, clock) for other in programs]
+        repeats = [
+            1 if self.quick else self._repeats(other.program, clock)
+            for other in programs
+        ]
         pairs = list(zip(programs, repeats, strict=True))
-        times = [[clock(p.program, n) / n / p.share for p, n in pairs] for _ in range(self.of(turns, 1))]
+        times = [
+            [clock(p.program, n) / n / p.share for p, n in pairs]
+            for _ in range(self.of(turns, 1))
+        ]
         mine, *theirs = np.transpose(times)
         rows = []
         for other, times in zip(others, theirs, strict=True):
-            kind, ratios = ("as long", mine / times) if other.bound else ("faster", times / mine)
+            kind, ratios = (
+                ("as long", mine / times) if other.bound else ("faster", times / mine)
+            )
             medians = [float(np.median(mine)), float(np.median(times))]
-            rows.append(Row(ours, other.name, kind, other.goal, middle(ratios), medians, other.errors))
+            rows.append(
+                Row(
+                    ours,
+                    other.name,
+                    kind,
+                    other.goal,
+                    middle(ratios),
+                    medians,
+                    other.errors,
+                )
+            )
         return rows
 
     def _repeats(self, program: Callable, clock: Callable) -> int:
@@ -129,7 +159,10 @@ class Bench:
         """CPU time [s] and peak memory [MB] of ``sim`` with some arguments, as a process of its own."""
         if not self.quick:
             return child("-m", "sim", *arguments, **environment)
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        with (
+            contextlib.redirect_stdout(io.StringIO()),
+            contextlib.redirect_stderr(io.StringIO()),
+        ):
             seconds = spent(lambda: cli(list(arguments), standalone_mode=False))
         return seconds, _peak()
 
@@ -147,7 +180,9 @@ def _peak() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
 
-def absolute(ours: str, values: list[float], unit: str, goal: float | None, beside: str = "–") -> Row:
+def absolute(
+    ours: str, values: list[float], unit: str, goal: float | None, beside: str = "–"
+) -> Row:
     """A row of measured values that stand beside nothing."""
     return Row(ours, beside, unit, goal, middle(values), [])
 
@@ -155,8 +190,14 @@ def absolute(ours: str, values: list[float], unit: str, goal: float | None, besi
 def child(*arguments: str, **environment: str) -> tuple[float, float]:
     """CPU time [s] and peak memory [MB] of a Python process."""
     command = [sys.executable, "-S", "-c", _LAUNCHER, sys.executable, *arguments]
-    usual = {name: value for name, value in os.environ.items() if not name.startswith(_UNUSUAL)}
-    printed = subprocess.run(command, env=usual | environment, check=True, capture_output=True, text=True).stdout
+    usual = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(_UNUSUAL)
+    }
+    printed = subprocess.run(
+        command, env=usual | environment, check=True, capture_output=True, text=True
+    ).stdout
     seconds, kilobytes = map(float, printed.split())
     return seconds, kilobytes / 1024.0
 

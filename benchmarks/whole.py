@@ -28,8 +28,15 @@ def commands(bench: Bench) -> list[Row]:
             output = ("-o", f"{folder}/x.nc") if words[0] == "run" else ()
             rows += bench.compare(
                 f"`sim {' '.join(words)}` of the starter scene",
-                lambda words=words, output=output: bench.command(words[0], STARTER, *words[1:], *output)[0],
-                Beside(f"import {modules}", lambda m=modules: bench.python(f"import {m}"), goal=goal, bound=True),
+                lambda words=words, output=output: bench.command(
+                    words[0], STARTER, *words[1:], *output
+                )[0],
+                Beside(
+                    f"import {modules}",
+                    lambda m=modules: bench.python(f"import {m}"),
+                    goal=goal,
+                    bound=True,
+                ),
                 turns=9,
                 clock=self_timed,
             )
@@ -42,8 +49,14 @@ def first(bench: Bench) -> list[Row]:
     for _ in range(bench.of(3, 1)):
         with tempfile.TemporaryDirectory() as folder:
             output = f"{folder}/x.nc"
-            times.append(bench.command("run", STARTER, "-o", output, SIM_CACHE_DIR=folder)[0])
-    return [absolute("`sim run` of the starter scene, the first ever: compiles", times, "s", 6.0)]
+            times.append(
+                bench.command("run", STARTER, "-o", output, SIM_CACHE_DIR=folder)[0]
+            )
+    return [
+        absolute(
+            "`sim run` of the starter scene, the first ever: compiles", times, "s", 6.0
+        )
+    ]
 
 
 def gallery(bench: Bench) -> list[Row]:
@@ -55,9 +68,17 @@ def gallery(bench: Bench) -> list[Row]:
             turns = [bench.command(*arguments) for _ in range(bench.of(3, 1))]
             times[path.stem] = [cpu for cpu, _ in turns]
     slowest = max(times, key=lambda name: np.median(times[name]))
-    others = ", ".join(f"{name} {np.median(seconds):.1f}" for name, seconds in times.items() if name != slowest)
+    others = ", ".join(
+        f"{name} {np.median(seconds):.1f}"
+        for name, seconds in times.items()
+        if name != slowest
+    )
     beside = f"this is {slowest}; the others [s]: {others}"
-    return [absolute("`sim run` of the gallery's slowest scene", times[slowest], "s", 3.5, beside)]
+    return [
+        absolute(
+            "`sim run` of the gallery's slowest scene", times[slowest], "s", 3.5, beside
+        )
+    ]
 
 
 def statistics(bench: Bench) -> list[Row]:
@@ -77,12 +98,22 @@ def statistics(bench: Bench) -> list[Row]:
             scene = lens(members, records - 1, drive=slow, bonds=RATE, shear=BANDED)
             sim.run(scene, path) if times == 1 else tiled(sim.run(scene), path, times)
             load = f"import xarray; xarray.open_dataset({str(path)!r}).load()"
-            turns = [(*bench.command("stats", str(path)), bench.python(load)) for _ in range(bench.of(3, 1))]
+            turns = [
+                (*bench.command("stats", str(path)), bench.python(load))
+                for _ in range(bench.of(3, 1))
+            ]
         ours, megabytes, plain = np.transpose(turns)
         medians = [float(np.median(ours)), float(np.median(plain))]
         name = f"`sim stats` of {name}"
         rows += [
-            Row(f"{name}: time", "xarray loads all of it once", "as long", goal, middle(ours / plain), medians),
+            Row(
+                f"{name}: time",
+                "xarray loads all of it once",
+                "as long",
+                goal,
+                middle(ours / plain),
+                medians,
+            ),
             absolute(f"{name}: peak memory", list(megabytes), "MB", 1500.0),
         ]
     return rows
@@ -97,30 +128,66 @@ def sweeps(bench: Bench) -> list[Row]:
             scene = lens(1, 20, drive={"model": "steady", "speed": 1e-3}, bonds=RATE)
             scene["sweep"] = {"drive.speed": np.geomspace(1e-5, 0.1, count).tolist()}
             path = Path(folder) / f"{count}.toml"
-            path.write_text("\n".join(f"{key} = {toml(value)}" for key, value in scene.items()), encoding="utf-8")
-            return bench.command("run", str(path), "-o", f"{path}.nc", "--force", "-j", "1", *options)
+            path.write_text(
+                "\n".join(f"{key} = {toml(value)}" for key, value in scene.items()),
+                encoding="utf-8",
+            )
+            return bench.command(
+                "run", str(path), "-o", f"{path}.nc", "--force", "-j", "1", *options
+            )
 
         def of(command: str, count: int) -> float:
-            further = {"report": ["--force"], "stats": []}.get(command, ["--csv", f"{folder}/out.csv", "--force"])
-            return bench.command(command.split()[0], f"{folder}/{count}.toml.nc", *further)[0]
+            further = {"report": ["--force"], "stats": []}.get(
+                command, ["--csv", f"{folder}/out.csv", "--force"]
+            )
+            return bench.command(
+                command.split()[0], f"{folder}/{count}.toml.nc", *further
+            )[0]
 
         turns = range(bench.of(3, 1))
         pairs = [(run(many), run(many, "--no-table")) for _ in turns]
         growing = np.transpose(
-            [(bare, *(run(count, "--no-table")[0] for count in (points, few))) for _, (bare, _) in pairs]
+            [
+                (bare, *(run(count, "--no-table")[0] for count in (points, few)))
+                for _, (bare, _) in pairs
+            ]
         )
         run(points), run(few)
-        each_point = [1e3 * abs(of("stats", many) - of("stats", few)) / (many - few) for _ in turns]
-        pages = np.transpose([[of("report", count) for count in (points, few)] for _ in turns])
+        each_point = [
+            1e3 * abs(of("stats", many) - of("stats", few)) / (many - few)
+            for _ in turns
+        ]
+        pages = np.transpose(
+            [[of("report", count) for count in (points, few)] for _ in turns]
+        )
         tables = [of("stats --csv", points) for _ in turns]
     helps = [bench.command("plot", "--help")[0] for _ in turns]
-    growths, growth = abs(growing[0] - growing[2]) / abs(growing[1] - growing[2]), "`sim run --no-table`: growth"
+    growths, growth = (
+        abs(growing[0] - growing[2]) / abs(growing[1] - growing[2]),
+        "`sim run --no-table`: growth",
+    )
     (tabled, megabytes), (bare, _) = np.transpose(pairs, (1, 2, 0))
-    medians, name = [float(np.median(tabled)), float(np.median(bare))], "`sim run` of a sweep of 10,000 points"
+    medians, name = (
+        [float(np.median(tabled)), float(np.median(bare))],
+        "`sim run` of a sweep of 10,000 points",
+    )
     return [
-        Row(f"{name}: time", "without its table", "as long", 1.5, middle(tabled / bare), medians),
+        Row(
+            f"{name}: time",
+            "without its table",
+            "as long",
+            1.5,
+            middle(tabled / bare),
+            medians,
+        ),
         absolute(f"{name}: peak memory", list(megabytes), "MB", 300.0),
-        absolute("`sim stats` of 10,000 points, a point", each_point, "ms", 0.3, "`sim stats` of 10 points subtracted"),
+        absolute(
+            "`sim stats` of 10,000 points, a point",
+            each_point,
+            "ms",
+            0.3,
+            "`sim stats` of 10 points subtracted",
+        ),
         absolute("`sim stats --csv` of 1,000 points", tables, "s", 2.0),
         absolute("`sim report` of 1,000 points", pages[0].tolist(), "s", 10.0),
         absolute(
@@ -130,6 +197,11 @@ def sweeps(bench: Bench) -> list[Row]:
             11.0,
             "`sim run` of 10 points subtracted",
         ),
-        absolute("`sim report`: growth from 10 to 1,000 points", (pages[0] / pages[1]).tolist(), "times", 100.0),
+        absolute(
+            "`sim report`: growth from 10 to 1,000 points",
+            (pages[0] / pages[1]).tolist(),
+            "times",
+            100.0,
+        ),
         absolute("`sim plot --help`", helps, "s", 0.1),
     ]

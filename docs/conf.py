@@ -6,12 +6,21 @@ from typing import Any
 from docutils.nodes import SkipNode
 from docutils.utils.math.latex2mathml import tex2mathml
 
-project, author, project_copyright = "sliding-sim", "The sliding-sim developers", "The sliding-sim developers"
+project, author, project_copyright = (
+    "sliding-sim",
+    "The sliding-sim developers",
+    "The sliding-sim developers",
+)
 release = metadata.version("sliding-sim")
 extensions = [
-    "myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.viewcode", "numpydoc", "sphinx_click",
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.viewcode",
+    "numpydoc",
+    "sphinx_click",
     "sphinx_copybutton",
-]  # fmt: skip
+]
 exclude_patterns, templates_path = ["_build", "_templates"], ["_templates"]
 html_theme, html_title = "furo", "sliding-sim"
 html_static_path, html_css_files = ["_static"], ["site.css"]

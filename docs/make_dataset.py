@@ -138,13 +138,37 @@ first, by `ncwa -a contact_load -d contact_load,0`.
 MAPS, PHASES = "record.maps", "a run of several phases"
 COORDINATES = (
     ("t", "s", "t", "time since the start", ""),
-    ("member", "1", "member", "number of the ensemble member", "members differ and each is kept"),
-    ("slip", "1", "slip", "number of the slip event of a member", 'drive.model = "spring", and each member is kept'),
-    ("late", "", "late", "statistic of the members' means over the second half of the run", "members are not kept"),
+    (
+        "member",
+        "1",
+        "member",
+        "number of the ensemble member",
+        "members differ and each is kept",
+    ),
+    (
+        "slip",
+        "1",
+        "slip",
+        "number of the slip event of a member",
+        'drive.model = "spring", and each member is kept',
+    ),
+    (
+        "late",
+        "",
+        "late",
+        "statistic of the members' means over the second half of the run",
+        "members are not kept",
+    ),
     ("phase", "1", "phase", "number of the phase", PHASES),
     ("phase_start", "s", "*sweep*, phase", "time at which a phase begins", PHASES),
     ("phase_end", "s", "*sweep*, phase", "time at which a phase ends", PHASES),
-    ("phase_name", "", "*sweep*, phase", "course of drive and contact in a phase", PHASES),
+    (
+        "phase_name",
+        "",
+        "*sweep*, phase",
+        "course of drive and contact in a phase",
+        PHASES,
+    ),
     ("map_member", "1", "map_member", "member of a map", MAPS),
     ("map_time", "s", "map_time", "time of a map", MAPS),
     ("x", "m", "x", "position along the sliding direction", MAPS),
@@ -171,7 +195,12 @@ def text() -> str:
                 for one in LARGEST
             ),
         ],
-        [*((name, unit, "*sweep*", meaning, "a periodic cell") for name, (unit, meaning) in SYSTEMATIC.items())],
+        [
+            *(
+                (name, unit, "*sweep*", meaning, "a periodic cell")
+                for name, (unit, meaning) in SYSTEMATIC.items()
+            )
+        ],
         [(MAP[0], MAP[1], f"{where}, x, y", MAP[2], MAPS)],
     )
     lines = [HEAD]
@@ -182,7 +211,10 @@ def text() -> str:
             "| name | unit | dimensions | meaning | there if |",
             "| --- " * 5 + "|",
         ]
-        lines += [f"| `{name}` | {unit} | {dims} | {meaning} | {there} |" for name, unit, dims, meaning, there in rows]
+        lines += [
+            f"| `{name}` | {unit} | {dims} | {meaning} | {there} |"
+            for name, unit, dims, meaning, there in rows
+        ]
     return "\n".join(lines) + "\n" + OTHERS
 
 

@@ -43,10 +43,19 @@ Its standard error stands in brackets and refers to the last digits. The command
 figures.
 """
 #: Headings of the index, each with the first of its questions.
-TOPICS = {"uniform_stress": "The sliding contact", "friction_maximum": "Friction", "stick_slip": "Stick-slip",
-          "motor_clutch": "Single bonds", "fixed_grips": "Pull-off", "measured_lens": "Measured data"}  # fmt: skip
+TOPICS = {
+    "uniform_stress": "The sliding contact",
+    "friction_maximum": "Friction",
+    "stick_slip": "Stick-slip",
+    "motor_clutch": "Single bonds",
+    "fixed_grips": "Pull-off",
+    "measured_lens": "Measured data",
+}
 #: Pixels an inch and colours of a picture, the first with which it is small enough, and its bytes.
-FINENESS, MOST_BYTES = ((140, 256), (120, 256), (110, 128), (100, 128), (90, 64)), 60_000
+FINENESS, MOST_BYTES = (
+    ((140, 256), (120, 256), (110, 128), (100, 128), (90, 64)),
+    60_000,
+)
 #: A number of an answer, or one with its standard error.
 Number = float | tuple[float, float]
 
@@ -94,17 +103,26 @@ class Entry(NamedTuple):
         path = f"scenarios/{self.scenario}"
         if self.free:
             free = "".join(f" --free {key}" for key in self.free)
-            table = f"--plan scenarios/{self.points}.csv" if self.points else f"{path}.csv"
+            table = (
+                f"--plan scenarios/{self.points}.csv" if self.points else f"{path}.csv"
+            )
             return [f"sim fit {path}.toml {table}{free} -o outputs/{self.name}"]
-        options = "".join(f" --set '{key}={_toml(value)}'" for key, value in self.changes.items())
+        options = "".join(
+            f" --set '{key}={_toml(value)}'" for key, value in self.changes.items()
+        )
         output = f" -o outputs/{self.name}.nc" if self.name != self.scenario else ""
-        chosen = "".join(f" --where '{key}={value}'" for key, value in self.where.items())
+        chosen = "".join(
+            f" --where '{key}={value}'" for key, value in self.where.items()
+        )
         chosen += "".join(f" --units {unit}" for unit in self.units)
         words = {"start": "from", "stop": "to"}
         chosen += "".join(
-            f" --{words.get(name, name)} {shlex.quote(str(value))}" for name, value in self.choices.items()
+            f" --{words.get(name, name)} {shlex.quote(str(value))}"
+            for name, value in self.choices.items()
         )
-        shown = " ".join(filter(None, ["sim plot", f"outputs/{self.name}.nc", self.kind]))
+        shown = " ".join(
+            filter(None, ["sim plot", f"outputs/{self.name}.nc", self.kind])
+        )
         return [f"sim run {path}.toml{options}{output}", f"{shown}{chosen}"]
 
     def run(self) -> Any:
@@ -125,12 +143,20 @@ class Entry(NamedTuple):
         if self.points:
             figure = planned(result)
         else:
-            figure = fitted(result.problem, result.best) if self.free else sim.plot(result, self.kind, **chosen)
+            figure = (
+                fitted(result.problem, result.best)
+                if self.free
+                else sim.plot(result, self.kind, **chosen)
+            )
         for dpi, colours in FINENESS:
             drawn, small = io.BytesIO(), io.BytesIO()
             figure.savefig(drawn, format="png", dpi=dpi)
-            picture = Image.open(drawn).convert("RGB")  # rare colours, such as those of a bar's ends, stay
-            palette = {"method": Image.Quantize.MAXCOVERAGE, "dither": Image.Dither.NONE}
+            # rare colours, such as those of a bar's ends, stay
+            picture = Image.open(drawn).convert("RGB")
+            palette = {
+                "method": Image.Quantize.MAXCOVERAGE,
+                "dither": Image.Dither.NONE,
+            }
             picture.quantize(colours, **palette).save(small, "png", optimize=True)
             if small.tell() < MOST_BYTES:
                 break
@@ -142,33 +168,58 @@ class Entry(NamedTuple):
         figure = f"![{self.question}]({self.picture.name})"
         scenario = f"[`{self.scenario}.toml`](../../scenarios/{self.scenario}.toml)"
         links = f"Scenario: {scenario}. [All questions](README.md)."
-        answer = textwrap.fill(self.filled(numbers), 120, break_long_words=False, break_on_hyphens=False)
+        answer = textwrap.fill(
+            self.filled(numbers), 120, break_long_words=False, break_on_hyphens=False
+        )
         return f"# {self.question}\n\n{answer}\n\n{figure}\n\n{commands}\n\n{links}\n"
 
     def filled(self, numbers: dict[str, Any]) -> str:
         """Return the answer with its numbers."""
-        shown = {name: concise(*value) if isinstance(value, list | tuple) else value for name, value in numbers.items()}
-        shown = {name: _Certain(value) if isinstance(value, float) else value for name, value in shown.items()}
+        shown = {
+            name: concise(*value) if isinstance(value, list | tuple) else value
+            for name, value in numbers.items()
+        }
+        shown = {
+            name: _Certain(value) if isinstance(value, float) else value
+            for name, value in shown.items()
+        }
         return " ".join(self.answer.format(**shown).split())
 
 
 def _toml(value: Any) -> str:
     """Return a value as an override of the command line."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f'"{key}" = {_toml(inner)}' for key, inner in value.items()) + "}"
+        return (
+            "{"
+            + ", ".join(f'"{key}" = {_toml(inner)}' for key, inner in value.items())
+            + "}"
+        )
     if isinstance(value, list):
         return f"[{', '.join(map(_toml, value))}]"
-    return f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
+    return (
+        f'"{value}"'
+        if isinstance(value, str)
+        else str(value).lower()
+        if isinstance(value, bool)
+        else str(value)
+    )
 
 
-def pair(summary: xr.Dataset, variable: str, factor: float = 1.0, **at: float) -> Number:
+def pair(
+    summary: xr.Dataset, variable: str, factor: float = 1.0, **at: float
+) -> Number:
     """A mean of the statistics with its standard error where it has one, at the records nearest to some values."""
     index = {name: nearest(summary[name], value) for name, value in at.items()}
-    value, error = (factor * float(summary[f"{variable}_{kind}"].isel(index).squeeze()) for kind in ("mean", "sem"))
+    value, error = (
+        factor * float(summary[f"{variable}_{kind}"].isel(index).squeeze())
+        for kind in ("mean", "sem")
+    )
     return (value, error) if error > 0.0 else value
 
 
-def mean(variable: str, dataset: xr.Dataset, factor: float = 1.0, **at: float) -> Number:
+def mean(
+    variable: str, dataset: xr.Dataset, factor: float = 1.0, **at: float
+) -> Number:
     """Mean over the members with its standard error."""
     return pair(statistics(dataset), variable, factor, **at)
 
@@ -205,11 +256,15 @@ def at_speed(dataset: xr.Dataset, speed: float) -> tuple[float, float]:
 ENTRIES: list[Entry] = []
 
 
-def asks(scenario: str, question: str, answer: str, **how: Any) -> Callable[[Reading], Reading]:
+def asks(
+    scenario: str, question: str, answer: str, **how: Any
+) -> Callable[[Reading], Reading]:
     """Add a question; the function below it reads the numbers of its answer from the dataset."""
 
     def add(reading: Reading) -> Reading:
-        ENTRIES.append(Entry(reading.__name__, scenario, question, answer, reading, **how))
+        ENTRIES.append(
+            Entry(reading.__name__, scenario, question, answer, reading, **how)
+        )
         return reading
 
     return add
@@ -228,8 +283,14 @@ def uniform_stress(dataset: xr.Dataset) -> dict[str, Number]:
     radii = 1e6 * dataset["contact_radius"].isel(t=-1, contact_load=-2)
     change = 100.0 * float(abs(radii / radii[0] - 1.0).max())
     friction = 1e3 * dataset["friction_force"].isel(t=-1, contact_load=-2)
-    return {"low": float(stress[0]), "high": float(stress[-1]), "load": float(load[-2]), "radius": float(radii[-1]),
-            "change": change, "friction": float(friction[-1])}  # fmt: skip
+    return {
+        "low": float(stress[0]),
+        "high": float(stress[-1]),
+        "load": float(load[-2]),
+        "radius": float(radii[-1]),
+        "change": change,
+        "friction": float(friction[-1]),
+    }
 
 
 @asks(
@@ -244,11 +305,20 @@ def uniform_stress(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def theories(dataset: xr.Dataset) -> dict[str, Number]:
     place = nearest(dataset["bonds_stress"], 50e3)
-    ratio = 100.0 * statistics(dataset)["area_ratio_mean"].isel(t=-1, bonds_stress=place)
-    numbers = (float(dataset[name]) for name in ("contact_load", "adhesion_work", "sphere_radius"))
-    return {"stress": 1e-3 * float(dataset["bonds_stress"][place]), "share": float(dataset["contact_reversible"][1]),
-            "some": float(ratio[1]), "all": float(ratio[2]),
-            "ends": 1e3 * float(laws.theories.savkoor_briggs_limit(*numbers))}  # fmt: skip
+    ratio = 100.0 * statistics(dataset)["area_ratio_mean"].isel(
+        t=-1, bonds_stress=place
+    )
+    numbers = (
+        float(dataset[name])
+        for name in ("contact_load", "adhesion_work", "sphere_radius")
+    )
+    return {
+        "stress": 1e-3 * float(dataset["bonds_stress"][place]),
+        "share": float(dataset["contact_reversible"][1]),
+        "some": float(ratio[1]),
+        "all": float(ratio[2]),
+        "ends": 1e3 * float(laws.theories.savkoor_briggs_limit(*numbers)),
+    }
 
 
 @asks(
@@ -259,10 +329,19 @@ def theories(dataset: xr.Dataset) -> dict[str, Number]:
     area. A stronger ripple does not reduce the area further.""",
 )
 def masking(dataset: xr.Dataset) -> dict[str, Number]:
-    wavelength, work = float(dataset["shear_spectrum_wavelength"]), float(dataset["adhesion_work"])
-    unit = laws.halfspace.ripple_energy(1.0, 2 * np.pi / wavelength, 0.0, modulus_of(dataset))
+    wavelength, work = (
+        float(dataset["shear_spectrum_wavelength"]),
+        float(dataset["adhesion_work"]),
+    )
+    unit = laws.halfspace.ripple_energy(
+        1.0, 2 * np.pi / wavelength, 0.0, modulus_of(dataset)
+    )
     ratio = 100.0 * statistics(dataset)["area_ratio_mean"].isel(t=-1)
-    return {"amplitude": 1e-3 * float(np.sqrt(work / unit)), "wavelength": 1e6 * wavelength, "hertz": float(ratio[-1])}
+    return {
+        "amplitude": 1e-3 * float(np.sqrt(work / unit)),
+        "wavelength": 1e6 * wavelength,
+        "hertz": float(ratio[-1]),
+    }
 
 
 @asks(
@@ -271,15 +350,24 @@ def masking(dataset: xr.Dataset) -> dict[str, Number]:
     """Yes, it changes the energy by a factor of two. A ripple of {amplitude:g} kPa stores {along:.2f} mJ/m² if it
     runs along the sliding direction. Across it the ripple stores {across:.2f} mJ/m², because the half-space is half
     as stiff there. The area falls from {wide:.1f} to {narrow:.1f} % of JKR's.""",
-    changes={"shear.spectrum.amplitude": "300 kPa",
-             "sweep": {"shear.spectrum.angle": {"from": "0 deg", "to": "90 deg", "count": 19}}},
+    changes={
+        "shear.spectrum.amplitude": "300 kPa",
+        "sweep": {
+            "shear.spectrum.angle": {"from": "0 deg", "to": "90 deg", "count": 19}
+        },
+    },
     units=("deg",),
-)  # fmt: skip
+)
 def direction(dataset: xr.Dataset) -> dict[str, Number]:
     energy = 1e3 * dataset["fluctuation_energy"].isel(t=-1)
     ratio = 100.0 * statistics(dataset)["area_ratio_mean"].isel(t=-1)
-    return {"amplitude": 1e-3 * float(dataset["shear_spectrum_amplitude"]), "along": float(energy[0]),
-            "across": float(energy[-1]), "wide": float(ratio[0]), "narrow": float(ratio[-1])}  # fmt: skip
+    return {
+        "amplitude": 1e-3 * float(dataset["shear_spectrum_amplitude"]),
+        "along": float(energy[0]),
+        "across": float(energy[-1]),
+        "wide": float(ratio[0]),
+        "narrow": float(ratio[-1]),
+    }
 
 
 @asks(
@@ -291,10 +379,17 @@ def direction(dataset: xr.Dataset) -> dict[str, Number]:
     [behind a spring](pdms_lens_spring.md) nothing prescribes it.""",
 )
 def pdms_lens(dataset: xr.Dataset) -> dict[str, Number]:
-    (slow, slower), (fast, faster) = (at_speed(dataset, speed) for speed in (1e-3, 8e-3))
-    return {"slow": 1e3 * slower, "fast": 1e3 * faster, "kept": mean("area_ratio", dataset, 100.0, t=slow),
-            "left": mean("area_ratio", dataset, 100.0, t=fast), "bonds": share("lost_to_bonds", dataset, t=fast),
-            "fluctuations": share("lost_to_fluctuations", dataset, t=fast)}  # fmt: skip
+    (slow, slower), (fast, faster) = (
+        at_speed(dataset, speed) for speed in (1e-3, 8e-3)
+    )
+    return {
+        "slow": 1e3 * slower,
+        "fast": 1e3 * faster,
+        "kept": mean("area_ratio", dataset, 100.0, t=slow),
+        "left": mean("area_ratio", dataset, 100.0, t=fast),
+        "bonds": share("lost_to_bonds", dataset, t=fast),
+        "fluctuations": share("lost_to_fluctuations", dataset, t=fast),
+    }
 
 
 @asks(
@@ -307,12 +402,24 @@ def pdms_lens(dataset: xr.Dataset) -> dict[str, Number]:
 def decomposition(dataset: xr.Dataset) -> dict[str, Number]:
     then, speed = at_speed(dataset, 8e-3)
     left = [
-        mean("area_ratio", dataset, 100.0, t=then, adhesion_bond_share=bonds, shear_paid_by_adhesion=paid)
+        mean(
+            "area_ratio",
+            dataset,
+            100.0,
+            t=then,
+            adhesion_bond_share=bonds,
+            shear_paid_by_adhesion=paid,
+        )
         for bonds, paid in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
     ]
     bonds, fluctuations = (float(np.max(each)) for each in left[:2])
-    return {"speed": 1e3 * speed, "bonds": left[0], "fluctuations": left[1],
-            "both": left[2], "product": 0.01 * bonds * fluctuations}  # fmt: skip
+    return {
+        "speed": 1e3 * speed,
+        "bonds": left[0],
+        "fluctuations": left[1],
+        "both": left[2],
+        "product": 0.01 * bonds * fluctuations,
+    }
 
 
 @asks(
@@ -324,12 +431,18 @@ def decomposition(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def soft_lens(dataset: xr.Dataset) -> dict[str, Number]:
     rms = 30e3
-    late = analysis.summary(analysis.settled(analysis.observables(dataset))).sel(shear_spectrum_rms=rms)
+    late = analysis.summary(analysis.settled(analysis.observables(dataset))).sel(
+        shear_spectrum_rms=rms
+    )
     work = analysis.bond_work(dataset).isel(t=-1)
-    return {"modulus": 1e-6 * modulus_of(dataset),
-            "width": 2e3 * float(dataset["radius_at_rest"].max()), "rms": 1e-3 * rms,
-            "masked": pair(late, "fraction_masked", 100.0), "energy": pair(late, "fluctuation_energy", 1e3),
-            "work": 1e3 * float(work.max())}  # fmt: skip
+    return {
+        "modulus": 1e-6 * modulus_of(dataset),
+        "width": 2e3 * float(dataset["radius_at_rest"].max()),
+        "rms": 1e-3 * rms,
+        "masked": pair(late, "fraction_masked", 100.0),
+        "energy": pair(late, "fluctuation_energy", 1e3),
+        "work": 1e3 * float(work.max()),
+    }
 
 
 @asks(
@@ -341,11 +454,19 @@ def soft_lens(dataset: xr.Dataset) -> dict[str, Number]:
     waves along a side.""",
 )
 def ten_wavelengths(dataset: xr.Dataset) -> dict[str, Number]:
-    area, ratio = (dataset["contact_area"].isel(t=-1), statistics(dataset)["area_ratio_quantile"].isel(t=-1))
+    area, ratio = (
+        dataset["contact_area"].isel(t=-1),
+        statistics(dataset)["area_ratio_quantile"].isel(t=-1),
+    )
     count = dataset.sizes["member"]
     spread = 100.0 * (area.std("member", ddof=1) / area.mean("member")).to_numpy()
-    three, ten, thirty = ((float(each), float(each) / np.sqrt(2.0 * (count - 1))) for each in spread)
-    low, high = (100.0 * float(ratio.isel(shear_spectrum_longest=1).sel(quantile=level)) for level in (0.05, 0.95))
+    three, ten, thirty = (
+        (float(each), float(each) / np.sqrt(2.0 * (count - 1))) for each in spread
+    )
+    low, high = (
+        100.0 * float(ratio.isel(shear_spectrum_longest=1).sel(quantile=level))
+        for level in (0.05, 0.95)
+    )
     return {"three": three, "ten": ten, "thirty": thirty, "low": low, "high": high}
 
 
@@ -370,8 +491,12 @@ def stress_map(dataset: xr.Dataset) -> dict[str, Number]:
     cell = float(dataset["x"][1] - dataset["x"][0]) * dataset.sizes["x"]
     modulus = modulus_of(dataset)
     moved = laws.halfspace.displacement(stress.to_numpy(), cell, modulus)
-    return {"rms": 1e-3 * float(stress.std()), "moved": 1e6 * float(np.std(moved)),
-            "energy": 1e3 * float(laws.halfspace.surface_energy(stress.to_numpy(), cell, modulus))}  # fmt: skip
+    return {
+        "rms": 1e-3 * float(stress.std()),
+        "moved": 1e6 * float(np.std(moved)),
+        "energy": 1e3
+        * float(laws.halfspace.surface_energy(stress.to_numpy(), cell, modulus)),
+    }
 
 
 @asks(
@@ -384,8 +509,12 @@ def stress_map(dataset: xr.Dataset) -> dict[str, Number]:
 def friction_maximum(dataset: xr.Dataset) -> dict[str, Number]:
     top = int(dataset["shear_stress"].argmax("t"))
     left = float(statistics(dataset)["area_ratio_mean"][top])
-    return {"stress": 1e-3 * float(dataset["peak_stress"]), "speed": 1e3 * float(dataset["speed"][top]),
-            "bound": 100.0 * float(dataset["bond_fraction"][top]), "lost": 100.0 - 100.0 * left}  # fmt: skip
+    return {
+        "stress": 1e-3 * float(dataset["peak_stress"]),
+        "speed": 1e3 * float(dataset["speed"][top]),
+        "bound": 100.0 * float(dataset["bond_fraction"][top]),
+        "lost": 100.0 - 100.0 * left,
+    }
 
 
 @asks(
@@ -397,12 +526,23 @@ def friction_maximum(dataset: xr.Dataset) -> dict[str, Number]:
     {short:g} s it has {share:.0f} % of that height. A single rebinding rate gives no logarithm of time.""",
 )
 def static_peak(dataset: xr.Dataset) -> dict[str, Number]:
-    peak, rest, speed = (dataset[name] for name in ("peak_stress", "drive_rest", "drive_speed"))
+    peak, rest, speed = (
+        dataset[name] for name in ("peak_stress", "drive_rest", "drive_speed")
+    )
     longest, shortest = 1e-3 * peak.isel(drive_rest=-1), 1e-3 * peak.isel(drive_rest=0)
-    first, last = (float(longest[k + 2] - longest[k]) for k in (0, -3))  # two speeds a decade
-    return {"rest": float(rest[-1]), "short": float(rest[0]), "slower": 1e6 * float(speed[0]),
-            "faster": 1e6 * float(speed[-1]), "slow": float(longest[0]), "fast": float(longest[-1]),
-            "share": 100.0 * float(shortest[-1] / longest[-1]), "first": first, "last": last}  # fmt: skip
+    # two speeds a decade
+    first, last = (float(longest[k + 2] - longest[k]) for k in (0, -3))
+    return {
+        "rest": float(rest[-1]),
+        "short": float(rest[0]),
+        "slower": 1e6 * float(speed[0]),
+        "faster": 1e6 * float(speed[-1]),
+        "slow": float(longest[0]),
+        "fast": float(longest[-1]),
+        "share": 100.0 * float(shortest[-1] / longest[-1]),
+        "first": first,
+        "last": last,
+    }
 
 
 @asks(
@@ -415,16 +555,35 @@ def static_peak(dataset: xr.Dataset) -> dict[str, Number]:
     kind="time",
 )
 def velocity_step(dataset: xr.Dataset) -> dict[str, Number]:
-    force, stage = (dataset[name].isel(member=0).to_numpy() for name in ("friction_force", "stage_speed"))
+    force, stage = (
+        dataset[name].isel(member=0).to_numpy()
+        for name in ("friction_force", "stage_speed")
+    )
     up, down = (int(place) + 1 for place in np.flatnonzero(np.diff(stage))[[0, -1]])
     top = up + int(np.argmax(force[up:down]))
-    position, settled = 1e6 * dataset["slider_position"].isel(member=0).to_numpy(), force[down - 1]
-    left = up + int(np.flatnonzero(np.abs(force[up:down] - settled) > (force[top] - settled) / np.e)[-1]) + 1
-    return {"slow": 1e3 * float(stage[0]), "fast": 1e3 * float(stage[up]), "before": 1e3 * float(force[0]),
-            "peak": 1e3 * float(force[top]), "settled": 1e3 * float(force[down - 1]),
-            "after": 1e3 * float(dataset["t"][top] - dataset["t"][up - 1]),
-            "length": float(position[left] - position[up - 1]),
-            "last": 1e3 * float(force[down:].min())}  # fmt: skip
+    position, settled = (
+        1e6 * dataset["slider_position"].isel(member=0).to_numpy(),
+        force[down - 1],
+    )
+    left = (
+        up
+        + int(
+            np.flatnonzero(
+                np.abs(force[up:down] - settled) > (force[top] - settled) / np.e
+            )[-1]
+        )
+        + 1
+    )
+    return {
+        "slow": 1e3 * float(stage[0]),
+        "fast": 1e3 * float(stage[up]),
+        "before": 1e3 * float(force[0]),
+        "peak": 1e3 * float(force[top]),
+        "settled": 1e3 * float(force[down - 1]),
+        "after": 1e3 * float(dataset["t"][top] - dataset["t"][up - 1]),
+        "length": float(position[left] - position[up - 1]),
+        "last": 1e3 * float(force[down:].min()),
+    }
 
 
 @asks(
@@ -438,11 +597,15 @@ def friction_loop(dataset: xr.Dataset) -> dict[str, Number]:
     member = dataset.isel(member=0)
     turns = np.flatnonzero(np.diff(np.sign(member["stage_speed"].to_numpy())[1:])) + 1
     stage, slider, work = (
-        member[name].to_numpy()[turns] for name in ("stage_position", "slider_position", "drive_work")
+        member[name].to_numpy()[turns]
+        for name in ("stage_position", "slider_position", "drive_work")
     )
-    return {"stage": 1e6 * abs(float(stage[2] - stage[1])), "slider": 1e6 * abs(float(slider[2] - slider[1])),
-            "force": 1e3 * float(abs(member["friction_force"]).max()),
-            "work": 1e6 * float(work[2] - work[1])}  # fmt: skip
+    return {
+        "stage": 1e6 * abs(float(stage[2] - stage[1])),
+        "slider": 1e6 * abs(float(slider[2] - slider[1])),
+        "force": 1e3 * float(abs(member["friction_force"]).max()),
+        "work": 1e6 * float(work[2] - work[1]),
+    }
 
 
 @asks(
@@ -453,15 +616,32 @@ def friction_loop(dataset: xr.Dataset) -> dict[str, Number]:
     after {soon:.1f} ms.""",
 )
 def creep(dataset: xr.Dataset) -> dict[str, Number]:
-    names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate", "site_density")
+    names = (
+        "rupture_zero_force_rate",
+        "rupture_bell_force",
+        "bond_stiffness",
+        "rebinding_rate",
+        "site_density",
+    )
     area = np.pi * float(dataset["radius_at_rest"].max()) ** 2
-    most = laws.schallamach.first_moment_peak(*(float(dataset[f"bonds_{name}"]) for name in names)).stress * area
+    most = (
+        laws.schallamach.first_moment_peak(
+            *(float(dataset[f"bonds_{name}"]) for name in names)
+        ).stress
+        * area
+    )
     force, last = 1e3 * dataset["drive_force"].to_numpy(), dataset.isel(member=0, t=-1)
     gone = np.flatnonzero(last["runaway_time"].notnull())
     speed, ends = 1e3 * last["speed"].to_numpy(), 1e3 * last["runaway_time"].to_numpy()
-    return {"most": 1e3 * float(most), "held": float(force[gone[0] - 1]), "creep": float(speed[gone[0] - 1]),
-            "more": float(force[gone[0]]), "late": float(ends[gone[0]]), "much": float(force[-1]),
-            "soon": float(ends[-1])}  # fmt: skip
+    return {
+        "most": 1e3 * float(most),
+        "held": float(force[gone[0] - 1]),
+        "creep": float(speed[gone[0] - 1]),
+        "more": float(force[gone[0]]),
+        "late": float(ends[gone[0]]),
+        "much": float(force[-1]),
+        "soon": float(ends[-1]),
+    }
 
 
 @asks(
@@ -475,12 +655,31 @@ def creep(dataset: xr.Dataset) -> dict[str, Number]:
     kind="incipient",
 )
 def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
-    pulls, load = analysis.events(dataset).isel(member=0), 1e3 * dataset["contact_load"].to_numpy()
-    lost, area = 100.0 * (1.0 - pulls["area_at_threshold"].to_numpy()), dataset["contact_area"].isel(member=0, t=0)
-    curves = zip(*(dataset[name].isel(member=0).to_numpy() for name in ("spring_force", "contact_area")), strict=True)
-    power = np.polyfit(np.log(area), np.log([incipient_law(*curve)[1] for curve in curves]), 1)[0]
-    return {"small": float(lost[0]), "least": float(load[0]), "large": float(lost[-1]), "load": float(load[-1]),
-            "power": float(power)}  # fmt: skip
+    pulls, load = (
+        analysis.events(dataset).isel(member=0),
+        1e3 * dataset["contact_load"].to_numpy(),
+    )
+    lost, area = (
+        100.0 * (1.0 - pulls["area_at_threshold"].to_numpy()),
+        dataset["contact_area"].isel(member=0, t=0),
+    )
+    curves = zip(
+        *(
+            dataset[name].isel(member=0).to_numpy()
+            for name in ("spring_force", "contact_area")
+        ),
+        strict=True,
+    )
+    power = np.polyfit(
+        np.log(area), np.log([incipient_law(*curve)[1] for curve in curves]), 1
+    )[0]
+    return {
+        "small": float(lost[0]),
+        "least": float(load[0]),
+        "large": float(lost[-1]),
+        "load": float(load[-1]),
+        "power": float(power),
+    }
 
 
 @asks(
@@ -493,17 +692,36 @@ def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
     kind="time",
 )
 def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
-    names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate", "site_density")
-    peak = laws.schallamach.first_moment_peak(*(float(dataset[f"bonds_{name}"]) for name in names))
+    names = (
+        "rupture_zero_force_rate",
+        "rupture_bell_force",
+        "bond_stiffness",
+        "rebinding_rate",
+        "site_density",
+    )
+    peak = laws.schallamach.first_moment_peak(
+        *(float(dataset[f"bonds_{name}"]) for name in names)
+    )
     run = dataset.isel(member=0)
-    end = float(run["slip_end"].min())  # the first event begins at the maximum of friction, long before it slips
-    mean, last = analysis.slips(run).isel(slip=slice(1, None)).mean("slip"), float(run["slip_time"].max())
+    # the first event begins at the maximum of friction, long before it slips
+    end = float(run["slip_end"].min())
+    mean, last = (
+        analysis.slips(run).isel(slip=slice(1, None)).mean("slip"),
+        float(run["slip_time"].max()),
+    )
     stage = run.sel(t=slice(end, last))
-    path, work = (float(stage[name][-1] - stage[name][0]) for name in ("stage_position", "drive_work"))
-    return {"onset": 1e3 * float(stage["stage_speed"][0]), "peak": 1e3 * float(peak.speed),
-            "drop": 1e3 * float(mean["force_drop"]), "slip": 1e6 * float(mean["slip_amplitude"]),
-            "static": 1e3 * float(mean["static_friction"]),
-            "kinetic": 1e3 * work / path}  # fmt: skip
+    path, work = (
+        float(stage[name][-1] - stage[name][0])
+        for name in ("stage_position", "drive_work")
+    )
+    return {
+        "onset": 1e3 * float(stage["stage_speed"][0]),
+        "peak": 1e3 * float(peak.speed),
+        "drop": 1e3 * float(mean["force_drop"]),
+        "slip": 1e6 * float(mean["slip_amplitude"]),
+        "static": 1e3 * float(mean["static_friction"]),
+        "kinetic": 1e3 * work / path,
+    }
 
 
 @asks(
@@ -516,10 +734,20 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     kind="stability",
 )
 def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
-    events, stiffness = analysis.stick_slip(dataset).isel(member=0), dataset["drive_stiffness"].to_numpy()
-    up, down = (1e3 * float(events[name][0]) for name in ("slips_from", "slips_down_to"))
+    events, stiffness = (
+        analysis.stick_slip(dataset).isel(member=0),
+        dataset["drive_stiffness"].to_numpy(),
+    )
+    up, down = (
+        1e3 * float(events[name][0]) for name in ("slips_from", "slips_down_to")
+    )
     calm = events["slips_down_to"].isnull().to_numpy()
-    return {"soft": float(stiffness[0]), "up": up, "down": down, "stiff": float(stiffness[np.argmax(calm)])}
+    return {
+        "soft": float(stiffness[0]),
+        "up": up,
+        "down": down,
+        "stiff": float(stiffness[np.argmax(calm)]),
+    }
 
 
 @asks(
@@ -535,12 +763,19 @@ def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
     late = analysis.distribution(dataset)
     slow, fast = (late.sel(drive_stage=speed) for speed in (2e-3, 3e-3))
     names = {"before": slow, "after": fast}
-    numbers: dict[str, Number] = {name: pair(each, "area_ratio", 100.0) for name, each in names.items()}
-    return numbers | {"slow": 2.0, "fast": 3.0, "bonds": pair(fast, "lost_to_bonds", 100.0),
-                    "bonded": pair(slow, "lost_to_bonds", 100.0), "noise": pair(fast, "lost_to_fluctuations", 100.0),
-                    "calm": pair(slow, "lost_to_fluctuations", 100.0),
-                    "rms": 1e-3 * float(dataset["shear_spectrum_rms"]),
-                    "length": 1e6 * float(dataset["shear_correlation_length"])}  # fmt: skip
+    numbers: dict[str, Number] = {
+        name: pair(each, "area_ratio", 100.0) for name, each in names.items()
+    }
+    return numbers | {
+        "slow": 2.0,
+        "fast": 3.0,
+        "bonds": pair(fast, "lost_to_bonds", 100.0),
+        "bonded": pair(slow, "lost_to_bonds", 100.0),
+        "noise": pair(fast, "lost_to_fluctuations", 100.0),
+        "calm": pair(slow, "lost_to_fluctuations", 100.0),
+        "rms": 1e-3 * float(dataset["shear_spectrum_rms"]),
+        "length": 1e6 * float(dataset["shear_correlation_length"]),
+    }
 
 
 @asks(
@@ -558,13 +793,28 @@ def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
 def slip_event(dataset: xr.Dataset) -> dict[str, Number]:
     shown = dataset.sel(drive_stage=3e-3, member=0)
     event = int(np.argmax(shown["slip_time"].to_numpy() > 1.0))
-    begin, end, moved = (float(shown[f"slip_{name}"][event]) for name in ("time", "end", "amplitude"))
-    force = {name: 1e3 * float(shown[f"slip_force_{name}"][event]) for name in ("before", "after")}
+    begin, end, moved = (
+        float(shown[f"slip_{name}"][event]) for name in ("time", "end", "amplitude")
+    )
+    force = {
+        name: 1e3 * float(shown[f"slip_force_{name}"][event])
+        for name in ("before", "after")
+    }
     within = shown.sel(t=slice(begin, end))
     least = within.isel(t=int(within["contact_radius"].argmin("t")))
-    area, left = (100.0 * float(least[name] / least["jkr_radius"]) ** 2 for name in ("contact_radius", "bonds_radius"))
-    return force | {"speed": 3.0, "time": 1e3 * begin, "slip": 1e6 * moved, "lasts": 1e3 * (end - begin),
-                    "small": area, "bonds": 100.0 - left, "noise": left - area}  # fmt: skip
+    area, left = (
+        100.0 * float(least[name] / least["jkr_radius"]) ** 2
+        for name in ("contact_radius", "bonds_radius")
+    )
+    return force | {
+        "speed": 3.0,
+        "time": 1e3 * begin,
+        "slip": 1e6 * moved,
+        "lasts": 1e3 * (end - begin),
+        "small": area,
+        "bonds": 100.0 - left,
+        "noise": left - area,
+    }
 
 
 @asks(
@@ -578,17 +828,25 @@ def slip_event(dataset: xr.Dataset) -> dict[str, Number]:
     kind="sweep",
 )
 def motor_clutch(dataset: xr.Dataset) -> dict[str, Number]:
-    late = analysis.summary(analysis.settled(dataset[["friction_force"]]), quantiles=False)
+    late = analysis.summary(
+        analysis.settled(dataset[["friction_force"]]), quantiles=False
+    )
     stiffness, best = (
         dataset["drive_contact_stiffness"].to_numpy(),
         int(np.argmax(late["friction_force_mean"].to_numpy())),
     )
     at = {"most": best, "softly": 0, "stiffly": -1}
-    numbers = {name: pair(late.isel(drive_contact_stiffness=k), "friction_force", 1e12) for name, k in at.items()}
+    numbers = {
+        name: pair(late.isel(drive_contact_stiffness=k), "friction_force", 1e12)
+        for name, k in at.items()
+    }
     borne = np.array(numbers["stiffly"])
     numbers["glides"] = 120.0 - 1.2 * float(borne[0]), 1.2 * float(borne[1])
     numbers["motors"] = 1e12 * float(dataset["drive_force"])
-    return numbers | {name: 1e3 * float(stiffness[k]) for name, k in (("best", best), ("soft", 0), ("stiff", -1))}
+    return numbers | {
+        name: 1e3 * float(stiffness[k])
+        for name, k in (("best", best), ("soft", 0), ("stiff", -1))
+    }
 
 
 @asks(
@@ -602,10 +860,16 @@ def bond_noise(dataset: xr.Dataset) -> dict[str, Number]:
     energy = dataset["fluctuation_energy"].max("shear_paid_by_adhesion")
     work, top = float(dataset["adhesion_work"]), int(energy.argmax("t"))
     area = dataset["contact_area"]
-    moved = 1.0 - area.isel(shear_paid_by_adhesion=1) / area.isel(shear_paid_by_adhesion=0)
+    moved = 1.0 - area.isel(shear_paid_by_adhesion=1) / area.isel(
+        shear_paid_by_adhesion=0
+    )
     fraction = dataset["bond_fraction"].isel(t=top).min()
-    return {"energy": 1e3 * float(energy[top]), "part": 100.0 * float(energy[top]) / work,
-            "bonds": 100.0 - 100.0 * float(fraction), "moved": 100.0 * float(moved.max())}  # fmt: skip
+    return {
+        "energy": 1e3 * float(energy[top]),
+        "part": 100.0 * float(energy[top]) / work,
+        "bonds": 100.0 - 100.0 * float(fraction),
+        "moved": 100.0 * float(moved.max()),
+    }
 
 
 @asks(
@@ -617,12 +881,21 @@ def bond_noise(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def fixed_grips(dataset: xr.Dataset) -> dict[str, Number]:
     depth, over_members = dataset["contact_indentation"], statistics(dataset)
-    high, deep = over_members.isel(contact_indentation=0), over_members.isel(contact_indentation=-1, t=-1)
+    high, deep = (
+        over_members.isel(contact_indentation=0),
+        over_members.isel(contact_indentation=-1, t=-1),
+    )
     off = pair(high, "first_detachment", 1e3)
     then = 1e-3 * (off[0] if isinstance(off, tuple) else off)
-    return {"deep": 1e6 * float(depth[-1]), "high": 1e6 * float(depth[0]), "kept": pair(deep, "area_ratio", 100.0),
-            "speed": 1e3 * float(speeds(dataset)[-1]), "open": pair(high, "ever_detached", 100.0), "off": off,
-            "at": 1e3 * float(speeds(dataset).sel(t=then, method="nearest"))}  # fmt: skip
+    return {
+        "deep": 1e6 * float(depth[-1]),
+        "high": 1e6 * float(depth[0]),
+        "kept": pair(deep, "area_ratio", 100.0),
+        "speed": 1e3 * float(speeds(dataset)[-1]),
+        "open": pair(high, "ever_detached", 100.0),
+        "off": off,
+        "at": 1e3 * float(speeds(dataset).sel(t=then, method="nearest")),
+    }
 
 
 @asks(
@@ -636,8 +909,13 @@ def fixed_grips(dataset: xr.Dataset) -> dict[str, Number]:
 def pull_off(dataset: xr.Dataset) -> dict[str, Number]:
     lost = 1e9 * analysis.loop_energy(dataset)["loop_dissipation"].mean("cycle")
     stiffness = dataset["contact_stiffness"]
-    return {"pull": -1e3 * float(dataset["pull_off_load"].min()), "soft": float(lost[0]), "stiff": float(lost[-1]),
-            "softest": float(stiffness[0]), "stiffest": float(stiffness[-1])}  # fmt: skip
+    return {
+        "pull": -1e3 * float(dataset["pull_off_load"].min()),
+        "soft": float(lost[0]),
+        "stiff": float(lost[-1]),
+        "softest": float(stiffness[0]),
+        "stiffest": float(stiffness[-1]),
+    }
 
 
 @asks(
@@ -651,9 +929,14 @@ def peeling(dataset: xr.Dataset) -> dict[str, Number]:
     pull, speed = -1e3 * dataset["pull_off_load"], dataset["contact_front_speed"]
     work, size = float(dataset["adhesion_work"]), float(dataset["sphere_radius"])
     lost = 1e9 * analysis.loop_energy(dataset)["loop_dissipation"].mean("cycle")
-    return {"fast": 1e3 * float(speed[-1]), "slow": 1e6 * float(speed[0]), "quick": float(pull[-1]),
-            "slack": float(pull[0]), "lost": float(lost[0]),
-            "times": float(pull[0]) / (-1e3 * float(laws.jkr.pull_off_load(work, size)))}  # fmt: skip
+    return {
+        "fast": 1e3 * float(speed[-1]),
+        "slow": 1e6 * float(speed[0]),
+        "quick": float(pull[-1]),
+        "slack": float(pull[0]),
+        "lost": float(lost[0]),
+        "times": float(pull[0]) / (-1e3 * float(laws.jkr.pull_off_load(work, size))),
+    }
 
 
 @asks(
@@ -667,8 +950,12 @@ def afm_tip(dataset: xr.Dataset) -> dict[str, Number]:
     last, load = dataset.isel(t=-1), dataset["contact_load"]
     force = 1e9 * last["friction_force"].where(last["in_contact"] == 1, drop=True)
     zero = 1e9 * last["friction_force"][nearest(load, 0.0)]
-    return {"stress": 1e-9 * float(last["shear_stress"].max()), "off": 1e9 * float(dataset["jkr_pull_off_load"].max()),
-            "friction": float(force[0]), "zero": float(zero)}  # fmt: skip
+    return {
+        "stress": 1e-9 * float(last["shear_stress"].max()),
+        "off": 1e9 * float(dataset["jkr_pull_off_load"].max()),
+        "friction": float(force[0]),
+        "zero": float(zero),
+    }
 
 
 @asks(
@@ -684,9 +971,13 @@ def measured_lens(fit: Fit) -> dict[str, Number]:
     speed, stress = fit.numbers
     ends = {"slowest": speed.interval.low, "fastest": speed.interval.high}
     heights = {"least": stress.interval.low, "most": stress.interval.high}
-    return {"speed": (1e3 * speed.value, 1e3 * speed.error), "stress": (1e-3 * stress.value, 1e-3 * stress.error),
-            "level": 100.0 * LEVEL, **{name: 1e3 * end for name, end in ends.items()},
-            **{name: 1e-3 * end for name, end in heights.items()}}  # fmt: skip
+    return {
+        "speed": (1e3 * speed.value, 1e3 * speed.error),
+        "stress": (1e-3 * stress.value, 1e-3 * stress.error),
+        "level": 100.0 * LEVEL,
+        **{name: 1e3 * end for name, end in ends.items()},
+        **{name: 1e-3 * end for name, end in heights.items()},
+    }
 
 
 @asks(
@@ -700,11 +991,18 @@ def measured_lens(fit: Fit) -> dict[str, Number]:
 )
 def jkr_fit(fit: Fit) -> dict[str, Number]:
     work, young = fit.numbers
-    contact = 1e-6 * fit.scenario.solid.contact_modulus / young.value  # MPa for a Pa of Young's modulus
-    return {"work": (1e3 * work.value, 1e3 * work.error), "level": 100.0 * LEVEL,
-            "least": 1e3 * work.interval.low, "most": 1e3 * work.interval.high,
-            "modulus": (contact * young.value, contact * young.error), "softest": contact * young.interval.low,
-            "stiffest": contact * young.interval.high, "together": float(fit.correlations[0, 1])}  # fmt: skip
+    # MPa for a Pa of Young's modulus
+    contact = 1e-6 * fit.scenario.solid.contact_modulus / young.value
+    return {
+        "work": (1e3 * work.value, 1e3 * work.error),
+        "level": 100.0 * LEVEL,
+        "least": 1e3 * work.interval.low,
+        "most": 1e3 * work.interval.high,
+        "modulus": (contact * young.value, contact * young.error),
+        "softest": contact * young.interval.low,
+        "stiffest": contact * young.interval.high,
+        "together": float(fit.correlations[0, 1]),
+    }
 
 
 @asks(
@@ -719,11 +1017,24 @@ def jkr_fit(fit: Fit) -> dict[str, Number]:
     points="pdms_lens_points",
 )
 def next_point(plan: Plan) -> dict[str, Number]:
-    best, names = plan.points[0], {"both": WHOLE, "bonds": "bonds only", "fluctuations": "fluctuations only"}
-    probabilities = {name: tuple(plan.probabilities[truth]) for name, truth in names.items()}
-    further = {f"{name}_next": tuple(best.probabilities[truth]) for name, truth in names.items()}
+    best, names = (
+        plan.points[0],
+        {"both": WHOLE, "bonds": "bonds only", "fluctuations": "fluctuations only"},
+    )
+    probabilities = {
+        name: tuple(plan.probabilities[truth]) for name, truth in names.items()
+    }
+    further = {
+        f"{name}_next": tuple(best.probabilities[truth])
+        for name, truth in names.items()
+    }
     error = 100.0 * float(np.median(plan.problem.sigma / plan.problem.values))
-    return {"speed": 1e3 * best.conditions["speed"], "error": error, **probabilities, **further}
+    return {
+        "speed": 1e3 * best.conditions["speed"],
+        "error": error,
+        **probabilities,
+        **further,
+    }
 
 
 @asks(
@@ -735,16 +1046,35 @@ def next_point(plan: Plan) -> dict[str, Number]:
     made-up record, [jkr_test.csv](../../scenarios/jkr_test.csv).""",
 )
 def jkr_test(dataset: xr.Dataset) -> dict[str, Number]:
-    size, modulus = float(dataset["sphere_radius"]), float(dataset["contact_modulus"].max())
-    load, top = dataset["normal_load"].isel(contact_front_speed=0), int(dataset["normal_load"].argmax("t")[0])
-    held = np.flatnonzero(np.isclose(load, 1e-3, rtol=1e-9))  # up to the ends of the two stays at this load
+    size, modulus = (
+        float(dataset["sphere_radius"]),
+        float(dataset["contact_modulus"].max()),
+    )
+    load, top = (
+        dataset["normal_load"].isel(contact_front_speed=0),
+        int(dataset["normal_load"].argmax("t")[0]),
+    )
+    # up to the ends of the two stays at this load
+    held = np.flatnonzero(np.isclose(load, 1e-3, rtol=1e-9))
     ends = [int(held[held < top][-1]), int(held[-1])]
-    radius = dataset["contact_radius"].isel(t=ends).transpose("contact_front_speed", "t").to_numpy()
+    radius = (
+        dataset["contact_radius"]
+        .isel(t=ends)
+        .transpose("contact_front_speed", "t")
+        .to_numpy()
+    )
     read = 1e3 * laws.jkr.energy_release_rate(radius, 1e-3, size, modulus)
     speed = 1e6 * dataset["contact_front_speed"]
-    return {"load": 1.0, "loading": read[0, 0], "unloading": read[0, 1], "closer": read[-1, 0],
-            "nearer": read[-1, 1], "work": 1e3 * float(dataset["adhesion_work"]), "speed": float(speed[0]),
-            "faster": float(speed[-1])}  # fmt: skip
+    return {
+        "load": 1.0,
+        "loading": read[0, 0],
+        "unloading": read[0, 1],
+        "closer": read[-1, 0],
+        "nearer": read[-1, 1],
+        "work": 1e3 * float(dataset["adhesion_work"]),
+        "speed": float(speed[0]),
+        "faster": float(speed[-1]),
+    }
 
 
 @asks(
@@ -757,11 +1087,19 @@ def jkr_test(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def own_psd(dataset: xr.Dataset) -> dict[str, Number]:
     rms, work = 100.0, 1e3 * float(dataset["adhesion_work"])
-    at, late = {"shear_spectrum_rms": 1e3 * rms}, distribution(dataset, ("fluctuation_energy", "area_ratio"))
+    at, late = (
+        {"shear_spectrum_rms": 1e3 * rms},
+        distribution(dataset, ("fluctuation_energy", "area_ratio")),
+    )
     energy = pair(late, "fluctuation_energy", 1e3, **at)
     stored = energy[0] if isinstance(energy, tuple) else energy
-    return {"rms": rms, "work": work, "energy": energy, "share": pair(late, "area_ratio", 100.0, **at),
-            "lost": rms * float(np.sqrt(work / stored))}  # fmt: skip
+    return {
+        "rms": rms,
+        "work": work,
+        "energy": energy,
+        "share": pair(late, "area_ratio", 100.0, **at),
+        "lost": rms * float(np.sqrt(work / stored)),
+    }
 
 
 @asks(
@@ -780,12 +1118,19 @@ def own_map(dataset: xr.Dataset) -> dict[str, Number]:
         100.0 * dataset["contact_area"] / (np.pi * dataset["jkr_radius"] ** 2),
     )
     paid = 1e3 * (dataset["adhesion_work"] - dataset["work_of_adhesion"])
-    ends = {"low": energy.min(), "high": energy.max(), "least": paid.min(), "most": paid.max(),
-            "small": area.min(), "large": area.max()}  # fmt: skip
+    ends = {
+        "low": energy.min(),
+        "high": energy.max(),
+        "least": paid.min(),
+        "most": paid.max(),
+        "small": area.min(),
+        "large": area.max(),
+    }
     modulus = modulus_of(dataset)
     return {name: float(value) for name, value in ends.items()} | {
-        "whole": 1e3 * field.surface_energy(modulus), "radial": 1e3 * float(field.spectrum.surface_energy(modulus))
-    }  # fmt: skip
+        "whole": 1e3 * field.surface_energy(modulus),
+        "radial": 1e3 * float(field.spectrum.surface_energy(modulus)),
+    }
 
 
 @asks(
@@ -798,7 +1143,9 @@ def own_map(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def pattern(dataset: xr.Dataset) -> dict[str, Number]:
     field = sim.load(ROOT / "scenarios" / "own_map.toml").shear.field
-    width = 2e6 * float(dataset["contact_radius"].sel(t=dataset["map_time"][-1], method="nearest"))
+    width = 2e6 * float(
+        dataset["contact_radius"].sel(t=dataset["map_time"][-1], method="nearest")
+    )
     return {"rms": 1e-3 * field.rms, "mean": 1e-3 * field.mean, "width": width}
 
 
@@ -812,10 +1159,17 @@ def pattern(dataset: xr.Dataset) -> dict[str, Number]:
     changes={"record.maps": {"from": "0 s", "to": "295 ms", "count": 60}},
 )
 def moving_pattern(dataset: xr.Dataset) -> dict[str, Number]:
-    share, last = 100.0 * (dataset["contact_radius"] / dataset["jkr_radius"]) ** 2, dataset["map_time"][-1]
-    return {"time": 1e3 * float(last), "moved": 1e6 * float(dataset["slider_position"].sel(t=last, method="nearest")),
-            "large": float(share.max()), "top": 1e3 * float(share["t"][int(share.argmax("t"))]),
-            "maps": float(dataset.sizes["map_time"])}  # fmt: skip
+    share, last = (
+        100.0 * (dataset["contact_radius"] / dataset["jkr_radius"]) ** 2,
+        dataset["map_time"][-1],
+    )
+    return {
+        "time": 1e3 * float(last),
+        "moved": 1e6 * float(dataset["slider_position"].sel(t=last, method="nearest")),
+        "large": float(share.max()),
+        "top": 1e3 * float(share["t"][int(share.argmax("t"))]),
+        "maps": float(dataset.sizes["map_time"]),
+    }
 
 
 def pages(numbers: dict[str, dict[str, Any]]) -> dict[Path, str]:
@@ -824,8 +1178,15 @@ def pages(numbers: dict[str, dict[str, Any]]) -> dict[Path, str]:
     for entry in ENTRIES:
         index += f"\n## {TOPICS[entry.name]}\n\n" if entry.name in TOPICS else ""
         index += f'- [<img src="{entry.picture.name}" alt="" width="160"> {entry.question}]({entry.name}.md)\n'
-    index += "\n```{toctree}\n:hidden:\n\n" + "".join(f"{entry.name}\n" for entry in ENTRIES) + "```\n"
-    texts = {FOLDER / f"{entry.name}.md": entry.text(numbers[entry.name]) for entry in ENTRIES}
+    index += (
+        "\n```{toctree}\n:hidden:\n\n"
+        + "".join(f"{entry.name}\n" for entry in ENTRIES)
+        + "```\n"
+    )
+    texts = {
+        FOLDER / f"{entry.name}.md": entry.text(numbers[entry.name])
+        for entry in ENTRIES
+    }
     return {FOLDER / "README.md": index} | texts
 
 

@@ -38,7 +38,9 @@ def text() -> str:
         options = tables(field.annotation)
         same = (path[-1:], *map(_form, options))
         same += tuple(key for table in options.values() for key in keys(table))
-        sections.setdefault(same, ([], options))[0].append(f"[{'.'.join(path)}]" if path else "top of the file")
+        sections.setdefault(same, ([], options))[0].append(
+            f"[{'.'.join(path)}]" if path else "top of the file"
+        )
     lines = [HEAD]
     for titles, options in sections.values():
         lines += _section(titles, options)
@@ -48,20 +50,33 @@ def text() -> str:
 def _section(titles: list[str], options: dict[str, type]) -> list[str]:
     lines = [f"\n## {', '.join(titles)}\n"]
     if len(options) > 1:
-        lines += [f"- {_form(name)}: {_meaning(table)}" for name, table in options.items()]
+        lines += [
+            f"- {_form(name)}: {_meaning(table)}" for name, table in options.items()
+        ]
         lines.append("")
     elif titles != ["top of the file"]:
         lines += [f"{_meaning(*options.values())}\n"]
     rows: dict[tuple[str, ...], list[str]] = {}
     for name, table in options.items():
-        for key, field in sorted(keys(table).items(), key=lambda item: table is Scenario and item[0] not in _FIRST):
+        for key, field in sorted(
+            keys(table).items(),
+            key=lambda item: table is Scenario and item[0] not in _FIRST,
+        ):
             if key not in ("model", "sweep"):
-                rows.setdefault((f"`{key}`", *_row(key, field, titles)), []).append(_form(name))
+                rows.setdefault((f"`{key}`", *_row(key, field, titles)), []).append(
+                    _form(name)
+                )
     has_models = len(options) > 1
-    lines += ["| key | unit | meaning | default |" + (" models |" if has_models else "")]
+    lines += [
+        "| key | unit | meaning | default |" + (" models |" if has_models else "")
+    ]
     lines += ["| --- | --- | --- | --- |" + (" --- |" if has_models else "")]
     for row, having in rows.items():
-        shown = [*row, "" if len(having) == len(options) else ", ".join(having)] if has_models else row
+        shown = (
+            [*row, "" if len(having) == len(options) else ", ".join(having)]
+            if has_models
+            else row
+        )
         lines.append(f"| {' | '.join(shown)} |")
     return lines if rows else lines[:-2]
 
@@ -69,7 +84,9 @@ def _section(titles: list[str], options: dict[str, type]) -> list[str]:
 def _row(key: str, field: typing.Any, titles: list[str]) -> tuple[str, str, str]:
     """Return unit, meaning and default of a key."""
     quantity, inner = declaration(field), tables(field.annotation)
-    place = f"[{titles[0].strip('[]')}.{key}]" if titles[0].startswith("[") else f"[{key}]"
+    place = (
+        f"[{titles[0].strip('[]')}.{key}]" if titles[0].startswith("[") else f"[{key}]"
+    )
     default = f"`{str(field.default).lower() if isinstance(field.default, bool) else field.default}`"
     if field.is_required():
         default = "needed"
@@ -84,18 +101,28 @@ def _row(key: str, field: typing.Any, titles: list[str]) -> tuple[str, str, str]
     words = _words(field.annotation)
     meaning += f": {', '.join(words)}" if words else ""
     meaning += f"; or the table {place}" if inner else ""
-    return ("" if quantity is None or quantity.whole else quantity.unit), meaning, default
+    return (
+        ("" if quantity is None or quantity.whole else quantity.unit),
+        meaning,
+        default,
+    )
 
 
 def _form(name: str) -> str:
     """Return the name of a model, or of a form without a model."""
     model, _, form = name.partition("[")
-    return f"`{model}`" + (f" with a {form[:-1]}" if form else "") if model else f"a {form[:-1]}"
+    return (
+        f"`{model}`" + (f" with a {form[:-1]}" if form else "")
+        if model
+        else f"a {form[:-1]}"
+    )
 
 
 def _meaning(table: type) -> str:
     """Return the first paragraph of the description of a table."""
-    return re.sub(r"`+", "`", " ".join((table.__doc__ or "").split("\n\n")[0].split())).replace("\\", "")
+    return re.sub(
+        r"`+", "`", " ".join((table.__doc__ or "").split("\n\n")[0].split())
+    ).replace("\\", "")
 
 
 def _words(annotation: typing.Any) -> list[str]:

@@ -32,7 +32,8 @@ from typing import TYPE_CHECKING, Any
 
 from sim.units.errors import BadInput, naming
 
-if TYPE_CHECKING:  # what a function needs is imported where it is called, so that importing the package costs nothing
+# what a function needs is imported where it is called, so that importing the package costs nothing
+if TYPE_CHECKING:
     import pandas
     import xarray
     from matplotlib.axes import Axes
@@ -47,14 +48,30 @@ if TYPE_CHECKING:  # what a function needs is imported where it is called, so th
 Path = str | os.PathLike[str]
 _FROM = {"Scenario": "sim.scenario.scenario", "load": "sim.scenario.reader"}
 _FOLDERS = ("analysis", "laws", "plots", "report", "spectrum")
-_FUNCTIONS = ("check", "converge", "explore", "fit", "open", "plan", "plot", "run", "stats", "steady_curves")
+_FUNCTIONS = (
+    "check",
+    "converge",
+    "explore",
+    "fit",
+    "open",
+    "plan",
+    "plot",
+    "run",
+    "stats",
+    "steady_curves",
+)
 __all__ = sorted([*_FROM, *_FOLDERS, *_FUNCTIONS, "BadInput"])
 
 
 def run(
-    scenario: "Scenario | Path | dict[str, Any]", to: Path | None = None, *, replace: bool = False,
-    resume: bool = False, jobs: int = 1, progress: bool | Callable[[int], None] = False,
-) -> Any:  # fmt: skip
+    scenario: "Scenario | Path | dict[str, Any]",
+    to: Path | None = None,
+    *,
+    replace: bool = False,
+    resume: bool = False,
+    jobs: int = 1,
+    progress: bool | Callable[[int], None] = False,
+) -> Any:
     """Run a scenario with its ensemble and its sweep.
 
     Parameters
@@ -96,13 +113,31 @@ def run(
     plan = Plan.of(scene)
     for remark in remarks(plan) if LOG.isEnabledFor(logging.INFO) else ():
         LOG.info(remark)
-    lines = Shown(progress) if callable(progress) else progress_lines(work(plan), "member-steps", LOG.info)
+    lines = (
+        Shown(progress)
+        if callable(progress)
+        else progress_lines(work(plan), "member-steps", LOG.info)
+    )
     try:
-        with progress_bar(work(plan)) if progress is True else contextlib.nullcontext(lines) as bar:
-            return simulate(scene, to, replace=replace, resume=resume, jobs=jobs, progress=bar.advance, stage=bar.begin)
+        with (
+            progress_bar(work(plan))
+            if progress is True
+            else contextlib.nullcontext(lines) as bar
+        ):
+            return simulate(
+                scene,
+                to,
+                replace=replace,
+                resume=resume,
+                jobs=jobs,
+                progress=bar.advance,
+                stage=bar.begin,
+            )
     except Exception as fault:
         message = str(fault).replace("the same command", "the same call")
-        message = message.replace("--resume", "resume=True").replace("--force", "replace=True")
+        message = message.replace("--resume", "resume=True").replace(
+            "--force", "replace=True"
+        )
         if isinstance(fault, OutputExists | BadInput):
             raise BadInput([message]) from None
         if message != str(fault):
@@ -130,7 +165,9 @@ def open(path: Path) -> "xarray.Dataset":
     return dataset.open(path)
 
 
-def stats(dataset: "xarray.Dataset | Path", where: dict[str, Any] | None = None) -> "pandas.DataFrame":
+def stats(
+    dataset: "xarray.Dataset | Path", where: dict[str, Any] | None = None
+) -> "pandas.DataFrame":
     """Return ensemble statistics of a run in SI units, a row for each sweep value and time; units are in ``attrs``.
 
     ``where`` gives values of swept keys, ``{"contact.load": "4 mN"}``.
@@ -141,9 +178,14 @@ def stats(dataset: "xarray.Dataset | Path", where: dict[str, Any] | None = None)
 
 
 def plot(
-    dataset: "xarray.Dataset | Path", kind: str | None = None, to: Path | None = None,
-    where: dict[str, Any] | None = None, *, ax: "Axes | None" = None, **choices: Any,
-) -> "Figure | Axes":  # fmt: skip
+    dataset: "xarray.Dataset | Path",
+    kind: str | None = None,
+    to: Path | None = None,
+    where: dict[str, Any] | None = None,
+    *,
+    ax: "Axes | None" = None,
+    **choices: Any,
+) -> "Figure | Axes":
     """Draw a figure of a run, by default of the kind that fits best. Save it if ``to`` is a file.
 
     Parameters
@@ -171,14 +213,22 @@ def plot(
     from sim.plots.style import save
 
     if unknown := choices.keys() - {*Choices._fields}:
-        raise BadInput([f"{sorted(unknown)[0]}: is no choice of a figure; there are: {', '.join(Choices._fields)}"])
-    figure = _plainly(lambda run: draw(run, kind, Choices(ax=ax, **choices)), dataset, where)
+        raise BadInput(
+            [
+                f"{sorted(unknown)[0]}: is no choice of a figure; there are: {', '.join(Choices._fields)}"
+            ]
+        )
+    figure = _plainly(
+        lambda run: draw(run, kind, Choices(ax=ax, **choices)), dataset, where
+    )
     if to is not None:
         save(figure, pathlib.Path(to))
     return figure if ax is None else ax
 
 
-def converge(scenario: "Scenario | Path | dict[str, Any]", budget: float | str = "60 s") -> "xarray.Dataset":
+def converge(
+    scenario: "Scenario | Path | dict[str, Any]", budget: float | str = "60 s"
+) -> "xarray.Dataset":
     """Compare speed and error of the models and settings of a scenario, in about ``budget`` [s] of computing time."""
     from sim.study.converge import converge as study
     from sim.units.quantity import read_option
@@ -187,9 +237,13 @@ def converge(scenario: "Scenario | Path | dict[str, Any]", budget: float | str =
 
 
 def fit(
-    scenario: "Scenario | Path | dict[str, Any]", data: "Path | Sequence[Path]", free: "Iterable[str]",
-    common: dict[str, float] | None = None, steady: bool = False, per_table: "Iterable[str]" = (),
-) -> "Fit":  # fmt: skip
+    scenario: "Scenario | Path | dict[str, Any]",
+    data: "Path | Sequence[Path]",
+    free: "Iterable[str]",
+    common: dict[str, float] | None = None,
+    steady: bool = False,
+    per_table: "Iterable[str]" = (),
+) -> "Fit":
     """Calibrate keys of a scenario to measured curves.
 
     Parameters
@@ -217,13 +271,25 @@ def fit(
     from sim.study.fit import fit as study
 
     paths = [data] if isinstance(data, str | os.PathLike) else list(data)
-    return study(_scene(scenario), [pathlib.Path(path) for path in paths], free, common, steady, per_table)
+    return study(
+        _scene(scenario),
+        [pathlib.Path(path) for path in paths],
+        free,
+        common,
+        steady,
+        per_table,
+    )
 
 
 def plan(
-    scenario: "Scenario | Path | dict[str, Any]", points: Path, free: "Iterable[str]", candidates: Path | None = None,
-    common: dict[str, float] | None = None, sims: int = 400, seed: int | None = None,
-) -> "Plan":  # fmt: skip
+    scenario: "Scenario | Path | dict[str, Any]",
+    points: Path,
+    free: "Iterable[str]",
+    candidates: Path | None = None,
+    common: dict[str, float] | None = None,
+    sims: int = 400,
+    seed: int | None = None,
+) -> "Plan":
     """Return what a planned measurement can tell, and which further point helps most to tell mechanisms apart.
 
     Parameters
@@ -257,7 +323,9 @@ def plan(
     from sim.study.plan import plan as study
 
     further = None if candidates is None else pathlib.Path(candidates)
-    return study(_scene(scenario), pathlib.Path(points), free, further, common, sims, seed)
+    return study(
+        _scene(scenario), pathlib.Path(points), free, further, common, sims, seed
+    )
 
 
 def steady_curves(
@@ -295,11 +363,18 @@ def steady_curves(
 
     values = np.atleast_1d(np.asarray(speeds, float))
     if values.ndim != 1 or not np.all((values > 0.0) & np.isfinite(values)):
-        raise BadInput(["speeds: must be positive numbers in m/s, such as [1e-3, 1e-2]"])
+        raise BadInput(
+            ["speeds: must be positive numbers in m/s, such as [1e-3, 1e-2]"]
+        )
     return curves(_scene(scenario).points()[0], values, time)
 
 
-def explore(scenario: "Scenario | Path | dict[str, Any]", data: Path | None = None, *, port: int = 0) -> "Server":
+def explore(
+    scenario: "Scenario | Path | dict[str, Any]",
+    data: Path | None = None,
+    *,
+    port: int = 0,
+) -> "Server":
     """Explore a scenario with sliders, on a page in the notebook; it needs the extra ``explore``.
 
     Parameters
@@ -323,7 +398,12 @@ def explore(scenario: "Scenario | Path | dict[str, Any]", data: Path | None = No
     """
     from sim.explorer.server import Server
 
-    server = Server(_scene(scenario), port, None if data is None else pathlib.Path(data), framed=True)
+    server = Server(
+        _scene(scenario),
+        port,
+        None if data is None else pathlib.Path(data),
+        framed=True,
+    )
     server.begin()
     return server
 
@@ -343,11 +423,20 @@ def _scene(scenario: "Scenario | Path | dict[str, Any]") -> "Scenario":
     return scenario if isinstance(scenario, Scenario) else load(scenario)
 
 
-def _plainly(function: Callable[..., Any], dataset: "xarray.Dataset | Path", where: dict[str, Any] | None) -> Any:
+def _plainly(
+    function: Callable[..., Any],
+    dataset: "xarray.Dataset | Path",
+    where: dict[str, Any] | None,
+) -> Any:
     """Return the result of a function of a dataset, or of a file with one; its faults become ``BadInput``."""
     from sim.analysis.statistics import where as chosen
 
-    with naming(), open(dataset) if isinstance(dataset, str | os.PathLike) else contextlib.nullcontext(dataset) as data:
+    with (
+        naming(),
+        open(dataset)
+        if isinstance(dataset, str | os.PathLike)
+        else contextlib.nullcontext(dataset) as data,
+    ):
         return function(chosen(data, where or {}))
 
 

@@ -26,21 +26,53 @@ from sim.units.terminal import (
     say,
     signals,
     while_read,
-)  # fmt: skip
+)
 
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
 
 _PATH = click.Path(path_type=Path)
-_SET = click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE", help="Replace a value of SCENARIO.")
-_SEED = click.option("--seed", type=click.IntRange(0, 2**64 - 1), help="Replace the seed of the random numbers.")
-_MEMBERS = click.option("--members", type=click.IntRange(1, 10**7), help="Replace the number of ensemble members.")
+_SET = click.option(
+    "--set",
+    "changes",
+    multiple=True,
+    metavar="TABLE.KEY=VALUE",
+    help="Replace a value of SCENARIO.",
+)
+_SEED = click.option(
+    "--seed",
+    type=click.IntRange(0, 2**64 - 1),
+    help="Replace the seed of the random numbers.",
+)
+_MEMBERS = click.option(
+    "--members",
+    type=click.IntRange(1, 10**7),
+    help="Replace the number of ensemble members.",
+)
 _FORCE = click.option("--force", is_flag=True, help="Replace files that exist.")
-_UNITS = click.option("--units", multiple=True, metavar="UNIT", help="Show values in UNIT, such as mm/s for speeds.")
-_WHERE = click.option("--where", "chosen", multiple=True, metavar="KEY=VALUE", help="Only this value of a swept key.")
+_UNITS = click.option(
+    "--units",
+    multiple=True,
+    metavar="UNIT",
+    help="Show values in UNIT, such as mm/s for speeds.",
+)
+_WHERE = click.option(
+    "--where",
+    "chosen",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Only this value of a swept key.",
+)
 
-_LOST = click.option("--lost", multiple=True, metavar="SHARE", help="Add the speed at which SHARE of the area is lost.")
+_LOST = click.option(
+    "--lost",
+    multiple=True,
+    metavar="SHARE",
+    help="Add the speed at which SHARE of the area is lost.",
+)
 
-_STOPPED = "stopped; the results so far are kept: the same command with --resume continues"
+_STOPPED = (
+    "stopped; the results so far are kept: the same command with --resume continues"
+)
 _CODES = (
     "Exit codes: 0 success; 1 failure; 2 bad input; 73 the output exists; 74 disk or file error; 75 interrupted"
     " (continue with --resume), or another run writes the output; 130 stopped at once."
@@ -52,9 +84,11 @@ _ROWS = 12
 
 def main() -> None:
     """Run the command line; every foreseen trouble ends in one message and its exit code."""
-    gc.set_threshold(500_000)  # imports make many objects that stay: looking through them is a tenth of a start,
+    # imports make many objects that stay: looking through them is a tenth of a start,
+    gc.set_threshold(500_000)
     atexit.register(gc.freeze)  # and as much of the end
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else what all packages declare is looked through
+    # else what all packages declare is looked through
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     LOG.addHandler(notes := Notes())
     for order in signals("SIGTERM", "SIGHUP"):  # schedulers stop a run by these
         signal.signal(order, signal.default_int_handler)
@@ -68,7 +102,10 @@ def main() -> None:
         fault.show(shown)
         _fail(shown.getvalue().rstrip("\n"), fault.exit_code)
     except MemoryError:
-        _fail("there is not enough memory; use fewer points, members or records (see `sim check`)", FAILED)
+        _fail(
+            "there is not enough memory; use fewer points, members or records (see `sim check`)",
+            FAILED,
+        )
     except (OSError, RuntimeError, ValueError) as trouble:
         if hasattr(trouble, "exit_code"):
             _fail(str(trouble), trouble.exit_code)
@@ -92,7 +129,9 @@ def _announce_compiling(quiet: bool = False) -> None:
     def announce(name: str) -> None:
         jit.on_compiling.clear()
         if not quiet:
-            note("compiling kernels, once per model (up to half a minute); `sim warm` compiles all")
+            note(
+                "compiling kernels, once per model (up to half a minute); `sim warm` compiles all"
+            )
 
     jit.on_compiling[:] = [announce]
 
@@ -105,7 +144,9 @@ def _values(pairs: tuple[str, ...], option: str) -> dict[str, Any]:
     for pair in pairs:
         key, sign, text = pair.partition("=")
         if not sign or not key.strip():
-            raise click.UsageError(f'{option} takes TABLE.KEY=VALUE, such as contact.load="2 mN", not {pair!r}')
+            raise click.UsageError(
+                f'{option} takes TABLE.KEY=VALUE, such as contact.load="2 mN", not {pair!r}'
+            )
         try:
             document = tomllib.loads(f"value = {text}")
         except (ValueError, RecursionError):
@@ -115,13 +156,19 @@ def _values(pairs: tuple[str, ...], option: str) -> dict[str, Any]:
 
 
 def _load(
-    scenario: Path, changes: tuple[str, ...], seed: int | None = None, members: int | None = None, quiet: bool = False
+    scenario: Path,
+    changes: tuple[str, ...],
+    seed: int | None = None,
+    members: int | None = None,
+    quiet: bool = False,
 ) -> Any:
     """Load a scenario with the values of --set, --seed and --members; print what they replace."""
     from sim.scenario.reader import load
 
     numbers = {"seed": seed, "ensemble.members": members}
-    overrides = _values(changes, "--set") | {key: value for key, value in numbers.items() if value is not None}
+    overrides = _values(changes, "--set") | {
+        key: value for key, value in numbers.items() if value is not None
+    }
     scene = load(scenario, overrides, option="--set")
     for line in () if quiet else scene.source.notes:
         note(f"note: {line}")
@@ -135,7 +182,10 @@ class _Commands(click.Group):
     invoke = while_read()(click.Group.invoke)
 
 
-@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(
+    cls=_Commands,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
 @click.version_option(package_name="sliding-sim", prog_name="sim")
 def cli() -> None:
     """Adhesive sliding interfaces: a smooth sphere slides on a soft half-space.
@@ -148,23 +198,68 @@ def cli() -> None:
 
 @cli.command(epilog=_CODES)
 @click.argument("scenario", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="The netCDF file. Default: outputs/<name>.nc.")
+@click.option(
+    "-o", "--output", type=_PATH, help="The netCDF file. Default: outputs/<name>.nc."
+)
 @_SET
 @_SEED
 @_MEMBERS
-@click.option("-j", "--jobs", type=click.IntRange(1), help="Processes. Default: one per core, fewer for short runs.")
-@click.option("--scheduler", default="", metavar="ADDRESS", help="Run on the dask cluster with this scheduler.")
-@click.option("--max-memory", metavar="SIZE", help="Limit of memory. Default: SIM_MAX_MEMORY, or the free memory.")
-@click.option("--max-time", metavar="TIME", help="Stop before this time, such as 8 h. Continue with --resume.")
-@click.option("--shard", metavar="I/N", help="Run part I of N in a job array. The last part writes the file.")
-@click.option("--force", is_flag=True, help="Replace an existing output or an unfinished run.")
-@click.option("--resume", is_flag=True, help="Continue an unfinished run; the results are the same bit for bit.")
+@click.option(
+    "-j",
+    "--jobs",
+    type=click.IntRange(1),
+    help="Processes. Default: one per core, fewer for short runs.",
+)
+@click.option(
+    "--scheduler",
+    default="",
+    metavar="ADDRESS",
+    help="Run on the dask cluster with this scheduler.",
+)
+@click.option(
+    "--max-memory",
+    metavar="SIZE",
+    help="Limit of memory. Default: SIM_MAX_MEMORY, or the free memory.",
+)
+@click.option(
+    "--max-time",
+    metavar="TIME",
+    help="Stop before this time, such as 8 h. Continue with --resume.",
+)
+@click.option(
+    "--shard",
+    metavar="I/N",
+    help="Run part I of N in a job array. The last part writes the file.",
+)
+@click.option(
+    "--force", is_flag=True, help="Replace an existing output or an unfinished run."
+)
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Continue an unfinished run; the results are the same bit for bit.",
+)
 @click.option("--quiet", is_flag=True, help="Print only errors.")
-@click.option("--no-table", "bare", is_flag=True, help="Do not print the table of statistics at the end.")
+@click.option(
+    "--no-table",
+    "bare",
+    is_flag=True,
+    help="Do not print the table of statistics at the end.",
+)
 def run(
-    scenario: Path, output: Path | None, jobs: int | None, scheduler: str, max_memory: str | None, max_time: str | None,
-    shard: str | None, force: bool, resume: bool, quiet: bool, bare: bool, **overrides: Any,
-) -> None:  # fmt: skip
+    scenario: Path,
+    output: Path | None,
+    jobs: int | None,
+    scheduler: str,
+    max_memory: str | None,
+    max_time: str | None,
+    shard: str | None,
+    force: bool,
+    resume: bool,
+    quiet: bool,
+    bare: bool,
+    **overrides: Any,
+) -> None:
     """Run a scenario with its ensemble and sweep, and write a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
     from sim.ensemble.store import BlockFiles, parts_of, shard_of
@@ -173,37 +268,63 @@ def run(
     from sim.units.quantity import read_option
 
     _announce_compiling(quiet)
-    until = time.monotonic() + read_option(max_time, "--max-time", "s", above=0, typical="8 h")
+    until = time.monotonic() + read_option(
+        max_time, "--max-time", "s", above=0, typical="8 h"
+    )
     memory = read_option(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
     scene = _load(scenario, **overrides, quiet=quiet)
     if force and resume:
-        raise click.UsageError("--resume continues an unfinished run, --force deletes it: give one of them")
+        raise click.UsageError(
+            "--resume continues an unfinished run, --force deletes it: give one of them"
+        )
 
     from sim.ensemble import plan as plans, preview, simulate
 
     plan = plans.Plan.of(scene)
     if not any(plan.share(*share)):
         tasks = sum(1 for _ in plan.tasks())
-        say(f"shard {shard} has nothing to compute: the most shards of this run: {tasks}")
+        say(
+            f"shard {shard} has nothing to compute: the most shards of this run: {tasks}"
+        )
         return
     simulate.claim(target, force or resume, simulate.files_read(scene))
     from sim.ensemble.execute import orders
 
     parts: Any = BlockFiles(parts_of(target)) if resume else ()
     jobs, lines = preview.processes(plan, jobs, memory, share, parts)
-    for line in () if quiet else (*(f"note: {text}" for text in preview.remarks(plan)), *lines):
+    for line in (
+        () if quiet else (*(f"note: {text}" for text in preview.remarks(plan)), *lines)
+    ):
         note(line)
-    how: dict[str, Any] = {"shard": share, "replace": force, "resume": resume, "jobs": jobs, "scheduler": scheduler}
-    with contextlib.nullcontext(Shown()) if quiet else progress_bar(plans.work(plan, *share)) as shown:
+    how: dict[str, Any] = {
+        "shard": share,
+        "replace": force,
+        "resume": resume,
+        "jobs": jobs,
+        "scheduler": scheduler,
+    }
+    with (
+        contextlib.nullcontext(Shown())
+        if quiet
+        else progress_bar(plans.work(plan, *share)) as shown
+    ):
         with orders() as ordered:
             how["stop"] = lambda: ordered() or time.monotonic() > until
             try:
-                simulate.run(scene, target, **how, memory=memory, stage=shown.begin, progress=shown.advance)
+                simulate.run(
+                    scene,
+                    target,
+                    **how,
+                    memory=memory,
+                    stage=shown.begin,
+                    progress=shown.advance,
+                )
             except (simulate.Stopped, KeyboardInterrupt) as stopped:
                 _fail(_STOPPED, getattr(stopped, "exit_code", INTERRUPTED))
         solves_motion = scene.drive.solves_motion
         if tabulated := not (quiet or bare or shard) and preview.tabulated(plan):
-            del plan, scene  # the points of a large sweep take as much memory as its table
+            # the points of a large sweep take as much memory as its table
+            del plan, scene
             shown.begin("table")
             tables = _tables_of(target)
     if tabulated:
@@ -211,7 +332,12 @@ def run(
     if not quiet:
         waits = f"shard {shard} is done; the last shard writes {target} (after a failure: --resume)"
         say(str(target) if target.exists() else waits)
-    if solves_motion and not shard and target.exists() and (sentence := _unresolved(target)):
+    if (
+        solves_motion
+        and not shard
+        and target.exists()
+        and (sentence := _unresolved(target))
+    ):
         _fail(f"{target}: {sentence}", FAILED)
 
 
@@ -223,15 +349,22 @@ def _unresolved(target: Path) -> str:
         return unresolved(dataset)
 
 
-def _tables(dataset: Any, most: int = _ROWS, lost: tuple[str, ...] = (), every: Any = None) -> tuple[Any, list[str]]:
+def _tables(
+    dataset: Any, most: int = _ROWS, lost: tuple[str, ...] = (), every: Any = None
+) -> tuple[Any, list[str]]:
     """Return the tables of statistics of a dataset, and notes on their numbers."""
     from sim import analysis
 
     stated = analysis.tables.stated(dataset, lost, every)
-    rows, once = analysis.table(dataset, most, stated), analysis.highlights(dataset, most, stated)
+    rows, once = (
+        analysis.table(dataset, most, stated),
+        analysis.highlights(dataset, most, stated),
+    )
     further = [of(dataset, most, stated) for of in (analysis.losses, analysis.phases)]
     further.append(analysis.spread(dataset, stated))
-    return [shown for shown in (rows, once, *further) if shown], analysis.notes(dataset, rows, once, stated)
+    return [shown for shown in (rows, once, *further) if shown], analysis.notes(
+        dataset, rows, once, stated
+    )
 
 
 def _tables_of(target: Path) -> tuple[list[list[dict[str, str]]], list[str]]:
@@ -239,9 +372,12 @@ def _tables_of(target: Path) -> tuple[list[list[dict[str, str]]], list[str]]:
     try:
         with _opened(target) as dataset:
             trajectories = dataset.drop_dims("map_time", errors="ignore").load()
-        return _tables(trajectories)  # of a closed file, because an open one keeps what was read in its cache
+        # of a closed file, because an open one keeps what was read in its cache
+        return _tables(trajectories)
     except (MemoryError, OSError) as trouble:
-        return [], [f"the output is complete, but its table could not be made: {trouble or 'not enough memory'}"]
+        return [], [
+            f"the output is complete, but its table could not be made: {trouble or 'not enough memory'}"
+        ]
 
 
 def _print_tables(tables: list[list[dict[str, str]]], notes: list[str]) -> None:
@@ -269,11 +405,24 @@ def check(scenario: Path, **overrides: Any) -> None:
 @_WHERE
 @click.option("--all", "whole", is_flag=True, help="Show all times and sweep values.")
 @_LOST
-@click.option("--csv", type=_PATH, help="Also write every time and sweep value to this CSV file.")
-@click.option("--wide", is_flag=True, help="In the CSV, one row per sweep value; with --all, per record.")
+@click.option(
+    "--csv", type=_PATH, help="Also write every time and sweep value to this CSV file."
+)
+@click.option(
+    "--wide",
+    is_flag=True,
+    help="In the CSV, one row per sweep value; with --all, per record.",
+)
 @_UNITS
 @_FORCE
-def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None, force: bool, **form: Any) -> None:
+def stats(
+    output: Path,
+    chosen: tuple[str, ...],
+    whole: bool,
+    csv: Path | None,
+    force: bool,
+    **form: Any,
+) -> None:
     """Print tables of ensemble statistics over time and sweep."""
     _import_xarray()
     from sim import analysis
@@ -288,7 +437,9 @@ def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None, 
             every = analysis.statements(dataset, lost=form["lost"])
             # before any printing, as nobody may read it to its end
             analysis.to_csv(dataset, csv, form["wide"], whole, form["lost"], every)
-        _print_tables(*_tables(dataset, sys.maxsize if whole else _ROWS, form["lost"], every))
+        _print_tables(
+            *_tables(dataset, sys.maxsize if whole else _ROWS, form["lost"], every)
+        )
         if csv is not None:
             say(str(csv))
 
@@ -311,7 +462,7 @@ _KINDS = {
     "map": "Last stress map of a member, or the map nearest to a time, and the displacement by this stress. --at",
     "movie": "Movie (GIF, MP4) of one contact: its edge, over the stress if maps are recorded, with area and"
     " force over time. --absolute",
-}  # fmt: skip
+}
 
 
 class _Plot(click.Command):
@@ -325,20 +476,63 @@ class _Plot(click.Command):
 @cli.command(cls=_Plot)
 @click.argument("output", type=_PATH)
 @click.argument("kind", required=False)
-@click.option("-o", "--picture", "to", type=_PATH, help="The picture. Default: beside the dataset.")
+@click.option(
+    "-o",
+    "--picture",
+    "to",
+    type=_PATH,
+    help="The picture. Default: beside the dataset.",
+)
 @_WHERE
-@click.option("--member", type=click.IntRange(0), help="Draw only this member of the ensemble; the first is 0.")
-@click.option("--at", metavar="TIME", help="Use the record or map nearest to this time, such as 1.3 s.")
-@click.option("--x", default="", metavar="NAME", help="Quantity of the x axis: t, another variable or a swept key.")
+@click.option(
+    "--member",
+    type=click.IntRange(0),
+    help="Draw only this member of the ensemble; the first is 0.",
+)
+@click.option(
+    "--at",
+    metavar="TIME",
+    help="Use the record or map nearest to this time, such as 1.3 s.",
+)
+@click.option(
+    "--x",
+    default="",
+    metavar="NAME",
+    help="Quantity of the x axis: t, another variable or a swept key.",
+)
 @click.option("--absolute", is_flag=True, help="Draw areas instead of shares.")
-@click.option("--size", default="", metavar="SIZE", help="Width and height of the picture, such as 3.4x2.6in.")
-@click.option("--xlim", default="", metavar="LOW:HIGH", help="Range of the x axis in its unit, such as 0.1:10.")
-@click.option("--from", "start", metavar="TIME", help="First time of a figure over time, such as 0.2 s.")
+@click.option(
+    "--size",
+    default="",
+    metavar="SIZE",
+    help="Width and height of the picture, such as 3.4x2.6in.",
+)
+@click.option(
+    "--xlim",
+    default="",
+    metavar="LOW:HIGH",
+    help="Range of the x axis in its unit, such as 0.1:10.",
+)
+@click.option(
+    "--from",
+    "start",
+    metavar="TIME",
+    help="First time of a figure over time, such as 0.2 s.",
+)
 @click.option("--to", "stop", metavar="TIME", help="Last time of a figure over time.")
 @_UNITS
-@click.option("--data", type=_PATH, help="Add measured points from a CSV file, as in `sim fit`.")
+@click.option(
+    "--data", type=_PATH, help="Add measured points from a CSV file, as in `sim fit`."
+)
 @_FORCE
-def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...], force: bool, **choices: Any) -> None:
+def plot(
+    output: Path,
+    kind: str | None,
+    to: Path | None,
+    chosen: tuple[str, ...],
+    force: bool,
+    **choices: Any,
+) -> None:
     """Draw a figure. Without KIND, the first kind that fits the dataset is drawn.
 
     KIND may also be a statement, such as pull_off_load, which is drawn over the swept key. If OUTPUT is a
@@ -368,7 +562,12 @@ def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...
 @_UNITS
 @_FORCE
 def report(
-    output: Path, page: Path | None, chosen: tuple[str, ...], units: tuple[str, ...], force: bool, **beside: Any
+    output: Path,
+    page: Path | None,
+    chosen: tuple[str, ...],
+    units: tuple[str, ...],
+    force: bool,
+    **beside: Any,
 ) -> None:
     """Write an HTML page on a run: question, key figures, remarks, figures, errors and commands."""
     _import_xarray()
@@ -381,7 +580,8 @@ def report(
 
 def _import_xarray() -> None:
     """Import xarray without pint and dask, whose import takes a second and whose arrays no command uses."""
-    dask = "dask.array" if "xarray" in sys.modules else "dask"  # which xarray looks for when it is imported
+    # which xarray looks for when it is imported
+    dask = "dask.array" if "xarray" in sys.modules else "dask"
     hidden = dict.fromkeys({"pint", dask} - sys.modules.keys())
     sys.modules.update(hidden)  # type: ignore[arg-type]
     import xarray as xr
@@ -406,13 +606,30 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
 
 @cli.command()
 @click.argument("scenario", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="The netCDF file. Default: outputs/<name>-converge.nc.")
-@click.option("--budget", default="60 s", show_default=True, help="Computing time for all settings together.")
-@click.option("--tolerance", help="Accepted error, such as 1 %. Default: that of the scenario.")
+@click.option(
+    "-o",
+    "--output",
+    type=_PATH,
+    help="The netCDF file. Default: outputs/<name>-converge.nc.",
+)
+@click.option(
+    "--budget",
+    default="60 s",
+    show_default=True,
+    help="Computing time for all settings together.",
+)
+@click.option(
+    "--tolerance", help="Accepted error, such as 1 %. Default: that of the scenario."
+)
 @_SET
 @_FORCE
 def converge(
-    scenario: Path, output: Path | None, budget: str, tolerance: str | None, changes: tuple[str, ...], force: bool
+    scenario: Path,
+    output: Path | None,
+    budget: str,
+    tolerance: str | None,
+    changes: tuple[str, ...],
+    force: bool,
 ) -> None:
     """Compare speed and error of models, tolerances and clock steps, and recommend a setting.
 
@@ -425,7 +642,11 @@ def converge(
     from sim.units.quantity import read_option
 
     seconds = read_option(budget, "--budget", "s", above=0)
-    accepted = None if tolerance is None else read_option(tolerance, "--tolerance", "1", above=0, below=1)
+    accepted = (
+        None
+        if tolerance is None
+        else read_option(tolerance, "--tolerance", "1", above=0, below=1)
+    )
     scene = _load(scenario, changes)
     from sim.study.converge import study
 
@@ -433,23 +654,74 @@ def converge(
     print_table(*study(scene, target, force, seconds, accepted))
 
 
-@cli.command(epilog="Exit codes: 0 success; 1 not converged; 2 bad input; 73 an output exists; 74 file error.")
+@cli.command(
+    epilog="Exit codes: 0 success; 1 not converged; 2 bad input; 73 an output exists; 74 file error."
+)
 @click.argument("scenario", type=_PATH)
 @click.argument("data", type=_PATH, nargs=-1, required=True)
-@click.option("--free", multiple=True, metavar="KEY[=LOW:HIGH]", help="Calibrate this key.")
-@click.option("--per-table", multiple=True, metavar="KEY[=LOW:HIGH]", help="Calibrate this key, a value in each table.")
-@click.option("--common", multiple=True, metavar="COLUMN=SIZE", help="Error shared by all points, such as 2 %.")
-@click.option("--steady", is_flag=True, help="Fit steady sliding only, without corrections by runs.")
-@click.option("--compare", "judged", is_flag=True, help="Also compare mechanisms and theories by the data.")
-@click.option("--plan", "is_plan", is_flag=True, help="Plan a measurement at the conditions of DATA instead.")
-@click.option("--candidates", type=_PATH, help="With --plan: further points to choose from. Default: twenty speeds.")
-@click.option("--sims", type=click.IntRange(50), help="With --plan: data sets per truth. Default: 400.")
-@click.option("--seed", type=click.IntRange(0), help="With --plan: seed of the errors. Default: that of the scenario.")
-@click.option("-o", "--output", type=_PATH, help="STEM of STEM_fit.toml, .json and .png. Default: scenario name.")
+@click.option(
+    "--free", multiple=True, metavar="KEY[=LOW:HIGH]", help="Calibrate this key."
+)
+@click.option(
+    "--per-table",
+    multiple=True,
+    metavar="KEY[=LOW:HIGH]",
+    help="Calibrate this key, a value in each table.",
+)
+@click.option(
+    "--common",
+    multiple=True,
+    metavar="COLUMN=SIZE",
+    help="Error shared by all points, such as 2 %.",
+)
+@click.option(
+    "--steady",
+    is_flag=True,
+    help="Fit steady sliding only, without corrections by runs.",
+)
+@click.option(
+    "--compare",
+    "judged",
+    is_flag=True,
+    help="Also compare mechanisms and theories by the data.",
+)
+@click.option(
+    "--plan",
+    "is_plan",
+    is_flag=True,
+    help="Plan a measurement at the conditions of DATA instead.",
+)
+@click.option(
+    "--candidates",
+    type=_PATH,
+    help="With --plan: further points to choose from. Default: twenty speeds.",
+)
+@click.option(
+    "--sims",
+    type=click.IntRange(50),
+    help="With --plan: data sets per truth. Default: 400.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    help="With --plan: seed of the errors. Default: that of the scenario.",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=_PATH,
+    help="STEM of STEM_fit.toml, .json and .png. Default: scenario name.",
+)
 @_UNITS
 @_SET
 @_FORCE
-def fit(scenario: Path, output: Path | None, changes: tuple[str, ...], force: bool, **options: Any) -> None:
+def fit(
+    scenario: Path,
+    output: Path | None,
+    changes: tuple[str, ...],
+    force: bool,
+    **options: Any,
+) -> None:
     """Calibrate keys of a scenario to measured curves.
 
     DATA are CSV files with units. Their columns have names of variables of a dataset, such as contact_area. With --plan
@@ -465,10 +737,21 @@ def fit(scenario: Path, output: Path | None, changes: tuple[str, ...], force: bo
         from sim.study import plan
         from sim.units.errors import BadInput
 
-        if len(options["data"]) > 1 or options["judged"] or options["steady"] or options["per_table"]:
-            raise BadInput(["--plan: takes one table, without --compare, --steady and --per-table; omit these"])
+        if (
+            len(options["data"]) > 1
+            or options["judged"]
+            or options["steady"]
+            or options["per_table"]
+        ):
+            raise BadInput(
+                [
+                    "--plan: takes one table, without --compare, --steady and --per-table; omit these"
+                ]
+            )
         chosen = {name: options[name] for name in ("free", "common", "units")}
-        shown = plan.carried_out(scene, options["data"][0], stem=stem, replaced=force, **chosen, **planned)
+        shown = plan.carried_out(
+            scene, options["data"][0], stem=stem, replaced=force, **chosen, **planned
+        )
         has_converged = True
     else:
         from sim.study import fit
@@ -495,11 +778,29 @@ def paper() -> None:
 @cli.command()
 @click.argument("scenario", required=False, type=_PATH)
 @_SET
-@click.option("--data", type=_PATH, help="A CSV of measured curves, with columns as those of `sim fit`.")
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port of this machine. Default: a free one.")
-@click.option("--state", default="", metavar="LINK", help="Numbers from the address of another page.")
-@click.option("--browser/--no-browser", default=True, help="Open the page in a browser.")
-def explore(scenario: Path | None, changes: tuple[str, ...], browser: bool, **page: Any) -> None:
+@click.option(
+    "--data",
+    type=_PATH,
+    help="A CSV of measured curves, with columns as those of `sim fit`.",
+)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    help="Port of this machine. Default: a free one.",
+)
+@click.option(
+    "--state",
+    default="",
+    metavar="LINK",
+    help="Numbers from the address of another page.",
+)
+@click.option(
+    "--browser/--no-browser", default=True, help="Open the page in a browser."
+)
+def explore(
+    scenario: Path | None, changes: tuple[str, ...], browser: bool, **page: Any
+) -> None:
     """Explore a scenario with sliders, on a page in the browser.
 
     Without SCENARIO it is the starter scenario. The page is open to this machine only. Needs the extra `explore`.
@@ -508,7 +809,11 @@ def explore(scenario: Path | None, changes: tuple[str, ...], browser: bool, **pa
 
     from sim.explorer.server import Server, serve
 
-    with contextlib.nullcontext(scenario) if scenario else as_file(files("sim").joinpath("starter.toml")) as path:
+    with (
+        contextlib.nullcontext(scenario)
+        if scenario
+        else as_file(files("sim").joinpath("starter.toml")) as path
+    ):
         scene = _load(path, changes)
     serve(Server(scene, **page), browser, say)
 
@@ -523,7 +828,9 @@ def new(name: Path) -> None:
     target = write_starter(name)
     say(f"{target}: run it with `sim run {target}`")
     if not write_schema(schema := target.with_name("sim.schema.json"), Scenario):
-        note(f"note: {schema} is another file and stays; `sim schema` prints the schema of this version")
+        note(
+            f"note: {schema} is another file and stays; `sim schema` prints the schema of this version"
+        )
 
 
 @cli.command()
@@ -538,7 +845,12 @@ def schema() -> None:
 
 
 @cli.command()
-@click.option("-j", "--jobs", type=click.IntRange(1), help="Number of processes. Default: one per core.")
+@click.option(
+    "-j",
+    "--jobs",
+    type=click.IntRange(1),
+    help="Number of processes. Default: one per core.",
+)
 def warm(jobs: int | None) -> None:
     """Compile all kernels now. Otherwise a run compiles each at its first use."""
     from sim.ensemble.execute import compile_missing

@@ -27,12 +27,15 @@ def _written_at_once(request):
 @pytest.fixture
 def room():
     """A limit on the bytes of a file, which stands for a full disk: ``with room(100): ...``."""
-    resource = pytest.importorskip("resource", reason="the system has no limit on the bytes of a file")
+    resource = pytest.importorskip(
+        "resource", reason="the system has no limit on the bytes of a file"
+    )
 
     @contextlib.contextmanager
     def limited(size):
         soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-        bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # Python would leave half of a file
+        # Python would leave half of a file
+        bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
         try:
             yield

@@ -11,7 +11,13 @@ from helpers.cases import some
 
 from benchmarks import page, run, timing
 from benchmarks.compare import interval
-from benchmarks.lines import called_once, long_lists, nested_conditionals, size, solids_as_floats
+from benchmarks.lines import (
+    called_once,
+    long_lists,
+    nested_conditionals,
+    size,
+    solids_as_floats,
+)
 
 RESULTS = json.loads(run.RESULTS.read_text(encoding="utf-8"))
 
@@ -26,7 +32,9 @@ def test_every_row_runs_and_is_kept(group):
     assert [row.ours for row in rows] == [row["ours"] for row in RESULTS[group]["rows"]]
     for row in rows:
         assert all(map(math.isfinite, row.result)), row.ours
-        assert all(0.0 < time < math.inf for time in row.seconds or row.result), row.ours
+        assert all(0.0 < time < math.inf for time in row.seconds or row.result), (
+            row.ours
+        )
 
 
 def test_the_page_of_speed_is_that_of_the_results():

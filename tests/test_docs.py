@@ -27,12 +27,17 @@ from sim.plots.kinds import KINDS
 from sim.scenario.reader import load
 
 ROOT = Path(__file__).parent.parent
-PAGES = sorted(str(path.relative_to(ROOT)) for path in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")))
+PAGES = sorted(
+    str(path.relative_to(ROOT))
+    for path in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"))
+)
 
 
 def maker_of(page):
     """The script that makes a page."""
-    spec = importlib.util.spec_from_file_location(f"make_{page}", ROOT / "docs" / f"make_{page}.py")
+    spec = importlib.util.spec_from_file_location(
+        f"make_{page}", ROOT / "docs" / f"make_{page}.py"
+    )
     maker = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(maker)
     return maker
@@ -44,7 +49,9 @@ def text_of(page):
 
 def test_pages_made_from_the_code_are_up_to_date():
     for page in ("keys", "dataset"):
-        assert text_of(f"docs/{page}.md") == maker_of(page).text(), f"run python docs/make_{page}.py"
+        assert text_of(f"docs/{page}.md") == maker_of(page).text(), (
+            f"run python docs/make_{page}.py"
+        )
 
 
 def test_the_pages_of_a_release_name_its_version():
@@ -56,7 +63,10 @@ def test_the_pages_of_a_release_name_its_version():
 def anchors(page):
     """The anchors that a code host gives to the headings of a page."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.M)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+    return {
+        re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+        for heading in headings
+    }
 
 
 def test_sentences_above_35_words_are_listed_and_no_text_is_a_fault(tmp_path):
@@ -68,7 +78,9 @@ def test_sentences_above_35_words_are_listed_and_no_text_is_a_fault(tmp_path):
     (tmp_path / "CONTRIBUTING.md").write_text("# A heading alone")
     (tmp_path / "sim").mkdir()
     (tmp_path / "sim" / "module.py").write_text('"""What opens as a question."""')
-    printed = subprocess.run([sys.executable, script], capture_output=True, encoding="utf-8", check=True).stdout
+    printed = subprocess.run(
+        [sys.executable, script], capture_output=True, encoding="utf-8", check=True
+    ).stdout
     assert "README.md, 36 words: Long word" in printed
     assert "Short" not in printed
     assert "question word: What opens" in printed
@@ -76,7 +88,9 @@ def test_sentences_above_35_words_are_listed_and_no_text_is_a_fault(tmp_path):
 
 def test_links_between_pages_lead_to_files_and_headings():
     for page in PAGES:
-        for target, heading in re.findall(r"(?:\]\(|src=\")(?!https?:)([^)#\"]*)(?:#([^)\"]*))?", text_of(page)):
+        for target, heading in re.findall(
+            r"(?:\]\(|src=\")(?!https?:)([^)#\"]*)(?:#([^)\"]*))?", text_of(page)
+        ):
             path = (ROOT / page).parent.joinpath(target) if target else ROOT / page
             assert path.exists(), (page, target)
             assert not heading or heading in anchors(path), (page, target, heading)
@@ -84,7 +98,11 @@ def test_links_between_pages_lead_to_files_and_headings():
 
 def test_names_of_code_in_the_pages_exist():
     for page in {*PAGES} - {"CHANGELOG.md"}:  # which has former names, too
-        for name in set(re.findall(r"`(sim(?!\.schema\.json)(?:\.\w+)+)(?:\([^`]*\))?`", text_of(page))):
+        for name in set(
+            re.findall(
+                r"`(sim(?!\.schema\.json)(?:\.\w+)+)(?:\([^`]*\))?`", text_of(page)
+            )
+        ):
             module, code = name, None
             while code is None and module:
                 try:
@@ -100,37 +118,71 @@ def test_names_of_code_in_the_pages_exist():
 def blocks(page):
     """The blocks of code of a page, each with the words after its fence."""
     tokens = MarkdownIt().parse(text_of(page))
-    return [(token.info.split(), token.content) for token in tokens if token.type in ("code_block", "fence")]
+    return [
+        (token.info.split(), token.content)
+        for token in tokens
+        if token.type in ("code_block", "fence")
+    ]
 
 
 def command_lines(code):
     """The commands of a block, each as its words after ``sim``."""
-    return [shlex.split(line, comments=True)[1:] for line in code.splitlines() if line.startswith("sim ")]
+    return [
+        shlex.split(line, comments=True)[1:]
+        for line in code.splitlines()
+        if line.startswith("sim ")
+    ]
 
 
 def commands(page):
     """The commands that a page shows, in blocks or between words, each as its words after ``sim``."""
-    between = [shlex.split(text)[1:] for text in re.findall(r"`(sim\s(?!-)[^`]*)`", text_of(page))]
-    return sorted({*map(tuple, between), *(tuple(line) for _, code in blocks(page) for line in command_lines(code))})
+    between = [
+        shlex.split(text)[1:]
+        for text in re.findall(r"`(sim\s(?!-)[^`]*)`", text_of(page))
+    ]
+    return sorted(
+        {
+            *map(tuple, between),
+            *(tuple(line) for _, code in blocks(page) for line in command_lines(code)),
+        }
+    )
 
 
 def test_the_commands_that_a_page_shows_exist_with_their_options_kinds_and_keys():
     for page in PAGES:
         for name, *words in commands(page):
             command = cli.commands[name]
-            known = {option for parameter in command.params for option in parameter.opts} | {"--help"}
-            assert {word for word in words if word.startswith("-")} <= known, (page, name, *words)
-            values = command.make_context(name, words, resilient_parsing=True).params  # words may be left out
+            known = {
+                option for parameter in command.params for option in parameter.opts
+            } | {"--help"}
+            assert {word for word in words if word.startswith("-")} <= known, (
+                page,
+                name,
+                *words,
+            )
+            # words may be left out
+            values = command.make_context(name, words, resilient_parsing=True).params
             assert values.get("kind") in (None, *KINDS), (page, name, *words)
-            assert all((ROOT / word).exists() for word in words if word.startswith("scenarios/")), (page, *words)
+            assert all(
+                (ROOT / word).exists()
+                for word in words
+                if word.startswith("scenarios/")
+            ), (page, *words)
             if values.get("changes"):
                 scenario = ROOT / values["scenario"]
-                scenario = scenario if scenario.exists() else ROOT / "sim" / "starter.toml"
+                scenario = (
+                    scenario if scenario.exists() else ROOT / "sim" / "starter.toml"
+                )
                 load(scenario, _values(values["changes"], "--set"))
 
 
 def test_the_page_for_newcomers_shows_what_its_code_gives():
-    assert doctest.testfile(str(ROOT / "docs" / "jkr_only.md"), module_relative=False).failed == 0
+    assert (
+        doctest.testfile(
+            str(ROOT / "docs" / "jkr_only.md"), module_relative=False
+        ).failed
+        == 0
+    )
 
 
 @posix
@@ -141,7 +193,10 @@ def test_a_tutorial_has_the_numbers_of_its_commands(page, tmp_path, monkeypatch)
     monkeypatch.chdir(tmp_path)
     text = text_of(f"docs/{page}.md")
     lines = re.findall(r"^    sim (.*)$", text, re.M)
-    printed = "".join(CliRunner().invoke(cli, shlex.split(line), catch_exceptions=False).output for line in lines)
+    printed = "".join(
+        CliRunner().invoke(cli, shlex.split(line), catch_exceptions=False).output
+        for line in lines
+    )
     numbers = re.findall(r"\d[\d.]*\(\d+\)|\d+(?= slip events| N/m)|\d\.\d{3}", text)
     assert len(numbers) > 1
     for number in numbers:
@@ -160,14 +215,24 @@ def test_every_scenario_has_its_question_in_the_gallery():
 
 def test_the_gallery_shows_the_numbers_that_were_computed():
     pages = GALLERY.pages(NUMBERS)
-    assert {*GALLERY.FOLDER.glob("*.md")} == {*pages}, "delete the page of a question that is gone"
+    assert {*GALLERY.FOLDER.glob("*.md")} == {*pages}, (
+        "delete the page of a question that is gone"
+    )
     for path, text in pages.items():
-        assert path.read_text(encoding="utf-8") == text, "run python docs/make_gallery.py --text"
+        assert path.read_text(encoding="utf-8") == text, (
+            "run python docs/make_gallery.py --text"
+        )
     for entry in GALLERY.ENTRIES:  # and no number is typed
-        typed = re.sub(r"\{.*?\}|`.*?`|\]\(.*?\)|[χα] = [01]|theory of 2018", "", entry.answer)
+        typed = re.sub(
+            r"\{.*?\}|`.*?`|\]\(.*?\)|[χα] = [01]|theory of 2018", "", entry.answer
+        )
         assert not re.search(r"\d", typed), entry.name
         moves = entry.kind == "movie"
-        assert 0 < entry.picture.stat().st_size < (2_000_000 if moves else GALLERY.MOST_BYTES)
+        assert (
+            0
+            < entry.picture.stat().st_size
+            < (2_000_000 if moves else GALLERY.MOST_BYTES)
+        )
         with Image.open(entry.picture) as picture:
             assert getattr(picture, "n_frames", 1) == (60 if moves else 1)
 
@@ -178,33 +243,52 @@ def test_an_answer_of_the_gallery_is_computed_again(entry):
     numbers = entry.numbers(entry.run())
     assert numbers.keys() == NUMBERS[entry.name].keys()
     for name, number in numbers.items():
-        assert_allclose(number, NUMBERS[entry.name][name], rtol=1e-6, atol=1e-9, err_msg=name)
+        assert_allclose(
+            number, NUMBERS[entry.name][name], rtol=1e-6, atol=1e-9, err_msg=name
+        )
 
 
 #: Numbers of docs/findings.md: change of the lens behind a spring, speed [mm/s], quantity, factor, and its text.
 SLIDING = [
-    ({}, 2, "area_ratio", 100.0, "91.71"), ({}, 3, "area_ratio", 100.0, "88.53(2)"),
-    ({}, 3, "lost_to_fluctuations", 100.0, "5.71(2)"), ({}, 2, "lost_to_fluctuations", 100.0, "0.03"),
-    ({}, 3, "lost_to_bonds", 100.0, "5.758(3)"), ({}, 2, "lost_to_bonds", 100.0, "8.27"),
-    ({}, 20, "lost_to_bonds", 100.0, "12.561(20)"), ({}, 20, "lost_to_fluctuations", 100.0, "5.096(9)"),
+    ({}, 2, "area_ratio", 100.0, "91.71"),
+    ({}, 3, "area_ratio", 100.0, "88.53(2)"),
+    ({}, 3, "lost_to_fluctuations", 100.0, "5.71(2)"),
+    ({}, 2, "lost_to_fluctuations", 100.0, "0.03"),
+    ({}, 3, "lost_to_bonds", 100.0, "5.758(3)"),
+    ({}, 2, "lost_to_bonds", 100.0, "8.27"),
+    ({}, 20, "lost_to_bonds", 100.0, "12.561(20)"),
+    ({}, 20, "lost_to_fluctuations", 100.0, "5.096(9)"),
     ({"shear.amplitude.memory_length": "1 mm"}, 3, "area_ratio", 100.0, "83.79(6)"),
     ({"drive.damping": 0.0}, 3, "friction_force", 1e3, "7.50(7)"),
     ({"drive.damping": 0.0}, 3, "area_ratio", 100.0, "92.71(2)"),
     ({"drive.damping": 0.0}, 3, "lost_to_fluctuations", 100.0, "2.079(7)"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.verify
-@pytest.mark.parametrize("keys", [{}, {"shear.amplitude.memory_length": "1 mm"}, {"drive.damping": 0.0}], ids=str)
-def test_the_findings_have_the_numbers_of_the_lens_behind_a_spring_at_a_16_times_finer_clock_step(keys):
+@pytest.mark.parametrize(
+    "keys",
+    [{}, {"shear.amplitude.memory_length": "1 mm"}, {"drive.damping": 0.0}],
+    ids=str,
+)
+def test_the_findings_have_the_numbers_of_the_lens_behind_a_spring_at_a_16_times_finer_clock_step(
+    keys,
+):
     """A mean differs by no more than twice the standard errors of both, or half of its last digit."""
     findings = " ".join(text_of("docs/findings.md").split())
     for speed in sorted({row[1] for row in SLIDING if row[0] == keys}):
-        path, values = ROOT / "scenarios" / "pdms_lens_spring.toml", {"sweep": {}, "drive.stage": f"{speed} mm/s"}
+        path, values = (
+            ROOT / "scenarios" / "pdms_lens_spring.toml",
+            {"sweep": {}, "drive.stage": f"{speed} mm/s"},
+        )
         fine = values | {"clock.step": "62.5 us", "clock.record": "1 ms"} | keys
         late = analysis.distribution(sim.run(load(path, fine)))
-        for _, _, name, factor, text in (row for row in SLIDING if row[:2] == (keys, speed)):
-            mean, sem = (factor * float(late[f"{name}_{kind}"]) for kind in ("mean", "sem"))
+        for _, _, name, factor, text in (
+            row for row in SLIDING if row[:2] == (keys, speed)
+        ):
+            mean, sem = (
+                factor * float(late[f"{name}_{kind}"]) for kind in ("mean", "sem")
+            )
             value, _, error = text.rstrip(")").partition("(")
             digit = 10.0 ** -len(value.partition(".")[2])
             assert text in findings
@@ -215,11 +299,19 @@ def test_the_findings_have_the_numbers_of_the_lens_behind_a_spring_at_a_16_times
 #: Pages whose blocks are run one after the other. A block that is marked ``cluster`` needs several machines, and one of
 #: ``browser`` waits for its page: both are only parsed. Lines of ``make`` and ``pip`` need a network: ``.ci/run`` runs
 #: ``make run`` and ``make test`` of README.
-RUN = [page for page in PAGES if any("python" in words or command_lines(code) for words, code in blocks(page))]
+RUN = [
+    page
+    for page in PAGES
+    if any("python" in words or command_lines(code) for words, code in blocks(page))
+]
 
 
 @pytest.mark.parametrize(
-    "page", [pytest.param(page, marks=[] if page == "README.md" else pytest.mark.verify) for page in RUN]
+    "page",
+    [
+        pytest.param(page, marks=[] if page == "README.md" else pytest.mark.verify)
+        for page in RUN
+    ],
 )
 def test_what_a_page_shows_runs(page, tmp_path, monkeypatch):
     shutil.copytree(ROOT / "scenarios", tmp_path / "scenarios")
@@ -227,7 +319,8 @@ def test_what_a_page_shows_runs(page, tmp_path, monkeypatch):
     names = {}
     for words, code in blocks(page):
         is_parsed_only = {"cluster", "browser"} & {*words}
-        if "python" in words and ">>>" not in code:  # which the test of the page for newcomers runs
+        # which the test of the page for newcomers runs
+        if "python" in words and ">>>" not in code:
             parsed = compile(code, page, "exec")
             exec("" if is_parsed_only else parsed, names)
         for line in () if is_parsed_only else command_lines(code):
@@ -252,29 +345,48 @@ NOTEBOOK = ROOT / "docs" / "first_steps.ipynb"
 def outputs_of(notebook):
     """The outputs of each code cell, without the cells that only import."""
     cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
-    return [cell["outputs"] for cell in cells if not "".join(cell["source"]).startswith("import")]
+    return [
+        cell["outputs"]
+        for cell in cells
+        if not "".join(cell["source"]).startswith("import")
+    ]
 
 
 def printed(outputs):
-    return ["".join(output["text"]) for cell in outputs for output in cell if output.get("name") == "stdout"]
+    return [
+        "".join(output["text"])
+        for cell in outputs
+        for output in cell
+        if output.get("name") == "stdout"
+    ]
 
 
 def test_the_notebook_stores_the_output_of_each_cell_and_no_warning_or_path():
     stored = outputs_of(json.loads(NOTEBOOK.read_text(encoding="utf-8")))
     assert all(stored), "execute docs/first_steps.ipynb and save its outputs"
-    assert {output.get("name", "result") for cell in stored for output in cell} == {"stdout", "result"}
-    assert not re.search(r"/(home|root|tmp|work|Users)/|Warning", json.dumps(stored, ensure_ascii=False))
+    assert {output.get("name", "result") for cell in stored for output in cell} == {
+        "stdout",
+        "result",
+    }
+    assert not re.search(
+        r"/(home|root|tmp|work|Users)/|Warning", json.dumps(stored, ensure_ascii=False)
+    )
     assert NOTEBOOK.stat().st_size < 400_000
 
 
 @pytest.mark.verify
 @pytest.mark.filterwarnings("default")  # those of the notebook's packages
 def test_the_notebook_runs_to_its_end():
-    nbclient, nbformat = (pytest.importorskip(name, reason="in the extra verify") for name in ("nbclient", "nbformat"))
+    nbclient, nbformat = (
+        pytest.importorskip(name, reason="in the extra verify")
+        for name in ("nbclient", "nbformat")
+    )
     notebook = nbformat.read(NOTEBOOK, 4)
     stored = printed(outputs_of(notebook))
     resources = {"metadata": {"path": str(ROOT / "docs")}}
-    nbclient.NotebookClient(notebook, timeout=600, kernel_name="python3", resources=resources).execute()
+    nbclient.NotebookClient(
+        notebook, timeout=600, kernel_name="python3", resources=resources
+    ).execute()
     assert printed(outputs_of(notebook)) == stored
     results = [result for cell in notebook.cells for result in cell.get("outputs", [])]
     assert sum("image/png" in result.get("data", {}) for result in results) == 3

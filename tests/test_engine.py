@@ -32,29 +32,45 @@ DEPTHS = {"drive": DRIVES, "bonds": BONDS, "shear": SHEARS, "contact": CONTACTS}
 
 def model(depth):
     """Return the class of a depth, the controlled and reversible keys that it has, and its contact."""
-    keys = [key for key in ("load", "indentation", "displacement", "reversible") if getattr(depth, key, None)]
+    keys = [
+        key
+        for key in ("load", "indentation", "displacement", "reversible")
+        if getattr(depth, key, None)
+    ]
     return (type(depth).__name__, *keys, getattr(depth, "contact", "plane"))
 
 
-MODELS = {part: {name: (part, *model(depth)) for name, depth in depths.items()} for part, depths in DEPTHS.items()}
+MODELS = {
+    part: {name: (part, *model(depth)) for name, depth in depths.items()}
+    for part, depths in DEPTHS.items()
+}
 
 
 def every(*parts):
     """Every choice of these parts that go together, by the names of their depths."""
-    cases = (dict(zip(parts, names, strict=True)) for names in itertools.product(*(DEPTHS[part] for part in parts)))
+    cases = (
+        dict(zip(parts, names, strict=True))
+        for names in itertools.product(*(DEPTHS[part] for part in parts))
+    )
     return [case for case in cases if go_together(case)]
 
 
 def pairs_of(case):
     """The pairs of models that a case holds, and its depths."""
-    return {*itertools.combinations([MODELS[part][name] for part, name in case.items()], 2), *case.items()}
+    return {
+        *itertools.combinations([MODELS[part][name] for part, name in case.items()], 2),
+        *case.items(),
+    }
 
 
 @functools.cache
 def covering():
     """Few cases that hold every pair of models and every depth: greedily the case with most that is not seen yet."""
     numbers, cases = {}, every(*DEPTHS)
-    masks = [sum(1 << numbers.setdefault(pair, len(numbers)) for pair in pairs_of(case)) for case in cases]
+    masks = [
+        sum(1 << numbers.setdefault(pair, len(numbers)) for pair in pairs_of(case))
+        for case in cases
+    ]
     chosen, left = [], (1 << len(numbers)) - 1
     while left:
         best = max(range(len(cases)), key=lambda i: (masks[i] & left).bit_count())
@@ -66,18 +82,30 @@ def covering():
 def same(one, two):
     """True if two states agree to the last bit, nan equal to nan."""
     left, right = pack(one), pack(two)
-    return left.keys() == right.keys() and all(np.array_equal(left[k], right[k], equal_nan=True) for k in left)
+    return left.keys() == right.keys() and all(
+        np.array_equal(left[k], right[k], equal_nan=True) for k in left
+    )
 
 
 def check_case(case, members=3, steps=6, **parts):
-    scenario = scene(members, steps, **parts, **{part: DEPTHS[part][name] for part, name in case.items()})
+    scenario = scene(
+        members,
+        steps,
+        **parts,
+        **{part: DEPTHS[part][name] for part, name in case.items()},
+    )
     straight = list(march(scenario, np.arange(members)))
     assert len(straight) == steps + 1
-    restarted = list(march(scenario, np.arange(members), unpack(scenario, pack(straight[2]))))
+    restarted = list(
+        march(scenario, np.arange(members), unpack(scenario, pack(straight[2])))
+    )
     assert all(same(one, two) for one, two in zip(straight[3:], restarted, strict=True))
     alone = list(march(scenario, np.array([1])))
     for together, single in zip(straight, alone, strict=True):
-        member = {k: v[1:2] if v.ndim and v.shape[0] == members else v for k, v in pack(together).items()}
+        member = {
+            k: v[1:2] if v.ndim and v.shape[0] == members else v
+            for k, v in pack(together).items()
+        }
         own = pack(single)
         slips = own["events.slips.log"].shape[1]  # others slip more
         member["events.slips.log"] = member["events.slips.log"][:, :slips]
@@ -89,9 +117,17 @@ def check_case(case, members=3, steps=6, **parts):
 
 def check_blocks(scenario, states, members):
     """Blocks of steps pass what the march passes, and end where it ends, recorded always or at every second step."""
-    for steps, some in ((range(len(states)), states), (range(0, len(states), 2), states[::2])):
-        end, passed = follow(scenario, MemberNoise.of(scenario.seed, np.arange(members)), None, steps)
-        marched = map(np.concatenate, zip(*(trajectory_of(scenario, state) for state in some), strict=True))
+    for steps, some in (
+        (range(len(states)), states),
+        (range(0, len(states), 2), states[::2]),
+    ):
+        end, passed = follow(
+            scenario, MemberNoise.of(scenario.seed, np.arange(members)), None, steps
+        )
+        marched = map(
+            np.concatenate,
+            zip(*(trajectory_of(scenario, state) for state in some), strict=True),
+        )
         for name, one, other in zip(passed._fields, passed, marched, strict=True):
             assert np.array_equal(one, other, equal_nan=True), name
         assert same(end, some[-1])
@@ -99,12 +135,23 @@ def check_blocks(scenario, states, members):
 
 def check_waist(scenario, state, members):
     """Shapes follow from the classes; w is the balance of its parts; no contact is smaller than Hertz."""
-    values = {"bonds": state.bonding.fraction, "shear": state.shear.energy, "contact": state.contact.radius}
+    values = {
+        "bonds": state.bonding.fraction,
+        "shear": state.shear.energy,
+        "contact": state.contact.radius,
+    }
     for part, value in values.items():
         assert value.shape == ((members,) if scenario.varies[part] else (1,)), part
     work = balance_of(scenario, state)
-    assert_allclose(state.contact.work, np.broadcast_to(work, state.contact.work.shape), rtol=1e-13, atol=1e-16)
-    control = scenario.contact.control(scenario.times.at(state.step), scenario.clock.duration)
+    assert_allclose(
+        state.contact.work,
+        np.broadcast_to(work, state.contact.work.shape),
+        rtol=1e-13,
+        atol=1e-16,
+    )
+    control = scenario.contact.control(
+        scenario.times.at(state.step), scenario.clock.duration
+    )
     hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, scenario.bodies)
     closed = np.isfinite(state.contact.radius)
     if np.isfinite(hertz[0]):
@@ -119,7 +166,13 @@ def balance_of(scenario, state):
     paid = scenario.fluctuations.paid_by_adhesion * share * state.shear.energy
     mean = 0.0  # a stress is unknown once nothing holds the body
     if scenario.contact.reversible:
-        mean = scenario.contact.reversible * 6.0 * stress**2 * radius / (np.pi * scenario.solid.contact_modulus)
+        mean = (
+            scenario.contact.reversible
+            * 6.0
+            * stress**2
+            * radius
+            / (np.pi * scenario.solid.contact_modulus)
+        )
     work, of_bonds = scenario.adhesion.work, scenario.adhesion.bond_share
     return work * (1.0 - of_bonds + of_bonds * state.bonding.fraction) - paid - mean
 
@@ -140,54 +193,101 @@ def test_any_depth_runs_with_any_depth(name):
 
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("drive", ["spring", "force"])
-def test_bonds_followed_one_by_one_go_through_blocks_of_steps_in_a_contact_that_stays(drive):
+def test_bonds_followed_one_by_one_go_through_blocks_of_steps_in_a_contact_that_stays(
+    drive,
+):
     rigid = Adhesion(work=42e-3, bond_share=0.0)
     assert scene(drive=DRIVES[drive], bonds=BONDS["tracked"]).by_steps
-    assert not scene(drive=DRIVES[drive], bonds=BONDS["tracked"], adhesion=rigid).by_steps
+    assert not scene(
+        drive=DRIVES[drive], bonds=BONDS["tracked"], adhesion=rigid
+    ).by_steps
     check_case({"drive": drive, "bonds": "tracked"}, adhesion=rigid)
 
 
 def test_more_fronts_between_bonds_of_one_limit_than_there_is_room_for_are_given_up():
-    check_case({"drive": "spring", "contact": "machine", "bonds": "cohort, cut-off", "shear": "mapped, fixed, stress"})
+    check_case(
+        {
+            "drive": "spring",
+            "contact": "machine",
+            "bonds": "cohort, cut-off",
+            "shear": "mapped, fixed, stress",
+        }
+    )
 
 
 def test_an_open_contact_has_no_area_at_the_largest_stress_that_all_members_share():
-    check_case({"drive": "steady", "contact": "lifted", "shear": "banded, slip, onset", "bonds": "rate"})
+    check_case(
+        {
+            "drive": "steady",
+            "contact": "lifted",
+            "shear": "banded, slip, onset",
+            "bonds": "rate",
+        }
+    )
 
 
 DRAWN = {
     "in time": shear.Banded(**IN_TIME),
-    "by waves, slip rate": shear.Banded(**BY_WAVES, tolerance=0.1, amplitude=SlipRate(memory_length=1e-5, floor=0.1)),
+    "by waves, slip rate": shear.Banded(
+        **BY_WAVES, tolerance=0.1, amplitude=SlipRate(memory_length=1e-5, floor=0.1)
+    ),
     "by slip, slip rate": shear.Banded(**BY_SLIP, amplitude=SlipRate(floor=0.1)),
-    "relaxing in time": shear.Banded(**IN_TIME, amplitude=SlipRate(memory_length=1e-5, relaxing=True)),
-    "on a disc": shear.Banded(**BY_SLIP, amplitude=SlipRate(floor=0.1, relaxing=True), contact="disc"),
+    "relaxing in time": shear.Banded(
+        **IN_TIME, amplitude=SlipRate(memory_length=1e-5, relaxing=True)
+    ),
+    "on a disc": shear.Banded(
+        **BY_SLIP, amplitude=SlipRate(floor=0.1, relaxing=True), contact="disc"
+    ),
     "mean, on a disc": shear.Mean(
-        spectrum=SPECTRUM, amplitude=SlipRate(memory_length=2e-6), contact="disc", paid_by_adhesion=0.5
+        spectrum=SPECTRUM,
+        amplitude=SlipRate(memory_length=2e-6),
+        contact="disc",
+        paid_by_adhesion=0.5,
     ),
 }
 
 
 @pytest.mark.parametrize("contact", ["load", "load there and back"])
 @pytest.mark.parametrize(
-    ("drive", "bonds"), [("spring with mass", "rate"), ("spring", "rate, bell"), ("spring", "cohort")]
+    ("drive", "bonds"),
+    [("spring with mass", "rate"), ("spring", "rate, bell"), ("spring", "cohort")],
 )
 @pytest.mark.parametrize("name", DRAWN)
-def test_the_loop_of_a_drive_draws_the_fluctuations_as_their_process_does(name, drive, bonds, contact, monkeypatch):
+def test_the_loop_of_a_drive_draws_the_fluctuations_as_their_process_does(
+    name, drive, bonds, contact, monkeypatch
+):
     """In blocks of steps, or by single steps: a block ends early only where the contact opens or closes."""
-    of = scene(3, 40, drive=DRIVES[drive], bonds=BONDS[bonds], shear=DRAWN[name], contact=CONTACTS[contact])
+    of = scene(
+        3,
+        40,
+        drive=DRIVES[drive],
+        bonds=BONDS[bonds],
+        shear=DRAWN[name],
+        contact=CONTACTS[contact],
+    )
     states, asked, steps = list(march(of, np.arange(3))), [], engine.advance
     is_open = np.isnan([state.contact.radius for state in states])
     check_blocks(of, states, 3)
-    monkeypatch.setattr(engine, "advance", lambda *given: asked.append(given[-1]) or steps(*given))
+    monkeypatch.setattr(
+        engine, "advance", lambda *given: asked.append(given[-1]) or steps(*given)
+    )
     follow(of, MemberNoise.of(of.seed, np.arange(3)), None, range(41))
     changes = np.count_nonzero(np.any(is_open[1:] != is_open[:-1], axis=1))
     assert changes > 1 if contact == "load there and back" else changes == 0
-    assert len(asked) < 20  # with another draw than that of the process, each of the 40 steps ends a block
+    # with another draw than that of the process, each of the 40 steps ends a block
+    assert len(asked) < 20
 
 
 def test_counted_bonds_of_a_slider_are_drawn_at_each_step_in_a_contact_that_stays():
     rigid = Adhesion(work=42e-3, bond_share=0.0)
-    of = scene(3, 40, drive=DRIVES["spring with mass"], bonds=BONDS["counted"], shear=SHEARS["uniform"], adhesion=rigid)
+    of = scene(
+        3,
+        40,
+        drive=DRIVES["spring with mass"],
+        bonds=BONDS["counted"],
+        shear=SHEARS["uniform"],
+        adhesion=rigid,
+    )
     states = list(march(of, np.arange(3)))
     assert len({float(state.bonding.fraction[0]) for state in states}) > 5
     check_blocks(of, states, 3)
@@ -206,11 +306,15 @@ def test_time_is_never_accumulated():
     assert math.isclose(scenario.times.at(333), 0.333, rel_tol=1e-15)
 
 
-@pytest.mark.parametrize("steps", [1000, pytest.param(1_000_000, marks=pytest.mark.verify)])
+@pytest.mark.parametrize(
+    "steps", [1000, pytest.param(1_000_000, marks=pytest.mark.verify)]
+)
 def test_long_marches_do_not_drift(steps):
     scenario = scene(1, steps, drive=DRIVES["steady"], bonds=BONDS["rate"])
     *_, last = march(scenario, np.arange(1))
     rate = 500.0 * (1.0 + 2e-3 / 1e-2)
     exact = 1.0 / 1.2 + (1.0 - 1.0 / 1.2) * math.exp(-rate * scenario.clock.duration)
     assert_allclose(last.bonds.bound, exact, rtol=1e-12)
-    assert_allclose(last.drive.position, 2e-3 * scenario.clock.duration, rtol=1e-16 * steps + 1e-14)
+    assert_allclose(
+        last.drive.position, 2e-3 * scenario.clock.duration, rtol=1e-16 * steps + 1e-14
+    )

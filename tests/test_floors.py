@@ -10,29 +10,64 @@ import sim
 ROOT = Path(sim.__file__).parent
 #: Modules of the tree outside of the package, by the name under which they import each other.
 BESIDE = {path.stem: path for path in sorted((ROOT.parent / "docs").glob("*.py"))}
-BESIDE |= {f"benchmarks.{path.stem}": path for path in sorted((ROOT.parent / "benchmarks").glob("*.py"))}
-BESIDE |= {f"helpers.{path.stem}": path for path in sorted((ROOT.parent / "tests" / "helpers").glob("*.py"))}
+BESIDE |= {
+    f"benchmarks.{path.stem}": path
+    for path in sorted((ROOT.parent / "benchmarks").glob("*.py"))
+}
+BESIDE |= {
+    f"helpers.{path.stem}": path
+    for path in sorted((ROOT.parent / "tests" / "helpers").glob("*.py"))
+}
 
 #: The folders and the two modules beside them, lowest first.
-FLOORS = ("units", "numerics", "laws", "spectrum", "parts", "scenario", "engine", "ensemble")
+FLOORS = (
+    "units",
+    "numerics",
+    "laws",
+    "spectrum",
+    "parts",
+    "scenario",
+    "engine",
+    "ensemble",
+)
 FLOORS += ("analysis", "plots", "report", "study", "explorer", "cli", "__main__")
 #: Floors that a floor must not import although they are below it.
-FORBIDDEN = {"analysis": {"parts", "scenario", "engine", "ensemble"}, "plots": {"engine", "ensemble"}}
+FORBIDDEN = {
+    "analysis": {"parts", "scenario", "engine", "ensemble"},
+    "plots": {"engine", "ensemble"},
+}
 FORBIDDEN |= {"report": {"ensemble"}}
 #: The lag of a ramp needs the steady law of bonds, made of the numbers that a dataset records.
 ALLOWED = {("analysis.over_speed", "parts.bonds.rupture")}
 #: A report shows the remarks of ``sim check``, a figure the boundary of steady sliding, of a stored scenario.
-ALLOWED |= {("analysis.errors", f"ensemble.{name}") for name in ("dataset", "diagnosis", "plan")}
+ALLOWED |= {
+    ("analysis.errors", f"ensemble.{name}") for name in ("dataset", "diagnosis", "plan")
+}
 ALLOWED |= {("plots.slider", f"ensemble.{name}") for name in ("dataset", "diagnosis")}
 #: Names that hold a part outside of ``parts``.
-PARTS = {"drive", "bonds", "shear", "contact", "population", "fluctuations", "process", "part"}
+PARTS = {
+    "drive",
+    "bonds",
+    "shear",
+    "contact",
+    "population",
+    "fluctuations",
+    "process",
+    "part",
+}
 
 
 def module_name(path):
-    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(
+        ".__init__"
+    )
 
 
-MODULES = {module_name(path): path for path in sorted(ROOT.rglob("*.py")) if path != ROOT / "__init__.py"}
+MODULES = {
+    module_name(path): path
+    for path in sorted(ROOT.rglob("*.py"))
+    if path != ROOT / "__init__.py"
+}
 
 
 @functools.cache
@@ -48,13 +83,22 @@ def imports(path):
             names |= {alias.name for alias in node.names}
         if isinstance(node, ast.ImportFrom) and node.module:
             inner = {f"{node.module}.{alias.name}" for alias in node.names}
-            names |= {name if name.removeprefix("sim.") in MODULES or name in BESIDE else node.module for name in inner}
+            names |= {
+                name
+                if name.removeprefix("sim.") in MODULES or name in BESIDE
+                else node.module
+                for name in inner
+            }
     return names
 
 
 def imported(name):
     """Names of the package's modules that a module imports anywhere."""
-    return {other.removeprefix("sim").lstrip(".") for other in imports(MODULES[name]) if other.split(".")[0] == "sim"}
+    return {
+        other.removeprefix("sim").lstrip(".")
+        for other in imports(MODULES[name])
+        if other.split(".")[0] == "sim"
+    }
 
 
 def floor(name):
@@ -66,8 +110,12 @@ def test_a_module_imports_only_from_floors_below_its_own():
         for other in imported(name):
             assert other, f"{name} imports the package root"
             if floor(other) != floor(name):
-                assert FLOORS.index(floor(other)) < FLOORS.index(floor(name)), f"{name} imports {other} above it"
-                is_allowed = (name, other) in ALLOWED or floor(other) not in FORBIDDEN.get(floor(name), ())
+                assert FLOORS.index(floor(other)) < FLOORS.index(floor(name)), (
+                    f"{name} imports {other} above it"
+                )
+                is_allowed = (name, other) in ALLOWED or floor(
+                    other
+                ) not in FORBIDDEN.get(floor(name), ())
                 assert is_allowed, f"{name} imports {other}"
 
 
@@ -76,44 +124,77 @@ def test_a_part_imports_no_other_part_except_the_coupled_solution():
         part = name.split(".")[1] if name.startswith("parts.") else "coupled"
         for other in imported(name) if part != "coupled" else ():
             if floor(other) == "parts":
-                assert other == "parts.exchange" or other.split(".")[1] == part, f"{name} imports {other}"
+                assert other == "parts.exchange" or other.split(".")[1] == part, (
+                    f"{name} imports {other}"
+                )
 
 
 def asks_a_class(call, taken):
     """True if a call asks a part for its class: isinstance of a class taken from parts, or a test for an attribute."""
     name = call.func.id if isinstance(call.func, ast.Name) else ""
     if name == "isinstance":
-        return bool(taken & {node.id for node in ast.walk(call.args[1]) if isinstance(node, ast.Name)})
+        return bool(
+            taken
+            & {node.id for node in ast.walk(call.args[1]) if isinstance(node, ast.Name)}
+        )
     tested = name == "hasattr" or (name == "getattr" and len(call.args) == 3)
-    return tested and bool(PARTS & set(ast.unparse(call.args[0]).replace("(", ".").replace(",", ".").split(".")))
+    return tested and bool(
+        PARTS
+        & set(ast.unparse(call.args[0]).replace("(", ".").replace(",", ".").split("."))
+    )
 
 
 def test_outside_its_folder_no_part_is_asked_for_its_class():
     for name in MODULES:
         if floor(name) != "parts" and name != "scenario.reader":
             nodes = list(ast.walk(tree(MODULES[name])))
-            froms = (node for node in nodes if isinstance(node, ast.ImportFrom) and node.module)
-            aliases = (alias for node in froms if node.module.startswith("sim.parts") for alias in node.names)
+            froms = (
+                node
+                for node in nodes
+                if isinstance(node, ast.ImportFrom) and node.module
+            )
+            aliases = (
+                alias
+                for node in froms
+                if node.module.startswith("sim.parts")
+                for alias in node.names
+            )
             taken = {alias.asname or alias.name for alias in aliases}
-            calls = [node for node in nodes if isinstance(node, ast.Call) and asks_a_class(node, taken)]
-            assert not calls, [f"{name}, line {call.lineno}: {ast.unparse(call)}" for call in calls]
+            calls = [
+                node
+                for node in nodes
+                if isinstance(node, ast.Call) and asks_a_class(node, taken)
+            ]
+            assert not calls, [
+                f"{name}, line {call.lineno}: {ast.unparse(call)}" for call in calls
+            ]
 
 
 def test_no_module_hands_open_files_to_another_process():
     # ruff forbids the other names that only some systems have
     for path in MODULES.values():
-        keywords = {node.arg for node in ast.walk(tree(path)) if isinstance(node, ast.keyword)}
+        keywords = {
+            node.arg for node in ast.walk(tree(path)) if isinstance(node, ast.keyword)
+        }
         assert "pass_fds" not in keywords, path
 
 
 def test_nothing_imports_in_a_circle_benchmarks_and_tests_included():
     graph = {f"sim.{name}": path for name, path in MODULES.items()} | BESIDE
     # raises a CycleError that names the circle
-    assert tuple(TopologicalSorter({name: imports(path) for name, path in graph.items()}).static_order())
+    assert tuple(
+        TopologicalSorter(
+            {name: imports(path) for name, path in graph.items()}
+        ).static_order()
+    )
 
 
 def names(node, context):
-    return {part.id for part in ast.walk(node) if isinstance(part, ast.Name) and isinstance(part.ctx, context)}
+    return {
+        part.id
+        for part in ast.walk(node)
+        if isinstance(part, ast.Name) and isinstance(part.ctx, context)
+    }
 
 
 def comprehensions(node):
@@ -128,7 +209,9 @@ def comprehensions(node):
 def test_a_variable_of_a_comprehension_is_no_function_that_another_one_calls():
     # CPython 3.12.1 takes such a function for a local variable without a value
     for path in (*MODULES.values(), *BESIDE.values()):
-        functions = {node.name for node in tree(path).body if isinstance(node, ast.FunctionDef)}
+        functions = {
+            node.name for node in tree(path).body if isinstance(node, ast.FunctionDef)
+        }
         for node in tree(path).body:
             variables, reads = set(), set()
             for inner in comprehensions(node):

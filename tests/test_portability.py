@@ -13,11 +13,15 @@ import pytest
 import xarray as xr
 from helpers.commands import COUNTED, LENS
 
-on_linux = pytest.mark.skipif(sys.platform != "linux", reason="names are hidden on Linux alone")
+on_linux = pytest.mark.skipif(
+    sys.platform != "linux", reason="names are hidden on Linux alone"
+)
 
 ELSEWHERE = Path(__file__).parent / "helpers" / "elsewhere"
 SCENE = (
-    LENS.replace('"a scene"', '"a lens — Größe µ"\nseed = 3').replace('"1 s"', '"40 ms"').replace('"0.1 s"', '"1 ms"')
+    LENS.replace('"a scene"', '"a lens — Größe µ"\nseed = 3')
+    .replace('"1 s"', '"40 ms"')
+    .replace('"0.1 s"', '"1 ms"')
 )
 SCENE += f"""
 [drive]
@@ -48,11 +52,18 @@ def elsewhere(tmp_path):
     (folder / "Geschwindigkeit à.csv").write_bytes(SPEEDS.encode())
     (folder / "curves.csv").write_bytes(CURVES.encode())
     path = os.pathsep.join([str(ELSEWHERE), *sys.path])
-    environment = {**os.environ, "PYTHONPATH": path, "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": path,
+        "PYTHONIOENCODING": "cp1252",
+        "PYTHONUTF8": "0",
+    }
 
     def sim(*words, code=0):
         command = [sys.executable, "-W", "error::FutureWarning", "-m", "sim", *words]
-        process = subprocess.run(command, cwd=folder, env=environment, capture_output=True, encoding="cp1252")
+        process = subprocess.run(
+            command, cwd=folder, env=environment, capture_output=True, encoding="cp1252"
+        )
         assert process.returncode == code, (words, process.stderr)
         assert "Traceback" not in process.stderr
         return process.stdout + process.stderr
@@ -63,7 +74,11 @@ def elsewhere(tmp_path):
 
 def variables(path):
     with xr.open_dataset(path) as dataset:
-        return {name: value.values for name, value in dataset.load().variables.items() if value.dtype.kind in "biuf"}
+        return {
+            name: value.values
+            for name, value in dataset.load().variables.items()
+            if value.dtype.kind in "biuf"
+        }
 
 
 @on_linux
@@ -81,7 +96,12 @@ print(getattr(os, "process_cpu_count", os.cpu_count)() > 0)
 """
     environment = {**os.environ, "PYTHONPATH": str(ELSEWHERE)}
     printed = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     seen = ["sim.somewhere does not see"] * 4 + ["elsewhere sees"] * 4 + ["True"]
     assert printed.stdout.splitlines() == seen
@@ -94,19 +114,43 @@ def test_a_user_goes_from_a_scenario_to_a_fit(elsewhere):
     sim("new", "erste Szene.toml")
     assert "counted" in sim("check", scene)
     sim("run", scene, "-o", "one.nc", "-j", "1", "--quiet")
-    sim("run", scene, "-o", "zwei Läufe.nc", "-j", "2", "--quiet", "--max-time", "1 us", code=75)
+    sim(
+        "run",
+        scene,
+        "-o",
+        "zwei Läufe.nc",
+        "-j",
+        "2",
+        "--quiet",
+        "--max-time",
+        "1 us",
+        code=75,
+    )
     sim("run", scene, "-o", "zwei Läufe.nc", "-j", "2", "--quiet", "--resume")
     one, two = (variables(sim.folder / name) for name in ("one.nc", "zwei Läufe.nc"))
     assert one.keys() == two.keys()
     for name, values in one.items():
         np.testing.assert_array_equal(values, two[name], err_msg=name)
-    assert not [path for path in sim.folder.iterdir() if path.is_dir() or path.suffix in (".lock", ".tmp")]
+    assert not [
+        path
+        for path in sim.folder.iterdir()
+        if path.is_dir() or path.suffix in (".lock", ".tmp")
+    ]
     assert "A/A_JKR" in sim("stats", "zwei Läufe.nc", "--csv", "stats ü.csv")
     assert (sim.folder / "stats ü.csv").stat().st_size > 1000
     sim("plot", "zwei Läufe.nc", "-o", "Bild.png")
     sim("report", "zwei Läufe.nc", "-o", "Seite.html")
     assert "Größe µ" in (sim.folder / "Seite.html").read_text(encoding="utf-8")
-    sim("fit", "fit.toml", "curves.csv", "--free", "bonds.critical_speed", "--steady", "-o", "à")
+    sim(
+        "fit",
+        "fit.toml",
+        "curves.csv",
+        "--free",
+        "bonds.critical_speed",
+        "--steady",
+        "-o",
+        "à",
+    )
     assert (sim.folder / "à_fit.json").exists()
 
 
@@ -122,6 +166,13 @@ def test_a_user_goes_from_a_scenario_to_a_fit(elsewhere):
 )
 def test_the_files_for_hosts_follow_their_schemas(schema, files):
     paths = [str(path) for path in Path(__file__).parents[1].glob(files)]
-    command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", f"vendor.{schema}", *paths]
+    command = [
+        sys.executable,
+        "-m",
+        "check_jsonschema",
+        "--builtin-schema",
+        f"vendor.{schema}",
+        *paths,
+    ]
     assert paths
     subprocess.run(command, check=True)

@@ -52,9 +52,13 @@ def test_importing_the_package_imports_nothing_heavy_and_dir_lists_what_is_publi
 def test_a_scene_is_a_path_a_dictionary_or_keywords(dataset, tmp_path):
     path = tmp_path / "x.toml"
     path.write_text(written(SCENE), encoding="utf-8")
-    keywords = sim.Scenario(**{**SCENE, "drive": {"model": "ramp", "start": "0 mm/s", "stop": "10 mm/s"}})
+    keywords = sim.Scenario(
+        **{**SCENE, "drive": {"model": "ramp", "start": "0 mm/s", "stop": "10 mm/s"}}
+    )
     for scene in (path, str(path), sim.load(SCENE), keywords):
-        np.testing.assert_array_equal(sim.run(scene).contact_radius, dataset.contact_radius)
+        np.testing.assert_array_equal(
+            sim.run(scene).contact_radius, dataset.contact_radius
+        )
 
 
 def test_a_run_into_a_file_is_replaced_only_if_asked(file, dataset, monkeypatch):
@@ -78,23 +82,42 @@ def test_progress_is_told_to_a_function_or_shown_or_logged(capsys, caplog, monke
     assert "100 % of 11 member-steps" in capsys.readouterr().err
     with caplog.at_level("INFO", "sim"):
         sim.run({**SCENE, "solid": {"shear_modulus": "1.6 MPa", "poisson_ratio": 0.4}})
-    assert "poisson_ratio is not 0.5: the normal-tangential coupling is neglected" in caplog.messages
+    assert (
+        "poisson_ratio is not 0.5: the normal-tangential coupling is neglected"
+        in caplog.messages
+    )
     assert any(line.startswith("100 % of 11 member-steps") for line in caplog.messages)
     assert capsys.readouterr() == ("", "")
 
 
-def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statistics(file, dataset, tmp_path):
-    spring = {"model": "spring", "stage": "1 mm/s", "stiffness": "1 N/m", "damping": 10, "contact_stiffness": "rigid"}
+def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statistics(
+    file, dataset, tmp_path
+):
+    spring = {
+        "model": "spring",
+        "stage": "1 mm/s",
+        "stiffness": "1 N/m",
+        "damping": 10,
+        "contact_stiffness": "rigid",
+    }
     assert "speed" in sim.run({**SCENE, "drive": spring}).data_vars
     with sim.open(file) as opened, xr.open_dataset(file, decode_times=False) as plainly:
-        variable, functions = dataset.reset_coords("speed"), ("observables", "statistics", "events", "shares")
+        variable, functions = (
+            dataset.reset_coords("speed"),
+            ("observables", "statistics", "events", "shares"),
+        )
         expected = {name: getattr(analysis, name)(variable) for name in functions}
         table = analysis.table(variable)
         for found in (dataset, opened, plainly):
             assert "speed" in found.contact_area.coords
-            assert float(found.contact_area.swap_dims(t="speed").sel(speed=5e-3)) == dataset.contact_area[5]
+            assert (
+                float(found.contact_area.swap_dims(t="speed").sel(speed=5e-3))
+                == dataset.contact_area[5]
+            )
             for name in functions:
-                xr.testing.assert_identical(getattr(analysis, name)(found), expected[name])
+                xr.testing.assert_identical(
+                    getattr(analysis, name)(found), expected[name]
+                )
             assert analysis.table(found) == table
         opened.to_netcdf(tmp_path / "again.nc")
     with netCDF4.Dataset(file, "a"):  # as nothing holds it any longer
@@ -105,15 +128,23 @@ def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statist
 def test_check_reads_as_the_command_prints_and_a_scene_is_shown_in_a_line(tmp_path):
     (tmp_path / "x.toml").write_text(written(SCENE), encoding="utf-8")
     printed = CliRunner().invoke(cli, ["check", str(tmp_path / "x.toml")]).stdout
-    assert printed == f"{sim.check(tmp_path / 'x.toml')}\n" and "sphere.radius" in printed
+    assert (
+        printed == f"{sim.check(tmp_path / 'x.toml')}\n" and "sphere.radius" in printed
+    )
     assert repr(sim.check(SCENE)) == str(sim.check(SCENE))
-    scene = sim.load(SCENE, {"sweep": {"contact.load": [1e-3, 2e-3]}, "ensemble.members": 3})
-    assert repr(scene).startswith('<Scenario "a <scene>": drive ramp') and repr(scene).endswith("points 2>")
+    scene = sim.load(
+        SCENE, {"sweep": {"contact.load": [1e-3, 2e-3]}, "ensemble.members": 3}
+    )
+    assert repr(scene).startswith('<Scenario "a <scene>": drive ramp') and repr(
+        scene
+    ).endswith("points 2>")
 
 
 def test_a_value_of_a_sweep_is_chosen_by_its_key():
     models = [{"model": "none"}, {"model": "none", "stress": 3e5}]
-    dataset = sim.run({**SCENE, "sweep": {"contact.load": ["1 mN", "4 mN"], "bonds": models}})
+    dataset = sim.run(
+        {**SCENE, "sweep": {"contact.load": ["1 mN", "4 mN"], "bonds": models}}
+    )
     for key, value in (("contact.load", "4 mN"), ("load", 4e-3)):
         found = sim.stats(dataset, where={key: value, "bonds": "none 2"})
         assert len(found) == dataset.sizes["t"]
@@ -131,7 +162,9 @@ def test_a_value_of_a_sweep_is_chosen_by_its_key():
 def test_stats_are_a_data_frame_in_si_and_plot_draws_and_saves(file, dataset, tmp_path):
     for source in (file, str(file), dataset):
         table = sim.stats(source)
-        np.testing.assert_array_equal(table["contact_radius_mean"], dataset.contact_radius.to_numpy().ravel())
+        np.testing.assert_array_equal(
+            table["contact_radius_mean"], dataset.contact_radius.to_numpy().ravel()
+        )
         assert table.attrs["units"]["contact_radius_mean"] == "m"
     assert sim.plot(dataset).axes
     sim.plot(file, "time", to=tmp_path / "time.png")
@@ -141,7 +174,9 @@ def test_stats_are_a_data_frame_in_si_and_plot_draws_and_saves(file, dataset, tm
 
 
 def test_converge_takes_a_budget_as_text(monkeypatch):
-    monkeypatch.setattr("sim.study.converge.converge", lambda scene, seconds: (scene.name, seconds))
+    monkeypatch.setattr(
+        "sim.study.converge.converge", lambda scene, seconds: (scene.name, seconds)
+    )
     assert sim.converge(SCENE, "2 min") == (SCENE["name"], 120.0)
     with pytest.raises(sim.BadInput, match=r"^budget 2 kg: .*not a unit of s"):
         sim.converge(SCENE, "2 kg")
@@ -149,9 +184,21 @@ def test_converge_takes_a_budget_as_text(monkeypatch):
 
 def test_a_fault_of_a_scene_is_bad_input_with_its_key_and_cure():
     for use, key, cure in (
-        (lambda: sim.Scenario(**{**SCENE, "sphere": {"raduis": 1}}), "sphere.raduis", '"radius"'),
-        (lambda: sim.load(SCENE, {"sphere.raduis": 1}), 'overrides["sphere.raduis"]', '"radius"'),
-        (lambda: sim.load(SCENE).with_values({"contact.lod": 1}), "contact.lod", '"load"'),
+        (
+            lambda: sim.Scenario(**{**SCENE, "sphere": {"raduis": 1}}),
+            "sphere.raduis",
+            '"radius"',
+        ),
+        (
+            lambda: sim.load(SCENE, {"sphere.raduis": 1}),
+            'overrides["sphere.raduis"]',
+            '"radius"',
+        ),
+        (
+            lambda: sim.load(SCENE).with_values({"contact.lod": 1}),
+            "contact.lod",
+            '"load"',
+        ),
     ):
         with pytest.raises(sim.BadInput) as fault:
             use()

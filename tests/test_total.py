@@ -26,7 +26,28 @@ from sim.ensemble.variables import LARGEST
 from sim.parts.drive import READINGS
 
 #: Seeds of the scenes: six, and scenes whose energies, sub-steps or messages have been wrong.
-SEEDS = [*range(6), 45, 59, 75, 78, 202, 214, 266, 310, 319, 445, 689, 730, 794, 807, 1042, 1102, 1192, 1240, 1293]
+SEEDS = [
+    *range(6),
+    45,
+    59,
+    75,
+    78,
+    202,
+    214,
+    266,
+    310,
+    319,
+    445,
+    689,
+    730,
+    794,
+    807,
+    1042,
+    1102,
+    1192,
+    1240,
+    1293,
+]
 SEEDS += [1319, 1399]
 #: That of a scene that is refused, with a reason.
 REFUSED = (75,)
@@ -63,11 +84,16 @@ def admitted(scene):
 
 def run(scenario, members, steps, state=None):
     """Return the state at the last of some clock steps, and the trajectory at each."""
-    return follow(scenario, MemberNoise.of(scenario.seed, np.array(members)), state, steps)
+    return follow(
+        scenario, MemberNoise.of(scenario.seed, np.array(members)), state, steps
+    )
 
 
 def largest_tolerance(scenario):
-    return max(getattr(part, "tolerance", 0.0) for part in (scenario.drive, scenario.population))
+    return max(
+        getattr(part, "tolerance", 0.0)
+        for part in (scenario.drive, scenario.population)
+    )
 
 
 def largest_energy(scenario, course):
@@ -88,17 +114,26 @@ def check_energy(scenario, course):
     With the default tolerances no residual exceeds a thousandth of the largest energy of the run.
     """
     path = np.max(np.abs(np.diff(column(course, "stage_position"), axis=0)))
-    free = 1e-3 * scenario.drive.tolerance * scenario.drive.spring * path**2  # of a slider that nothing holds
+    # of a slider that nothing holds
+    free = 1e-3 * scenario.drive.tolerance * scenario.drive.spring * path**2
     bound = max(1e-6, 10.0 * largest_tolerance(scenario))
     size = largest_energy(scenario, course) + free / bound + 1e-30
     residual = np.abs(np.nan_to_num(column(course, "energy_residual")))
-    over, members = np.flatnonzero(np.any(residual > bound * size, axis=1)), residual.shape[1]
+    over, members = (
+        np.flatnonzero(np.any(residual > bound * size, axis=1)),
+        residual.shape[1],
+    )
     if len(over) and np.max(column(course, "substeps")) < EXPENSIVE:
-        finer, records = scenario.with_values({"clock.step": scenario.clock.step / 8.0}), over[-1] + 1
+        finer, records = (
+            scenario.with_values({"clock.step": scenario.clock.step / 8.0}),
+            over[-1] + 1,
+        )
         _, within = run(finer, range(members), range(8 * over[-1] + 1))
         size[:records] = np.maximum(size[:records], largest_energy(finer, within)[::8])
     drive, limit = scenario.drive, bound * size
-    if scenario.population.model == "tracked" or (drive.mass and not drive.damping + drive.viscosity):
+    if scenario.population.model == "tracked" or (
+        drive.mass and not drive.damping + drive.viscosity
+    ):
         limit = np.maximum(limit, MOST_MISSING * size.max(axis=0))
     if drive.tolerance <= 1e-6 and largest_tolerance(scenario) <= 1e-4:
         limit = np.minimum(limit, MOST_MISSING * size.max(axis=0))
@@ -113,12 +148,24 @@ def check_missing(scenario, course):
     """No value is missing, but after a loss of stability, which ``check_ends`` explains, and after a stop."""
     stopped = np.isnan(course.radius) & (scenario.contact.after_pull_off == "stop")
     explained = stopped | has_ended(course) if scenario.drive.solves_motion else stopped
-    for name in ("position", "speed", "fraction", "stress", "strength", "energy", "work"):
+    for name in (
+        "position",
+        "speed",
+        "fraction",
+        "stress",
+        "strength",
+        "energy",
+        "work",
+    ):
         missing = np.isnan(getattr(course, name))
         assert not np.any(missing & ~explained), f"{name} is missing"
     if scenario.drive.solves_motion:
-        for name in (name for name in READINGS if name not in ("runaway_time", "unresolved_time")):
-            assert not np.any(np.isnan(column(course, name)) & ~explained), f"{name} is missing"
+        for name in (
+            name for name in READINGS if name not in ("runaway_time", "unresolved_time")
+        ):
+            assert not np.any(np.isnan(column(course, name)) & ~explained), (
+                f"{name} is missing"
+            )
 
 
 def check_cuts(scenario, course, end, cut=None):
@@ -128,21 +175,41 @@ def check_cuts(scenario, course, end, cut=None):
     single, alone = run(scenario, [1], range(last + 1))
     members = range(scenario.ensemble.members)
     middle, _ = run(scenario, members, range(cut + 1))
-    resumed, _ = run(scenario, members, range(cut + 1, last + 1), unpack(scenario, pack(middle)))
+    resumed, _ = run(
+        scenario, members, range(cut + 1, last + 1), unpack(scenario, pack(middle))
+    )
     seldom, sparse = run(scenario, members, range(last % 5, last + 1, 5))
     for name, values in pack(end).items():
-        assert np.array_equal(values, pack(resumed)[name], equal_nan=True), f"{name} of a resumed run"
-        assert np.array_equal(values, pack(seldom)[name], equal_nan=True), f"{name} of sparse records"
-    whole = [each for each in LARGEST if each.applies(scenario) and each.name not in ("step_renewal", "pull_off_error")]
+        assert np.array_equal(values, pack(resumed)[name], equal_nan=True), (
+            f"{name} of a resumed run"
+        )
+        assert np.array_equal(values, pack(seldom)[name], equal_nan=True), (
+            f"{name} of sparse records"
+        )
+    whole = [
+        each
+        for each in LARGEST
+        if each.applies(scenario)
+        and each.name not in ("step_renewal", "pull_off_error")
+    ]
     for largest in whole:
-        dense, single_values = (np.asarray(largest.read(scenario, state)) for state in (end, single))
+        dense, single_values = (
+            np.asarray(largest.read(scenario, state)) for state in (end, single)
+        )
         one = dense if len(dense) == 1 else dense[1:2]
-        one = one[:, : single_values.shape[1]] if largest.axis else one  # others may have more slip events
-        assert np.array_equal(one, single_values, equal_nan=True), f"{largest.name} of a member alone"
-    for name, dense, lone, thin in zip(course._fields, course, alone, sparse, strict=True):
+        # others may have more slip events
+        one = one[:, : single_values.shape[1]] if largest.axis else one
+        assert np.array_equal(one, single_values, equal_nan=True), (
+            f"{largest.name} of a member alone"
+        )
+    for name, dense, lone, thin in zip(
+        course._fields, course, alone, sparse, strict=True
+    ):
         one = dense if name == "time" or dense.shape[1] == 1 else dense[:, 1:2]
         assert np.array_equal(one, lone, equal_nan=True), f"{name} of a member alone"
-        assert np.array_equal(dense[last % 5 :: 5], thin, equal_nan=True), f"{name} of sparse records"
+        assert np.array_equal(dense[last % 5 :: 5], thin, equal_nan=True), (
+            f"{name} of sparse records"
+        )
 
 
 def refined(seed, parts, members=1, sharper=1.0):
@@ -152,12 +219,15 @@ def refined(seed, parts, members=1, sharper=1.0):
     """
     scene = random_scene(seed)
     scene["clock"]["step"] /= parts
-    if scene["drive"]["model"] == "start":  # the error of a jump within a step goes as its distance from the middle
+    # the error of a jump within a step goes as its distance from the middle
+    if scene["drive"]["model"] == "start":
         scene["drive"]["rest"] = 0.25 * scene["clock"]["duration"]
     if scene["drive"]["model"] in ("spring", "force"):
         scene["drive"]["tolerance"] = 1e-6 / sharper
     scenario = sim.Scenario(**scene)
-    _, course = run(scenario, range(members), range(0, scenario.clock.steps + 1, round(2 * parts)))
+    _, course = run(
+        scenario, range(members), range(0, scenario.clock.steps + 1, round(2 * parts))
+    )
     values = np.pi * course.radius**2, course.energy, course.stress, course.position
     return np.array([np.nan_to_num(value) + np.zeros((1, members)) for value in values])
 
@@ -176,16 +246,33 @@ def check_steps(seed, scenario, course):
     if scenario.drive.solves_motion and np.max(column(course, "substeps")) > 2e4:
         return
     size = max(1, 96 // scenario.clock.steps)
-    if scenario.population.model in ("counted", "tracked") or scenario.fluctuations.per_member:
-        runs = np.array([refined(seed, size * parts, 32).mean(axis=1) for parts in (0.5, 1, 2, 8)])
+    if (
+        scenario.population.model in ("counted", "tracked")
+        or scenario.fluctuations.per_member
+    ):
+        runs = np.array(
+            [refined(seed, size * parts, 32).mean(axis=1) for parts in (0.5, 1, 2, 8)]
+        )
         noise = np.sum(3.0 * runs.std(axis=2), axis=0) / math.sqrt(31.0)
         double, whole, half, finest = runs.mean(axis=2, keepdims=True)
     else:
-        double, whole, half, finest = (refined(seed, size * parts)[:, :, 0] for parts in (0.5, 1, 2, 8))
-        noise = 10.0 * np.abs(refined(seed, size * 8, sharper=100.0)[:, :, 0] - finest).mean(axis=1)
-    *farther, nearer = (np.abs(values - finest).mean(axis=1) for values in (double, whole, half))
-    bound = np.maximum(*farther) + noise + 10.0 * max(largest_tolerance(scenario), 1e-9) * np.abs(finest).mean(axis=1)
-    assert np.all(nearer <= bound), f"half a clock step is off by {nearer}, more than {bound}"
+        double, whole, half, finest = (
+            refined(seed, size * parts)[:, :, 0] for parts in (0.5, 1, 2, 8)
+        )
+        noise = 10.0 * np.abs(
+            refined(seed, size * 8, sharper=100.0)[:, :, 0] - finest
+        ).mean(axis=1)
+    *farther, nearer = (
+        np.abs(values - finest).mean(axis=1) for values in (double, whole, half)
+    )
+    bound = (
+        np.maximum(*farther)
+        + noise
+        + 10.0 * max(largest_tolerance(scenario), 1e-9) * np.abs(finest).mean(axis=1)
+    )
+    assert np.all(nearer <= bound), (
+        f"half a clock step is off by {nearer}, more than {bound}"
+    )
 
 
 def check_scene(seed, finer=False, draw=random_scene):
@@ -204,7 +291,9 @@ def faults_in(seed, finer, draw):
     scenario, faults = admitted(draw(seed)), []
     if scenario is None:
         return faults, None
-    end, course = run(scenario, range(scenario.ensemble.members), range(scenario.clock.steps + 1))
+    end, course = run(
+        scenario, range(scenario.ensemble.members), range(scenario.clock.steps + 1)
+    )
     for rule, arguments in rules(scenario, course, end, seed if finer else None):
         try:
             rule(*arguments)
@@ -221,9 +310,15 @@ def rules(scenario, course, end, seed=None):
     """
     checks = [(check_missing, (scenario, course)), (check_turns, (scenario, course))]
     if scenario.drive.solves_motion:
-        checks += [(rule, (scenario, course)) for rule in (check_ends, check_energy, check_spring, check_open)]
+        checks += [
+            (rule, (scenario, course))
+            for rule in (check_ends, check_energy, check_spring, check_open)
+        ]
         checks.append((check_peaks, (scenario, course, end)))
-    if not scenario.drive.solves_motion or np.sum(column(course, "substeps")[-1]) < MILLIONS:
+    if (
+        not scenario.drive.solves_motion
+        or np.sum(column(course, "substeps")[-1]) < MILLIONS
+    ):
         checks.append((check_cuts, (scenario, course, end)))
     if seed is not None:
         checks.append((check_steps, (seed, scenario, course)))
@@ -231,12 +326,15 @@ def rules(scenario, course, end, seed=None):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_random_scene_closes_its_energy_and_has_the_same_numbers_however_it_is_cut(seed):
+def test_a_random_scene_closes_its_energy_and_has_the_same_numbers_however_it_is_cut(
+    seed,
+):
     assert check_scene(seed) is not None or seed in REFUSED
 
 
 @pytest.mark.verify
-@pytest.mark.parametrize("seed", [*range(int(os.environ.get("SCENES", "300"))), 1768])  # which takes three seconds
+# which takes three seconds
+@pytest.mark.parametrize("seed", [*range(int(os.environ.get("SCENES", "300"))), 1768])
 def test_a_random_scene_keeps_all_rules_also_at_finer_steps(seed):
     if check_scene(seed, finer=True) is None:
         pytest.skip("the scene is refused with a reason")
@@ -259,8 +357,16 @@ def test_a_scene_at_a_corner_keeps_all_rules(seed):
 def test_scenes_at_the_corners_reach_them_as_often_as_they_must():
     """Counts are those of the first members, read off their runs."""
     counts = Counter()
-    for scenario in filter(None, (admitted(corner_scene(seed)) for seed in range(CORNERS))):
-        _, course = run(scenario, range(scenario.ensemble.members), range(scenario.clock.steps + 1))
+    for scenario in filter(
+        None, (admitted(corner_scene(seed)) for seed in range(CORNERS))
+    ):
+        _, course = run(
+            scenario, range(scenario.ensemble.members), range(scenario.clock.steps + 1)
+        )
         counts += reached(scenario, course)
-    few = {name: f"{counts[name]} of {least}" for name, least in LEAST_REACHED.items() if counts[name] < least}
+    few = {
+        name: f"{counts[name]} of {least}"
+        for name, least in LEAST_REACHED.items()
+        if counts[name] < least
+    }
     assert not few, f"corners that {CORNERS} scenes reach too seldom: {few}"

@@ -5,7 +5,15 @@ Some are recorded, others are derived (such as the share of the area lost to bro
 run, such as the detachment or the friction peak. ``summary`` returns statistics of both over the members.
 """
 
-from sim.analysis.dataset import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
+from sim.analysis.dataset import (
+    Control,
+    control,
+    is_stationary,
+    is_steady,
+    setting,
+    speed_of,
+    sweep_dims,
+)
 from sim.analysis.errors import SystematicError, remarks, systematic_errors
 from sim.analysis.events import (
     Lifetime,
@@ -18,7 +26,13 @@ from sim.analysis.events import (
     slips_by_phase,
     stick_slip,
 )
-from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
+from sim.analysis.observables import (
+    bond_work,
+    observables,
+    reference_radii,
+    settled,
+    share_observables,
+)
 from sim.analysis.over_speed import crossing, extremes, loss_speeds, steady_speeds
 from sim.analysis.statements import Statement, each, relaxation, statements, statistics
 from sim.analysis.statistics import (
@@ -33,18 +47,75 @@ from sim.analysis.statistics import (
     summary,
     where,
 )
-from sim.analysis.tables import highlights, in_columns, losses, notes, phases, spread, table, tidy, to_csv
+from sim.analysis.tables import (
+    highlights,
+    in_columns,
+    losses,
+    notes,
+    phases,
+    spread,
+    table,
+    tidy,
+    to_csv,
+)
 from sim.units.notation import concise, engineering, scaled
 
 __all__ = [
-    "QUANTILES", "Control", "IntegralTime", "Lifetime", "Statement", "SystematicError", "averaging", "bond_work",
-    "concise", "control", "correlation_time", "crossing", "distribution", "each", "engineering", "events", "extremes",
-    "highlights", "in_columns", "integral_time", "is_stationary", "is_steady", "lifetime",
-    "loop_energy", "loss_speeds", "losses", "notes", "observables", "over_time", "peaks", "phases", "pull_offs",
-    "reference_radii", "relaxation", "remarks", "scaled", "setting", "settled", "share_observables", "shares",
-    "slips", "slips_by_phase", "spread", "statements", "statistics",
-    "steady_speeds", "stick_slip", "summary", "sweep_dims", "systematic_errors", "table", "tidy", "to_csv", "where",
-]  # fmt: skip
+    "QUANTILES",
+    "Control",
+    "IntegralTime",
+    "Lifetime",
+    "Statement",
+    "SystematicError",
+    "averaging",
+    "bond_work",
+    "concise",
+    "control",
+    "correlation_time",
+    "crossing",
+    "distribution",
+    "each",
+    "engineering",
+    "events",
+    "extremes",
+    "highlights",
+    "in_columns",
+    "integral_time",
+    "is_stationary",
+    "is_steady",
+    "lifetime",
+    "loop_energy",
+    "loss_speeds",
+    "losses",
+    "notes",
+    "observables",
+    "over_time",
+    "peaks",
+    "phases",
+    "pull_offs",
+    "reference_radii",
+    "relaxation",
+    "remarks",
+    "scaled",
+    "setting",
+    "settled",
+    "share_observables",
+    "shares",
+    "slips",
+    "slips_by_phase",
+    "spread",
+    "statements",
+    "statistics",
+    "steady_speeds",
+    "stick_slip",
+    "summary",
+    "sweep_dims",
+    "systematic_errors",
+    "table",
+    "tidy",
+    "to_csv",
+    "where",
+]
 
 
 def __dir__() -> list[str]:

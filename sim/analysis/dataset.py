@@ -25,25 +25,47 @@ MEMBERS = "member"
 ROOM = 2**26
 #: Quantities that every run records unless its scenario chooses some, and the statements that need them.
 _STATEMENTS = {
-    "contact_area": "contact area", "friction_force": "friction", "in_contact": "open contacts",
-    "time_masked": "masked contacts", "first_detachment": "detachment", "jkr_radius": "area ratio",
-    "bonds_radius": "area lost to bonds and fluctuations", "peak_stress": "peak of stress",
+    "contact_area": "contact area",
+    "friction_force": "friction",
+    "in_contact": "open contacts",
+    "time_masked": "masked contacts",
+    "first_detachment": "detachment",
+    "jkr_radius": "area ratio",
+    "bonds_radius": "area lost to bonds and fluctuations",
+    "peak_stress": "peak of stress",
     "peak_friction": "peak of friction",
-}  # fmt: skip
+}
 #: A missing variable in the words of xarray, without the ending of a statistic.
 _MISSING = re.compile(r"(?:^|named ')(\w+?)(?:_mean|_std|_sem)?(?:'|$)")
 #: Ending of a statistic of the members in the name of a variable.
 _STATISTIC = re.compile("_(mean|std|sem|count)$")
 #: Numbers that every run derives from its scenario.
 _DERIVED = (
-    "contact_modulus", "effective_shear_modulus", "effective_poisson_ratio", "has_noise", "radius_at_rest",
+    "contact_modulus",
+    "effective_shear_modulus",
+    "effective_poisson_ratio",
+    "has_noise",
+    "radius_at_rest",
     "radius_without_adhesion",
-)  # fmt: skip
+)
 #: Other numbers of a run, and the dimensions that a run has beside those of its sweep.
 _RECORDED = {
-    *get_args(Recorded), "t", MEMBERS, "slip", "phase", "phase_start", "phase_end", "shear_map", "map_member",
-    "map_time", "x", "y", "jkr_pull_off_load", "error_speed", "member_spread_area",
-}  # fmt: skip
+    *get_args(Recorded),
+    "t",
+    MEMBERS,
+    "slip",
+    "phase",
+    "phase_start",
+    "phase_end",
+    "shear_map",
+    "map_member",
+    "map_time",
+    "x",
+    "y",
+    "jkr_pull_off_load",
+    "error_speed",
+    "member_spread_area",
+}
 #: Numbers on slip events, which are recorded together unless a scenario chooses some.
 _SLIPS = [name for name in get_args(Recorded) if name.startswith(("slip_", "late_"))]
 #: Names of systematic errors.
@@ -67,7 +89,11 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
     if not os.path.exists(path) or os.path.isdir(path):
         reason = "is a folder" if os.path.isdir(path) else "there is no such file"
         unfinished = os.path.isdir(f"{path}.parts")
-        cure = "the run is not complete; continue it with `sim run ... --resume`" if unfinished else "name a dataset"
+        cure = (
+            "the run is not complete; continue it with `sim run ... --resume`"
+            if unfinished
+            else "name a dataset"
+        )
         raise BadInput([f"{path}: {reason}; {cure}"])
     try:
         dataset = open_lazily(path)
@@ -79,9 +105,15 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
     with contextlib.ExitStack() as refused:
         refused.callback(dataset.close)
         if not {"sim_version", "scenario_resolved"} & dataset.attrs.keys():
-            raise BadInput([f"{path}: was not written by `sim run`; name one of its outputs"])
+            raise BadInput(
+                [f"{path}: was not written by `sim run`; name one of its outputs"]
+            )
         if reason := _fault(dataset):
-            raise BadInput([f"{path}: {reason}: it was changed after the run; run the scenario again"])
+            raise BadInput(
+                [
+                    f"{path}: {reason}: it was changed after the run; run the scenario again"
+                ]
+            )
         dataset.attrs |= _joined(dataset)  # a copy would not close the file
         result = hdf5.located(dataset)
         refused.pop_all()
@@ -90,11 +122,19 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
 
 def _joined(dataset: xr.Dataset) -> dict[str, Any]:
     """Return attributes of runs that were joined, or of selected members: their number, and in ``joined`` in words."""
-    recorded, scenario = int(dataset.attrs["members"]), hdf5.tables(dataset.attrs["scenario_resolved"])
-    count, keys = dataset.sizes.get(MEMBERS, recorded), {key.replace(".", "_") for key in _swept(scenario)}
+    recorded, scenario = (
+        int(dataset.attrs["members"]),
+        hdf5.tables(dataset.attrs["scenario_resolved"]),
+    )
+    count, keys = (
+        dataset.sizes.get(MEMBERS, recorded),
+        {key.replace(".", "_") for key in _swept(scenario)},
+    )
     texts = [f"joined along {name}" for name in sweep_dims(dataset) if name not in keys]
     if count != recorded:
-        rest = f"joined, {recorded} of one run" if count > recorded else f"of {recorded}"
+        rest = (
+            f"joined, {recorded} of one run" if count > recorded else f"of {recorded}"
+        )
         texts.append(f"{count} members {rest}")
     return {"members": np.int32(count), "joined": "; ".join(texts)} if texts else {}
 
@@ -112,31 +152,61 @@ def _fault(dataset: xr.Dataset) -> str:
             return f"lacks the attribute {name}"
     if not (scenario := hdf5.tables(dataset.attrs["scenario_resolved"])):
         return "the attribute scenario_resolved does not hold a scenario"
-    swept, numbers = _swept(scenario), list(_numbers({key: scenario[key] for key in scenario if key != "sweep"}))
-    whole = {key.partition(".")[0] for key in swept if _label(dataset, key) is not None}  # tables that differ by point
+    swept, numbers = (
+        _swept(scenario),
+        list(_numbers({key: scenario[key] for key in scenario if key != "sweep"})),
+    )
+    # tables that differ by point
+    whole = {key.partition(".")[0] for key in swept if _label(dataset, key) is not None}
     varied = tuple(f"{name}." for name in swept)
-    fixed = [key for key in numbers if key.partition(".")[0] not in whole and not f"{key}.".startswith(varied)]
+    fixed = [
+        key
+        for key in numbers
+        if key.partition(".")[0] not in whole and not f"{key}.".startswith(varied)
+    ]
     keys = {key.replace(".", "_") for key in (*numbers, *swept)}
     for name in ("t", *_DERIVED, *(key.replace(".", "_") for key in fixed)):
         if name not in dataset.variables:
             return f"lacks the numbers {name}"
-    for name in _SLIPS if "slip_time" in dataset and not (scenario.get("record") or {}).get("quantities") else ():
+    for name in (
+        _SLIPS
+        if "slip_time" in dataset
+        and not (scenario.get("record") or {}).get("quantities")
+        else ()
+    ):
         if name not in dataset.variables:
             return f"lacks the numbers {name}"
     if dataset.variables["t"].dims != ("t",):
         return "the numbers t have other dimensions"
-    for name in sweep_dims(dataset):  # which are those of this variable; each has its values
+    # which are those of this variable; each has its values
+    for name in sweep_dims(dataset):
         if name not in dataset.variables:
             return f"the variable contact_modulus has the unknown dimension {name}"
-    for name, variable in ((str(name), variable) for name, variable in dataset.variables.items()):
+    for name, variable in (
+        (str(name), variable) for name, variable in dataset.variables.items()
+    ):
         over_sweep = name in keys or name in _DERIVED
-        stem = name if name in _RECORDED else _STATISTIC.sub("", name).removeprefix("late_")
+        stem = (
+            name
+            if name in _RECORDED
+            else _STATISTIC.sub("", name).removeprefix("late_")
+        )
         if not (over_sweep or stem in _RECORDED or _ERRORS.match(name)):
             continue
-        is_label = name in keys and variable.dims and variable.dims[0] in dataset["contact_modulus"].dims
-        if variable.dtype.kind not in ("OUSTfiu" if is_label else "f" if over_sweep or name == "t" else "fiu"):
+        is_label = (
+            name in keys
+            and variable.dims
+            and variable.dims[0] in dataset["contact_modulus"].dims
+        )
+        if variable.dtype.kind not in (
+            "OUSTfiu" if is_label else "f" if over_sweep or name == "t" else "fiu"
+        ):
             return f"the variable {name} has the type {variable.dtype}, which a run does not give it"
-        if unknown := set(variable.dims) - {*sweep_dims(dataset), MEMBERS, *(() if over_sweep else _DIMENSIONS)}:
+        if unknown := set(variable.dims) - {
+            *sweep_dims(dataset),
+            MEMBERS,
+            *(() if over_sweep else _DIMENSIONS),
+        }:
             return f"the variable {name} has the unknown dimension {min(map(str, unknown))}"
     return ""
 
@@ -144,7 +214,11 @@ def _fault(dataset: xr.Dataset) -> str:
 def _swept(scenario: dict[str, Any]) -> set[str]:
     """Return the dotted keys that a scenario sweeps, along axes or in rows of several keys."""
     sweep = scenario.get("sweep", {})
-    return {str(key) for row in (sweep if isinstance(sweep, list) else [sweep]) for key in row}
+    return {
+        str(key)
+        for row in (sweep if isinstance(sweep, list) else [sweep])
+        for key in row
+    }
 
 
 def _numbers(table: dict[str, Any], path: str = "") -> Iterator[str]:
@@ -158,21 +232,38 @@ def _numbers(table: dict[str, Any], path: str = "") -> Iterator[str]:
 
 def lacking(dataset: xr.Dataset) -> str:
     """Return which statements a dataset of an older version cannot make, in one sentence; "" if it makes all."""
-    if hdf5.tables(dataset.attrs["scenario_resolved"]).get("record", {}).get("quantities") is not None:
+    if (
+        hdf5.tables(dataset.attrs["scenario_resolved"])
+        .get("record", {})
+        .get("quantities")
+        is not None
+    ):
         return ""
     recorded = {re.sub("_(mean|std|sem)$", "", str(name)) for name in dataset.variables}
-    lost = [statement for name, statement in _STATEMENTS.items() if name not in recorded]
+    lost = [
+        statement for name, statement in _STATEMENTS.items() if name not in recorded
+    ]
     text = f"made by sim {dataset.attrs['sim_version']}, which did not record all"
-    return f"{text}: no {', no '.join(lost)}; run the scenario again for these" if lost else ""
+    return (
+        f"{text}: no {', no '.join(lost)}; run the scenario again for these"
+        if lost
+        else ""
+    )
 
 
 def with_trajectories(dataset: xr.Dataset, *names: str) -> xr.Dataset:
     """Return the dataset without its trajectories, except those named."""
-    timed = [str(name) for name, variable in dataset.data_vars.items() if "t" in variable.dims]
+    timed = [
+        str(name)
+        for name, variable in dataset.data_vars.items()
+        if "t" in variable.dims
+    ]
     return dataset.drop_vars([name for name in timed if name not in names])
 
 
-def in_pieces(dataset: xr.Dataset, dims: Sequence[str], reduce: Callable[[xr.Dataset], xr.Dataset]) -> xr.Dataset:
+def in_pieces(
+    dataset: xr.Dataset, dims: Sequence[str], reduce: Callable[[xr.Dataset], xr.Dataset]
+) -> xr.Dataset:
     """Apply a function to pieces of a dataset, so that little of a large file is in memory, and join the results.
 
     Parameters
@@ -187,22 +278,37 @@ def in_pieces(dataset: xr.Dataset, dims: Sequence[str], reduce: Callable[[xr.Dat
     dataset = plain(dataset)
     sizes = {name: dataset.sizes[name] for name in dims if name in dataset.sizes}
     dim = max(sizes, key=sizes.__getitem__, default="t")
-    timed = [variable for variable in dataset.variables.values() if {dim, "t"} <= set(variable.dims)]
+    timed = [
+        variable
+        for variable in dataset.variables.values()
+        if {dim, "t"} <= set(variable.dims)
+    ]
     chunk = max((_chunk(variable, dim) for variable in timed), default=1)
     size = dataset.sizes[dim]
     share = int(size * ROOM / max(ROOM, sum(variable.nbytes for variable in timed)))
     length = max(share // chunk, 1) * chunk
-    pieces = (dataset.isel({dim: slice(start, start + length)}).compute() for start in range(0, size, length))
+    pieces = (
+        dataset.isel({dim: slice(start, start + length)}).compute()
+        for start in range(0, size, length)
+    )
     results = [reduce(piece) for piece in pieces]
     if len(results) == 1:
         return results[0]
-    return xr.concat(results, dim, data_vars="minimal", coords="minimal", compat="override", join="override")
+    return xr.concat(
+        results,
+        dim,
+        data_vars="minimal",
+        coords="minimal",
+        compat="override",
+        join="override",
+    )
 
 
 def _chunk(variable: xr.Variable, dim: str) -> int:
     """Return the length of a file's chunks along a dimension; 1 for an array in memory."""
     chunks = variable.encoding.get("chunksizes") or ()
-    return int(chunks[variable.dims.index(dim)]) if len(chunks) == variable.ndim else 1  # joined runs have other sizes
+    # joined runs have other sizes
+    return int(chunks[variable.dims.index(dim)]) if len(chunks) == variable.ndim else 1
 
 
 def plain(dataset: xr.Dataset) -> xr.Dataset:
@@ -210,7 +316,9 @@ def plain(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.reset_coords("speed") if "speed" in dataset.coords else dataset
 
 
-def claim(dataset: xr.Dataset, path: Path, target: Path, replace: bool, *others: Path) -> None:
+def claim(
+    dataset: xr.Dataset, path: Path, target: Path, replace: bool, *others: Path
+) -> None:
     """Refuse a file to be made of the dataset at ``path`` and ``others``; errors as of ``files.claim``.
 
     Neither a dataset nor a file that this dataset was made from is replaced.
@@ -223,12 +331,19 @@ def claim(dataset: xr.Dataset, path: Path, target: Path, replace: bool, *others:
     texts.append(str(dataset.attrs.get("scenario_toml")))
     texts = [same_line_ends(text) for text in texts]  # of a dataset of an older version
     with target.open("rb") as file:
-        content = file.read(10 + 2 * max(len(text.encode()) for text in texts))  # a mark, and line ends of two letters
+        # a mark, and line ends of two letters
+        content = file.read(10 + 2 * max(len(text.encode()) for text in texts))
     text = decoded(content, "replace")
     if content.startswith((b"\x89HDF", b"CDF")):
-        raise BadInput([f"{target} is a dataset, which is never replaced; name another file"])
+        raise BadInput(
+            [f"{target} is a dataset, which is never replaced; name another file"]
+        )
     if content and text in texts:
-        raise BadInput([f"{target} is the scenario of this dataset, or a table of it; name another file"])
+        raise BadInput(
+            [
+                f"{target} is the scenario of this dataset, or a table of it; name another file"
+            ]
+        )
 
 
 @contextlib.contextmanager
@@ -246,7 +361,11 @@ def answered() -> Iterator[None]:
         name = match[1] if (match := _MISSING.search(str(fault.args[0]))) else ""
         if name not in get_args(Recorded):
             raise
-        raise BadInput([f'{name} was not recorded; add "{name}" to record.quantities and run again']) from None
+        raise BadInput(
+            [
+                f'{name} was not recorded; add "{name}" to record.quantities and run again'
+            ]
+        ) from None
 
 
 @contextlib.contextmanager
@@ -277,7 +396,8 @@ def steady_points(dataset: xr.Dataset) -> xr.DataArray:
     if speed_name(dataset) not in dataset:
         return word(dataset, "drive.model", "") == "steady"
     speed = speed_of(dataset)
-    steady = ((speed == speed.isel(t=0)) | speed.isnull()).all("t")  # unknown after a runaway
+    # unknown after a runaway
+    steady = ((speed == speed.isel(t=0)) | speed.isnull()).all("t")
     if "phase_name" in dataset:  # records may be too few to show a course
         driven = dataset["phase_name"].str.contains("speed|sliding|rest").any("phase")
         steady = steady & ~(driven & (dataset["phase_start"].count("phase") > 1))
@@ -330,10 +450,13 @@ def word(dataset: xr.Dataset, key: str, default: str) -> xr.DataArray:
     table, _, last = key.rpartition(".")
     label = _label(dataset, key)
     if label is None and last == "model":
-        label = _label(dataset, table)  # a table that is swept whole is labelled by its model
+        # a table that is swept whole is labelled by its model
+        label = _label(dataset, table)
     if label is not None:
         # labels that would be alike carry a number
-        return label.copy(data=np.array([str(text).split(" ")[0] for text in label.to_numpy()]))
+        return label.copy(
+            data=np.array([str(text).split(" ")[0] for text in label.to_numpy()])
+        )
     with contextlib.suppress(KeyError):
         return xr.DataArray(str(resolved(dataset, key)))
     return xr.DataArray(default)
@@ -348,7 +471,10 @@ def resolved(dataset: xr.Dataset, key: str) -> Any:
         If there is no such key, or it or a table that holds it is swept: the scenario is resolved for one point only.
     """
     words = key.split(".")
-    if any(_label(dataset, ".".join(words[:count])) is not None for count in range(1, len(words) + 1)):
+    if any(
+        _label(dataset, ".".join(words[:count])) is not None
+        for count in range(1, len(words) + 1)
+    ):
         raise KeyError(f"{key} is swept")
     value = json.loads(dataset.attrs["scenario_resolved"])
     for name in words:
@@ -361,7 +487,11 @@ def resolved(dataset: xr.Dataset, key: str) -> Any:
 def _label(dataset: xr.Dataset, key: str) -> xr.DataArray | None:
     """Return the labels by which a key is swept; None if it is not swept."""
     name = key.replace(".", "_")
-    swept = name in dataset.variables and dataset[name].dtype.kind in "OUST" and dataset[name].ndim == 1
+    swept = (
+        name in dataset.variables
+        and dataset[name].dtype.kind in "OUST"
+        and dataset[name].ndim == 1
+    )
     return dataset[name] if swept else None
 
 
@@ -388,9 +518,15 @@ def control(dataset: xr.Dataset) -> Control:
         table = resolved(dataset, "contact")
     for kind in _CONTROLS:
         if table.get(kind) is not None or f"contact_{kind}" in dataset:
-            stiffness = setting(dataset, "contact.stiffness") if kind == "displacement" else xr.DataArray(np.inf)
+            stiffness = (
+                setting(dataset, "contact.stiffness")
+                if kind == "displacement"
+                else xr.DataArray(np.inf)
+            )
             return Control(kind, stiffness)
-    raise KeyError("the dataset does not name the mount: a load, an indentation or a displacement")
+    raise KeyError(
+        "the dataset does not name the mount: a load, an indentation or a displacement"
+    )
 
 
 def has_noise(dataset: xr.Dataset) -> xr.DataArray:
@@ -407,7 +543,13 @@ def stays_held(dataset: xr.Dataset) -> xr.DataArray:
     """
     still = xr.ones_like(dataset["contact_modulus"], bool)
     with contextlib.suppress(KeyError):
-        still = still & (not isinstance(resolved(dataset, f"contact.{control(dataset).kind}"), dict))
-    for radius in (dataset.variables[name] for name in ("jkr_radius", "hertz_radius") if name in dataset):
+        still = still & (
+            not isinstance(resolved(dataset, f"contact.{control(dataset).kind}"), dict)
+        )
+    for radius in (
+        dataset.variables[name]
+        for name in ("jkr_radius", "hertz_radius")
+        if name in dataset
+    ):
         still = still & (radius == radius.isel(t=0)).all("t")
     return still

@@ -10,9 +10,17 @@ from sim.units.errors import BadInput
 from sim.units.notation import engineering
 
 #: Unit and factor of an error by the last word of its name.
-_UNITS = {"area": ("points of A/A_JKR", 100.0), "friction": ("% of the friction", 100.0)}
+_UNITS = {
+    "area": ("points of A/A_JKR", 100.0),
+    "friction": ("% of the friction", 100.0),
+}
 #: Sources of an error by the first word of its name.
-_SOURCES = {"cell": "the cell", "banded": "banding", "step": "the clock step", "pull": "the clock step"}
+_SOURCES = {
+    "cell": "the cell",
+    "banded": "banding",
+    "step": "the clock step",
+    "pull": "the clock step",
+}
 
 
 class SystematicError(NamedTuple):
@@ -32,8 +40,15 @@ class SystematicError(NamedTuple):
     def __str__(self) -> str:
         """Return the error in words, with its place and cure."""
         is_relative = self.unit.startswith(("points", "%"))
-        size = f"{self.value:+.2g} {self.unit}" if is_relative else engineering(self.value, self.unit)
-        place, cure = f" at {self.where}" if self.where else "", f"; cure: {self.cure}" if self.cure else ""
+        size = (
+            f"{self.value:+.2g} {self.unit}"
+            if is_relative
+            else engineering(self.value, self.unit)
+        )
+        place, cure = (
+            f" at {self.where}" if self.where else "",
+            f"; cure: {self.cure}" if self.cure else "",
+        )
         return f"{_SOURCES[self.name.partition('_')[0]]} adds {size}{place}{cure}"
 
 
@@ -42,23 +57,43 @@ def systematic_errors(dataset: xr.Dataset) -> list[SystematicError]:
 
     The cure of an error of the cell leaves about a tenth of it. It is "" if the error is less than 1 % of the JKR area.
     """
-    names = [f"{source}_error_{of}" for of in _UNITS for source in ("cell", "banded", "step")]
+    names = [
+        f"{source}_error_{of}" for of in _UNITS for source in ("cell", "banded", "step")
+    ]
     known = [name for name in (*names, "pull_off_error") if name in dataset]
-    return [_largest(dataset, name) for name in known if bool((abs(dataset[name]) > 0.0).any())]
+    return [
+        _largest(dataset, name)
+        for name in known
+        if bool((abs(dataset[name]) > 0.0).any())
+    ]
 
 
 def _largest(dataset: xr.Dataset, name: str) -> SystematicError:
     variable = dataset[name]
     size = np.nan_to_num(np.abs(variable.to_numpy()))
-    place = dict(zip(variable.dims, np.unravel_index(np.argmax(size), size.shape), strict=True))
+    place = dict(
+        zip(variable.dims, np.unravel_index(np.argmax(size), size.shape), strict=True)
+    )
     known = [at for at in (*sweep_dims(dataset), "error_speed") if at in dataset]
-    point, values = dataset[known].isel(place, missing_dims="ignore"), float(variable.isel(place))
+    point, values = (
+        dataset[known].isel(place, missing_dims="ignore"),
+        float(variable.isel(place)),
+    )
     unit, factor = _UNITS.get(name.rpartition("_")[2], (variable.units, 1.0))
     swept = [point[dim] for dim in sweep_dims(dataset)]
-    words = [f"{at.name} = {engineering(float(at), at.units) if at.dtype.kind == 'f' else at.item()}" for at in swept]
-    if "error_speed" in point and not {"drive_speed", "drive_stage"} & set(sweep_dims(dataset)) and factor > 1.0:
+    words = [
+        f"{at.name} = {engineering(float(at), at.units) if at.dtype.kind == 'f' else at.item()}"
+        for at in swept
+    ]
+    if (
+        "error_speed" in point
+        and not {"drive_speed", "drive_stage"} & set(sweep_dims(dataset))
+        and factor > 1.0
+    ):
         words.append(engineering(float(point["error_speed"]), "m/s"))
-    return SystematicError(name, factor * values, unit, ", ".join(words), variable.attrs.get("cure", ""))
+    return SystematicError(
+        name, factor * values, unit, ", ".join(words), variable.attrs.get("cure", "")
+    )
 
 
 def remarks(dataset: xr.Dataset) -> list[str]:
@@ -72,5 +107,7 @@ def remarks(dataset: xr.Dataset) -> list[str]:
     try:
         run = plan.Plan.of(scenario_of(dataset.attrs))
     except BadInput as fault:
-        return [f"not in the dataset, but printed by `sim check` of its scenario ({fault.problems[0]})"]
+        return [
+            f"not in the dataset, but printed by `sim check` of its scenario ({fault.problems[0]})"
+        ]
     return [*diagnosis.remarks(run), *diagnosis.diagnosis(run)]

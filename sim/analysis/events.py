@@ -34,9 +34,11 @@ _ROUNDING = 1e-9
 _RESOLVED = 3
 #: Properties of slip events and the quantities of late ones of which the engine records moments.
 _LATE = {
-    "static_friction": "force_before", "force_drop": "force_drop", "slip_amplitude": "amplitude",
+    "static_friction": "force_before",
+    "force_drop": "force_drop",
+    "slip_amplitude": "amplitude",
     "recurrence_time": "recurrence",
-}  # fmt: skip
+}
 #: Half of a 95 % interval of a normal law in standard errors.
 _WIDE = 1.96
 
@@ -69,20 +71,43 @@ def slips(dataset: xr.Dataset) -> xr.Dataset:
     which the stage moves. A member has at most 1,000 of them here; ``stick_slip`` counts all.
     """
     if "slip_count_mean" in dataset:
-        raise ValueError("slip events need every member; record them: [record] per_member = true")
+        raise ValueError(
+            "slip events need every member; record them: [record] per_member = true"
+        )
     if not bool((word(dataset, "drive.model", "") == "spring").any()):
-        raise ValueError('slips need a stage that pulls through a spring: [drive] model = "spring"')
+        raise ValueError(
+            'slips need a stage that pulls through a spring: [drive] model = "spring"'
+        )
     event = {name: dataset[f"slip_{name}"].astype(float) for name in SLIP_EVENT}
     begins, ends, following = event["time"], event["end"], event["time"].shift(slip=-1)
-    drop, fall = event["force_before"] - event["force_after"], event["stress_before"] - event["stress_after"]
+    drop, fall = (
+        event["force_before"] - event["force_after"],
+        event["stress_before"] - event["stress_after"],
+    )
     columns = {
         "slip_time": (begins, "s", "time at which a slip event begins"),
         "slip_duration": (ends - begins, "s", "duration of a slip event"),
         "stick_duration": (following - ends, "s", "duration of a stick phase"),
-        "recurrence_time": (following - begins, "s", "time between the starts of two slip events"),
-        "slip_amplitude": (event["amplitude"], "m", "displacement of the slider in a slip event"),
-        "slip_speed": (event["speed"], "m/s", "stage speed at the start of a slip event"),
-        "static_friction": (event["force_before"], "N", "spring force at the start of a slip event"),
+        "recurrence_time": (
+            following - begins,
+            "s",
+            "time between the starts of two slip events",
+        ),
+        "slip_amplitude": (
+            event["amplitude"],
+            "m",
+            "displacement of the slider in a slip event",
+        ),
+        "slip_speed": (
+            event["speed"],
+            "m/s",
+            "stage speed at the start of a slip event",
+        ),
+        "static_friction": (
+            event["force_before"],
+            "N",
+            "spring force at the start of a slip event",
+        ),
         "force_drop": (drop, "N", "drop of the spring force in a slip event"),
         "stress_drop": (fall, "Pa", "drop of the shear stress in a slip event"),
     }
@@ -113,36 +138,76 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
         Under a prescribed force see ``runaways``. Empty for other drives. Where only statistics were recorded, those of
         the means over late slip events.
     """
-    if "stage_speed" not in dataset and {"runaway_time", "spring_force"} <= set(dataset):
+    if "stage_speed" not in dataset and {"runaway_time", "spring_force"} <= set(
+        dataset
+    ):
         return runaways(dataset)
     late = {"slip_count": "slip_count_late", "kinetic_friction": "kinetic_friction"}
     late |= {name: f"late_{quantity}_mean" for name, quantity in _LATE.items()}
-    late |= {f"{name}_{kind}": f"late_{of}_{kind}" for name, of in _LATE.items() for kind in ("least", "largest")}
-    sources = {name + ending: source + ending for ending in ENDINGS for name, source in late.items()}
-    result = xr.Dataset({name: dataset[source].astype(float) for name, source in sources.items() if source in dataset})
+    late |= {
+        f"{name}_{kind}": f"late_{of}_{kind}"
+        for name, of in _LATE.items()
+        for kind in ("least", "largest")
+    }
+    sources = {
+        name + ending: source + ending
+        for ending in ENDINGS
+        for name, source in late.items()
+    }
+    result = xr.Dataset(
+        {
+            name: dataset[source].astype(float)
+            for name, source in sources.items()
+            if source in dataset
+        }
+    )
     if "slip_time" not in dataset or not result:
         return result
     if not is_stationary(dataset):
         count = pure(dataset["slip_count"].astype(float), "number of slip events")
-        return xr.Dataset({"slip_count": count} | (_between_speeds(dataset) if varies(dataset) else {}))
+        return xr.Dataset(
+            {"slip_count": count}
+            | (_between_speeds(dataset) if varies(dataset) else {})
+        )
     text = "standard deviation of slip displacements over their mean"
-    result["slip_spread"] = pure(dataset["late_amplitude_std"] / dataset["late_amplitude_mean"], text)
+    result["slip_spread"] = pure(
+        dataset["late_amplitude_std"] / dataset["late_amplitude_mean"], text
+    )
     late_half = dataset["slip_time"] >= 0.5 * float(dataset["t"][-1])
-    each = slips(dataset).where(late_half)[["slip_duration", "stick_duration", "stress_drop"]]
+    each = slips(dataset).where(late_half)[
+        ["slip_duration", "stick_duration", "stress_drop"]
+    ]
     result = result.merge(each.mean("slip", keep_attrs=True), compat="no_conflicts")
-    if dataset.sizes.get(MEMBERS, 1) == 1:  # there is no other error than the scatter between slip events
-        events, squares = each.count("slip"), ((each - each.mean("slip")) ** 2).sum("slip")
-        errors = {str(n): (squares[n] / events[n] / (events[n] - 1).where(events[n] > 1)) ** 0.5 for n in each}
-        of_late = {name: dataset[f"late_{of}_std"] / dataset["slip_count_late"] ** 0.5 for name, of in _LATE.items()}
+    # there is no other error than the scatter between slip events
+    if dataset.sizes.get(MEMBERS, 1) == 1:
+        events, squares = (
+            each.count("slip"),
+            ((each - each.mean("slip")) ** 2).sum("slip"),
+        )
+        errors = {
+            str(n): (squares[n] / events[n] / (events[n] - 1).where(events[n] > 1))
+            ** 0.5
+            for n in each
+        }
+        of_late = {
+            name: dataset[f"late_{of}_std"] / dataset["slip_count_late"] ** 0.5
+            for name, of in _LATE.items()
+        }
         errors |= of_late | {"kinetic_friction": 0.5 * of_late["force_drop"]}
-        result = result.assign({f"{name}_reading": _WIDE * error for name, error in errors.items()})
+        result = result.assign(
+            {f"{name}_reading": _WIDE * error for name, error in errors.items()}
+        )
     return result
 
 
 def unresolved_slips(dataset: xr.Dataset) -> str:
     """Return a remark if slip events are hardly longer than a clock step, so that their means are off; "" if not."""
-    with contextlib.suppress(ValueError, KeyError):  # of a run without slips, or without single ones
-        lasting, step = slips(dataset)["slip_duration"].median(), setting(dataset, "clock.step")
+    # of a run without slips, or without single ones
+    with contextlib.suppress(ValueError, KeyError):
+        lasting, step = (
+            slips(dataset)["slip_duration"].median(),
+            setting(dataset, "clock.step"),
+        )
         if bool((lasting < _RESOLVED * step).any()):
             effect = "drop, duration and friction have an error that the brackets do not hold"
             return f"slip events last fewer than {_RESOLVED} clock steps: {effect}; reduce clock.step"
@@ -167,13 +232,27 @@ def slips_by_phase(dataset: xr.Dataset) -> xr.Dataset:
     """
     each, start, end = slips(dataset), dataset["phase_start"], dataset["phase_end"]
     inside = (each["slip_time"] >= start) & (each["slip_time"] < end)
-    each["recurrence_time"] = each["recurrence_time"].where(each["slip_time"] + each["recurrence_time"] < end)
+    each["recurrence_time"] = each["recurrence_time"].where(
+        each["slip_time"] + each["recurrence_time"] < end
+    )
     result = each[list(_LATE)].where(inside).mean("slip", keep_attrs=True)
-    result["slip_count"] = pure(inside.sum("slip").astype(float), "number of slip events in a phase")
-    first = each["static_friction"].isel(slip=inside.argmax("slip")).where(inside.any("slip"))
-    result["first_friction"] = labelled(first, "N", "spring force at which the first slip event of a phase begins")
-    held = (end - start).where(dataset["phase_name"].str.contains("rest")).shift(phase=1)
-    result["time_held"] = labelled(held, "s", "time at rest of the stage before a phase")
+    result["slip_count"] = pure(
+        inside.sum("slip").astype(float), "number of slip events in a phase"
+    )
+    first = (
+        each["static_friction"]
+        .isel(slip=inside.argmax("slip"))
+        .where(inside.any("slip"))
+    )
+    result["first_friction"] = labelled(
+        first, "N", "spring force at which the first slip event of a phase begins"
+    )
+    held = (
+        (end - start).where(dataset["phase_name"].str.contains("rest")).shift(phase=1)
+    )
+    result["time_held"] = labelled(
+        held, "s", "time at rest of the stage before a phase"
+    )
     result["start"] = labelled(start, "s", "start of a phase")
     return result.drop_vars("slip", errors="ignore").transpose(..., "phase")
 
@@ -183,22 +262,38 @@ def _between_speeds(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
     turn, each_slip = abs(dataset["stage_speed"]).idxmax("t"), slips(dataset)
     rises = falls = xr.DataArray(True)
     if "phase_name" in dataset:  # a stage that jumps between speeds does neither
-        rises, falls = (dataset["phase_name"].str.contains(word) for word in ("increasing", "decreasing"))
+        rises, falls = (
+            dataset["phase_name"].str.contains(word)
+            for word in ("increasing", "decreasing")
+        )
         turn = dataset["phase_end"].where(rises).max("phase").fillna(0.0)
         rises, falls = rises.any("phase"), falls.any("phase")
-    speed, time, later = each_slip["slip_speed"], each_slip["slip_time"], each_slip["recurrence_time"].notnull()
+    speed, time, later = (
+        each_slip["slip_speed"],
+        each_slip["slip_time"],
+        each_slip["recurrence_time"].notnull(),
+    )
     after_another = later.shift(slip=1, fill_value=False) & (time > turn)
     begins = "lowest speed of the stage, as it gets {}, at which a slip begins that {}".format
-    up, down = begins("faster", "another one follows"), begins("slower", "follows another one")
+    up, down = (
+        begins("faster", "another one follows"),
+        begins("slower", "follows another one"),
+    )
     return {
-        "slips_from": labelled(speed.where(later & (time <= turn) & rises).min("slip"), "m/s", up),
-        "slips_down_to": labelled(speed.where(after_another & falls).min("slip"), "m/s", down),
+        "slips_from": labelled(
+            speed.where(later & (time <= turn) & rises).min("slip"), "m/s", up
+        ),
+        "slips_down_to": labelled(
+            speed.where(after_another & falls).min("slip"), "m/s", down
+        ),
     }
 
 
 def varies(dataset: xr.Dataset) -> bool:
     """Return True if the magnitude of the stage's speed changes in a run."""
-    if "phase_name" in dataset and bool(dataset["phase_name"].str.contains("ing speed").any()):
+    if "phase_name" in dataset and bool(
+        dataset["phase_name"].str.contains("ing speed").any()
+    ):
         return True
     stage = abs(dataset["stage_speed"]).where(dataset["stage_speed"] != 0.0)
     return bool((stage.max("t") > (1.0 + _ROUNDING) * stage.min("t")).any())
@@ -219,17 +314,33 @@ def runaways(dataset: xr.Dataset) -> xr.Dataset:
         the force at that time, nan where the body is held to the end.
     """
     when = dataset["runaway_time"].isel(t=-1, drop=True).astype(float)
-    return xr.Dataset({
-        "ran_away": pure(when.notnull().astype(float), "members that ran away"),
-        "runaway_after": labelled(when, "s", "mean time of the runaways"),
-        "static_friction": labelled(dataset["runaway_force"], "N", "force at which the slider lost stability"),
-    })  # fmt: skip
+    return xr.Dataset(
+        {
+            "ran_away": pure(when.notnull().astype(float), "members that ran away"),
+            "runaway_after": labelled(when, "s", "mean time of the runaways"),
+            "static_friction": labelled(
+                dataset["runaway_force"],
+                "N",
+                "force at which the slider lost stability",
+            ),
+        }
+    )
 
 
-def _growth(series: xr.DataArray, times: xr.DataArray, ends: xr.DataArray) -> xr.DataArray:
+def _growth(
+    series: xr.DataArray, times: xr.DataArray, ends: xr.DataArray
+) -> xr.DataArray:
     """Return the growth of a series between neighbouring times ``ends``, which have the dimension ``end``."""
-    dims: Any = {"input_core_dims": [["end"], ["t"], ["t"]], "output_core_dims": [["end"]], "vectorize": True}
-    return xr.apply_ufunc(np.interp, ends, times, series.astype(float), **dims).where(ends.notnull()).diff("end")
+    dims: Any = {
+        "input_core_dims": [["end"], ["t"], ["t"]],
+        "output_core_dims": [["end"]],
+        "vectorize": True,
+    }
+    return (
+        xr.apply_ufunc(np.interp, ends, times, series.astype(float), **dims)
+        .where(ends.notnull())
+        .diff("end")
+    )
 
 
 # --- readings of records, for figures ---
@@ -254,7 +365,9 @@ def jumps(speed: Array, turns: bool = False) -> Array:
     (array([], dtype=int64), array([2]))
     """
     change = np.abs(np.diff(speed))
-    jumped = np.append(False, change[1:-1] > _JUMP * np.maximum(change[:-2], change[2:]))
+    jumped = np.append(
+        False, change[1:-1] > _JUMP * np.maximum(change[:-2], change[2:])
+    )
     turned = (speed[1:] * speed[:-1] < 0.0) & turns
     return np.flatnonzero(np.pad(jumped, (0, change.size - jumped.size)) | turned) + 1
 
@@ -272,7 +385,9 @@ def incipient_law(force: Array, area: Array) -> tuple[int, float]:
     top = int(np.nanargmax(force[: fallen[0]] if fallen.size else force))
     small = np.flatnonzero(force[:top] <= _FITTED * force[top])
     with np.errstate(invalid="ignore"):  # no force at all
-        alpha = np.sum(force[small] ** 2 * (area[0] - area[small])) / np.sum(force[small] ** 4)
+        alpha = np.sum(force[small] ** 2 * (area[0] - area[small])) / np.sum(
+            force[small] ** 4
+        )
     return top, float(alpha)
 
 
@@ -286,12 +401,20 @@ _NOTHING = 1e-12
 #: A force begins at zero if it is below this share of its largest.
 _REST = 0.01
 #: Names of a peak, the quantity that it is of, and its unit.
-_PEAKS = (("peak_stress", "shear_stress", "Pa"), ("peak_friction", "friction_force", "N"))
+_PEAKS = (
+    ("peak_stress", "shear_stress", "Pa"),
+    ("peak_friction", "friction_force", "N"),
+)
 #: Events of openings, closings and masking.
 _SEEN = (
-    "first_detachment", "detachments", "first_closing", "closing_displacement", "closing_load", "first_masked",
+    "first_detachment",
+    "detachments",
+    "first_closing",
+    "closing_displacement",
+    "closing_load",
+    "first_masked",
     "time_masked",
-)  # fmt: skip
+)
 
 
 def events(dataset: xr.Dataset) -> xr.Dataset:
@@ -323,9 +446,18 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
         Where only statistics were recorded, those of them that follow, as ``…_mean``.
     """
     dataset = plain(dataset)
-    result = dataset[[f"{name}{end}" for name in _SEEN for end in ENDINGS if f"{name}{end}" in dataset]].astype(float)
+    result = dataset[
+        [
+            f"{name}{end}"
+            for name in _SEEN
+            for end in ENDINGS
+            if f"{name}{end}" in dataset
+        ]
+    ].astype(float)
     if "first_detachment" in result:
-        result["ever_detached"] = pure(result["first_detachment"].notnull().astype(float), "contacts that detached")
+        result["ever_detached"] = pure(
+            result["first_detachment"].notnull().astype(float), "contacts that detached"
+        )
     result = result.drop_vars(MEMBERS, errors="ignore").reset_coords(drop=True)
     result = result.merge(_pulled_off(dataset), compat="no_conflicts")
     for part in (peaks, stick_slip, static_threshold):
@@ -333,7 +465,11 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
             result = result.merge(part(dataset), compat="no_conflicts")
     for suffix in ENDINGS:
         if f"dissipated_energy{suffix}" in dataset:
-            lost = dataset[f"dissipated_energy{suffix}"].isel(t=-1, drop=True).astype(float)
+            lost = (
+                dataset[f"dissipated_energy{suffix}"]
+                .isel(t=-1, drop=True)
+                .astype(float)
+            )
             text = "total energy dissipated by opening and closing"
             result[f"total_dissipated{suffix}"] = labelled(lost, "J", text, "W")
     with contextlib.suppress(ValueError), answered():
@@ -364,24 +500,40 @@ def pull_offs(dataset: xr.Dataset) -> xr.Dataset:
     phased = "phase_detachment" in dataset
     names = [f"pull_off_{name}" for name in ("load", "time", "displacement")]
     opened = dataset["phase_detachment" if phased else "first_detachment"].notnull()
-    return xr.Dataset({name: dataset[f"phase_{name}" if phased else name].where(opened) for name in names})
+    return xr.Dataset(
+        {
+            name: dataset[f"phase_{name}" if phased else name].where(opened)
+            for name in names
+        }
+    )
 
 
 def _pulled_off(dataset: xr.Dataset) -> xr.Dataset:
     """Return the lowest load that the contact bore; of several cycles the mean over the pull-offs of a member."""
-    recorded = dataset[[name for name in dataset if str(name).startswith("pull_off_")]].astype(float)
-    if not {"phase_detachment", "phase_pull_off_load", "pull_off_load"} <= dataset.keys():
+    recorded = dataset[
+        [name for name in dataset if str(name).startswith("pull_off_")]
+    ].astype(float)
+    if (
+        not {"phase_detachment", "phase_pull_off_load", "pull_off_load"}
+        <= dataset.keys()
+    ):
         return recorded
     each = pull_offs(dataset)
     count = each["pull_off_load"].count("phase")
     if bool((count <= 1).all()):
         return recorded
-    several = each[["pull_off_load", "pull_off_displacement"]].mean("phase", keep_attrs=True)
+    several = each[["pull_off_load", "pull_off_displacement"]].mean(
+        "phase", keep_attrs=True
+    )
     several["pull_offs"] = pure(count.astype(float), "number of phases with a pull-off")
     text = "of the lowest normal loads over the pull-offs of a member"
     several["pull_off_load"].attrs["long_name"] = f"mean {text}"
-    several["pull_off_load_least"] = labelled(each["pull_off_load"].min("phase"), "N", f"least {text}")
-    several["pull_off_load_largest"] = labelled(each["pull_off_load"].max("phase"), "N", f"largest {text}")
+    several["pull_off_load_least"] = labelled(
+        each["pull_off_load"].min("phase"), "N", f"least {text}"
+    )
+    several["pull_off_load_largest"] = labelled(
+        each["pull_off_load"].max("phase"), "N", f"largest {text}"
+    )
     return several
 
 
@@ -414,32 +566,64 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
         return xr.Dataset()
     result, phased = {}, "phase_start" in dataset
     last = dataset["phase_start"].count("phase") - 1 if phased else xr.DataArray(0)
-    beginning = dataset["phase_start"].isel(phase=last).where(start, 0.0) if phased else xr.DataArray(0.0)
+    beginning = (
+        dataset["phase_start"].isel(phase=last).where(start, 0.0)
+        if phased
+        else xr.DataArray(0.0)
+    )
     for name, source, unit in _PEAKS:
-        if name not in dataset or source not in dataset or MEMBERS in dataset[name].dims:
+        if (
+            name not in dataset
+            or source not in dataset
+            or MEMBERS in dataset[name].dims
+        ):
             continue
-        prefix, ends = name.removesuffix("_stress"), abs(dataset[source].astype(float)).isel(t=[0, -1])
-        read = {key: dataset[key] for key in (name, f"{prefix}_time", f"{prefix}_speed")}
+        prefix, ends = (
+            name.removesuffix("_stress"),
+            abs(dataset[source].astype(float)).isel(t=[0, -1]),
+        )
+        read = {
+            key: dataset[key] for key in (name, f"{prefix}_time", f"{prefix}_speed")
+        }
         if phased:
-            read = {key: dataset[f"phase_{key}"].isel(phase=last).where(start, whole) for key, whole in read.items()}
+            read = {
+                key: dataset[f"phase_{key}"].isel(phase=last).where(start, whole)
+                for key, whole in read.items()
+            }
         size, when, speed = read.values()
-        before, after = (size / (1.0 + _ROUNDING) > ends.isel(t=k, drop=True) for k in (0, 1))
+        before, after = (
+            size / (1.0 + _ROUNDING) > ends.isel(t=k, drop=True) for k in (0, 1)
+        )
         known = (ramp | start) & after & (~ramp | before)
         text = f"largest {dataset[source].attrs.get('long_name', source)} while sliding"
         described = {
             name: (size, unit, text),
-            f"{prefix}_time": (when - beginning, "s", f"time from the start of sliding to the {text}"),
+            f"{prefix}_time": (
+                when - beginning,
+                "s",
+                f"time from the start of sliding to the {text}",
+            ),
             f"{prefix}_speed": (speed, "m/s", f"sliding speed at the {text}"),
         }
-        if bool(ramp.any()):  # a clock step has one speed, so the peak is up to half a step from where it is found
-            is_log, step = word(dataset, "drive.scale", "") == "log", setting(dataset, "clock.step")
-            low, high = (abs(setting(dataset, f"drive.{end}")) for end in ("from", "to"))
-            change = (speed * np.log(high / low.where(is_log, high))).where(is_log, high - low)
+        # a clock step has one speed, so the peak is up to half a step from where it is found
+        if bool(ramp.any()):
+            is_log, step = (
+                word(dataset, "drive.scale", "") == "log",
+                setting(dataset, "clock.step"),
+            )
+            low, high = (
+                abs(setting(dataset, f"drive.{end}")) for end in ("from", "to")
+            )
+            change = (speed * np.log(high / low.where(is_log, high))).where(
+                is_log, high - low
+            )
             half = 0.5 * abs(change) * step / setting(dataset, "clock.duration")
             described[f"{prefix}_time_reading"] = 0.5 * step + 0.0 * when, "s", ""
             described[f"{prefix}_speed_reading"] = half, "m/s", ""
         for key, (values, *about) in described.items():
-            result[key] = labelled(values.where(known).drop_vars("phase", errors="ignore"), *about)
+            result[key] = labelled(
+                values.where(known).drop_vars("phase", errors="ignore"), *about
+            )
     return xr.Dataset(result)
 
 
@@ -462,17 +646,23 @@ def static_threshold(dataset: xr.Dataset) -> xr.Dataset:
     if "stage_speed" not in dataset:
         return xr.Dataset()
     force = dataset["peak_friction"]
-    first, last = (abs(dataset["friction_force"]).isel(t=record, drop=True) for record in (0, -1))
+    first, last = (
+        abs(dataset["friction_force"]).isel(t=record, drop=True) for record in (0, -1)
+    )
     known = stays_held(dataset) & ~has_noise(dataset)
     known = known & (first <= _REST * force) & (last < (1.0 - _ROUNDING) * force)
     if "phase_start" in dataset:
         known = known & (dataset["phase_start"].count("phase") == 1)
     share = dataset["peak_friction_area"] / dataset["contact_area"].isel(t=0, drop=True)
     text = "largest friction force after a start from rest"
-    return xr.Dataset({
-        "static_threshold": labelled(force.where(known), "N", text),
-        "area_at_threshold": pure(share.where(known), f"contact area at the {text} over that at rest"),
-    })  # fmt: skip
+    return xr.Dataset(
+        {
+            "static_threshold": labelled(force.where(known), "N", text),
+            "area_at_threshold": pure(
+                share.where(known), f"contact area at the {text} over that at rest"
+            ),
+        }
+    )
 
 
 def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
@@ -512,33 +702,65 @@ def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
         raise ValueError(f"neither load nor position moves in cycles; {cure}")
     count = int(cycles.max())
     suffix = "" if "normal_load" in dataset else "_mean"
-    read = (f"{name}{suffix}" for name in ("contact_radius", "normal_load", "displacement", "dissipated_energy"))
+    read = (
+        f"{name}{suffix}"
+        for name in (
+            "contact_radius",
+            "normal_load",
+            "displacement",
+            "dissipated_energy",
+        )
+    )
     dims = (*sweep_dims(dataset), MEMBERS)
-    return in_pieces(with_trajectories(dataset, *read), dims, lambda piece: _loops(piece, suffix, count))
+    return in_pieces(
+        with_trajectories(dataset, *read),
+        dims,
+        lambda piece: _loops(piece, suffix, count),
+    )
 
 
 def _loops(dataset: xr.Dataset, suffix: str, count: int) -> xr.Dataset:
     """Return ``loop_energy`` and ``loop_dissipation`` in each of ``count`` cycles."""
     cycles = cycles_of(dataset)
     going = dataset[f"contact_radius{suffix}"].notnull()
-    load, displacement = dataset[[f"normal_load{suffix}", f"displacement{suffix}"]].astype(float).where(going).values()
+    load, displacement = (
+        dataset[[f"normal_load{suffix}", f"displacement{suffix}"]]
+        .astype(float)
+        .where(going)
+        .values()
+    )
     number = xr.DataArray(np.arange(dataset.sizes["t"]), dims="t")
-    done = (0.5 * (load + load.shift(t=1)) * (displacement - displacement.shift(t=1))).where(number > 0, 0.0)
+    done = (
+        0.5 * (load + load.shift(t=1)) * (displacement - displacement.shift(t=1))
+    ).where(number > 0, 0.0)
     period = setting(dataset, "clock.duration") / cycles.where(cycles >= 1.0)
     put_in = done.fillna(0.0).cumsum("t")
     rounding = _NOTHING * abs(put_in).max("t")
     ends = period * xr.DataArray(np.arange(count + 1), dims="end")
     ends = ends.where(ends <= float(dataset["t"][-1]) + 1e-6 * period)
     series = done.isnull().cumsum("t"), put_in, dataset[f"dissipated_energy{suffix}"]
-    missing, *gained = (_growth(values, dataset["t"], ends).rename(end="cycle") for values in series)
+    missing, *gained = (
+        _growth(values, dataset["t"], ends).rename(end="cycle") for values in series
+    )
     texts = {"loop_energy": "closed integral of the load over the displacement"}
     texts["loop_dissipation"] = "energy dissipated by opening and closing"
     result = {}
     for (name, text), values in zip(texts.items(), gained, strict=True):
         values = values.where(~(abs(values) < rounding), 0.0).where(missing == 0.0)
         values = values.transpose(..., MEMBERS, "cycle", missing_dims="ignore")
-        result[f"{name}{suffix}"] = values.assign_attrs(units="J", long_name=f"{text}, over a cycle", symbol="")
-    return xr.Dataset(result, {"cycle": ("cycle", np.arange(1, count + 1), {"long_name": "number of the cycle"})})
+        result[f"{name}{suffix}"] = values.assign_attrs(
+            units="J", long_name=f"{text}, over a cycle", symbol=""
+        )
+    return xr.Dataset(
+        result,
+        {
+            "cycle": (
+                "cycle",
+                np.arange(1, count + 1),
+                {"long_name": "number of the cycle"},
+            )
+        },
+    )
 
 
 def cycles_of(dataset: xr.Dataset) -> xr.DataArray:
@@ -551,7 +773,10 @@ def cycles_of(dataset: xr.Dataset) -> xr.DataArray:
 # --- peaks of the mean of members with noise, with errors, or the reason for none ---
 
 #: Quantities whose peak is stated, with the beginnings of the names of its time and speed.
-_PEAKS_OF_MEAN = {"peak_stress": ("shear_stress", "peak"), "peak_friction": ("friction_force", "peak_friction")}
+_PEAKS_OF_MEAN = {
+    "peak_stress": ("shear_stress", "peak"),
+    "peak_friction": ("friction_force", "peak_friction"),
+}
 #: Chance of a peak out of noise; resampled ensembles for the error of its time; share of the records after it.
 _CHANCE, _RESAMPLED, _AFTER = 0.01, 200, 8
 #: Standard errors by which estimates of a peak over different numbers of records may differ.
@@ -601,35 +826,69 @@ def peak_of_mean(values: Array, times: Array, unit: str = "1") -> Peak:
     last = records - max(1, records // _AFTER)
 
     def error(weights: Array) -> float:
-        return float(np.std(values @ weights, ddof=1)) / math.sqrt(members) if members > 1 else math.nan
+        return (
+            float(np.std(values @ weights, ddof=1)) / math.sqrt(members)
+            if members > 1
+            else math.nan
+        )
 
     weights, _ = _top(mean, 0, last)
     place = int(np.argmax(weights))
     surely = float(special.stdtrit(free, 1.0 - _CHANCE / records))
     for base in (tail, np.eye(1, records)[0]):
         if not (weights - base) @ mean > surely * error(weights - base):
-            most, end, when = (engineering(*number) for number in (
-                (mean[place], unit), (float(tail @ mean), unit), (float(times[place]), "s")
-            ))  # fmt: skip
-            return Peak(f"no peak above the noise: at most {most} after {when}, {end} at the end")
+            most, end, when = (
+                engineering(*number)
+                for number in (
+                    (mean[place], unit),
+                    (float(tail @ mean), unit),
+                    (float(times[place]), "s"),
+                )
+            )
+            return Peak(
+                f"no peak above the noise: at most {most} after {when}, {end} at the end"
+            )
     if place < 3:
         step = engineering(float(times[place]) / 4.0, "s")
-        return Peak(f"too few records to resolve the peak: record every {step} or more often")
+        return Peak(
+            f"too few records to resolve the peak: record every {step} or more often"
+        )
     tried, width = [_top(mean, 0, last)], 1
     while 2 * width <= place:
         weights, at = _top(mean, width, last)
-        if any(abs((weights - other) @ mean) > _ALIKE * error(weights - other) for other, _ in tried):
+        if any(
+            abs((weights - other) @ mean) > _ALIKE * error(weights - other)
+            for other, _ in tried
+        ):
             break
         tried, width = [*tried, (weights, at)], 2 * width
     (weights, at), width = tried[-1], width // 2
     rng = np.random.default_rng(0)  # the same interval each time
-    drawn = rng.multinomial(members, np.full(members, 1.0 / members), size=_RESAMPLED) / members @ values
-    ends = np.quantile([_top(each, width, last)[1] for each in drawn], [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
+    drawn = (
+        rng.multinomial(members, np.full(members, 1.0 / members), size=_RESAMPLED)
+        / members
+        @ values
+    )
+    ends = np.quantile(
+        [_top(each, width, last)[1] for each in drawn],
+        [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL],
+    )
     value, sem, records_at = float(weights @ mean), error(weights), np.arange(records)
     half = float(special.stdtrit(free, 0.5 + 0.5 * LEVEL)) * sem
-    between = max(0.0, 0.125 * float(np.array([-1.0, 2.0, -1.0]) @ mean[place - 1 : place + 2])) * (width < 2)
+    between = max(
+        0.0, 0.125 * float(np.array([-1.0, 2.0, -1.0]) @ mean[place - 1 : place + 2])
+    ) * (width < 2)
     time, first, stop = np.interp([at, ends[0] - 0.5, ends[1] + 0.5], records_at, times)
-    return Peak("", value, sem, value - half, value + half + between, float(time), float(first), float(stop))
+    return Peak(
+        "",
+        value,
+        sem,
+        value - half,
+        value + half + between,
+        float(time),
+        float(first),
+        float(stop),
+    )
 
 
 def _top(mean: Array, width: int, last: int) -> tuple[Array, float]:
@@ -638,7 +897,8 @@ def _top(mean: Array, width: int, last: int) -> tuple[Array, float]:
     It is the largest value, or if the ``width`` is two or more records to both sides the vertex of a parabola.
     """
     sums = np.append(0.0, np.cumsum(mean))
-    averages = sums[2 * width + 1 : last + width] - sums[: last - width - 1]  # of centres width, ..., last - 1
+    # of centres width, ..., last - 1
+    averages = sums[2 * width + 1 : last + width] - sums[: last - width - 1]
     begin = 1 if width == 0 else 0
     place = width + begin + int(np.argmax(averages[begin:]))
     weights, at = np.zeros(len(mean)), float(place)
@@ -648,7 +908,9 @@ def _top(mean: Array, width: int, last: int) -> tuple[Array, float]:
     chosen = slice(place - width, place + width + 1)
     fit = np.linalg.pinv(np.vander(np.linspace(-1.0, 1.0, 2 * width + 1), 3))
     curvature, slope, _ = fit @ mean[chosen]
-    vertex = float(np.clip(-0.5 * slope / curvature, -1.0, 1.0)) if curvature < 0.0 else 0.0
+    vertex = (
+        float(np.clip(-0.5 * slope / curvature, -1.0, 1.0)) if curvature < 0.0 else 0.0
+    )
     weights[chosen] = np.array([vertex**2, vertex, 1.0]) @ fit
     return weights, at + vertex * width
 
@@ -666,40 +928,77 @@ def ensemble_peaks(dataset: xr.Dataset) -> xr.Dataset:
     """
     dataset = plain(dataset)
     drive, result = word(dataset, "drive.model", ""), xr.Dataset()
-    if not bool(((drive == "ramp") | (drive == "start")).any()) or "speed" not in dataset:
+    if (
+        not bool(((drive == "ramp") | (drive == "start")).any())
+        or "speed" not in dataset
+    ):
         return result
     rest = xr.DataArray(0.0)
     with contextlib.suppress(KeyError):
         rest = setting(dataset, "drive.rest").where(drive == "start", 0.0)
     times, sweep = dataset["t"], xr.zeros_like(dataset["contact_modulus"], float)
-    onset, speeds = (times >= rest - 1e-6 * times[-1]).argmax("t"), abs(speed_of(dataset)) + sweep
+    onset, speeds = (
+        (times >= rest - 1e-6 * times[-1]).argmax("t"),
+        abs(speed_of(dataset)) + sweep,
+    )
     for name, (source, prefix) in _PEAKS_OF_MEAN.items():
         is_recorded = source in dataset
-        if f"{source}_mean" not in dataset and not (is_recorded and MEMBERS in dataset[source].dims):
+        if f"{source}_mean" not in dataset and not (
+            is_recorded and MEMBERS in dataset[source].dims
+        ):
             continue
-        unit = dataset[source if is_recorded else f"{source}_mean"].attrs.get("units", "1")
-        values = observable_of(dataset, source) if is_recorded else xr.DataArray(np.empty((0, times.size)), dims=_EACH)
-        how: Any = {"input_core_dims": [_EACH, ["t"], [], ["t"]], "output_core_dims": [[]] * 11, "vectorize": True}
+        unit = dataset[source if is_recorded else f"{source}_mean"].attrs.get(
+            "units", "1"
+        )
+        values = (
+            observable_of(dataset, source)
+            if is_recorded
+            else xr.DataArray(np.empty((0, times.size)), dims=_EACH)
+        )
+        how: Any = {
+            "input_core_dims": [_EACH, ["t"], [], ["t"]],
+            "output_core_dims": [[]] * 11,
+            "vectorize": True,
+        }
         how |= {"output_dtypes": [object, *"dddddddddd"], "kwargs": {"unit": unit}}
-        reason, *numbers = xr.apply_ufunc(_peak_since, values, speeds, onset, times, **how)
+        reason, *numbers = xr.apply_ufunc(
+            _peak_since, values, speeds, onset, times, **how
+        )
         text = f"peak of the mean of the {source.replace('_', ' ')}"
-        described: dict[str, Any] = {f"{name}_{kind}": (unit, text) for kind in ("mean", "sem", "low", "high")}
-        for of, *about in (("time", "s", f"time of sliding to the {text}"), ("speed", "m/s", f"speed at the {text}")):
-            described |= {f"{prefix}_{of}_{end}": about for end in ("mean", "low", "high")}
+        described: dict[str, Any] = {
+            f"{name}_{kind}": (unit, text) for kind in ("mean", "sem", "low", "high")
+        }
+        for of, *about in (
+            ("time", "s", f"time of sliding to the {text}"),
+            ("speed", "m/s", f"speed at the {text}"),
+        ):
+            described |= {
+                f"{prefix}_{of}_{end}": about for end in ("mean", "low", "high")
+            }
         for (key, about), column in zip(described.items(), numbers, strict=True):
             result[key] = labelled(column, *about)
-        result[f"{name}_reason"] = reason.drop_attrs(deep=False).assign_attrs(long_name=f"reason for no {text}")
+        result[f"{name}_reason"] = reason.drop_attrs(deep=False).assign_attrs(
+            long_name=f"reason for no {text}"
+        )
     return result
 
 
-def _peak_since(values: Array, speeds: Array, first: int, times: Array, unit: str) -> tuple[Any, ...]:
+def _peak_since(
+    values: Array, speeds: Array, first: int, times: Array, unit: str
+) -> tuple[Any, ...]:
     """Return the fields of the ``Peak`` of the members after a record, and the speed at its time and interval."""
     if not len(values):
-        return *Peak("the peak of members with noise needs every member: [record] per_member = true"), *[math.nan] * 3
+        return *Peak(
+            "the peak of members with noise needs every member: [record] per_member = true"
+        ), *[math.nan] * 3
     known, since = np.abs(values[:, first:]), times[first:] - times[first]
     known = known[np.isfinite(known).all(axis=-1)]
     is_enough = len(known) > 1 and known.shape[1] >= _FEWEST
-    peak = peak_of_mean(known, since, unit) if is_enough else Peak("too few records or members")
+    peak = (
+        peak_of_mean(known, since, unit)
+        if is_enough
+        else Peak("too few records or members")
+    )
     return *peak, *np.interp(peak[-3:], since, speeds[first:])
 
 
@@ -721,7 +1020,9 @@ class Lifetime(NamedTuple):
     rate_high: float
 
 
-def lifetime(times: Array, ends: Array | float, begins: Array | float = 0.0) -> Lifetime:
+def lifetime(
+    times: Array, ends: Array | float, begins: Array | float = 0.0
+) -> Lifetime:
     """Return the median and the rate of an event that may come after a run's end.
 
     Parameters
@@ -750,14 +1051,24 @@ def lifetime(times: Array, ends: Array | float, begins: Array | float = 0.0) -> 
     watched = np.where(np.isfinite(times), times, ends)
     since = np.broadcast_to(begins, watched.shape)
     counts = (watched > since) | ((since == 0.0) & ~np.isnan(watched))
-    happened, watched, since = np.isfinite(times)[counts], watched[counts], since[counts]
+    happened, watched, since = (
+        np.isfinite(times)[counts],
+        watched[counts],
+        since[counts],
+    )
     half = low = high = np.nan
     if np.any(happened) and np.all(np.isfinite(watched)):
         half, low, high = _halves(watched, happened, since)
-    count, exposure, tail = float(happened.sum()), float(np.sum(watched - since)) or np.nan, 0.5 - 0.5 * LEVEL
+    count, exposure, tail = (
+        float(happened.sum()),
+        float(np.sum(watched - since)) or np.nan,
+        0.5 - 0.5 * LEVEL,
+    )
     least = special.gammaincinv(count, tail) if count else 0.0
     most = special.gammaincinv(count + 1.0, 1.0 - tail)
-    return Lifetime(half, low, high, count / exposure, least / exposure, most / exposure)
+    return Lifetime(
+        half, low, high, count / exposure, least / exposure, most / exposure
+    )
 
 
 def _halves(watched: Array, happened: Array, begins: Array) -> list[float]:
@@ -766,16 +1077,28 @@ def _halves(watched: Array, happened: Array, begins: Array) -> list[float]:
     The numbers are those of ``scipy.stats.ecdf``, whose import would make the start of ``sim run`` a quarter longer.
     """
     times, places, counts = np.unique(watched, return_inverse=True, return_counts=True)
-    events, at_risk = np.bincount(places, happened), watched.size - np.cumsum(counts) + counts
-    at_risk = at_risk - np.sum((begins > 0.0) & (begins >= times[:, np.newaxis]), axis=1)
+    events, at_risk = (
+        np.bincount(places, happened),
+        watched.size - np.cumsum(counts) + counts,
+    )
+    at_risk = at_risk - np.sum(
+        (begins > 0.0) & (begins >= times[:, np.newaxis]), axis=1
+    )
     left = at_risk - events
     if np.any(left[:-1] <= 0):  # nobody was watched for a while
         return [np.nan] * 3
-    survival = left / watched.size if np.all(happened) and not np.any(begins) else np.cumprod(left / at_risk)
-    with np.errstate(divide="ignore", invalid="ignore"):  # there is no interval if the survival is 1 or 0
+    survival = (
+        left / watched.size
+        if np.all(happened) and not np.any(begins)
+        else np.cumprod(left / at_risk)
+    )
+    # there is no interval if the survival is 1 or 0
+    with np.errstate(divide="ignore", invalid="ignore"):
         logarithm = np.log(survival)
         width = WIDE * np.sqrt(np.cumsum(events / (at_risk * left))) / np.abs(logarithm)
-        ends = [np.exp(-np.exp(np.log(-logarithm) + side * width)) for side in (1.0, -1.0)]
+        ends = [
+            np.exp(-np.exp(np.log(-logarithm) + side * width)) for side in (1.0, -1.0)
+        ]
     curves = [survival, *ends] if happened.sum() > 1 else [survival]
     below = [np.flatnonzero(curve <= 0.5) for curve in curves]
     halves = [float(times[first[0]]) if first.size else np.nan for first in below]
@@ -785,13 +1108,26 @@ def _halves(watched: Array, happened: Array, begins: Array) -> list[float]:
 def half_lives(dataset: xr.Dataset, event_times: xr.Dataset) -> xr.Dataset:
     """Return median times of first detachment and masking from ``events``, and rates if the run is stationary."""
     result = xr.Dataset()
-    happened = {"first_detachment": ("detached", "detached"), "first_masked": ("masked", "had their adhesion masked")}
+    happened = {
+        "first_detachment": ("detached", "detached"),
+        "first_masked": ("masked", "had their adhesion masked"),
+    }
     for event, words in happened.items():
-        result.update(lifetimes(dataset, event_times[event], *words) if event in event_times else {})
-    return result if is_stationary(dataset) else result.drop_vars([name for name in result if "_rate" in str(name)])
+        result.update(
+            lifetimes(dataset, event_times[event], *words)
+            if event in event_times
+            else {}
+        )
+    return (
+        result
+        if is_stationary(dataset)
+        else result.drop_vars([name for name in result if "_rate" in str(name)])
+    )
 
 
-def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -> xr.Dataset:
+def lifetimes(
+    dataset: xr.Dataset, times: xr.DataArray, name: str, words: str
+) -> xr.Dataset:
     """Return the median and the rate of an event, at each point of the sweep.
 
     Parameters
@@ -817,9 +1153,17 @@ def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -
     if {"contact_radius", "first_closing"} <= dataset.keys():
         closed = dataset["contact_radius"].isel(t=0, drop=True) > 0.0
         begins = (dataset["first_closing"] - start).where(~closed, 0.0)
-    how: Any = {"input_core_dims": [[MEMBERS]] * 3, "output_core_dims": [[]] * 6, "vectorize": True}
+    how: Any = {
+        "input_core_dims": [[MEMBERS]] * 3,
+        "output_core_dims": [[]] * 6,
+        "vectorize": True,
+    }
     watched = xr.full_like(times, end - start, float)
-    estimates = iter(xr.apply_ufunc(lifetime, times - start, watched, begins.broadcast_like(times), **how))
+    estimates = iter(
+        xr.apply_ufunc(
+            lifetime, times - start, watched, begins.broadcast_like(times), **how
+        )
+    )
     result = xr.Dataset()
     for key, unit, text in (
         (f"half_{name}", "s", f"time at which half of the members have {words}"),
@@ -827,5 +1171,7 @@ def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -
     ):
         for side in ("", "low", "high"):
             about = f"{side} end of the 95 % interval of the {text}" if side else text
-            result[f"{key}_{side}" if side else key] = labelled(next(estimates), unit, about)
+            result[f"{key}_{side}" if side else key] = labelled(
+                next(estimates), unit, about
+            )
     return result

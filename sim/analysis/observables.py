@@ -11,7 +11,16 @@ from collections.abc import Collection
 import numpy as np
 import xarray as xr
 
-from sim.analysis.dataset import MEMBERS, control, plain, setting, stays_held, where_recorded, with_trajectories, word
+from sim.analysis.dataset import (
+    MEMBERS,
+    control,
+    plain,
+    setting,
+    stays_held,
+    where_recorded,
+    with_trajectories,
+    word,
+)
 from sim.laws import jkr
 from sim.units.notation import OF_CONTACT
 
@@ -22,7 +31,10 @@ ENDINGS = ("", *(f"_{kind}" for kind in KEPT))
 #: Shares of the area after that lost to bonds, in the order of charging: radius before each, and what it is lost to.
 _LOSSES = {
     "lost_to_fluctuations": ("bonds_radius", "fluctuations, after the bonds"),
-    "lost_to_mean_stress": ("fluctuations_radius", "the mean stress, after bonds and fluctuations"),
+    "lost_to_mean_stress": (
+        "fluctuations_radius",
+        "the mean stress, after bonds and fluctuations",
+    ),
     "lost_to_lag": ("equilibrium_radius", "the lag of the edge, subtracted last"),
 }
 #: Radii that others are compared with.
@@ -31,11 +43,19 @@ _REFERENCES = ("jkr_radius", "hertz_radius")
 FEW_LEFT = 2
 #: Trajectories from which observables of other names follow; those of shares, beside the radii of their losses.
 _SOURCES = {
-    "area_ratio": ("contact_area",), "fraction_detached": ("in_contact",), "fraction_masked": ("masked", "in_contact"),
-}  # fmt: skip
+    "area_ratio": ("contact_area",),
+    "fraction_detached": ("in_contact",),
+    "fraction_masked": ("masked", "in_contact"),
+}
 #: What else only a closed contact has.
 _OF_AREA = ("area_ratio", "lost_to", "order_of", "indentation")
-_SOURCES_OF_SHARES = ("contact_area", "fluctuation_energy", "applied_load", "indentation", "displacement")
+_SOURCES_OF_SHARES = (
+    "contact_area",
+    "fluctuation_energy",
+    "applied_load",
+    "indentation",
+    "displacement",
+)
 
 
 def ordered(variable: xr.DataArray) -> xr.DataArray:
@@ -43,7 +63,9 @@ def ordered(variable: xr.DataArray) -> xr.DataArray:
     return variable.transpose(..., MEMBERS, "t", missing_dims="ignore")
 
 
-def labelled(values: xr.DataArray, unit: str, text: str, symbol: str = "") -> xr.DataArray:
+def labelled(
+    values: xr.DataArray, unit: str, text: str, symbol: str = ""
+) -> xr.DataArray:
     """Return values with members and time last, with their unit and meaning."""
     return ordered(values).assign_attrs(units=unit, long_name=text, symbol=symbol)
 
@@ -62,7 +84,9 @@ def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
         ``radius_jkr`` and ``radius_hertz`` [m], without the dimension ``t`` where what holds the sphere stays at all
         points of the sweep. The former is nan where that contact is open, the latter 0.
     """
-    radii = plain(dataset)[[*_REFERENCES]].rename(jkr_radius="radius_jkr", hertz_radius="radius_hertz")
+    radii = plain(dataset)[[*_REFERENCES]].rename(
+        jkr_radius="radius_jkr", hertz_radius="radius_hertz"
+    )
     if bool(stays_held(dataset).all()):
         radii = radii.isel(t=0, drop=True)
     radii = radii.astype(float, copy=False).map(ordered)
@@ -86,19 +110,35 @@ def closed_only(dataset: xr.Dataset) -> xr.Dataset:
         if MEMBERS in closed.dims:
             count = closed.sum(MEMBERS)
             closed = closed & ((count > FEW_LEFT) | (count == closed.sizes[MEMBERS]))
-        return dataset.assign({name: dataset[name].astype(float, copy=False).where(closed) for name in names})
-    if "in_contact_mean" not in dataset or bool((dataset["in_contact_mean"] == 1.0).all()):
+        return dataset.assign(
+            {
+                name: dataset[name].astype(float, copy=False).where(closed)
+                for name in names
+            }
+        )
+    if "in_contact_mean" not in dataset or bool(
+        (dataset["in_contact_mean"] == 1.0).all()
+    ):
         return dataset
     members, share = float(dataset.attrs["members"]), dataset["in_contact_mean"]
-    stops, count, result = word(dataset, "contact.after_pull_off", "stop") == "stop", (members * share).round(), {}
-    recorded, is_known = count.where(stops, members), (count > FEW_LEFT) | (count == members)
+    stops, count, result = (
+        word(dataset, "contact.after_pull_off", "stop") == "stop",
+        (members * share).round(),
+        {},
+    )
+    recorded, is_known = (
+        count.where(stops, members),
+        (count > FEW_LEFT) | (count == members),
+    )
     for name in (name for name in OF_CONTACT if f"{name}_mean" in dataset):
         mean, std = (dataset[f"{name}_{kind}"] for kind in ("mean", "std"))
         squares = (recorded - 1.0) * std**2 + recorded * mean**2
         mean = (mean * recorded / count).where(is_known)
         std = ((squares - count * mean**2) / (count - 1.0)).clip(0.0) ** 0.5
         for kind, values in zip(KEPT, (mean, std, std / count**0.5), strict=True):
-            result[f"{name}_{kind}"] = values.assign_attrs(dataset[f"{name}_{kind}"].attrs)
+            result[f"{name}_{kind}"] = values.assign_attrs(
+                dataset[f"{name}_{kind}"].attrs
+            )
     return dataset.assign(result)
 
 
@@ -109,11 +149,23 @@ def with_slips(dataset: xr.Dataset) -> xr.Dataset:
     """
     if "bonds_sites" not in dataset.variables or dataset.sizes["t"] < 2:
         return dataset
-    names = [end for end in ("", "_mean") if f"spring_force{end}" in dataset and f"slider_position{end}" in dataset]
-    moved = {f"speed{end}": dataset[f"slider_position{end}"].astype(float).differentiate("t") for end in names}
+    names = [
+        end
+        for end in ("", "_mean")
+        if f"spring_force{end}" in dataset and f"slider_position{end}" in dataset
+    ]
+    moved = {
+        f"speed{end}": dataset[f"slider_position{end}"].astype(float).differentiate("t")
+        for end in names
+    }
     later = dataset["t"] > dataset["t"][0]  # at the start nothing has moved yet
     speeds = {name: speed.where(later, dataset[name]) for name, speed in moved.items()}
-    return dataset.assign({name: speed.assign_attrs(dataset[name].attrs) for name, speed in speeds.items()})
+    return dataset.assign(
+        {
+            name: speed.assign_attrs(dataset[name].attrs)
+            for name, speed in speeds.items()
+        }
+    )
 
 
 def full_area(dataset: xr.Dataset) -> xr.DataArray:
@@ -129,7 +181,9 @@ def bond_work(dataset: xr.Dataset) -> xr.DataArray:
     """
     dataset = plain(dataset)
     share = setting(dataset, "adhesion.bond_share")
-    fraction = dataset["bond_fraction" if "bond_fraction" in dataset else "bond_fraction_mean"]
+    fraction = dataset[
+        "bond_fraction" if "bond_fraction" in dataset else "bond_fraction_mean"
+    ]
     left = setting(dataset, "adhesion.work") * (1.0 - share + share * fraction)
     return labelled(left, "J/m^2", "work of adhesion of the intact bonds", "Δγ")
 
@@ -157,22 +211,36 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     """
     dataset = plain(dataset)
     suffix = "" if "contact_area" in dataset else "_mean"
-    area, full = dataset[f"contact_area{suffix}"].astype(float, copy=False), full_area(dataset)
+    area, full = (
+        dataset[f"contact_area{suffix}"].astype(float, copy=False),
+        full_area(dataset),
+    )
     recorded = {str(name).removesuffix("_mean") for name in dataset}
     charged = {name: loss for name, loss in _LOSSES.items() if loss[0] in recorded}
     if any(radius not in dataset for radius, _ in charged.values()):
-        raise ValueError("shares need every member; record them: [record] per_member = true")
-    left = [np.pi * dataset[radius].astype(float, copy=False) ** 2 for radius, _ in charged.values()]
+        raise ValueError(
+            "shares need every member; record them: [record] per_member = true"
+        )
+    left = [
+        np.pi * dataset[radius].astype(float, copy=False) ** 2
+        for radius, _ in charged.values()
+    ]
     left = [level.where(area.notnull()) for level in left]
     levels = [full, *left, area]
     texts = {"lost_to_bonds": "broken bonds, which are subtracted first"}
     texts |= {name + suffix: text for name, (_, text) in charged.items()}
     shares = {}
-    for (name, text), (before, after) in zip(texts.items(), itertools.pairwise(levels), strict=False):
-        shares[name] = pure((before - after) / full, f"share of the JKR area lost to {text}")
+    for (name, text), (before, after) in zip(
+        texts.items(), itertools.pairwise(levels), strict=False
+    ):
+        shares[name] = pure(
+            (before - after) / full, f"share of the JKR area lost to {text}"
+        )
     if suffix:  # the bonds are the same for all members, so the spread is the area's
         for kind in ("std", "sem"):
-            shares[f"lost_to_fluctuations_{kind}"] = pure(dataset[f"contact_area_{kind}"] / full, "")
+            shares[f"lost_to_fluctuations_{kind}"] = pure(
+                dataset[f"contact_area_{kind}"] / full, ""
+            )
     return xr.Dataset(shares, attrs=dataset.attrs)
 
 
@@ -184,12 +252,21 @@ def radius_at_work(dataset: xr.Dataset, work: xr.DataArray) -> xr.DataArray:
     KeyError
         If the dataset does not hold a number that is needed.
     """
-    held, sphere = control(dataset), (work, setting(dataset, "sphere.radius"), dataset["contact_modulus"])
+    held, sphere = (
+        control(dataset),
+        (work, setting(dataset, "sphere.radius"), dataset["contact_modulus"]),
+    )
     if held.kind == "load":
-        load = dataset["applied_load"] if "applied_load" in dataset else dataset.get("contact_load")
+        load = (
+            dataset["applied_load"]
+            if "applied_load" in dataset
+            else dataset.get("contact_load")
+        )
         return xr.apply_ufunc(jkr.radius_at_load, load, *sphere)
     # an indentation is a displacement behind an infinite stiffness
-    return xr.apply_ufunc(jkr.radius_at_displacement, dataset[held.kind], held.stiffness, *sphere)
+    return xr.apply_ufunc(
+        jkr.radius_at_displacement, dataset[held.kind], held.stiffness, *sphere
+    )
 
 
 def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
@@ -200,17 +277,29 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
     ValueError
         If members were not recorded, or the contact is on a disc of finite radius.
     """
-    if "fluctuation_energy" not in dataset or bool((word(dataset, "shear.contact", "plane") != "plane").any()):
-        raise ValueError("the other order of losses needs the fluctuation energy of each member, on a plane")
+    if "fluctuation_energy" not in dataset or bool(
+        (word(dataset, "shear.contact", "plane") != "plane").any()
+    ):
+        raise ValueError(
+            "the other order of losses needs the fluctuation energy of each member, on a plane"
+        )
     energy = dataset["fluctuation_energy"].astype(float, copy=False)
     try:
-        work = setting(dataset, "adhesion.work") - setting(dataset, "shear.paid_by_adhesion") * energy
+        work = (
+            setting(dataset, "adhesion.work")
+            - setting(dataset, "shear.paid_by_adhesion") * energy
+        )
         radius = radius_at_work(dataset, work)
     except KeyError as fault:
-        raise ValueError(f"the other order of losses is not known: {fault.args[0]}") from None
+        raise ValueError(
+            f"the other order of losses is not known: {fault.args[0]}"
+        ) from None
     full, alone = full_area(dataset), np.pi * radius.fillna(0.0) ** 2
     alone = alone.where(dataset["contact_area"].notnull())
-    return pure((full - alone) / full, "share of the JKR area lost to fluctuations, which are subtracted first")
+    return pure(
+        (full - alone) / full,
+        "share of the JKR area lost to fluctuations, which are subtracted first",
+    )
 
 
 def observables(dataset: xr.Dataset) -> xr.Dataset:
@@ -221,18 +310,26 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     Their ensemble means are the fractions.
     """
     dataset = plain(dataset)
-    result = dataset.drop_vars([n for n, v in dataset.data_vars.items() if "t" not in v.dims])
+    result = dataset.drop_vars(
+        [n for n, v in dataset.data_vars.items() if "t" not in v.dims]
+    )
     for suffix in ENDINGS:
         if f"contact_area{suffix}" in result and set(_REFERENCES) <= set(result):
-            ratio = result[f"contact_area{suffix}"].astype(float, copy=False) / full_area(dataset)
-            result[f"area_ratio{suffix}"] = pure(ratio, "contact area over JKR's", "A/A_JKR")
+            ratio = result[f"contact_area{suffix}"].astype(
+                float, copy=False
+            ) / full_area(dataset)
+            result[f"area_ratio{suffix}"] = pure(
+                ratio, "contact area over JKR's", "A/A_JKR"
+            )
         if f"in_contact{suffix}" in result:
             closed = result[f"in_contact{suffix}"].astype(float, copy=False)
             opened = closed if suffix in ("_std", "_sem") else 1.0 - closed
             result[f"fraction_detached{suffix}"] = pure(opened, "open contacts")
     with where_recorded():
         result = result.assign(masks(dataset))
-    return result.drop_vars([n for n in result if str(n).startswith(("in_contact", "masked"))])
+    return result.drop_vars(
+        [n for n in result if str(n).startswith(("in_contact", "masked"))]
+    )
 
 
 def charges(dataset: xr.Dataset) -> xr.Dataset:
@@ -260,9 +357,18 @@ def charges(dataset: xr.Dataset) -> xr.Dataset:
         shares = share_observables(dataset)
         first, later = _charged_first(dataset), shares["lost_to_fluctuations"]
         last = shares["lost_to_bonds"] + later - first
-        last = pure(last, "share of the JKR area lost to broken bonds, after the fluctuations")
-        more = pure(first - later, "additional loss to fluctuations if they are subtracted first")
-        shares = shares.assign(lost_to_fluctuations_first=first, lost_to_bonds_last=last, order_of_charging=more)
+        last = pure(
+            last, "share of the JKR area lost to broken bonds, after the fluctuations"
+        )
+        more = pure(
+            first - later,
+            "additional loss to fluctuations if they are subtracted first",
+        )
+        shares = shares.assign(
+            lost_to_fluctuations_first=first,
+            lost_to_bonds_last=last,
+            order_of_charging=more,
+        )
     return shares
 
 
@@ -270,13 +376,20 @@ def restricted(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset
     """Return the dataset without trajectories that the observables ``names`` do not need; None stands for all."""
     if names is None:
         return dataset
-    sources = {source for name in names for source in _SOURCES.get(name, (name,))} | {*_REFERENCES, "in_contact"}
+    sources = {source for name in names for source in _SOURCES.get(name, (name,))} | {
+        *_REFERENCES,
+        "in_contact",
+    }
     if _shares_among(names):
         sources |= {*_SOURCES_OF_SHARES, *(radius for radius, _ in _LOSSES.values())}
-    return with_trajectories(dataset, *(f"{name}{ending}" for name in sources for ending in ENDINGS))
+    return with_trajectories(
+        dataset, *(f"{name}{ending}" for name in sources for ending in ENDINGS)
+    )
 
 
-def chosen_observables(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset:
+def chosen_observables(
+    dataset: xr.Dataset, names: Collection[str] | None
+) -> xr.Dataset:
     """Return the observables ``names``, or their statistics if only these were recorded.
 
     If ``names`` is None, return all observables, and the shares of the lost area in both orders if they are known.
@@ -290,7 +403,9 @@ def chosen_observables(dataset: xr.Dataset, names: Collection[str] | None) -> xr
     return result[[name for name in result if name in wanted]]
 
 
-def closed_observables(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset:
+def closed_observables(
+    dataset: xr.Dataset, names: Collection[str] | None
+) -> xr.Dataset:
     """Return the ``chosen_observables``; what only a closed contact has is nan if the contact is open."""
     return chosen_observables(closed_only(dataset), names)
 
@@ -303,9 +418,14 @@ def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
     """Return ``fraction_masked``; of statistics alone it is known if all contacts are closed, else nan."""
     text = "closed contacts without effective work of adhesion"
     if "masked" in dataset:
-        return {"fraction_masked": pure(dataset["masked"].astype(float, copy=False), text)}
+        return {
+            "fraction_masked": pure(dataset["masked"].astype(float, copy=False), text)
+        }
     closed = dataset["in_contact_mean"] == 1.0
-    return {f"fraction_masked_{kind}": pure(dataset[f"masked_{kind}"].where(closed), text) for kind in KEPT}
+    return {
+        f"fraction_masked_{kind}": pure(dataset[f"masked_{kind}"].where(closed), text)
+        for kind in KEPT
+    }
 
 
 def settled(trajectories: xr.Dataset) -> xr.Dataset:

@@ -23,7 +23,13 @@ from sim.analysis.dataset import (
     sweep_dims,
     word,
 )
-from sim.analysis.observables import closed_observables, labelled, radius_at_work, reference_radii, restricted
+from sim.analysis.observables import (
+    closed_observables,
+    labelled,
+    radius_at_work,
+    reference_radii,
+    restricted,
+)
 from sim.analysis.statistics import LEVEL, Array
 from sim.laws import schallamach
 from sim.units.errors import BadInput
@@ -34,22 +40,36 @@ from sim.units.quantity import read_option
 _LOSSES = (0.05, 0.5)
 #: Shares of a loss, in both orders of charging.
 _CHARGED = (
-    "lost_to_bonds", "lost_to_fluctuations", "lost_to_fluctuations_first", "lost_to_bonds_last", "lost_to_mean_stress",
+    "lost_to_bonds",
+    "lost_to_fluctuations",
+    "lost_to_fluctuations_first",
+    "lost_to_bonds_last",
+    "lost_to_mean_stress",
     "lost_to_lag",
-)  # fmt: skip
+)
 #: Groups of members that are left out in turn, and means of them, at most.
 _GROUPS, _MOST_MEANS = 64, 2**22
-_ENDS = {"": "", "_low": "lower end of the 95 % interval of the ", "_high": "upper end of the 95 % interval of the "}
+_ENDS = {
+    "": "",
+    "_low": "lower end of the 95 % interval of the ",
+    "_high": "upper end of the 95 % interval of the ",
+}
 #: Within how many standard errors of a level speeds are near it.
 _NEAR = 4.0
 #: Speeds to each side of a level that its interpolation needs.
 _REACH = 6
 #: Reasons for a bound: below the speeds, above them, and above those at which all groups are in contact.
 _BEYOND = (
-    "more is lost at the lowest speed", "less is lost at the highest speed", "the contacts detach before this loss",
-)  # fmt: skip
+    "more is lost at the lowest speed",
+    "less is lost at the highest speed",
+    "the contacts detach before this loss",
+)
 #: Numbers of bonds that stretch, and of a rupture law, in a dataset; speeds at which steady bonds are tabulated.
-_BONDS, _PREFIX, _FINE = ("bond_stiffness", "rebinding_rate", "site_density"), "bonds_rupture_", 600
+_BONDS, _PREFIX, _FINE = (
+    ("bond_stiffness", "rebinding_rate", "site_density"),
+    "bonds_rupture_",
+    600,
+)
 #: Names of branches by the sign of the change of the speed.
 _WAYS = {1.0: "increasing speed", -1.0: "decreasing speed"}
 #: Relative lag of a speed below which it is not stated.
@@ -72,7 +92,13 @@ class Crossing(NamedTuple):
     beside: Array
 
 
-def crossing(speeds: Array, groups: Array, sizes: Array, level: float, beside: Array | None = None) -> Crossing:
+def crossing(
+    speeds: Array,
+    groups: Array,
+    sizes: Array,
+    level: float,
+    beside: Array | None = None,
+) -> Crossing:
     """Return the speed at which the mean of a falling quantity has first fallen to a level.
 
     Parameters
@@ -105,61 +131,105 @@ def crossing(speeds: Array, groups: Array, sizes: Array, level: float, beside: A
     free = len(groups) - 1.0
     student = special.stdtrit(free, 0.5 + 0.5 * LEVEL) if free else 0.0
     curves = np.stack([groups - level, *(beside if beside is not None else ())])
-    none = Crossing(math.nan, math.nan, math.nan, "", np.full((len(curves) - 1, 3), math.nan))
+    none = Crossing(
+        math.nan, math.nan, math.nan, "", np.full((len(curves) - 1, 3), math.nan)
+    )
     highest = np.fmax.reduce(speeds)
-    speeds, order = np.unique(np.where(np.isfinite(curves[0]).all(axis=0), speeds, 0.0), return_index=True)
+    speeds, order = np.unique(
+        np.where(np.isfinite(curves[0]).all(axis=0), speeds, 0.0), return_index=True
+    )
     x, curves = np.log(speeds[speeds > 0.0]), curves[..., order[speeds > 0.0]]
     if not x.size:
         here = "contacts are open, or open even at the full work of adhesion"
-        return none._replace(reason=here if highest > 0.0 else "the speed does not change here")
+        return none._replace(
+            reason=here if highest > 0.0 else "the speed does not change here"
+        )
     weight = (sizes / sizes.sum())[:, np.newaxis]
     ends_early = bool(speeds[-1] < highest)
     whole = np.sum(weight * curves, axis=1, keepdims=True)
     if free:  # in the first row the mean, then those without each group
-        whole = np.concatenate([whole, (whole - weight * curves) / (1.0 - weight)], axis=1)
+        whole = np.concatenate(
+            [whole, (whole - weight * curves) / (1.0 - weight)], axis=1
+        )
 
     def error(rows: Array) -> Array:
-        return np.sqrt(free * np.var(rows[1:], axis=0)) if free else np.zeros(rows.shape[1:])
+        return (
+            np.sqrt(free * np.var(rows[1:], axis=0))
+            if free
+            else np.zeros(rows.shape[1:])
+        )
 
     def half(rows: Array, *coarser: Array) -> float:
         off = (each - rows for each in coarser)
-        return math.hypot(student * error(rows), *(math.sqrt(max(0.0, d[0] ** 2 - error(d) ** 2)) for d in off))
+        return math.hypot(
+            student * error(rows),
+            *(math.sqrt(max(0.0, d[0] ** 2 - error(d) ** 2)) for d in off),
+        )
 
     mean, surely = whole[0, 0], max(_NEAR, student) * error(whole[0])
     first = int(np.argmax(mean <= 0.0))
     far = np.flatnonzero(np.abs(mean) > surely[first])
-    window = max(far[far < first - 1], default=-1) + 1, min(far[far > first], default=len(mean))
+    window = (
+        max(far[far < first - 1], default=-1) + 1,
+        min(far[far > first], default=len(mean)),
+    )
     block = max(1, (window[1] - window[0]) // 2) if mean[0] > 0.0 >= mean[first] else 1
     edges = np.unique([0, *range(window[0] % block, len(x), block)])
     counts, count = np.diff([*edges, len(x)]), len(x)
-    x, whole = np.add.reduceat(x, edges) / counts, np.add.reduceat(whole, edges, axis=-1) / counts
+    x, whole = (
+        np.add.reduceat(x, edges) / counts,
+        np.add.reduceat(whole, edges, axis=-1) / counts,
+    )
     if block > 1:
         whole[..., 1:-1] -= np.diff(whole, 2) / 24.0
     rows, surely = whole[0], max(_NEAR, student) * error(whole[0])
     k = int(np.argmax(rows[0] <= 0.0)) if np.any(rows[0] <= 0.0) else len(x)
     low = max(x[:k][rows[0, :k] > surely[:k]], default=math.nan)
     high = min(x[k:][rows[0, k:] < -surely[k:]], default=math.nan)
-    bracket = none._replace(low=math.exp(low), high=math.exp(high), reason=f"{count} speeds: add some here")
+    bracket = none._replace(
+        low=math.exp(low), high=math.exp(high), reason=f"{count} speeds: add some here"
+    )
     if math.isnan(low) and math.isnan(high):
         bracket = bracket._replace(reason="hidden by the noise; add members")
     if not 2 <= k <= len(x) - 2:
-        return bracket._replace(reason=_BEYOND[k > 0 and 1 + ends_early]) if k in (0, len(x)) else bracket
+        return (
+            bracket._replace(reason=_BEYOND[k > 0 and 1 + ends_early])
+            if k in (0, len(x))
+            else bracket
+        )
     near = slice(max(k - _REACH, 0), k + _REACH)
     x, whole, rows, k = x[near], whole[..., near], rows[:, near], k - near.start
     at = next(place for place in _places(x, rows[0], 0.0) if place >= x[k - 1])
     halves = (_interpolated(x[first::2], rows[:, first::2], at) for first in (0, 1))
     width = half(_interpolated(x, rows, at), *halves)
     above, below = (_places(x, rows[0], end) for end in (width, -width))
-    ends = np.fmax(low, max(above[above <= at], default=low)), np.fmin(high, min(below[below >= at], default=high))
+    ends = (
+        np.fmax(low, max(above[above <= at], default=low)),
+        np.fmin(high, min(below[below >= at], default=high)),
+    )
     if ends == (low, high) and width > 0.0:
         return bracket
 
     def over_the_fall(values: Array, a: int, b: int) -> Array:
-        return values[:, a] + rows[:, a] / (rows[:, a] - rows[:, b]) * (values[:, b] - values[:, a])
+        return values[:, a] + rows[:, a] / (rows[:, a] - rows[:, b]) * (
+            values[:, b] - values[:, a]
+        )
 
-    others = [[over_the_fall(values, k - a, k + b) for a, b in ((1, 0), (2, 0), (1, 1))] for values in whole[1:]]
-    intervals = [(each[0][0], each[0][0] - half(*each), each[0][0] + half(*each)) for each in others]
-    return Crossing(math.exp(at), math.exp(ends[0]), math.exp(ends[1]), "", np.reshape(intervals, (-1, 3)))
+    others = [
+        [over_the_fall(values, k - a, k + b) for a, b in ((1, 0), (2, 0), (1, 1))]
+        for values in whole[1:]
+    ]
+    intervals = [
+        (each[0][0], each[0][0] - half(*each), each[0][0] + half(*each))
+        for each in others
+    ]
+    return Crossing(
+        math.exp(at),
+        math.exp(ends[0]),
+        math.exp(ends[1]),
+        "",
+        np.reshape(intervals, (-1, 3)),
+    )
 
 
 def cubics(x: Array, y: Array) -> Array:
@@ -170,18 +240,35 @@ def cubics(x: Array, y: Array) -> Array:
     points, and more memory.
     """
     step, rise = np.diff(x), np.diff(y) / np.diff(x)
-    (before, after), (left, right) = (step[:-1], step[1:]), (rise[..., :-1], rise[..., 1:])
+    (before, after), (left, right) = (
+        (step[:-1], step[1:]),
+        (rise[..., :-1], rise[..., 1:]),
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
-        inner = 3.0 * (before + after) / ((before + 2.0 * after) / left + (2.0 * before + after) / right)
+        inner = (
+            3.0
+            * (before + after)
+            / ((before + 2.0 * after) / left + (2.0 * before + after) / right)
+        )
     slopes = np.zeros(y.shape)
     slopes[..., 1:-1] = np.where(left * right > 0.0, inner, 0.0)
     for end, two in ((0, slice(2)), (-1, slice(-1, -3, -1))):
-        (near, *_, far), first, second = step[two].repeat(2), rise[..., two][..., 0], rise[..., two][..., -1]
+        (near, *_, far), first, second = (
+            step[two].repeat(2),
+            rise[..., two][..., 0],
+            rise[..., two][..., -1],
+        )
         slope = ((2.0 * near + far) * first - near * second) / (near + far)
         slope = np.where(slope * first > 0.0, slope, 0.0)
-        slopes[..., end] = np.where((first * second <= 0.0) & (abs(slope) > 3.0 * abs(first)), 3.0 * first, slope)
+        slopes[..., end] = np.where(
+            (first * second <= 0.0) & (abs(slope) > 3.0 * abs(first)),
+            3.0 * first,
+            slope,
+        )
     left, excess = slopes[..., :-1], slopes[..., :-1] + slopes[..., 1:] - 2.0 * rise
-    return np.stack([excess / step**2, (rise - left - excess) / step, left, y[..., :-1]])
+    return np.stack(
+        [excess / step**2, (rise - left - excess) / step, left, y[..., :-1]]
+    )
 
 
 def _interpolated(x: Array, y: Array, at: float) -> Array:
@@ -203,7 +290,11 @@ def _places(x: Array, y: Array, level: float) -> Array:
 def speed_dim(dataset: xr.Dataset) -> str | None:
     """Return the sweep's dimension along which the speed changes."""
     speed = speed_of(dataset).isel(t=0)
-    varying = (n for n in sweep_dims(dataset) if n in speed.dims and bool((speed != speed.isel({n: 0})).any()))
+    varying = (
+        n
+        for n in sweep_dims(dataset)
+        if n in speed.dims and bool((speed != speed.isel({n: 0})).any())
+    )
     return next(varying, None)
 
 
@@ -229,28 +320,50 @@ def extremes(curves: xr.Dataset, name: str, along: str) -> xr.Dataset:
     curves, result = curves.sortby(along), xr.Dataset()
     mean, low, high = (curves[f"{name}_{end}"] for end in ("mean", "low", "high"))
     low, high, last = low.fillna(mean), high.fillna(mean), curves.sizes[along] - 1
-    for kind, sign, near, far in (("largest", 1.0, low, high), ("least", -1.0, -high, -low)):
+    for kind, sign, near, far in (
+        ("largest", 1.0, low, high),
+        ("least", -1.0, -high, -low),
+    ):
         index = (sign * mean).fillna(-np.inf).argmax(along)
         inside = near.isel({along: index}) > far.isel({along: [0, last]}).max(along)
         for end, step, values in (("", 0, mean), ("_low", -1, low), ("_high", 1, high)):
-            place = curves[along].isel({along: (index + step).clip(0, last)}).where(inside)
+            place = (
+                curves[along].isel({along: (index + step).clip(0, last)}).where(inside)
+            )
             extreme = values.isel({along: index}, drop=True).where(inside)
             result[f"{name}_{kind}{end}"] = extreme.assign_attrs(mean.attrs)
-            result[f"{name}_{kind}_at{end}"] = place.drop_vars(along, errors="ignore").assign_attrs(curves[along].attrs)
-        result[f"{name}_{kind}_reason"] = xr.where(inside, "", "at an end of the sweep, within the errors")
+            result[f"{name}_{kind}_at{end}"] = place.drop_vars(
+                along, errors="ignore"
+            ).assign_attrs(curves[along].attrs)
+        result[f"{name}_{kind}_reason"] = xr.where(
+            inside, "", "at an end of the sweep, within the errors"
+        )
     return result.drop_vars(along, errors="ignore")
 
 
 def _least_area(dataset: xr.Dataset, hertz: xr.DataArray) -> xr.DataArray:
     """Return the least area over JKR's that can be left: Hertz's, and without fluctuations that without bonds."""
-    energy = dataset.get("fluctuation_energy", dataset.get("fluctuation_energy_mean", xr.DataArray(math.nan)))
-    others = {"fluctuations_radius", "fluctuations_radius_mean", "equilibrium_radius", "equilibrium_radius_mean"}
+    energy = dataset.get(
+        "fluctuation_energy",
+        dataset.get("fluctuation_energy_mean", xr.DataArray(math.nan)),
+    )
+    others = {
+        "fluctuations_radius",
+        "fluctuations_radius_mean",
+        "equilibrium_radius",
+        "equilibrium_radius_mean",
+    }
     if bool((energy != 0.0).any()) or others & dataset.keys():
         return hertz
     with contextlib.suppress(KeyError):
-        left = setting(dataset, "adhesion.work") * (1.0 - setting(dataset, "adhesion.bond_share"))
+        left = setting(dataset, "adhesion.work") * (
+            1.0 - setting(dataset, "adhesion.bond_share")
+        )
         bare = radius_at_work(dataset, left) / reference_radii(dataset)["radius_jkr"]
-        return bare.min([name for name in bare.dims if name not in hertz.dims]) ** 2 + 0.0 * hertz
+        return (
+            bare.min([name for name in bare.dims if name not in hertz.dims]) ** 2
+            + 0.0 * hertz
+        )
     return hertz
 
 
@@ -263,12 +376,26 @@ def _course(dataset: xr.Dataset) -> tuple[str, xr.DataArray]:
         If there is no such curve.
     """
     has_area = bool({"contact_area", "contact_area_mean"} & dataset.keys())
-    if speed_name(dataset) not in dataset or not (has_area and {"jkr_radius", "hertz_radius"} <= dataset.keys()):
-        raise BadInput(["speeds of a loss need speed, contact_area, jkr_radius and hertz_radius in record.quantities"])
+    if speed_name(dataset) not in dataset or not (
+        has_area and {"jkr_radius", "hertz_radius"} <= dataset.keys()
+    ):
+        raise BadInput(
+            [
+                "speeds of a loss need speed, contact_area, jkr_radius and hertz_radius in record.quantities"
+            ]
+        )
     if bool((word(dataset, "drive.model", "") == "force").any()):
-        raise BadInput(["a loss at a speed needs a prescribed speed, but a force drives the slider"])
+        raise BadInput(
+            [
+                "a loss at a speed needs a prescribed speed, but a force drives the slider"
+            ]
+        )
     if not bool(stays_held(dataset).all()):
-        raise BadInput(["a loss at a speed needs a constant mount, but load, indentation or displacement changes"])
+        raise BadInput(
+            [
+                "a loss at a speed needs a constant mount, but load, indentation or displacement changes"
+            ]
+        )
     speed = abs(speed_of(dataset))
     if is_steady(dataset) and (along := speed_dim(dataset)) is not None:
         return along, speed.isel(t=0, drop=True)
@@ -282,11 +409,23 @@ def _course(dataset: xr.Dataset) -> tuple[str, xr.DataArray]:
                 number[way[first]] += 1
                 name = f"{_WAYS[way[first]]} {number[way[first]]}".removesuffix(" 1")
                 records = (*point, slice(first, last + 1))
-                branches.setdefault(name, np.full(values.shape, np.nan))[records] = values[records]
+                branches.setdefault(name, np.full(values.shape, np.nan))[records] = (
+                    values[records]
+                )
     if not branches:
-        raise BadInput(["the speed neither changes steadily nor is swept; a loss at a speed needs one of both"])
-    names = xr.Variable("branch", list(branches), {"long_name": "branch of increasing or decreasing speed"})
-    return "t", xr.concat([speed.copy(data=each) for each in branches.values()], names).squeeze(drop=len(branches) == 1)
+        raise BadInput(
+            [
+                "the speed neither changes steadily nor is swept; a loss at a speed needs one of both"
+            ]
+        )
+    names = xr.Variable(
+        "branch",
+        list(branches),
+        {"long_name": "branch of increasing or decreasing speed"},
+    )
+    return "t", xr.concat(
+        [speed.copy(data=each) for each in branches.values()], names
+    ).squeeze(drop=len(branches) == 1)
 
 
 class Population(NamedTuple):
@@ -301,24 +440,38 @@ class Population(NamedTuple):
     def pathway(self) -> tuple[float, float, float] | tuple[()]:
         """Rate [1/s], Bell force [N] and stiffness [N/m] if all rupture is by one pathway that force opens."""
         law = self.rupture.law(self.stiffness)
-        return (law.rate, self.stiffness / law.softness, self.stiffness) if law.one_pathway else ()
+        return (
+            (law.rate, self.stiffness / law.softness, self.stiffness)
+            if law.one_pathway
+            else ()
+        )
 
     @property
     def at_rest(self) -> float:
         """Share of the sites that are bound at rest."""
-        return float(schallamach.rest_share(self.rupture.law(self.stiffness).at_rest, self.rebinding))
+        return float(
+            schallamach.rest_share(
+                self.rupture.law(self.stiffness).at_rest, self.rebinding
+            )
+        )
 
 
 def population_of(point: xr.Dataset) -> Population | None:
     """Return the bonds of a dataset without a sweep; None if they do not stretch or it lacks their numbers."""
-    if not (keys := [str(name) for name in point.variables if str(name).startswith(_PREFIX)]):
+    if not (
+        keys := [str(name) for name in point.variables if str(name).startswith(_PREFIX)]
+    ):
         return None
-    from sim.parts.bonds.rupture import Rupture  # which takes a while, and few datasets need it
+    # which takes a while, and few datasets need it
+    from sim.parts.bonds.rupture import Rupture
 
     with contextlib.suppress(KeyError, ValueError):
         numbers = {key.removeprefix(_PREFIX): float(point[key]) for key in keys}
-        rupture = TypeAdapter(get_args(Rupture)[0]).validate_python(numbers)  # any law by its numbers alone
-        return Population(rupture, *(float(setting(point, f"bonds.{key}")) for key in _BONDS))
+        # any law by its numbers alone
+        rupture = TypeAdapter(get_args(Rupture)[0]).validate_python(numbers)
+        return Population(
+            rupture, *(float(setting(point, f"bonds.{key}")) for key in _BONDS)
+        )
     return None
 
 
@@ -328,33 +481,67 @@ def steady_speeds(dataset: xr.Dataset) -> xr.DataArray:
     If the amplitude of the field relaxes and lags more, it is approximately the speed of the steady field. This is the
     speed one memory time earlier, to first order in the rate of the course. It is nan if a law is not known.
     """
-    speed = (abs(speed_of(dataset)) + 0.0 * dataset["contact_modulus"]).transpose(*sweep_dims(dataset), "t")
-    fraction = dataset.get("bond_fraction", dataset.get("bond_fraction_mean", math.nan * speed))
+    speed = (abs(speed_of(dataset)) + 0.0 * dataset["contact_modulus"]).transpose(
+        *sweep_dims(dataset), "t"
+    )
+    fraction = dataset.get(
+        "bond_fraction", dataset.get("bond_fraction_mean", math.nan * speed)
+    )
     fraction = fraction.mean(MEMBERS) if MEMBERS in fraction.dims else fraction
-    fraction, result = fraction.broadcast_like(speed).transpose(*speed.dims), speed.copy(deep=True)
-    has_memory = any(str(name).startswith("bonds_rebinding") for name in dataset.variables)
+    fraction, result = (
+        fraction.broadcast_like(speed).transpose(*speed.dims),
+        speed.copy(deep=True),
+    )
+    has_memory = any(
+        str(name).startswith("bonds_rebinding") for name in dataset.variables
+    )
     for place in np.ndindex(speed.shape[:-1] if has_memory else 0):
-        point, sizes = dataset.isel(dict(zip(speed.dims[:-1], place, strict=True))), speed[place].to_numpy()
+        point, sizes = (
+            dataset.isel(dict(zip(speed.dims[:-1], place, strict=True))),
+            speed[place].to_numpy(),
+        )
         if not np.any(sizes > 0.0):
             continue
-        fine = np.geomspace(1e-3 * np.min(sizes[sizes > 0.0]), 1e3 * np.nanmax(sizes), _FINE)
+        fine = np.geomspace(
+            1e-3 * np.min(sizes[sizes > 0.0]), 1e3 * np.nanmax(sizes), _FINE
+        )
         law = np.full(_FINE, math.nan)
-        if (bonds := population_of(point)) and word(point, "bonds.model", "") == "rate" and bonds.pathway:
-            law = schallamach.first_moment_fraction(fine, *bonds.pathway, bonds.rebinding) / bonds.at_rest
+        if (
+            (bonds := population_of(point))
+            and word(point, "bonds.model", "") == "rate"
+            and bonds.pathway
+        ):
+            law = (
+                schallamach.first_moment_fraction(fine, *bonds.pathway, bonds.rebinding)
+                / bonds.at_rest
+            )
         elif bonds:
-            law = bonds.rupture.closed_form(fine, bonds.stiffness, bonds.rebinding).bound / bonds.at_rest
+            law = (
+                bonds.rupture.closed_form(fine, bonds.stiffness, bonds.rebinding).bound
+                / bonds.at_rest
+            )
         elif "bonds_critical_speed" in point:
-            law = schallamach.steady_fraction(fine, float(point["bonds_critical_speed"]))
-        law = law if np.all(np.diff(law) <= 0.0) else math.nan * law  # else one fraction has several speeds
+            law = schallamach.steady_fraction(
+                fine, float(point["bonds_critical_speed"])
+            )
+        # else one fraction has several speeds
+        law = law if np.all(np.diff(law) <= 0.0) else math.nan * law
         result[place] = np.exp(np.interp(-fraction[place], -law, np.log(fine)))
     with contextlib.suppress(KeyError):
         if resolved(dataset, "shear.amplitude").get("relaxing"):
             memory = dataset.get("shear_correlation_time", math.nan * speed)
             memory = dataset.get("shear_correlation_length", memory * speed) / speed
-            along: Any = {"input_core_dims": [["t"]] * 3, "output_core_dims": [["t"]], "vectorize": True}
-            earlier = (dataset["t"] - 0.5 * memory).broadcast_like(speed)  # energy goes with the square of amplitudes
+            along: Any = {
+                "input_core_dims": [["t"]] * 3,
+                "output_core_dims": [["t"]],
+                "vectorize": True,
+            }
+            # energy goes with the square of amplitudes
+            earlier = (dataset["t"] - 0.5 * memory).broadcast_like(speed)
             field = xr.apply_ufunc(np.interp, earlier, dataset["t"], speed, **along)
-            result = result.where(abs(np.log(result / speed)) > abs(np.log(field / speed)), field)
+            result = result.where(
+                abs(np.log(result / speed)) > abs(np.log(field / speed)), field
+            )
     return result
 
 
@@ -384,7 +571,10 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
     BadInput
         If there is no such curve, with the reason, or a level is no share.
     """
-    wanted = [read_option(level, "lost", "1", above=0, below=1, typical="10 %") for level in levels]
+    wanted = [
+        read_option(level, "lost", "1", above=0, below=1, typical="10 %")
+        for level in levels
+    ]
     try:
         along, speed = _course(dataset)
     except BadInput:
@@ -396,63 +586,152 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
     if along in hertz.dims:
         hertz = hertz.min(along)
     shares = wanted or _LOSSES
-    left = [(f"at_{100 * k:g}_percent_lost", 1.0 - k + 0.0 * hertz, f"{100 * k:g} % of JKR's") for k in shares]
+    left = [
+        (
+            f"at_{100 * k:g}_percent_lost",
+            1.0 - k + 0.0 * hertz,
+            f"{100 * k:g} % of JKR's",
+        )
+        for k in shares
+    ]
     if not wanted:
-        left.append(("halfway_to_hertz", 0.5 * (1.0 + hertz), "half of the JKR area above the Hertz area"))
+        left.append(
+            (
+                "halfway_to_hertz",
+                0.5 * (1.0 + hertz),
+                "half of the JKR area above the Hertz area",
+            )
+        )
     least = _least_area(dataset, hertz)
     means, sizes, alone = _group_means(dataset, along, bool(wanted))
-    if along == "t" and bool(((steady := steady_speeds(dataset)) != abs(speed_of(dataset))).any()):
-        means["steady_speed"] = np.log(steady.where(steady > 0.0)) + 0.0 * means["area_ratio"]
-    beside, result = means.to_array("quantity").drop_vars("quantity"), dict[str, xr.DataArray]()
-    how: Any = {"input_core_dims": [[along], ["group", along], ["group"], [], ["quantity", "group", along]]}
-    how |= {"output_core_dims": [[], [], [], [], ["quantity", "end"]], "output_dtypes": [*"dddOd"], "vectorize": True}
+    if along == "t" and bool(
+        ((steady := steady_speeds(dataset)) != abs(speed_of(dataset))).any()
+    ):
+        means["steady_speed"] = (
+            np.log(steady.where(steady > 0.0)) + 0.0 * means["area_ratio"]
+        )
+    beside, result = (
+        means.to_array("quantity").drop_vars("quantity"),
+        dict[str, xr.DataArray](),
+    )
+    how: Any = {
+        "input_core_dims": [
+            [along],
+            ["group", along],
+            ["group"],
+            [],
+            ["quantity", "group", along],
+        ]
+    }
+    how |= {
+        "output_core_dims": [[], [], [], [], ["quantity", "end"]],
+        "output_dtypes": [*"dddOd"],
+        "vectorize": True,
+    }
     for name, level, loss in left:
-        *ends, why, others = xr.apply_ufunc(crossing, speed, means["area_ratio"], sizes, level, beside, **how)
+        *ends, why, others = xr.apply_ufunc(
+            crossing, speed, means["area_ratio"], sizes, level, beside, **how
+        )
         is_known, never = ends[0].notnull(), ends[0].isnull() & (level < least)
         reasons = [why, never, 100.0 * (1.0 - least)]
-        columns = dict(zip(means, others.transpose("quantity", "end", ...), strict=True))
+        columns = dict(
+            zip(means, others.transpose("quantity", "end", ...), strict=True)
+        )
         columns["area_ratio"] = xr.concat(ends, "end")
         lag: list[Any] = [math.nan, False]
         if "steady_speed" in columns:
             columns["steady_speed"] = np.exp(columns["steady_speed"])
-            lags = abs(np.log(ends[0] / columns["steady_speed"][0])) > np.fmax(0.5 * np.log(ends[2] / ends[1]), _UNSEEN)
-            off = abs(means["steady_speed"].isel(group=0) - np.log(speed.where(speed > 0.0))).max(along) > _LATE
+            lags = abs(np.log(ends[0] / columns["steady_speed"][0])) > np.fmax(
+                0.5 * np.log(ends[2] / ends[1]), _UNSEEN
+            )
+            off = (
+                abs(
+                    means["steady_speed"].isel(group=0)
+                    - np.log(speed.where(speed > 0.0))
+                ).max(along)
+                > _LATE
+            )
             lag = [columns["steady_speed"][0].where(lags), off & ~is_known]
-        texts = {"area_ratio": ("speed", "m/s", f"sliding speed at which the mean contact area has lost {loss}")}
-        texts["steady_speed"] = "steady_speed", "m/s", f"sliding speed, about, at which steady sliding loses {loss}"
+        texts = {
+            "area_ratio": (
+                "speed",
+                "m/s",
+                f"sliding speed at which the mean contact area has lost {loss}",
+            )
+        }
+        texts["steady_speed"] = (
+            "steady_speed",
+            "m/s",
+            f"sliding speed, about, at which steady sliding loses {loss}",
+        )
         for key, numbers in columns.items():
             text = f"{means[key].attrs.get('long_name', '')}, at the speed at which {loss} is lost"
             stem, unit, text = texts.get(str(key), (key, "1", text))
             for (end, words), values in zip(_ENDS.items(), numbers, strict=True):
                 known = ~never & ~(is_known & alone) if end else ~never
-                result[f"{stem}_{name}{end}"] = labelled(values.where(known), unit, words + text)
+                result[f"{stem}_{name}{end}"] = labelled(
+                    values.where(known), unit, words + text
+                )
             further = [*reasons, *lag, is_known & alone]
-            if key == "steady_speed":  # a reason of the course says nothing of steady sliding
-                unmet = f"unknown, because the course has no speed with a loss of {loss}"
-                further = [xr.where(is_known, why, unmet), *reasons[1:], math.nan, False, False]
-            reason = xr.apply_ufunc(_in_words, *further, vectorize=True, output_dtypes=[object])
+            # a reason of the course says nothing of steady sliding
+            if key == "steady_speed":
+                unmet = (
+                    f"unknown, because the course has no speed with a loss of {loss}"
+                )
+                further = [
+                    xr.where(is_known, why, unmet),
+                    *reasons[1:],
+                    math.nan,
+                    False,
+                    False,
+                ]
+            reason = xr.apply_ufunc(
+                _in_words, *further, vectorize=True, output_dtypes=[object]
+            )
             result[f"{stem}_{name}_reason"] = reason.drop_attrs(deep=False)
-    return xr.Dataset(result).assign_coords({name: dataset[name] for name in sweep_dims(dataset)})  # with their units
+    # with their units
+    return xr.Dataset(result).assign_coords(
+        {name: dataset[name] for name in sweep_dims(dataset)}
+    )
 
 
-def _in_words(reason: str, never: bool, most: float, steady: float, lags: bool, alone: bool) -> str:
+def _in_words(
+    reason: str, never: bool, most: float, steady: float, lags: bool, alone: bool
+) -> str:
     """Return the reason why there is no speed or no error, from the largest loss [%] and the ``steady`` speed [m/s]."""
     if never:
         return f"never: at most {most:.3g} % of the area can be lost"
-    near = "" if math.isnan(steady) else f"the course lags: {engineering(float(f'{steady:.3g}'), 'm/s')} if steady"
-    words = near or reason, "the course lags" if lags else "", "a single member has no known error" if alone else ""
+    near = (
+        ""
+        if math.isnan(steady)
+        else f"the course lags: {engineering(float(f'{steady:.3g}'), 'm/s')} if steady"
+    )
+    words = (
+        near or reason,
+        "the course lags" if lags else "",
+        "a single member has no known error" if alone else "",
+    )
     return "; ".join(filter(None, words))
 
 
-def _group_means(dataset: xr.Dataset, along: str, charged: bool) -> tuple[xr.Dataset, xr.DataArray, bool]:
+def _group_means(
+    dataset: xr.Dataset, along: str, charged: bool
+) -> tuple[xr.Dataset, xr.DataArray, bool]:
     """Return means over groups of members and, at steady speeds, the second half; sizes of groups; and if one is alone.
 
     They are those of ``area_ratio`` and, if ``charged``, of shares of the loss. If only statistics were recorded,
     groups are made up that have their mean and standard error. A member is alone if its noise compares with no other.
     """
-    outer, pooled = (*sweep_dims(dataset), *(["t"] if along == "t" else [])), "contact_area_sem" in dataset
+    outer, pooled = (
+        (*sweep_dims(dataset), *(["t"] if along == "t" else [])),
+        "contact_area_sem" in dataset,
+    )
     members = int(dataset.attrs["members"]) if pooled else dataset.sizes.get(MEMBERS, 1)
-    count = min(members, _GROUPS, max(2, _MOST_MEANS // math.prod(dataset.sizes[name] for name in outer)))
+    count = min(
+        members,
+        _GROUPS,
+        max(2, _MOST_MEANS // math.prod(dataset.sizes[name] for name in outer)),
+    )
     names = ["area_ratio", *(_CHARGED if charged and not pooled else ())]
 
     def values(piece: xr.Dataset) -> xr.Dataset:
@@ -462,11 +741,20 @@ def _group_means(dataset: xr.Dataset, along: str, charged: bool) -> tuple[xr.Dat
     def means(piece: xr.Dataset) -> xr.Dataset:
         if pooled:
             apart = xr.DataArray(np.linspace(-1.0, 1.0, count), dims="group")
-            apart = apart * piece["area_ratio_sem"] * math.sqrt(count * (count - 1.0) / float((apart**2).sum()))
+            apart = (
+                apart
+                * piece["area_ratio_sem"]
+                * math.sqrt(count * (count - 1.0) / float((apart**2).sum()))
+            )
             return (piece["area_ratio_mean"] + apart).to_dataset(name="area_ratio")
         piece = piece if MEMBERS in piece.dims else piece.expand_dims(MEMBERS)
-        groups = [piece.isel({MEMBERS: slice(k, None, count)}).mean(MEMBERS, keep_attrs=True) for k in range(count)]
-        return xr.concat(groups, "group", data_vars="all", coords="minimal", compat="override")
+        groups = [
+            piece.isel({MEMBERS: slice(k, None, count)}).mean(MEMBERS, keep_attrs=True)
+            for k in range(count)
+        ]
+        return xr.concat(
+            groups, "group", data_vars="all", coords="minimal", compat="override"
+        )
 
     areas = restricted(dataset, names)
     if along == "t":
@@ -474,5 +762,7 @@ def _group_means(dataset: xr.Dataset, along: str, charged: bool) -> tuple[xr.Dat
     else:
         late = areas.isel(t=slice(dataset.sizes["t"] // 2, None))
         result = means(in_pieces(late, (*outer, MEMBERS), values))
-    sizes = xr.DataArray(np.bincount(np.arange(members) % count).astype(float), dims="group")
+    sizes = xr.DataArray(
+        np.bincount(np.arange(members) % count).astype(float), dims="group"
+    )
     return result, sizes, members == 1 and MEMBERS in dataset.sizes

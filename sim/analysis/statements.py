@@ -10,16 +10,35 @@ import xarray as xr
 from sim.analysis.dataset import MEMBERS, is_stationary, plain, sweep_dims
 from sim.analysis.events import ensemble_peaks, events, half_lives, slips_by_phase
 from sim.analysis.over_speed import loss_speeds
-from sim.analysis.statistics import WIDE, Array, averaging, correlation_time, of_second_half, over_members, summary
+from sim.analysis.statistics import (
+    WIDE,
+    Array,
+    averaging,
+    correlation_time,
+    of_second_half,
+    over_members,
+    summary,
+)
 from sim.units.errors import BadInput
 from sim.units.notation import bounded, scaled, share
 
 #: Endings of the variables of a statement beside its value.
 _BESIDE = ("sem", "low", "high", "reason")
 #: Pure numbers that are no shares, so that they are not printed in percent.
-COUNTS = frozenset(("bond_fraction", "slip_count", "phase_slip_count", "pull_offs", "detachments", "step_renewal"))
+COUNTS = frozenset(
+    (
+        "bond_fraction",
+        "slip_count",
+        "phase_slip_count",
+        "pull_offs",
+        "detachments",
+        "step_renewal",
+    )
+)
 #: Shares that are at least 0 and at most 1.
-BOUNDED = frozenset(("fraction_detached", "fraction_masked", "time_masked", "ever_detached", "ran_away"))
+BOUNDED = frozenset(
+    ("fraction_detached", "fraction_masked", "time_masked", "ever_detached", "ran_away")
+)
 
 
 class Statement(NamedTuple):
@@ -52,18 +71,29 @@ class Statement(NamedTuple):
 
     def __str__(self) -> str:
         """Return the value with its error or bounds and unit, and the reason if there is one."""
-        sizes = [abs(size) for size in (self.value, self.low, self.high) if np.isfinite(size)]
+        sizes = [
+            abs(size) for size in (self.value, self.low, self.high) if np.isfinite(size)
+        ]
         is_share = self.unit == "1" and self.name not in COUNTS
-        factor, unit = (100.0, "%") if is_share else scaled(max(sizes, default=0.0), self.unit)
-        error = (self.high - self.low) / (2.0 * WIDE)  # of few members above the standard error
-        numbers = (factor * number for number in (self.value, error, self.low, self.high))
+        factor, unit = (
+            (100.0, "%") if is_share else scaled(max(sizes, default=0.0), self.unit)
+        )
+        # of few members above the standard error
+        error = (self.high - self.low) / (2.0 * WIDE)
+        numbers = (
+            factor * number for number in (self.value, error, self.low, self.high)
+        )
         text = share(self.value, self.low, self.high) if self.name in BOUNDED else ""
         text = text or bounded(*numbers)
-        return "; ".join(filter(None, (f"{text} {unit}".rstrip() if sizes else "", self.reason)))
+        return "; ".join(
+            filter(None, (f"{text} {unit}".rstrip() if sizes else "", self.reason))
+        )
 
 
 def statements(
-    dataset: xr.Dataset, names: Collection[str] | None = None, lost: Sequence[float | str] = ()
+    dataset: xr.Dataset,
+    names: Collection[str] | None = None,
+    lost: Sequence[float | str] = (),
 ) -> xr.Dataset:
     """Return the statements of a run over the sweep.
 
@@ -89,17 +119,28 @@ def statements(
     dataset = plain(dataset)
     if MEMBERS in dataset["contact_modulus"].dims:
         cure = 'xarray.concat(..., "member", data_vars="minimal", coords="minimal", compat="override")'
-        raise BadInput([f"numbers of the scenario differ between members; join runs by {cure}"])
-    groups = [(of_events(dataset), False), (as_means(loss_speeds(dataset, lost)), False)]
+        raise BadInput(
+            [f"numbers of the scenario differ between members; join runs by {cure}"]
+        )
+    groups = [
+        (of_events(dataset), False),
+        (as_means(loss_speeds(dataset, lost)), False),
+    ]
     if is_stationary(dataset):
         groups.append((of_second_half(dataset, names), True))
     result = xr.Dataset()
     for group, late in groups:
         over = averaging(dataset, late).removeprefix("mean over the ")
-        means = {key: group[key].assign_attrs(over=over) for key in group if str(key).endswith("_mean")}
+        means = {
+            key: group[key].assign_attrs(over=over)
+            for key in group
+            if str(key).endswith("_mean")
+        }
         result = result.merge(group.assign(means), compat="no_conflicts", join="outer")
-    result = result.drop_vars("t", errors="ignore")  # of a record that a number was taken from: a statement has no time
-    return result.assign_coords({name: dataset[name] for name in sweep_dims(dataset)})  # with their units
+    # of a record that a number was taken from: a statement has no time
+    result = result.drop_vars("t", errors="ignore")
+    # with their units
+    return result.assign_coords({name: dataset[name] for name in sweep_dims(dataset)})
 
 
 def statistics(dataset: xr.Dataset) -> xr.Dataset:
@@ -130,40 +171,90 @@ def of_events(dataset: xr.Dataset) -> xr.Dataset:
     An event that is read off the records has an interval wider by what it changes if every second record is left out.
     """
     result = events(dataset)
-    beside = {end: result[[name for name in result if str(name).endswith(f"_{end}")]] for end in ("reason", "reading")}
-    members = summary(result.drop_vars([*beside["reason"], *beside["reading"]]).assign_attrs(dataset.attrs))
+    beside = {
+        end: result[[name for name in result if str(name).endswith(f"_{end}")]]
+        for end in ("reason", "reading")
+    }
+    members = summary(
+        result.drop_vars([*beside["reason"], *beside["reading"]]).assign_attrs(
+            dataset.attrs
+        )
+    )
     for key, reading in beside["reading"].items():
         name = str(key).removesuffix("_reading")
         half = reading.mean(MEMBERS) if MEMBERS in reading.dims else reading
         for end, sign in (("low", -1.0), ("high", 1.0)):
             known = members[f"{name}_{end}"].fillna(members[f"{name}_mean"])
-            members[f"{name}_{end}"] = (known + sign * half).assign_attrs(members[f"{name}_{end}"].attrs)
+            members[f"{name}_{end}"] = (known + sign * half).assign_attrs(
+                members[f"{name}_{end}"].attrs
+            )
     for further in (as_means(half_lives(dataset, result)), beside["reason"]):
         members = members.merge(further, compat="no_conflicts", join="outer")
-    if {"phase_start", "slip_time"} <= dataset.keys() | dataset.coords.keys() and dataset.sizes["slip"]:
-        of_phases = summary(slips_by_phase(dataset).assign_attrs(dataset.attrs), quantiles=False)
-        members = members.merge(of_phases.rename({name: f"phase_{name}" for name in of_phases}), join="outer")
+    if {
+        "phase_start",
+        "slip_time",
+    } <= dataset.keys() | dataset.coords.keys() and dataset.sizes["slip"]:
+        of_phases = summary(
+            slips_by_phase(dataset).assign_attrs(dataset.attrs), quantiles=False
+        )
+        members = members.merge(
+            of_phases.rename({name: f"phase_{name}" for name in of_phases}),
+            join="outer",
+        )
     return members.assign(ensemble_peaks(dataset))
 
 
 def as_means(values: xr.Dataset) -> xr.Dataset:
     """Return values with intervals and reasons under names of means."""
-    return values.rename({n: f"{n}_mean" for n in values if not str(n).endswith(tuple(f"_{end}" for end in _BESIDE))})
+    return values.rename(
+        {
+            n: f"{n}_mean"
+            for n in values
+            if not str(n).endswith(tuple(f"_{end}" for end in _BESIDE))
+        }
+    )
 
 
 def each(group: xr.Dataset) -> Iterator[Statement]:
     """Yield the statements of a dataset of ``statements``, one for each point of the sweep."""
     for key in (str(key) for key in group if str(key).endswith("_mean")):
         name, values = key.removesuffix("_mean"), group[key]
-        beside = {end: group[f"{name}_{end}"].broadcast_like(values) for end in _BESIDE if f"{name}_{end}" in group}
-        text = str(values.attrs.get("long_name", name)).removeprefix("ensemble mean of ")
-        unit, over = str(values.attrs.get("units", "1")), str(values.attrs.get("over", ""))
+        beside = {
+            end: group[f"{name}_{end}"].broadcast_like(values)
+            for end in _BESIDE
+            if f"{name}_{end}" in group
+        }
+        text = str(values.attrs.get("long_name", name)).removeprefix(
+            "ensemble mean of "
+        )
+        unit, over = (
+            str(values.attrs.get("units", "1")),
+            str(values.attrs.get("over", "")),
+        )
         for place in np.ndindex(*values.shape):
             index = dict(zip(values.dims, place, strict=True))
-            error, low, high = (float(beside[end][index]) if end in beside else np.nan for end in _BESIDE[:3])
+            error, low, high = (
+                float(beside[end][index]) if end in beside else np.nan
+                for end in _BESIDE[:3]
+            )
             reason = str(beside["reason"][index].item()) if "reason" in beside else ""
-            at = {str(dim): values[dim][index[dim]].item() for dim in values.dims if dim in values.coords}
-            yield Statement(name, text, unit, float(values[index]), error, low, high, over, reason, at)
+            at = {
+                str(dim): values[dim][index[dim]].item()
+                for dim in values.dims
+                if dim in values.coords
+            }
+            yield Statement(
+                name,
+                text,
+                unit,
+                float(values[index]),
+                error,
+                low,
+                high,
+                over,
+                reason,
+                at,
+            )
 
 
 def reasons(group: xr.Dataset) -> dict[str, list[str]]:
@@ -206,28 +297,62 @@ def relaxation(dataset: xr.Dataset, name: str, start: float = 0.0) -> Statement:
     """
     after = dataset[name].sel(t=slice(start, None)).transpose(..., "t")
     time, values = after["t"].to_numpy(), after.to_numpy().reshape(-1, after.sizes["t"])
-    number, mean, past = len(values), values.mean(axis=0), (time - time[0]) / (time[-1] - time[0])
-    text, over, nan = f"time in which {name} relaxes by a factor of e", f"{number} members" * (number > 1), np.nan
-    result = Statement(f"{name}_relaxation_time", text, "s", nan, nan, nan, nan, over, "", {})
+    number, mean, past = (
+        len(values),
+        values.mean(axis=0),
+        (time - time[0]) / (time[-1] - time[0]),
+    )
+    text, over, nan = (
+        f"time in which {name} relaxes by a factor of e",
+        f"{number} members" * (number > 1),
+        np.nan,
+    )
+    result = Statement(
+        f"{name}_relaxation_time", text, "s", nan, nan, nan, nan, over, "", {}
+    )
     change, is_noisy = mean[0] - mean[-1], bool(np.ptp(values, axis=0).any())
     if not (np.isfinite(mean).all() and change != 0.0):
-        return result._replace(reason="it does not change, or is not known at all times")
-    courses = (np.array([mean, *((number * mean - values) / (number - 1) if is_noisy else ())]) - mean[-1]) / change
+        return result._replace(
+            reason="it does not change, or is not known at all times"
+        )
+    courses = (
+        np.array([mean, *((number * mean - values) / (number - 1) if is_noisy else ())])
+        - mean[-1]
+    ) / change
 
     def missed(numbers: Array, course: Array) -> Array:
-        return np.asarray(numbers[0] + numbers[1] * np.exp(-past * np.exp(-numbers[2])) - course)
+        return np.asarray(
+            numbers[0] + numbers[1] * np.exp(-past * np.exp(-numbers[2])) - course
+        )
 
     first = 0.0, 1.0, np.log(past[np.argmax(courses[0] < 0.37)])
-    fits = np.array([scipy.optimize.least_squares(missed, first, args=(course,)).x for course in courses])
+    fits = np.array(
+        [
+            scipy.optimize.least_squares(missed, first, args=(course,)).x
+            for course in courses
+        ]
+    )
     value = (time[-1] - time[0]) * np.exp(fits[0, 2])
-    _, doubt, spread = np.sqrt((number - 1) * fits[1:].var(axis=0)) if is_noisy else (nan, nan, nan)
+    _, doubt, spread = (
+        np.sqrt((number - 1) * fits[1:].var(axis=0)) if is_noisy else (nan, nan, nan)
+    )
     noise = np.sqrt(np.mean(values.var(axis=0)) / max(number - 1, 1)) / abs(change)
     off = np.sqrt(np.mean(missed(fits[0], courses[0]) ** 2))
     if off > 0.01 + 2.0 * noise:
-        return result._replace(reason=f"it is not exponential: the best exponential misses {off:.1%} of the change")
+        return result._replace(
+            reason=f"it is not exponential: the best exponential misses {off:.1%} of the change"
+        )
     is_long, is_short = value > 0.5 * (time[-1] - time[0]), value < time[1] - time[0]
     if is_long or is_short or doubt > abs(fits[0, 1]) / 3.0 or spread > 0.5:
-        kind = "too long for the run" if is_long else "too short for its records" if is_short else "not above the noise"
+        kind = (
+            "too long for the run"
+            if is_long
+            else "too short for its records"
+            if is_short
+            else "not above the noise"
+        )
         return result._replace(reason=f"about {value:.2g} s, {kind}")
     factor = np.exp(scipy.stats.t.ppf(0.975, number - 1) * spread)
-    return result._replace(value=value, error=value * spread, low=value / factor, high=value * factor)
+    return result._replace(
+        value=value, error=value * spread, low=value / factor, high=value * factor
+    )

@@ -11,7 +11,16 @@ import scipy
 import xarray as xr
 from scipy import special
 
-from sim.analysis.dataset import MEMBERS, ROOM, has_noise, in_pieces, plain, steady_points, sweep_dims, word
+from sim.analysis.dataset import (
+    MEMBERS,
+    ROOM,
+    has_noise,
+    in_pieces,
+    plain,
+    steady_points,
+    sweep_dims,
+    word,
+)
 from sim.analysis.observables import (
     FEW_LEFT,
     KEPT,
@@ -103,15 +112,24 @@ def _times_of(values: Array, step: float) -> Array:
     """Return the numbers of ``integral_time``, shape (3, ...), of values with the shape (..., members, records)."""
     points = values.reshape(-1, *values.shape[-2:])
     ends = np.stack([points.min(axis=(1, 2)), points.max(axis=(1, 2))], axis=-1)
-    return _memory(points, points, points.mean(axis=(1, 2)), ends, step, False)[1].reshape(3, *values.shape[:-2])
+    return _memory(points, points, points.mean(axis=(1, 2)), ends, step, False)[
+        1
+    ].reshape(3, *values.shape[:-2])
 
 
-def time_of(covariance: Array, members: int, records: int, step: float, largest: Array) -> Array:
+def time_of(
+    covariance: Array, members: int, records: int, step: float, largest: Array
+) -> Array:
     """Return the numbers of ``integral_time`` from autocovariances of values whose largest magnitude is ``largest``."""
     if records < 2:
         return np.full((3, *largest.shape), math.nan)
-    free, lags, coarse = max(members - 1, 1), np.arange(covariance.shape[-1]), math.exp(-1.0 / _FEWEST)
-    with np.errstate(invalid="ignore", divide="ignore"):  # nan is the answer if nothing fluctuates
+    free, lags, coarse = (
+        max(members - 1, 1),
+        np.arange(covariance.shape[-1]),
+        math.exp(-1.0 / _FEWEST),
+    )
+    # nan is the answer if nothing fluctuates
+    with np.errstate(invalid="ignore", divide="ignore"):
         known = covariance[..., 0] > (1e-10 * largest) ** 2
         correlation = covariance / covariance[..., :1]
         weights = np.where(lags % 2, 4.0, 2.0) / 3.0
@@ -121,9 +139,13 @@ def time_of(covariance: Array, members: int, records: int, step: float, largest:
     window, is_coarse = inside.argmax(axis=-1), correlation[..., 1] < coarse
     time = step * np.take_along_axis(sums, window[..., np.newaxis], axis=-1)[..., 0]
     time = np.where(known & ~is_coarse & inside.any(axis=-1), time, math.nan)
-    is_sure = known & (correlation[..., 1] < coarse - _SURELY / math.sqrt(free * records))
+    is_sure = known & (
+        correlation[..., 1] < coarse - _SURELY / math.sqrt(free * records)
+    )
     below = np.where(is_sure, _FEWEST * step, math.nan)
-    return np.array([time, time * np.sqrt(2.0 * (2.0 * window + 1.0) / (free * records)), below])
+    return np.array(
+        [time, time * np.sqrt(2.0 * (2.0 * window + 1.0) / (free * records)), below]
+    )
 
 
 def members_for_memory(members: int, records: int) -> int:
@@ -143,11 +165,20 @@ def covariance_of(values: Array, mean: Array | float, free: float) -> Array:
     free : float
         Number of independent series.
     """
-    mean, records = np.broadcast_to(mean, (*values.shape[:-2], values.shape[-1])), values.shape[-1]
+    mean, records = (
+        np.broadcast_to(mean, (*values.shape[:-2], values.shape[-1])),
+        values.shape[-1],
+    )
     for lags in np.unique(np.minimum(records, _LAGS)):
-        result = _products(values, mean, lags) / (free * np.arange(records, records - lags, -1))
+        result = _products(values, mean, lags) / (
+            free * np.arange(records, records - lags, -1)
+        )
         sums = np.cumsum(result, axis=-1)
-        if np.all(np.any(np.arange(lags) * result[..., :1] >= _SAFELY * _WINDOW * sums, axis=-1)):
+        if np.all(
+            np.any(
+                np.arange(lags) * result[..., :1] >= _SAFELY * _WINDOW * sums, axis=-1
+            )
+        ):
             break
     return result
 
@@ -160,15 +191,20 @@ def _products(values: Array, mean: Array, lags: int) -> Array:
     power = np.zeros((2, *points, length + 1), complex)
     for first in range(0, members, rows):
         before = None
-        for start in range(0, records, length):  # stretches; each with itself and with the one before
+        # stretches; each with itself and with the one before
+        for start in range(0, records, length):
             stretch = slice(start, start + length)
-            some = values[..., first : first + rows, stretch] - mean[..., np.newaxis, stretch]
+            some = (
+                values[..., first : first + rows, stretch]
+                - mean[..., np.newaxis, stretch]
+            )
             spectrum = scipy.fft.rfft(some, 2 * length)
             power[0] += np.sum(spectrum.real**2 + spectrum.imag**2, axis=-2)
             if before is not None:
                 power[1] += np.sum(spectrum * before.conj(), axis=-2)
             before = spectrum
-    total = power[0] + (-1.0) ** np.arange(length + 1) * power[1]  # the second is half the length later
+    # the second is half the length later
+    total = power[0] + (-1.0) ** np.arange(length + 1) * power[1]
     return scipy.fft.irfft(total, 2 * length)[..., :lags]
 
 
@@ -204,11 +240,18 @@ def inflation(covariance: Array, members: int, records: int) -> Array:
         inside = np.arange(sums.shape[-1]) >= 0.5 * _WINDOW * sums
     window = inside.argmax(axis=-1)
     wide = (2.0 * window + 1.0) / records
-    ratio = np.maximum(np.take_along_axis(sums, window[..., np.newaxis], axis=-1)[..., 0], 1.0 / records)
+    ratio = np.maximum(
+        np.take_along_axis(sums, window[..., np.newaxis], axis=-1)[..., 0],
+        1.0 / records,
+    )
     known = (covariance[..., 0] > 0.0) & inside.any(axis=-1)
     if members == 1:
         ratio, known = ratio * (1.0 + wide), known & (wide * _TOO_FEW <= 1.0)
-    return np.where(known[..., np.newaxis], np.stack([ratio, max(members - 1, 1) / wide], axis=-1), math.nan)
+    return np.where(
+        known[..., np.newaxis],
+        np.stack([ratio, max(members - 1, 1) / wide], axis=-1),
+        math.nan,
+    )
 
 
 def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
@@ -228,17 +271,43 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
     times = np.full((3, *sweep.shape), math.nan)
     if energy is not None and MEMBERS in energy.dims and dataset.sizes["t"] > 1:
         step = float(dataset["t"][1] - dataset["t"][0])
-        energy = energy.isel({MEMBERS: slice(members_for_memory(energy.sizes[MEMBERS], energy.sizes["t"]))})
-        steady = steady_points(dataset).broadcast_like(sweep).transpose(*sweep.dims).to_numpy()
-        whole = [()] if energy.nbytes <= ROOM else np.ndindex(steady.shape)  # a large file is read point by point
+        energy = energy.isel(
+            {
+                MEMBERS: slice(
+                    members_for_memory(energy.sizes[MEMBERS], energy.sizes["t"])
+                )
+            }
+        )
+        steady = (
+            steady_points(dataset)
+            .broadcast_like(sweep)
+            .transpose(*sweep.dims)
+            .to_numpy()
+        )
+        # a large file is read point by point
+        whole = [()] if energy.nbytes <= ROOM else np.ndindex(steady.shape)
         for point in (point for point in whole if np.any(steady[point])):
-            values = energy.isel(dict(zip(sweep.dims, point, strict=False))).transpose(..., MEMBERS, "t").to_numpy()
-            times[:, *point] = np.where(steady[point], _times_of(values.astype(float, copy=False), step), math.nan)
+            values = (
+                energy.isel(dict(zip(sweep.dims, point, strict=False)))
+                .transpose(..., MEMBERS, "t")
+                .to_numpy()
+            )
+            times[:, *point] = np.where(
+                steady[point],
+                _times_of(values.astype(float, copy=False), step),
+                math.nan,
+            )
     about = "integral correlation time of the fluctuation energy"
-    texts = {"": about, "_sem": f"standard error of the {about}", "_below": f"upper limit of the {about}"}
+    texts = {
+        "": about,
+        "_sem": f"standard error of the {about}",
+        "_below": f"upper limit of the {about}",
+    }
     result = xr.Dataset()
     for (suffix, text), numbers in zip(texts.items(), times, strict=True):
-        result[f"correlation_time{suffix}"] = labelled(sweep.copy(data=numbers), "s", text, "" if suffix else "t_c")
+        result[f"correlation_time{suffix}"] = labelled(
+            sweep.copy(data=numbers), "s", text, "" if suffix else "t_c"
+        )
     return result
 
 
@@ -272,7 +341,11 @@ _OF = {
 }
 
 #: Units of statistics that are not in that of their observable.
-_UNITS = {"effective_samples": "1", "correlation_time": "s", "correlation_time_sem": "s"}
+_UNITS = {
+    "effective_samples": "1",
+    "correlation_time": "s",
+    "correlation_time_sem": "s",
+}
 
 #: How far from a swept value, in parts of it, one may be chosen: as far as rounding to three digits.
 _NEAR = 5e-3
@@ -302,9 +375,13 @@ def where(dataset: xr.Dataset, chosen: Mapping[str, Any]) -> xr.Dataset:
     for key, value in chosen.items():
         dims = sweep_dims(dataset)
         full = key.replace(".", "_")
-        fitting = [n for n in dims if n == full] or [n for n in dims if n.endswith(f"_{full}")]
+        fitting = [n for n in dims if n == full] or [
+            n for n in dims if n.endswith(f"_{full}")
+        ]
         if len(fitting) != 1:
-            raise BadInput([f"{key} is not swept; swept: {', '.join(dims) or 'nothing'}"])
+            raise BadInput(
+                [f"{key} is not swept; swept: {', '.join(dims) or 'nothing'}"]
+            )
         name = fitting[0]
         swept = dataset[name]
         if swept.dtype.kind in "fi":
@@ -312,12 +389,16 @@ def where(dataset: xr.Dataset, chosen: Mapping[str, Any]) -> xr.Dataset:
             wanted = read_option(value, key, unit)
             off = np.abs(swept.to_numpy() - wanted)
             places = np.flatnonzero(off <= min(off.min(), _NEAR * abs(wanted)))
-            known = [engineering(float(f"{number:.4g}"), unit) for number in swept.to_numpy()]
+            known = [
+                engineering(float(f"{number:.4g}"), unit) for number in swept.to_numpy()
+            ]
         else:
             known = [str(text) for text in swept.to_numpy()]
             places = np.flatnonzero([text == value for text in known])
         if not places.size:
-            raise BadInput([f"{key} has no value {value}; there are: {', '.join(known)}"])
+            raise BadInput(
+                [f"{key} has no value {value}; there are: {', '.join(known)}"]
+            )
         dataset = dataset.isel({name: places[:1]})
     return dataset
 
@@ -326,7 +407,9 @@ def averaging(dataset: xr.Dataset, late: bool) -> str:
     """Return in words the sample of a mean: the second half of the run if ``late``, and members that differ."""
     over = ["second half of the run"] if late and dataset.sizes["t"] > 2 else []
     members = dataset.sizes.get(MEMBERS, dataset.attrs.get("members", 1))
-    differ = MEMBERS in dataset.sizes or any(str(name).endswith("_sem") for name in dataset.data_vars)
+    differ = MEMBERS in dataset.sizes or any(
+        str(name).endswith("_sem") for name in dataset.data_vars
+    )
     over += [f"{members} members"] if differ and members > 1 else []
     return f"mean over the {' and '.join(over)}" if over else ""
 
@@ -366,11 +449,21 @@ def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
             if kind == "mean" and f"{stem}_sem" in trajectories:
                 count = members
                 if is_of_contact(stem) and "fraction_detached_mean" in trajectories:
-                    count = np.rint(members * (1.0 - trajectories["fraction_detached_mean"].to_numpy()))
-                ends = interval(stem, variable.to_numpy(), trajectories[f"{stem}_sem"].to_numpy(), count)
+                    count = np.rint(
+                        members
+                        * (1.0 - trajectories["fraction_detached_mean"].to_numpy())
+                    )
+                ends = interval(
+                    stem,
+                    variable.to_numpy(),
+                    trajectories[f"{stem}_sem"].to_numpy(),
+                    count,
+                )
                 for end, at in zip(("low", "high"), ends, strict=True):
                     text = f"{_OF[end]} of {variable.attrs.get('long_name', stem).removeprefix(_OF['mean'] + ' of ')}"
-                    result[f"{stem}_{end}"] = variable.copy(data=at).assign_attrs(long_name=text)
+                    result[f"{stem}_{end}"] = variable.copy(data=at).assign_attrs(
+                        long_name=text
+                    )
             continue
         number = variable.astype(float)
         if variable.attrs.get("units") == "N":
@@ -383,7 +476,13 @@ def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
 def _attributes(kind: str, variable: xr.DataArray) -> dict[str, Any]:
     """Return the attributes of a statistic of an observable."""
     unit = {"units": _UNITS[kind], "symbol": ""} if kind in _UNITS else {}
-    return variable.attrs | unit | {"long_name": f"{_OF[kind]} of {variable.attrs.get('long_name', variable.name)}"}
+    return (
+        variable.attrs
+        | unit
+        | {
+            "long_name": f"{_OF[kind]} of {variable.attrs.get('long_name', variable.name)}"
+        }
+    )
 
 
 def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.DataArray]:
@@ -391,23 +490,36 @@ def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.Data
         none = xr.zeros_like(variable).where(variable.notnull())
         levels = variable.expand_dims(quantile=list(QUANTILES))
         ends = ("quantile", "quantile_low", "quantile_high") if quantiles else ()
-        alike = {"mean": variable, "std": none, "sem": none, "low": variable, "high": variable}
+        alike = {
+            "mean": variable,
+            "std": none,
+            "sem": none,
+            "low": variable,
+            "high": variable,
+        }
         return alike | dict.fromkeys(ends, levels)
     values = np.moveaxis(variable.to_numpy(), variable.get_axis_num(MEMBERS), -1).copy()
     if quantiles:
         values.sort()  # nan last
     count = np.sum(~np.isnan(values), axis=-1, dtype=float)
     first_member = variable.isel({MEMBERS: 0}, drop=True)
-    result = {kind: first_member.copy(data=data) for kind, data in _moments(str(variable.name), values, count).items()}
+    result = {
+        kind: first_member.copy(data=data)
+        for kind, data in _moments(str(variable.name), values, count).items()
+    }
     if quantiles:
         levels = first_member.expand_dims(quantile=list(QUANTILES))
-        result |= {kind: levels.copy(data=data) for kind, data in _quantiles(values, count).items()}
+        result |= {
+            kind: levels.copy(data=data)
+            for kind, data in _quantiles(values, count).items()
+        }
     return result
 
 
 def _moments(name: str, values: Array, count: Array) -> dict[str, Array]:
     """Return the statistics over the last axis, of ``count`` numbers each, that need no order."""
-    with np.errstate(invalid="ignore", divide="ignore"):  # nan is the answer where there are too few
+    # nan is the answer where there are too few
+    with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.nansum(values, axis=-1) / count
         deviations = values - mean[..., None]
         squares = np.nansum(deviations * deviations, axis=-1)
@@ -417,19 +529,35 @@ def _moments(name: str, values: Array, count: Array) -> dict[str, Array]:
     return {"mean": mean, "std": std, "sem": error, "low": low, "high": high}
 
 
-def interval(name: str, mean: Array, sem: Array, count: Array | float) -> tuple[Array, Array]:
+def interval(
+    name: str, mean: Array, sem: Array, count: Array | float
+) -> tuple[Array, Array]:
     """Return the ends of the 95 % interval of a mean over ``count`` members; nan for a single member."""
     count = np.asarray(count, float)
     if name not in _COUNTED:
-        half = special.stdtrit(np.where(count > 1.0, count - 1.0, np.nan), 0.5 + 0.5 * LEVEL) * sem
+        half = (
+            special.stdtrit(
+                np.where(count > 1.0, count - 1.0, np.nan), 0.5 + 0.5 * LEVEL
+            )
+            * sem
+        )
         return mean - half, mean + half
-    with np.errstate(invalid="ignore", divide="ignore"):  # time averages of the members count for more than one each
+    # time averages of the members count for more than one each
+    with np.errstate(invalid="ignore", divide="ignore"):
         equivalent = np.where(sem > 0.0, mean * (1.0 - mean) / sem**2, 0.0)
     count = np.where(count > 1.0, np.maximum(count, equivalent), np.nan)
     shrunk = 1.0 + WIDE**2 / count
     middle = (mean + 0.5 * WIDE**2 / count) / shrunk
-    half = WIDE / shrunk * np.sqrt(np.maximum(mean * (1.0 - mean), 0.0) / count + (0.5 * WIDE / count) ** 2)
-    return np.maximum(middle - half, 0.0) * (mean != 0.0), np.minimum(middle + half, 1.0)
+    half = (
+        WIDE
+        / shrunk
+        * np.sqrt(
+            np.maximum(mean * (1.0 - mean), 0.0) / count + (0.5 * WIDE / count) ** 2
+        )
+    )
+    return np.maximum(middle - half, 0.0) * (mean != 0.0), np.minimum(
+        middle + half, 1.0
+    )
 
 
 def _quantiles(ordered: Array, count: Array) -> dict[str, Array]:
@@ -437,9 +565,13 @@ def _quantiles(ordered: Array, count: Array) -> dict[str, Array]:
     levels = np.array(QUANTILES)
     counts, indices = np.unique(count, return_inverse=True)
     places = {"quantile": levels * (counts[:, None] - 1.0)}
-    places["quantile_low"], places["quantile_high"] = quantile_ranks(counts[:, None], levels)
+    places["quantile_low"], places["quantile_high"] = quantile_ranks(
+        counts[:, None], levels
+    )
     return {
-        kind: np.moveaxis(values_at_ranks(ordered, place[indices.reshape(count.shape)]), -1, 0)
+        kind: np.moveaxis(
+            values_at_ranks(ordered, place[indices.reshape(count.shape)]), -1, 0
+        )
         for kind, place in places.items()
     }
 
@@ -455,12 +587,19 @@ def quantile_ranks(count: Array, level: Array) -> tuple[Array, Array]:
     23.69 39.31
     """
     left = 1.0 - LEVEL
-    lowest, highest = (1.0 - level) ** count, level**count  # chances of all numbers above the quantile, and below
-    below = np.where(highest > 0.5 * left, left - highest, np.maximum(lowest, 0.5 * left))
-    above = np.where(lowest > 0.5 * left, left - lowest, np.maximum(highest, 0.5 * left))
+    # chances of all numbers above the quantile, and below
+    lowest, highest = (1.0 - level) ** count, level**count
+    below = np.where(
+        highest > 0.5 * left, left - highest, np.maximum(lowest, 0.5 * left)
+    )
+    above = np.where(
+        lowest > 0.5 * left, left - lowest, np.maximum(highest, 0.5 * left)
+    )
     with np.errstate(invalid="ignore"):
         low = np.where(below > lowest, special.bdtrik(below, count, level), 0.0)
-        high = np.where(above > highest, special.bdtrik(1.0 - above, count, level), count - 1.0)
+        high = np.where(
+            above > highest, special.bdtrik(1.0 - above, count, level), count - 1.0
+        )
     none = (below < lowest) | (above < highest)
     return np.where(none, np.nan, low), np.where(none, np.nan, high)
 
@@ -472,13 +611,21 @@ def values_at_ranks(ordered: Array, places: Array) -> Array:
     above = np.minimum(below + 1, ordered.shape[-1] - 1)
     share = places - below
     low, high = (np.take_along_axis(ordered, at, axis=-1) for at in (below, above))
-    return np.where(share > 0.0, low + share * (high - low), np.where(known, low, np.nan))
+    return np.where(
+        share > 0.0, low + share * (high - low), np.where(known, low, np.nan)
+    )
 
 
-def over_members(dataset: xr.Dataset, names: Collection[str] | None = None, quantiles: bool = True) -> xr.Dataset:
+def over_members(
+    dataset: xr.Dataset, names: Collection[str] | None = None, quantiles: bool = True
+) -> xr.Dataset:
     """Return the ``summary`` of observables at each sweep value and time, by default of all."""
     needed = restricted(dataset, names)
-    return in_pieces(needed, ("t",), lambda piece: summary(closed_observables(piece, names), quantiles))
+    return in_pieces(
+        needed,
+        ("t",),
+        lambda piece: summary(closed_observables(piece, names), quantiles),
+    )
 
 
 def shares(dataset: xr.Dataset) -> xr.Dataset:
@@ -509,9 +656,15 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
     area is not linear in the work, so what is taken off later weighs more.
     """
     radii = reference_radii(dataset)
-    ratio = pure((radii["radius_hertz"] / radii["radius_jkr"]) ** 2, "Hertz area over JKR area")
+    ratio = pure(
+        (radii["radius_hertz"] / radii["radius_jkr"]) ** 2, "Hertz area over JKR area"
+    )
     share_observables(dataset.isel(t=[0]))  # where they are not known it says why
-    lost = in_pieces(restricted(dataset, ["lost_to_bonds"]), ("t",), lambda piece: summary(charges(closed_only(piece))))
+    lost = in_pieces(
+        restricted(dataset, ["lost_to_bonds"]),
+        ("t",),
+        lambda piece: summary(charges(closed_only(piece))),
+    )
     return lost.merge(radii, compat="no_conflicts").assign(area_ratio_hertz=ratio)
 
 
@@ -538,7 +691,9 @@ _FEW_RECORDS = 4
 _LEVELS = np.array(QUANTILES)
 
 
-def _shares(spreads: Array, errors: Array, freedoms: Array, surely: float) -> tuple[Array, Array]:
+def _shares(
+    spreads: Array, errors: Array, freedoms: Array, surely: float
+) -> tuple[Array, Array]:
     """Return the shares of the ordered values between which each quantile of the law lies, at each point of a sweep.
 
     The number of free values follows from the error of the share of values below the quantile. It is smaller if that
@@ -546,10 +701,17 @@ def _shares(spreads: Array, errors: Array, freedoms: Array, surely: float) -> tu
     many are required if they are estimated by the autocorrelation, because a tail is seldom sampled.
     """
     wider = errors * special.stdtrit(freedoms, 0.5 + 0.5 * LEVEL) / WIDE
-    with np.errstate(divide="ignore", invalid="ignore"):  # what does not spread is known without end
-        count = np.where(np.isnan(wider) & (spreads > 0.0), np.nan, np.fmin(spreads**2 / wider**2, 1e12))
+    # what does not spread is known without end
+    with np.errstate(divide="ignore", invalid="ignore"):
+        count = np.where(
+            np.isnan(wider) & (spreads > 0.0),
+            np.nan,
+            np.fmin(spreads**2 / wider**2, 1e12),
+        )
     none = np.isnan(quantile_ranks(surely * count[0, :, np.newaxis], _LEVELS)[0])
-    low, high = np.where(none, np.nan, quantile_ranks(count[1:].T, _LEVELS)) / (count[1:].T - 1.0)
+    low, high = np.where(none, np.nan, quantile_ranks(count[1:].T, _LEVELS)) / (
+        count[1:].T - 1.0
+    )
     return low, high
 
 
@@ -593,10 +755,15 @@ def over_time(values: Array, step: float = 1.0, name: str = "") -> dict[str, Any
     True True
     """
     result, _ = _over_time(values[np.newaxis], step, name, np.array([True]))
-    return {kind: numbers[0] if kind.startswith("quantile") else float(numbers[0]) for kind, numbers in result.items()}
+    return {
+        kind: numbers[0] if kind.startswith("quantile") else float(numbers[0])
+        for kind, numbers in result.items()
+    }
 
 
-def _over_time(values: Array, step: float, name: str, noisy: Array) -> tuple[dict[str, Array], Array]:
+def _over_time(
+    values: Array, step: float, name: str, noisy: Array
+) -> tuple[dict[str, Array], Array]:
     """Return the statistics of ``over_time`` at each point of a sweep, and the degrees of freedom of the error.
 
     Values have the shape (points, members, records). There are no errors at points that are not ``noisy``.
@@ -609,30 +776,65 @@ def _over_time(values: Array, step: float, name: str, noisy: Array) -> tuple[dic
         values = np.where(known, values, np.nan)
     ordered = np.sort(values.reshape(points, -1), axis=-1)  # nan last
     levels = values_at_ranks(ordered, _LEVELS * (total[:, np.newaxis] - 1.0))
-    with np.errstate(invalid="ignore", divide="ignore"):  # nan is the answer where there is nothing, or no spread
+    # nan is the answer where there is nothing, or no spread
+    with np.errstate(invalid="ignore", divide="ignore"):
         means = _sum(values) / counts
         mean = np.nansum(means, axis=-1) / np.isfinite(means).sum(axis=-1)
         deviations = values - mean[:, np.newaxis, np.newaxis]
         np.square(deviations, out=deviations)
         spread = np.sqrt(_sum(deviations).sum(axis=-1) / total)
-        below = [np.sum(values <= levels[:, k, np.newaxis, np.newaxis], axis=-1) / counts for k in range(len(_LEVELS))]
+        below = [
+            np.sum(values <= levels[:, k, np.newaxis, np.newaxis], axis=-1) / counts
+            for k in range(len(_LEVELS))
+        ]
         del deviations, known
-        inflated, times = _memory(values, levels, mean, ordered[:, [0, -1]], step, bool(noisy.any()))
-        spreads = np.array([spread, *np.broadcast_to(np.sqrt(_LEVELS * (1.0 - _LEVELS)), (points, len(_LEVELS))).T])
+        inflated, times = _memory(
+            values, levels, mean, ordered[:, [0, -1]], step, bool(noisy.any())
+        )
+        spreads = np.array(
+            [
+                spread,
+                *np.broadcast_to(
+                    np.sqrt(_LEVELS * (1.0 - _LEVELS)), (points, len(_LEVELS))
+                ).T,
+            ]
+        )
         errors, freedoms = _errors(np.array([means, *below]), spreads, inflated, total)
-        effective = np.where(errors[0] > 1e-12 * abs(mean), (spread / errors[0]) ** 2, np.nan)
-        ends, surely = np.full((2, points, len(_LEVELS)), np.nan), 1.0 if members >= _MANY else 0.5
-        ends[:, noisy] = _shares(spreads[:, noisy], errors[:, noisy], freedoms[:, noisy], surely)
+        effective = np.where(
+            errors[0] > 1e-12 * abs(mean), (spread / errors[0]) ** 2, np.nan
+        )
+        ends, surely = (
+            np.full((2, points, len(_LEVELS)), np.nan),
+            1.0 if members >= _MANY else 0.5,
+        )
+        ends[:, noisy] = _shares(
+            spreads[:, noisy], errors[:, noisy], freedoms[:, noisy], surely
+        )
         if members >= _SEVERAL:
-            errors, freedoms = _errors(means[np.newaxis], spreads[:1], np.full((1, points, 2), np.nan), total)
+            errors, freedoms = _errors(
+                means[np.newaxis], spreads[:1], np.full((1, points, 2), np.nan), total
+            )
         sem, freedom = np.where(noisy, errors[0], np.nan), freedoms[0]
         low, high = interval(name, mean, sem, freedom + 1.0)
-    result = {"mean": mean, "std": spread, "sem": sem, "low": low, "high": high, "effective_samples": effective}
+    result = {
+        "mean": mean,
+        "std": spread,
+        "sem": sem,
+        "low": low,
+        "high": high,
+        "effective_samples": effective,
+    }
     if complete.any():
         result |= {"correlation_time": times[0], "correlation_time_sem": times[1]}
-    ranks = np.where((ends >= 0.0) & (ends <= 1.0), ends * (total[:, np.newaxis] - 1.0), np.nan)
+    ranks = np.where(
+        (ends >= 0.0) & (ends <= 1.0), ends * (total[:, np.newaxis] - 1.0), np.nan
+    )
     lowest, highest = (values_at_ranks(ordered, end) for end in ranks)
-    return result | {"quantile": levels, "quantile_low": lowest, "quantile_high": highest}, freedom
+    return result | {
+        "quantile": levels,
+        "quantile_low": lowest,
+        "quantile_high": highest,
+    }, freedom
 
 
 def _sum(values: Array, axis: int = -1) -> Array:
@@ -651,7 +853,10 @@ def _memory(
     ``noisy``.
     """
     (points, members, records), free = values.shape, max(values.shape[1] - 1, 1)
-    inflated, times = np.full((1 + len(_LEVELS), points, 2), np.nan), np.full((3, points), np.nan)
+    inflated, times = (
+        np.full((1 + len(_LEVELS), points, 2), np.nan),
+        np.full((3, points), np.nan),
+    )
     some = members if members < _MANY else members_for_memory(members, records)
     changes, largest = extremes[:, 0] < extremes[:, 1], np.max(np.abs(extremes), axis=1)
     size = max(1, _AT_ONCE // (2 * members * records))
@@ -662,18 +867,25 @@ def _memory(
         times[:, at] = time_of(covariance, some, records, step, largest[at])
         for k in range(1 + len(_LEVELS) * noisy) if members < _MANY else ():
             if k:
-                flags, share = part <= levels[at, k - 1, np.newaxis, np.newaxis], _LEVELS[k - 1]
+                flags, share = (
+                    part <= levels[at, k - 1, np.newaxis, np.newaxis],
+                    _LEVELS[k - 1],
+                )
                 if members > 1:
                     covariance = covariance_of(flags, flags.mean(axis=1), free)
                 else:
                     off = flags.mean(axis=(1, 2)) - share
-                    covariance = covariance_of(flags, share, 1.0) - off[:, np.newaxis] ** 2
+                    covariance = (
+                        covariance_of(flags, share, 1.0) - off[:, np.newaxis] ** 2
+                    )
             inflated[k, at] = inflation(covariance, members, records)
     inflated[:, ~changes] = times[:, ~changes] = np.nan
     return inflated, times
 
 
-def _errors(means: Array, spreads: Array, inflated: Array, count: Array) -> tuple[Array, Array]:
+def _errors(
+    means: Array, spreads: Array, inflated: Array, count: Array
+) -> tuple[Array, Array]:
     """Return standard errors of means and their degrees of freedom, from the members' means or the autocorrelation.
 
     Parameters
@@ -691,7 +903,11 @@ def _errors(means: Array, spreads: Array, inflated: Array, count: Array) -> tupl
     center = np.nansum(means, axis=-1, keepdims=True) / members[..., np.newaxis]
     std = np.sqrt(np.nansum((means - center) ** 2, axis=-1) / free)
     of_series = freedom > members - 1.0
-    errors = np.where(of_series, spreads * np.sqrt(records / count * (1.0 + records / count)), std / np.sqrt(members))
+    errors = np.where(
+        of_series,
+        spreads * np.sqrt(records / count * (1.0 + records / count)),
+        std / np.sqrt(members),
+    )
     return errors, np.where(of_series, freedom, free)
 
 
@@ -718,7 +934,10 @@ class Settlement(NamedTuple):
         if not self.verdict:
             return ""
         factor, shown = scaled(max(abs(self.begin), abs(self.end)), unit)
-        texts = [[f"{factor * value:.{digits}g}" for value in (self.begin, self.end)] for digits in (4, 7)]
+        texts = [
+            [f"{factor * value:.{digits}g}" for value in (self.begin, self.end)]
+            for digits in (4, 7)
+        ]
         begin, end = texts[0] if texts[0][0] != texts[0][1] else texts[1]
         return f"{self.verdict}: {begin} → {end} {shown}".rstrip() + f" over {span}"
 
@@ -757,23 +976,33 @@ def settlements(values: Array, sem: Array, freedom: Array, noisy: Array) -> Sett
     with np.errstate(invalid="ignore", divide="ignore"):
         known = np.isfinite(values)
         course = _sum(values, 1) / known.sum(axis=1)
-        first, second = (_sum(values[at]) / known[at].sum(axis=-1) for at in (np.s_[..., :half], np.s_[..., half:]))
+        first, second = (
+            _sum(values[at]) / known[at].sum(axis=-1)
+            for at in (np.s_[..., :half], np.s_[..., half:])
+        )
         drifts = second - first
         count = np.isfinite(drifts).sum(axis=-1)
         drift = np.nansum(drifts, axis=-1) / count
         squares = np.nansum((drifts - drift[:, np.newaxis]) ** 2, axis=-1)
         error = np.sqrt(squares / (count - 1.0)) / np.sqrt(count)
     of_members = (count > 1) & ((count >= _SEVERAL) | ~(freedom > count - 1.0))
-    error, free = np.where(of_members, error, 2.0 * sem), np.where(of_members, count - 1.0, freedom)
+    error, free = (
+        np.where(of_members, error, 2.0 * sem),
+        np.where(of_members, count - 1.0, freedom),
+    )
     return _settled(course, drift, error, free, noisy)
 
 
-def _settled(courses: Array, drift: Array, error: Array, free: Array, noisy: Array) -> Settlement:
+def _settled(
+    courses: Array, drift: Array, error: Array, free: Array, noisy: Array
+) -> Settlement:
     """Return the settlements of the members' means over time, with drifts, their errors and degrees of freedom.
 
     ``courses`` have the shape (points, records); unknown records are left out.
     """
-    result = Settlement(np.full(len(courses), "", object), *np.full((4, len(courses)), math.nan))
+    result = Settlement(
+        np.full(len(courses), "", object), *np.full((4, len(courses)), math.nan)
+    )
     known, alike = np.isfinite(courses), dict[bytes, list[int]]()
     for place in np.flatnonzero(known.any(axis=1)).tolist():
         alike.setdefault(known[place].tobytes(), []).append(place)
@@ -785,7 +1014,9 @@ def _settled(courses: Array, drift: Array, error: Array, free: Array, noisy: Arr
     return result
 
 
-def _settled_alike(course: Array, drift: Array, error: Array, free: Array, noisy: Array) -> Settlement:
+def _settled_alike(
+    course: Array, drift: Array, error: Array, free: Array, noisy: Array
+) -> Settlement:
     """Return the settlements of ``_settled`` of courses that are known throughout."""
     records, chance = course.shape[1], 1.0 - 0.5 * _FALSE_ALARM
     few = max(1, int(_ENDS_SHARE * records))
@@ -793,19 +1024,27 @@ def _settled_alike(course: Array, drift: Array, error: Array, free: Array, noisy
     end = np.where(noisy, course[:, -few:].mean(axis=1), course[:, -1])
     whole, change, bound = _cycles(course)
     mean = np.where(np.isfinite(change), whole, end)
-    is_still = np.ptp(course, axis=1) <= np.where(noisy, _UNSEEN, _STILL) * np.max(np.abs(course), axis=1)
-    limit = np.where(noisy, error * special.stdtrit(free, chance), _STILL * np.abs(mean))
+    is_still = np.ptp(course, axis=1) <= np.where(noisy, _UNSEEN, _STILL) * np.max(
+        np.abs(course), axis=1
+    )
+    limit = np.where(
+        noisy, error * special.stdtrit(free, chance), _STILL * np.abs(mean)
+    )
     is_short = np.isnan(limit) | (~noisy & (records < _FEW_RECORDS))
     steps, off = np.diff(course, axis=1), course > course.mean(axis=1, keepdims=True)
     is_one_way = np.zeros(len(course), bool)
     if records >= _ONE_WAY:
         is_one_way = np.all(steps >= 0.0, axis=1) | np.all(steps <= 0.0, axis=1)
-    lasts = np.where(noisy, (np.abs(drift) <= limit) & ~is_one_way, np.abs(change) <= limit)
+    lasts = np.where(
+        noisy, (np.abs(drift) <= limit) & ~is_one_way, np.abs(change) <= limit
+    )
     has_settled = ~is_short & (lasts | (np.abs(change) <= bound))
     is_short |= ~noisy & (np.count_nonzero(off[:, 1:] > off[:, :-1], axis=1) > 1)
     still = is_still | (records == 1)
     verdicts = np.select([still | has_settled, is_short], ["", _SHORT], "not settled")
-    values = np.select([still, has_settled, is_short], [end, mean, course.mean(axis=1)], end)
+    values = np.select(
+        [still, has_settled, is_short], [end, mean, course.mean(axis=1)], end
+    )
     half = 0.5 * bound * WIDE / float(special.ndtri(chance))
     halves = np.where(~still & has_settled & (half > 0.0), half, math.nan)
     return Settlement(verdicts, values, begin, end, halves)
@@ -814,7 +1053,10 @@ def _settled_alike(course: Array, drift: Array, error: Array, free: Array, noisy
 def _of_two(states: Settlement, noisy: Array) -> Settlement:
     """Return the settlements of two records, the first of which is the start of the run: the values at its end."""
     unknown = (noisy | (states.verdict == _SHORT)) & (states.begin != states.end)
-    verdict, value = np.where(unknown, "too few records", states.verdict), np.where(unknown, states.end, states.value)
+    verdict, value = (
+        np.where(unknown, "too few records", states.verdict),
+        np.where(unknown, states.end, states.value),
+    )
     return states._replace(verdict=verdict, value=value)
 
 
@@ -840,11 +1082,23 @@ def _cycles(course: Array) -> Array:
     with np.errstate(invalid="ignore", divide="ignore"):  # without cycles
         for chosen in (places <= middle, places >= middle):
             pair = (row[1:] == row[:-1]) & chosen[1:] & chosen[:-1]
-            lengths, areas, count = np.diff(places)[pair], np.diff(at)[pair], total(pair[pair])
+            lengths, areas, count = (
+                np.diff(places)[pair],
+                np.diff(at)[pair],
+                total(pair[pair]),
+            )
             means.append(total(areas) / total(lengths))
-            rest = total((areas - means[-1][row[:-1][pair]] * lengths) ** 2) / total(lengths) ** 2
-            error, known = error + rest * count / (count - 1.0), known & (count >= _CYCLES)
-    first, last = (np.searchsorted(row, np.flatnonzero(known), side) for side in ("left", "right"))
+            rest = (
+                total((areas - means[-1][row[:-1][pair]] * lengths) ** 2)
+                / total(lengths) ** 2
+            )
+            error, known = (
+                error + rest * count / (count - 1.0),
+                known & (count >= _CYCLES),
+            )
+    first, last = (
+        np.searchsorted(row, np.flatnonzero(known), side) for side in ("left", "right")
+    )
     average[known] += (at[last - 1] - at[first]) / (places[last - 1] - places[first])
     bound = float(special.ndtri(1.0 - 0.5 * _FALSE_ALARM)) * np.sqrt(error)
     nothing = np.array([[np.nan], [np.inf], [0.0]])
@@ -861,7 +1115,9 @@ def _openings(counts: Array, members: int, again: str, span: str) -> str:
 
 
 def distribution(
-    dataset: xr.Dataset, names: Collection[str] | None = None, minus: Mapping[str, Any] | None = None
+    dataset: xr.Dataset,
+    names: Collection[str] | None = None,
+    minus: Mapping[str, Any] | None = None,
 ) -> xr.Dataset:
     """Return statistics of observables over the members and the second half of the run, at each point of the sweep.
 
@@ -890,33 +1146,54 @@ def distribution(
     dataset = plain(dataset)
     late, words = _late(dataset)
     step = float(late["t"][-1] - late["t"][0]) / max(late.sizes["t"] - 1, 1)
-    sweep, result = dataset["contact_modulus"], {"quantile": xr.Variable("quantile", list(QUANTILES))}
-    noisy, base = has_noise(dataset).to_numpy().ravel(), where(late, minus) if minus else None
+    sweep, result = (
+        dataset["contact_modulus"],
+        {"quantile": xr.Variable("quantile", list(QUANTILES))},
+    )
+    noisy, base = (
+        has_noise(dataset).to_numpy().ravel(),
+        where(late, minus) if minus else None,
+    )
     openings = [""] * sweep.size
     if "in_contact" in late:
         closed = rows_of(late["in_contact"].compute(), sweep) > 0.0
         if base is not None:
-            closed = closed & (rows_of(base["in_contact"].compute(), base["contact_modulus"]) > 0.0)
+            closed = closed & (
+                rows_of(base["in_contact"].compute(), base["contact_modulus"]) > 0.0
+            )
         closed = closed.reshape(-1, *closed.shape[-2:])
         again = (closed[..., 1:] & ~closed[..., :-1]).any(axis=-1).sum(axis=-1)
-        counts = closed.sum(axis=1), itertools.repeat(closed.shape[1]), (str(count or "") for count in again)
+        counts = (
+            closed.sum(axis=1),
+            itertools.repeat(closed.shape[1]),
+            (str(count or "") for count in again),
+        )
         openings = [_openings(*point, words) for point in zip(*counts, strict=False)]
     readers = [_reader(each, names) for each in (late, base) if each is not None]
-    for name in map(str, chosen_observables(restricted(late, names).isel(t=[-1]), names)):
+    for name in map(
+        str, chosen_observables(restricted(late, names).isel(t=[-1]), names)
+    ):
         if name in CUMULATIVE:
             continue
         variable = readers[0](name)
-        differ, values = noisy & (MEMBERS in variable.dims), _series(late, variable, step)
+        differ, values = (
+            noisy & (MEMBERS in variable.dims),
+            _series(late, variable, step),
+        )
         if base is not None:
             values = values - _series(base, readers[1](name), step)
         values = values.reshape(-1, *values.shape[-2:])
         numbers, freedom = _over_time(values, step, name, differ)
         states = settlements(values, numbers["sem"], freedom, differ)
-        result |= _described(variable.rename(name), numbers, sweep, states, openings, words, differ)
+        result |= _described(
+            variable.rename(name), numbers, sweep, states, openings, words, differ
+        )
     return xr.Dataset(result, sweep.coords)
 
 
-def _reader(dataset: xr.Dataset, names: Collection[str] | None) -> Callable[[str], xr.DataArray]:
+def _reader(
+    dataset: xr.Dataset, names: Collection[str] | None
+) -> Callable[[str], xr.DataArray]:
     """Return a function that returns an observable; all are computed at once if the dataset is small."""
     if dataset.nbytes > ROOM:
         return partial(observable_of, dataset)
@@ -926,16 +1203,27 @@ def _reader(dataset: xr.Dataset, names: Collection[str] | None) -> Callable[[str
 def _series(dataset: xr.Dataset, variable: xr.DataArray, step: float) -> Array:
     """Return values of an observable, shape (..., members, records); the speed of a slider that may slip by its way."""
     sweep = dataset["contact_modulus"]
-    fewest = 1 if "bonds_sites" in dataset.variables else 2  # single bonds slip without duration
-    if variable.name == "speed" and {"slider_position", "spring_force"} <= set(dataset) and dataset.sizes["t"] > fewest:
-        return np.diff(rows_of(dataset["slider_position"].compute(), sweep)) / step  # slips come between two records
+    # single bonds slip without duration
+    fewest = 1 if "bonds_sites" in dataset.variables else 2
+    if (
+        variable.name == "speed"
+        and {"slider_position", "spring_force"} <= set(dataset)
+        and dataset.sizes["t"] > fewest
+    ):
+        # slips come between two records
+        return np.diff(rows_of(dataset["slider_position"].compute(), sweep)) / step
     return rows_of(variable, sweep)
 
 
 def _described(
-    variable: xr.DataArray, numbers: dict[str, Array], sweep: xr.DataArray, states: Settlement,
-    openings: list[str], span: str, noisy: Array,
-) -> dict[str, xr.Variable]:  # fmt: skip
+    variable: xr.DataArray,
+    numbers: dict[str, Array],
+    sweep: xr.DataArray,
+    states: Settlement,
+    openings: list[str],
+    span: str,
+    noisy: Array,
+) -> dict[str, xr.Variable]:
     """Return statistics of an observable over the sweep, with the reasons where there is no mean.
 
     ``numbers`` of each statistic have the points of the sweep first.
@@ -948,20 +1236,30 @@ def _described(
         reasons[place] = states.at(place).reason(unit, span)
     ends = np.where(is_open, np.nan, states.value)
     numbers["mean"] = np.where((reasons != "") | ~noisy, ends, numbers["mean"])
-    halves = np.where(noisy, math.nan, states.half)  # without noise cycles differ, if anything
+    # without noise cycles differ, if anything
+    halves = np.where(noisy, math.nan, states.half)
     for kind, sign in (("low", -1.0), ("high", 1.0)):
-        numbers[kind] = np.where(np.isnan(halves), numbers[kind], numbers["mean"] + sign * halves)
+        numbers[kind] = np.where(
+            np.isnan(halves), numbers[kind], numbers["mean"] + sign * halves
+        )
     result: dict[str, xr.Variable] = {}
     for kind, values in numbers.items():
         if kind != "mean":
             values[reasons != ""] = np.nan
-        if np.isnan(values).all():  # one nan for all points, because large sweeps often have no noise
+        # one nan for all points, because large sweeps often have no noise
+        if np.isnan(values).all():
             values = np.broadcast_to(np.nan, values.shape)
         dims = (*sweep.dims, "quantile")[: sweep.ndim + values.ndim - 1]
         shaped = values.reshape(sweep.shape + values.shape[1:])
-        result[f"{name}_{kind}"] = xr.Variable(dims, shaped, _attributes(kind, variable))
-    text = {"long_name": f"reason why there is no {_OF['mean']} of {variable.attrs.get('long_name', name)}"}
-    result[f"{name}_reason"] = xr.Variable(sweep.dims, reasons.reshape(sweep.shape), text)
+        result[f"{name}_{kind}"] = xr.Variable(
+            dims, shaped, _attributes(kind, variable)
+        )
+    text = {
+        "long_name": f"reason why there is no {_OF['mean']} of {variable.attrs.get('long_name', name)}"
+    }
+    result[f"{name}_reason"] = xr.Variable(
+        sweep.dims, reasons.reshape(sweep.shape), text
+    )
     return result
 
 
@@ -971,7 +1269,9 @@ def _late(dataset: xr.Dataset) -> tuple[xr.Dataset, str]:
     return dataset.isel(t=slice(first, None)), "the second half" if first else "the run"
 
 
-def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
+def of_second_half(
+    dataset: xr.Dataset, names: Collection[str] | None = None
+) -> xr.Dataset:
     """Return the ``distribution`` of observables; of recorded statistics the same means with errors and reasons.
 
     Of those the engine records the members' means over the second half of the run.
@@ -981,28 +1281,50 @@ def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) ->
     dataset = plain(dataset)
     (late, words), sweep = _late(dataset), dataset["contact_modulus"]
     points, members = sweep.size, int(dataset.attrs["members"])
-    noisy, counts = has_noise(dataset).to_numpy().ravel(), np.full((points, late.sizes["t"]), members)
+    noisy, counts = (
+        has_noise(dataset).to_numpy().ravel(),
+        np.full((points, late.sizes["t"]), members),
+    )
     if "in_contact_mean" in late:
-        counts = np.rint(members * rows_of(late["in_contact_mean"], sweep).reshape(counts.shape)).astype(int)
-    reattach = (word(dataset, "contact.after_pull_off", "stop") == "reattach").broadcast_like(sweep).to_numpy().ravel()
+        counts = np.rint(
+            members * rows_of(late["in_contact_mean"], sweep).reshape(counts.shape)
+        ).astype(int)
+    reattach = (
+        (word(dataset, "contact.after_pull_off", "stop") == "reattach")
+        .broadcast_like(sweep)
+        .to_numpy()
+        .ravel()
+    )
     again = np.where(reattach & (counts.min(axis=-1) < members), "some", "")
-    openings = [_openings(count, members, may, words) for count, may in zip(counts, again, strict=True)]
+    openings = [
+        _openings(count, members, may, words)
+        for count, may in zip(counts, again, strict=True)
+    ]
     courses = closed_observables(late, names)
-    whole, later = (chosen_observables(_as_last(late, with_drift), names) for with_drift in (False, True))
+    whole, later = (
+        chosen_observables(_as_last(late, with_drift), names)
+        for with_drift in (False, True)
+    )
     result: dict[str, xr.Variable] = {}
     for key in (str(key) for key in courses if not str(key).endswith(("_std", "_sem"))):
         name, differ = key.removesuffix("_mean"), noisy & key.endswith("_mean")
         if name in CUMULATIVE:
             continue
         ends = [key, f"{name}_sem" if key.endswith("_mean") else key]
-        (mean, sem), (after, error) = ([rows_of(of[end], sweep).ravel() for end in ends] for of in (whole, later))
+        (mean, sem), (after, error) = (
+            [rows_of(of[end], sweep).ravel() for end in ends] for of in (whole, later)
+        )
         free = (counts if is_of_contact(name) else np.full_like(counts, members)) - 1.0
         sem = np.where(differ, sem, np.nan)
         low, high = interval(name, mean, sem, free[:, 0] + 1.0)
         course = rows_of(courses[key], sweep).reshape(points, -1)
         numbers = {"mean": mean, "sem": sem, "low": low, "high": high}
-        states = _settled(course, after - mean, error, free[:, free.shape[1] // 2], differ)
-        result |= _described(courses[key].rename(name), numbers, sweep, states, openings, words, differ)
+        states = _settled(
+            course, after - mean, error, free[:, free.shape[1] // 2], differ
+        )
+        result |= _described(
+            courses[key].rename(name), numbers, sweep, states, openings, words, differ
+        )
     return xr.Dataset(result, sweep.coords)
 
 
@@ -1012,9 +1334,13 @@ def _as_last(late: xr.Dataset, with_drift: bool) -> xr.Dataset:
     ``with_drift`` their drift is added to the means, with its standard error.
     """
     last, result = late.isel(t=[-1]), {}
-    names = (str(key).removesuffix("_mean") for key in last if str(key).endswith("_mean"))
+    names = (
+        str(key).removesuffix("_mean") for key in last if str(key).endswith("_mean")
+    )
     for name in (name for name in names if f"late_{name}" in last):
-        mean, error, drift, drift_error = (last[f"late_{name}"].isel(late=k, drop=True) for k in range(4))
+        mean, error, drift, drift_error = (
+            last[f"late_{name}"].isel(late=k, drop=True) for k in range(4)
+        )
         if with_drift:
             mean, error = mean + drift, drift_error
         for kind, values in zip(KEPT, (mean, math.nan * error, error), strict=True):
@@ -1026,11 +1352,23 @@ def observable_of(dataset: xr.Dataset, name: str) -> xr.DataArray:
     """Return an observable of a dataset in memory."""
     if name in dataset and not is_of_contact(name):
         return dataset[name].compute()  # load would keep each variable in the dataset
-    return in_pieces(restricted(dataset, [name]), ("t",), lambda piece: closed_observables(piece, [name]))[name]
+    return in_pieces(
+        restricted(dataset, [name]),
+        ("t",),
+        lambda piece: closed_observables(piece, [name]),
+    )[name]
 
 
 def rows_of(variable: xr.DataArray, sweep: xr.DataArray) -> Array:
     """Return values of an observable at all points of the sweep, shape (..., members, records)."""
-    sizes = {name: sweep.sizes.get(name, 1) for name in (*sweep.dims, MEMBERS) if name not in variable.dims}
-    rows = variable.drop_vars(sizes, errors="ignore").expand_dims(sizes).transpose(*sweep.dims, MEMBERS, "t")
+    sizes = {
+        name: sweep.sizes.get(name, 1)
+        for name in (*sweep.dims, MEMBERS)
+        if name not in variable.dims
+    }
+    rows = (
+        variable.drop_vars(sizes, errors="ignore")
+        .expand_dims(sizes)
+        .transpose(*sweep.dims, MEMBERS, "t")
+    )
     return rows.to_numpy().astype(float, copy=False)

@@ -24,7 +24,14 @@ from sim.ensemble.store import Blocks
 from sim.ensemble.variables import MAP, NUMBERS, SYSTEMATIC, Variable
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice
-from sim.numerics.hdf5 import CHUNK_CACHE, File, Refused, opened, tables, write_in_memory
+from sim.numerics.hdf5 import (
+    CHUNK_CACHE,
+    File,
+    Refused,
+    opened,
+    tables,
+    write_in_memory,
+)
 from sim.scenario.files import Files
 from sim.scenario.messages import in_plain_words
 from sim.scenario.scenario import Scenario
@@ -74,9 +81,15 @@ class Place(NamedTuple):
     timed: bool = True
     axis: str = ""
 
-    def axes(self, piece: "Piece", rows: slice = slice(None)) -> tuple[int | slice, ...]:
+    def axes(
+        self, piece: "Piece", rows: slice = slice(None)
+    ) -> tuple[int | slice, ...]:
         """Return the index of the numbers of some members in a piece."""
-        return (*piece.where, *((rows,) if self.each else ()), *((piece.times,) if self.timed else ()))
+        return (
+            *piece.where,
+            *((rows,) if self.each else ()),
+            *((piece.times,) if self.timed else ()),
+        )
 
 
 class Piece(NamedTuple):
@@ -100,25 +113,44 @@ class Outline:
     pieces: list[Piece] = field(default_factory=list)
 
     def add(
-        self, name: str, kind: Any, dimensions: tuple[str, ...], unit: str, long_name: str, symbol: str = "",
-        values: Any = None, chunks: tuple[int, ...] | None = None, compression: str = "zlib", **more: Any,
-    ) -> None:  # fmt: skip
+        self,
+        name: str,
+        kind: Any,
+        dimensions: tuple[str, ...],
+        unit: str,
+        long_name: str,
+        symbol: str = "",
+        values: Any = None,
+        chunks: tuple[int, ...] | None = None,
+        compression: str = "zlib",
+        **more: Any,
+    ) -> None:
         """Add a variable; without ``values`` the parts hold them."""
         attributes = {"units": unit, "long_name": long_name, "symbol": symbol} | more
-        attributes = {key: value for key, value in attributes.items() if not isinstance(value, str) or value}
-        self.variables[name] = Described(kind, dimensions, attributes, values, chunks, compression)
+        attributes = {
+            key: value
+            for key, value in attributes.items()
+            if not isinstance(value, str) or value
+        }
+        self.variables[name] = Described(
+            kind, dimensions, attributes, values, chunks, compression
+        )
 
 
 def outline(plan: Plan, parts: Blocks) -> Outline:
     """Return the dataset of a plan without the numbers of its parts, which say how many slip events there are."""
-    sweep = {variable_name(axis.keys[0]): len(axis.values) for axis in plan.scenario.sweep}
+    sweep = {
+        variable_name(axis.keys[0]): len(axis.values) for axis in plan.scenario.sweep
+    }
     content, shape = Outline(sweep, {**sweep}, attributes(plan)), tuple(sweep.values())
     for place, axis in enumerate(plan.scenario.sweep):
         _add_sweep_coordinates(content, plan, axis, math.prod(shape[place + 1 :]))
     if plan.per_member and any(map(plan.varies, plan.variables)):
         content.sizes["member"] = plan.members
         described = "1", "number of the ensemble member", "", np.arange(plan.members)
-        content.add("member", "i4", ("member",), *described, standard_name="realization")
+        content.add(
+            "member", "i4", ("member",), *described, standard_name="realization"
+        )
     clock = plan.points[0].clock
     content.sizes["t"] = clock.records
     content.add("t", "f8", ("t",), "s", "time since the start", "t", clock.times)
@@ -141,13 +173,33 @@ def outline(plan: Plan, parts: Blocks) -> Outline:
             *outer, along = map(int, np.unravel_index(pack.start, shape))
             where = (*outer, slice(along, along + len(pack)))
         for index, block in enumerate(plan.blocks(plan.points[pack.start])):
-            names = [part_name(pack.start, group, index) for group in range(len(groups))]
-            content.pieces.append(Piece(where, slice(block.records.start, block.records.stop), members, names))
+            names = [
+                part_name(pack.start, group, index) for group in range(len(groups))
+            ]
+            content.pieces.append(
+                Piece(
+                    where,
+                    slice(block.records.start, block.records.stop),
+                    members,
+                    names,
+                )
+            )
             if slips and block.end == clock.steps:
-                content.sizes["slip"] = max(content.sizes["slip"], *(parts.load(n)[slips[0]].shape[-1] for n in names))
+                content.sizes["slip"] = max(
+                    content.sizes["slip"],
+                    *(parts.load(n)[slips[0]].shape[-1] for n in names),
+                )
     if slips:
         numbers = np.arange(1, content.sizes["slip"] + 1)
-        content.add("slip", "i4", ("slip",), "1", "number of the slip event of a member", "", numbers)
+        content.add(
+            "slip",
+            "i4",
+            ("slip",),
+            "1",
+            "number of the slip event of a member",
+            "",
+            numbers,
+        )
     return content
 
 
@@ -160,27 +212,56 @@ def variable_name(key: str) -> str:
     return key.replace(".", "_")
 
 
-def _add_sweep_coordinates(content: Outline, plan: Plan, axis: Axis, stride: int) -> None:
+def _add_sweep_coordinates(
+    content: Outline, plan: Plan, axis: Axis, stride: int
+) -> None:
     """Add the swept values, points a stride apart, as coordinates: numbers in SI, anything else as a label."""
     along = (variable_name(axis.keys[0]),)
     points = [quantities(plan.points[i * stride]) for i in range(len(axis.values))]
     for position, key in enumerate(axis.keys):
         if all(key in numbers for numbers in points):
             quantity = points[0][key][0]
-            described = quantity.unit, quantity.meaning, quantity.symbol, [numbers[key][1] for numbers in points]
+            described = (
+                quantity.unit,
+                quantity.meaning,
+                quantity.symbol,
+                [numbers[key][1] for numbers in points],
+            )
             content.add(variable_name(key), "f8", along, *described)
         else:
             labels = [_label(key, row[position]) for row in axis.values]
-            names = [label if labels.count(label) == 1 else f"{label} {i}" for i, label in enumerate(labels, 1)]
-            courses = [(name, row[position]) for name, row in zip(names, axis.values, strict=True)]
-            meanings = [f"{name}: {_course(value)}" for name, value in courses if _is_course(value)]
+            names = [
+                label if labels.count(label) == 1 else f"{label} {i}"
+                for i, label in enumerate(labels, 1)
+            ]
+            courses = [
+                (name, row[position])
+                for name, row in zip(names, axis.values, strict=True)
+            ]
+            meanings = [
+                f"{name}: {_course(value)}"
+                for name, value in courses
+                if _is_course(value)
+            ]
             words = ", ".join(filter(None, [f"swept {key}", "; ".join(meanings)]))
-            content.add(variable_name(key), str, along, "", words, "", np.array(names, object))
-            contacts = [plan.points[i * stride].contact for i in range(len(axis.values))]
+            content.add(
+                variable_name(key), str, along, "", words, "", np.array(names, object)
+            )
+            contacts = [
+                plan.points[i * stride].contact for i in range(len(axis.values))
+            ]
             if all(key == f"contact.{contact.kind}" for contact in contacts):
-                rates = [_last_rate(contact.course, plan.points[0].clock.duration) for contact in contacts]
-                unit, text = "N/s" if contacts[0].kind == "load" else "m/s", f"rate of the last change of {key}"
-                content.add(f"{variable_name(key)}_rate", "f8", along, unit, text, "", rates)
+                rates = [
+                    _last_rate(contact.course, plan.points[0].clock.duration)
+                    for contact in contacts
+                ]
+                unit, text = (
+                    "N/s" if contacts[0].kind == "load" else "m/s",
+                    f"rate of the last change of {key}",
+                )
+                content.add(
+                    f"{variable_name(key)}_rate", "f8", along, unit, text, "", rates
+                )
 
 
 def _last_rate(course: Any, duration: float) -> float:
@@ -190,7 +271,10 @@ def _last_rate(course: Any, duration: float) -> float:
     rates = np.trim_zeros(change[span > 0.0] / span[span > 0.0], "b")
     turns = np.flatnonzero(np.sign(rates) != np.sign(rates[-1:]))
     ramp = slice(turns[-1] + 1 if turns.size else 0, rates.size)
-    straight = np.allclose(rates[ramp], rates[-1:], 1e-9, 0.0) and getattr(course, "scale", "linear") == "linear"
+    straight = (
+        np.allclose(rates[ramp], rates[-1:], 1e-9, 0.0)
+        and getattr(course, "scale", "linear") == "linear"
+    )
     return float(rates[-1]) if rates.size and straight else 0.0
 
 
@@ -209,7 +293,10 @@ def _label(key: str, value: Any) -> str:
 def _course(value: Any) -> str:
     """Return a course or a table in words, shortened."""
     parts = value.items() if isinstance(value, dict) else [("", value)]
-    words = " ".join(f"{key} {', '.join(map(str, p)) if isinstance(p, list) else p}" for key, p in parts).strip()
+    words = " ".join(
+        f"{key} {', '.join(map(str, p)) if isinstance(p, list) else p}"
+        for key, p in parts
+    ).strip()
     return words if len(words) <= _WORDS else f"{words[: _WORDS - 1]}…"
 
 
@@ -218,7 +305,9 @@ def scenario_json(scenario: Scenario, per_member: bool | None = None) -> str:
 
     ``per_member`` is True if every member is recorded, for a scenario that leaves this to the size of the run.
     """
-    dumped = TypeAdapter(Scenario).dump_python(scenario, by_alias=True, exclude={"source", "sweep"}, mode="json")
+    dumped = TypeAdapter(Scenario).dump_python(
+        scenario, by_alias=True, exclude={"source", "sweep"}, mode="json"
+    )
     if per_member is not None:
         dumped["record"]["per_member"] = per_member
     sweep = {"sweep": written(scenario.sweep)} if scenario.sweep else {}
@@ -234,10 +323,19 @@ def scenario_of(attributes: Mapping[str, Any]) -> Scenario:
         If the attributes do not hold it: of a measured map they have the digest alone.
     """
     files = tables(attributes.get("scenario_files"))
-    texts = {name: str(entry.get("text")) for name, entry in files.items() if isinstance(entry, dict)}
+    texts = {
+        name: str(entry.get("text"))
+        for name, entry in files.items()
+        if isinstance(entry, dict)
+    }
     with in_plain_words(Scenario):
-        document, context = tables(attributes.get("scenario_resolved")), {"files": Files(Path(), texts)}
-        return TypeAdapter(Scenario).validate_python(document, context=context, by_alias=True, by_name=False)
+        document, context = (
+            tables(attributes.get("scenario_resolved")),
+            {"files": Files(Path(), texts)},
+        )
+        return TypeAdapter(Scenario).validate_python(
+            document, context=context, by_alias=True, by_name=False
+        )
 
 
 def _digest(text: str) -> str:
@@ -247,10 +345,16 @@ def _digest(text: str) -> str:
 def attributes(plan: Plan) -> dict[str, Any]:
     """Return the global attributes: the scenario and the versions that ran it."""
     scene, source = plan.scenario, plan.scenario.origin
-    resolved, sim_version = scenario_json(scene, plan.per_member), _version("sliding-sim")
+    resolved, sim_version = (
+        scenario_json(scene, plan.per_member),
+        _version("sliding-sim"),
+    )
     versions = {name: _version(name) for name in ("numpy", "scipy", "numba")}
     packages = ", ".join(f"{name} {version}" for name, version in versions.items())
-    files = {name: {"sha256": _digest(text), "text": text} for name, text in source.files.items()}
+    files = {
+        name: {"sha256": _digest(text), "text": text}
+        for name, text in source.files.items()
+    }
     return {
         "Conventions": "CF-1.11",
         "title": scene.name,
@@ -274,8 +378,16 @@ def identity(attributes: Mapping[str, Any]) -> dict[str, Any]:
     if not (scenario := tables(attributes.get("scenario_resolved"))):
         return {}
     files = tables(attributes.get("scenario_files"))
-    digests = {name: entry.get("sha256") for name, entry in files.items() if isinstance(entry, dict)}
-    versions = {key.removesuffix("_version"): attributes[key] for key in attributes if key.endswith("_version")}
+    digests = {
+        name: entry.get("sha256")
+        for name, entry in files.items()
+        if isinstance(entry, dict)
+    }
+    versions = {
+        key.removesuffix("_version"): attributes[key]
+        for key in attributes
+        if key.endswith("_version")
+    }
     return {"scenario": scenario, "files": digests, "version": versions}
 
 
@@ -284,18 +396,33 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
     points = [quantities(point) for point in plan.points]
     swept = {key for axis in plan.scenario.sweep for key in axis.keys}
     for key, (quantity, value) in points[0].items():
-        if key not in swept and all(key in numbers and numbers[key][1] == value for numbers in points):
+        if key not in swept and all(
+            key in numbers and numbers[key][1] == value for numbers in points
+        ):
             described = quantity.unit, quantity.meaning, quantity.symbol, value
             content.add(variable_name(key), "f8", (), *described)
-    described_as = {number.name: (number.unit, number.long_name, number.symbol) for number in NUMBERS}
-    described_as |= {name: (*unit_and_text, "") for name, unit_and_text in SYSTEMATIC.items()}
+    described_as = {
+        number.name: (number.unit, number.long_name, number.symbol)
+        for number in NUMBERS
+    }
+    described_as |= {
+        name: (*unit_and_text, "") for name, unit_and_text in SYSTEMATIC.items()
+    }
     derived: dict[str, list[float]] = {}
     errors = []
     for point in plan.points:
         errors.append((point, systematic_errors(point)))
-        numbers = {number.name: number.read(point) for number in NUMBERS if number.applies(point)}
+        numbers = {
+            number.name: number.read(point)
+            for number in NUMBERS
+            if number.applies(point)
+        }
         for key, (quantity, value) in point.derived.items():
-            described_as[variable_name(key)] = quantity.unit, quantity.meaning, quantity.symbol
+            described_as[variable_name(key)] = (
+                quantity.unit,
+                quantity.meaning,
+                quantity.symbol,
+            )
             numbers[variable_name(key)] = value
         for name, value in (numbers | errors[-1][1]).items():
             derived.setdefault(name, []).append(float(value))
@@ -310,27 +437,54 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
 
 def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:
     """Add the variables of a quantity that is recorded at each record, or once a run."""
-    record, sweep, name, whole = plan.scenario.record, tuple(content.sweep), recorded.name, recorded in plan.largest
+    record, sweep, name, whole = (
+        plan.scenario.record,
+        tuple(content.sweep),
+        recorded.name,
+        recorded in plan.largest,
+    )
     varies = plan.varies(recorded)
     each = varies and plan.per_member
     dimensions = (*sweep, *(["member"] if each else []), *([] if whole else ["t"]))
     dimensions += (recorded.axis,) if recorded.axis else ()
     block = {"member": plan.group, "t": max(1, plan.records_of_block(plan.points[0]))}
     block |= dict.fromkeys(sweep[-1:], len(plan.packs[0]))
-    chunks = None if whole else tuple(block.get(dimension, 1) for dimension in dimensions)
-    prescribed = any(variable.name == SPEED and not plan.varies(variable) for variable in plan.variables)
+    chunks = (
+        None if whole else tuple(block.get(dimension, 1) for dimension in dimensions)
+    )
+    prescribed = any(
+        variable.name == SPEED and not plan.varies(variable)
+        for variable in plan.variables
+    )
     names = {}
     statistics = _STATISTICS | (_COUNT if whole else {})
     for statistic, of in (statistics if varies and not each else {"": ""}).items():
-        kind = "f4" if record.precision == "float32" and not (statistic or whole) else "f8"
+        kind = (
+            "f4" if record.precision == "float32" and not (statistic or whole) else "f8"
+        )
         compression: str = "zlib" if whole else record.compression
-        more: dict[str, Any] = {"coordinates": SPEED} if prescribed and not whole and name != SPEED else {}
+        more: dict[str, Any] = (
+            {"coordinates": SPEED} if prescribed and not whole and name != SPEED else {}
+        )
         if name == "in_contact" and not statistic:
             kind, compression = "i1", compression.replace("digits", "zlib")
-            more = {"units": "", "flag_values": np.array([0, 1], "i1"), "flag_meanings": _FLAGS}
+            more = {
+                "units": "",
+                "flag_values": np.array([0, 1], "i1"),
+                "flag_meanings": _FLAGS,
+            }
         names[statistic] = "_".join(filter(None, (name, statistic)))
         described = recorded.unit, f"{of} {recorded.long_name}".strip(), recorded.symbol
-        content.add(names[statistic], kind, dimensions, *described, None, chunks, compression, **more)
+        content.add(
+            names[statistic],
+            kind,
+            dimensions,
+            *described,
+            None,
+            chunks,
+            compression,
+            **more,
+        )
     return Place(names, each, not whole, recorded.axis)
 
 
@@ -339,14 +493,26 @@ def _add_late(content: Outline, recorded: Variable) -> None:
     content.sizes["late"] = len(LATE)
     text = "statistic of the members' means over the second half of the run, and of their drift"
     content.add("late", str, ("late",), "", text, "", np.array(LATE, object))
-    about = recorded.unit, f"over the second half of the run: {recorded.long_name}", recorded.symbol
+    about = (
+        recorded.unit,
+        f"over the second half of the run: {recorded.long_name}",
+        recorded.symbol,
+    )
     content.add(f"late_{recorded.name}", "f8", (*content.sweep, "late"), *about)
 
 
 def _add_phases(content: Outline, plan: Plan) -> None:
     """Add the phases of each point: start, end and name."""
     content.sizes["phase"] = plan.phases
-    content.add("phase", "i4", ("phase",), "1", "number of the phase", "", np.arange(1, plan.phases + 1))
+    content.add(
+        "phase",
+        "i4",
+        ("phase",),
+        "1",
+        "number of the phase",
+        "",
+        np.arange(1, plan.phases + 1),
+    )
     shape, dims = (*content.sweep.values(), plan.phases), (*content.sweep, "phase")
     starts, ends = np.full((2, len(plan.points), plan.phases), np.nan)
     names = np.full(starts.shape, "", object)
@@ -354,9 +520,33 @@ def _add_phases(content: Outline, plan: Plan) -> None:
         count = len(point.phases.starts)
         starts[k, :count], names[k, :count] = point.phases.starts, point.phases.names
         ends[k, :count] = [*point.phases.starts[1:], point.clock.duration]
-    content.add("phase_start", "f8", dims, "s", "time at which a phase begins", "", starts.reshape(shape))
-    content.add("phase_end", "f8", dims, "s", "time at which a phase ends", "", ends.reshape(shape))
-    content.add("phase_name", str, dims, "", "course of drive and contact in a phase", "", names.reshape(shape))
+    content.add(
+        "phase_start",
+        "f8",
+        dims,
+        "s",
+        "time at which a phase begins",
+        "",
+        starts.reshape(shape),
+    )
+    content.add(
+        "phase_end",
+        "f8",
+        dims,
+        "s",
+        "time at which a phase ends",
+        "",
+        ends.reshape(shape),
+    )
+    content.add(
+        "phase_name",
+        str,
+        dims,
+        "",
+        "course of drive and contact in a phase",
+        "",
+        names.reshape(shape),
+    )
 
 
 def _add_maps(content: Outline, plan: Plan) -> None:
@@ -366,21 +556,52 @@ def _add_maps(content: Outline, plan: Plan) -> None:
     count = min(scene.record.map_members, plan.members)
     sizes = dict(zip("xy", lattice.shape, strict=True))
     content.sizes |= {"map_member": count, "map_time": len(scene.record.maps)} | sizes
-    content.add("map_member", "i4", ("map_member",), "1", "member of a map", "", np.arange(count))
-    content.add("map_time", "f8", ("map_time",), "s", "time of a map", "t", sorted(scene.record.maps))
+    content.add(
+        "map_member",
+        "i4",
+        ("map_member",),
+        "1",
+        "member of a map",
+        "",
+        np.arange(count),
+    )
+    content.add(
+        "map_time",
+        "f8",
+        ("map_time",),
+        "s",
+        "time of a map",
+        "t",
+        sorted(scene.record.maps),
+    )
     for axis, text, side in zip("xy", ("along", "across"), lattice.sides, strict=True):
         positions = np.arange(sizes[axis]) * (side / sizes[axis])
-        content.add(axis, "f8", (axis,), "m", f"position {text} the sliding direction", axis, positions)
+        content.add(
+            axis,
+            "f8",
+            (axis,),
+            "m",
+            f"position {text} the sliding direction",
+            axis,
+            positions,
+        )
     names = (*content.sweep, "map_member", "map_time", "x", "y")
-    content.add(MAP[0], "f8", names, *MAP[1:], None, (1,) * (len(names) - 2) + lattice.shape)
+    content.add(
+        MAP[0], "f8", names, *MAP[1:], None, (1,) * (len(names) - 2) + lattice.shape
+    )
     content.places[MAP[0]] = Place({"": MAP[0]})
 
 
-def in_memory(outline: Outline, parts: Blocks) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
+def in_memory(
+    outline: Outline, parts: Blocks
+) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
     """Return dimensions, values and attributes of each variable, by name."""
     content = {}
     for name, (kind, dimensions, attributes, values, *_) in outline.variables.items():
-        array = np.empty([outline.sizes[size] for size in dimensions], object if kind is str else kind)
+        array = np.empty(
+            [outline.sizes[size] for size in dimensions],
+            object if kind is str else kind,
+        )
         if values is not None:
             array[...] = values
         content[name] = dimensions, array, attributes
@@ -393,7 +614,10 @@ def write(outline: Outline, parts: Blocks, path: Path) -> None:
 
     HDF5 gives no reason if the disk fails.
     """
-    sizes = [math.prod(outline.sizes[size] for size in each.dimensions) for each in outline.variables.values()]
+    sizes = [
+        math.prod(outline.sizes[size] for size in each.dimensions)
+        for each in outline.variables.values()
+    ]
     try:
         if 8 * sum(sizes) > IN_MEMORY:
             with pool(1) as executor:
@@ -410,7 +634,8 @@ def _write(outline: Outline, parts: Blocks, path: Path) -> None:
     """Write a netCDF file part by part."""
     with HDF5, File(path, "w", format="NETCDF4") as file:
         _put(outline, parts, file)
-        file.sync()  # which raises an error if the disk fails, while closing the file would crash
+        # which raises an error if the disk fails, while closing the file would crash
+        file.sync()
 
 
 def _put(outline: Outline, parts: Blocks, file: File) -> None:
@@ -418,13 +643,25 @@ def _put(outline: Outline, parts: Blocks, file: File) -> None:
     for name, size in outline.sizes.items():
         file.createDimension(name, size)
     file.setncatts(outline.attributes)
-    _fill(outline, parts, {name: _variable(file, name, each) for name, each in outline.variables.items()})
+    _fill(
+        outline,
+        parts,
+        {name: _variable(file, name, each) for name, each in outline.variables.items()},
+    )
 
 
-def _variable(file: netCDF4.Dataset, name: str, described: Described) -> netCDF4.Variable:
+def _variable(
+    file: netCDF4.Dataset, name: str, described: Described
+) -> netCDF4.Variable:
     kind, dimensions, attributes, values, chunks, compression = described
-    packed = {"fletcher32": True, **_PACKED[compression]} if dimensions and kind is not str else {}
-    variable = file.createVariable(name, kind, dimensions, chunksizes=chunks, fill_value=False, **packed)
+    packed = (
+        {"fletcher32": True, **_PACKED[compression]}
+        if dimensions and kind is not str
+        else {}
+    )
+    variable = file.createVariable(
+        name, kind, dimensions, chunksizes=chunks, fill_value=False, **packed
+    )
     if chunks:
         variable.set_var_chunk_cache(CHUNK_CACHE)
     variable.setncatts(attributes)
@@ -438,13 +675,16 @@ def _fill(outline: Outline, parts: Blocks, variables: Mapping[str, Any]) -> None
     sums: dict[tuple[str, int], np.ndarray] = {}
     for piece in outline.pieces:
         pools: dict[str, list[np.ndarray]] = {}
-        rank = 1 if piece.where else 0  # the axis of members: without a sweep there is none of its points
+        # the axis of members: without a sweep there is none of its points
+        rank = 1 if piece.where else 0
         for rows, part in zip(piece.members, piece.names, strict=True):
             for key, stored in parts.load(part).items():
                 name, _, snapshot = key.partition("@")
                 place, values = outline.places.get(name), stored if rank else stored[0]
                 if name.startswith("late "):
-                    sums[name, rows.start] = sums.get((name, rows.start), 0.0) + np.moveaxis(values, rank, 0)
+                    sums[name, rows.start] = sums.get(
+                        (name, rows.start), 0.0
+                    ) + np.moveaxis(values, rank, 0)
                 if place is None:
                     continue
                 if place.axis:
@@ -453,7 +693,9 @@ def _fill(outline: Outline, parts: Blocks, variables: Mapping[str, Any]) -> None
                     drawn = slice(rows.start, rows.start + values.shape[rank])
                     variables[name][(*piece.where, drawn, int(snapshot))] = values
                 elif "" in place.names:
-                    variables[name][place.axes(piece, rows)] = values if place.each else values.take(0, rank)
+                    variables[name][place.axes(piece, rows)] = (
+                        values if place.each else values.take(0, rank)
+                    )
                 else:
                     pools.setdefault(name, []).append(np.moveaxis(values, rank, 0))
         for name, groups in pools.items():
@@ -466,7 +708,11 @@ def _fill(outline: Outline, parts: Blocks, variables: Mapping[str, Any]) -> None
             sums = {}
 
 
-def _fill_late(piece: Piece, sums: Mapping[tuple[str, int], np.ndarray], variables: Mapping[str, Any]) -> None:
+def _fill_late(
+    piece: Piece,
+    sums: Mapping[tuple[str, int], np.ndarray],
+    variables: Mapping[str, Any],
+) -> None:
     """Put the statistics of the members' means over the second half into variables.
 
     ``sums`` are sums and counts of each member over both halves of it, by variable and group of members.
@@ -474,9 +720,13 @@ def _fill_late(piece: Piece, sums: Mapping[tuple[str, int], np.ndarray], variabl
     pools: dict[str, list[np.ndarray]] = {}
     for (name, _), groups in sums.items():
         with np.errstate(invalid="ignore", divide="ignore"):  # nan without a value
-            first, last = (groups[..., half, 0] / groups[..., half, 1] for half in (0, 1))
+            first, last = (
+                groups[..., half, 0] / groups[..., half, 1] for half in (0, 1)
+            )
             whole = groups[..., 0].sum(axis=-1) / groups[..., 1].sum(axis=-1)
-        pools.setdefault(name, []).append(moments(np.stack([whole, last - first], axis=-1).reshape(len(whole), -1)))
+        pools.setdefault(name, []).append(
+            moments(np.stack([whole, last - first], axis=-1).reshape(len(whole), -1))
+        )
     for name, each in pools.items():
         statistics = pooled(each)
         name = name.replace(" ", "_")
@@ -487,7 +737,11 @@ def _fill_late(piece: Piece, sums: Mapping[tuple[str, int], np.ndarray], variabl
 
 def padded(values: np.ndarray, length: int) -> np.ndarray:
     """Return values with a last axis of a length, nan beyond their own."""
-    return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, length - values.shape[-1])], constant_values=np.nan)
+    return np.pad(
+        values,
+        [(0, 0)] * (values.ndim - 1) + [(0, length - values.shape[-1])],
+        constant_values=np.nan,
+    )
 
 
 def moments(values: np.ndarray) -> np.ndarray:
@@ -511,10 +765,19 @@ def pooled(groups: list[np.ndarray]) -> dict[str, np.ndarray]:
         for other, other_mean, other_squares in groups[1:]:
             total, step = count + other, np.where(other > 0.0, other_mean - mean, 0.0)
             mean = np.where(count > 0.0, mean + step * other / total, other_mean)
-            squares = np.where(count > 0.0, squares + other_squares + step**2 * count * other / total, other_squares)
+            squares = np.where(
+                count > 0.0,
+                squares + other_squares + step**2 * count * other / total,
+                other_squares,
+            )
             count = total
         deviation = np.sqrt(squares / (count - 1.0))
-        return {"mean": mean, "std": deviation, "sem": deviation / np.sqrt(count), "count": count}
+        return {
+            "mean": mean,
+            "std": deviation,
+            "sem": deviation / np.sqrt(count),
+            "count": count,
+        }
 
 
 def attributes_of(path: Path) -> dict[str, Any]:

@@ -39,7 +39,10 @@ _LOOK, _PATIENCE = 0.2, "20 s"
 #: Blocks that are given out for each thread of a cluster.
 _AHEAD = 2
 #: Each process has one core: libraries of linear algebra are not to start threads of their own.
-_ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR", "NUMBA")}
+_ONE_THREAD = {
+    f"{name}_NUM_THREADS": "1"
+    for name in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR", "NUMBA")
+}
 #: Signals by which a terminal or a scheduler stops a run.
 _STOPPING = "SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK", "SIGUSR1", "SIGXCPU"
 #: The ``group`` of which this thread computed the last block.
@@ -101,7 +104,9 @@ class _Team(NamedTuple):
 class _Here(concurrent.futures.Executor):
     """An executor that computes at once, in the process and thread that asks for it."""
 
-    def submit(self, function: Callable[..., Any], /, *arguments: Any, **keywords: Any) -> Any:
+    def submit(
+        self, function: Callable[..., Any], /, *arguments: Any, **keywords: Any
+    ) -> Any:
         future: Any = concurrent.futures.Future()
         try:
             future.set_result(function(*arguments, **keywords))
@@ -111,9 +116,14 @@ class _Here(concurrent.futures.Executor):
 
 
 def compute(
-    advance: Advance, store: Blocks, tasks: Sequence[tuple[Task, list[int]]], progress: Callable[[int], None],
-    stop: Callable[[], bool], jobs: int = 1, scheduler: str = "",
-) -> None:  # fmt: skip
+    advance: Advance,
+    store: Blocks,
+    tasks: Sequence[tuple[Task, list[int]]],
+    progress: Callable[[int], None],
+    stop: Callable[[], bool],
+    jobs: int = 1,
+    scheduler: str = "",
+) -> None:
     """Compute the missing blocks of tasks and save them.
 
     Parameters
@@ -143,7 +153,10 @@ def compute(
         As raised by a block: at once if it may concern all (disk, memory, input, cluster), else when all else is done.
     """
     run, before = uuid.uuid4().hex, dict(_last.__dict__)
-    chains = [_Chain(f"{run}-{place}", task, missing[::-1]) for place, (task, missing) in enumerate(tasks)]
+    chains = [
+        _Chain(f"{run}-{place}", task, missing[::-1])
+        for place, (task, missing) in enumerate(tasks)
+    ]
     waiting = chains[::-1]
     if scheduler:
         with _cluster(scheduler) as team:
@@ -151,44 +164,70 @@ def compute(
     elif jobs > 1 and len(tasks) > 1:
         while waiting and not stop():  # a broken pool is replaced
             with pool(min(jobs, len(tasks))) as executor:
-                _work_off(_Team(executor, lambda: jobs), advance, store, waiting, progress, stop)
+                _work_off(
+                    _Team(executor, lambda: jobs),
+                    advance,
+                    store,
+                    waiting,
+                    progress,
+                    stop,
+                )
     else:
         try:
-            _work_off(_Team(_Here(), lambda: 1), advance, store, waiting, progress, stop)
+            _work_off(
+                _Team(_Here(), lambda: 1), advance, store, waiting, progress, stop
+            )
         finally:
             _last.__dict__.clear()
             _last.__dict__.update(before)  # of a run whose ``progress`` runs this one
     for chain in chains:
         if chain.fault:
-            chain.fault.add_note(f"in {chain.task}; all other blocks are kept; --resume repeats these")
+            chain.fault.add_note(
+                f"in {chain.task}; all other blocks are kept; --resume repeats these"
+            )
             raise chain.fault
     if lost := [chain for chain in chains if chain.broken == _TRIES]:
         names = "; ".join(str(chain.task) for chain in lost)
         cure = "the likely reason is too little memory; all other blocks are kept; --resume repeats these"
-        raise WorkerDied(f"stopped after repeated crashes of processes: {names}; {cure}")
+        raise WorkerDied(
+            f"stopped after repeated crashes of processes: {names}; {cure}"
+        )
 
 
 def _work_off(
-    team: _Team, advance: Advance, store: Blocks, waiting: list[_Chain], progress: Callable[[int], None],
+    team: _Team,
+    advance: Advance,
+    store: Blocks,
+    waiting: list[_Chain],
+    progress: Callable[[int], None],
     stop: Callable[[], bool],
-) -> None:  # fmt: skip
+) -> None:
     """Give out the blocks of chains until none is left, a stop is asked for, or the pool breaks."""
     running: dict[Any, _Chain] = {}
     is_broken = False
     try:
         while True:
-            while not is_broken and len(running) < team.room() and not (waiting and stop()):
+            while (
+                not is_broken
+                and len(running) < team.room()
+                and not (waiting and stop())
+            ):
                 if not (chain := _taken(waiting, running.values())):
                     break
                 try:
                     running[_submitted(team, advance, store, chain)] = chain
                 except concurrent.futures.BrokenExecutor:
                     is_broken = True
-                    chain.broken += not running  # the pool broke under this chain, or does not start
+                    # the pool broke under this chain, or does not start
+                    chain.broken += not running
                     _put(waiting, chain)
             if not running:
                 break
-            when = concurrent.futures.ALL_COMPLETED if is_broken else concurrent.futures.FIRST_COMPLETED
+            when = (
+                concurrent.futures.ALL_COMPLETED
+                if is_broken
+                else concurrent.futures.FIRST_COMPLETED
+            )
             for future in concurrent.futures.wait(running, _LOOK, when).done:
                 chain = running.pop(future)
                 try:
@@ -198,7 +237,12 @@ def _work_off(
                     chain.broken += 1
                 except team.killed:
                     chain.broken = _TRIES
-                except (OSError, MemoryError, BadInput, concurrent.futures.CancelledError):
+                except (
+                    OSError,
+                    MemoryError,
+                    BadInput,
+                    concurrent.futures.CancelledError,
+                ):
                     raise
                 except Exception as fault:
                     chain.fault = fault
@@ -208,7 +252,9 @@ def _work_off(
                     if team.far:
                         arrays, state = result
                         store.save(chain.task.names[number], arrays, state)
-                        chain.state = state if number + 1 in chain.missing[-1:] else None
+                        chain.state = (
+                            state if number + 1 in chain.missing[-1:] else None
+                        )
                     progress(chain.task.work[number])
                 _put(waiting, chain)
     finally:
@@ -237,16 +283,27 @@ def _submitted(team: _Team, advance: Advance, store: Blocks, chain: _Chain) -> A
     with warnings.catch_warnings():  # of dask: a state may be large
         warnings.filterwarnings("ignore", "Sending large graph")
         reached = None if team.far else store
-        return team.executor.submit(_block, advance, chain.key, task, number, state, reached, _code())
+        return team.executor.submit(
+            _block, advance, chain.key, task, number, state, reached, _code()
+        )
 
 
 def _block(
-    advance: Advance, key: str, task: Task | bytes, number: int, state: Arrays | None, store: Blocks | None,
+    advance: Advance,
+    key: str,
+    task: Task | bytes,
+    number: int,
+    state: Arrays | None,
+    store: Blocks | None,
     code: tuple[str, ...],
-) -> tuple[Arrays, Arrays] | None:  # fmt: skip
+) -> tuple[Arrays, Arrays] | None:
     """Compute a block in a worker and save it, or return it if there is no store."""
     if code != _code():
-        raise BadInput(["a worker has another version of sim, numpy, scipy or numba; install the same versions"])
+        raise BadInput(
+            [
+                "a worker has another version of sim, numpy, scipy or numba; install the same versions"
+            ]
+        )
     group: _Group | None = _last.__dict__.pop("group", None)
     if group is None or group.key != key:
         group = _Group(key, pickle.loads(task) if isinstance(task, bytes) else task)
@@ -286,17 +343,28 @@ def pool(jobs: int) -> Iterator[Any]:
     from loky.backend import get_context
 
     # the modules that this process would import, and none of the present folder beside
-    environment = {"PYTHONPATH": os.pathsep.join(folder or os.getcwd() for folder in sys.path), "PYTHONSAFEPATH": "1"}
+    environment = {
+        "PYTHONPATH": os.pathsep.join(folder or os.getcwd() for folder in sys.path),
+        "PYTHONSAFEPATH": "1",
+    }
     environment |= _ONE_THREAD | {"LOKY_MAX_MEMORY_LEAK_SIZE": "1e18"}
-    how: dict[str, Any] = {"initializer": _begin, "initargs": (os.getpid(),), "env": environment}
+    how: dict[str, Any] = {
+        "initializer": _begin,
+        "initargs": (os.getpid(),),
+        "env": environment,
+    }
     executor = None
     try:
         with _ctrl_c_ignored():
-            executor = loky.ProcessPoolExecutor(jobs, context=get_context("loky"), **how)
+            executor = loky.ProcessPoolExecutor(
+                jobs, context=get_context("loky"), **how
+            )
             executor.submit(os.getpid)  # which starts all processes
         yield executor
     except concurrent.futures.BrokenExecutor:
-        raise WorkerDied("a process died: it was killed or crashed, or there was too little memory") from None
+        raise WorkerDied(
+            "a process died: it was killed or crashed, or there was too little memory"
+        ) from None
     finally:
         if executor is not None:
             executor.shutdown(kill_workers=True)
@@ -338,7 +406,8 @@ def end_with(parent: int) -> None:
 
     with contextlib.suppress(psutil.Error):
         process = psutil.Process(parent)
-        while process.is_running() and process.status() != psutil.STATUS_ZOMBIE:  # for which `wait` would wait
+        # for which `wait` would wait
+        while process.is_running() and process.status() != psutil.STATUS_ZOMBIE:
             time.sleep(_LOOK)
     os._exit(1)
 
@@ -350,13 +419,18 @@ def _cluster(address: str) -> Iterator[_Team]:
         from distributed import CancelledError, Client, KilledWorker  # slow to import
         from distributed.comm import CommClosedError, resolve_address
     except ImportError:
-        raise BadInput(["--scheduler needs dask.distributed; install sliding-sim[cluster]"]) from None
+        raise BadInput(
+            ["--scheduler needs dask.distributed; install sliding-sim[cluster]"]
+        ) from None
     try:
-        resolve_address(address)  # a client that fails at it is not closed within its patience
+        # a client that fails at it is not closed within its patience
+        resolve_address(address)
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as trouble:
         raise WorkerDied(f"no dask scheduler answers at {address}: {trouble}") from None
-    lost = WorkerDied(f"the scheduler at {address} does not answer any more; the results so far are kept")
+    lost = WorkerDied(
+        f"the scheduler at {address} does not answer any more; the results so far are kept"
+    )
 
     def room() -> int:
         try:
@@ -366,7 +440,9 @@ def _cluster(address: str) -> Iterator[_Team]:
 
     with client, client.as_current():
         try:
-            yield _Team(client.get_executor(pure=False), room, far=True, killed=(KilledWorker,))
+            yield _Team(
+                client.get_executor(pure=False), room, far=True, killed=(KilledWorker,)
+            )
         except (CancelledError, concurrent.futures.CancelledError, CommClosedError):
             raise lost from None
 
@@ -381,7 +457,9 @@ def orders() -> Iterator[Callable[[], bool]]:
             raise KeyboardInterrupt
         received.append(number)
         with contextlib.suppress(OSError):  # of a terminal that is gone
-            os.write(2, b"stopping when the running blocks end; once more stops at once\n")
+            os.write(
+                2, b"stopping when the running blocks end; once more stops at once\n"
+            )
 
     before = {number: signal.signal(number, order) for number in signals(*_STOPPING)}
     try:
@@ -400,7 +478,11 @@ def missing_kernels() -> list[str]:
     for module in texts:
         importlib.import_module(module)
     names = [name for name in jit.compiled if _module(name) in texts]
-    return [name for name in sorted(names, key=lambda name: -len(texts[_module(name)])) if not jit.cached(name)]
+    return [
+        name
+        for name in sorted(names, key=lambda name: -len(texts[_module(name)]))
+        if not jit.cached(name)
+    ]
 
 
 def compile_missing(jobs: int | None) -> str:
@@ -416,12 +498,19 @@ def compile_missing(jobs: int | None) -> str:
     lacking = missing_kernels()
     if lacking:
         processes = min(jobs or loky.cpu_count(), len(lacking))
-        with progress_bar(len(lacking), "kernels") as shown, pool(processes) as executor:
-            for future in concurrent.futures.as_completed([executor.submit(_compile_kernel, name) for name in lacking]):
+        with (
+            progress_bar(len(lacking), "kernels") as shown,
+            pool(processes) as executor,
+        ):
+            for future in concurrent.futures.as_completed(
+                [executor.submit(_compile_kernel, name) for name in lacking]
+            ):
                 future.result()
                 shown.advance(1)
     if left := sum(not jit.cached(name) for name in lacking):
-        raise StoreTrouble(f"{left} kernels could not be stored; set SIM_CACHE_DIR to a writable folder")
+        raise StoreTrouble(
+            f"{left} kernels could not be stored; set SIM_CACHE_DIR to a writable folder"
+        )
     return f"{len(lacking)} of {len(jit.compiled)} kernels and laws compiled; the others are in the cache"
 
 

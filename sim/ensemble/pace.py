@@ -31,7 +31,12 @@ def counted(plan: Plan) -> float:
     """Return the counted time of all steps and records on one core [s]."""
     some, groups = spread(plan.points), plan.groups
     first, last = (
-        sum(counted_block(point, group, Block(-1, point.clock.steps, point.clock.stride)) for point in some)
+        sum(
+            counted_block(
+                point, group, Block(-1, point.clock.steps, point.clock.stride)
+            )
+            for point in some
+        )
         for group in (np.array(groups[0]), np.array(groups[-1]))
     )
     return len(plan.points) * ((len(groups) - 1) * first + last) / len(some)
@@ -41,7 +46,9 @@ def counted_block(point: Scenario, members: np.ndarray, block: Block) -> float:
     """Return the counted time of the steps of a block and of the records and maps in it [s]."""
     steps = block.end - block.start
     maps = map_bytes(point, int(np.sum(members < point.record.map_members)))
-    maps *= sum(block.start < step <= block.end for step in snapshots(point)) / max(1, len(point.record.maps))
+    maps *= sum(block.start < step <= block.end for step in snapshots(point)) / max(
+        1, len(point.record.maps)
+    )
     records = steps / block.stride * (_RECORD + len(members) * _RECORD_OF_MEMBER)
     return steps * seconds_a_step(point, len(members)) + records + _MAP_BYTE * maps
 
@@ -73,16 +80,35 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
     minutes. All are made four times as long as often as the time allows. Behind a spring they begin in steady sliding,
     but for the first, because a slider at rest needs no sub-steps before its spring is loaded.
     """
-    members = np.arange(min(plan.group, max(1, int(most / 10.0 / seconds_a_step(point, 1)))))
-    noise, clock, division, count = MemberNoise.of(point.seed, members), point.clock, 1, 1
-    while in_substeps(point) and division < _DIVISIONS and clock.steps * division * _LONGER <= _MOST_STEPS:
+    members = np.arange(
+        min(plan.group, max(1, int(most / 10.0 / seconds_a_step(point, 1))))
+    )
+    noise, clock, division, count = (
+        MemberNoise.of(point.seed, members),
+        point.clock,
+        1,
+        1,
+    )
+    while (
+        in_substeps(point)
+        and division < _DIVISIONS
+        and clock.steps * division * _LONGER <= _MOST_STEPS
+    ):
         division *= _LONGER
     scene = _divided(point, division)
     first = follow(scene, noise, None, range(1, 2))[0]  # loads kernels
     sliding = _sliding(point, noise)
     # its first step is made as such, because at any other the bonds of a contact that was open begin without a stretch
-    others = pack(first if sliding is None else follow(scene, noise, sliding, range(1, 2))[0])
-    states = [first, *(unpack(point, {name: array.copy() for name, array in others.items()}) for _ in _PLACES[1:])]
+    others = pack(
+        first if sliding is None else follow(scene, noise, sliding, range(1, 2))[0]
+    )
+    states = [
+        first,
+        *(
+            unpack(point, {name: array.copy() for name, array in others.items()})
+            for _ in _PLACES[1:]
+        ),
+    ]
     now = stopwatch()
     end, rates = now() + most, np.ones(len(_PLACES))
     while True:
@@ -90,21 +116,33 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
         for number, place in enumerate(_PLACES):
             last = min(int(place * clock.steps * division) + count, scene.clock.steps)
             steps, before = range(last - count + 1, last + 1), now()
-            states[number] = follow(scene, noise, states[number]._replace(step=last - count), steps)[0]
+            states[number] = follow(
+                scene, noise, states[number]._replace(step=last - count), steps
+            )[0]
             longer.append(max(now() - before, 1e-9) * division / count)
             if now() > end:
                 break
         number, after = len(longer), now()
         # places without such long pieces change like those with them
-        rates = np.append(longer, rates[number:] * np.mean(longer) / np.mean(rates[:number]))
-        if count * _LONGER > clock.steps * division or after + _LONGER * (after - began) > end:
+        rates = np.append(
+            longer, rates[number:] * np.mean(longer) / np.mean(rates[:number])
+        )
+        if (
+            count * _LONGER > clock.steps * division
+            or after + _LONGER * (after - began) > end
+        ):
             break
-        division, count = (division // _LONGER, 1) if division > 1 else (1, _LONGER * count)
+        division, count = (
+            (division // _LONGER, 1) if division > 1 else (1, _LONGER * count)
+        )
         scene = _divided(point, division)
     weights = np.where(np.isin(_PLACES, (0.0, 1.0)), 0.5, 1.0)  # trapezoidal rule
     measured = clock.steps * float(np.average(rates, weights=weights))
     block = Block(-1, clock.steps, clock.stride)
-    expected, whole = (counted_block(point, group, block) for group in (members, np.array(plan.groups[0])))
+    expected, whole = (
+        counted_block(point, group, block)
+        for group in (members, np.array(plan.groups[0]))
+    )
     if in_substeps(point) and measured > expected:  # sub-steps are made for each member
         return whole + (measured - expected) * len(plan.groups[0]) / len(members), whole
     return measured * whole / expected, whole
@@ -115,14 +153,21 @@ def _divided(point: Scenario, divisions: int) -> Scenario:
     if divisions == 1:
         return point
     clock = {"duration": point.clock.duration, "step": point.clock.step / divisions}
-    finer = point.with_values({"clock": clock | {"record": point.clock.step * point.clock.stride}}, built=False)
+    finer = point.with_values(
+        {"clock": clock | {"record": point.clock.step * point.clock.stride}},
+        built=False,
+    )
     finer.__dict__["process"] = point.process
     return finer
 
 
 def _sliding(point: Scenario, noise: MemberNoise) -> State | None:
     """Return the state of steady sliding behind a spring, with steady bonds; None if there is no such state."""
-    changes: dict[str, Any] = {"drive.start": "steady", "drive.start_after": 0.0, "bonds.start": "steady"}
+    changes: dict[str, Any] = {
+        "drive.start": "steady",
+        "drive.start_after": 0.0,
+        "bonds.start": "steady",
+    }
     try:
         return start(point.with_values(changes, built=False), noise)
     except BadInput:

@@ -18,7 +18,14 @@ _PART_NUMBERS = 2**22
 _STATE_NUMBERS = 2**23
 # Rough costs of one core [s]: a step of a batch, more if it is advanced step by step; of a member, of a counted
 # population, an event of a bond that is followed, more behind a spring.
-_STEP, _ALONE, _OF_MEMBER, _COUNTED, _EVENT, _DRIVEN_EVENT = 5e-6, 150e-6, 5e-8, 3e-7, 1e-7, 3e-6
+_STEP, _ALONE, _OF_MEMBER, _COUNTED, _EVENT, _DRIVEN_EVENT = (
+    5e-6,
+    150e-6,
+    5e-8,
+    3e-7,
+    1e-7,
+    3e-6,
+)
 #: A dataset without its trajectories [byte], and a variable over the sweep alone; number of statistics of each pooled
 #: variable.
 _SCENARIO_BYTES, _VARIABLE_BYTES, _STATISTICS = 1.6e5, 3.6e3, 3
@@ -80,11 +87,18 @@ class Task(NamedTuple):
     @property
     def work(self) -> list[int]:
         """Return the member-steps of each block."""
-        return [len(self.points) * len(self.members) * (block.end - block.start) for block in self.blocks]
+        return [
+            len(self.points) * len(self.members) * (block.end - block.start)
+            for block in self.blocks
+        ]
 
     def done(self, parts: Any) -> int:
         """Return the member-steps of the blocks whose parts are stored."""
-        return sum(steps for name, steps in zip(self.names, self.work, strict=True) if name in parts)
+        return sum(
+            steps
+            for name, steps in zip(self.names, self.work, strict=True)
+            if name in parts
+        )
 
     def __str__(self) -> str:
         first, last = self.members[0], self.members[-1]
@@ -110,7 +124,10 @@ class Plan:
     @cached_property
     def _vary(self) -> dict[str, bool]:
         """Map each part to True if members differ in it at any point."""
-        return {part: any(point.varies[part] for point in self.points) for part in self.points[0].varies}
+        return {
+            part: any(point.varies[part] for point in self.points)
+            for part in self.points[0].varies
+        }
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
@@ -129,18 +146,33 @@ class Plan:
         return max(len(point.phases.starts) for point in self.points)
 
     def _recorded(self, variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
-        wanted = (variable for variable in variables if self.scenario.record.keeps(variable.name))
-        return tuple(variable for variable in wanted if any(map(variable.applies, self.points)))
+        wanted = (
+            variable
+            for variable in variables
+            if self.scenario.record.keeps(variable.name)
+        )
+        return tuple(
+            variable for variable in wanted if any(map(variable.applies, self.points))
+        )
 
     @cached_property
     def _pieces(self) -> tuple[int, int]:
         """Return the members of a group and the most steps of a block, by the first and the last point of the sweep."""
         ends = self.points[0], self.points[-1]
         group = min(self.members, *(together(point) for point in ends))
-        if self._seconds(group) > _SHARED_SECONDS:  # smaller groups for more cores, if a batch costs little
-            batch, whole = (max(seconds_a_step(point, rows) for point in ends) for rows in (0, group))
-            group = min(group, max(_SMALLEST_GROUP, math.ceil(10.0 * batch * group / (whole - batch))))
-        steps = min(int(_BLOCK_SECONDS / seconds_a_step(point, group)) for point in ends)
+        # smaller groups for more cores, if a batch costs little
+        if self._seconds(group) > _SHARED_SECONDS:
+            batch, whole = (
+                max(seconds_a_step(point, rows) for point in ends)
+                for rows in (0, group)
+            )
+            group = min(
+                group,
+                max(_SMALLEST_GROUP, math.ceil(10.0 * batch * group / (whole - batch))),
+            )
+        steps = min(
+            int(_BLOCK_SECONDS / seconds_a_step(point, group)) for point in ends
+        )
         for point in ends:
             point.release()
         return group, max(1, steps)
@@ -148,11 +180,16 @@ class Plan:
     def _seconds(self, group: int) -> float:
         """Return the counted work of the whole run in groups of so many members, as time of one core [s]."""
         runs = len(self.points) * self.members / group
-        return runs * self.points[0].clock.steps * seconds_a_step(self.points[-1], group)
+        return (
+            runs * self.points[0].clock.steps * seconds_a_step(self.points[-1], group)
+        )
 
     def worthwhile(self) -> int:
         """Return the number of processes that are worth starting."""
-        return min(len(self.packs) * len(self.groups), 1 + int(self._seconds(self.group) / _PROCESS_SECONDS))
+        return min(
+            len(self.packs) * len(self.groups),
+            1 + int(self._seconds(self.group) / _PROCESS_SECONDS),
+        )
 
     @property
     def group(self) -> int:
@@ -161,7 +198,11 @@ class Plan:
 
     def records_of_block(self, point: Scenario) -> int:
         """Return the records of a block; 0 if the steps of a record take longer than a block."""
-        return min(self._pieces[1] // point.clock.stride, self._most_records, point.clock.records)
+        return min(
+            self._pieces[1] // point.clock.stride,
+            self._most_records,
+            point.clock.records,
+        )
 
     @property
     def _most_records(self) -> int:
@@ -169,7 +210,15 @@ class Plan:
 
     def snapshots_of_block(self, point: Scenario) -> int:
         """Return the largest number of times in one block at which maps are drawn."""
-        return max(1, int(8 * _PART_NUMBERS * len(point.record.maps) / map_bytes(point, self.group)))
+        return max(
+            1,
+            int(
+                8
+                * _PART_NUMBERS
+                * len(point.record.maps)
+                / map_bytes(point, self.group)
+            ),
+        )
 
     def blocks(self, point: Scenario) -> list[Block]:
         """Return the blocks of a group: of whole records, or of steps between two records if a record takes too long.
@@ -178,14 +227,25 @@ class Plan:
         """
         clock, longest = point.clock, self._pieces[1]
         if records := self.records_of_block(point):
-            ends = {*range((records - 1) * clock.stride, clock.steps, records * clock.stride), clock.steps}
+            ends = {
+                *range(
+                    (records - 1) * clock.stride, clock.steps, records * clock.stride
+                ),
+                clock.steps,
+            }
         else:
-            intervals = (range(first, first + clock.stride, longest) for first in range(0, clock.steps, clock.stride))
+            intervals = (
+                range(first, first + clock.stride, longest)
+                for first in range(0, clock.steps, clock.stride)
+            )
             ends = {clock.steps, *itertools.chain(*intervals)}
         if point.map_lattice is not None:
             ends |= {*snapshots(point)[:: self.snapshots_of_block(point)]}
         stops = sorted(ends)
-        return [Block(start, end, clock.stride) for start, end in zip([-1, *stops], stops, strict=False)]
+        return [
+            Block(start, end, clock.stride)
+            for start, end in zip([-1, *stops], stops, strict=False)
+        ]
 
     def keeps_late(self, variable: Variable) -> bool:
         """Return True if statistics of a quantity over the second half of the run are recorded, for want of members."""
@@ -195,13 +255,26 @@ class Plan:
     @cached_property
     def packs(self) -> list[range]:
         """Return ranges of points that are stored in one part: neighbours on the last axis with short runs."""
-        first, along, together = self.points[0], len(self.scenario.sweep[-1].values) if self.scenario.sweep else 1, 1
-        alike = not first.record.maps and all(point.clock == first.clock for point in self.points)
+        first, along, together = (
+            self.points[0],
+            len(self.scenario.sweep[-1].values) if self.scenario.sweep else 1,
+            1,
+        )
+        alike = not first.record.maps and all(
+            point.clock == first.clock for point in self.points
+        )
         if alike and len(self.blocks(first)) == 1:
-            by_work, by_records = self._pieces[1] // (first.clock.steps + 1), self._most_records // first.clock.records
+            by_work, by_records = (
+                self._pieces[1] // (first.clock.steps + 1),
+                self._most_records // first.clock.records,
+            )
             together = min(along, max(1, min(by_work, by_records)))
         rows = range(0, len(self.points), along)
-        return [range(a, min(a + together, row + along)) for row in rows for a in range(row, row + along, together)]
+        return [
+            range(a, min(a + together, row + along))
+            for row in rows
+            for a in range(row, row + along, together)
+        ]
 
     def tasks(self) -> Iterator[Task]:
         """Yield all tasks of the run."""
@@ -212,8 +285,18 @@ class Plan:
             points = [self.points[number] for number in pack]
             blocks = self.blocks(points[0])
             for group, members in enumerate(self.groups):
-                names = [part_name(pack.start, group, index) for index in range(len(blocks))]
-                yield Task(points, np.array(members), blocks, names, quantities, each, not self.per_member)
+                names = [
+                    part_name(pack.start, group, index) for index in range(len(blocks))
+                ]
+                yield Task(
+                    points,
+                    np.array(members),
+                    blocks,
+                    names,
+                    quantities,
+                    each,
+                    not self.per_member,
+                )
 
     def share(self, number: int, of: int) -> Iterator[Task]:
         """Yield the tasks of one shard; the shards take turns."""
@@ -222,7 +305,10 @@ class Plan:
     @cached_property
     def groups(self) -> list[range]:
         """Return the members of each group."""
-        return [range(first, min(first + self.group, self.members)) for first in range(0, self.members, self.group)]
+        return [
+            range(first, min(first + self.group, self.members))
+            for first in range(0, self.members, self.group)
+        ]
 
     @cached_property
     def bytes(self) -> float:
@@ -233,12 +319,20 @@ class Plan:
     def file_bytes(self) -> float:
         """Return the rough size of the dataset [byte]."""
         ratio = _PACKED[self.scenario.record.compression]
-        return self._scenario_bytes + _PACKED_MAPS * self.maps + ratio * self.trajectories
+        return (
+            self._scenario_bytes + _PACKED_MAPS * self.maps + ratio * self.trajectories
+        )
 
     @property
     def _scenario_bytes(self) -> float:
-        pooled = [] if self.per_member else list(filter(self.varies, self.variables + self.largest))
-        return _SCENARIO_BYTES + _VARIABLE_BYTES * (self.late + _STATISTICS * len(pooled))
+        pooled = (
+            []
+            if self.per_member
+            else list(filter(self.varies, self.variables + self.largest))
+        )
+        return _SCENARIO_BYTES + _VARIABLE_BYTES * (
+            self.late + _STATISTICS * len(pooled)
+        )
 
     @property
     def late(self) -> int:
@@ -267,7 +361,9 @@ class Plan:
         """Return the size of the trajectories before compression [byte]."""
         each = 4.0 if self.scenario.record.precision == "float32" else 8.0
         varying = self.members * each if per_member else _STATISTICS * 8.0
-        a_record = sum(varying if self.varies(variable) else each for variable in self.variables)
+        a_record = sum(
+            varying if self.varies(variable) else each for variable in self.variables
+        )
         return a_record * self.points[0].clock.records * len(self.points)
 
     def varies(self, variable: Variable) -> bool:
@@ -283,7 +379,10 @@ def together(scenario: Scenario) -> int:
 def snapshots(point: Scenario) -> list[int]:
     """Return the clock steps at which maps are drawn."""
     clock = point.clock
-    return [round(time / clock.duration * (clock.records - 1)) * clock.stride for time in sorted(point.record.maps)]
+    return [
+        round(time / clock.duration * (clock.records - 1)) * clock.stride
+        for time in sorted(point.record.maps)
+    ]
 
 
 def state_numbers(point: Scenario) -> int:
@@ -293,8 +392,15 @@ def state_numbers(point: Scenario) -> int:
 
 def seconds_a_step(point: Scenario, members: int) -> float:
     """Return the rough time of one core for a step of a batch, averaged over the run [s], the same on any machine."""
-    bonds, batch = point.population, _STEP + _ALONE * point.by_steps + point.population.step_seconds
-    member = _OF_MEMBER + point.process.pairs * point.fluctuations.pair_seconds + point.contact.edge_seconds
+    bonds, batch = (
+        point.population,
+        _STEP + _ALONE * point.by_steps + point.population.step_seconds,
+    )
+    member = (
+        _OF_MEMBER
+        + point.process.pairs * point.fluctuations.pair_seconds
+        + point.contact.edge_seconds
+    )
     if bonds.per_member and not bonds.feeds_back:
         event = _DRIVEN_EVENT if point.drive.solves_motion else _EVENT
         member += _COUNTED + event * bonds.followed(point.speeds(21), point.clock.step)
@@ -305,13 +411,27 @@ def map_bytes(point: Scenario, members: int) -> float:
     """Return the size of the maps of some members at one point of a sweep [byte]."""
     if point.map_lattice is None:
         return 0.0
-    return 8.0 * min(point.record.map_members, members) * len(point.record.maps) * math.prod(point.map_lattice.shape)
+    return (
+        8.0
+        * min(point.record.map_members, members)
+        * len(point.record.maps)
+        * math.prod(point.map_lattice.shape)
+    )
 
 
 def work(plan: Plan, number: int = 1, of: int = 1) -> int:
     """Return the member-steps of a plan, or of one shard of it."""
-    steps = (len(pack) * (plan.points[pack.start].clock.steps + 1) for pack in plan.packs)
-    return sum(itertools.islice((one * len(group) for one in steps for group in plan.groups), number - 1, None, of))
+    steps = (
+        len(pack) * (plan.points[pack.start].clock.steps + 1) for pack in plan.packs
+    )
+    return sum(
+        itertools.islice(
+            (one * len(group) for one in steps for group in plan.groups),
+            number - 1,
+            None,
+            of,
+        )
+    )
 
 
 def part_name(point: int, group: int, block: int) -> str:

@@ -10,7 +10,15 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from sim.ensemble.diagnosis import Worst, diagnosis, place as in_words, remarks, slider_body, spread, worst_of_sweep
+from sim.ensemble.diagnosis import (
+    Worst,
+    diagnosis,
+    place as in_words,
+    remarks,
+    slider_body,
+    spread,
+    worst_of_sweep,
+)
 from sim.ensemble.pace import counted, pace as pace_of
 from sim.ensemble.plan import IN_MEMORY, Plan, map_bytes, state_numbers, work
 from sim.ensemble.variables import SOURCES
@@ -59,7 +67,9 @@ class Forecast(NamedTuple):
     file: float
 
 
-def forecast(plan: Plan, jobs: int, pace: float = 1.0, shares: int = 1, left: float = 1.0) -> Forecast:
+def forecast(
+    plan: Plan, jobs: int, pace: float = 1.0, shares: int = 1, left: float = 1.0
+) -> Forecast:
     """Estimate the needs of a run, or of one of some shares of it.
 
     ``pace`` is the measured time of some steps over their counted time, ``left`` the fraction of steps that are not
@@ -81,7 +91,9 @@ def tabulated(plan: Plan) -> bool:
 def memory(plan: Plan, jobs: int) -> float:
     """Estimate the largest memory of all processes together [byte]: libraries, and blocks or the dataset."""
     block = max(_block(plan, point) for point in spread(plan.points, 2))
-    dataset = _COPIES * min(plan.bytes, IN_MEMORY) + (_TABLE if tabulated(plan) else 0.0)
+    dataset = _COPIES * min(plan.bytes, IN_MEMORY) + (
+        _TABLE if tabulated(plan) else 0.0
+    )
     return (jobs + 1 if jobs > 1 else 1) * _PROCESS + max(jobs * block, dataset)
 
 
@@ -91,11 +103,25 @@ def _mode_pairs(point: Scenario) -> int:
 
 def _block(plan: Plan, point: Scenario) -> float:
     """Return the memory of a block while it is computed [byte]: modes, states, and copies of its part."""
-    numbers = plan.group * max(1, plan.records_of_block(point)) * len(plan.variables) * len(plan.packs[0])
-    drawn = min(1.0, plan.snapshots_of_block(point) / len(point.record.maps)) if point.record.maps else 0.0
-    part, pairs = 8.0 * numbers + drawn * map_bytes(point, plan.group), _mode_pairs(point)
+    numbers = (
+        plan.group
+        * max(1, plan.records_of_block(point))
+        * len(plan.variables)
+        * len(plan.packs[0])
+    )
+    drawn = (
+        min(1.0, plan.snapshots_of_block(point) / len(point.record.maps))
+        if point.record.maps
+        else 0.0
+    )
+    part, pairs = (
+        8.0 * numbers + drawn * map_bytes(point, plan.group),
+        _mode_pairs(point),
+    )
     states = 16.0 * plan.group * state_numbers(point)
-    return max(_OF_MODE_MADE * pairs, _OF_MODE * pairs + states + _COPIES_OF_PART * part)
+    return max(
+        _OF_MODE_MADE * pairs, _OF_MODE * pairs + states + _COPIES_OF_PART * part
+    )
 
 
 def memory_limit() -> tuple[float, str]:
@@ -106,15 +132,22 @@ def memory_limit() -> tuple[float, str]:
     import psutil
 
     if text := os.environ.get("SIM_MAX_MEMORY"):
-        return read_option(text, "SIM_MAX_MEMORY", "byte", above=0, typical="4 GB"), "are allowed (SIM_MAX_MEMORY)"
+        return read_option(
+            text, "SIM_MAX_MEMORY", "byte", above=0, typical="4 GB"
+        ), "are allowed (SIM_MAX_MEMORY)"
     processors = int(os.environ.get("SLURM_CPUS_ON_NODE") or cores())
     for name, count in (("SLURM_MEM_PER_NODE", 1), ("SLURM_MEM_PER_CPU", processors)):
         if megabytes := int(os.environ.get(name) or 0):  # 0 stands for all memory
             return 2.0**20 * megabytes * count, f"are allowed ({name})"
-    return psutil.virtual_memory().available + psutil.Process().memory_info().rss, "are free"
+    return (
+        psutil.virtual_memory().available + psutil.Process().memory_info().rss,
+        "are free",
+    )
 
 
-def fitting(plan: Plan, jobs: int, most: float = math.inf, in_memory: bool = False) -> int:
+def fitting(
+    plan: Plan, jobs: int, most: float = math.inf, in_memory: bool = False
+) -> int:
     """Return the number of processes, at most ``jobs``, for which ``most`` [byte] of memory are enough.
 
     If ``most`` is infinite, the limit is ``memory_limit``. A dataset that stays ``in_memory`` counts.
@@ -124,14 +157,18 @@ def fitting(plan: Plan, jobs: int, most: float = math.inf, in_memory: bool = Fal
     NoRoom
         If memory is too small for one process; the message says how much the run takes.
     """
-    limit, source = (most, "are allowed (--max-memory)") if most < math.inf else memory_limit()
+    limit, source = (
+        (most, "are allowed (--max-memory)") if most < math.inf else memory_limit()
+    )
     dataset = _COPIES_IN_MEMORY * plan.bytes if in_memory else 0.0
     for count in range(jobs, 0, -1):
         if memory(plan, count) + dataset <= limit:
             return count
     cure = "reduce modes, maps, records or points of a sweep (see `sim check`)"
     needed = size(memory(plan, 1) + dataset)
-    raise NoRoom(f"the run needs at least {needed} of memory, but {size(limit)} {source}; {cure}")
+    raise NoRoom(
+        f"the run needs at least {needed} of memory, but {size(limit)} {source}; {cure}"
+    )
 
 
 def size(count: float) -> str:
@@ -155,7 +192,11 @@ def usual_jobs(plan: Plan) -> int:
 
 
 def processes(
-    plan: Plan, jobs: int | None, most: float, shard: tuple[int, int] = (1, 1), parts: Any = ()
+    plan: Plan,
+    jobs: int | None,
+    most: float,
+    shard: tuple[int, int] = (1, 1),
+    parts: Any = (),
 ) -> tuple[int, list[str]]:
     """Return the number of processes of a run and the lines that are printed before it.
 
@@ -168,17 +209,27 @@ def processes(
         lines.append(f"note: the memory is enough for {jobs} of {wanted} processes")
     if not tabulated(plan):
         lines.append("note: the dataset is large; `sim stats` prints its table")
-    left = 1.0 - sum(task.done(parts) for task in plan.share(*shard)) / work(plan, *shard) if parts else 1.0
+    left = (
+        1.0 - sum(task.done(parts) for task in plan.share(*shard)) / work(plan, *shard)
+        if parts
+        else 1.0
+    )
     if jobs > 1 or left * counted(plan) > _LONG:
         needs = forecast(plan, jobs, pace_of(plan), shard[1], left)
         if jobs > 1 or needs.clock > _LONG:
-            lines.append(f"{_times(needs, jobs)}, {size(needs.memory)} of memory, a file of {size(needs.file)}")
+            lines.append(
+                f"{_times(needs, jobs)}, {size(needs.memory)} of memory, a file of {size(needs.file)}"
+            )
     return jobs, lines
 
 
 def _times(needs: Forecast, jobs: int) -> str:
     """Return CPU time and time by the clock as text."""
-    clock = f", {duration(needs.clock)} of wall time in {jobs} processes" if jobs > 1 else ""
+    clock = (
+        f", {duration(needs.clock)} of wall time in {jobs} processes"
+        if jobs > 1
+        else ""
+    )
     return f"about {duration(needs.cpu)} of CPU time{clock}"
 
 
@@ -208,13 +259,25 @@ def preview(scenario: Scenario) -> str:
         "notes": [(text,) for text in remarks(plan, most)],
         "the run": _run(plan),
     }
-    return "\n\n".join([scenario.name, *(f"{title}\n{_aligned(rows)}" for title, rows in blocks.items() if rows)])
+    return "\n\n".join(
+        [
+            scenario.name,
+            *(f"{title}\n{_aligned(rows)}" for title, rows in blocks.items() if rows),
+        ]
+    )
 
 
 def _aligned(rows: Rows) -> str:
     """Return rows as text in columns, each as wide as its longest cell."""
-    widths = [max(map(len, column)) for column in itertools.zip_longest(*rows, fillvalue="")]
-    lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip() for row in rows)
+    widths = [
+        max(map(len, column)) for column in itertools.zip_longest(*rows, fillvalue="")
+    ]
+    lines = (
+        "  ".join(
+            cell.ljust(width) for cell, width in zip(row, widths, strict=False)
+        ).rstrip()
+        for row in rows
+    )
     return "\n".join(f"  {line}" for line in lines)
 
 
@@ -227,22 +290,34 @@ def _span(values: Sequence[float], unit: str = "", digits: str = ".4g") -> str:
 def _models(plan: Plan) -> Rows:
     """Return the model of each part, its origin, and its description."""
     source = plan.scenario.origin
-    origins = dict.fromkeys(Parts._fields, "omitted: the simplest" if source.text else "given")
+    origins = dict.fromkeys(
+        Parts._fields, "omitted: the simplest" if source.text else "given"
+    )
     origins |= dict.fromkeys(tomllib.loads(source.text), "in the file")
-    origins |= {key.partition(".")[0]: "changed by an override" for key in source.overrides}
+    origins |= {
+        key.partition(".")[0]: "changed by an override" for key in source.overrides
+    }
     origins |= {key: "swept" for axis in plan.scenario.sweep for key in axis.keys}
     rows: Rows = []
     for place, name in enumerate(Parts._fields):
         models: dict[str, tuple[str, ...]] = {}
         for point in plan.points:
             part = getattr(point, name)
-            models.setdefault(part.model, (name, part.model, origins[name], _meaning(part)))
+            models.setdefault(
+                part.model, (name, part.model, origins[name], _meaning(part))
+            )
             if name in point.why:
                 chosen = f"→ {point.chosen[place].model}"
                 models[chosen] = ("", chosen, "chosen", point.why[name])
         rows += models.values()
-    differ = ", ".join(name for name in Parts._fields if any(point.varies[name] for point in plan.points))
-    text = f"differ in {differ}" if differ else "are identical, so one is computed for all"
+    differ = ", ".join(
+        name
+        for name in Parts._fields
+        if any(point.varies[name] for point in plan.points)
+    )
+    text = (
+        f"differ in {differ}" if differ else "are identical, so one is computed for all"
+    )
     return [*rows, ("members", str(plan.scenario.ensemble.members), text)]
 
 
@@ -257,34 +332,64 @@ def _quantities(points: Sequence[Scenario]) -> Rows:
     columns: dict[str, tuple[str, str, list[Any]]] = {}
     tables = (entries(part, f"{name}.") for name, part in distinct(points))
     plain = (entry for entry in entries(points[0]) if "." not in entry.key)
-    derived = (Entry(key, value, quantity) for point in points for key, (quantity, value) in point.derived.items())
+    derived = (
+        Entry(key, value, quantity)
+        for point in points
+        for key, (quantity, value) in point.derived.items()
+    )
     for key, value, quantity in itertools.chain(*tables, derived, plain):
         unrecorded = key.startswith("record.") and points[0].record == Record()
         if value in (None, "", ()) or key in _ELSEWHERE or unrecorded:
             continue
         unit = "" if quantity is None or quantity.unit == "1" else quantity.unit
-        meaning = "" if quantity is None or key.endswith(quantity.meaning) else quantity.meaning
+        meaning = (
+            ""
+            if quantity is None or key.endswith(quantity.meaning)
+            else quantity.meaning
+        )
         if isinstance(value, tuple):
-            value = f"{len(value)} values" + (f", {_span(value, unit)}" if quantity else "")
-        columns.setdefault(key, (unit, meaning, []))[2].append(str(value).lower() if isinstance(value, bool) else value)
+            value = f"{len(value)} values" + (
+                f", {_span(value, unit)}" if quantity else ""
+            )
+        columns.setdefault(key, (unit, meaning, []))[2].append(
+            str(value).lower() if isinstance(value, bool) else value
+        )
     order = list(dict.fromkeys(key.partition(".")[0] for key in columns))
     rows: Rows = []
     for key in sorted(columns, key=lambda key: order.index(key.partition(".")[0])):
         unit, meaning, values = columns[key]
         different = list(dict.fromkeys(values))
         if isinstance(different[0], str):
-            shown = ", ".join(different[:_MOST_WORDS]) + (", ..." if len(different) > _MOST_WORDS else "")
+            shown = ", ".join(different[:_MOST_WORDS]) + (
+                ", ..." if len(different) > _MOST_WORDS else ""
+            )
         else:
-            shown = _span(different, unit, ".6g" if isinstance(different[0], float) else "")
-        rows.append((key, shown, f"{meaning} ({len(different)} values)" if len(different) > 1 else meaning))
+            shown = _span(
+                different, unit, ".6g" if isinstance(different[0], float) else ""
+            )
+        rows.append(
+            (
+                key,
+                shown,
+                f"{meaning} ({len(different)} values)"
+                if len(different) > 1
+                else meaning,
+            )
+        )
     return rows
 
 
 def _contact(points: Sequence[Scenario]) -> Rows:
     """Return radius and pull-off load of the contact with all its bonds and without fluctuations."""
     closed = [point.rest_radius for point in points if math.isfinite(point.rest_radius)]
-    lost, loaded = len(points) - len(closed), [point for point in points if point.contact.load is not None]
-    loads = [float(jkr.pull_off_load(point.adhesion.work, point.sphere.radius)) for point in loaded]
+    lost, loaded = (
+        len(points) - len(closed),
+        [point for point in points if point.contact.load is not None],
+    )
+    loads = [
+        float(jkr.pull_off_load(point.adhesion.work, point.sphere.radius))
+        for point in loaded
+    ]
     rows: Rows = [("JKR radius", _span(closed, "m"))] if closed else []
     if lost:
         rows.append(("open", f"beyond pull-off at {lost} of {len(points)} points"))
@@ -293,23 +398,46 @@ def _contact(points: Sequence[Scenario]) -> Rows:
 
 def _fluctuations(points: Sequence[Scenario]) -> Rows:
     """Return the size of the fluctuations on the infinite plane, and the errors of the cell."""
-    fields = [(_power(point), point.fluctuations.spectrum, point.solid.effective) for point in points]
+    fields = [
+        (_power(point), point.fluctuations.spectrum, point.solid.effective)
+        for point in points
+    ]
     if not any(spectrum.variance > 0.0 for _, spectrum, _ in fields):
         return []
     rms = [math.sqrt(power * spectrum.variance) for power, spectrum, _ in fields]
-    energies = [power * float(spectrum.surface_energy(*solid)) for power, spectrum, solid in fields]
+    energies = [
+        power * float(spectrum.surface_energy(*solid))
+        for power, spectrum, solid in fields
+    ]
     settled = any(spectrum.bond_made for _, spectrum, _ in fields)
     when = "in steady sliding at the last speed" if settled else "at amplitude 1"
     rows = {"rms of the stress": f"{_span(rms, 'Pa')} {when}"}
     rows["stored energy"] = f"{_span(energies, 'J/m^2')} {when}, on the infinite plane"
     cells = {point.fluctuations.side(point.setting.cell): point for point in points}
     if sides := [side for side in cells if math.isfinite(side)]:
-        ratios = [side / point.rest_radius for side, point in cells.items() if point.rest_radius > 0.0]
-        rows["cell"] = _span(sides, "m") + (f", {_span(ratios)} times the JKR radius" if ratios else "")
+        ratios = [
+            side / point.rest_radius
+            for side, point in cells.items()
+            if point.rest_radius > 0.0
+        ]
+        rows["cell"] = _span(sides, "m") + (
+            f", {_span(ratios)} times the JKR radius" if ratios else ""
+        )
     # a map that is the field has an rms and an energy of its own
-    rows |= dict(detail for point in points[::-1] for detail in point.fluctuations.details(point.setting))
-    if modes := [cast(ModalProcess, point.process).modes for point in points if point.fluctuations.keeps_modes]:
-        pairs, grid = _span([each.qx.size for each in modes], "", ","), _span([each.points for each in modes], "", ",")
+    rows |= dict(
+        detail
+        for point in points[::-1]
+        for detail in point.fluctuations.details(point.setting)
+    )
+    if modes := [
+        cast(ModalProcess, point.process).modes
+        for point in points
+        if point.fluctuations.keeps_modes
+    ]:
+        pairs, grid = (
+            _span([each.qx.size for each in modes], "", ","),
+            _span([each.points for each in modes], "", ","),
+        )
         rows["modes"] = f"{pairs} pairs on a grid of {grid} points a side"
     return [*rows.items()]
 
@@ -326,12 +454,25 @@ def _errors(plan: Plan, most: Worst | None) -> Rows:
     """Return the systematic errors of area and friction where they are largest, beside the standard error."""
     if most is None:
         return []
-    (point, errors), rows, members = most, list[tuple[str, ...]](), plan.scenario.ensemble.members
+    (point, errors), rows, members = (
+        most,
+        list[tuple[str, ...]](),
+        plan.scenario.ensemble.members,
+    )
     for name, words in SOURCES.items():
-        area, friction = (100.0 * errors[f"{name}_error_{of}"] for of in ("area", "friction"))
-        rows.append((words, f"{area:+.2g} points of A/A_JKR, {friction:+.2g} % of the friction"))
+        area, friction = (
+            100.0 * errors[f"{name}_error_{of}"] for of in ("area", "friction")
+        )
+        rows.append(
+            (words, f"{area:+.2g} points of A/A_JKR, {friction:+.2g} % of the friction")
+        )
     noise = 100.0 * errors["member_spread_area"] / math.sqrt(members)
-    rows.append(("standard error", f"{noise:.2g} points of A/A_JKR, of {members} members at one time"))
+    rows.append(
+        (
+            "standard error",
+            f"{noise:.2g} points of A/A_JKR, of {members} members at one time",
+        )
+    )
     return [*rows, ("largest at", in_words(plan, point, errors["error_speed"]))]
 
 
@@ -342,38 +483,71 @@ def _slider(points: Sequence[Scenario]) -> Rows:
         drive, speeds = cast(Spring, point.drive), np.abs(point.speeds(41))
         yields, slope = drive.yields(*point.solid.effective)
         compliance = yields + slope / math.sqrt(point.contact_area / math.pi)
-        rows.setdefault(("contact k_t", "N/m"), []).append(1.0 / compliance if compliance else math.inf)
+        rows.setdefault(("contact k_t", "N/m"), []).append(
+            1.0 / compliance if compliance else math.inf
+        )
         if not drive.spring:
             continue
         if drive.mass > 0.0:
             frequency = math.sqrt(drive.spring / drive.mass) / (2.0 * math.pi)
-            rows.setdefault(("natural frequency", "Hz, of mass and spring"), []).append(frequency)
-        onset = cast(Rate | Cohort | FirstMoment, point.population).onset(speeds, slider_body(point, speeds))
+            rows.setdefault(("natural frequency", "Hz, of mass and spring"), []).append(
+                frequency
+            )
+        onset = cast(Rate | Cohort | FirstMoment, point.population).onset(
+            speeds, slider_body(point, speeds)
+        )
         stiffness = np.where(np.isnan(onset.stiffness), 0.0, onset.stiffness)
         worst = int(np.argmax(stiffness))
         text = "N/m of the spring (0: never, inf: with any spring)"
         rows.setdefault(("oscillates below", text), []).append(float(stiffness[worst]))
         if stiffness[worst] > 0.0:
-            rows.setdefault(("sliding speed then", "m/s"), []).append(float(speeds[worst]))
-            rows.setdefault(("frequency then", "Hz"), []).append(float(onset.frequency[worst]) / (2.0 * math.pi))
+            rows.setdefault(("sliding speed then", "m/s"), []).append(
+                float(speeds[worst])
+            )
+            rows.setdefault(("frequency then", "Hz"), []).append(
+                float(onset.frequency[worst]) / (2.0 * math.pi)
+            )
     return [(name, f"{_span(values)} {text}") for (name, text), values in rows.items()]
 
 
 def _run(plan: Plan) -> Rows:
     """Return the size of a run: steps, members, time, memory and file."""
     scene, clock, jobs = plan.scenario, plan.points[0].clock, usual_jobs(plan)
-    alike = ", all identical, so one is computed" if scene.ensemble.members > plan.members else ""
-    rows: Rows = [("time", f"{clock.steps:,} step{'s' if clock.steps > 1 else ''}, {clock.records:,} records")]
+    alike = (
+        ", all identical, so one is computed"
+        if scene.ensemble.members > plan.members
+        else ""
+    )
+    rows: Rows = [
+        (
+            "time",
+            f"{clock.steps:,} step{'s' if clock.steps > 1 else ''}, {clock.records:,} records",
+        )
+    ]
     rows.append(("members", f"{scene.ensemble.members:,}{alike}"))
     if scene.sweep:
         axes = " × ".join(f"{len(axis.values)} {axis.keys[0]}" for axis in scene.sweep)
-        rows.append(("sweep", f"{axes} = {len(plan.points):,} points" if len(scene.sweep) > 1 else axes))
+        rows.append(
+            (
+                "sweep",
+                f"{axes} = {len(plan.points):,} points"
+                if len(scene.sweep) > 1
+                else axes,
+            )
+        )
     needs, (limit, source) = forecast(plan, jobs, pace_of(plan)), memory_limit()
     short = f", but {size(limit)} {source}" if memory(plan, 1) > limit else ""
-    before = "" if scene.record.compression == "none" else f", {size(plan.bytes)} before compression"
+    before = (
+        ""
+        if scene.record.compression == "none"
+        else f", {size(plan.bytes)} before compression"
+    )
     return [
         *rows,
         ("work", f"{work(plan):,} member-steps, {_times(needs, jobs)}"),
-        ("memory", f"about {size(needs.memory)}{', all processes together' if jobs > 1 else ''}{short}"),
+        (
+            "memory",
+            f"about {size(needs.memory)}{', all processes together' if jobs > 1 else ''}{short}",
+        ),
         ("file", f"about {size(needs.file)}{before}"),
     ]

@@ -12,11 +12,30 @@ from typing import Any, cast
 import numpy as np
 
 from sim.engine import MemberNoise, State, Trajectory, follow
-from sim.ensemble.dataset import attributes, attributes_of, identity, in_memory, moments, outline, padded, write
+from sim.ensemble.dataset import (
+    attributes,
+    attributes_of,
+    identity,
+    in_memory,
+    moments,
+    outline,
+    padded,
+    write,
+)
 from sim.ensemble.execute import compute
 from sim.ensemble.plan import Block, Plan, Task, snapshots
 from sim.ensemble.preview import fitting
-from sim.ensemble.store import WHOLE, Arrays, BlockFiles, Blocks, MemoryBlocks, OutputBusy, Shard, Stopped, Unfinished
+from sim.ensemble.store import (
+    WHOLE,
+    Arrays,
+    BlockFiles,
+    Blocks,
+    MemoryBlocks,
+    OutputBusy,
+    Shard,
+    Stopped,
+    Unfinished,
+)
 from sim.ensemble.variables import LARGEST, MAP, VARIABLES, Variable
 from sim.numerics.files import DiskFull, OutputExists, explained
 from sim.numerics.hdf5 import claim, located
@@ -38,10 +57,19 @@ _MEMBER_STEPS, _STEPS = 2**16, 2**10
 
 
 def run(
-    scenario: Scenario, to: str | os.PathLike | None = None, *, replace: bool = False, resume: bool = False,
-    jobs: int = 1, progress: Progress = lambda done: None, stage: Callable[[str], None] = lambda name: None,
-    stop: Callable[[], bool] = lambda: False, shard: Shard = WHOLE, scheduler: str = "", memory: float = math.inf,
-) -> Any:  # fmt: skip
+    scenario: Scenario,
+    to: str | os.PathLike | None = None,
+    *,
+    replace: bool = False,
+    resume: bool = False,
+    jobs: int = 1,
+    progress: Progress = lambda done: None,
+    stage: Callable[[str], None] = lambda name: None,
+    stop: Callable[[], bool] = lambda: False,
+    shard: Shard = WHOLE,
+    scheduler: str = "",
+    memory: float = math.inf,
+) -> Any:
     """Run a scenario with its ensemble and its sweep.
 
     Parameters
@@ -96,17 +124,28 @@ def run(
     if to is not None and not any(plan.share(*shard)):
         return Path(to)
     jobs = fitting(plan, jobs, memory, in_memory=to is None)
-    how: dict[str, Any] = {"progress": progress, "stop": stop, "jobs": jobs, "scheduler": scheduler}
+    how: dict[str, Any] = {
+        "progress": progress,
+        "stop": stop,
+        "jobs": jobs,
+        "scheduler": scheduler,
+    }
     stage("simulating")
     if to is None:
         import xarray  # slow to import
 
-        with contextlib.nullcontext() if jobs == 1 or scheduler else tempfile.TemporaryDirectory() as folder:
+        with (
+            contextlib.nullcontext()
+            if jobs == 1 or scheduler
+            else tempfile.TemporaryDirectory() as folder
+        ):
             blocks = MemoryBlocks() if folder is None else BlockFiles(Path(folder))
             simulate(plan, blocks, **how)
             stage("writing")
             content = outline(plan, blocks)
-            return located(xarray.Dataset(in_memory(content, blocks), attrs=content.attributes))
+            return located(
+                xarray.Dataset(in_memory(content, blocks), attrs=content.attributes)
+            )
     claim(Path(to), replace or resume, files_read(scenario))
     target = Path(to).resolve() if Path(to).is_symlink() else Path(to)
     if target.exists() and not target.is_file():
@@ -119,17 +158,29 @@ def run(
             is_done = _run(plan, target, shard, resume, replace, stage, how)
             resume, replace = True, False  # of another run that published meanwhile
     except DiskFull as trouble:
-        raise DiskFull(f"{trouble}; free some space and repeat the command with --resume") from trouble
+        raise DiskFull(
+            f"{trouble}; free some space and repeat the command with --resume"
+        ) from trouble
     return target
 
 
 def _run(
-    plan: Plan, target: Path, shard: Shard, resume: bool, replace: bool, stage: Callable[[str], None],
+    plan: Plan,
+    target: Path,
+    shard: Shard,
+    resume: bool,
+    replace: bool,
+    stage: Callable[[str], None],
     how: dict[str, Any],
-) -> bool:  # fmt: skip
+) -> bool:
     """Compute what no other process does, and publish the output if all is there; False to begin anew."""
     order = [axis.keys[0] for axis in plan.scenario.sweep]
-    folder = Unfinished(target, identity(attributes(plan)), order, lambda path: identity(attributes_of(path)))
+    folder = Unfinished(
+        target,
+        identity(attributes(plan)),
+        order,
+        lambda path: identity(attributes_of(path)),
+    )
     tasks = list(plan.tasks())
     names = [name for task in tasks for name in task.names]
     names_of_shard = [name for task in plan.share(*shard) for name in task.names]
@@ -151,17 +202,27 @@ def _run(
     if busy and (shard != WHOLE or of == 1):
         raise folder.refusal(busy[0], of)
     stage("writing")
-    is_done = folder.publish(names, of, lambda path: write(outline(plan, folder.blocks), folder.blocks, path))
+    is_done = folder.publish(
+        names, of, lambda path: write(outline(plan, folder.blocks), folder.blocks, path)
+    )
     if is_done is False and shard == WHOLE:
         shards = ", ".join(f"{number}/{of}" for number in busy) or "some"
-        raise OutputBusy(f"other processes run the shards {shards} of {target}; continue with --resume after them")
+        raise OutputBusy(
+            f"other processes run the shards {shards} of {target}; continue with --resume after them"
+        )
     return is_done is not None
 
 
 def simulate(
-    plan: Plan, blocks: Blocks, progress: Progress = lambda done: None, stop: Callable[[], bool] = lambda: False,
-    jobs: int = 1, scheduler: str = "", shards: Iterable[int] = (1,), of: int = 1,
-) -> None:  # fmt: skip
+    plan: Plan,
+    blocks: Blocks,
+    progress: Progress = lambda done: None,
+    stop: Callable[[], bool] = lambda: False,
+    jobs: int = 1,
+    scheduler: str = "",
+    shards: Iterable[int] = (1,),
+    of: int = 1,
+) -> None:
     """Advance every group of members at every point of the sweep, or those of some shards, and save each block.
 
     Raises
@@ -172,7 +233,9 @@ def simulate(
     missing = []
     for number in shards:
         for task in plan.share(number, of):
-            lacking = [place for place, name in enumerate(task.names) if name not in blocks]
+            lacking = [
+                place for place, name in enumerate(task.names) if name not in blocks
+            ]
             if len(lacking) < len(task.names):
                 progress(task.done(blocks))
             if lacking:
@@ -199,19 +262,34 @@ def advance(task: Task, number: int, state: State | None) -> tuple[State, Arrays
     return end, result
 
 
-def _record(task: Task, point: Scenario, state: State | None, block: Block) -> tuple[State, dict[str, np.ndarray]]:
+def _record(
+    task: Task, point: Scenario, state: State | None, block: Block
+) -> tuple[State, dict[str, np.ndarray]]:
     """One part: every variable over a block and the maps in it; and the state at its end."""
-    clock, members, records, noise = point.clock, task.members, block.records, MemberNoise.of(point.seed, task.members)
+    clock, members, records, noise = (
+        point.clock,
+        task.members,
+        block.records,
+        MemberNoise.of(point.seed, task.members),
+    )
     variables = [variable for variable in VARIABLES if variable.name in task.quantities]
-    rows_of = {name: len(members) if name in task.each else 1 for name in task.quantities}
-    rows = {variable.name: np.empty((rows_of[variable.name], len(records))) for variable in variables}
+    rows_of = {
+        name: len(members) if name in task.each else 1 for name in task.quantities
+    }
+    rows = {
+        variable.name: np.empty((rows_of[variable.name], len(records)))
+        for variable in variables
+    }
     maps: dict[str, np.ndarray] = {}
     drawn, drawn_at = int(np.sum(members < point.record.map_members)), snapshots(point)
     most = max(_STEPS, _MEMBER_STEPS // len(members))
     for steps in block.pieces(max(1, most // clock.stride), drawn_at):
         state, course = follow(point, noise, state, steps)
         if steps[-1] % clock.stride == 0:
-            first, last = steps[0] // clock.stride - records[0], steps[-1] // clock.stride + 1 - records[0]
+            first, last = (
+                steps[0] // clock.stride - records[0],
+                steps[-1] // clock.stride + 1 - records[0],
+            )
             for variable in variables:
                 part = rows[variable.name][:, first:last]
                 part.T[:] = _read(variable, point, course)
@@ -221,19 +299,34 @@ def _record(task: Task, point: Scenario, state: State | None, block: Block) -> t
     if block.end == clock.steps:
         for largest in LARGEST:
             if largest.name in task.quantities:
-                unknown = np.full((1, 0) if largest.axis else 1, np.nan)  # at a point of a sweep without it
+                # at a point of a sweep without it
+                unknown = np.full((1, 0) if largest.axis else 1, np.nan)
                 values = largest.read(point, end) if largest.applies(point) else unknown
-                rows[largest.name] = np.broadcast_to(values, (rows_of[largest.name], *np.shape(values)[1:]))
+                rows[largest.name] = np.broadcast_to(
+                    values, (rows_of[largest.name], *np.shape(values)[1:])
+                )
     if task.pooled:
-        each, late = {name: values for name, values in rows.items() if name in task.each}, {}
+        each, late = (
+            {name: values for name, values in rows.items() if name in task.each},
+            {},
+        )
         if records.stop > second_half(clock.records)[0]:
-            averaged = (v.name for v in variables if v.name in task.each and v.name not in CUMULATIVE)
-            late = {f"late {name}": _late_sums(name, rows, records, clock.records) for name in averaged}
+            averaged = (
+                v.name
+                for v in variables
+                if v.name in task.each and v.name not in CUMULATIVE
+            )
+            late = {
+                f"late {name}": _late_sums(name, rows, records, clock.records)
+                for name in averaged
+            }
         rows |= {name: moments(values) for name, values in each.items()} | late
     return end, rows | maps
 
 
-def _late_sums(name: str, rows: dict[str, np.ndarray], records: range, count: int) -> np.ndarray:
+def _late_sums(
+    name: str, rows: dict[str, np.ndarray], records: range, count: int
+) -> np.ndarray:
     """Return sums and numbers of each member's values over the third and the last quarter of the run, of some records.
 
     Of ``count`` records these are in ``rows``. Values are nan where there is none, and count where the contact is
@@ -245,7 +338,9 @@ def _late_sums(name: str, rows: dict[str, np.ndarray], records: range, count: in
     first, middle = second_half(count)
     places = np.clip(np.array([first, middle, count]) - records.start, 0, len(records))
     quarters = [values[:, slice(*ends)] for ends in itertools.pairwise(places)]
-    return np.stack([[np.nansum(part, axis=1), np.isfinite(part).sum(axis=1)] for part in quarters]).transpose(2, 0, 1)
+    return np.stack(
+        [[np.nansum(part, axis=1), np.isfinite(part).sum(axis=1)] for part in quarters]
+    ).transpose(2, 0, 1)
 
 
 def _read(variable: Variable, point: Scenario, course: Trajectory) -> np.ndarray:
@@ -260,4 +355,8 @@ def _read(variable: Variable, point: Scenario, course: Trajectory) -> np.ndarray
 def _maps(point: Scenario, state: State, drawn: int) -> np.ndarray:
     """Return the maps of the first members."""
     process = cast(ModalProcess | CarriedProcess, point.process)
-    return process.maps(cast(Fluctuation, state.shear), np.broadcast_to(state.drive.position, drawn), drawn)
+    return process.maps(
+        cast(Fluctuation, state.shear),
+        np.broadcast_to(state.drive.position, drawn),
+        drawn,
+    )

@@ -32,7 +32,9 @@ def changed(part: Any, values: Mapping[str, Any]) -> Any:
     for key, value in values.items():
         first, _, rest = key.partition(".")
         name = aliases.get(first, first)
-        result.__dict__[name] = changed(getattr(result, name), {rest: value}) if rest else value
+        result.__dict__[name] = (
+            changed(getattr(result, name), {rest: value}) if rest else value
+        )
     return result
 
 
@@ -40,10 +42,14 @@ def changed(part: Any, values: Mapping[str, Any]) -> Any:
 def _fields(table: Any) -> tuple[list[str], dict[str, str]]:
     """Return the names of a table's values, and those by the key of a file if the key differs."""
     declared = getattr(table, "__pydantic_fields__", {})
-    return [item.name for item in fields(table)], {item.alias: name for name, item in declared.items() if item.alias}
+    return [item.name for item in fields(table)], {
+        item.alias: name for name, item in declared.items() if item.alias
+    }
 
 
-def steady_course(scenario: Scenario, time: Array, speed: Array, stored: Array | None = None) -> Trajectory:
+def steady_course(
+    scenario: Scenario, time: Array, speed: Array, stored: Array | None = None
+) -> Trajectory:
     """Return contacts that have slid at speeds [m/s] for ever, held as the scenario has it at times [s].
 
     Shapes are (rows, 1). ``stored`` is ΔΓ at amplitude 1 [J/m²], by default its mean on the infinite plane. With
@@ -56,27 +62,48 @@ def steady_course(scenario: Scenario, time: Array, speed: Array, stored: Array |
     shear = scenario.fluctuations
     size = shear.amplitude.factor(speed, bonding.strength) ** 2
     size = bonding.frozen + bonding.varying if shear.spectrum.bond_made else size
-    energy = size * (plane_energy(shear.spectrum, *scenario.solid.effective) if stored is None else stored)
+    energy = size * (
+        plane_energy(shear.spectrum, *scenario.solid.effective)
+        if stored is None
+        else stored
+    )
     terms = balance(scenario, bonding.fraction, bonding.strength, energy + still, still)
     touch = scenario.contact.start(motion, scenario.clock.duration, terms)
-    moving = time, still, speed, bonding.fraction, bonding.stress, bonding.strength, energy
+    moving = (
+        time,
+        still,
+        speed,
+        bonding.fraction,
+        bonding.stress,
+        bonding.strength,
+        energy,
+    )
     return Trajectory(*moving, np.empty((len(speed), 1, 0)), *touch)
 
 
-@functools.lru_cache(maxsize=64)  # points of a sweep and shares of the energy have the same bonds at the same speeds
+# points of a sweep and shares of the energy have the same bonds at the same speeds
+@functools.lru_cache(maxsize=64)
 def bonds_at(population: Model, speeds: tuple[float, ...]) -> Bonding:
     """Return bonds in steady sliding at speeds [m/s], each distinct speed computed once."""
     distinct, place = np.unique(speeds, return_inverse=True)
-    return Bonding(*(values[place] if values.size > 1 else values for values in population.steady(distinct)))
+    return Bonding(
+        *(
+            values[place] if values.size > 1 else values
+            for values in population.steady(distinct)
+        )
+    )
 
 
-@functools.lru_cache(maxsize=256)  # most numbers that are changed are none of the spectrum's
+# most numbers that are changed are none of the spectrum's
+@functools.lru_cache(maxsize=256)
 def plane_energy(spectrum: Family, shear_modulus: float, poisson_ratio: float) -> float:
     """Return the mean ΔΓ of a spectrum on the infinite plane [J/m²]."""
     return float(spectrum.surface_energy(shear_modulus, poisson_ratio))
 
 
-def sensitivities(scenario: Scenario, time: float, speed: float) -> dict[str, tuple[float, float]]:
+def sensitivities(
+    scenario: Scenario, time: float, speed: float
+) -> dict[str, tuple[float, float]]:
     """Return the sensitivities of contact area and friction in steady sliding to each key, the largest first.
 
     They are logarithmic derivatives (percent per percent) by differences of the steady laws, central unless the number
@@ -96,11 +123,23 @@ def sensitivities(scenario: Scenario, time: float, speed: float) -> dict[str, tu
     >>> print(f"{sensitivities(lens, 0.0, 0.0)['sphere.radius'][0]:.5f}")
     1.33333
     """
-    result, ends = {}, {"speed": [(scenario, speed * (1.0 + h), h) for h in (-_STEP, _STEP)]} if speed else {}
+    result, ends = (
+        {},
+        {"speed": [(scenario, speed * (1.0 + h), h) for h in (-_STEP, _STEP)]}
+        if speed
+        else {},
+    )
     for key, (quantity, value) in quantities(scenario).items():
         if value and not quantity.whole and key.partition(".")[0] not in _NO_PHYSICS:
-            steps = (-_STEP, _STEP if value * (1.0 + _STEP) < min(quantity.at_most, quantity.below) else 0.0)
-            ends[key] = [(changed(scenario, {key: value * (1.0 + h)}), speed, h) for h in steps]
+            steps = (
+                -_STEP,
+                _STEP
+                if value * (1.0 + _STEP) < min(quantity.at_most, quantity.below)
+                else 0.0,
+            )
+            ends[key] = [
+                (changed(scenario, {key: value * (1.0 + h)}), speed, h) for h in steps
+            ]
     for key, (before, after) in ends.items():
         rise = _logarithms(*after[:2], time) - _logarithms(*before[:2], time)
         if np.max(np.abs(rise)) > _NOTHING * _STEP:
@@ -112,6 +151,10 @@ def sensitivities(scenario: Scenario, time: float, speed: float) -> dict[str, tu
 def _logarithms(scenario: Scenario, speed: float, time: float) -> Array:
     """Return the logarithms of area and friction in steady sliding; nan without a contact, and friction's 0 if none."""
     course = steady_course(scenario, np.full((1, 1), time), np.full((1, 1), speed))
-    area = 2.0 * math.log(float(course.radius[0, 0])) if course.radius[0, 0] > 0.0 else math.nan
+    area = (
+        2.0 * math.log(float(course.radius[0, 0]))
+        if course.radius[0, 0] > 0.0
+        else math.nan
+    )
     stress = float(course.strength[0, 0])
     return np.array([area, area + math.log(stress) if stress > 0.0 else 0.0])

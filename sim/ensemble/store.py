@@ -31,10 +31,18 @@ Manifest = dict[str, Any]
 Shard = tuple[int, int]
 WHOLE: Shard = (1, 1)
 
-_MANIFEST, _DATASET, _LOCK, _STATE, _SEAL = "manifest.json", "dataset.nc", "output.lock", "state.", "seal"
+_MANIFEST, _DATASET, _LOCK, _STATE, _SEAL = (
+    "manifest.json",
+    "dataset.nc",
+    "output.lock",
+    "state.",
+    "seal",
+)
 _SHARD = re.compile(r"([1-9][0-9]{0,5})/([1-9][0-9]{0,5})")
 #: Names of the files that a run makes in its folder, whole or on the way.
-_OURS = re.compile(r"manifest\.json|dataset\.nc|.*\.(lock|held)(\..+)?|point\d+-group\d+-block\d+\.npz|\..*\.tmp")
+_OURS = re.compile(
+    r"manifest\.json|dataset\.nc|.*\.(lock|held)(\..+)?|point\d+-group\d+-block\d+\.npz|\..*\.tmp"
+)
 _FORMAT = "parts of a run of sim, 4"
 #: Seconds for which a run that begins waits while another one begins.
 _PATIENCE = 10.0
@@ -61,7 +69,11 @@ def shard_of(text: str) -> Shard:
     """Return the number of a shard and how many there are, of "I/N"."""
     match = _SHARD.fullmatch(text)
     if not match or int(match[1]) > int(match[2]):
-        raise BadInput([f"--shard takes I/N with I from 1 to N, such as 3/64, not {text[:_LONGEST]}"])
+        raise BadInput(
+            [
+                f"--shard takes I/N with I from 1 to N, such as 3/64, not {text[:_LONGEST]}"
+            ]
+        )
     return int(match[1]), int(match[2])
 
 
@@ -109,7 +121,11 @@ class BlockFiles:
         """Write a block, whole or not at all."""
         content = arrays | {f"{_STATE}{key}": values for key, values in state.items()}
         sealed: dict[str, Any] = content | {_SEAL: np.array(self._seal(content))}
-        with explained(self.folder), whole(self.path(name)) as aside, aside.open("wb") as file:
+        with (
+            explained(self.folder),
+            whole(self.path(name)) as aside,
+            aside.open("wb") as file,
+        ):
             np.savez(file, **sealed)
 
     def _seal(self, content: Arrays) -> str:
@@ -132,11 +148,25 @@ class BlockFiles:
         with explained(self.folder):
             self.path(name).unlink(missing_ok=True)
 
-    def _read(self, name: str, wanted: Callable[[str], bool], wholly: bool = False) -> Arrays:
+    def _read(
+        self, name: str, wanted: Callable[[str], bool], wholly: bool = False
+    ) -> Arrays:
         try:
-            with self.path(name).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-                content, seal = {key: arrays[key] for key in arrays if key != _SEAL and wanted(key)}, str(arrays[_SEAL])
-                if not (seal == self._seal(content) if wholly else seal.startswith(self.run)):
+            with (
+                self.path(name).open("rb") as file,
+                np.load(file, allow_pickle=False) as arrays,
+            ):
+                content, seal = (
+                    {
+                        key: arrays[key]
+                        for key in arrays
+                        if key != _SEAL and wanted(key)
+                    },
+                    str(arrays[_SEAL]),
+                )
+                if not (
+                    seal == self._seal(content) if wholly else seal.startswith(self.run)
+                ):
                     raise ValueError("another run or another process wrote it")
                 return content
         except Exception as trouble:  # a damaged file raises whatever its reader meets
@@ -162,12 +192,29 @@ class Unfinished:
         Returns the ``run`` of an output.
     """
 
-    def __init__(self, target: Path, run: Manifest, order: list[str], read: Callable[[Path], Manifest]) -> None:
-        self.target, self.folder, self.run, self.order, self.read = target, parts_of(target), run, order, read
+    def __init__(
+        self,
+        target: Path,
+        run: Manifest,
+        order: list[str],
+        read: Callable[[Path], Manifest],
+    ) -> None:
+        self.target, self.folder, self.run, self.order, self.read = (
+            target,
+            parts_of(target),
+            run,
+            order,
+            read,
+        )
         self._begun: Manifest = {}
-        self.blocks = BlockFiles(self.folder, hashlib.sha256(json.dumps(run, sort_keys=True).encode()).hexdigest())
+        self.blocks = BlockFiles(
+            self.folder,
+            hashlib.sha256(json.dumps(run, sort_keys=True).encode()).hexdigest(),
+        )
 
-    def begin(self, shard: Shard, resume: bool, replace: bool, names: Iterable[str]) -> int:
+    def begin(
+        self, shard: Shard, resume: bool, replace: bool, names: Iterable[str]
+    ) -> int:
         """Begin a run or take up one; return the number of its shards, 0 if the output is there already.
 
         ==========  ====================================  ===========  =======
@@ -189,15 +236,29 @@ class Unfinished:
             if resume and finished == self.run and not older:
                 return 0
             if resume and older:
-                refuse_other(self.folder, older, manifest | ({"shards": older["shards"]} if shard == WHOLE else {}))
+                refuse_other(
+                    self.folder,
+                    older,
+                    manifest | ({"shards": older["shards"]} if shard == WHOLE else {}),
+                )
             elif resume and exists:
                 refuse_other(self.target, finished, self.run)
             joins = shard != WHOLE and older and not _changed(older, manifest)
-            if older and not (resume or replace or (joins and not any(name in self.blocks for name in names))):
+            if older and not (
+                resume
+                or replace
+                or (joins and not any(name in self.blocks for name in names))
+            ):
                 cure = "continue with --resume, or start again with --force"
                 raise OutputExists(f"{self.folder} holds an unfinished run; {cure}")
-            if exists and finished != self.run and not (replace or older.get("replace")):
-                raise OutputExists(f"{self.target} exists; replace it with --force or name another output")
+            if (
+                exists
+                and finished != self.run
+                and not (replace or older.get("replace"))
+            ):
+                raise OutputExists(
+                    f"{self.target} exists; replace it with --force or name another output"
+                )
             if (resume or joins) and older:
                 if replace and self._busy(older["shards"], [shard[0]] if joins else ()):
                     raise self.refusal(*shard)
@@ -210,12 +271,17 @@ class Unfinished:
             with explained(self.folder):
                 self._clean()
                 with whole(self.folder / _MANIFEST) as aside:
-                    aside.write_text(json.dumps(manifest, sort_keys=True, default=str), encoding="utf-8")
+                    aside.write_text(
+                        json.dumps(manifest, sort_keys=True, default=str),
+                        encoding="utf-8",
+                    )
             self._begun = self._manifest()
             return shard[1]
 
     @contextlib.contextmanager
-    def shards_locked(self, numbers: Iterable[int], of: int) -> Iterator[list[int] | None]:
+    def shards_locked(
+        self, numbers: Iterable[int], of: int
+    ) -> Iterator[list[int] | None]:
         """Lock those of some shards that no other process holds, and give their numbers; None if the run is done."""
         locked = list[int]()
         with contextlib.ExitStack() as held:
@@ -227,7 +293,9 @@ class Unfinished:
                         locked.append(number)
             yield None if gone else locked
 
-    def publish(self, names: Iterable[str], of: int, write: Callable[[Path], None]) -> bool | None:
+    def publish(
+        self, names: Iterable[str], of: int, write: Callable[[Path], None]
+    ) -> bool | None:
         """Make the output; False if blocks are missing or another process holds a shard, None if it did so itself."""
         with self._output_locked(None):
             if not (manifest := self._manifest_of_this_run()):
@@ -237,9 +305,15 @@ class Unfinished:
             dataset = self.folder / _DATASET
             with explained(self.folder), whole(dataset) as aside:
                 write(aside)
-            if self.target.exists() and not manifest["replace"] and self.read(self.target) != self.run:
+            if (
+                self.target.exists()
+                and not manifest["replace"]
+                and self.read(self.target) != self.run
+            ):
                 cure = "move it away and repeat the command with --resume"
-                raise OutputExists(f"{self.target} appeared during the run and is not replaced: {cure}")
+                raise OutputExists(
+                    f"{self.target} appeared during the run and is not replaced: {cure}"
+                )
             try:
                 move(dataset, self.target)
             except StoreTrouble as trouble:
@@ -255,10 +329,14 @@ class Unfinished:
         A lock that a file stands in for may be abandoned.
         """
         name = lock_of(*shard) if shard else _LOCK
-        text = f"another run is writing {self.target}; wait for it or name another output"
+        text = (
+            f"another run is writing {self.target}; wait for it or name another output"
+        )
         for path in (self.folder / name, (self.folder / name).with_suffix(".held")):
             if path.exists() and path.stat().st_size:  # such a file names its process
-                text += f"; if that process was killed on another computer, delete {path}"
+                text += (
+                    f"; if that process was killed on another computer, delete {path}"
+                )
         return OutputBusy(text)
 
     def _busy(self, of: int, numbers: Sequence[int] = ()) -> bool:
@@ -278,7 +356,11 @@ class Unfinished:
         except (FileNotFoundError, RecursionError, ValueError):
             return {}
         known = isinstance(manifest, dict) and manifest.get("format") == _FORMAT
-        return manifest if known and manifest.keys() >= {"scenario", "shards", "replace"} else {}
+        return (
+            manifest
+            if known and manifest.keys() >= {"scenario", "shards", "replace"}
+            else {}
+        )
 
     def _manifest_of_this_run(self) -> Manifest:
         """Return the manifest, empty if the run is done; ``BadInput`` if another run has begun in the folder since."""
@@ -290,14 +372,19 @@ class Unfinished:
         """Refuse a folder that no run made, or a run of another format."""
         inside = os.listdir(self.folder)
         foreign = any(not _OURS.fullmatch(name) for name in inside)
-        if _MANIFEST in inside:  # a manifest that is gone by now is of a run that was done meanwhile
+        # a manifest that is gone by now is of a run that was done meanwhile
+        if _MANIFEST in inside:
             foreign = not self._manifest() and (self.folder / _MANIFEST).exists()
         if self.folder.is_symlink() or foreign:
-            raise OutputExists(f"{self.folder} is not the folder of a run; move it away or name another output")
+            raise OutputExists(
+                f"{self.folder} is not the folder of a run; move it away or name another output"
+            )
 
     def _clean(self) -> None:
         """Remove what a run made in the folder, first the manifest, without which no run goes on; a held lock stays."""
-        for path in sorted(self.folder.iterdir(), key=lambda path: path.name != _MANIFEST):
+        for path in sorted(
+            self.folder.iterdir(), key=lambda path: path.name != _MANIFEST
+        ):
             if _OURS.fullmatch(path.name) and path.stem != "output":
                 _unlink(path)
 
@@ -310,18 +397,25 @@ class Unfinished:
                 self.folder.parent.mkdir(parents=True, exist_ok=True)
                 try:
                     self.folder.mkdir()
-                except FileExistsError:  # or it did: another process may have removed the folder since
+                except FileExistsError:
+                    # or it did: another process may have removed the folder since
                     if self.folder.is_file():
                         raise
-            with contextlib.suppress(FileNotFoundError):  # the folder of a run that was done meanwhile
+            # the folder of a run that was done meanwhile
+            with contextlib.suppress(FileNotFoundError):
                 self._refuse_foreign()
                 lock = _lock(path, 1.0)
-            if not lock and patience is not None and time.monotonic() - began > patience:
+            if (
+                not lock
+                and patience is not None
+                and time.monotonic() - began > patience
+            ):
                 raise self.refusal()
         try:
             yield
         finally:
-            if not (self.folder / _MANIFEST).exists():  # of a run that was killed on its way out
+            # of a run that was killed on its way out
+            if not (self.folder / _MANIFEST).exists():
                 with contextlib.suppress(OSError):
                     self._clean()
             self._unlock(lock)
@@ -331,12 +425,14 @@ class Unfinished:
         path, is_done = Path(lock.lock_file), not (self.folder / _MANIFEST).exists()
         left = [path.with_suffix(".lock"), path] if is_done else []
         with contextlib.suppress(OSError):  # Windows keeps open files
-            while left:  # before the release: who waits for a file that is gone begins anew
+            # before the release: who waits for a file that is gone begins anew
+            while left:
                 left[-1].unlink(missing_ok=True)
                 left.pop()
         lock.release()
         if is_done:
-            with contextlib.suppress(OSError):  # with a lock of another process, or files of others
+            # with a lock of another process, or files of others
+            with contextlib.suppress(OSError):
                 for file in left:
                     file.unlink(missing_ok=True)
                 self.folder.rmdir()
@@ -381,19 +477,38 @@ def refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
         version = _short(changed["version.sim"][0])
         if changed["version.sim"][0] is None:
             fault = "is not a netCDF file, is truncated or damaged, or was not written by `sim run`"
-            raise BadInput([f"{path}: {fault}; move it away, or replace it with --force"])
-        raise BadInput([f"{path} was made by sim {version}: finish it by that version, or move it and run again"])
+            raise BadInput(
+                [f"{path}: {fault}; move it away, or replace it with --force"]
+            )
+        raise BadInput(
+            [
+                f"{path} was made by sim {version}: finish it by that version, or move it and run again"
+            ]
+        )
     if changed:
-        some = [f"{key} was {_short(was)}, is {_short(now)}" for key, (was, now) in changed.items()]
+        some = [
+            f"{key} was {_short(was)}, is {_short(now)}"
+            for key, (was, now) in changed.items()
+        ]
         more = f" and {len(some) - _MOST_NAMED} more" if len(some) > _MOST_NAMED else ""
         cure = "run the original scenario, or start again with --force"
-        raise BadInput([f"{path} belongs to another run: {'; '.join(some[:_MOST_NAMED])}{more}; {cure}"])
+        raise BadInput(
+            [
+                f"{path} belongs to another run: {'; '.join(some[:_MOST_NAMED])}{more}; {cure}"
+            ]
+        )
 
 
 def _changed(older: Manifest, wanted: Manifest) -> dict[str, tuple[Any, Any]]:
     """Return the entries before and now that differ between two manifests and decide the numbers, by dotted key."""
-    was, now = (_flat(manifest | {"format": "", "replace": ""}) for manifest in (older, wanted))
-    return {key: (was.get(key), now.get(key)) for key in sorted({*was, *now}) if was.get(key) != now.get(key)}
+    was, now = (
+        _flat(manifest | {"format": "", "replace": ""}) for manifest in (older, wanted)
+    )
+    return {
+        key: (was.get(key), now.get(key))
+        for key in sorted({*was, *now})
+        if was.get(key) != now.get(key)
+    }
 
 
 def _short(value: Any) -> str:
@@ -405,4 +520,8 @@ def _flat(tree: Any, path: str = "") -> dict[str, Any]:
     """Return the values of nested tables by dotted key."""
     if not isinstance(tree, dict):
         return {path: tree}
-    return {k: v for name, inner in tree.items() for k, v in _flat(inner, f"{path}.{name}".lstrip(".")).items()}
+    return {
+        k: v
+        for name, inner in tree.items()
+        for k, v in _flat(inner, f"{path}.{name}".lstrip(".")).items()
+    }

@@ -4,5 +4,13 @@ from importlib.util import find_spec
 
 from sim.units.errors import BadInput
 
-if missing := [name for name in ("starlette", "uvicorn", "plotly", "tomlkit", "lmfit") if find_spec(name) is None]:
-    raise BadInput([f"{missing[0]} is missing; install it with: pip install 'sliding-sim[explore]'"])
+if missing := [
+    name
+    for name in ("starlette", "uvicorn", "plotly", "tomlkit", "lmfit")
+    if find_spec(name) is None
+]:
+    raise BadInput(
+        [
+            f"{missing[0]} is missing; install it with: pip install 'sliding-sim[explore]'"
+        ]
+    )

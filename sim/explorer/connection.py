@@ -34,7 +34,8 @@ class _Transport:
             return
         self.is_ended = True
         self._timer = asyncio.get_running_loop().call_later(_PATIENCE, self.end)
-        self._transport.resume_reading()  # the end of the peer's side is read like its data
+        # the end of the peer's side is read like its data
+        self._transport.resume_reading()
         try:
             self._transport.write_eof()
         except OSError:  # the peer has gone

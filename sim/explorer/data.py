@@ -28,13 +28,19 @@ def table_of(source: str | Path, name: str, scenario: Scenario) -> Measured:
         if isinstance(source, str):
             path.write_text(source, encoding="utf-8")
         if path.is_file() and path.stat().st_size > _MOST_BYTES:
-            raise BadInput([f"{name}: has more than 2 MB; leave out rows, or use sim fit"])
+            raise BadInput(
+                [f"{name}: has more than 2 MB; leave out rows, or use sim fit"]
+            )
         try:
             table = read(path, scenario)
         except BadInput as fault:
-            raise BadInput([problem.replace(str(path), name) for problem in fault.problems]) from None
+            raise BadInput(
+                [problem.replace(str(path), name) for problem in fault.problems]
+            ) from None
     if table.rows > _MOST_ROWS:
-        raise BadInput([f"{name}: has more than {_MOST_ROWS} rows; leave out some, or use sim fit"])
+        raise BadInput(
+            [f"{name}: has more than {_MOST_ROWS} rows; leave out some, or use sim fit"]
+        )
     return table._replace(path=Path(name))
 
 
@@ -45,18 +51,36 @@ def compared(scenario: Scenario, table: Measured) -> dict[str, Any]:
     errors has no residuals and no part in chi^2.
     """
     problem = problem_of(scenario, [table], [], {})
-    off = (problem.values - problem.steady(problem.start)) / np.where(problem.estimated, np.nan, problem.sigma)
+    off = (problem.values - problem.steady(problem.start)) / np.where(
+        problem.estimated, np.nan, problem.sigma
+    )
     speeds, full = np.empty(table.rows), np.empty(table.rows)
     for group in problem.groups[0]:
         speeds[group.rows] = group.speed[:, 0]
-        full[group.rows] = np.pi * by_steady_sliding(group, {}, ["jkr_radius"])["jkr_radius"] ** 2
+        full[group.rows] = (
+            np.pi * by_steady_sliding(group, {}, ["jkr_radius"])["jkr_radius"] ** 2
+        )
     points = {}
     for number, curve in enumerate(table.curves):
         here = problem.curve == number
-        values, errors = curve.values, np.where(problem.estimated, np.nan, problem.sigma)[here]
+        values, errors = (
+            curve.values,
+            np.where(problem.estimated, np.nan, problem.sigma)[here],
+        )
         about = {"speed": listed(speeds), "residuals": listed(off[here])}
-        points[curve.name] = about | {"values": listed(values), "errors": listed(errors)}
+        points[curve.name] = about | {
+            "values": listed(values),
+            "errors": listed(errors),
+        }
         if curve.name == "contact_area":
-            points["area_ratio"] = about | {"values": listed(values / full), "errors": listed(errors / full)}
+            points["area_ratio"] = about | {
+                "values": listed(values / full),
+                "errors": listed(errors / full),
+            }
     chi_square, count = float(np.nansum(off**2)), int(np.sum(~problem.estimated))
-    return {"points": points, "chi_square": chi_square, "count": count, "name": table.path.name}
+    return {
+        "points": points,
+        "chi_square": chi_square,
+        "count": count,
+        "name": table.path.name,
+    }

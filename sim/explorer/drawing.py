@@ -23,19 +23,41 @@ def contact(scenario: Scenario, speed: float) -> dict[str, Any]:
     [m], positive upwards from the undeformed half-space. ``stress`` is a map of one realisation of the shear stress
     [Pa], its mean included, of the side ``side`` [m]; None if the stress is the same everywhere.
     """
-    at_speed = {name: float(values[0]) for name, values in curves(scenario, np.array([speed])).items()}
+    at_speed = {
+        name: float(values[0])
+        for name, values in curves(scenario, np.array([speed])).items()
+    }
     radius, share = at_speed["contact_radius"], at_speed["area_ratio"] or math.nan
     full = math.sqrt(at_speed["contact_area"] / math.pi / share)
     wide = _WIDE / 2.0 * (radius or full or 0.0)
-    result: dict[str, Any] = {"speed": speed, "radius": radius, "jkr_radius": full if math.isfinite(full) else None}
+    result: dict[str, Any] = {
+        "speed": speed,
+        "radius": radius,
+        "jkr_radius": full if math.isfinite(full) else None,
+    }
     if not wide > 0.0:
         return result
     x = np.linspace(-wide, wide, _PROFILE)
-    control, ball = scenario.contact.control(np.zeros((1, 1)), scenario.clock.duration), scenario.sphere.radius
-    indentation = float(np.squeeze(control.indentation(np.full((1, 1), radius), scenario.bodies))) if radius else 0.0
-    surface = -normal_displacement(np.abs(x), radius, indentation, ball) if radius else 0.0 * x
+    control, ball = (
+        scenario.contact.control(np.zeros((1, 1)), scenario.clock.duration),
+        scenario.sphere.radius,
+    )
+    indentation = (
+        float(np.squeeze(control.indentation(np.full((1, 1), radius), scenario.bodies)))
+        if radius
+        else 0.0
+    )
+    surface = (
+        -normal_displacement(np.abs(x), radius, indentation, ball)
+        if radius
+        else 0.0 * x
+    )
     above = gap(np.abs(x), radius, indentation, ball) if radius else x**2 / (2.0 * ball)
-    profiles = {"x": listed(x), "surface": listed(surface), "sphere": listed(surface + above)}
+    profiles = {
+        "x": listed(x),
+        "surface": listed(surface),
+        "sphere": listed(surface + above),
+    }
     stress = _stress(scenario, at_speed, 2.0 * wide)
     rows = None if stress is None else [listed(row) for row in np.round(stress, -1)]
     return result | profiles | {"side": 2.0 * wide, "stress": rows}
@@ -46,15 +68,23 @@ def listed(values: Any) -> list[float | None]:
     return [float(x) if math.isfinite(x) else None for x in np.asarray(values, float)]
 
 
-def _stress(scenario: Scenario, at_speed: dict[str, float], side: float) -> Array | None:
+def _stress(
+    scenario: Scenario, at_speed: dict[str, float], side: float
+) -> Array | None:
     """Return a map of a realisation of the stress on a square [Pa]; None without fluctuations, or of a measured map.
 
     The amplitude is that at the speed of the curves ``at_speed``. Waves shorter than two pixels are left out.
     """
-    shear, full = scenario.fluctuations, plane_energy(scenario.fluctuations.spectrum, *scenario.solid.effective)
+    shear, full = (
+        scenario.fluctuations,
+        plane_energy(scenario.fluctuations.spectrum, *scenario.solid.effective),
+    )
     if shear.passes or not full > 0.0 or not at_speed["fluctuation_energy"] > 0.0:
         return None
-    pixel, white = side / _MAP, np.random.default_rng(scenario.seed).standard_normal((_MAP, _MAP))
+    pixel, white = (
+        side / _MAP,
+        np.random.default_rng(scenario.seed).standard_normal((_MAP, _MAP)),
+    )
     q = 2.0 * math.pi * np.fft.fftfreq(_MAP, pixel)
     try:
         density = shear.spectrum.density(q[:, np.newaxis], q)
@@ -62,5 +92,10 @@ def _stress(scenario: Scenario, at_speed: dict[str, float], side: float) -> Arra
     except ValueError:  # of a single wave, which has no density
         place = pixel * np.arange(_MAP)
         qx, qy = cast(Ripple, shear.spectrum).wavevector
-        field = math.sqrt(2.0 * shear.spectrum.variance) * np.cos(qx * place[:, np.newaxis] + qy * place)
-    return np.asarray(at_speed["shear_stress"] + math.sqrt(at_speed["fluctuation_energy"] / full) * field)
+        field = math.sqrt(2.0 * shear.spectrum.variance) * np.cos(
+            qx * place[:, np.newaxis] + qy * place
+        )
+    return np.asarray(
+        at_speed["shear_stress"]
+        + math.sqrt(at_speed["fluctuation_energy"] / full) * field
+    )

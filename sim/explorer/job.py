@@ -54,10 +54,20 @@ def fitted(scenario: Scenario, table: Any, free: list[str], say: Say) -> dict[st
     say({"done": 0.0})
     result = fit(scenario, [table], free)
     numbers = {
-        item.free.key: {"value": item.value, "low": item.interval.low, "high": item.interval.high, "text": item.texts}
+        item.free.key: {
+            "value": item.value,
+            "low": item.interval.low,
+            "high": item.interval.high,
+            "text": item.texts,
+        }
         for item in result.numbers
     }
-    return {"numbers": numbers, "chi_square": result.best.chi_square, "text": repr(result), "remarks": result.remarks}
+    return {
+        "numbers": numbers,
+        "chi_square": result.best.chi_square,
+        "text": repr(result),
+        "remarks": result.remarks,
+    }
 
 
 def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
@@ -70,8 +80,14 @@ def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
 
     (data,) = xr.broadcast(dataset[[*_NAMES, "jkr_radius", "speed"]])
     data = data if "member" in data.dims else data.expand_dims("member")
-    data["area_ratio"] = data["contact_area"] / (np.pi * data["jkr_radius"].where(data["jkr_radius"] > 0.0) ** 2)
-    data, speed, members = data.drop_vars(["jkr_radius", "speed"]), dataset["speed"], data.sizes["member"]
+    data["area_ratio"] = data["contact_area"] / (
+        np.pi * data["jkr_radius"].where(data["jkr_radius"] > 0.0) ** 2
+    )
+    data, speed, members = (
+        data.drop_vars(["jkr_radius", "speed"]),
+        dataset["speed"],
+        data.sizes["member"],
+    )
     every = slice(None, None, -(-data.sizes["t"] // _DRAWN))
     if scene.drive.solves_motion or scene.contact.changes:
         first = data.isel(member=0, t=every)
@@ -83,10 +99,22 @@ def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
     data, speed = data.isel(t=every), speed.isel(t=every)
     mean, spread = data.mean("member"), xr.zeros_like(data.mean("member"))
     if members > 1:
-        spread = data.std("member", ddof=1) * float(student.ppf(0.975, members - 1)) / members**0.5
+        spread = (
+            data.std("member", ddof=1)
+            * float(student.ppf(0.975, members - 1))
+            / members**0.5
+        )
     sides = {"mean": mean, "low": mean - spread, "high": mean + spread}
-    curves = {str(name): {kind: listed(values[name]) for kind, values in sides.items()} for name in mean}
-    return {"along": "speed", "speed": listed(np.abs(speed)), "curves": curves, "members": members}
+    curves = {
+        str(name): {kind: listed(values[name]) for kind, values in sides.items()}
+        for name in mean
+    }
+    return {
+        "along": "speed",
+        "speed": listed(np.abs(speed)),
+        "curves": curves,
+        "members": members,
+    }
 
 
 def command(task: Callable[[Say], dict[str, Any]]) -> tuple[list[str], bytes]:
@@ -96,7 +124,10 @@ def command(task: Callable[[Say], dict[str, Any]]) -> tuple[list[str], bytes]:
     the last has ``result`` or ``fault``. It does not outlive the present process.
     """
     pickled = cloudpickle.dumps(task)
-    return [sys.executable, "-c", _BEGIN, str(os.getpid())], b"%d\n%s" % (len(pickled), pickled)
+    return [sys.executable, "-c", _BEGIN, str(os.getpid())], b"%d\n%s" % (
+        len(pickled),
+        pickled,
+    )
 
 
 def main() -> None:

@@ -38,7 +38,12 @@ _LOADS, _FEW, _QUICK = (0.25, 4.0), 8, 0.05
 #: Keys that matter most for the area and are marked; tables that are kept.
 _MARKED, _KEPT = 3, 8
 #: Curves of the page that are not shares of an area, with their SI unit.
-_UNITS = {"work_of_adhesion": "J/m^2", "fluctuation_energy": "J/m^2", "friction_force": "N", "contact_area": "m^2"}
+_UNITS = {
+    "work_of_adhesion": "J/m^2",
+    "fluctuation_energy": "J/m^2",
+    "friction_force": "N",
+    "contact_area": "m^2",
+}
 
 
 class Slider(NamedTuple):
@@ -96,9 +101,12 @@ class Page:
     def start(self) -> dict[str, Any]:
         """Return what the page needs once: title, sliders, and why its curves are a preview alone."""
         return {
-            "title": self.scenario.name, "sliders": [slider._asdict() for slider in self.sliders],
-            "preview": list(previews(self.scenario)), "members": self.scenario.ensemble.members, "data": self._first,
-        }  # fmt: skip
+            "title": self.scenario.name,
+            "sliders": [slider._asdict() for slider in self.sliders],
+            "preview": list(previews(self.scenario)),
+            "members": self.scenario.ensemble.members,
+            "data": self._first,
+        }
 
     def read(self, values: Mapping[str, Any], built: bool = True) -> Scenario:
         """Return the scenario with numbers [SI], or text with units, by key; ``built`` as of ``Scenario.with_values``.
@@ -126,7 +134,11 @@ class Page:
             raise Refused({"": "; ".join(fault.problems)}) from None
 
     def answer(
-        self, values: Mapping[str, Any], share: float, loads: bool = False, table: str | None = None
+        self,
+        values: Mapping[str, Any],
+        share: float,
+        loads: bool = False,
+        table: str | None = None,
     ) -> dict[str, Any]:
         """Return curves [SI] for values of the sliders, and the speeds at which a share of the area is lost in words.
 
@@ -134,18 +146,28 @@ class Page:
         """
         scene = self.read(values, built=False)
         now, columns = quantities(scene), curves(scene, self.speeds)
-        largest = {name: float(np.nanmax(np.abs(columns[name]), initial=0.0)) for name in _UNITS}
+        largest = {
+            name: float(np.nanmax(np.abs(columns[name]), initial=0.0))
+            for name in _UNITS
+        }
         energies = ("work_of_adhesion", "fluctuation_energy")
         largest |= dict.fromkeys(energies, max(largest[name] for name in energies))
         crossings = speeds_of_loss(scene, share, self.speeds)
         result: dict[str, Any] = {
-            "values": {key: (now[key][1], engineering(now[key][1], unit)) for key, _, _, unit, *_ in self.sliders},
+            "values": {
+                key: (now[key][1], engineering(now[key][1], unit))
+                for key, _, _, unit, *_ in self.sliders
+            },
             "speed": self.speeds.tolist(),
             "curves": {name: listed(column) for name, column in columns.items()},
-            "units": {name: scaled(largest[name], unit) for name, unit in _UNITS.items()},
+            "units": {
+                name: scaled(largest[name], unit) for name, unit in _UNITS.items()
+            },
             "level": {"speeds": crossings, "words": _loss(scene, share, crossings)},
         }
-        result["units"]["speed"] = scaled(float(np.sqrt(self.speeds[0] * self.speeds[-1])), "m/s")
+        result["units"]["speed"] = scaled(
+            float(np.sqrt(self.speeds[0] * self.speeds[-1])), "m/s"
+        )
         if loads and scene.contact.load is not None and not scene.contact.changes:
             result["loads"] = list(self._other_loads(scene))
         if measured := self.tables.get(table):
@@ -159,7 +181,10 @@ class Page:
         for load in (factor * float(scene.contact.load or 0.0) for factor in _LOADS):
             with contextlib.suppress(BadInput):
                 other = curves(scene.with_values({"contact.load": load}), self.speeds)
-                drawn = {name: listed(other[name]) for name in ("contact_area", "area_ratio", "friction_force")}
+                drawn = {
+                    name: listed(other[name])
+                    for name in ("contact_area", "area_ratio", "friction_force")
+                }
                 yield {"load": engineering(load, "N"), "curves": drawn}
 
     def band(self, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -167,9 +192,14 @@ class Page:
         from sim.explorer.job import ensemble
 
         scenes = self.scenes(values, min(_FEW, self.scenario.ensemble.members))
-        estimate = sum(scene.clock.steps * seconds_a_step(scene, scene.ensemble.members) for scene in scenes)
+        estimate = sum(
+            scene.clock.steps * seconds_a_step(scene, scene.ensemble.members)
+            for scene in scenes
+        )
         # the first run also loads and compiles, and the estimate is rough
-        if estimate > 10.0 * _QUICK or (len(self._times) > 1 and min(self._times) > _QUICK):
+        if estimate > 10.0 * _QUICK or (
+            len(self._times) > 1 and min(self._times) > _QUICK
+        ):
             return {}
         began = time.perf_counter()
         result = ensemble(scenes, lambda message: None)
@@ -181,7 +211,9 @@ class Page:
         scene = self.read(dict(values) | {"ensemble.members": members})
         axes = self._asked.sweep
         if len(axes) == 1 and axes[0].keys == ("drive.speed",):
-            return [scene.with_values({"drive.speed": speed}) for (speed,) in axes[0].values]
+            return [
+                scene.with_values({"drive.speed": speed}) for (speed,) in axes[0].values
+            ]
         return [scene]
 
     def add(self, source: str | Path, name: str) -> str:
@@ -197,7 +229,11 @@ class Page:
         from sim.explorer import take
 
         scene, known = self.read(values), quantities(self.scenario)
-        changed = {key: value for key, (_, value) in quantities(scene).items() if value != known[key][1]}
+        changed = {
+            key: value
+            for key, (_, value) in quantities(scene).items()
+            if value != known[key][1]
+        }
         first = rows(self._asked.sweep)[0] if self._asked.sweep else {}
         return take.toml(self._asked, changed, self._asked.source.overrides | first)
 
@@ -206,7 +242,11 @@ class Page:
         from sim.explorer import take
 
         scene = self.read(values)
-        return take.table(scene, self.speeds) if kind == "csv" else take.picture(scene, self.speeds, kind)
+        return (
+            take.table(scene, self.speeds)
+            if kind == "csv"
+            else take.picture(scene, self.speeds, kind)
+        )
 
     def words(self, values: Mapping[str, Any]) -> dict[str, list[str]]:
         """Return the diagnosis and the remarks of ``sim check`` for values of the sliders."""
@@ -219,16 +259,37 @@ class Page:
         tried = np.geomspace(self.speeds[0], self.speeds[-1], _TRIED)
         before = curves(self.scenario, tried)
         middle = float(tried[len(tried) // 2])
-        order = sorted(sensitivities(self.scenario, 0.0, middle).items(), key=lambda item: -abs(item[1][0]))
+        order = sorted(
+            sensitivities(self.scenario, 0.0, middle).items(),
+            key=lambda item: -abs(item[1][0]),
+        )
         marked = [key for key, (area, _) in order if key != "speed" and area][:_MARKED]
         for key, (quantity, value) in known.items():
             known_to_stay = quantity.whole or key.partition(".")[0] in _NO_SLIDERS
             if known_to_stay or not _changes(self.scenario, key, tried, before):
                 continue
             low, high, logarithmic = _ends(self.scenario, key, quantity, value)
-            shown = quantity.meaning, quantity.symbol, quantity.unit, value, engineering(value, quantity.unit)
-            more = over_band(self.scenario.fluctuations.spectrum) if key == "shear.spectrum.length" else None
-            yield Slider(key, *shown, low, high, logarithmic, key in marked, None if more is None else 1.0 / more)
+            shown = (
+                quantity.meaning,
+                quantity.symbol,
+                quantity.unit,
+                value,
+                engineering(value, quantity.unit),
+            )
+            more = (
+                over_band(self.scenario.fluctuations.spectrum)
+                if key == "shear.spectrum.length"
+                else None
+            )
+            yield Slider(
+                key,
+                *shown,
+                low,
+                high,
+                logarithmic,
+                key in marked,
+                None if more is None else 1.0 / more,
+            )
 
 
 def previews(scenario: Scenario) -> Iterator[str]:
@@ -241,7 +302,9 @@ def previews(scenario: Scenario) -> Iterator[str]:
         yield "what holds the sphere changes in time: the curves are those of its start"
     if scenario.fluctuations.passes:
         yield "a measured map passes under the contact"
-    if ("bonds.area", "carried") in ((entry.key, entry.value) for entry in entries(scenario)):
+    if ("bonds.area", "carried") in (
+        (entry.key, entry.value) for entry in entries(scenario)
+    ):
         yield "bonds keep the stretch of an area that the contact has lost"
 
 
@@ -250,12 +313,18 @@ def _speeds(scenario: Scenario) -> Array:
     speeds = np.abs(scenario.speeds(_POINTS))
     moving = speeds[speeds > 0.0]
     _, critical = quantities(scenario).get("bonds.critical_speed", (None, 1e-3))
-    low, high = (float(np.min(moving)), float(np.max(moving))) if moving.size else (critical, critical)
+    low, high = (
+        (float(np.min(moving)), float(np.max(moving)))
+        if moving.size
+        else (critical, critical)
+    )
     wider = math.sqrt(max(1.0, 1e3 / (high / low)))
     return np.geomspace(low / wider, high * wider, _POINTS)
 
 
-def _changes(scenario: Scenario, key: str, speeds: Array, before: dict[str, Array]) -> bool:
+def _changes(
+    scenario: Scenario, key: str, speeds: Array, before: dict[str, Array]
+) -> bool:
     """Return True if another value of a key, a little smaller or larger, changes a curve."""
     value = quantities(scenario)[key][1]
     for other in (0.99 * value, 1.01 * value) if value else (0.01, -0.01, 1e-6, -1e-6):
@@ -264,18 +333,27 @@ def _changes(scenario: Scenario, key: str, speeds: Array, before: dict[str, Arra
         except BadInput:
             continue
         close = functools.partial(np.allclose, rtol=_CHANGE, atol=0.0, equal_nan=True)
-        return after.keys() != before.keys() or not all(close(after[name], before[name]) for name in before)
+        return after.keys() != before.keys() or not all(
+            close(after[name], before[name]) for name in before
+        )
     return False
 
 
-def _ends(scenario: Scenario, key: str, quantity: Quantity, value: float) -> tuple[float, float, bool]:
+def _ends(
+    scenario: Scenario, key: str, quantity: Quantity, value: float
+) -> tuple[float, float, bool]:
     """Return the ends of a slider, and True if it is logarithmic."""
-    lowest, highest = max(quantity.above, quantity.at_least), min(quantity.below, quantity.at_most)
+    lowest, highest = (
+        max(quantity.above, quantity.at_least),
+        min(quantity.below, quantity.at_most),
+    )
     if math.isfinite(lowest) and math.isfinite(highest):
         return lowest, highest, False
     if quantity.above >= 0.0:
         return value / _FACTOR, min(value * _FACTOR, highest), True
-    size = abs(value) or abs(Quantity(quantity.unit, "").read(quantity.example.strip('"')))
+    size = abs(value) or abs(
+        Quantity(quantity.unit, "").read(quantity.example.strip('"'))
+    )
     if lowest >= 0.0:
         return 0.0, _TIMES * size, False
     if key == "contact.load":
@@ -290,8 +368,16 @@ def _loss(scenario: Scenario, share: float, speeds: list[float]) -> str:
     if not speeds:
         return f"{lost} of the area is lost at no speed shown"
     at = curves(scenario, np.array(speeds[:1]))
-    names = {"bonds": "lost_to_bonds", "fluctuations": "lost_to_fluctuations", "mean stress": "lost_to_mean_stress"}
-    points = [f"{word} {100.0 * at[name][0]:.1f}" for word, name in names.items() if name in at]
+    names = {
+        "bonds": "lost_to_bonds",
+        "fluctuations": "lost_to_fluctuations",
+        "mean stress": "lost_to_mean_stress",
+    }
+    points = [
+        f"{word} {100.0 * at[name][0]:.1f}"
+        for word, name in names.items()
+        if name in at
+    ]
     others = [engineering(speed, "m/s") for speed in speeds[1:]]
     again = f"; again at {', '.join(others)}" if others else ""
     return f"{lost} lost at {engineering(speeds[0], 'm/s')}: {', '.join(points)} points{again}"

@@ -72,12 +72,19 @@ class Guarded:
 
     def __init__(self, page: Page, port: int, framed: bool = False) -> None:
         self.token = secrets.token_urlsafe(32)
-        self._page, self._locks = page, {True: threading.Lock(), False: threading.Lock()}
+        self._page, self._locks = (
+            page,
+            {True: threading.Lock(), False: threading.Lock()},
+        )
         self._hosts = {f"{name}:{port}".encode() for name in ("127.0.0.1", "localhost")}
         static = Path(__file__).with_name("static").iterdir()
-        self._files = {f"/{path.name}": path for path in static if path.suffix[1:] in _TYPES}
+        self._files = {
+            f"/{path.name}": path for path in static if path.suffix[1:] in _TYPES
+        }
         self._files["/"] = self._files.pop("/page.html")
-        self._files["/plotly.js"] = Path(plotly.__file__).with_name("package_data") / "plotly.min.js"
+        self._files["/plotly.js"] = (
+            Path(plotly.__file__).with_name("package_data") / "plotly.min.js"
+        )
         self._headers = {
             "content-security-policy": _POLICY + (_NOTEBOOKS if framed else "'none'"),
             "x-content-type-options": "nosniff",
@@ -87,7 +94,9 @@ class Guarded:
         }
         self._answers: dict[str, Callable[[Query], Any]] = {
             "/start": lambda query: page.start(),
-            "/curves": lambda query: page.answer(query.values, query.share, query.loads, query.data),
+            "/curves": lambda query: page.answer(
+                query.values, query.share, query.loads, query.data
+            ),
             "/words": lambda query: page.words(query.values),
             "/band": lambda query: page.band(query.values),
             "/contact": lambda query: contact(page.read(query.values), query.speed),
@@ -112,7 +121,11 @@ class Guarded:
                     return
                 content = await run_in_threadpool(self._answer, scope["path"], query)
                 is_table = isinstance(content, dict)
-                answer = JSONResponse(content) if is_table else Response(content, media_type=_PICTURES[query.kind])
+                answer = (
+                    JSONResponse(content)
+                    if is_table
+                    else Response(content, media_type=_PICTURES[query.kind])
+                )
         except Refused as fault:
             answer = JSONResponse({"message": fault.detail}, fault.status_code)
         except ValidationError:
@@ -129,23 +142,40 @@ class Guarded:
         from sim.explorer.job import command, ensemble, fitted
 
         if query.task == "ensemble":
-            return command(functools.partial(ensemble, self._page.scenes(query.values, query.members)))
+            return command(
+                functools.partial(
+                    ensemble, self._page.scenes(query.values, query.members)
+                )
+            )
         if (table := self._page.tables.get(query.data)) is None or not query.free:
             raise Refused(400, "a fit needs a table and numbers that are free")
-        return command(functools.partial(fitted, self._page.read(query.values), table, query.free))
+        return command(
+            functools.partial(fitted, self._page.read(query.values), table, query.free)
+        )
 
-    async def _stream(self, query: Query, scope: Scope, receive: Receive, send: Send) -> None:
+    async def _stream(
+        self, query: Query, scope: Scope, receive: Receive, send: Send
+    ) -> None:
         """Run a job in a process of its own for as long as its reader stays, and send its messages as lines."""
         if self._places.locked():
-            raise Refused(429, f"{_MOST_JOBS} computations are under way; stop one of them")
+            raise Refused(
+                429, f"{_MOST_JOBS} computations are under way; stop one of them"
+            )
         async with self._places:
             words, task_bytes = await run_in_threadpool(self._task, query)
-            job = await asyncio.create_subprocess_exec(*words, stdin=PIPE, stdout=PIPE, limit=_MOST_BYTES)
-            writing, reading = cast(asyncio.StreamWriter, job.stdin), cast(asyncio.StreamReader, job.stdout)
+            job = await asyncio.create_subprocess_exec(
+                *words, stdin=PIPE, stdout=PIPE, limit=_MOST_BYTES
+            )
+            writing, reading = (
+                cast(asyncio.StreamWriter, job.stdin),
+                cast(asyncio.StreamReader, job.stdout),
+            )
             self._jobs.add(job)
             try:
                 writing.write(task_bytes)
-                answer = StreamingResponse(reading, headers=self._headers, media_type="application/x-ndjson")
+                answer = StreamingResponse(
+                    reading, headers=self._headers, media_type="application/x-ndjson"
+                )
                 # without a version of the protocol it listens for a reader that leaves
                 await answer({**scope, "asgi": {}}, receive, send)
                 if reading.at_eof():  # it ends by itself, or was ended
@@ -169,9 +199,15 @@ class Guarded:
     def _checked(self, scope: Scope) -> dict[bytes, bytes]:
         """Return the headers of a request that names this server once and comes from no other site."""
         headers = dict(scope["headers"])
-        if len(headers) != len(scope["headers"]) or headers.get(b"host") not in self._hosts:
+        if (
+            len(headers) != len(scope["headers"])
+            or headers.get(b"host") not in self._hosts
+        ):
             raise Refused(403, "another host")
-        if headers.get(b"sec-fetch-site", b"none") not in (b"none", b"same-origin") and not (
+        if headers.get(b"sec-fetch-site", b"none") not in (
+            b"none",
+            b"same-origin",
+        ) and not (
             scope["path"] == "/" and headers.get(b"sec-fetch-mode") == b"navigate"
         ):
             raise Refused(403, "another site")
@@ -183,8 +219,14 @@ class Guarded:
         if scope["method"] != "POST" or not known or scope["query_string"]:
             raise Refused(403, "no such address")
         if not hmac.compare_digest(headers.get(b"x-token", b""), self.token.encode()):
-            raise Refused(403, "This page has lost its key. Open the address that sim explore printed.")
-        if headers.get(b"origin", b"http://" + headers[b"host"]) != b"http://" + headers[b"host"]:
+            raise Refused(
+                403,
+                "This page has lost its key. Open the address that sim explore printed.",
+            )
+        if (
+            headers.get(b"origin", b"http://" + headers[b"host"])
+            != b"http://" + headers[b"host"]
+        ):
             raise Refused(403, "another origin")
         if headers.get(b"content-type") != b"application/json":
             raise Refused(403, "no JSON")
@@ -217,8 +259,13 @@ def bound(port: int) -> socket.socket:
     try:
         result = socket.create_server(("127.0.0.1", port), backlog=128)
     except OSError:
-        raise BadInput([f"--port {port}: the port is in use; name another one, or none for one that is free"]) from None
-    result.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # of all its connections: answers go at once
+        raise BadInput(
+            [
+                f"--port {port}: the port is in use; name another one, or none for one that is free"
+            ]
+        ) from None
+    # of all its connections: answers go at once
+    result.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return result
 
 
@@ -244,7 +291,11 @@ def state_of(link: str, page: Page) -> str:
     BadInput
         If the link has anything but numbers of this page.
     """
-    words = dict(parse_qsl(link.rpartition("#")[2], keep_blank_values=True, max_num_fields=_MOST_FIELDS))
+    words = dict(
+        parse_qsl(
+            link.rpartition("#")[2], keep_blank_values=True, max_num_fields=_MOST_FIELDS
+        )
+    )
     words.pop("token", None)
     try:
         numbers = {key: float(word) for key, word in words.items()}
@@ -296,21 +347,40 @@ class Server:
     """
 
     def __init__(
-        self, scenario: Scenario, port: int = 0, data: Path | None = None, state: str = "", framed: bool = False
+        self,
+        scenario: Scenario,
+        port: int = 0,
+        data: Path | None = None,
+        state: str = "",
+        framed: bool = False,
     ) -> None:
         page = Page(scenario, data)
         numbers = state_of(state, page)
         self._socket = bound(port)
         self.port = self._socket.getsockname()[1]
         application = Guarded(page, self.port, framed)
-        self.address = f"http://127.0.0.1:{self.port}/#token={application.token}" + f"&{numbers}" * bool(numbers)
-        options: Any = {"proxy_headers": False, "server_header": False, "ws": "none", "access_log": False}
-        options |= {"log_level": "error", "lifespan": "off", "timeout_graceful_shutdown": 1, "http": Connection}
+        self.address = (
+            f"http://127.0.0.1:{self.port}/#token={application.token}"
+            + f"&{numbers}" * bool(numbers)
+        )
+        options: Any = {
+            "proxy_headers": False,
+            "server_header": False,
+            "ws": "none",
+            "access_log": False,
+        }
+        options |= {
+            "log_level": "error",
+            "lifespan": "off",
+            "timeout_graceful_shutdown": 1,
+            "http": Connection,
+        }
         self._server = _Stopping(uvicorn.Config(application, **options))
 
     def run(self) -> None:
         """Serve until the process is interrupted."""
-        threading.Thread(target=_import_answers, daemon=True).start()  # while the browser starts
+        # while the browser starts
+        threading.Thread(target=_import_answers, daemon=True).start()
         with self._socket, contextlib.suppress(KeyboardInterrupt):
             self._server.run([self._socket])
 
@@ -335,7 +405,9 @@ class Server:
 def serve(server: Server, browser: bool, say: Callable[[str], None]) -> None:
     """Serve a page until the process is stopped, and open a browser; ``say`` takes the lines that are printed."""
     say(f"open {server.address}")
-    say(f"Ctrl-C stops it; from another machine, first: ssh -L {server.port}:127.0.0.1:{server.port} HOST")
+    say(
+        f"Ctrl-C stops it; from another machine, first: ssh -L {server.port}:127.0.0.1:{server.port} HOST"
+    )
     with _opener(server.address) as link:
         if browser and not webbrowser.open(link):
             say("no browser was found: open the address above")

@@ -22,10 +22,16 @@ from sim.units.notation import engineering
 from sim.units.quantity import Quantity
 
 #: Shares of the lost area, from the curve of the contact upwards, with their colours.
-_LOST = {"lost_to_fluctuations": FLUCTUATIONS, "lost_to_mean_stress": REFERENCE, "lost_to_bonds": BONDS}
+_LOST = {
+    "lost_to_fluctuations": FLUCTUATIONS,
+    "lost_to_mean_stress": REFERENCE,
+    "lost_to_bonds": BONDS,
+}
 
 
-def toml(scenario: Scenario, changed: Mapping[str, float], fixed: Mapping[str, Any]) -> str:
+def toml(
+    scenario: Scenario, changed: Mapping[str, float], fixed: Mapping[str, Any]
+) -> str:
     """Return a scenario as TOML with some numbers changed [SI], and without its sweep.
 
     The comments of its file stay. ``fixed`` are values of keys that its file does not have: those of an option, and
@@ -34,12 +40,19 @@ def toml(scenario: Scenario, changed: Mapping[str, float], fixed: Mapping[str, A
     text = scenario.source.text
     if not text:
         resolved = scenario_json(scenario.with_values(dict(changed)))
-        document = json.loads(resolved, object_hook=lambda table: {k: v for k, v in table.items() if v is not None})
+        document = json.loads(
+            resolved,
+            object_hook=lambda table: {k: v for k, v in table.items() if v is not None},
+        )
         return written(document)
     result, known = tomlkit.parse(text), quantities(scenario)
     result.pop("sweep", None)
-    fixed = {key: value for key, value in fixed.items() if key.partition(".")[0] != "sweep"}
-    numbers = {key: _shortest(value, known[key][0].unit) for key, value in changed.items()}
+    fixed = {
+        key: value for key, value in fixed.items() if key.partition(".")[0] != "sweep"
+    }
+    numbers = {
+        key: _shortest(value, known[key][0].unit) for key, value in changed.items()
+    }
     for key, value in (fixed | numbers).items():
         table: Any = result
         *tables, last = key.split(".")
@@ -53,7 +66,9 @@ def toml(scenario: Scenario, changed: Mapping[str, float], fixed: Mapping[str, A
 
 def _shortest(value: float, unit: str) -> float | str:
     """Return a number as text with a unit if that is exact, else the number in SI."""
-    text = engineering(value, unit).replace("µ", "u").replace("²", "^2").replace("³", "^3")
+    text = (
+        engineering(value, unit).replace("µ", "u").replace("²", "^2").replace("³", "^3")
+    )
     return text if unit != "1" and Quantity(unit, "").read(text) == value else value
 
 
@@ -61,7 +76,9 @@ def table(scenario: Scenario, speeds: Array) -> str:
     """Return curves of steady sliding as CSV in SI, with the columns of ``sim.steady_curves``."""
     curves = steady_curves(scenario, speeds)
     names = [f"{name} [{column.attrs['units']}]" for name, column in curves.items()]
-    return curves.to_dataframe().to_csv(header=names, index_label="speed [m/s]", lineterminator="\n")
+    return curves.to_dataframe().to_csv(
+        header=names, index_label="speed [m/s]", lineterminator="\n"
+    )
 
 
 def picture(scenario: Scenario, speeds: Array, kind: str) -> bytes:
@@ -77,17 +94,30 @@ def figure(scenario: Scenario, speeds: Array) -> Figure:
     with mpl.rc_context(style.STYLE):
         result, (area, energy, friction) = style.rows([1.7, 1.0, 1.0])
         x = speeds * style.in_unit(friction.xaxis, "sliding speed $V$", speeds, "m/s")
-        lost = [name for name in _LOST if name in curves and np.any(curves[name] != 0.0)]
-        levels = np.cumsum([100.0 * curves[name].to_numpy() for name in ("area_ratio", *lost)], axis=0)
+        lost = [
+            name for name in _LOST if name in curves and np.any(curves[name] != 0.0)
+        ]
+        levels = np.cumsum(
+            [100.0 * curves[name].to_numpy() for name in ("area_ratio", *lost)], axis=0
+        )
         area.plot(x, levels[0], color=BOTH, label="contact")
         for name, low, high in zip(lost, levels, levels[1:], strict=False):
             look: Any = {"color": _LOST[name], "alpha": 0.3, "linewidth": 0.0}
             area.fill_between(x, low, high, label=name.replace("_", " "), **look)
         area.set_ylabel(r"$A/A_{\mathrm{JKR}}$ (%)")
-        scale = style.in_unit(energy.yaxis, "energy", np.array([scenario.adhesion.work]), "J/m^2")
+        scale = style.in_unit(
+            energy.yaxis, "energy", np.array([scenario.adhesion.work]), "J/m^2"
+        )
         energy.plot(x, scale * curves["work_of_adhesion"], color=BOTH, label="$w$")
-        energy.plot(x, scale * curves["fluctuation_energy"], color=FLUCTUATIONS, label=r"$\Delta\Gamma$")
-        force = style.in_unit(friction.yaxis, "friction $F$", curves["friction_force"].to_numpy(), "N")
+        energy.plot(
+            x,
+            scale * curves["fluctuation_energy"],
+            color=FLUCTUATIONS,
+            label=r"$\Delta\Gamma$",
+        )
+        force = style.in_unit(
+            friction.yaxis, "friction $F$", curves["friction_force"].to_numpy(), "N"
+        )
         friction.plot(x, force * curves["friction_force"], color=BOTH)
         friction.set_xscale("log")
         for panel in (area, energy):

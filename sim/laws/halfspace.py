@@ -127,7 +127,9 @@ def point_displacement(x, y, shear_modulus, poisson_ratio=0.5):
     if r == 0.0:
         return math.inf
     cosine = x / r
-    return (1.0 - poisson_ratio + poisson_ratio * cosine * cosine) / (2.0 * math.pi * shear_modulus * r)
+    return (1.0 - poisson_ratio + poisson_ratio * cosine * cosine) / (
+        2.0 * math.pi * shear_modulus * r
+    )
 
 
 @law
@@ -193,7 +195,9 @@ def _second(m):
 def _mixed(m):
     """Integral of sin^2 cos^2/Delta over a quarter turn."""
     rest = np.maximum(1.0 - m, _LEAST_REST)
-    near_edge = (_second(m) - rest * scipy.special.elliprd(0.0, rest, 1.0) / 3.0) / (3.0 * np.maximum(m, _SWITCH))
+    near_edge = (_second(m) - rest * scipy.special.elliprd(0.0, rest, 1.0) / 3.0) / (
+        3.0 * np.maximum(m, _SWITCH)
+    )
     inner = math.pi / 16.0 * scipy.special.hyp2f1(0.5, 1.5, 3.0, np.minimum(m, _SWITCH))
     return np.where(m < _SWITCH, inner, near_edge)
 
@@ -245,10 +249,19 @@ def disc_displacement(x, y, radius, stress, shear_modulus, poisson_ratio=0.5):
     outward = np.maximum(rho, 1.0)
     m = np.minimum(rho, 1.0 / outward) ** 2
     turn = (x / outward) ** 2 - (y / outward) ** 2
-    inside = (2.0 - poisson_ratio) * scipy.special.ellipe(m) + poisson_ratio * turn * _mixed(m)
+    inside = (2.0 - poisson_ratio) * scipy.special.ellipe(
+        m
+    ) + poisson_ratio * turn * _mixed(m)
     skew = _second(m) - 2.0 * m * _mixed(m)
-    outside = ((2.0 - poisson_ratio) * _second(m) + poisson_ratio * turn * skew) / outward
-    return stress * radius / (math.pi * shear_modulus) * np.where(rho <= 1.0, inside, outside)
+    outside = (
+        (2.0 - poisson_ratio) * _second(m) + poisson_ratio * turn * skew
+    ) / outward
+    return (
+        stress
+        * radius
+        / (math.pi * shear_modulus)
+        * np.where(rho <= 1.0, inside, outside)
+    )
 
 
 @law
@@ -270,7 +283,9 @@ def disc_mean_displacement(radius, stress, shear_modulus, poisson_ratio=0.5):
     >>> print(f"{disc_mean_displacement(1.0, 1.0, 1.0):.6f}")
     0.636620
     """
-    return 4.0 / 3.0 * (2.0 - poisson_ratio) * stress * radius / (math.pi * shear_modulus)
+    return (
+        4.0 / 3.0 * (2.0 - poisson_ratio) * stress * radius / (math.pi * shear_modulus)
+    )
 
 
 @law
@@ -314,7 +329,9 @@ def disc_tangential_energy(radius, stress, shear_modulus, poisson_ratio=0.5):
     >>> print(f"{disc_tangential_energy(1.0, 1.0, 0.25):.3f}")
     4.000
     """
-    return 2.0 / 3.0 * (2.0 - poisson_ratio) * stress * stress * radius**3 / shear_modulus
+    return (
+        2.0 / 3.0 * (2.0 - poisson_ratio) * stress * stress * radius**3 / shear_modulus
+    )
 
 
 @law
@@ -337,7 +354,9 @@ def edge_work(radius, stress, shear_modulus, poisson_ratio=0.5):
     >>> print(f"{edge_work(1.0, 1.0, 0.25):.3f}")
     -12.000
     """
-    return -2.0 * (2.0 - poisson_ratio) * stress * stress * radius * radius / shear_modulus
+    return (
+        -2.0 * (2.0 - poisson_ratio) * stress * stress * radius * radius / shear_modulus
+    )
 
 
 @law
@@ -443,7 +462,15 @@ def noise_energy(rms, pixel, shear_modulus, poisson_ratio=0.5):
     >>> print(f"{noise_energy(1.0, 1.0, 1.0):.6f}")
     0.210412
     """
-    return (2.0 - poisson_ratio) * math.asinh(1.0) / (2.0 * math.pi) * rms * rms * pixel / shear_modulus
+    return (
+        (2.0 - poisson_ratio)
+        * math.asinh(1.0)
+        / (2.0 * math.pi)
+        * rms
+        * rms
+        * pixel
+        / shear_modulus
+    )
 
 
 @functools.lru_cache(maxsize=4)
@@ -487,8 +514,14 @@ def displacement(field, cell, shear_modulus, poisson_ratio=0.5):
     1.000
     """
     field = np.asarray(field, dtype=float)
-    lattice, unit = _unit_compliance(_sides(cell), field.shape[-2:], float(poisson_ratio))
-    spectrum = scipy.fft.rfft2(field) * unit / np.asarray(shear_modulus, dtype=float)[..., None, None]
+    lattice, unit = _unit_compliance(
+        _sides(cell), field.shape[-2:], float(poisson_ratio)
+    )
+    spectrum = (
+        scipy.fft.rfft2(field)
+        * unit
+        / np.asarray(shear_modulus, dtype=float)[..., None, None]
+    )
     return scipy.fft.irfft2(spectrum, lattice.shape)
 
 
@@ -522,8 +555,14 @@ def surface_energy(field, cell, shear_modulus, poisson_ratio=0.5):
     1.000
     """
     field = np.asarray(field, dtype=float)
-    lattice, unit = _unit_compliance(_sides(cell), field.shape[-2:], float(poisson_ratio))
-    return 0.5 * lattice.weighted_power(field, unit) / (lattice.area**2 * np.asarray(shear_modulus))
+    lattice, unit = _unit_compliance(
+        _sides(cell), field.shape[-2:], float(poisson_ratio)
+    )
+    return (
+        0.5
+        * lattice.weighted_power(field, unit)
+        / (lattice.area**2 * np.asarray(shear_modulus))
+    )
 
 
 # Elastic energy of a fluctuating shear stress on one finite disc of contact: of a wave, of a map.
@@ -585,7 +624,9 @@ def energy_factors(x):
     sine, cosine, integral = np.sin(far) / far, np.cos(far), sine_integral(far)
     mean = integral + (cosine - sine) / far
     skew = (4.0 - 3.0 * sine - cosine) / far - integral
-    return np.where(x < _SERIES_END, near[0], mean), np.where(x < _SERIES_END, near[1], skew)
+    return np.where(x < _SERIES_END, near[0], mean), np.where(
+        x < _SERIES_END, near[1], skew
+    )
 
 
 def marginal_factors(x):
@@ -618,7 +659,9 @@ def marginal_factors(x):
     far = np.clip(x, _SERIES_END, 1e300)
     integral = sine_integral(far)
     skew = 4.0 * np.sin(0.5 * far) ** 2 / far - integral
-    return np.where(x < _SERIES_END, near[0], integral), np.where(x < _SERIES_END, near[1], skew)
+    return np.where(x < _SERIES_END, near[0], integral), np.where(
+        x < _SERIES_END, near[1], skew
+    )
 
 
 def _quarter(x, y):
@@ -646,12 +689,18 @@ def _coverage(points, radius):
     to second order, so that the weights integrate smooth functions up to the edge.
     """
     middle = 0.5 * points
-    index = np.arange(math.ceil(middle - radius - 0.5) - 1, math.floor(middle + radius + 0.5) + 2)
+    index = np.arange(
+        math.ceil(middle - radius - 0.5) - 1, math.floor(middle + radius + 0.5) + 2
+    )
     corner = (np.append(index, index[-1] + 1) - 0.5 - middle) / radius
     area = radius**2 * _quarter(corner[:, None], corner)
     weight = np.clip(np.diff(np.diff(area, axis=0), axis=1), 0.0, 1.0)
     for axis in (0, 1):
-        weight = weight - scipy.ndimage.correlate1d(weight, [1.0, -2.0, 1.0], axis, mode="constant") / 24.0
+        weight = (
+            weight
+            - scipy.ndimage.correlate1d(weight, [1.0, -2.0, 1.0], axis, mode="constant")
+            / 24.0
+        )
     weight.flags.writeable = False
     return index % points, index - middle, weight
 
@@ -668,8 +717,14 @@ def _free_kernel(points, poisson_ratio):
     q = np.hypot(qx, qy)
     q[0, 0] = 1.0
     x = 0.5 * points * q
-    j1, h0, h1 = scipy.special.j1(x), scipy.special.struve(0, x), scipy.special.struve(1, x)
-    mean = x * scipy.special.j0(x) + 0.5 * math.pi * x * (j1 * h0 - scipy.special.j0(x) * h1)
+    j1, h0, h1 = (
+        scipy.special.j1(x),
+        scipy.special.struve(0, x),
+        scipy.special.struve(1, x),
+    )
+    mean = x * scipy.special.j0(x) + 0.5 * math.pi * x * (
+        j1 * h0 - scipy.special.j0(x) * h1
+    )
     skew = (qx**2 - qy**2) / q**2 * (mean - 2.0 * j1)
     level, swing = angular_compliance(poisson_ratio)
     kernel = (level * mean + swing * skew) / q
@@ -682,7 +737,12 @@ def _padded_size(radius):
     """Side of the padded grid in pixels for a disc of ``radius`` pixels; few values, so that kernels are kept."""
     least = 2.0 * (2.0 * radius + 4.0)
     step = 2.0 ** (math.ceil(math.log2(least)) - 3)
-    return max(16, scipy.fft.next_fast_len(2 * math.ceil(0.5 * step * math.ceil(least / step)), real=True))
+    return max(
+        16,
+        scipy.fft.next_fast_len(
+            2 * math.ceil(0.5 * step * math.ceil(least / step)), real=True
+        ),
+    )
 
 
 def _each(energy, field, cell, radius, poisson_ratio):
@@ -696,7 +756,9 @@ def _each(energy, field, cell, radius, poisson_ratio):
     def of_one(map_, a):
         return energy(map_, pixel, a, nu) if a > _LEAST_RADIUS * pixel else 0.0 * a
 
-    return np.vectorize(of_one, otypes=[float], signature="(x,y),()->()")(field, radius)[()]
+    return np.vectorize(of_one, otypes=[float], signature="(x,y),()->()")(
+        field, radius
+    )[()]
 
 
 def disc_energy_of_map(field, cell, radius, shear_modulus, poisson_ratio=0.5):
@@ -741,10 +803,14 @@ def disc_energy_of_map(field, cell, radius, shear_modulus, poisson_ratio=0.5):
     >>> print(f"{disc_energy_of_map(np.ones((64, 64)), 2.0, 1.0, 1.0) * math.pi:.3f}")
     1.000
     """
-    return _each(_energy, field, cell, radius, poisson_ratio) / np.asarray(shear_modulus, dtype=float)
+    return _each(_energy, field, cell, radius, poisson_ratio) / np.asarray(
+        shear_modulus, dtype=float
+    )
 
 
-def disc_energies_of_map(field, pixel, radii, shear_modulus, poisson_ratio=0.5, discs=None):
+def disc_energies_of_map(
+    field, pixel, radii, shear_modulus, poisson_ratio=0.5, discs=None
+):
     """Return the elastic energies per area of a shear-stress map on discs of several radii at its middle.
 
     Parameters
@@ -773,13 +839,17 @@ def disc_energies_of_map(field, pixel, radii, shear_modulus, poisson_ratio=0.5, 
     [0.5 1. ]
     """
     held = np.asarray(radii, float) / pixel
-    grid, kernel = _free_kernel(_padded_size(np.max(held) + _EDGE), float(poisson_ratio))
+    grid, kernel = _free_kernel(
+        _padded_size(np.max(held) + _EDGE), float(poisson_ratio)
+    )
     energies = np.empty(held.shape)
     for place, radius in enumerate(held):
         disc = soft_disc(radius) if discs is None else discs[place]
         first = field.shape[0] // 2 - len(disc) // 2
         inside = slice(first, first + len(disc))
-        energies[place] = grid.weighted_power(field[inside, inside] * disc, kernel) / radius**2
+        energies[place] = (
+            grid.weighted_power(field[inside, inside] * disc, kernel) / radius**2
+        )
     return 0.5 * pixel / (math.pi * grid.points**2 * shear_modulus) * energies
 
 
@@ -915,9 +985,13 @@ def normal_displacement(r, radius, indentation, sphere_radius):
     outside = np.maximum(r, radius)
     # the arcsine of radius/r would lose half its digits at the edge
     turn = np.arctan2(radius, np.sqrt(outside - radius) * np.sqrt(outside + radius))
-    lever = (2.0 * turn) ** 3 / 3.0 * scipy.special.hyp0f1(2.5, -(turn**2))  # sin 2t - 2t cos 2t without cancellation
+    # sin 2t - 2t cos 2t without cancellation
+    lever = (2.0 * turn) ** 3 / 3.0 * scipy.special.hyp0f1(2.5, -(turn**2))
     punch = indentation - radius * (radius / sphere_radius)
-    free = 0.5 / math.pi * outside * (outside / sphere_radius) * lever + 2.0 / math.pi * punch * turn
+    free = (
+        0.5 / math.pi * outside * (outside / sphere_radius) * lever
+        + 2.0 / math.pi * punch * turn
+    )
     return np.where(r <= radius, indentation - 0.5 * r * (r / sphere_radius), free)[()]
 
 
@@ -947,7 +1021,16 @@ def gap(r, radius, indentation, sphere_radius):
     >>> print("%.2e %.2e" % tuple(gap(1.0001, 1.0, [1.0, 0.9], 1.0)))
     1.20e-06 9.01e-04
     """
-    t = np.sqrt(np.maximum(np.subtract(r, radius), 0.0)) * np.sqrt(np.add(r, radius)) / radius
-    opening = t**2 * np.arctan(t) + t**3 / 3.0 * scipy.special.hyp2f1(1.0, 1.5, 2.5, -(t**2))  # t + (t^2 - 1) atan t
+    t = (
+        np.sqrt(np.maximum(np.subtract(r, radius), 0.0))
+        * np.sqrt(np.add(r, radius))
+        / radius
+    )
+    # t + (t^2 - 1) atan t
+    opening = t**2 * np.arctan(t) + t**3 / 3.0 * scipy.special.hyp2f1(
+        1.0, 1.5, 2.5, -(t**2)
+    )
     hertz = radius * (radius / sphere_radius)
-    return hertz / math.pi * opening + 2.0 / math.pi * np.subtract(hertz, indentation) * np.arctan(t)
+    return hertz / math.pi * opening + 2.0 / math.pi * np.subtract(
+        hertz, indentation
+    ) * np.arctan(t)

@@ -241,7 +241,9 @@ def energy_release_rate_at_indentation(radius, indentation, sphere_radius, modul
     >>> print(f"{energy_release_rate_at_indentation(a, 1e-6, 2e-3, 6.4e6):.6f}")
     0.042000
     """
-    return energy_release_rate_at_displacement(radius, indentation, math.inf, sphere_radius, modulus)
+    return energy_release_rate_at_displacement(
+        radius, indentation, math.inf, sphere_radius, modulus
+    )
 
 
 @law
@@ -265,8 +267,16 @@ def potential_at_indentation(separation, stress, radius, work, sphere_radius, mo
     -3.80
     """
     a, s, curvature = radius, separation, 1.0 / sphere_radius
-    normal = a * s * s + 2.0 / 3.0 * a**3 * s * curvature + 0.2 * a**5 * curvature * curvature
-    return modulus * normal - 4.0 * stress * stress * a**3 / modulus - math.pi * work * a * a
+    normal = (
+        a * s * s
+        + 2.0 / 3.0 * a**3 * s * curvature
+        + 0.2 * a**5 * curvature * curvature
+    )
+    return (
+        modulus * normal
+        - 4.0 * stress * stress * a**3 / modulus
+        - math.pi * work * a * a
+    )
 
 
 def potential_at_load(tractive_force, stress, radius, work, sphere_radius, modulus):
@@ -282,13 +292,19 @@ def potential_at_load(tractive_force, stress, radius, work, sphere_radius, modul
     >>> print(f"{potential_at_load(0.0, 0.0, 1.0, 0.0, 1.0, 45.0):.2f}")
     4.00
     """
-    separation = -indentation_under_load(radius, np.negative(tractive_force), sphere_radius, modulus)
-    whole = potential_at_indentation(separation, stress, radius, work, sphere_radius, modulus)
+    separation = -indentation_under_load(
+        radius, np.negative(tractive_force), sphere_radius, modulus
+    )
+    whole = potential_at_indentation(
+        separation, stress, radius, work, sphere_radius, modulus
+    )
     return whole - tractive_force * separation
 
 
 @law
-def potential_slope_at_indentation(separation, stress, radius, work, sphere_radius, modulus):
+def potential_slope_at_indentation(
+    separation, stress, radius, work, sphere_radius, modulus
+):
     """Return dH/da at fixed separation and stress [J/m]; arguments as for ``potential_at_indentation``.
 
     Notes
@@ -306,7 +322,9 @@ def potential_slope_at_indentation(separation, stress, radius, work, sphere_radi
     return modulus * missing * missing - shear - 2.0 * math.pi * work * radius
 
 
-def potential_slope_at_load(tractive_force, stress, radius, work, sphere_radius, modulus):
+def potential_slope_at_load(
+    tractive_force, stress, radius, work, sphere_radius, modulus
+):
     """Return dG/da at fixed load and stress [J/m]; arguments as for ``potential_at_load``.
 
     Notes
@@ -319,8 +337,12 @@ def potential_slope_at_load(tractive_force, stress, radius, work, sphere_radius,
     2.6667
     """
     # with the force held, the separation changes with the radius but does no work in G
-    separation = -indentation_under_load(radius, np.negative(tractive_force), sphere_radius, modulus)
-    return potential_slope_at_indentation(separation, stress, radius, work, sphere_radius, modulus)
+    separation = -indentation_under_load(
+        radius, np.negative(tractive_force), sphere_radius, modulus
+    )
+    return potential_slope_at_indentation(
+        separation, stress, radius, work, sphere_radius, modulus
+    )
 
 
 # Adhesive contact behind a spring of stiffness k: pull-off, load, indentation and energy release rate.
@@ -333,7 +355,9 @@ def fold_root(grips, load):
     x is the root of ``2 g (x^3 - 1) + 3 (1 - g) x^2 (x^3 - 3)``. The start is a rational function with an error of
     5e-4. A step of Halley's method (1e-9) and one of Newton's follow. No branch and no call, for vector instructions.
     """
-    x = (1.0001867 + load * (3.79243383 + 12.48194754 * load)) / (1.0 + load * (2.83851392 + 8.14055122 * load))
+    x = (1.0001867 + load * (3.79243383 + 12.48194754 * load)) / (
+        1.0 + load * (2.83851392 + 8.14055122 * load)
+    )
     cube = x * x * x
     value = 2.0 * grips * (cube - 1.0) + 3.0 * load * (x * x) * (cube - 3.0)
     slope = 6.0 * grips * (x * x) + 3.0 * load * x * (5.0 * cube - 6.0)
@@ -389,7 +413,8 @@ def pull_off_displacement(stiffness, work, sphere_radius, modulus):
     -7.33e-07 -4.35e-06
     """
     root, unit, grips, load = _fold(stiffness, work, sphere_radius, modulus)
-    return fold_level(root, grips, load) * (unit * (unit / sphere_radius) / grips) + 0.0  # no -0
+    # no -0
+    return fold_level(root, grips, load) * (unit * (unit / sphere_radius) / grips) + 0.0
 
 
 @law
@@ -418,11 +443,17 @@ def load_under_displacement(radius, displacement, stiffness, sphere_radius, modu
         return math.nan
     if stiffness == 0.0:
         return 0.0 * displacement * punch
-    return punch * (displacement - radius * (radius / sphere_radius) / 3.0) / (1.0 + punch / stiffness)
+    return (
+        punch
+        * (displacement - radius * (radius / sphere_radius) / 3.0)
+        / (1.0 + punch / stiffness)
+    )
 
 
 @law
-def indentation_under_displacement(radius, displacement, stiffness, sphere_radius, modulus):
+def indentation_under_displacement(
+    radius, displacement, stiffness, sphere_radius, modulus
+):
     """Return the indentation of any contact, in equilibrium or not, of given radius behind a spring [m].
 
     Parameters
@@ -445,7 +476,9 @@ def indentation_under_displacement(radius, displacement, stiffness, sphere_radiu
 
 
 @law
-def energy_release_rate_at_displacement(radius, displacement, stiffness, sphere_radius, modulus):
+def energy_release_rate_at_displacement(
+    radius, displacement, stiffness, sphere_radius, modulus
+):
     """Return the elastic energy released per area by a shrinking contact behind a spring [J/m^2].
 
     Parameters
@@ -486,7 +519,10 @@ def _first_guess(excess, second, fourth, sixth, root, floor):
     level, linear, square = math.sqrt(excess), math.sqrt(second), math.sqrt(fourth)
     near = 2.0 * level / (linear + math.sqrt(second + 4.0 * square * level))
     shift = 3.0 if second > 0.0 else 0.0
-    far = 1.0003 * rough_cube_root(shift + math.sqrt(excess + floor) / math.sqrt(sixth)) - root
+    far = (
+        1.0003 * rough_cube_root(shift + math.sqrt(excess + floor) / math.sqrt(sixth))
+        - root
+    )
     guess = 0.97 * (far if far < near else near)
     return guess if excess > 0.0 else 0.0
 
@@ -496,11 +532,15 @@ def _sums(t, second, third, fourth, fifth, sixth):
     """f_2 t^2 + ... + f_6 t^6, and its slope times t."""
     square = t * t
     value = square * (second + t * (third + t * (fourth + t * (fifth + t * sixth))))
-    slope = 2.0 * second + t * (3.0 * third + t * (4.0 * fourth + t * (5.0 * fifth + t * 6.0 * sixth)))
+    slope = 2.0 * second + t * (
+        3.0 * third + t * (4.0 * fourth + t * (5.0 * fifth + t * 6.0 * sixth))
+    )
     return value, square * slope
 
 
-@kernel("void(float64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])")
+@kernel(
+    "void(float64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])"
+)
 def _solve(displacements, stiffnesses, works, sphere_radii, moduli, radii):
     """Radii for flat arrays, see ``radius_at_displacement``.
 
@@ -509,11 +549,16 @@ def _solve(displacements, stiffnesses, works, sphere_radii, moduli, radii):
     """
     for i in range(radii.size):
         displacement, stiffness, work, sphere_radius, modulus = (
-            displacements[i], stiffnesses[i], works[i], sphere_radii[i], moduli[i],
-        )  # fmt: skip
+            displacements[i],
+            stiffnesses[i],
+            works[i],
+            sphere_radii[i],
+            moduli[i],
+        )
         unit = fold_radius(work, sphere_radius, modulus)
         depth = unit * (unit / sphere_radius)
-        sticks = work > 0.0 and depth > 1e-300 and displacement / depth < 1e290  # else adhesion is lost in rounding
+        # else adhesion is lost in rounding
+        sticks = work > 0.0 and depth > 1e-300 and displacement / depth < 1e290
         unit = unit if sticks else sphere_radius
         depth = depth if sticks else sphere_radius
         contact = 4.0 / 3.0 * modulus * unit
@@ -522,28 +567,49 @@ def _solve(displacements, stiffnesses, works, sphere_radii, moduli, radii):
         level = fold_level(root, grips, load) if sticks else 0.0
         root = root if sticks else 0.0
         last = level * (depth / grips)
-        excess = (displacement - last) * (grips / depth) if last > -1e300 else grips * (displacement / depth) - level
+        excess = (
+            (displacement - last) * (grips / depth)
+            if last > -1e300
+            else grips * (displacement / depth) - level
+        )
         cube = root * root * root
         second = 6.0 * grips * root * root + load * root * (15.0 * cube - 18.0)
         third = 4.0 * grips * root + load * (20.0 * cube - 6.0) if sticks else 0.0
         fourth = grips + 15.0 * load * root * root
         fifth = 6.0 * load * root
-        floor = level + 3.0 * grips + 9.0 * load + 1e-14 if sticks else 0.0  # >= 0 but for rounding
+        # >= 0 but for rounding
+        floor = level + 3.0 * grips + 9.0 * load + 1e-14 if sticks else 0.0
         t = _first_guess(excess, second, fourth, load, root, floor)
         value, slope = _sums(t, second, third, fourth, fifth, load)
         share = excess / value
-        nearer = t * (((slope + value) * share + (slope - value)) / ((slope - value) * share + (slope + value)))
+        nearer = t * (
+            ((slope + value) * share + (slope - value))
+            / ((slope - value) * share + (slope + value))
+        )
         t = nearer if nearer > 0.0 else t  # nan where t is 0 or infinite
         for _ in range(3):
             value, slope = _sums(t, second, third, fourth, fifth, load)
             nearer = t - t * ((value - excess) / slope)
             t = nearer if nearer > 0.0 else t
-        known = excess >= 0.0 and stiffness >= 0.0 and sphere_radius > 0.0 and modulus > 0.0 and work < math.inf
-        known = known and 1e-300 < contact < math.inf and (excess < math.inf or displacement == math.inf)
-        known = known and (sticks or excess > 0.0 or displacement == 0.0 or stiffness == 0.0)
+        known = (
+            excess >= 0.0
+            and stiffness >= 0.0
+            and sphere_radius > 0.0
+            and modulus > 0.0
+            and work < math.inf
+        )
+        known = (
+            known
+            and 1e-300 < contact < math.inf
+            and (excess < math.inf or displacement == math.inf)
+        )
+        known = known and (
+            sticks or excess > 0.0 or displacement == 0.0 or stiffness == 0.0
+        )
         radius = unit * (root + t) * (root + t)
         if load == 0.0 and not sticks:
-            radius = math.sqrt(displacement) * math.sqrt(sphere_radius)  # of any size: no product leaves the numbers
+            # of any size: no product leaves the numbers
+            radius = math.sqrt(displacement) * math.sqrt(sphere_radius)
         radii[i] = radius if known else math.nan
 
 
@@ -698,7 +764,9 @@ def load_under_indentation(radius, indentation, sphere_radius, modulus):
     >>> print(f"{load_under_indentation(1.0, 1.0, 1.0, 1.0):.4f}")
     1.3333
     """
-    return load_under_displacement(radius, indentation, math.inf, sphere_radius, modulus)
+    return load_under_displacement(
+        radius, indentation, math.inf, sphere_radius, modulus
+    )
 
 
 def pull_off_indentation(work, sphere_radius, modulus):

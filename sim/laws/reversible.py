@@ -57,7 +57,14 @@ def mean_stress_energy(radius, stress, modulus, poisson_ratio=0.5):
     >>> print(f"{mean_stress_energy(1.2e-4, 3e5, 6.4e6) / 0.042:.1f}")
     76.7
     """
-    return 6.0 / math.pi * compressible(poisson_ratio) * (stress * stress) * radius / modulus
+    return (
+        6.0
+        / math.pi
+        * compressible(poisson_ratio)
+        * (stress * stress)
+        * radius
+        / modulus
+    )
 
 
 @device
@@ -88,9 +95,28 @@ def crossing(z, level, hard, m, s):
 
 
 @device
-def _shrunk(jkr, hertz, control, level, hard, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio):
+def _shrunk(
+    jkr,
+    hertz,
+    control,
+    level,
+    hard,
+    work,
+    stress,
+    reversible,
+    held,
+    sphere_radius,
+    modulus,
+    poisson_ratio,
+):
     """Contact radius at a load or a displacement, ``control``, of a ``level`` as in ``crossing``."""
-    if reversible == 0.0 or stress == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
+    if (
+        reversible == 0.0
+        or stress == 0.0
+        or work <= 0.0
+        or not jkr > 0.0
+        or jkr == math.inf
+    ):
         return jkr
     tilt = sphere_radius / jkr
     shear = stress / modulus * tilt
@@ -108,7 +134,18 @@ def _shrunk(jkr, hertz, control, level, hard, work, stress, reversible, held, sp
 
 
 @law
-def shrunk_at_load(jkr, hertz, load, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio):
+def shrunk_at_load(
+    jkr,
+    hertz,
+    load,
+    work,
+    stress,
+    reversible,
+    held,
+    sphere_radius,
+    modulus,
+    poisson_ratio,
+):
     """Return the contact radius at a load from those of JKR and Hertz; ``held`` as in ``shrunk_at_displacement``."""
     level = 0.5 * (load / modulus / jkr) * (sphere_radius / jkr / jkr)
     rest = (sphere_radius, modulus, poisson_ratio)
@@ -117,7 +154,17 @@ def shrunk_at_load(jkr, hertz, load, work, stress, reversible, held, sphere_radi
 
 @law
 def shrunk_at_displacement(
-    jkr, hertz, displacement, stiffness, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio
+    jkr,
+    hertz,
+    displacement,
+    stiffness,
+    work,
+    stress,
+    reversible,
+    held,
+    sphere_radius,
+    modulus,
+    poisson_ratio,
 ):
     """Return the contact radius at a displacement behind a spring, from those of JKR and Hertz.
 
@@ -148,10 +195,14 @@ def shrunk_at_displacement(
     hard = 1.0 / (1.0 + 2.0 * modulus * jkr / stiffness)
     level = hard * (displacement / jkr * (sphere_radius / jkr))
     rest = (sphere_radius, modulus, poisson_ratio)
-    return _shrunk(jkr, hertz, displacement, level, hard, work, stress, reversible, held, *rest)
+    return _shrunk(
+        jkr, hertz, displacement, level, hard, work, stress, reversible, held, *rest
+    )
 
 
-def radius_at_load_reversible(load, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5):
+def radius_at_load_reversible(
+    load, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5
+):
     """Return the contact radius at a load when adhesion pays a share of the energy of the mean stress.
 
     Parameters
@@ -188,10 +239,23 @@ def radius_at_load_reversible(load, work, stress, reversible, sphere_radius, mod
     """
     adhesive = jkr.radius_at_load(load, work, sphere_radius, modulus)
     hertz = jkr.hertz_radius_at_load(load, sphere_radius, modulus)
-    return shrunk_at_load(adhesive, hertz, load, work, stress, reversible, 0.0, sphere_radius, modulus, poisson_ratio)
+    return shrunk_at_load(
+        adhesive,
+        hertz,
+        load,
+        work,
+        stress,
+        reversible,
+        0.0,
+        sphere_radius,
+        modulus,
+        poisson_ratio,
+    )
 
 
-def radius_at_indentation_reversible(indentation, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5):
+def radius_at_indentation_reversible(
+    indentation, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5
+):
     """Return the contact radius at an indentation [m]; otherwise as ``radius_at_load_reversible``.
 
     Notes
@@ -208,11 +272,20 @@ def radius_at_indentation_reversible(indentation, work, stress, reversible, sphe
     3.44e-05 2.57e-05 nan
     """
     rest = (sphere_radius, modulus, poisson_ratio)
-    return radius_at_displacement_reversible(indentation, math.inf, work, stress, reversible, *rest)
+    return radius_at_displacement_reversible(
+        indentation, math.inf, work, stress, reversible, *rest
+    )
 
 
 def radius_at_displacement_reversible(
-    displacement, stiffness, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5
+    displacement,
+    stiffness,
+    work,
+    stress,
+    reversible,
+    sphere_radius,
+    modulus,
+    poisson_ratio=0.5,
 ):
     """Return the contact radius at a displacement behind a spring [m]; otherwise as ``radius_at_load_reversible``.
 
@@ -222,7 +295,13 @@ def radius_at_displacement_reversible(
     >>> print("%.2e %.2e %.2e" % tuple(a))
     3.64e-05 2.76e-05 nan
     """
-    adhesive = jkr.radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus)
-    hertz = jkr.radius_at_displacement(displacement, stiffness, 0.0, sphere_radius, modulus)
+    adhesive = jkr.radius_at_displacement(
+        displacement, stiffness, work, sphere_radius, modulus
+    )
+    hertz = jkr.radius_at_displacement(
+        displacement, stiffness, 0.0, sphere_radius, modulus
+    )
     rest = (sphere_radius, modulus, poisson_ratio)
-    return shrunk_at_displacement(adhesive, hertz, displacement, stiffness, work, stress, reversible, 0.0, *rest)
+    return shrunk_at_displacement(
+        adhesive, hertz, displacement, stiffness, work, stress, reversible, 0.0, *rest
+    )

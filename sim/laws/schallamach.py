@@ -93,7 +93,11 @@ def _bound(life, pull, rebinding_rate):
 @law
 def _reward(moment, reach, life, rebinding_rate):
     # bonds that break at once carry nothing, however fast they are stretched
-    return 0.0 if moment == 0.0 or reach == 0.0 else reach * moment / (life + 1.0 / rebinding_rate)
+    return (
+        0.0
+        if moment == 0.0 or reach == 0.0
+        else reach * moment / (life + 1.0 / rebinding_rate)
+    )
 
 
 def renewal(life, half_square, third_cube, speed, bond_stiffness, rebinding_rate):
@@ -168,7 +172,9 @@ def constant_moments(speed, rate, bond_stiffness, rebinding_rate):
     [0.75 0.75] [0.75 7.5 ]
     """
     life = np.divide(1.0, rate)
-    return renewal(life, life * life, 2.0 * life**3, speed, bond_stiffness, rebinding_rate)
+    return renewal(
+        life, life * life, 2.0 * life**3, speed, bond_stiffness, rebinding_rate
+    )
 
 
 # Stability of steady sliding on bonds that sites make and lose, behind a spring: where oscillations set in.
@@ -216,11 +222,20 @@ Answer = Callable[[Array], tuple[Complex, Complex]]
 _LOOKS, _STEPS = 48, 12
 
 
-def _onset_behind(answer: Answer, speed: ArrayLike, stress: Array, between: tuple[Array, Array], body: Body) -> Onset:
+def _onset_behind(
+    answer: Answer,
+    speed: ArrayLike,
+    stress: Array,
+    between: tuple[Array, Array],
+    body: Body,
+) -> Onset:
     """Onset of oscillations of a body at a speed [m/s] on bonds of a stress [Pa], ``between`` two frequencies."""
-    area, by_bonds, by_stress, mass, damping, viscosity, firm, firmer = (np.asarray(each, float) for each in body)
+    area, by_bonds, by_stress, mass, damping, viscosity, firm, firmer = (
+        np.asarray(each, float) for each in body
+    )
     bears = area * (stress + viscosity * np.abs(speed))
-    apart = np.where(stress == 0.0, math.inf, stress)  # an area at rest does not answer to a small stress
+    # an area at rest does not answer to a small stress
+    apart = np.where(stress == 0.0, math.inf, stress)
 
     def of_interface(frequency: Array) -> tuple[Complex, Complex]:
         """Return Z, and k_t times the way of the body beyond that of the interface."""
@@ -231,7 +246,9 @@ def _onset_behind(answer: Answer, speed: ArrayLike, stress: Array, between: tupl
 
     def needed(frequency: Array) -> Complex:
         force, ahead = of_interface(frequency)
-        return frequency * (mass * frequency - 1j * damping) - force / (1.0 + ahead / firm)
+        return frequency * (mass * frequency - 1j * damping) - force / (
+            1.0 + ahead / firm
+        )
 
     onset = _stiffest(needed, *between)
     if np.all(np.isinf(firm)):
@@ -251,17 +268,24 @@ def _stiffest(needed: Callable[[Array], Complex], low: Array, high: Array) -> On
     place = np.argmax(np.where(turns, larger, -math.inf), axis=-1)
     places = place, place + 1
     before, here = (low * (high / low) ** steps[k] for k in places)
-    off, now = (np.take_along_axis(tried.imag, k[..., np.newaxis], -1)[..., 0] for k in places)
+    off, now = (
+        np.take_along_axis(tried.imag, k[..., np.newaxis], -1)[..., 0] for k in places
+    )
     with np.errstate(divide="ignore", invalid="ignore"):  # where none turns
         for _ in range(_STEPS):
             guess = here - now * (here - before) / (now - off)
             after = needed(guess).imag
             across = after * now < 0.0
-            before, off = np.where(across, here, before), np.where(across, now, 0.5 * off)
+            before, off = (
+                np.where(across, here, before),
+                np.where(across, now, 0.5 * off),
+            )
             here, now = guess, after
         stiffness = needed(here).real
     holds = turns.any(axis=-1) & (stiffness > 0.0)
-    return Onset(np.where(holds, stiffness, np.nan)[()], np.where(holds, here, np.nan)[()])
+    return Onset(
+        np.where(holds, stiffness, np.nan)[()], np.where(holds, here, np.nan)[()]
+    )
 
 
 #: Gauss's rule on panels of the age of bonds, and their number; integral of the rupture rate at the oldest.
@@ -272,9 +296,13 @@ _SLOWEST, _FASTEST = 1e-3, 30.0
 
 
 def resolved_onset(
-    speed: ArrayLike, pathways: Sequence[tuple[float, float]], bond_stiffness: float, rebinding_rate: float,
-    site_density: float, body: Body,
-) -> Onset:  # fmt: skip
+    speed: ArrayLike,
+    pathways: Sequence[tuple[float, float]],
+    bond_stiffness: float,
+    rebinding_rate: float,
+    site_density: float,
+    body: Body,
+) -> Onset:
     """Return the stiffness of a spring below which bonds of a density over their stretch oscillate at a speed.
 
     Parameters
@@ -314,13 +342,21 @@ def resolved_onset(
     0.029557 4.2578
     """
     pace = np.abs(np.asarray(speed, dtype=float))[..., np.newaxis]
-    rates = [(rate, bond_stiffness / force, bond_stiffness * pace / force) for rate, force in pathways]
+    rates = [
+        (rate, bond_stiffness / force, bond_stiffness * pace / force)
+        for rate, force in pathways
+    ]
     last, _, grows = rates[-1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        oldest, soonest = np.log1p(grows * _OLDEST / last) / grows, 0.1 / sum(rate + np.abs(a) for rate, _, a in rates)
+        oldest, soonest = (
+            np.log1p(grows * _OLDEST / last) / grows,
+            0.1 / sum(rate + np.abs(a) for rate, _, a in rates),
+        )
         edges = oldest * (soonest / oldest) ** np.linspace(1.0, 0.0, _PANELS)
         half = 0.5 * np.diff(edges, prepend=0.0)[..., np.newaxis]
-        age = (edges[..., np.newaxis] + half * (_AGE_NODES - 1.0)).reshape(*edges.shape[:-1], -1)
+        age = (edges[..., np.newaxis] + half * (_AGE_NODES - 1.0)).reshape(
+            *edges.shape[:-1], -1
+        )
         survival = np.exp(-sum(rate * np.expm1(a * age) / a for rate, _, a in rates))
         survival *= (half * _AGE_WEIGHTS).reshape(age.shape)
         life, way = np.sum(survival, axis=-1), np.sum(survival * pace * age, axis=-1)
@@ -330,16 +366,31 @@ def resolved_onset(
             turns = 1j * frequency[..., np.newaxis]
             back = np.exp(-turns * age)
             earlier = survival * -sum(
-                rate * soft * ((np.exp(a * age) - back) / (a + turns) - back * np.expm1(a * age) / a)
+                rate
+                * soft
+                * (
+                    (np.exp(a * age) - back) / (a + turns)
+                    - back * np.expm1(a * age) / a
+                )
                 for rate, soft, a in rates
             )
-            bound = births * np.sum(earlier, axis=-1) / (1.0 + rebinding_rate * np.sum(back * survival, axis=-1))
-            moment = births * np.sum((1.0 - back) * survival + pace * age * earlier, axis=-1)
-            moment -= rebinding_rate * bound * np.sum(pace * age * back * survival, axis=-1)
+            bound = (
+                births
+                * np.sum(earlier, axis=-1)
+                / (1.0 + rebinding_rate * np.sum(back * survival, axis=-1))
+            )
+            moment = births * np.sum(
+                (1.0 - back) * survival + pace * age * earlier, axis=-1
+            )
+            moment -= (
+                rebinding_rate * bound * np.sum(pace * age * back * survival, axis=-1)
+            )
             return site_density * bond_stiffness * moment, bound / (births * life)
 
         stress = site_density * bond_stiffness * births * way
-        return _onset_behind(answer, speed, stress, (_SLOWEST / life, _FASTEST / life), body)
+        return _onset_behind(
+            answer, speed, stress, (_SLOWEST / life, _FASTEST / life), body
+        )
 
 
 # Linear law of the bond fraction: steady sliding, rate equation and its exact step.
@@ -371,7 +422,9 @@ def steady_fraction(speed, critical_speed):
     return 1.0 / (1.0 + math.fabs(speed) / critical_speed)
 
 
-def linear_onset(speed, critical_speed, rebinding_rate, strength, damping, mass=0.0, area_growth=0.0):
+def linear_onset(
+    speed, critical_speed, rebinding_rate, strength, damping, mass=0.0, area_growth=0.0
+):
     """Return the stiffness of a spring below which a slider on bonds of the linear rate equation oscillates at a speed.
 
     Parameters
@@ -402,7 +455,13 @@ def linear_onset(speed, critical_speed, rebinding_rate, strength, damping, mass=
     2.2733 11.1355
     """
     pace = rebinding_rate * (1.0 + np.abs(speed) / critical_speed)
-    falls = (1.0 + area_growth) * strength * rebinding_rate / critical_speed * steady_fraction(speed, critical_speed)
+    falls = (
+        (1.0 + area_growth)
+        * strength
+        * rebinding_rate
+        / critical_speed
+        * steady_fraction(speed, critical_speed)
+    )
     with np.errstate(divide="ignore"):
         over = np.divide(falls - damping * pace, damping)
     over = np.where(over > 0.0, over, np.nan)
@@ -504,7 +563,9 @@ def _pace(speed, zero_force_rate, bell_force, bond_stiffness):
 @law
 def _life(speed, zero_force_rate, bell_force, bond_stiffness, order):
     n = int(order)
-    moment = reduced(_pace(speed, zero_force_rate, bell_force, bond_stiffness), n) / zero_force_rate ** (n + 1)
+    moment = reduced(
+        _pace(speed, zero_force_rate, bell_force, bond_stiffness), n
+    ) / zero_force_rate ** (n + 1)
     return 2.0 * moment if n == 2 else moment
 
 
@@ -602,11 +663,16 @@ def bell_fraction(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_
     0.336 0.500 0.981
     """
     life = reduced(_pace(speed, zero_force_rate, bell_force, bond_stiffness), 0)
-    rupture, rebinding = 1.0 / (1.0 + rebinding_rate / zero_force_rate), 1.0 / (1.0 + zero_force_rate / rebinding_rate)
+    rupture, rebinding = (
+        1.0 / (1.0 + rebinding_rate / zero_force_rate),
+        1.0 / (1.0 + zero_force_rate / rebinding_rate),
+    )
     return life / (rupture + rebinding * life)
 
 
-def bell_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
+def bell_stress(
+    speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density
+):
     """Return the shear stress of a Bell population in steady sliding [Pa]; odd in the speed.
 
     Parameters
@@ -628,7 +694,9 @@ def bell_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_ra
     >>> print("%.0f %.0f %.0f" % tuple(bell_stress([1e-6, 4.5e-6, 1e-4], 1.0, 1e-11, 1e-5, 1.0, 1e14)))
     167 218 87
     """
-    moments = bell_moments(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
+    moments = bell_moments(
+        speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate
+    )
     return np.multiply(site_density, moments.force)
 
 
@@ -646,7 +714,9 @@ def _bell_peak_speed(zero_force_rate, bell_force, bond_stiffness, rebinding_rate
     for _ in range(60):
         z = math.sqrt(low * high)
         life = reduced(z, 0)
-        slope = 1.0 + z - z * life / reduced(z, 1) - ((1.0 + z) * life - z) / (wait + life)
+        slope = (
+            1.0 + z - z * life / reduced(z, 1) - ((1.0 + z) * life - z) / (wait + life)
+        )
         if slope > 0.0:
             low = z
         else:
@@ -662,7 +732,9 @@ class BellNumbers(NamedTuple):
     site_density: Array
 
 
-def bell_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
+def bell_peak(
+    zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density
+):
     """Return the friction maximum of a Bell population: the largest steady stress at any speed.
 
     Parameters
@@ -690,7 +762,12 @@ def bell_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_
     bonds = zero_force_rate, bell_force, bond_stiffness, rebinding_rate
     speed = _bell_peak_speed(*bonds)
     # without a wait for the next bond the stress grows with speed for ever
-    return Peak(speed, np.where(np.isinf(speed), math.inf, bell_stress(speed, *bonds, site_density))[()])
+    return Peak(
+        speed,
+        np.where(np.isinf(speed), math.inf, bell_stress(speed, *bonds, site_density))[
+            ()
+        ],
+    )
 
 
 @law
@@ -759,8 +836,13 @@ def bell_numbers(critical_speed, stress, bell_force, bond_stiffness, rebinding_r
     0.0030
     """
     of_one = bell_critical_speed(1.0, bell_force, bond_stiffness, rebinding_ratio)
-    rate, largest = np.divide(critical_speed, of_one), bell_peak(1.0, bell_force, bond_stiffness, rebinding_ratio, 1.0)
-    return BellNumbers(rate, np.multiply(rebinding_ratio, rate), np.divide(stress, largest.stress))
+    rate, largest = (
+        np.divide(critical_speed, of_one),
+        bell_peak(1.0, bell_force, bond_stiffness, rebinding_ratio, 1.0),
+    )
+    return BellNumbers(
+        rate, np.multiply(rebinding_ratio, rate), np.divide(stress, largest.stress)
+    )
 
 
 # Bell bonds in mean field, every bond at the mean stretch: closed forms by Lambert's W.
@@ -779,7 +861,9 @@ def steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness):
 @law
 def _steady_rate(speed, zero_force_rate, bell_force, bond_stiffness):
     """Rupture rate k of all bonds in steady sliding."""
-    return zero_force_rate * math.exp(steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness))
+    return zero_force_rate * math.exp(
+        steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness)
+    )
 
 
 @law
@@ -803,10 +887,13 @@ def first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness):
     tilt = steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness)
     if tilt > 1.0:
         return math.copysign(tilt * bell_force / bond_stiffness, speed)
-    return speed / zero_force_rate * math.exp(-tilt)  # the same, also for an infinite Bell force
+    # the same, also for an infinite Bell force
+    return speed / zero_force_rate * math.exp(-tilt)
 
 
-def first_moment_fraction(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
+def first_moment_fraction(
+    speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate
+):
     """Return the bond fraction of a mean-field Bell population in steady sliding: bonds over bonds at rest [1].
 
     Parameters
@@ -826,10 +913,14 @@ def first_moment_fraction(speed, zero_force_rate, bell_force, bond_stiffness, re
     0.724 0.297
     """
     rate = _steady_rate(speed, zero_force_rate, bell_force, bond_stiffness)
-    return rest_share(rate, rebinding_rate) / rest_share(zero_force_rate, rebinding_rate)
+    return rest_share(rate, rebinding_rate) / rest_share(
+        zero_force_rate, rebinding_rate
+    )
 
 
-def first_moment_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
+def first_moment_stress(
+    speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density
+):
     """Return the shear stress of a mean-field Bell population in steady sliding [Pa]; odd in the speed.
 
     Parameters
@@ -851,10 +942,15 @@ def first_moment_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebi
     0.259
     """
     rate = _steady_rate(speed, zero_force_rate, bell_force, bond_stiffness)
-    return np.multiply(site_density, constant_moments(speed, rate, bond_stiffness, rebinding_rate).force)
+    return np.multiply(
+        site_density,
+        constant_moments(speed, rate, bond_stiffness, rebinding_rate).force,
+    )
 
 
-def first_moment_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
+def first_moment_peak(
+    zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density
+):
     """Return the friction maximum of a mean-field Bell population.
 
     Parameters
@@ -879,13 +975,17 @@ def first_moment_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rat
     >>> print("%.3f %.6f" % first_moment_peak(1.0, 1.0, 1.0, 1.0, 1.0))
     4.591 0.278465
     """
-    rate, force, stiffness, binding = np.broadcast_arrays(zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
+    rate, force, stiffness, binding = np.broadcast_arrays(
+        zero_force_rate, bell_force, bond_stiffness, rebinding_rate
+    )
     beyond = lambert_w(binding / rate / math.e)
     speed = rate * force / stiffness * (1.0 + beyond) * np.exp(1.0 + beyond)
     return Peak(speed, np.multiply(site_density, force * beyond))
 
 
-def first_moment_numbers(critical_speed, stress, bell_force, bond_stiffness, rebinding_ratio):
+def first_moment_numbers(
+    critical_speed, stress, bell_force, bond_stiffness, rebinding_ratio
+):
     """Return the rates and site density of a mean-field Bell population of a given critical speed and friction maximum.
 
     Parameters
@@ -911,12 +1011,26 @@ def first_moment_numbers(critical_speed, stress, bell_force, bond_stiffness, reb
     20.12 201.2 4.322e+16
     """
     most = 2.0 + np.asarray(rebinding_ratio)
-    rate = np.divide(np.multiply(bond_stiffness, critical_speed), bell_force * most * np.log(most))
-    largest = first_moment_peak(1.0, bell_force, bond_stiffness, rebinding_ratio, 1.0).stress
-    return BellNumbers(rate, np.multiply(rebinding_ratio, rate), np.divide(stress, largest))
+    rate = np.divide(
+        np.multiply(bond_stiffness, critical_speed), bell_force * most * np.log(most)
+    )
+    largest = first_moment_peak(
+        1.0, bell_force, bond_stiffness, rebinding_ratio, 1.0
+    ).stress
+    return BellNumbers(
+        rate, np.multiply(rebinding_ratio, rate), np.divide(stress, largest)
+    )
 
 
-def first_moment_onset(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density, body):
+def first_moment_onset(
+    speed,
+    zero_force_rate,
+    bell_force,
+    bond_stiffness,
+    rebinding_rate,
+    site_density,
+    body,
+):
     """Return the stiffness of a spring below which a mean-field Bell population oscillates at a speed.
 
     Parameters
@@ -951,19 +1065,34 @@ def first_moment_onset(speed, zero_force_rate, bell_force, bond_stiffness, rebin
     0.0390213 4.691569
     """
     unit = np.divide(bell_force, bond_stiffness)
-    tilt = np.abs(first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness) / unit)
+    tilt = np.abs(
+        first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness) / unit
+    )
     rate = _steady_rate(speed, zero_force_rate, bell_force, bond_stiffness)
     bound = rest_share(rate, rebinding_rate)
     density = site_density * bond_stiffness * bound
 
     def answer(frequency):
         turns = 1j * frequency
-        determinant = turns * (turns + rebinding_rate + 2.0 * rate) + rate * (rebinding_rate + rate) * (1.0 + tilt)
-        stretched = density * turns * (turns + rebinding_rate + (1.0 - tilt) * rate) / determinant
+        determinant = turns * (turns + rebinding_rate + 2.0 * rate) + rate * (
+            rebinding_rate + rate
+        ) * (1.0 + tilt)
+        stretched = (
+            density
+            * turns
+            * (turns + rebinding_rate + (1.0 - tilt) * rate)
+            / determinant
+        )
         return stretched, -rate * turns / determinant / unit
 
     pace = rebinding_rate + (1.0 + tilt) * rate
-    return _onset_behind(answer, speed, density * tilt * unit, (_LOWEST_RATE * pace, _HIGHEST_RATE * pace), body)
+    return _onset_behind(
+        answer,
+        speed,
+        density * tilt * unit,
+        (_LOWEST_RATE * pace, _HIGHEST_RATE * pace),
+        body,
+    )
 
 
 # Bonds that open at a constant rate and all break at a stretch l (after Chernyak & Leonov 1986).
@@ -1005,7 +1134,9 @@ def _site(speed, rate, stretch, bond_stiffness, rebinding_rate, power):
     if a > _SWITCH:  # in units of k_0
         pull = bond_stiffness * math.fabs(speed) / rate
         return pull**n * _slow(a, n) / (_slow(a, 0) + rate * wait)
-    return (bond_stiffness * stretch) ** n * _fast(a, n) / (_fast(a, 0) + wait / longest)
+    return (
+        (bond_stiffness * stretch) ** n * _fast(a, n) / (_fast(a, 0) + wait / longest)
+    )
 
 
 def cut_off_moments(speed, rate, stretch, bond_stiffness, rebinding_rate):
@@ -1068,7 +1199,9 @@ def cut_off_fraction(speed, rate, stretch, rebinding_rate):
     >>> print("%.3f %.3f" % tuple(cut_off_fraction(1.0, [0.0, 1.0], 1.0, 1.0)))
     0.500 0.775
     """
-    return _site(speed, rate, stretch, 1.0, rebinding_rate, 0) / rest_share(rate, rebinding_rate)
+    return _site(speed, rate, stretch, 1.0, rebinding_rate, 0) / rest_share(
+        rate, rebinding_rate
+    )
 
 
 def cut_off_stress(speed, rate, stretch, bond_stiffness, rebinding_rate, site_density):
@@ -1091,7 +1224,10 @@ def cut_off_stress(speed, rate, stretch, bond_stiffness, rebinding_rate, site_de
     >>> print("%.3f %.3f" % tuple(cut_off_stress([1e-6, 1.0], 0.0, 1.0, 1.0, 1.0, 1.0)))
     0.500 0.250
     """
-    return np.multiply(site_density, cut_off_moments(speed, rate, stretch, bond_stiffness, rebinding_rate).force)
+    return np.multiply(
+        site_density,
+        cut_off_moments(speed, rate, stretch, bond_stiffness, rebinding_rate).force,
+    )
 
 
 # Catch bonds: two pathways of rupture, one that force slows down and one that it speeds up.
@@ -1103,7 +1239,12 @@ _CATCH_END = 60.0
 
 
 def catch_lives(
-    speed: ArrayLike, catch_rate: float, catch_force: float, slip_rate: float, slip_force: float, bond_stiffness: float
+    speed: ArrayLike,
+    catch_rate: float,
+    catch_force: float,
+    slip_rate: float,
+    slip_force: float,
+    bond_stiffness: float,
 ) -> Lives:
     """Return the moments of the life of a catch bond that is pulled at constant speed.
 
@@ -1140,10 +1281,17 @@ def catch_lives(
     pace = bond_stiffness * np.abs(np.asarray(speed, float))[..., np.newaxis]
     easing, growing = pace / catch_force, pace / slip_force
     ratio, slip_time = growing * _CATCH_END / slip_rate, _CATCH_END / slip_rate
-    longest = slip_time * np.divide(np.log1p(ratio), ratio, out=np.ones(ratio.shape), where=ratio > 0.0)
+    longest = slip_time * np.divide(
+        np.log1p(ratio), ratio, out=np.ones(ratio.shape), where=ratio > 0.0
+    )
     shortest = 1e-3 / (catch_rate + slip_rate + easing + growing)
     share = np.linspace(0.0, 1.0, 193)
-    edges = np.sort(np.concatenate([longest * share, shortest * (longest / shortest) ** share], axis=-1), axis=-1)
+    edges = np.sort(
+        np.concatenate(
+            [longest * share, shortest * (longest / shortest) ** share], axis=-1
+        ),
+        axis=-1,
+    )
     half = 0.5 * np.diff(edges, axis=-1)[..., np.newaxis]
     age = edges[..., :-1, np.newaxis] + half * (_CATCH_NODES + 1.0)
     lost = catch_rate * age * scipy.special.exprel(-easing[..., np.newaxis] * age)
@@ -1153,9 +1301,14 @@ def catch_lives(
 
 
 def catch_moments(
-    speed: ArrayLike, catch_rate: float, catch_force: float, slip_rate: float, slip_force: float,
-    bond_stiffness: float, rebinding_rate: float,
-) -> SiteMoments:  # fmt: skip
+    speed: ArrayLike,
+    catch_rate: float,
+    catch_force: float,
+    slip_rate: float,
+    slip_force: float,
+    bond_stiffness: float,
+    rebinding_rate: float,
+) -> SiteMoments:
     """Return the bound share and force moments in steady sliding of catch bonds.
 
     Parameters
@@ -1182,7 +1335,9 @@ def catch_moments(
     >>> print(np.round(bound, 2))
     [0.5  0.74 0.24]
     """
-    lives = catch_lives(speed, catch_rate, catch_force, slip_rate, slip_force, bond_stiffness)
+    lives = catch_lives(
+        speed, catch_rate, catch_force, slip_rate, slip_force, bond_stiffness
+    )
     return renewal(*lives, speed, bond_stiffness, rebinding_rate)
 
 
@@ -1290,6 +1445,14 @@ def start_up_peak(speed, zero_force_rate, bell_force, bond_stiffness):
     >>> print("%.4f %.4f" % tuple(start_up_peak([1e2, 1e4], 1.0, 1.0, 1.0).force))
     2.5451 6.2985
     """
-    tilt = lambert_w(np.multiply(bond_stiffness, np.abs(speed)) / np.multiply(zero_force_rate, bell_force))
-    steady_force = bond_stiffness * first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness)
-    return StartUpPeak(np.exp(-tilt) / zero_force_rate, steady_force * np.exp(-scipy.special.exprel(-tilt)))
+    tilt = lambert_w(
+        np.multiply(bond_stiffness, np.abs(speed))
+        / np.multiply(zero_force_rate, bell_force)
+    )
+    steady_force = bond_stiffness * first_moment_stretch(
+        speed, zero_force_rate, bell_force, bond_stiffness
+    )
+    return StartUpPeak(
+        np.exp(-tilt) / zero_force_rate,
+        steady_force * np.exp(-scipy.special.exprel(-tilt)),
+    )

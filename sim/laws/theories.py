@@ -53,7 +53,12 @@ import numpy as np
 
 from sim.laws import jkr
 from sim.laws.jkr import twice_pull_off
-from sim.laws.reversible import compressible, crossing, shrunk_at_displacement, shrunk_at_load
+from sim.laws.reversible import (
+    compressible,
+    crossing,
+    shrunk_at_displacement,
+    shrunk_at_load,
+)
 from sim.numerics.jit import device, law
 from sim.numerics.special import cube_root
 
@@ -76,7 +81,9 @@ def _toughness(y, mixity, which):
     if which == _SHARE:
         return y * y + mixity, 2.0 * y
     rest = y * y + (1.0 - mixity)
-    return y * y * (1.0 + mixity / rest), 2.0 * y * (1.0 + mixity * (1.0 - mixity) / (rest * rest))
+    return y * y * (1.0 + mixity / rest), 2.0 * y * (
+        1.0 + mixity * (1.0 - mixity) / (rest * rest)
+    )
 
 
 @device
@@ -89,7 +96,11 @@ def _held(y, force, mixity, which, control):
         return cube - _SHEAR * force * y, force * slope, cube
     radius = cube_root(cube)
     level = radius * radius - 2.0 / 3.0 * _SHEAR * force * y / radius
-    return level, 2.0 / 3.0 * force / radius * (slope + _SHEAR / 3.0 * y * growth / toughness), cube
+    return (
+        level,
+        2.0 / 3.0 * force / radius * (slope + _SHEAR / 3.0 * y * growth / toughness),
+        cube,
+    )
 
 
 @device
@@ -113,7 +124,9 @@ def _widest(y, level, force, mixity, which, control):
     for _ in range(_MOST):
         if not value > level:
             return cube
-        lower = max(y - (value - level) / slope, _KEPT * y) if slope > 0.0 else _KEPT * y
+        lower = (
+            max(y - (value - level) / slope, _KEPT * y) if slope > 0.0 else _KEPT * y
+        )
         if not lower < y:
             return cube
         before = slope
@@ -129,17 +142,36 @@ def _widest(y, level, force, mixity, which, control):
 
 
 @law
-def _radius(jkr, hertz, level, work, tangential_force, mixity, which, control, sphere_radius, modulus, poisson_ratio):
+def _radius(
+    jkr,
+    hertz,
+    level,
+    work,
+    tangential_force,
+    mixity,
+    which,
+    control,
+    sphere_radius,
+    modulus,
+    poisson_ratio,
+):
     """Contact radius at a load or an indentation from those of JKR and Hertz."""
     if not 0.0 <= mixity <= 1.0:
         return math.nan
-    if tangential_force == 0.0 or mixity == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
+    if (
+        tangential_force == 0.0
+        or mixity == 0.0
+        or work <= 0.0
+        or not jkr > 0.0
+        or jkr == math.inf
+    ):
         return jkr
     unit = cube_root(0.75 * math.pi * work * sphere_radius * (sphere_radius / modulus))
     scale = math.pi * work * sphere_radius
     force = abs(tangential_force) / scale * math.sqrt(compressible(poisson_ratio))
     held = level / scale if control == _LOAD else level / unit * (sphere_radius / unit)
-    start = 2.0 * math.sqrt(jkr / unit) * (jkr / unit) / force  # F >= y^2: a state of JKR's radius or more
+    # F >= y^2: a state of JKR's radius or more
+    start = 2.0 * math.sqrt(jkr / unit) * (jkr / unit) / force
     if start > _NO_FORCE:
         return jkr
     radius = unit * cube_root(_widest(start, held, force, mixity, which, control))
@@ -148,17 +180,48 @@ def _radius(jkr, hertz, level, work, tangential_force, mixity, which, control, s
     return radius if radius > hertz else hertz
 
 
-def _mixed_at_load(which, load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio):
+def _mixed_at_load(
+    which, load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio
+):
     held = _at_load(load, work, sphere_radius, modulus)
-    return _radius(*held, tangential_force, mixity, which, _LOAD, sphere_radius, modulus, poisson_ratio)
+    return _radius(
+        *held,
+        tangential_force,
+        mixity,
+        which,
+        _LOAD,
+        sphere_radius,
+        modulus,
+        poisson_ratio,
+    )
 
 
-def _mixed_at_depth(which, indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio):
+def _mixed_at_depth(
+    which,
+    indentation,
+    work,
+    tangential_force,
+    mixity,
+    sphere_radius,
+    modulus,
+    poisson_ratio,
+):
     held = _at_indentation(indentation, work, sphere_radius, modulus)
-    return _radius(*held, tangential_force, mixity, which, _INDENTATION, sphere_radius, modulus, poisson_ratio)
+    return _radius(
+        *held,
+        tangential_force,
+        mixity,
+        which,
+        _INDENTATION,
+        sphere_radius,
+        modulus,
+        poisson_ratio,
+    )
 
 
-def scaled_angle_at_load(load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):
+def scaled_angle_at_load(
+    load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5
+):
     """Return the contact radius at a load and a tangential force by ``f = 1 + tan^2((1 - lambda) psi)``.
 
     Parameters
@@ -185,15 +248,43 @@ def scaled_angle_at_load(load, work, tangential_force, mixity, sphere_radius, mo
     2.904 1.973 1.442
     7.276 6.694 6.694
     """
-    return _mixed_at_load(_ANGLE, load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio)
+    return _mixed_at_load(
+        _ANGLE,
+        load,
+        work,
+        tangential_force,
+        mixity,
+        sphere_radius,
+        modulus,
+        poisson_ratio,
+    )
 
 
-def scaled_angle_at_indentation(indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):
+def scaled_angle_at_indentation(
+    indentation,
+    work,
+    tangential_force,
+    mixity,
+    sphere_radius,
+    modulus,
+    poisson_ratio=0.5,
+):
     """Return the contact radius at an indentation and a tangential force [m], as ``scaled_angle_at_load``."""
-    return _mixed_at_depth(_ANGLE, indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio)
+    return _mixed_at_depth(
+        _ANGLE,
+        indentation,
+        work,
+        tangential_force,
+        mixity,
+        sphere_radius,
+        modulus,
+        poisson_ratio,
+    )
 
 
-def shear_share_at_load(load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):
+def shear_share_at_load(
+    load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5
+):
     """Return the contact radius at a load by ``G + lambda G_s = w`` [m], as ``scaled_angle_at_load``.
 
     Notes
@@ -201,15 +292,43 @@ def shear_share_at_load(load, work, tangential_force, mixity, sphere_radius, mod
     ``f = 1/(1 + (lambda - 1) sin^2 psi)``: Savkoor & Briggs' radius at the force ``sqrt(lambda) T``. It jumps to
     Hertz's at ``savkoor_briggs_limit/sqrt(lambda)``.
     """
-    return _mixed_at_load(_SHARE, load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio)
+    return _mixed_at_load(
+        _SHARE,
+        load,
+        work,
+        tangential_force,
+        mixity,
+        sphere_radius,
+        modulus,
+        poisson_ratio,
+    )
 
 
-def shear_share_at_indentation(indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):
+def shear_share_at_indentation(
+    indentation,
+    work,
+    tangential_force,
+    mixity,
+    sphere_radius,
+    modulus,
+    poisson_ratio=0.5,
+):
     """Return the contact radius at an indentation and a tangential force [m], as ``shear_share_at_load``."""
-    return _mixed_at_depth(_SHARE, indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio)
+    return _mixed_at_depth(
+        _SHARE,
+        indentation,
+        work,
+        tangential_force,
+        mixity,
+        sphere_radius,
+        modulus,
+        poisson_ratio,
+    )
 
 
-def scaled_tangent_at_load(load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):
+def scaled_tangent_at_load(
+    load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5
+):
     """Return the contact radius at a load and a tangential force by ``f = 1 + (1 - lambda) tan^2 psi`` [m].
 
     Otherwise as ``scaled_angle_at_load``. A share 1 - lambda of adhesion remains at any force. The radius therefore
@@ -226,14 +345,38 @@ def scaled_tangent_at_load(load, work, tangential_force, mixity, sphere_radius, 
     >>> print(f"{jkr.radius_at_load(5.0, 0.5, 1.0, 4.0):.4f}")
     1.5011
     """
-    return _mixed_at_load(_TANGENT, load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio)
+    return _mixed_at_load(
+        _TANGENT,
+        load,
+        work,
+        tangential_force,
+        mixity,
+        sphere_radius,
+        modulus,
+        poisson_ratio,
+    )
 
 
 def scaled_tangent_at_indentation(
-    indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5
+    indentation,
+    work,
+    tangential_force,
+    mixity,
+    sphere_radius,
+    modulus,
+    poisson_ratio=0.5,
 ):
     """Return the contact radius at an indentation and a tangential force [m], as ``scaled_tangent_at_load``."""
-    return _mixed_at_depth(_TANGENT, indentation, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio)
+    return _mixed_at_depth(
+        _TANGENT,
+        indentation,
+        work,
+        tangential_force,
+        mixity,
+        sphere_radius,
+        modulus,
+        poisson_ratio,
+    )
 
 
 # Competing theories of the radius of an adhesive contact under shear.
@@ -243,7 +386,8 @@ _STICK = 1.5  # of T^2 in the energy balance at a load: full stick,
 _UNIFORM = 16.0 / math.pi**2  # and uniform stress
 _AS_STICK = math.pi**2 / 32.0  # alpha at a constant stress that gives the same radii
 _AS_UNIFORM = 1.0 / 3.0
-_STEPS, _ROUNDING = 100, 1e-14  # most steps to the force of a stress, every other a halving, and when it is known
+# most steps to the force of a stress, every other a halving, and when it is known
+_STEPS, _ROUNDING = 100, 1e-14
 
 
 @device
@@ -254,7 +398,17 @@ def _largest_force(load, work, sphere_radius, share):
 
 
 @law
-def _stuck_at_load(jkr, hertz, load, work, tangential_force, share, sphere_radius, modulus, poisson_ratio):
+def _stuck_at_load(
+    jkr,
+    hertz,
+    load,
+    work,
+    tangential_force,
+    share,
+    sphere_radius,
+    modulus,
+    poisson_ratio,
+):
     """Contact radius at a load from those of JKR and Hertz, with ``share`` T^2 in the energy balance."""
     if tangential_force == 0.0 or work <= 0.0 or math.isnan(jkr):
         return jkr
@@ -269,10 +423,19 @@ def _stuck_at_load(jkr, hertz, load, work, tangential_force, share, sphere_radiu
 
 
 @device
-def _widened(normal, control, hard, work, stress, sphere_radius, modulus, poisson_ratio):
+def _widened(
+    normal, control, hard, work, stress, sphere_radius, modulus, poisson_ratio
+):
     """Contact radius at a load or an indentation, ``control``, at whose size Hertz's is ``normal``."""
-    adhesive = cube_root(2.0 * math.pi * abs(work) * sphere_radius * (sphere_radius / modulus))
-    sheared = math.sqrt(12.0 * compressible(poisson_ratio)) * abs(stress) / modulus * sphere_radius
+    adhesive = cube_root(
+        2.0 * math.pi * abs(work) * sphere_radius * (sphere_radius / modulus)
+    )
+    sheared = (
+        math.sqrt(12.0 * compressible(poisson_ratio))
+        * abs(stress)
+        / modulus
+        * sphere_radius
+    )
     scale = max(normal, max(adhesive, sheared))
     known = normal + adhesive + sheared
     if known == 0.0 or not known < math.inf:
@@ -280,7 +443,8 @@ def _widened(normal, control, hard, work, stress, sphere_radius, modulus, poisso
     size = normal / scale
     level = math.copysign(hard * size**2 + 2.0 / 3.0 * (1.0 - hard) * size**3, control)
     m = math.copysign((adhesive / scale) ** 3, work)
-    z, _ = crossing(2.1, level, hard, m, (sheared / scale) ** 2)  # all terms at most 1: z <= 2.1 at a load, else 1.9
+    # all terms at most 1: z <= 2.1 at a load, else 1.9
+    z, _ = crossing(2.1, level, hard, m, (sheared / scale) ** 2)
     return max(normal, scale * z) if control >= 0.0 else scale * z
 
 
@@ -310,11 +474,15 @@ def uncorrected_at_load(load, work, stress, sphere_radius, modulus, poisson_rati
     1.7371 2.0640
     """
     normal = cube_root(0.75 * (sphere_radius / modulus) * abs(load))
-    return _widened(normal, load, 0.0, work, stress, sphere_radius, modulus, poisson_ratio)
+    return _widened(
+        normal, load, 0.0, work, stress, sphere_radius, modulus, poisson_ratio
+    )
 
 
 @law
-def uncorrected_at_indentation(indentation, work, stress, sphere_radius, modulus, poisson_ratio=0.5):
+def uncorrected_at_indentation(
+    indentation, work, stress, sphere_radius, modulus, poisson_ratio=0.5
+):
     """Return the contact radius at an indentation [m]; otherwise as ``uncorrected_at_load``.
 
     Examples
@@ -323,10 +491,14 @@ def uncorrected_at_indentation(indentation, work, stress, sphere_radius, modulus
     1.6093 1.8197
     """
     normal = math.sqrt(sphere_radius) * math.sqrt(abs(indentation))
-    return _widened(normal, indentation, 1.0, work, stress, sphere_radius, modulus, poisson_ratio)
+    return _widened(
+        normal, indentation, 1.0, work, stress, sphere_radius, modulus, poisson_ratio
+    )
 
 
-def savkoor_briggs_at_load(load, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
+def savkoor_briggs_at_load(
+    load, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5
+):
     """Return the contact radius at a load and a tangential force, in full stick (Savkoor & Briggs 1977).
 
     Parameters
@@ -353,17 +525,23 @@ def savkoor_briggs_at_load(load, work, tangential_force, sphere_radius, modulus,
     1.203e-04 1.039e-04 9.787e-05
     """
     held = _at_load(load, work, sphere_radius, modulus)
-    return _stuck_at_load(*held, tangential_force, _STICK, sphere_radius, modulus, poisson_ratio)
+    return _stuck_at_load(
+        *held, tangential_force, _STICK, sphere_radius, modulus, poisson_ratio
+    )
 
 
-def savkoor_briggs_at_indentation(indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
+def savkoor_briggs_at_indentation(
+    indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5
+):
     """Return the contact radius at an indentation [m]; otherwise as ``savkoor_briggs_at_load``.
 
     Notes
     -----
     ``E* (delta - a^2/R)^2/(2 pi a) + 3 T^2/(16 pi E* a^3) = w`` at nu = 1/2.
     """
-    return shear_share_at_indentation(indentation, work, tangential_force, 1.0, sphere_radius, modulus, poisson_ratio)
+    return shear_share_at_indentation(
+        indentation, work, tangential_force, 1.0, sphere_radius, modulus, poisson_ratio
+    )
 
 
 @law
@@ -392,7 +570,9 @@ def savkoor_briggs_limit(load, work, sphere_radius, poisson_ratio=0.5):
     """
     if work <= 0.0:
         return 0.0
-    return _largest_force(load, work, sphere_radius, _STICK * compressible(poisson_ratio))
+    return _largest_force(
+        load, work, sphere_radius, _STICK * compressible(poisson_ratio)
+    )
 
 
 @law
@@ -422,10 +602,14 @@ def savkoor_briggs_shrinkage(load, work, sphere_radius, modulus, poisson_ratio=0
     root = math.sqrt(pull) * math.sqrt(2.0 * load + pull)
     cube = load + pull + root
     radius = cube_root(0.75 * (sphere_radius / modulus) * cube)
-    return compressible(poisson_ratio) * 0.5 * math.pi * (radius / cube) * (radius / root)
+    return (
+        compressible(poisson_ratio) * 0.5 * math.pi * (radius / cube) * (radius / root)
+    )
 
 
-def reversible_force_at_load(load, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
+def reversible_force_at_load(
+    load, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5
+):
     """Return the contact radius at a load under a uniformly spread tangential force whose energy adhesion pays.
 
     Parameters
@@ -449,13 +633,20 @@ def reversible_force_at_load(load, work, tangential_force, sphere_radius, modulu
     1.6249
     """
     held = _at_load(load, work, sphere_radius, modulus)
-    return _stuck_at_load(*held, tangential_force, _UNIFORM, sphere_radius, modulus, poisson_ratio)
+    return _stuck_at_load(
+        *held, tangential_force, _UNIFORM, sphere_radius, modulus, poisson_ratio
+    )
 
 
-def reversible_force_at_indentation(indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
+def reversible_force_at_indentation(
+    indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5
+):
     """Return the contact radius at an indentation [m]; otherwise as ``reversible_force_at_load``."""
-    sticking = math.sqrt(_UNIFORM / _STICK) * np.asarray(tangential_force)  # the force with this energy in full stick
-    return shear_share_at_indentation(indentation, work, sticking, 1.0, sphere_radius, modulus, poisson_ratio)
+    # the force with this energy in full stick
+    sticking = math.sqrt(_UNIFORM / _STICK) * np.asarray(tangential_force)
+    return shear_share_at_indentation(
+        indentation, work, sticking, 1.0, sphere_radius, modulus, poisson_ratio
+    )
 
 
 def _at_load(load, work, sphere_radius, modulus):
@@ -467,10 +658,25 @@ def _at_load(load, work, sphere_radius, modulus):
 def _at_indentation(indentation, work, sphere_radius, modulus):
     """Radii of JKR and Hertz at an indentation, the indentation and the work."""
     adhesive = jkr.radius_at_indentation(indentation, work, sphere_radius, modulus)
-    return adhesive, jkr.hertz_radius_at_indentation(indentation, sphere_radius), indentation, work
+    return (
+        adhesive,
+        jkr.hertz_radius_at_indentation(indentation, sphere_radius),
+        indentation,
+        work,
+    )
 
 
-def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, mixity=0.5, only=()):
+def compare_at_load(
+    stress,
+    load,
+    work,
+    sphere_radius,
+    modulus,
+    poisson_ratio=0.5,
+    reversible=0.1,
+    mixity=0.5,
+    only=(),
+):
     """Return the contact radius at a load and a mean shear stress by every theory.
 
     Parameters
@@ -512,33 +718,66 @@ def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.
     scaled_angle      1.7371 1.6611
     scaled_tangent    1.7371 1.6917
     """
-    rest, stress = (sphere_radius, modulus, poisson_ratio), np.asarray(stress, dtype=float)
+    rest, stress = (
+        (sphere_radius, modulus, poisson_ratio),
+        np.asarray(stress, dtype=float),
+    )
     jkr, hertz, *held = _at_load(load, work, sphere_radius, modulus)
     radii = {"jkr": jkr, "hertz": hertz}
     if not only or "uncorrected" in only:
         radii["uncorrected"] = uncorrected_at_load(load, work, stress, *rest)
     _add_shares(radii, shrunk_at_load, (*held, stress), reversible, mixity, rest, only)
-    laws = {"scaled_angle": scaled_angle_at_load, "scaled_tangent": scaled_tangent_at_load}
+    laws = {
+        "scaled_angle": scaled_angle_at_load,
+        "scaled_tangent": scaled_tangent_at_load,
+    }
     return _with_own_forces(radii, laws, held, stress, mixity, rest, only)
 
 
 def compare_at_indentation(
-    stress, indentation, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, mixity=0.5, only=()
+    stress,
+    indentation,
+    work,
+    sphere_radius,
+    modulus,
+    poisson_ratio=0.5,
+    reversible=0.1,
+    mixity=0.5,
+    only=(),
 ):
     """Return the contact radius at an indentation by theory [m], as ``compare_at_load``."""
-    rest, stress = (sphere_radius, modulus, poisson_ratio), np.asarray(stress, dtype=float)
+    rest, stress = (
+        (sphere_radius, modulus, poisson_ratio),
+        np.asarray(stress, dtype=float),
+    )
     jkr, hertz, *held = _at_indentation(indentation, work, sphere_radius, modulus)
     radii = {"jkr": jkr, "hertz": hertz}
     if not only or "uncorrected" in only:
-        radii["uncorrected"] = uncorrected_at_indentation(indentation, work, stress, *rest)
-    _add_shares(radii, shrunk_at_displacement, (indentation, math.inf, work, stress), reversible, mixity, rest, only)
-    laws = {"scaled_angle": scaled_angle_at_indentation, "scaled_tangent": scaled_tangent_at_indentation}
+        radii["uncorrected"] = uncorrected_at_indentation(
+            indentation, work, stress, *rest
+        )
+    _add_shares(
+        radii,
+        shrunk_at_displacement,
+        (indentation, math.inf, work, stress),
+        reversible,
+        mixity,
+        rest,
+        only,
+    )
+    laws = {
+        "scaled_angle": scaled_angle_at_indentation,
+        "scaled_tangent": scaled_tangent_at_indentation,
+    }
     return _with_own_forces(radii, laws, held, stress, mixity, rest, only)
 
 
 def _add_shares(radii, shrunk, held, reversible, mixity, rest, only):
     """Radii by theory with those that differ in the reversible share and in what is held."""
-    shares = {"savkoor_briggs": (_AS_STICK, 4.0), "reversible_force": (_AS_UNIFORM, 4.0)}
+    shares = {
+        "savkoor_briggs": (_AS_STICK, 4.0),
+        "reversible_force": (_AS_UNIFORM, 4.0),
+    }
     shares |= {"reversible_stress": (1.0, 0.0), "fraction": (reversible, 0.0)}
     shares["shear_share"] = (_AS_STICK * np.asarray(mixity), 4.0)
     for name, share in shares.items():
@@ -560,9 +799,26 @@ def _with_own_forces(radii, laws, held, stress, mixity, rest, only):
                 is_wide = high - low > _ROUNDING * high
                 if not is_wide.any():
                     break
-                limit = np.pi * radius_at(*held, force, mixity, *rest) ** 2 * stress  # falls as the force grows
-                ends = np.fmax(low, np.fmin(limit, force)), np.where(limit > force, np.fmin(high, limit), force)
-                low, high = (np.where(is_wide, *pair) for pair in zip(ends, (low, high), strict=True))
-                force = 0.5 * (low + high) if step % 2 else np.fmin(np.fmax(limit, low), high)
+                # falls as the force grows
+                limit = np.pi * radius_at(*held, force, mixity, *rest) ** 2 * stress
+                ends = (
+                    np.fmax(low, np.fmin(limit, force)),
+                    np.where(limit > force, np.fmin(high, limit), force),
+                )
+                low, high = (
+                    np.where(is_wide, *pair)
+                    for pair in zip(ends, (low, high), strict=True)
+                )
+                force = (
+                    0.5 * (low + high)
+                    if step % 2
+                    else np.fmin(np.fmax(limit, low), high)
+                )
         radii[name] = radius_at(*held, high, mixity, *rest)
-    return dict(zip(radii, map(np.array, np.broadcast_arrays(*radii.values(), stress)), strict=False))
+    return dict(
+        zip(
+            radii,
+            map(np.array, np.broadcast_arrays(*radii.values(), stress)),
+            strict=False,
+        )
+    )

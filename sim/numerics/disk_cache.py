@@ -20,7 +20,11 @@ _WORTH = 0.1
 
 def folder() -> Path:
     """Return the folder of the cache: ``SIM_CACHE_DIR``, else the user's cache, else none that can be written."""
-    base = os.environ.get("SIM_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    base = (
+        os.environ.get("SIM_CACHE_DIR")
+        or os.environ.get("XDG_CACHE_HOME")
+        or "~/.cache"
+    )
     try:
         return Path(base).expanduser() / "sliding-sim"
     except RuntimeError:  # there is no home; nothing is written below a device
@@ -33,7 +37,9 @@ def read(path: Path) -> bytes | None:
         content = path.read_bytes()
     except OSError:
         return None
-    return content[32:] if content[:32] == hashlib.sha256(content[32:]).digest() else None
+    return (
+        content[32:] if content[:32] == hashlib.sha256(content[32:]).digest() else None
+    )
 
 
 def store(path: Path, content: bytes) -> None:
@@ -48,7 +54,10 @@ def store(path: Path, content: bytes) -> None:
 def sources() -> dict[str, bytes]:
     """Return the texts of the package's modules by name."""
     package = Path(__file__).parents[1]
-    texts = {path.relative_to(package).with_suffix(""): path.read_bytes() for path in sorted(package.rglob("*.py"))}
+    texts = {
+        path.relative_to(package).with_suffix(""): path.read_bytes()
+        for path in sorted(package.rglob("*.py"))
+    }
     return {".".join((package.name, *path.parts)): text for path, text in texts.items()}
 
 
@@ -66,7 +75,11 @@ def cached(key: Any, compute: Callable[[], T]) -> T:
 
     The key holds all that the result depends on, including versions of libraries and features of the processor.
     """
-    path = folder() / "found" / hashlib.sha256(digest() + pickle.dumps(key)).hexdigest()[:32]
+    path = (
+        folder()
+        / "found"
+        / hashlib.sha256(digest() + pickle.dumps(key)).hexdigest()[:32]
+    )
     with contextlib.suppress(Exception):
         return pickle.loads(read(path) or b"")
     began = time.process_time()

@@ -12,7 +12,11 @@ from pathlib import Path
 
 from sim.units.errors import BadInput
 
-_FULL = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG") if hasattr(errno, name)}
+_FULL = {
+    getattr(errno, name)
+    for name in ("ENOSPC", "EDQUOT", "EFBIG")
+    if hasattr(errno, name)
+}
 
 
 class _Lock:
@@ -28,7 +32,9 @@ class _Lock:
                 return False
             entered.callback(self._lock.release)
             # xarray's lock is not reentrant, and without xarray there is no other reader
-            module = None if self._entered else sys.modules.get("xarray.backends.netCDF4_")
+            module = (
+                None if self._entered else sys.modules.get("xarray.backends.netCDF4_")
+            )
             if lock := getattr(module, "NETCDF4_PYTHON_LOCK", None):
                 if not lock.acquire(blocking):
                     return False
@@ -91,26 +97,42 @@ def claim(path: Path, replace: bool, inputs: Iterable[Path] = ()) -> None:
         str(path).encode()
         if path.is_dir():
             raise BadInput([f"{path} is a folder; name a file"])
-        if os.sep == "/" and "\\" in str(path.absolute()):  # which HDF5 takes for the sign between folders
-            raise BadInput([f"{path}: datasets cannot be read in a path with a backslash; name another file"])
+        # which HDF5 takes for the sign between folders
+        if os.sep == "/" and "\\" in str(path.absolute()):
+            raise BadInput(
+                [
+                    f"{path}: datasets cannot be read in a path with a backslash; name another file"
+                ]
+            )
         folder = next(folder for folder in path.absolute().parents if folder.exists())
         for name in (*path.parts, f"{path.name}.parts"):
             with contextlib.suppress(FileNotFoundError):
                 os.stat(folder / name)  # which refuses names that are too long
         if not device:
-            tempfile.TemporaryFile(dir=folder).close()  # the rights of a folder do not say that this works
+            # the rights of a folder do not say that this works
+            tempfile.TemporaryFile(dir=folder).close()
     except UnicodeEncodeError:
         shown = str(path).encode(errors="replace").decode()
-        raise BadInput([f"{shown}: the name is not UTF-8 text; name another file"]) from None
+        raise BadInput(
+            [f"{shown}: the name is not UTF-8 text; name another file"]
+        ) from None
     except OSError as trouble:
-        raise StoreTrouble(f"{path}: {trouble.strerror}; name a file in another folder") from trouble
+        raise StoreTrouble(
+            f"{path}: {trouble.strerror}; name a file in another folder"
+        ) from trouble
     if any(path.exists() and each.exists() and path.samefile(each) for each in inputs):
         raise BadInput([f"{path}: the command reads this file, too; name another file"])
     if path.is_file() and not device:
         if not replace:
-            raise OutputExists(f"{path} exists; replace it with --force or name another file")
+            raise OutputExists(
+                f"{path} exists; replace it with --force or name another file"
+            )
         if path.suffix == ".toml":
-            raise BadInput([f"{path} has a scenario name, which is never replaced; name another file"])
+            raise BadInput(
+                [
+                    f"{path} has a scenario name, which is never replaced; name another file"
+                ]
+            )
 
 
 @contextlib.contextmanager
@@ -118,7 +140,8 @@ def output(path: Path) -> Iterator[Path]:
     """Give the name under which to write a file for its user; at the end the whole file takes its place."""
     with explained(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
-        if path.exists() and (not path.is_file() or path.is_relative_to("/dev")):  # such as a pipe, or /dev/stdout
+        # such as a pipe, or /dev/stdout
+        if path.exists() and (not path.is_file() or path.is_relative_to("/dev")):
             yield path
         else:
             with whole(path.resolve()) as aside:
@@ -145,7 +168,9 @@ def move(path: Path, target: Path) -> None:
     try:
         os.replace(path, target)
     except PermissionError as trouble:  # Windows keeps a file that a program holds open
-        raise StoreTrouble(f"{target} cannot be replaced: close the program in which it is open") from trouble
+        raise StoreTrouble(
+            f"{target} cannot be replaced: close the program in which it is open"
+        ) from trouble
 
 
 @contextlib.contextmanager
@@ -155,11 +180,18 @@ def explained(folder: Path) -> Iterator[None]:
         yield
     except StoreTrouble:
         raise
-    except (OSError, RuntimeError) as trouble:  # HDF5 reports trouble with its file as a RuntimeError
+    except (OSError, RuntimeError) as trouble:
+        # HDF5 reports trouble with its file as a RuntimeError
         number = trouble.errno if isinstance(trouble, OSError) else None
-        reason = trouble.strerror if isinstance(trouble, OSError) and number else str(trouble)
+        reason = (
+            trouble.strerror
+            if isinstance(trouble, OSError) and number
+            else str(trouble)
+        )
         with contextlib.suppress(OSError):
             usage = shutil.disk_usage(folder)
             if usage.total > 0 and usage.free < 2**20:
                 number, reason = errno.ENOSPC, os.strerror(errno.ENOSPC)
-        raise (DiskFull if number in _FULL else StoreTrouble)(f"{folder}: {reason}") from trouble
+        raise (DiskFull if number in _FULL else StoreTrouble)(
+            f"{folder}: {reason}"
+        ) from trouble

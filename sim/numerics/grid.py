@@ -85,7 +85,8 @@ class Lattice:
         The amplitudes are overwritten. Arrays used again save the system's time for new ones, as long as the
         transforms themselves.
         """
-        columns = scipy.fft.ifft(amplitudes, axis=0, norm="forward", overwrite_x=True)  # several columns at once
+        # several columns at once
+        columns = scipy.fft.ifft(amplitudes, axis=0, norm="forward", overwrite_x=True)
         np.fft.irfft(columns, self.shape[1], axis=1, norm="forward", out=field)
 
     def weighted_power(self, fields: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -96,7 +97,9 @@ class Lattice:
         """
         # no name holds a spectrum, so that the next one takes its memory
         sums = [
-            _weighted_power(scipy.fft.rfft2(field, s=self.shape), weight, self.multiplicity)
+            _weighted_power(
+                scipy.fft.rfft2(field, s=self.shape), weight, self.multiplicity
+            )
             for field in fields.reshape(-1, *fields.shape[-2:])
         ]
         return np.reshape(sums, fields.shape[:-2]) * self.pixel**2
@@ -165,14 +168,18 @@ def lattice_of(cell: float | tuple[float, float], shape: tuple[int, int]) -> Lat
     return Lattice((float(first), float(second)), (shape[0], shape[1]))
 
 
-@kernel("float64(complex128[:, ::1], Array(float64, 2, 'C', readonly=True), Array(float64, 1, 'C', readonly=True))")
+@kernel(
+    "float64(complex128[:, ::1], Array(float64, 2, 'C', readonly=True), Array(float64, 1, 'C', readonly=True))"
+)
 def _weighted_power(spectrum, weight, multiplicity):
     """Sum of weight × \\|spectrum\\|² × multiplicity, column by column: vector instructions of any width agree."""
     columns, total = np.zeros(multiplicity.size), 0.0
     for i in range(weight.shape[0]):
         for j in range(multiplicity.size):
             value = spectrum[i, j]
-            columns[j] += weight[i, j] * (value.real * value.real + value.imag * value.imag)
+            columns[j] += weight[i, j] * (
+                value.real * value.real + value.imag * value.imag
+            )
     for j in range(multiplicity.size):
         total += multiplicity[j] * columns[j]
     return total

@@ -51,8 +51,11 @@ class Damaged(RuntimeError):
 class File(netCDF4.Dataset):
     """A netCDF file whose name may have every letter of the system's code page."""
 
-    def __init__(self, path: str | os.PathLike[str], mode: Any = "r", **how: Any) -> None:
-        whole = os.path.abspath(path)  # because a relative path may look like an address in the network
+    def __init__(
+        self, path: str | os.PathLike[str], mode: Any = "r", **how: Any
+    ) -> None:
+        # because a relative path may look like an address in the network
+        whole = os.path.abspath(path)
         try:
             super().__init__(whole, mode, encoding=ENCODING, **how)
         except BaseException:
@@ -99,7 +102,8 @@ def opened(path: str | os.PathLike[str]) -> netCDF4.Dataset:
     Refused
         If it is no plain file, no netCDF file, cut short or damaged.
     """
-    if not stat.S_ISREG(os.stat(path).st_mode):  # opening a pipe would wait for its writer
+    # opening a pipe would wait for its writer
+    if not stat.S_ISREG(os.stat(path).st_mode):
         raise Refused("is no plain file")
     if reason := _unnamable(path):
         raise Refused(reason)
@@ -119,7 +123,15 @@ def readable() -> Iterator[None]:
         yield
     except (Refused, Damaged):
         raise
-    except (OSError, RuntimeError, ValueError, ArithmeticError, AttributeError, LookupError, TypeError):
+    except (
+        OSError,
+        RuntimeError,
+        ValueError,
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        TypeError,
+    ):
         raise Refused(BROKEN) from None
 
 
@@ -129,8 +141,12 @@ def _hdf5() -> ctypes.CDLL | None:
 
     Its own datasets in memory do not serve: they lose the order of variables, and hold the time of their making.
     """
-    beside = Path(netCDF4.__file__).parent.with_name("netCDF4.libs")  # where Windows has the libraries of a wheel
-    for path in (str(sys.modules["netCDF4._netCDF4"].__file__), *map(str, sorted(beside.glob("hdf5*.dll")))):
+    # where Windows has the libraries of a wheel
+    beside = Path(netCDF4.__file__).parent.with_name("netCDF4.libs")
+    for path in (
+        str(sys.modules["netCDF4._netCDF4"].__file__),
+        *map(str, sorted(beside.glob("hdf5*.dll"))),
+    ):
         with contextlib.suppress(OSError, AttributeError):
             library = ctypes.CDLL(path)
             for name, arguments in _FUNCTIONS.items():
@@ -157,15 +173,24 @@ def bytes_of(name: str) -> bytearray:
     if library is not None:
         files = (_ID * max(0, library.H5Fget_obj_count(_ALL, _FILES)))()
         library.H5Fget_obj_ids(_ALL, _FILES, len(files), files)
-        wanted = name.encode(ENCODING), name.encode("utf-8", "replace")  # on Windows netCDF gives HDF5 names in UTF-8
-        room = max(map(len, wanted)) + 2  # so that a longer name is not cut to one of them
+        # on Windows netCDF gives HDF5 names in UTF-8
+        wanted = name.encode(ENCODING), name.encode("utf-8", "replace")
+        # so that a longer name is not cut to one of them
+        room = max(map(len, wanted)) + 2
         for file in files:
             named = ctypes.create_string_buffer(room)
             library.H5Fget_name(file, named, len(named))
-            size = library.H5Fget_file_image(file, None, 0) if named.value in wanted else 0
+            size = (
+                library.H5Fget_file_image(file, None, 0) if named.value in wanted else 0
+            )
             if size > 0:
                 content = bytearray(size)
-                if library.H5Fget_file_image(file, (ctypes.c_char * size).from_buffer(content), size) == size:
+                if (
+                    library.H5Fget_file_image(
+                        file, (ctypes.c_char * size).from_buffer(content), size
+                    )
+                    == size
+                ):
                     return content
     raise RuntimeError("HDF5 does not give the bytes of a dataset in memory")
 
@@ -176,8 +201,15 @@ def write_in_memory(path: Path, fill: Callable[[File], None]) -> None:
     HDF5 gives no reason if the disk fails, and netCDF crashes if that happens while it closes a file.
     """
     gives_bytes = hdf5_gives_bytes()
-    name = os.path.abspath(path.with_name(f"{os.urandom(8).hex()}.nc") if gives_bytes else path)
-    with HDF5, File(name, "w", format="NETCDF4", diskless=True, persist=not gives_bytes) as file:
+    name = os.path.abspath(
+        path.with_name(f"{os.urandom(8).hex()}.nc") if gives_bytes else path
+    )
+    with (
+        HDF5,
+        File(
+            name, "w", format="NETCDF4", diskless=True, persist=not gives_bytes
+        ) as file,
+    ):
         fill(file)
         file.sync()
         content = bytes_of(name) if gives_bytes else None
@@ -187,13 +219,18 @@ def write_in_memory(path: Path, fill: Callable[[File], None]) -> None:
 
 def located(dataset: "xarray.Dataset") -> "xarray.Dataset":
     """Return a dataset whose prescribed speed is a coordinate, if its variables name it as one."""
-    names = [name for name, variable in dataset.variables.items() if variable.attrs.get("coordinates") == "speed"]
+    names = [
+        name
+        for name, variable in dataset.variables.items()
+        if variable.attrs.get("coordinates") == "speed"
+    ]
     if not names or "speed" not in dataset:
         return dataset
     result = dataset.copy().set_coords("speed")
     result.set_close(dataset._close)
     for name in names:
-        result[name].attrs.pop("coordinates")  # xarray writes it again when a dataset is saved
+        # xarray writes it again when a dataset is saved
+        result[name].attrs.pop("coordinates")
     return result
 
 

@@ -103,7 +103,9 @@ def _without_owner(context: Any, builder: Any, signature: Any, arguments: Any) -
         array.meminfo = array.meminfo.type(None)
         return array._getvalue()
     for place, inner in enumerate(getattr(kind, "types", ())):
-        part = _without_owner(context, builder, inner(inner), (builder.extract_value(value, place),))
+        part = _without_owner(
+            context, builder, inner(inner), (builder.extract_value(value, place),)
+        )
         value = builder.insert_value(value, part, place)
     return value
 
@@ -120,14 +122,20 @@ def sources() -> dict[str, bytes]:
     """Texts of the modules that import this one and of those that they import, whose constants are compiled in."""
     texts = disk_cache.sources()
     users = [name for name, text in texts.items() if b"sim.numerics.jit" in text]
-    imported = {word.decode() for name in users for word in re.findall(rb"^from (sim[\w.]*) import", texts[name], re.M)}
+    imported = {
+        word.decode()
+        for name in users
+        for word in re.findall(rb"^from (sim[\w.]*) import", texts[name], re.M)
+    }
     return {name: texts[name] for name in sorted({*users, *imported} & texts.keys())}
 
 
 @functools.cache
 def _cache_folder() -> str:
     """Folder of compiled code, named by a hash of versions and of all sources that import this module."""
-    digest = hashlib.sha256(f"{sys.version} {numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
+    digest = hashlib.sha256(
+        f"{sys.version} {numba.__version__} {llvmlite.__version__} {np.__version__}".encode()
+    )
     for text in (Path(__file__).read_bytes(), *sources().values()):
         digest.update(text)
     return str(disk_cache.folder() / digest.hexdigest()[:16])
@@ -138,13 +146,18 @@ def machine() -> str:
     vectors = np._core._multiarray_umath.__cpu_features__  # type: ignore[attr-defined]
     features = binding.get_host_cpu_features().flatten()
     processor = binding.get_process_triple(), binding.get_host_cpu_name(), features
-    chosen = [getattr(numba.config, name) for name in ("CPU_NAME", "CPU_FEATURES", "ENABLE_AVX")]
+    chosen = [
+        getattr(numba.config, name)
+        for name in ("CPU_NAME", "CPU_FEATURES", "ENABLE_AVX")
+    ]
     return repr((processor, chosen, np.__version__, vectors))
 
 
 def _path(name: str) -> Path:
     """File of a kernel or law in the cache, which also names the machine that the code is for."""
-    return Path(_cache_folder(), f"{name}.{hashlib.sha256(machine().encode()).hexdigest()[:8]}")
+    return Path(
+        _cache_folder(), f"{name}.{hashlib.sha256(machine().encode()).hexdigest()[:8]}"
+    )
 
 
 def cached(name: str) -> bool:
@@ -161,7 +174,11 @@ def _add_symbols() -> None:
         binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
-def _built(function: Callable, make: Callable[[], tuple[Callable, Any]], load: Callable[..., Callable]) -> Callable:
+def _built(
+    function: Callable,
+    make: Callable[[], tuple[Callable, Any]],
+    load: Callable[..., Callable],
+) -> Callable:
     """Load the code of a function from the cache; compile the function by ``make`` if loading fails in any way.
 
     Unpickling and rebuilding raise whatever they meet (EOFError, UnpicklingError, AttributeError, ...), so every
@@ -196,7 +213,9 @@ def _name(function: Callable) -> str:
     return f"{function.__module__}.{function.__qualname__}"
 
 
-def _at_first_call(function: Callable, public: Callable[..., Callable], make: Callable, load: Callable) -> Callable:
+def _at_first_call(
+    function: Callable, public: Callable[..., Callable], make: Callable, load: Callable
+) -> Callable:
     """Return the function that compiles or loads another one when it is first called, and list it in ``compiled``."""
 
     @functools.cache
@@ -213,19 +232,32 @@ def kernel(signature: str) -> Callable[[Callable], Callable]:
     def decorate(function: Callable) -> Callable:
         def make() -> tuple[Callable, Callable]:
             dispatcher = numba.njit(signature, **_OPTIONS)(function)
-            return dispatcher, lambda: without_numba(*next(iter(dispatcher.overloads.values()))._reduce())
+            return dispatcher, lambda: without_numba(
+                *next(iter(dispatcher.overloads.values()))._reduce()
+            )
 
         def without_numba(*parts: Any) -> Any:
             """Leave out names that only messages of numba's own functions use; to import them takes 50 ms."""
-            return *parts[:-1], [names for names in parts[-1] if not names.globals["__name__"].startswith("numba.")]
+            return *parts[:-1], [
+                names
+                for names in parts[-1]
+                if not names.globals["__name__"].startswith("numba.")
+            ]
 
         def load(*code: Any) -> Callable:
             dispatcher = numba.njit(**_OPTIONS)(function)
-            dispatcher.add_overload(CompileResult._rebuild(cpu_target.target_context, *code))
+            dispatcher.add_overload(
+                CompileResult._rebuild(cpu_target.target_context, *code)
+            )
             dispatcher.disable_compile()
             return dispatcher
 
-        built = _at_first_call(function, functools.partial(numba.njit, signature, error_model="numpy"), make, load)
+        built = _at_first_call(
+            function,
+            functools.partial(numba.njit, signature, error_model="numpy"),
+            make,
+            load,
+        )
 
         @functools.wraps(function)
         def call(*arguments):
@@ -247,21 +279,50 @@ def law(function: Callable) -> Callable:
     signature = f"float64({', '.join(['float64'] * count)})"
 
     def ufunc_of(library: Any, name: str) -> Callable:
-        pointer, doubles = library.get_pointer_to_function(name), [np.dtype(float).num] * (count + 1)
+        pointer, doubles = (
+            library.get_pointer_to_function(name),
+            [np.dtype(float).num] * (count + 1),
+        )
         labels = function.__name__, function.__doc__
-        return _internal.fromfunc(*labels, [pointer], [doubles], count, 1, [None], [library], _internal.PyUFunc_None)
+        return _internal.fromfunc(
+            *labels,
+            [pointer],
+            [doubles],
+            count,
+            1,
+            [None],
+            [library],
+            _internal.PyUFunc_None,
+        )
 
     def make() -> tuple[Callable, Callable]:
-        result = UFuncDispatcher(function, targetoptions={"nopython": True}).compile(signature)
-        inner = result.library, result.target_context, result.fndesc.llvm_func_name, result.signature
+        result = UFuncDispatcher(function, targetoptions={"nopython": True}).compile(
+            signature
+        )
+        inner = (
+            result.library,
+            result.target_context,
+            result.fndesc.llvm_func_name,
+            result.signature,
+        )
         library, _, name = build_ufunc_wrapper(*inner, False, result)
         library.enable_object_caching()
-        return ufunc_of(library, name), lambda: (library.serialize_using_object_code(), name)
+        return ufunc_of(library, name), lambda: (
+            library.serialize_using_object_code(),
+            name,
+        )
 
     def load(code: Any, name: str) -> Callable:
-        return ufunc_of(cpu_target.target_context.codegen().unserialize_library(code), name)
+        return ufunc_of(
+            cpu_target.target_context.codegen().unserialize_library(code), name
+        )
 
-    built = _at_first_call(function, functools.partial(numba.vectorize, [signature], nopython=True), make, load)
+    built = _at_first_call(
+        function,
+        functools.partial(numba.vectorize, [signature], nopython=True),
+        make,
+        load,
+    )
 
     @functools.wraps(function)
     def call(*arguments, **keywords):
@@ -277,7 +338,9 @@ def law(function: Callable) -> Callable:
 
 
 def _is_small(argument: Any) -> bool:
-    return type(argument) is float or (type(argument) is np.ndarray and argument.size < _BLOCK // 16)
+    return type(argument) is float or (
+        type(argument) is np.ndarray and argument.size < _BLOCK // 16
+    )
 
 
 @functools.lru_cache(maxsize=64)  # constants of a scene come back at every step
@@ -303,11 +366,25 @@ def _in_blocks(ufunc: Callable, arguments: tuple) -> Any:
     if shapes.count(shape) != len(shapes):
         return ufunc(*arrays)
     if size <= _BLOCK:
-        return ufunc(*[_filled(shape, array.item()) if array.size == 1 else array for array in arrays])
-    flat = [_filled((_BLOCK,), a.item()) if a.size == 1 else np.ascontiguousarray(a).ravel() for a in arrays]
+        return ufunc(
+            *[
+                _filled(shape, array.item()) if array.size == 1 else array
+                for array in arrays
+            ]
+        )
+    flat = [
+        _filled((_BLOCK,), a.item()) if a.size == 1 else np.ascontiguousarray(a).ravel()
+        for a in arrays
+    ]
     out = np.empty(size)
     for first in range(0, size, _BLOCK):
         block = slice(first, min(first + _BLOCK, size))
         length = block.stop - first
-        ufunc(*[a[:length] if array.size == 1 else a[block] for a, array in zip(flat, arrays, strict=True)], out[block])
+        ufunc(
+            *[
+                a[:length] if array.size == 1 else a[block]
+                for a, array in zip(flat, arrays, strict=True)
+            ],
+            out[block],
+        )
     return out.reshape(shape)

@@ -37,9 +37,17 @@ class _Store(NetCDF4DataStore):
     def open_store_variable(self, name: str, var: Any) -> Any:
         variable = super().open_store_variable(name, var)
         for attribute in ("scale_factor", "add_offset", "_FillValue", "missing_value"):
-            if isinstance(variable.attrs.get(attribute), str) and variable.dtype.kind not in "OUS":
+            if (
+                isinstance(variable.attrs.get(attribute), str)
+                and variable.dtype.kind not in "OUS"
+            ):
                 raise Refused(f"holds no number in {attribute} of the variable {name}")
-        return xr.Variable(variable.dims, LazilyIndexedArray(_Array(name, self)), variable.attrs, variable.encoding)
+        return xr.Variable(
+            variable.dims,
+            LazilyIndexedArray(_Array(name, self)),
+            variable.attrs,
+            variable.encoding,
+        )
 
 
 def open_lazily(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -56,14 +64,22 @@ def open_lazily(path: str | os.PathLike[str]) -> xr.Dataset:
     """
     with HDF5, readable(), contextlib.ExitStack() as refused:
         file: Any = CachingFileManager(opened, os.path.abspath(path), lock=HDF5)  # type: ignore[type-var]
-        refused.callback(file.close)  # because nobody can delete or replace an open file on Windows
+        # because nobody can delete or replace an open file on Windows
+        refused.callback(file.close)
         store: Any = _Store(file, lock=HDF5)
         store.path = path
-        dataset = xr.open_dataset(store, engine=StoreBackendEntrypoint, decode_times=False, decode_coords=False)
+        dataset = xr.open_dataset(
+            store,
+            engine=StoreBackendEntrypoint,
+            decode_times=False,
+            decode_coords=False,
+        )
         refused.pop_all()
     return dataset
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
     """Write a dataset as a netCDF file. On Windows xarray itself writes no path with a letter outside of ASCII."""
-    write_in_memory(path, lambda file: dataset.dump_to_store(NetCDF4DataStore(file, lock=HDF5)))
+    write_in_memory(
+        path, lambda file: dataset.dump_to_store(NetCDF4DataStore(file, lock=HDF5))
+    )

@@ -28,7 +28,8 @@ PARTS = {"bonds": 1, "shear": 2, "drive": 3, "contact": 4}
 _U = np.uint64
 _FACTORS = _U(0xD2E7470EE14C6C93), _U(0xCA5A826395121157)
 _WEYL = _U(0x9E3779B97F4A7C15), _U(0xBB67AE8584CAA73B)
-_STREAMS = _U(256)  # first lane of streams; those below belong to the lives of single bonds
+# first lane of streams; those below belong to the lives of single bonds
+_STREAMS = _U(256)
 _LOW_HALF, _HALF = _U(0xFFFFFFFF), _U(32)
 
 
@@ -145,12 +146,20 @@ def logarithm(x):
     exponent = (bits - np.int64(0x3FE6A09E00000000)) >> np.int64(52)
     f = float_of(bits - (exponent << np.int64(52))) - 1.0
     # the integer exponent as a float, by its bits
-    k = float_of((exponent + np.int64(1024)) | np.int64(0x4330000000000000)) - 4503599627371520.0
+    k = (
+        float_of((exponent + np.int64(1024)) | np.int64(0x4330000000000000))
+        - 4503599627371520.0
+    )
     s = f / (2.0 + f)
     z = s * s
     w = z * z
-    even = w * (3.999999999940941908e-01 + w * (2.222219843214978396e-01 + w * 1.531383769920937332e-01))
-    odd = 2.857142874366239149e-01 + w * (1.818357216161805012e-01 + w * 1.479819860510658591e-01)
+    even = w * (
+        3.999999999940941908e-01
+        + w * (2.222219843214978396e-01 + w * 1.531383769920937332e-01)
+    )
+    odd = 2.857142874366239149e-01 + w * (
+        1.818357216161805012e-01 + w * 1.479819860510658591e-01
+    )
     odd = z * (6.666666666666735130e-01 + w * odd)
     half = 0.5 * f * f
     rest = s * (half + odd + even) + k * 1.90821492927058770002e-10
@@ -170,7 +179,10 @@ def _layers() -> tuple[np.ndarray, np.ndarray]:
     rectangle of the same area.
     """
     with localcontext(prec=20):
-        area, height = Decimal("0.0049286732339746553474"), Decimal("0.0012602859304985975641")
+        area, height = (
+            Decimal("0.0049286732339746553474"),
+            Decimal("0.0012602859304985975641"),
+        )
         widths, heights = [area / height], [Decimal(0), height]
         while len(widths) < 256:
             widths.append((-2 * heights[-1].ln()).sqrt())
@@ -247,7 +259,9 @@ def gamma(shape, numbers):
         if v <= 0.0:
             continue
         v, u = v * v * v, 2.0 - _unit(drawn)
-        if u < 1.0 - 0.1986 * (c * x * x) * (c * x * x) or logarithm(u) < 0.5 * x * x + d * (1.0 - v + logarithm(v)):
+        if u < 1.0 - 0.1986 * (c * x * x) * (c * x * x) or logarithm(
+            u
+        ) < 0.5 * x * x + d * (1.0 - v + logarithm(v)):
             break
     if shape >= 1.0:
         return d * v, numbers
@@ -278,13 +292,30 @@ def _uniforms(seed, part, members, step, drawn):
 
 
 #: ln n! less Stirling's formula for n = 1 to 15; unused at n = 0.
-_STIRLING = np.array((
-    0.0, 0.08106146679532726, 0.0413406959554093, 0.02767792568499834, 0.020790672103765093, 0.016644691189821193,
-    0.013876128823070748, 0.01189670994589177, 0.010411265261972096, 0.009255462182712733, 0.00833056343336287,
-    0.007573675487951841, 0.00694284010720953, 0.006408994188004207, 0.0059513701127588475, 0.005554733551962801,
-))  # fmt: skip
-_SPLIT = 2.0**30 + 1.0  # leaves 23 bits, so that their product with a number below 2^30 is exact
-_FEW = 10.0  # mean up to which numbers are counted up; the constants of rejection hold from here
+_STIRLING = np.array(
+    (
+        0.0,
+        0.08106146679532726,
+        0.0413406959554093,
+        0.02767792568499834,
+        0.020790672103765093,
+        0.016644691189821193,
+        0.013876128823070748,
+        0.01189670994589177,
+        0.010411265261972096,
+        0.009255462182712733,
+        0.00833056343336287,
+        0.007573675487951841,
+        0.00694284010720953,
+        0.006408994188004207,
+        0.0059513701127588475,
+        0.005554733551962801,
+    )
+)
+# leaves 23 bits, so that their product with a number below 2^30 is exact
+_SPLIT = 2.0**30 + 1.0
+# mean up to which numbers are counted up; the constants of rejection hold from here
+_FEW = 10.0
 
 
 @device
@@ -323,7 +354,11 @@ def binomial(trials, constants, numbers):
         return 0.0, numbers
     if chance >= 1.0:
         return trials, numbers
-    number, numbers = _rejected(trials, p, numbers) if trials * p >= _FEW else _counted_up(trials, log, odds, numbers)
+    number, numbers = (
+        _rejected(trials, p, numbers)
+        if trials * p >= _FEW
+        else _counted_up(trials, log, odds, numbers)
+    )
     return (number if chance <= 0.5 else trials - number), numbers
 
 
@@ -367,9 +402,14 @@ def _rejected(n, p, numbers):
         if k < 0.0 or k > n:
             continue
         bar, off = logarithm(v * size / (a / (room * room) + b)), abs(k - most)
-        if off < 0.5 * variance - 1.0:  # Kachitvichyanukul & Schmeiser's bounds (Comm. ACM 31, 1988)
+        # Kachitvichyanukul & Schmeiser's bounds (Comm. ACM 31, 1988)
+        if off < 0.5 * variance - 1.0:
             about = -0.5 * off * off / variance
-            doubt = ((off * (off / 3.0 + 0.625) + 1.0 / 6.0) / variance + 0.5) * off / variance
+            doubt = (
+                ((off * (off / 3.0 + 0.625) + 1.0 / 6.0) / variance + 0.5)
+                * off
+                / variance
+            )
             if bar < about - doubt:
                 return k, numbers
             if bar > about + doubt:
@@ -389,8 +429,12 @@ def _log1p_less(x):
     """ln(1 + x) − x for |x| <= 1/2, by 2 artanh(x/(2 + x))."""
     r = x / (2.0 + x)
     y = r * r
-    total = 1 / 21 + y * (1 / 23 + y * (1 / 25 + y * (1 / 27 + y * (1 / 29 + y * (1 / 31)))))
-    total = 1 / 11 + y * (1 / 13 + y * (1 / 15 + y * (1 / 17 + y * (1 / 19 + y * total))))
+    total = 1 / 21 + y * (
+        1 / 23 + y * (1 / 25 + y * (1 / 27 + y * (1 / 29 + y * (1 / 31))))
+    )
+    total = 1 / 11 + y * (
+        1 / 13 + y * (1 / 15 + y * (1 / 17 + y * (1 / 19 + y * total)))
+    )
     total = 1 / 3 + y * (1 / 5 + y * (1 / 7 + y * (1 / 9 + y * total)))
     return r * (2.0 * y * total - x)
 
@@ -410,7 +454,14 @@ def _stirling(n):
     if n < 16.0:
         return _STIRLING[int(n)]
     y = 1.0 / (n * n)
-    return (1 / 12 - y * (1 / 360 - y * (1 / 1260 - y * (1 / 1680 - y * (1 / 1188 - y * 691 / 360360))))) / n
+    return (
+        1 / 12
+        - y
+        * (
+            1 / 360
+            - y * (1 / 1260 - y * (1 / 1680 - y * (1 / 1188 - y * 691 / 360360)))
+        )
+    ) / n
 
 
 @device
@@ -429,5 +480,10 @@ def _log_chance(k, n, p):
     if k == n:
         return n * logarithm(p)
     over = _excess(k, n, p)
-    log = _stirling(n) - _stirling(k) - _stirling(n - k) - 0.5 * logarithm(2.0 * math.pi * k * (n - k) / n)
+    log = (
+        _stirling(n)
+        - _stirling(k)
+        - _stirling(n - k)
+        - 0.5 * logarithm(2.0 * math.pi * k * (n - k) / n)
+    )
     return log - _deviance(k, over, n * p) - _deviance(n - k, -over, n * (1.0 - p))

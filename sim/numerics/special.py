@@ -74,7 +74,8 @@ def lambert(x):
         return x if x >= 0.0 else math.nan
     root = math.log1p(x)
     root *= 1.0 - math.log1p(root) / (2.0 + root)
-    for _ in range(4):  # the guess is within 2 %; each round squares the error (Iacono & Boyd 2017)
+    # the guess is within 2 %; each round squares the error (Iacono & Boyd 2017)
+    for _ in range(4):
         root *= (1.0 + math.log(x / root)) / (1.0 + root)
     return root
 
@@ -93,9 +94,13 @@ def si(x):
     inverse_real, inverse_imag = under, -x * under
     real, imag = inverse_real, inverse_imag
     over_real = over_imag = 0.0
-    for k in range(1, 200):  # Lentz's method: the product of the ratios of numerators and denominators
+    # Lentz's method: the product of the ratios of numerators and denominators
+    for k in range(1, 200):
         below, square = 2.0 * k + 1.0, float(k * k)
-        lower_real, lower_imag = below - square * inverse_real, x - square * inverse_imag
+        lower_real, lower_imag = (
+            below - square * inverse_real,
+            x - square * inverse_imag,
+        )
         upper_real, upper_imag = below - square * over_real, x - square * over_imag
         under = 1.0 / (lower_real * lower_real + lower_imag * lower_imag)
         inverse_real, inverse_imag = lower_real * under, -lower_imag * under
@@ -116,13 +121,21 @@ def exp(x):
     The rational form of fdlibm's ``exp`` in exactly rounded operations: the same bits on any machine.
     """
     inside = min(max(x, -708.0), 709.0)
-    shifted = inside * 1.44269504088896338700 + 6755399441055744.0  # a whole number in the last bits
+    # a whole number in the last bits
+    shifted = inside * 1.44269504088896338700 + 6755399441055744.0
     whole = shifted - 6755399441055744.0
-    high, low = inside - whole * 6.93147180369123816490e-01, whole * 1.90821492927058770002e-10
+    high, low = (
+        inside - whole * 6.93147180369123816490e-01,
+        whole * 1.90821492927058770002e-10,
+    )
     r = high - low
     t = r * r
-    odd = 6.61375632143793436117e-05 + t * (-1.65339022054652515390e-06 + t * 4.13813679705723846039e-08)
-    c = r - t * (1.66666666666666019037e-01 + t * (-2.77777777770155933842e-03 + t * odd))
+    odd = 6.61375632143793436117e-05 + t * (
+        -1.65339022054652515390e-06 + t * 4.13813679705723846039e-08
+    )
+    c = r - t * (
+        1.66666666666666019037e-01 + t * (-2.77777777770155933842e-03 + t * odd)
+    )
     near = 1.0 - ((low - r * c / (2.0 - c)) - high)
     value = float_of(bits_of(near) + (bits_of(shifted) << np.int64(52)))
     value = math.inf if x > 709.0 else value
@@ -257,7 +270,11 @@ def erf_between(low, high):
     """
     if low > 0.0:
         low, high = -high, -low
-    return math.erfc(-high) - math.erfc(-low) if high < 0.0 else math.erf(high) - math.erf(low)
+    return (
+        math.erfc(-high) - math.erfc(-low)
+        if high < 0.0
+        else math.erf(high) - math.erf(low)
+    )
 
 
 @law

@@ -46,11 +46,21 @@ class _Sliding(Part):
         motion = self.motion(0, 0.0, 0.0, times.duration)
         return Slider(np.zeros(1), motion.speed), motion
 
-    def advance(self, state: Slider, times: Times, steps: range) -> tuple[Slider, Motion]:
-        rows = self._of_steps(times, steps) if len(steps) > 1 else self._of_one(times, steps.start)
+    def advance(
+        self, state: Slider, times: Times, steps: range
+    ) -> tuple[Slider, Motion]:
+        rows = (
+            self._of_steps(times, steps)
+            if len(steps) > 1
+            else self._of_one(times, steps.start)
+        )
         time, duration, slip, path, first, speed, unsteady = rows
-        position = np.add.accumulate(np.concatenate([state.position[np.newaxis], slip]))[1:]
-        motions = Motion(steps.start, time, duration, slip, path, first, speed, unsteady, position)
+        position = np.add.accumulate(
+            np.concatenate([state.position[np.newaxis], slip])
+        )[1:]
+        motions = Motion(
+            steps.start, time, duration, slip, path, first, speed, unsteady, position
+        )
         return Slider(position[-1], speed[-1]), motions
 
     def _of_steps(self, times: Times, steps: range) -> Array:
@@ -62,7 +72,9 @@ class _Sliding(Part):
         """Rows of ``_sums`` for a single step, computed for many steps at once."""
         before = (step - 1) // _AHEAD * _AHEAD
         if (rows := self._ahead.get((times, before))) is None:
-            rows = self._of_steps(times, range(before + 1, min(before + _AHEAD, times.steps) + 1))
+            rows = self._of_steps(
+                times, range(before + 1, min(before + _AHEAD, times.steps) + 1)
+            )
             self._ahead.clear()
             self._ahead[times, before] = rows
         return rows[:, step - before - 1 : step - before]
@@ -82,10 +94,20 @@ class _Sliding(Part):
         """Slip, path and final speed from time ``start`` to ``stop`` of a run of ``duration`` [s]."""
         return Motion(step, *self._sums(np.array([start, stop]), duration))
 
-    def _sums(self, ends: Array, duration: float) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
+    def _sums(
+        self, ends: Array, duration: float
+    ) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
         """Return quantities of ``Motion`` from ``time`` to ``unsteady`` in the intervals between times [s]."""
         pieces = self.pieces(ends, duration).joined
-        return ends[1:], np.diff(ends), pieces.integral, pieces.path, pieces.first, pieces.last, pieces.unsteady
+        return (
+            ends[1:],
+            np.diff(ends),
+            pieces.integral,
+            pieces.path,
+            pieces.first,
+            pieces.last,
+            pieces.unsteady,
+        )
 
 
 @keyed()
@@ -114,7 +136,9 @@ class Start(_Sliding):
     0.002 0.0 0.001
     """
 
-    rest: Annotated[float, Quantity("s", "time at rest before sliding", "t_w", at_least=0)]
+    rest: Annotated[
+        float, Quantity("s", "time at rest before sliding", "t_w", at_least=0)
+    ]
     speed: Annotated[float, _SPEED]
     model: Literal["start"] = "start"
 
@@ -125,7 +149,10 @@ class Start(_Sliding):
         return [still] if self.rest >= setting.times.duration else []
 
     def pieces(self, ends: Array, duration: float) -> tables.Pieces:
-        times, speeds = np.array([0.0, self.rest, self.rest]), np.array([0.0, 0.0, self.speed])
+        times, speeds = (
+            np.array([0.0, self.rest, self.rest]),
+            np.array([0.0, 0.0, self.speed]),
+        )
         return tables.table_pieces(times, speeds, ends, duration)
 
 
@@ -157,16 +184,30 @@ class Table(tables.Table, _Sliding):
     model: Literal["table"] = "table"
 
 
-_Tolerance = Annotated[float, Quantity("1", "tolerance of the slider's motion", "", at_least=1e-12, at_most=1e-2)]
+_Tolerance = Annotated[
+    float,
+    Quantity("1", "tolerance of the slider's motion", "", at_least=1e-12, at_most=1e-2),
+]
 #: Columns of ``Driven.energies``: work of the drive; lost to damping, viscosity, rupture, snaps and to the area as it
 #: changes; stored now, and at the start.
 ENERGY = record("work damping viscosity rupture snaps area stored first")
 #: Columns of the readings of a drive that feels the friction.
 READINGS = (
-    "stage_position", "stage_speed", "spring_force", "drive_work", "stored_energy", "dissipated_by_damping",
-    "dissipated_by_viscosity", "dissipated_by_rupture", "dissipated_by_snaps", "dissipated_by_area", "energy_residual",
-    "substeps", "runaway_time", "unresolved_time",
-)  # fmt: skip
+    "stage_position",
+    "stage_speed",
+    "spring_force",
+    "drive_work",
+    "stored_energy",
+    "dissipated_by_damping",
+    "dissipated_by_viscosity",
+    "dissipated_by_rupture",
+    "dissipated_by_snaps",
+    "dissipated_by_area",
+    "energy_residual",
+    "substeps",
+    "runaway_time",
+    "unresolved_time",
+)
 
 
 class Driven(NamedTuple):
@@ -234,12 +275,21 @@ class _Driven(Part):
     solves_motion: ClassVar[bool] = True
 
     mass: Annotated[float, Quantity("kg", "mass of the body", "m", at_least=0)] = 0.0
-    damping: Annotated[float, Quantity("N s/m", "damping of the body", "c", at_least=0)] = 0.0
-    viscosity: Annotated[float, Quantity("Pa s/m", "viscosity of the interface", "eta", at_least=0)] = 0.0
+    damping: Annotated[
+        float, Quantity("N s/m", "damping of the body", "c", at_least=0)
+    ] = 0.0
+    viscosity: Annotated[
+        float, Quantity("Pa s/m", "viscosity of the interface", "eta", at_least=0)
+    ] = 0.0
     contact_stiffness: Annotated[
-        Annotated[float, Quantity("N/m", "tangential stiffness of the contact", "k_t", above=0)]
+        Annotated[
+            float,
+            Quantity("N/m", "tangential stiffness of the contact", "k_t", above=0),
+        ]
         | Literal["half_space", "rigid"],
-        Field(description='"half_space": that of the half-space under a uniform stress'),
+        Field(
+            description='"half_space": that of the half-space under a uniform stress'
+        ),
     ] = "half_space"
     tolerance: _Tolerance = 1e-6
 
@@ -265,7 +315,11 @@ class _Driven(Part):
         zero = np.zeros(members)
         never = np.full(members, np.nan)
         state = Driven(*(zero for _ in Driven._fields))._replace(
-            body_speed=speed, speed=speed, runaway_time=never, unresolved_time=never, energies=np.zeros((members, 8))
+            body_speed=speed,
+            speed=speed,
+            runaway_time=never,
+            unresolved_time=never,
+            energies=np.zeros((members, 8)),
         )
         return state, Motion(0, np.zeros(1), np.zeros(1), zero, zero, speed, speed)
 
@@ -284,7 +338,11 @@ class _Driven(Part):
         """
         if self.contact_stiffness == "half_space":
             return 0.0, 4.0 * (2.0 - poisson_ratio) / (3.0 * math.pi**2 * shear_modulus)
-        return (0.0, 0.0) if self.contact_stiffness == "rigid" else (1.0 / float(self.contact_stiffness), 0.0)
+        return (
+            (0.0, 0.0)
+            if self.contact_stiffness == "rigid"
+            else (1.0 / float(self.contact_stiffness), 0.0)
+        )
 
     def driven(self, ends: Array, duration: float) -> tables.Pieces:
         """Return the prescribed speed of the stage or force in the intervals between some times [s]."""
@@ -292,12 +350,16 @@ class _Driven(Part):
 
     def readings(self, state: Driven) -> Array:
         """Recorded quantities of the drive, columns ``READINGS``, as last axis."""
-        work, *spent, stored, first = (state.energies[..., k] for k in range(state.energies.shape[-1]))
+        work, *spent, stored, first = (
+            state.energies[..., k] for k in range(state.energies.shape[-1])
+        )
         residual = work - (stored - first) - sum(spent)
         stage = state.stage_position, state.stage_speed, state.spring_force
         readings = np.empty((*work.shape, len(READINGS)))
         ends = state.runaway_time, state.unresolved_time
-        for k, column in enumerate((*stage, work, stored, *spent, residual, state.substeps, *ends)):
+        for k, column in enumerate(
+            (*stage, work, stored, *spent, residual, state.substeps, *ends)
+        ):
             readings[..., k] = column
         return readings
 
@@ -326,11 +388,17 @@ class Spring(_Driven):
     """A stage that pulls the body through a spring: stick-slip. Limit: the stage's own motion as K -> infinity."""
 
     stage: tables.over_time(Quantity("m/s", "speed of the stage", "V"), "speed")  # type: ignore[valid-type]
-    stiffness: Annotated[float, Quantity("N/m", "stiffness of the spring", "K", above=0)]
-    start_after: Annotated[float, Quantity("s", "time at rest before the stage moves", "t_w", at_least=0)] = 0.0
+    stiffness: Annotated[
+        float, Quantity("N/m", "stiffness of the spring", "K", above=0)
+    ]
+    start_after: Annotated[
+        float, Quantity("s", "time at rest before the stage moves", "t_w", at_least=0)
+    ] = 0.0
     start: Annotated[
         Literal["rest", "steady"],
-        Field(description='"steady": moving with the stage; it remains so until disturbed, even if unstable'),
+        Field(
+            description='"steady": moving with the stage; it remains so until disturbed, even if unstable'
+        ),
     ] = "rest"
     model: Literal["spring"] = "spring"
 
@@ -363,15 +431,27 @@ class Spring(_Driven):
         if after >= ends[-1]:
             return still.pieces(ends, duration)
         rests, cut = ends[ends < after], ends[ends > after]
-        moving = _shifted(self.course.pieces(np.append(0.0, cut - after), duration - after), after)
-        pairs = zip(still.pieces(np.append(rests, after), duration), moving, strict=True)
+        moving = _shifted(
+            self.course.pieces(np.append(0.0, cut - after), duration - after), after
+        )
+        pairs = zip(
+            still.pieces(np.append(rests, after), duration), moving, strict=True
+        )
         pieces = tables.Pieces(*(np.concatenate(pair) for pair in pairs))
-        return pieces._replace(interval=np.searchsorted(ends, 0.5 * (pieces.start + pieces.stop)) - 1)
+        return pieces._replace(
+            interval=np.searchsorted(ends, 0.5 * (pieces.start + pieces.stop)) - 1
+        )
 
 
 def _shifted(pieces: tables.Pieces, time: float) -> tables.Pieces:
     """Return pieces that begin later by a time [s]."""
-    return pieces._replace(start=pieces.start + time, stop=pieces.stop + time) if time else pieces
+    return (
+        pieces._replace(start=pieces.start + time, stop=pieces.stop + time)
+        if time
+        else pieces
+    )
 
 
-Drive = Annotated[Steady | Start | Ramp | Table | Force | Spring, Field(discriminator="model")]
+Drive = Annotated[
+    Steady | Start | Ramp | Table | Force | Spring, Field(discriminator="model")
+]

@@ -30,9 +30,21 @@ TURN = record("opening closing radius")
 #: Row of a contact: radius [m] when it last opened or closed, and time of the last detachment [s]; number of
 #: detachments; time at which it was first masked, time for which it was closed, and of that masked [s]; then the turns
 #: of the phase.
-CONTACT = record("last detached detachments masked closed hidden " + " ".join(TURN.names or ()))
+CONTACT = record(
+    "last detached detachments masked closed hidden " + " ".join(TURN.names or ())
+)
 #: Its columns for the kernel, because a kernel with a view of a record takes 0.1 s to load.
-_LAST, _DETACHED, _DETACHMENTS, _MASKED, _CLOSED, _HIDDEN, _OPENING, _CLOSING, _RADIUS = range(len(CONTACT.names or ()))
+(
+    _LAST,
+    _DETACHED,
+    _DETACHMENTS,
+    _MASKED,
+    _CLOSED,
+    _HIDDEN,
+    _OPENING,
+    _CLOSING,
+    _RADIUS,
+) = range(len(CONTACT.names or ()))
 #: Fall of the spring force that makes a slip event, and rise that ends it, over the largest force so far.
 FALL, RISE = 0.3, 0.1
 #: Slip of the interface over the slider's advance in a slip event, at least.
@@ -53,7 +65,9 @@ _GONE = "work", "path", "gone"
 SLIPPING = record(
     "sense stage position slid largest falling top top_slid low low_slid before count "
     + " ".join([*(SLIP.names or ()), *_GONE])
-    + "".join(f" {at}_{name}" for at in ("top", "half", "first", "last") for name in _GONE)
+    + "".join(
+        f" {at}_{name}" for at in ("top", "half", "first", "last") for name in _GONE
+    )
 )
 #: Quantities of late slip events of which moments are kept, and their moments.
 LATE = "force_before", "force_drop", "amplitude", "recurrence"
@@ -80,12 +94,24 @@ class Slips(NamedTuple):
     @classmethod
     def none(cls, stage: Array) -> "Slips":
         """Return the slip events before the first sample, for positions of the stage at the start [m]."""
-        slipping, moments, slip = (len(kind.names or ()) for kind in (SLIPPING, MOMENTS, SLIP))
+        slipping, moments, slip = (
+            len(kind.names or ()) for kind in (SLIPPING, MOMENTS, SLIP)
+        )
         running = np.zeros((len(stage), slipping))
         running.view(SLIPPING)[:, 0]["stage"] = stage
-        return cls(running, np.zeros((len(stage), len(LATE), moments)), np.zeros((len(stage), 0, slip)))
+        return cls(
+            running,
+            np.zeros((len(stage), len(LATE), moments)),
+            np.zeros((len(stage), 0, slip)),
+        )
 
-    def after(self, time: Array, stage: tuple[Array, Array], slider: tuple[Array, ...], half: float) -> "Slips":
+    def after(
+        self,
+        time: Array,
+        stage: tuple[Array, Array],
+        slider: tuple[Array, ...],
+        half: float,
+    ) -> "Slips":
         """Return the slip events after some more samples.
 
         Parameters
@@ -104,7 +130,8 @@ class Slips(NamedTuple):
         slips = Slips(self.running.copy(), self.late.copy(), self.log[:, :0])
         if not _follow_slips(*samples, *slips):
             return Slips(*slips[:2], self.log)
-        room = 2 ** math.ceil(math.log2(min(slips.total.max(), MOST_SLIPS)))  # of the count alone, not of the blocks
+        # of the count alone, not of the blocks
+        room = 2 ** math.ceil(math.log2(min(slips.total.max(), MOST_SLIPS)))
         log = np.full((len(self.log), room, self.log.shape[2]), np.nan)
         log[:, : self.log.shape[1]] = self.log
         slips = Slips(self.running.copy(), self.late.copy(), log)
@@ -132,9 +159,13 @@ class Slips(NamedTuple):
         slips = self.late[:, 0].view(MOMENTS)[:, 0]["count"] > 1.0
         between = (state[f"last_{name}"] - state[f"first_{name}"] for name in _GONE)
         since_half = (state[name] - state[f"half_{name}"] for name in _GONE)
-        work, path, gone = (np.where(slips, *spans) for spans in zip(between, since_half, strict=True))
+        work, path, gone = (
+            np.where(slips, *spans) for spans in zip(between, since_half, strict=True)
+        )
         follows = (path > 0.0) & (gone > _SLIPPED * path)
-        friction: Array = np.divide(work, path, out=np.full(len(path), np.nan), where=follows)
+        friction: Array = np.divide(
+            work, path, out=np.full(len(path), np.nan), where=follows
+        )
         return friction
 
 
@@ -163,27 +194,55 @@ def slip_ends(time, stage, speed, force, position, slip, stress, work, state, ev
     if sense == 0.0:
         return False
     pull, bears = sense * force, sense * stress
-    rises = not turns and state.falling > 0.0 and pull - state.force_after > RISE * state.largest
+    rises = (
+        not turns
+        and state.falling > 0.0
+        and pull - state.force_after > RISE * state.largest
+    )
     slips = False
     if rises:
-        advance, slid = sense * (state.low - state.top), sense * (state.low_slid - state.top_slid)
+        advance, slid = (
+            sense * (state.low - state.top),
+            sense * (state.low_slid - state.top_slid),
+        )
         slips = advance > 0.0 and slid >= _SLIPPED * advance
         if slips:
-            event.time, event.end, event.amplitude, event.speed = state.time, state.end, advance, state.speed
-            event.force_before, event.force_after = state.force_before, state.force_after
-            event.stress_before, event.stress_after = state.stress_before, state.stress_after
+            event.time, event.end, event.amplitude, event.speed = (
+                state.time,
+                state.end,
+                advance,
+                state.speed,
+            )
+            event.force_before, event.force_after = (
+                state.force_before,
+                state.force_after,
+            )
+            event.stress_before, event.stress_after = (
+                state.stress_before,
+                state.stress_after,
+            )
     if turns or rises:
         state.falling, state.force_before, state.stress_before = 0.0, -math.inf, bears
     if bears > state.stress_before:
         state.stress_before = bears
     if pull > state.force_before:
         state.force_before, state.time, state.speed = pull, time, math.fabs(speed)
-        state.top, state.top_slid, state.force_after, state.stress_after = position, state.slid, math.inf, bears
+        state.top, state.top_slid, state.force_after, state.stress_after = (
+            position,
+            state.slid,
+            math.inf,
+            bears,
+        )
         state.top_work, state.top_path, state.top_gone = work, state.path, state.gone
     if bears < state.stress_after:
         state.stress_after = bears
     if pull < state.force_after:
-        state.force_after, state.end, state.low, state.low_slid = pull, time, position, state.slid
+        state.force_after, state.end, state.low, state.low_slid = (
+            pull,
+            time,
+            position,
+            state.slid,
+        )
     if state.force_before - state.force_after > FALL * state.largest:
         state.falling = 1.0
     return slips
@@ -208,7 +267,9 @@ def _gather(value, moments):
     f"boolean(Array(float64, 1, 'A', readonly=True), {7 * _READ}float64, "
     "float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1])"
 )
-def _follow_slips(times, stage, speed, force, position, slip, stress, work, half, running, late, log):
+def _follow_slips(
+    times, stage, speed, force, position, slip, stress, work, half, running, late, log
+):
     """Take samples of all members; return True if a slip event has ended."""
     ends = False
     columns = np.zeros(log.shape[2])
@@ -217,10 +278,23 @@ def _follow_slips(times, stage, speed, force, position, slip, stress, work, half
         state = running[i].view(SLIPPING)[0]
         for k in range(len(times)):
             mark = state.top_work, state.top_path, state.top_gone
-            sample = times[k], stage[k, i], speed[k, i], force[k, i], position[k, i], slip[k, i], stress[k, i]
+            sample = (
+                times[k],
+                stage[k, i],
+                speed[k, i],
+                force[k, i],
+                position[k, i],
+                slip[k, i],
+                stress[k, i],
+            )
             ended = slip_ends(*sample, work[k, i], state, event)
-            if times[k] >= half and state.half_path == 0.0:  # a stage at rest has no path
-                state.half_work, state.half_path, state.half_gone = state.work, state.path, state.gone
+            # a stage at rest has no path
+            if times[k] >= half and state.half_path == 0.0:
+                state.half_work, state.half_path, state.half_gone = (
+                    state.work,
+                    state.path,
+                    state.gone,
+                )
             if not ended:
                 continue
             ends = True
@@ -262,7 +336,9 @@ class Events(NamedTuple):
         contact = self.contact[:, -1:].copy()
         contact[..., _OPENING:] = np.nan
         ahead = *(_started(rows[:, -1, 1]) for rows in self[:3]), contact
-        phases = (np.concatenate(pair, axis=1) for pair in zip(self[:4], ahead, strict=True))
+        phases = (
+            np.concatenate(pair, axis=1) for pair in zip(self[:4], ahead, strict=True)
+        )
         return Events._make([*phases, self.path, self.slips])
 
     def by_phase(self, name: str) -> NDArray[np.void]:
@@ -291,9 +367,18 @@ def first(bonding: Bonding, contact: ContactState, pull: Array, stage: Array) ->
     stress = np.abs(bonding.stress)
     friction = stress * (np.pi * contact.radius**2)
     rows = np.zeros((len(contact.radius), 1, len(CONTACT.names or ())))
-    rows[:, 0, _LAST], rows[..., _DETACHED], rows[..., _OPENING:] = contact.radius, -np.inf, np.nan
-    rows[:, 0, _MASKED] = np.where((contact.work <= 0.0) & (contact.radius > 0.0), 0.0, np.nan)
-    started = [_started(np.where(np.isnan(values), 0.0, values)) for values in (stress, friction, pull)]
+    rows[:, 0, _LAST], rows[..., _DETACHED], rows[..., _OPENING:] = (
+        contact.radius,
+        -np.inf,
+        np.nan,
+    )
+    rows[:, 0, _MASKED] = np.where(
+        (contact.work <= 0.0) & (contact.radius > 0.0), 0.0, np.nan
+    )
+    started = [
+        _started(np.where(np.isnan(values), 0.0, values))
+        for values in (stress, friction, pull)
+    ]
     return Events._make([*started, rows, np.zeros(1), Slips.none(stage)])
 
 
@@ -305,9 +390,15 @@ def _started(values: Array) -> Array:
 
 
 def after(
-    so_far: Events, before: tuple[Bonding, Array], bonding: Bonding, contact: ContactState, pull: Array,
-    motions: Motion, with_path: bool = False, with_area: bool = True,
-) -> Events:  # fmt: skip
+    so_far: Events,
+    before: tuple[Bonding, Array],
+    bonding: Bonding,
+    contact: ContactState,
+    pull: Array,
+    motions: Motion,
+    with_path: bool = False,
+    with_area: bool = True,
+) -> Events:
     """Return the events after a block of steps in one phase, from bonds, contact and pull [N] at the end of each.
 
     ``before`` are bonds and contact radius at its start. The path is followed only ``with_path``, the area at the
@@ -329,19 +420,47 @@ def after(
     """
     start, radius_before = before
     stress, stiffness, relaxation = (
-        _with_start(getattr(start, name), getattr(bonding, name), len(contact.radius)) for name in _OF_THE_STRESS
+        _with_start(getattr(start, name), getattr(bonding, name), len(contact.radius))
+        for name in _OF_THE_STRESS
     )
     radii = _with_start(radius_before, contact.radius, len(contact.radius))
     rows = max(len(so_far.stress), stress.shape[1])
     members = max(rows, len(so_far.friction), radii.shape[1])
-    counts = rows, members, max(len(so_far.pull), pull.shape[1]), max(len(so_far.contact), radii.shape[1])
-    now = [values + np.zeros((count, 1, 1)) for values, count in zip(so_far[:4], counts, strict=True)]
+    counts = (
+        rows,
+        members,
+        max(len(so_far.pull), pull.shape[1]),
+        max(len(so_far.contact), radii.shape[1]),
+    )
+    now = [
+        values + np.zeros((count, 1, 1))
+        for values, count in zip(so_far[:4], counts, strict=True)
+    ]
     here = (values[:, -1] for values in now)
-    ends = motions.first, motions.speed, *motions.stick_ends, motions.time[:, 0], motions.duration[:, 0]
+    ends = (
+        motions.first,
+        motions.speed,
+        *motions.stick_ends,
+        motions.time[:, 0],
+        motions.duration[:, 0],
+    )
     bent = np.isnan(bonding.frozen).all()  # bonds without a stretch
     traits = 1.0 * with_area, 1.0 * bent
-    _follow(stress, stiffness, relaxation, radii, pull, contact.work, contact.detached, *ends, *traits, *here)
-    path = np.maximum(so_far.path, motions.path.max(axis=0)) if with_path else so_far.path
+    _follow(
+        stress,
+        stiffness,
+        relaxation,
+        radii,
+        pull,
+        contact.work,
+        contact.detached,
+        *ends,
+        *traits,
+        *here,
+    )
+    path = (
+        np.maximum(so_far.path, motions.path.max(axis=0)) if with_path else so_far.path
+    )
     return Events._make([*now, path, so_far.slips])
 
 
@@ -363,14 +482,37 @@ def _load(k, i, stress, stiffness, relaxation, speed, radius):
     """Magnitude of the stress, its slope over time at a speed, and the area."""
     value, area = _of(stress, k, i), math.pi * _of(radius, k, i) ** 2
     slope = _of(stiffness, k, i) * speed + _of(relaxation, k, i)
-    return math.fabs(value), (slope if value > 0.0 else -slope if value < 0.0 else math.fabs(slope)), area
+    return (
+        math.fabs(value),
+        (slope if value > 0.0 else -slope if value < 0.0 else math.fabs(slope)),
+        area,
+    )
 
 
-@kernel(f"void({11 * _READ}{2 * 'float64[:], '}float64, float64, {', '.join(4 * ['float64[:, :]'])})")
+@kernel(
+    f"void({11 * _READ}{2 * 'float64[:], '}float64, float64, {', '.join(4 * ['float64[:, :]'])})"
+)
 def _follow(
-    stresses, stiffness, relaxation, radii, pulls, works, detached, first, speed, strengths, since, times, steps,
-    share, bent, stress, friction, pull, contact,
-):  # fmt: skip
+    stresses,
+    stiffness,
+    relaxation,
+    radii,
+    pulls,
+    works,
+    detached,
+    first,
+    speed,
+    strengths,
+    since,
+    times,
+    steps,
+    share,
+    bent,
+    stress,
+    friction,
+    pull,
+    contact,
+):
     bonds, none = (stresses, stiffness, relaxation), (0.0, math.nan, 0.0)
     for k in range(len(times)):
         time, step = times[k], steps[k]
@@ -381,24 +523,51 @@ def _follow(
             value1, slope1, area1 = _load(k + 1, i, *bonds, speeds[1], radii)
             around = time, step, speeds[0], speeds[1], area0, area1
             if i < len(stress):
-                areas = (area0, area1) if share > 0.0 else (0.0, 0.0)  # an open contact has none to leave out
-                _keep(value1, slope0, slope1, (*around[:4], areas[0], areas[1]), (bent, strength, place), stress, i)
+                # an open contact has none to leave out
+                areas = (area0, area1) if share > 0.0 else (0.0, 0.0)
+                _keep(
+                    value1,
+                    slope0,
+                    slope1,
+                    (*around[:4], areas[0], areas[1]),
+                    (bent, strength, place),
+                    stress,
+                    i,
+                )
             growth = (area1 - area0) / step
-            rise, slope = area0 * slope0 + growth * value0, area1 * slope1 + growth * value1
+            rise, slope = (
+                area0 * slope0 + growth * value0,
+                area1 * slope1 + growth * value1,
+            )
             of_stress = math.fabs(value1 - value0) * (area0 + area1)
             of_area = math.fabs(area1 - area0) * (value0 + value1)
-            kink = (bent if of_stress > of_area else 0.0), strength * (area1 - place * (area1 - area0)), place
+            kink = (
+                (bent if of_stress > of_area else 0.0),
+                strength * (area1 - place * (area1 - area0)),
+                place,
+            )
             _keep(value1 * area1, rise, slope, around, kink, friction, i)
         for i in range(len(pull)):
-            area0, area1 = math.pi * _of(radii, k, i) ** 2, math.pi * _of(radii, k + 1, i) ** 2
+            area0, area1 = (
+                math.pi * _of(radii, k, i) ** 2,
+                math.pi * _of(radii, k + 1, i) ** 2,
+            )
             around = time, step, _of(first, k, i), _of(speed, k, i), area0, area1
             _keep(_of(pulls, k, i), math.nan, math.nan, around, none, pull, i)
         for i in range(len(contact)):
-            radius, work, opening = _of(radii, k + 1, i), _of(works, k, i), _of(detached, k, i)
+            radius, work, opening = (
+                _of(radii, k + 1, i),
+                _of(works, k, i),
+                _of(detached, k, i),
+            )
             closed, was_closed = radius > 0.0, contact[i, _LAST] > 0.0
             if closed:
                 contact[i, _CLOSED] += step
-            if closed != was_closed or (closed and not work > 0.0) or opening > contact[i, _DETACHED]:
+            if (
+                closed != was_closed
+                or (closed and not work > 0.0)
+                or opening > contact[i, _DETACHED]
+            ):
                 _turn(time, step, radius, work, opening, contact[i])
 
 
@@ -445,13 +614,15 @@ def _keep(now, rise, slope, around, kink, maxima, i):
     if now > largest:
         largest, place = now, 0.0
     peak, back = -math.inf, 0.0
-    steepest, larger = rise if rise > -slope else -slope, last if last > now else now  # max compiles for long
+    # max compiles for long
+    steepest, larger = rise if rise > -slope else -slope, last if last > now else now
     if rise > 0.0 > slope and step * steepest < _RESOLVED * larger:
         peak, back = _top(last, now, step * rise, step * slope)
     elif (
         bent == 0.0
         and fell >= 0.0
-        and (fell > 0.0 or math.isnan(rise + slope) or (rise > 0.0 and slope > 0.0))  # slopes are wrong or unknown
+        # slopes are wrong or unknown
+        and (fell > 0.0 or math.isnan(rise + slope) or (rise > 0.0 and slope > 0.0))
         and (last >= before and last > now and before > 0.5 * last and now > 0.5 * last)
     ):
         back = 1.0 - 0.5 * (before - now) / (before - 2.0 * last + now)
@@ -464,7 +635,10 @@ def _keep(now, rise, slope, around, kink, maxima, i):
     maxima[i, 2] = -1.0 if bent > 0.0 else 1.0 if rise < 0.0 and slope < 0.0 else 0.0
     if place >= 0.0:
         maxima[i, 3], maxima[i, 4] = largest, time - place * step
-        maxima[i, 5], maxima[i, 6] = speed1 - place * (speed1 - speed0), area1 - place * (area1 - area0)
+        maxima[i, 5], maxima[i, 6] = (
+            speed1 - place * (speed1 - speed0),
+            area1 - place * (area1 - area0),
+        )
 
 
 @device
@@ -474,9 +648,16 @@ def _top(last, now, rise, slope):
     The derivative ``rise + 2 b s + c s²`` has one zero between the ends, since it changes its sign there. The maximum
     is lowered to the tangents at both ends where it exceeds one of them.
     """
-    b, c = 3.0 * (now - last) - 2.0 * rise - slope, 3.0 * (rise + slope) - 6.0 * (now - last)
+    b, c = (
+        3.0 * (now - last) - 2.0 * rise - slope,
+        3.0 * (rise + slope) - 6.0 * (now - last),
+    )
     square = b * b - rise * c
     s = rise / (math.sqrt(0.0 if square < 0.0 else square) - b)
-    peak, first, second = last + s * (rise + s * (b + s * c / 3.0)), last + s * rise, now - (1.0 - s) * slope
+    peak, first, second = (
+        last + s * (rise + s * (b + s * c / 3.0)),
+        last + s * rise,
+        now - (1.0 - s) * slope,
+    )
     lower = first if first < second else second
     return (peak if peak < lower else lower), 1.0 - s

@@ -186,7 +186,19 @@ class Draws(NamedTuple):
 
 _NO_ADDRESS = np.uint64(0), np.uint64(0), np.empty(0, np.uint64), 0
 #: Draws where the loop of a drive draws nothing.
-NO_DRAWS = Draws(np.empty((0, 0)), np.empty((0, 0)), _EMPTY, _EMPTY, _EMPTY, True, 1.0, 0.0, False, False, _NO_ADDRESS)
+NO_DRAWS = Draws(
+    np.empty((0, 0)),
+    np.empty((0, 0)),
+    _EMPTY,
+    _EMPTY,
+    _EMPTY,
+    True,
+    1.0,
+    0.0,
+    False,
+    False,
+    _NO_ADDRESS,
+)
 
 
 class StickEnds(NamedTuple):
@@ -257,7 +269,11 @@ class Motion(NamedTuple):
 
 def during(values: Array, steps: int) -> Array:
     """Return values that are constant during a block, with the step as first axis."""
-    return values[np.newaxis] if steps == 1 else np.repeat(values[np.newaxis], steps, axis=0)
+    return (
+        values[np.newaxis]
+        if steps == 1
+        else np.repeat(values[np.newaxis], steps, axis=0)
+    )
 
 
 class Bonding(NamedTuple):
@@ -443,7 +459,9 @@ class Bonds(Part, Protocol[State]):
     def start(self, motion: Motion, noise: Noise) -> State:
         """Population at t = 0, as the key ``start`` has it."""
 
-    def advance(self, state: State, motions: Motion, radius: Array, noise: Noise) -> tuple[State, Bonding]:
+    def advance(
+        self, state: State, motions: Motion, radius: Array, noise: Noise
+    ) -> tuple[State, Bonding]:
         """Population after a block of steps, and what others read of it at the end of each.
 
         ``radius`` is that of the contact at the start of the block [m], nan where it was open.
@@ -466,7 +484,9 @@ class Shear(Protocol[State]):
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> State:
         """Stationary fluctuations at t = 0."""
 
-    def advance(self, state: State, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[State, Array]:
+    def advance(
+        self, state: State, motions: Motion, bonding: Bonding, noise: Noise
+    ) -> tuple[State, Array]:
         """Fluctuations after a block of steps, at the ends of which the bonds are ``bonding``; ΔΓ at each [J/m²]."""
 
     @property
@@ -494,7 +514,9 @@ class Contact(Part, Protocol[Terms]):
     def start(self, motion: Motion, duration: float, balance: Terms) -> ContactState:
         """Contact at the start of a run of ``duration`` [s], in equilibrium with the terms of the work of adhesion."""
 
-    def advance(self, state: ContactState, motions: Motion, duration: float, balance: Terms) -> ContactState:
+    def advance(
+        self, state: ContactState, motions: Motion, duration: float, balance: Terms
+    ) -> ContactState:
         """Contact at the end of each step of a block, where the terms of the work of adhesion are ``balance``."""
 
 

@@ -28,57 +28,101 @@ STRESS = "Pa", r"shear stress $\tau_1$", "RdBu_r"
 def needs_maps(dataset: xr.Dataset) -> None:
     """Refuse a dataset without stress maps."""
     if "shear_map" not in dataset:
-        raise ValueError('there are no stress maps; record some: [shear] model = "mapped" and [record] maps = ["1 s"]')
+        raise ValueError(
+            'there are no stress maps; record some: [shear] model = "mapped" and [record] maps = ["1 s"]'
+        )
 
 
 def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     """Last stress map of a member, or the map nearest to a time, and the displacement by this stress."""
     point = dataset.isel(dict.fromkeys(sweep_dims(dataset), 0))
-    number = -1 if at is None else int(np.abs(point["map_time"].to_numpy() - at).argmin())
+    number = (
+        -1 if at is None else int(np.abs(point["map_time"].to_numpy() - at).argmin())
+    )
     stress = point["shear_map"].isel(map_time=number, map_member=0).transpose("x", "y")
     sides, measured = sides_of(stress), bool(word(dataset, "shear.field.file", ""))
-    solid = (float(point[f"effective_{name}"]) for name in ("shear_modulus", "poisson_ratio"))
+    solid = (
+        float(point[f"effective_{name}"]) for name in ("shear_modulus", "poisson_ratio")
+    )
     moved = displacement(stress.to_numpy(), sides, *solid)
-    radius, speed = (float(_then(point, name, stress)) for name in ("contact_radius", "speed"))
+    radius, speed = (
+        float(_then(point, name, stress)) for name in ("contact_radius", "speed")
+    )
     figure, axes = style.pairs(0.6 + 2.5 * min(1.0, sides[1] / sides[0]), shared=True)
     length = style.Unit.of(np.array(sides), "m")
     sizes = [length.factor * size for size in (*sides, radius)]
     draw_field(axes[0], stress.to_numpy(), sizes, measured, STRESS)
     draw_field(axes[1], moved, sizes, measured, ("m", "displacement $w_1$", "PuOr_r"))
-    arrow = {-1.0: r"$\longleftarrow$ sliding", 0.0: "at rest", 1.0: r"sliding $\longrightarrow$"}
-    box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.85, "linewidth": 0}
+    arrow = {
+        -1.0: r"$\longleftarrow$ sliding",
+        0.0: "at rest",
+        1.0: r"sliding $\longrightarrow$",
+    }
+    box = {
+        "boxstyle": "round,pad=0.2",
+        "facecolor": "white",
+        "alpha": 0.85,
+        "linewidth": 0,
+    }
     for panel in axes:
         if measured or 0.0 < sizes[2] < 1.5 * sizes[0]:
             style.contact_circle(panel, sizes[2])
         panel.set_xlabel(length.label("$x$"))
-        panel.text(0.04, 0.05, arrow[float(np.sign(speed))], transform=panel.transAxes, fontsize=7, bbox=box)
+        panel.text(
+            0.04,
+            0.05,
+            arrow[float(np.sign(speed))],
+            transform=panel.transAxes,
+            fontsize=7,
+            bbox=box,
+        )
     axes[0].set_ylabel(length.label("$y$"))
     then = f"$t$ = {style.text_of(stress['map_time'], 's')}, $V$ = {style.text_of(speed, 'm/s')}"
     with where_recorded():
         then += rf", mean $\tau_0$ = {style.rounded(_then(point, 'shear_stress', stress), 'Pa')}"
-    axes[0].set_title(", ".join([*(style.swept_value(dataset, name, 0) for name in style.swept(dataset)), then]))
+    axes[0].set_title(
+        ", ".join(
+            [
+                *(style.swept_value(dataset, name, 0) for name in style.swept(dataset)),
+                then,
+            ]
+        )
+    )
     return figure
 
 
 def _then(point: xr.Dataset, name: str, stress: xr.DataArray) -> np.ndarray:
     """Return a variable at the time of the maps, of the member of a single map."""
     values = style.recorded(point, name).sel(t=stress["map_time"], method="nearest")
-    return (values.sel(member=stress["map_member"]) if "member" in values.dims else values).to_numpy()
+    return (
+        values.sel(member=stress["map_member"]) if "member" in values.dims else values
+    ).to_numpy()
 
 
-def around(field: np.ndarray, sizes: list[float], measured: bool) -> tuple[np.ndarray, tuple, float]:
+def around(
+    field: np.ndarray, sizes: list[float], measured: bool
+) -> tuple[np.ndarray, tuple, float]:
     """Return pixels of a field around the contact, the extent of the pixels, and half the side of a square view.
 
     ``sizes`` are the two sides of the cell and the radius of the contact. A measured field is shown whole, pixel by
     pixel. Any other field is continued periodically if the contact is wider than the cell.
     """
     if measured:
-        firsts = [-(points // 2 + 0.5) * side / points for points, side in zip(field.shape, sizes, strict=False)]
-        return field, (firsts[0], firsts[0] + sizes[0], firsts[1], firsts[1] + sizes[1]), 0.0
+        firsts = [
+            -(points // 2 + 0.5) * side / points
+            for points, side in zip(field.shape, sizes, strict=False)
+        ]
+        return (
+            field,
+            (firsts[0], firsts[0] + sizes[0], firsts[1], firsts[1] + sizes[1]),
+            0.0,
+        )
     cell, _, radius = sizes
     # between its samples by its own Fourier series: nothing is smoothed
     points = field.shape[0] * -(-PIXELS // field.shape[0])
-    field = scipy.signal.resample(scipy.signal.resample(field, points, axis=0), points, axis=1)
+    field = scipy.signal.resample(
+        scipy.signal.resample(field, points, axis=0), points, axis=1
+    )
     side = max(cell, 2.3 * radius) if 2.3 * radius < 3.0 * cell else cell
     half = int(np.ceil(0.5 * side / cell * points))
     index = np.arange(-half, half + 1) % points
@@ -87,7 +131,12 @@ def around(field: np.ndarray, sizes: list[float], measured: bool) -> tuple[np.nd
 
 
 def draw_field(
-    panel: Axes, field: np.ndarray, sizes: list[float], measured: bool, about: tuple, among: np.ndarray | None = None
+    panel: Axes,
+    field: np.ndarray,
+    sizes: list[float],
+    measured: bool,
+    about: tuple,
+    among: np.ndarray | None = None,
 ) -> tuple[AxesImage, float]:
     """Draw a field (x, y) around the contact with x to the right, and a colour bar; return the image and its factor.
 
@@ -98,13 +147,29 @@ def draw_field(
     shown, extent, half = around(field, sizes, measured)
     among = shown if among is None else among
     unit = style.Unit.of(among, si)
-    low, high, most = unit.factor * np.array([np.min(among), np.max(among), np.quantile(np.abs(among), _SHOWN)])
+    low, high, most = unit.factor * np.array(
+        [np.min(among), np.max(among), np.quantile(np.abs(among), _SHOWN)]
+    )
     most = most or 1.0
-    cut = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+    cut = {
+        (False, False): "neither",
+        (True, False): "min",
+        (False, True): "max",
+        (True, True): "both",
+    }
     extend = cut[bool(low < -most), bool(high > most)]
-    look: Any = {"cmap": style.part_of(colours, 0.05, 0.95), "vmin": -most, "vmax": most, "interpolation": "nearest"}
+    look: Any = {
+        "cmap": style.part_of(colours, 0.05, 0.95),
+        "vmin": -most,
+        "vmax": most,
+        "interpolation": "nearest",
+    }
     image = panel.imshow(unit.factor * shown.T, extent=extent, origin="lower", **look)
-    beside: Any = {"cax": panel.inset_axes((1.03, 0.0, 0.045, 1.0)), "label": unit.label(words), "extend": extend}
+    beside: Any = {
+        "cax": panel.inset_axes((1.03, 0.0, 0.045, 1.0)),
+        "label": unit.label(words),
+        "extend": extend,
+    }
     bar = panel.figure.colorbar(image, extendfrac=0.03, **beside)
     if high > low:
         bar.ax.set_ylim(max(low, -most), min(high, most))
@@ -115,7 +180,9 @@ def draw_field(
 
 def sides_of(maps: xr.DataArray) -> tuple[float, float]:
     """Return the sides of the cell of maps along x and y [m]."""
-    along, across = (float(maps[axis][1] - maps[axis][0]) * maps.sizes[axis] for axis in "xy")
+    along, across = (
+        float(maps[axis][1] - maps[axis][0]) * maps.sizes[axis] for axis in "xy"
+    )
     return along, across
 
 
@@ -127,10 +194,15 @@ def density_figure(scene: "Scenario") -> Figure:
     ValueError
         If there is none: the stress is uniform, or a single wave.
     """
-    shear, radius = scene.fluctuations, scene.rest_radius if scene.rest_radius > 0.0 else 0.01 * scene.sphere.radius
+    shear, radius = (
+        scene.fluctuations,
+        scene.rest_radius if scene.rest_radius > 0.0 else 0.01 * scene.sphere.radius,
+    )
     spectrum = shear.spectrum
     if spectrum.wavevector is not None:
-        raise ValueError("its stress has no spectrum before a run; name the dataset that `sim run` writes")
+        raise ValueError(
+            "its stress has no spectrum before a run; name the dataset that `sim run` writes"
+        )
     low, high = cast(Waves, spectrum).reach(radius)
     q = np.geomspace(0.7 * low, min(1.4 * high, 1e4 * low), 1500)
     along, across = spectrum.density(q, 0.0), spectrum.density(0.0, q)
@@ -138,26 +210,59 @@ def density_figure(scene: "Scenario") -> Figure:
     figure, (panel, below) = style.rows([1.9, 1.1])
     shown = q / length.factor
     split = not np.allclose(along, across, rtol=1e-9, atol=0.0)
-    for density, look, name in ((along, "-", "along the sliding"), (across, "--", "across it"))[: 1 + split]:
+    for density, look, name in (
+        (along, "-", "along the sliding"),
+        (across, "--", "across it"),
+    )[: 1 + split]:
         line = np.where(density > 0.0, density, np.nan)
-        panel.loglog(shown, line, look, color=style.FLUCTUATIONS, label=name if split else "$C(q)$")
+        panel.loglog(
+            shown,
+            line,
+            look,
+            color=style.FLUCTUATIONS,
+            label=name if split else "$C(q)$",
+        )
     if getattr(spectrum, "file", ""):
         rows = cast(Rowed, spectrum).rows
-        marks: Any = style.HOLLOW | {"markersize": 3.0, "markeredgewidth": 0.6, "color": style.BOTH}
-        panel.plot(rows.q / length.factor, np.where(rows.density > 0.0, rows.density, np.nan), label="rows", **marks)
+        marks: Any = style.HOLLOW | {
+            "markersize": 3.0,
+            "markeredgewidth": 0.6,
+            "color": style.BOTH,
+        }
+        panel.plot(
+            rows.q / length.factor,
+            np.where(rows.density > 0.0, rows.density, np.nan),
+            label="rows",
+            **marks,
+        )
     most = np.max(np.maximum(along, across))
-    panel.set_ylim(max(0.3 * np.min(along[along > 0.0], initial=most), 1e-9 * most), 3.0 * most)
-    wide, cell = np.pi / radius / length.factor, 2 * np.pi / shear.side(scene.setting.cell) / length.factor
-    for place, look, name in ((wide, ":", r"$\pi/a$, a wave as wide as the contact"), (cell, "-.", r"$2\pi$/cell")):
+    panel.set_ylim(
+        max(0.3 * np.min(along[along > 0.0], initial=most), 1e-9 * most), 3.0 * most
+    )
+    wide, cell = (
+        np.pi / radius / length.factor,
+        2 * np.pi / shear.side(scene.setting.cell) / length.factor,
+    )
+    for place, look, name in (
+        (wide, ":", r"$\pi/a$, a wave as wide as the contact"),
+        (cell, "-.", r"$2\pi$/cell"),
+    ):
         if shown[0] < place < shown[-1]:
             panel.axvline(place, linestyle=look, **style.GREY, label=name)
             below.axvline(place, linestyle=look, **style.GREY)
-    words = r"$C$ for $n\langle f^2\rangle$ = 1 N²/m²" if spectrum.bond_made else r"spectral density $C$ (Pa² m²)"
+    words = (
+        r"$C$ for $n\langle f^2\rangle$ = 1 N²/m²"
+        if spectrum.bond_made
+        else r"spectral density $C$ (Pa² m²)"
+    )
     panel.set_ylabel(words)
     style.legend(panel)
     mean, lean = cast(Waves, spectrum).harmonics(q)
     level, swing = angular_compliance(scene.solid.effective[1])
-    for weight, look, name in ((q * mean, "-", "variance"), (level * mean - swing * lean, "--", "stored energy")):
+    for weight, look, name in (
+        (q * mean, "-", "variance"),
+        (level * mean - swing * lean, "--", "stored energy"),
+    ):
         held = scipy.integrate.cumulative_trapezoid(weight, q, initial=0.0)
         below.plot(shown, held / held[-1], look, color=style.BOTH, label=name)
     below.set_ylabel("share of longer waves")

@@ -56,9 +56,15 @@ class Choices(NamedTuple):
     @property
     def chosen(self) -> dict[str, Any]:
         """Choices that are not the default, by name."""
-        return {name: value for name, value in self._asdict().items() if value != self._field_defaults[name]}
+        return {
+            name: value
+            for name, value in self._asdict().items()
+            if value != self._field_defaults[name]
+        }
 
-    def options(self, kind: str, takes: Collection[str], dataset: xr.Dataset) -> dict[str, Any]:
+    def options(
+        self, kind: str, takes: Collection[str], dataset: xr.Dataset
+    ) -> dict[str, Any]:
         """Return the arguments for the function that draws a kind of figure.
 
         Raises
@@ -66,11 +72,25 @@ class Choices(NamedTuple):
         ValueError
             For a choice that the kind does not take, or that cannot be read.
         """
-        of_all = ("member", "units", "size", "xlim", *(("start", "stop") if kind in _OVER_TIME else ()))
-        options = {name: value for name, value in self.chosen.items() if name not in of_all}
+        of_all = (
+            "member",
+            "units",
+            "size",
+            "xlim",
+            *(("start", "stop") if kind in _OVER_TIME else ()),
+        )
+        options = {
+            name: value for name, value in self.chosen.items() if name not in of_all
+        }
         if refused := [name for name in options if name not in takes]:
-            words = f"it takes: {', '.join(takes)}" if takes else "it takes only member and units"
-            raise ValueError(f'the figure "{kind}" has no choice of {refused[0]}; {words}')
+            words = (
+                f"it takes: {', '.join(takes)}"
+                if takes
+                else "it takes only member and units"
+            )
+            raise ValueError(
+                f'the figure "{kind}" has no choice of {refused[0]}; {words}'
+            )
         if self.at is not None:
             options["at"] = read_option(self.at, "at", "s")
         if self.data is not None:
@@ -79,23 +99,36 @@ class Choices(NamedTuple):
 
     def measured(self, dataset: xr.Dataset) -> Measured | None:
         """Return the measured points, if there are any."""
-        return self.data if self.data is None or isinstance(self.data, Measured) else Measured(self.data, dataset)
+        return (
+            self.data
+            if self.data is None or isinstance(self.data, Measured)
+            else Measured(self.data, dataset)
+        )
 
     def between(self, dataset: xr.Dataset) -> xr.Dataset:
         """Return the dataset between the times ``start`` and ``stop``."""
-        start = -math.inf if self.start is None else read_option(self.start, "--from", "s")
+        start = (
+            -math.inf if self.start is None else read_option(self.start, "--from", "s")
+        )
         cut = dataset.sel(t=slice(start, read_option(self.stop, "--to", "s")))
         if cut.sizes["t"] < 2:
             last = engineering(float(dataset["t"][-1]), "s")
-            raise ValueError(f"there are fewer than two records between --from and --to; the run ends at {last}")
+            raise ValueError(
+                f"there are fewer than two records between --from and --to; the run ends at {last}"
+            )
         return cut
 
     def shape(self, figure: Figure) -> None:
         """Give a figure the chosen size and range of its x axis."""
         if self.size:
             if not (match := _SIZE.fullmatch(self.size)):
-                raise ValueError(f'--size takes width x height with a unit, such as 3.4x2.6in, not "{self.size[:40]}"')
-            width, height = (float(match[name]) * _INCHES[match["unit"]] for name in ("width", "height"))
+                raise ValueError(
+                    f'--size takes width x height with a unit, such as 3.4x2.6in, not "{self.size[:40]}"'
+                )
+            width, height = (
+                float(match[name]) * _INCHES[match["unit"]]
+                for name in ("width", "height")
+            )
             figure.set_size_inches(width, height)
         if self.xlim:
             try:
@@ -117,13 +150,23 @@ class Choices(NamedTuple):
             return dataset
         members = int(dataset.attrs["members"])
         if not 0 <= self.member < members:
-            raise ValueError(f"there is no member {self.member}; there are members 0 to {members - 1}")
-        if MEMBERS not in dataset.dims and any(str(name).endswith("_sem") for name in dataset.data_vars):
-            raise ValueError("members were not recorded, only statistics; run again with [record] per_member = true")
+            raise ValueError(
+                f"there is no member {self.member}; there are members 0 to {members - 1}"
+            )
+        if MEMBERS not in dataset.dims and any(
+            str(name).endswith("_sem") for name in dataset.data_vars
+        ):
+            raise ValueError(
+                "members were not recorded, only statistics; run again with [record] per_member = true"
+            )
         dataset = dataset.isel({MEMBERS: [self.member]}, missing_dims="ignore")
         if "map_member" in dataset.dims:
             maps = dataset["map_member"].to_numpy() == self.member
-            dataset = dataset.isel(map_member=maps) if maps.any() else dataset.drop_dims("map_member")
+            dataset = (
+                dataset.isel(map_member=maps)
+                if maps.any()
+                else dataset.drop_dims("map_member")
+            )
         return dataset
 
 
@@ -150,28 +193,70 @@ _OF_THEORY = ("shear_stress", "contact_area")
 _OF_CURVE = ("speed", "contact_area", "jkr_radius", "hertz_radius")
 #: All figures, by name. The default of a dataset is the first kind that fits it.
 KINDS: dict[str, Kind] = {
-    "loop": Kind(theories.loop_figure, theories.needs_course, reads=("normal_load", "displacement")),
-    "theories": Kind(theories.theories_figure, theories.case_of, theories.sweeps_theories, _OF_THEORY),
-    "stress": Kind(slider.stress_figure, slider.needs_stress, lambda dataset: "drive_rest" in dataset, ("speed",)),
-    "stability": Kind(slider.stability_figure, slider.needs_map, reads=("spring_force",)),
-    "creep": Kind(slider.creep_figure, slider.needs_force, reads=("slider_position", "speed")),
-    "friction": Kind(curves.friction_figure, curves.needs_friction, curves.turns, ("speed",)),
-    "curve": Kind(curves.curve_figure, curves.needs_speeds, lambda dataset: not curves.turns(dataset), _OF_CURVE),
+    "loop": Kind(
+        theories.loop_figure,
+        theories.needs_course,
+        reads=("normal_load", "displacement"),
+    ),
+    "theories": Kind(
+        theories.theories_figure, theories.case_of, theories.sweeps_theories, _OF_THEORY
+    ),
+    "stress": Kind(
+        slider.stress_figure,
+        slider.needs_stress,
+        lambda dataset: "drive_rest" in dataset,
+        ("speed",),
+    ),
+    "stability": Kind(
+        slider.stability_figure, slider.needs_map, reads=("spring_force",)
+    ),
+    "creep": Kind(
+        slider.creep_figure, slider.needs_force, reads=("slider_position", "speed")
+    ),
+    "friction": Kind(
+        curves.friction_figure, curves.needs_friction, curves.turns, ("speed",)
+    ),
+    "curve": Kind(
+        curves.curve_figure,
+        curves.needs_speeds,
+        lambda dataset: not curves.turns(dataset),
+        _OF_CURVE,
+    ),
     "sweep": Kind(curves.sweep_figure, curves.needs_sweep),
     "time": Kind(curves.time_figure),
-    "incipient": Kind(slider.incipient_figure, slider.needs_pull, reads=("spring_force", "contact_area")),
+    "incipient": Kind(
+        slider.incipient_figure,
+        slider.needs_pull,
+        reads=("spring_force", "contact_area"),
+    ),
     "map": Kind(field.map_figure, field.needs_maps),
-    "movie": Kind(movie.movie_figure, movie.needs_one_contact, lambda dataset: False, movie.READS),
+    "movie": Kind(
+        movie.movie_figure, movie.needs_one_contact, lambda dataset: False, movie.READS
+    ),
 }
 
 
 def default(dataset: xr.Dataset, data: Measured | None = None) -> str:
     """Return the kind of figure that fits a dataset best; with measured points one that has a place for them."""
     dataset = plain(dataset)
-    kinds = (name for name, kind in KINDS.items() if data is None or "data" in kind.takes)
-    result = next(name for name in kinds if not _missing(dataset, name) and KINDS[name].fits(dataset))
-    over = {"curve": speed_name(dataset), "stress": speed_name(dataset), "sweep": next(iter(style.swept(dataset)), "")}
-    timed = data is not None and data.column("t") is not None and data.column(over.get(result, "t")) is None
+    kinds = (
+        name for name, kind in KINDS.items() if data is None or "data" in kind.takes
+    )
+    result = next(
+        name
+        for name in kinds
+        if not _missing(dataset, name) and KINDS[name].fits(dataset)
+    )
+    over = {
+        "curve": speed_name(dataset),
+        "stress": speed_name(dataset),
+        "sweep": next(iter(style.swept(dataset)), ""),
+    }
+    timed = (
+        data is not None
+        and data.column("t") is not None
+        and data.column(over.get(result, "t")) is None
+    )
     return "time" if timed else result
 
 
@@ -192,7 +277,9 @@ def _missing(dataset: xr.Dataset, kind: str) -> str:
     return ""
 
 
-def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None = None) -> Figure:
+def draw(
+    dataset: xr.Dataset, kind: str | None = None, choices: Choices | None = None
+) -> Figure:
     """Draw a figure of a dataset.
 
     Parameters
@@ -220,36 +307,76 @@ def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None =
     if not kind:
         data = choices.measured(dataset)
         choices = choices._replace(data=data)
-        dims = [(dim, dim.rpartition("_")[2], dim.replace("_", ".", 1)) for dim in style.swept(dataset)]
+        dims = [
+            (dim, dim.rpartition("_")[2], dim.replace("_", ".", 1))
+            for dim in style.swept(dataset)
+        ]
         over = "sweep" if any(choices.x in words for words in dims) else "time"
         kind = {"": default(dataset, data), "speed": "curve"}.get(choices.x, over)
-    of_statement = kind not in KINDS and bool(style.swept(dataset)) and f"{kind}_mean" in statements(dataset)
-    drawing = Kind(lambda run: curves.statement_figure(run, str(kind))) if of_statement else KINDS.get(kind)
+    of_statement = (
+        kind not in KINDS
+        and bool(style.swept(dataset))
+        and f"{kind}_mean" in statements(dataset)
+    )
+    drawing = (
+        Kind(lambda run: curves.statement_figure(run, str(kind)))
+        if of_statement
+        else KINDS.get(kind)
+    )
     if drawing is None:
-        raise ValueError(f'there is no figure "{kind}"; known: {", ".join(KINDS)}, and statements of a sweep')
+        raise ValueError(
+            f'there is no figure "{kind}"; known: {", ".join(KINDS)}, and statements of a sweep'
+        )
     if not of_statement and (missing := _missing(dataset, kind)):
-        raise ValueError(f"{missing}; it can be drawn as: {', '.join(drawable(dataset))}")
+        raise ValueError(
+            f"{missing}; it can be drawn as: {', '.join(drawable(dataset))}"
+        )
     options = choices.options(kind, drawing.takes, dataset)
     dataset = choices.between(dataset) if kind in _OVER_TIME else dataset
-    look = contextlib.nullcontext() if choices.ax else mpl.rc_context(STYLE)  # axes of somebody else keep their own
+    # axes of somebody else keep their own
+    look = contextlib.nullcontext() if choices.ax else mpl.rc_context(STYLE)
     with look, answered(), in_units(choices.units):
         figure = drawing.draw(dataset, **options)
-        fixed = [swept_value(dataset, name, 0) for name in sweep_dims(dataset) if dataset.sizes[name] == 1]
+        fixed = [
+            swept_value(dataset, name, 0)
+            for name in sweep_dims(dataset)
+            if dataset.sizes[name] == 1
+        ]
         fixed += [] if choices.member is None else [f"member {choices.member}"]
         if fixed and not choices.ax:
             figure.suptitle(", ".join(fixed), fontsize=mpl.rcParams["axes.titlesize"])
-        labelled = [dataset[name] for name in style.swept(dataset) if dataset[name].dtype.kind not in "fi"]
-        key = [str(label.attrs.get("long_name", "")).partition(", ")[2] for label in labelled]
+        labelled = [
+            dataset[name]
+            for name in style.swept(dataset)
+            if dataset[name].dtype.kind not in "fi"
+        ]
+        key = [
+            str(label.attrs.get("long_name", "")).partition(", ")[2]
+            for label in labelled
+        ]
         if any(key) and not choices.ax:
-            texts = filter(None, [*"; ".join(filter(None, key)).split("; "), figure.get_supxlabel()])
+            texts = filter(
+                None,
+                [*"; ".join(filter(None, key)).split("; "), figure.get_supxlabel()],
+            )
             lines = [textwrap.fill(text, 76, subsequent_indent="   ") for text in texts]
-            figure.supxlabel("\n".join(lines), x=0.02, ha="left", fontsize=0.75 * mpl.rcParams["font.size"])
+            figure.supxlabel(
+                "\n".join(lines),
+                x=0.02,
+                ha="left",
+                fontsize=0.75 * mpl.rcParams["font.size"],
+            )
         choices.shape(figure)
         return figure
 
 
 def drawn(
-    dataset: xr.Dataset, kind: str | None, source: Path, path: Path | None, replace: bool, choices: Choices
+    dataset: xr.Dataset,
+    kind: str | None,
+    source: Path,
+    path: Path | None,
+    replace: bool,
+    choices: Choices,
 ) -> tuple[Path, str]:
     """Draw the dataset of a file into a picture, by default beside it; return its path and a remark on measured points.
 
@@ -260,17 +387,27 @@ def drawn(
     """
     with naming(source):
         suffix = ".gif" if kind == "movie" else ".png"
-        target = path or source.with_name(f"{source.stem}{'-' + kind if kind else ''}{suffix}")
+        target = path or source.with_name(
+            f"{source.stem}{'-' + kind if kind else ''}{suffix}"
+        )
         if kind == "movie" and target.suffix.lower() not in (".gif", ".mp4"):
             raise ValueError(f"a movie is a .gif or .mp4 file, not {target.name}")
         tables = [Path(choices.data)] if isinstance(choices.data, Path | str) else []
         claim(dataset, source, target, replace, *tables)
         figure = draw(dataset, kind, choices)
         save(figure, target)
-    return target, " ".join(figure.get_supxlabel().split()) if choices.data is not None else ""
+    return target, " ".join(
+        figure.get_supxlabel().split()
+    ) if choices.data is not None else ""
 
 
-def planned(source: Path, kind: str | None, path: Path | None, replace: bool, chosen: Collection[str] = ()) -> Path:
+def planned(
+    source: Path,
+    kind: str | None,
+    path: Path | None,
+    replace: bool,
+    chosen: Collection[str] = (),
+) -> Path:
     """Draw the spectral density of a scenario file before any run, and return the path of the picture.
 
     Raises
@@ -281,9 +418,16 @@ def planned(source: Path, kind: str | None, path: Path | None, replace: bool, ch
     from sim.scenario.reader import load  # heavy: pydantic, where a dataset needs none
     from sim.scenario.schema import files_read
 
-    scene, target = load(source), path or Path("outputs") / f"{source.stem}-spectrum.png"
+    scene, target = (
+        load(source),
+        path or Path("outputs") / f"{source.stem}-spectrum.png",
+    )
     if kind not in (None, "spectrum"):
-        raise BadInput([f'{source}: before a run only "spectrum" can be drawn; for "{kind}" run it: sim run {source}'])
+        raise BadInput(
+            [
+                f'{source}: before a run only "spectrum" can be drawn; for "{kind}" run it: sim run {source}'
+            ]
+        )
     if chosen:
         fault = f"a figure before a run takes no options ({', '.join(chosen)})"
         raise BadInput([f"{source}: {fault}; name the dataset that `sim run` writes"])

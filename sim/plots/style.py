@@ -38,7 +38,9 @@ LINES = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B
 #: Colours of many curves, none too light for paper.
 def part_of(colours: str, first: float, last: float) -> mpl.colors.ListedColormap:
     """Return the part of a colour map between two of its places, of 0 to 1."""
-    return mpl.colors.ListedColormap(mpl.colormaps[colours](np.linspace(first, last, 256)))
+    return mpl.colors.ListedColormap(
+        mpl.colormaps[colours](np.linspace(first, last, 256))
+    )
 
 
 SHADES = part_of("viridis", 0.0, 0.92)
@@ -49,20 +51,36 @@ GUIDE: Any = {"color": REFERENCE, "linewidth": 0.5, "zorder": 1}
 HOLLOW: Any = {"marker": "o", "markersize": 3.5, "mfc": "white", "linestyle": "none"}
 
 #: Look of all legends.
-LEGEND: Any = {"handletextpad": 0.5, "labelspacing": 0.25, "alignment": "left", "title_fontsize": 7.0}
+LEGEND: Any = {
+    "handletextpad": 0.5,
+    "labelspacing": 0.25,
+    "alignment": "left",
+    "title_fontsize": 7.0,
+}
 
 _TICKS = {"direction": "in", "labelsize": 7.5, "major.width": 0.6, "minor.width": 0.4}
 STYLE: Any = {
-    "font.family": "STIXGeneral", "mathtext.fontset": "stix",
-    "font.size": 8.0, "axes.labelsize": 8.0, "axes.titlesize": 8.0, "legend.fontsize": 7.0,
-    "axes.linewidth": 0.6, "lines.linewidth": 1.2,
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 8.0,
+    "axes.labelsize": 8.0,
+    "axes.titlesize": 8.0,
+    "legend.fontsize": 7.0,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 1.2,
     **{f"{axis}tick.{key}": value for axis in "xy" for key, value in _TICKS.items()},
-    "xtick.top": True, "ytick.right": True,
-    "legend.frameon": False, "legend.handlelength": 1.6, "legend.columnspacing": 1.2,
-    "axes.formatter.use_mathtext": True, "axes.formatter.useoffset": False,
-    "figure.constrained_layout.h_pad": 0.03, "figure.constrained_layout.w_pad": 0.03,
-    "pdf.fonttype": 42, "svg.hashsalt": "sim",
-}  # fmt: skip
+    "xtick.top": True,
+    "ytick.right": True,
+    "legend.frameon": False,
+    "legend.handlelength": 1.6,
+    "legend.columnspacing": 1.2,
+    "axes.formatter.use_mathtext": True,
+    "axes.formatter.useoffset": False,
+    "figure.constrained_layout.h_pad": 0.03,
+    "figure.constrained_layout.w_pad": 0.03,
+    "pdf.fonttype": 42,
+    "svg.hashsalt": "sim",
+}
 
 
 class Picture(Figure):
@@ -70,7 +88,9 @@ class Picture(Figure):
 
     def savefig(self, fname: Any, **options: Any) -> None:
         """Save as PNG (200 dpi), PDF or SVG, by the extension; see ``matplotlib.figure.Figure.savefig``."""
-        undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(str(fname).rpartition(".")[2].lower())
+        undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(
+            str(fname).rpartition(".")[2].lower()
+        )
         with mpl.rc_context(STYLE):
             super().savefig(fname, **({"metadata": undated} | options))
 
@@ -90,7 +110,9 @@ def save(figure: Figure, path: Path) -> None:
 def rows(heights: list[float], shared: bool = True) -> tuple[Figure, list[Axes]]:
     """Return a picture of one column: lettered panels of given heights [in], with one x axis if shared."""
     size = COLUMN, 0.45 + sum(heights)
-    figure, axes = _panels(size, (len(heights), 1), sharex=shared, height_ratios=heights)
+    figure, axes = _panels(
+        size, (len(heights), 1), sharex=shared, height_ratios=heights
+    )
     figure.align_ylabels(axes)
     return figure, axes
 
@@ -100,15 +122,24 @@ def pairs(height: float, shared: bool = False) -> tuple[Figure, list[Axes]]:
     return _panels((WIDE, height), (1, 2), sharey=shared)
 
 
-def _panels(size: tuple[float, float], count: tuple[int, int], **options: Any) -> tuple[Figure, list[Axes]]:
+def _panels(
+    size: tuple[float, float], count: tuple[int, int], **options: Any
+) -> tuple[Figure, list[Axes]]:
     """Return a picture of a size [in] with its own canvas, and its panels, with letters if there are more than one."""
     figure = Picture(figsize=size, dpi=200, layout="constrained")
     FigureCanvasAgg(figure)
     axes = list(figure.subplots(*count, squeeze=False, **options).flat)
     for panel in axes:
         panel.locator_params(axis="y", min_n_ticks=3)
-    corner: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "right", "va": "bottom"}
-    for mark, panel in zip(string.ascii_lowercase, axes if len(axes) > 1 else (), strict=False):
+    corner: Any = {
+        "xycoords": "axes fraction",
+        "textcoords": "offset points",
+        "ha": "right",
+        "va": "bottom",
+    }
+    for mark, panel in zip(
+        string.ascii_lowercase, axes if len(axes) > 1 else (), strict=False
+    ):
         panel.annotate(f"({mark})", (0.0, 1.0), (-2, 4), fontweight="bold", **corner)
     return figure, axes
 
@@ -124,7 +155,8 @@ def swept_value(dataset: xr.Dataset, name: str, at: int) -> str:
         unit = Unit.of(value, coordinate.attrs.get("units", "1"))
     number = f"{value * unit.factor:.4g} {unit.name}".strip().replace("-", "−")
     sign, key = symbol(coordinate), (name.partition("_")[2] or name).replace("_", " ")
-    if not sign or coordinate.attrs.get("units") == "1":  # the letters of pure numbers are known to few
+    # the letters of pure numbers are known to few
+    if not sign or coordinate.attrs.get("units") == "1":
         return f"{key} {sign}".strip() + f" = {number}"
     return f"{sign} = {number}"
 
@@ -174,21 +206,29 @@ def rounded(value: Any, unit: str) -> str:
     return text_of(f"{value:.3g}", unit)
 
 
-_GREEK = re.compile(r"(?<![A-Za-z])(alpha|beta|tau|nu|chi|delta|sigma|xi|theta|lambda|DeltaGamma|Delta)(?![A-Za-z])")
+_GREEK = re.compile(
+    r"(?<![A-Za-z])(alpha|beta|tau|nu|chi|delta|sigma|xi|theta|lambda|DeltaGamma|Delta)(?![A-Za-z])"
+)
 
 
 def symbol(variable: xr.DataArray) -> str:
     """Return the variable's symbol as mathematics."""
     text = variable.attrs.get("symbol", "")
     text = re.sub(r"(?<=[^\W\d_])(\d+)$", r"_\1", text)
-    text = _GREEK.sub(lambda m: r"\Delta\Gamma" if m[1] == "DeltaGamma" else rf"\{m[1]}", text)
+    text = _GREEK.sub(
+        lambda m: r"\Delta\Gamma" if m[1] == "DeltaGamma" else rf"\{m[1]}", text
+    )
     text = re.sub(r"_(\w+)", r"_{\1}", text).replace("*", "^*")
     return f"${text}$" if text else ""
 
 
 def named(variable: xr.DataArray, with_symbol: bool = True) -> str:
     """Return the meaning of a variable or of its mean, and its symbol: ``normal load $P$``."""
-    words = str(variable.attrs.get("long_name", variable.name)).removeprefix("ensemble mean of ").partition(",")[0]
+    words = (
+        str(variable.attrs.get("long_name", variable.name))
+        .removeprefix("ensemble mean of ")
+        .partition(",")[0]
+    )
     return f"{words} {symbol(variable)}".strip() if with_symbol else words
 
 
@@ -208,7 +248,11 @@ class Unit(NamedTuple):
         sizes = np.abs(values)
         sizes = sizes[np.isfinite(sizes) & (sizes > 0.0)]
         most = sizes.max(initial=0.0)
-        return cls(*scaled(np.sqrt(sizes.min(initial=most) * most) if logarithmic else most, unit))
+        return cls(
+            *scaled(
+                np.sqrt(sizes.min(initial=most) * most) if logarithmic else most, unit
+            )
+        )
 
 
 def in_unit(axis: Axis, words: str, values: Any, si: str) -> float:
@@ -235,15 +279,28 @@ def legend(panel: Axes, title: str = "", columns: int = 0) -> None:
         entries.setdefault(label, handle)
     if not entries and not title:
         return
-    longest = max((len(re.sub(r"[$^_{}]", "", re.sub(r"\\[A-Za-z]+", "x", text))) for text in entries), default=0)
+    longest = max(
+        (
+            len(re.sub(r"[$^_{}]", "", re.sub(r"\\[A-Za-z]+", "x", text)))
+            for text in entries
+        ),
+        default=0,
+    )
     panel.legend(
-        entries.values(), entries, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
+        entries.values(),
+        entries,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        borderaxespad=0.2,
         ncols=columns or (3 if longest <= 16 else 2 if longest <= 28 else 1),
-        title="\n".join(textwrap.wrap(title, 62)) or None, **LEGEND,
-    )  # fmt: skip
+        title="\n".join(textwrap.wrap(title, 62)) or None,
+        **LEGEND,
+    )
 
 
-def fill(panel: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray, **look: Any) -> None:
+def fill(
+    panel: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray, **look: Any
+) -> None:
     """Draw a shaded band, one for each way back and forth, because a polygon that turns back hides itself."""
     turns = np.flatnonzero(np.diff(np.sign(np.diff(x)))) + 1
     for first, last in itertools.pairwise([0, *turns, len(x) - 1]):
@@ -257,11 +314,16 @@ def upward(panel: Axes) -> None:
         panel.set_yscale("log")
 
 
-def across(panel: Axes, x: np.ndarray, words: str, scale: str = "linear", room: float = 0.0) -> None:
+def across(
+    panel: Axes, x: np.ndarray, words: str, scale: str = "linear", room: float = 0.0
+) -> None:
     """Set the x axis from the least to the largest value, with some ``room`` for markers at its ends, and its label."""
     known = x[np.isfinite(x) & ((x > 0.0) | (scale != "log"))]
-    low, high = (known.min(), known.max()) if known.size else (0.0, 0.0)  # of a contact that never closes
-    panel.set_xscale(scale, **({"linthresh": np.min(x[x > 0.0])} if scale == "symlog" else {}))
+    # of a contact that never closes
+    low, high = (known.min(), known.max()) if known.size else (0.0, 0.0)
+    panel.set_xscale(
+        scale, **({"linthresh": np.min(x[x > 0.0])} if scale == "symlog" else {})
+    )
     if scale == "linear":
         panel.locator_params(axis="x", min_n_ticks=3)
     if scale == "log" and high < 100.0 * low:

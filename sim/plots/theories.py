@@ -28,7 +28,11 @@ _THEORIES: dict[str, tuple[str, str, Any]] = {
     "fraction": ("a fraction {share:.3g} reversible", style.LINES[3], "-."),
     "scaled_angle": (r"mixed mode $1+\tan^2((1-\lambda)\psi)$", "#7A4B1F", "-"),
     "shear_share": (r"mixed mode $1/(1-(1-\lambda)\sin^2\psi)$", "#6A3D9A", "--"),
-    "scaled_tangent": (r"mixed mode $1+(1-\lambda)\tan^2\psi$, $\lambda=$ {mixity:.3g}", "#8A9A00", "-."),
+    "scaled_tangent": (
+        r"mixed mode $1+(1-\lambda)\tan^2\psi$, $\lambda=$ {mixity:.3g}",
+        "#8A9A00",
+        "-.",
+    ),
 }
 
 #: Reversible fraction that is drawn where the dataset has none of its own.
@@ -47,7 +51,10 @@ _POINTS = 40
 _AXES = ((r"shear stress $\tau$", "Pa", 0), (r"tangential force $T = \tau A$", "N", 1))
 
 #: Control of the contact: the law of all theories under it, its symbol and unit.
-_CONTROLS: Any = {"load": (compare_at_load, "$P$", "N"), "indentation": (compare_at_indentation, r"$\delta$", "m")}
+_CONTROLS: Any = {
+    "load": (compare_at_load, "$P$", "N"),
+    "indentation": (compare_at_indentation, r"$\delta$", "m"),
+}
 
 
 class Case(NamedTuple):
@@ -93,16 +100,28 @@ def case_of(dataset: xr.Dataset) -> Case:
     if not settings or held not in _CONTROLS:
         cure = 'run it with [contact] load = "4 mN", or with an indentation'
         raise ValueError(f"theories need a constant load or indentation;  {cure}")
-    settings |= {"work": setting(dataset, "adhesion.work"), "sphere_radius": setting(dataset, "sphere.radius")}
-    settings |= {"modulus": dataset["contact_modulus"], "poisson_ratio": dataset["effective_poisson_ratio"]}
+    settings |= {
+        "work": setting(dataset, "adhesion.work"),
+        "sphere_radius": setting(dataset, "sphere.radius"),
+    }
+    settings |= {
+        "modulus": dataset["contact_modulus"],
+        "poisson_ratio": dataset["effective_poisson_ratio"],
+    }
     if not settings["work"].max() > 0.0:
-        raise ValueError("the theories differ only with adhesion; give adhesion.work above 0")
+        raise ValueError(
+            "the theories differ only with adhesion; give adhesion.work above 0"
+        )
     if not (dataset["radius_at_rest"] > 0.0).any():
-        raise ValueError("there is no contact at rest; raise the load or the indentation")
+        raise ValueError(
+            "there is no contact at rest; raise the load or the indentation"
+        )
     for values in settings.values():
         if values.min() < values.max():
             dim = str(values.dims[0])
-            value = style.swept_value(dataset, dim, 0).rpartition("= ")[2].replace("−", "-")
+            value = (
+                style.swept_value(dataset, dim, 0).rpartition("= ")[2].replace("−", "-")
+            )
             cure = f'choose by --where, such as --where {dim}="{value}"'
             raise ValueError(f"theories describe a single contact; {cure}")
     fractions = np.ravel(dataset.get("contact_reversible", ()))
@@ -118,12 +137,24 @@ def points_of(dataset: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     spread evenly over the run.
     """
     dataset = plain(dataset)
-    means = xr.Dataset({name: style.mean_of(dataset, name) for name in ("shear_stress", "contact_area")})
+    means = xr.Dataset(
+        {
+            name: style.mean_of(dataset, name)
+            for name in ("shear_stress", "contact_area")
+        }
+    )
     if is_steady(dataset):
         means = settled(means)
     else:
-        means = means.isel(t=np.unique(np.rint(np.linspace(0, dataset.sizes["t"] - 1, _POINTS)).astype(int)))
-    stress, area = (values.to_numpy().ravel() for values in xr.broadcast(means["shear_stress"], means["contact_area"]))
+        means = means.isel(
+            t=np.unique(
+                np.rint(np.linspace(0, dataset.sizes["t"] - 1, _POINTS)).astype(int)
+            )
+        )
+    stress, area = (
+        values.to_numpy().ravel()
+        for values in xr.broadcast(means["shear_stress"], means["contact_area"])
+    )
     closed = area > 0.0
     return np.abs(stress[closed]), area[closed]
 
@@ -133,22 +164,41 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
     case = case_of(dataset)
     stress, area = points_of(dataset)
     sheared = stress[stress > 0.0]
-    low, high = 0.1 * case.scale, max(3.0 * case.scale, 1.3 * np.max(sheared, initial=0.0))
+    low, high = (
+        0.1 * case.scale,
+        max(3.0 * case.scale, 1.3 * np.max(sheared, initial=0.0)),
+    )
     low = max(0.01 * case.scale, 0.7 * np.min(sheared, initial=low / 0.7))
     fine = np.geomspace(low, high, _FINE)
     areas = {name: np.pi * radius**2 for name, radius in case.radii(fine).items()}
     figure, axes = style.pairs(3.3, shared=True)
-    full, mark = areas["jkr"][0], style.HOLLOW | {"color": style.BOTH, "zorder": 1.8, "markersize": 2.8, "mew": 0.7}
+    full, mark = (
+        areas["jkr"][0],
+        style.HOLLOW
+        | {"color": style.BOTH, "zorder": 1.8, "markersize": 2.8, "mew": 0.7},
+    )
     factor = style.in_unit(axes[0].yaxis, "contact area $A$", areas["jkr"], "m^2")
     for panel, (words, si, power) in zip(axes, _AXES, strict=True):
         unit = style.Unit.of(full**power * fine, si, logarithmic=True)
-        along = {name: unit.factor * values**power * fine for name, values in areas.items()}
+        along = {
+            name: unit.factor * values**power * fine for name, values in areas.items()
+        }
         _panel(panel, case, along, areas, factor)
         x = unit.factor * stress * area**power
         panel.plot(x, factor * area, label="simulated", **mark)
         if not is_steady(dataset) and area.size:
-            panel.plot(x[-1:], factor * area[-1:], label="simulated, last record", **mark | {"mfc": style.BOTH})
-        style.across(panel, unit.factor * np.array([low, high]) * full**power, unit.label(words), "log")
+            panel.plot(
+                x[-1:],
+                factor * area[-1:],
+                label="simulated, last record",
+                **mark | {"mfc": style.BOTH},
+            )
+        style.across(
+            panel,
+            unit.factor * np.array([low, high]) * full**power,
+            unit.label(words),
+            "log",
+        )
     # heights from Hertz's area, or none, to somewhat above JKR's: the uncorrected theory goes far beyond
     least = np.nan_to_num(areas["hertz"][0])
     bottom = min(least - 0.3 * (full - least), np.min(area, initial=least))
@@ -157,14 +207,25 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
     _, symbol, si = _CONTROLS[case.held]
     words = f"{symbol} = {style.text_of(case.value, si)}, $w$ = {style.text_of(case.work, 'J/m^2')}"
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", title=words, ncols=3, **style.LEGEND)
+    figure.legend(
+        handles, labels, loc="outside upper left", title=words, ncols=3, **style.LEGEND
+    )
     return figure
 
 
-def _panel(panel: Axes, case: Case, along: dict[str, np.ndarray], areas: dict[str, np.ndarray], factor: float) -> None:
+def _panel(
+    panel: Axes,
+    case: Case,
+    along: dict[str, np.ndarray],
+    areas: dict[str, np.ndarray],
+    factor: float,
+) -> None:
     """Draw each theory along its own x, to the end of its adhesive branch."""
     for name, (words, colour, line) in _THEORIES.items():
-        values, label = factor * areas[name], words.format(share=case.reversible, mixity=_MIXITY)
+        values, label = (
+            factor * areas[name],
+            words.format(share=case.reversible, mixity=_MIXITY),
+        )
         if name in ("jkr", "hertz"):  # whatever the shear
             panel.axhline(values[0], linestyle=line, label=label, **style.GREY)
             continue
@@ -189,7 +250,10 @@ _GRIPS = 5.0 / 9.0
 _LATER = 0.6
 
 #: Axis of each control, in words and as a symbol; the indentation where no stiffness is between.
-_DISPLACEMENTS = {"displacement": ("displacement", r"\Delta"), "": ("displacement, or indentation,", r"\Delta")}
+_DISPLACEMENTS = {
+    "displacement": ("displacement", r"\Delta"),
+    "": ("displacement, or indentation,", r"\Delta"),
+}
 
 
 class Theory(NamedTuple):
@@ -205,7 +269,9 @@ def needs_course(dataset: xr.Dataset) -> None:
     """Refuse a dataset in which the mount of the sphere does not move."""
     if stays_held(dataset).all():
         cure = '[contact] indentation = { from = "2 um", to = "-12 um", cycles = 1 }'
-        raise ValueError(f"the mount does not move, so there is no loop; move it: {cure}")
+        raise ValueError(
+            f"the mount does not move, so there is no loop; move it: {cure}"
+        )
 
 
 def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
@@ -215,27 +281,46 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     full work of adhesion, with stable and unstable equilibria. The loads of pull-off under a dead load and in fixed
     grips are also shown.
     """
-    kind, stiffness, scene = "", xr.DataArray(np.nan), scene_along(dataset, "t")._replace(measured=data)
+    kind, stiffness, scene = (
+        "",
+        xr.DataArray(np.nan),
+        scene_along(dataset, "t")._replace(measured=data),
+    )
     with contextlib.suppress(KeyError):  # the whole table [contact] is swept
         kind, stiffness = control(dataset)
     words, symbol = _DISPLACEMENTS.get(kind, ("indentation", r"\delta"))
     over = "displacement" if kind in _DISPLACEMENTS else "indentation"
-    scene = scene.placed(over, scene.all("displacement_mean"), f"{words} ${symbol}$", "m")
+    scene = scene.placed(
+        over, scene.all("displacement_mean"), f"{words} ${symbol}$", "m"
+    )
     work, size = setting(dataset, "adhesion.work"), setting(dataset, "sphere.radius")
     numbers = (work, size, dataset["contact_modulus"], stiffness)
-    theories = [Theory(*(style.number_at(number, line.point) for number in numbers)) for line in scene.lines]
+    theories = [
+        Theory(*(style.number_at(number, line.point) for number in numbers))
+        for line in scene.lines
+    ]
     compared = data is not None and data.has_errors
     figure, panels = style.rows([2.1, 1.5, 1.8] + [0.8] * compared, shared=False)
     loads, radii, loaded, *below = panels
-    force = style.in_unit(loads.yaxis, "normal load $P$", scene.all("normal_load_mean"), "N")
-    length = style.in_unit(radii.yaxis, "contact radius $a$", scene.all("contact_radius_mean"), "m")
+    force = style.in_unit(
+        loads.yaxis, "normal load $P$", scene.all("normal_load_mean"), "N"
+    )
+    length = style.in_unit(
+        radii.yaxis, "contact radius $a$", scene.all("contact_radius_mean"), "m"
+    )
     loaded.set_ylabel(radii.get_ylabel())
-    of_load = scene.placed("normal_load", scene.all("normal_load_mean"), "normal load $P$", "N")
+    of_load = scene.placed(
+        "normal_load", scene.all("normal_load_mean"), "normal load $P$", "N"
+    )
     stated, cycles = statements(dataset, []), cycles_of(dataset)
     integral = rf"$\oint\,P\,\mathrm{{d}}{symbol}$"
-    in_cycles = "loop_energy_mean" in stated and bool(stated["loop_energy_mean"].notnull().all())
+    in_cycles = "loop_energy_mean" in stated and bool(
+        stated["loop_energy_mean"].notnull().all()
+    )
     spent = stated["loop_dissipation_mean" if in_cycles else "total_dissipated_mean"]
-    energies = {"$W$": spent} | ({integral: stated["loop_energy_mean"]} if in_cycles else {})
+    energies = {"$W$": spent} | (
+        {integral: stated["loop_energy_mean"]} if in_cycles else {}
+    )
     labelled = scene._replace(lines=_labelled(scene, energies))
     for panel, placed, name, factor in (
         (loads, labelled, "normal_load", force),
@@ -243,7 +328,15 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
         (loaded, of_load, "contact_radius", length),
     ):
         for line in placed.lines:
-            _cycle(panel, placed, name, line, factor, kind, style.number_at(cycles, line.point))
+            _cycle(
+                panel,
+                placed,
+                name,
+                line,
+                factor,
+                kind,
+                style.number_at(cycles, line.point),
+            )
         beside(panel, placed, name, factor)
         style.across(panel, placed.reach, placed.words, room=0.03)
     _equilibria(panels[:3], scene, theories, (scene.unit.factor, force, length))
@@ -267,7 +360,15 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     return figure
 
 
-def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, kind: str, cycles: float) -> None:
+def _cycle(
+    panel: Axes,
+    scene: Scene,
+    name: str,
+    line: Line,
+    factor: float,
+    kind: str,
+    cycles: float,
+) -> None:
     """Draw one curve with its jumps: a cross at each pull-off, a ring at each jump-in; thin after its first cycle.
 
     If members differ, crosses are their own pull-offs, at their lowest loads: their mean ends where the last comes off.
@@ -276,27 +377,55 @@ def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, kind
     mean, _, low, high = (factor * values for values in scene.drawn(name, line))
     along_load = scene.over == "normal_load"
     first = int(np.ceil(len(x) / max(cycles, 1.0)))
-    known = scene.statistics.get(f"{name}_quantile") is not None  # a standard deviation reaches loads that none has
-    if known and np.any(high > low) and not along_load:  # a band over a mean of loads says nothing
-        shade: Any = {"color": line.colour, "alpha": 0.18, "label": "" if loads else scene.spread}
+    # a standard deviation reaches loads that none has
+    known = scene.statistics.get(f"{name}_quantile") is not None
+    # a band over a mean of loads says nothing
+    if known and np.any(high > low) and not along_load:
+        shade: Any = {
+            "color": line.colour,
+            "alpha": 0.18,
+            "label": "" if loads else scene.spread,
+        }
         style.fill(panel, x[:first], low[:first], high[:first], **shade)
-    panel.plot(x[:first], mean[:first], color=line.colour, label=line.label if loads else "")
+    panel.plot(
+        x[:first], mean[:first], color=line.colour, label=line.label if loads else ""
+    )
     if first < len(x):
         later: Any = {"linewidth": _LATER, "label": "" if loads else "later cycles"}
         panel.plot(x[first - 1 :], mean[first - 1 :], color=line.colour, **later)
     if loads:
-        colour = line.colour if scene.single else style.REFERENCE  # the open spheres of all curves lie on each other
+        # the open spheres of all curves lie on each other
+        colour = line.colour if scene.single else style.REFERENCE
         panel.plot(x, np.where(gone, 0.0, np.nan), color=colour, linewidth=0.4)
     off = _pull_offs(scene.statistics.dataset, line)
     if off is not None:
         if loads:
-            look: Any = {"color": line.colour, "markersize": 2.5, "linestyle": "none", "alpha": 0.6}
-            words = "mean pull-off" if "pull_off_load_std" in scene.statistics.dataset else "pull-off of each member"
-            panel.plot(scene.unit.factor * off[0], factor * off[1], "x", label=words, **look)
+            look: Any = {
+                "color": line.colour,
+                "markersize": 2.5,
+                "linestyle": "none",
+                "alpha": 0.6,
+            }
+            words = (
+                "mean pull-off"
+                if "pull_off_load_std" in scene.statistics.dataset
+                else "pull-off of each member"
+            )
+            panel.plot(
+                scene.unit.factor * off[0], factor * off[1], "x", label=words, **look
+            )
         return
-    if kind != "load" and not along_load:  # under a dead load the sphere leaves: no place to draw a jump to
+    # under a dead load the sphere leaves: no place to draw a jump to
+    if kind != "load" and not along_load:
         jumps = np.concatenate(scene.openings(line))
-        panel.vlines(x[jumps], 0.0, mean[jumps], colors=line.colour, linestyles="dotted", linewidth=0.8)
+        panel.vlines(
+            x[jumps],
+            0.0,
+            mean[jumps],
+            colors=line.colour,
+            linestyles="dotted",
+            linewidth=0.8,
+        )
     mark_jumps(panel, scene, name, line, factor, labelled=not loads)
 
 
@@ -307,12 +436,24 @@ def _pull_offs(dataset: xr.Dataset, line: Line) -> np.ndarray | None:
     """
     names = ("pull_off_displacement", "pull_off_load")
     with contextlib.suppress(KeyError):
-        if dataset.sizes.get("member", 1) > 1 and "member" in dataset["pull_off_load"].dims:
+        if (
+            dataset.sizes.get("member", 1) > 1
+            and "member" in dataset["pull_off_load"].dims
+        ):
             off = pull_offs(dataset)
         elif "pull_off_load_std" in dataset:
-            phase, opened = ("phase_", "phase_") if "phase_detachment_count" in dataset else ("", "first_")
-            all_off = dataset[f"{opened}detachment_count"] == dataset[f"{phase}pull_off_load_count"]
-            off = xr.Dataset({name: dataset[f"{phase}{name}_mean"].where(all_off) for name in names})
+            phase, opened = (
+                ("phase_", "phase_")
+                if "phase_detachment_count" in dataset
+                else ("", "first_")
+            )
+            all_off = (
+                dataset[f"{opened}detachment_count"]
+                == dataset[f"{phase}pull_off_load_count"]
+            )
+            off = xr.Dataset(
+                {name: dataset[f"{phase}{name}_mean"].where(all_off) for name in names}
+            )
         else:
             return None
         off = off.isel(line.point, missing_dims="ignore")
@@ -320,7 +461,9 @@ def _pull_offs(dataset: xr.Dataset, line: Line) -> np.ndarray | None:
     return None
 
 
-def _equilibria(panels: list[Axes], scene: Scene, theories: list[Theory], factors: tuple[float, ...]) -> None:
+def _equilibria(
+    panels: list[Axes], scene: Scene, theories: list[Theory], factors: tuple[float, ...]
+) -> None:
     """Draw JKR's equilibria up to the largest contact, each different curve once."""
     reached: dict[Theory, float] = {}
     for line, theory in zip(scene.lines, theories, strict=True):
@@ -329,18 +472,35 @@ def _equilibria(panels: list[Axes], scene: Scene, theories: list[Theory], factor
     (loads, radii, loaded), (along, force, length) = panels, factors
     for theory, most in reached.items():
         if most > 0.0 and not np.isnan(theory.stiffness):
-            radius = most * np.linspace(0.0, 1.0, _RADII) ** 2  # dense at small radii, where the slopes are infinite
-            load, depth = (law(radius, *theory[:3]) for law in (jkr.load_at_radius, jkr.indentation_at_radius))
+            # dense at small radii, where the slopes are infinite
+            radius = most * np.linspace(0.0, 1.0, _RADII) ** 2
+            load, depth = (
+                law(radius, *theory[:3])
+                for law in (jkr.load_at_radius, jkr.indentation_at_radius)
+            )
             displacement = along * (depth + load / theory.stiffness)
             loads.plot(displacement, force * load, "--", **style.GREY)
-            radii.plot(displacement, length * radius, "--", label="JKR, stable and unstable", **style.GREY)
+            radii.plot(
+                displacement,
+                length * radius,
+                "--",
+                label="JKR, stable and unstable",
+                **style.GREY,
+            )
             loaded.plot(force * load, length * radius, "--", **style.GREY)
 
 
 def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
     """Draw the loads at which a dead load and fixed grips lose JKR's contact."""
-    levels = ((1.0, "-.", r"JKR under a dead load, $-3\pi wR/2$"), (_GRIPS, ":", r"in fixed grips, $-5\pi wR/6$"))
-    for pull in {factor * jkr.pull_off_load(*theory[:2]) for theory in theories if theory.work > 0.0}:
+    levels = (
+        (1.0, "-.", r"JKR under a dead load, $-3\pi wR/2$"),
+        (_GRIPS, ":", r"in fixed grips, $-5\pi wR/6$"),
+    )
+    for pull in {
+        factor * jkr.pull_off_load(*theory[:2])
+        for theory in theories
+        if theory.work > 0.0
+    }:
         for share, dashes, text in levels:
             panel.axhline(share * pull, linestyle=dashes, label=text, **style.GUIDE)
 
@@ -349,8 +509,19 @@ def _labelled(scene: Scene, energies: dict[str, xr.DataArray]) -> list[Line]:
     """Return the curves, each with its energies in its name."""
     labelled = []
     for line in scene.lines:
-        known = {words: style.number_at(values, line.point) for words, values in energies.items()}
-        parts = [f"{words} = {style.rounded(value, 'J')}" for words, value in known.items() if abs(value) > 0.0]
-        label = ": ".join(filter(None, [line.label, ", ".join(parts)])) if line.label else ""
+        known = {
+            words: style.number_at(values, line.point)
+            for words, values in energies.items()
+        }
+        parts = [
+            f"{words} = {style.rounded(value, 'J')}"
+            for words, value in known.items()
+            if abs(value) > 0.0
+        ]
+        label = (
+            ": ".join(filter(None, [line.label, ", ".join(parts)]))
+            if line.label
+            else ""
+        )
         labelled.append(line._replace(label=label))
     return labelled

@@ -21,7 +21,15 @@ from sim.analysis import is_stationary, is_steady, speed_of, statements, sweep_d
 from sim.analysis.dataset import claim, speed_name
 from sim.analysis.errors import remarks, systematic_errors
 from sim.analysis.statistics import averaging, over_members
-from sim.analysis.tables import highlights, key_figures, losses, narrow, notes, phases, table
+from sim.analysis.tables import (
+    highlights,
+    key_figures,
+    losses,
+    narrow,
+    notes,
+    phases,
+    table,
+)
 from sim.numerics import hdf5
 from sim.numerics.files import output
 from sim.plots import kinds
@@ -57,7 +65,13 @@ _SPEEDS = 4
 #: Inks of figures that follow the page from light to dark.
 _INKS = {"#000000": "currentColor", "#ffffff": "var(--paper)"}
 #: Text of matplotlib's SVG that a page lacks: the head with its namespaces and style, comments, space between elements.
-_LEFT_OUT = {r"\A.*</style>\s*</defs>": "", "<!--.*?-->": "", r">\s+<": "><", r"\s+": " ", "xlink:": ""}
+_LEFT_OUT = {
+    r"\A.*</style>\s*</defs>": "",
+    "<!--.*?-->": "",
+    r">\s+<": "><",
+    r"\s+": " ",
+    "xlink:": "",
+}
 _COORDINATES, _NUMBER = re.compile(r' (?:d|x|y)="[^"]*"'), re.compile(r"\d+\.\d{3,}")
 _REFERENCE = re.compile(r'(\bid="|href="#|url\(#)')
 
@@ -89,9 +103,20 @@ def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
     points = None if data is None else Measured(data, dataset)
     best, of_points = kinds.default(dataset), kinds.default(dataset, points)
     could = kinds.drawable(dataset)
-    speeds = speed_of(dataset).to_numpy() if speed_name(dataset) in dataset else np.zeros(1)
-    moves = bool(np.all(speeds > 0.0) or np.all(speeds < 0.0)) and np.unique(speeds).size > _SPEEDS
-    others = [kind for kind in could if kind in _ALSO or kinds.KINDS[kind].fits(dataset) or (kind == "curve" and moves)]
+    speeds = (
+        speed_of(dataset).to_numpy() if speed_name(dataset) in dataset else np.zeros(1)
+    )
+    moves = (
+        bool(np.all(speeds > 0.0) or np.all(speeds < 0.0))
+        and np.unique(speeds).size > _SPEEDS
+    )
+    others = [
+        kind
+        for kind in could
+        if kind in _ALSO
+        or kinds.KINDS[kind].fits(dataset)
+        or (kind == "curve" and moves)
+    ]
     # theories have an axis of their own; the end of a run that is on its way says little, and over the speed a sweep
     # is a curve already; only bonds with a rupture law have a maximum of the stress, which transients after steps
     # between few speeds do not show, nor many springs upon each other
@@ -99,19 +124,29 @@ def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
     varies = speed_name(dataset) in dataset and not is_steady(dataset)
     steps = varies and np.unique(speeds).size <= _SPEEDS
     has_peak = any(str(name).startswith("bonds_rupture") for name in dataset.variables)
-    less = {"sweep": best in ("theories", "curve") or not lasts, "friction": best in ("creep", "stability")}
+    less = {
+        "sweep": best in ("theories", "curve") or not lasts,
+        "friction": best in ("creep", "stability"),
+    }
     less["curve"] = best == "creep"  # whose speed nothing sets
     less["stress"] = best != "stress" and (best == "stability" or steps or not has_peak)
     # time is no more than another axis for a speed that rises or for creep, and nothing happens in it where a run lasts
-    less["time"] = best in ("curve", "creep", "stability") or (best != "time" and lasts and "incipient" not in could)
+    less["time"] = best in ("curve", "creep", "stability") or (
+        best != "time" and lasts and "incipient" not in could
+    )
     shown = [best, *(kind for kind in others if not less.get(kind, False))]
     if points is not None and of_points not in shown:
         shown.insert(0, of_points)
     numbered = enumerate(dict.fromkeys(shown))
-    return [_drawing(dataset, kind, f"f{number}-", points, kind == of_points) for number, kind in numbered]
+    return [
+        _drawing(dataset, kind, f"f{number}-", points, kind == of_points)
+        for number, kind in numbered
+    ]
 
 
-def _drawing(dataset: xr.Dataset, kind: str, prefix: str, points: Measured | None, needed: bool) -> Drawing:
+def _drawing(
+    dataset: xr.Dataset, kind: str, prefix: str, points: Measured | None, needed: bool
+) -> Drawing:
     """Return a figure, with measured points if it can show them; raise ValueError if it cannot and they are needed."""
     drawing = Drawing(kind, kinds.KINDS[kind].shows, HINTS.get(kind, ""))
     if points is not None and "data" in kinds.KINDS[kind].takes:
@@ -119,7 +154,11 @@ def _drawing(dataset: xr.Dataset, kind: str, prefix: str, points: Measured | Non
         measured.forget()
         with contextlib.nullcontext() if needed else contextlib.suppress(ValueError):
             svg = svg_of(kinds.draw(dataset, kind, Choices(data=measured)), prefix)
-            return drawing._replace(hint=f"{drawing.hint} Rings are measured points.", svg=svg, measured=measured)
+            return drawing._replace(
+                hint=f"{drawing.hint} Rings are measured points.",
+                svg=svg,
+                measured=measured,
+            )
     try:
         return drawing._replace(svg=svg_of(kinds.draw(dataset, kind), prefix))
     except ValueError as fault:  # a fault that only the drawing of the kind detects
@@ -135,15 +174,20 @@ def svg_of(figure: Figure, prefix: str) -> str:
     content, fineness = io.BytesIO(), figure.dpi
     figure.dpi = 72.0  # that of SVG
     FigureCanvasSVG(figure)
-    if layout := figure.get_layout_engine():  # here, as saving would draw the figure twice
+    # here, as saving would draw the figure twice
+    if layout := figure.get_layout_engine():
         with mpl.rc_context(STYLE):
             layout.execute(figure)
         figure.set_layout_engine(None)
-    figure.savefig(content, format="svg", transparent=True, dpi=fineness)  # of images within it
+    # of images within it
+    figure.savefig(content, format="svg", transparent=True, dpi=fineness)
     text = content.getvalue().decode()
     for pattern, replacement in _LEFT_OUT.items():
         text = re.sub(pattern, replacement, text, flags=re.DOTALL)
-    text = _COORDINATES.sub(lambda match: _NUMBER.sub(lambda number: f"{float(number[0]):.2f}", match[0]), text)
+    text = _COORDINATES.sub(
+        lambda match: _NUMBER.sub(lambda number: f"{float(number[0]):.2f}", match[0]),
+        text,
+    )
     text = _REFERENCE.sub(rf"\1{prefix}", text)
     for ink, colour in _INKS.items():
         text = text.replace(ink, colour)
@@ -165,16 +209,24 @@ _WHOLE = 2**29
 _ROUNDING = 1e-12
 #: Attributes on where a dataset comes from, in the page's words.
 _PROVENANCE = {
-    "source": "written by", "history": "scenario and versions", "seed": "seed", "members": "members",
+    "source": "written by",
+    "history": "scenario and versions",
+    "seed": "seed",
+    "members": "members",
     "joined": "of several runs or some members, but the scenario describes one run",
-    "references": "references", "Conventions": "conventions of the file",
-}  # fmt: skip
+    "references": "references",
+    "Conventions": "conventions of the file",
+}
 
 
 def written(
-    dataset: xr.Dataset, source: Path, path: Path | None, replace: bool,
-    data: Path | None = None, lost: Sequence[str] = (),
-) -> Path:  # fmt: skip
+    dataset: xr.Dataset,
+    source: Path,
+    path: Path | None,
+    replace: bool,
+    data: Path | None = None,
+    lost: Sequence[str] = (),
+) -> Path:
     """Write the page of a dataset, by default beside its file, and return the path of the page.
 
     Raises
@@ -194,9 +246,11 @@ def written(
 
 
 def html(
-    dataset: xr.Dataset, source: Path | str = "OUT.nc", data: Data | None = None,
+    dataset: xr.Dataset,
+    source: Path | str = "OUT.nc",
+    data: Data | None = None,
     lost: Sequence[float | str] = (),
-) -> str:  # fmt: skip
+) -> str:
     """Return the page of a run as one text of HTML.
 
     Parameters
@@ -215,7 +269,8 @@ def html(
     str
         A page without scripts or anything outside of itself. What comes from the file is escaped.
     """
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # heavy: for this command alone
+    # heavy: for this command alone
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     if dataset.nbytes <= _WHOLE:
         dataset = dataset.load()
@@ -223,18 +278,34 @@ def html(
     points = [figure.measured for figure in figures if figure.measured]
     stated, swept = statements(dataset, lost=lost), sweep_dims(dataset)
     rows, whole = table(dataset, _ROWS, stated), highlights(dataset, _ROWS, stated)
-    headings = [heading.replace("\n", "").partition("(")[0].strip() for heading in (rows or [{}])[0]]
+    headings = [
+        heading.replace("\n", "").partition("(")[0].strip()
+        for heading in (rows or [{}])[0]
+    ]
     keys = sum(heading in (*swept, "t") for heading in headings)
-    wide = [rows, *([whole, *(of(dataset, _ROWS, stated) for of in (losses, phases))] if swept else [])]
+    wide = [
+        rows,
+        *(
+            [whole, *(of(dataset, _ROWS, stated) for of in (losses, phases))]
+            if swept
+            else []
+        ),
+    ]
     stem = Path(source).stem
     page = Environment(
-        loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined,
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
         # values marked as HTML stay as they are, texts lose control characters
-        finalize=lambda value: plain(value) if type(value) is str else value, trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
+        finalize=lambda value: plain(value) if type(value) is str else value,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     return page.get_template("page.html").render(
         question=dict(zip(("name", "text", "more"), question(dataset), strict=True)),
-        measured="; ".join(filter(None, [points[0].source, points[0].assumed])) if points else "",
+        measured="; ".join(filter(None, [points[0].source, points[0].assumed]))
+        if points
+        else "",
         averaged=averaging(dataset, is_stationary(dataset)),
         drawings=figures,
         swept=bool(swept),
@@ -247,7 +318,11 @@ def html(
         changes=changes(dataset),
         files=list(hdf5.tables(dataset.attrs.get("scenario_files"))),
         commands="\n".join(commands(dataset, stem)),
-        provenance={words: str(dataset.attrs[key]) for key, words in _PROVENANCE.items() if key in dataset.attrs},
+        provenance={
+            words: str(dataset.attrs[key])
+            for key, words in _PROVENANCE.items()
+            if key in dataset.attrs
+        },
         version=str(dataset.attrs["sim_version"]),
         source=str(source),
         saved=f"{stem}.toml" if dataset.attrs.get("scenario_toml") else f"{stem}.json",
@@ -259,23 +334,37 @@ def question(dataset: xr.Dataset) -> tuple[str, str, list[str]]:
 
     The question is the first paragraph of the comment, else the name.
     """
-    text, name = str(dataset.attrs.get("scenario_toml", "")), str(dataset.attrs.get("title", "")) or "A run of sim"
+    text, name = (
+        str(dataset.attrs.get("scenario_toml", "")),
+        str(dataset.attrs.get("title", "")) or "A run of sim",
+    )
     comment = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
     lines = [line[1:].strip() for line in comment]
-    question, *more = [" ".join(part.split()) for part in "\n".join(lines).split("\n\n") if part.strip()] or [name]
+    question, *more = [
+        " ".join(part.split())
+        for part in "\n".join(lines).split("\n\n")
+        if part.strip()
+    ] or [name]
     return name, question, more
 
 
 def changes(dataset: xr.Dataset) -> dict[str, str]:
     """Return the values that replace the scenario's, by key, as TOML."""
-    return {key: toml(value) for key, value in hdf5.tables(dataset.attrs.get("scenario_overrides")).items()}
+    return {
+        key: toml(value)
+        for key, value in hdf5.tables(dataset.attrs.get("scenario_overrides")).items()
+    }
 
 
 def scenario(dataset: xr.Dataset) -> str:
     """Return the scenario's text; for a scenario from Python all of its keys, as JSON."""
     text = str(dataset.attrs.get("scenario_toml", ""))
     if not text:
-        text = json.dumps(hdf5.tables(dataset.attrs["scenario_resolved"]), indent=2, ensure_ascii=False)
+        text = json.dumps(
+            hdf5.tables(dataset.attrs["scenario_resolved"]),
+            indent=2,
+            ensure_ascii=False,
+        )
     return text.expandtabs(4)
 
 
@@ -283,17 +372,32 @@ def commands(dataset: xr.Dataset, stem: str) -> list[str]:
     """Return the commands that repeat a run of ``<stem>.toml``, or of ``<stem>.json`` for a scenario from Python."""
     if not dataset.attrs.get("scenario_toml"):
         return [f'sim.run(json.load(open("{stem}.json")), to="{stem}.nc")']
-    words = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in changes(dataset).items()]
+    words = [
+        f"--set {shlex.quote(f'{key}={value}')}"
+        for key, value in changes(dataset).items()
+    ]
     name, output = (shlex.quote(f"{stem}.{ending}") for ending in ("toml", "nc"))
-    return [" ".join(["sim run", name, "-o", output, *words]), f"sim stats {output}", f"sim report {output}"]
+    return [
+        " ".join(["sim run", name, "-o", output, *words]),
+        f"sim stats {output}",
+        f"sim report {output}",
+    ]
 
 
 def known(dataset: xr.Dataset) -> Rows:
     """Return the systematic errors that are estimated before the run, and the largest standard error in it."""
-    rows = [{"error": str(each), "size": "systematic"} for each in systematic_errors(dataset)]
+    rows = [
+        {"error": str(each), "size": "systematic"}
+        for each in systematic_errors(dataset)
+    ]
     times = np.unique(np.linspace(0, dataset.sizes["t"] - 1, _ROWS).round().astype(int))
     ratios = over_members(dataset.isel(t=times), ["area_ratio"], quantiles=False)
-    if "area_ratio_sem" in ratios and (error := float(ratios["area_ratio_sem"].max())) > _ROUNDING:
-        words = f"largest standard error of the mean area over JKR's, of {times.size} times"
+    if (
+        "area_ratio_sem" in ratios
+        and (error := float(ratios["area_ratio_sem"].max())) > _ROUNDING
+    ):
+        words = (
+            f"largest standard error of the mean area over JKR's, of {times.size} times"
+        )
         rows.append({"error": words, "size": f"{100.0 * error:.3g} %"})
     return rows

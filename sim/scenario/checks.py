@@ -38,9 +38,21 @@ def faults_across(scene: Scene, built: bool = True) -> Faults:
     try:
         _ = scene.fluctuations
     except (PydanticCustomError, ValidationError) as fault:
-        yield ("shear",), fault.message() if isinstance(fault, PydanticCustomError) else fault.errors()[0]["msg"]
+        yield (
+            ("shear",),
+            fault.message()
+            if isinstance(fault, PydanticCustomError)
+            else fault.errors()[0]["msg"],
+        )
         return
-    for check in (_too_short, _cannot_be_driven, _lacks_bonds, _catch_is_too_weak, _implausible, _wrong_maps):
+    for check in (
+        _too_short,
+        _cannot_be_driven,
+        _lacks_bonds,
+        _catch_is_too_weak,
+        _implausible,
+        _wrong_maps,
+    ):
         yield from check(scene)
     yield from _shear_faults(scene, built)
     yield from _off_the_map(scene)
@@ -53,8 +65,13 @@ def _too_short(scene: Scene) -> Faults:
     if end < clock.duration * (1 - 1e-9):
         yield ("contact", contact.kind), _TOO_SHORT.format(end, clock.duration)
     elif clock.steps < _STEPS_A_CYCLE * contact.course.cycles:
-        fault = f"fewer than {_STEPS_A_CYCLE} of the {clock.steps} clock steps for a cycle"
-        yield ("contact", contact.kind, "cycles"), f"{fault}; make fewer cycles or shorter steps"
+        fault = (
+            f"fewer than {_STEPS_A_CYCLE} of the {clock.steps} clock steps for a cycle"
+        )
+        yield (
+            ("contact", contact.kind, "cycles"),
+            f"{fault}; make fewer cycles or shorter steps",
+        )
 
 
 def _cannot_be_driven(scene: Scene) -> Faults:
@@ -62,18 +79,30 @@ def _cannot_be_driven(scene: Scene) -> Faults:
     if drive.solves_motion and not bonds.stretched:
         if drive.contact_stiffness != "rigid":
             fault = "bonds without a stretch allow no slip between interface and body"
-            yield ("drive", "contact_stiffness"), f'{fault}: take "rigid", or bonds with a rupture'
+            yield (
+                ("drive", "contact_stiffness"),
+                f'{fault}: take "rigid", or bonds with a rupture',
+            )
         if drive.at_once:
             fault = "the slip speed of bonds without a stretch is not determined"
-            yield ("drive",), f"{fault}: give drive.damping, mass or viscosity, or bonds with a rupture"
+            yield (
+                ("drive",),
+                f"{fault}: give drive.damping, mass or viscosity, or bonds with a rupture",
+            )
         if not bonds.carries_stress:
-            yield ("bonds", "stress"), "is 0 Pa, so there is no friction; give the stress of the bonds"
+            yield (
+                ("bonds", "stress"),
+                "is 0 Pa, so there is no friction; give the stress of the bonds",
+            )
 
 
 def _lacks_bonds(scene: Scene) -> Faults:
     shear, bonds = scene.fluctuations, scene.population
     if bonds.stretched and bonds.rebinding_rate == 0.0 and bonds.start_from != "bonded":
-        yield ("bonds", "start"), 'no site binds without rebinding: give "bonded", or a rebinding_rate above 0'
+        yield (
+            ("bonds", "start"),
+            'no site binds without rebinding: give "bonded", or a rebinding_rate above 0',
+        )
     if not shear.spectrum.bond_made:
         if shear.reads_stress and not bonds.carries_stress:
             fault = 'amplitude model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
@@ -85,25 +114,40 @@ def _lacks_bonds(scene: Scene) -> Faults:
         stiffest = cast(BondMade, shear.spectrum).stiffest(*scene.solid.effective)
         if cast(Cohort | Tracked, bonds).bond_stiffness > stiffest * (1.0 + 1e-9):
             fault = f"the half-space under a bond of this footprint has a stiffness of {stiffest:.3g} N/m in series"
-            yield ("bonds", "bond_stiffness"), f"{fault}: give at most that, or a larger shear.spectrum.footprint"
+            yield (
+                ("bonds", "bond_stiffness"),
+                f"{fault}: give at most that, or a larger shear.spectrum.footprint",
+            )
 
 
 def _catch_is_too_weak(scene: Scene) -> Faults:
     bonds = scene.population
-    if bonds.stretched and bonds.law.catch > 0.0 and bonds.law.relief > _LARGEST_FORCE_RATIO * bonds.law.softness:
+    if (
+        bonds.stretched
+        and bonds.law.catch > 0.0
+        and bonds.law.relief > _LARGEST_FORCE_RATIO * bonds.law.softness
+    ):
         fault = f"is less than 1/{_LARGEST_FORCE_RATIO:,.0f} of slip_force; the time of a run grows as it falls"
         cure = f"give at least {bonds.rupture.slip_force / _LARGEST_FORCE_RATIO:.3g} N, a smaller slip_force"
         yield ("bonds", "rupture", "catch_force"), f"{fault}; {cure}, or catch_rate = 0"
 
 
 def _implausible(scene: Scene) -> Faults:
-    drive, contact, radius, size = scene.drive, scene.contact, scene.rest_radius, scene.sphere.radius
+    drive, contact, radius, size = (
+        scene.drive,
+        scene.contact,
+        scene.rest_radius,
+        scene.sphere.radius,
+    )
     if contact.lags and not scene.adhesion.work > 0.0:
         fault = "a rate-dependent edge needs a work of adhesion at rest; give adhesion.work above zero"
         yield ("adhesion", "work"), fault
     if radius > _WIDEST * size:
         fault = f"makes a contact of {radius:.3g} m on a sphere of {size:.3g} m radius, for which no theory holds;"
-        yield ("contact", contact.kind), f"{fault} check its unit, and those of sphere, adhesion and solid"
+        yield (
+            ("contact", contact.kind),
+            f"{fault} check its unit, and those of sphere, adhesion and solid",
+        )
     if drive.solves_motion and contact.reversible > 0.0 and drive.at_once:
         fault = "lets friction drop with the contact at once: give drive.mass, damping or viscosity"
         yield ("contact", "reversible"), fault
@@ -112,10 +156,17 @@ def _implausible(scene: Scene) -> Faults:
 def _wrong_maps(scene: Scene) -> Faults:
     record, clock, members = scene.record, scene.clock, scene.ensemble.members
     if record.maps and not scene.fluctuations.draws_maps:
-        yield ("record", "maps"), 'needs shear.model = "mapped"; choose it or omit the maps'
+        yield (
+            ("record", "maps"),
+            'needs shear.model = "mapped"; choose it or omit the maps',
+        )
     between = clock.step * clock.stride
     records = {time: time / between for time in record.maps}
-    off = [time for time, number in records.items() if abs(number - round(number)) > 1e-9 * max(number, 1.0)]
+    off = [
+        time
+        for time, number in records.items()
+        if abs(number - round(number)) > 1e-9 * max(number, 1.0)
+    ]
     off += [time for time in record.maps if time > clock.duration * (1 + 1e-9)]
     if off:
         fault = f"{off[0]:g} s is not a recorded time; choose whole multiples of {between:g} s"
@@ -133,10 +184,15 @@ def _shear_faults(scene: Scene, built: bool) -> Faults:
         pull_off = jkr.pull_off_load(scene.adhesion.work, scene.sphere.radius)
         limit = f" of {pull_off:.3g} N" if contact.kind == "load" else ""
         fault = f"is beyond pull-off{limit} at the start, so there is no contact at rest for the size of the cell"
-        yield ("contact", contact.kind), f'{fault}; move the sphere closer, or give shear.cell such as "0.2 mm"'
+        yield (
+            ("contact", contact.kind),
+            f'{fault}; move the sphere closer, or give shear.cell such as "0.2 mm"',
+        )
     elif built:
         listed = shear.faults(*scene.solid.effective, radius)
-        yield from ((("shear", key) if key else ("shear",), fault) for key, fault in listed)
+        yield from (
+            (("shear", key) if key else ("shear",), fault) for key, fault in listed
+        )
 
 
 def _off_the_map(scene: Scene) -> Faults:
@@ -149,7 +205,10 @@ def _off_the_map(scene: Scene) -> Faults:
         positions = np.cumsum(scene.drive.pieces(ends, clock.duration).joined.integral)
         reach = min(0.0, positions.min()), max(0.0, positions.max())
         faults = shear.off_the_map(reach, scene.widest)
-        yield from ((("shear", "field", *([key] if key else [])), fault) for key, fault in faults)
+        yield from (
+            (("shear", "field", *([key] if key else [])), fault)
+            for key, fault in faults
+        )
 
 
 #: Rms of the fluctuations over the mean stress above which a remark is made: some 2 % of the area is reversed.
@@ -167,27 +226,46 @@ def remarks_between(scene: Scene) -> list[str]:
     speeds = scene.speeds(41)
     remarks = []
     if (radius := scene.sphere.radius) > _LARGEST_SPHERE:
-        remarks.append(f'sphere.radius is {radius:g} m: a number without a unit is in metres, write "5 mm"')
+        remarks.append(
+            f'sphere.radius is {radius:g} m: a number without a unit is in metres, write "5 mm"'
+        )
     if scene.fluctuations_move_contact and bonds.feeds_back and not contact.lags:
-        remarks.append('carried area does not converge in a fluctuating contact: use model = "rate_dependent"')
+        remarks.append(
+            'carried area does not converge in a fluctuating contact: use model = "rate_dependent"'
+        )
     reattaches = contact.after_pull_off == "reattach"
     if reattaches and bonds.stretched and not (bonds.feeds_back or drive.solves_motion):
-        remarks.append('bonds continue to slide while the contact is open; bonds.area = "carried" starts without bonds')
+        remarks.append(
+            'bonds continue to slide while the contact is open; bonds.area = "carried" starts without bonds'
+        )
     strength = np.broadcast_to(bonds.steady(speeds).strength, speeds.shape)
     strain = strength.max() / scene.setting.shear_modulus
     if strain > _LARGEST_STRAIN:
-        remarks.append(f"the mean stress is {strain:.2g} times the shear modulus, beyond linear elasticity")
+        remarks.append(
+            f"the mean stress is {strain:.2g} times the shear modulus, beyond linear elasticity"
+        )
     remarks += _remark_on_unit(shear, float(strength.max()))
     rms = math.sqrt(shear.spectrum.variance) * shear.amplitude.factor(speeds, strength)
-    if not shear.spectrum.bond_made and np.any((rms > _MOST_REVERSED * strength) & (strength > 0.0)):
-        remarks.append(f"rms fluctuations exceed {_MOST_REVERSED} of the mean stress: patches of reversed friction")
-    return [*remarks, *_remarks_on_step(scene, np.array([np.abs(speeds).max() * scene.clock.step]))]
+    if not shear.spectrum.bond_made and np.any(
+        (rms > _MOST_REVERSED * strength) & (strength > 0.0)
+    ):
+        remarks.append(
+            f"rms fluctuations exceed {_MOST_REVERSED} of the mean stress: patches of reversed friction"
+        )
+    return [
+        *remarks,
+        *_remarks_on_step(scene, np.array([np.abs(speeds).max() * scene.clock.step])),
+    ]
 
 
 def _remark_on_unit(shear: Any, strength: float) -> list[str]:
     """Return a remark if the stress of a measured map is nearer to a thousand times that of the bonds, or less."""
     if shear.measured:
-        key, size, text = "field", max(abs(shear.field.mean), shear.field.rms), f"mean {shear.field.mean:.3g} Pa, "
+        key, size, text = (
+            "field",
+            max(abs(shear.field.mean), shear.field.rms),
+            f"mean {shear.field.mean:.3g} Pa, ",
+        )
         text += f"rms {shear.field.rms:.3g} Pa"
     elif isinstance(shear.spectrum, Measured) and shear.spectrum.rms is None:
         key, size = "spectrum", math.sqrt(shear.spectrum.variance)
@@ -196,8 +274,10 @@ def _remark_on_unit(shear: Any, strength: float) -> list[str]:
         return []
     if strength == 0.0 or abs(math.log10(size / strength)) < _FAR:
         return []
-    return [f"the map ({text}) is {size / strength:.2g} times the stress of the bonds, {strength:.3g} Pa: is"
-            f" shear.{key}.unit right?"]  # fmt: skip
+    return [
+        f"the map ({text}) is {size / strength:.2g} times the stress of the bonds, {strength:.3g} Pa: is"
+        f" shear.{key}.unit right?"
+    ]
 
 
 #: Mean overshoot of a random walk beyond a limit, over the standard deviation of its steps: −ζ(1/2)/√(2π).
@@ -225,13 +305,31 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
     load this is 3/2 πR times the overshoot. A prescribed load adds half of its largest change in a step. The two have
     opposite signs; this is a bound.
     """
-    shear, clock, settled = scene.fluctuations, scene.clock, scene.population.steady(path / scene.clock.step)
-    size = np.ones(1) if shear.law.remembers else shear.law.factor(path / clock.step, settled.strength)
+    shear, clock, settled = (
+        scene.fluctuations,
+        scene.clock,
+        scene.population.steady(path / scene.clock.step),
+    )
+    size = (
+        np.ones(1)
+        if shear.law.remembers
+        else shear.law.factor(path / clock.step, settled.strength)
+    )
     power = settled.frozen + settled.varying if shear.spectrum.bond_made else size**2
-    late = _OVERSHOOT * shear.paid_by_adhesion * power * scene.process.change(path, clock.step)
+    late = (
+        _OVERSHOOT
+        * shear.paid_by_adhesion
+        * power
+        * scene.process.change(path, clock.step)
+    )
     times = np.linspace(0.0, clock.duration, min(clock.steps, _MOST_SLIPS) + 1)
-    most = np.abs(np.diff(scene.contact.course.at(times, clock.duration))).max() * (len(times) - 1) / clock.steps
-    ramp = 0.5 * most if scene.contact.kind == "load" else 0.0  # else the course is no load
+    most = (
+        np.abs(np.diff(scene.contact.course.at(times, clock.duration))).max()
+        * (len(times) - 1)
+        / clock.steps
+    )
+    # else the course is no load
+    ramp = 0.5 * most if scene.contact.kind == "load" else 0.0
     return np.asarray(1.5 * math.pi * scene.sphere.radius * late + ramp)
 
 
@@ -240,7 +338,9 @@ def _remarks_on_step(scene: Scene, path: Array) -> list[str]:
     between, slid = scene.clock.step * scene.clock.stride, path[0]
     if scene.feels_steps:
         gone = -math.log1p(-min(renewed(scene, path)[0], 0.999))
-        share = -math.log1p(-(_RENEWED_LATE if pulled(scene) else _RENEWED_LAGGING)) / max(gone, 1e-300)
+        share = -math.log1p(
+            -(_RENEWED_LATE if pulled(scene) else _RENEWED_LAGGING)
+        ) / max(gone, 1e-300)
         lost = 0.5 * gone / math.tanh(0.5 * gone) - 1.0 if gone else 0.0
         error = f"the variance of its radius is up to {lost:.1%} too large"
         if pulled(scene):
@@ -255,5 +355,12 @@ def _remarks_on_step(scene: Scene, path: Array) -> list[str]:
     if share >= 1.0:
         return []
     least = scene.clock.stride / share
-    count = next(count for k in range(99) for count in (10**k, 2 * 10**k, 5 * 10**k) if count >= least)
-    return [f'{text}; give clock.step = "{engineering(between / count, "s").replace("µ", "u")}"']
+    count = next(
+        count
+        for k in range(99)
+        for count in (10**k, 2 * 10**k, 5 * 10**k)
+        if count >= least
+    )
+    return [
+        f'{text}; give clock.step = "{engineering(between / count, "s").replace("µ", "u")}"'
+    ]

@@ -34,14 +34,20 @@ def read_text(path: Path) -> str:
         with path.open("rb") as file:
             content = file.read(_MOST_BYTES + 1)
     except FileNotFoundError:
-        raise _refusal(f"{path}: there is no such file; `sim new` writes a starter") from None
+        raise _refusal(
+            f"{path}: there is no such file; `sim new` writes a starter"
+        ) from None
     except (OSError, ValueError) as fault:
         reason = getattr(fault, "strerror", None) or fault
         raise _refusal(f"{path}: cannot be read ({reason}); name a TOML file") from None
     if content.startswith((b"\x89HDF", b"CDF")):
-        raise _refusal(f"{path}: is a dataset, not a scenario; name the TOML file that it came from")
+        raise _refusal(
+            f"{path}: is a dataset, not a scenario; name the TOML file that it came from"
+        )
     if len(content) > _MOST_BYTES:
-        raise _refusal(f"{path}: is larger than 1 MiB; put long tables into CSV files and name those")
+        raise _refusal(
+            f"{path}: is larger than 1 MiB; put long tables into CSV files and name those"
+        )
     try:
         return decoded(content)
     except UnicodeDecodeError:
@@ -53,10 +59,19 @@ def parse(text: str, file: str) -> dict[str, Any]:
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as fault:
-        cure = next((f"; {cure}" for start, cure in _CURES.items() if str(fault).startswith(start)), "")
+        cure = next(
+            (
+                f"; {cure}"
+                for start, cure in _CURES.items()
+                if str(fault).startswith(start)
+            ),
+            "",
+        )
         raise _refusal(f"{file}: is not TOML: {fault}{cure}") from None
     except (RecursionError, ValueError):
-        raise _refusal(f"{file}: is nested too deeply, or holds a number too long, to be a scenario") from None
+        raise _refusal(
+            f"{file}: is nested too deeply, or holds a number too long, to be a scenario"
+        ) from None
     if not document:
         raise _refusal(f"{file}: is empty; `sim new` writes a starter scenario")
     return document
@@ -72,7 +87,11 @@ def toml(value: Any) -> str:
         return f"{{{', '.join(f'{json.dumps(key)} = {toml(inner)}' for key, inner in value.items())}}}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(toml, value))}]"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str | bool) else str(value)
+    return (
+        json.dumps(value, ensure_ascii=False)
+        if isinstance(value, str | bool)
+        else str(value)
+    )
 
 
 def _refusal(problem: str) -> BadInput:
@@ -91,15 +110,23 @@ def written(document: dict[str, Any], table: tuple[str, ...] = ()) -> str:
     [shear.amplitude]
     width = 0.3
     """
-    values = {key: value for key, value in document.items() if not isinstance(value, dict)}
+    values = {
+        key: value for key, value in document.items() if not isinstance(value, dict)
+    }
     text = "".join(f"{_key(key)} = {toml(value)}\n" for key, value in values.items())
     if table and (values or not document):
         text = f"\n[{'.'.join(map(_key, table))}]\n{text}"
-    return text + "".join(written(document[key], (*table, key)) for key in document if key not in values)
+    return text + "".join(
+        written(document[key], (*table, key)) for key in document if key not in values
+    )
 
 
 def _key(word: str) -> str:
-    return word if re.fullmatch(r"[A-Za-z0-9_-]+", word) else json.dumps(word, ensure_ascii=False)
+    return (
+        word
+        if re.fullmatch(r"[A-Za-z0-9_-]+", word)
+        else json.dumps(word, ensure_ascii=False)
+    )
 
 
 # Origin of a scenario: its text and the files it names.
@@ -123,7 +150,11 @@ class Source:
     def changed(self, values: dict[str, Any]) -> "Source":
         """Return the source with more overrides; they replace those of keys inside their own keys."""
         inside = tuple(f"{key}." for key in values)
-        others = {key: value for key, value in self.overrides.items() if not key.startswith(inside)}
+        others = {
+            key: value
+            for key, value in self.overrides.items()
+            if not key.startswith(inside)
+        }
         return Source(self.path, self.text, others | values, self.files)
 
 

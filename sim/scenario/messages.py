@@ -11,7 +11,14 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from sim.scenario.schema import all_tables, declaration, keys, model, tables, with_models
+from sim.scenario.schema import (
+    all_tables,
+    declaration,
+    keys,
+    model,
+    tables,
+    with_models,
+)
 from sim.units.errors import BadInput
 from sim.units.terminal import one_line
 
@@ -20,7 +27,13 @@ T = TypeVar("T")
 
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 _MISSING = ("missing", "missing_argument")
-_NO_TABLE = ("dataclass_type", "dataclass_exact_type", "model_attributes_type", "dict_type", "union_tag_not_found")
+_NO_TABLE = (
+    "dataclass_type",
+    "dataclass_exact_type",
+    "model_attributes_type",
+    "dict_type",
+    "union_tag_not_found",
+)
 #: Faults that are reported at once.
 _MOST = 100
 _PLAIN_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -44,12 +57,20 @@ class _Place(NamedTuple):
 
     @property
     def keys(self) -> dict[str, FieldInfo]:
-        return {key: field for table in self.chosen.values() for key, field in keys(table).items()}
+        return {
+            key: field
+            for table in self.chosen.values()
+            for key, field in keys(table).items()
+        }
 
 
 def dotted(path: Path) -> str:
     """Return a path as it is written in a file, without places in lists."""
-    words = [word if _PLAIN_KEY.fullmatch(word) else f'"{word}"' for word in path if isinstance(word, str)]
+    words = [
+        word if _PLAIN_KEY.fullmatch(word) else f'"{word}"'
+        for word in path
+        if isinstance(word, str)
+    ]
     return ".".join(word[:60] for word in words)
 
 
@@ -61,13 +82,22 @@ def faults(root: type, invalid: ValidationError) -> list[Fault]:
     errors = invalid.errors(include_url=False)
     result = [_fault(root, error) for error in errors[:_MOST]]
     misspelt = {fault.meant for fault in result}
-    result = [fault for fault in result if not (fault.path in misspelt and fault.message.startswith("is missing"))]
+    result = [
+        fault
+        for fault in result
+        if not (fault.path in misspelt and fault.message.startswith("is missing"))
+    ]
     if len(errors) > _MOST:
         result.append(Fault((), f"and {len(errors) - _MOST:,} faults more"))
     return list({fault.path: fault for fault in reversed(result)}.values())[::-1]
 
 
-def problems(faults: Iterable[Fault], file: str = "", overrides: Iterable[Path] = (), option: str = "") -> list[str]:
+def problems(
+    faults: Iterable[Fault],
+    file: str = "",
+    overrides: Iterable[Path] = (),
+    option: str = "",
+) -> list[str]:
     """Return a line for each fault: the file or the override that caused it, the key, the fault.
 
     ``option`` is the option of a command that gave the overrides; without it they are an argument.
@@ -75,7 +105,14 @@ def problems(faults: Iterable[Fault], file: str = "", overrides: Iterable[Path] 
     lines = []
     for fault in faults:
         length = len(fault.path)
-        cause = next((words for words in overrides if length and words[:length] == fault.path[: len(words)]), None)
+        cause = next(
+            (
+                words
+                for words in overrides
+                if length and words[:length] == fault.path[: len(words)]
+            ),
+            None,
+        )
         origin, key = file, dotted(fault.path)
         if cause is not None:
             changed = dotted(cause)
@@ -128,13 +165,23 @@ def _fault(root: type, error: ErrorDetails) -> Fault:
         return _unknown(root, _place(root, error["loc"][:-1]), str(error["loc"][-1]))
     if kind in _MISSING:
         return _missing(place)
-    if kind == "union_tag_invalid" or (kind == "union_tag_not_found" and isinstance(error["input"], dict)):
+    if kind == "union_tag_invalid" or (
+        kind == "union_tag_not_found" and isinstance(error["input"], dict)
+    ):
         models = [name for option in place.admitted.values() if (name := model(option))]
-        return Fault((*place.path, "model"), _choice(error["input"].get("model"), models))
+        return Fault(
+            (*place.path, "model"), _choice(error["input"].get("model"), models)
+        )
     if kind == "literal_error":
-        return Fault(place.path, _choice(error["input"], re.findall(r"'([^']*)'", error["ctx"]["expected"])))
+        return Fault(
+            place.path,
+            _choice(error["input"], re.findall(r"'([^']*)'", error["ctx"]["expected"])),
+        )
     if kind in _NO_TABLE:
-        return Fault(place.path, f"must be a table; write [{dotted(place.path)}] and its keys below")
+        return Fault(
+            place.path,
+            f"must be a table; write [{dotted(place.path)}] and its keys below",
+        )
     last = place.path[-1] if place.path else ""
     value = f"value {last + 1}: " if isinstance(last, int) else ""
     return Fault(place.path, value + error["msg"])
@@ -144,14 +191,31 @@ def _unknown(root: type, table: _Place, key: str) -> Fault:
     """Return the fault of a key that its table does not have."""
     path = (*table.path, key)
     chosen = {model(option) for option in table.chosen.values()}
-    others = [name for kind in table.admitted.values() if key in keys(kind) and (name := model(kind)) not in chosen]
+    others = [
+        name
+        for kind in table.admitted.values()
+        if key in keys(kind) and (name := model(kind)) not in chosen
+    ]
     if others and len(chosen) == 1:
-        return Fault(path, f"is not a key of this model; remove it, or choose model = {_either(others)}")
+        return Fault(
+            path,
+            f"is not a key of this model; remove it, or choose model = {_either(others)}",
+        )
     if near := difflib.get_close_matches(key, table.keys, 1):
-        return Fault(path, f'is not a key; did you mean "{near[0]}"?', (*table.path, near[0]))
-    elsewhere = [above for above, field in all_tables(root) if any(key in keys(t) for t in _inner(field).values())]
+        return Fault(
+            path, f'is not a key; did you mean "{near[0]}"?', (*table.path, near[0])
+        )
+    elsewhere = [
+        above
+        for above, field in all_tables(root)
+        if any(key in keys(t) for t in _inner(field).values())
+    ]
     if len(elsewhere) == 1:
-        return Fault(path, f'is not a key here; did you mean "{dotted((*elsewhere[0], key))}"?', (*elsewhere[0], key))
+        return Fault(
+            path,
+            f'is not a key here; did you mean "{dotted((*elsewhere[0], key))}"?',
+            (*elsewhere[0], key),
+        )
     return Fault(path, f"is not a key; known: {', '.join(table.keys)}")
 
 
@@ -160,11 +224,19 @@ def _missing(place: _Place) -> Fault:
     name = place.path[-1]
     quantity = place.field and declaration(place.field)
     if quantity is not None:
-        return Fault(place.path, f"is missing; add for example {name} = {quantity.example}")
+        return Fault(
+            place.path, f"is missing; add for example {name} = {quantity.example}"
+        )
     if not place.admitted:
         return Fault(place.path, f'is missing; add for example {name} = "..."')
-    choice = f" with model = {_either(map(model, place.admitted.values()))}" if len(place.admitted) > 1 else ""
-    return Fault(place.path, f"is missing; add the table [{dotted(place.path)}]{choice}")
+    choice = (
+        f" with model = {_either(map(model, place.admitted.values()))}"
+        if len(place.admitted) > 1
+        else ""
+    )
+    return Fault(
+        place.path, f"is missing; add the table [{dotted(place.path)}]{choice}"
+    )
 
 
 def _inner(field: FieldInfo | None) -> dict[str, type]:

@@ -22,7 +22,10 @@ _SCENARIO = TypeAdapter(Scenario)
 
 
 def load(
-    scenario: str | os.PathLike[str] | dict[str, Any], overrides: dict[str, Any] | None = None, *, option: str = ""
+    scenario: str | os.PathLike[str] | dict[str, Any],
+    overrides: dict[str, Any] | None = None,
+    *,
+    option: str = "",
 ) -> Scenario:
     """Read a scenario from a TOML file or a dictionary of the same tables and keys.
 
@@ -49,19 +52,35 @@ def load(
     if isinstance(scenario, dict):
         file, text, folder, document = "", "", Path(), copy.deepcopy(scenario)
     else:
-        file, text, folder = str(scenario), read_text(Path(scenario)), Path(scenario).parent
+        file, text, folder = (
+            str(scenario),
+            read_text(Path(scenario)),
+            Path(scenario).parent,
+        )
         document = parse(text, file)
     words = {_words(key): value for key, value in overrides.items()}
     notes = override(document, overrides)
     wrong = [Fault(("source",), "is not a key")] if "source" in document else []
     for table in (key for axis in _axes(document) for key in axis.keys):
-        inside = (path for path in words if path[: len(_words(table))] == _words(table) != path)
-        wrong += [Fault(path, f"is part of {table}, which is swept as a whole: set sweep instead") for path in inside]
+        inside = (
+            path
+            for path in words
+            if path[: len(_words(table))] == _words(table) != path
+        )
+        wrong += [
+            Fault(
+                path,
+                f"is part of {table}, which is swept as a whole: set sweep instead",
+            )
+            for path in inside
+        ]
     files = Files(folder)
     source = Source(file, text, overrides, files.texts, notes=tuple(notes))
     document = with_models(Scenario, document) | {"source": source}
     try:
-        scene = _SCENARIO.validate_python(document, context={"files": files}, by_alias=True, by_name=False)
+        scene = _SCENARIO.validate_python(
+            document, context={"files": files}, by_alias=True, by_name=False
+        )
     except ValidationError as invalid:
         wrong += faults(Scenario, invalid)
     if wrong:
@@ -81,7 +100,11 @@ def override(document: dict[str, Any], overrides: dict[str, Any]) -> list[str]:
     """
     paths = {_words(key): value for key, value in overrides.items()}
     dropped, notes = list[str](), list[str]()
-    others = [(*path[:-1], key) for path, value in paths.items() for key in _of_other_models(path, value)]
+    others = [
+        (*path[:-1], key)
+        for path, value in paths.items()
+        for key in _of_other_models(path, value)
+    ]
     for *above, key in others:
         table: Any = document
         for word in above:
@@ -89,13 +112,17 @@ def override(document: dict[str, Any], overrides: dict[str, Any]) -> list[str]:
         if isinstance(table, dict) and table.pop(key, None) is not None:
             dropped.append(dotted((*above, key)))
     if dropped:
-        notes.append(f"omitted, because the chosen model has no such key: {', '.join(dropped)}")
+        notes.append(
+            f"omitted, because the chosen model has no such key: {', '.join(dropped)}"
+        )
     axes = () if ("sweep",) in paths else _axes(document)
     for swept, count in [(key, len(axis.values)) for axis in axes for key in axis.keys]:
         if any(_words(swept)[: len(path)] == path for path in (*paths, *others)):
             axes = without(axes, swept)
             document["sweep"] = written(axes)
-            notes.append(f"{swept} is not swept over its {count} values, because its value or model is set")
+            notes.append(
+                f"{swept} is not swept over its {count} values, because its value or model is set"
+            )
     for path, value in paths.items():
         set_key(document, path, value)
     return notes
@@ -114,13 +141,21 @@ def _of_other_models(path: tuple[str, ...], value: Any) -> list[str]:
     admitted: list[type] = [Scenario]
     for word in path[:-1]:
         fields = [keys(table)[word] for table in admitted if word in keys(table)]
-        admitted = [inner for field in fields for inner in tables(field.annotation).values()]
+        admitted = [
+            inner for field in fields for inner in tables(field.annotation).values()
+        ]
     chosen = {key for table in admitted if model(table) == value for key in keys(table)}
     if path[-1] != "model" or not chosen:
         return []
-    return list(dict.fromkeys(key for table in admitted for key in keys(table) if key not in chosen))
+    return list(
+        dict.fromkeys(
+            key for table in admitted for key in keys(table) if key not in chosen
+        )
+    )
 
 
 def _words(key: str) -> tuple[str, ...]:
     """Return the words of a dotted key, some of which may be quoted."""
-    return tuple(word.strip(' "') for word in re.findall(r'"[^"]*"|[^."]+', key)) or (key,)
+    return tuple(word.strip(' "') for word in re.findall(r'"[^"]*"|[^."]+', key)) or (
+        key,
+    )

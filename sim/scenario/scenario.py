@@ -8,7 +8,14 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, cast
 
 import numpy as np
-from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, ValidationInfo, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
 from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
@@ -32,7 +39,12 @@ from sim.units.notation import Recorded
 from sim.units.quantity import Quantity
 from sim.units.tables import Pieces
 
-_Title = Annotated[str, Field(max_length=200, description="subject of the scenario and title of the dataset")]
+_Title = Annotated[
+    str,
+    Field(
+        max_length=200, description="subject of the scenario and title of the dataset"
+    ),
+]
 #: Points of a sweep whose shear processes are all tried.
 _MOST_BUILT = 64
 #: Faults of a sweep that are reported at once.
@@ -59,22 +71,31 @@ class Clock:
 
     duration: _Duration
     step: Annotated[float, Quantity("s", "clock step", "dt", above=0)]
-    record: Annotated[float, Quantity("s", "time between records", "", above=0)] | None = None
+    record: (
+        Annotated[float, Quantity("s", "time between records", "", above=0)] | None
+    ) = None
 
     @model_validator(mode="after")
     def _whole_multiples(self) -> "Clock":
         for name in ("record", "step"):
             if (getattr(self, name) or 0.0) > self.duration * (1.0 + 1e-9):
                 message = f"{name} ({getattr(self, name):g} s) is longer than duration ({self.duration:g} s)"
-                raise PydanticCustomError("clock", f"{message}; shorten it, or lengthen the run")
+                raise PydanticCustomError(
+                    "clock", f"{message}; shorten it, or lengthen the run"
+                )
         if self.record is not None:
             _require_multiple("record", self.record, "step", self.step)
         word = "step" if self.record is None else "record"
         _require_multiple("duration", self.duration, word, self.record or self.step)
         if self.steps > _MOST_STEPS:
-            raise PydanticCustomError("clock", f"has more than {_MOST_STEPS:,} steps; make step longer")
+            raise PydanticCustomError(
+                "clock", f"has more than {_MOST_STEPS:,} steps; make step longer"
+            )
         if self.records > _MOST_RECORDS:
-            raise PydanticCustomError("clock", f"has more than {_MOST_RECORDS:,} records; give a longer record")
+            raise PydanticCustomError(
+                "clock",
+                f"has more than {_MOST_RECORDS:,} records; give a longer record",
+            )
         return self
 
     @property
@@ -113,7 +134,10 @@ def _require_multiple(name: str, long: float, other: str, short: float) -> None:
 class Ensemble:
     """Independent members of the ensemble, which share everything but their noise."""
 
-    members: Annotated[int, Quantity("1", "members of the ensemble", at_least=1, at_most=10**7, whole=True)] = 1
+    members: Annotated[
+        int,
+        Quantity("1", "members of the ensemble", at_least=1, at_most=10**7, whole=True),
+    ] = 1
 
 
 def _times(value: Any) -> Any:
@@ -133,21 +157,46 @@ class Record:
         ),
     ] = None
     maps: Annotated[
-        tuple[Annotated[float, Quantity("s", "times of stress maps, a list or { from, to, count }", at_least=0)], ...],
+        tuple[
+            Annotated[
+                float,
+                Quantity(
+                    "s",
+                    "times of stress maps, a list or { from, to, count }",
+                    at_least=0,
+                ),
+            ],
+            ...,
+        ],
         BeforeValidator(_times, list[float | str] | dict[str, float | str]),
     ] = ()
-    map_members: Annotated[int, Quantity("1", "members with recorded maps", at_least=1, at_most=10**4, whole=True)] = 1
+    map_members: Annotated[
+        int,
+        Quantity(
+            "1", "members with recorded maps", at_least=1, at_most=10**4, whole=True
+        ),
+    ] = 1
     quantities: Annotated[
-        tuple[Recorded, ...] | None, Field(description="quantities to record beside contact_radius; if omitted: all")
+        tuple[Recorded, ...] | None,
+        Field(
+            description="quantities to record beside contact_radius; if omitted: all"
+        ),
     ] = None
-    precision: Annotated[Literal["float64", "float32"], Field(description="of trajectories in the file")] = "float64"
+    precision: Annotated[
+        Literal["float64", "float32"], Field(description="of trajectories in the file")
+    ] = "float64"
     compression: Annotated[
-        Literal["none", "zlib", "digits"], Field(description="of trajectories in the file; digits: zlib of six digits")
+        Literal["none", "zlib", "digits"],
+        Field(description="of trajectories in the file; digits: zlib of six digits"),
     ] = "zlib"
 
     def keeps(self, name: str) -> bool:
         """Return True if a quantity is recorded; the contact radius and the time of an unresolved motion always are."""
-        return self.quantities is None or name in ("contact_radius", "unresolved_time", *self.quantities)
+        return self.quantities is None or name in (
+            "contact_radius",
+            "unresolved_time",
+            *self.quantities,
+        )
 
 
 #: Phases of a run that are told apart at most.
@@ -183,12 +232,22 @@ def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
     for start in starts:
         place = [max(at for at in course if at <= start) for course in (moved, pressed)]
         sense, trend = moved[place[0]]
-        names = ["rest" if sense == 0.0 else of_drive[trend], of_contact[pressed[place[1]][1]]]
-        shown = [name for name, course in zip(names, (moved, pressed), strict=True) if len(course) > 1]
-        step = math.floor(start / times.step + 0.5) + 1  # the first whose middle is later
+        names = [
+            "rest" if sense == 0.0 else of_drive[trend],
+            of_contact[pressed[place[1]][1]],
+        ]
+        shown = [
+            name
+            for name, course in zip(names, (moved, pressed), strict=True)
+            if len(course) > 1
+        ]
+        # the first whose middle is later
+        step = math.floor(start / times.step + 0.5) + 1
         if step <= times.steps:
             result[step] = start, ", ".join(shown or names[:1])
-    columns: Any = zip(*((*result[step], step) for step in sorted(result)[:_MOST_PHASES]), strict=True)
+    columns: Any = zip(
+        *((*result[step], step) for step in sorted(result)[:_MOST_PHASES]), strict=True
+    )
     return Phases(*columns)
 
 
@@ -201,12 +260,23 @@ def _turns(pieces: Pieces, signed: bool) -> dict[float, tuple[float, float]]:
     result: dict[float, tuple[float, float]] = {}
     before, value = (math.nan, math.nan), math.nan
     for start, stop, first, last in zip(*pieces[1:5], strict=True):
-        crossing = start + (stop - start) * first / (first - last) if signed and first * last < 0.0 else stop
-        parts = ((start, first, 0.0), (crossing, 0.0, last)) if crossing < stop else ((start, first, last),)
+        crossing = (
+            start + (stop - start) * first / (first - last)
+            if signed and first * last < 0.0
+            else stop
+        )
+        parts = (
+            ((start, first, 0.0), (crossing, 0.0, last))
+            if crossing < stop
+            else ((start, first, last),)
+        )
         for at, low, high in parts:
             sense = float(np.sign(low + high)) if signed else 1.0
             change = (high - low) * sense
-            now = sense, float(np.sign(change)) if abs(change) > _SAME * largest else 0.0
+            now = (
+                sense,
+                float(np.sign(change)) if abs(change) > _SAME * largest else 0.0,
+            )
             if now != before or abs(low - value) > _SAME * largest:
                 result[float(at)] = now
             before, value = now, high
@@ -246,12 +316,17 @@ class Scenario:
     record: Record = Field(default_factory=Record)
     sweep: Annotated[tuple[Any, ...], BeforeValidator(read_sweep)] = ()
     name: _Title = "sliding contact"
-    seed: Annotated[int, Quantity("1", "seed of the run", at_least=0, at_most=2**64 - 1, whole=True)] = 0
+    seed: Annotated[
+        int, Quantity("1", "seed of the run", at_least=0, at_most=2**64 - 1, whole=True)
+    ] = 0
     source: Annotated[Any, Field(exclude=True)] = Source()
 
     def __repr__(self) -> str:
         parts = self.drive, self.bonds, self.shear, self.contact
-        models = ", ".join(f"{name} {part.model}" for name, part in zip(Parts._fields, parts, strict=True))
+        models = ", ".join(
+            f"{name} {part.model}"
+            for name, part in zip(Parts._fields, parts, strict=True)
+        )
         points = math.prod(len(axis.values) for axis in self.sweep)
         return f'<Scenario "{self.name}": {models}; members {self.ensemble.members}, points {points}>'
 
@@ -263,7 +338,12 @@ class Scenario:
     def _check_across(self, built: bool = True) -> None:
         """Refuse parts that do not go together; without ``built`` the shear part's process is not tried."""
         across = faults_across(self, built)
-        faults = [InitErrorDetails(type=PydanticCustomError("across", text), loc=at, input=None) for at, text in across]
+        faults = [
+            InitErrorDetails(
+                type=PydanticCustomError("across", text), loc=at, input=None
+            )
+            for at, text in across
+        ]
         if faults:
             raise ValidationError.from_exception_data("Scenario", faults)
         if self.source.text and not self.source.parts:
@@ -285,7 +365,11 @@ class Scenario:
     def rest_radius(self) -> float:
         """Return the contact radius at rest, with all bonds and no fluctuation [m]; nan without equilibrium."""
         work = np.array([self.adhesion.work])
-        return float(self.contact.equilibrium_radius(work, self.sphere.radius, self.solid.contact_modulus)[0])
+        return float(
+            self.contact.equilibrium_radius(
+                work, self.sphere.radius, self.solid.contact_modulus
+            )[0]
+        )
 
     @cached_property
     def population(self) -> BondModel:
@@ -296,12 +380,21 @@ class Scenario:
     def derived(self) -> dict[str, tuple[Quantity, float]]:
         """Return the numbers of bonds that follow from their critical speed and stress, by key."""
         keys_of_file = quantities(self.bonds)
-        derived = quantities(self.population).items() if "rebinding_ratio" in keys_of_file else ()
+        derived = (
+            quantities(self.population).items()
+            if "rebinding_ratio" in keys_of_file
+            else ()
+        )
         text = "{}, by critical_speed and stress"
         renamed = (
-            (key, replace(quantity, meaning=text.format(quantity.meaning)), value) for key, (quantity, value) in derived
+            (key, replace(quantity, meaning=text.format(quantity.meaning)), value)
+            for key, (quantity, value) in derived
         )
-        return {f"bonds.{key}": (quantity, value) for key, quantity, value in renamed if key not in keys_of_file}
+        return {
+            f"bonds.{key}": (quantity, value)
+            for key, quantity, value in renamed
+            if key not in keys_of_file
+        }
 
     @property
     def _bond_conditions(self) -> tuple[float, bool]:
@@ -316,7 +409,10 @@ class Scenario:
     @cached_property
     def why(self) -> dict[str, str]:
         """Return the reason for the model of each part with model = "auto"."""
-        why = {"shear": self.shear.why(bool(self.record.maps)), "bonds": self.bonds.why(*self._bond_conditions)}
+        why = {
+            "shear": self.shear.why(bool(self.record.maps)),
+            "bonds": self.bonds.why(*self._bond_conditions),
+        }
         return {part: reason for part, reason in why.items() if reason}
 
     @cached_property
@@ -324,13 +420,16 @@ class Scenario:
         """Return the shear part on this solid and cell; raise ``BadInput`` if it cannot be built."""
         try:
             return self.fluctuations.process(*self.solid.effective, self._square)
-        except PydanticCustomError as fault:  # of a point inside a long sweep, which was not tried before
+        except PydanticCustomError as fault:
+            # of a point inside a long sweep, which was not tried before
             raise BadInput([f"shear: {fault.message()}"]) from None
 
     @cached_property
     def contact_area(self) -> float:
         """Return the area of the contact at rest [m²]; of one without equilibrium, that of radius R/100."""
-        radius = self.rest_radius if self.rest_radius > 0.0 else 0.01 * self.sphere.radius
+        radius = (
+            self.rest_radius if self.rest_radius > 0.0 else 0.01 * self.sphere.radius
+        )
         return math.pi * radius**2
 
     @property
@@ -341,24 +440,34 @@ class Scenario:
     @property
     def map_lattice(self) -> Lattice | None:
         """Return sides and points of the recorded maps; None without maps."""
-        return cast(ModalProcess | CarriedProcess, self.process).lattice if self.record.maps else None
+        return (
+            cast(ModalProcess | CarriedProcess, self.process).lattice
+            if self.record.maps
+            else None
+        )
 
     @cached_property
     def bodies(self) -> Bodies:
         """Return the sphere and the half-space as the contact sees them."""
-        return Bodies(self.sphere.radius, self.solid.contact_modulus, self.solid.effective[1])
+        return Bodies(
+            self.sphere.radius, self.solid.contact_modulus, self.solid.effective[1]
+        )
 
     @property
     def widest(self) -> float:
         """Return the radius that the contact can reach [m]."""
-        return self.contact.largest_radius(self.adhesion.work, self.sphere.radius, self.solid.contact_modulus)
+        return self.contact.largest_radius(
+            self.adhesion.work, self.sphere.radius, self.solid.contact_modulus
+        )
 
     @cached_property
     def margin(self) -> Shares | None:
         """Return the share of ΔΓ that acts on the edge of a finite contact; None if waves are taken as short."""
         if self.fluctuations.contact == "plane":
             return None
-        return self.fluctuations.margin(self.solid.effective, self.sphere.radius, self.widest)
+        return self.fluctuations.margin(
+            self.solid.effective, self.sphere.radius, self.widest
+        )
 
     @cached_property
     def times(self) -> Times:
@@ -370,7 +479,14 @@ class Scenario:
         """Return the constants from which parts make their remarks."""
         strength = float(self.population.steady(np.zeros(1)).strength[0])
         bodies = *self.solid.effective, self.solid.contact_modulus, self.sphere.radius
-        return Setting(*bodies, self.adhesion.work, strength, self.rest_radius, self._square, self.times)
+        return Setting(
+            *bodies,
+            self.adhesion.work,
+            strength,
+            self.rest_radius,
+            self._square,
+            self.times,
+        )
 
     @property
     def chosen(self) -> tuple[Drive, BondModel, Model, Contact]:
@@ -386,7 +502,9 @@ class Scenario:
     @cached_property
     def parts(self) -> Parts:
         """Return the parts for the engine; each model fits its protocol with its class of state."""
-        return Parts(*cast(Parts, (self.drive, self.population, self.process, self.contact)))
+        return Parts(
+            *cast(Parts, (self.drive, self.population, self.process, self.contact))
+        )
 
     def release(self) -> None:
         """Drop the process, whose arrays may be large; it is made again when needed."""
@@ -398,9 +516,17 @@ class Scenario:
         """Return, for each part and the control of the contact, True if its values differ between members."""
         driven = self.drive.per_member
         bonded = driven or self.population.per_member
-        by_bonds = bonded and (self.fluctuations.reads_stress or self.fluctuations.passes)
+        by_bonds = bonded and (
+            self.fluctuations.reads_stress or self.fluctuations.passes
+        )
         sheared = driven or self.fluctuations.per_member or by_bonds
-        return {"drive": driven, "bonds": bonded, "shear": sheared, "contact": bonded or sheared, "control": False}
+        return {
+            "drive": driven,
+            "bonds": bonded,
+            "shear": sheared,
+            "contact": bonded or sheared,
+            "control": False,
+        }
 
     @property
     def is_random(self) -> bool:
@@ -415,7 +541,9 @@ class Scenario:
     @cached_property
     def feels_steps(self) -> bool:
         """Return True if what ΔΓ does between clock steps matters: to an edge that lags, or to a pull-off."""
-        varies = self.fluctuations.per_member and self.fluctuations.spectrum.variance > 0.0
+        varies = (
+            self.fluctuations.per_member and self.fluctuations.spectrum.variance > 0.0
+        )
         return varies and (self.contact.lags or pulled(self))
 
     @cached_property
@@ -428,26 +556,42 @@ class Scenario:
         block early. Bonds drawn at the end of a step need single steps.
         """
         _, bonds, shear, contact = self.chosen
-        in_blocks = bonds.in_blocks or (bonds.in_place and self.fluctuations_leave_contact and self.holds_contact)
-        alone = contact.lags or not (self.fluctuations_leave_contact or shear.in_blocks) or not in_blocks
-        return any(part.feeds_back for part in self.chosen[1:]) or (self.drive.solves_motion and alone)
+        in_blocks = bonds.in_blocks or (
+            bonds.in_place and self.fluctuations_leave_contact and self.holds_contact
+        )
+        alone = (
+            contact.lags
+            or not (self.fluctuations_leave_contact or shear.in_blocks)
+            or not in_blocks
+        )
+        return any(part.feeds_back for part in self.chosen[1:]) or (
+            self.drive.solves_motion and alone
+        )
 
     @cached_property
     def draws_within(self) -> bool:
         """Return True if the loop of a drive that solves the motion draws the fluctuations that the contact feels."""
-        return self.drive.solves_motion and not (self.by_steps or self.fluctuations_leave_contact)
+        return self.drive.solves_motion and not (
+            self.by_steps or self.fluctuations_leave_contact
+        )
 
     @cached_property
     def holds_contact(self) -> bool:
         """Return True if neither bonds nor the mount change the contact within the sub-steps of a slider."""
         contact, work = self.contact, self.adhesion.work_of_bonds
-        return contact.lags or not (contact.changes or contact.reversible or work(1.0) != work(0.0))
+        return contact.lags or not (
+            contact.changes or contact.reversible or work(1.0) != work(0.0)
+        )
 
     @property
     def fluctuations_move_contact(self) -> bool:
         """Return True if random fluctuations change the area of the contact."""
         shear = self.fluctuations
-        return shear.per_member and shear.spectrum.variance > 0.0 and not self.fluctuations_leave_contact
+        return (
+            shear.per_member
+            and shear.spectrum.variance > 0.0
+            and not self.fluctuations_leave_contact
+        )
 
     @property
     def fluctuations_leave_contact(self) -> bool:
@@ -456,15 +600,29 @@ class Scenario:
 
     def remarks(self) -> list[str]:
         """Return one sentence for each assumption, error of the cell and implausible value."""
-        remarks = [remark for part in self.chosen for remark in part.remarks(self.setting)]
+        remarks = [
+            remark for part in self.chosen for remark in part.remarks(self.setting)
+        ]
         remarks += remarks_between(self)
-        if self.ensemble.members > 1 and self.fluctuations.measured and not any(self.varies.values()):
-            remarks.append("all members and seeds share the map and nothing else is random, so one member is enough")
-        if (lattice := self.map_lattice) and not self.fluctuations.measured and (points := lattice.faster):
+        if (
+            self.ensemble.members > 1
+            and self.fluctuations.measured
+            and not any(self.varies.values())
+        ):
+            remarks.append(
+                "all members and seeds share the map and nothing else is random, so one member is enough"
+            )
+        if (
+            (lattice := self.map_lattice)
+            and not self.fluctuations.measured
+            and (points := lattice.faster)
+        ):
             slow = f"{lattice.shape[0]} points along a side have a large prime factor, so each map needs more time"
             remarks.append(f"{slow}: shear.points = {points}")
         if self.solid.poisson_ratio != 0.5:
-            remarks.append("poisson_ratio is not 0.5: the normal-tangential coupling is neglected")
+            remarks.append(
+                "poisson_ratio is not 0.5: the normal-tangential coupling is neglected"
+            )
         return list(dict.fromkeys(remarks))
 
     def with_values(self, values: dict[str, Any], built: bool = True) -> "Scenario":
@@ -477,11 +635,17 @@ class Scenario:
         BadInput
             If a key is unknown or a value is not admissible.
         """
-        document = {name: getattr(self, name) for name in _FIELDS if name != "sweep"} | self._changed(values)
-        document["source"] = self.origin.changed(values | ({"sweep": {}} if self.sweep else {}))
+        document = {
+            name: getattr(self, name) for name in _FIELDS if name != "sweep"
+        } | self._changed(values)
+        document["source"] = self.origin.changed(
+            values | ({"sweep": {}} if self.sweep else {})
+        )
         with in_plain_words(Scenario):
             context = {"files": self._files, "unbuilt": not built}
-            return _adapter(Scenario).validate_python(with_models(Scenario, document), context=context)
+            return _adapter(Scenario).validate_python(
+                with_models(Scenario, document), context=context
+            )
 
     def points(self) -> list["Scenario"]:
         """Return the scenario at each point of its sweep, the last axis fastest; without a sweep the only point.
@@ -513,21 +677,36 @@ class Scenario:
         if faults:
             raise BadInput(list(faults))
         if len({point.clock.records for point in points}) > 1:
-            raise BadInput(["the points of the sweep would have different records; give clock.record"])
+            raise BadInput(
+                [
+                    "the points of the sweep would have different records; give clock.record"
+                ]
+            )
         if len({point.map_lattice for point in points}) > 1:
             cure = "run once for each cell and number of points"
-            raise BadInput([f"the points of the sweep would have different maps; {cure}"])
+            raise BadInput(
+                [f"the points of the sweep would have different maps; {cure}"]
+            )
         return points
 
-    def _point(self, values: dict[str, Any], origin: Source, tables: dict[Any, Any], built: bool) -> "Scenario":
+    def _point(
+        self,
+        values: dict[str, Any],
+        origin: Source,
+        tables: dict[Any, Any],
+        built: bool,
+    ) -> "Scenario":
         """Return the scenario with some values; ``tables`` holds those that other points have read."""
         groups: dict[str, dict[str, Any]] = {}
         for key, value in values.items():
             groups.setdefault(key.partition(".")[0], {})[key] = value
         point = object.__new__(Scenario)
-        point.__dict__.update(self._parts, sweep=(), source=origin.changed(values | {"sweep": {}}))
+        point.__dict__.update(
+            self._parts, sweep=(), source=origin.changed(values | {"sweep": {}})
+        )
         for name, changes in groups.items():
-            place = (name, *map(id, changes.values()))  # the values live as long as the sweep
+            # the values live as long as the sweep
+            place = (name, *map(id, changes.values()))
             if place not in tables:
                 tables[place] = self._table(name, changes)
             point.__dict__[name] = tables[place]
@@ -539,9 +718,12 @@ class Scenario:
         """Return a table with some keys changed."""
         try:
             table = with_models(Scenario, self._changed(changes))[name]
-            return table_adapter(name).validate_python(table, context={"files": self._files})
+            return table_adapter(name).validate_python(
+                table, context={"files": self._files}
+            )
         except (ValidationError, KeyError):
-            return getattr(self.with_values(changes), name)  # raises BadInput with the fault
+            # raises BadInput with the fault
+            return getattr(self.with_values(changes), name)
 
     @property
     def _files(self) -> Files:
@@ -553,9 +735,13 @@ class Scenario:
         A table that names a file reads it anew, except for a change of a key in ``_OF_USE``.
         """
         document: dict[str, Any] = {}
-        for name in {key.partition(".")[0] for key in values if "." in key} & set(_FIELDS):
+        for name in {key.partition(".")[0] for key in values if "." in key} & set(
+            _FIELDS
+        ):
             part = getattr(self, name)
-            document[name] = _adapter(type(part)).dump_python(part, by_alias=True, exclude_none=True)
+            document[name] = _adapter(type(part)).dump_python(
+                part, by_alias=True, exclude_none=True
+            )
         for key, value in values.items():
             *above, last = key.split(".")
             set_key(document, [*above, last], value)
@@ -574,5 +760,9 @@ _FIELDS = tuple(item.name for item in fields(Scenario))
 def table_adapter(name: str) -> TypeAdapter[Any]:
     """Return the adapter that checks one table of a scenario."""
     declared = getattr(Scenario, "__pydantic_fields__", {})[name]
-    kind: Any = Annotated[declared.annotation, Field(discriminator=declared.discriminator), *declared.metadata]
+    kind: Any = Annotated[
+        declared.annotation,
+        Field(discriminator=declared.discriminator),
+        *declared.metadata,
+    ]
     return TypeAdapter(kind)

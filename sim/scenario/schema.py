@@ -20,9 +20,18 @@ from sim.units.quantity import Quantity
 def keys(table: type) -> dict[str, FieldInfo]:
     """Return the keys of a table as they are written in a file, with their declarations."""
     declared: dict[str, FieldInfo] = getattr(table, "__pydantic_fields__", {})
-    read = cast(type, SkipJsonSchema)  # marks a field that is read from a file that a table names
-    written = {name: field for name, field in declared.items() if not any(isinstance(n, read) for n in field.metadata)}
-    return {field.alias or name: field for name, field in written.items() if not field.exclude}
+    # marks a field that is read from a file that a table names
+    read = cast(type, SkipJsonSchema)
+    written = {
+        name: field
+        for name, field in declared.items()
+        if not any(isinstance(n, read) for n in field.metadata)
+    }
+    return {
+        field.alias or name: field
+        for name, field in written.items()
+        if not field.exclude
+    }
 
 
 @functools.cache
@@ -33,16 +42,30 @@ def model(table: type) -> str | None:
 
 def tables(annotation: Any, tag: str = "") -> dict[str, type]:
     """Return the tables that an annotation admits, by the name that pydantic gives each; "" if there is only one."""
-    tag = next((note.tag for note in getattr(annotation, "__metadata__", ()) if isinstance(note, Tag)), tag)
+    tag = next(
+        (
+            note.tag
+            for note in getattr(annotation, "__metadata__", ())
+            if isinstance(note, Tag)
+        ),
+        tag,
+    )
     if isinstance(annotation, type) and is_dataclass(annotation):
         return {tag or model(annotation) or "": annotation}
-    return {name: table for option in get_args(annotation) for name, table in tables(option, tag).items()}
+    return {
+        name: table
+        for option in get_args(annotation)
+        for name, table in tables(option, tag).items()
+    }
 
 
 @functools.cache
 def _inner(table: type) -> dict[str, list[type]]:
     """Return the tables that the keys of a table admit."""
-    admitted = {key: list(tables(field.annotation).values()) for key, field in keys(table).items()}
+    admitted = {
+        key: list(tables(field.annotation).values())
+        for key, field in keys(table).items()
+    }
     return {key: options for key, options in admitted.items() if options}
 
 
@@ -51,7 +74,11 @@ def all_tables(root: type) -> list[tuple[tuple[str, ...], FieldInfo]]:
     """Return the path and declaration of every table in a scenario, outer ones first."""
     result: list[tuple[tuple[str, ...], FieldInfo]] = [((), FieldInfo(annotation=root))]
     for path, field in result:  # grows on the way
-        inner = {key: keys(table)[key] for table in tables(field.annotation).values() for key in _inner(table)}
+        inner = {
+            key: keys(table)[key]
+            for table in tables(field.annotation).values()
+            for key in _inner(table)
+        }
         result += [((*path, key), declared) for key, declared in inner.items()]
     return result
 
@@ -68,9 +95,18 @@ def with_models(table: type, document: Any) -> Any:
         inner, simplest = document.get(key), keys(table)[key].default_factory
         if not isinstance(inner, dict):
             continue
-        if len(admitted) > 1 and "model" not in inner and isinstance(simplest, type) and simplest in admitted:
-            others = {word for option in admitted for word in keys(option)} - keys(simplest).keys()
-            inner = inner if others & inner.keys() else {"model": model(simplest), **inner}
+        if (
+            len(admitted) > 1
+            and "model" not in inner
+            and isinstance(simplest, type)
+            and simplest in admitted
+        ):
+            others = {word for option in admitted for word in keys(option)} - keys(
+                simplest
+            ).keys()
+            inner = (
+                inner if others & inner.keys() else {"model": model(simplest), **inner}
+            )
         chosen = [option for option in admitted if model(option) == inner.get("model")]
         result[key] = with_models(chosen[0], inner) if chosen else inner
     return result
@@ -111,7 +147,10 @@ def distinct(points: Iterable[Any]) -> Iterator[tuple[str, Any]]:
 def _listed(table: type) -> list[tuple[str, str, Quantity]]:
     """Return name, key and declaration as a number of each field of a table that a file gives."""
     listed = []
-    for name, field in sorted(getattr(table, "__pydantic_fields__", {}).items(), key=lambda item: item[0] != "model"):
+    for name, field in sorted(
+        getattr(table, "__pydantic_fields__", {}).items(),
+        key=lambda item: item[0] != "model",
+    ):
         if (key := field.alias or name) in keys(table):
             meaning = field.description or name.replace("_", " ")
             listed.append((name, key, declaration(field) or Quantity("1", meaning)))
@@ -122,10 +161,20 @@ def files_read(scenario: Any) -> list[Path]:
     """Return the file of a scenario and all files that it and its sweep name."""
     values = [(key, value) for key, value, _ in entries(scenario)]
     for axis in scenario.sweep:
-        values += [pair for row in axis.values for pair in zip(axis.keys, row, strict=True)]
+        values += [
+            pair for row in axis.values for pair in zip(axis.keys, row, strict=True)
+        ]
     for key, value in values:  # grows on the way
-        values += [(f"{key}.{name}", inner) for name, inner in value.items()] if isinstance(value, dict) else []
-    names = {value for key, value in values if key.rpartition(".")[2] == "file" and isinstance(value, str) and value}
+        values += (
+            [(f"{key}.{name}", inner) for name, inner in value.items()]
+            if isinstance(value, dict)
+            else []
+        )
+    names = {
+        value
+        for key, value in values
+        if key.rpartition(".")[2] == "file" and isinstance(value, str) and value
+    }
     path = Path(scenario.source.path)
     files = [path.parent / name for name in sorted(names.union(scenario.source.files))]
     return [path, *files] if scenario.source.path else files
@@ -134,7 +183,11 @@ def files_read(scenario: Any) -> list[Path]:
 def quantities(part: Any) -> dict[str, tuple[Quantity, float]]:
     """Return every number of a scenario with its declaration, by its dotted key in a scenario file."""
     listed = entries(part)
-    return {key: (quantity, value) for key, value, quantity in listed if quantity and not isinstance(value, tuple)}
+    return {
+        key: (quantity, value)
+        for key, value, quantity in listed
+        if quantity and not isinstance(value, tuple)
+    }
 
 
 def declaration(declared: Any) -> Quantity | None:
@@ -180,19 +233,36 @@ def write_schema(path: Path, root: type) -> bool:
 def json_schema(root: type) -> dict[str, Any]:
     """Return the JSON schema of a scenario file; ``root`` is the class of scenarios."""
     schema = TypeAdapter(root).json_schema(by_alias=True, mode="validation")
-    simplest = [field.default_factory or next(iter(tables(field.annotation).values())) for _, field in all_tables(root)]
-    optional = [(model(table), keys(table).keys()) for table in simplest if isinstance(table, type)]
+    simplest = [
+        field.default_factory or next(iter(tables(field.annotation).values()))
+        for _, field in all_tables(root)
+    ]
+    optional = [
+        (model(table), keys(table).keys())
+        for table in simplest
+        if isinstance(table, type)
+    ]
     for table in schema["$defs"].values():
         properties = table["properties"]
         if "file" in properties and "file" not in table.get("required", ()):
-            columns = [name for name, each in properties.items() if each.get("type") == "array"]
-            table["anyOf"] = [{"required": ["file"]}, {"required": table.pop("required", columns)}]
+            columns = [
+                name for name, each in properties.items() if each.get("type") == "array"
+            ]
+            table["anyOf"] = [
+                {"required": ["file"]},
+                {"required": table.pop("required", columns)},
+            ]
         word = properties.get("model", {}).get("const")
-        if word and (word, properties.keys()) not in optional:  # only the simplest table may leave its model out
+        # only the simplest table may leave its model out
+        if word and (word, properties.keys()) not in optional:
             table["required"] = ["model", *table.get("required", ())]
     schema["properties"].pop("source", None)
     schema["properties"]["sweep"] = {
         "description": "keys with lists of values (outer product), or a list of tables (zipped)",
         "anyOf": [{"type": "object"}, {"type": "array", "items": {"type": "object"}}],
     }
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "sim scenario"}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **schema,
+        "title": "sim scenario",
+    }

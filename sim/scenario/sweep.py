@@ -50,9 +50,17 @@ def read_sweep(sweep: Any) -> tuple[Axis, ...]:
     """
     if isinstance(sweep, tuple) and all(isinstance(axis, Axis) for axis in sweep):
         return sweep
-    axes = [_zipped(sweep)] if isinstance(sweep, list) else list(_columns(sweep)) if isinstance(sweep, dict) else None
+    axes = (
+        [_zipped(sweep)]
+        if isinstance(sweep, list)
+        else list(_columns(sweep))
+        if isinstance(sweep, dict)
+        else None
+    )
     if axes is None:
-        raise _fault('must be a table of lists, such as "contact.load" = ["1 mN", "4 mN"]')
+        raise _fault(
+            'must be a table of lists, such as "contact.load" = ["1 mN", "4 mN"]'
+        )
     keys = [key for axis in axes for key in axis.keys]
     for key in keys:
         _require_sweepable(key, keys)
@@ -60,7 +68,9 @@ def read_sweep(sweep: Any) -> tuple[Axis, ...]:
         if len({str(row) for row in axis.values}) < len(axis.values):
             raise _fault(f"{', '.join(axis.keys)}: has a value twice; remove one")
     if math.prod(len(axis.values) for axis in axes) > _MOST_POINTS:
-        raise _fault(f"has more than {_MOST_POINTS:,} points; give fewer values, or use several runs")
+        raise _fault(
+            f"has more than {_MOST_POINTS:,} points; give fewer values, or use several runs"
+        )
     return tuple(axes)
 
 
@@ -83,9 +93,16 @@ def without(axes: tuple[Axis, ...], key: str) -> tuple[Axis, ...]:
     result = []
     for axis in axes:
         places = [place for place, other in enumerate(axis.keys) if other != key]
-        values = {str(row): row for row in (tuple(row[place] for place in places) for row in axis.values)}
+        values = {
+            str(row): row
+            for row in (tuple(row[place] for place in places) for row in axis.values)
+        }
         if places:
-            result.append(Axis(tuple(axis.keys[place] for place in places), tuple(values.values())))
+            result.append(
+                Axis(
+                    tuple(axis.keys[place] for place in places), tuple(values.values())
+                )
+            )
     return tuple(result)
 
 
@@ -95,8 +112,13 @@ def _fault(message: str) -> PydanticCustomError:
 
 def _zipped(tables: list[Any]) -> Axis:
     """Return the axis of a list of tables, each a row of values."""
-    if not tables or not all(isinstance(table, dict) and table.keys() == tables[0].keys() != set() for table in tables):
-        raise _fault('must be a list of tables with the same keys, each such as { "contact.load" = "1 mN" }')
+    if not tables or not all(
+        isinstance(table, dict) and table.keys() == tables[0].keys() != set()
+        for table in tables
+    ):
+        raise _fault(
+            'must be a list of tables with the same keys, each such as { "contact.load" = "1 mN" }'
+        )
     keys = tuple(tables[0])
     return Axis(keys, tuple(tuple(table[key] for key in keys) for table in tables))
 
@@ -105,28 +127,43 @@ def _columns(table: dict[str, Any], above: str = "") -> Iterator[Axis]:
     """Iterate over the axes of the swept keys; keys may be quoted as one or nested as tables."""
     for name, values in table.items():
         key = f"{above}{name}"
-        if isinstance(values, dict) and any(type(values.get(word, [])) not in (list, dict) for word in _RANGE):
+        if isinstance(values, dict) and any(
+            type(values.get(word, [])) not in (list, dict) for word in _RANGE
+        ):
             values = spaced(values, f"{key}: ")
         if isinstance(values, list) and values:
             yield Axis((key,), tuple((value,) for value in values))
         elif isinstance(values, dict) and values:
             yield from _columns(values, f"{key}.")
         else:
-            example = '["1 mN", "4 mN"] or { from, to, count, scale = "linear" or "log" }'
-            raise _fault(f"{key}: must be a list of values that is not empty; write {example}")
+            example = (
+                '["1 mN", "4 mN"] or { from, to, count, scale = "linear" or "log" }'
+            )
+            raise _fault(
+                f"{key}: must be a list of values that is not empty; write {example}"
+            )
 
 
 def _require_sweepable(key: str, keys: list[str]) -> None:
     """Refuse a key that cannot be swept, with the cure."""
     first = key.partition(".")[0]
     if first in ("seed", "sweep", "source"):
-        raise _fault(f"{key}: cannot be swept; members differ in their noise, so raise ensemble.members")
+        raise _fault(
+            f"{key}: cannot be swept; members differ in their noise, so raise ensemble.members"
+        )
     if first in _SHARED[3:] or key in _SHARED:
-        raise _fault(f"{key}: cannot be swept, because all points share it; run the scenario once for each value")
+        raise _fault(
+            f"{key}: cannot be swept, because all points share it; run the scenario once for each value"
+        )
     if key.endswith(".model"):
         table = key.removesuffix(".model")
-        raise _fault(f'{key}: a model is swept as a whole table: "{table}" = [{{ model = ... }}, {{ model = ... }}]')
-    if any(other != key and key.startswith(f"{other}.") for other in keys) or keys.count(key) > 1:
+        raise _fault(
+            f'{key}: a model is swept as a whole table: "{table}" = [{{ model = ... }}, {{ model = ... }}]'
+        )
+    if (
+        any(other != key and key.startswith(f"{other}.") for other in keys)
+        or keys.count(key) > 1
+    ):
         raise _fault(f"{key}: is swept twice; remove one")
 
 
@@ -134,14 +171,29 @@ def spaced(values: dict[str, Any], before: str = "") -> list[Any]:
     """Return the values of a range, spaced evenly on a linear or logarithmic scale; ``before`` begins a message."""
     low, high, count, scale = (values.get(word, "linear") for word in _RANGE)
     ends = same_unit(low, high)
-    if not {"from", "to", "count"} <= values.keys() <= set(_RANGE) or scale not in ("linear", "log"):
-        raise _fault(f'{before}write a range as {{ from = ..., to = ..., count = ..., scale = "linear" or "log" }}')
+    if not {"from", "to", "count"} <= values.keys() <= set(_RANGE) or scale not in (
+        "linear",
+        "log",
+    ):
+        raise _fault(
+            f'{before}write a range as {{ from = ..., to = ..., count = ..., scale = "linear" or "log" }}'
+        )
     if type(count) is not int or not 2 <= count <= _MOST_POINTS:
-        raise _fault(f"{before}the count of the range must be a whole number from 2 to {_MOST_POINTS:,}")
+        raise _fault(
+            f"{before}the count of the range must be a whole number from 2 to {_MOST_POINTS:,}"
+        )
     if ends is None:
-        raise _fault(f"{before}both ends of the range must be finite numbers in units of one dimension")
+        raise _fault(
+            f"{before}both ends of the range must be finite numbers in units of one dimension"
+        )
     first, last, unit = ends
     if scale == "log" and not (first > 0.0 and last > 0.0):
         raise _fault(f'{before}a range with scale = "log" needs both ends above zero')
-    numbers = (np.geomspace if scale == "log" else np.linspace)(first, last, count).tolist()
-    return numbers if unit is None else [f"{number!r} {unit}".strip() for number in numbers]
+    numbers = (np.geomspace if scale == "log" else np.linspace)(
+        first, last, count
+    ).tolist()
+    return (
+        numbers
+        if unit is None
+        else [f"{number!r} {unit}".strip() for number in numbers]
+    )

@@ -54,7 +54,12 @@ class BondMade(Isotropic):
     0.63 mJ/m^2
     """
 
-    footprint: Annotated[float, Quantity("m", "radius of the disc that a bond pulls on", "b", above=0, typical="1 nm")]
+    footprint: Annotated[
+        float,
+        Quantity(
+            "m", "radius of the disc that a bond pulls on", "b", above=0, typical="1 nm"
+        ),
+    ]
     model: Literal["bonds"] = "bonds"
 
     bond_made: ClassVar[bool] = True
@@ -64,7 +69,9 @@ class BondMade(Isotropic):
 
         A bond's own stiffness is in series with it, so the two together cannot be stiffer.
         """
-        return 0.75 * math.pi**2 * shear_modulus * self.footprint / (2.0 - poisson_ratio)
+        return (
+            0.75 * math.pi**2 * shear_modulus * self.footprint / (2.0 - poisson_ratio)
+        )
 
     @property
     def variance(self) -> float:
@@ -79,7 +86,11 @@ class BondMade(Isotropic):
     def radial_density(self, q: ArrayLike) -> Array:
         """Return the density C at wavenumber q [rad/m], in Pa² m²."""
         x = np.asarray(q, float) * self.footprint
-        return np.square(np.where(x == 0.0, 1.0, 2.0 * scipy.special.j1(x) / np.where(x == 0.0, 1.0, x)))
+        return np.square(
+            np.where(
+                x == 0.0, 1.0, 2.0 * scipy.special.j1(x) / np.where(x == 0.0, 1.0, x)
+            )
+        )
 
     def cumulative(self, q: ArrayLike) -> Array:
         """Return the variance within wavenumber q [Pa²]: (1 − J0² − J1²)/(πb²), by its series where that cancels."""
@@ -97,18 +108,25 @@ class BondMade(Isotropic):
         That of J0(qs) q C/2π over q is the autocorrelation, the overlap of two footprints.
         """
         least = min(self.footprint, radius)
-        distance = least * np.sin(_PHASE)  # half of it; the root at the end of the overlap becomes smooth
+        # half of it; the root at the end of the overlap becomes smooth
+        distance = least * np.sin(_PHASE)
         u, v = distance / radius, distance / self.footprint
-        disc = np.arccos(u) - (u * np.sqrt(1 - u * u) if factors is energy_factors else 0.0)
+        disc = np.arccos(u) - (
+            u * np.sqrt(1 - u * u) if factors is energy_factors else 0.0
+        )
         bond = np.arccos(v) - v * np.sqrt(1 - v * v)
-        return 16 / self.footprint**2 * float(np.sum(disc * bond * np.cos(_PHASE) * _WEIGHTS)) * least, 0.0
+        return 16 / self.footprint**2 * float(
+            np.sum(disc * bond * np.cos(_PHASE) * _WEIGHTS)
+        ) * least, 0.0
 
     def _outside(self, q: ArrayLike) -> Array:
         x = np.asarray(q, float) * self.footprint
         return scipy.special.j0(x) ** 2 + scipy.special.j1(x) ** 2
 
 
-Rms = Annotated[float, Quantity("Pa", "root mean square of the shear stress", "σ", above=0)]
+Rms = Annotated[
+    float, Quantity("Pa", "root mean square of the shear stress", "σ", above=0)
+]
 Length = Annotated[float, Quantity("m", "correlation length", "ξ", above=0)]
 Longest = Annotated[float, Quantity("m", "longest wavelength", "λ_L", above=0)]
 Shortest = Annotated[float, Quantity("m", "shortest wavelength", "λ_s", above=0)]
@@ -136,8 +154,12 @@ class Ripple(Family):
     0.042000
     """
 
-    amplitude: Annotated[float, Quantity("Pa", "amplitude of the ripple", "τ1", at_least=0)]
-    wavelength: Annotated[float, Quantity("m", "wavelength of the ripple", "λ", above=0)]
+    amplitude: Annotated[
+        float, Quantity("Pa", "amplitude of the ripple", "τ1", at_least=0)
+    ]
+    wavelength: Annotated[
+        float, Quantity("m", "wavelength of the ripple", "λ", above=0)
+    ]
     angle: Angle = 0.0
     model: Literal["ripple"] = "ripple"
 
@@ -160,15 +182,21 @@ class Ripple(Family):
 
     def density(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """Raise ValueError: a ripple has no density."""
-        raise ValueError("a ripple has no density: all its variance lies at ±wavevector; use those two")
+        raise ValueError(
+            "a ripple has no density: all its variance lies at ±wavevector; use those two"
+        )
 
     def pixels(self, step: float, reach: int) -> Array:
         """Raise ValueError: a ripple has no density."""
         return self.density(step, reach)
 
-    def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
+    def surface_energy(
+        self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
+    ) -> Array:
         """Return the mean energy per area [J/m²]: ``τ1² (1 - ν cos²θ) / (4 G q)``."""
-        return ripple_energy(self.amplitude, self.support[0], self.angle, shear_modulus, poisson_ratio)
+        return ripple_energy(
+            self.amplitude, self.support[0], self.angle, shear_modulus, poisson_ratio
+        )
 
     def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
         """Return the integrals over discs of the density's two peaks, see ``Family``."""
@@ -198,7 +226,9 @@ def _ordered(*wavelengths: tuple[str, float]) -> None:
     (name, long), (other, short) = wavelengths[0], wavelengths[-1]
     if long * (1 - 1e-9) <= short:
         message = f"{name} and {other} are equal ({long:g} m), which leaves no band; make {name} longer, or use"
-        raise PydanticCustomError("empty_band", f'{message} model = "ripple" for a single wavelength')
+        raise PydanticCustomError(
+            "empty_band", f'{message} model = "ripple" for a single wavelength'
+        )
 
 
 @keyed()
@@ -238,7 +268,9 @@ class Band(Rowed):
     def rows(self) -> Rows:  # type: ignore[override]
         """Both ends of the band."""
         q = 2 * np.pi / np.array([self.longest, self.shortest])
-        return Rows(q, np.full(2, 4 * np.pi * self.rms**2 / ((q[1] - q[0]) * (q[1] + q[0]))))
+        return Rows(
+            q, np.full(2, 4 * np.pi * self.rms**2 / ((q[1] - q[0]) * (q[1] + q[0])))
+        )
 
 
 @keyed()
@@ -272,13 +304,19 @@ class SelfAffine(Rowed):
     rms: Rms
     hurst: Annotated[float, Quantity("1", "Hurst exponent", "H", at_least=0, at_most=1)]
     longest: Longest
-    rolloff: Annotated[float, Quantity("m", "wavelength at the end of the plateau", "λ_r", above=0)]
+    rolloff: Annotated[
+        float, Quantity("m", "wavelength at the end of the plateau", "λ_r", above=0)
+    ]
     shortest: Shortest
     model: Literal["self_affine"] = "self_affine"
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _ordered(("longest", self.longest), ("rolloff", self.rolloff), ("shortest", self.shortest))
+        _ordered(
+            ("longest", self.longest),
+            ("rolloff", self.rolloff),
+            ("shortest", self.shortest),
+        )
         return self
 
     @functools.cached_property
@@ -435,7 +473,9 @@ class AnisotropicGaussian(_OfRms, Waves):
         (xx, xy, yy), x, y = self._form, np.asarray(qx, float), np.asarray(qy, float)
         return level * np.exp(-(xx * x**2 + 2 * xy * x * y + yy * y**2))
 
-    def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
+    def surface_energy(
+        self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
+    ) -> Array:
         """Return the mean energy per area [J/m²] stored in an infinite half-space (see Notes)."""
         a, b, cosine = self.length_x, self.length_y, math.cos(self.angle)
         scale = self.variance * a * b / (3 * math.sqrt(math.pi))
@@ -443,25 +483,37 @@ class AnisotropicGaussian(_OfRms, Waves):
         across = scale * a**2 * scipy.special.elliprd(0.0, b**2, a**2)
         level, swing = angular_compliance(np.asarray(poisson_ratio, float))
         turned = swing * (along - across) * (2 * cosine**2 - 1)
-        return (level * (along + across) + turned) / (2 * np.asarray(shear_modulus, float))
+        return (level * (along + across) + turned) / (
+            2 * np.asarray(shear_modulus, float)
+        )
 
     @functools.cached_property
     def _form(self) -> tuple[float, float, float]:
         """Coefficients of qx², 2 qx qy and qy² in minus the exponent of C."""
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
         a, b = self.length_x**2 / 4, self.length_y**2 / 4
-        return a * cosine**2 + b * sine**2, (a - b) * cosine * sine, a * sine**2 + b * cosine**2
+        return (
+            a * cosine**2 + b * sine**2,
+            (a - b) * cosine * sine,
+            a * sine**2 + b * cosine**2,
+        )
 
     def reach(self, radius: float) -> tuple[float, float]:
         """Return the wavenumbers [rad/m] between which the density varies."""
-        return 0.25 / max(self.length_x, self.length_y), 14.0 / min(self.length_x, self.length_y)
+        return 0.25 / max(self.length_x, self.length_y), 14.0 / min(
+            self.length_x, self.length_y
+        )
 
     def harmonics(self, q: Array) -> tuple[Array, Array]:
         """Return ``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
         a, b = self.length_x, self.length_y
-        level = 2 * math.pi**2 * a * b * self.variance * np.exp(-((min(a, b) * q) ** 2) / 4)
+        level = (
+            2 * math.pi**2 * a * b * self.variance * np.exp(-((min(a, b) * q) ** 2) / 4)
+        )
         bend = (a - b) * (a + b) / 8 * q**2
-        return level * scipy.special.ive(0, bend), -level * scipy.special.ive(1, bend) * math.cos(2 * self.angle)
+        return level * scipy.special.ive(0, bend), -level * scipy.special.ive(
+            1, bend
+        ) * math.cos(2 * self.angle)
 
     def pixels(self, step: float, reach: int) -> Array:
         """Return the variance in the pixels of a wavevector lattice [Pa²], see ``Family``."""
@@ -472,6 +524,14 @@ class AnisotropicGaussian(_OfRms, Waves):
 
 #: Any spectrum, by the key ``model`` of a scenario.
 Spectrum = Annotated[
-    Ripple | Band | SelfAffine | Gaussian | AnisotropicGaussian | VonKarman | Tabulated | Measured | BondMade,
+    Ripple
+    | Band
+    | SelfAffine
+    | Gaussian
+    | AnisotropicGaussian
+    | VonKarman
+    | Tabulated
+    | Measured
+    | BondMade,
     Field(discriminator="model"),
 ]

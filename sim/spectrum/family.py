@@ -43,7 +43,9 @@ class Family(Protocol):
     def density(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """Return the power spectral density C at wavevector (qx, qy) [Pa² m²]; raises ValueError for a single wave."""
 
-    def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
+    def surface_energy(
+        self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
+    ) -> Array:
         """Return the mean elastic energy per area of an infinite half-space [J/m²] under this stress."""
 
     def pixels(self, step: float, reach: int) -> Array:
@@ -132,13 +134,19 @@ def _edges(spectrum: Radial, step: float, reach: int) -> tuple[Array, Array]:
     panel = np.minimum(np.searchsorted(bounds, (start + end) / 2) - 1, reach)
     place = (line - 0.5).astype(np.int64) * (reach + 1) + panel
     shape, size = (reach + 1, reach + 1), (reach + 1) ** 2
-    within, beyond = (np.bincount(place, value, size).reshape(shape) / (2 * math.pi) for value in values)
+    within, beyond = (
+        np.bincount(place, value, size).reshape(shape) / (2 * math.pi)
+        for value in values
+    )
     for edges in (within, beyond):
-        edges[:, 0] += edges[:, 0]  # the first panel was integrated from 0; its other half is a mirror image
+        # the first panel was integrated from 0; its other half is a mirror image
+        edges[:, 0] += edges[:, 0]
     return within, beyond
 
 
-def _integrate(spectrum: Radial, step: float, line: Array, start: Array, end: Array) -> Array:
+def _integrate(
+    spectrum: Radial, step: float, line: Array, start: Array, end: Array
+) -> Array:
     """∫ f dθ along pieces of lines, by bisection until Gauss-Legendre sums agree; shape (2, pieces)."""
     total = np.zeros((2, len(line)))
     owner = np.arange(len(line))
@@ -150,7 +158,9 @@ def _integrate(spectrum: Radial, step: float, line: Array, start: Array, end: Ar
         halves = left + right
         turn = line * (end - start) / (line**2 + middle**2)
         # rounding grows with the steepness of f, the error of the sums falls 4096-fold by each halving
-        allowed = 8.0**depth * (1e-14 * np.abs(halves) + 2e-16 * spectrum.variance * turn)
+        allowed = 8.0**depth * (
+            1e-14 * np.abs(halves) + 2e-16 * spectrum.variance * turn
+        )
         rough = np.any(np.abs(halves - whole) > allowed, axis=0)
         fine = ~rough
         for sums, part in zip(total, halves, strict=True):
@@ -166,17 +176,26 @@ def _integrate(spectrum: Radial, step: float, line: Array, start: Array, end: Ar
     raise ArithmeticError("the pixel integrals of the spectrum do not converge")
 
 
-def _legendre(spectrum: Radial, step: float, line: Array, start: Array, end: Array) -> Array:
+def _legendre(
+    spectrum: Radial, step: float, line: Array, start: Array, end: Array
+) -> Array:
     """Gauss-Legendre sums of ∫ f dθ, θ the polar angle along the line; shape (2, pieces)."""
     half = (end - start) / 2
     y = (start + half)[:, None] + half[:, None] * _NODES
     square = line[:, None] ** 2 + y**2
     q = step * np.sqrt(square)
     turn = half[:, None] * _WEIGHTS * line[:, None] / square
-    return np.stack([np.sum(spectrum.cumulative(q) * turn, axis=1), np.sum(spectrum.beyond(q) * turn, axis=1)])
+    return np.stack(
+        [
+            np.sum(spectrum.cumulative(q) * turn, axis=1),
+            np.sum(spectrum.beyond(q) * turn, axis=1),
+        ]
+    )
 
 
-def gaussian_boxes(form: tuple[float, float, float], x_edges: NDArray, y_edges: NDArray) -> Array:
+def gaussian_boxes(
+    form: tuple[float, float, float], x_edges: NDArray, y_edges: NDArray
+) -> Array:
     """Return ∫∫ exp(-(xx qx² + 2 xy qx qy + yy qy²)) over each rectangle between the edges.
 
     Parameters
@@ -222,4 +241,6 @@ def gaussian_boxes(form: tuple[float, float, float], x_edges: NDArray, y_edges: 
     u = x_edges[:-1, None] + step[:, None] * node
     ends = root * (y_edges + (xy / yy) * u[..., None])
     mass = math.sqrt(math.pi) / (2 * root) * erf_between(ends[..., :-1], ends[..., 1:])
-    return np.einsum("ik,ikj->ij", np.exp(-(xx - xy**2 / yy) * u**2) * weight * step[:, None], mass)
+    return np.einsum(
+        "ik,ikj->ij", np.exp(-(xx - xy**2 / yy) * u**2) * weight * step[:, None], mass
+    )

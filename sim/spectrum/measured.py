@@ -12,7 +12,14 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, PlainSerializer, Strict, ValidationInfo, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    PlainSerializer,
+    Strict,
+    ValidationInfo,
+    model_validator,
+)
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError
 
@@ -28,12 +35,22 @@ _WAVENUMBER = Quantity("rad/m", "wavenumber", "q", above=0)
 _HEIGHTS = 'it is a spectrum of heights; give a density of stress over the plane, in "Pa^2 m^2"'
 _LINE = 'it is the spectrum of a line; give the density over the plane, in "Pa^2 m^2"'
 _MISTAKEN = (("m^4", _HEIGHTS), ("m^3", _HEIGHTS), ("m^2", _HEIGHTS), ("Pa^2 m", _LINE))
-_DENSITY = Quantity("Pa^2 m^2", "power spectral density of the stress", "C", at_least=0, mistaken=_MISTAKEN)
+_DENSITY = Quantity(
+    "Pa^2 m^2",
+    "power spectral density of the stress",
+    "C",
+    at_least=0,
+    mistaken=_MISTAKEN,
+)
 Wavenumbers = Annotated[tuple[Annotated[float, _WAVENUMBER], ...], LISTED]
 Densities = Annotated[tuple[Annotated[float, _DENSITY], ...], LISTED]
-Rescaled = Annotated[float, Quantity("Pa", "root mean square of the shear stress", "σ", above=0)]
+Rescaled = Annotated[
+    float, Quantity("Pa", "root mean square of the shear stress", "σ", above=0)
+]
 _WHERE = "4π² in the integral, <τ1²> = ∫ d²q C / 4π², or in the density, <τ1²> = ∫ d²q C (Persson)"
-_Normalization = Annotated[Literal["in_integral", "in_density"], Field(description=_WHERE)]
+_Normalization = Annotated[
+    Literal["in_integral", "in_density"], Field(description=_WHERE)
+]
 #: Factor from a density to C: the 4π² stands in the integral ⟨τ1²⟩ = ∫ d²q C / 4π², or already in the density.
 NORMALIZATIONS = {"in_integral": 1.0, "in_density": 4 * math.pi**2}
 #: How near 2π the ratio of two rms is taken for that of the normalizations.
@@ -64,17 +81,31 @@ class FromFile(Rowed, Protocol):
         if not (self.wavenumbers or self.densities):
             with blamed(self.file):
                 q, density = self.read_file(info.context)
-            vars(self).update(wavenumbers=tuple(q.tolist()), densities=tuple(density.tolist()))
-        rows, steps = (len(self.wavenumbers), len(self.densities)), np.diff(self.wavenumbers)
+            vars(self).update(
+                wavenumbers=tuple(q.tolist()), densities=tuple(density.tolist())
+            )
+        rows, steps = (
+            (len(self.wavenumbers), len(self.densities)),
+            np.diff(self.wavenumbers),
+        )
         falls = np.flatnonzero((-steps if self._falling else steps) <= 0.0)
         if rows[0] != rows[1] or rows[0] < 2:
             text = "a spectrum needs at least two rows and one density per wavenumber"
-            raise PydanticCustomError("table_too_short", f"{text}, not {rows[0]} and {rows[1]}")
+            raise PydanticCustomError(
+                "table_too_short", f"{text}, not {rows[0]} and {rows[1]}"
+            )
         if len(falls):
             text = f"the wavenumbers must be monotonic, but row {falls[0] + 2} reverses the order of the rows"
-            raise PydanticCustomError("table_not_increasing", f"{text} before; sort the rows and merge equal ones")
+            raise PydanticCustomError(
+                "table_not_increasing",
+                f"{text} before; sort the rows and merge equal ones",
+            )
         if not any(self.densities):
-            raise PydanticCustomError("table_empty", "every density is zero; give a row with a positive one", {})
+            raise PydanticCustomError(
+                "table_empty",
+                "every density is zero; give a row with a positive one",
+                {},
+            )
         return self
 
     @property
@@ -84,13 +115,21 @@ class FromFile(Rowed, Protocol):
     def _chain(self, factor: float) -> Rows:
         """The rows with a factor of the density, rising."""
         order = slice(None, None, -1 if self._falling else 1)
-        return Rows(np.array(self.wavenumbers[order]), factor * np.array(self.densities[order]))
+        return Rows(
+            np.array(self.wavenumbers[order]), factor * np.array(self.densities[order])
+        )
 
     @functools.cached_property
     def rows(self) -> Rows:  # type: ignore[override]
         """The rows with the 4π² in the integral, at the rms that is given."""
         chain = self._chain(NORMALIZATIONS[self.normalization])
-        return chain if self.rms is None else Rows(chain.q, chain.density * (self.rms**2 / PowerLaws(chain).variance))
+        return (
+            chain
+            if self.rms is None
+            else Rows(
+                chain.q, chain.density * (self.rms**2 / PowerLaws(chain).variance)
+            )
+        )
 
 
 @keyed()
@@ -126,16 +165,32 @@ class Tabulated(FromFile):
     wavenumbers: Wavenumbers = ()
     densities: Densities = ()
     normalization: _Normalization = "in_integral"
-    file: Annotated[str, Field(description="CSV file with the columns q [rad/m], C [Pa^2 m^2], instead of rows")] = ""
-    header: Annotated[str, Field(description="header for a file without one, such as q [cycles/um], C [Pa^2 m^2]")] = ""
+    file: Annotated[
+        str,
+        Field(
+            description="CSV file with the columns q [rad/m], C [Pa^2 m^2], instead of rows"
+        ),
+    ] = ""
+    header: Annotated[
+        str,
+        Field(
+            description="header for a file without one, such as q [cycles/um], C [Pa^2 m^2]"
+        ),
+    ] = ""
     rms: Rescaled | None = None
     model: Literal["tabulated"] = "tabulated"
 
     def read_file(self, context: Any) -> tuple[Array, Array]:
         """Return the columns q and C of the file."""
         if not self.file:
-            raise PydanticCustomError("no_table", 'needs file = "psd.csv" with the columns q [rad/m], C [Pa^2 m^2]', {})
-        table = file_columns(self.file, context, {"q": _WAVENUMBER, "C": _DENSITY}, self.header)
+            raise PydanticCustomError(
+                "no_table",
+                'needs file = "psd.csv" with the columns q [rad/m], C [Pa^2 m^2]',
+                {},
+            )
+        table = file_columns(
+            self.file, context, {"q": _WAVENUMBER, "C": _DENSITY}, self.header
+        )
         return table["q"], table["C"]
 
     @model_validator(mode="after")
@@ -145,7 +200,9 @@ class Tabulated(FromFile):
         gaps = np.setdiff1d(np.arange(full[0], full[-1]), full) if full.size else full
         if gaps.size:
             text = f"row {gaps[0] + 1} is zero between positive rows, like an empty bin of an average"
-            raise PydanticCustomError("table_gaps", f"{text}: its energy would be lost; remove such rows")
+            raise PydanticCustomError(
+                "table_gaps", f"{text}: its energy would be lost; remove such rows"
+            )
         return self
 
     @property
@@ -155,8 +212,13 @@ class Tabulated(FromFile):
 
     def _normalized(self) -> tuple[str, ...]:
         """Remark on the rms that the table has under the other normalization."""
-        chains = {where: self._chain(factor) for where, factor in NORMALIZATIONS.items()}
-        rms = {where: math.sqrt(PowerLaws(chain).variance) for where, chain in chains.items()}
+        chains = {
+            where: self._chain(factor) for where, factor in NORMALIZATIONS.items()
+        }
+        rms = {
+            where: math.sqrt(PowerLaws(chain).variance)
+            for where, chain in chains.items()
+        }
         other = next(where for where in NORMALIZATIONS if where != self.normalization)
         words = {where: where.replace("_", " the ") for where in NORMALIZATIONS}
         if self.rms is not None and abs(math.log(self.rms / rms[other])) < _NEAR:
@@ -166,21 +228,30 @@ class Tabulated(FromFile):
             text = f"the table is read with the 4π² {words[self.normalization]}, rms {rms[self.normalization]:.3g} Pa;"
             text += f" {words[other]} it would be {rms[other]:.3g} Pa, and the energy 39.5 times as"
             more = "large" if rms[other] > rms[self.normalization] else "small"
-            return (f"{text} {more}: shear.spectrum.normalization chooses, rms fixes it",)
+            return (
+                f"{text} {more}: shear.spectrum.normalization chooses, rms fixes it",
+            )
         return ()
 
     def _cut_plateau(self) -> tuple[str, ...]:
         """Remark on the energy below a first row at which the density is flat; the mean energy goes as ∫ C dq."""
         (q, *_), (density, *_) = self.rows.q, self.rows.density
-        flat = density > 0.0 and abs(math.log(self.rows.density[1] / density)) < _FLAT * math.log(self.rows.q[1] / q)
+        flat = density > 0.0 and abs(
+            math.log(self.rows.density[1] / density)
+        ) < _FLAT * math.log(self.rows.q[1] / q)
         if not (flat and self.file) or q * density < _PART * self.line_integral:
             return ()
         more, condition = q * density / self.line_integral, ""
-        if self.rms is not None:  # the plateau takes its part of the variance from the rest
-            more = (1.0 + more) / (1.0 + density * q**2 / (4.0 * math.pi * self.rms**2)) - 1.0
+        # the plateau takes its part of the variance from the rest
+        if self.rms is not None:
+            more = (1.0 + more) / (
+                1.0 + density * q**2 / (4.0 * math.pi * self.rms**2)
+            ) - 1.0
             condition = ", the rms kept"
         text = f"the table is flat at its first row and zero before: below {q:.3g} rad/m a plateau down to 0 would add"
-        return (f"{text} {more:.0%} to the mean energy{condition}; add a row where it ends",)
+        return (
+            f"{text} {more:.0%} to the mean energy{condition}; add a row where it ends",
+        )
 
 
 # Files of measured stress maps: CSV, npy without pickled objects, netCDF. Declared sizes are not trusted.
@@ -213,7 +284,9 @@ _UNIT = "unit of a CSV, npy or netCDF file that does not name one; Pa if it is o
 MapUnit = Annotated[str, AfterValidator(checked_unit), Field(description=_UNIT)]
 
 
-def read_map(name: str, context: Any, variable: str, gaps: bool = False, unit: str = "") -> MapFile:
+def read_map(
+    name: str, context: Any, variable: str, gaps: bool = False, unit: str = ""
+) -> MapFile:
     """Read a map from a file that a scenario names, by the ending of its name.
 
     Parameters
@@ -244,19 +317,28 @@ def read_map(name: str, context: Any, variable: str, gaps: bool = False, unit: s
     if values.ndim < 2 or values.size == 0:
         raise ValueError("the map does not have two dimensions; give rows and columns")
     if (points := min(values.shape[-2:])) < LEAST:
-        raise ValueError(f"a map of {points} points along a side is too small; give at least {LEAST}")
+        raise ValueError(
+            f"a map of {points} points along a side is too small; give at least {LEAST}"
+        )
     if not np.all(np.isfinite(values) | (np.isnan(values) & gaps)):
-        raise ValueError("the map has gaps (nan or infinite); fill them or crop the map")
-    for value in (np.nanmin(values), np.nanmax(values)) if np.isfinite(values).any() else ():
+        raise ValueError(
+            "the map has gaps (nan or infinite); fill them or crop the map"
+        )
+    for value in (
+        (np.nanmin(values), np.nanmax(values)) if np.isfinite(values).any() else ()
+    ):
         STRESS.read(value)
     return map_file
 
 
 def _from_npy(path: Path) -> Array:
     """Return the numbers of an array that numpy has saved."""
-    values = np.load(path, mmap_mode="r", allow_pickle=False)  # the file holds as many numbers as its header says
+    # the file holds as many numbers as its header says
+    values = np.load(path, mmap_mode="r", allow_pickle=False)
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
-        raise ValueError("it does not hold real numbers; save a map of numbers, such as numpy.save of a float array")
+        raise ValueError(
+            "it does not hold real numbers; save a map of numbers, such as numpy.save of a float array"
+        )
     if values.size > _MOST:
         raise ValueError(f"it has more than {_MOST:.0e} numbers; crop the map")
     return np.array(values, float)
@@ -264,7 +346,8 @@ def _from_npy(path: Path) -> Array:
 
 def _from_netcdf(path: Path, variable: str, unit: str) -> MapFile:
     """Maps and their spacings in a netCDF file."""
-    from sim.numerics.lazy import Refused, open_lazily  # imports xarray, which only maps need here
+    # imports xarray, which only maps need here
+    from sim.numerics.lazy import Refused, open_lazily
 
     try:
         dataset = open_lazily(path)
@@ -272,38 +355,64 @@ def _from_netcdf(path: Path, variable: str, unit: str) -> MapFile:
         raise ValueError(f"{fault}; write the map again, as a plain variable") from None
     with HDF5, dataset:
         if variable not in dataset:
-            raise ValueError(f'there is no variable "{variable}"; name it by variable = "..."')
+            raise ValueError(
+                f'there is no variable "{variable}"; name it by variable = "..."'
+            )
         data = dataset[variable]
         if data.ndim < 2 or data.dtype.kind not in "fiu":
-            raise ValueError(f'"{variable}" is not an array of numbers in two dimensions; give variable = "..."')
+            raise ValueError(
+                f'"{variable}" is not an array of numbers in two dimensions; give variable = "..."'
+            )
         if data.size > _MOST:
-            raise ValueError(f'"{variable}" has more than {_MOST:.0e} numbers; crop the map')
+            raise ValueError(
+                f'"{variable}" has more than {_MOST:.0e} numbers; crop the map'
+            )
         data = data.load()
     has_axes = {"x", "y"} <= set(data.dims)
     if has_axes:
         data = data.transpose(..., "x", "y")
     spacings = _spacing(data, "x"), _spacing(data, "y")
-    steps = [np.ptp(np.asarray(data[axis], float)) / (data.sizes[axis] - 1) for axis in ("x", "y") if has_axes]
+    steps = [
+        np.ptp(np.asarray(data[axis], float)) / (data.sizes[axis] - 1)
+        for axis in ("x", "y")
+        if has_axes
+    ]
     if has_axes and None in spacings and not math.isclose(*steps, rel_tol=1e-4):
-        raise ValueError("x and y have other steps but no units; give both coordinates the attribute units, such as um")
+        raise ValueError(
+            "x and y have other steps but no units; give both coordinates the attribute units, such as um"
+        )
     factor, of_key = _factor(data, STRESS, unit), STRESS.scaled(1.0, unit)
     if unit and not math.isclose(factor, of_key):
         raise ValueError(
             f'"{variable}" is in {data.attrs["units"]}, not in {unit} as the key unit has it; leave unit out'
         )
-    return MapFile(np.asarray(data, float) * factor, has_axes, spacings if has_axes else (None, None))
+    return MapFile(
+        np.asarray(data, float) * factor,
+        has_axes,
+        spacings if has_axes else (None, None),
+    )
 
 
-def spacings_of(map_file: MapFile, along: float | None, across: float | None, key: str) -> tuple[float, float]:
+def spacings_of(
+    map_file: MapFile, along: float | None, across: float | None, key: str
+) -> tuple[float, float]:
     """Return the distances of points along x and y [m], of the ``key`` of a scenario or the file, which must agree."""
     across = along if across is None else across
     for step, spacing in zip((along, across), map_file.spacings, strict=True):
-        if step is not None and spacing is not None and not math.isclose(step, spacing, rel_tol=1e-4):
-            raise ValueError(f"the points are {spacing:g} m apart, not {step:g} m as in {key}; omit {key}")
+        if (
+            step is not None
+            and spacing is not None
+            and not math.isclose(step, spacing, rel_tol=1e-4)
+        ):
+            raise ValueError(
+                f"the points are {spacing:g} m apart, not {step:g} m as in {key}; omit {key}"
+            )
     along = along or map_file.spacings[0]
     across = across or map_file.spacings[1] or along
     if along is None or across is None:
-        raise ValueError(f'the map has no coordinates with units; give {key}, such as "0.5 um"')
+        raise ValueError(
+            f'the map has no coordinates with units; give {key}, such as "0.5 um"'
+        )
     return along, across
 
 
@@ -320,14 +429,18 @@ def _spacing(data: Any, axis: str) -> float | None:
     steps = np.diff(np.asarray(data[axis], float)) * _factor(data[axis], SPACING)
     step = float(np.mean(steps))
     if not np.allclose(steps, step, rtol=1e-4, atol=0.0):
-        raise ValueError(f"the coordinate {axis} is not spaced by one step; interpolate the map onto a square lattice")
+        raise ValueError(
+            f"the coordinate {axis} is not spaced by one step; interpolate the map onto a square lattice"
+        )
     return abs(step) if "units" in data[axis].attrs else None
 
 
 # Power spectral density of a stress map on a grid, and its radial average.
 
 
-def periodogram(field: Array, cell: float | tuple[float, float], window: str = "none") -> Array:
+def periodogram(
+    field: Array, cell: float | tuple[float, float], window: str = "none"
+) -> Array:
     """Return the power spectral density of maps, on the half spectrum of their lattice.
 
     Parameters
@@ -366,7 +479,9 @@ def tapered(field: Array, window: str) -> Array:
     if window not in ("none", "hann"):
         raise ValueError(f'window must be "none" or "hann", not {window!r}')
     along, across = (
-        np.ones(points) if window == "none" else 1.0 - np.cos(2 * np.pi * (np.arange(points) + 0.5) / points)
+        np.ones(points)
+        if window == "none"
+        else 1.0 - np.cos(2 * np.pi * (np.arange(points) + 0.5) / points)
         for points in field.shape[-2:]
     )
     taper = along[:, None] * across
@@ -412,10 +527,13 @@ def radial_average(density: Array, grid: Lattice) -> RadialAverage:
     length = side_of_rings(grid)
     ring = np.floor(q * length / (2 * np.pi) + 0.5).astype(int)
     ring[(ring == 0) & (q > 0.0)] = 1
-    rings = min((points - 1) // 2 if side == length else int((points - 1) / 2 * length / side)
-                for points, side in zip(grid.shape, grid.sides, strict=True))  # fmt: skip
+    rings = min(
+        (points - 1) // 2 if side == length else int((points - 1) / 2 * length / side)
+        for points, side in zip(grid.shape, grid.sides, strict=True)
+    )
     inside = (ring > 0) & (ring <= rings)
-    share = np.broadcast_to(grid.multiplicity / 2, q.shape)[inside]  # the first column holds both q and -q
+    # the first column holds both q and -q
+    share = np.broadcast_to(grid.multiplicity / 2, q.shape)[inside]
     place = ring[inside] - 1
 
     def total(values: Array) -> Array:
@@ -424,7 +542,9 @@ def radial_average(density: Array, grid: Lattice) -> RadialAverage:
     pairs = total(np.ones(len(place)))
     mean = total(density[inside]) / pairs
     scatter = total((density[inside] - mean[place]) ** 2) / np.maximum(pairs - 1, 1)
-    return RadialAverage(total(q[inside]) / pairs, mean, np.sqrt(scatter / pairs), pairs)
+    return RadialAverage(
+        total(q[inside]) / pairs, mean, np.sqrt(scatter / pairs), pairs
+    )
 
 
 # Spectrum estimated from measured stress maps.
@@ -462,13 +582,20 @@ class Measured(FromFile):
     others is lost, and with it up to some 30 % of the energy: ``StressMap`` keeps the very map.
     """
 
-    file: Annotated[str, Field(description="the map: plain CSV in Pa, one row a line, npy or netCDF")]
+    file: Annotated[
+        str,
+        Field(description="the map: plain CSV in Pa, one row a line, npy or netCDF"),
+    ]
     spacing: Annotated[float, SPACING] | None = None
     window: Annotated[
         Literal["none", "hann"],
-        Field(description='taper of the map before its transform; "hann" unless it is periodic'),
+        Field(
+            description='taper of the map before its transform; "hann" unless it is periodic'
+        ),
     ] = "none"
-    variable: Annotated[str, Field(description="name of the map in a netCDF file")] = "shear_map"
+    variable: Annotated[str, Field(description="name of the map in a netCDF file")] = (
+        "shear_map"
+    )
     unit: MapUnit = ""
     wavenumbers: Wavenumbers = ()
     densities: Densities = ()
@@ -480,13 +607,19 @@ class Measured(FromFile):
         map_file = read_map(self.file, context, self.variable, unit=self.unit)
         along, across = spacings_of(map_file, self.spacing, None, "spacing")
         if not math.isclose(along, across, rel_tol=1e-4):
-            raise ValueError("x and y are not spaced by one step; interpolate the map onto a square lattice")
+            raise ValueError(
+                "x and y are not spaced by one step; interpolate the map onto a square lattice"
+            )
         vars(self).update(spacing=along)
         maps = map_file.values.reshape(-1, *map_file.values.shape[-2:])
-        return estimate(maps, (maps.shape[1] * along, maps.shape[2] * along), self.window)
+        return estimate(
+            maps, (maps.shape[1] * along, maps.shape[2] * along), self.window
+        )
 
 
-def estimate(maps: Array, cell: float | tuple[float, float], window: str) -> tuple[Array, Array]:
+def estimate(
+    maps: Array, cell: float | tuple[float, float], window: str
+) -> tuple[Array, Array]:
     """Return the rows of the radial spectrum of maps (maps, x, y), averaged over them."""
     lattice = lattice_of(cell, maps.shape[-2:])
     ring = radial_average(np.mean(periodogram(maps, cell, window), axis=0), lattice)
@@ -501,14 +634,26 @@ def estimate(maps: Array, cell: float | tuple[float, float], window: str) -> tup
 # direction of sliding. The elastic response differs along x and y, so that a map with exchanged axes stores up to twice
 # or half as much.
 
-_START = Quantity("m", "first position of a disc along x of the map; if omitted, the middle", "x_0", at_least=0)
-_NOISE = Quantity("Pa", "rms of the white measurement noise per pixel, which is reported", "s", at_least=0)
+_START = Quantity(
+    "m",
+    "first position of a disc along x of the map; if omitted, the middle",
+    "x_0",
+    at_least=0,
+)
+_NOISE = Quantity(
+    "Pa",
+    "rms of the white measurement noise per pixel, which is reported",
+    "s",
+    at_least=0,
+)
 _WINDOW = 'taper of a map that is not periodic; "none" on a disc'
 _ROWS = "axis from row to row of a CSV or npy file; netCDF names its axes"
 _MASK = "true: nan marks points outside the contact, without stress"
 
 
-_DIGEST = PlainSerializer(lambda values: hashlib.sha256(values).hexdigest(), return_type=str, when_used="json")
+_DIGEST = PlainSerializer(
+    lambda values: hashlib.sha256(values).hexdigest(), return_type=str, when_used="json"
+)
 _Values = Annotated[bytes, Strict(), SkipJsonSchema(), _DIGEST]
 _Shape = Annotated[tuple[int, int], SkipJsonSchema()]
 
@@ -556,7 +701,9 @@ class StressMap:
     5.0 1.000
     """
 
-    file: Annotated[str, Field(description="the map: CSV in Pa, one row a line, npy, or netCDF")]
+    file: Annotated[
+        str, Field(description="the map: CSV in Pa, one row a line, npy, or netCDF")
+    ]
     pixel: Annotated[float, SPACING] | None = None
     pixel_y: Annotated[float, SPACING] | None = None
     window: Annotated[Literal["none", "hann"], Field(description=_WINDOW)] = "none"
@@ -564,7 +711,9 @@ class StressMap:
     mask: Annotated[bool, Field(description=_MASK)] = False
     noise: Annotated[float, _NOISE] = 0.0
     start: Annotated[float, _START] | None = None
-    variable: Annotated[str, Field(description="name of the map in a netCDF file")] = "shear_map"
+    variable: Annotated[str, Field(description="name of the map in a netCDF file")] = (
+        "shear_map"
+    )
     unit: MapUnit = ""
     values: _Values = Field(default=b"", repr=False)
     shape: _Shape = (0, 0)
@@ -575,21 +724,37 @@ class StressMap:
             with blamed(self.file):
                 self._read_file(info.context)
         if self.mask and self.window != "none":
-            message = "a window would taper the stress inside the contact; omit it with mask"
+            message = (
+                "a window would taper the stress inside the contact; omit it with mask"
+            )
             raise PydanticCustomError("window", message, {})
         if self.mask and not self.square:
-            raise PydanticCustomError("pixels", "a masked map needs square pixels; interpolate it onto them", {})
+            raise PydanticCustomError(
+                "pixels",
+                "a masked map needs square pixels; interpolate it onto them",
+                {},
+            )
         return self
 
     def _read_file(self, context: Any) -> None:
-        map_file = read_map(self.file, context, self.variable, gaps=True, unit=self.unit)
+        map_file = read_map(
+            self.file, context, self.variable, gaps=True, unit=self.unit
+        )
         values = _one_map(map_file, self.rows)
         if not self.mask and np.isnan(values).any():
-            raise ValueError("the map has gaps (nan); with mask = true they mark points outside the contact")
-        if not np.nanmax(values, initial=-math.inf) > np.nanmin(values, initial=math.inf):
-            raise ValueError("the stress is uniform, so there are no fluctuations; check the file")
+            raise ValueError(
+                "the map has gaps (nan); with mask = true they mark points outside the contact"
+            )
+        if not np.nanmax(values, initial=-math.inf) > np.nanmin(
+            values, initial=math.inf
+        ):
+            raise ValueError(
+                "the stress is uniform, so there are no fluctuations; check the file"
+            )
         pixel, pixel_y = spacings_of(map_file, self.pixel, self.pixel_y, "pixel")
-        vars(self).update(pixel=pixel, pixel_y=pixel_y, values=values.tobytes(), shape=values.shape)
+        vars(self).update(
+            pixel=pixel, pixel_y=pixel_y, values=values.tobytes(), shape=values.shape
+        )
 
     @property
     def pixels(self) -> tuple[float, float]:
@@ -637,7 +802,11 @@ class StressMap:
     def field(self) -> Array:
         """Fluctuation τ1 [Pa], shape (nx, ny): less its mean, tapered by the window, 0 outside of the contact."""
         fluctuation = np.nan_to_num(self._measured - self.mean, nan=0.0)
-        fluctuation = fluctuation if self.window == "none" else tapered(self._measured, self.window)
+        fluctuation = (
+            fluctuation
+            if self.window == "none"
+            else tapered(self._measured, self.window)
+        )
         fluctuation.flags.writeable = False
         return fluctuation
 
@@ -650,7 +819,9 @@ class StressMap:
     def spectrum(self) -> Measured:
         """The radially averaged spectrum, of which random fields can be drawn."""
         q, density = estimate(self.field[np.newaxis], self.lattice.sides, "none")
-        return Measured(self.file, wavenumbers=tuple(q), densities=tuple(density / self.inside))
+        return Measured(
+            self.file, wavenumbers=tuple(q), densities=tuple(density / self.inside)
+        )
 
     def surface_energy(self, shear_modulus: float, poisson_ratio: float = 0.5) -> float:
         """Elastic energy of this very map per area [J/m²].
@@ -658,13 +829,21 @@ class StressMap:
         Without a mask that of the periodic map, else that of the stress in a free half-space, per area of the contact.
         """
         if self.mask:
-            each = free_energy_of_map(self.field, self.pixels[0], shear_modulus, poisson_ratio)
+            each = free_energy_of_map(
+                self.field, self.pixels[0], shear_modulus, poisson_ratio
+            )
             return float(each) / self.inside
-        return float(surface_energy(self.field, self.lattice.sides, shear_modulus, poisson_ratio))
+        return float(
+            surface_energy(self.field, self.lattice.sides, shear_modulus, poisson_ratio)
+        )
 
     def noise_energy(self, shear_modulus: float, poisson_ratio: float = 0.5) -> float:
         """Share of the energy that the measurement's noise makes [J/m²]."""
-        return float(noise_energy(self.noise, math.sqrt(self.lattice.pixel), shear_modulus, poisson_ratio))
+        return float(
+            noise_energy(
+                self.noise, math.sqrt(self.lattice.pixel), shear_modulus, poisson_ratio
+            )
+        )
 
 
 def _one_map(map_file: MapFile, rows: str) -> Array:
@@ -673,4 +852,6 @@ def _one_map(map_file: MapFile, rows: str) -> Array:
         many = math.prod(map_file.values.shape[:-2])
         raise ValueError(f"it holds {many} maps; save the wanted map on its own")
     values = map_file.values.reshape(map_file.values.shape[-2:])
-    return np.ascontiguousarray(values if map_file.has_axes or rows == "x" else values.T)
+    return np.ascontiguousarray(
+        values if map_file.has_axes or rows == "x" else values.T
+    )

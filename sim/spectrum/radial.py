@@ -67,7 +67,10 @@ class Waves(Family, Protocol):
             if radius == 0.0:
                 return 0.0, 0.0
             if math.isinf(radius):
-                at_zero, at_one = (4 * math.pi**3 * float(self.surface_energy(1.0, nu)) for nu in (0.0, 1.0))
+                at_zero, at_one = (
+                    4 * math.pi**3 * float(self.surface_energy(1.0, nu))
+                    for nu in (0.0, 1.0)
+                )
                 return at_zero, 2 * at_one - at_zero
             return self.integrals(factors, radius)
 
@@ -88,7 +91,12 @@ class Waves(Family, Protocol):
         return float(np.sum(level * mean * step)), float(np.sum(lean * skew * step))
 
 
-def disc_energy(spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
+def disc_energy(
+    spectrum: Family,
+    radius: ArrayLike,
+    shear_modulus: ArrayLike,
+    poisson_ratio: ArrayLike = 0.5,
+) -> Array:
     """Return the mean elastic energy per area that a fluctuating shear stress stores on a disc of contact.
 
     Parameters
@@ -129,7 +137,9 @@ def disc_energy(spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, p
     return _on_disc(energy_factors, spectrum, radius, shear_modulus, poisson_ratio)
 
 
-def share_of_long_waves(spectrum: Family, wavelength: float, poisson_ratio: float = 0.5) -> float:
+def share_of_long_waves(
+    spectrum: Family, wavelength: float, poisson_ratio: float = 0.5
+) -> float:
     """Return the share of the energy stored on the infinite plane that waves longer than a wavelength [m] store [1].
 
     Examples
@@ -140,12 +150,19 @@ def share_of_long_waves(spectrum: Family, wavelength: float, poisson_ratio: floa
     >>> print(f"{share_of_long_waves(Gaussian(rms=1.0, length=1.0), 4.0):.10f} {math.erf(math.pi / 4.0):.10f}")
     0.7333114256 0.7333114256
     """
-    end, plane = 2.0 * math.pi / wavelength, float(spectrum.surface_energy(1.0, poisson_ratio))
+    end, plane = (
+        2.0 * math.pi / wavelength,
+        float(spectrum.surface_energy(1.0, poisson_ratio)),
+    )
     if spectrum.wavevector is not None or plane == 0.0:
-        return float(spectrum.wavevector is not None and math.hypot(*spectrum.wavevector) < end)
+        return float(
+            spectrum.wavevector is not None and math.hypot(*spectrum.wavevector) < end
+        )
     waves = cast(Waves, spectrum)
     octaves = end * 2.0 ** -np.arange(_OCTAVES)
-    edge: Array = np.unique(np.concatenate([[0.0], octaves, waves.breaks[waves.breaks < end]]))
+    edge: Array = np.unique(
+        np.concatenate([[0.0], octaves, waves.breaks[waves.breaks < end]])
+    )
     half = 0.5 * np.diff(edge)[:, None]
     level, lean = waves.harmonics((edge[:-1, None] + half * (1 + _NODES)).ravel())
     mean, swing = angular_compliance(np.asarray(poisson_ratio, float))
@@ -154,7 +171,10 @@ def share_of_long_waves(spectrum: Family, wavelength: float, poisson_ratio: floa
 
 
 def marginal_energy(
-    spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
+    spectrum: Family,
+    radius: ArrayLike,
+    shear_modulus: ArrayLike,
+    poisson_ratio: ArrayLike = 0.5,
 ) -> Array:
     """Return the mean energy that a unit of new contact area stores at the edge of a growing disc: dE/dA.
 
@@ -186,14 +206,22 @@ def marginal_energy(
 
 
 def _on_disc(
-    factors: Factors, spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike
+    factors: Factors,
+    spectrum: Family,
+    radius: ArrayLike,
+    shear_modulus: ArrayLike,
+    poisson_ratio: ArrayLike,
 ) -> Array:
     radii = np.asarray(radius, float)
     if not np.all(radii >= 0.0):
-        raise ValueError("the radius of a disc must be at least zero; give detached contacts the radius 0")
+        raise ValueError(
+            "the radius of a disc must be at least zero; give detached contacts the radius 0"
+        )
     mean, skew = spectrum.on_disc(factors, radii)
     level, swing = angular_compliance(np.asarray(poisson_ratio, float))
-    return (level * mean - swing * skew) / (4 * math.pi**3 * np.asarray(shear_modulus, float))
+    return (level * mean - swing * skew) / (
+        4 * math.pi**3 * np.asarray(shear_modulus, float)
+    )
 
 
 def _nodes(spectrum: Waves, radius: float) -> tuple[Array, Array]:
@@ -201,7 +229,11 @@ def _nodes(spectrum: Waves, radius: float) -> tuple[Array, Array]:
     low, high = spectrum.reach(radius)
     start = low if spectrum.breaks.size else min(low, 0.5 / radius)
     halves = math.ceil(2 * math.log2(high / start))
-    edges: list[ArrayLike] = [spectrum.breaks, start * 2.0 ** (0.5 * np.arange(halves)), [high]]
+    edges: list[ArrayLike] = [
+        spectrum.breaks,
+        start * 2.0 ** (0.5 * np.arange(halves)),
+        [high],
+    ]
     if not spectrum.breaks.size:
         edges.append([0.0])
     for begin, end in _followed(spectrum, radius):
@@ -219,7 +251,9 @@ def _followed(spectrum: Waves, radius: float) -> list[tuple[float, float]]:
     x = 2 * radius * spectrum.breaks
     near = np.concatenate([[0.0], x[x < _LAST_KINK], x[:1], x[-1:]])
     intervals: list[tuple[float, float]] = []
-    for begin, end in zip(np.sort(near) - _FOLLOWED, np.sort(near) + _FOLLOWED, strict=True):
+    for begin, end in zip(
+        np.sort(near) - _FOLLOWED, np.sort(near) + _FOLLOWED, strict=True
+    ):
         if intervals and begin - intervals[-1][1] < 12 * _FADING:
             begin = intervals.pop()[0]
         intervals.append((begin, end))
@@ -245,7 +279,13 @@ class Margin:
     #: No wave gives energy back, on average over its phases.
     least = 0.0
 
-    def __init__(self, spectrum: Family, shear_modulus: float, poisson_ratio: float, sphere_radius: float) -> None:
+    def __init__(
+        self,
+        spectrum: Family,
+        shear_modulus: float,
+        poisson_ratio: float,
+        sphere_radius: float,
+    ) -> None:
         self.spectrum, self.solid = spectrum, (shear_modulus, poisson_ratio)
         self._ends = sphere_radius * 10.0**-_DECADES, sphere_radius
         self._splines: dict[Callable[..., Array], scipy.interpolate.CubicSpline] = {}
@@ -259,7 +299,10 @@ class Margin:
     def mean(self, radius: Array) -> Array:
         """Return the mean of the share over the area of the disc: E/(πa²) over ΔΓ of the plane [1]."""
         if self.spectrum.wavevector is not None and self._plane > 0.0:
-            share = disc_energy(self.spectrum, np.nan_to_num(radius), *self.solid) / self._plane
+            share = (
+                disc_energy(self.spectrum, np.nan_to_num(radius), *self.solid)
+                / self._plane
+            )
             return np.where(np.isnan(radius), np.nan, share)
         low, high = self._ends
         share = self._spline(disc_energy)(np.log(np.clip(radius, low, high)))
@@ -278,7 +321,13 @@ class Margin:
             square = wave[0] ** 2 + wave[1] ** 2
             lean = swing * (wave[0] ** 2 - wave[1] ** 2) / square
             whole = 0.5 * math.pi * (level + lean)
-            return [((2.0 * math.sqrt(square), level / whole, -lean / whole), _NONE, np.zeros((1, 4)))]
+            return [
+                (
+                    (2.0 * math.sqrt(square), level / whole, -lean / whole),
+                    _NONE,
+                    np.zeros((1, 4)),
+                )
+            ]
         count, spline = _POINTS - 1, self._spline(marginal_energy)
         step = math.log(high / low) / count
         cubics = np.ascontiguousarray(spline.c.T * step ** np.arange(3, -1, -1))
@@ -291,8 +340,14 @@ class Margin:
     def _spline(self, law: Callable[..., Array]) -> "scipy.interpolate.CubicSpline":
         if law not in self._splines:
             radii = np.geomspace(*self._ends, _POINTS)
-            energies = law(self.spectrum, radii, *self.solid) if self._plane > 0.0 else np.zeros(_POINTS)
-            self._splines[law] = scipy.interpolate.CubicSpline(np.log(radii), energies / (self._plane or 1.0))
+            energies = (
+                law(self.spectrum, radii, *self.solid)
+                if self._plane > 0.0
+                else np.zeros(_POINTS)
+            )
+            self._splines[law] = scipy.interpolate.CubicSpline(
+                np.log(radii), energies / (self._plane or 1.0)
+            )
         return self._splines[law]
 
 
@@ -312,11 +367,15 @@ def share_of(radius, wave, ends, cubics):
     return share if radius >= low else share * radius / low
 
 
-@kernel("void(float64[:], UniTuple(float64, 3), UniTuple(float64, 3), float64[:, ::1], float64[::1])")
+@kernel(
+    "void(float64[:], UniTuple(float64, 3), UniTuple(float64, 3), float64[:, ::1], float64[::1])"
+)
 def _shares(radii, wave, ends, cubics, shares):
     """Write ``share_of`` many radii; 0 and nan stay as they are."""
     for i in range(radii.size):
-        shares[i] = share_of(radii[i], wave, ends, cubics) if radii[i] > 0.0 else radii[i]
+        shares[i] = (
+            share_of(radii[i], wave, ends, cubics) if radii[i] > 0.0 else radii[i]
+        )
 
 
 # Isotropic spectra: a radial density, the variance within a circle, the energy.
@@ -340,14 +399,18 @@ class Isotropic(Waves, Radial, Protocol):
         """Return the power spectral density C at wavevector (qx, qy) [rad/m], in Pa² m²."""
         return self.radial_density(np.hypot(qx, qy))
 
-    def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
+    def surface_energy(
+        self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
+    ) -> Array:
         """Return the mean elastic energy per area [J/m²] stored by the fluctuations in an infinite half-space.
 
         ``ΔΓ = (2 - nu) / (8 pi G) ∫ C dq``, the angular mean of ``½ G_x C``. The normal-tangential coupling for nu
         other than 1/2 is neglected.
         """
         mean, _ = angular_compliance(np.asarray(poisson_ratio, float))
-        return mean / (4 * np.pi * np.asarray(shear_modulus, float)) * self.line_integral
+        return (
+            mean / (4 * np.pi * np.asarray(shear_modulus, float)) * self.line_integral
+        )
 
     def pixels(self, step: float, reach: int) -> Array:
         """Return the variance in the pixels of a wavevector lattice [Pa²], see ``Family``."""
@@ -382,13 +445,18 @@ class Rowed(Isotropic, Protocol):
         """Return the variance within the circle of radius q: ``(1/2 pi) ∫ C q dq`` from 0 to q [Pa²]."""
         q, row = self._locate(q)
         held = np.concatenate([[0.0], np.cumsum(self._moments(1))])
-        return (held[row] + self._piece(1, self.rows.q[row], self.rows.density[row], q, row)) / (2 * np.pi)
+        return (
+            held[row] + self._piece(1, self.rows.q[row], self.rows.density[row], q, row)
+        ) / (2 * np.pi)
 
     def beyond(self, q: ArrayLike) -> Array:
         """Return the variance outside the circle of radius q [Pa²], without cancellation at large q."""
         q, row = self._locate(q)
         left = np.concatenate([np.cumsum(self._moments(1)[::-1])[::-1], [0.0]])
-        return (left[row + 1] + self._piece(1, q, self._value(q, row), self.rows.q[row + 1], row)) / (2 * np.pi)
+        return (
+            left[row + 1]
+            + self._piece(1, q, self._value(q, row), self.rows.q[row + 1], row)
+        ) / (2 * np.pi)
 
     @functools.cached_property
     def line_integral(self) -> float:
@@ -413,12 +481,16 @@ class Rowed(Isotropic, Protocol):
     def _moments(self, power: int) -> Array:
         """∫ q^power C dq of each piece."""
         rows = np.arange(len(self.rows.q) - 1)
-        return self._piece(power, self.rows.q[:-1], self.rows.density[:-1], self.rows.q[1:], rows)
+        return self._piece(
+            power, self.rows.q[:-1], self.rows.density[:-1], self.rows.q[1:], rows
+        )
 
     def _locate(self, q: ArrayLike) -> tuple[Array, NDArray[np.intp]]:
         """q brought into the rows, and the piece it lies in."""
         q = np.clip(q, self.rows.q[0], self.rows.q[-1])
-        return q, np.minimum(np.searchsorted(self.rows.q, q, side="right") - 1, len(self.rows.q) - 2)
+        return q, np.minimum(
+            np.searchsorted(self.rows.q, q, side="right") - 1, len(self.rows.q) - 2
+        )
 
     @functools.cached_property
     def _slopes(self) -> tuple[Array, Array, NDArray[np.bool_]]:
@@ -426,18 +498,25 @@ class Rowed(Isotropic, Protocol):
         linear = (self.rows.density[1:] == 0.0) | (self.rows.density[:-1] == 0.0)
         logs = np.log(np.where(self.rows.density > 0.0, self.rows.density, 1.0))
         exponent = np.where(linear, 0.0, np.diff(logs) / np.diff(np.log(self.rows.q)))
-        gradient = np.where(linear, np.diff(self.rows.density) / np.diff(self.rows.q), 0.0)
+        gradient = np.where(
+            linear, np.diff(self.rows.density) / np.diff(self.rows.q), 0.0
+        )
         return exponent, gradient, linear
 
     def _value(self, q: Array, row: NDArray[np.intp]) -> Array:
         """C at q by the law of its piece."""
         exponent, gradient, linear = self._slopes
-        larger = row + (exponent[row] > 0.0)  # seen from there a power law only falls: no overflow
-        power = self.rows.density[larger] * np.exp(exponent[row] * np.log(q / self.rows.q[larger]))
+        # seen from there a power law only falls: no overflow
+        larger = row + (exponent[row] > 0.0)
+        power = self.rows.density[larger] * np.exp(
+            exponent[row] * np.log(q / self.rows.q[larger])
+        )
         straight = self.rows.density[row] + gradient[row] * (q - self.rows.q[row])
         return np.where(linear[row], np.maximum(straight, 0.0), power)
 
-    def _piece(self, power: int, low: Array, level: Array, high: Array, row: NDArray[np.intp]) -> Array:
+    def _piece(
+        self, power: int, low: Array, level: Array, high: Array, row: NDArray[np.intp]
+    ) -> Array:
         """∫ q^power C dq from ``low``, where C = ``level``, to ``high`` in the same piece."""
         exponent, gradient, linear = self._slopes
         stretch = np.log(high / low)
@@ -445,7 +524,11 @@ class Rowed(Isotropic, Protocol):
         # from the end where q^(power+1) C is larger, so that steep rows cannot overflow
         lower = level * low ** (power + 1)
         upper = self._value(high, row) * high ** (power + 1)
-        powered = np.where(amplitude > 0.0, upper, lower) * stretch * _decay(np.abs(amplitude))
+        powered = (
+            np.where(amplitude > 0.0, upper, lower)
+            * stretch
+            * _decay(np.abs(amplitude))
+        )
         d, slope = high - low, gradient[row]
         straight = level * d + slope * d**2 / 2
         if power == 1:

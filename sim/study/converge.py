@@ -36,7 +36,16 @@ from sim.parts.drive import Driven
 from sim.parts.exchange import Array, Bonding, Gammas, Motion
 from sim.parts.shear.bands import cell_pairs
 from sim.parts.shear.process import Fluctuation
-from sim.plots.style import BONDS, FLUCTUATIONS, LINES, REFERENCE, STYLE, legend, rows, save
+from sim.plots.style import (
+    BONDS,
+    FLUCTUATIONS,
+    LINES,
+    REFERENCE,
+    STYLE,
+    legend,
+    rows,
+    save,
+)
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read, keys, model, tables
 from sim.units.errors import BadInput
@@ -44,7 +53,13 @@ from sim.units.notation import concise
 
 #: A table to print, and the text below it.
 Printed = tuple[list[dict[str, str]], str]
-QUANTITIES = ("shear_stress", "bond_fraction", "fluctuation_energy", "contact_radius", "friction_force")
+QUANTITIES = (
+    "shear_stress",
+    "bond_fraction",
+    "fluctuation_energy",
+    "contact_radius",
+    "friction_force",
+)
 STATISTICS = ("mean", "spread", "skewness", "correlation time")
 #: A function that raises an error if the time of a run is spent.
 Check = Callable[[], None]
@@ -53,7 +68,13 @@ Read = Callable[[Scenario, Trajectory], Array]
 _READS = tuple(READ[name] for name in QUANTITIES)
 _ENERGY, _RADIUS = 2, 3
 _SHORT = ("stress", "bonds", "ΔΓ", "radius", "friction")
-_WORDS = ("the shear stress", "the bond fraction", "ΔΓ", "the radius", "the friction force")
+_WORDS = (
+    "the shear stress",
+    "the bond fraction",
+    "ΔΓ",
+    "the radius",
+    "the friction force",
+)
 _BANDS, _COHORTS = (0.3, 0.1, 0.03, 0.01, 0.003), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 #: Shares of the budget that are spent on times and on clock steps; the rest is spent on models and grids.
@@ -126,13 +147,19 @@ class Setting:
     ratio: float = 1.0
     time: float = math.nan
     members: int = 0
-    error: Array = field(default_factory=lambda: np.full((len(QUANTITIES), len(STATISTICS)), np.nan))
-    standard_error: Array = field(default_factory=lambda: np.zeros((len(QUANTITIES), len(STATISTICS))))
+    error: Array = field(
+        default_factory=lambda: np.full((len(QUANTITIES), len(STATISTICS)), np.nan)
+    )
+    standard_error: Array = field(
+        default_factory=lambda: np.zeros((len(QUANTITIES), len(STATISTICS)))
+    )
 
     @property
     def pace(self) -> float:
         """Return the estimated time of a run of one member [s]."""
-        return self.time / (self.scenario.ensemble.members if _fluctuates(self.scenario) else 1)
+        return self.time / (
+            self.scenario.ensemble.members if _fluctuates(self.scenario) else 1
+        )
 
 
 @dataclass
@@ -172,14 +199,20 @@ class Budget:
 
     def needs(self, seconds: float) -> None:
         """Remember that something of this length [s] was left out."""
-        self.needed = max(self.needed, _MARGIN * self.slower * seconds / self.share, _MARGIN * self.seconds)
+        self.needed = max(
+            self.needed,
+            _MARGIN * self.slower * seconds / self.share,
+            _MARGIN * self.seconds,
+        )
 
 
 class _Spent(Exception):
     """The time is spent in the middle of a run."""
 
 
-def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None = None) -> xr.Dataset:
+def converge(
+    scenario: Scenario, budget_seconds: float, tolerance: float | None = None
+) -> xr.Dataset:
     """Run a scene at every admissible setting, and report the cost and the error of each.
 
     Parameters
@@ -226,15 +259,24 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     standard error. Differences below ``drive.tolerance`` are not resolved.
     """
     if scenario.fluctuations.measured:
-        raise BadInput(["shear.field: a map has no simpler model; study fields of its spectrum, shear.spectrum"])
+        raise BadInput(
+            [
+                "shear.field: a map has no simpler model; study fields of its spectrum, shear.spectrum"
+            ]
+        )
     now = stopwatch()
     began = now()
     budget = Budget(now, budget_seconds, began + 0.5 * budget_seconds)
-    chosen_models = {"shear": _table(scenario.fluctuations), "bonds": _table(scenario.population)}
+    chosen_models = {
+        "shear": _table(scenario.fluctuations),
+        "bonds": _table(scenario.population),
+    }
     base = scenario.with_values(chosen_models | {"record": {}})
     accepted = tolerance or float(_table(scenario.shear).get("tolerance", 0.01))
     written = _at_step(base, 1.0)
-    settings = [row for changes in _tried(base) if (row := _admitted(*changes, base, budget))]
+    settings = [
+        row for changes in _tried(base) if (row := _admitted(*changes, base, budget))
+    ]
     building = now() - began
     for row in [*settings, written]:  # compiles, which is not counted
         with contextlib.suppress(Unresolved):
@@ -242,30 +284,59 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     budget.end = now() + budget_seconds - building
     for row in [*settings, written]:
         row.time = _timed(row.scenario, _TIMING * budget_seconds / (len(settings) + 1))
-    parts = [list(rows) for _, rows in itertools.groupby(settings, key=lambda row: row.part)]
+    parts = [
+        list(rows) for _, rows in itertools.groupby(settings, key=lambda row: row.part)
+    ]
     judged = list[Setting]()
     for place, rows_of_part in enumerate(parts):
         left = budget.left() - _STEPS * budget_seconds
         budget.share = (1.0 - _TIMING - _STEPS) / len(parts)
         judged += _judged(rows_of_part, now() + left / (len(parts) - place), budget)
-    means = [row for row in judged if row.members and row.part == "bonds" and "sites" not in _table(row.scenario.bonds)]
-    driven = scenario.drive.solves_motion  # its mean depends on the noise of the bonds, which other models lack
+    means = [
+        row
+        for row in judged
+        if row.members
+        and row.part == "bonds"
+        and "sites" not in _table(row.scenario.bonds)
+    ]
+    # its mean depends on the noise of the bonds, which other models lack
+    driven = scenario.drive.solves_motion
     budget.share = _STEPS
-    of_steps, trend = _judged_steps(written, written if driven else [written, *means][-1], accepted, budget)
+    of_steps, trend = _judged_steps(
+        written, written if driven else [written, *means][-1], accepted, budget
+    )
     judged += of_steps
     for row in judged if driven else ():
         row.error[:, 1:] = row.standard_error[:, 1:] = np.nan
     dims, variables = ("row", "quantity", "statistic"), dict[str, Any]()
     for name, (unit, text) in _DESCRIBED.items():
         values = np.array([getattr(row, name) for row in judged])
-        variables[name] = (dims[: values.ndim], values, {"long_name": text} | ({"units": unit} if unit else {}))
-    coordinates = {"row": [row.label for row in judged], "quantity": [*QUANTITIES], "statistic": [*STATISTICS]}
-    return xr.Dataset(variables, coordinates, {
-        "Conventions": "CF-1.11", "title": f"speed against error: {scenario.name}", "not_converging": trend,
-        "sim_version": importlib.metadata.version("sliding-sim"), "seed": str(scenario.seed), "tolerance": accepted,
-        "budget": float(f"{budget.needed:.1e}"), "averaged": int(driven), "left_out": "\n".join(budget.left_out),
-        "swept": ", ".join(key for axis in scenario.sweep for key in axis.keys),
-    })  # fmt: skip
+        variables[name] = (
+            dims[: values.ndim],
+            values,
+            {"long_name": text} | ({"units": unit} if unit else {}),
+        )
+    coordinates = {
+        "row": [row.label for row in judged],
+        "quantity": [*QUANTITIES],
+        "statistic": [*STATISTICS],
+    }
+    return xr.Dataset(
+        variables,
+        coordinates,
+        {
+            "Conventions": "CF-1.11",
+            "title": f"speed against error: {scenario.name}",
+            "not_converging": trend,
+            "sim_version": importlib.metadata.version("sliding-sim"),
+            "seed": str(scenario.seed),
+            "tolerance": accepted,
+            "budget": float(f"{budget.needed:.1e}"),
+            "averaged": int(driven),
+            "left_out": "\n".join(budget.left_out),
+            "swept": ", ".join(key for axis in scenario.sweep for key in axis.keys),
+        },
+    )
 
 
 def _table(part: object) -> dict[str, Any]:
@@ -278,37 +349,63 @@ def _tried(scenario: Scenario) -> Iterator[tuple[str, dict[str, Any]]]:
     shear, bonds = _table(scenario.shear), _table(scenario.bonds)
     if "correlation" in shear:
         yield "shear", {"model": "mean"}
-        for tolerance in sorted({*_BANDS, shear.get("tolerance", _BANDS[0])}, reverse=True):
+        for tolerance in sorted(
+            {*_BANDS, shear.get("tolerance", _BANDS[0])}, reverse=True
+        ):
             yield "shear", {"model": "banded", "tolerance": tolerance}
-        yield "shear", {"model": "mapped" if shear["model"] == "mapped" else "modal"}  # the same numbers
+        # the same numbers
+        yield "shear", {"model": "mapped" if shear["model"] == "mapped" else "modal"}
     if "rebinding_rate" not in bonds:
         return
     carried, stretched = bonds.get("area") == "carried", "rupture" in bonds
     if not (stretched or carried):
         yield "bonds", {"model": "steady"}
     yield "bonds", {"model": "rate"}
-    for tolerance in sorted({*_COHORTS, bonds.get("tolerance", _COHORTS[0])}, reverse=True) if stretched else ():
+    for tolerance in (
+        sorted({*_COHORTS, bonds.get("tolerance", _COHORTS[0])}, reverse=True)
+        if stretched
+        else ()
+    ):
         yield "bonds", {"model": "cohort", "tolerance": tolerance}
-    sites = bonds.get("sites") or bonds.get("site_density", math.inf) * math.pi * scenario.rest_radius**2
+    sites = (
+        bonds.get("sites")
+        or bonds.get("site_density", math.inf) * math.pi * scenario.rest_radius**2
+    )
     last, most = ("tracked", 1e5) if stretched else ("counted", 1e9)
-    if not carried and ("sites" in bonds or 0.0 < sites <= most):  # sites cannot be carried with the area
+    # sites cannot be carried with the area
+    if not carried and ("sites" in bonds or 0.0 < sites <= most):
         yield "bonds", {"model": last, "sites": round(sites)}
 
 
-def _admitted(part: str, changes: dict[str, Any], base: Scenario, budget: Budget) -> Setting | None:
+def _admitted(
+    part: str, changes: dict[str, Any], base: Scenario, budget: Budget
+) -> Setting | None:
     """Return the scene with some keys of a part changed; None, with a reason in ``left_out``, if it refuses them.
 
     If the time is spent, only the setting of the scene itself is built.
     """
-    table_now, label = _table(getattr(base, part)), " ".join(f"{value}" for value in changes.values())
+    table_now, label = (
+        _table(getattr(base, part)),
+        " ".join(f"{value}" for value in changes.values()),
+    )
     admitted = tables(keys(Scenario)[part].annotation).values()
-    declared = {key for kind in admitted if model(kind) == changes["model"] for key in keys(kind)}
+    declared = {
+        key
+        for kind in admitted
+        if model(kind) == changes["model"]
+        for key in keys(kind)
+    }
     is_written = table_now.items() >= changes.items()
     try:
         if budget.left() < 0.0 and not is_written:
             budget.needs(2.0 * budget.seconds)
             raise ValueError(_TOO_LONG)
-        changed = base.with_values({part: {key: table_now[key] for key in table_now.keys() & declared} | changes})
+        changed = base.with_values(
+            {
+                part: {key: table_now[key] for key in table_now.keys() & declared}
+                | changes
+            }
+        )
         changed.process  # noqa: B018 - some models are refused only when their modes are made
     except ValueError as fault:
         budget.left_out.append(f"{label}: " + str(fault).partition("\n")[0])
@@ -321,8 +418,13 @@ def _at_step(scenario: Scenario, ratio: float) -> Setting:
     """Return the scene with its clock step times a power of two and the same records."""
     clock = scenario.clock
     step, record = clock.step * ratio, clock.stride * clock.step
-    changed = scenario.with_values({"clock": {"duration": clock.duration, "step": step, "record": record}})
-    text, label = f'step = "{step:.12g} s"\nrecord = "{record:.12g} s"', f"step {engineering(step, 's')}"
+    changed = scenario.with_values(
+        {"clock": {"duration": clock.duration, "step": step, "record": record}}
+    )
+    text, label = (
+        f'step = "{step:.12g} s"\nrecord = "{record:.12g} s"',
+        f"step {engineering(step, 's')}",
+    )
     return Setting(label, "step", changed, text, int(ratio == 1.0), ratio)
 
 
@@ -333,17 +435,27 @@ def _fluctuates(scenario: Scenario) -> bool:
 
 def _timed(scenario: Scenario, seconds: float) -> float:
     """Return the CPU time of the scene's run [s], by all but the first of the pieces that are run in some seconds."""
-    members, last = scenario.ensemble.members if _fluctuates(scenario) else 1, scenario.clock.steps
+    members, last = (
+        scenario.ensemble.members if _fluctuates(scenario) else 1,
+        scenario.clock.steps,
+    )
     full = min(together(scenario), members)
-    batch = full if seconds_a_step(scenario, full) < 0.25 * seconds else min(full, _FEWEST)
-    noise, now, state = MemberNoise.of(scenario.seed, np.arange(batch)), stopwatch(), None
+    batch = (
+        full if seconds_a_step(scenario, full) < 0.25 * seconds else min(full, _FEWEST)
+    )
+    noise, now, state = (
+        MemberNoise.of(scenario.seed, np.arange(batch)),
+        stopwatch(),
+        None,
+    )
     times, end, step, length = list[tuple[int, float]](), now() + seconds, 0, 1
     while not times or now() < end:
         steps, before = range(step + 1, min(step + length, last) + 1), now()
         state, _ = follow(scenario, noise, state if step else None, steps)
         times.append((len(steps), now() - before))
         step, length = steps[-1] % last, min(2 * length, _PIECE)
-    done, spent = np.sum(times[1:] or times, axis=0).tolist()  # the first piece has loaded what is computed once
+    # the first piece has loaded what is computed once
+    done, spent = np.sum(times[1:] or times, axis=0).tolist()
     batches = -(-members // full) * full / batch
     return batches * last * max(spent, _TICK) / done
 
@@ -351,7 +463,9 @@ def _timed(scenario: Scenario, seconds: float) -> float:
 def _records(scenario: Scenario) -> range:
     """Return the clock steps at which runs are compared: those of all records, or evenly spaced ones of very many."""
     clock = scenario.clock
-    numbers = clock.records * len(QUANTITIES) * (_FEWEST if _fluctuates(scenario) else 1)
+    numbers = (
+        clock.records * len(QUANTITIES) * (_FEWEST if _fluctuates(scenario) else 1)
+    )
     every = clock.stride * -(-numbers // _SAMPLED)
     return range(clock.steps % every, clock.steps + 1, every)
 
@@ -367,7 +481,11 @@ class Unresolved(RuntimeError):
 
 
 def recorded(
-    scenario: Scenario, members: range, steps: range, reads: Sequence[Read] = _READS, check: Check = _unlimited
+    scenario: Scenario,
+    members: range,
+    steps: range,
+    reads: Sequence[Read] = _READS,
+    check: Check = _unlimited,
 ) -> Array:
     """Return variables of some members at some clock steps, shape (variables, members, steps).
 
@@ -375,21 +493,36 @@ def recorded(
     """
     values, length = list[Array](), max(1, len(steps) // _PIECES)
     for batch in np.array_split(members, -(-len(members) // together(scenario))):
-        noise, state, pieces = MemberNoise.of(scenario.seed, batch), None, list[list[Array]]()
+        noise, state, pieces = (
+            MemberNoise.of(scenario.seed, batch),
+            None,
+            list[list[Array]](),
+        )
         for begin in range(0, len(steps), length):
             check()
-            state, course = follow(scenario, noise, state, steps[begin : begin + length])
-            if scenario.drive.solves_motion and np.isfinite(cast(Driven, state.drive).unresolved_time).any():
+            state, course = follow(
+                scenario, noise, state, steps[begin : begin + length]
+            )
+            if (
+                scenario.drive.solves_motion
+                and np.isfinite(cast(Driven, state.drive).unresolved_time).any()
+            ):
                 cure = "set drive.viscosity or a shorter clock.step"
                 step = f"clock.step = {scenario.clock.step:.3g} s"
-                raise Unresolved(f"with {step} some members could not be resolved; {cure}")
+                raise Unresolved(
+                    f"with {step} some members could not be resolved; {cure}"
+                )
             shape = course.time.size, len(batch)
-            pieces.append([np.broadcast_to(read(scenario, course), shape).T for read in reads])
+            pieces.append(
+                [np.broadcast_to(read(scenario, course), shape).T for read in reads]
+            )
         values.append(np.concatenate(pieces, axis=2))
     return np.concatenate(values, axis=1)
 
 
-def compared(scenario: Scenario, members: range, steps: range, check: Check = _unlimited) -> Array:
+def compared(
+    scenario: Scenario, members: range, steps: range, check: Check = _unlimited
+) -> Array:
     """Return the ``QUANTITIES`` of some members at some clock steps, shape (quantities, members, times).
 
     Under a spring or a force the only time is the mean over the second half of the steps, because single paths diverge.
@@ -400,7 +533,9 @@ def compared(scenario: Scenario, members: range, steps: range, check: Check = _u
     averages, most = list[Array](), _most_at_once(steps)
     for begin in range(0, len(members), most):
         values = recorded(scenario, members[begin : begin + most], steps, check=check)
-        averages.append(np.nan_to_num(values[:, :, len(steps) // 2 :]).mean(axis=2, keepdims=True))
+        averages.append(
+            np.nan_to_num(values[:, :, len(steps) // 2 :]).mean(axis=2, keepdims=True)
+        )
     return np.concatenate(averages, axis=1)
 
 
@@ -422,7 +557,11 @@ def _known(terms: Gammas, power: int) -> Array:
     """
     mean, variance, third = (np.sum(terms.shape * terms.weight**n) for n in (1, 2, 3))
     lives = np.sum(terms.shape * terms.weight**2 * terms.wavenumber ** -float(power))
-    of_spread = (2.0 * third / variance**1.5, lives / variance) if variance > 0.0 else (0.0, 0.0)
+    of_spread = (
+        (2.0 * third / variance**1.5, lives / variance)
+        if variance > 0.0
+        else (0.0, 0.0)
+    )
     return np.array([mean + terms.constant, math.sqrt(variance), *of_spread])
 
 
@@ -447,20 +586,33 @@ def _errors(values: Array, reference: Array, known: Array | None = None) -> Arra
     difference = changed - exact
     if known is not None:
         of_energy, of_radius = exact[_ENERGY, 0, 1:], exact[_RADIUS, 0, 1:]
-        along, variance = np.sum(of_radius * of_energy, axis=0), np.sum(of_energy**2, axis=0)
-        slope = np.divide(along, variance, out=np.zeros(variance.shape), where=variance > 0.0)
+        along, variance = (
+            np.sum(of_radius * of_energy, axis=0),
+            np.sum(of_energy**2, axis=0),
+        )
+        slope = np.divide(
+            along, variance, out=np.zeros(variance.shape), where=variance > 0.0
+        )
         slopes = np.stack([slope, np.abs(slope)])[:, np.newaxis]
-        lacking = known[:2, np.newaxis, np.newaxis] * exact[_ENERGY] - difference[_ENERGY]
+        lacking = (
+            known[:2, np.newaxis, np.newaxis] * exact[_ENERGY] - difference[_ENERGY]
+        )
         difference[_RADIUS] += slopes * lacking
     size, influence = np.abs(difference[:, :, 0]), difference[:, :, 1:]
     count = influence.shape[2]
     deviation = np.sqrt(np.sum(influence**2, axis=2) / (count * max(count - 1, 1)))
     unit = np.repeat(np.abs(exact[:, :1, 0]).max(axis=2), 2, axis=1)
     unit[_ENERGY, 1] = exact[_ENERGY, 1, 0].max() or unit[_ENERGY, 1]
-    largest = (size + students(count) * deviation).argmax(axis=2)[np.newaxis, ..., np.newaxis]
-    at_largest = np.take_along_axis(np.stack([size, deviation]), largest, axis=3)[..., 0]
+    largest = (size + students(count) * deviation).argmax(axis=2)[
+        np.newaxis, ..., np.newaxis
+    ]
+    at_largest = np.take_along_axis(np.stack([size, deviation]), largest, axis=3)[
+        ..., 0
+    ]
     result = np.full((2, len(QUANTITIES), len(STATISTICS)), np.nan)
-    result[:, :, :2] = np.divide(at_largest, unit, out=np.zeros(at_largest.shape), where=unit > 0.0)
+    result[:, :, :2] = np.divide(
+        at_largest, unit, out=np.zeros(at_largest.shape), where=unit > 0.0
+    )
     if known is not None:
         result[:, _ENERGY] = np.abs(known), np.zeros(len(STATISTICS))
     return result
@@ -471,11 +623,21 @@ def _moments(sample: Array) -> Array:
 
     The shape is (quantities, 2, 1 + members, times).
     """
-    mean, spread = (np.nan_to_num(of(sample, axis=1, keepdims=True)) for of in (np.mean, np.std))
+    mean, spread = (
+        np.nan_to_num(of(sample, axis=1, keepdims=True)) for of in (np.mean, np.std)
+    )
     spread = np.where(spread > 1e-12 * np.abs(mean), spread, 0.0)
     off = np.where(spread > 0.0, sample - mean, 0.0)
-    on_spread = np.divide(off**2 - spread**2, 2.0 * spread, out=np.zeros(off.shape), where=spread > 0.0)
-    return np.stack([np.concatenate([mean, off], axis=1), np.concatenate([spread, on_spread], axis=1)], axis=1)
+    on_spread = np.divide(
+        off**2 - spread**2, 2.0 * spread, out=np.zeros(off.shape), where=spread > 0.0
+    )
+    return np.stack(
+        [
+            np.concatenate([mean, off], axis=1),
+            np.concatenate([spread, on_spread], axis=1),
+        ],
+        axis=1,
+    )
 
 
 def _judged(settings: list[Setting], until: float, budget: Budget) -> list[Setting]:
@@ -485,8 +647,12 @@ def _judged(settings: list[Setting], until: float, budget: Budget) -> list[Setti
     run. Without a finer setting, that of the scene has no error, and none is returned but itself.
     """
     (own,) = (row for row in settings if row.own)
-    nearest = min(settings[settings.index(own) + 1 :], key=lambda row: row.time, default=own)
-    order = sorted(settings, key=lambda row: (row is not own, row is not nearest, row.time))
+    nearest = min(
+        settings[settings.index(own) + 1 :], key=lambda row: row.time, default=own
+    )
+    order = sorted(
+        settings, key=lambda row: (row is not own, row is not nearest, row.time)
+    )
     noisy = [row for row in settings if _fluctuates(row.scenario)]
     steps = _records([own, *noisy][-1].scenario)
     most, wanted = _most_members(own.scenario, steps), _affordable(noisy, until, budget)
@@ -494,33 +660,49 @@ def _judged(settings: list[Setting], until: float, budget: Budget) -> list[Setti
     samples, reasons = dict[Setting, Array](), dict.fromkeys(settings, _TOO_LONG)
     expected = taken = 0.0
     for row in order:
-        members, limit = range(first if row in noisy else 1), budget.end if row is own else until
+        members, limit = (
+            range(first if row in noisy else 1),
+            budget.end if row is own else until,
+        )
         if budget.slower * row.pace * len(members) > budget.left(limit):
             continue
         before = budget.now()
         try:
-            samples[row] = compared(row.scenario, members, steps, functools.partial(budget.check, limit))
+            samples[row] = compared(
+                row.scenario, members, steps, functools.partial(budget.check, limit)
+            )
         except Unresolved as fault:
             if row is own:
                 raise
             reasons[row] = str(fault)
         except _Spent:
             pass
-        expected, taken = expected + row.pace * len(members), taken + budget.now() - before
+        expected, taken = (
+            expected + row.pace * len(members),
+            taken + budget.now() - before,
+        )
         budget.slower = max(budget.slower, taken / expected)
-    fitting, costly = [row for row in settings if row in samples], [row for row in noisy if row in samples]
-    more = range(first, first + int(min(_affordable(costly, until, budget), most - first)))
+    fitting, costly = (
+        [row for row in settings if row in samples],
+        [row for row in noisy if row in samples],
+    )
+    more = range(
+        first, first + int(min(_affordable(costly, until, budget), most - first))
+    )
     if costly and more:
         check = functools.partial(budget.check, until)
         with contextlib.suppress(_Spent, Unresolved):
             rest = [compared(row.scenario, more, steps, check) for row in costly]
             samples |= {
-                row: np.concatenate([samples[row], values], axis=1) for row, values in zip(costly, rest, strict=True)
+                row: np.concatenate([samples[row], values], axis=1)
+                for row, values in zip(costly, rest, strict=True)
             }
     left_out = {row.label: reasons[row] for row in settings if row not in samples}
     budget.left_out += map(": ".join, left_out.items())
     if _TOO_LONG in left_out.values():
-        budget.needs(2.0 * sum(row.pace * (_FEWEST if row in noisy else 1) for row in settings))
+        budget.needs(
+            2.0 * sum(row.pace * (_FEWEST if row in noisy else 1) for row in settings)
+        )
     if not fitting or (own is fitting[-1] and own is not settings[-1]):
         return [own]
     _compare(own.scenario, fitting, samples)
@@ -529,21 +711,43 @@ def _judged(settings: list[Setting], until: float, budget: Budget) -> list[Setti
 
 def _affordable(rows: list[Setting], until: float, budget: Budget) -> float:
     """Return the members of some settings whose runs are estimated to take half of the time that is left."""
-    return 0.5 * budget.left(until) / max(budget.slower * sum(row.pace for row in rows), _TICK)
+    return (
+        0.5
+        * budget.left(until)
+        / max(budget.slower * sum(row.pace for row in rows), _TICK)
+    )
 
 
-def _compare(scene: Scenario, fitting: list[Setting], samples: dict[Setting, Array]) -> None:
+def _compare(
+    scene: Scenario, fitting: list[Setting], samples: dict[Setting, Array]
+) -> None:
     """Write the errors of the settings of one part against the last of them."""
     part, finest, known = cast(Any, scene.fluctuations), samples[fitting[-1]], None
     driven = scene.drive.solves_motion
-    has_truth = fitting[0].part == "shear" and part.per_member and not (part.law.relaxing or driven)
+    has_truth = (
+        fitting[0].part == "shear"
+        and part.per_member
+        and not (part.law.relaxing or driven)
+    )
     if has_truth:  # the distribution of ΔΓ by all modes of the cell
-        pairs = cell_pairs(part.spectrum, part.side(scene.setting.cell), part.points, *scene.solid.effective)
-        truth = _known(Gammas(pairs.weight, pairs.count, pairs.wavenumber), part.correlation.power)
+        pairs = cell_pairs(
+            part.spectrum,
+            part.side(scene.setting.cell),
+            part.points,
+            *scene.solid.effective,
+        )
+        truth = _known(
+            Gammas(pairs.weight, pairs.count, pairs.wavenumber), part.correlation.power
+        )
     for row in fitting:
         if has_truth:
             approximate = _known(row.scenario.process.gammas, part.correlation.power)
-            known = np.divide(approximate, truth, out=np.ones(truth.shape), where=truth != 0.0) - 1.0
+            known = (
+                np.divide(
+                    approximate, truth, out=np.ones(truth.shape), where=truth != 0.0
+                )
+                - 1.0
+            )
         row.error, row.standard_error = _errors(samples[row], finest, known)
         row.members = max(samples[row].shape[1], finest.shape[1])
 
@@ -555,12 +759,18 @@ class _Replayed:
     """
 
     def __init__(self, scenario: Scenario, energy: Array) -> None:
-        self.process, self.amplitude, self.energy = scenario.process, scenario.fluctuations.law, energy
+        self.process, self.amplitude, self.energy = (
+            scenario.process,
+            scenario.fluctuations.law,
+            energy,
+        )
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.process, name)
 
-    def advance(self, state: Any, motions: Motion, bonding: Bonding, noise: Any) -> tuple[Fluctuation, Array]:
+    def advance(
+        self, state: Any, motions: Motion, bonding: Bonding, noise: Any
+    ) -> tuple[Fluctuation, Array]:
         """Return the fluctuations after a block of steps, and ΔΓ at each of them."""
         size = self.amplitude.factor(motions.speed, bonding.strength)
         energy = size**2 * self.energy[motions.step : motions.step + len(motions.time)]
@@ -570,16 +780,22 @@ class _Replayed:
 def _replays(scenario: Scenario) -> bool:
     """True if coarser steps can have the fluctuations of a finer run: the fluctuations do not depend on other parts."""
     part, driven = scenario.fluctuations, scenario.drive.solves_motion
-    return part.per_member and not (driven or part.law.relaxing or part.law.remembers or part.spectrum.bond_made)
+    return part.per_member and not (
+        driven or part.law.relaxing or part.law.remembers or part.spectrum.bond_made
+    )
 
 
 def _unit_energy(scenario: Scenario, course: Trajectory) -> Array:
     """Return ΔΓ at amplitude 1 [J/m²]."""
     size = scenario.fluctuations.law.factor(course.speed, course.strength) ** 2
-    return np.divide(course.energy, size, out=np.zeros(course.energy.shape), where=size > 0.0)
+    return np.divide(
+        course.energy, size, out=np.zeros(course.energy.shape), where=size > 0.0
+    )
 
 
-def _at_steps(rows: Sequence[Setting], count: int, check: Check = _unlimited) -> list[Array]:
+def _at_steps(
+    rows: Sequence[Setting], count: int, check: Check = _unlimited
+) -> list[Array]:
     """Return the ``QUANTITIES`` by several clock steps, the finest first; ``check`` as of ``recorded``.
 
     At a prescribed speed all have the fluctuations that the finest draws. Fluctuations have no error in time. Their
@@ -587,12 +803,20 @@ def _at_steps(rows: Sequence[Setting], count: int, check: Check = _unlimited) ->
     """
     (finest, *others), members = (row.scenario for row in rows), range(count)
     if not _replays(finest):
-        return [compared(scenario, members, _records(scenario), check) for scenario in (finest, *others)]
-    records, steps = _records(finest), range(0, finest.clock.steps + 1, round(rows[1].ratio / rows[0].ratio))
+        return [
+            compared(scenario, members, _records(scenario), check)
+            for scenario in (finest, *others)
+        ]
+    records, steps = (
+        _records(finest),
+        range(0, finest.clock.steps + 1, round(rows[1].ratio / rows[0].ratio)),
+    )
     values = recorded(finest, members, steps, [*_READS, _unit_energy], check)
     result = [values[:-1, :, records.start // steps.step :: records.step // steps.step]]
     for row in rows[1:]:
-        energy = np.ascontiguousarray(values[-1, :, :: round(row.ratio / rows[1].ratio)].T)
+        energy = np.ascontiguousarray(
+            values[-1, :, :: round(row.ratio / rows[1].ratio)].T
+        )
         scenario = row.scenario.with_values({}, built=False)
         scenario.__dict__["process"] = _Replayed(row.scenario, energy)
         result.append(compared(scenario, members, _records(scenario), check))
@@ -612,7 +836,9 @@ def _series(rows: list[Setting], members: int, budget: Budget) -> _Series | None
     """Return runs at several clock steps; None if the budget is spent before, or if a motion is not resolved."""
     began = budget.now()
     try:
-        return _Series(rows, _at_steps(rows, members, budget.check), members, budget.now() - began)
+        return _Series(
+            rows, _at_steps(rows, members, budget.check), members, budget.now() - began
+        )
     except Unresolved as fault:
         budget.left_out.append(str(fault))
     except _Spent:
@@ -620,9 +846,16 @@ def _series(rows: list[Setting], members: int, budget: Budget) -> _Series | None
     return None
 
 
-def _first_series(setting: Setting, ratios: Sequence[float], budget: Budget) -> _Series | None:
+def _first_series(
+    setting: Setting, ratios: Sequence[float], budget: Budget
+) -> _Series | None:
     """Return runs at a few clock steps, with as many members as fit; None if too few do."""
-    scene, pace, left, members = setting.scenario, budget.slower * setting.pace, budget.left(), 1
+    scene, pace, left, members = (
+        setting.scenario,
+        budget.slower * setting.pace,
+        budget.left(),
+        1,
+    )
     cost = pace * sum(1.0 / ratio for ratio in ratios)
     if _fluctuates(scene):
         members = max(min(_most_in_series(scene), int(left / (32.0 * pace))), 4)
@@ -639,7 +872,9 @@ def _most_in_series(exact: Scenario) -> int:
     return _most_members(exact, _records(exact))
 
 
-def _judged_steps(written: Setting, finest: Setting, accepted: float, budget: Budget) -> tuple[list[Setting], str]:
+def _judged_steps(
+    written: Setting, finest: Setting, accepted: float, budget: Budget
+) -> tuple[list[Setting], str]:
     """Return clock steps with their errors, and in words the results that do not converge.
 
     Steps are quartered until the bound is small, or until the next quarter does not fit into the time. If noise is the
@@ -647,7 +882,11 @@ def _judged_steps(written: Setting, finest: Setting, accepted: float, budget: Bu
     the finest model, which any model of small error resembles. If that does not fit, they are those of the scene.
     """
     coarser = written.scenario.clock.stride % 4 == 0
-    ratios = ((0.25, 1.0, 4.0), (1.0, 4.0), (0.25, 1.0)) if coarser else ((0.0625, 0.25, 1.0), (0.25, 1.0))
+    ratios = (
+        ((0.25, 1.0, 4.0), (1.0, 4.0), (0.25, 1.0))
+        if coarser
+        else ((0.0625, 0.25, 1.0), (0.25, 1.0))
+    )
     for scene, some in itertools.product(dict.fromkeys((finest, written)), ratios):
         if series := _first_series(scene, some, budget):
             exact, most = scene.scenario, _most_in_series(scene.scenario)
@@ -657,22 +896,38 @@ def _judged_steps(written: Setting, finest: Setting, accepted: float, budget: Bu
         return [written], ""
     while True:
         rows, runs, count, seconds = series
-        changes = np.array([_errors(longer, shorter) for shorter, longer in itertools.pairwise(runs)])
+        changes = np.array(
+            [_errors(longer, shorter) for shorter, longer in itertools.pairwise(runs)]
+        )
         changes[:, :, :, 2 - exact.drive.solves_motion :] = 0.0
         # a change that is small by chance does not hide those before it, of first order
-        sure, rest = students(count), np.max(changes / 4.0 ** np.arange(len(changes)).reshape(-1, 1, 1, 1), axis=0)
+        sure, rest = (
+            students(count),
+            np.max(
+                changes / 4.0 ** np.arange(len(changes)).reshape(-1, 1, 1, 1), axis=0
+            ),
+        )
         small = float(np.max(rest[0] + sure * rest[1])) <= _SMALL * accepted
-        more_members = count < most and sure * float(np.max(rest[1])) > float(np.max(rest[0]))
-        if small or not (more_members or rows[0].ratio > _FINEST_STEP) or 4.2 * seconds > budget.left():
+        more_members = count < most and sure * float(np.max(rest[1])) > float(
+            np.max(rest[0])
+        )
+        if (
+            small
+            or not (more_members or rows[0].ratio > _FINEST_STEP)
+            or 4.2 * seconds > budget.left()
+        ):
             break
         if more_members:
             following = _series(rows, min(4 * count, most), budget)
         else:
-            following = _series([_at_step(exact, 0.25 * rows[0].ratio), *rows], count, budget)
+            following = _series(
+                [_at_step(exact, 0.25 * rows[0].ratio), *rows], count, budget
+            )
         if following is None:
             break
         series = following
-    for row, run in zip(rows, runs, strict=True):  # the rest of a series that falls by _FALL is its last term here
+    # the rest of a series that falls by _FALL is its last term here
+    for row, run in zip(rows, runs, strict=True):
         row.error, row.standard_error = _errors(run, runs[0]) + rest / (_FALL - 1.0)
         row.members, row.time = count, written.time / row.ratio
     trend = _trend(changes, 2.0 * runs[0].size / count, count, accepted)
@@ -689,9 +944,13 @@ def _trend(changes: Array, numbers: float, members: int, accepted: float) -> str
     Noise alone is larger than stated in one study of twenty, though many ``numbers`` are compared.
     """
     last, noise = changes[0]
-    shown = (last > students(members, numbers) * noise) & (_FALL * last > _SMALL * accepted)
+    shown = (last > students(members, numbers) * noise) & (
+        _FALL * last > _SMALL * accepted
+    )
     before, noise_before = changes[1] if len(changes) > 1 else (last, noise)
-    grown = np.where(shown & (before - last <= np.hypot(noise, noise_before)), last, 0.0)
+    grown = np.where(
+        shown & (before - last <= np.hypot(noise, noise_before)), last, 0.0
+    )
     if not grown.any():
         return ""
     what, of = divmod(int(grown.argmax()), grown.shape[1])
@@ -725,18 +984,31 @@ def choices(dataset: xr.Dataset) -> list[Choice]:
 
     Errors add up, and so does the time that each change adds to a step; clock steps multiply it.
     """
-    part, is_written, cost, members, errors, deviations = (dataset[name].to_numpy() for name in _COLUMNS)
+    part, is_written, cost, members, errors, deviations = (
+        dataset[name].to_numpy() for name in _COLUMNS
+    )
     noises = students(members)[:, np.newaxis, np.newaxis] * deviations
-    groups = [sorted(np.flatnonzero(part == kind), key=lambda row: -is_written[row]) for kind in _PARTS if kind in part]
+    groups = [
+        sorted(np.flatnonzero(part == kind), key=lambda row: -is_written[row])
+        for kind in _PARTS
+        if kind in part
+    ]
     reference, combined = float(cost[groups[-1][0]]), list[Choice]()
     for chosen_rows in itertools.product(*groups):
         place = [int(row) for row in chosen_rows]
         *changed, step = cost[place].tolist()
-        total = max(sum(changed) - (len(changed) - 1) * reference, 0.2 * min([reference, *changed]))
+        total = max(
+            sum(changed) - (len(changed) - 1) * reference,
+            0.2 * min([reference, *changed]),
+        )
         error = np.nan_to_num(errors[place]).sum(axis=0)
         noise = np.sqrt(np.nansum(noises[place] ** 2, axis=0))
         bound = float(np.max(error + noise)) if np.all(members[place] > 0) else math.inf
-        combined.append(Choice((*place,), float(f"{total * step / reference:.2g}"), error, noise, bound))
+        combined.append(
+            Choice(
+                (*place,), float(f"{total * step / reference:.2g}"), error, noise, bound
+            )
+        )
     return combined
 
 
@@ -746,16 +1018,23 @@ def chosen(tried: list[Choice], tolerance: float) -> tuple[Choice, bool]:
     Of combinations that take as long, to two digits, the most accurate is used.
     """
     good = [choice for choice in tried if choice.bound <= tolerance * (1.0 + _ROUNDING)]
-    best = min(good or tried, key=lambda choice: (choice.time if good else 0.0, choice.bound))
+    best = min(
+        good or tried, key=lambda choice: (choice.time if good else 0.0, choice.bound)
+    )
     return best, bool(good)
 
 
 def _worst(error: Array, deviation: Array) -> tuple[str, int, int]:
     """Return the largest of errors (quantities, statistics) in percent, its quantity and its statistic."""
     place = int(np.argmax(np.nan_to_num(error)))
-    off, spread = 100.0 * float(np.ravel(error)[place]), 100.0 * float(np.ravel(deviation)[place])
+    off, spread = (
+        100.0 * float(np.ravel(error)[place]),
+        100.0 * float(np.ravel(deviation)[place]),
+    )
     text = concise(off, spread) if spread > 0.01 * off else f"{float(f'{off:.2g}'):.4g}"
-    return text if max(off, spread) > 100.0 * _ROUNDING else "0", *divmod(place, error.shape[1])
+    return text if max(off, spread) > 100.0 * _ROUNDING else "0", *divmod(
+        place, error.shape[1]
+    )
 
 
 def table(dataset: xr.Dataset) -> list[dict[str, str]]:
@@ -764,7 +1043,11 @@ def table(dataset: xr.Dataset) -> list[dict[str, str]]:
     columns = (dataset[name].to_numpy() for name in ("row", *_COLUMNS))
     for name, part, own, cost, members, *errors in zip(*columns, strict=True):
         duration = engineering(float(f"{cost:.2g}"), "s")
-        cells = {"changed": str(part), "setting": str(name) + " *" * int(own), "time": duration}
+        cells = {
+            "changed": str(part),
+            "setting": str(name) + " *" * int(own),
+            "time": duration,
+        }
         for symbol, error, deviation in zip(_SHORT, *errors, strict=True):
             size, _, statistic = _worst(error[np.newaxis], deviation)
             in_words = f" {STATISTICS[statistic]}" if statistic and size != "0" else ""
@@ -775,14 +1058,18 @@ def table(dataset: xr.Dataset) -> list[dict[str, str]]:
 
 def explanation(dataset: xr.Dataset) -> str:
     """Return the subject of the study and the meaning of the table's columns, in sentences."""
-    swept, left_out = dataset.attrs["swept"], dataset.attrs["left_out"].replace("\n", "; ")
+    swept, left_out = (
+        dataset.attrs["swept"],
+        dataset.attrs["left_out"].replace("\n", "; "),
+    )
     compared_values = "mean and spread over the members at all recorded times"
     if dataset.attrs.get("averaged"):
         compared_values = "means over the members and the second half of the run"
     return (
         "Each row changes one setting (* marks the scenario as written). time: CPU time of its run on one core."
         "\n(%): largest difference from a finer setting, its standard error; of ΔΓ beyond its mean in its own units."
-        + f"\nThe values of {swept} are those of the tables; choose others by --set." * bool(swept)
+        + f"\nThe values of {swept} are those of the tables; choose others by --set."
+        * bool(swept)
         + f"\nOmitted: {left_out}." * bool(left_out)
         + _larger_budget(dataset, "answers what is missing")
         + f"\nCompared: {compared_values}."
@@ -806,30 +1093,53 @@ def recommendation(dataset: xr.Dataset) -> str:
         return f"{text} recommended. See also sim check.{_larger_budget(dataset, 'tries a finer step')}"
     tolerance, tried = float(dataset.attrs["tolerance"]), choices(dataset)
     if not math.isfinite(tried[0].bound):
-        unknown = dataset.isel(row=[row for row in tried[0].rows if not dataset["members"].values[row]])
+        unknown = dataset.isel(
+            row=[row for row in tried[0].rows if not dataset["members"].values[row]]
+        )
         names = ", ".join(str(name) for name in unknown["row"].values)
         text = f"No setting is recommended, because the budget was spent before the error of {names} was known."
         return text + _larger_budget(dataset, "shows it")
     written, (best, good) = tried[0], chosen(tried, tolerance)
-    name = "It" if best is written else f"“{', '.join(dataset['row'].values[list(best.rows)])}”"
-    verdict = "is the fastest combination within" if good else "has the smallest error; none is shown to be within"
+    name = (
+        "It"
+        if best is written
+        else f"“{', '.join(dataset['row'].values[list(best.rows)])}”"
+    )
+    verdict = (
+        "is the fastest combination within"
+        if good
+        else "has the smallest error; none is shown to be within"
+    )
     cost = f"{engineering(best.time, 's')} of CPU time"
     lines = [f"The scenario as written is {_off(written)}."]
     lines.append(f"{name} {verdict} {100.0 * tolerance:.4g} %: {_off(best)}, {cost}.")
     if (factor := (2.0 * float(best.noise.max()) / tolerance) ** 2) > 1.0:
-        needed = float(f"{factor * dataset['members'].values[list(best.rows)].max():.2g}")
-        lines.append(f"About {needed:,.0f} members, {factor:.2g} times this budget, reduce the noise to half of that.")
+        needed = float(
+            f"{factor * dataset['members'].values[list(best.rows)].max():.2g}"
+        )
+        lines.append(
+            f"About {needed:,.0f} members, {factor:.2g} times this budget, reduce the noise to half of that."
+        )
     changed = [dataset.isel(row=row) for row in best.rows if row not in written.rows]
-    toml = [f"\n[{_PARTS[str(row['part'].values)][1]}]\n{row['toml'].values}" for row in changed]
+    toml = [
+        f"\n[{_PARTS[str(row['part'].values)][1]}]\n{row['toml'].values}"
+        for row in changed
+    ]
     return "\n".join([*lines, *["Write:"] * bool(toml), *toml])
 
 
 def _off(choice: Choice) -> str:
     """Return the bound of a combination's error, and the part of it that is noise, in words."""
-    size, quantity, statistic = _worst(choice.error + choice.noise, np.zeros(choice.error.shape))
+    size, quantity, statistic = _worst(
+        choice.error + choice.noise, np.zeros(choice.error.shape)
+    )
     share = float(choice.noise[quantity, statistic])
     noise = f", of which {100.0 * share:.2g} % is noise" * (share > _ROUNDING)
-    return f"off by at most {size} % ({STATISTICS[statistic]} of {_WORDS[quantity]}{noise})" if size != "0" else "exact"
+    return (
+        f"off by at most {size} % ({STATISTICS[statistic]} of {_WORDS[quantity]}{noise})"
+        if size != "0"
+        else "exact"
+    )
 
 
 def figure(dataset: xr.Dataset) -> Figure:
@@ -840,37 +1150,89 @@ def figure(dataset: xr.Dataset) -> Figure:
     """
     tolerance = float(dataset.attrs["tolerance"])
     best, _ = chosen(choices(dataset), tolerance)
-    part, is_written, cost, members, *errors = (dataset[name].to_numpy() for name in _COLUMNS)
+    part, is_written, cost, members, *errors = (
+        dataset[name].to_numpy() for name in _COLUMNS
+    )
     error, deviation = (np.nan_to_num(each).reshape(len(part), -1) for each in errors)
     at = np.arange(len(part)), error.argmax(axis=1)
-    off, bars = np.where(members > 0, error[at], np.nan), students(members) * deviation[at]
+    off, bars = (
+        np.where(members > 0, error[at], np.nan),
+        students(members) * deviation[at],
+    )
     floor = 0.1 * min([tolerance, *off[off > _ROUNDING]])
     off = np.maximum(off, floor)
     with mpl.rc_context(STYLE):
         picture, (panel,) = rows([3.0])
         for name, (words, _, color, marker) in _PARTS.items():
             if np.any(here := (part == name) & (members > 0)):
-                panel.errorbar(cost[here], off[here], bars[here], c=color, marker=marker, ms=3.6, lw=0.6, label=words)
-        panel.plot(cost[is_written == 1], off[is_written == 1], "o", c="none", mec="black", ms=7.5, label="as written")
+                panel.errorbar(
+                    cost[here],
+                    off[here],
+                    bars[here],
+                    c=color,
+                    marker=marker,
+                    ms=3.6,
+                    lw=0.6,
+                    label=words,
+                )
+        panel.plot(
+            cost[is_written == 1],
+            off[is_written == 1],
+            "o",
+            c="none",
+            mec="black",
+            ms=7.5,
+            label="as written",
+        )
         if math.isfinite(best.bound) and not dataset.attrs.get("not_converging"):
-            panel.plot(best.time, max(best.bound, floor), "*", c="black", ms=7.0, zorder=5, label="recommended")
-        panel.axhline(tolerance, color=REFERENCE, linestyle="--", linewidth=0.8, label="accepted")
+            panel.plot(
+                best.time,
+                max(best.bound, floor),
+                "*",
+                c="black",
+                ms=7.0,
+                zorder=5,
+                label="recommended",
+            )
+        panel.axhline(
+            tolerance, color=REFERENCE, linestyle="--", linewidth=0.8, label="accepted"
+        )
         if not np.any(members > 0):  # logarithmic axes need a range
-            panel.set(xlim=(0.5 * cost.min(), 2.0 * cost.max()), ylim=(0.1 * tolerance, 10.0 * tolerance))
-        panel.set(xscale="log", yscale="log", xlabel="CPU time of the run (s)", ylabel="largest error (bottom: exact)")
+            panel.set(
+                xlim=(0.5 * cost.min(), 2.0 * cost.max()),
+                ylim=(0.1 * tolerance, 10.0 * tolerance),
+            )
+        panel.set(
+            xscale="log",
+            yscale="log",
+            xlabel="CPU time of the run (s)",
+            ylabel="largest error (bottom: exact)",
+        )
         legend(panel)
     return picture
 
 
-def study(scenario: Scenario, target: Path, replace: bool, seconds: float, tolerance: float | None) -> Printed:
+def study(
+    scenario: Scenario,
+    target: Path,
+    replace: bool,
+    seconds: float,
+    tolerance: float | None,
+) -> Printed:
     """Study a scene and save dataset and figure; return the table to print and the text below it."""
     picture = target.with_suffix(".png")
     if picture == target:
-        raise BadInput([f"{target}: the dataset cannot have the name of its picture; end it in .nc"])
+        raise BadInput(
+            [
+                f"{target}: the dataset cannot have the name of its picture; end it in .nc"
+            ]
+        )
     hdf5.claim(target, replace, files_read(scenario))
     files.claim(picture, replace, files_read(scenario))
     dataset = converge(scenario, seconds, tolerance)
     with files.output(target) as beside:
         lazy.save(dataset, beside)
     save(figure(dataset), picture)
-    return table(dataset), f"{explanation(dataset)}\n\n{recommendation(dataset)}\n\n{target}\n{picture}"
+    return table(
+        dataset
+    ), f"{explanation(dataset)}\n\n{recommendation(dataset)}\n\n{target}\n{picture}"

@@ -15,9 +15,14 @@ if TYPE_CHECKING:
 
 #: Variables of a dataset that are curves of steady sliding.
 OVER_SPEED = (
-    "bond_fraction", "shear_stress", "fluctuation_energy", "work_of_adhesion", "contact_radius", "contact_area",
+    "bond_fraction",
+    "shear_stress",
+    "fluctuation_energy",
+    "work_of_adhesion",
+    "contact_radius",
+    "contact_area",
     "friction_force",
-)  # fmt: skip
+)
 #: Shares of JKR's area that follow from them.
 SHARES = {
     "area_ratio": "contact area over JKR's",
@@ -31,23 +36,43 @@ SHARES = {
 
 def curves(scenario: Scenario, speeds: Array, time: float = 0.0) -> dict[str, Array]:
     """Return the curves of ``steady_curves`` by name, arrays like ``speeds`` [m/s]."""
-    course = steady_course(scenario, np.full((len(speeds), 1), time), speeds[:, np.newaxis])
-    radii = ["jkr_radius", "bonds_radius", *(["fluctuations_radius"] if scenario.contact.reversible else [])]
+    course = steady_course(
+        scenario, np.full((len(speeds), 1), time), speeds[:, np.newaxis]
+    )
+    radii = [
+        "jkr_radius",
+        "bonds_radius",
+        *(["fluctuations_radius"] if scenario.contact.reversible else []),
+    ]
     names = (*OVER_SPEED, *radii)
-    read = {name: np.broadcast_to(READ[name](scenario, course), (len(speeds), 1))[:, 0] for name in names}
+    read = {
+        name: np.broadcast_to(READ[name](scenario, course), (len(speeds), 1))[:, 0]
+        for name in names
+    }
     full, *left = (np.pi * read.pop(name) ** 2 for name in radii)
     full = np.where(full > 0.0, full, np.nan)
     levels = [full, *left, read["contact_area"]]
     lost = ("lost_to_bonds", "lost_to_fluctuations", "lost_to_mean_stress")
     result = read | {"area_ratio": read["contact_area"] / full}
-    result |= {name: (levels[k] - levels[k + 1]) / full for k, name in enumerate(lost[: len(levels) - 1])}
-    if scenario.margin is None:  # on a disc the edge pays another energy than that on the contact
-        work = scenario.adhesion.work - scenario.fluctuations.paid_by_adhesion * course.energy
+    result |= {
+        name: (levels[k] - levels[k + 1]) / full
+        for k, name in enumerate(lost[: len(levels) - 1])
+    }
+    # on a disc the edge pays another energy than that on the contact
+    if scenario.margin is None:
+        work = (
+            scenario.adhesion.work
+            - scenario.fluctuations.paid_by_adhesion * course.energy
+        )
         control = scenario.contact.control(course.time, scenario.clock.duration)
-        alone = np.nan_to_num(control.radius(work, np.zeros(1), 0.0, scenario.bodies))[:, 0]
+        alone = np.nan_to_num(control.radius(work, np.zeros(1), 0.0, scenario.bodies))[
+            :, 0
+        ]
         result["lost_to_fluctuations_first"] = 1.0 - np.pi * alone**2 / full
         lost_to_either = result["lost_to_bonds"] + result["lost_to_fluctuations"]
-        result["lost_to_bonds_last"] = lost_to_either - result["lost_to_fluctuations_first"]
+        result["lost_to_bonds_last"] = (
+            lost_to_either - result["lost_to_fluctuations_first"]
+        )
     return result
 
 
@@ -73,9 +98,16 @@ def speeds_of_loss(scenario: Scenario, share: float, speeds: Array) -> list[floa
     from scipy import optimize
 
     def surplus(logarithm: float) -> float:
-        return float(curves(scenario, np.exp([logarithm]))["area_ratio"][0]) - (1.0 - share)
+        return float(curves(scenario, np.exp([logarithm]))["area_ratio"][0]) - (
+            1.0 - share
+        )
 
     left = curves(scenario, speeds)["area_ratio"] - (1.0 - share)
     places = np.flatnonzero((left[:-1] > 0.0) != (left[1:] > 0.0))
-    ends: Sequence[tuple[float, float]] = [(np.log(speeds[k]), np.log(speeds[k + 1])) for k in places]
-    return [float(np.exp(optimize.brentq(surplus, low, high, xtol=1e-12, rtol=1e-12))) for low, high in ends]
+    ends: Sequence[tuple[float, float]] = [
+        (np.log(speeds[k]), np.log(speeds[k + 1])) for k in places
+    ]
+    return [
+        float(np.exp(optimize.brentq(surplus, low, high, xtol=1e-12, rtol=1e-12)))
+        for low, high in ends
+    ]

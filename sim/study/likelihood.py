@@ -34,11 +34,18 @@ from sim.units.tables import names_of, read_measured
 
 #: Column, unit and symbol of what holds the sphere, by the key of the contact that prescribes it.
 MOUNT = {
-    "load": ("normal_load", "N", "P"), "indentation": ("indentation", "m", "delta"),
+    "load": ("normal_load", "N", "P"),
+    "indentation": ("indentation", "m", "delta"),
     "displacement": ("displacement", "m", "Delta"),
-}  # fmt: skip
+}
 #: What is recorded of a history, or is no measured number; and what is measured of a slider that feels its friction.
-_NOT_MEASURED = ("in_contact", "masked", "detachment_time", "dissipated_energy", "applied_load")
+_NOT_MEASURED = (
+    "in_contact",
+    "masked",
+    "detachment_time",
+    "dissipated_energy",
+    "applied_load",
+)
 #: Sizes of the contact, which are never below 0.
 _SIZES = ("contact_radius", "contact_area")
 _OF_SLIDER = ("speed", "slider_position", "spring_force")
@@ -105,32 +112,51 @@ def read(path: Path, scenario: Scenario, planned: Sequence[str] = ()) -> Measure
     """
     at, outcomes = conditions_of(scenario), outcomes_of(scenario)
     if planned:
-        outcomes = {name: quantity for name, quantity in outcomes.items() if name not in at}
+        outcomes = {
+            name: quantity for name, quantity in outcomes.items() if name not in at
+        }
     known = {name: quantity for name, (_, quantity) in at.items()} | outcomes
     result, _ = read_measured(path, known, outcomes, is_planned=bool(planned))
-    conditions = {at[name][0]: points.values for name, points in result.items() if name in at}
-    curves = tuple(Curve(name, *points) for name, points in result.items() if name not in at)
+    conditions = {
+        at[name][0]: points.values for name, points in result.items() if name in at
+    }
+    curves = tuple(
+        Curve(name, *points) for name, points in result.items() if name not in at
+    )
     unknown = np.full(len(next(iter(result.values())).values), np.nan)
     curves = curves or tuple(Curve(name, unknown, None) for name in planned)
     for fault in faults_of(scenario, conditions, curves):
         raise BadInput([f"{path}: {fault}"])
-    ranges = [f"{name} {np.min(x):.4g} to {np.max(x):.4g} {known[name].unit}" for name, (x, _) in result.items()]
+    ranges = [
+        f"{name} {np.min(x):.4g} to {np.max(x):.4g} {known[name].unit}"
+        for name, (x, _) in result.items()
+    ]
     return Measured(path, scenario.contact.kind, conditions, curves, ", ".join(ranges))
 
 
-def faults_of(scenario: Scenario, conditions: dict[str, Array], curves: tuple[Curve, ...]) -> Iterator[str]:
+def faults_of(
+    scenario: Scenario, conditions: dict[str, Array], curves: tuple[Curve, ...]
+) -> Iterator[str]:
     """Yield the faults of a table: missing conditions, curves without information and opposite signs."""
     if not curves:
         yield 'no column was measured; name one as a variable of a dataset, such as "contact_area [mm^2]"'
     drive, contact, known = scenario.drive, scenario.contact, quantities(scenario)
-    steady = {"drive.stage", "drive.force"} & known.keys() if drive.solves_motion else {"speed"} & conditions.keys()
+    steady = (
+        {"drive.stage", "drive.force"} & known.keys()
+        if drive.solves_motion
+        else {"speed"} & conditions.keys()
+    )
     varies = not steady and drive.model != "steady"
     if "t" in conditions and len(conditions.keys() & {"speed", "mount"}):
         yield "the scenario has the speed and the load at each time; omit t, or these columns"
-    elif "t" not in conditions and (not conditions or varies or ("mount" not in conditions and contact.changes)):
+    elif "t" not in conditions and (
+        not conditions or varies or ("mount" not in conditions and contact.changes)
+    ):
         yield f'no column has the conditions of each row; add "t [s]", or "speed [mm/s]" and "{MOUNT[contact.kind][0]}"'
     for name, values, errors in curves:
-        if name in ("friction_force", "shear_stress") and np.all(values * conditions.get("speed", 1.0) < 0.0):
+        if name in ("friction_force", "shear_stress") and np.all(
+            values * conditions.get("speed", 1.0) < 0.0
+        ):
             yield f"{name} needs the sign of the speed; change the sign of one of them"
         if errors is None and not np.any(values):
             yield f"{name} is 0 in all rows, so it has no scatter; give errors, or omit it"
@@ -140,25 +166,41 @@ def outcomes_of(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declarations of the variables that can be measured, by name."""
     by_run = scenario.drive.solves_motion
     return {
-        item.name: Quantity(item.unit, item.long_name, at_least=0 if item.name in _SIZES else -math.inf)
+        item.name: Quantity(
+            item.unit, item.long_name, at_least=0 if item.name in _SIZES else -math.inf
+        )
         for item in VARIABLES
-        if item.name not in _NOT_MEASURED and item.applies(scenario)
+        if item.name not in _NOT_MEASURED
+        and item.applies(scenario)
         and (item.part != "drive" or (by_run and item.name in _OF_SLIDER))
-    }  # fmt: skip
+    }
 
 
 def conditions_of(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
     """Return condition and declaration by the name of a column."""
     kind = scenario.contact.kind
-    result = {variable_name(key): (key, quantity) for key, (quantity, _) in quantities(scenario).items()}
+    result = {
+        variable_name(key): (key, quantity)
+        for key, (quantity, _) in quantities(scenario).items()
+    }
     if not scenario.drive.solves_motion:
-        result["speed"] = result["drive_speed"] = "speed", Quantity("m/s", "sliding speed", "V")
+        result["speed"] = result["drive_speed"] = (
+            "speed",
+            Quantity("m/s", "sliding speed", "V"),
+        )
     elif "drive_stage" in result:
         result["stage_speed"] = result["drive_stage"]
     column, unit, symbol = MOUNT[kind]
     mount = Quantity(unit, f"{column} of the sphere, contact.{kind}", symbol)
     result |= dict.fromkeys(names_of(column), ("mount", mount))
-    return result | {"t": ("t", Quantity("s", "time since the start", at_least=0, at_most=scenario.clock.duration))}
+    return result | {
+        "t": (
+            "t",
+            Quantity(
+                "s", "time since the start", at_least=0, at_most=scenario.clock.duration
+            ),
+        )
+    }
 
 
 class Group(NamedTuple):
@@ -176,48 +218,89 @@ class Group(NamedTuple):
 
 def groups(scenario: Scenario, table: Measured) -> list[Group]:
     """The groups of a table's rows; ``BadInput`` where a row has values that do not go together."""
-    keyed = {key: values for key, values in table.conditions.items() if key not in ("t", "speed", "mount")}
+    keyed = {
+        key: values
+        for key, values in table.conditions.items()
+        if key not in ("t", "speed", "mount")
+    }
     columns = np.array([*keyed.values()]).reshape(len(keyed), table.rows)
     result = []
     for place in np.unique(columns, axis=1, return_index=True)[1] if keyed else [0]:
         rows = np.flatnonzero(np.all(columns == columns[:, place : place + 1], axis=0))
         try:
-            item = scenario.with_values({key: float(values[place]) for key, values in keyed.items()}, built=False)
+            item = scenario.with_values(
+                {key: float(values[place]) for key, values in keyed.items()},
+                built=False,
+            )
         except BadInput as fault:
-            raise BadInput([f"{table.path}: row {place + 1}: {message}" for message in fault.problems]) from None
+            raise BadInput(
+                [
+                    f"{table.path}: row {place + 1}: {message}"
+                    for message in fault.problems
+                ]
+            ) from None
         conditions = {name: values[rows] for name, values in table.conditions.items()}
         duration, count = item.clock.duration, len(rows)
-        time = conditions.get("t", np.linspace(0.0, duration, count))  # a course of the rows, as long as the run
+        # a course of the rows, as long as the run
+        time = conditions.get("t", np.linspace(0.0, duration, count))
         if (mount := conditions.get("mount")) is not None:
-            course = float(mount[0]) if np.all(mount == mount[0]) else {"time": time, "value": mount}
+            course = (
+                float(mount[0])
+                if np.all(mount == mount[0])
+                else {"time": time, "value": mount}
+            )
             item = item.with_values({f"contact.{table.mount}": course}, built=False)
         instants = np.repeat(conditions.get("t", np.zeros(count)), 2)
-        speed = conditions.get("speed", item.drive.pieces(instants, duration).joined.last[::2])
+        speed = conditions.get(
+            "speed", item.drive.pieces(instants, duration).joined.last[::2]
+        )
         result.append(Group(item, rows, time[:, np.newaxis], speed[:, np.newaxis]))
     return result
 
 
-def by_steady_sliding(group: Group, values: Values, names: list[str], theory: str = "") -> dict[str, Array]:
+def by_steady_sliding(
+    group: Group, values: Values, names: list[str], theory: str = ""
+) -> dict[str, Array]:
     """Variables at the rows of a group with some numbers changed, in steady sliding.
 
     ``theory`` is the name of a theory of ``sim.laws.theories``. It then gives the radius instead of the contact
     balance, at the stress of the bonds and the full work of adhesion. Its numbers ``"alpha"`` and ``"lambda"`` are
     among the ``values``.
     """
-    scenario = changed(group.scenario, {key: value for key, value in values.items() if "." in key})
+    scenario = changed(
+        group.scenario, {key: value for key, value in values.items() if "." in key}
+    )
     course = steady_course(scenario, group.time, group.speed)
     if theory:
-        load, base, _ = scenario.contact.control(course.time, scenario.clock.duration).mount
+        load, base, _ = scenario.contact.control(
+            course.time, scenario.clock.duration
+        ).mount
         at_load = scenario.contact.kind == "load"
-        compare: Callable[..., dict[str, Array]] = compare_at_load if at_load else compare_at_indentation
-        numbers = {"reversible": values.get("alpha", 0.0), "mixity": values.get("lambda", 0.5)}
+        compare: Callable[..., dict[str, Array]] = (
+            compare_at_load if at_load else compare_at_indentation
+        )
+        numbers = {
+            "reversible": values.get("alpha", 0.0),
+            "mixity": values.get("lambda", 0.5),
+        }
         rest = scenario.adhesion.work, *scenario.bodies
-        radii = compare(np.abs(course.stress), load if at_load else base, *rest, **numbers, only=(theory,))
+        radii = compare(
+            np.abs(course.stress),
+            load if at_load else base,
+            *rest,
+            **numbers,
+            only=(theory,),
+        )
         course = course._replace(radius=radii[theory])
-    return {name: np.broadcast_to(READ[name](scenario, course), group.speed.shape)[:, 0] for name in names}
+    return {
+        name: np.broadcast_to(READ[name](scenario, course), group.speed.shape)[:, 0]
+        for name in names
+    }
 
 
-def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool) -> Array:
+def by_runs(
+    groups: list[Group], values: Values, names: list[str], by_time: bool
+) -> Array:
     """Return means and standard errors by the scenario's own models, with the noise of its seed: (2, names, rows).
 
     Rows with times are read along the scenario's run, and so are rows with speeds alone if the drive passes through
@@ -230,25 +313,36 @@ def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool
     """
     result = np.empty((2, len(names), sum(len(group.rows) for group in groups)))
     for group in groups:
-        scenario, is_along = group.scenario.with_values(dict(values) | {"record": {}}), by_time or _by_speed(group)
+        scenario, is_along = (
+            group.scenario.with_values(dict(values) | {"record": {}}),
+            by_time or _by_speed(group),
+        )
         still = () if is_along else enumerate(group.rows)
-        runs = [(group.rows[[k]], _still(scenario, group, k)) for k, _ in still] or [(group.rows, scenario)]
+        runs = [(group.rows[[k]], _still(scenario, group, k)) for k, _ in still] or [
+            (group.rows, scenario)
+        ]
         for rows, point in runs:
             time, speed, records = _records(point, names)
             members = records[..., np.newaxis, :, len(time) // 2 :].mean(axis=-1)
             if is_along:
                 members = _at_rows(group, by_time, time, speed, records)
-            error = members.std(axis=-1, ddof=min(members.shape[-1] - 1, 1)) / math.sqrt(members.shape[-1])
+            error = members.std(
+                axis=-1, ddof=min(members.shape[-1] - 1, 1)
+            ) / math.sqrt(members.shape[-1])
             result[..., rows] = members.mean(axis=-1), error
         if not group.scenario.drive.solves_motion:
-            result[0][:, group.rows] += [*by_steady_sliding(group, values, names).values()]
+            result[0][:, group.rows] += [
+                *by_steady_sliding(group, values, names).values()
+            ]
     return result
 
 
 def _by_speed(group: Group) -> bool:
     """Return True if a run passes through the speeds of the rows of a group, unless these have times."""
     drive = group.scenario.drive
-    return not (drive.solves_motion or drive.model == "steady" or group.scenario.contact.changes)
+    return not (
+        drive.solves_motion or drive.model == "steady" or group.scenario.contact.changes
+    )
 
 
 def _still(scenario: Scenario, group: Group, row: int) -> Scenario:
@@ -256,10 +350,14 @@ def _still(scenario: Scenario, group: Group, row: int) -> Scenario:
     mount = scenario.contact.course.at(group.time[row], scenario.clock.duration)
     steady = {"drive": {"model": "steady", "speed": float(group.speed[row, 0])}}
     drive = {} if scenario.drive.solves_motion else steady
-    return scenario.with_values(drive | {f"contact.{scenario.contact.kind}": float(mount[0])})
+    return scenario.with_values(
+        drive | {f"contact.{scenario.contact.kind}": float(mount[0])}
+    )
 
 
-def _at_rows(group: Group, by_time: bool, time: Array, speed: Array, records: Array) -> Array:
+def _at_rows(
+    group: Group, by_time: bool, time: Array, speed: Array, records: Array
+) -> Array:
     """Return values between two records, by the time of a row or by the logarithm of its speed."""
     along, at = time, group.time[:, 0]
     if not by_time:
@@ -268,12 +366,23 @@ def _at_rows(group: Group, by_time: bool, time: Array, speed: Array, records: Ar
     if along[0] > along[-1]:
         along, at = -along, -at
     near = 1e-9 * max(1.0, float(np.ptp(along)))
-    if not np.all(np.diff(along) > 0.0) or at.min() < along[0] - near or at.max() > along[-1] + near:
+    if (
+        not np.all(np.diff(along) > 0.0)
+        or at.min() < along[0] - near
+        or at.max() > along[-1] + near
+    ):
         ends = (np.abs(speed), np.abs(group.speed))
         run, data = (f"{values.min():.3g} to {values.max():.3g} m/s" for values in ends)
         cure = 'must pass each speed of the data once; widen it, or fit with [drive] model = "steady"'
-        raise BadInput([f"drive.speed: the run goes from {run}, the data from {data}; it {cure}"])
-    return np.array([np.transpose([np.interp(at, along, member) for member in members]) for members in records])
+        raise BadInput(
+            [f"drive.speed: the run goes from {run}, the data from {data}; it {cure}"]
+        )
+    return np.array(
+        [
+            np.transpose([np.interp(at, along, member) for member in members])
+            for members in records
+        ]
+    )
 
 
 def _records(point: Scenario, names: list[str]) -> tuple[Array, Array, Array]:
@@ -288,18 +397,25 @@ def _records(point: Scenario, names: list[str]) -> tuple[Array, Array, Array]:
 
     count = point.ensemble.members if any(point.varies.values()) else 1
     steps = range(0, point.clock.steps + 1, point.clock.stride)
-    speeds, *values = recorded(point, range(count), steps, [READ[name] for name in ("speed", *names)])
+    speeds, *values = recorded(
+        point, range(count), steps, [READ[name] for name in ("speed", *names)]
+    )
     times = point.times.at(np.array(steps))
     if not point.drive.solves_motion:
         alone = steady_course(point, times[:, np.newaxis], speeds[:1].T)
-        values = [members - READ[name](point, alone)[:, 0] for name, members in zip(names, values, strict=True)]
+        values = [
+            members - READ[name](point, alone)[:, 0]
+            for name, members in zip(names, values, strict=True)
+        ]
     return times, speeds[0], np.array(values)
 
 
 try:
     import lmfit
 except ModuleNotFoundError:
-    raise BadInput(["fitting needs lmfit, of an extra: pip install 'sliding-sim[fit]'"]) from None
+    raise BadInput(
+        ["fitting needs lmfit, of an extra: pip install 'sliding-sim[fit]'"]
+    ) from None
 
 
 #: Probability of an interval.
@@ -353,7 +469,12 @@ class Free(NamedTuple):
         """Change of the number as it is fitted that is a large one: an e-fold, its range, or its size without one."""
         if self.logarithmic:
             return 1.0
-        return max(self.high - self.low if math.isfinite(self.high - self.low) else abs(self.start), 1e-300)
+        return max(
+            self.high - self.low
+            if math.isfinite(self.high - self.low)
+            else abs(self.start),
+            1e-300,
+        )
 
     def inner(self, value: float) -> float:
         """The number as it is fitted."""
@@ -400,7 +521,9 @@ class Problem:
 
     @property
     def start(self) -> Array:
-        return np.array([item.inner(item.start) for item in self.free] + [0.0] * len(self.common))
+        return np.array(
+            [item.inner(item.start) for item in self.free] + [0.0] * len(self.common)
+        )
 
     @property
     def bounds(self) -> list[tuple[float, float]]:
@@ -409,44 +532,70 @@ class Problem:
 
     def numbers(self, x: Array) -> dict[str, float]:
         """Return the values of the free keys and of those that make the mechanism."""
-        return {item.key: item.outer(float(value)) for item, value in zip(self.free, x, strict=False)} | {**self.fixed}
+        return {
+            item.key: item.outer(float(value))
+            for item, value in zip(self.free, x, strict=False)
+        } | {**self.fixed}
 
     def of_table(self, x: Array, table: int) -> dict[str, float]:
         """Return the values of the keys in a table, and of those that make the mechanism."""
-        numbers = [item.outer(float(value)) for item, value in zip(self.free, x, strict=False)]
+        numbers = [
+            item.outer(float(value)) for item, value in zip(self.free, x, strict=False)
+        ]
         for k, item in enumerate(self.free):
             if item.base >= 0:
                 base = self.free[item.base]
-                numbers[k] = min(max(item.related(numbers[item.base], float(x[k])), base.low), base.high)
+                numbers[k] = min(
+                    max(item.related(numbers[item.base], float(x[k])), base.low),
+                    base.high,
+                )
         applied = zip(self.free, numbers, strict=True)
-        return {item.name: value for item, value in applied if item.table in (-1, table)} | {**self.fixed}
+        return {
+            item.name: value for item, value in applied if item.table in (-1, table)
+        } | {**self.fixed}
 
     def steady(self, x: Array) -> Array:
         """Return all curves in steady sliding, or by runs."""
         if self.by_run:
             return self.sampled(x)[0]
         result = []
-        for k, (table, table_groups) in enumerate(zip(self.tables, self.groups, strict=True)):
-            numbers, columns = self.of_table(x, k), np.empty((len(table.curves), table.rows))
+        for k, (table, table_groups) in enumerate(
+            zip(self.tables, self.groups, strict=True)
+        ):
+            numbers, columns = (
+                self.of_table(x, k),
+                np.empty((len(table.curves), table.rows)),
+            )
             for group in table_groups:
-                columns[:, group.rows] = [*by_steady_sliding(group, numbers, table.names, self.theory).values()]
+                columns[:, group.rows] = [
+                    *by_steady_sliding(
+                        group, numbers, table.names, self.theory
+                    ).values()
+                ]
             result.append(columns.ravel())
         return np.concatenate(result)
 
     def sampled(self, x: Array) -> Array:
         """Return all curves by the scenario's own models and their standard errors, shape (2, numbers)."""
         tables = zip(range(len(self.tables)), self.tables, self.groups, strict=True)
-        runs = [by_runs(rows, self.of_table(x, k), table.names, "t" in table.conditions) for k, table, rows in tables]
+        runs = [
+            by_runs(rows, self.of_table(x, k), table.names, "t" in table.conditions)
+            for k, table, rows in tables
+        ]
         return np.concatenate([rows.reshape(2, -1) for rows in runs], axis=1)
 
     def predicted(self, x: Array) -> Array:
         """All curves, with the shift and the common errors."""
         result = self.steady(x) + self.shift
         for k, (name, size) in enumerate(self.common.items()):
-            result = np.where(self.of(name), result * (1.0 + size * x[len(self.free) + k]), result)
+            result = np.where(
+                self.of(name), result * (1.0 + size * x[len(self.free) + k]), result
+            )
         return result
 
-    def between(self, x: Array, table: int, name: str, rows: NDArray[np.int64]) -> tuple[Array, Array] | None:
+    def between(
+        self, x: Array, table: int, name: str, rows: NDArray[np.int64]
+    ) -> tuple[Array, Array] | None:
         """Return speeds between those of rows that differ in nothing else, and their curve in steady sliding.
 
         There is no curve by runs, or if a row is at rest.
@@ -456,22 +605,46 @@ class Problem:
         if self.by_run or not np.min(speeds) > 0.0:
             return None
         fine = np.geomspace(np.min(speeds), np.max(speeds), _DRAWN)[:, np.newaxis]
-        course = group._replace(rows=np.arange(_DRAWN), time=group.time[k] + 0.0 * fine, speed=fine)
-        return fine[:, 0], by_steady_sliding(course, self.of_table(x, table), [name], self.theory)[name]
+        course = group._replace(
+            rows=np.arange(_DRAWN), time=group.time[k] + 0.0 * fine, speed=fine
+        )
+        return fine[:, 0], by_steady_sliding(
+            course, self.of_table(x, table), [name], self.theory
+        )[name]
 
     def conditions(self) -> dict[str, tuple[Quantity, list[Array]]]:
         """Return the conditions but time that some table names, by key, with the values at the rows of each table.
 
         They are nan along a run over time, and those of the scenario if a table does not name the condition.
         """
-        declared, result = dict(conditions_of(self.groups[0][0].scenario).values()), dict[str, Any]()
-        for key in (key for table in self.tables for key in table.conditions if key != "t"):
-            result[key] = declared[key], [np.full(table.rows, np.nan) for table in self.tables]
-            for values, table, groups in zip(result[key][1], self.tables, self.groups, strict=True):
+        declared, result = (
+            dict(conditions_of(self.groups[0][0].scenario).values()),
+            dict[str, Any](),
+        )
+        for key in (
+            key for table in self.tables for key in table.conditions if key != "t"
+        ):
+            result[key] = (
+                declared[key],
+                [np.full(table.rows, np.nan) for table in self.tables],
+            )
+            for values, table, groups in zip(
+                result[key][1], self.tables, self.groups, strict=True
+            ):
                 for group in () if "t" in table.conditions else groups:
-                    course, duration = group.scenario.contact.course, group.scenario.clock.duration
-                    of_course = {"speed": group.speed[:, 0], "mount": course.at(group.time[:, 0], duration)}
-                    values[group.rows] = of_course[key] if key in of_course else quantities(group.scenario)[key][1]
+                    course, duration = (
+                        group.scenario.contact.course,
+                        group.scenario.clock.duration,
+                    )
+                    of_course = {
+                        "speed": group.speed[:, 0],
+                        "mount": course.at(group.time[:, 0], duration),
+                    }
+                    values[group.rows] = (
+                        of_course[key]
+                        if key in of_course
+                        else quantities(group.scenario)[key][1]
+                    )
         return result
 
     @property
@@ -486,7 +659,12 @@ class Problem:
     def at(self, number: int) -> tuple[int, str, int]:
         """Return the table, the variable and the row of one of all numbers."""
         curve = self.curve[number]
-        table = int(np.repeat(np.arange(len(self.tables)), [len(table.curves) for table in self.tables])[curve])
+        table = int(
+            np.repeat(
+                np.arange(len(self.tables)),
+                [len(table.curves) for table in self.tables],
+            )[curve]
+        )
         return table, self.names[curve], number - int(np.argmax(self.curve == curve))
 
     def place(self, number: int) -> str:
@@ -502,7 +680,10 @@ class Problem:
     def residuals(self, x: Array) -> Array:
         """Deviations over errors, and the common errors over their sizes."""
         off = (self.values - self.predicted(x)) / np.hypot(self.sigma, self.noise)
-        return np.append(np.nan_to_num(off, nan=_OPEN, posinf=_OPEN, neginf=-_OPEN), x[len(self.free) :])
+        return np.append(
+            np.nan_to_num(off, nan=_OPEN, posinf=_OPEN, neginf=-_OPEN),
+            x[len(self.free) :],
+        )
 
     @property
     def freedom(self) -> int:
@@ -512,7 +693,11 @@ class Problem:
     def criterion(self, chi_square: float) -> float:
         """Akaike's criterion for few points, AICc."""
         count = len(self.free) + len({*self.curve[self.estimated].tolist()})
-        size = chi_square + 2.0 * float(np.sum(np.log(self.sigma[self.estimated]))) + 2.0 * count
+        size = (
+            chi_square
+            + 2.0 * float(np.sum(np.log(self.sigma[self.estimated])))
+            + 2.0 * count
+        )
         left = len(self.values) - count - 1
         return size + 2.0 * count * (count + 1) / left if left > 0 else math.inf
 
@@ -520,7 +705,11 @@ class Problem:
         """Return this problem with the shift from steady sliding at x to the scenario's own models there."""
         mean, noise = self.sampled(x)
         for number in np.flatnonzero(~np.isfinite(mean)):
-            raise BadInput([f"{self.place(int(number))} has no value in a run of the fit: is the contact open there?"])
+            raise BadInput(
+                [
+                    f"{self.place(int(number))} has no value in a run of the fit: is the contact open there?"
+                ]
+            )
         return replace(self, shift=mean - self.steady(x), noise=noise)
 
 
@@ -530,19 +719,30 @@ def lag(problem: Problem, x: Array) -> str:
     It is that where the run adds most to steady sliding, from a run at this speed: fluctuations add to it as well.
     """
     passing = [
-        number for number, (table, _, row) in enumerate(map(problem.at, range(len(problem.values))))
-        if "t" not in problem.tables[table].conditions and _by_speed(problem.group(table, row)[0])
-    ]  # fmt: skip
+        number
+        for number, (table, _, row) in enumerate(
+            map(problem.at, range(len(problem.values)))
+        )
+        if "t" not in problem.tables[table].conditions
+        and _by_speed(problem.group(table, row)[0])
+    ]
     if not passing:
         return ""
     ramp = problem.steady(x) + problem.shift
-    added = np.abs(ramp - replace(problem, by_run=False).steady(x)) / np.hypot(problem.sigma, problem.noise)
+    added = np.abs(ramp - replace(problem, by_run=False).steady(x)) / np.hypot(
+        problem.sigma, problem.noise
+    )
     number = max(passing, key=added.__getitem__)
     if added[number] <= 1.0:
         return ""
     table, name, row = problem.at(number)
     group, k = problem.group(table, row)
-    alone = Group(_still(group.scenario, group, k), np.zeros(1, int), group.time[[k]], group.speed[[k]])
+    alone = Group(
+        _still(group.scenario, group, k),
+        np.zeros(1, int),
+        group.time[[k]],
+        group.speed[[k]],
+    )
     mean, noise = by_runs([alone], problem.of_table(x, table), [name], False)[:, 0, 0]
     off = ramp[number] - mean
     error = math.hypot(problem.sigma[number], 2.0 * noise, 2.0 * problem.noise[number])
@@ -563,7 +763,11 @@ class Minimum(NamedTuple):
 
 
 def minimum(
-    problem: Problem, start: Array, fixed: dict[int, float] | None = None, errors: bool = False, precision: float = 1e-8
+    problem: Problem,
+    start: Array,
+    fixed: dict[int, float] | None = None,
+    errors: bool = False,
+    precision: float = 1e-8,
 ) -> Minimum:
     """The least sum of squares near a start, with some numbers fixed, to a relative precision."""
     fixed, bounds = dict(fixed or {}), problem.bounds
@@ -574,12 +778,14 @@ def minimum(
                 fixed[base] = low
     parameters = lmfit.Parameters()
     for k, (low, high) in enumerate(bounds):
-        room = 1e-3 * (high - low) if math.isfinite(high - low) else 0.0  # at a bound no step has an effect
+        # at a bound no step has an effect
+        room = 1e-3 * (high - low) if math.isfinite(high - low) else 0.0
         if k in fixed:
             parameters.add(f"p{k}", value=fixed[k], vary=False)
             continue
         value = min(max(start[k], low + room), high - room)
-        if abs(value - 0.5 * (low + high)) < _BESIDE * room:  # in the middle its steps are none
+        # in the middle its steps are none
+        if abs(value - 0.5 * (low + high)) < _BESIDE * room:
             value = 0.5 * (low + high) + _BESIDE * room
         parameters.add(f"p{k}", value=value, min=low, max=high)
 
@@ -589,14 +795,26 @@ def minimum(
     if len(fixed) == len(parameters):
         x = numbers(parameters)
         return Minimum(x, float(np.sum(problem.residuals(x) ** 2)), None, True)
-    options: dict[str, Any] = {"calc_covar": errors, "scale_covar": False, "max_nfev": _EVALUATIONS * (len(start) + 1)}
-    if problem.by_run:  # steps of the minimizer's own would be lost in the rounding of a run
-        varied, precision = [k for k in range(len(parameters)) if k not in fixed], _RUN_PRECISION
+    options: dict[str, Any] = {
+        "calc_covar": errors,
+        "scale_covar": False,
+        "max_nfev": _EVALUATIONS * (len(start) + 1),
+    }
+    # steps of the minimizer's own would be lost in the rounding of a run
+    if problem.by_run:
+        varied, precision = (
+            [k for k in range(len(parameters)) if k not in fixed],
+            _RUN_PRECISION,
+        )
         options["Dfun"] = lambda current: derivatives(problem, numbers(current), varied)
-    minimizer = lmfit.Minimizer(lambda current: problem.residuals(numbers(current)), parameters, **options)
+    minimizer = lmfit.Minimizer(
+        lambda current: problem.residuals(numbers(current)), parameters, **options
+    )
     result = minimizer.leastsq(ftol=precision, xtol=precision)
     covariance = getattr(result, "covar", None) if errors else None
-    return Minimum(numbers(result.params), float(result.chisqr), covariance, bool(result.success))
+    return Minimum(
+        numbers(result.params), float(result.chisqr), covariance, bool(result.success)
+    )
 
 
 def with_errors(problem: Problem, start: Array) -> tuple[Problem, Minimum]:
@@ -619,35 +837,57 @@ def idle(problem: Problem) -> list[str]:
     """Free keys that have no effect on the curves."""
     if not problem.free:  # as of a mechanism that has none of the keys
         return []
-    sizes = np.sqrt(np.sum(derivatives(problem, problem.start, range(len(problem.free))) ** 2, axis=0))
+    sizes = np.sqrt(
+        np.sum(
+            derivatives(problem, problem.start, range(len(problem.free))) ** 2, axis=0
+        )
+    )
     least = _NO_EFFECT * math.sqrt(len(problem.values))
-    return [item.key for item, size in zip(problem.free, sizes, strict=True) if size < least]
+    return [
+        item.key for item, size in zip(problem.free, sizes, strict=True) if size < least
+    ]
 
 
 def entangled(problem: Problem) -> list[list[str]]:
     """Sets of free keys that the curves depend on only together, as on their product."""
     count, spaces = len(problem.free), []
-    for share in (0.05, 0.16):  # off the bounds, and what holds at two places is no accident of one
-        inside = [x + share * (0.5 * (low + high) - x) if math.isfinite(high - low) else x
-                  for x, (low, high) in zip(problem.start, problem.bounds, strict=True)]  # fmt: skip
+    # off the bounds, and what holds at two places is no accident of one
+    for share in (0.05, 0.16):
+        inside = [
+            x + share * (0.5 * (low + high) - x) if math.isfinite(high - low) else x
+            for x, (low, high) in zip(problem.start, problem.bounds, strict=True)
+        ]
         columns = derivatives(problem, np.array(inside), range(count))
-        _, sizes, rows = np.linalg.svd(columns / np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300))
+        _, sizes, rows = np.linalg.svd(
+            columns / np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300)
+        )
         nothing = (_RUN_NOTHING if problem.by_run else _NOTHING) * sizes[0]
-        spaces.append([rows[k] for k in range(count) if k >= len(sizes) or sizes[k] < nothing])
+        spaces.append(
+            [rows[k] for k in range(count) if k >= len(sizes) or sizes[k] < nothing]
+        )
     if not all(spaces):
         return []
-    return [[problem.free[k].key for k in range(count) if abs(row[k]) > 0.1] for row in spaces[0]]
+    return [
+        [problem.free[k].key for k in range(count) if abs(row[k]) > 0.1]
+        for row in spaces[0]
+    ]
 
 
 def refuse_undetermined(problem: Problem) -> None:
     """Raise ``BadInput`` if curves do not depend on a free key, or on some only together."""
     faults, split = [], any(item.table >= 0 for item in problem.free)
     for name, _, table in (key.partition(" (") for key in idle(problem)):
-        option, place = ("--per-table", f" in {table[:-1]}") if table else ("--free", "")
-        faults.append(f"{option} {name}: has no effect on what was measured{place}; fix it")
+        option, place = (
+            ("--per-table", f" in {table[:-1]}") if table else ("--free", "")
+        )
+        faults.append(
+            f"{option} {name}: has no effect on what was measured{place}; fix it"
+        )
     for keys in [] if faults else entangled(problem):
         options = "--free" + " and --per-table" * split
-        faults.append(f"{options} {', '.join(keys)}: the curves depend on them only together; free one of them")
+        faults.append(
+            f"{options} {', '.join(keys)}: the curves depend on them only together; free one of them"
+        )
     if faults:
         raise BadInput(faults)
 
@@ -660,7 +900,9 @@ def derivatives(problem: Problem, x: Array, places: Iterable[int]) -> Array:
         step = share * (1.0 if k >= len(problem.free) else problem.free[k].width)
         up, down = x.copy(), x.copy()
         up[k], down[k] = min(x[k] + step, high), max(x[k] - step, low)
-        columns.append((problem.residuals(up) - problem.residuals(down)) / (up[k] - down[k]))
+        columns.append(
+            (problem.residuals(up) - problem.residuals(down)) / (up[k] - down[k])
+        )
     return np.array(columns).T
 
 
@@ -680,16 +922,29 @@ def interval(problem: Problem, best: Minimum, k: int) -> Interval:
     it, and it widens all intervals by an estimated variance even if the errors are known.
     """
     estimated = problem.estimated.any()
-    rise = math.sqrt(stats.f.ppf(LEVEL, 1, problem.freedom) if estimated else stats.chi2.ppf(LEVEL, 1))
-    (low, low_open), (high, high_open) = (_end(problem, best, k, sign, rise) for sign in (-1.0, 1.0))
-    return Interval(problem.free[k].outer(low), problem.free[k].outer(high), low_open, high_open)
+    rise = math.sqrt(
+        stats.f.ppf(LEVEL, 1, problem.freedom)
+        if estimated
+        else stats.chi2.ppf(LEVEL, 1)
+    )
+    (low, low_open), (high, high_open) = (
+        _end(problem, best, k, sign, rise) for sign in (-1.0, 1.0)
+    )
+    return Interval(
+        problem.free[k].outer(low), problem.free[k].outer(high), low_open, high_open
+    )
 
 
-def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> tuple[float, bool]:
+def _end(
+    problem: Problem, best: Minimum, k: int, sign: float, rise: float
+) -> tuple[float, bool]:
     """Return one end of an interval, and True if it is only the bound of the number."""
     assert best.covariance is not None
     lowest, highest = np.transpose(problem.bounds)
-    bound, spread = (lowest if sign < 0.0 else highest)[k], math.sqrt(best.covariance[k, k])
+    bound, spread = (
+        (lowest if sign < 0.0 else highest)[k],
+        math.sqrt(best.covariance[k, k]),
+    )
     along = best.covariance[:, k] / spread  # where the rest goes with this number
     base = problem.free[item.base] if (item := problem.free[k]).base >= 0 else None
     room, near, far, start = abs(bound - best.x[k]), 0.0, rise * spread, best.x
@@ -701,16 +956,25 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
         if distance == 0.0:
             return -rise
         number = bound if distance == room else best.x[k] + sign * distance
-        starts = np.array([start, best.x + along * (number - best.x[k]) / spread, best.x, best.x])
+        starts = np.array(
+            [start, best.x + along * (number - best.x[k]) / spread, best.x, best.x]
+        )
         starts[:, k] = number
         if base:  # in the last start the other value is kept instead of the base
             other = item.related(base.outer(best.x[item.base]), best.x[k])
-            starts[-1, item.base] = base.inner(min(max(item.related(other, -number), base.low), base.high))
+            starts[-1, item.base] = base.inner(
+                min(max(item.related(other, -number), base.low), base.high)
+            )
         # if the data do not bound a number, the straight way to it leads out of the bounds
         guesses = [*np.clip(starts, lowest, highest)]
         if not base:
-            guesses = [min(guesses[:2], key=lambda x: float(np.sum(problem.residuals(x) ** 2)))]
-        minima = [minimum(problem, guess, {k: number}, precision=_END_SQUARES) for guess in guesses]
+            guesses = [
+                min(guesses[:2], key=lambda x: float(np.sum(problem.residuals(x) ** 2)))
+            ]
+        minima = [
+            minimum(problem, guess, {k: number}, precision=_END_SQUARES)
+            for guess in guesses
+        ]
         result = min(minima, key=lambda item: item.chi_square)
         root, start = math.sqrt(max(result.chi_square - best.chi_square, 0.0)), result.x
         return 0.0 if abs(root / rise - 1.0) < _END else root - rise
@@ -718,7 +982,9 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
     for _ in range(_MOST):
         far = min(far, room)
         if above(far) >= 0.0:
-            near = optimize.brentq(above, near, far, rtol=_END, maxiter=_MOST, disp=False)
+            near = optimize.brentq(
+                above, near, far, rtol=_END, maxiter=_MOST, disp=False
+            )
             return best.x[k] + sign * near, False
         if far == room:
             return bound, True
@@ -727,43 +993,104 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
     return math.nan, True
 
 
-def with_one_value(problem: Problem, best: Minimum, places: Sequence[int]) -> tuple[Problem, list[Array]]:
+def with_one_value(
+    problem: Problem, best: Minimum, places: Sequence[int]
+) -> tuple[Problem, list[Array]]:
     """Return the problem in which neighbouring numbers, one of each table, are a single one, and starts for it."""
     first, merged, x = places[0], [*problem.free], best.x
-    merged[first : places[-1] + 1] = [merged[first]._replace(key=merged[first].name, table=-1)]
+    merged[first : places[-1] + 1] = [
+        merged[first]._replace(key=merged[first].name, table=-1)
+    ]
     values = [float(np.mean(x[list(places)])), *x[list(places)]]
-    starts = [np.where(np.isin(np.arange(len(x)), places), value, x) for value in values]
-    return replace(problem, free=merged), [np.delete(start, places[1:]) for start in starts]
+    starts = [
+        np.where(np.isin(np.arange(len(x)), places), value, x) for value in values
+    ]
+    return replace(problem, free=merged), [
+        np.delete(start, places[1:]) for start in starts
+    ]
 
 
-def with_difference(problem: Problem, best: Minimum, k: int, base: int, is_ratio: bool) -> tuple[Problem, Minimum]:
+def with_difference(
+    problem: Problem, best: Minimum, k: int, base: int, is_ratio: bool
+) -> tuple[Problem, Minimum]:
     """Return the problem and its minimum if a number k of a table is fitted by its ratio or difference to another."""
-    item, free, x, slopes = problem.free[k], [*problem.free], best.x.copy(), np.eye(len(best.x))
+    item, free, x, slopes = (
+        problem.free[k],
+        [*problem.free],
+        best.x.copy(),
+        np.eye(len(best.x)),
+    )
     value, reference = item.outer(float(x[k])), item.outer(float(x[base]))
     table, other = (problem.tables[problem.free[j].table].path.stem for j in (k, base))
-    quantity, start, low, high = item.quantity, 0.0, item.low - item.high, item.high - item.low
-    x[k], slopes[k, [k, base]] = value - reference, (value, -reference) if item.logarithmic else (1.0, -1.0)
+    quantity, start, low, high = (
+        item.quantity,
+        0.0,
+        item.low - item.high,
+        item.high - item.low,
+    )
+    x[k], slopes[k, [k, base]] = (
+        value - reference,
+        (value, -reference) if item.logarithmic else (1.0, -1.0),
+    )
     if is_ratio:
-        quantity, start, low, high = Quantity("1", "ratio"), 1.0, item.low / item.high, item.high / item.low
+        quantity, start, low, high = (
+            Quantity("1", "ratio"),
+            1.0,
+            item.low / item.high,
+            item.high / item.low,
+        )
         x[k], slopes[k, [k, base]] = math.log(value / reference), (1.0, -1.0)
     name = f"{item.name} ({table} {'/' if is_ratio else '-'} {other})"
     free[k] = Free(name, quantity, start, low, high, item.table, base)
-    covariance = None if best.covariance is None else slopes @ best.covariance @ slopes.T
+    covariance = (
+        None if best.covariance is None else slopes @ best.covariance @ slopes.T
+    )
     return replace(problem, free=free), best._replace(x=x, covariance=covariance)
 
 
-def problem_of(scenario: Scenario, tables: Sequence[Measured], free: list[Free], common: dict[str, float]) -> Problem:
+def problem_of(
+    scenario: Scenario,
+    tables: Sequence[Measured],
+    free: list[Free],
+    common: dict[str, float],
+) -> Problem:
     """Return the problem of some tables; ``BadInput`` if they hold fewer numbers than are free."""
     curves = [curve for table in tables for curve in table.curves]
     names = [curve.name for curve in curves]
     for name in common.keys() - names:
-        raise BadInput([f"--common {name}: no such curve; measured: {', '.join(names)}"])
+        raise BadInput(
+            [f"--common {name}: no such curve; measured: {', '.join(names)}"]
+        )
     values = np.concatenate([curve.values for curve in curves])
     if len(values) <= len(free):
         cure = "measure more, or free fewer keys"
-        raise BadInput([f"{tables[0].path}: measured numbers: {len(values)}, free keys: {len(free)}; {cure}"])
+        raise BadInput(
+            [
+                f"{tables[0].path}: measured numbers: {len(values)}, free keys: {len(free)}; {cure}"
+            ]
+        )
     number = np.repeat(np.arange(len(curves)), [len(curve.values) for curve in curves])
-    sigma = [np.full_like(c.values, 0.01 * np.abs(c.values).max()) if c.errors is None else c.errors for c in curves]
-    estimated, zero = np.array([curve.errors is None for curve in curves])[number], np.zeros(len(values))
+    sigma = [
+        np.full_like(c.values, 0.01 * np.abs(c.values).max())
+        if c.errors is None
+        else c.errors
+        for c in curves
+    ]
+    estimated, zero = (
+        np.array([curve.errors is None for curve in curves])[number],
+        np.zeros(len(values)),
+    )
     rows = [groups(scenario, table) for table in tables]
-    return Problem(tables, rows, free, common, values, np.concatenate(sigma), number, estimated, zero, zero, {})
+    return Problem(
+        tables,
+        rows,
+        free,
+        common,
+        values,
+        np.concatenate(sigma),
+        number,
+        estimated,
+        zero,
+        zero,
+        {},
+    )

@@ -32,7 +32,9 @@ _SPREAD, _AROUND, _STARTS = 8, 3.0, 12
 #: What rejects a mechanism: probability of a ratio at least as large, and difference of AICc.
 RARE, WORSE = 0.05, 4.0
 
-_ALPHA = Free("alpha", Quantity("1", "reversible share", at_least=0, at_most=1), 0.1, 0.0, 1.0)
+_ALPHA = Free(
+    "alpha", Quantity("1", "reversible share", at_least=0, at_most=1), 0.1, 0.0, 1.0
+)
 _LAMBDA = Free("lambda", Quantity("1", "mixity", at_least=0, at_most=1), 0.5, 0.0, 1.0)
 #: Theories by their name in ``sim.laws.theories``: words, and numbers of their own.
 _THEORIES: dict[str, tuple[str, tuple[Free, ...]]] = {
@@ -101,11 +103,15 @@ class Search:
 
     def _curve(self, place: Array) -> Array:
         """Return all curves in standard errors, and the common errors in their sizes."""
-        return np.append(self.problem.predicted(place) / self.error, place[len(self.problem.free) :])
+        return np.append(
+            self.problem.predicted(place) / self.error, place[len(self.problem.free) :]
+        )
 
     def _sums(self, values: Array) -> Array:
         """Return the sums of squares of some values at all known places."""
-        off = self.curves - np.append(values / self.error, np.zeros(len(self.problem.common)))
+        off = self.curves - np.append(
+            values / self.error, np.zeros(len(self.problem.common))
+        )
         return np.sum(np.nan_to_num(off, nan=_FAR) ** 2, axis=1)
 
     def _from(self, values: Array, starts: Sequence[int], precision: float) -> Minimum:
@@ -130,13 +136,18 @@ class Search:
         starts = list(range(self.given))
         for k in np.argsort(self._sums(values), kind="stable").tolist():
             off = np.nan_to_num(self.curves[starts] - self.curves[k], nan=_FAR)
-            if len(starts) < self.given + _STARTS and np.all(np.sum(off**2, axis=1) > _APART**2):
+            if len(starts) < self.given + _STARTS and np.all(
+                np.sum(off**2, axis=1) > _APART**2
+            ):
                 starts.append(k)
         return self._from(values, starts, 1e-8)
 
     def reaches(self, values: Array, level: float) -> bool:
         """Return True if the least sum of squares for simulated values is at most a level."""
-        return level >= 0.0 and bool(np.min(self._sums(values)) <= level or self.least(values).chi_square <= level)
+        return level >= 0.0 and bool(
+            np.min(self._sums(values)) <= level
+            or self.least(values).chi_square <= level
+        )
 
 
 def _spread(problem: Problem) -> Array:
@@ -144,21 +155,35 @@ def _spread(problem: Problem) -> Array:
     count = len(problem.bounds)
     if not count:
         return np.empty((0, 0))
-    widths = [_AROUND * item.width for item in problem.free] + [_AROUND] * len(problem.common)
+    widths = [_AROUND * item.width for item in problem.free] + [_AROUND] * len(
+        problem.common
+    )
     bounds = zip(problem.bounds, problem.start, widths, strict=True)
-    ends = [(max(low, x - width), min(high, x + width)) if math.isinf(high - low) else (low, high)
-            for (low, high), x, width in bounds]  # fmt: skip
+    ends = [
+        (max(low, x - width), min(high, x + width))
+        if math.isinf(high - low)
+        else (low, high)
+        for (low, high), x, width in bounds
+    ]
     # scipy has the name rng since 1.15 only
-    shares = qmc.Sobol(count, seed=np.random.default_rng(0)).random_base2(min(4 + 2 * count, _SPREAD))
+    shares = qmc.Sobol(count, seed=np.random.default_rng(0)).random_base2(
+        min(4 + 2 * count, _SPREAD)
+    )
     return qmc.scale(shares, *np.transpose(ends))
 
 
-def draws_of(problem: Problem, expected: Array, rng: np.random.Generator) -> Iterator[Array]:
+def draws_of(
+    problem: Problem, expected: Array, rng: np.random.Generator
+) -> Iterator[Array]:
     """Yield curves with random errors, those that all points of a variable share included."""
     while True:
-        values = expected + np.hypot(problem.sigma, problem.noise) * rng.standard_normal(len(expected))
+        values = expected + np.hypot(
+            problem.sigma, problem.noise
+        ) * rng.standard_normal(len(expected))
         for name, size in problem.common.items():
-            values = np.where(problem.of(name), values * (1.0 + size * rng.standard_normal()), values)
+            values = np.where(
+                problem.of(name), values * (1.0 + size * rng.standard_normal()), values
+            )
         yield values
 
 
@@ -175,20 +200,43 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
         Curves drawn for each mechanism.
     """
     whole = Search(problem, [best.x])
-    fits = [(WHOLE, whole, min(best, whole.exact(problem.values), key=lambda item: item.chi_square))]
+    fits = [
+        (
+            WHOLE,
+            whole,
+            min(best, whole.exact(problem.values), key=lambda item: item.chi_square),
+        )
+    ]
     for name, other in others(problem):
         search = Search(other, _starts(other))
         fits.append((name, search, search.exact(problem.values)))
-    best, criteria = fits[0][2], [item.problem.criterion(least.chi_square) for _, item, least in fits]
+    best, criteria = (
+        fits[0][2],
+        [item.problem.criterion(least.chi_square) for _, item, least in fits],
+    )
     worst = min(criteria) + _HOPELESS
     judged = []
-    for place, ((name, item, least), aicc) in enumerate(zip(fits, criteria, strict=True)):
+    for place, ((name, item, least), aicc) in enumerate(
+        zip(fits, criteria, strict=True)
+    ):
         p_value, rejected = math.nan, place > 0
         if place and aicc < worst:
             rng = np.random.default_rng([seed, place])
             p_value = _p_value(item, least, whole, best, rng, draws)
-            rejected = p_value <= RARE and aicc - (criteria[0] if name in PARTS else min(criteria)) >= WORSE
-        judged.append(Judged(name, item.problem.numbers(least.x), least.chi_square, aicc, p_value, rejected))
+            rejected = (
+                p_value <= RARE
+                and aicc - (criteria[0] if name in PARTS else min(criteria)) >= WORSE
+            )
+        judged.append(
+            Judged(
+                name,
+                item.problem.numbers(least.x),
+                least.chi_square,
+                aicc,
+                p_value,
+                rejected,
+            )
+        )
     sufficient, words = _verdict(judged)
     return Verdict(tuple(sorted(judged, key=lambda item: item.aicc)), sufficient, words)
 
@@ -197,15 +245,24 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
     """Return the mechanism that is sufficient, "" if the data cannot tell, and that in words."""
     whole, *others = judged
     if not others:
-        return ("", "there is no other mechanism to compare with; give bonds a stress or a [shear] that fluctuates")
+        return (
+            "",
+            "there is no other mechanism to compare with; give bonds a stress or a [shear] that fluctuates",
+        )
     if math.isinf(whole.aicc):
-        return "", f"the data cannot tell: AICc of {WHOLE} needs two more points than free keys; measure more"
+        return (
+            "",
+            f"the data cannot tell: AICc of {WHOLE} needs two more points than free keys; measure more",
+        )
     left = [item for item in others if not item.rejected]
     if not left:
         return WHOLE, f"the data prefer {WHOLE}: every other mechanism is rejected"
     first, ahead = left[0], whole.aicc - left[0].aicc
     if len(left) > 1 or (first.name not in PARTS and ahead < WORSE):
-        return "", f"the data cannot tell: not rejected are {WHOLE}, {', '.join(item.name for item in left)}"
+        return (
+            "",
+            f"the data cannot tell: not rejected are {WHOLE}, {', '.join(item.name for item in left)}",
+        )
     evidence = f"(p = {first.p_value:.2g}, AICc {-ahead:+.2g} from {WHOLE})"
     words = f"the data prefer {first.name} {evidence} and reject the others"
     if first.name in PARTS:
@@ -215,15 +272,27 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
 
 def others(problem: Problem) -> Iterator[tuple[str, Problem]]:
     """Mechanisms beside the scenario as it is, each with the keys that it has."""
-    scene, known = problem.groups[0][0].scenario, quantities(problem.groups[0][0].scenario)
+    scene, known = (
+        problem.groups[0][0].scenario,
+        quantities(problem.groups[0][0].scenario),
+    )
     still = {"shear.paid_by_adhesion": 0.0} if "shear.paid_by_adhesion" in known else {}
     share = {"adhesion.bond_share": 0.0}
     is_bonded = scene.adhesion.bond_share > 0.0 and scene.population.carries_stress
-    if is_bonded and "shear.paid_by_adhesion" in known and scene.fluctuations.paid_by_adhesion > 0.0:
+    if (
+        is_bonded
+        and "shear.paid_by_adhesion" in known
+        and scene.fluctuations.paid_by_adhesion > 0.0
+    ):
         yield "bonds only", _less(problem, still, "shear.")
         yield "fluctuations only", _less(problem, share, "adhesion.bond_share")
-    if scene.contact.kind == "displacement" or not scene.population.carries_stress or problem.by_run:
-        return  # theories are of a load or an indentation, of a stress, and of equilibrium
+    if (
+        scene.contact.kind == "displacement"
+        or not scene.population.carries_stress
+        or problem.by_run
+    ):
+        # theories are of a load or an indentation, of a stress, and of equilibrium
+        return
     for theory, (words, more) in _THEORIES.items():
         other = _less(problem, still | share, "shear.", "adhesion.bond_share")
         yield words, replace(other, free=(*other.free, *more), theory=theory)
@@ -234,7 +303,9 @@ def _less(problem: Problem, fixed: dict[str, float], *without: str) -> Problem:
     free = tuple(item for item in problem.free if not item.key.startswith(without))
     result = replace(problem, free=free, fixed=fixed)
     left_out = idle(result)
-    return replace(result, free=tuple(item for item in free if item.key not in left_out))
+    return replace(
+        result, free=tuple(item for item in free if item.key not in left_out)
+    )
 
 
 def _starts(problem: Problem) -> list[Array]:
@@ -246,14 +317,23 @@ def _starts(problem: Problem) -> list[Array]:
 
 
 def _p_value(
-    poorer: Search, least: Minimum, whole: Search, best: Minimum, rng: np.random.Generator, draws: int
+    poorer: Search,
+    least: Minimum,
+    whole: Search,
+    best: Minimum,
+    rng: np.random.Generator,
+    draws: int,
 ) -> float:
     """Return the share of curves made by the poorer mechanism whose likelihood ratio is at least the measured one."""
     measured = least.chi_square - best.chi_square
-    if measured <= _FINE * least.chi_square:  # what more acts explains nothing, as precisely as draws are fitted
+    # what more acts explains nothing, as precisely as draws are fitted
+    if measured <= _FINE * least.chi_square:
         return 1.0
     drawn = draws_of(whole.problem, poorer.problem.predicted(least.x), rng)
-    flags = (whole.reaches(values, poorer.least(values).chi_square - measured) for values in drawn)
+    flags = (
+        whole.reaches(values, poorer.least(values).chi_square - measured)
+        for values in drawn
+    )
     return share_of_larger(flags, draws)[0]
 
 

@@ -30,7 +30,15 @@ from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read
 from sim.study import fit as fits, likelihood
 from sim.study.converge import Printed
-from sim.study.likelihood import LEVEL, Curve, Free, Interval, Measured, Minimum, Problem
+from sim.study.likelihood import (
+    LEVEL,
+    Curve,
+    Free,
+    Interval,
+    Measured,
+    Minimum,
+    Problem,
+)
 from sim.study.mechanisms import PARTS, RARE, WHOLE, WORSE, Search, draws_of, others
 from sim.units.errors import BadInput
 from sim.units.notation import concise, engineering, in_units, scaled
@@ -41,7 +49,11 @@ from sim.units.terminal import progress_bar
 SIMS, LEAST_SIMS, _SPEEDS, _BEST = 400, 50, 20, 3
 #: Least noncentrality that scipy knows, and spread of a number without information, in large changes.
 _LEAST, _UNKNOWN = 1e-9, 1e3
-_LOOKS = {WHOLE: style.BOTH, "bonds only": style.BONDS, "fluctuations only": style.FLUCTUATIONS}
+_LOOKS = {
+    WHOLE: style.BOTH,
+    "bonds only": style.BONDS,
+    "fluctuations only": style.FLUCTUATIONS,
+}
 
 
 class Chance(NamedTuple):
@@ -54,7 +66,9 @@ class Chance(NamedTuple):
     def of(cls, flags: Array) -> "Chance":
         """Return the share of True. Its error counts one more data set of either kind, so that it is never zero."""
         middle = (np.sum(flags) + 1.0) / (len(flags) + 2.0)
-        return cls(float(np.mean(flags)), math.sqrt(middle * (1.0 - middle) / len(flags)))
+        return cls(
+            float(np.mean(flags)), math.sqrt(middle * (1.0 - middle) / len(flags))
+        )
 
     def __str__(self) -> str:
         return concise(self.probability, self.error)
@@ -118,7 +132,11 @@ class Plan(NamedTuple):
     def best(self) -> list[Point]:
         """Return the best further point, and those that are not worse by two standard errors of their difference."""
         points = self.simulated
-        return [item for item in points if not _is_more(points[0].probabilities, item.probabilities)]
+        return [
+            item
+            for item in points
+            if not _is_more(points[0].probabilities, item.probabilities)
+        ]
 
     @property
     def advice(self) -> str:
@@ -140,21 +158,33 @@ class Plan(NamedTuple):
         for item in self.numbers:
             value, (low, high, *is_open) = item.free.start, item.interval
             factor, unit = scaled(value, item.free.quantity.unit)
-            ends = [f"{factor * end:.4g}" + " (open)" * mark for end, mark in zip((low, high), is_open, strict=True)]
-            keys.append({
-                "key": item.free.key, "value": engineering(value, item.free.quantity.unit),
-                f"{LEVEL:.0%} interval to expect": f"{' to '.join(ends)} {unit}".rstrip(),
-                "P(lower end open)": str(item.low_open), "P(upper end open)": str(item.high_open),
-            })  # fmt: skip
+            ends = [
+                f"{factor * end:.4g}" + " (open)" * mark
+                for end, mark in zip((low, high), is_open, strict=True)
+            ]
+            keys.append(
+                {
+                    "key": item.free.key,
+                    "value": engineering(value, item.free.quantity.unit),
+                    f"{LEVEL:.0%} interval to expect": f"{' to '.join(ends)} {unit}".rstrip(),
+                    "P(lower end open)": str(item.low_open),
+                    "P(upper end open)": str(item.high_open),
+                }
+            )
         for truth, chance in self.probabilities.items():
-            further = {f"with {point.words}": str(point.probabilities[truth]) for point in self.simulated}
+            further = {
+                f"with {point.words}": str(point.probabilities[truth])
+                for point in self.simulated
+            }
             truths.append({"truth": truth, "P(told apart)": str(chance)} | further)
         return keys, truths
 
 
 def _is_more(probabilities: dict[str, Chance], others: dict[str, Chance]) -> bool:
     """Return True if the sum of some probabilities exceeds that of others by two standard errors of the difference."""
-    chances, other_chances = (np.array([*item.values()]) for item in (probabilities, others))
+    chances, other_chances = (
+        np.array([*item.values()]) for item in (probabilities, others)
+    )
     more, _ = np.sum(chances, axis=0) - np.sum(other_chances, axis=0)
     return bool(more > 2.0 * np.linalg.norm([chances[:, 1], other_chances[:, 1]]))
 
@@ -177,7 +207,11 @@ class _Design:
     def __init__(self, problem: Problem) -> None:
         curves = problem.predicted(problem.start)
         self.problem, self.whole = problem, Search(problem, [problem.start])
-        self.parts = {name: Search(other, [other.start]) for name, other in others(problem) if name in PARTS}
+        self.parts = {
+            name: Search(other, [other.start])
+            for name, other in others(problem)
+            if name in PARTS
+        }
         self.expected = {WHOLE: curves}
         for name, search in self.parts.items():
             self.expected[name] = search.problem.predicted(search.exact(curves).x)
@@ -192,24 +226,37 @@ class _Design:
         penalty = self.parts[part].problem.criterion(0.0) - self.problem.criterion(0.0)
         return max(rare[part], WORSE - penalty)
 
-    def simulated(self, sims: int, seed: int, advance: Callable[[int], None]) -> "_Simulated":
+    def simulated(
+        self, sims: int, seed: int, advance: Callable[[int], None]
+    ) -> "_Simulated":
         """Return the results of a number of simulated data sets for each truth."""
         values, sums, rare = dict[str, Array](), dict[str, Array](), dict[str, float]()
         for number, (truth, expected) in enumerate(self.expected.items()):
-            drawn = draws_of(self.problem, expected, np.random.default_rng([seed, number]))
+            drawn = draws_of(
+                self.problem, expected, np.random.default_rng([seed, number])
+            )
             values[truth] = np.array([*itertools.islice(drawn, sims)])
-            sums[truth] = np.array([self.whole.least(item).chi_square for item in values[truth]])
+            sums[truth] = np.array(
+                [self.whole.least(item).chi_square for item in values[truth]]
+            )
             advance(sims)
             if truth in self.parts:
-                least = [self.parts[truth].least(item).chi_square for item in values[truth]]
-                rare[truth] = float(np.sort(least - sums[truth])[-math.floor(RARE * (sims + 1))])
+                least = [
+                    self.parts[truth].least(item).chi_square for item in values[truth]
+                ]
+                rare[truth] = float(
+                    np.sort(least - sums[truth])[-math.floor(RARE * (sims + 1))]
+                )
                 advance(sims)
         probabilities = dict[str, Chance]()
         for truth in self.expected:
             is_truth = np.ones(sims, bool)
             for part, search in self.parts.items():
                 levels = sums[truth] + self.level(part, rare)
-                rejected = [not search.reaches(*item) for item in zip(values[truth], levels, strict=True)]
+                rejected = [
+                    not search.reaches(*item)
+                    for item in zip(values[truth], levels, strict=True)
+                ]
                 is_truth &= np.array(rejected) == (part != truth)
                 advance(sims)
             probabilities[truth] = Chance.of(is_truth)
@@ -222,16 +269,25 @@ class _Design:
             least, chances = self.whole.exact(curves).chi_square, []
             for part in self.parts.keys() - {truth}:
                 away = max(self.parts[part].exact(curves).chi_square - least, _LEAST)
-                freedom = max(len(self.problem.free) - len(self.parts[part].problem.free), 1)
-                chances.append(float(stats.ncx2.sf(self.level(part, rare), freedom, away)))
+                freedom = max(
+                    len(self.problem.free) - len(self.parts[part].problem.free), 1
+                )
+                chances.append(
+                    float(stats.ncx2.sf(self.level(part, rare), freedom, away))
+                )
             result[truth] = min(chances)
         return result
 
 
 def plan(
-    scenario: Scenario, points: Path, free: Iterable[str], candidates: Path | None = None,
-    common: dict[str, float] | None = None, sims: int = SIMS, seed: int | None = None,
-) -> Plan:  # fmt: skip
+    scenario: Scenario,
+    points: Path,
+    free: Iterable[str],
+    candidates: Path | None = None,
+    common: dict[str, float] | None = None,
+    sims: int = SIMS,
+    seed: int | None = None,
+) -> Plan:
     """Return what a planned measurement can tell.
 
     Parameters
@@ -258,47 +314,99 @@ def plan(
     BadInput
         If a key has no effect, the table cannot be read or has no errors, or the drive needs runs.
     """
-    base, seed = scenario.with_values({"record": {}}), scenario.seed if seed is None else seed
+    base, seed = (
+        scenario.with_values({"record": {}}),
+        scenario.seed if seed is None else seed,
+    )
     if sims < LEAST_SIMS:
-        raise BadInput([f"sims: {sims} simulated data sets do not show a probability; give {LEAST_SIMS} or more"])
+        raise BadInput(
+            [
+                f"sims: {sims} simulated data sets do not show a probability; give {LEAST_SIMS} or more"
+            ]
+        )
     if base.drive.solves_motion:
-        raise BadInput([f'--plan: drive.model = "{base.drive.model}" needs runs; plan with a prescribed speed'])
+        raise BadInput(
+            [
+                f'--plan: drive.model = "{base.drive.model}" needs runs; plan with a prescribed speed'
+            ]
+        )
     noise = "the models of the scenario have noise; curves are those of steady sliding with its means"
     remarks = [noise if base.is_random else "curves are those of steady sliding"]
-    numbers, table = [fits.free_number(base, text) for text in free], _read(points, base)
+    numbers, table = (
+        [fits.free_number(base, text) for text in free],
+        _read(points, base),
+    )
     if not all(np.isnan(item.values).all() for item in table.curves):
         remarks.append(f"{points}: measured values are not used; a plan predicts them")
     if faults := [*fits.conflicts(base, numbers, [], [table])]:
         raise BadInput(faults)
     problem = _predicted(base, [table], numbers, common or {})
     likelihood.refuse_undetermined(problem)
-    further = _speeds(table) if candidates is None else _read(candidates, base, table.names)
+    further = (
+        _speeds(table) if candidates is None else _read(candidates, base, table.names)
+    )
     if further is None:
-        remarks.append(f"{points}: no column has the speed, so no further point is proposed; give --candidates")
+        remarks.append(
+            f"{points}: no column has the speed, so no further point is proposed; give --candidates"
+        )
     design = _Design(problem)
     if not design.parts:
-        further, cause = None, "bonds or fluctuations do not act in the scenario as it is"
+        further, cause = (
+            None,
+            "bonds or fluctuations do not act in the scenario as it is",
+        )
         remarks.append(f"no mechanisms are told apart, because {cause}")
-    candidate_rows = [_rows(further, [row]) for row in range(further.rows)] if further else []
-    total = sims * (design.fits * (1 + min(len(candidate_rows), _BEST)) + 2 * len(numbers))
+    candidate_rows = (
+        [_rows(further, [row]) for row in range(further.rows)] if further else []
+    )
+    total = sims * (
+        design.fits * (1 + min(len(candidate_rows), _BEST)) + 2 * len(numbers)
+    )
     with progress_bar(total, "fits of simulated data") as shown:
-        first, ranked = design.simulated(sims, seed, shown.advance), list[tuple[Point, _Design]]()
-        expected = [_interval(problem, k, first.values, first.sums, shown.advance) for k in range(len(numbers))]
+        first, ranked = (
+            design.simulated(sims, seed, shown.advance),
+            list[tuple[Point, _Design]](),
+        )
+        expected = [
+            _interval(problem, k, first.values, first.sums, shown.advance)
+            for k in range(len(numbers))
+        ]
         for row in candidate_rows:
-            beside = _Design(_predicted(base, _joined(table, row, problem), numbers, common or {}))
-            conditions = {key: float(values[0]) for key, values in row.conditions.items()}
-            point = Point(conditions, _words(base, conditions, table, row), beside.estimate(first.rare), {})
+            beside = _Design(
+                _predicted(base, _joined(table, row, problem), numbers, common or {})
+            )
+            conditions = {
+                key: float(values[0]) for key, values in row.conditions.items()
+            }
+            point = Point(
+                conditions,
+                _words(base, conditions, table, row),
+                beside.estimate(first.rare),
+                {},
+            )
             ranked.append((point, beside))
         ranked.sort(key=lambda item: -sum(item[0].estimate.values()))
         proposed = [point for point, _ in ranked]
         for k, (point, beside) in enumerate(ranked[:_BEST]):
             simulated = beside.simulated(sims, seed + 1 + k, shown.advance)
             proposed[k] = point._replace(probabilities=simulated.probabilities)
-    proposed.sort(key=lambda item: -sum(chance.probability for chance in item.probabilities.values()))
+    proposed.sort(
+        key=lambda item: (
+            -sum(chance.probability for chance in item.probabilities.values())
+        )
+    )
     probabilities = first.probabilities if design.parts else {}
-    result = Plan(problem, tuple(expected), probabilities, tuple(proposed), tuple(remarks))
-    tried = [point.conditions["speed"] for point in proposed] if candidates is None else []
-    if any(point.conditions["speed"] in (min(tried), max(tried)) for point in result.best if tried):
+    result = Plan(
+        problem, tuple(expected), probabilities, tuple(proposed), tuple(remarks)
+    )
+    tried = (
+        [point.conditions["speed"] for point in proposed] if candidates is None else []
+    )
+    if any(
+        point.conditions["speed"] in (min(tried), max(tried))
+        for point in result.best
+        if tried
+    ):
         end = "a best speed is the first or last candidate; speeds beyond may be better: give them by --candidates"
         result = result._replace(remarks=(*result.remarks, end))
     return result
@@ -314,14 +422,26 @@ def _read(path: Path, scenario: Scenario, template: Sequence[str] = ()) -> Measu
     return table
 
 
-def _predicted(scenario: Scenario, tables: Sequence[Measured], free: list[Free], common: dict[str, float]) -> Problem:
+def _predicted(
+    scenario: Scenario,
+    tables: Sequence[Measured],
+    free: list[Free],
+    common: dict[str, float],
+) -> Problem:
     """Return the problem of some tables, with the values that the scenario predicts and their errors."""
     problem = likelihood.problem_of(scenario, tables, free, common)
     values = problem.predicted(problem.start)
-    sigma = np.where(problem.sigma < 0.0, -problem.sigma * np.abs(values), problem.sigma)
+    sigma = np.where(
+        problem.sigma < 0.0, -problem.sigma * np.abs(values), problem.sigma
+    )
     for number in np.flatnonzero(~(sigma > 0.0)):
-        place, cure = problem.place(int(number)), "omit the row, or give an error in units"
-        cause = "is predicted as 0 or without a contact, so a relative error is undefined"
+        place, cure = (
+            problem.place(int(number)),
+            "omit the row, or give an error in units",
+        )
+        cause = (
+            "is predicted as 0 or without a contact, so a relative error is undefined"
+        )
         raise BadInput([f"{tables[0].path}: {place} {cause}; {cure}"])
     return replace(problem, values=values, sigma=sigma)
 
@@ -329,8 +449,13 @@ def _predicted(scenario: Scenario, tables: Sequence[Measured], free: list[Free],
 def _rows(table: Measured, rows: Sequence[int]) -> Measured:
     """Return some rows of a table."""
     conditions = {key: values[rows] for key, values in table.conditions.items()}
-    curves = [(name, values[rows], None if errors is None else errors[rows]) for name, values, errors in table.curves]
-    return table._replace(conditions=conditions, curves=tuple(Curve(*curve) for curve in curves))
+    curves = [
+        (name, values[rows], None if errors is None else errors[rows])
+        for name, values, errors in table.curves
+    ]
+    return table._replace(
+        conditions=conditions, curves=tuple(Curve(*curve) for curve in curves)
+    )
 
 
 def _speeds(table: Measured) -> Measured | None:
@@ -340,9 +465,14 @@ def _speeds(table: Measured) -> Measured | None:
     held = [values for key, values in table.conditions.items() if key != "speed"]
     places = np.unique([np.zeros(table.rows), *held], axis=1, return_index=True)[1]
     result = _rows(table, np.repeat(places, _SPEEDS).tolist())
-    beyond = np.geomspace(0.1 * speeds[speeds > 0.0].min(), 10.0 * speeds.max(), _SPEEDS)
+    beyond = np.geomspace(
+        0.1 * speeds[speeds > 0.0].min(), 10.0 * speeds.max(), _SPEEDS
+    )
     conditions = result.conditions | {"speed": np.tile(beyond, len(places))}
-    return result._replace(conditions=conditions, curves=tuple(item._replace(errors=None) for item in result.curves))
+    return result._replace(
+        conditions=conditions,
+        curves=tuple(item._replace(errors=None) for item in result.curves),
+    )
 
 
 def _joined(table: Measured, row: Measured, problem: Problem) -> list[Measured]:
@@ -351,24 +481,42 @@ def _joined(table: Measured, row: Measured, problem: Problem) -> list[Measured]:
     It is a row of the same table if its columns are the same, because a table is computed at once.
     """
     shares = problem.sigma / np.abs(problem.values)
-    medians = {name: -np.median(shares[problem.of(name)], keepdims=True) for name in problem.names}
-    curves = [item if item.errors is not None else item._replace(errors=medians[item.name]) for item in row.curves]
+    medians = {
+        name: -np.median(shares[problem.of(name)], keepdims=True)
+        for name in problem.names
+    }
+    curves = [
+        item if item.errors is not None else item._replace(errors=medians[item.name])
+        for item in row.curves
+    ]
     row = row._replace(curves=tuple(curves))
     if row.names != table.names or row.conditions.keys() != table.conditions.keys():
         return [table, row]
-    conditions = {key: np.append(values, row.conditions[key]) for key, values in table.conditions.items()}
+    conditions = {
+        key: np.append(values, row.conditions[key])
+        for key, values in table.conditions.items()
+    }
     pairs: Any = zip(table.curves, curves, strict=True)
-    curves = [Curve(name, *map(np.append, planned, further)) for (name, *planned), (_, *further) in pairs]
+    curves = [
+        Curve(name, *map(np.append, planned, further))
+        for (name, *planned), (_, *further) in pairs
+    ]
     return [table._replace(conditions=conditions, curves=tuple(curves))]
 
 
-def _words(scenario: Scenario, conditions: dict[str, float], table: Measured, row: Measured) -> str:
+def _words(
+    scenario: Scenario, conditions: dict[str, float], table: Measured, row: Measured
+) -> str:
     """Return conditions and variables of a further point that are not the same in the whole table, for people."""
     declared = dict(likelihood.conditions_of(scenario).values())
     texts = [
         f"{declared[key].symbol or key} = {engineering(value, declared[key].unit)}"
-        for key, value in sorted(conditions.items(), key=lambda item: item[0] != "speed")
-        if key == "speed" or key not in table.conditions or np.ptp(table.conditions[key]) > 0.0
+        for key, value in sorted(
+            conditions.items(), key=lambda item: item[0] != "speed"
+        )
+        if key == "speed"
+        or key not in table.conditions
+        or np.ptp(table.conditions[key]) > 0.0
     ]
     variables = "" if row.names == table.names else f" ({', '.join(row.names)})"
     return (", ".join(texts) or "the same conditions") + variables
@@ -377,19 +525,33 @@ def _words(scenario: Scenario, conditions: dict[str, float], table: Measured, ro
 def covariance_at(problem: Problem, x: Array) -> Array:
     """Return the covariance of what is free at a place, finite for numbers without information, too."""
     slopes = likelihood.derivatives(problem, x, range(len(x)))
-    widths = np.array([item.width for item in problem.free] + [1.0] * len(problem.common))
-    return np.asarray(np.linalg.inv(slopes.T @ slopes + np.diag((_UNKNOWN * widths) ** -2.0)), float)
+    widths = np.array(
+        [item.width for item in problem.free] + [1.0] * len(problem.common)
+    )
+    return np.asarray(
+        np.linalg.inv(slopes.T @ slopes + np.diag((_UNKNOWN * widths) ** -2.0)), float
+    )
 
 
-def _interval(problem: Problem, k: int, values: Array, sums: Array, advance: Callable[[int], None]) -> Expected:
+def _interval(
+    problem: Problem, k: int, values: Array, sums: Array, advance: Callable[[int], None]
+) -> Expected:
     """Return the interval to expect for a free number, by simulated values and their least sums of squares."""
     item, covariance = problem.free[k], covariance_at(problem, problem.start)
-    interval = likelihood.interval(problem, Minimum(problem.start, 0.0, covariance, True), k)
-    rise, rest, chances = float(stats.chi2.ppf(LEVEL, 1)), [*problem.free[:k], *problem.free[k + 1 :]], []
+    interval = likelihood.interval(
+        problem, Minimum(problem.start, 0.0, covariance, True), k
+    )
+    rise, rest, chances = (
+        float(stats.chi2.ppf(LEVEL, 1)),
+        [*problem.free[:k], *problem.free[k + 1 :]],
+        [],
+    )
     for end in (item.low, item.high):
         held = replace(problem, free=rest, fixed={**problem.fixed, item.key: end})
         search = Search(held, [held.start])
-        is_open = [search.reaches(*item) for item in zip(values, sums + rise, strict=True)]
+        is_open = [
+            search.reaches(*item) for item in zip(values, sums + rise, strict=True)
+        ]
         chances.append(Chance.of(np.array(is_open)))
         advance(len(values))
     return Expected(item, interval, *chances)
@@ -401,12 +563,25 @@ def figure(result: Plan) -> Figure:
     Lines are the estimates, points with errors are simulated, and dots are the probabilities without a further point.
     Points have the other conditions of the best one.
     """
-    held = {key: value for key, value in result.points[0].conditions.items() if key != "speed"}
-    drawn = [item for item in result.points if {**item.conditions, **held} == item.conditions]
+    held = {
+        key: value
+        for key, value in result.points[0].conditions.items()
+        if key != "speed"
+    }
+    drawn = [
+        item for item in result.points if {**item.conditions, **held} == item.conditions
+    ]
     drawn.sort(key=lambda item: item.conditions.get("speed", 0.0))
-    words, si = ("sliding speed $V$", "m/s") if "speed" in drawn[0].conditions else ("number", "1")
+    words, si = (
+        ("sliding speed $V$", "m/s")
+        if "speed" in drawn[0].conditions
+        else ("number", "1")
+    )
     speeds = np.array([item.conditions.get("speed", k) for k, item in enumerate(drawn)])
-    scale, simulated = style.axis_scale(speeds), [k for k, item in enumerate(drawn) if item.probabilities]
+    scale, simulated = (
+        style.axis_scale(speeds),
+        [k for k, item in enumerate(drawn) if item.probabilities],
+    )
     unit = style.Unit.of(speeds, si, scale == "log")
     x = unit.factor * speeds
     with mpl.rc_context(style.STYLE):
@@ -414,9 +589,21 @@ def figure(result: Plan) -> Figure:
         for truth, chance in result.probabilities.items():
             look: Any = {"color": _LOOKS[truth]}
             panel.axhline(chance.probability, linestyle=":", linewidth=0.9, **look)
-            panel.plot(x, [item.estimate[truth] for item in drawn], "--", linewidth=0.7, **look)
-            points, errors = np.transpose([drawn[k].probabilities[truth] for k in simulated])
-            panel.errorbar(x[simulated], points, errors, label=truth, elinewidth=0.7, **style.HOLLOW, **look)
+            panel.plot(
+                x, [item.estimate[truth] for item in drawn], "--", linewidth=0.7, **look
+            )
+            points, errors = np.transpose(
+                [drawn[k].probabilities[truth] for k in simulated]
+            )
+            panel.errorbar(
+                x[simulated],
+                points,
+                errors,
+                label=truth,
+                elinewidth=0.7,
+                **style.HOLLOW,
+                **look,
+            )
         panel.plot([], [], ":", color=style.REFERENCE, label="without it")
         panel.plot([], [], "--", color=style.REFERENCE, label="estimate for ranking")
         panel.set(ylim=(-0.03, 1.03), ylabel="P(mechanisms told apart)")
@@ -426,14 +613,28 @@ def figure(result: Plan) -> Figure:
 
 
 def carried_out(
-    scenario: Scenario, points: Path, free: Sequence[str], common: Sequence[str], stem: Path, replaced: bool,
-    units: Sequence[str] = (), candidates: Path | None = None, sims: int = SIMS, seed: int | None = None,
-) -> list[Printed]:  # fmt: skip
+    scenario: Scenario,
+    points: Path,
+    free: Sequence[str],
+    common: Sequence[str],
+    stem: Path,
+    replaced: bool,
+    units: Sequence[str] = (),
+    candidates: Path | None = None,
+    sims: int = SIMS,
+    seed: int | None = None,
+) -> list[Printed]:
     """Plan, write ``<stem>_plan.json`` and ``.png``, and return the tables to print."""
-    outputs = [stem.with_name(f"{stem.name}_plan.{ending}") for ending in ("json", "png")]
+    outputs = [
+        stem.with_name(f"{stem.name}_plan.{ending}") for ending in ("json", "png")
+    ]
     for path in outputs:
-        files.claim(path, replaced, [*files_read(scenario), points, *filter(None, [candidates])])
-    result = plan(scenario, points, free, candidates, fits.common_errors(common), sims, seed)
+        files.claim(
+            path, replaced, [*files_read(scenario), points, *filter(None, [candidates])]
+        )
+    result = plan(
+        scenario, points, free, candidates, fits.common_errors(common), sims, seed
+    )
     with in_units(units):
         shown, truths = result.rows
         picture = figure(result) if result.points else None
@@ -443,7 +644,9 @@ def carried_out(
         style.save(picture, outputs[1])
     else:
         outputs.pop().unlink(missing_ok=True)  # of an older plan, which may be replaced
-    below = "\n".join(["", *filter(None, [result.advice]), *result.remarks, "", *map(str, outputs)])
+    below = "\n".join(
+        ["", *filter(None, [result.advice]), *result.remarks, "", *map(str, outputs)]
+    )
     return [(shown, ""), (truths, below)] if truths else [(shown, below)]
 
 
@@ -456,12 +659,19 @@ def document(result: Plan) -> dict[str, Any]:
     return {
         "numbers": {
             item.free.key: {
-                "value": item.free.start, "unit": item.free.quantity.unit, **item.interval._asdict(),
-                "probability_low_open": item.low_open._asdict(), "probability_high_open": item.high_open._asdict(),
+                "value": item.free.start,
+                "unit": item.free.quantity.unit,
+                **item.interval._asdict(),
+                "probability_low_open": item.low_open._asdict(),
+                "probability_high_open": item.high_open._asdict(),
             }
             for item in result.numbers
         },
         "probabilities": chances(result.probabilities),
-        "points": [item._asdict() | {"probabilities": chances(item.probabilities)} for item in result.points],
-        "advice": result.advice, "remarks": result.remarks,
-    }  # fmt: skip
+        "points": [
+            item._asdict() | {"probabilities": chances(item.probabilities)}
+            for item in result.points
+        ],
+        "advice": result.advice,
+        "remarks": result.remarks,
+    }

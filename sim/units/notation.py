@@ -13,46 +13,141 @@ from sim.units.quantity import Quantity
 #: Most digits of a mean with its error.
 _MOST_DIGITS = 7
 
-_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+_PREFIXES = {
+    -15: "f",
+    -12: "p",
+    -9: "n",
+    -6: "µ",
+    -3: "m",
+    0: "",
+    3: "k",
+    6: "M",
+    9: "G",
+    12: "T",
+}
 _PREFIXABLE = re.compile(r"(?P<base>m|s|N|Pa|J)(?:\^(?P<power>\d))?(?P<rest>|[/ ].*)")
 
 #: Names of the quantities of each record and of each whole run, of which ``record.quantities`` chooses.
 Recorded = Literal[
-    "speed", "slider_position", "bond_fraction", "shear_stress", "fluctuation_energy", "edge_energy",
-    "work_of_adhesion", "contact_radius", "contact_area", "normal_load", "indentation", "displacement",
-    "friction_force", "in_contact", "masked", "detachment_time", "dissipated_energy", "jkr_radius", "hertz_radius",
-    "bonds_radius", "fluctuations_radius", "equilibrium_radius", "applied_load",
-    "stage_position", "stage_speed", "spring_force", "drive_work", "stored_energy", "dissipated_by_damping",
-    "dissipated_by_viscosity", "dissipated_by_rupture", "dissipated_by_snaps", "dissipated_by_area", "energy_residual",
+    "speed",
+    "slider_position",
+    "bond_fraction",
+    "shear_stress",
+    "fluctuation_energy",
+    "edge_energy",
+    "work_of_adhesion",
+    "contact_radius",
+    "contact_area",
+    "normal_load",
+    "indentation",
+    "displacement",
+    "friction_force",
+    "in_contact",
+    "masked",
+    "detachment_time",
+    "dissipated_energy",
+    "jkr_radius",
+    "hertz_radius",
+    "bonds_radius",
+    "fluctuations_radius",
+    "equilibrium_radius",
+    "applied_load",
+    "stage_position",
+    "stage_speed",
+    "spring_force",
+    "drive_work",
+    "stored_energy",
+    "dissipated_by_damping",
+    "dissipated_by_viscosity",
+    "dissipated_by_rupture",
+    "dissipated_by_snaps",
+    "dissipated_by_area",
+    "energy_residual",
     "substeps",
     "runaway_time",
-    "peak_stress", "peak_time", "peak_speed", "peak_area",
-    "peak_friction", "peak_friction_time", "peak_friction_speed", "peak_friction_area",
-    "pull_off_load", "pull_off_time", "pull_off_displacement",
-    "first_detachment", "first_closing", "detachments", "closing_displacement", "closing_load",
-    "first_masked", "time_masked", "runaway_force", "unresolved_time",
-    "step_renewal", "pull_off_error",
-    "phase_peak_stress", "phase_peak_time", "phase_peak_speed", "phase_peak_area",
-    "phase_peak_friction", "phase_peak_friction_time", "phase_peak_friction_speed", "phase_peak_friction_area",
-    "phase_pull_off_load", "phase_pull_off_time", "phase_pull_off_displacement", "phase_detachment", "phase_closing",
-    "slip_time", "slip_end", "slip_amplitude", "slip_speed", "slip_force_before", "slip_force_after",
-    "slip_stress_before", "slip_stress_after", "slip_count", "slip_count_late",
-    "late_force_before_mean", "late_force_before_std", "late_force_before_least", "late_force_before_largest",
-    "late_force_drop_mean", "late_force_drop_std", "late_force_drop_least", "late_force_drop_largest",
-    "late_amplitude_mean", "late_amplitude_std", "late_amplitude_least", "late_amplitude_largest",
-    "late_recurrence_mean", "late_recurrence_std", "late_recurrence_least", "late_recurrence_largest",
+    "peak_stress",
+    "peak_time",
+    "peak_speed",
+    "peak_area",
+    "peak_friction",
+    "peak_friction_time",
+    "peak_friction_speed",
+    "peak_friction_area",
+    "pull_off_load",
+    "pull_off_time",
+    "pull_off_displacement",
+    "first_detachment",
+    "first_closing",
+    "detachments",
+    "closing_displacement",
+    "closing_load",
+    "first_masked",
+    "time_masked",
+    "runaway_force",
+    "unresolved_time",
+    "step_renewal",
+    "pull_off_error",
+    "phase_peak_stress",
+    "phase_peak_time",
+    "phase_peak_speed",
+    "phase_peak_area",
+    "phase_peak_friction",
+    "phase_peak_friction_time",
+    "phase_peak_friction_speed",
+    "phase_peak_friction_area",
+    "phase_pull_off_load",
+    "phase_pull_off_time",
+    "phase_pull_off_displacement",
+    "phase_detachment",
+    "phase_closing",
+    "slip_time",
+    "slip_end",
+    "slip_amplitude",
+    "slip_speed",
+    "slip_force_before",
+    "slip_force_after",
+    "slip_stress_before",
+    "slip_stress_after",
+    "slip_count",
+    "slip_count_late",
+    "late_force_before_mean",
+    "late_force_before_std",
+    "late_force_before_least",
+    "late_force_before_largest",
+    "late_force_drop_mean",
+    "late_force_drop_std",
+    "late_force_drop_least",
+    "late_force_drop_largest",
+    "late_amplitude_mean",
+    "late_amplitude_std",
+    "late_amplitude_least",
+    "late_amplitude_largest",
+    "late_recurrence_mean",
+    "late_recurrence_std",
+    "late_recurrence_least",
+    "late_recurrence_largest",
     "kinetic_friction",
-]  # fmt: skip
+]
 
 
 #: Quantities that only a closed contact has; they are recorded as 0 while it is open.
 OF_CONTACT = ("contact_radius", "contact_area", "normal_load", "friction_force")
 #: Quantities that grow over a run or are times, of which a mean over time is none.
 CUMULATIVE = (
-    "slider_position", "stage_position", "detachment_time", "dissipated_energy", "drive_work", "dissipated_by_damping",
-    "dissipated_by_viscosity", "dissipated_by_rupture", "dissipated_by_snaps", "dissipated_by_area", "energy_residual",
-    "substeps", "runaway_time",
-)  # fmt: skip
+    "slider_position",
+    "stage_position",
+    "detachment_time",
+    "dissipated_energy",
+    "drive_work",
+    "dissipated_by_damping",
+    "dissipated_by_viscosity",
+    "dissipated_by_rupture",
+    "dissipated_by_snaps",
+    "dissipated_by_area",
+    "energy_residual",
+    "substeps",
+    "runaway_time",
+)
 
 
 def second_half(records: int) -> tuple[int, int]:
@@ -62,7 +157,16 @@ def second_half(records: int) -> tuple[int, int]:
 
 
 #: What is recorded of each slip event, as ``slip_<name>``.
-SLIP_EVENT = ("time", "end", "amplitude", "speed", "force_before", "force_after", "stress_before", "stress_after")
+SLIP_EVENT = (
+    "time",
+    "end",
+    "amplitude",
+    "speed",
+    "force_before",
+    "force_after",
+    "stress_before",
+    "stress_after",
+)
 #: Units that a person has chosen for numbers of their dimensions, and whether any number has had them.
 _CHOSEN: ContextVar[dict[str, bool]] = ContextVar("chosen units")
 
@@ -86,7 +190,11 @@ def in_units(units: Iterable[str]) -> Iterator[None]:
     finally:
         _CHOSEN.reset(before)
     for name in (name for name in wanted if not chosen[name]):
-        raise BadInput([f'--units: no number here can be in "{name[:40]}"; choose a unit of one, as mm/s of speed'])
+        raise BadInput(
+            [
+                f'--units: no number here can be in "{name[:40]}"; choose a unit of one, as mm/s of speed'
+            ]
+        )
 
 
 def chosen_unit(unit: str) -> tuple[float, str] | None:
@@ -116,7 +224,9 @@ def scaled(magnitude: float, unit: str) -> tuple[float, str]:
         return 1.0, "" if unit == "1" else shown
     power = int(match["power"] or 1)
     # squares step by a million: 0.05 mm² reads better than 50 000 µm²
-    exponent = 3 * math.floor((math.log10(size) + 2.0 * (power - 1) + 1e-12) / (3 * power))
+    exponent = 3 * math.floor(
+        (math.log10(size) + 2.0 * (power - 1) + 1e-12) / (3 * power)
+    )
     exponent = min(max(exponent, -15), 12)
     return 10.0 ** (-exponent * power), _PREFIXES[exponent] + shown
 
@@ -161,7 +271,9 @@ def concise(mean: float, sem: float) -> str:
     return f"{round(mean, places) + 0.0:.{digits}f}({round(round(sem, places) * 10**digits)})"
 
 
-def bounded(value: float, sem: float, low: float = math.nan, high: float = math.nan) -> str:
+def bounded(
+    value: float, sem: float, low: float = math.nan, high: float = math.nan
+) -> str:
     """Return a value with its standard error, or with the only end of its interval that is known.
 
     >>> print(bounded(118.2312, 0.0423), bounded(561.0, math.nan, low=446.0), bounded(math.nan, math.nan, low=50.0))
@@ -169,9 +281,15 @@ def bounded(value: float, sem: float, low: float = math.nan, high: float = math.
     >>> print(bounded(math.nan, math.nan, high=0.2), bounded(math.nan, math.nan, 0.3, 3.0), bounded(math.nan, math.nan))
     < 0.2 0.3 to 3 –
     """
-    ends = [f"{sign} {end:.4g}" for sign, end in ((">", low), ("<", high)) if math.isfinite(end)]
+    ends = [
+        f"{sign} {end:.4g}"
+        for sign, end in ((">", low), ("<", high))
+        if math.isfinite(end)
+    ]
     if math.isnan(value):
-        return f"{low:.4g} to {high:.4g}" if len(ends) == 2 else ends[0] if ends else "–"
+        return (
+            f"{low:.4g} to {high:.4g}" if len(ends) == 2 else ends[0] if ends else "–"
+        )
     return f"{value:.4g} ({ends[0]})" if len(ends) == 1 else concise(value, sem)
 
 
@@ -184,5 +302,7 @@ def share(value: float, low: float, high: float) -> str:
     error = (high - low) / 3.92
     if not (value - error < 0.0 or value + error > 1.0):
         return ""
-    first, middle, last = (100.0 * min(max(number, 0.0), 1.0) for number in (low, value, high))
+    first, middle, last = (
+        100.0 * min(max(number, 0.0), 1.0) for number in (low, value, high)
+    )
     return f"{middle:.3g} ({first:.2g} to {last:.3g})"

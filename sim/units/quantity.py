@@ -47,9 +47,16 @@ _BOUNDS = {
     "at_most": ("maximum", operator.le),
 }
 _TYPICAL = {
-    "m": "2 mm", "Pa": "1.6 MPa", "N": "4 mN", "s": "10 ms", "m/s": "1 mm/s", "J/m^2": "42 mJ/m^2", "1/s": "500 1/s",
-    "m^2/s": "1 um^2/s", "rad": "30 deg",
-}  # fmt: skip
+    "m": "2 mm",
+    "Pa": "1.6 MPa",
+    "N": "4 mN",
+    "s": "10 ms",
+    "m/s": "1 mm/s",
+    "J/m^2": "42 mJ/m^2",
+    "1/s": "500 1/s",
+    "m^2/s": "1 um^2/s",
+    "rad": "30 deg",
+}
 
 
 @functools.cache
@@ -65,7 +72,9 @@ def _units() -> Any:
 @functools.cache
 def _common_scales() -> dict[str, float | None]:
     """Return the factors between common units as pint has them, so that most runs need not load it."""
-    return json.loads(Path(__file__).with_name("scales.json").read_text(encoding="utf-8"))
+    return json.loads(
+        Path(__file__).with_name("scales.json").read_text(encoding="utf-8")
+    )
 
 
 @functools.lru_cache(maxsize=1024)
@@ -83,11 +92,14 @@ def _scale_of_pint(unit: str, target: str) -> float | None:
     registry = _units()
     try:
         source = registry.Quantity(1.0, registry.parse_units(unit))
-        wanted = registry.parse_units(target) if target != "1" else registry.dimensionless
+        wanted = (
+            registry.parse_units(target) if target != "1" else registry.dimensionless
+        )
         if not source.is_compatible_with(wanted):
             return None
         scale = float(source.to(wanted).magnitude)
-    except Exception as fault:  # pint raises its own, tokenizer's and arithmetic errors here
+    except Exception as fault:
+        # pint raises its own, tokenizer's and arithmetic errors here
         raise ValueError(unit) from fault
     if not (0.0 < scale < math.inf and source._is_multiplicative):
         raise ValueError(unit)
@@ -104,7 +116,9 @@ def _times(number: float, scale: float) -> float:
 
 def _split(text: str) -> tuple[float, str] | None:
     """Return the number and the unit of a text; None if it cannot be read."""
-    match = _TEXT.fullmatch(text.translate(_TYPESET)) if len(text) < _LONGEST_TEXT else None
+    match = (
+        _TEXT.fullmatch(text.translate(_TYPESET)) if len(text) < _LONGEST_TEXT else None
+    )
     return (float(match["number"]), match["unit"] or "") if match else None
 
 
@@ -116,8 +130,11 @@ def same_unit(first: Any, last: Any) -> tuple[float, float, str | None] | None:
     >>> same_unit("10 um/s", "3 mm/s")
     (10.0, 3000.0, 'um/s')
     """
-    ends: Any = [_split(end) if isinstance(end, str) else (end, None) for end in (first, last)]
-    with contextlib.suppress(TypeError, ValueError):  # of what is no number, and of an unknown unit
+    ends: Any = [
+        _split(end) if isinstance(end, str) else (end, None) for end in (first, last)
+    ]
+    # of what is no number, and of an unknown unit
+    with contextlib.suppress(TypeError, ValueError):
         (low, unit), (high, other) = ends
         scale = 1.0 if unit == other else _scale(other, unit)
         if scale and math.isfinite(low) and math.isfinite(high):
@@ -174,19 +191,27 @@ class Quantity:
             (a ValueError) if it is not a number, is text without a unit, has the wrong dimension, is not
             finite or lies outside the bounds; the message names the cure.
         """
-        number = self._parse(value) if isinstance(value, str) and not self.whole else self._number(value)
+        number = (
+            self._parse(value)
+            if isinstance(value, str) and not self.whole
+            else self._number(value)
+        )
         if not self.whole and not math.isfinite(number):
             raise _fault(f"must be finite; write for example {self.example}")
         for name, (_, holds) in _BOUNDS.items():
             bound = getattr(self, name)
             if not holds(number, bound):
                 unit = "" if self.unit == "1" else f" {self.unit}"
-                raise _fault(f"must be {name.replace('_', ' ')} {_digits(bound)}{unit}, not {_digits(number)}{unit}")
+                raise _fault(
+                    f"must be {name.replace('_', ' ')} {_digits(bound)}{unit}, not {_digits(number)}{unit}"
+                )
         if abs(number) > _LARGEST:
             raise _fault(f"is too large to be real; write for example {self.example}")
         if 0.0 < abs(number) < SMALLEST:
             zero = "0, or " if self._holds(0.0) else ""
-            raise _fault(f"is too small to be real; write {zero}for example {self.example}")
+            raise _fault(
+                f"is too small to be real; write {zero}for example {self.example}"
+            )
         return number
 
     def scaled(self, numbers: Any, unit: str) -> Any:
@@ -200,7 +225,11 @@ class Quantity:
             raise _fault(f'has the unknown unit "{shown}"; {cure}') from None
         if scale is None:
             wanted = "a pure number" if self.unit == "1" else self.unit
-            reasons = [f": {reason}" for other, reason in self.mistaken if _scale(unit, other) is not None]
+            reasons = [
+                f": {reason}"
+                for other, reason in self.mistaken
+                if _scale(unit, other) is not None
+            ]
             reasons.append(f", which is not a unit of {wanted}; {cure}")
             raise _fault(f'has the unit "{shown}"{reasons[0]}')
         if self.unit.startswith("rad/") and not _ANGLES.search(unit):
@@ -213,10 +242,18 @@ class Quantity:
 
     def _number(self, value: Any) -> float:
         """Return a number that is none of text."""
-        whole = hasattr(value, "__index__") or (isinstance(value, float) and value.is_integer())
+        whole = hasattr(value, "__index__") or (
+            isinstance(value, float) and value.is_integer()
+        )
         is_scalar = not isinstance(value, bool) and getattr(value, "shape", ()) == ()
         if not is_scalar or not (whole if self.whole else hasattr(value, "__float__")):
-            kind = "whole number" if self.whole else "number" if self.unit == "1" else "number or text with a unit"
+            kind = (
+                "whole number"
+                if self.whole
+                else "number"
+                if self.unit == "1"
+                else "number or text with a unit"
+            )
             raise _fault(f"must be a {kind} such as {self.example}")
         try:
             return int(value) if self.whole else float(value)
@@ -227,10 +264,14 @@ class Quantity:
         """Return the number of a text in SI."""
         parts = _split(text)
         if parts is None:
-            raise _fault(f"cannot be read; write a number with a decimal point and its unit, such as {self.example}")
+            raise _fault(
+                f"cannot be read; write a number with a decimal point and its unit, such as {self.example}"
+            )
         number, unit = parts
         if not unit and self.unit != "1" and math.isfinite(number):
-            raise _fault(f"is text without a unit; write for example {self.example}, or a bare number in {self.unit}")
+            raise _fault(
+                f"is text without a unit; write for example {self.example}, or a bare number in {self.unit}"
+            )
         return self.scaled(number, unit)
 
     @property
@@ -247,20 +288,39 @@ class Quantity:
         return f"{inside:g}" if self.unit == "1" else f'"{inside:g} {self.unit}"'
 
     def _holds(self, number: float) -> bool:
-        return all(holds(number, getattr(self, name)) for name, (_, holds) in _BOUNDS.items())
+        return all(
+            holds(number, getattr(self, name)) for name, (_, holds) in _BOUNDS.items()
+        )
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        written = core_schema.plain_serializer_function_ser_schema(int if self.whole else float)
-        return core_schema.no_info_plain_validator_function(self.read, serialization=written)
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        written = core_schema.plain_serializer_function_ser_schema(
+            int if self.whole else float
+        )
+        return core_schema.no_info_plain_validator_function(
+            self.read, serialization=written
+        )
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict:
-        described: dict[str, Any] = {"type": ["number", "string"], "description": f"{self.meaning} [{self.unit}]"}
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict:
+        described: dict[str, Any] = {
+            "type": ["number", "string"],
+            "description": f"{self.meaning} [{self.unit}]",
+        }
         if self.whole:
             described = {"type": "integer", "description": self.meaning}
         bounds = {word: getattr(self, name) for name, (word, _) in _BOUNDS.items()}
-        described |= {word: bound for word, bound in bounds.items() if math.isfinite(bound)}
+        described |= {
+            word: bound for word, bound in bounds.items() if math.isfinite(bound)
+        }
         example: Any = self.example.strip('"')
-        return described | {"examples": [64 if self.whole else float(example) if self.unit == "1" else example]}
+        return described | {
+            "examples": [
+                64 if self.whole else float(example) if self.unit == "1" else example
+            ]
+        }
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(Field,))
@@ -277,7 +337,11 @@ def tagged(shared: str, *names: str) -> Callable[[object], str | None]:
     """
 
     def tag(value: object) -> str | None:
-        keys = value if isinstance(value, dict) else {name: getattr(value, name, None) for name in ("model", *names)}
+        keys = (
+            value
+            if isinstance(value, dict)
+            else {name: getattr(value, name, None) for name in ("model", *names)}
+        )
         model = keys.get("model")
         if model == shared and any(keys.get(name) is not None for name in names):
             return f"{shared}[{names[0]}]"
@@ -286,7 +350,9 @@ def tagged(shared: str, *names: str) -> Callable[[object], str | None]:
     return tag
 
 
-def read_option(value: float | str | None, name: str, unit: str, **bounds: Any) -> float:
+def read_option(
+    value: float | str | None, name: str, unit: str, **bounds: Any
+) -> float:
     """Return the value of an option in SI from a number, or text with or without a unit; infinity for None.
 
     Raises

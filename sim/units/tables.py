@@ -14,7 +14,14 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, model_validator
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationInfo,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from sim.units.errors import BadInput
@@ -24,7 +31,9 @@ from sim.units.terminal import LOG
 Array = NDArray[np.float64]
 
 #: A name and its unit: "speed [mm/s]", "speed (mm/s)" or "speed in mm/s".
-_HEADING = re.compile(r"(?P<name>[^\[\]()]+?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]*?)\s*[\])]|\sin\s+(?P<other>\S+))?")
+_HEADING = re.compile(
+    r"(?P<name>[^\[\]()]+?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]*?)\s*[\])]|\sin\s+(?P<other>\S+))?"
+)
 #: A comment that states a condition of all rows: "# contact.load = 4 mN".
 _STATED = re.compile(r"^#[ \t]*([\w.]+)[ \t]*=[ \t]*([^;,\t\n]+)", re.MULTILINE)
 _MOST_BYTES = 2**28
@@ -36,7 +45,12 @@ class TableError(ValueError):
     """A table that cannot be read; the message names the line and the cure, not the file nor its content."""
 
 
-def columns(text: str, wanted: dict[str, Quantity], header: str | None = None, gaps: bool = False) -> dict[str, Array]:
+def columns(
+    text: str,
+    wanted: dict[str, Quantity],
+    header: str | None = None,
+    gaps: bool = False,
+) -> dict[str, Array]:
     """Return named columns of a CSV text in SI units.
 
     Parameters
@@ -72,27 +86,40 @@ def columns(text: str, wanted: dict[str, Quantity], header: str | None = None, g
     >>> table["speed"].tolist()
     [0.001, 0.005]
     """
-    example = ", ".join(name if wanted[name].unit == "1" else f"{name} [{wanted[name].unit}]" for name in wanted)
+    example = ", ".join(
+        name if wanted[name].unit == "1" else f"{name} [{wanted[name].unit}]"
+        for name in wanted
+    )
     table = _cells(text)
     if header and table.bare:
         place, units = "header", _headings("header", header.split(","))
     elif header:
-        raise TableError(f"line {table.lines[0]}: the file has a header; omit the key header")
+        raise TableError(
+            f"line {table.lines[0]}: the file has a header; omit the key header"
+        )
     else:
         place, units, table = _headed(table)
         if not units:
-            cure = "add one, such as" if header is None else "add one, or the key header, such as header ="
+            cure = (
+                "add one, such as"
+                if header is None
+                else "add one, or the key header, such as header ="
+            )
             raise TableError(f'the columns have no header; {cure} "{example}"')
     if not table.rows:
         raise TableError("no rows follow the header; add rows of numbers below it")
     if len(units) != len(table.rows[0]):
-        raise TableError(f"{place}: {len(units)} names for {len(table.rows[0])} columns; name each column")
+        raise TableError(
+            f"{place}: {len(units)} names for {len(table.rows[0])} columns; name each column"
+        )
     result = {}
     for name, quantity in wanted.items():
         places = [k for k, (heading, _) in enumerate(units) if heading == name]
         if len(places) != 1:
             fault = "is there twice" if places else "is missing"
-            raise TableError(f'{place}: column "{name}" {fault}; write the header as "{example}"')
+            raise TableError(
+                f'{place}: column "{name}" {fault}; write the header as "{example}"'
+            )
         unit = units[places[0]][1]
         unit = "" if quantity.unit == "1" and unit in ("1", "-") else unit
         try:
@@ -121,12 +148,22 @@ def matrix(text: str, quantity: Quantity, gaps: bool = False, unit: str = "") ->
             factors[quantity.scaled(1.0, other) if other else None] = other
     units = [other for other in factors.values() if other]
     if len(units) > 1:
-        raise TableError(f"the unit is {' and '.join(units)}, by the comments and the key unit; give one of them")
+        raise TableError(
+            f"the unit is {' and '.join(units)}, by the comments and the key unit; give one of them"
+        )
     for edge in (table.rows[0], [row[0] for row in table.rows]):
-        if len(edge) > 4 and edge[0] in ("0", "1") and edge == [str(k + int(edge[0])) for k in range(len(edge))]:
-            raise TableError("its first row or column only numbers the others; remove it")
+        if (
+            len(edge) > 4
+            and edge[0] in ("0", "1")
+            and edge == [str(k + int(edge[0])) for k in range(len(edge))]
+        ):
+            raise TableError(
+                "its first row or column only numbers the others; remove it"
+            )
     cells = list(itertools.chain.from_iterable(table.rows))
-    return _numbers("value", table, cells, "".join(units), quantity, gaps).reshape(len(table.rows), -1)
+    return _numbers("value", table, cells, "".join(units), quantity, gaps).reshape(
+        len(table.rows), -1
+    )
 
 
 class _Cells(NamedTuple):
@@ -150,35 +187,66 @@ def _headed(table: _Cells) -> tuple[str, list[tuple[str, str]], _Cells]:
     """Return the place of a header, its names and units, none without a header, and the table below it."""
     place = f"line {table.lines[0]}"
     if table.bare:
-        fitting = [comment for comment in table.comments if len(comment) == len(table.rows[0]) > 1]
+        fitting = [
+            comment
+            for comment in table.comments
+            if len(comment) == len(table.rows[0]) > 1
+        ]
         return f"comment above {place}", fitting[-1] if fitting else [], table
     noted = {name: unit for comment in table.comments for name, unit in comment if unit}
-    units = [(name, unit or noted.get(name, "")) for name, unit in _headings(place, table.rows[0])]
+    units = [
+        (name, unit or noted.get(name, ""))
+        for name, unit in _headings(place, table.rows[0])
+    ]
     return place, units, table._replace(lines=table.lines[1:], rows=table.rows[1:])
 
 
 def _cells(text: str) -> _Cells:
     """Return the cells of all lines that are neither empty nor comments, without columns that are empty."""
-    every = {number: line.strip(" ") for number, line in enumerate(text.removeprefix("\ufeff").splitlines(), 1)}
-    texts = {n: line for n, line in every.items() if line.strip(" \t;,") and not line.startswith(("#", "sep="))}
+    every = {
+        number: line.strip(" ")
+        for number, line in enumerate(text.removeprefix("\ufeff").splitlines(), 1)
+    }
+    texts = {
+        n: line
+        for n, line in every.items()
+        if line.strip(" \t;,") and not line.startswith(("#", "sep="))
+    }
     if not texts:
-        raise TableError("the table is empty; write a header of names and units, then rows of numbers")
+        raise TableError(
+            "the table is empty; write a header of names and units, then rows of numbers"
+        )
     lines, first = list(texts), next(iter(texts.values()))
     blank = " " if all(map(_is_number, first.split())) else ","
     sign = next((sign for sign in ";\t," if sign in first), blank)
     try:
-        rows = list(csv.reader(texts.values(), delimiter=sign, skipinitialspace=True, strict=True))
+        rows = list(
+            csv.reader(
+                texts.values(), delimiter=sign, skipinitialspace=True, strict=True
+            )
+        )
     except csv.Error as fault:
-        raise TableError(f"a line cannot be read as cells ({fault}); close quotes on the same line") from None
+        raise TableError(
+            f"a line cannot be read as cells ({fault}); close quotes on the same line"
+        ) from None
     for line, row in zip(lines, rows, strict=False):
         if len(row) != len(rows[0]):
             cure = "separate cells by commas, write decimals with a point"
-            raise TableError(f"line {line}: {len(row)} cells where the first row has {len(rows[0])}; {cure}")
+            raise TableError(
+                f"line {line}: {len(row)} cells where the first row has {len(rows[0])}; {cure}"
+            )
     if not all(rows[0]):  # a spreadsheet ends each line with separators
         filled = [k for k in range(len(rows[0])) if any(row[k] for row in rows)]
         rows = [[row[k] for k in filled] for row in rows]
-    above = [line[:200].strip("# ;,\t") for n, line in every.items() if n < lines[0] and line.startswith("#")]
-    comments = [_named(_HEADING.fullmatch(cell.strip()) for cell in re.split("[;,\t]", line)) for line in above]
+    above = [
+        line[:200].strip("# ;,\t")
+        for n, line in every.items()
+        if n < lines[0] and line.startswith("#")
+    ]
+    comments = [
+        _named(_HEADING.fullmatch(cell.strip()) for cell in re.split("[;,\t]", line))
+        for line in above
+    ]
     return _Cells(lines, rows, sign in ";\t", comments)
 
 
@@ -194,34 +262,64 @@ def _headings(place: str, cells: Sequence[str]) -> list[tuple[str, str]]:
     """Return the name and the text of the unit of each column, "" without one."""
     matches = [_HEADING.fullmatch(cell.strip()) for cell in cells]
     if not all(matches):
-        raise TableError(f"{place}: a heading cannot be read; write a name and its unit, such as time [s]")
+        raise TableError(
+            f"{place}: a heading cannot be read; write a name and its unit, such as time [s]"
+        )
     return _named(matches)
 
 
 def _named(matches: Iterable[re.Match[str] | None]) -> list[tuple[str, str]]:
-    return [(match["name"], match["unit"] or match["other"] or "") for match in matches if match]
+    return [
+        (match["name"], match["unit"] or match["other"] or "")
+        for match in matches
+        if match
+    ]
 
 
-def _numbers(name: str, table: _Cells, cells: list[str], unit: str, quantity: Quantity, gaps: bool = False) -> Array:
+def _numbers(
+    name: str,
+    table: _Cells,
+    cells: list[str],
+    unit: str,
+    quantity: Quantity,
+    gaps: bool = False,
+) -> Array:
     """Return cells of a table as numbers in SI."""
 
     def fault(place: int, reason: str) -> TableError:
-        return TableError(f"line {table.lines[place * len(table.lines) // len(cells)]}: {name} {reason}")
+        return TableError(
+            f"line {table.lines[place * len(table.lines) // len(cells)]}: {name} {reason}"
+        )
 
     if table.comma and any("," in cell for cell in cells):
         if any("." in cell for cell in cells):
-            raise TableError(f'{name} has numbers with "." and with ","; write all decimals with a point')
+            raise TableError(
+                f'{name} has numbers with "." and with ","; write all decimals with a point'
+            )
         cells = [cell.replace(",", ".") for cell in cells]
     try:
-        numbers = quantity.scaled(np.fromiter(map(float, cells), float, len(cells)), unit)
+        numbers = quantity.scaled(
+            np.fromiter(map(float, cells), float, len(cells)), unit
+        )
     except ValueError:
-        place = next(place for place, cell in enumerate(cells) if "," in cell or not _is_number(cell))
-        raise fault(place, "is not a number; write decimals with a point, or omit the row") from None
+        place = next(
+            place
+            for place, cell in enumerate(cells)
+            if "," in cell or not _is_number(cell)
+        )
+        raise fault(
+            place, "is not a number; write decimals with a point, or omit the row"
+        ) from None
     filled = np.flatnonzero(~(np.isnan(numbers) & gaps))
-    for place in filled[[numbers[filled].argmin(), numbers[filled].argmax()]] if filled.size else ():
+    for place in (
+        filled[[numbers[filled].argmin(), numbers[filled].argmax()]]
+        if filled.size
+        else ()
+    ):
         try:
             quantity.read(numbers[place])
-        except ValueError as refusal:  # shown without the number, as a scenario may name any file
+        except ValueError as refusal:
+            # shown without the number, as a scenario may name any file
             raise fault(place, re.split("; |, not ", str(refusal))[0]) from None
     return numbers
 
@@ -234,7 +332,10 @@ def _listed(values: Any) -> Any:
     listed = values.tolist() if isinstance(values, np.ndarray) else values
     if not isinstance(listed, list | tuple):
         return listed
-    return [0.0 if isinstance(value, float) and abs(value) < SMALLEST else value for value in listed]
+    return [
+        0.0 if isinstance(value, float) and abs(value) < SMALLEST else value
+        for value in listed
+    ]
 
 
 #: Validator that takes an array for the numbers in it.
@@ -314,7 +415,9 @@ def file_path(name: str, context: Any) -> Path:
     return _plain(context["files"].path(name) if context else Path(name))
 
 
-def file_columns(name: str, context: Any, wanted: dict[str, Quantity], header: str | None = None) -> dict[str, Array]:
+def file_columns(
+    name: str, context: Any, wanted: dict[str, Quantity], header: str | None = None
+) -> dict[str, Array]:
     """Return columns of a CSV file that a scenario names; arguments as of ``file_text`` and ``columns``."""
     with blamed(name):
         return columns(file_text(name, context), wanted, header)
@@ -325,7 +428,13 @@ def file_columns(name: str, context: Any, wanted: dict[str, Quantity], header: s
 
 Indices = NDArray[np.int64]
 _TIME = Quantity("s", "time", "t")
-_CYCLES = Quantity("1", "number of cycles between both ends; 0: one way", at_least=0, at_most=10**6, whole=True)
+_CYCLES = Quantity(
+    "1",
+    "number of cycles between both ends; 0: one way",
+    at_least=0,
+    at_most=10**6,
+    whole=True,
+)
 #: Times nearer than this share of the run are meant to be the same.
 _SAME = 1e-9
 
@@ -356,11 +465,21 @@ class Pieces(NamedTuple):
         opening = np.flatnonzero(np.diff(self.interval, prepend=-1))
         closing = np.append(opening[1:], len(self.interval)) - 1
         squares = self.unsteady + _steady_square(self.path, self.stop - self.start)
-        integral, path, square = np.add.reduceat([self.integral, self.path, squares], opening, axis=1)
+        integral, path, square = np.add.reduceat(
+            [self.integral, self.path, squares], opening, axis=1
+        )
         for k in np.flatnonzero(closing - opening > 1):
             inside = slice(opening[k], closing[k] + 1)
-            integral[k], path[k] = math.fsum(self.integral[inside]), math.fsum(self.path[inside])
-        ends = self.start[opening], self.stop[closing], self.first[opening], self.last[closing]
+            integral[k], path[k] = (
+                math.fsum(self.integral[inside]),
+                math.fsum(self.path[inside]),
+            )
+        ends = (
+            self.start[opening],
+            self.stop[closing],
+            self.first[opening],
+            self.last[closing],
+        )
         unsteady = np.maximum(square - _steady_square(path, ends[1] - ends[0]), 0.0)
         unsteady = np.where(closing > opening, unsteady, self.unsteady[opening])
         return Pieces(self.interval[opening], *ends, integral, path, unsteady)
@@ -371,7 +490,9 @@ def _steady_square(path: Array, span: Array) -> Array:
     return np.divide(path * path, span, out=np.zeros(path.shape), where=span > 0.0)
 
 
-def linear_pieces(interval: Indices, start: Array, stop: Array, first: Array, last: Array) -> Pieces:
+def linear_pieces(
+    interval: Indices, start: Array, stop: Array, first: Array, last: Array
+) -> Pieces:
     """Return pieces in which the value changes linearly."""
     integral = 0.5 * (first + last) * (stop - start)
     path, turns = np.abs(integral), first * last < 0.0
@@ -379,7 +500,9 @@ def linear_pieces(interval: Indices, start: Array, stop: Array, first: Array, la
     if turns.any():
         v0, v1, span = first[turns], last[turns], (stop - start)[turns]
         path[turns] = 0.5 * (v0**2 + v1**2) / np.abs(v1 - v0) * span
-        unsteady[turns] = (v0**2 + v0 * v1 + v1**2) / 3.0 * span - _steady_square(path[turns], span)
+        unsteady[turns] = (v0**2 + v0 * v1 + v1**2) / 3.0 * span - _steady_square(
+            path[turns], span
+        )
     return Pieces(interval, start, stop, first, last, integral, path, unsteady)
 
 
@@ -421,8 +544,21 @@ class Number(NamedTuple):
     def pieces(self, ends: Array, duration: float) -> Pieces:
         """Return the pieces of the intervals between some times [s], cut where the value turns or jumps."""
         span = ends[1:] - ends[:-1]
-        value, unsteady, integral = np.full(len(span), self.value), np.zeros(len(span)), self.value * span
-        return Pieces(np.arange(len(span)), ends[:-1], ends[1:], value, value, integral, np.abs(integral), unsteady)
+        value, unsteady, integral = (
+            np.full(len(span), self.value),
+            np.zeros(len(span)),
+            self.value * span,
+        )
+        return Pieces(
+            np.arange(len(span)),
+            ends[:-1],
+            ends[1:],
+            value,
+            value,
+            integral,
+            np.abs(integral),
+            unsteady,
+        )
 
 
 @keyed(kw_only=True)
@@ -436,7 +572,10 @@ class Course:
 
     start: Annotated[float, Field(alias="from")]
     stop: Annotated[float, Field(alias="to")]
-    scale: Annotated[Literal["linear", "log"], Field(description="spacing of values between the ends")] = "linear"
+    scale: Annotated[
+        Literal["linear", "log"],
+        Field(description="spacing of values between the ends"),
+    ] = "linear"
     changes: ClassVar[bool] = True
     cycles: ClassVar[int] = 0
     end: ClassVar[float] = math.inf
@@ -460,19 +599,29 @@ class Course:
         if self.scale == "log":
             # the library's scalar power: that of numpy differs between processors
             ratio = self.stop / self.start
-            return self.start * np.array([ratio**share for share in part.ravel().tolist()]).reshape(part.shape)
+            return self.start * np.array(
+                [ratio**share for share in part.ravel().tolist()]
+            ).reshape(part.shape)
         value = self.start + (self.stop - self.start) * part
         # a course that reaches zero but for rounding reaches it: there a free sphere touches
-        return np.where(np.abs(value) > 1e-13 * max(abs(self.start), abs(self.stop)), value, 0.0)
+        return np.where(
+            np.abs(value) > 1e-13 * max(abs(self.start), abs(self.stop)), value, 0.0
+        )
 
     def pieces(self, ends: Array, duration: float) -> Pieces:
         values, interval = self.at(ends, duration), np.arange(len(ends) - 1)
         if self.cycles:
             half = duration / (2.0 * self.cycles)
-            turns = np.arange(math.floor(ends[0] / half), math.ceil(ends[-1] / half) + 1) * half
+            turns = (
+                np.arange(math.floor(ends[0] / half), math.ceil(ends[-1] / half) + 1)
+                * half
+            )
             turns, places = _within(ends, turns, _SAME * duration)
             odd = np.round(turns / half) % 2.0 == 1.0
-            values, interval = np.insert(values, places, np.where(odd, self.stop, self.start)), _intervals(ends, places)
+            values, interval = (
+                np.insert(values, places, np.where(odd, self.stop, self.start)),
+                _intervals(ends, places),
+            )
             ends = np.insert(ends, places, turns)
         pieces = linear_pieces(interval, ends[:-1], ends[1:], values[:-1], values[1:])
         if self.scale == "linear":
@@ -482,17 +631,23 @@ class Course:
             return pieces
         rates = np.copysign(rate, np.abs(pieces.last) - np.abs(pieces.first))
         span = pieces.stop - pieces.start
-        growth, twice = ([math.expm1(n * share) for share in (rates * span).tolist()] for n in (1, 2))
+        growth, twice = (
+            [math.expm1(n * share) for share in (rates * span).tolist()] for n in (1, 2)
+        )
         integral = pieces.first * np.array(growth) / rates
         square = pieces.first**2 * np.array(twice) / (2.0 * rates)
         unsteady = np.maximum(square - _steady_square(integral, span), 0.0)
-        return pieces._replace(integral=integral, path=np.abs(integral), unsteady=unsteady)
+        return pieces._replace(
+            integral=integral, path=np.abs(integral), unsteady=unsteady
+        )
 
 
 def table_pieces(times: Array, values: Array, ends: Array, duration: float) -> Pieces:
     """Return pieces of a table, linear between rows and constant after the last; two rows at one time are a jump."""
     ends = _snapped(times, ends, duration)
-    rows, places = _within(ends, np.unique(times[slice(*np.searchsorted(times, ends[[0, -1]], "right"))]))
+    rows, places = _within(
+        ends, np.unique(times[slice(*np.searchsorted(times, ends[[0, -1]], "right"))])
+    )
     edges = np.insert(ends, places, rows)
     start, stop = edges[:-1], edges[1:]
     row = np.searchsorted(times, 0.5 * (start + stop), "right") - 1
@@ -513,7 +668,9 @@ def _interpolated(times: Array, values: Array, row: Indices, time: Array) -> Arr
     after = np.minimum(row + 1, len(times) - 1)
     span, rise = times[after] - times[row], values[after] - values[row]
     slope = np.divide(rise, span, out=np.zeros(span.shape), where=span > 0.0)
-    return np.where(time >= times[after], values[after], slope * (time - times[row]) + values[row])
+    return np.where(
+        time >= times[after], values[after], slope * (time - times[row]) + values[row]
+    )
 
 
 @keyed(kw_only=True)
@@ -531,21 +688,34 @@ class Table:
     cycles: ClassVar[int] = 0
 
     time: Annotated[tuple[Annotated[float, _TIME], ...], LISTED] = ()
-    file: Annotated[str, Field(description="CSV file with these columns, beside the scenario, instead of lists")] = ""
+    file: Annotated[
+        str,
+        Field(
+            description="CSV file with these columns, beside the scenario, instead of lists"
+        ),
+    ] = ""
 
     @model_validator(mode="after")
     def _rows_in_order(self, info: ValidationInfo) -> "Table":
         if self.file and not self.time:
-            read = file_columns(self.file, info.context, {"time": _TIME, self.column: self.quantity})
+            read = file_columns(
+                self.file, info.context, {"time": _TIME, self.column: self.quantity}
+            )
             columns_read = {"time": read["time"], self.values_in: read[self.column]}
-            vars(self).update({name: tuple(_listed(values)) for name, values in columns_read.items()})
+            vars(self).update(
+                {name: tuple(_listed(values)) for name, values in columns_read.items()}
+            )
         if len(self.time) != len(self.extremes):
-            raise PydanticCustomError("short_table", "a table needs as many values as times")
+            raise PydanticCustomError(
+                "short_table", "a table needs as many values as times"
+            )
         if len(self.time) < 2:
             message = 'a table needs two rows or more; give them, or a CSV file such as file = "data.csv"'
             raise PydanticCustomError("short_table", message)
         if np.any(np.diff(self.time) < 0.0) or self.time[0] > 0.0:
-            raise PydanticCustomError("time_order", "times must start at 0 s or before and never decrease")
+            raise PydanticCustomError(
+                "time_order", "times must start at 0 s or before and never decrease"
+            )
         return self
 
     @property
@@ -564,14 +734,18 @@ class Table:
     def at(self, time: Array, duration: float) -> Array:
         times, values = self._rows
         time = _snapped(times, time, duration)
-        return _interpolated(times, values, np.searchsorted(times, time, "right") - 1, time)
+        return _interpolated(
+            times, values, np.searchsorted(times, time, "right") - 1, time
+        )
 
     def pieces(self, ends: Array, duration: float) -> Pieces:
         return table_pieces(*self._rows, ends, duration)
 
 
 def _kind(value: Any) -> str:
-    if isinstance(value, Table) or (isinstance(value, dict) and ("file" in value or "time" in value)):
+    if isinstance(value, Table) or (
+        isinstance(value, dict) and ("file" in value or "time" in value)
+    ):
         return "[table]"
     return "[course]" if isinstance(value, dict | Course) else "[value]"
 
@@ -594,10 +768,20 @@ def over_time(unit: Quantity, name: str) -> Any:
         quantity: ClassVar[Quantity] = unit
         column: ClassVar[str] = name
         value: Annotated[tuple[Annotated[float, unit], ...], LISTED] = ()
-        file: Annotated[str, Field(description=f"CSV file with the columns `time` and `{name}`, instead of lists")] = ""
+        file: Annotated[
+            str,
+            Field(
+                description=f"CSV file with the columns `time` and `{name}`, instead of lists"
+            ),
+        ] = ""
 
-    number, course = Annotated[float, unit, Tag("[value]")], Annotated[_Course, Tag("[course]")]
-    return Annotated[number | course | Annotated[_Table, Tag("[table]")], Discriminator(_kind)]
+    number, course = (
+        Annotated[float, unit, Tag("[value]")],
+        Annotated[_Course, Tag("[course]")],
+    )
+    return Annotated[
+        number | course | Annotated[_Table, Tag("[table]")], Discriminator(_kind)
+    ]
 
 
 #: A value prescribed over a run.
@@ -616,9 +800,12 @@ def prescribed(value: float | Course | Table) -> Prescribed:
 ERROR = "_error"
 #: Groups of names of one condition: as recorded, as prescribed, and for short.
 _NAMES = (
-    ("speed", "drive_speed"), ("stage_speed", "drive_stage"), ("normal_load", "contact_load", "load"),
-    ("indentation", "contact_indentation"), ("displacement", "contact_displacement"),
-)  # fmt: skip
+    ("speed", "drive_speed"),
+    ("stage_speed", "drive_stage"),
+    ("normal_load", "contact_load", "load"),
+    ("indentation", "contact_indentation"),
+    ("displacement", "contact_displacement"),
+)
 
 
 def names_of(name: str) -> tuple[str, ...]:
@@ -634,13 +821,20 @@ def names_of(name: str) -> tuple[str, ...]:
 _PROPOSED = {
     word: names
     for names, words in (
-        ("speed stage_speed", "V v U velocity speed"), ("contact_area", "A area"),
-        ("contact_radius", "a radius"), ("friction_force spring_force", "F f F_T Ft friction force"),
-        ("shear_stress", "tau τ stress"), ("t", "T time"), ("displacement", "z"),
-        ("normal_load", "P W N L FN Fn F_N load normal"), ("indentation", "d δ delta depth"),
-        ("solid_shear_modulus", "G modulus"), ("sphere_radius", "R"),
-    ) for word in words.split()
-}  # fmt: skip
+        ("speed stage_speed", "V v U velocity speed"),
+        ("contact_area", "A area"),
+        ("contact_radius", "a radius"),
+        ("friction_force spring_force", "F f F_T Ft friction force"),
+        ("shear_stress", "tau τ stress"),
+        ("t", "T time"),
+        ("displacement", "z"),
+        ("normal_load", "P W N L FN Fn F_N load normal"),
+        ("indentation", "d δ delta depth"),
+        ("solid_shear_modulus", "G modulus"),
+        ("sphere_radius", "R"),
+    )
+    for word in words.split()
+}
 
 
 class Points(NamedTuple):
@@ -651,9 +845,12 @@ class Points(NamedTuple):
 
 
 def read_measured(
-    path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity], gaps: bool = False,
+    path: Path,
+    known: Mapping[str, Quantity],
+    outcomes: Mapping[str, Quantity],
+    gaps: bool = False,
     is_planned: bool = False,
-) -> tuple[dict[str, Points], str]:  # fmt: skip
+) -> tuple[dict[str, Points], str]:
     """Return the columns of a table of measured values, and a remark if it has no units, which is printed, too.
 
     Parameters
@@ -677,17 +874,24 @@ def read_measured(
     """
     try:
         with blamed(str(path)):
-            result, bare = _measured_columns(plain_text(path), known, outcomes, gaps, is_planned)
+            result, bare = _measured_columns(
+                plain_text(path), known, outcomes, gaps, is_planned
+            )
     except PydanticCustomError as fault:
         raise BadInput([str(fault)]) from None
-    reach = [f"{name} reaches {np.nanmax(np.abs(result[name].values)):.4g} {known[name].unit}" for name in bare]
+    reach = [
+        f"{name} reaches {np.nanmax(np.abs(result[name].values)):.4g} {known[name].unit}"
+        for name in bare
+    ]
     remark = f"no units: SI assumed; {', '.join(reach)}" if bare else ""
     if remark:
         LOG.warning("%s: %s", path, remark)
     return result, remark
 
 
-def measured_points(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -> dict[str, Points]:
+def measured_points(
+    columns: Mapping[str, Any], known: Mapping[str, Quantity]
+) -> dict[str, Points]:
     """Return columns of measured values [SI] by name, some with their errors.
 
     Raises
@@ -699,30 +903,62 @@ def measured_points(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -
     _refuse_unknown(arrays, known, known)
     for name in arrays:
         if len(twice := [other for other in names_of(name) if other in arrays]) > 1:
-            raise ValueError(f'columns "{twice[0]}" and "{twice[1]}" are the same condition; omit one of them')
-    if len({values.shape for values in arrays.values()}) != 1 or next(iter(arrays.values())).ndim != 1:
-        raise ValueError("measured columns need the same number of rows; give arrays of one length")
-    return {name: Points(values, arrays.get(name + ERROR)) for name, values in arrays.items() if name in known}
+            raise ValueError(
+                f'columns "{twice[0]}" and "{twice[1]}" are the same condition; omit one of them'
+            )
+    if (
+        len({values.shape for values in arrays.values()}) != 1
+        or next(iter(arrays.values())).ndim != 1
+    ):
+        raise ValueError(
+            "measured columns need the same number of rows; give arrays of one length"
+        )
+    return {
+        name: Points(values, arrays.get(name + ERROR))
+        for name, values in arrays.items()
+        if name in known
+    }
 
 
 def _measured_columns(
-    text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity], gaps: bool, is_planned: bool
+    text: str,
+    known: Mapping[str, Quantity],
+    outcomes: Mapping[str, Quantity],
+    gaps: bool,
+    is_planned: bool,
 ) -> tuple[dict[str, Points], list[str]]:
     """Return the columns, and the names of those that would need a unit if none has one."""
     units = dict(_headed(_cells(text))[1])
     if not units:
-        raise TableError("the columns have no header; add one of names and units, such as speed [mm/s]")
-    comments = {name.replace(".", "_"): (name, value.strip()) for name, value in _STATED.findall(text)}
-    stated = {n: comment for n, comment in comments.items() if "." in comment[0] or (n in known and n not in outcomes)}
-    _refuse_unknown([*units, *stated, *(outcomes if is_planned else ())], known, outcomes)
+        raise TableError(
+            "the columns have no header; add one of names and units, such as speed [mm/s]"
+        )
+    comments = {
+        name.replace(".", "_"): (name, value.strip())
+        for name, value in _STATED.findall(text)
+    }
+    stated = {
+        n: comment
+        for n, comment in comments.items()
+        if "." in comment[0] or (n in known and n not in outcomes)
+    }
+    _refuse_unknown(
+        [*units, *stated, *(outcomes if is_planned else ())], known, outcomes
+    )
     wanted: dict[str, Quantity] = {}
     for name, unit in units.items():
         if name in known:
             wanted[name] = known[name]
         else:
             declared = outcomes[name.removesuffix(ERROR)].unit
-            wanted[name] = Quantity("1" if unit == "%" and declared != "1" else declared, name, above=0)
-    bare = [name for name, quantity in wanted.items() if not units[name] and quantity.unit != "1"]
+            wanted[name] = Quantity(
+                "1" if unit == "%" and declared != "1" else declared, name, above=0
+            )
+    bare = [
+        name
+        for name, quantity in wanted.items()
+        if not units[name] and quantity.unit != "1"
+    ]
     if bare and any(units.values()):
         cure = f'write "{bare[0]} [{wanted[bare[0]].unit}]" if that is its unit'
         raise TableError(f'column "{bare[0]}" has no unit, but others have one; {cure}')
@@ -740,20 +976,36 @@ def _measured_columns(
         if wanted[base + ERROR].unit != outcomes[base].unit:  # a share of the value
             arrays[base + ERROR] *= -1.0 if is_planned else np.abs(values)
         if not is_planned and np.any(arrays[base + ERROR] <= 0.0):
-            raise TableError(f'column "{base}" has a value of 0, so a relative error is undefined; give it in units')
+            raise TableError(
+                f'column "{base}" has a value of 0, so a relative error is undefined; give it in units'
+            )
     return measured_points(arrays, known), [name for name in bare if name in known]
 
 
-def _refuse_unknown(names: Collection[str], known: Iterable[str], outcomes: Iterable[str]) -> None:
+def _refuse_unknown(
+    names: Collection[str], known: Iterable[str], outcomes: Iterable[str]
+) -> None:
     """Refuse columns that are no conditions, variables or errors of such a column, all at once and with proposals."""
     errors, texts = [name + ERROR for name in names if name in outcomes], []
-    for name in [name for name in names if name not in known and name not in errors][:_MOST_NAMED]:
+    for name in [name for name in names if name not in known and name not in errors][
+        :_MOST_NAMED
+    ]:
         base = name.removesuffix(ERROR)
         near = difflib.get_close_matches(base.lower()[:40], known, 1, 0.75)
         for word in [base, *re.findall("[^\\W\\d_]+", base.lower())]:
-            near += [each for name in _PROPOSED.get(word, "").split() for each in names_of(name) if each in known]
+            near += [
+                each
+                for name in _PROPOSED.get(word, "").split()
+                for each in names_of(name)
+                if each in known
+            ]
         ending = f" → {near[0]}{name[len(base) :]}" if near else ""
-        texts.append(name[:40] + (" (the error of no measured column)" if base in known else ending))
+        texts.append(
+            name[:40]
+            + (" (the error of no measured column)" if base in known else ending)
+        )
     if texts:
         cure = "rename these columns (docs/dataset.md), or omit them"
-        raise TableError(f"neither variables of a dataset nor numbers of the scenario: {', '.join(texts)}; {cure}")
+        raise TableError(
+            f"neither variables of a dataset nor numbers of the scenario: {', '.join(texts)}; {cure}"
+        )

@@ -24,11 +24,39 @@ _PAUSE = 30.0
 _WIDE = 100_000
 #: Signs of formulas in ASCII, for an output whose encoding lacks them: a lost minus sign would change a number.
 _SIGNS = {
-    "−": "-", "–": "-", "—": "-", "×": "x", "·": "*", "⋅": "*", "±": "+-", "√": "sqrt", "½": "1/2", "⁄": "/",
-    "°": " deg", "∫": "integral ", "∮": "loop integral ", "→": "->", "►": ">", "─": "-", "≠": "!=", "≤": "<=",
-    "≥": ">=", "≈": "~", "∝": "~", "∞": "inf", "⟨": "<", "⟩": ">", "ℓ": "l", "µ": "u", "μ": "u", "…": "...", "“": '"',
-    "”": '"', "’": "'", "ß": "ss",
-}  # fmt: skip
+    "−": "-",
+    "–": "-",
+    "—": "-",
+    "×": "x",
+    "·": "*",
+    "⋅": "*",
+    "±": "+-",
+    "√": "sqrt",
+    "½": "1/2",
+    "⁄": "/",
+    "°": " deg",
+    "∫": "integral ",
+    "∮": "loop integral ",
+    "→": "->",
+    "►": ">",
+    "─": "-",
+    "≠": "!=",
+    "≤": "<=",
+    "≥": ">=",
+    "≈": "~",
+    "∝": "~",
+    "∞": "inf",
+    "⟨": "<",
+    "⟩": ">",
+    "ℓ": "l",
+    "µ": "u",
+    "μ": "u",
+    "…": "...",
+    "“": '"',
+    "”": '"',
+    "’": "'",
+    "ß": "ss",
+}
 
 
 def one_line(text: str) -> str:
@@ -37,7 +65,9 @@ def one_line(text: str) -> str:
     >>> print(one_line(f"{chr(27)}[31m{chr(0x202E)}3 mN"))
     \x1b[31m\u202e3 mN
     """
-    return "".join(c if c.isprintable() else "?" if c.isspace() else repr(c)[1:-1] for c in text)
+    return "".join(
+        c if c.isprintable() else "?" if c.isspace() else repr(c)[1:-1] for c in text
+    )
 
 
 def plain(text: str) -> str:
@@ -56,7 +86,10 @@ def in_ascii(text: str) -> str:
         if letter.isascii():
             result += letter
             continue
-        name, kind = unicodedata.name(letter, "").split(), unicodedata.decomposition(letter)
+        name, kind = (
+            unicodedata.name(letter, "").split(),
+            unicodedata.decomposition(letter),
+        )
         if letter in _SIGNS:
             result += _SIGNS[letter]
         elif name[:1] == ["GREEK"] and name[2:3] == ["LETTER"]:
@@ -65,7 +98,12 @@ def in_ascii(text: str) -> str:
             continue
         else:
             parts = unicodedata.normalize("NFKD", letter).replace("−", "-")
-            raised = "^" if kind.startswith("<super>") and not _is_raised(text[place - 1 : place]) else ""
+            raised = (
+                "^"
+                if kind.startswith("<super>")
+                and not _is_raised(text[place - 1 : place])
+                else ""
+            )
             result += raised + ("".join(c for c in parts if c.isascii()) or "?")
     return result
 
@@ -120,7 +158,12 @@ def print_rows(rows: list[dict[str, str]]) -> None:
 
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in rows[0]:
-        table.add_column(Text(_written(plain(heading))), justify="right", no_wrap=True, vertical="bottom")
+        table.add_column(
+            Text(_written(plain(heading))),
+            justify="right",
+            no_wrap=True,
+            vertical="bottom",
+        )
     for row in rows:
         table.add_row(*(Text(_written(one_line(cell))) for cell in row.values()))
     Console(file=sys.stdout, width=_WIDE).print(table)
@@ -179,7 +222,10 @@ def progress_bar(total: int, what: str = "member-steps") -> Iterator[Shown]:
 
         with Progress(transient=True) as progress:
             task = progress.add_task(what, total=total)
-            yield Shown(lambda n: progress.advance(task, n), lambda stage: progress.update(task, description=stage))
+            yield Shown(
+                lambda n: progress.advance(task, n),
+                lambda stage: progress.update(task, description=stage),
+            )
         return
     yield progress_lines(total, what, note)
 
@@ -194,7 +240,9 @@ def progress_lines(total: int, what: str, tell: Callable[[str], None]) -> Shown:
         finished, now = finished + done, time.monotonic()
         if now - printed > _PAUSE and finished:
             printed, left = now, (now - began) * (total - finished) / finished
-            tell(f"{100 * finished / total:.0f} % of {total:,} {what}, {duration(left)} left")
+            tell(
+                f"{100 * finished / total:.0f} % of {total:,} {what}, {duration(left)} left"
+            )
 
     def begin(stage: str) -> None:
         if stage and time.monotonic() - began > _PAUSE:
@@ -207,7 +255,9 @@ def duration(seconds: float) -> str:
     """Return a time as text."""
     if seconds < 90.0:
         return f"{max(seconds, 1.0):.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
+    return (
+        f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
+    )
 
 
 def signals(*names: str) -> list[signal.Signals]:

@@ -25,15 +25,23 @@ def known(ramp):
     dims = ("member", "t")
     masked = (dims, ((numbers <= 0.0) & (closed == 1)).astype(float))
     return five.assign(
-        work_of_adhesion=(dims, numbers, ramp["work_of_adhesion"].attrs), in_contact=(dims, closed), masked=masked
+        work_of_adhesion=(dims, numbers, ramp["work_of_adhesion"].attrs),
+        in_contact=(dims, closed),
+        masked=masked,
     )
 
 
 @pytest.mark.verify  # dask comes with its extra
 def test_runs_joined_as_the_page_says_have_the_table_of_a_sweep(tmp_path):
     parts = {"drive": Steady(speed=1e-2), "record": Record(quantities=["contact_area"])}
-    loads = [run(scene(contact=Equilibrium(load=load), **parts), to=tmp_path / f"{load}.nc") for load in (2e-3, 4e-3)]
-    key = {"concat_dim": "contact_load", "preprocess": lambda dataset: dataset.set_coords("contact_load")}
+    loads = [
+        run(scene(contact=Equilibrium(load=load), **parts), to=tmp_path / f"{load}.nc")
+        for load in (2e-3, 4e-3)
+    ]
+    key = {
+        "concat_dim": "contact_load",
+        "preprocess": lambda dataset: dataset.set_coords("contact_load"),
+    }
     with xr.open_mfdataset(loads, combine="nested", **key) as runs:
         swept = run(scene(sweep={"contact.load": [2e-3, 4e-3]}, **parts))
         assert analysis.table(runs) == analysis.table(swept)
@@ -46,36 +54,58 @@ def test_statistics_of_known_numbers_few_members_and_missing_values(known, ramp)
     deviation = np.sqrt(np.sum((sorted_numbers - mean) ** 2, axis=0) / 4.0)
     assert_allclose(result["work_of_adhesion_mean"], mean, rtol=1e-14)
     assert_allclose(result["work_of_adhesion_std"], deviation, rtol=1e-13)
-    assert_allclose(result["work_of_adhesion_sem"], deviation / math.sqrt(5.0), rtol=1e-13)
+    assert_allclose(
+        result["work_of_adhesion_sem"], deviation / math.sqrt(5.0), rtol=1e-13
+    )
     # five sorted numbers: the 5 % quantile lies a fifth of the way from the first to the second
     fifth = 0.8 * sorted_numbers[0] + 0.2 * sorted_numbers[1]
-    assert_allclose(result["work_of_adhesion_quantile"].sel(quantile=0.05), fifth, rtol=1e-13)
-    assert_allclose(result["work_of_adhesion_quantile"].sel(quantile=0.5), 3.0 * t, rtol=1e-13)
+    assert_allclose(
+        result["work_of_adhesion_quantile"].sel(quantile=0.05), fifth, rtol=1e-13
+    )
+    assert_allclose(
+        result["work_of_adhesion_quantile"].sel(quantile=0.5), 3.0 * t, rtol=1e-13
+    )
     assert result["work_of_adhesion_mean"].attrs["units"] == "J/m^2"
     result = analysis.statistics(known)
     assert_allclose(result["fraction_detached_mean"], 0.2, rtol=1e-14)
-    assert_allclose(result["fraction_detached_sem"], math.sqrt(0.2 * 0.8 / 4.0), rtol=1e-14)
+    assert_allclose(
+        result["fraction_detached_sem"], math.sqrt(0.2 * 0.8 / 4.0), rtol=1e-14
+    )
     # member 0 has no work left, at t = 0 all that are closed have none
-    assert_allclose(result["fraction_masked_mean"], [0.8] + [0.2] * (known.sizes["t"] - 1), rtol=1e-14)
+    assert_allclose(
+        result["fraction_masked_mean"],
+        [0.8] + [0.2] * (known.sizes["t"] - 1),
+        rtol=1e-14,
+    )
     result = analysis.statistics(ramp)
     np.testing.assert_array_equal(result["speed_mean"], ramp["speed"])
     assert np.all(result["speed_sem"] == 0.0)
     assert np.all(result["speed_quantile"].sel(quantile=0.95) == ramp["speed"])
     result = analysis.statistics(ramp.isel(member=[0]))
-    np.testing.assert_array_equal(result["contact_radius_mean"], ramp["contact_radius"][0])
+    np.testing.assert_array_equal(
+        result["contact_radius_mean"], ramp["contact_radius"][0]
+    )
     assert bool(result["contact_radius_sem"].isnull().all())
-    np.testing.assert_array_equal(result["contact_radius_quantile"].sel(quantile=0.05), ramp["contact_radius"][0])
+    np.testing.assert_array_equal(
+        result["contact_radius_quantile"].sel(quantile=0.05), ramp["contact_radius"][0]
+    )
     depth = ramp["indentation"].copy()
     depth[0] = math.nan
     result = analysis.statistics(ramp.assign(indentation=depth))
     rest = analysis.statistics(ramp.isel(member=slice(1, None)))
     for kind in ("mean", "std", "sem", "quantile"):
-        assert_allclose(result[f"indentation_{kind}"], rest[f"indentation_{kind}"], rtol=1e-12)
+        assert_allclose(
+            result[f"indentation_{kind}"], rest[f"indentation_{kind}"], rtol=1e-12
+        )
     depth[:, :3] = math.nan
     none = analysis.statistics(ramp.assign(indentation=depth))
-    assert bool(none["indentation_mean"][:3].isnull().all()) and bool(none["indentation_mean"][3:].notnull().all())
+    assert bool(none["indentation_mean"][:3].isnull().all()) and bool(
+        none["indentation_mean"][3:].notnull().all()
+    )
     dims = ("member", "t")
-    levels = np.array([1.0, 2.0, 4.0, 4.0, 5.0, 8.0])[:, None] * np.ones(ramp.sizes["t"])
+    levels = np.array([1.0, 2.0, 4.0, 4.0, 5.0, 8.0])[:, None] * np.ones(
+        ramp.sizes["t"]
+    )
     levels[:, : ramp.sizes["t"] // 2] = 1e9  # a start-up that must not count
     members = xr.Dataset({"level": (dims, levels)}, {"t": ramp["t"]})
     result = analysis.summary(analysis.settled(members))
@@ -84,32 +114,62 @@ def test_statistics_of_known_numbers_few_members_and_missing_values(known, ramp)
     assert_allclose(result["level_sem"], math.sqrt(30.0 / 5.0 / 6.0), rtol=1e-14)
 
 
-def test_recorded_statistics_and_those_of_files_and_pieces_are_those_of_the_members(ramp, tmp_path, monkeypatch):
-    result, recorded = analysis.statistics(ramp), analysis.statistics(run(scene(record=Record(per_member=False))))
-    for name in ("contact_radius", "fluctuation_energy", "fraction_detached", "fraction_masked", "area_ratio"):
+def test_recorded_statistics_and_those_of_files_and_pieces_are_those_of_the_members(
+    ramp, tmp_path, monkeypatch
+):
+    result, recorded = (
+        analysis.statistics(ramp),
+        analysis.statistics(run(scene(record=Record(per_member=False)))),
+    )
+    for name in (
+        "contact_radius",
+        "fluctuation_energy",
+        "fraction_detached",
+        "fraction_masked",
+        "area_ratio",
+    ):
         for kind in ("mean", "std", "sem"):
             # deviations cancel: what is left is rounding of the mean
             rounding = 1e-14 * float(np.max(np.abs(result[f"{name}_mean"])))
-            assert_allclose(recorded[f"{name}_{kind}"], result[f"{name}_{kind}"], rtol=1e-12, atol=rounding)
+            assert_allclose(
+                recorded[f"{name}_{kind}"],
+                result[f"{name}_{kind}"],
+                rtol=1e-12,
+                atol=rounding,
+            )
     assert "contact_radius_quantile" not in recorded
-    pooled, each = analysis.shares(run(scene(record=Record(per_member=False)))), analysis.shares(ramp)
+    pooled, each = (
+        analysis.shares(run(scene(record=Record(per_member=False)))),
+        analysis.shares(ramp),
+    )
     for name in ("lost_to_fluctuations_mean", "lost_to_fluctuations_sem"):
         assert_allclose(pooled[name], each[name], rtol=1e-10, atol=1e-14)
     recorded = run(scene(record=Record(per_member=False)))
     closed = recorded["in_contact_mean"].copy()
     closed[3:6] = 0.5
-    result = analysis.observables(recorded.assign(in_contact_mean=closed))["fraction_masked_mean"]
+    result = analysis.observables(recorded.assign(in_contact_mean=closed))[
+        "fraction_masked_mean"
+    ]
     assert result.isnull().to_numpy().tolist() == [3 <= k < 6 for k in range(21)]
     path = run(scene(), to=tmp_path / "out.nc")
     with xr.open_dataset(path) as opened:
-        xr.testing.assert_identical(analysis.statistics(opened).load(), analysis.statistics(ramp))
-    path = run(scene(record=Record(quantities=["friction_force", "masked"])), to=tmp_path / "some.nc")
-    cycles = run(scene(contact=Equilibrium(load={"from": 4e-3, "to": 1e-3, "cycles": 2})))
+        xr.testing.assert_identical(
+            analysis.statistics(opened).load(), analysis.statistics(ramp)
+        )
+    path = run(
+        scene(record=Record(quantities=["friction_force", "masked"])),
+        to=tmp_path / "some.nc",
+    )
+    cycles = run(
+        scene(contact=Equilibrium(load={"from": 4e-3, "to": 1e-3, "cycles": 2}))
+    )
     results = []
     for room in (2**27, 1000):
         monkeypatch.setattr(dataset_module, "ROOM", room)
         with xr.open_dataset(path) as opened:
-            results.append((analysis.statistics(opened).load(), analysis.loop_energy(cycles)))
+            results.append(
+                (analysis.statistics(opened).load(), analysis.loop_energy(cycles))
+            )
     for whole, pieces in zip(*results, strict=True):
         xr.testing.assert_identical(pieces, whole)
 
@@ -121,18 +181,39 @@ def test_words_and_settings_are_known_whether_swept_or_not_and_a_run_that_is_sta
     with pytest.raises(KeyError, match=r"contact\.indentation"):
         analysis.setting(dataset, "contact.indentation")
     contact = Equilibrium(indentation={"from": 1e-6, "to": 2e-6})
-    dataset = run(scene(contact=contact, shear=shear.Uniform(), sweep={"contact.after_pull_off": ["stop", "reattach"]}))
-    assert word(dataset, "contact.after_pull_off", "").to_numpy().tolist() == ["stop", "reattach"]
-    rows = [{"contact.after_pull_off": "reattach", "contact.load": load} for load in (1e-3, 2e-3)]
+    dataset = run(
+        scene(
+            contact=contact,
+            shear=shear.Uniform(),
+            sweep={"contact.after_pull_off": ["stop", "reattach"]},
+        )
+    )
+    assert word(dataset, "contact.after_pull_off", "").to_numpy().tolist() == [
+        "stop",
+        "reattach",
+    ]
+    rows = [
+        {"contact.after_pull_off": "reattach", "contact.load": load}
+        for load in (1e-3, 2e-3)
+    ]
     dataset = run(scene(shear=shear.Uniform(), sweep=rows))
-    assert word(dataset, "contact.after_pull_off", "").to_numpy().tolist() == ["reattach", "reattach"]
-    drives = [{"model": "ramp", "from": 1e-5, "to": 1e-2}, {"model": "start", "rest": 0.1, "speed": 1e-2}]
+    assert word(dataset, "contact.after_pull_off", "").to_numpy().tolist() == [
+        "reattach",
+        "reattach",
+    ]
+    drives = [
+        {"model": "ramp", "from": 1e-5, "to": 1e-2},
+        {"model": "start", "rest": 0.1, "speed": 1e-2},
+    ]
     dataset = run(scene(shear=shear.Uniform(), sweep={"drive": drives}))
     assert word(dataset, "drive.model", "").to_numpy().tolist() == ["ramp", "start"]
     steady = {"drive": drive.Steady(speed=1e-3), "shear": shear.Uniform()}
     assert analysis.is_stationary(run(scene(**steady)))
     ended = run(scene(**steady))
-    ended["speed"] = ended["speed"].where(ended["t"] < ended["t"][2])  # as after a runaway
-    assert analysis.is_steady(ended) and not analysis.is_stationary(run(scene(shear=shear.Uniform())))
+    # as after a runaway
+    ended["speed"] = ended["speed"].where(ended["t"] < ended["t"][2])
+    assert analysis.is_steady(ended) and not analysis.is_stationary(
+        run(scene(shear=shear.Uniform()))
+    )
     moved = run(scene(contact=Equilibrium(load={"from": 1e-3, "to": 2e-3}), **steady))
     assert analysis.is_steady(moved) and not analysis.is_stationary(moved)

@@ -54,9 +54,26 @@ SCENES = {
 #: Ways in which a variable is not as it was written.
 KINDS = ("removed", "renamed", "shape", "type", "text")
 #: Attributes that are given to variables, and what a run writes as attributes of the file.
-ATTRIBUTES = {"scale_factor": "two", "add_offset": "none", "units": "furlong", "long_name": 5}
-OTHERWISE = {"no attribute": None, "another text": "some text", "no text": np.array([1.5, 2.5])}
-OF_THE_FILE = ("members", "scenario_resolved", "scenario_toml", "scenario_files", "sim_version", "seed", "title")
+ATTRIBUTES = {
+    "scale_factor": "two",
+    "add_offset": "none",
+    "units": "furlong",
+    "long_name": 5,
+}
+OTHERWISE = {
+    "no attribute": None,
+    "another text": "some text",
+    "no text": np.array([1.5, 2.5]),
+}
+OF_THE_FILE = (
+    "members",
+    "scenario_resolved",
+    "scenario_toml",
+    "scenario_files",
+    "sim_version",
+    "seed",
+    "title",
+)
 
 
 def damaged(dataset, name, kind):
@@ -67,13 +84,19 @@ def damaged(dataset, name, kind):
     if kind == "renamed":
         return dataset.rename_vars({name: f"{name}_x"})
     if kind == "shape":
-        changed = xr.Variable(("other", *values.dims), values.to_numpy()[np.newaxis].repeat(2, 0), values.attrs)
+        changed = xr.Variable(
+            ("other", *values.dims),
+            values.to_numpy()[np.newaxis].repeat(2, 0),
+            values.attrs,
+        )
     elif kind == "text":
         texts = np.full(values.shape, "some text", object)
         changed = xr.Variable(values.dims, texts, {})
     else:
         is_text = values.dtype.kind in "OU"
-        changed = xr.Variable(values.dims, np.ones(values.shape, "f8" if is_text else "i4"), values.attrs)
+        changed = xr.Variable(
+            values.dims, np.ones(values.shape, "f8" if is_text else "i4"), values.attrs
+        )
     return dataset.drop_vars(name).assign({name: changed})
 
 
@@ -82,7 +105,9 @@ def cases(datasets):
     for shift, (scene, dataset) in enumerate(datasets.items()):
         for place, name in enumerate(dataset.variables):
             yield scene, name, KINDS[(place + shift) % len(KINDS)]
-        for attribute, name in itertools.product(ATTRIBUTES, ("t", "contact_modulus", "contact_radius")):
+        for attribute, name in itertools.product(
+            ATTRIBUTES, ("t", "contact_modulus", "contact_radius")
+        ):
             yield scene, name, attribute
         for name, kind in itertools.product(OF_THE_FILE, OTHERWISE):
             yield scene, name, kind
@@ -111,7 +136,9 @@ def datasets(tmp_path_factory):
         result = {}
         for scene, text in SCENES.items():
             path = package.run(tomllib.loads(text), f"{scene}.nc")
-            with xr.open_dataset(path, decode_times=False, decode_coords=False) as dataset:
+            with xr.open_dataset(
+                path, decode_times=False, decode_coords=False
+            ) as dataset:
                 result[scene] = dataset.load()
         yield result
 
@@ -127,13 +154,20 @@ def uncollected():
 
 def is_open(name):
     """True if this process has a file open."""
-    return str(Path(name).absolute()) in {file.path for file in psutil.Process().open_files()}
+    return str(Path(name).absolute()) in {
+        file.path for file in psutil.Process().open_files()
+    }
 
 
 @pytest.mark.parametrize("command", ["stats", "plot", "report"])
 @pytest.mark.parametrize(
     ("name", "kind"),
-    [("t", "scale_factor"), ("t", "removed"), ("contact_modulus", "shape"), ("members", "no attribute")],
+    [
+        ("t", "scale_factor"),
+        ("t", "removed"),
+        ("contact_modulus", "shape"),
+        ("members", "no attribute"),
+    ],
 )
 def test_a_dataset_that_is_refused_is_closed_so_that_windows_lets_it_be_deleted(
     datasets, uncollected, command, name, kind
@@ -143,7 +177,9 @@ def test_a_dataset_that_is_refused_is_closed_so_that_windows_lets_it_be_deleted(
     Path("refused.nc").unlink()
 
 
-def test_a_file_with_a_variable_that_netcdf_does_not_read_is_closed(datasets, uncollected):
+def test_a_file_with_a_variable_that_netcdf_does_not_read_is_closed(
+    datasets, uncollected
+):
     h5py = pytest.importorskip("h5py")
     with h5py.File("opaque.nc", "w") as file:
         file["opaque"] = np.zeros(2, "V5")
@@ -157,9 +193,13 @@ def test_a_file_with_a_variable_that_netcdf_does_not_read_is_closed(datasets, un
 
 @pytest.mark.parametrize("apart", [61, pytest.param(1, marks=pytest.mark.verify)])
 @pytest.mark.parametrize("command", ["stats", "plot", "report"])
-def test_a_changed_variable_or_attribute_is_done_without_or_refused_in_one_line_that_names_it(datasets, command, apart):
+def test_a_changed_variable_or_attribute_is_done_without_or_refused_in_one_line_that_names_it(
+    datasets, command, apart
+):
     wrong, refusals = [], 0
-    for number, (scene, name, kind) in enumerate(itertools.islice(cases(datasets), 0, None, apart)):
+    for number, (scene, name, kind) in enumerate(
+        itertools.islice(cases(datasets), 0, None, apart)
+    ):
         path = Path(f"{command}-{apart}-{number}.nc")
         write(datasets[scene], scene, name, kind, path)
         done = sim(command, path)
@@ -168,7 +208,11 @@ def test_a_changed_variable_or_attribute_is_done_without_or_refused_in_one_line_
             wrong.append((scene, name, kind, repr(done.exception)))
         elif done.exit_code:
             refusals += 1
-            if done.exit_code != 2 or not message or (str(path) not in done.stderr and name not in done.stderr):
+            if (
+                done.exit_code != 2
+                or not message
+                or (str(path) not in done.stderr and name not in done.stderr)
+            ):
                 wrong.append((scene, name, kind, done.exit_code, message))
         path.unlink()
     assert not wrong and refusals
@@ -184,4 +228,7 @@ def test_a_flipped_byte_of_a_coordinate_is_named(datasets):
     for command in ("stats", "plot", "report"):
         done = sim(command, "flipped.nc")
         assert (done.exit_code, done.stdout) == (2, "")
-        assert done.stderr.startswith("flipped.nc: variable t is damaged") and done.stderr.count("\n") == 1
+        assert (
+            done.stderr.startswith("flipped.nc: variable t is damaged")
+            and done.stderr.count("\n") == 1
+        )

@@ -8,7 +8,18 @@ import numpy as np
 import pytest
 import xarray as xr
 from helpers.lens import scene
-from helpers.parts import Bell, Clock, Ensemble, Equilibrium, analysis, bonds, drive, jkr, run, shear
+from helpers.parts import (
+    Bell,
+    Clock,
+    Ensemble,
+    Equilibrium,
+    analysis,
+    bonds,
+    drive,
+    jkr,
+    run,
+    shear,
+)
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
@@ -21,69 +32,138 @@ NAN = math.nan
 
 def per_member(dataset, **values):
     """The dataset with these numbers per member."""
-    return dataset.assign({name: dataset[name].copy(data=np.array(each)) for name, each in values.items()})
+    return dataset.assign(
+        {name: dataset[name].copy(data=np.array(each)) for name, each in values.items()}
+    )
 
 
 def test_first_detachment_and_masking_are_told_of_those_members_that_had_them(ramp):
     # Three of six open, one of them twice: its first time counts.
-    result = analysis.statistics(per_member(ramp, first_detachment=[0.07, 0.19, 0.3, NAN, NAN, NAN]))
+    result = analysis.statistics(
+        per_member(ramp, first_detachment=[0.07, 0.19, 0.3, NAN, NAN, NAN])
+    )
     assert_allclose(result["ever_detached_mean"], 0.5, rtol=1e-14)
     assert_allclose(result["ever_detached_sem"], math.sqrt(0.25 / 5.0), rtol=1e-13)
-    assert_allclose(result["first_detachment_mean"], (0.07 + 0.19 + 0.3) / 3.0, rtol=1e-13)
+    assert_allclose(
+        result["first_detachment_mean"], (0.07 + 0.19 + 0.3) / 3.0, rtol=1e-13
+    )
     deviation = np.std([0.07, 0.19, 0.3], ddof=1)
-    assert_allclose(result["first_detachment_sem"], deviation / math.sqrt(3.0), rtol=1e-13)
-    assert_allclose(result["first_detachment_quantile"], [0.082, 0.19, 0.289], rtol=1e-13)
+    assert_allclose(
+        result["first_detachment_sem"], deviation / math.sqrt(3.0), rtol=1e-13
+    )
+    assert_allclose(
+        result["first_detachment_quantile"], [0.082, 0.19, 0.289], rtol=1e-13
+    )
     result = analysis.statistics(ramp)
-    assert float(result["ever_detached_mean"]) == 0.0 and math.isnan(result["first_detachment_mean"])
+    assert float(result["ever_detached_mean"]) == 0.0 and math.isnan(
+        result["first_detachment_mean"]
+    )
     assert not any("_reading" in str(name) for name in result)
-    assert not any("detached" in heading for row in analysis.highlights(ramp) for heading in row)
+    assert not any(
+        "detached" in heading for row in analysis.highlights(ramp) for heading in row
+    )
     lifted = Equilibrium(indentation=-0.4e-6)
-    dataset = run(scene(contact=lifted, drive=drive.Steady(speed=3e-3), ensemble=Ensemble(members=24)))
+    dataset = run(
+        scene(
+            contact=lifted,
+            drive=drive.Steady(speed=3e-3),
+            ensemble=Ensemble(members=24),
+        )
+    )
     result, opened = analysis.statistics(dataset), dataset["in_contact"] == 0
-    assert_allclose(result["ever_detached_mean"], float(opened.any("t").mean()), rtol=1e-14)
+    assert_allclose(
+        result["ever_detached_mean"], float(opened.any("t").mean()), rtol=1e-14
+    )
     first = dataset["t"].to_numpy()[opened.argmax("t")][opened.any("t").to_numpy()]
     assert_allclose(result["first_detachment_mean"], first.mean(), rtol=1e-12)
     assert 2 <= len(first) < 24
     (row,) = analysis.highlights(dataset, stated=analysis.statements(dataset))
-    assert row["detached,\nof members (%)"].startswith(f"{100.0 * len(first) / 24.0:.0f}(")
+    assert row["detached,\nof members (%)"].startswith(
+        f"{100.0 * len(first) / 24.0:.0f}("
+    )
     assert "5 to 95 %\nof members, interpolated (ms)" in row  # 5 of 24 detached
     at, masked = ramp["t"].to_numpy()[[11, 4]], [0.0, 0.5, 0.75, 0.0, 0.0, 0.0]
-    (row,) = analysis.highlights(per_member(ramp, time_masked=masked, first_masked=[NAN, *at, NAN, NAN, NAN]))
-    assert row["first\nmasked (ms)"] == "200(500)" and row["half\nmasked (ms)"] == "> 80"  # a third of the members were
-    (row,) = analysis.highlights(per_member(ramp, time_masked=masked, first_masked=[NAN, *at, *[ramp["t"][9]] * 3]))
+    (row,) = analysis.highlights(
+        per_member(ramp, time_masked=masked, first_masked=[NAN, *at, NAN, NAN, NAN])
+    )
+    # a third of the members were
+    assert (
+        row["first\nmasked (ms)"] == "200(500)" and row["half\nmasked (ms)"] == "> 80"
+    )
+    (row,) = analysis.highlights(
+        per_member(
+            ramp, time_masked=masked, first_masked=[NAN, *at, *[ramp["t"][9]] * 3]
+        )
+    )
     assert row["half\nmasked (ms)"] == "180 (> 80)"
 
 
 def test_openings_closings_and_masking_are_those_of_all_clock_steps_however_seldom_is_recorded():
-    clock, held = Clock(duration=0.4, step=2e-3), Equilibrium(indentation=-0.4e-6, after_pull_off="reattach")
-    moved = Equilibrium(load={"from": 4e-3, "to": -1e-3, "cycles": 2}, after_pull_off="reattach")
+    clock, held = (
+        Clock(duration=0.4, step=2e-3),
+        Equilibrium(indentation=-0.4e-6, after_pull_off="reattach"),
+    )
+    moved = Equilibrium(
+        load={"from": 4e-3, "to": -1e-3, "cycles": 2}, after_pull_off="reattach"
+    )
     for part, count in ((held, 24), (moved, 6)):
         for policy in ("reattach", "stop"):
             contact = replace(part, after_pull_off=policy)
-            parts = {"contact": contact, "drive": drive.Steady(speed=3e-3), "ensemble": Ensemble(members=count)}
-            dense, seldom = (run(scene(clock=replace(clock, record=each), **parts)) for each in (2e-3, 0.4))
-            names = ["first_detachment", "detachments", "first_closing", "closing_load", "first_masked", "time_masked"]
+            parts = {
+                "contact": contact,
+                "drive": drive.Steady(speed=3e-3),
+                "ensemble": Ensemble(members=count),
+            }
+            dense, seldom = (
+                run(scene(clock=replace(clock, record=each), **parts))
+                for each in (2e-3, 0.4)
+            )
+            names = [
+                "first_detachment",
+                "detachments",
+                "first_closing",
+                "closing_load",
+                "first_masked",
+                "time_masked",
+            ]
             for name in names:
                 assert_array_equal(seldom[name], dense[name])
             closed, t = dense["in_contact"].values == 1, dense["t"].values
-            opens, closes = closed[:, :-1] & ~closed[:, 1:], ~closed[:, :-1] & closed[:, 1:]
+            opens, closes = (
+                closed[:, :-1] & ~closed[:, 1:],
+                ~closed[:, :-1] & closed[:, 1:],
+            )
             assert_array_equal(dense["detachments"], opens.sum(axis=1))
             for turns, name in ((opens, "first_detachment"), (closes, "first_closing")):
                 first = np.where(turns.any(axis=1), t[1:][turns.argmax(axis=1)], NAN)
                 assert_allclose(dense[name], first, rtol=1e-12)
             hidden = dense["masked"].values[:, 1:].sum(axis=1)
-            assert_allclose(dense["time_masked"], hidden / closed[:, 1:].sum(axis=1), rtol=1e-12)
+            assert_allclose(
+                dense["time_masked"], hidden / closed[:, 1:].sum(axis=1), rtol=1e-12
+            )
             at = dense["first_closing"].fillna(0.0)
-            load = dense["normal_load"].sel(t=at, method="nearest").where(dense["first_closing"].notnull())
+            load = (
+                dense["normal_load"]
+                .sel(t=at, method="nearest")
+                .where(dense["first_closing"].notnull())
+            )
             assert_allclose(dense["closing_load"], load, rtol=1e-12, atol=1e-18)
 
 
 def cycled(cycles=2, steps=400, **held):
     kind = next(iter(held))
-    at_rest = {"drive": drive.Steady(speed=0.0), "bonds": bonds.Unbroken(), "shear": shear.Uniform()}
-    course = {kind: {**held[kind], "cycles": cycles}} | {name: value for name, value in held.items() if name != kind}
+    at_rest = {
+        "drive": drive.Steady(speed=0.0),
+        "bonds": bonds.Unbroken(),
+        "shear": shear.Uniform(),
+    }
+    course = {kind: {**held[kind], "cycles": cycles}} | {
+        name: value for name, value in held.items() if name != kind
+    }
     part = Equilibrium(**course, after_pull_off="reattach")
-    return run(scene(contact=part, clock=Clock(duration=1.0, step=1.0 / steps), **at_rest))
+    return run(
+        scene(contact=part, clock=Clock(duration=1.0, step=1.0 / steps), **at_rest)
+    )
 
 
 def test_a_loop_is_what_its_jumps_dissipate_nothing_without_and_the_area_of_a_circle():
@@ -93,19 +173,27 @@ def test_a_loop_is_what_its_jumps_dissipate_nothing_without_and_the_area_of_a_ci
     # a polygon of 400 corners
     result = analysis.loop_energy(drawn)["loop_energy"]
     assert_allclose(result, 200.0 * math.sin(2.0 * math.pi / 400.0), rtol=1e-12)
-    assert result["cycle"].to_numpy().tolist() == [1, 2] and result.attrs["units"] == "J"
+    assert (
+        result["cycle"].to_numpy().tolist() == [1, 2] and result.attrs["units"] == "J"
+    )
     for held in [
         {"indentation": {"from": 2e-6, "to": -0.3e-6}},
         {"load": {"from": 4e-3, "to": -0.2e-3}},
         {"displacement": {"from": 3e-6, "to": -0.3e-6}, "stiffness": 2e3},
     ]:
         dataset = cycled(**held)
-        stored = np.trapezoid(dataset["normal_load"][:101], dataset["displacement"][:101])
+        stored = np.trapezoid(
+            dataset["normal_load"][:101], dataset["displacement"][:101]
+        )
         result = analysis.loop_energy(dataset)
         assert abs(stored) > 1e-12  # J, given back on the way up
         assert_array_equal(result["loop_energy"], 0.0)
         assert_array_equal(result["loop_dissipation"], 0.0)
-        assert not any("cycle" in heading for row in analysis.highlights(dataset) for heading in row)
+        assert not any(
+            "cycle" in heading
+            for row in analysis.highlights(dataset)
+            for heading in row
+        )
     for held in [
         {"indentation": {"from": 1e-6, "to": -2e-6}},
         {"displacement": {"from": 1e-6, "to": -3e-6}, "stiffness": 500.0},
@@ -115,26 +203,45 @@ def test_a_loop_is_what_its_jumps_dissipate_nothing_without_and_the_area_of_a_ci
             dataset = cycled(steps=steps, **held)
             result = analysis.loop_energy(dataset)
             step = 2.0 * abs(held[next(iter(held))]["to"] - 1e-6) * 2 / steps
-            most = 1.5 * 2 * np.abs(dataset["normal_load"].where(dataset["displacement"] < 0.2e-6)).max() * step
+            most = (
+                1.5
+                * 2
+                * np.abs(
+                    dataset["normal_load"].where(dataset["displacement"] < 0.2e-6)
+                ).max()
+                * step
+            )
             lost = result["loop_dissipation"]
-            assert float(lost.min()) > 10.0 * float(most) and bool((result["loop_energy"] > 0.0).all())
+            assert float(lost.min()) > 10.0 * float(most) and bool(
+                (result["loop_energy"] > 0.0).all()
+            )
             assert bool((np.abs(result["loop_energy"] - lost) < most).all())
             errors.append(float(np.abs(result["loop_energy"] - lost).max()))
             assert_allclose(lost.sum(), dataset["dissipated_energy"][-1], rtol=1e-12)
         assert errors[1] < 0.5 * errors[0]
         headings = set(analysis.highlights(dataset)[0])
-        assert {heading.partition("\n")[0] for heading in headings} >= {"∮P dΔ,", "dissipated,", "detached,"}
+        assert {heading.partition("\n")[0] for heading in headings} >= {
+            "∮P dΔ,",
+            "dissipated,",
+            "detached,",
+        }
 
 
 def test_loops_of_points_are_those_of_the_whole_and_there_are_none_without_trips(ramp):
-    course = Equilibrium(indentation={"from": 1e-6, "to": -2e-6, "cycles": 1}, after_pull_off="reattach")
+    course = Equilibrium(
+        indentation={"from": 1e-6, "to": -2e-6, "cycles": 1}, after_pull_off="reattach"
+    )
     sweep = {"contact.indentation.cycles": [1, 2], "adhesion.work": [2e-2, 4e-2]}
-    swept = scene(contact=course, sweep=sweep, bonds=bonds.Unbroken(), shear=shear.Uniform())
+    swept = scene(
+        contact=course, sweep=sweep, bonds=bonds.Unbroken(), shear=shear.Uniform()
+    )
     together = analysis.loop_energy(run(swept))
     for k, point in enumerate(swept.points()):
         alone, where = analysis.loop_energy(run(point)), divmod(k, 2)
         for name in alone:
-            values = together[name].isel(contact_indentation_cycles=where[0], adhesion_work=where[1])
+            values = together[name].isel(
+                contact_indentation_cycles=where[0], adhesion_work=where[1]
+            )
             assert_array_equal(values[: alone.sizes["cycle"]], alone[name])
             assert bool(values[alone.sizes["cycle"] :].isnull().all())
     dataset = cycled(cycles=2, load={"from": 4e-3, "to": -1e-3})
@@ -142,7 +249,12 @@ def test_loops_of_points_are_those_of_the_whole_and_there_are_none_without_trips
     dataset = cycled(cycles=4, indentation={"from": 2e-6, "to": 1e-6})
     stopped = dataset["contact_radius"].where(dataset["t"] < 0.6)
     result = analysis.loop_energy(dataset.assign(contact_radius=stopped))
-    assert result["loop_energy"].isnull().to_numpy().tolist() == [False, False, True, True]
+    assert result["loop_energy"].isnull().to_numpy().tolist() == [
+        False,
+        False,
+        True,
+        True,
+    ]
     with pytest.raises(ValueError, match="cycles = 2"):
         analysis.loop_energy(ramp)
     assert "loop_energy_mean" not in analysis.statistics(ramp)
@@ -152,27 +264,47 @@ def test_loops_of_points_are_those_of_the_whole_and_there_are_none_without_trips
 def started():
     """Bonds that are stretched together after a rest of a tenth of a second; the rest is swept."""
     stretched = bonds.Cohort(
-        rupture=Bell(zero_force_rate=5.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=5.0, site_density=9e16,
-        start_from="empty", tolerance=1e-3,
-    )  # fmt: skip
+        rupture=Bell(zero_force_rate=5.0, bell_force=4e-12),
+        bond_stiffness=4e-4,
+        rebinding_rate=5.0,
+        site_density=9e16,
+        start_from="empty",
+        tolerance=1e-3,
+    )
     part = drive.Start(rest=0.1, speed=5e-6)
-    return run(scene(drive=part, bonds=stretched, shear=shear.Uniform(), clock=Clock(duration=0.5, step=2e-3),
-                     sweep={"drive.rest": [0.1, 0.2]}))  # fmt: skip
+    return run(
+        scene(
+            drive=part,
+            bonds=stretched,
+            shear=shear.Uniform(),
+            clock=Clock(duration=0.5, step=2e-3),
+            sweep={"drive.rest": [0.1, 0.2]},
+        )
+    )
 
 
-def test_a_static_peak_is_timed_from_the_start_among_steps_and_of_statistics_that_of_the_mean(started):
+def test_a_static_peak_is_timed_from_the_start_among_steps_and_of_statistics_that_of_the_mean(
+    started,
+):
     result = analysis.events(started)
     for k, rest in enumerate((0.1, 0.2)):
         stress, t = started["shear_stress"][k].to_numpy(), started["t"].to_numpy()
         at = int(np.argmax(stress))
         assert stress[at] > 1.5 * stress[-1] and t[at] > rest
         # between two records it is higher, but below the lines through its neighbours: it is concave there
-        assert stress[at] <= float(result["peak_stress"][k]) < 2.0 * stress[at] - min(stress[at - 1], stress[at + 1])
+        assert (
+            stress[at]
+            <= float(result["peak_stress"][k])
+            < 2.0 * stress[at] - min(stress[at - 1], stress[at + 1])
+        )
         assert abs(float(result["peak_time"][k]) - (t[at] - rest)) < 2e-3
-    assert float(result["peak_stress"][1]) > float(result["peak_stress"][0])  # more bonds after a longer rest
+    # more bonds after a longer rest
+    assert float(result["peak_stress"][1]) > float(result["peak_stress"][0])
     rows = analysis.highlights(started)
     assert [row["drive_rest\n(ms)"] for row in rows] == ["100", "200"]
-    assert {"peak of\nstress (kPa)", "peak of\nfriction (mN)", "after\n(ms)"} < set(rows[0])
+    assert {"peak of\nstress (kPa)", "peak of\nfriction (mN)", "after\n(ms)"} < set(
+        rows[0]
+    )
     assert not any(heading.startswith("at V") for heading in rows[0])
 
 
@@ -181,20 +313,36 @@ def test_the_friction_maximum_and_the_static_peak_are_those_of_the_clock_steps_w
     bell = {"model": "bell", "zero_force_rate": "20 1/s", "bell_force": "4 pN"}
     parts = LENS | {
         "adhesion": {"work": "42 mJ/m^2", "bond_share": 0.0},
-        "bonds": {"model": "cohort", "rupture": bell, "bond_stiffness": "0.4 uN/m", "rebinding_rate": "100 1/s",
-                  "site_density": "1e16 1/m^2"},
-    }  # fmt: skip
+        "bonds": {
+            "model": "cohort",
+            "rupture": bell,
+            "bond_stiffness": "0.4 uN/m",
+            "rebinding_rate": "100 1/s",
+            "site_density": "1e16 1/m^2",
+        },
+    }
     ramp = {"model": "ramp", "from": "1 um/s", "to": "1 m/s", "scale": "log"}
-    slow = {"model": "rate", "rupture": bell | {"zero_force_rate": "1 1/s"}, "bond_stiffness": "0.4 mN/m",
-            "rebinding_rate": "1 1/s", "site_density": "1e16 1/m^2", "start": "empty"}  # fmt: skip
+    slow = {
+        "model": "rate",
+        "rupture": bell | {"zero_force_rate": "1 1/s"},
+        "bond_stiffness": "0.4 mN/m",
+        "rebinding_rate": "1 1/s",
+        "site_density": "1e16 1/m^2",
+        "start": "empty",
+    }
     start = {"model": "start", "rest": "1 s", "speed": "3 um/s"}
-    clock = {"duration": "100 s", "step": "0.1 s", "record": "100 s"}  # the first record and the last alone
-    result = analysis.peaks(run(sim.Scenario(**parts | {"drive": ramp, "clock": clock})))
+    # the first record and the last alone
+    clock = {"duration": "100 s", "step": "0.1 s", "record": "100 s"}
+    result = analysis.peaks(
+        run(sim.Scenario(**parts | {"drive": ramp, "clock": clock}))
+    )
     assert_allclose(result["peak_stress"], 24.40e3, rtol=2e-4)
     for name in ("peak_speed", "peak_friction_speed"):
         assert_allclose(result[name], 2.270e-3, rtol=1e6 ** (0.1 / 100.0) - 1.0)
     clock = {"duration": "2 s", "step": "0.1 ms", "record": "2 s"}
-    result = analysis.peaks(run(sim.Scenario(**parts | {"bonds": slow, "drive": start, "clock": clock})))
+    result = analysis.peaks(
+        run(sim.Scenario(**parts | {"bonds": slow, "drive": start, "clock": clock}))
+    )
     assert_allclose(result["peak_stress"], 59.32e3, rtol=1e-4)
     assert_allclose(result["peak_time"], 14.37e-3, atol=1e-4)
     assert_allclose(result["peak_friction_time"], result["peak_time"], rtol=1e-12)
@@ -203,16 +351,23 @@ def test_the_friction_maximum_and_the_static_peak_are_those_of_the_clock_steps_w
 @pytest.mark.parametrize("cycles", [2, pytest.param(10, marks=pytest.mark.verify)])
 def test_pull_offs_of_cycles_are_those_of_all_cycles_and_not_the_lowest(cycles):
     """Own Gillespie and JKR, 200 pull-offs: mean -364 nN, quantiles of 5, 50 and 95 %."""
-    scenario = sim.Scenario(**SCENES["cycles"]).with_values({"contact.displacement.cycles": cycles})
+    scenario = sim.Scenario(**SCENES["cycles"]).with_values(
+        {"contact.displacement.cycles": cycles}
+    )
     clock = {"duration": 2.0 * cycles, "step": "1 ms", "record": 1.0 * cycles}
     dataset = run(scenario.with_values({"clock": clock, "ensemble.members": 20}))
     loads = analysis.pull_offs(dataset)["pull_off_load"]
     every = 1e9 * loads.values[np.isfinite(loads.values)]
-    assert every.size == 20 * cycles and dataset["phase_name"].values.tolist() == ["retraction", "approach"] * cycles
+    assert (
+        every.size == 20 * cycles
+        and dataset["phase_name"].values.tolist() == ["retraction", "approach"] * cycles
+    )
     error = every.std(ddof=1) / math.sqrt(every.size)
     assert abs(every.mean() + 364.0) < 5.0 * error
     if cycles == 10:  # of the same seed
-        assert_allclose(np.quantile(every, [0.05, 0.5, 0.95]), [-451.0, -370.0, -255.0], atol=1.0)
+        assert_allclose(
+            np.quantile(every, [0.05, 0.5, 0.95]), [-451.0, -370.0, -255.0], atol=1.0
+        )
     result = analysis.events(dataset)
     assert_allclose(result["pull_off_load"].mean(), 1e-9 * every.mean(), rtol=1e-12)
     assert_array_equal(result["pull_offs"], cycles)
@@ -220,18 +375,28 @@ def test_pull_offs_of_cycles_are_those_of_all_cycles_and_not_the_lowest(cycles):
     assert_allclose(result["pull_off_load_largest"], loads.max("phase"), rtol=1e-14)
 
 
-def test_peaks_are_maxima_inside_a_ramp_or_at_once_after_a_start_and_none_is_of_noise(ramp):
+def test_peaks_are_maxima_inside_a_ramp_or_at_once_after_a_start_and_none_is_of_noise(
+    ramp,
+):
     one, n = ramp.isel(member=0, drop=True), np.arange(21.0)
     shape = 1e5 * (1.0 - (n - 12.0) ** 2 / 400.0)
-    shapes = {"level": 0 * n + 1, "rising": n, "falling": n[::-1], "rounding": 1 + 1e-14 * np.sin(n), "peak": shape}
+    shapes = {
+        "level": 0 * n + 1,
+        "rising": n,
+        "falling": n[::-1],
+        "rounding": 1 + 1e-14 * np.sin(n),
+        "peak": shape,
+    }
     for name, values in shapes.items():
-        made_up = {"shear_stress": values, "friction_force": -values}  # its size: sliding back it is negative
+        # its size: sliding back it is negative
+        made_up = {"shear_stress": values, "friction_force": -values}
         made_up = {key: ("t", series) for key, series in made_up.items()}
         made_up |= dict.fromkeys(("peak_stress", "peak_friction"), np.abs(values).max())
         result = analysis.peaks(one.assign(made_up))
         known = [bool(result[key].notnull()) for key in result]
         assert len(known) == 10 and set(known) == {name == "peak"}
-    assert not any("friction" in name for name in analysis.peaks(ramp))  # members differ by noise
+    # members differ by noise
+    assert not any("friction" in name for name in analysis.peaks(ramp))
     # Bonds without a stretch bear most at the first slip: the first record after it, two lives of the transient on.
     part = drive.Start(rest=0.1, speed=1e-2)
     population = bonds.Rate(critical_speed=1e-2, rebinding_rate=50.0, stress=3e5)
@@ -242,35 +407,86 @@ def test_peaks_are_maxima_inside_a_ramp_or_at_once_after_a_start_and_none_is_of_
     dataset = run(scene(drive=drive.Steady(speed=1e-3)))
     assert not any(str(name).startswith("peak") for name in analysis.events(dataset))
     contact = Equilibrium(displacement={"from": 1e-6, "to": -3e-5}, stiffness=50.0)
-    dataset = run(scene(contact=contact, drive=drive.Steady(), clock=Clock(duration=1.0, step=1e-3, record=0.1)))
-    exact = float(jkr.pull_off_load(float(dataset["adhesion_work"]), float(dataset["sphere_radius"])))
+    dataset = run(
+        scene(
+            contact=contact,
+            drive=drive.Steady(),
+            clock=Clock(duration=1.0, step=1e-3, record=0.1),
+        )
+    )
+    exact = float(
+        jkr.pull_off_load(
+            float(dataset["adhesion_work"]), float(dataset["sphere_radius"])
+        )
+    )
     assert not dataset["in_contact"].isel(t=-1).any()
     assert_allclose(dataset["pull_off_load"], exact, rtol=2e-3)
 
 
 @pytest.mark.parametrize("step", ["10 ms", "40 ms"])
-def test_the_speed_of_a_friction_maximum_has_the_closed_form_in_its_interval_at_any_clock_step(step):
-    point = sim.load(Path(sim.__file__).parents[1] / "scenarios" / "friction_maximum.toml", {"clock.step": step})
-    stated, law, rupture = analysis.statements(run(point)), point.bonds, point.bonds.rupture
-    exact = bell_peak(rupture.zero_force_rate, rupture.bell_force, law.bond_stiffness, law.rebinding_rate, 1.0).speed
+def test_the_speed_of_a_friction_maximum_has_the_closed_form_in_its_interval_at_any_clock_step(
+    step,
+):
+    point = sim.load(
+        Path(sim.__file__).parents[1] / "scenarios" / "friction_maximum.toml",
+        {"clock.step": step},
+    )
+    stated, law, rupture = (
+        analysis.statements(run(point)),
+        point.bonds,
+        point.bonds.rupture,
+    )
+    exact = bell_peak(
+        rupture.zero_force_rate,
+        rupture.bell_force,
+        law.bond_stiffness,
+        law.rebinding_rate,
+        1.0,
+    ).speed
     low, high = (float(stated[f"peak_speed_{end}"]) for end in ("low", "high"))
-    assert low < exact < high < low * 1e7 ** (1.01 * point.clock.step / point.clock.duration)  # seven decades in all
-    assert stated["peak_time_low"] < np.log(exact / 1e-7) / np.log(1e7) * 10.0 < stated["peak_time_high"]
+    # seven decades in all
+    assert (
+        low
+        < exact
+        < high
+        < low * 1e7 ** (1.01 * point.clock.step / point.clock.duration)
+    )
+    assert (
+        stated["peak_time_low"]
+        < np.log(exact / 1e-7) / np.log(1e7) * 10.0
+        < stated["peak_time_high"]
+    )
 
 
 def test_a_pull_from_rest_has_the_largest_force_of_all_clock_steps_and_the_area_there_unless_it_still_grows():
-    stretched = {"rupture": Bell(zero_force_rate=25.0, bell_force=4e-12), "bond_stiffness": 8e-7}
-    parts = {"bonds": bonds.FirstMoment(**stretched, rebinding_rate=250.0, site_density=6.5e16, start_from="steady"),
-             "drive": drive.Spring(stage=2e-3, stiffness=300.0), "shear": shear.Uniform()}  # fmt: skip
-    dense, seldom, short = (run(scene(**parts, clock=Clock(*clock))) for clock in (
-        (0.2, 5e-4), (0.2, 5e-4, 0.2), (0.02, 5e-4)
-    ))  # fmt: skip
-    force, area = dense["friction_force"][0].to_numpy(), dense["contact_area"][0].to_numpy()
+    stretched = {
+        "rupture": Bell(zero_force_rate=25.0, bell_force=4e-12),
+        "bond_stiffness": 8e-7,
+    }
+    parts = {
+        "bonds": bonds.FirstMoment(
+            **stretched, rebinding_rate=250.0, site_density=6.5e16, start_from="steady"
+        ),
+        "drive": drive.Spring(stage=2e-3, stiffness=300.0),
+        "shear": shear.Uniform(),
+    }
+    dense, seldom, short = (
+        run(scene(**parts, clock=Clock(*clock)))
+        for clock in ((0.2, 5e-4), (0.2, 5e-4, 0.2), (0.02, 5e-4))
+    )
+    force, area = (
+        dense["friction_force"][0].to_numpy(),
+        dense["contact_area"][0].to_numpy(),
+    )
     top = int(np.argmax(force))
     assert 0 < top < len(force) - 1
     result = analysis.events(dense).isel(member=0)
     # between two clock steps it is higher, but below the lines through its neighbours: it is concave there
-    assert force[top] <= result["static_threshold"].item() < 2.0 * force[top] - min(force[top - 1], force[top + 1])
+    assert (
+        force[top]
+        <= result["static_threshold"].item()
+        < 2.0 * force[top] - min(force[top - 1], force[top + 1])
+    )
     low, high = sorted(area[[top - 1, top + 1]] / area[0])
     assert low < result["area_at_threshold"].item() < high
     xr.testing.assert_identical(static_threshold(seldom), static_threshold(dense))

@@ -58,19 +58,25 @@ FAULTS = {
     "text": lambda: Path("out.nc").write_text("a, b\n1, 2\n", encoding="utf-8"),
     "cut short": cut_short,
     "foreign": lambda: xr.Dataset({"x": ("y", np.ones(3))}).to_netcdf("out.nc"),
-    "no scenario": edited(lambda file: file.setncattr("scenario_resolved", "[" * 100_000)),
+    "no scenario": edited(
+        lambda file: file.setncattr("scenario_resolved", "[" * 100_000)
+    ),
     "no members": edited(lambda file: file.delncattr("members")),
     "no times": edited(lambda file: file.renameVariable("t", "other")),
 }
 
 
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS)
-def test_a_damaged_or_foreign_dataset_is_refused_in_one_line_by_every_command(folder, fault):
+def test_a_damaged_or_foreign_dataset_is_refused_in_one_line_by_every_command(
+    folder, fault
+):
     fault()
     with pytest.raises(package.BadInput) as refused:
         package.open("out.nc")
     (message,) = refused.value.problems
-    assert message.startswith("out.nc: ") and message.isprintable() and len(message) < 200
+    assert (
+        message.startswith("out.nc: ") and message.isprintable() and len(message) < 200
+    )
     for command in ("stats", "plot", "report"):
         done = sim(command, "out.nc")
         assert (done.exit_code, done.stdout, done.stderr.strip()) == (2, "", message)
@@ -82,7 +88,9 @@ def test_pipes_are_not_waited_for(folder):
     os.mkfifo("map.nc")
     for command, name in (("stats", "map.nc"), ("check", "mapped.toml")):
         done = sim(command, name)
-        assert done.exit_code == 2 and re.search("is no plain file|is not a regular file", done.stderr)
+        assert done.exit_code == 2 and re.search(
+            "is no plain file|is not a regular file", done.stderr
+        )
 
 
 def flipped(path, name):
@@ -91,38 +99,67 @@ def flipped(path, name):
     with h5py.File(path) as file:
         place = file[name].id.get_chunk_info(0)
     content = Path(path).read_bytes()
-    for at in range(place.byte_offset, place.byte_offset + place.size, max(1, place.size // 20)):
-        Path("flipped.nc").write_bytes(content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :])
+    for at in range(
+        place.byte_offset, place.byte_offset + place.size, max(1, place.size // 20)
+    ):
+        Path("flipped.nc").write_bytes(
+            content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
+        )
         yield Path("flipped.nc")
 
 
-def test_a_changed_byte_of_a_recorded_variable_or_a_checksummed_map_is_named_and_never_read(folder):
+def test_a_changed_byte_of_a_recorded_variable_or_a_checksummed_map_is_named_and_never_read(
+    folder,
+):
     for compression in ("none", "zlib"):
         written = tomllib.loads(SCENE) | {"record": {"compression": compression}}
         with package.open(package.run(written, f"{compression}.nc")) as dataset:
             dataset.load()
         for path in flipped(f"{compression}.nc", "contact_area"):
             with package.open(path) as damaged:
-                with pytest.raises(Damaged, match=r"^flipped\.nc: variable contact_area is damaged"):
+                with pytest.raises(
+                    Damaged, match=r"^flipped\.nc: variable contact_area is damaged"
+                ):
                     damaged["contact_area"].load()
-                xr.testing.assert_equal(damaged["contact_radius"].load(), dataset["contact_radius"])
+                xr.testing.assert_equal(
+                    damaged["contact_radius"].load(), dataset["contact_radius"]
+                )
     done = sim("stats", "flipped.nc")
     assert (done.exit_code, done.stdout) == (2, "")
-    assert done.stderr.startswith("flipped.nc: variable contact_area is damaged") and done.stderr.count("\n") == 1
+    assert (
+        done.stderr.startswith("flipped.nc: variable contact_area is damaged")
+        and done.stderr.count("\n") == 1
+    )
     noise = np.random.Generator(np.random.Philox(key=1)).standard_normal((16, 16))
     maps = xr.Dataset({"shear_map": (("row", "column"), noise)})
-    maps.to_netcdf("sound.nc", encoding={"shear_map": {"fletcher32": True, "zlib": True}})
+    maps.to_netcdf(
+        "sound.nc", encoding={"shear_map": {"fletcher32": True, "zlib": True}}
+    )
     shutil.copy("sound.nc", "map.nc")
     assert sim("check", "mapped.toml").exit_code == 0
     shutil.copy(next(flipped("sound.nc", "shear_map")), "map.nc")
     done = sim("check", "mapped.toml")
-    assert done.exit_code == 2 and "map.nc" in done.stderr and "shear_map is damaged" in done.stderr
+    assert (
+        done.exit_code == 2
+        and "map.nc" in done.stderr
+        and "shear_map is damaged" in done.stderr
+    )
 
 
-def test_maps_of_netcdf_in_its_formats_are_read_and_other_files_are_refused(folder, monkeypatch):
+def test_maps_of_netcdf_in_its_formats_are_read_and_other_files_are_refused(
+    folder, monkeypatch
+):
     noise = np.random.Generator(np.random.Philox(key=1)).standard_normal((16, 16))
     maps = xr.Dataset({"shear_map": (("row", "column"), noise)})
-    packed = {"shear_map": {"dtype": "i2", "scale_factor": 1e-3, "add_offset": 0.1, "_FillValue": -9999, "zlib": True}}
+    packed = {
+        "shear_map": {
+            "dtype": "i2",
+            "scale_factor": 1e-3,
+            "add_offset": 0.1,
+            "_FillValue": -9999,
+            "zlib": True,
+        }
+    }
     for options in ({}, {"format": "NETCDF3_CLASSIC"}, {"encoding": packed}):
         maps.to_netcdf("map.nc", **options)
         assert sim("check", "mapped.toml").exit_code == 0
@@ -139,12 +176,18 @@ def test_a_dataset_of_an_older_version_says_what_it_lacks(folder):
     for command in (["stats"], ["plot", "time"]):
         done = sim(command[0], "old.nc", *command[1:])
         assert done.exit_code == 0 and done.stderr.count("\n") == 1
-        assert all(words in done.stderr for words in ("old.nc", "lost to bonds", "peak of friction"))
+        assert all(
+            words in done.stderr
+            for words in ("old.nc", "lost to bonds", "peak of friction")
+        )
         assert "masked" not in done.stderr
     assert sim("stats", "out.nc").stderr == ""
 
 
-@pytest.mark.parametrize("text", ["alice,hunter2\nbob,swordfish\n", "time [s], speed [m/s]\n-31415,hunter2\n"])
+@pytest.mark.parametrize(
+    "text",
+    ["alice,hunter2\nbob,swordfish\n", "time [s], speed [m/s]\n-31415,hunter2\n"],
+)
 def test_no_message_shows_what_stands_in_a_file_elsewhere(folder, text):
     outside = folder / "secret.csv"
     outside.write_text(text, encoding="utf-8")
@@ -153,13 +196,20 @@ def test_no_message_shows_what_stands_in_a_file_elsewhere(folder, text):
     scenario = folder / "in" / "scene.toml"
     head, rest = SCENE.split('model = "ramp"\nfrom = "1 mm/s"\nto = "20 mm/s"\n')
     for name in (outside.as_posix(), "../secret.csv"):
-        for drive in (f'model = "table"\nfile = "{name}"\n', f'model = "steady"\nspeed = 1\n[shear]\n{spectrum}'):
+        for drive in (
+            f'model = "table"\nfile = "{name}"\n',
+            f'model = "steady"\nspeed = 1\n[shear]\n{spectrum}',
+        ):
             scenario.write_text(head + drive.format(name) + rest, encoding="utf-8")
             message = sim("check", scenario).stderr.replace(str(folder), "")
-            assert message and not any(word in message for word in ("alice", "hunter2", "swordfish", "31415"))
+            assert message and not any(
+                word in message for word in ("alice", "hunter2", "swordfish", "31415")
+            )
 
 
-def test_files_of_a_scenario_without_texts_do_not_keep_an_output_from_being_replaced(folder):
+def test_files_of_a_scenario_without_texts_do_not_keep_an_output_from_being_replaced(
+    folder,
+):
     edited(lambda file: file.setncattr("scenario_files", '{"map.csv": 1}'))()
     Path("rows.csv").write_text("a, b\n", encoding="utf-8")
     result = sim("stats", "out.nc", "--csv", "rows.csv", "--force")

@@ -7,7 +7,19 @@ import pytest
 import xarray as xr
 from helpers import lens
 from helpers.lens import LOAD, MODULUS, RADIUS, WORK, scene
-from helpers.parts import Adhesion, Band, Clock, Equilibrium, RateDependent, Record, analysis, bonds, drive, run, shear
+from helpers.parts import (
+    Adhesion,
+    Band,
+    Clock,
+    Equilibrium,
+    RateDependent,
+    Record,
+    analysis,
+    bonds,
+    drive,
+    run,
+    shear,
+)
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import PchipInterpolator
 
@@ -18,7 +30,11 @@ from sim.units.errors import BadInput
 
 LONG = pytest.mark.verify
 SPEEDS = np.geomspace(1e-3, 1e3, 61)
-NAMES = ("speed_at_5_percent_lost", "speed_at_50_percent_lost", "speed_halfway_to_hertz")
+NAMES = (
+    "speed_at_5_percent_lost",
+    "speed_at_50_percent_lost",
+    "speed_halfway_to_hertz",
+)
 
 
 def falling(speeds):
@@ -28,15 +44,22 @@ def falling(speeds):
 
 @pytest.mark.parametrize(
     ("groups", "count", "spread"),
-    [(64, 61, 0.03), (8, 1201, 0.1), *(pytest.param(*each, marks=LONG) for each in ((64, 1201, 0.1), (8, 61, 0.03)))],
+    [
+        (64, 61, 0.03),
+        (8, 1201, 0.1),
+        *(pytest.param(*each, marks=LONG) for each in ((64, 1201, 0.1), (8, 61, 0.03))),
+    ],
 )
 def test_intervals_of_a_speed_hold_what_they_promise(groups, count, spread):
     """A spread of 0.03 is below the steps, one of 0.1 above. Half of the variance is shared along the curve."""
     rng, speeds, hits = np.random.default_rng(31), np.geomspace(1e-3, 1e3, count), []
-    about = np.abs(np.log(speeds)) < 1.0  # what noise there is elsewhere changes nothing
+    # what noise there is elsewhere changes nothing
+    about = np.abs(np.log(speeds)) < 1.0
     for _ in range(1000):
         noise = np.zeros((groups, count))
-        noise[:, about] = rng.normal(size=(groups, 1)) + rng.normal(size=(groups, about.sum()))
+        noise[:, about] = rng.normal(size=(groups, 1)) + rng.normal(
+            size=(groups, about.sum())
+        )
         means = falling(speeds) + spread * math.sqrt(groups / 64.0 / 2.0) * noise
         result = analysis.crossing(speeds, means, np.full(groups, 64.0 / groups), 0.5)
         hits.append(result.low <= 1.0 <= result.high)
@@ -60,19 +83,31 @@ def bonds_alone(speeds):
 
 
 @pytest.mark.parametrize("noise", [0.0, pytest.param(1e-3, marks=LONG), 5e-3])
-@pytest.mark.parametrize("count", [3, *(pytest.param(count, marks=LONG) for count in (4, 9, 25)), 5, 200])
+@pytest.mark.parametrize(
+    "count", [3, *(pytest.param(count, marks=LONG) for count in (4, 9, 25)), 5, 200]
+)
 def test_interpolated_speeds_hold_the_truth_however_many_speeds_there_are(count, noise):
     rng, hits, widths = np.random.default_rng(28), [], []
     for _ in range(200):
-        speeds = np.geomspace(1.0, 10.0 ** rng.uniform(1.5, 4.0), count) * 10.0 ** rng.uniform(-5.0, -3.5)
+        speeds = np.geomspace(
+            1.0, 10.0 ** rng.uniform(1.5, 4.0), count
+        ) * 10.0 ** rng.uniform(-5.0, -3.5)
         loss = rng.uniform(0.01, 0.3)
         truth, common = speed_of_loss(loss), rng.normal(size=(6, 1))
-        groups = bonds_alone(speeds) + noise * math.sqrt(3.0) * (common + rng.normal(size=(6, count)))
+        groups = bonds_alone(speeds) + noise * math.sqrt(3.0) * (
+            common + rng.normal(size=(6, count))
+        )
         mixed = rng.permutation(count)
-        result = analysis.crossing(speeds[mixed], groups[:, mixed], np.ones(6), 1.0 - loss)
+        result = analysis.crossing(
+            speeds[mixed], groups[:, mixed], np.ones(6), 1.0 - loss
+        )
         assert result.reason or np.isfinite(result.speed)
         hits.append(not (result.low > truth or result.high < truth))
-        widths.append(math.log(result.high / result.low) if np.isfinite(result.speed) else math.nan)
+        widths.append(
+            math.log(result.high / result.low)
+            if np.isfinite(result.speed)
+            else math.nan
+        )
     assert np.mean(hits) >= 0.92
     if count == 200 and noise == 0.0:
         assert np.nanmedian(widths) < 1e-4
@@ -80,7 +115,11 @@ def test_interpolated_speeds_hold_the_truth_however_many_speeds_there_are(count,
 
 def test_shares_of_a_loss_add_up_in_both_orders_and_are_those_of_the_laws_there():
     field = shear.Mean(spectrum=Band(rms=1e5, longest=60e-6, shortest=24e-6))
-    parts = {"bonds": bonds.Steady(critical_speed=1e-2), "shear": field, "clock": Clock(duration=0.02, step=0.01)}
+    parts = {
+        "bonds": bonds.Steady(critical_speed=1e-2),
+        "shear": field,
+        "clock": Clock(duration=0.02, step=0.01),
+    }
     sweep = {"drive.speed": list(np.geomspace(1e-5, 1.0, 41))}
     dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep=sweep, **parts))
     energy = float(dataset["fluctuation_energy"][0, 0])
@@ -89,75 +128,125 @@ def test_shares_of_a_loss_add_up_in_both_orders_and_are_those_of_the_laws_there(
     left = np.interp(0.8, jkr_area(works) / jkr_area(WORK), works)
     speed = 1e-2 * (WORK / (left + energy) - 1.0)
     name = "at_20_percent_lost"
-    assert float(result[f"speed_{name}_low"]) <= speed <= float(result[f"speed_{name}_high"])
+    assert (
+        float(result[f"speed_{name}_low"])
+        <= speed
+        <= float(result[f"speed_{name}_high"])
+    )
     assert_allclose(result[f"speed_{name}"], speed, rtol=1e-3)
-    by_bonds, alone = 1.0 - bonds_alone(speed), 1.0 - jkr_area(WORK - energy) / jkr_area(WORK)
+    by_bonds, alone = (
+        1.0 - bonds_alone(speed),
+        1.0 - jkr_area(WORK - energy) / jkr_area(WORK),
+    )
     law = {"lost_to_bonds": by_bonds, "lost_to_fluctuations": 0.2 - by_bonds}
     law |= {"lost_to_fluctuations_first": alone, "lost_to_bonds_last": 0.2 - alone}
     for share, truth in law.items():
-        low, value, high = (float(result[f"{share}_{name}{end}"]) for end in ("_low", "", "_high"))
+        low, value, high = (
+            float(result[f"{share}_{name}{end}"]) for end in ("_low", "", "_high")
+        )
         assert low - 1e-12 <= truth <= high + 1e-12 and abs(value - truth) < 1e-3
     for first, last in (
         ("lost_to_bonds", "lost_to_fluctuations"),
         ("lost_to_fluctuations_first", "lost_to_bonds_last"),
     ):
-        assert_allclose(result[f"{first}_{name}"] + result[f"{last}_{name}"], 0.2, rtol=1e-12)
+        assert_allclose(
+            result[f"{first}_{name}"] + result[f"{last}_{name}"], 0.2, rtol=1e-12
+        )
     assert "never" in str(result["speed_at_90_percent_lost_reason"].values)
-    assert_allclose([result["speed_at_0.1_percent_lost"], result["speed_at_0.1_percent_lost_high"]], [math.nan, 1e-5])
+    assert_allclose(
+        [result["speed_at_0.1_percent_lost"], result["speed_at_0.1_percent_lost_high"]],
+        [math.nan, 1e-5],
+    )
 
 
 def test_area_that_a_contact_loses_as_it_comes_off_is_no_loss_to_a_speed():
     """Steady bonds under tension let go where the pull-off load 3/2 π w R has fallen to it."""
-    pulled = Equilibrium(load=-0.5 * 1.5 * math.pi * WORK * RADIUS, after_pull_off="stay_open")
-    parts = {"bonds": bonds.Steady(critical_speed=1e-2), "shear": shear.Uniform(), "clock": Clock(0.4, 1e-3)}
+    pulled = Equilibrium(
+        load=-0.5 * 1.5 * math.pi * WORK * RADIUS, after_pull_off="stay_open"
+    )
+    parts = {
+        "bonds": bonds.Steady(critical_speed=1e-2),
+        "shear": shear.Uniform(),
+        "clock": Clock(0.4, 1e-3),
+    }
     result = analysis.loss_speeds(run(scene(contact=pulled, **parts)), ["10 %", "90 %"])
-    assert math.isfinite(result["speed_at_10_percent_lost"]) and math.isnan(result["speed_at_90_percent_lost"])
+    assert math.isfinite(result["speed_at_10_percent_lost"]) and math.isnan(
+        result["speed_at_90_percent_lost"]
+    )
     assert "detach before" in str(result["speed_at_90_percent_lost_reason"].values)
-    last = float(result["speed_at_90_percent_lost_low"])  # the pull-off is at the critical speed, where w = W/2
+    # the pull-off is at the critical speed, where w = W/2
+    last = float(result["speed_at_90_percent_lost_low"])
     assert last <= 1e-2 <= last * math.exp(math.log(1e4) / 400.0 * 1.001)
 
 
 @pytest.mark.parametrize("duration", [2.0, 40.0])
-def test_branches_of_a_course_lag_both_ways_and_the_steady_speed_is_that_of_the_law(duration):
+def test_branches_of_a_course_lag_both_ways_and_the_steady_speed_is_that_of_the_law(
+    duration,
+):
     """Bonds with a rate of 5 1/s are late; the bonds left tell the speed at which they would be steady."""
     course = drive.Table(time=(0.0, duration / 2.0, duration), speed=(1e-5, 2e-2, 1e-5))
-    late, clock = bonds.Rate(critical_speed=5e-3, rebinding_rate=5.0), Clock(duration, duration / 2000)
-    result = analysis.loss_speeds(run(scene(drive=course, bonds=late, shear=shear.Uniform(), clock=clock)))
+    late, clock = (
+        bonds.Rate(critical_speed=5e-3, rebinding_rate=5.0),
+        Clock(duration, duration / 2000),
+    )
+    result = analysis.loss_speeds(
+        run(scene(drive=course, bonds=late, shear=shear.Uniform(), clock=clock))
+    )
     assert result["branch"].values.tolist() == ["increasing speed", "decreasing speed"]
     hertz = jkr_area(0.0) / jkr_area(WORK)
     steady = 0.5 * speed_of_loss(0.5 * (1.0 - hertz))
     up, down = result["speed_halfway_to_hertz"].values
     assert up > steady > down and up / down - 1.0 > 0.2 / duration
     assert_allclose(result["steady_speed_halfway_to_hertz"], steady, rtol=1e-3)
-    assert all("lags" in reason for reason in result["speed_halfway_to_hertz_reason"].values)
+    assert all(
+        "lags" in reason for reason in result["speed_halfway_to_hertz_reason"].values
+    )
     early, at_end = result["speed_at_5_percent_lost_reason"].values
     rising, falling = result["steady_speed_at_5_percent_lost_reason"].values
-    assert not rising and falling.startswith("unknown" if duration == 2.0 else "")  # less is lost if steady
-    assert "lags" in early and "lags" in at_end  # on the way back more is lost at the lowest speed, or at a lower one
+    # less is lost if steady
+    assert not rising and falling.startswith("unknown" if duration == 2.0 else "")
+    # on the way back more is lost at the lowest speed, or at a lower one
+    assert "lags" in early and "lags" in at_end
 
 
 def test_an_extreme_inside_a_sweep_is_named_and_one_at_its_end_or_within_the_errors_is_not():
-    speeds, force = np.array([0.1, 100.0, 1.0, 10.0]), np.array([0.416, 0.288, 1.034, 0.880])
+    speeds, force = (
+        np.array([0.1, 100.0, 1.0, 10.0]),
+        np.array([0.416, 0.288, 1.034, 0.880]),
+    )
     for error, named in ((0.01, True), (0.5, False)):
         columns = {"F_mean": force, "F_low": force - error, "F_high": force + error}
-        curves = xr.Dataset({name: ("V", values) for name, values in columns.items()}, {"V": speeds})
+        curves = xr.Dataset(
+            {name: ("V", values) for name, values in columns.items()}, {"V": speeds}
+        )
         result = analysis.extremes(curves, "F", "V")
         places = [float(result[f"F_largest_at{end}"]) for end in ("", "_low", "_high")]
         assert_array_equal(places, [1.0, 0.1, 10.0] if named else [math.nan] * 3)
         assert_array_equal(result["F_largest"], 1.034 if named else math.nan)
         assert (str(result["F_largest_reason"].values) == "") == named
-        assert math.isnan(result["F_least"]) and str(result["F_least_reason"].values)  # at the highest speed
+        # at the highest speed
+        assert math.isnan(result["F_least"]) and str(result["F_least_reason"].values)
 
 
 def test_cubics_between_speeds_are_the_monotone_ones_of_scipy():
     rng = np.random.default_rng(5)
     for count in (2, 3, 9):
-        x, y = np.cumsum(rng.uniform(0.5, 2.0, count)), rng.integers(-3, 4, (99, count)).astype(float)
+        x, y = (
+            np.cumsum(rng.uniform(0.5, 2.0, count)),
+            rng.integers(-3, 4, (99, count)).astype(float),
+        )
         expected = np.moveaxis(PchipInterpolator(x, y, axis=1).c, 1, 2)
-        assert_allclose(over_speed.cubics(x, y), expected, rtol=0.0, atol=1e-14 * np.abs(expected).max())
+        assert_allclose(
+            over_speed.cubics(x, y),
+            expected,
+            rtol=0.0,
+            atol=1e-14 * np.abs(expected).max(),
+        )
 
 
-def test_crossings_are_exact_on_straight_lines_and_a_ramp_is_read_in_pieces(monkeypatch):
+def test_crossings_are_exact_on_straight_lines_and_a_ramp_is_read_in_pieces(
+    monkeypatch,
+):
     curve = 1.0 - 0.1 * np.log(SPEEDS / SPEEDS[0])
     result = analysis.crossing(SPEEDS, curve[None], np.ones(1), 0.55)
     assert_allclose(result.speed, SPEEDS[0] * math.exp(4.5), rtol=1e-12)
@@ -176,23 +265,35 @@ def test_crossings_are_exact_on_straight_lines_and_a_ramp_is_read_in_pieces(monk
 
     monkeypatch.setattr(over_speed, "closed_observables", reading)
     xr.testing.assert_identical(analysis.loss_speeds(ramp), whole)
-    assert len(read) > 1 and sum(read) == ramp.sizes["t"] and math.isfinite(whole[NAMES[0]])
+    assert (
+        len(read) > 1
+        and sum(read) == ramp.sizes["t"]
+        and math.isfinite(whole[NAMES[0]])
+    )
 
 
 def test_the_order_of_charging_changes_no_sum_and_fluctuations_alone_leave_the_area_of_their_work():
     for contact in [
-        Equilibrium(load=LOAD), Equilibrium(indentation=1e-6), Equilibrium(displacement=2e-6, stiffness=2e3),
+        Equilibrium(load=LOAD),
+        Equilibrium(indentation=1e-6),
+        Equilibrium(displacement=2e-6, stiffness=2e3),
         Equilibrium(load=LOAD, reversible=0.2),
-    ]:  # fmt: skip
+    ]:
         dataset = run(scene(contact=contact))
         shares = charges(dataset)
         bonds_first = shares["lost_to_bonds"] + shares["lost_to_fluctuations"]
-        fluctuations_first = shares["lost_to_fluctuations_first"] + shares["lost_to_bonds_last"]
+        fluctuations_first = (
+            shares["lost_to_fluctuations_first"] + shares["lost_to_bonds_last"]
+        )
         assert_allclose(fluctuations_first - bonds_first, 0.0, rtol=0, atol=1e-14)
         assert float(abs(shares["order_of_charging"]).max()) > 1e-3
     shared, charged = analysis.shares(lens.ramp()), charges(lens.ramp())
-    apart = np.hypot(shared["lost_to_fluctuations_sem"], shared["lost_to_fluctuations_first_sem"])
-    differ = float(charged["order_of_charging"].isel(t=-8).std("member", ddof=1)) / math.sqrt(6.0)
+    apart = np.hypot(
+        shared["lost_to_fluctuations_sem"], shared["lost_to_fluctuations_first_sem"]
+    )
+    differ = float(
+        charged["order_of_charging"].isel(t=-8).std("member", ddof=1)
+    ) / math.sqrt(6.0)
     assert_allclose(shared["order_of_charging_sem"][-8], differ, rtol=1e-9)
     assert differ < 0.9 * float(apart[-8])
     dataset = lens.ramp()
@@ -208,49 +309,94 @@ def test_speeds_of_loss_of_what_stays_or_is_missing_are_refused_or_left_out():
     low, at, high = (float(result[NAMES[0] + end]) for end in ("_low", "", "_high"))
     assert 1e-5 < low < at < high < 1e-1
     pooled = analysis.loss_speeds(run(scene(record=Record(per_member=False))))
-    assert_allclose(pooled[NAMES[0]], at, rtol=1e-3)  # errors of neighbouring records count as in common
-    assert high / low <= float(pooled[NAMES[0] + "_high"] / pooled[NAMES[0] + "_low"]) < (high / low) ** 4
+    # errors of neighbouring records count as in common
+    assert_allclose(pooled[NAMES[0]], at, rtol=1e-3)
+    assert (
+        high / low
+        <= float(pooled[NAMES[0] + "_high"] / pooled[NAMES[0] + "_low"])
+        < (high / low) ** 4
+    )
     with pytest.raises(ValueError, match="nor is swept"):
         analysis.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2))), ["10 %"])
     with pytest.raises(ValueError, match="must be below 1"):
         analysis.loss_speeds(lens.ramp(), ["100 %"])
     assert not analysis.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2))))
-    assert "order_of_charging_mean" not in analysis.shares(run(scene(record=Record(per_member=False))))
+    assert "order_of_charging_mean" not in analysis.shares(
+        run(scene(record=Record(per_member=False)))
+    )
 
 
 def test_shares_of_a_sweep_are_those_of_its_points():
     for sweep in (
         {"contact.load": [1e-3, 1.6e-2]},
-        [{"sphere.radius": 1e-3, "contact.load": 1e-3}, {"sphere.radius": 4e-3, "contact.load": 8e-3}],
+        [
+            {"sphere.radius": 1e-3, "contact.load": 1e-3},
+            {"sphere.radius": 4e-3, "contact.load": 8e-3},
+        ],
         {"adhesion.work": [2e-2, 8e-2], "adhesion.bond_share": [0.3, 1.0]},
-        {"contact": [{"model": "rate_dependent", "indentation": 1e-6, "front_speed": 1.0},
-                     {"model": "equilibrium", "load": {"from": 4e-3, "to": 1e-3}, "reversible": 0.02}]},
-    ):  # fmt: skip
+        {
+            "contact": [
+                {"model": "rate_dependent", "indentation": 1e-6, "front_speed": 1.0},
+                {
+                    "model": "equilibrium",
+                    "load": {"from": 4e-3, "to": 1e-3},
+                    "reversible": 0.02,
+                },
+            ]
+        },
+    ):
         swept = scene(sweep=sweep)
         dataset = run(swept)
-        together, ratio = analysis.share_observables(dataset), analysis.observables(dataset)["area_ratio"]
+        together, ratio = (
+            analysis.share_observables(dataset),
+            analysis.observables(dataset)["area_ratio"],
+        )
         dims = [name for name in ratio.dims if name not in ("member", "t")]
         for k, point in enumerate(swept.points()):
-            place = dict(zip(dims, np.unravel_index(k, [ratio.sizes[name] for name in dims]), strict=True))
+            place = dict(
+                zip(
+                    dims,
+                    np.unravel_index(k, [ratio.sizes[name] for name in dims]),
+                    strict=True,
+                )
+            )
             alone = run(point)
-            assert_array_equal(ratio.isel(place), analysis.observables(alone)["area_ratio"])
+            assert_array_equal(
+                ratio.isel(place), analysis.observables(alone)["area_ratio"]
+            )
             shares = analysis.share_observables(alone)
             for name in together:  # a mechanism that a point lacks takes nothing there
-                assert_array_equal(together[name].isel(place) - shares.get(name, 0.0), 0.0)
+                assert_array_equal(
+                    together[name].isel(place) - shares.get(name, 0.0), 0.0
+                )
 
 
-def test_shares_and_what_is_left_add_up_to_one_and_are_unknown_without_contact_or_members(ramp):
-    lost, left = analysis.share_observables(ramp), analysis.observables(ramp)["area_ratio"]
+def test_shares_and_what_is_left_add_up_to_one_and_are_unknown_without_contact_or_members(
+    ramp,
+):
+    lost, left = (
+        analysis.share_observables(ramp),
+        analysis.observables(ramp)["area_ratio"],
+    )
     total = lost["lost_to_bonds"] + lost["lost_to_fluctuations"] + left
     assert_allclose(total, 1.0, rtol=1e-15)
     assert lost["lost_to_fluctuations"].dims == ("member", "t")
-    shares, lost = analysis.shares(ramp), analysis.share_observables(ramp)["lost_to_fluctuations"].to_numpy()
-    assert_allclose(shares["lost_to_fluctuations_sem"], lost.std(axis=0, ddof=1) / math.sqrt(6), rtol=1e-10)
+    shares, lost = (
+        analysis.shares(ramp),
+        analysis.share_observables(ramp)["lost_to_fluctuations"].to_numpy(),
+    )
+    assert_allclose(
+        shares["lost_to_fluctuations_sem"],
+        lost.std(axis=0, ddof=1) / math.sqrt(6),
+        rtol=1e-10,
+    )
     # a mean-field population does not fluctuate: nothing but rounding is left
     assert_allclose(shares["lost_to_bonds_sem"], 0.0, rtol=0, atol=1e-15)
     lifted = Equilibrium(load=1.5 * float(jkr.pull_off_load(WORK, RADIUS)))
     shares = analysis.shares(run(scene(contact=lifted, shear=shear.Uniform())))
-    assert bool(shares["lost_to_bonds_mean"].isnull().all()) and math.isnan(shares["area_ratio_hertz"])
+    assert bool(shares["lost_to_bonds_mean"].isnull().all()) and math.isnan(
+        shares["area_ratio_hertz"]
+    )
     for parts in (
         {"bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=100)},
         {"contact": Equilibrium(load=LOAD, reversible=0.02)},
@@ -262,27 +408,57 @@ def test_shares_and_what_is_left_add_up_to_one_and_are_unknown_without_contact_o
 
 def test_bonds_fluctuations_and_mean_stress_take_what_their_laws_say():
     masking = shear.Mean(spectrum=Band(rms=1e6, longest=60e-6, shortest=24e-6))
-    shares = analysis.shares(run(scene(adhesion=Adhesion(work=WORK, bond_share=0.0), shear=masking)))
-    hertz, full = jkr.hertz_radius_at_load(LOAD, RADIUS, MODULUS), jkr.radius_at_load(LOAD, WORK, RADIUS, MODULUS)
+    shares = analysis.shares(
+        run(scene(adhesion=Adhesion(work=WORK, bond_share=0.0), shear=masking))
+    )
+    hertz, full = (
+        jkr.hertz_radius_at_load(LOAD, RADIUS, MODULUS),
+        jkr.radius_at_load(LOAD, WORK, RADIUS, MODULUS),
+    )
     assert_allclose(shares["lost_to_bonds_mean"], 0.0, rtol=0, atol=1e-15)
-    assert_allclose(shares["lost_to_fluctuations_mean"], 1.0 - (hertz / full) ** 2, rtol=1e-13)
+    assert_allclose(
+        shares["lost_to_fluctuations_mean"], 1.0 - (hertz / full) ** 2, rtol=1e-13
+    )
     assert_allclose(shares["area_ratio_hertz"], (hertz / full) ** 2, rtol=1e-13)
-    assert_allclose([shares["radius_jkr"], shares["radius_hertz"]], [full, hertz], rtol=1e-13)
+    assert_allclose(
+        [shares["radius_jkr"], shares["radius_hertz"]], [full, hertz], rtol=1e-13
+    )
     for control, radius in (
         ({"load": LOAD}, lambda w: jkr.radius_at_load(LOAD, w, RADIUS, MODULUS)),
-        ({"indentation": 2e-6}, lambda w: jkr.radius_at_indentation(2e-6, w, RADIUS, MODULUS)),
+        (
+            {"indentation": 2e-6},
+            lambda w: jkr.radius_at_indentation(2e-6, w, RADIUS, MODULUS),
+        ),
     ):
         field = shear.Mean(spectrum=Band(rms=80e3, longest=60e-6, shortest=24e-6))
         population = bonds.Steady(critical_speed=1e-2, stress=1e5)
-        dataset = run(scene(contact=Equilibrium(**control, reversible=0.03), bonds=population, shear=field))
+        dataset = run(
+            scene(
+                contact=Equilibrium(**control, reversible=0.03),
+                bonds=population,
+                shear=field,
+            )
+        )
         shares = analysis.shares(dataset)
         bonded = WORK / (1.0 + np.geomspace(1e-5, 1e-1, 21) / 1e-2)
-        areas = [radius(w) ** 2 for w in (np.full(21, WORK), bonded, bonded - dataset["fluctuation_energy"].to_numpy())]
+        areas = [
+            radius(w) ** 2
+            for w in (
+                np.full(21, WORK),
+                bonded,
+                bonded - dataset["fluctuation_energy"].to_numpy(),
+            )
+        ]
         areas.append((dataset["contact_radius"].to_numpy()) ** 2)
         names = ("lost_to_bonds", "lost_to_fluctuations", "lost_to_mean_stress")
         for name, before, after in zip(names, areas[:-1], areas[1:], strict=True):
             # the work is put together again from its parts, near the fluctuations' onset of masking to 1e-12 of itself
-            assert_allclose(shares[f"{name}_mean"], (before - after) / areas[0], rtol=1e-9, atol=1e-12)
+            assert_allclose(
+                shares[f"{name}_mean"],
+                (before - after) / areas[0],
+                rtol=1e-9,
+                atol=1e-12,
+            )
         assert 0.01 < float(shares["lost_to_mean_stress_mean"].max()) < 0.5
 
 
@@ -291,15 +467,28 @@ def test_a_lagging_edge_loses_nothing_that_it_has_still_to_lose_and_has_its_own_
     jump = drive.Table(time=(0.0, 0.1, 0.1, 0.4), speed=(0.0, 0.0, 1e-2, 1e-2))
     part = RateDependent(load=LOAD, front_speed=1e-4)
     population = bonds.Steady(critical_speed=1e-2)
-    shares = analysis.shares(run(scene(contact=part, drive=jump, bonds=population, shear=shear.Uniform())))
+    shares = analysis.shares(
+        run(scene(contact=part, drive=jump, bonds=population, shear=shear.Uniform()))
+    )
     assert_allclose(shares["lost_to_fluctuations_mean"], 0.0, rtol=0, atol=1e-13)
-    lag, lost = shares["lost_to_lag_mean"].to_numpy(), shares["lost_to_bonds_mean"].to_numpy()
+    lag, lost = (
+        shares["lost_to_lag_mean"].to_numpy(),
+        shares["lost_to_bonds_mean"].to_numpy(),
+    )
     assert_allclose(lag[:5], 0.0, rtol=0, atol=1e-13)
-    assert lag.min() < -0.3 * lost[-1]  # the area is still there that the bonds no longer pay for
+    # the area is still there that the bonds no longer pay for
+    assert lag.min() < -0.3 * lost[-1]
     assert np.all(np.diff(lag[6:]) > 0.0)
     assert "lost_to_lag_mean" not in analysis.shares(run(scene(shear=shear.Uniform())))
     down = RateDependent(indentation={"from": -1e-5, "to": 1e-5}, front_speed=1e-3)
-    dataset = run(scene(contact=down, bonds=bonds.Unbroken(), shear=shear.Uniform(), clock=Clock(0.4, 0.02)))
+    dataset = run(
+        scene(
+            contact=down,
+            bonds=bonds.Unbroken(),
+            shear=shear.Uniform(),
+            clock=Clock(0.4, 0.02),
+        )
+    )
     assert dataset["in_contact"].to_numpy()[9:12].tolist() == [0, 0, 1]
     lost = analysis.share_observables(dataset)
     assert_array_equal(lost["lost_to_lag"].isnull(), np.arange(21) < 10)
@@ -309,76 +498,128 @@ def test_a_lagging_edge_loses_nothing_that_it_has_still_to_lose_and_has_its_own_
     parts = {"bonds": bonds.Unbroken(stress=1e5), "shear": shear.Uniform()}
     lagging = run(scene(contact=RateDependent(front_speed=1e-7, **control), **parts))
     settled = run(scene(contact=Equilibrium(**control), **parts))
-    assert_allclose(lagging["equilibrium_radius"], settled["contact_radius"], rtol=1e-14)
-    assert float(lagging["contact_radius"][-1]) < 0.99 * float(settled["contact_radius"][-1])
+    assert_allclose(
+        lagging["equilibrium_radius"], settled["contact_radius"], rtol=1e-14
+    )
+    assert float(lagging["contact_radius"][-1]) < 0.99 * float(
+        settled["contact_radius"][-1]
+    )
 
 
 MOVED = {
     "load": {"load": {"from": 1e-3, "to": 8e-3, "scale": "log", "cycles": 2}},
-    "load in a table": {"load": {"time": [0.0, 0.1, 0.4], "value": [1e-3, 8e-3, -0.2e-3]}},
+    "load in a table": {
+        "load": {"time": [0.0, 0.1, 0.4], "value": [1e-3, 8e-3, -0.2e-3]}
+    },
     "indentation": {"indentation": {"from": 2e-6, "to": -0.4e-6, "cycles": 1}},
-    "displacement": {"displacement": {"from": 3e-6, "to": -0.5e-6, "cycles": 3}, "stiffness": 2e3},
+    "displacement": {
+        "displacement": {"from": 3e-6, "to": -0.5e-6, "cycles": 3},
+        "stiffness": 2e3,
+    },
 }
 
 
 @pytest.mark.parametrize("control", MOVED)
-@pytest.mark.parametrize("records", [(0, 10, 17), pytest.param((0, 3, 10, 17, 20), marks=pytest.mark.verify)])
+@pytest.mark.parametrize(
+    "records", [(0, 10, 17), pytest.param((0, 3, 10, 17, 20), marks=pytest.mark.verify)]
+)
 def test_shares_of_a_moved_sphere_are_those_at_its_present_place(records, control):
     """Each record of a course is the same as a run at its value: the parts react at once."""
-    parts = {"bonds": bonds.Steady(critical_speed=1e-2), "drive": drive.Steady(speed=3e-3)}
+    parts = {
+        "bonds": bonds.Steady(critical_speed=1e-2),
+        "drive": drive.Steady(speed=3e-3),
+    }
     parts["shear"] = shear.Mean(spectrum=Band(rms=60e3, longest=60e-6, shortest=24e-6))
     moving = Equilibrium(**MOVED[control])
     dataset = run(scene(contact=moving, **parts))
     moved = analysis.share_observables(dataset)
-    kind = next(name for name in ("load", "indentation", "displacement") if name in MOVED[control])
-    held = MOVED[control] | {kind: moving.course.at(dataset["t"].to_numpy(), 0.4).tolist()}
+    kind = next(
+        name
+        for name in ("load", "indentation", "displacement")
+        if name in MOVED[control]
+    )
+    held = MOVED[control] | {
+        kind: moving.course.at(dataset["t"].to_numpy(), 0.4).tolist()
+    }
     for at in records:
-        still = run(scene(contact=Equilibrium(**(held | {kind: float(held[kind][at])})), **parts))
+        still = run(
+            scene(
+                contact=Equilibrium(**(held | {kind: float(held[kind][at])})), **parts
+            )
+        )
         lost = analysis.share_observables(still)
         for name in ("lost_to_bonds", "lost_to_fluctuations"):
             assert_allclose(moved[name][at], lost[name][0], rtol=1e-11, atol=1e-14)
-        moving_ratio, ratio = (analysis.observables(each)["area_ratio"] for each in (dataset, still))
+        moving_ratio, ratio = (
+            analysis.observables(each)["area_ratio"] for each in (dataset, still)
+        )
         assert_allclose(moving_ratio[at], ratio[0], rtol=1e-12)
 
 
 def test_a_moved_sphere_comes_off_by_its_policy():
     pulled = Equilibrium(load={"from": -0.1e-3, "to": -0.3e-3})
-    dataset = run(scene(contact=pulled, bonds=bonds.Steady(critical_speed=1e-2), shear=shear.Uniform()))
+    dataset = run(
+        scene(
+            contact=pulled,
+            bonds=bonds.Steady(critical_speed=1e-2),
+            shear=shear.Uniform(),
+        )
+    )
     assert dataset["in_contact"].to_numpy()[[0, -1]].tolist() == [1, 0]
-    assert_allclose(dataset["applied_load"], np.linspace(-0.1e-3, -0.3e-3, 21), rtol=1e-12)
-    assert math.isnan(analysis.shares(dataset)["lost_to_bonds_mean"][-1])  # it is lost to the detachment
+    assert_allclose(
+        dataset["applied_load"], np.linspace(-0.1e-3, -0.3e-3, 21), rtol=1e-12
+    )
+    # it is lost to the detachment
+    assert math.isnan(analysis.shares(dataset)["lost_to_bonds_mean"][-1])
     assert float(analysis.observables(dataset)["area_ratio"][-1]) == 0.0
     course = {"from": 2e-6, "to": -3e-6, "cycles": 1}
     for policy, closes in (("stay_open", False), ("reattach", True), ("stop", False)):
         part = Equilibrium(indentation=course, after_pull_off=policy)
-        dataset = run(scene(contact=part, bonds=bonds.Unbroken(), shear=shear.Uniform()))
+        dataset = run(
+            scene(contact=part, bonds=bonds.Unbroken(), shear=shear.Uniform())
+        )
         reference = analysis.reference_radii(dataset)["radius_jkr"].to_numpy()
         recorded = dataset["contact_radius"].to_numpy()
         assert_array_equal(np.isnan(reference), ~(recorded > 0.0))
         assert (reference[-1] > 0.0) == closes and np.isnan(reference[10])
-        assert_allclose(reference[reference > 0.0], recorded[recorded > 0.0], rtol=1e-13)
+        assert_allclose(
+            reference[reference > 0.0], recorded[recorded > 0.0], rtol=1e-13
+        )
     part = Equilibrium(indentation={"from": 1e-6, "to": -0.7e-6}, after_pull_off="stop")
     dataset = run(scene(contact=part, drive=drive.Steady(speed=3e-3)))
     gone = dataset["contact_area"].isnull()
     assert 0 < int(gone.sum()) < gone.size
     lost = analysis.share_observables(dataset)
     for name in lost:
-        assert_array_equal(lost[name].isnull(), gone | analysis.reference_radii(dataset)["radius_jkr"].isnull())
+        assert_array_equal(
+            lost[name].isnull(),
+            gone | analysis.reference_radii(dataset)["radius_jkr"].isnull(),
+        )
 
 
 def test_no_speed_is_stated_at_which_more_is_lost_than_can_be_nor_under_a_force():
-    scenario = scene(shear=shear.Uniform(), adhesion=Adhesion(work=WORK, bond_share=0.3))
+    scenario = scene(
+        shear=shear.Uniform(), adhesion=Adhesion(work=WORK, bond_share=0.3)
+    )
     speeds = analysis.loss_speeds(run(scenario))
     # JKR's areas with 70 % of the work of adhesion and with all of it
-    left, full = (jkr.radius_at_load(LOAD, share * WORK, RADIUS, MODULUS) ** 2 for share in (0.7, 1.0))
+    left, full = (
+        jkr.radius_at_load(LOAD, share * WORK, RADIUS, MODULUS) ** 2
+        for share in (0.7, 1.0)
+    )
     assert 100.0 * (1.0 - left / full) < 50.0
     reason = f"never: at most {100 * (1 - left / full):.3g} % of the area can be lost"
     assert speeds["speed_at_50_percent_lost_reason"].item() == reason
     creeping = scene(
-        shear=shear.Uniform(), drive=drive.Force(force=1e-3, contact_stiffness="rigid"),
-        bonds=bonds.FirstMoment(rupture=bonds.Bell(zero_force_rate=5.0, bell_force=4e-12), bond_stiffness=8e-7,
-                                rebinding_rate=50.0, site_density=6.5e16),
-    )  # fmt: skip
+        shear=shear.Uniform(),
+        drive=drive.Force(force=1e-3, contact_stiffness="rigid"),
+        bonds=bonds.FirstMoment(
+            rupture=bonds.Bell(zero_force_rate=5.0, bell_force=4e-12),
+            bond_stiffness=8e-7,
+            rebinding_rate=50.0,
+            site_density=6.5e16,
+        ),
+    )
     assert not analysis.loss_speeds(run(creeping))
     with pytest.raises(BadInput, match="force"):
         analysis.loss_speeds(run(creeping), ["10 %"])

@@ -7,7 +7,19 @@ import pytest
 import xarray as xr
 from helpers.draws import ornstein_uhlenbeck
 from helpers.lens import FIELD, scene
-from helpers.parts import Bell, Clock, Ensemble, Equilibrium, Record, Time, analysis, bonds, drive, run, shear
+from helpers.parts import (
+    Bell,
+    Clock,
+    Ensemble,
+    Equilibrium,
+    Record,
+    Time,
+    analysis,
+    bonds,
+    drive,
+    run,
+    shear,
+)
 from numpy.testing import assert_allclose
 
 import sim
@@ -22,7 +34,9 @@ TIME = np.linspace(0.0, 1.0, 400)
 
 
 def settlement(values, sem=math.nan, freedom=math.nan, noisy=True):
-    return settlements(values[np.newaxis], *(np.array([number]) for number in (sem, freedom, noisy))).at(0)
+    return settlements(
+        values[np.newaxis], *(np.array([number]) for number in (sem, freedom, noisy))
+    ).at(0)
 
 
 def series(rng, members, times):
@@ -31,16 +45,30 @@ def series(rng, members, times):
 
 
 @pytest.mark.parametrize(("members", "times"), [(2, 5), (4, 2), (6, 20), (40, 5)])
-def test_settled_series_are_so_in_99_of_100_cases_and_their_intervals_hold_while_a_drift_is_seen(members, times):
+def test_settled_series_are_so_in_99_of_100_cases_and_their_intervals_hold_while_a_drift_is_seen(
+    members, times
+):
     values = series(np.random.default_rng(31), members, times)
     results = [analysis.over_time(each) for each in values]
-    means, lows, highs, errors = (np.array([each[k] for each in results]) for k in ("mean", "low", "high", "sem"))
+    means, lows, highs, errors = (
+        np.array([each[k] for each in results]) for k in ("mean", "low", "high", "sem")
+    )
     free = math.nan if members < 4 else members - 1.0
-    settled = np.array([settlement(*each, free).verdict == "" for each in zip(values, errors, strict=True)])
+    settled = np.array(
+        [
+            settlement(*each, free).verdict == ""
+            for each in zip(values, errors, strict=True)
+        ]
+    )
     assert 0.98 < settled.mean() < 1.0
     assert LEAST < np.mean((lows <= 0.0) & (highs >= 0.0), where=settled) < MOST
-    if members >= 4:  # the error is that of the members' means, however they are recorded
-        assert_allclose(errors, values.mean(axis=-1).std(axis=1, ddof=1) / math.sqrt(members), rtol=1e-12)
+    # the error is that of the members' means, however they are recorded
+    if members >= 4:
+        assert_allclose(
+            errors,
+            values.mean(axis=-1).std(axis=1, ddof=1) / math.sqrt(members),
+            rtol=1e-12,
+        )
     # a drift that all members share: ten errors of the ensemble's drift are seen by four members and more
     drift = 10.0 * 2.0 * np.std(means) * np.linspace(-1.0, 1.0, values.shape[-1])
     drifting = [settlement(each + drift, np.nan).verdict for each in values[:100]]
@@ -48,40 +76,77 @@ def test_settled_series_are_so_in_99_of_100_cases_and_their_intervals_hold_while
 
 
 def test_a_run_without_noise_settles_to_the_end_or_to_whole_cycles_without_an_error():
-    relaxing = settlement(153.5e-6 - 40e-6 * np.exp(-3.0 * TIME)[np.newaxis], noisy=False)
-    assert relaxing.reason("m/s", "the second half") == "not settled: 113.5 → 151.5 µm/s over the second half"
+    relaxing = settlement(
+        153.5e-6 - 40e-6 * np.exp(-3.0 * TIME)[np.newaxis], noisy=False
+    )
+    assert (
+        relaxing.reason("m/s", "the second half")
+        == "not settled: 113.5 → 151.5 µm/s over the second half"
+    )
     assert_allclose(relaxing.value, 153.5e-6 - 40e-6 * math.exp(-3.0), rtol=1e-12)
-    assert settlement(1.0 + 0.5e-3 * TIME[np.newaxis], noisy=False)[:4] == ("", 1.0005, 1.0, 1.0005)
+    assert settlement(1.0 + 0.5e-3 * TIME[np.newaxis], noisy=False)[:4] == (
+        "",
+        1.0005,
+        1.0,
+        1.0005,
+    )
     assert settlement(np.zeros((1, 5)), noisy=False).verdict == ""
     # a saw-tooth of 11.3 cycles has the mean of a whole one, to half a record of its ends
     saw = (11.3 * TIME) % 1.0
     cycle = settlement(saw[np.newaxis], noisy=False)
     assert cycle.verdict == "" and abs(cycle.value - 0.5) < 11.3 / 400 / 11
     assert settlement((saw + TIME)[np.newaxis], noisy=False).verdict != ""
-    assert settlement(((2.3 * TIME) % 1.0)[np.newaxis], noisy=False).verdict.startswith("too short")
-    opens = np.where(np.arange(40) < 3, 20 + 10 * np.arange(40), 1000)  # three of forty come off, one by one
-    assert settlement((np.arange(60) >= opens[:, None]).astype(float)).verdict == "not settled"
+    assert settlement(((2.3 * TIME) % 1.0)[np.newaxis], noisy=False).verdict.startswith(
+        "too short"
+    )
+    # three of forty come off, one by one
+    opens = np.where(np.arange(40) < 3, 20 + 10 * np.arange(40), 1000)
+    assert (
+        settlement((np.arange(60) >= opens[:, None]).astype(float)).verdict
+        == "not settled"
+    )
     one = settlement(np.random.default_rng(3).normal(size=(1, 5)).cumsum()[np.newaxis])
     assert one.verdict.startswith("too short")
 
 
-PULLED = SCENES["lives"] | {"clock": Clock(duration=0.6, step=2e-3), "shear": shear.Uniform()}
+PULLED = SCENES["lives"] | {
+    "clock": Clock(duration=0.6, step=2e-3),
+    "shear": shear.Uniform(),
+}
 FLUCTUATING = {
-    "clock": Clock(duration=0.4, step=4e-3), "drive": drive.Steady(speed=4e-3),
-    "shear": shear.Modal(correlation=Time(time=0.01), **FIELD), "sweep": {"contact.load": [1e-3, 4e-3]},
-}  # fmt: skip
+    "clock": Clock(duration=0.4, step=4e-3),
+    "drive": drive.Steady(speed=4e-3),
+    "shear": shear.Modal(correlation=Time(time=0.01), **FIELD),
+    "sweep": {"contact.load": [1e-3, 4e-3]},
+}
 
 
-@pytest.mark.parametrize("parts", [PULLED, FLUCTUATING], ids=["contacts come off", "a sweep"])
-def test_a_mean_has_one_error_with_and_without_members_and_in_any_division_into_blocks(parts, monkeypatch):
+@pytest.mark.parametrize(
+    "parts", [PULLED, FLUCTUATING], ids=["contacts come off", "a sweep"]
+)
+def test_a_mean_has_one_error_with_and_without_members_and_in_any_division_into_blocks(
+    parts, monkeypatch
+):
     each = run(scene(**parts))
     expected = of_second_half(each)
-    monkeypatch.setattr(plans, "_BLOCK_SECONDS", 2e-3)  # blocks that end within the second half
+    # blocks that end within the second half
+    monkeypatch.setattr(plans, "_BLOCK_SECONDS", 2e-3)
     monkeypatch.setattr(plans, "_GROUP", 5)
     pooled = of_second_half(run(scene(**parts, record=Record(per_member=False))))
-    for name in ("contact_area", "area_ratio", "work_of_adhesion", "fraction_detached", "bond_fraction"):
+    for name in (
+        "contact_area",
+        "area_ratio",
+        "work_of_adhesion",
+        "fraction_detached",
+        "bond_fraction",
+    ):
         for kind in ("mean", "sem", "low", "high"):
-            assert_allclose(pooled[f"{name}_{kind}"], expected[f"{name}_{kind}"], rtol=1e-6, err_msg=name)
+            assert_allclose(
+                pooled[f"{name}_{kind}"],
+                expected[f"{name}_{kind}"],
+                rtol=1e-6,
+                err_msg=name,
+            )
         xr.testing.assert_equal(pooled[f"{name}_reason"], expected[f"{name}_reason"])
     # by hand: each member's mean while it is closed
     late = each.isel(t=slice(each.sizes["t"] // 2, None))
@@ -99,18 +164,32 @@ def test_contacts_that_come_off_lose_no_area_to_bonds_and_too_few_or_those_that_
     assert result["fraction_detached_reason"].item().startswith("not settled")
     assert abs(result["lost_to_bonds_mean"] - 1.0 + result["area_ratio_mean"]) < 1e-12
     # as the bonds are all there on average, closed contacts have nearly JKR's area
-    assert abs(result["area_ratio_mean"] - 1.0) < 0.1 and 0.0 < result["area_ratio_sem"] < 0.05
+    assert (
+        abs(result["area_ratio_mean"] - 1.0) < 0.1
+        and 0.0 < result["area_ratio_sem"] < 0.05
+    )
     shares = analysis.shares(dataset)
-    assert_allclose(shares["lost_to_bonds_mean"] + analysis.statistics(closed_only(dataset))["area_ratio_mean"], 1.0)
+    assert_allclose(
+        shares["lost_to_bonds_mean"]
+        + analysis.statistics(closed_only(dataset))["area_ratio_mean"],
+        1.0,
+    )
     lasting = np.flatnonzero(~gone[:, -1])[:2]
     few = dataset.isel(member=[*lasting, *np.flatnonzero(gone[:, -1])])
     result = of_second_half(few)
-    reason = f"2 of {few.sizes['member']} contacts are closed at the end of the second half"
-    assert result["contact_area_reason"] == reason and math.isnan(result["contact_area_mean"])
+    reason = (
+        f"2 of {few.sizes['member']} contacts are closed at the end of the second half"
+    )
+    assert result["contact_area_reason"] == reason and math.isnan(
+        result["contact_area_mean"]
+    )
     again = dataset["in_contact"].copy()
     again[0, 200], again[0, 201:] = 0, 1
     result = of_second_half(dataset.assign(in_contact=again))
-    assert result["friction_force_reason"] == "1 of 40 contacts close again in the second half"
+    assert (
+        result["friction_force_reason"]
+        == "1 of 40 contacts close again in the second half"
+    )
 
 
 def test_a_peak_of_noisy_members_is_that_of_their_mean_or_none_and_its_intervals_hold():
@@ -126,47 +205,85 @@ def test_a_peak_of_noisy_members_is_that_of_their_mean_or_none_and_its_intervals
     assert 179 <= sum(peak.first <= at <= peak.last for peak in peaks) <= 200
     assert sum(reason.startswith("no peak above the noise") for reason in calm) >= 190
     sparse = peak_of_mean((mean + members)[:, ::15], times[::15])
-    assert sparse.reason.startswith("too few records to resolve the peak") and math.isnan(sparse.value)
+    assert sparse.reason.startswith(
+        "too few records to resolve the peak"
+    ) and math.isnan(sparse.value)
     exact = peak_of_mean(np.tile(mean, (5, 1)), times)
     assert_allclose([exact.value, exact.time, exact.sem], [3.0, at, 0.0], rtol=1e-12)
 
 
 def test_the_peak_after_a_rest_does_not_grow_with_the_time_of_sliding():
     start = drive.Start(rest=0.1, speed=3e-6)
-    parts = {"drive": start, "bonds": bonds.Tracked(
-        sites=20, rupture=Bell(zero_force_rate=10.0, bell_force=4e-12), bond_stiffness=0.4e-3, rebinding_rate=10.0,
-        site_density=1e16, start_from="empty"), "shear": shear.Uniform(), "ensemble": Ensemble(members=40),
-        "adhesion": Adhesion(work=42e-3, bond_share=0.0)}  # fmt: skip
+    parts = {
+        "drive": start,
+        "bonds": bonds.Tracked(
+            sites=20,
+            rupture=Bell(zero_force_rate=10.0, bell_force=4e-12),
+            bond_stiffness=0.4e-3,
+            rebinding_rate=10.0,
+            site_density=1e16,
+            start_from="empty",
+        ),
+        "shear": shear.Uniform(),
+        "ensemble": Ensemble(members=40),
+        "adhesion": Adhesion(work=42e-3, bond_share=0.0),
+    }
     clocks = (Clock(duration=duration, step=1e-3) for duration in (0.3, 1.0))
-    results = [analysis.statements(run(scene(**parts, clock=clock))) for clock in clocks]
+    results = [
+        analysis.statements(run(scene(**parts, clock=clock))) for clock in clocks
+    ]
     for name in ("peak_stress", "peak_friction", "peak_time", "peak_friction_time"):
         assert_allclose(*(result[f"{name}_mean"] for result in results), rtol=1e-6)
     # bond by bond, in 400 ensembles of another code: 32.1 kPa
-    low, high, reason = (results[0][f"peak_stress_{end}"] for end in ("low", "high", "reason"))
+    low, high, reason = (
+        results[0][f"peak_stress_{end}"] for end in ("low", "high", "reason")
+    )
     assert low < 32.1e3 < high and reason == ""
 
 
 @pytest.mark.parametrize("members", [1, 2, 6])
 def test_a_difference_along_a_sweep_has_the_error_of_the_members_differences(members):
     loads = {"contact.load": [4e-3, 4.2e-3]}
-    dataset = run(scene(**FLUCTUATING | {"sweep": loads, "clock": Clock(duration=4.0, step=4e-3),
-                                         "ensemble": Ensemble(members=members)}))  # fmt: skip
-    alone, change = of_second_half(dataset), analysis.distribution(dataset, minus={"contact.load": 4e-3})
+    dataset = run(
+        scene(
+            **FLUCTUATING
+            | {
+                "sweep": loads,
+                "clock": Clock(duration=4.0, step=4e-3),
+                "ensemble": Ensemble(members=members),
+            }
+        )
+    )
+    alone, change = (
+        of_second_half(dataset),
+        analysis.distribution(dataset, minus={"contact.load": 4e-3}),
+    )
     area, late = (of["contact_area_mean"] for of in (change, alone))
     assert_allclose(area[1], late[1] - late[0], rtol=1e-9)
     assert area[0] == 0.0 and change["contact_area_reason"][1] == ""
     apart = math.hypot(*alone["contact_area_sem"])
     assert 0.0 < change["contact_area_sem"][1] < 0.3 * apart
     if members > 2:
-        each = dataset["contact_area"].isel(t=slice(dataset.sizes["t"] // 2, None)).mean("t").diff("contact_load")
+        each = (
+            dataset["contact_area"]
+            .isel(t=slice(dataset.sizes["t"] // 2, None))
+            .mean("t")
+            .diff("contact_load")
+        )
         error = each.std("member", ddof=1).item() / math.sqrt(members)
         assert_allclose(change["contact_area_sem"][1], error, rtol=1e-9)
 
 
 def test_joined_runs_are_described_as_what_they_are(tmp_path):
     parts = {key: value for key, value in FLUCTUATING.items() if key != "sweep"}
-    several = [run(scene(**parts, contact=Equilibrium(load=load))) for load in (1e-3, 4e-3)]
-    joined = xr.concat([each.set_coords("contact_load") for each in several], "contact_load", data_vars="all")
+    several = [
+        run(scene(**parts, contact=Equilibrium(load=load))) for load in (1e-3, 4e-3)
+    ]
+    joined = xr.concat(
+        [each.set_coords("contact_load") for each in several],
+        "contact_load",
+        data_vars="all",
+    )
     joined.to_netcdf(tmp_path / "loads.nc")
     swept = run(scene(**FLUCTUATING))
     with sim.open(tmp_path / "loads.nc") as dataset:
@@ -177,10 +294,17 @@ def test_joined_runs_are_described_as_what_they_are(tmp_path):
     both = xr.concat(seeds, "member", **how)
     both.to_netcdf(tmp_path / "seeds.nc")
     with sim.open(tmp_path / "seeds.nc") as dataset:
-        assert dataset.attrs["members"] == 12 and dataset.attrs["joined"] == "12 members joined, 6 of one run"
+        assert (
+            dataset.attrs["members"] == 12
+            and dataset.attrs["joined"] == "12 members joined, 6 of one run"
+        )
         error = of_second_half(dataset)["contact_area_sem"]
-        halves = both["contact_area"].isel(t=slice(dataset.sizes["t"] // 2, None)).mean("t")
-        assert_allclose(error, halves.std("member", ddof=1) / math.sqrt(12.0), rtol=1e-10)
+        halves = (
+            both["contact_area"].isel(t=slice(dataset.sizes["t"] // 2, None)).mean("t")
+        )
+        assert_allclose(
+            error, halves.std("member", ddof=1) / math.sqrt(12.0), rtol=1e-10
+        )
     run(scene(**parts), to=tmp_path / "one.nc")
     with sim.open(tmp_path / "one.nc") as dataset:
         assert "joined" not in dataset.attrs
@@ -191,9 +315,29 @@ def test_two_records_one_of_which_is_the_start_have_no_mean_but_the_value_at_the
     dataset = run(scene(**parts, clock=Clock(0.8, 2e-3)))
     ends = analysis.distribution(dataset.isel(t=[0, -1]))
     for name in ("contact_area", "friction_force"):
-        assert_allclose(ends[f"{name}_mean"], dataset[name].isel(t=-1).mean(), rtol=1e-12)
-        assert math.isnan(ends[f"{name}_sem"]) and ends[f"{name}_reason"].item().startswith("too few records")
-    assert analysis.distribution(dataset.isel(t=[0, 10, -1]))["contact_area_reason"] == ""
-    pooled = of_second_half(run(scene(**parts, record=Record(per_member=False), clock=Clock(0.8, 2e-3, record=0.8))))
-    assert_allclose(pooled["contact_area_mean"], dataset["contact_area"].isel(t=-1).mean(), rtol=1e-12)
-    assert pooled["contact_area_reason"].item().startswith("too few records") and math.isnan(pooled["contact_area_sem"])
+        assert_allclose(
+            ends[f"{name}_mean"], dataset[name].isel(t=-1).mean(), rtol=1e-12
+        )
+        assert math.isnan(ends[f"{name}_sem"]) and ends[
+            f"{name}_reason"
+        ].item().startswith("too few records")
+    assert (
+        analysis.distribution(dataset.isel(t=[0, 10, -1]))["contact_area_reason"] == ""
+    )
+    pooled = of_second_half(
+        run(
+            scene(
+                **parts,
+                record=Record(per_member=False),
+                clock=Clock(0.8, 2e-3, record=0.8),
+            )
+        )
+    )
+    assert_allclose(
+        pooled["contact_area_mean"],
+        dataset["contact_area"].isel(t=-1).mean(),
+        rtol=1e-12,
+    )
+    assert pooled["contact_area_reason"].item().startswith(
+        "too few records"
+    ) and math.isnan(pooled["contact_area_sem"])

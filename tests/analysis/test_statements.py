@@ -20,7 +20,13 @@ def test_a_statement_prints_its_error_its_bounds_or_its_reason():
         "1.57(2) mm/s": (1.57e-3, 2e-5, 1.53e-3, 1.61e-3, ""),
         "> 50 mm/s": (nan, nan, 0.05, nan, ""),
         "< 200 µm/s": (nan, nan, nan, 2e-4, ""),
-        "0.3 to 3 mm/s; 5 speeds: add some here": (nan, nan, 3e-4, 3e-3, "5 speeds: add some here"),
+        "0.3 to 3 mm/s; 5 speeds: add some here": (
+            nan,
+            nan,
+            3e-4,
+            3e-3,
+            "5 speeds: add some here",
+        ),
         "105 µm/s; not settled": (105e-6, nan, nan, nan, "not settled"),
         "no member is closed": (nan, nan, nan, nan, "no member is closed"),
     }
@@ -32,13 +38,20 @@ def test_table_csv_and_statements_have_the_same_numbers_and_samples():
     speeds = ["1 mm/s", "3 mm/s", "10 mm/s"]
     dataset = run(scene(drive=drive.Steady(speed=1e-3), sweep={"drive.speed": speeds}))
     stated = analysis.statements(dataset)
-    assert stated["contact_area_mean"].attrs["over"] == "second half of the run and 6 members"
+    assert (
+        stated["contact_area_mean"].attrs["over"]
+        == "second half of the run and 6 members"
+    )
     assert stated["speed_at_5_percent_lost_mean"].attrs["over"] == "6 members"
     rows = analysis.tidy(dataset).set_index("quantity")
     whole_run = rows[rows["t"].isna()]
     for statement in analysis.each(stated):
         row = whole_run.loc[[statement.name]]
-        at = row if "drive_speed" not in statement.at else row[row["drive_speed"] == statement.at["drive_speed"]]
+        at = (
+            row
+            if "drive_speed" not in statement.at
+            else row[row["drive_speed"] == statement.at["drive_speed"]]
+        )
         np.testing.assert_array_equal(at["mean"], statement.value)
         assert set(at["over"]) == {statement.over or "one run"}
     areas = [s.value for s in analysis.each(stated) if s.name == "area_ratio"]
@@ -49,44 +62,86 @@ def test_table_csv_and_statements_have_the_same_numbers_and_samples():
 def test_key_figures_have_the_errors_of_the_table():
     dataset = run(scene(drive=drive.Steady(speed=1e-3)))
     stated = analysis.statements(dataset)
-    values = {row[""]: row["value"].split()[0] for row in analysis.tables.key_figures(dataset, stated)}
-    rows = {row["quantity"].partition(" (")[0]: row["mean"] for row in analysis.tables.spread(dataset, stated)}
-    assert {"ΔΓ", "w", "a", "A/A_JKR"} <= rows.keys() and all("(" in values[name] for name in rows)
-    assert {name: values[name] for name in ("ΔΓ", "w", "a", "A/A_JKR")}.items() <= rows.items()
+    values = {
+        row[""]: row["value"].split()[0]
+        for row in analysis.tables.key_figures(dataset, stated)
+    }
+    rows = {
+        row["quantity"].partition(" (")[0]: row["mean"]
+        for row in analysis.tables.spread(dataset, stated)
+    }
+    assert {"ΔΓ", "w", "a", "A/A_JKR"} <= rows.keys() and all(
+        "(" in values[name] for name in rows
+    )
+    assert {
+        name: values[name] for name in ("ΔΓ", "w", "a", "A/A_JKR")
+    }.items() <= rows.items()
 
 
 def test_a_reason_marks_its_cell_and_is_a_note_of_the_table():
-    dataset = run(scene(drive=drive.Steady(speed=1e-3), shear=shear.Uniform(), sweep={"contact.load": [1e-3, 4e-3]}))
+    dataset = run(
+        scene(
+            drive=drive.Steady(speed=1e-3),
+            shear=shear.Uniform(),
+            sweep={"contact.load": [1e-3, 4e-3]},
+        )
+    )
     stated = analysis.statements(dataset)
-    stated = stated.assign(area_ratio_reason=("contact_load", np.array(["", "not settled"], object)))
+    stated = stated.assign(
+        area_ratio_reason=("contact_load", np.array(["", "not settled"], object))
+    )
     rows = analysis.table(dataset, stated=stated)
     marked = [row["A/A_JKR\n(%)"].endswith("*") for row in rows]
-    assert marked == [False, True] and reasons(stated) == {"not settled": ["area_ratio"]}
+    assert marked == [False, True] and reasons(stated) == {
+        "not settled": ["area_ratio"]
+    }
     assert "* A/A_JKR: not settled" in analysis.notes(dataset, rows, [], stated)
 
 
 @pytest.mark.parametrize(
-    ("count", "least", "most"), [(40, 32, 40), pytest.param(200, 179, 198, marks=pytest.mark.verify)]
+    ("count", "least", "most"),
+    [(40, 32, 40), pytest.param(200, 179, 198, marks=pytest.mark.verify)],
 )
-def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_members_or_a_reason(count, least, most):
-    rates, still = {"critical_speed": 3e-3, "rebinding_rate": 5.0, "stress": 2e5}, {"shear": shear.Uniform()}
-    lens = still | {"drive": drive.Steady(speed=1e-3), "clock": Clock(duration=2.0, step=0.01)}
+def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_members_or_a_reason(
+    count, least, most
+):
+    rates, still = (
+        {"critical_speed": 3e-3, "rebinding_rate": 5.0, "stress": 2e5},
+        {"shear": shear.Uniform()},
+    )
+    lens = still | {
+        "drive": drive.Steady(speed=1e-3),
+        "clock": Clock(duration=2.0, step=0.01),
+    }
     exact = 1.0 / (5.0 * (1.0 + 1.0 / 3.0))  # dN/dt = h (N0 - N) - h (V/Vc) N
-    found = analysis.relaxation(run(scene(bonds=bonds.Rate(**rates, start_from="empty"), **lens)), "shear_stress")
+    found = analysis.relaxation(
+        run(scene(bonds=bonds.Rate(**rates, start_from="empty"), **lens)),
+        "shear_stress",
+    )
     assert_allclose(found.value, exact, rtol=1e-9)
-    assert math.isnan(found.error) and math.isnan(found.low) and not found.reason  # no noise, no interval
+    # no noise, no interval
+    assert math.isnan(found.error) and math.isnan(found.low) and not found.reason
     counted = bonds.Counted(**rates, start_from="empty", sites=50)
-    found = analysis.relaxation(run(scene(bonds=counted, ensemble=Ensemble(members=40), **lens)), "shear_stress")
+    found = analysis.relaxation(
+        run(scene(bonds=counted, ensemble=Ensemble(members=40), **lens)), "shear_stress"
+    )
     assert found.low < exact < found.high and found.error < 0.1 * exact
     time, rng = np.linspace(0.0, 5.0, 101), np.random.default_rng(27)
 
     def course(mean, members=10):
-        noise = ornstein_uhlenbeck(rng, (members, time.size), math.exp(-0.05 / 0.5))  # of a correlation time of 0.5 s
+        # of a correlation time of 0.5 s
+        noise = ornstein_uhlenbeck(rng, (members, time.size), math.exp(-0.05 / 0.5))
         return xr.Dataset({"x": (("member", "t"), mean + 0.1 * noise)}, {"t": time})
 
-    intervals = [analysis.relaxation(course(1.0 - np.exp(-time / 0.63)), "x") for _ in range(count)]
-    assert least <= sum(each.low < 0.63 < each.high for each in intervals) <= most  # a band of 99.9 %
-    rests = xr.Dataset({"x": ("t", np.exp(-np.maximum(time - 1.0, 0.0) / 0.4))}, {"t": time})
+    intervals = [
+        analysis.relaxation(course(1.0 - np.exp(-time / 0.63)), "x")
+        for _ in range(count)
+    ]
+    # a band of 99.9 %
+    assert least <= sum(each.low < 0.63 < each.high for each in intervals) <= most
+    rests = xr.Dataset(
+        {"x": ("t", np.exp(-np.maximum(time - 1.0, 0.0) / 0.4))}, {"t": time}
+    )
     later = analysis.relaxation(rests, "x", 1.0)
     assert_allclose(later.value, 0.4, rtol=1e-9)
     cases = {
@@ -97,16 +152,25 @@ def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_memb
     for words, mean in cases.items():
         refused = analysis.relaxation(xr.Dataset({"x": ("t", mean)}, {"t": time}), "x")
         assert words in refused.reason and math.isnan(refused.value)
-    of_noise = [analysis.relaxation(course(0.0 * time), "x").reason for _ in range(count // 4)]
+    of_noise = [
+        analysis.relaxation(course(0.0 * time), "x").reason for _ in range(count // 4)
+    ]
     assert of_noise.count("") <= 2
 
 
 def test_a_maximum_inside_a_sweep_and_a_systematic_error_are_notes():
-    bond = {"rupture": Bell(zero_force_rate=20.0, bell_force=4e-12), "bond_stiffness": 4e-7, "rebinding_rate": 200.0}
+    bond = {
+        "rupture": Bell(zero_force_rate=20.0, bell_force=4e-12),
+        "bond_stiffness": 4e-7,
+        "rebinding_rate": 200.0,
+    }
     stretched = bonds.FirstMoment(**bond, site_density=1e16)
     speeds = ["100 mm/s", "0.1 mm/s", "4 mm/s"]
     scenario = scene(
-        drive=drive.Steady(speed=1e-3), bonds=stretched, shear=shear.Uniform(), sweep={"drive.speed": speeds}
+        drive=drive.Steady(speed=1e-3),
+        bonds=stretched,
+        shear=shear.Uniform(),
+        sweep={"drive.speed": speeds},
     )
     dataset = run(scenario)
     friction = dataset["friction_force"].isel(t=-1).to_numpy()
@@ -115,9 +179,22 @@ def test_a_maximum_inside_a_sweep_and_a_systematic_error_are_notes():
     lines = analysis.notes(dataset, analysis.table(dataset, stated=stated), [], stated)
     (line,) = [line for line in lines if line.startswith("friction force is largest")]
     assert line.endswith("at drive_speed = 4 mm/s (between 100 µm/s and 100 mm/s)")
-    assert not [line for line in lines if "contact area is" in line]  # it falls all the way
-    drifting = stated.assign(friction_force_reason=("drive_speed", np.array(["", "not settled", ""], object)))
-    assert not [line for line in analysis.notes(dataset, [], [], drifting) if "friction force is" in line]
-    error = SystematicError("cell_error_area", 5.13, "points of A/A_JKR", "contact_load = 1 mN", 'shear.cell = "4 mm"')
+    # it falls all the way
+    assert not [line for line in lines if "contact area is" in line]
+    drifting = stated.assign(
+        friction_force_reason=("drive_speed", np.array(["", "not settled", ""], object))
+    )
+    assert not [
+        line
+        for line in analysis.notes(dataset, [], [], drifting)
+        if "friction force is" in line
+    ]
+    error = SystematicError(
+        "cell_error_area",
+        5.13,
+        "points of A/A_JKR",
+        "contact_load = 1 mN",
+        'shear.cell = "4 mm"',
+    )
     words = 'the cell adds +5.1 points of A/A_JKR at contact_load = 1 mN; cure: shear.cell = "4 mm"'
     assert str(error) == words and error.matters

@@ -9,7 +9,18 @@ import xarray as xr
 from helpers import lens
 from helpers.draws import ornstein_uhlenbeck
 from helpers.lens import FIELD, scene
-from helpers.parts import Adhesion, Clock, Ensemble, Equilibrium, Time, analysis, bonds, drive, run, shear
+from helpers.parts import (
+    Adhesion,
+    Clock,
+    Ensemble,
+    Equilibrium,
+    Time,
+    analysis,
+    bonds,
+    drive,
+    run,
+    shear,
+)
 from numpy.testing import assert_allclose
 from scipy import special, stats
 
@@ -26,7 +37,10 @@ ENSEMBLES, LEAST, MOST = 1000, 0.92, 0.98
 LAWS = {
     "normal": (lambda values: values, stats.norm()),
     "exponential": (lambda values: -np.log(special.ndtr(-values)), stats.expon()),
-    "gamma": (lambda values: special.gammaincinv(3.0, special.ndtr(values)), stats.gamma(3.0)),
+    "gamma": (
+        lambda values: special.gammaincinv(3.0, special.ndtr(values)),
+        stats.gamma(3.0),
+    ),
 }
 
 
@@ -53,18 +67,26 @@ def test_quantiles_and_intervals_of_64_members_hold_what_they_promise(ensembles)
     assert np.all(np.abs(below - places / 65.0) < 5.0 * errors)
     assert LEAST < share_holding(result["x_low"], result["x_high"], law.mean()) < MOST
     for k, level in enumerate(LEVELS):
-        low, high = (result[f"x_quantile_{end}"].isel(quantile=k) for end in ("low", "high"))
-        assert bool((low <= result["x_quantile"].isel(quantile=k)).all()) and bool((low < high).all())
+        low, high = (
+            result[f"x_quantile_{end}"].isel(quantile=k) for end in ("low", "high")
+        )
+        assert bool((low <= result["x_quantile"].isel(quantile=k)).all()) and bool(
+            (low < high).all()
+        )
         assert LEAST < share_holding(low, high, law.ppf(level)) < MOST, level
 
 
 def test_few_members_bound_no_quantile():
     low, high = quantile_ranks(np.arange(1.0, 200.0)[:, None], LEVELS)
     known = np.isfinite(low) & np.isfinite(high)
-    assert np.array_equal(known, np.isfinite(low)) and np.array_equal(known, np.isfinite(high))
+    assert np.array_equal(known, np.isfinite(low)) and np.array_equal(
+        known, np.isfinite(high)
+    )
     # 0.95^59 = 0.0485 is the first power below what may be left out, and 2 (1/2)^6 = 0.03125
     assert [int(np.argmax(level)) + 1 for level in known.T] == [59, 6, 59]
-    assert np.all(low[known] >= 0.0) and np.all((high <= np.arange(0.0, 199.0)[:, None])[known])
+    assert np.all(low[known] >= 0.0) and np.all(
+        (high <= np.arange(0.0, 199.0)[:, None])[known]
+    )
 
 
 def test_few_members_widen_an_interval_and_those_of_shares_hold_what_they_promise():
@@ -75,13 +97,23 @@ def test_few_members_widen_an_interval_and_those_of_shares_hold_what_they_promis
         low, high = (result["x_mean"] + z * result["x_sem"] for z in (-1.96, 1.96))
         assert share_holding(low, high, 0.0) < LEAST
     for detached in [0.02, 0.1, 0.5]:
-        opened = (np.random.default_rng(13).random((64, ENSEMBLES)) < detached).astype(float)
-        result = analysis.summary(xr.Dataset({"fraction_detached": (("member", "t"), opened)}))
+        opened = (np.random.default_rng(13).random((64, ENSEMBLES)) < detached).astype(
+            float
+        )
+        result = analysis.summary(
+            xr.Dataset({"fraction_detached": (("member", "t"), opened)})
+        )
         low, high = result["fraction_detached_low"], result["fraction_detached_high"]
         assert share_holding(low, high, detached) > LEAST and float(low.min()) >= -1e-15
-        none = analysis.summary(xr.Dataset({"fraction_detached": (("member",), np.zeros(64))}))
+        none = analysis.summary(
+            xr.Dataset({"fraction_detached": (("member",), np.zeros(64))})
+        )
         # Wilson's bound of none in 64: z^2/(64 + z^2)
-        assert_allclose(none["fraction_detached_high"], 3.841458820694124 / 67.84145882069413, rtol=1e-12)
+        assert_allclose(
+            none["fraction_detached_high"],
+            3.841458820694124 / 67.84145882069413,
+            rtol=1e-12,
+        )
         assert none["fraction_detached_low"] == 0.0
 
 
@@ -92,23 +124,35 @@ def covered(law, members, length, ensembles):
     drawn = of(ornstein_uhlenbeck(np.random.default_rng(14), shape, math.exp(-0.2)))
     result = [analysis.over_time(series) for series in drawn]
     ends = [
-        np.column_stack([[estimate[end], *estimate[f"quantile_{end}"]] for estimate in result])
+        np.column_stack(
+            [[estimate[end], *estimate[f"quantile_{end}"]] for estimate in result]
+        )
         for end in ("low", "high")
     ]
-    has_interval, truth = np.isfinite(ends[0]) & np.isfinite(ends[1]), np.array([[exact.mean(), *exact.ppf(LEVELS)]]).T
+    has_interval, truth = (
+        np.isfinite(ends[0]) & np.isfinite(ends[1]),
+        np.array([[exact.mean(), *exact.ppf(LEVELS)]]).T,
+    )
     hits = (ends[0] <= truth) & (truth <= ends[1])
     return [
-        float(hit[known].mean()) if known.any() else math.nan for hit, known in zip(hits, has_interval, strict=True)
+        float(hit[known].mean()) if known.any() else math.nan
+        for hit, known in zip(hits, has_interval, strict=True)
     ], has_interval.mean(axis=1)
 
 
 @pytest.mark.verify
 @pytest.mark.parametrize("law", sorted(LAWS))
 @pytest.mark.parametrize("members", [1, 4])
-def test_intervals_of_1000_series_of_100_correlation_times_hold_what_they_promise(law, members):
+def test_intervals_of_1000_series_of_100_correlation_times_hold_what_they_promise(
+    law, members
+):
     shares, has_interval = covered(law, members, 100, ENSEMBLES)
     # one series in a thousand seems to forget so fast that it states the interval of a tail, too
-    assert all(LEAST < share < MOST for share, known in zip(shares, has_interval, strict=True) if known > 0.01)
+    assert all(
+        LEAST < share < MOST
+        for share, known in zip(shares, has_interval, strict=True)
+        if known > 0.01
+    )
     assert np.all(has_interval[[0, 2]] > 0.9)
     assert np.all(has_interval[[1, 3]] < 0.01 if members == 1 else has_interval > 0.5)
 
@@ -116,8 +160,12 @@ def test_intervals_of_1000_series_of_100_correlation_times_hold_what_they_promis
 def test_a_single_series_that_is_short_for_its_memory_has_no_interval():
     for length in (1, 2, 5, 10):
         shares, has_interval = covered("exponential", 1, length, 400)
-        missed = has_interval * (1.0 - np.nan_to_num(shares))  # of all series: a true share of at most 8 %
-        assert np.all(missed < 0.08 + 5.0 * math.sqrt(0.92 * 0.08 / 400.0)), (length, missed)
+        # of all series: a true share of at most 8 %
+        missed = has_interval * (1.0 - np.nan_to_num(shares))
+        assert np.all(missed < 0.08 + 5.0 * math.sqrt(0.92 * 0.08 / 400.0)), (
+            length,
+            missed,
+        )
         assert has_interval.max() < 0.1 * length
 
 
@@ -132,7 +180,9 @@ def test_correlation_times_and_free_values_are_those_of_the_law_and_of_white_noi
     series = ornstein_uhlenbeck(np.random.default_rng(16), (1, 50), math.exp(-0.2))
     assert np.all(np.isnan(analysis.over_time(series)["quantile_low"]))
     result = analysis.over_time(np.random.default_rng(18).normal(size=(1, 20_000)))
-    assert abs(result["effective_samples"] / 20_000 - 1.0) < 0.1 and math.isnan(result["correlation_time"])
+    assert abs(result["effective_samples"] / 20_000 - 1.0) < 0.1 and math.isnan(
+        result["correlation_time"]
+    )
 
 
 STEADY = {"drive": drive.Steady(speed=4e-3), "clock": Clock(duration=0.8, step=0.01)}
@@ -140,28 +190,55 @@ STEADY = {"drive": drive.Steady(speed=4e-3), "clock": Clock(duration=0.8, step=0
 
 def test_statistics_leave_out_missing_values_and_a_distribution_is_over_members_and_the_second_half():
     for members in [40, 3, 1]:
-        values = ornstein_uhlenbeck(np.random.default_rng(19), (members, 2000), math.exp(-0.2)) ** 2
+        values = (
+            ornstein_uhlenbeck(
+                np.random.default_rng(19), (members, 2000), math.exp(-0.2)
+            )
+            ** 2
+        )
         values[0, 100:] = math.nan
         result, known = analysis.over_time(values), values[np.isfinite(values)]
         assert_allclose(result["quantile"], np.quantile(known, LEVELS), rtol=1e-13)
         assert_allclose(result["mean"], np.nanmean(values, axis=1).mean(), rtol=1e-13)
-        assert math.isnan(result.get("correlation_time", math.nan)) and (members == 1) == math.isnan(result["sem"])
-    dataset = run(scene(**STEADY, ensemble=Ensemble(members=20), sweep={"contact.load": [1e-3, 4e-3]}))
+        assert math.isnan(result.get("correlation_time", math.nan)) and (
+            members == 1
+        ) == math.isnan(result["sem"])
+    dataset = run(
+        scene(
+            **STEADY,
+            ensemble=Ensemble(members=20),
+            sweep={"contact.load": [1e-3, 4e-3]},
+        )
+    )
     result = analysis.distribution(dataset)
     late = dataset["contact_area"].isel(t=slice(dataset.sizes["t"] // 2, None))
     assert_allclose(result["contact_area_mean"], late.mean(("member", "t")), rtol=1e-13)
     assert_allclose(result["contact_area_std"], late.std(("member", "t")), rtol=1e-9)
     means = late.mean("t")
-    assert_allclose(result["contact_area_sem"], means.std("member", ddof=1) / math.sqrt(20), rtol=1e-10)
-    assert_allclose(result["contact_area_quantile"], late.quantile(LEVELS, ("member", "t")).T, rtol=1e-13)
-    assert result["contact_area_mean"].dims == ("contact_load",) and bool(result["speed_sem"].isnull().all())
+    assert_allclose(
+        result["contact_area_sem"],
+        means.std("member", ddof=1) / math.sqrt(20),
+        rtol=1e-10,
+    )
+    assert_allclose(
+        result["contact_area_quantile"],
+        late.quantile(LEVELS, ("member", "t")).T,
+        rtol=1e-13,
+    )
+    assert result["contact_area_mean"].dims == ("contact_load",) and bool(
+        result["speed_sem"].isnull().all()
+    )
     assert result["contact_area_quantile_low"].attrs["units"] == "m^2"
 
 
 def squared_ornstein_uhlenbeck(rng, members, records, keep, pairs=5):
     """Energies of modes whose amplitudes keep a share from record to record: correlation keep^(2 lag)."""
     weights = 1.0 / np.arange(1.0, pairs + 1.0)
-    return np.einsum("mpct,p->mt", ornstein_uhlenbeck(rng, (members, pairs, 2, records), keep) ** 2, weights)
+    return np.einsum(
+        "mpct,p->mt",
+        ornstein_uhlenbeck(rng, (members, pairs, 2, records), keep) ** 2,
+        weights,
+    )
 
 
 def exact_time(keep, step):
@@ -170,45 +247,74 @@ def exact_time(keep, step):
 
 
 def test_correlation_time_is_within_its_errors_or_a_bound_of_records_that_are_too_coarse():
-    for members, records, keep in [(1, 8000, 0.9), (2, 4000, 0.9), (64, 400, 0.8), (16384, 60, 0.8)]:
-        energy = squared_ornstein_uhlenbeck(np.random.default_rng(7), members, records, keep)
+    for members, records, keep in [
+        (1, 8000, 0.9),
+        (2, 4000, 0.9),
+        (64, 400, 0.8),
+        (16384, 60, 0.8),
+    ]:
+        energy = squared_ornstein_uhlenbeck(
+            np.random.default_rng(7), members, records, keep
+        )
         time, sem, _ = analysis.integral_time(energy, step=0.01)
         assert abs(time - exact_time(keep, 0.01)) < 5.0 * sem and sem < 0.3 * time
     for records_a_time in [1.6, 2.4]:
         keep = math.exp(-0.5 / records_a_time)
         for seed in range(20):
-            energy = squared_ornstein_uhlenbeck(np.random.default_rng(seed), 64, 400, keep)
+            energy = squared_ornstein_uhlenbeck(
+                np.random.default_rng(seed), 64, 400, keep
+            )
             time, sem, below = analysis.integral_time(energy, step=0.01)
             if records_a_time < 2.0:
                 assert math.isnan(time) and below == 0.02
             else:
                 # Simpson's rule is off by 1/(180 2.4^4) = 2e-4 and the window by e^-6, each far below the error
-                assert abs(time - 0.01 * records_a_time) < 4.0 * sem and math.isnan(below)
+                assert abs(time - 0.01 * records_a_time) < 4.0 * sem and math.isnan(
+                    below
+                )
 
 
 def test_energy_forgets_twice_as_fast_as_its_amplitudes_and_records_too_seldom_are_named():
     # Amplitudes forget over the correlation time, energies over half of it.
     field = shear.Modal(correlation=Time(time=0.02), **FIELD)
-    steady = scene(drive=drive.Steady(speed=1e-3), shear=field, clock=Clock(duration=0.4, step=0.001),
-                   ensemble=Ensemble(members=128))  # fmt: skip
+    steady = scene(
+        drive=drive.Steady(speed=1e-3),
+        shear=field,
+        clock=Clock(duration=0.4, step=0.001),
+        ensemble=Ensemble(members=128),
+    )
     result = analysis.statistics(run(steady))
-    assert abs(float(result["correlation_time"]) - 0.01) < 5.0 * float(result["correlation_time_sem"])
+    assert abs(float(result["correlation_time"]) - 0.01) < 5.0 * float(
+        result["correlation_time_sem"]
+    )
     assert float(result["correlation_time_sem"]) < 1e-3
     field = shear.Banded(correlation=Time(time=0.02), **FIELD)
-    coarse = run(scene(drive=drive.Steady(speed=1e-3), shear=field, clock=Clock(duration=4.0, step=0.02),
-                       ensemble=Ensemble(members=16)))  # fmt: skip
+    coarse = run(
+        scene(
+            drive=drive.Steady(speed=1e-3),
+            shear=field,
+            clock=Clock(duration=4.0, step=0.02),
+            ensemble=Ensemble(members=16),
+        )
+    )
     assert float(analysis.statistics(coarse)["correlation_time_below"]) == 0.04
     assert {row["t_c\n(ms)"] for row in analysis.table(coarse)} == {"<40"}
 
 
 def test_there_is_no_correlation_time_where_nothing_decays_visibly_or_on_a_ramp():
     for energy in [
-        np.ones((4, 100)), np.full((4, 100), 0.1) * (1.0 + 1e-14 * np.random.default_rng(1).normal(size=(4, 100))),
-        np.ones((4, 100)) * np.arange(1.0, 5.0)[:, None], np.random.default_rng(2).normal(size=(64, 1000)),
-        np.ones((4, 1)), np.full((4, 100), math.nan),
+        np.ones((4, 100)),
+        np.full((4, 100), 0.1)
+        * (1.0 + 1e-14 * np.random.default_rng(1).normal(size=(4, 100))),
+        np.ones((4, 100)) * np.arange(1.0, 5.0)[:, None],
+        np.random.default_rng(2).normal(size=(64, 1000)),
+        np.ones((4, 1)),
+        np.full((4, 100), math.nan),
         squared_ornstein_uhlenbeck(np.random.default_rng(3), 256, 20, 0.99),
-    ]:  # fmt: skip
-        assert all(math.isnan(number) for number in analysis.integral_time(energy, 0.1)[:2])
+    ]:
+        assert all(
+            math.isnan(number) for number in analysis.integral_time(energy, 0.1)[:2]
+        )
     energy = squared_ornstein_uhlenbeck(np.random.default_rng(4), 2, 12, 0.1)
     assert all(math.isnan(number) for number in analysis.integral_time(energy, 1.0))
     assert math.isnan(analysis.correlation_time(lens.ramp())["correlation_time"])
@@ -223,17 +329,32 @@ def test_a_covariance_is_the_mean_of_products_of_deviations_and_sees_nothing_tha
     assert_allclose(analysis.integral_time(pair, 1.0), alone, rtol=1e-9)
     energy = squared_ornstein_uhlenbeck(np.random.default_rng(8), 64, 400, 0.8)
     drift = np.linspace(0.0, 100.0, 400)
-    assert_allclose(analysis.integral_time(energy + drift, 1.0), analysis.integral_time(energy, 1.0), rtol=1e-9)
+    assert_allclose(
+        analysis.integral_time(energy + drift, 1.0),
+        analysis.integral_time(energy, 1.0),
+        rtol=1e-9,
+    )
 
 
-@pytest.mark.parametrize(("lags", "known"), [((40, 600), 600), ((200, 600), 200), ((5000,), 2000)])
-def test_products_are_summed_over_as_many_records_as_the_window_needs_in_stretches_and_groups(monkeypatch, lags, known):
+@pytest.mark.parametrize(
+    ("lags", "known"), [((40, 600), 600), ((200, 600), 200), ((5000,), 2000)]
+)
+def test_products_are_summed_over_as_many_records_as_the_window_needs_in_stretches_and_groups(
+    monkeypatch, lags, known
+):
     monkeypatch.setitem(covariance_of.__globals__, "_LAGS", lags)
-    monkeypatch.setitem(covariance_of.__globals__, "_AT_ONCE", 2000)  # groups of less than all members
-    values = ornstein_uhlenbeck(np.random.default_rng(12), (7, 2000), 0.9)  # the window is 6 / 0.1 records
+    # groups of less than all members
+    monkeypatch.setitem(covariance_of.__globals__, "_AT_ONCE", 2000)
+    # the window is 6 / 0.1 records
+    values = ornstein_uhlenbeck(np.random.default_rng(12), (7, 2000), 0.9)
     off = values - values.mean(axis=0)
-    products = [sum(member[k:] @ member[: 2000 - k] for member in off) / (6.0 * (2000 - k)) for k in range(known)]
-    assert_allclose(covariance_of(values, values.mean(axis=0), 6.0), products, rtol=0.0, atol=1e-12)
+    products = [
+        sum(member[k:] @ member[: 2000 - k] for member in off) / (6.0 * (2000 - k))
+        for k in range(known)
+    ]
+    assert_allclose(
+        covariance_of(values, values.mean(axis=0), 6.0), products, rtol=0.0, atol=1e-12
+    )
 
 
 def censored(rng, end, members=64):
@@ -242,11 +363,19 @@ def censored(rng, end, members=64):
     return np.where(times <= end, times, math.nan)
 
 
-@pytest.mark.parametrize("end", [1.0, 3.0], ids=["a third goes on", "one in twenty goes on"])
+@pytest.mark.parametrize(
+    "end", [1.0, 3.0], ids=["a third goes on", "one in twenty goes on"]
+)
 def test_intervals_of_censored_lifetimes_hold_what_they_promise(end):
-    estimates = [analysis.lifetime(times, end) for times in censored(np.random.default_rng(21), end)]
+    estimates = [
+        analysis.lifetime(times, end)
+        for times in censored(np.random.default_rng(21), end)
+    ]
     for name, truth in (("rate", 1.0), ("half", math.log(2.0))):
-        low, high = (np.array([getattr(time, f"{name}_{side}") for time in estimates]) for side in ("low", "high"))
+        low, high = (
+            np.array([getattr(time, f"{name}_{side}") for time in estimates])
+            for side in ("low", "high")
+        )
         high[np.isnan(high)] = math.inf  # a median that may lie beyond the runs
         assert 0.92 < np.mean((low <= truth) & (truth <= high)) < 0.98, name
 
@@ -254,13 +383,22 @@ def test_intervals_of_censored_lifetimes_hold_what_they_promise(end):
 def test_contacts_that_close_late_count_as_long_as_they_are_closed():
     rng = np.random.default_rng(22)
     hits = {"half": [], "rate": []}
-    for _ in range(ENSEMBLES):  # exponential lives do not age: a contact that closed late is like any other of then
+    # exponential lives do not age: a contact that closed late is like any other of then
+    for _ in range(ENSEMBLES):
         begins = np.where(rng.random(64) < 0.6, rng.exponential(size=64), 0.0)
         times = begins + rng.exponential(size=64)
-        estimate = analysis.lifetime(np.where(times <= 3.0, times, math.nan), 3.0, begins)
+        estimate = analysis.lifetime(
+            np.where(times <= 3.0, times, math.nan), 3.0, begins
+        )
         hits["rate"].append(estimate.rate_low <= 1.0 <= estimate.rate_high)
-        hits["half"].append(estimate.half_low <= math.log(2.0) <= np.nan_to_num(estimate.half_high, nan=math.inf))
-    assert all(LEAST < np.mean(hit) < MOST for hit in hits.values()), {key: np.mean(hit) for key, hit in hits.items()}
+        hits["half"].append(
+            estimate.half_low
+            <= math.log(2.0)
+            <= np.nan_to_num(estimate.half_high, nan=math.inf)
+        )
+    assert all(LEAST < np.mean(hit) < MOST for hit in hits.values()), {
+        key: np.mean(hit) for key, hit in hits.items()
+    }
 
 
 def test_censored_lifetimes_have_the_median_of_scipy_and_the_rate_of_chi_square():
@@ -269,17 +407,31 @@ def test_censored_lifetimes_have_the_median_of_scipy_and_the_rate_of_chi_square(
         times = np.round(rng.exponential(size=size), 2)  # with equal ones
         times[times > end] = math.nan
         happened = np.isfinite(times)
-        survival = stats.ecdf(stats.CensoredData(times[happened], right=np.full(np.sum(~happened), end))).sf
+        survival = stats.ecdf(
+            stats.CensoredData(times[happened], right=np.full(np.sum(~happened), end))
+        ).sf
         with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
             interval = survival.confidence_interval(0.95, method="log-log")
         result = analysis.lifetime(times, end)
-        for name, curve in (("half", survival), ("half_low", interval.low), ("half_high", interval.high)):
+        for name, curve in (
+            ("half", survival),
+            ("half_low", interval.low),
+            ("half_high", interval.high),
+        ):
             below = curve.quantiles[curve.probabilities <= 0.5]
-            np.testing.assert_equal(getattr(result, name), below[0] if below.size else math.nan, name)
-    result = analysis.lifetime(np.array([1.0, 2.0, math.nan, math.nan]), np.array([9.0, 9.0, 3.0, 4.0]))
+            np.testing.assert_equal(
+                getattr(result, name), below[0] if below.size else math.nan, name
+            )
+    result = analysis.lifetime(
+        np.array([1.0, 2.0, math.nan, math.nan]), np.array([9.0, 9.0, 3.0, 4.0])
+    )
     assert_allclose(result.rate, 2.0 / 10.0, rtol=1e-15)
     # chi-square with 4 and 6 degrees of freedom
-    assert_allclose([result.rate_low, result.rate_high], [0.48441855708793 / 20, 14.4493753354 / 20], rtol=1e-10)
+    assert_allclose(
+        [result.rate_low, result.rate_high],
+        [0.48441855708793 / 20, 14.4493753354 / 20],
+        rtol=1e-10,
+    )
     none = analysis.lifetime(np.full(8, math.nan), 5.0)
     assert math.isnan(none.half) and none.rate == none.rate_low == 0.0
     # nobody in 40 s: with 95 % the rate is below the 97.5 % quantile of an exponential law over 40 s
@@ -290,20 +442,37 @@ def test_censored_lifetimes_have_the_median_of_scipy_and_the_rate_of_chi_square(
 
 def test_members_that_are_never_in_contact_are_no_survivors():
     # a tension beyond the pull-off of those members whose fluctuations are large at the start
-    field = {"spectrum": Gaussian(rms=63e3, length=15e-6), "points": 64, "correlation": Time(time=10e-3)}
+    field = {
+        "spectrum": Gaussian(rms=63e3, length=15e-6),
+        "points": 64,
+        "correlation": Time(time=10e-3),
+    }
     parts = {
         "clock": Clock(duration=0.1, step=2e-3),
         "solid": Solid(shear_modulus=1.1e6),
         "sphere": Sphere(radius=1.6e-3),
     }
-    parts |= {"adhesion": Adhesion(work=35e-3), "drive": drive.Steady(), "bonds": bonds.Unbroken()}
+    parts |= {
+        "adhesion": Adhesion(work=35e-3),
+        "drive": drive.Steady(),
+        "bonds": bonds.Unbroken(),
+    }
     contact = Equilibrium(load=-0.19e-3, after_pull_off="stop")
-    dataset = run(scene(**parts, contact=contact, shear=shear.Banded(**field), ensemble=Ensemble(members=100)))
+    dataset = run(
+        scene(
+            **parts,
+            contact=contact,
+            shear=shear.Banded(**field),
+            ensemble=Ensemble(members=100),
+        )
+    )
     closed = (dataset["contact_radius"].isel(t=0) > 0.0).to_numpy()
     assert 20 < closed.sum() < 80
     times = analysis.events(dataset)["first_detachment"]
     every, alone = (
-        lifetimes(dataset.isel(member=who), times.isel(member=who), "detached", "detached")
+        lifetimes(
+            dataset.isel(member=who), times.isel(member=who), "detached", "detached"
+        )
         for who in (slice(None), closed)
     )
     xr.testing.assert_identical(every, alone)

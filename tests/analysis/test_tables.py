@@ -10,7 +10,19 @@ import pytest
 from helpers import lens
 from helpers.cases import posix
 from helpers.lens import scene
-from helpers.parts import Adhesion, Bell, Clock, Ensemble, Equilibrium, Record, analysis, bonds, drive, run, shear
+from helpers.parts import (
+    Adhesion,
+    Bell,
+    Clock,
+    Ensemble,
+    Equilibrium,
+    Record,
+    analysis,
+    bonds,
+    drive,
+    run,
+    shear,
+)
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
@@ -24,7 +36,12 @@ from sim.units.notation import in_units
 def test_a_reduced_dataset_has_the_columns_that_it_can(per_member):
     recorded = ("fluctuation_energy", "speed")
     whole, some = (
-        run(scene(drive=drive.Steady(speed=1e-2), record=Record(per_member=per_member, quantities=quantities)))
+        run(
+            scene(
+                drive=drive.Steady(speed=1e-2),
+                record=Record(per_member=per_member, quantities=quantities),
+            )
+        )
         for quantities in (None, recorded)
     )
     rows = analysis.table(some)
@@ -33,7 +50,9 @@ def test_a_reduced_dataset_has_the_columns_that_it_can(per_member):
         assert row.items() <= full.items()
     alone = run(scene(record=Record(per_member=per_member, quantities=())))
     assert [set(row) for row in analysis.table(alone)] == 12 * [{"t\n(ms)", "a\n(µm)"}]
-    assert analysis.highlights(alone) == [] and "contact_radius_mean" in sim.stats(alone)
+    assert analysis.highlights(alone) == [] and "contact_radius_mean" in sim.stats(
+        alone
+    )
 
 
 def test_tables_have_a_dozen_rows_or_one_for_each_point(ramp):
@@ -43,7 +62,9 @@ def test_tables_have_a_dozen_rows_or_one_for_each_point(ramp):
     for row, at in ((rows[0], 0), (rows[-1], -1)):
         mean = float(re.match(r"[\d.]+", row["a\n(µm)"])[0])
         # half a unit of the fourth digit, the least that is shown
-        np.testing.assert_allclose(mean, 1e6 * float(result["contact_radius_mean"][at]), rtol=5e-4)
+        np.testing.assert_allclose(
+            mean, 1e6 * float(result["contact_radius_mean"][at]), rtol=5e-4
+        )
     assert "open\n(%)" not in rows[0]
     # Wilson's bound of none in six: z²/(6 + z²) = 0.390
     assert {row["masked\n(%)"] for row in rows} == {"0 (0 to 39)", "100 (61 to 100)"}
@@ -53,13 +74,21 @@ def test_tables_have_a_dozen_rows_or_one_for_each_point(ramp):
             "contact.load": list(np.linspace(1e-3, 9e-3, loads)),
             "adhesion.bond_share": list(np.linspace(0, 1, shares)),
         }
-        dataset = run(scene(drive=drive.Steady(speed=1e-2), shear=shear.Uniform(), sweep=sweep))
+        dataset = run(
+            scene(drive=drive.Steady(speed=1e-2), shear=shear.Uniform(), sweep=sweep)
+        )
         table = analysis.table(dataset)
-        assert len(table) == rows and [row["contact_\nload (mN)"] for row in (table[0], table[-1])] == ["1", "9"]
+        assert len(table) == rows and [
+            row["contact_\nload (mN)"] for row in (table[0], table[-1])
+        ] == ["1", "9"]
         assert not any(heading.startswith("t\n") for heading in table[0])
-    rows = analysis.table(run(scene(sweep={"contact.load": ["1 mN", "4 mN"]}, shear=shear.Uniform())))
+    rows = analysis.table(
+        run(scene(sweep={"contact.load": ["1 mN", "4 mN"]}, shear=shear.Uniform()))
+    )
     points = [(row["contact_load\n(mN)"], row["t\n(ms)"]) for row in rows]
-    assert points == list(itertools.product(["1", "4"], ["0", "80", "160", "240", "320", "400"]))
+    assert points == list(
+        itertools.product(["1", "4"], ["0", "80", "160", "240", "320", "400"])
+    )
     ripple = {"model": "ripple", "amplitude": 1e5, "wavelength": 24e-6}
     fields = {"shear": [{"model": "uniform"}, {"model": "mean", "spectrum": ripple}]}
     rows = analysis.table(run(scene(drive=drive.Steady(speed=1e-2), sweep=fields)))
@@ -97,13 +126,23 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
     assert_array_equal(rows["speed [m/s]"], ramp["speed"])
     for column, kind in names.items():
         assert_array_equal(rows[column], result[f"contact_radius_{kind}"])
-    assert_array_equal(rows["q95"], result["contact_radius_quantile"].sel(quantile=0.95))
-    assert_array_equal(rows["q50_low"], result["contact_radius_quantile_low"].sel(quantile=0.5))
+    assert_array_equal(
+        rows["q95"], result["contact_radius_quantile"].sel(quantile=0.95)
+    )
+    assert_array_equal(
+        rows["q50_low"], result["contact_radius_quantile_low"].sel(quantile=0.5)
+    )
     lost = analysis.shares(ramp)["lost_to_fluctuations_first_mean"]
     assert_array_equal(of(long, "lost_to_fluctuations_first")["mean"], lost)
-    assert set(rows["unit"]) == {"m"} and set(rows["over"]) == {"6 members"} and next(iter(long)) == "t [s]"
+    assert (
+        set(rows["unit"]) == {"m"}
+        and set(rows["over"]) == {"6 members"}
+        and next(iter(long)) == "t [s]"
+    )
     (masked,) = of(long, "time_masked").to_dict("records")
-    assert masked["mean"] == float(analysis.statistics(ramp)["time_masked_mean"]) and math.isnan(masked["t [s]"])
+    assert masked["mean"] == float(
+        analysis.statistics(ramp)["time_masked_mean"]
+    ) and math.isnan(masked["t [s]"])
     (dissipated,) = of(long, "total_dissipated").to_dict("records")
     assert dissipated["q95"] == 0.0 and dissipated["unit"] == "J"
     (speed,) = of(long, "speed_at_5_percent_lost").to_dict("records")
@@ -114,44 +153,80 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
     analysis.to_csv(dataset, tmp_path / "out.csv")
     rows = of(numbers_of(tmp_path / "out.csv"), "contact_area")
     expected = itertools.product([1e-3, 4e-3], [0.0, 0.5, 1.0], dataset["t"].to_numpy())
-    read = rows[["contact_load [N]", "adhesion_bond_share", "t [s]"]].itertuples(index=False, name=None)
+    read = rows[["contact_load [N]", "adhesion_bond_share", "t [s]"]].itertuples(
+        index=False, name=None
+    )
     assert list(read) == list(expected)
     assert_array_equal(rows["mean"], dataset["contact_area"].to_numpy().ravel())
-    text, how = (tmp_path / "out.csv").read_bytes().decode(), {"index": False, "na_rep": "nan", "lineterminator": "\n"}
-    assert text == analysis.tidy(dataset).to_csv(header=text.partition("\n")[0].split(","), **how)
+    text, how = (
+        (tmp_path / "out.csv").read_bytes().decode(),
+        {"index": False, "na_rep": "nan", "lineterminator": "\n"},
+    )
+    assert text == analysis.tidy(dataset).to_csv(
+        header=text.partition("\n")[0].split(","), **how
+    )
 
 
-def test_a_large_csv_is_written_in_pieces_and_an_empty_one_has_no_rows(tmp_path, monkeypatch):
+def test_a_large_csv_is_written_in_pieces_and_an_empty_one_has_no_rows(
+    tmp_path, monkeypatch
+):
     texts, lengths = tables._texts, []
-    monkeypatch.setattr(tables, "_texts", lambda values: lengths.append(len(values)) or texts(values))
+    monkeypatch.setattr(
+        tables, "_texts", lambda values: lengths.append(len(values)) or texts(values)
+    )
     numbers = pd.DataFrame({"a": np.arange(70_000) / 7.0, "b": np.arange(70_000)})
     for rows in (numbers, pd.DataFrame()):
         monkeypatch.setattr(tables, "in_columns", lambda *_, rows=rows: rows)
         tables.to_csv(None, tmp_path / "out.csv", wide=True)
         text = (tmp_path / "out.csv").read_bytes().decode()
-        assert text == (rows.to_csv(index=False, lineterminator="\n") if rows.size else "\n")
+        assert text == (
+            rows.to_csv(index=False, lineterminator="\n") if rows.size else "\n"
+        )
     assert max(lengths) < 50_000 and sum(lengths) == numbers.size
 
 
-def test_a_wide_csv_has_a_row_for_each_point_or_record_in_the_units_that_are_chosen(tmp_path):
+def test_a_wide_csv_has_a_row_for_each_point_or_record_in_the_units_that_are_chosen(
+    tmp_path,
+):
     path = tmp_path / "out.csv"
-    names = {"contact_area": ("mm^2", 1e6), "friction_force": ("mN", 1e3), "indentation": ("m", 1)}
+    names = {
+        "contact_area": ("mm^2", 1e6),
+        "friction_force": ("mN", 1e3),
+        "indentation": ("m", 1),
+    }
     sweep = {"drive.speed": [1e-3, 1e-2]}
-    dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep=sweep, ensemble=Ensemble(members=2)))
+    dataset = run(
+        scene(drive=drive.Steady(speed=1e-2), sweep=sweep, ensemble=Ensemble(members=2))
+    )
     for every in (False, True):
         with in_units(["mm/s", "mm^2", "mN", "ms"]):
             analysis.to_csv(dataset, path, wide=True, every=every)
         rows, long = pd.read_csv(path), analysis.tidy(dataset)
         long = long[long["t"].notna() == every]
         assert_allclose(np.unique(rows["drive_speed [mm/s]"]), [1.0, 10.0], rtol=1e-15)
-        assert len(rows) == 2 * (dataset.sizes["t"] if every else 1) and any("_q95" in name for name in rows) == every
-        for (name, (unit, factor)), kind in itertools.product(names.items(), ("mean", "error", "low", "high")):
+        assert (
+            len(rows) == 2 * (dataset.sizes["t"] if every else 1)
+            and any("_q95" in name for name in rows) == every
+        )
+        for (name, (unit, factor)), kind in itertools.product(
+            names.items(), ("mean", "error", "low", "high")
+        ):
             column = f"{name}{f'_{kind}' * (kind != 'mean')} [{unit}]"
-            assert_allclose(rows[column], factor * long.loc[long["quantity"] == name, kind], rtol=1e-15, atol=0)
+            assert_allclose(
+                rows[column],
+                factor * long.loc[long["quantity"] == name, kind],
+                rtol=1e-15,
+                atol=0,
+            )
     assert_allclose(rows["t [ms]"], np.tile(1e3 * dataset["t"], 2), rtol=1e-15)
     analysis.to_csv(run(scene(shear=shear.Uniform())), path, wide=True)
-    rows = pd.read_csv(path)  # of one run without noise: the statements of its events, without errors
-    assert len(rows) == 1 and "speed_at_5_percent_lost [m/s]" in rows and not any("_error" in name for name in rows)
+    # of one run without noise: the statements of its events, without errors
+    rows = pd.read_csv(path)
+    assert (
+        len(rows) == 1
+        and "speed_at_5_percent_lost [m/s]" in rows
+        and not any("_error" in name for name in rows)
+    )
     with pytest.raises(BadInput, match=r"--units: .*kg"), in_units(["mm/s", "kg"]):
         assert {"drive_speed\n(mm/s)", "F\n(mN)"} < set(analysis.table(dataset)[0])
 
@@ -160,40 +235,108 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
     dataset = run(scene(bonds=bonds.Unbroken(), shear=shear.Uniform()))
     rows = analysis.table(dataset, rows=5)
     assert len(rows) == 5 and analysis.highlights(dataset) == []
-    assert list(rows[0]) == ["t\n(ms)", "V\n(mm/s)", "w\n(mJ/m²)", "a\n(µm)", "A/A_JKR\n(%)"]
-    cycle = Equilibrium(indentation={"from": 1e-6, "to": -2e-6, "cycles": 1}, after_pull_off="reattach")
-    still = {"bonds": bonds.Unbroken(), "shear": shear.Uniform(), "drive": drive.Steady(speed=0.0)}
+    assert list(rows[0]) == [
+        "t\n(ms)",
+        "V\n(mm/s)",
+        "w\n(mJ/m²)",
+        "a\n(µm)",
+        "A/A_JKR\n(%)",
+    ]
+    cycle = Equilibrium(
+        indentation={"from": 1e-6, "to": -2e-6, "cycles": 1}, after_pull_off="reattach"
+    )
+    still = {
+        "bonds": bonds.Unbroken(),
+        "shear": shear.Uniform(),
+        "drive": drive.Steady(speed=0.0),
+    }
     rows = analysis.table(run(scene(contact=cycle, **still)), rows=5)
     assert [row["Δ\n(µm)"] for row in rows] == ["1", "-0.5", "-2", "-0.5", "1"]
-    assert {heading.partition("\n")[0] for heading in rows[0]} >= {"t", "P", "W", "open"}
+    assert {heading.partition("\n")[0] for heading in rows[0]} >= {
+        "t",
+        "P",
+        "W",
+        "open",
+    }
     pulled = Equilibrium(load={"from": 1e-3, "to": -1e-3})
     rows = analysis.table(run(scene(contact=pulled, **still)), rows=3)
-    assert [row["P\n(mN)"] for row in rows] == ["1", "0", "-1"]  # of the free sphere too
-    dataset = run(scene(drive=drive.Steady(speed=4e-3), clock=Clock(0.8, 2e-3), ensemble=Ensemble(members=20)))
-    result = {row["quantity"].partition(" (")[0]: row for row in analysis.spread(dataset)}
-    assert set(result) == {"ΔΓ", "w", "a", "A/A_JKR", "lost to fluct.", "fluct. first", "F"}
+    # of the free sphere too
+    assert [row["P\n(mN)"] for row in rows] == ["1", "0", "-1"]
+    dataset = run(
+        scene(
+            drive=drive.Steady(speed=4e-3),
+            clock=Clock(0.8, 2e-3),
+            ensemble=Ensemble(members=20),
+        )
+    )
+    result = {
+        row["quantity"].partition(" (")[0]: row for row in analysis.spread(dataset)
+    }
+    assert set(result) == {
+        "ΔΓ",
+        "w",
+        "a",
+        "A/A_JKR",
+        "lost to fluct.",
+        "fluct. first",
+        "F",
+    }
     energy, law = result["ΔΓ"], analysis.distribution(dataset)
-    assert list(energy) == ["quantity", "mean", "sd", "5 %", "50 %", "95 %", "t_c", "free values"]
-    np.testing.assert_allclose(float(energy["sd"]), 1e3 * float(law["fluctuation_energy_std"]), rtol=5e-3)
+    assert list(energy) == [
+        "quantity",
+        "mean",
+        "sd",
+        "5 %",
+        "50 %",
+        "95 %",
+        "t_c",
+        "free values",
+    ]
+    np.testing.assert_allclose(
+        float(energy["sd"]), 1e3 * float(law["fluctuation_energy_std"]), rtol=5e-3
+    )
     free_values = float(law["fluctuation_energy_effective_samples"])
     np.testing.assert_allclose(float(energy["free values"]), free_values, rtol=5e-3)
-    assert "(" in energy["mean"] and "(" in energy["95 %"] and energy["t_c"].endswith(" ms")
+    assert (
+        "(" in energy["mean"]
+        and "(" in energy["95 %"]
+        and energy["t_c"].endswith(" ms")
+    )
     assert analysis.spread(lens.ramp()) == []
     sweep = {"contact.load": [1e-3, 4e-3]}
     (low, high) = analysis.losses(run(scene(sweep=sweep)))
     assert low["contact_load\n(mN)"] == "1" and high["contact_load\n(mN)"] == "4"
-    slow, fast = (float(row["5 % of area\nlost at V (mm/s)"].partition("(")[0]) for row in (low, high))
-    assert slow < fast and analysis.losses(run(scene(drive=drive.Steady(speed=1e-3)))) == []
+    slow, fast = (
+        float(row["5 % of area\nlost at V (mm/s)"].partition("(")[0])
+        for row in (low, high)
+    )
+    assert (
+        slow < fast
+        and analysis.losses(run(scene(drive=drive.Steady(speed=1e-3)))) == []
+    )
 
 
 @pytest.mark.parametrize("cycles", [0, 1])
 def test_rows_of_the_whole_run_have_no_time_whether_or_not_a_loop_is_closed(cycles):
-    course = Equilibrium(indentation={"from": 1e-6, "to": -2e-6, "cycles": cycles}, after_pull_off="reattach")
-    quiet = {"bonds": bonds.Unbroken(), "shear": shear.Uniform(), "drive": drive.Steady(speed=0.0)}
+    course = Equilibrium(
+        indentation={"from": 1e-6, "to": -2e-6, "cycles": cycles},
+        after_pull_off="reattach",
+    )
+    quiet = {
+        "bonds": bonds.Unbroken(),
+        "shear": shear.Uniform(),
+        "drive": drive.Steady(speed=0.0),
+    }
     dataset = run(scene(contact=course, **quiet))
     rows = analysis.tidy(dataset)
-    of_run = rows["quantity"].isin([name.removesuffix("_mean") for name in map(str, analysis.statements(dataset))])
-    assert ("loop_energy" in set(rows["quantity"])) == bool(cycles) and of_run.any() and not of_run.all()
+    of_run = rows["quantity"].isin(
+        [name.removesuffix("_mean") for name in map(str, analysis.statements(dataset))]
+    )
+    assert (
+        ("loop_energy" in set(rows["quantity"])) == bool(cycles)
+        and of_run.any()
+        and not of_run.all()
+    )
     assert rows["t"][of_run].isna().all() and rows["t"][~of_run].notna().all()
 
 
@@ -208,29 +351,62 @@ def test_csv_goes_through_a_link_to_where_it_points(ramp, tmp_path):
 def test_notes_say_what_is_averaged_how_many_rows_are_shown_and_what_symbols_mean(ramp):
     rows = analysis.table(ramp)
     lines = analysis.notes(ramp, rows, analysis.highlights(ramp))
-    assert "6 members" in lines[0] and "12 of 21" in lines[1] and "--where" in lines[1] and "A/A_JKR: " in lines[2]
-    dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep={"drive.speed": list(np.geomspace(1e-4, 1e-1, 16))}))
+    assert (
+        "6 members" in lines[0]
+        and "12 of 21" in lines[1]
+        and "--where" in lines[1]
+        and "A/A_JKR: " in lines[2]
+    )
+    dataset = run(
+        scene(
+            drive=drive.Steady(speed=1e-2),
+            sweep={"drive.speed": list(np.geomspace(1e-4, 1e-1, 16))},
+        )
+    )
     rows = analysis.table(dataset)
-    assert analysis.notes(dataset, rows, [])[0].startswith("mean over the second half of the run and 6 members")
+    assert analysis.notes(dataset, rows, [])[0].startswith(
+        "mean over the second half of the run and 6 members"
+    )
     assert analysis.notes(dataset, rows, [])[1].startswith("12 of 16 rows shown")
-    assert [heading for heading in rows[0] if heading.endswith("(mm/s)")] == ["drive_speed\n(mm/s)"]
+    assert [heading for heading in rows[0] if heading.endswith("(mm/s)")] == [
+        "drive_speed\n(mm/s)"
+    ]
 
 
 def test_the_speed_of_a_slider_on_single_bonds_is_its_displacement_over_the_time_from_rest_on():
     rupture = Bell(zero_force_rate=5.0, bell_force=4e-12)
-    numbers = {"bond_stiffness": 8e-7, "rebinding_rate": 50.0, "site_density": 6.5e16, "start_from": "bonded"}
+    numbers = {
+        "bond_stiffness": 8e-7,
+        "rebinding_rate": 50.0,
+        "site_density": 6.5e16,
+        "start_from": "bonded",
+    }
     creeping = scene(
-        clock=Clock(duration=0.4, step=0.002), shear=shear.Uniform(), bonds=bonds.Tracked(rupture, **numbers, sites=40),
-        drive=drive.Force(force=4e-3, contact_stiffness="rigid"), adhesion=Adhesion(work=lens.WORK, bond_share=0.0),
-    )  # fmt: skip
+        clock=Clock(duration=0.4, step=0.002),
+        shear=shear.Uniform(),
+        bonds=bonds.Tracked(rupture, **numbers, sites=40),
+        drive=drive.Force(force=4e-3, contact_stiffness="rigid"),
+        adhesion=Adhesion(work=lens.WORK, bond_share=0.0),
+    )
     dataset = run(creeping)
-    position, time = dataset["slider_position"].mean("member").to_numpy(), dataset["t"].to_numpy()
-    shown = [float(re.match(r"[\d.]+", row["V\n(µm/s)"])[0]) for row in analysis.table(dataset)]
+    position, time = (
+        dataset["slider_position"].mean("member").to_numpy(),
+        dataset["t"].to_numpy(),
+    )
+    shown = [
+        float(re.match(r"[\d.]+", row["V\n(µm/s)"])[0])
+        for row in analysis.table(dataset)
+    ]
     at = np.rint(np.linspace(0, 200, 12)).astype(int)[1:-1]
     speed = 1e6 * (position[at + 1] - position[at - 1]) / (2.0 * time[1])
     few = analysis.distribution(dataset.isel(t=[0, 100, 200]), ["speed"])["speed_mean"]
-    np.testing.assert_allclose(few, (position[200] - position[100]) / (time[200] - time[100]), rtol=1e-9)
-    np.testing.assert_allclose(shown[1:-1], speed, atol=5.0)  # half of the last digit that an error of 10 leaves
+    np.testing.assert_allclose(
+        few, (position[200] - position[100]) / (time[200] - time[100]), rtol=1e-9
+    )
+    # half of the last digit that an error of 10 leaves
+    np.testing.assert_allclose(shown[1:-1], speed, atol=5.0)
     ends = with_slips(dataset.isel(t=[0, -1]))["speed"]
     assert_array_equal(ends[:, 0], 0.0)
-    assert_allclose(ends[:, 1], dataset["slider_position"][:, -1] / time[-1], rtol=1e-12)
+    assert_allclose(
+        ends[:, 1], dataset["slider_position"][:, -1] / time[-1], rtol=1e-12
+    )

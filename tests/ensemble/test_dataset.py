@@ -35,11 +35,17 @@ from sim.scenario.schema import all_tables, keys, quantities, tables
 from sim.units.errors import BadInput
 from sim.units.notation import Recorded
 
-MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))
+MAPPED = shear.Mapped(
+    spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6)
+)
 
 
 def sample(**parts):
-    defaults = {"shear": SHEARS["modal, slip, onset"], "bonds": BONDS["rate"], "contact": CONTACTS["load"]}
+    defaults = {
+        "shear": SHEARS["modal, slip, onset"],
+        "bonds": BONDS["rate"],
+        "contact": CONTACTS["load"],
+    }
     return scene(parts.pop("members", 5), parts.pop("steps", 6), **(defaults | parts))
 
 
@@ -57,17 +63,24 @@ def test_the_dataset_is_what_the_engine_marched_with_members_only_if_they_differ
             np.testing.assert_array_equal(recorded, marched, err_msg=variable.name)
     pooled = ensemble.run(sample(record=Record(per_member=False)))
     assert "member" not in pooled.dims and pooled["bond_fraction"].dims == ("t",)
-    assert "member" not in ensemble.run(sample(members=64, shear=shear.Uniform())).dims  # members do not differ
+    # members do not differ
+    assert "member" not in ensemble.run(sample(members=64, shear=shear.Uniform())).dims
 
 
 def test_recording_one_quantity_alone_gives_the_bits_of_the_whole_run():
-    chosen = ("fluctuation_energy", "jkr_radius", "peak_stress", "applied_load")  # the last is not of this scene
+    # the last is not of this scene
+    chosen = ("fluctuation_energy", "jkr_radius", "peak_stress", "applied_load")
     names = {variable.name for variable in VARIABLES + LARGEST}
     for per_member in (True, False):
         whole = ensemble.run(sample(record=Record(per_member=per_member)))
-        some = ensemble.run(sample(record=Record(per_member=per_member, quantities=chosen)))
+        some = ensemble.run(
+            sample(record=Record(per_member=per_member, quantities=chosen))
+        )
         xr.testing.assert_equal(some, whole.drop_vars("speed")[list(some.variables)])
-        assert names & {str(name).removesuffix("_mean") for name in some} == {"contact_radius", *chosen[:-1]}
+        assert names & {str(name).removesuffix("_mean") for name in some} == {
+            "contact_radius",
+            *chosen[:-1],
+        }
 
 
 def test_maps_are_those_of_the_members_and_times_asked_for(tmp_path):
@@ -77,27 +90,49 @@ def test_maps_are_those_of_the_members_and_times_asked_for(tmp_path):
     assert_allclose(dataset["map_time"], [1e-3, 4e-3])
     states = list(march(scenario, np.arange(5)))
     for snapshot, step in enumerate((1, 4)):
-        maps = scenario.process.maps(states[step].shear, np.full(2, states[step].drive.position[0]), 2)
+        maps = scenario.process.maps(
+            states[step].shear, np.full(2, states[step].drive.position[0]), 2
+        )
         assert np.array_equal(dataset["shear_map"].isel(map_time=snapshot).values, maps)
-    with netCDF4.Dataset(ensemble.run(scenario, tmp_path / "out.nc")) as file:  # reading one map reads one map
+    # reading one map reads one map
+    with netCDF4.Dataset(ensemble.run(scenario, tmp_path / "out.nc")) as file:
         assert file["shear_map"].chunking() == [1, 1, 12, 12]
 
 
 def test_a_detached_contact_is_zero_and_not_in_contact():
     tension = CONTACTS["tension"].__class__(load=-1e-3)
-    dataset = ensemble.run(sample(contact=tension, shear=shear.Uniform(), bonds=BONDS["none"]))
-    for name in ("contact_radius", "contact_area", "friction_force", "in_contact", "normal_load"):
+    dataset = ensemble.run(
+        sample(contact=tension, shear=shear.Uniform(), bonds=BONDS["none"])
+    )
+    for name in (
+        "contact_radius",
+        "contact_area",
+        "friction_force",
+        "in_contact",
+        "normal_load",
+    ):
         assert np.all(dataset[name] == 0), name
     assert np.all(np.isnan(dataset["indentation"]))
 
 
 def test_swept_models_are_labelled_and_zipped_sweeps_have_one_dimension_and_all_their_coordinates():
     spectrum = {"model": "gaussian", "rms": "1e5 Pa", "length": "5 um"}
-    dataset = ensemble.run(swept({"shear": [{"model": "uniform"}, {"model": "mean", "spectrum": spectrum}]}))
+    dataset = ensemble.run(
+        swept(
+            {"shear": [{"model": "uniform"}, {"model": "mean", "spectrum": spectrum}]}
+        )
+    )
     assert list(dataset["shear"].values) == ["uniform", "mean"]
-    assert dataset["fluctuation_energy"].isel(shear=0).max() == 0.0 < dataset["fluctuation_energy"].isel(shear=1).min()
+    assert (
+        dataset["fluctuation_energy"].isel(shear=0).max()
+        == 0.0
+        < dataset["fluctuation_energy"].isel(shear=1).min()
+    )
     for radii in ([1e-3, 2e-3], [2e-3, 2e-3]):  # a key may keep one value
-        rows = [{"contact.load": p, "sphere.radius": r} for p, r in zip((1e-3, 4e-3), radii, strict=True)]
+        rows = [
+            {"contact.load": p, "sphere.radius": r}
+            for p, r in zip((1e-3, 4e-3), radii, strict=True)
+        ]
         dataset = ensemble.run(swept(rows))
         assert_allclose(dataset["contact_load"], [1e-3, 4e-3])
         assert dataset["contact_radius"].dims == ("contact_load", "member", "t")
@@ -105,11 +140,18 @@ def test_swept_models_are_labelled_and_zipped_sweeps_have_one_dimension_and_all_
         assert_allclose(dataset["sphere_radius"], radii)
 
 
-def test_a_file_in_parts_equals_the_run_in_memory_and_an_older_one_survives_a_failure(tmp_path, monkeypatch):
+def test_a_file_in_parts_equals_the_run_in_memory_and_an_older_one_survives_a_failure(
+    tmp_path, monkeypatch
+):
     scenario = swept({"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 1.0]})
     whole = ensemble.run(scenario)
     with sim.open(ensemble.run(scenario, tmp_path / "small.nc")) as from_disk:
-        assert from_disk["contact_radius"].dims == ("contact_load", "adhesion_bond_share", "member", "t")
+        assert from_disk["contact_radius"].dims == (
+            "contact_load",
+            "adhesion_bond_share",
+            "member",
+            "t",
+        )
         assert from_disk["speed"].dims == ("contact_load", "adhesion_bond_share", "t")
         xr.testing.assert_identical(from_disk.load(), whole)
     assert [file.name for file in tmp_path.iterdir()] == ["small.nc"]
@@ -121,8 +163,13 @@ def test_a_file_in_parts_equals_the_run_in_memory_and_an_older_one_survives_a_fa
     monkeypatch.undo()
     path = ensemble.run(sample(), tmp_path / "out.nc")
     before = path.read_bytes()
-    with monkeypatch.context() as patched, pytest.raises(StoreTrouble, match="No space left"):
-        patched.setattr(datasets, "_fill", Mock(side_effect=OSError(28, "No space left on device")))
+    with (
+        monkeypatch.context() as patched,
+        pytest.raises(StoreTrouble, match="No space left"),
+    ):
+        patched.setattr(
+            datasets, "_fill", Mock(side_effect=OSError(28, "No space left on device"))
+        )
         ensemble.run(sample(seed=6), path, replace=True)
     assert path.read_bytes() == before and not list(tmp_path.glob(".out*"))
 
@@ -132,7 +179,9 @@ def test_datasets_can_be_computed_in_threads_and_pickled(tmp_path):
     alone = [ensemble.run(scenario) for scenario in scenarios]
 
     def whole(number):
-        with sim.open(ensemble.run(scenarios[number], tmp_path / f"{number}.nc")) as dataset:
+        with sim.open(
+            ensemble.run(scenarios[number], tmp_path / f"{number}.nc")
+        ) as dataset:
             again = pickle.loads(pickle.dumps(dataset))
             try:
                 return ensemble.run(scenarios[number]), dataset.load(), again.load()
@@ -140,7 +189,9 @@ def test_datasets_can_be_computed_in_threads_and_pickled(tmp_path):
                 again.close()
 
     with ThreadPoolExecutor(4) as pool:
-        for expected, datasets_of_thread in zip(alone, pool.map(whole, range(4)), strict=True):
+        for expected, datasets_of_thread in zip(
+            alone, pool.map(whole, range(4)), strict=True
+        ):
             for dataset in datasets_of_thread:
                 xr.testing.assert_identical(dataset, expected)
     xr.testing.assert_identical(pickle.loads(pickle.dumps(alone[0])), alone[0])
@@ -154,24 +205,32 @@ def test_a_path_has_letters_of_the_systems_code_page(tmp_path):
         lazy.save(dataset, beside := path.with_name("ñ.nc"))
         with hdf5.opened(beside) as file:
             assert file.filepath().endswith("ñ.nc")
-            assert_allclose(file["contact_area"][:], dataset["contact_area"], rtol=0, atol=0)
+            assert_allclose(
+                file["contact_area"][:], dataset["contact_area"], rtol=0, atol=0
+            )
     assert datasets.attributes_of(path)["sim_version"] == sim.__version__
 
 
-def test_an_output_that_another_program_holds_open_is_published_by_resume(tmp_path, monkeypatch):
+def test_an_output_that_another_program_holds_open_is_published_by_resume(
+    tmp_path, monkeypatch
+):
     path, changed, replace_file = tmp_path / "out.nc", sample(seed=4), os.replace
     ensemble.run(sample(), path)
     content = path.read_bytes()
 
     def refusing(source, target):
         if Path(target) == path:
-            raise PermissionError(13, "The file is used by another process", str(target))
+            raise PermissionError(
+                13, "The file is used by another process", str(target)
+            )
         replace_file(source, target)
 
     with monkeypatch.context() as patched, path.open("rb"):
         if os.name != "nt":  # which refuses by itself
             patched.setattr("os.replace", refusing)
-        with pytest.raises(StoreTrouble, match=r"out\.nc cannot be replaced: close the program"):
+        with pytest.raises(
+            StoreTrouble, match=r"out\.nc cannot be replaced: close the program"
+        ):
             ensemble.run(changed, path, replace=True)
         assert path.read_bytes() == content
     ensemble.run(changed, path, resume=True)
@@ -195,20 +254,33 @@ def test_letters_that_the_code_page_lacks_are_refused_before_the_run_and_named_w
     toml = tmp_path / "scene.toml"
     toml.write_text(SCENE, encoding="utf-8")
     for arguments in (
-        ["run", toml, "-o", other, "--force"], ["run", toml, "-o", other.with_name("new.nc")], ["stats", other],
+        ["run", toml, "-o", other, "--force"],
+        ["run", toml, "-o", other.with_name("new.nc")],
+        ["stats", other],
         ["converge", toml, "-o", other.with_name("new.nc")],
-    ):  # fmt: skip
+    ):
         done = command(*arguments)
-        assert done.exit_code == 2 and "code page" in done.stderr and "damaged" not in done.stderr, arguments
+        assert (
+            done.exit_code == 2
+            and "code page" in done.stderr
+            and "damaged" not in done.stderr
+        ), arguments
     with pytest.raises(BadInput, match="code page"):
         ensemble.run(sample(), other, replace=True)
     assert sorted(other.parent.iterdir()) == before
 
 
 def test_no_file_is_read_or_written_while_another_thread_reads_through_xarray(tmp_path):
-    path, lock = ensemble.run(sample(), tmp_path / "out.nc"), xr.backends.netCDF4_.NETCDF4_PYTHON_LOCK
-    other = ensemble.run(sample(), tmp_path / "other.nc")  # because Windows replaces no file that is open
-    writes = [lambda: ensemble.run(sample(), other, replace=True), lambda: datasets.attributes_of(path)]
+    path, lock = (
+        ensemble.run(sample(), tmp_path / "out.nc"),
+        xr.backends.netCDF4_.NETCDF4_PYTHON_LOCK,
+    )
+    # because Windows replaces no file that is open
+    other = ensemble.run(sample(), tmp_path / "other.nc")
+    writes = [
+        lambda: ensemble.run(sample(), other, replace=True),
+        lambda: datasets.attributes_of(path),
+    ]
     with ThreadPoolExecutor(1) as pool, sim.open(path) as dataset:
         for work in (*writes, lambda: sim.open(path).close(), dataset.load):
             with lock:
@@ -218,11 +290,14 @@ def test_no_file_is_read_or_written_while_another_thread_reads_through_xarray(tm
             waiting.result(60)
         with HDF5, HDF5:
             assert all(each.locked() for each in lock.locks)
-    assert not any(each.locked() for each in lock.locks)  # the lowest xarray's lock calls itself locked always
+    # the lowest xarray's lock calls itself locked always
+    assert not any(each.locked() for each in lock.locks)
 
 
 def test_names_that_may_be_recorded_are_the_quantities_and_none_is_that_of_a_key():
-    assert typing.get_args(Recorded) == tuple(variable.name for variable in VARIABLES + LARGEST)
+    assert typing.get_args(Recorded) == tuple(
+        variable.name for variable in VARIABLES + LARGEST
+    )
     mapped = sample(shear=MAPPED, record=Record(maps=(2e-3,)))
     numbers = {variable_name(key) for key in quantities(mapped)}
     names = {
@@ -231,54 +306,90 @@ def test_names_that_may_be_recorded_are_the_quantities_and_none_is_that_of_a_key
         for table in tables(field.annotation).values()
         for key in keys(table)
     }
-    assert len(names) > 50 and not names & (set(ensemble.run(mapped).variables) - numbers)
+    assert len(names) > 50 and not names & (
+        set(ensemble.run(mapped).variables) - numbers
+    )
 
 
 def test_six_digits_are_kept_if_asked_and_none_is_lost_otherwise(tmp_path):
     def written(compression):
-        return ensemble.run(sample(record=Record(compression=compression)), tmp_path / f"{compression}.nc")
+        return ensemble.run(
+            sample(record=Record(compression=compression)),
+            tmp_path / f"{compression}.nc",
+        )
 
     none, whole, digits = map(written, ("none", "zlib", "digits"))
-    with netCDF4.Dataset(none) as bare, netCDF4.Dataset(whole) as exact, netCDF4.Dataset(digits) as file:
+    with (
+        netCDF4.Dataset(none) as bare,
+        netCDF4.Dataset(whole) as exact,
+        netCDF4.Dataset(digits) as file,
+    ):
         assert not bare["contact_radius"].filters()["zlib"]
         assert file["contact_radius"].quantization() == (20, "BitRound")
         for variable in VARIABLES:
             if not variable.condition:
                 values = exact[variable.name][:]
-                assert np.array_equal(bare[variable.name][:], values, equal_nan=True), variable.name
-                assert_allclose(file[variable.name][:], values, rtol=5e-7, err_msg=variable.name)
+                assert np.array_equal(bare[variable.name][:], values, equal_nan=True), (
+                    variable.name
+                )
+                assert_allclose(
+                    file[variable.name][:], values, rtol=5e-7, err_msg=variable.name
+                )
         assert not np.array_equal(file["contact_radius"][:], exact["contact_radius"][:])
         assert np.array_equal(file["masked"][:], exact["masked"][:])
         assert np.ptp(file["jkr_radius"][:]) == 0.0  # what is equal stays equal
-        assert np.array_equal(file["t"][:], exact["t"][:]) and np.array_equal(file["peak_stress"], exact["peak_stress"])
+        assert np.array_equal(file["t"][:], exact["t"][:]) and np.array_equal(
+            file["peak_stress"], exact["peak_stress"]
+        )
 
 
 def test_every_variable_has_unit_and_long_name_and_stands_where_its_condition_holds():
     scenario = sample(shear=MAPPED, record=Record(maps=(2e-3,)))
     dataset = ensemble.run(scenario)
-    page = Path(__file__).parents[2].joinpath("docs", "dataset.md").read_text(encoding="utf-8")
+    page = (
+        Path(__file__)
+        .parents[2]
+        .joinpath("docs", "dataset.md")
+        .read_text(encoding="utf-8")
+    )
     numbers = {variable_name(key) for key in quantities(scenario)}
     for name, variable in dataset.variables.items():
-        assert name in numbers or f"| `{name}` |" in page, f"{name}: declare it in sim.ensemble.variables"
+        assert name in numbers or f"| `{name}` |" in page, (
+            f"{name}: declare it in sim.ensemble.variables"
+        )
         assert variable.attrs["long_name"], name
         assert "units" in variable.attrs or "flag_values" in variable.attrs, name
-    assert set(dataset.attrs) >= {"Conventions", "title", "history", "scenario_toml", "seed", "sim_version"}
+    assert set(dataset.attrs) >= {
+        "Conventions",
+        "title",
+        "history",
+        "scenario_toml",
+        "seed",
+        "sim_version",
+    }
     bell = {"bonds": BONDS["rate, bell"]}
-    driven, stage, runaway = set(READINGS) - {"unresolved_time"}, {"stage_position", "stage_speed"}, {"runaway_time"}
+    driven, stage, runaway = (
+        set(READINGS) - {"unresolved_time"},
+        {"stage_position", "stage_speed"},
+        {"runaway_time"},
+    )
     scenes = [
-        (set(), sample()), ({"fluctuations_radius"}, sample(contact=CONTACTS["partly reversible"])),
+        (set(), sample()),
+        ({"fluctuations_radius"}, sample(contact=CONTACTS["partly reversible"])),
         ({"equilibrium_radius"}, sample(contact=CONTACTS["rate_dependent"])),
         ({"edge_energy"}, sample(shear=SHEARS["modal on a disc"])),
         ({"applied_load"}, sample(contact=CONTACTS["load there and back"])),
         (driven - runaway, sample(drive=DRIVES["spring"], **bell)),
         (driven - stage, sample(drive=DRIVES["force"], **bell)),
-    ]  # fmt: skip
+    ]
     some = set.union(*(names for names, _ in scenes))
     assert some == {variable.name for variable in VARIABLES if variable.condition}
     for names, scenario in scenes:
         variables = set(ensemble.run(scenario).variables)
         assert variables & some == names
-        assert {variable.name for variable in VARIABLES if not variable.condition} <= variables
+        assert {
+            variable.name for variable in VARIABLES if not variable.condition
+        } <= variables
 
 
 LENS = Path(__file__).parents[2] / "scenarios" / "pdms_lens.toml"
@@ -293,24 +404,38 @@ def reread(dataset, folder):
 
 def test_text_and_overrides_or_the_resolved_scenario_give_what_was_run(tmp_path):
     lens = load(LENS, SHORT)
-    twice = lens.with_values({"contact.load": 1e-3}).with_values({"contact": {"load": 2e-3}})
+    twice = lens.with_values({"contact.load": 1e-3}).with_values(
+        {"contact": {"load": 2e-3}}
+    )
     for scenario in (lens, lens.with_values({"adhesion.work": 0.03}), twice):
         dataset = run(scenario)
         assert dataset.attrs["scenario_toml"] == LENS.read_text(encoding="utf-8")
         assert scenario_json(reread(dataset, tmp_path)) == scenario_json(scenario)
     part_replaced = replace(lens, adhesion=Adhesion(work=0.03))
     swept = replace(lens, sweep=read_sweep({"contact.load": [1e-3, 2e-3]}))
-    for scenario in (part_replaced.with_values({"contact.load": 1e-3}), swept, scene(members=2)):
+    for scenario in (
+        part_replaced.with_values({"contact.load": 1e-3}),
+        swept,
+        scene(members=2),
+    ):
         dataset = run(scenario)
-        assert (dataset.attrs["scenario_toml"], dataset.attrs["scenario_overrides"]) == ("", "{}")
-        again = TypeAdapter(Scenario).validate_python(json.loads(dataset.attrs["scenario_resolved"]))
+        assert (
+            dataset.attrs["scenario_toml"],
+            dataset.attrs["scenario_overrides"],
+        ) == ("", "{}")
+        again = TypeAdapter(Scenario).validate_python(
+            json.loads(dataset.attrs["scenario_resolved"])
+        )
         assert again.sweep == scenario.sweep
         xr.testing.assert_identical(run(again), dataset)
     swept = load(LENS, SHORT | {"sweep": {"contact.load": ["1 mN", "4 mN"]}})
     point = swept.points()[1]
     again = reread(run(point), tmp_path)
     assert (again.contact.load, again.sweep) == (4e-3, ())
-    rows = [{"contact.load": "1 mN", "sphere.radius": "1 mm"}, {"contact.load": "4 mN", "sphere.radius": "2 mm"}]
+    rows = [
+        {"contact.load": "1 mN", "sphere.radius": "1 mm"},
+        {"contact.load": "4 mN", "sphere.radius": "2 mm"},
+    ]
     scenario = replace(scene(members=2), sweep=read_sweep(rows))
     assert json.loads(scenario_json(scenario))["sweep"] == rows
 
@@ -325,10 +450,14 @@ def check(path):
     nothing there) that heights stand right of the time: a swept stress or modulus stands left of it.
     """
     checker = Path(sys.executable).with_name("compliance-checker")
-    done = subprocess.run([checker, "--test=cf:1.11", path], capture_output=True, text=True, timeout=600)
+    done = subprocess.run(
+        [checker, "--test=cf:1.11", path], capture_output=True, text=True, timeout=600
+    )
     assert "IOOS Compliance Checker Report" in done.stdout, done.stderr
     remarks = [line for line in done.stdout.splitlines() if line.startswith("* ")]
-    assert [line for line in remarks if "recommended order T, Z, Y, X" not in line] == []
+    assert [
+        line for line in remarks if "recommended order T, Z, Y, X" not in line
+    ] == []
     assert remarks or "All tests passed" in done.stdout
 
 
@@ -341,7 +470,9 @@ def test_every_scenario_gives_a_conforming_dataset(path, tmp_path):
 @pytest.mark.verify
 @pytest.mark.parametrize("per_member", [True, False])
 def test_maps_labels_and_statistics_conform(per_member, tmp_path):
-    mapped = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))
+    mapped = shear.Mapped(
+        spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6)
+    )
     record = Record(maps=(2e-3,), map_members=2, per_member=per_member)
     scenario = scene(3, shear=mapped, bonds=BONDS["counted"], record=record)
     tables = [{"model": "none"}, {"model": "steady", "critical_speed": "1 cm/s"}]

@@ -39,22 +39,33 @@ def workers(parent=None):
     found = []
     for child in psutil.Process(parent).children(recursive=True):
         try:
-            if any("LokyProcess" in word or "popen_loky" in word for word in child.cmdline()):  # of POSIX, of Windows
+            # of POSIX, of Windows
+            if any(
+                "LokyProcess" in word or "popen_loky" in word
+                for word in child.cmdline()
+            ):
                 found.append(child)
         except psutil.Error:  # one that ends now
             continue
     return found
 
 
-@pytest.mark.parametrize("jobs", [2, *(pytest.param(jobs, marks=pytest.mark.verify) for jobs in (3, 5))])
-def test_any_number_of_processes_gives_the_same_numbers_of_threads_too(tmp_path, many_parts, jobs):
+@pytest.mark.parametrize(
+    "jobs", [2, *(pytest.param(jobs, marks=pytest.mark.verify) for jobs in (3, 5))]
+)
+def test_any_number_of_processes_gives_the_same_numbers_of_threads_too(
+    tmp_path, many_parts, jobs
+):
     counted = []
     how = {"jobs": jobs, "progress": counted.append}
-    thread = threading.Thread(target=lambda: ensemble.run(sample(), tmp_path / "out.nc", **how))
+    thread = threading.Thread(
+        target=lambda: ensemble.run(sample(), tmp_path / "out.nc", **how)
+    )
     thread.start()
     thread.join()
     assert sum(counted) == plans.work(Plan.of(sample())) and same(tmp_path / "out.nc")
-    scenario = sample(members=5, sweep=None, contact=CONTACTS["load there and back"])  # of classes that are local
+    # of classes that are local
+    scenario = sample(members=5, sweep=None, contact=CONTACTS["load there and back"])
     assert ensemble.run(scenario, jobs=jobs).identical(ensemble.run(scenario))
 
 
@@ -68,12 +79,19 @@ def test_a_worker_that_dies_costs_its_blocks_alone(tmp_path, many_parts):
 
     scenario = sample(members=8, steps=40)
     ensemble.run(scenario, tmp_path / "out.nc", jobs=2, progress=kill)
-    assert sum(counted) == plans.work(Plan.of(scenario)) and same(tmp_path / "out.nc", scenario) and not workers()
+    assert (
+        sum(counted) == plans.work(Plan.of(scenario))
+        and same(tmp_path / "out.nc", scenario)
+        and not workers()
+    )
 
 
 @pytest.mark.parametrize(
     ("advance", "fault", "jobs"),
-    [(deadly.advance, WorkerDied, 2), *((deadly.advance_faulty, ZeroDivisionError, jobs) for jobs in (1, 2))],
+    [
+        (deadly.advance, WorkerDied, 2),
+        *((deadly.advance_faulty, ZeroDivisionError, jobs) for jobs in (1, 2)),
+    ],
 )
 def test_a_block_that_raises_or_breaks_three_pools_is_given_up_and_the_others_are_kept(
     tmp_path, many_parts, advance, fault, jobs
@@ -89,15 +107,26 @@ def test_a_block_that_raises_or_breaks_three_pools_is_given_up_and_the_others_ar
     ensemble.simulate(Plan.of(sample()), blocks)
     assert all(name in blocks for task, _ in tasks for name in task.names)
     task = next(Plan.of(sample()).tasks())
-    with pytest.raises(OSError, match="out"):  # which may concern all blocks: the run ends at once
-        compute(ensemble.advance, BlockFiles(tmp_path / "out"), [(task, [0])] * 2, print, never)
+    # which may concern all blocks: the run ends at once
+    with pytest.raises(OSError, match="out"):
+        compute(
+            ensemble.advance,
+            BlockFiles(tmp_path / "out"),
+            [(task, [0])] * 2,
+            print,
+            never,
+        )
     assert not workers()
 
 
 def test_a_run_within_the_progress_of_another_changes_neither(many_parts):
     inner = []
-    outer = ensemble.run(sample(), progress=lambda done: inner.append(ensemble.run(sample(seed=6))))
-    assert outer.identical(ensemble.run(sample())) and inner[0].identical(ensemble.run(sample(seed=6)))
+    outer = ensemble.run(
+        sample(), progress=lambda done: inner.append(ensemble.run(sample(seed=6)))
+    )
+    assert outer.identical(ensemble.run(sample())) and inner[0].identical(
+        ensemble.run(sample(seed=6))
+    )
 
 
 SCRIPT = """
@@ -114,37 +143,73 @@ sim.run(scene, {path!r}, jobs=2, resume=True, progress=lambda done: print(done, 
 
 
 def script(path, members=3, steps=9):
-    return SCRIPT.format(tests=str(Path(__file__).parents[1]), path=str(path), members=members, steps=steps)
+    return SCRIPT.format(
+        tests=str(Path(__file__).parents[1]),
+        path=str(path),
+        members=members,
+        steps=steps,
+    )
 
 
 @pytest.mark.parametrize(
-    "way", ["unguarded", *(pytest.param(way, marks=pytest.mark.verify) for way in ("standard input", "notebook"))]
+    "way",
+    [
+        "unguarded",
+        *(
+            pytest.param(way, marks=pytest.mark.verify)
+            for way in ("standard input", "notebook")
+        ),
+    ],
 )
-def test_processes_need_no_guard_in_what_starts_them_and_import_nothing_of_the_present_folder(tmp_path, way):
+def test_processes_need_no_guard_in_what_starts_them_and_import_nothing_of_the_present_folder(
+    tmp_path, way
+):
     folder, path = tmp_path / "present", tmp_path / "own" / "out.nc"
     folder.mkdir()
     for name in ("queue", "numpy", "loky"):
-        (folder / f"{name}.py").write_text("raise SystemExit('wrong')", encoding="utf-8")
+        (folder / f"{name}.py").write_text(
+            "raise SystemExit('wrong')", encoding="utf-8"
+        )
     (tmp_path / "script.py").write_text(script(path), encoding="utf-8")
     if way == "notebook":
         nbformat, nbclient = (
-            pytest.importorskip(name, reason="in the extra verify") for name in ("nbformat", "nbclient")
+            pytest.importorskip(name, reason="in the extra verify")
+            for name in ("nbformat", "nbclient")
         )
         cell = nbformat.v4.new_code_cell(script(path))
-        nbclient.NotebookClient(nbformat.v4.new_notebook(cells=[cell]), timeout=300).execute()
+        nbclient.NotebookClient(
+            nbformat.v4.new_notebook(cells=[cell]), timeout=300
+        ).execute()
     else:
         with (tmp_path / "script.py").open() as file:
-            words = [sys.executable, "-P"] + ([tmp_path / "script.py"] if way == "unguarded" else ["-"])
-            how = {"cwd": folder, "stdin": file, "capture_output": True, "text": True, "check": True}
+            words = [sys.executable, "-P"] + (
+                [tmp_path / "script.py"] if way == "unguarded" else ["-"]
+            )
+            how = {
+                "cwd": folder,
+                "stdin": file,
+                "capture_output": True,
+                "text": True,
+                "check": True,
+            }
             assert subprocess.run(words, **how).stdout.count("begun") == 1
     assert same(path)
 
 
 @pytest.mark.parametrize("kills", [2, pytest.param(50, marks=pytest.mark.verify)])
-def test_a_run_whose_processes_are_killed_goes_on_to_the_same_numbers_and_leaves_none(tmp_path, many_parts, kills):
-    path, scenario, dice = tmp_path / "out.nc", sample(members=8, steps=40 * kills), np.random.default_rng(3)
+def test_a_run_whose_processes_are_killed_goes_on_to_the_same_numbers_and_leaves_none(
+    tmp_path, many_parts, kills
+):
+    path, scenario, dice = (
+        tmp_path / "out.nc",
+        sample(members=8, steps=40 * kills),
+        np.random.default_rng(3),
+    )
     for kill in range(kills):
-        command, how = [sys.executable, "-c", script(path, 8, 40 * kills)], {"stderr": subprocess.DEVNULL, "text": True}
+        command, how = (
+            [sys.executable, "-c", script(path, 8, 40 * kills)],
+            {"stderr": subprocess.DEVNULL, "text": True},
+        )
         run = subprocess.Popen(command, stdout=subprocess.PIPE, **how)
         for _ in range(dice.integers(2, 12)):
             run.stdout.readline()
@@ -167,49 +232,86 @@ def test_a_run_whose_processes_are_killed_goes_on_to_the_same_numbers_and_leaves
 def threads():
     """A cluster of two threads of this process."""
     distributed = pytest.importorskip("distributed")
-    how = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "dashboard_address": ":0"}
+    how = {
+        "processes": False,
+        "n_workers": 1,
+        "threads_per_worker": 2,
+        "dashboard_address": ":0",
+    }
     with distributed.LocalCluster(**how) as cluster:
         yield cluster
 
 
-def test_a_run_that_is_stopped_again_and_again_goes_on_in_processes_and_on_a_cluster(tmp_path, many_parts, threads):
+def test_a_run_that_is_stopped_again_and_again_goes_on_in_processes_and_on_a_cluster(
+    tmp_path, many_parts, threads
+):
     path, stops, scenario = tmp_path / "out.nc", 0, sample(members=7)
-    ways = itertools.cycle(({"scheduler": threads.scheduler_address}, {"jobs": 1}, {"jobs": 2}))
+    ways = itertools.cycle(
+        ({"scheduler": threads.scheduler_address}, {"jobs": 1}, {"jobs": 2})
+    )
     while not path.exists():
         count, counted = itertools.count(), []
         how = next(ways) | {"progress": counted.append}
         try:
-            ensemble.run(scenario, path, resume=True, stop=lambda count=count: next(count) > 4, **how)
+            ensemble.run(
+                scenario,
+                path,
+                resume=True,
+                stop=lambda count=count: next(count) > 4,
+                **how,
+            )
         except Stopped:
             stops += 1
-    assert stops > 2 and sum(counted) == plans.work(Plan.of(scenario)) and same(path, scenario)
+    assert (
+        stops > 2
+        and sum(counted) == plans.work(Plan.of(scenario))
+        and same(path, scenario)
+    )
 
 
 def test_what_a_block_raises_on_a_cluster_is_raised_and_what_is_computed_stays(
     tmp_path, many_parts, threads, monkeypatch
 ):
     path, follow, count = tmp_path / "out.nc", ensemble.follow, itertools.count()
-    monkeypatch.setattr(ensemble, "follow", lambda *given: 1 / 0 if next(count) == 5 else follow(*given))
+    monkeypatch.setattr(
+        ensemble, "follow", lambda *given: 1 / 0 if next(count) == 5 else follow(*given)
+    )
     with pytest.raises(ZeroDivisionError):
         ensemble.run(sample(), path, scheduler=threads.scheduler_address)
     assert list(path.with_name("out.nc.parts").glob("*.npz"))
 
 
-def test_workers_of_another_version_and_schedulers_that_do_not_answer_are_told(tmp_path, threads, monkeypatch):
+def test_workers_of_another_version_and_schedulers_that_do_not_answer_are_told(
+    tmp_path, threads, monkeypatch
+):
     ours = threading.current_thread()
-    with monkeypatch.context() as patched, pytest.raises(BadInput, match="another version of sim"):
-        patched.setattr(execute, "_code", lambda: (str(threading.current_thread() is ours),))
+    with (
+        monkeypatch.context() as patched,
+        pytest.raises(BadInput, match="another version of sim"),
+    ):
+        patched.setattr(
+            execute, "_code", lambda: (str(threading.current_thread() is ours),)
+        )
         ensemble.run(sample(), tmp_path / "out.nc", scheduler=threads.scheduler_address)
     monkeypatch.setattr(execute, "_PATIENCE", "0.1 s")
-    for address in ("tcp://127.0.0.1:1", "nonsense://x", "nowhere", "tcp://127.0.0.1:x"):
+    for address in (
+        "tcp://127.0.0.1:1",
+        "nonsense://x",
+        "nowhere",
+        "tcp://127.0.0.1:x",
+    ):
         with pytest.raises(WorkerDied, match=f"no dask scheduler answers at {address}"):
-            compute(ensemble.advance, MemoryBlocks(), [], print, never, scheduler=address)
+            compute(
+                ensemble.advance, MemoryBlocks(), [], print, never, scheduler=address
+            )
 
 
 def test_a_cluster_maps_scenes(threads):
     from distributed import Client
 
-    assert ensemble.run(sample(), scheduler=threads.scheduler_address).identical(ensemble.run(sample()))
+    assert ensemble.run(sample(), scheduler=threads.scheduler_address).identical(
+        ensemble.run(sample())
+    )
     scenarios = [sample(seed=seed) for seed in (1, 2, 3)]
     with Client(threads) as client:
         results = client.gather(client.map(sim.run, scenarios))
@@ -218,13 +320,17 @@ def test_a_cluster_maps_scenes(threads):
 
 
 @pytest.mark.verify
-def test_a_cluster_whose_workers_are_killed_gives_the_same_numbers(tmp_path, monkeypatch):
+def test_a_cluster_whose_workers_are_killed_gives_the_same_numbers(
+    tmp_path, monkeypatch
+):
     from distributed import LocalCluster
 
     monkeypatch.setattr(plans, "_GROUP", 2)
     monkeypatch.setattr(plans, "_BLOCK_SECONDS", 2e-2)
     scenario, killed, counted = sample(members=20, steps=4000), [], itertools.count()
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster:
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=":0"
+    ) as cluster:
 
         def kill(done):
             if next(counted) % 10 == 5 and len(killed) < 3:
@@ -232,27 +338,48 @@ def test_a_cluster_whose_workers_are_killed_gives_the_same_numbers(tmp_path, mon
                 killed.append(worker.pid)
                 psutil.Process(worker.pid).kill()
 
-        ensemble.run(scenario, tmp_path / "out.nc", scheduler=cluster.scheduler_address, progress=kill)
+        ensemble.run(
+            scenario,
+            tmp_path / "out.nc",
+            scheduler=cluster.scheduler_address,
+            progress=kill,
+        )
     assert len(set(killed)) == 3 and same(tmp_path / "out.nc", scenario)
 
 
 @pytest.mark.verify
-def test_a_scheduler_that_goes_away_is_told_and_what_is_computed_stays(tmp_path, many_parts, monkeypatch):
+def test_a_scheduler_that_goes_away_is_told_and_what_is_computed_stays(
+    tmp_path, many_parts, monkeypatch
+):
     from distributed import LocalCluster
 
     monkeypatch.setattr(execute, "_PATIENCE", "2 s")
-    cluster, path = LocalCluster(processes=False, n_workers=1, dashboard_address=":0"), tmp_path / "out.nc"
+    cluster, path = (
+        LocalCluster(processes=False, n_workers=1, dashboard_address=":0"),
+        tmp_path / "out.nc",
+    )
     with pytest.raises(WorkerDied, match="does not answer"), cluster:
-        how = {"progress": lambda done: cluster.close(), "scheduler": cluster.scheduler_address}
+        how = {
+            "progress": lambda done: cluster.close(),
+            "scheduler": cluster.scheduler_address,
+        }
         ensemble.run(sample(members=20), path, **how)
     ensemble.run(sample(members=20), path, resume=True)
     assert same(path, sample(members=20))
 
 
-def test_a_suspect_runs_alone_and_an_executor_that_does_not_start_is_no_endless_loop(monkeypatch, many_parts):
-    waiting = [execute._Chain(str(place), None, [0], broken=broken) for place, broken in enumerate((0, 0, 2))]
+def test_a_suspect_runs_alone_and_an_executor_that_does_not_start_is_no_endless_loop(
+    monkeypatch, many_parts
+):
+    waiting = [
+        execute._Chain(str(place), None, [0], broken=broken)
+        for place, broken in enumerate((0, 0, 2))
+    ]
     suspect, other = waiting[2], waiting[1]
-    assert execute._taken(waiting, [other]) is None and execute._taken(waiting, []) is suspect
+    assert (
+        execute._taken(waiting, [other]) is None
+        and execute._taken(waiting, []) is suspect
+    )
     assert execute._taken(waiting, [suspect]) is None
 
     class Broken(concurrent.futures.Executor):
@@ -260,14 +387,22 @@ def test_a_suspect_runs_alone_and_an_executor_that_does_not_start_is_no_endless_
             raise concurrent.futures.BrokenExecutor
 
     made = []
-    monkeypatch.setattr(execute, "pool", lambda jobs: made.append(jobs) or contextlib.nullcontext(Broken()))
+    monkeypatch.setattr(
+        execute,
+        "pool",
+        lambda jobs: made.append(jobs) or contextlib.nullcontext(Broken()),
+    )
     tasks = [(task, [0]) for task in Plan.of(sample()).tasks()]
     with pytest.raises(WorkerDied):
         compute(ensemble.advance, MemoryBlocks(), tasks, print, never, 2)
     assert len(made) < 100
 
 
-SOME = ["sim.laws.jkr.pull_off_load", "sim.laws.jkr.radius_at_load", "sim.numerics.special.lambert_w"]
+SOME = [
+    "sim.laws.jkr.pull_off_load",
+    "sim.laws.jkr.radius_at_load",
+    "sim.numerics.special.lambert_w",
+]
 
 
 @pytest.fixture
@@ -284,20 +419,32 @@ def test_every_kernel_and_law_of_the_sources_is_compiled_once(cold, monkeypatch)
     for module, text in jit.sources().items():
         for node in ast.parse(text).body:
             for mark in getattr(node, "decorator_list", ()):
-                if getattr(mark, "id", getattr(getattr(mark, "func", None), "id", "")) in ("kernel", "law"):
+                if getattr(
+                    mark, "id", getattr(getattr(mark, "func", None), "id", "")
+                ) in ("kernel", "law"):
                     decorated.add(f"{module}.{node.name}")
     assert set(execute.missing_kernels()) == decorated and len(decorated) > 50
     missing = execute.missing_kernels()
-    monkeypatch.setattr(execute, "missing_kernels", lambda: [name for name in SOME if not jit.cached(name)])
+    monkeypatch.setattr(
+        execute,
+        "missing_kernels",
+        lambda: [name for name in SOME if not jit.cached(name)],
+    )
     done = CliRunner().invoke(cli, ["warm", "--jobs", "2"])
-    assert done.exit_code == 0 and done.stdout.startswith(f"3 of {len(jit.compiled)} kernels and laws compiled")
+    assert done.exit_code == 0 and done.stdout.startswith(
+        f"3 of {len(jit.compiled)} kernels and laws compiled"
+    )
     monkeypatch.undo()
     monkeypatch.setenv("SIM_CACHE_DIR", str(cold))
     assert set(missing) - set(execute.missing_kernels()) == set(SOME)
-    before = {path: path.stat().st_mtime_ns for path in cold.rglob("*") if path.is_file()}
+    before = {
+        path: path.stat().st_mtime_ns for path in cold.rglob("*") if path.is_file()
+    }
     monkeypatch.setattr(execute, "missing_kernels", lambda: SOME)
     execute.compile_missing(1)
-    assert {path: path.stat().st_mtime_ns for path in cold.rglob("*") if path.is_file()} == before
+    assert {
+        path: path.stat().st_mtime_ns for path in cold.rglob("*") if path.is_file()
+    } == before
 
 
 def test_a_cache_that_cannot_be_written_is_no_success(cold, monkeypatch):

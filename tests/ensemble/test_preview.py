@@ -18,10 +18,17 @@ FOLDER = Path(__file__).parents[2] / "scenarios"
 WIDE = {"model": "gaussian", "rms": "10 kPa", "length": "4 mm"}
 NAMES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 MODAL = {
-    "model": "modal", "cell": "0.24 mm", "points": 32,
-    "spectrum": {"model": "band", "rms": "150 kPa", "longest": "60 um", "shortest": "16 um"},
+    "model": "modal",
+    "cell": "0.24 mm",
+    "points": 32,
+    "spectrum": {
+        "model": "band",
+        "rms": "150 kPa",
+        "longest": "60 um",
+        "shortest": "16 um",
+    },
     "correlation": {"model": "slip", "length": "5 um"},
-}  # fmt: skip
+}
 
 
 def blocks(name, **overrides):
@@ -29,7 +36,10 @@ def blocks(name, **overrides):
     scenario = load(FOLDER / f"{name}.toml", overrides)
     title, *texts = preview(scenario).split("\n\n")
     assert title == scenario.name
-    return {block.partition("\n")[0]: [line.strip() for line in block.splitlines()[1:]] for block in texts}
+    return {
+        block.partition("\n")[0]: [line.strip() for line in block.splitlines()[1:]]
+        for block in texts
+    }
 
 
 def row(lines, key):
@@ -49,13 +59,26 @@ def test_every_number_is_listed_in_si_with_its_unit_in_columns_and_swept_ones_wi
                 assert unit == ("" if quantity.unit == "1" else quantity.unit)
         assert len({re.match(r"(?:\S+ )*\S+ {2,}", line).end() for line in lines}) == 1
     for name, overrides, key, cells in (
-        ("uniform_stress", {}, "contact.load", ["-0.0003 to 0.016 N", "normal load, compression positive (5 values)"]),
+        (
+            "uniform_stress",
+            {},
+            "contact.load",
+            ["-0.0003 to 0.016 N", "normal load, compression positive (5 values)"],
+        ),
         ("uniform_stress", {}, "bonds.stress", ["0 to 1e+06 Pa"]),
         ("fixed_grips", {"shear": MODAL}, "drive.scale", ["log"]),
         ("fixed_grips", {"shear": MODAL}, "shear.mode_amplitudes", ["gaussian"]),
-        ("fixed_grips", {"record": {"per_member": False}}, "record.per_member", ["false"]),
+        (
+            "fixed_grips",
+            {"record": {"per_member": False}},
+            "record.per_member",
+            ["false"],
+        ),
     ):
-        assert row(blocks(name, **overrides)["quantities in SI"], key)[1:][: len(cells)] == cells
+        assert (
+            row(blocks(name, **overrides)["quantities in SI"], key)[1:][: len(cells)]
+            == cells
+        )
     lines = blocks("fixed_grips", shear=MODAL)["quantities in SI"]
     assert not any(line.startswith(("record", "name", "shear.model")) for line in lines)
 
@@ -63,16 +86,30 @@ def test_every_number_is_listed_in_si_with_its_unit_in_columns_and_swept_ones_wi
 def test_the_contact_at_rest_its_stiffness_and_errors_of_the_cell_are_those_of_the_dataset():
     lines = blocks("afm_tip")["contact at rest"]
     scenario = load(FOLDER / "afm_tip.toml")
-    radii = [point.rest_radius for point in scenario.points() if math.isfinite(point.rest_radius)]
+    radii = [
+        point.rest_radius
+        for point in scenario.points()
+        if math.isfinite(point.rest_radius)
+    ]
     low, _, high, unit = row(lines, "JKR radius")[1].split()
     assert_allclose([float(low), float(high)], [min(radii), max(radii)], rtol=1e-3)
     assert unit == "m"
     lost = len(scenario.points()) - len(radii)
     assert row(lines, "open")[1] == f"beyond pull-off at {lost} of 61 points"
-    assert_allclose(float(row(lines, "pull-off load")[1].split()[0]), -1.5 * math.pi * 0.4 * 100e-9, rtol=1e-3)
+    assert_allclose(
+        float(row(lines, "pull-off load")[1].split()[0]),
+        -1.5 * math.pi * 0.4 * 100e-9,
+        rtol=1e-3,
+    )
     short = {"clock.duration": "10 ms", "clock.step": "10 ms", "ensemble.members": 2}
-    shown, dataset = blocks("soft_lens", **short), run(load(FOLDER / "soft_lens.toml", short))
-    points, lines = float(row(shown["errors of the result"], "cell")[1].split()[0]), shown["fluctuations"]
+    shown, dataset = (
+        blocks("soft_lens", **short),
+        run(load(FOLDER / "soft_lens.toml", short)),
+    )
+    points, lines = (
+        float(row(shown["errors of the result"], "cell")[1].split()[0]),
+        shown["fluctuations"],
+    )
     assert_allclose(points, 100 * float(dataset["cell_error_area"].min()), rtol=0.05)
     energies = [float(word) for word in row(lines, "stored energy")[1].split()[::2][:2]]
     assert_allclose(energies[1] / energies[0], (45 / 10) ** 2, rtol=1e-3)
@@ -86,7 +123,10 @@ def test_the_contact_at_rest_its_stiffness_and_errors_of_the_cell_are_those_of_t
 def sizes(name, **overrides):
     """Bytes of the file, as told: packed and before compression."""
     cell = row(blocks(name, **overrides)["the run"], "file")[1]
-    found = [float(number) * {"kB": 1e3, "MB": 1e6}[unit] for number, unit in re.findall(r"([0-9.]+) (kB|MB)", cell)]
+    found = [
+        float(number) * {"kB": 1e3, "MB": 1e6}[unit]
+        for number, unit in re.findall(r"([0-9.]+) (kB|MB)", cell)
+    ]
     return found[0], found[-1]
 
 
@@ -97,22 +137,39 @@ def test_the_run_is_counted_and_its_file_estimated_with_its_maps(tmp_path):
     assert row(lines, "time")[1] == f"{clock.steps} steps, {clock.records} records"
     work = len(plan.points) * plan.members * (clock.steps + 1)
     assert row(lines, "work")[1].startswith(f"{work:,} member-steps, about ")
-    assert row(blocks("uniform_stress")["the run"], "sweep")[1] == "4 bonds.stress × 5 contact.load = 20 points"
+    assert (
+        row(blocks("uniform_stress")["the run"], "sweep")[1]
+        == "4 bonds.stress × 5 contact.load = 20 points"
+    )
     alone = blocks("masking", **{"ensemble.members": 9})["the run"]
     assert row(alone, "members")[1] == "9, all identical, so one is computed"
     scenes = ("fixed_grips", {}), ("soft_lens", {"record.per_member": False})
     scenes += (("fixed_grips", {"record.quantities": ["speed"]}),)
-    for compression, (name, changes) in itertools.product(("none", "zlib", "digits"), scenes):
+    for compression, (name, changes) in itertools.product(
+        ("none", "zlib", "digits"), scenes
+    ):
         overrides = changes | {"record.compression": compression}
         packed, bare = sizes(name, **overrides)
-        size = run(load(FOLDER / f"{name}.toml", overrides), tmp_path / "out.nc", replace=True).stat().st_size
+        size = (
+            run(
+                load(FOLDER / f"{name}.toml", overrides),
+                tmp_path / "out.nc",
+                replace=True,
+            )
+            .stat()
+            .st_size
+        )
         assert 0.5 * packed < size < 2.0 * packed
         assert size < bare + 100e3  # and what HDF5 itself takes
         assert (packed == bare) == (compression == "none")
 
     def size(**record):
         mapped = {**MODAL, "model": "mapped", "points": 64}
-        overrides = {"shear": mapped, "clock": {"duration": "2 s", "step": "1 s"}, "ensemble.members": 9}
+        overrides = {
+            "shear": mapped,
+            "clock": {"duration": "2 s", "step": "1 s"},
+            "ensemble.members": 9,
+        }
         return sizes("uniform_stress", sweep={}, record=record, **overrides)[1]
 
     maps = 8 * 9 * 2 * 64**2  # 9 members, 2 times, a grid of 64 points a side
@@ -121,14 +178,41 @@ def test_the_run_is_counted_and_its_file_estimated_with_its_maps(tmp_path):
 
 def test_limits_of_the_theory_and_of_the_cell_are_noted_once():
     for name, overrides, start in (
-        ("soft_lens", {}, "adhesion pays for the stored energy: the paper's assumption"),
-        ("uniform_stress", {"sphere.radius": "100 um"}, "the contact exceeds 0.3 of the sphere's radius"),
-        ("soft_lens", {"shear.spectrum": WIDE, "shear.points": 32, "sweep": {}}, "the cell makes A/A_JKR up to"),
-        ("masking", {"sweep": {}, "sphere.radius": 2.0, "contact.load": "1 kN"}, "sphere.radius is 2 m"),
-        ("uniform_stress", {}, "the mean stress is 0.62 times the shear modulus, beyond linear elasticity"),
-        ("masking", {"sweep": {}, "shear.spectrum.amplitude": "3.2 MPa"}, "the rms of the fluctuations is 1.41 times"),
+        (
+            "soft_lens",
+            {},
+            "adhesion pays for the stored energy: the paper's assumption",
+        ),
+        (
+            "uniform_stress",
+            {"sphere.radius": "100 um"},
+            "the contact exceeds 0.3 of the sphere's radius",
+        ),
+        (
+            "soft_lens",
+            {"shear.spectrum": WIDE, "shear.points": 32, "sweep": {}},
+            "the cell makes A/A_JKR up to",
+        ),
+        (
+            "masking",
+            {"sweep": {}, "sphere.radius": 2.0, "contact.load": "1 kN"},
+            "sphere.radius is 2 m",
+        ),
+        (
+            "uniform_stress",
+            {},
+            "the mean stress is 0.62 times the shear modulus, beyond linear elasticity",
+        ),
+        (
+            "masking",
+            {"sweep": {}, "shear.spectrum.amplitude": "3.2 MPa"},
+            "the rms of the fluctuations is 1.41 times",
+        ),
     ):
-        assert sum(line.startswith(start) for line in blocks(name, **overrides)["notes"]) == 1, start
+        assert (
+            sum(line.startswith(start) for line in blocks(name, **overrides)["notes"])
+            == 1
+        ), start
     assert not {"notes", "fluctuations"} & blocks("uniform_stress", sweep={}).keys()
     for cell, noted in ((CELL, False), (0.4 * CELL, True)):
         part = shear.Banded(spectrum=SPECTRUM, cell=cell, correlation=Slip(length=1e-6))
@@ -144,12 +228,27 @@ def test_depths_are_listed_with_their_reason_also_if_chosen_by_the_scene():
     assert row(lines, "contact")[3].startswith("The contact is in JKR equilibrium")
     tables = [{"model": "none"}, {"model": "steady", "critical_speed": 0.01}]
     swept = blocks("masking", sweep={"bonds": tables})["models"]
-    assert [line.split()[1] for line in swept if line.startswith("bonds")] == ["none", "steady"]
+    assert [line.split()[1] for line in swept if line.startswith("bonds")] == [
+        "none",
+        "steady",
+    ]
     assert all("swept" in line for line in swept if line.startswith("bonds"))
     for part, model, reason in (
-        ({"shear": SHEARS["auto with correlation"]}, "banded", "a correlation is given"),
-        ({"shear": SHEARS["auto without correlation"]}, "mean", "no correlation is given"),
-        ({"bonds": bonds.Auto(rupture=BELL, **STRETCHED)}, "cohort", "1/√N of 4,547,221,756 sites is 1.48e-05"),
+        (
+            {"shear": SHEARS["auto with correlation"]},
+            "banded",
+            "a correlation is given",
+        ),
+        (
+            {"shear": SHEARS["auto without correlation"]},
+            "mean",
+            "no correlation is given",
+        ),
+        (
+            {"bonds": bonds.Auto(rupture=BELL, **STRETCHED)},
+            "cohort",
+            "1/√N of 4,547,221,756 sites is 1.48e-05",
+        ),
     ):
         (line,) = (line for line in preview(scene(**part)).splitlines() if "→" in line)
         mark, chosen, why = re.split(r" {2,}", line.strip())
@@ -161,26 +260,50 @@ def test_what_bonds_do_to_the_paper_is_listed_with_the_size_of_their_field():
         recipe = STRETCHED | {"rebinding_rate": rebinding * BELL.zero_force_rate}
         text = preview(scene(bonds=bonds.FirstMoment(rupture=BELL, **recipe)))
         (line,) = (line.strip() for line in text.splitlines() if "overpredicts" in line)
-        assert line.startswith("the mean stretch") and f" overpredicts the friction maximum by {percent}%" in line
-    for silent in (bonds.FirstMoment(rupture=CUT_OFF, **STRETCHED), bonds.Cohort(rupture=BELL, **STRETCHED)):
+        assert (
+            line.startswith("the mean stretch")
+            and f" overpredicts the friction maximum by {percent}%" in line
+        )
+    for silent in (
+        bonds.FirstMoment(rupture=CUT_OFF, **STRETCHED),
+        bonds.Cohort(rupture=BELL, **STRETCHED),
+    ):
         assert "overpredicts" not in preview(scene(bonds=silent))
 
     def twice(**overrides):
         lines = blocks("bond_noise", **overrides).get("notes", [])
-        return sum(line.startswith("friction already supplies the energy under each bond") for line in lines)
+        return sum(
+            line.startswith("friction already supplies the energy under each bond")
+            for line in lines
+        )
 
     assert twice() == twice(sweep={}) == 1
-    assert twice(**{"sweep": {}, "shear.paid_by_adhesion": 0.0}) == twice(sweep={}, shear={"model": "uniform"}) == 0
-    assert not any("friction already supplies" in line for line in blocks("masking")["notes"])
+    assert (
+        twice(**{"sweep": {}, "shear.paid_by_adhesion": 0.0})
+        == twice(sweep={}, shear={"model": "uniform"})
+        == 0
+    )
+    assert not any(
+        "friction already supplies" in line for line in blocks("masking")["notes"]
+    )
     lines = blocks("bond_noise")["fluctuations"]
     square = 9e16 * float(bell_moments(0.1, 1e4, 4e-12, 4e-4, 1e5).force_square)
     energy, unit, *when = row(lines, "stored energy")[1].split(" ", 2)
     assert_allclose(float(energy), square / (math.pi**2 * 1.6e6 * 1e-9), rtol=1e-3)
-    assert (unit, when) == ("J/m^2", ["in steady sliding at the last speed, on the infinite plane"])
-    assert_allclose(float(row(lines, "rms of the stress")[1].split()[0]), math.sqrt(square / math.pi) / 1e-9, rtol=1e-3)
+    assert (unit, when) == (
+        "J/m^2",
+        ["in steady sliding at the last speed, on the infinite plane"],
+    )
+    assert_allclose(
+        float(row(lines, "rms of the stress")[1].split()[0]),
+        math.sqrt(square / math.pi) / 1e-9,
+        rtol=1e-3,
+    )
 
 
 def test_a_very_large_run_is_counted_without_a_name_for_each_of_its_parts(monkeypatch):
     monkeypatch.delattr("sim.ensemble.plan.part_name")
-    run = blocks("pdms_lens", **{"clock.duration": "100 s", "ensemble.members": 10_000_000})["the run"]
+    run = blocks(
+        "pdms_lens", **{"clock.duration": "100 s", "ensemble.members": 10_000_000}
+    )["the run"]
     assert row(run, "work")[1].startswith("1,000,010,000,000 member-steps")

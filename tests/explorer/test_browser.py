@@ -20,7 +20,10 @@ from numpy.testing import assert_allclose
 import sim
 
 playwright = pytest.importorskip("playwright.sync_api", reason="in the extra verify")
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), "")
+CHROMIUM = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),
+    "",
+)
 pytestmark = [
     pytest.mark.verify,
     pytest.mark.skipif(not CHROMIUM, reason="no Chromium"),
@@ -29,7 +32,14 @@ pytestmark = [
 
 BONDS = '[bonds]\nmodel = "steady"\ncritical_speed = "10 mm/s"\nstress = "0.3 MPa"\n'
 WAVES = '[shear]\nmodel = "mean"\nspectrum = { model = "gaussian", rms = "60 kPa", length = "4 um" }\n'
-SCENE = LENS.replace("a scene", "</title><script>alert(1)</script><img src=x onerror=alert(1)>") + RAMP + BONDS + WAVES
+SCENE = (
+    LENS.replace(
+        "a scene", "</title><script>alert(1)</script><img src=x onerror=alert(1)>"
+    )
+    + RAMP
+    + BONDS
+    + WAVES
+)
 #: A scene whose ensembles take minutes.
 LONG = LENS.replace('duration = "1 s"', 'duration = "10000 s"') + RAMP + COUNTED
 RADIUS = "sphere.radius"
@@ -69,15 +79,26 @@ def browser():
 @contextlib.contextmanager
 def explored(path, *options, browse="--no-browser"):
     """The process of ``sim explore`` on a scenario, and the address that it prints."""
-    command = [sys.executable, "-m", "sim", "explore", str(path), browse, *map(str, options)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+    command = [
+        sys.executable,
+        "-m",
+        "sim",
+        "explore",
+        str(path),
+        browse,
+        *map(str, options),
+    ]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as process:
         try:
             line = process.stdout.readline()
             assert line.startswith("open http://127.0.0.1:"), line
             yield process, line.split()[1]
         finally:
             with contextlib.suppress(psutil.NoSuchProcess):
-                for child in psutil.Process(process.pid).children(recursive=True):  # a browser that it opened
+                # a browser that it opened
+                for child in psutil.Process(process.pid).children(recursive=True):
                     child.kill()
             process.kill()
 
@@ -99,7 +120,9 @@ def shown(browser, served):
 
 @contextlib.contextmanager
 def opened(browser, address, **options):
-    context = browser.new_context(**{"viewport": {"width": 1200, "height": 900}} | options)
+    context = browser.new_context(
+        **{"viewport": {"width": 1200, "height": 900}} | options
+    )
     page = context.new_page()
     page.said, page.asked = [], []
     page.on("console", lambda message: page.said.append(message.text))
@@ -139,25 +162,44 @@ def lost(page):
     return page.locator("#lost").text_content()
 
 
-def test_a_page_asks_for_nothing_beyond_its_server_and_shows_a_hostile_name_as_text(shown):
+def test_a_page_asks_for_nothing_beyond_its_server_and_shows_a_hostile_name_as_text(
+    shown,
+):
     assert "<script>alert(1)</script>" in shown.locator("#title").text_content()
-    assert shown.locator("h1 script, h1 img").count() == 0 and shown.locator("#plot svg a").count() == 0
+    assert (
+        shown.locator("h1 script, h1 img").count() == 0
+        and shown.locator("#plot svg a").count() == 0
+    )
     shown.locator("#run").click()
     wait(shown, lambda: "mean" in shown.locator("#ran").text_content(), "no ensemble")
-    assert {re.match(r"(blob:)?http://127\.0\.0\.1:\d+/", url) is not None for url in shown.asked} == {True}
-    assert [text for text in shown.said if "inline style" not in text] == []  # which plotly's full script asks for
+    assert {
+        re.match(r"(blob:)?http://127\.0\.0\.1:\d+/", url) is not None
+        for url in shown.asked
+    } == {True}
+    # which plotly's full script asks for
+    assert [text for text in shown.said if "inline style" not in text] == []
     assert "token" not in shown.url
 
 
-def test_a_slider_changes_curves_words_and_address_and_undo_takes_each_gesture_back(shown):
+def test_a_slider_changes_curves_words_and_address_and_undo_takes_each_gesture_back(
+    shown,
+):
     before, words = value(shown), lost(shown)
     slider = shown.locator(f"[id='{RADIUS}']")
     slider.focus()
     for _ in range(3):
         shown.keyboard.press("ArrowRight")
-    wait(shown, lambda: value(shown) != before and lost(shown) != words, "nothing changed")
+    wait(
+        shown,
+        lambda: value(shown) != before and lost(shown) != words,
+        "nothing changed",
+    )
     wait(shown, lambda: RADIUS in shown.url, "not in the address")
-    wait(shown, lambda: slider.get_attribute("aria-valuetext") == value(shown), "another text for a screen reader")
+    wait(
+        shown,
+        lambda: slider.get_attribute("aria-valuetext") == value(shown),
+        "another text for a screen reader",
+    )
     for _ in range(3):
         shown.locator("#undo").click()
     wait(shown, lambda: (value(shown), lost(shown)) == (before, words), "not undone")
@@ -170,7 +212,11 @@ def test_a_slider_changes_curves_words_and_address_and_undo_takes_each_gesture_b
     shown.keyboard.press("ArrowRight")
     wait(shown, lambda: lost(shown).startswith("11 %"), "no other level")
     shown.locator("#undo").click()
-    wait(shown, lambda: lost(shown).startswith("10 %") and value(shown) == "3 mm", "another gesture is undone as well")
+    wait(
+        shown,
+        lambda: lost(shown).startswith("10 %") and value(shown) == "3 mm",
+        "another gesture is undone as well",
+    )
     shown.locator("#reset").click()
     wait(shown, lambda: (value(shown), lost(shown)) == (before, words), "not reset")
 
@@ -180,7 +226,9 @@ def test_a_text_that_cannot_be_read_leaves_the_value_and_states_the_reason(shown
     enter(shown, "3 kg")
     wait(shown, lambda: shown.locator("[role=alert]").count() == 1, "no message")
     assert "is not a unit of m" in shown.locator("[role=alert]").text_content()
-    assert shown.locator(f"[id='text {RADIUS}']").get_attribute("aria-invalid") == "true"
+    assert (
+        shown.locator(f"[id='text {RADIUS}']").get_attribute("aria-invalid") == "true"
+    )
     assert lost(shown) == words and RADIUS not in shown.url
     enter(shown, "2 mm")
     wait(shown, lambda: shown.locator("[role=alert]").count() == 0, "the message stays")
@@ -214,17 +262,28 @@ def test_the_curves_are_those_of_a_run_of_the_saved_scenario(shown, tmp_path):
         run = sim.run(sim.load(path, still))
         for name in ("contact_area", "friction_force", "fluctuation_energy"):
             assert_allclose(curves[name][place], float(run[name][-1]), rtol=1e-12)
-    for kind, magic in (("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF"), ("csv", b"speed [m/s]")):
+    for kind, magic in (
+        ("png", b"\x89PNG"),
+        ("svg", b"<?xml"),
+        ("pdf", b"%PDF"),
+        ("csv", b"speed [m/s]"),
+    ):
         assert saved(shown, kind).read_bytes().startswith(magic)
 
 
-def test_a_table_with_decimal_commas_is_dropped_fitted_saved_and_opened_again(browser, tmp_path):
+def test_a_table_with_decimal_commas_is_dropped_fitted_saved_and_opened_again(
+    browser, tmp_path
+):
     path = tmp_path / "lens.toml"
     path.write_text(LENS + RAMP.replace("ramp", "ramp") + BONDS, encoding="utf-8")
-    exact = sim.steady_curves(sim.load(path, {"bonds.critical_speed": "5 mm/s"}), [1e-3, 3e-3, 1e-2, 1.9e-2])
+    exact = sim.steady_curves(
+        sim.load(path, {"bonds.critical_speed": "5 mm/s"}), [1e-3, 3e-3, 1e-2, 1.9e-2]
+    )
     rows = zip(exact["speed"].to_numpy(), exact["contact_area"].to_numpy(), strict=True)
     lines = [f"{1e3 * v:.4f};{1e6 * a:.9f};1".replace(".", ",") for v, a in rows]
-    content = "\n".join(["speed [mm/s];contact_area [mm^2];contact_area_error [%]", *lines])
+    content = "\n".join(
+        ["speed [mm/s];contact_area [mm^2];contact_area_error [%]", *lines]
+    )
     with explored(path) as (_, address), opened(browser, address) as page:
         assert not page.get_by_text("Fit these numbers").is_visible()
         drop(page, content, "<img src=x onerror=alert(1)>.csv")
@@ -233,24 +292,37 @@ def test_a_table_with_decimal_commas_is_dropped_fitted_saved_and_opened_again(br
         page.locator("#free input[value='bonds.critical_speed']").check()
         page.locator("#fit").click()
         wait(page, lambda: page.locator("#fitted").is_visible(), "no fit")
-        wait(page, lambda: value(page, "bonds.critical_speed") in ("5 mm/s", "5.000 mm/s"), "not the exact speed")
+        wait(
+            page,
+            lambda: value(page, "bonds.critical_speed") in ("5 mm/s", "5.000 mm/s"),
+            "not the exact speed",
+        )
         assert page.locator(".track svg").count() == 1
         link, words = page.url, lost(page)
-    with explored(path, "--state", link) as (_, address), opened(browser, address) as page:
+    with (
+        explored(path, "--state", link) as (_, address),
+        opened(browser, address) as page,
+    ):
         assert lost(page) == words
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_every_text_has_contrast(browser, served, scheme):
     with opened(browser, served, color_scheme=scheme) as page:
-        drop(page, "speed [mm/s],contact_area [mm^2],contact_area_error [%]\n1,0.04,1\n9,0.03,1", "own.csv")
+        drop(
+            page,
+            "speed [mm/s],contact_area [mm^2],contact_area_error [%]\n1,0.04,1\n9,0.03,1",
+            "own.csv",
+        )
         wait(page, lambda: page.locator("#free input").count() > 5, "no points")
         enter(page, "3 kg")
         page.locator("#run").click()
         wait(page, lambda: "mean" in page.locator("#ran").text_content(), "no ensemble")
         wait(page, lambda: page.locator("[role=alert]").count() == 1, "no message")
         texts = page.evaluate(CONTRAST)
-        assert len(texts) > 100 and {"Numbers", "measured", "3 kg", "Undo"} <= {text for text, _ in texts}
+        assert len(texts) > 100 and {"Numbers", "measured", "3 kg", "Undo"} <= {
+            text for text, _ in texts
+        }
         assert [text for text in texts if text[1] < 4.5] == []
 
 
@@ -258,22 +330,36 @@ def test_every_text_has_contrast(browser, served, scheme):
 def test_the_token_is_in_no_process_list_log_or_address(browser, tmp_path, monkeypatch):
     path, profile = tmp_path / "long.toml", tmp_path / "profile"
     path.write_text(LONG, encoding="utf-8")
-    options = f"--headless --no-sandbox --remote-debugging-port=0 --user-data-dir={profile}"
-    monkeypatch.setenv("BROWSER", f"{CHROMIUM} {options} %s &")  # as the command opens a browser by itself
+    options = (
+        f"--headless --no-sandbox --remote-debugging-port=0 --user-data-dir={profile}"
+    )
+    # as the command opens a browser by itself
+    monkeypatch.setenv("BROWSER", f"{CHROMIUM} {options} %s &")
     with explored(path, browse="--browser") as (process, address):
         token = address.partition("token=")[2]
         end = time.monotonic() + 60.0
-        while not (port := profile / "DevToolsActivePort").exists() and time.monotonic() < end:
+        while (
+            not (port := profile / "DevToolsActivePort").exists()
+            and time.monotonic() < end
+        ):
             time.sleep(0.1)
-        driven = browser.browser_type.connect_over_cdp(f"http://127.0.0.1:{port.read_text().split()[0]}")
+        driven = browser.browser_type.connect_over_cdp(
+            f"http://127.0.0.1:{port.read_text().split()[0]}"
+        )
         page = driven.contexts[0].pages[0]
         settled(page)
         page.locator("#run").click()
-        wait(page, lambda: any("sim.explorer.job" in line for line in command_lines()), "no job")
+        wait(
+            page,
+            lambda: any("sim.explorer.job" in line for line in command_lines()),
+            "no job",
+        )
         shown = command_lines()
         assert len(token) > 40 and any("open.html" in line for line in shown)
         assert not [line for line in shown if token in line] and "token" not in page.url
-        visited = page.context.new_cdp_session(page).send("Page.getNavigationHistory")["entries"]
+        visited = page.context.new_cdp_session(page).send("Page.getNavigationHistory")[
+            "entries"
+        ]
         assert not [entry for entry in visited if token in entry["url"]]
         driven.new_browser_cdp_session().send("Browser.close")
         process.send_signal(signal.SIGINT)
@@ -282,18 +368,28 @@ def test_the_token_is_in_no_process_list_log_or_address(browser, tmp_path, monke
 
 def command_lines():
     """The process list, as any user of the machine reads it."""
-    return [" ".join(process.info["cmdline"] or ()) for process in psutil.process_iter(["cmdline"])]
+    return [
+        " ".join(process.info["cmdline"] or ())
+        for process in psutil.process_iter(["cmdline"])
+    ]
 
 
 def jobs(process):
     with contextlib.suppress(psutil.Error):
         children = psutil.Process(process.pid).children(recursive=True)
-        return [child.pid for child in children if child.status() != psutil.STATUS_ZOMBIE]
+        return [
+            child.pid for child in children if child.status() != psutil.STATUS_ZOMBIE
+        ]
     return []
 
 
 def alive(pids):
-    return [pid for pid in pids if psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE]
+    return [
+        pid
+        for pid in pids
+        if psutil.pid_exists(pid)
+        and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    ]
 
 
 @pytest.fixture
@@ -317,7 +413,11 @@ def test_a_job_ends_with_stop_a_closed_tab_and_a_reload(browser, long, how):
     process, address = long
     with opened(browser, address) as page:
         begun(page, process)
-        {"stop": page.locator("#stop").click, "close": page.close, "reload": page.reload}[how]()
+        {
+            "stop": page.locator("#stop").click,
+            "close": page.close,
+            "reload": page.reload,
+        }[how]()
         end = time.monotonic() + 20.0
         while jobs(process) and time.monotonic() < end:
             time.sleep(0.05)
@@ -337,9 +437,16 @@ def test_a_server_that_is_stopped_or_killed_takes_its_jobs_along(browser, long, 
             time.sleep(0.05)
         assert not alive(pids)
         if order == signal.SIGINT:
-            assert process.returncode == 0 and process.stdout.read().count("\n") == 1  # no trace, only the hint
+            # no trace, only the hint
+            assert process.returncode == 0 and process.stdout.read().count("\n") == 1
         enter(page, "3 mm")
-        wait(page, lambda: "server has ended" in page.locator("[role=alert]").first.text_content(), "no message")
+        wait(
+            page,
+            lambda: (
+                "server has ended" in page.locator("[role=alert]").first.text_content()
+            ),
+            "no message",
+        )
 
 
 def test_the_whole_page_is_played_by_keyboard_and_all_inputs_have_names(shown):
@@ -352,51 +459,98 @@ def test_the_whole_page_is_played_by_keyboard_and_all_inputs_have_names(shown):
     for _ in range(60):
         shown.keyboard.press("Tab")
         seen.append(shown.evaluate("document.activeElement.id"))
-    for key in f"undo reset take level absolute first loads {RADIUS} members run file".split():
+    for key in (
+        f"undo reset take level absolute first loads {RADIUS} members run file".split()
+    ):
         assert key in seen or shown.locator(f"[id='{key}']").is_disabled(), key
     assert seen.index(RADIUS) + 1 == seen.index(f"text {RADIUS}")
     shown.locator("#absolute").focus()
     shown.keyboard.press("Space")
-    wait(shown, lambda: "mm²" in shown.locator("#plot .ytitle").first.text_content(), "no areas")
+    wait(
+        shown,
+        lambda: "mm²" in shown.locator("#plot .ytitle").first.text_content(),
+        "no areas",
+    )
     shown.locator("#level").focus()
     words = lost(shown)
     shown.keyboard.press("ArrowRight")
-    wait(shown, lambda: lost(shown) != words and lost(shown).startswith("11 %"), "no other level")
+    wait(
+        shown,
+        lambda: lost(shown) != words and lost(shown).startswith("11 %"),
+        "no other level",
+    )
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_small_screen_has_no_sideways_scroll_large_targets_and_contrast(browser, served, scheme):
-    small = {"viewport": {"width": 390, "height": 800}, "color_scheme": scheme, "has_touch": True, "is_mobile": True}
+def test_a_small_screen_has_no_sideways_scroll_large_targets_and_contrast(
+    browser, served, scheme
+):
+    small = {
+        "viewport": {"width": 390, "height": 800},
+        "color_scheme": scheme,
+        "has_touch": True,
+        "is_mobile": True,
+    }
     with opened(browser, served, **small) as page:
         assert page.evaluate("document.documentElement.scrollWidth") == 390
         assert [size for size in page.evaluate(SIZES) if min(size[1:]) < 24] == []
-        title, back = page.locator("#plot .ytitle").first, "getComputedStyle(document.body).backgroundColor"
+        title, back = (
+            page.locator("#plot .ytitle").first,
+            "getComputedStyle(document.body).backgroundColor",
+        )
         before = page.evaluate(back), title.evaluate("(item) => item.style.fill")
         page.emulate_media(color_scheme={"light": "dark", "dark": "light"}[scheme])
-        wait(page, lambda: title.evaluate("(item) => item.style.fill") != before[1], "the figure stays")
+        wait(
+            page,
+            lambda: title.evaluate("(item) => item.style.fill") != before[1],
+            "the figure stays",
+        )
         assert page.evaluate(back) != before[0]
 
 
 def test_a_swipe_over_the_figure_scrolls_the_page(browser, served):
-    with opened(browser, served, viewport={"width": 390, "height": 800}, has_touch=True, is_mobile=True) as page:
+    with opened(
+        browser,
+        served,
+        viewport={"width": 390, "height": 800},
+        has_touch=True,
+        is_mobile=True,
+    ) as page:
         session = page.context.new_cdp_session(page)
-        for kind, y in (("touchStart", 250), *(("touchMove", 250 - 10 * k) for k in range(1, 16)), ("touchEnd", None)):
+        for kind, y in (
+            ("touchStart", 250),
+            *(("touchMove", 250 - 10 * k) for k in range(1, 16)),
+            ("touchEnd", None),
+        ):
             points = [] if y is None else [{"x": 200, "y": y}]
-            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+            session.send(
+                "Input.dispatchTouchEvent", {"type": kind, "touchPoints": points}
+            )
             page.wait_for_timeout(16)
         page.wait_for_timeout(400)
         assert page.evaluate("scrollY") > 50
 
 
 @pytest.mark.parametrize("name", ["pdms_lens_spring", "own_map", "pull_off"])
-def test_a_scenario_that_steady_sliding_does_not_answer_is_called_a_preview(browser, name):
+def test_a_scenario_that_steady_sliding_does_not_answer_is_called_a_preview(
+    browser, name
+):
     path = Path(sim.__file__).parents[1] / "scenarios" / f"{name}.toml"
     with explored(path) as (_, address), opened(browser, address) as page:
-        assert page.locator("#preview").text_content().startswith("Preview: steady sliding is not what")
+        assert (
+            page.locator("#preview")
+            .text_content()
+            .startswith("Preview: steady sliding is not what")
+        )
 
 
-def test_a_notebook_shows_pages_side_by_side_that_end_with_its_kernel(tmp_path, browser):
-    nbclient, nbformat = (pytest.importorskip(name, reason="in the extra verify") for name in ("nbclient", "nbformat"))
+def test_a_notebook_shows_pages_side_by_side_that_end_with_its_kernel(
+    tmp_path, browser
+):
+    nbclient, nbformat = (
+        pytest.importorskip(name, reason="in the extra verify")
+        for name in ("nbclient", "nbformat")
+    )
     scene = tomllib.loads(LENS + RAMP + BONDS)
     code = f"import json, sim\nscene = sim.load(json.loads({json.dumps(json.dumps(scene))}))\n"
     code += "pages = [sim.explore(scene) for _ in range(3)]\nprint(*[page.address for page in pages])\npages[0]"
@@ -405,11 +559,17 @@ def test_a_notebook_shows_pages_side_by_side_that_end_with_its_kernel(tmp_path, 
     with client.setup_kernel():
         client.execute_cell(notebook.cells[0], 0)
         printed, result = notebook.cells[0]["outputs"]
-        assert "<iframe" in result["data"]["text/html"] and "ssh -L" in result["data"]["text/html"]
+        assert (
+            "<iframe" in result["data"]["text/html"]
+            and "ssh -L" in result["data"]["text/html"]
+        )
         addresses = printed["text"].split()
         assert len({*addresses}) == 3
         for address in addresses:
             with opened(browser, address) as page:
                 assert lost(page).startswith("10 %")
-    with pytest.raises(playwright.Error, match="ERR_CONNECTION_REFUSED"), opened(browser, addresses[0]):
+    with (
+        pytest.raises(playwright.Error, match="ERR_CONNECTION_REFUSED"),
+        opened(browser, addresses[0]),
+    ):
         pass

@@ -22,7 +22,16 @@ from sim.laws import jkr
 from sim.parts.shear import models
 from sim.study.curves import curves, speeds_of_loss
 
-SCENARIOS = ("pdms_lens", "friction_maximum", "masking", "stick_slip", "motor_clutch", "pull_off", "afm_tip", "jkr_fit")
+SCENARIOS = (
+    "pdms_lens",
+    "friction_maximum",
+    "masking",
+    "stick_slip",
+    "motor_clutch",
+    "pull_off",
+    "afm_tip",
+    "jkr_fit",
+)
 #: A lens on bonds alone, some of whose numbers have comments.
 LENS = (
     MOUNTED.replace('"1.6 MPa"', '"1.6 MPa"  # of PDMS')
@@ -61,16 +70,30 @@ def test_curves_of_steady_sliding_are_the_closed_forms():
     radius = jkr.radius_at_load(4e-3, 42e-3 * fraction, 2e-3, 6.4e6)
     assert_allclose(found["bond_fraction"], fraction, rtol=1e-12)
     assert_allclose(found["contact_radius"], radius, rtol=1e-12)
-    assert_allclose(found["friction_force"], 3e5 * fraction * np.pi * radius**2, rtol=1e-12)
+    assert_allclose(
+        found["friction_force"], 3e5 * fraction * np.pi * radius**2, rtol=1e-12
+    )
     full = jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6)
-    assert_allclose(found["lost_to_bonds"], 1.0 - (radius / full) ** 2, rtol=1e-9, atol=1e-12)
-    assert found["contact_area"].attrs["units"] == "m^2" and found["speed"].attrs["units"] == "m/s"
+    assert_allclose(
+        found["lost_to_bonds"], 1.0 - (radius / full) ** 2, rtol=1e-9, atol=1e-12
+    )
+    assert (
+        found["contact_area"].attrs["units"] == "m^2"
+        and found["speed"].attrs["units"] == "m/s"
+    )
     for wrong in ([0.0], [-1e-3], [[1e-3]], [math.nan]):
         with pytest.raises(sim.BadInput, match="speeds"):
             sim.steady_curves(scene(LENS), wrong)
 
 
-@pytest.mark.parametrize("text", [LENS, LENS + WAVES, LENS.replace('load = "4 mN"', 'load = "4 mN"\nreversible = 0.3')])
+@pytest.mark.parametrize(
+    "text",
+    [
+        LENS,
+        LENS + WAVES,
+        LENS.replace('load = "4 mN"', 'load = "4 mN"\nreversible = 0.3'),
+    ],
+)
 def test_the_shares_of_the_area_add_up_to_one_in_either_order(text):
     found = curves(scene(text), np.geomspace(1e-4, 1.0, 7))
     stress = found.get("lost_to_mean_stress", 0.0)
@@ -78,9 +101,21 @@ def test_the_shares_of_the_area_add_up_to_one_in_either_order(text):
         ("lost_to_bonds", "lost_to_fluctuations"),
         ("lost_to_bonds_last", "lost_to_fluctuations_first"),
     ):
-        assert_allclose(found["area_ratio"] + found[bonds] + found[waves] + stress, 1.0, rtol=1e-12)
-    alone = curves(scene(text).with_values({"adhesion.bond_share": 0.0, "contact.reversible": 0.0}), np.array([1.0]))
-    assert_allclose(found["lost_to_fluctuations_first"][-1], 1.0 - alone["area_ratio"][0], rtol=1e-9, atol=1e-12)
+        assert_allclose(
+            found["area_ratio"] + found[bonds] + found[waves] + stress, 1.0, rtol=1e-12
+        )
+    alone = curves(
+        scene(text).with_values(
+            {"adhesion.bond_share": 0.0, "contact.reversible": 0.0}
+        ),
+        np.array([1.0]),
+    )
+    assert_allclose(
+        found["lost_to_fluctuations_first"][-1],
+        1.0 - alone["area_ratio"][0],
+        rtol=1e-9,
+        atol=1e-12,
+    )
 
 
 def test_the_speed_of_a_loss_is_solved():
@@ -100,21 +135,36 @@ def test_sliders_are_numbers_that_change_a_curve_between_ends_within_their_bound
         for end in (slider.low, slider.high):
             try:
                 page.answer({slider.key: end}, 0.1)
-            except Refused as refused:  # an end may not go with other numbers, but is a number of its key
+            except Refused as refused:
+                # an end may not go with other numbers, but is a number of its key
                 assert set(refused.faults) == {""}
         if slider.logarithmic:
             assert slider.low > 0.0
     keys = {slider.key for slider in page.sliders}
-    assert not {key for key in keys if key.startswith(("clock", "drive", "ensemble", "record", "seed"))}
-    assert ("bonds.critical_speed" in keys) == (name in ("pdms_lens", "masking") and name != "masking")
+    assert not {
+        key
+        for key in keys
+        if key.startswith(("clock", "drive", "ensemble", "record", "seed"))
+    }
+    assert ("bonds.critical_speed" in keys) == (
+        name in ("pdms_lens", "masking") and name != "masking"
+    )
 
 
 def test_a_value_that_cannot_be_used_is_refused_with_its_key(lens):
     page = Page(sim.load(lens))
-    for value, reason in (("3 kg", "kg"), ("x", "cannot be read"), (-1.0, "above 0"), ("5", "without a unit")):
+    for value, reason in (
+        ("3 kg", "kg"),
+        ("x", "cannot be read"),
+        (-1.0, "above 0"),
+        ("5", "without a unit"),
+    ):
         with pytest.raises(Refused) as refused:
             page.read({"sphere.radius": value})
-        assert list(refused.value.faults) == ["sphere.radius"] and reason in refused.value.faults["sphere.radius"]
+        assert (
+            list(refused.value.faults) == ["sphere.radius"]
+            and reason in refused.value.faults["sphere.radius"]
+        )
     with pytest.raises(Refused) as refused:
         page.read({"__class__": 1.0})
     assert refused.value.faults == {"__class__": "is no slider of this page"}
@@ -126,15 +176,24 @@ def test_a_value_that_cannot_be_used_is_refused_with_its_key(lens):
     [
         ({}, ""),
         ({"contact.load": {"from": "4 mN", "to": "1 mN"}}, "changes in time"),
-        ({"drive": {"model": "table", "time": [0.0, 1.0], "speed": [1e-3, 2e-3]}}, "a course"),
+        (
+            {"drive": {"model": "table", "time": [0.0, 1.0], "speed": [1e-3, 2e-3]}},
+            "a course",
+        ),
     ],
 )
 def test_a_page_states_why_its_curves_are_a_preview_alone(lens, changes, reason):
-    assert [reason in text for text in previews(sim.load(lens, changes))] == [True] * bool(reason)
+    assert [reason in text for text in previews(sim.load(lens, changes))] == [
+        True
+    ] * bool(reason)
 
 
 def test_a_saved_scenario_has_its_comments_and_the_numbers_of_the_page(lens):
-    values = {"sphere.radius": "3 mm", "bonds.critical_speed": 0.123456789, "shear.spectrum.rms": "70 kPa"}
+    values = {
+        "sphere.radius": "3 mm",
+        "bonds.critical_speed": 0.123456789,
+        "shear.spectrum.rms": "70 kPa",
+    }
     for changes in ({}, {"seed": 7}, {"sweep": {"contact.load": ["1 mN", "2 mN"]}}):
         page = Page(sim.load(lens, changes))
         text = page.toml(values)
@@ -152,14 +211,25 @@ def test_a_saved_scenario_has_its_comments_and_the_numbers_of_the_page(lens):
 
 def test_values_of_the_page_are_those_of_a_run_of_the_saved_scenario(lens):
     page = Page(sim.load(lens))
-    values = {"sphere.radius": "2.7 mm", "shear.spectrum.length": "3.3 um", "contact.load": -1e-4}
+    values = {
+        "sphere.radius": "2.7 mm",
+        "shear.spectrum.length": "3.3 um",
+        "contact.load": -1e-4,
+    }
     answer = page.answer(values, 0.1)
     saved = lens.with_name("saved.toml")
     saved.write_text(page.toml(values), encoding="utf-8")
     for place in (0, 60, 120):
         run = sim.run(sim.load(saved, {"drive.speed": answer["speed"][place]}))
-        for name in ("contact_area", "friction_force", "fluctuation_energy", "work_of_adhesion"):
-            assert_allclose(answer["curves"][name][place], float(run[name][-1]), rtol=1e-12)
+        for name in (
+            "contact_area",
+            "friction_force",
+            "fluctuation_energy",
+            "work_of_adhesion",
+        ):
+            assert_allclose(
+                answer["curves"][name][place], float(run[name][-1]), rtol=1e-12
+            )
 
 
 @pytest.mark.parametrize("name", ["own_psd", "soft_lens", "ten_wavelengths"])
@@ -169,7 +239,9 @@ def test_values_of_the_page_lie_within_the_error_of_the_scenarios_own_models(nam
     own = ensemble(page.scenes({}, 64), lambda message: None)
     found = curves(page.scenario, np.array(own["speed"]))
     for quantity in ("contact_area", "friction_force"):
-        mean, low, high = (np.array(own["curves"][quantity][kind]) for kind in ("mean", "low", "high"))
+        mean, low, high = (
+            np.array(own["curves"][quantity][kind]) for kind in ("mean", "low", "high")
+        )
         assert np.all(np.abs(found[quantity] - mean) <= high - low)
         assert np.all(high > low) or found[quantity] == 0.0
 
@@ -179,23 +251,38 @@ def test_curves_are_taken_away_as_a_table_and_as_pictures(lens):
     rows = list(csv.reader(io.StringIO(take.table(page.scenario, page.speeds))))
     column = rows[0].index("contact_area [m^2]")
     assert_allclose(
-        [float(row[column]) for row in rows[1:]], curves(page.scenario, page.speeds)["contact_area"], rtol=0
+        [float(row[column]) for row in rows[1:]],
+        curves(page.scenario, page.speeds)["contact_area"],
+        rtol=0,
     )
     for kind, magic in (("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")):
         assert take.picture(page.scenario, page.speeds, kind).startswith(magic)
     area, energy, friction = take.figure(page.scenario, page.speeds).axes
-    assert_allclose(area.lines[0].get_ydata(), 100.0 * curves(page.scenario, page.speeds)["area_ratio"], rtol=1e-12)
+    assert_allclose(
+        area.lines[0].get_ydata(),
+        100.0 * curves(page.scenario, page.speeds)["area_ratio"],
+        rtol=1e-12,
+    )
     assert friction.get_xscale() == "log" and "mJ" in energy.get_ylabel()
 
 
-def test_curves_and_their_comparison_with_a_table_need_no_process_of_the_fluctuations(monkeypatch):
+def test_curves_and_their_comparison_with_a_table_need_no_process_of_the_fluctuations(
+    monkeypatch,
+):
     models._grouped.cache_clear()
     scene = sim.load("scenarios/pdms_lens.toml")
-    monkeypatch.setattr(models.disk_cache, "cached", None)  # a new spectrum takes half a second
+    # a new spectrum takes half a second
+    monkeypatch.setattr(models.disk_cache, "cached", None)
     page = Page(scene)
-    table = page.add("speed [mm/s],contact_area [mm^2],contact_area_error [%]\n0.1,0.045,1\n1,0.044,1\n", "x.csv")
+    table = page.add(
+        "speed [mm/s],contact_area [mm^2],contact_area_error [%]\n0.1,0.045,1\n1,0.044,1\n",
+        "x.csv",
+    )
     answer = page.answer({"shear.spectrum.hurst": 0.7}, 0.1, table=table)
-    assert answer["data"]["count"] == 2 and answer["values"]["shear.spectrum.hurst"][0] == 0.7
+    assert (
+        answer["data"]["count"] == 2
+        and answer["values"]["shear.spectrum.hurst"][0] == 0.7
+    )
 
 
 def test_measured_curves_are_compared_with_the_curves(lens):
@@ -232,7 +319,8 @@ def test_the_drawing_has_the_contact_to_scale(lens):
     assert_allclose(sphere[inside], surface[inside], rtol=0, atol=1e-15)
     outside = np.abs(x) > 1.01 * found["radius"]
     assert np.all(sphere[outside] > surface[outside])
-    assert_allclose(sphere - sphere[80], x**2 / 4e-3, rtol=1e-6, atol=1e-15)  # the parabola of 2 mm
+    # the parabola of 2 mm
+    assert_allclose(sphere - sphere[80], x**2 / 4e-3, rtol=1e-6, atol=1e-15)
     stress = np.array(found["stress"])
     assert_allclose(stress.mean(), exact["shear_stress"][0], rtol=0.05)
     # waves shorter than two pixels are left out, so the map has at most the rms of the spectrum
@@ -240,12 +328,18 @@ def test_the_drawing_has_the_contact_to_scale(lens):
 
 
 def test_a_band_that_takes_too_long_is_not_begun(lens):
-    short, long = (Page(sim.load(lens, {"clock.duration": seconds})) for seconds in (1.0, 1e5))
+    short, long = (
+        Page(sim.load(lens, {"clock.duration": seconds})) for seconds in (1.0, 1e5)
+    )
     assert short.band({})["along"] == "speed" and long.band({}) == {}
 
 
 @pytest.mark.parametrize(
-    "link", ["http://127.0.0.1:1/#sphere.radius=0.003&share=0.2&token=x", "sphere.radius=0.003&share=0.2"]
+    "link",
+    [
+        "http://127.0.0.1:1/#sphere.radius=0.003&share=0.2&token=x",
+        "sphere.radius=0.003&share=0.2",
+    ],
 )
 def test_the_numbers_of_an_address_are_taken_and_its_token_is_not(lens, link):
     assert state_of(link, Page(sim.load(lens))) == "sphere.radius=0.003&share=0.2"
@@ -253,43 +347,71 @@ def test_the_numbers_of_an_address_are_taken_and_its_token_is_not(lens, link):
 
 @pytest.mark.parametrize(
     "link",
-    ["#sphere.radius=<img>", "#__proto__=1", "#sphere.radius=inf", "#sphere.radius=-1", "#path=/etc", "#a=" * 300],
+    [
+        "#sphere.radius=<img>",
+        "#__proto__=1",
+        "#sphere.radius=inf",
+        "#sphere.radius=-1",
+        "#path=/etc",
+        "#a=" * 300,
+    ],
 )
 def test_an_address_of_anything_but_numbers_is_refused(lens, link):
     with pytest.raises(sim.BadInput, match="--state"):
         state_of(link, Page(sim.load(lens)))
 
 
-def test_the_command_refuses_what_it_cannot_use_in_one_line_before_it_serves(lens, monkeypatch):
+def test_the_command_refuses_what_it_cannot_use_in_one_line_before_it_serves(
+    lens, monkeypatch
+):
     with Server(sim.load(lens))._socket as taken:
         port = taken.getsockname()[1]
         for arguments, message in (
-            (("nothing.toml",), "there is no such file"), ((lens, "--port", port), "the port is in use"),
-            ((lens, "--port", 70000), "70000"), ((lens, "--data", "nothing.csv"), "nothing.csv"),
-            ((lens, "--data", lens), "lens.toml"), ((lens, "--state", "#x=y"), "--state"),
-        ):  # fmt: skip
+            (("nothing.toml",), "there is no such file"),
+            ((lens, "--port", port), "the port is in use"),
+            ((lens, "--port", 70000), "70000"),
+            ((lens, "--data", "nothing.csv"), "nothing.csv"),
+            ((lens, "--data", lens), "lens.toml"),
+            ((lens, "--state", "#x=y"), "--state"),
+        ):
             done = command("explore", *arguments, "--no-browser")
-            assert done.exit_code == 2 and message in done.stderr.splitlines()[-1], arguments
+            assert done.exit_code == 2 and message in done.stderr.splitlines()[-1], (
+                arguments
+            )
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["check", "scenarios/pdms_lens.toml"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["check", "scenarios/pdms_lens.toml"]]
+)
 def test_another_command_imports_nothing_of_the_page(arguments):
     code = "import atexit, sys\natexit.register(lambda: print(*sys.modules, file=sys.stderr))\n"
     code += f"import sim.cli\nsys.argv[1:] = {arguments}\nsim.cli.main()"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
     modules = done.stderr.split()
     assert "sim.cli" in modules and done.stdout
-    assert not [n for n in modules if n.startswith(("sim.explorer", "starlette", "uvicorn", "plotly", "tomlkit"))]
+    assert not [
+        n
+        for n in modules
+        if n.startswith(("sim.explorer", "starlette", "uvicorn", "plotly", "tomlkit"))
+    ]
 
 
-def test_the_command_names_the_extra_that_is_missing_and_a_browser_that_is(lens, monkeypatch):
+def test_the_command_names_the_extra_that_is_missing_and_a_browser_that_is(
+    lens, monkeypatch
+):
     monkeypatch.setattr("webbrowser.open", lambda link: False)
     monkeypatch.setattr(Server, "run", lambda self: self._socket.close())
     done = command("explore", lens)
-    assert done.exit_code == 0 and "no browser was found" in done.stdout.splitlines()[-1]
+    assert (
+        done.exit_code == 0 and "no browser was found" in done.stdout.splitlines()[-1]
+    )
     for name in [name for name in sys.modules if name.startswith("sim.explorer")]:
         monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "plotly" else name)
+    monkeypatch.setattr(
+        "importlib.util.find_spec", lambda name: None if name == "plotly" else name
+    )
     done = command("explore", "nothing.toml")
     assert done.exit_code == 2 and len(done.stderr.splitlines()) == 1
     assert "plotly" in done.stderr and "[explore]" in done.stderr

@@ -43,7 +43,9 @@ SCENE = f"{LENS}{RAMP}{COUNTED}[ensemble]\nmembers = 3\n"
 def sim(*arguments):
     """Run a command as ``main`` runs it, in this process; return exit code, output and errors."""
 
-    @click.command(context_settings={"ignore_unknown_options": True, "help_option_names": []})
+    @click.command(
+        context_settings={"ignore_unknown_options": True, "help_option_names": []}
+    )
     @click.argument("words", nargs=-1, type=click.UNPROCESSED)
     def run(words):
         before, sys.argv = sys.argv, ["sim", *words]

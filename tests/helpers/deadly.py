@@ -15,4 +15,8 @@ def advance(task, number, state):
 
 
 def advance_faulty(task, number, state):
-    return number / 0 if task.names[number] == DEADLY else simulate.advance(task, number, state)
+    return (
+        number / 0
+        if task.names[number] == DEADLY
+        else simulate.advance(task, number, state)
+    )

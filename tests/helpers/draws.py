@@ -24,7 +24,9 @@ def _words(states, drawn):
 def _states(addresses, states):
     for i in range(len(addresses)):
         seed, part, member, step, lane = addresses[i]
-        states[i, 0], states[i, 1], states[i, 2], states[i, 3] = noise.stream(seed, part, member, step, lane)
+        states[i, 0], states[i, 1], states[i, 2], states[i, 3] = noise.stream(
+            seed, part, member, step, lane
+        )
 
 
 @kernel("void(float64[::1], uint64, uint64, uint64[::1], int64, float64[:,::1])")
@@ -92,18 +94,25 @@ def ornstein_uhlenbeck(rng, shape, keep):
     values = np.empty(shape)
     values[..., 0] = rng.normal(size=shape[:-1])
     for k in range(1, shape[-1]):
-        values[..., k] = keep * values[..., k - 1] + np.sqrt(1.0 - keep**2) * rng.normal(size=shape[:-1])
+        values[..., k] = keep * values[..., k - 1] + np.sqrt(
+            1.0 - keep**2
+        ) * rng.normal(size=shape[:-1])
     return values
 
 
 def fits(counted, expected):
     """Whether counts have their expected values, by Pearson's χ²; cells of few are put together."""
     few = expected < 10.0
-    counted, expected = (np.append(counts[~few], counts[few].sum()) for counts in (counted, expected))
+    counted, expected = (
+        np.append(counts[~few], counts[few].sum()) for counts in (counted, expected)
+    )
     if expected[-1] < 10.0:
         counted, expected = counted[:-1], expected[:-1]
     assert len(expected) > 1
-    assert chi2.sf(np.sum((counted - expected) ** 2 / expected), len(expected) - 1) > FIVE_SIGMA
+    assert (
+        chi2.sf(np.sum((counted - expected) ** 2 / expected), len(expected) - 1)
+        > FIVE_SIGMA
+    )
 
 
 def is_usual(count, mean):

@@ -25,9 +25,22 @@ LOAD = 4e-3
 WORK = LOAD / (math.pi * R)
 
 
-def scenario(duration, steps, drive, share=0.0, start="steady", members=1, make=FirstMoment, **keys):
+def scenario(
+    duration,
+    steps,
+    drive,
+    share=0.0,
+    start="steady",
+    members=1,
+    make=FirstMoment,
+    **keys,
+):
     """A lens whose bonds, as made of their recipe, carry ``share`` of the work of adhesion."""
-    bonds = {"rupture": keys.pop("rupture", BELL), "rebinding_rate": keys.pop("rebinding", 1.0), "start_from": start}
+    bonds = {
+        "rupture": keys.pop("rupture", BELL),
+        "rebinding_rate": keys.pop("rebinding", 1.0),
+        "start_from": start,
+    }
     return Scenario(
         clock=Clock(duration=duration, step=duration / steps),
         solid=Solid(shear_modulus=MODULUS / 4.0),
@@ -49,14 +62,32 @@ COULOMB = 1e5
 HELD = COULOMB * AREA
 
 
-def spring(stiffness, speed=10.0, mass=0.0, damping=0.0, contact=math.inf, viscosity=0.0, **keys):
+def spring(
+    stiffness,
+    speed=10.0,
+    mass=0.0,
+    damping=0.0,
+    contact=math.inf,
+    viscosity=0.0,
+    **keys,
+):
     """A spring drive in units of all sites bound: stiffness and k_t over n κ A, speed in stretches a second."""
-    held = contact if isinstance(contact, str) else "rigid" if contact == math.inf else contact * STIFF
+    held = (
+        contact
+        if isinstance(contact, str)
+        else "rigid"
+        if contact == math.inf
+        else contact * STIFF
+    )
     return Spring(
-        stage=speed * STRETCH if isinstance(speed, float) else speed, stiffness=stiffness * STIFF, mass=mass * STIFF,
-        damping=damping * STIFF, viscosity=viscosity * DENSITY * KAPPA,
-        contact_stiffness=held, **keys,
-    )  # fmt: skip
+        stage=speed * STRETCH if isinstance(speed, float) else speed,
+        stiffness=stiffness * STIFF,
+        mass=mass * STIFF,
+        damping=damping * STIFF,
+        viscosity=viscosity * DENSITY * KAPPA,
+        contact_stiffness=held,
+        **keys,
+    )
 
 
 def force(load, **keys):
@@ -66,7 +97,9 @@ def force(load, **keys):
 def marched(scene):
     """States of a single member, and the readings of the drive in each, by name."""
     states = list(march(scene, np.arange(1)))
-    readings = np.array([scene.parts.drive.readings(state.drive)[0] for state in states])
+    readings = np.array(
+        [scene.parts.drive.readings(state.drive)[0] for state in states]
+    )
     return states, dict(zip(READINGS, readings.T, strict=True))
 
 
@@ -74,50 +107,87 @@ def residual(read):
     """Largest energy that is missing, over the larger of work and stored energy; no term may exceed ten times that."""
     work, stored = np.abs(read["drive_work"]), read["stored_energy"]
     scale = max(np.max(work), np.max(stored))
-    terms = [np.abs(values) for name, values in read.items() if name.startswith("dissipated_by")]
+    terms = [
+        np.abs(values)
+        for name, values in read.items()
+        if name.startswith("dissipated_by")
+    ]
     assert np.max(terms) <= 10.0 * scale
     return np.max(np.abs(read["energy_residual"])) / scale
 
 
 def reached(states, *names):
     """Some quantities of bonds and drive in the units of the bonds, one row a state."""
-    units = {"position": STRETCH, "body_speed": STRETCH, "bound": 1.0, "stretch": STRETCH}
-    parts = {"position": "drive", "body_speed": "drive", "bound": "bonds", "stretch": "bonds"}
-    return np.array([[getattr(getattr(state, parts[n]), n)[0] / units[n] for n in names] for state in states])
+    units = {
+        "position": STRETCH,
+        "body_speed": STRETCH,
+        "bound": 1.0,
+        "stretch": STRETCH,
+    }
+    parts = {
+        "position": "drive",
+        "body_speed": "drive",
+        "bound": "bonds",
+        "stretch": "bonds",
+    }
+    return np.array(
+        [
+            [getattr(getattr(state, parts[n]), n)[0] / units[n] for n in names]
+            for state in states
+        ]
+    )
 
 
 #: A load that pulls the contact off and comes back, and what the contact does then.
 PULLED_OFF = {
-    "load": {"time": (0.0, 0.95, 1.1, 2.0, 2.0, 9.0), "value": (LOAD, LOAD, -LOAD, -LOAD, LOAD, LOAD)},
+    "load": {
+        "time": (0.0, 0.95, 1.1, 2.0, 2.0, 9.0),
+        "value": (LOAD, LOAD, -LOAD, -LOAD, LOAD, LOAD),
+    },
     "after_pull_off": "reattach",
 }
 
 
 def stuck(duration, steps, bonds, drive, share=0.0, members=1, **contact):
     """A lens whose bonds have no stretch; their strength and the unit of length make the unit of stiffness."""
-    scene = scenario(duration, steps, spring(1.0, mass=1.0), share=share, members=members, **contact)
+    scene = scenario(
+        duration, steps, spring(1.0, mass=1.0), share=share, members=members, **contact
+    )
     return replace(scene, bonds=bonds, drive=drive)
 
 
 def pulled(stiffness=1.0, speed=1.0, mass=0.0, damping=0.0, **keys):
     stiff = HELD / STRETCH
     stage = speed * STRETCH if isinstance(speed, float) else speed
-    given = {"stage": stage, "stiffness": stiffness * stiff, "mass": mass * stiff, "damping": damping * stiff}
+    given = {
+        "stage": stage,
+        "stiffness": stiffness * stiff,
+        "mass": mass * stiff,
+        "damping": damping * stiff,
+    }
     return Spring(**given, contact_stiffness="rigid", **keys)
 
 
 def jolted(speed, step, factor=1.0001):
     """A stage in steady motion whose speed, in stretches a second, rises by a factor after a first step."""
     speeds = speed, speed, factor * speed, factor * speed
-    return {"time": (0.0, step, step, 1e3), "value": tuple(value * STRETCH for value in speeds)}
+    return {
+        "time": (0.0, step, step, 1e3),
+        "value": tuple(value * STRETCH for value in speeds),
+    }
 
 
 def mode_of(signal, step, frequency, modes):
     """Growth rate and frequency of the mode nearest to a frequency in a signal, by linear prediction."""
     changes = np.diff(signal)
     shifted = np.stack([changes[modes - 1 - k : -1 - k] for k in range(modes)], axis=1)
-    roots = np.roots([1.0, *-np.linalg.lstsq(shifted, changes[modes:])[0]]).astype(complex)
-    nearest = min(np.log(roots[roots.imag > 0.0]) / step, key=lambda root: abs(root.imag - frequency))
+    roots = np.roots([1.0, *-np.linalg.lstsq(shifted, changes[modes:])[0]]).astype(
+        complex
+    )
+    nearest = min(
+        np.log(roots[roots.imag > 0.0]) / step,
+        key=lambda root: abs(root.imag - frequency),
+    )
     return nearest.real, nearest.imag
 
 

@@ -33,7 +33,11 @@ def faults_of(kind, seed):
 
 def short(fault):
     """Return a line for a fault: the rule that it broke, and its message."""
-    rule = [frame.name for frame in traceback.extract_tb(fault.__traceback__) if frame.name.startswith("check_")]
+    rule = [
+        frame.name
+        for frame in traceback.extract_tb(fault.__traceback__)
+        if frame.name.startswith("check_")
+    ]
     return f"{rule[-1] if rule else type(fault).__name__}: {' '.join(str(fault).split())[:160]}"
 
 
@@ -60,7 +64,11 @@ class Worker:
     @property
     def spent(self):
         """Time of the processor since the process began [s]."""
-        return sum(psutil.Process(self.process.pid).cpu_times()[:2]) if self.process.is_alive() else 0.0
+        return (
+            sum(psutil.Process(self.process.pid).cpu_times()[:2])
+            if self.process.is_alive()
+            else 0.0
+        )
 
     def give(self, seed):
         self.seed, self.since = seed, self.spent
@@ -81,9 +89,18 @@ def go_through(kind, seeds, processes=2, patience=PATIENCE, tell=print):
                 continue
             seed, ended = worker.seed, False
             try:
-                texts, corners, seconds = worker.pipe.recv() if worker.pipe in ready else ([], Counter(), patience)
+                texts, corners, seconds = (
+                    worker.pipe.recv()
+                    if worker.pipe in ready
+                    else ([], Counter(), patience)
+                )
             except EOFError:
-                texts, corners, seconds, ended = ["the process died"], Counter(), 0.0, True
+                texts, corners, seconds, ended = (
+                    ["the process died"],
+                    Counter(),
+                    0.0,
+                    True,
+                )
             if worker.pipe not in ready:
                 texts, ended = [f"takes longer than {patience:.0f} s"], True
             if ended:
@@ -94,13 +111,17 @@ def go_through(kind, seeds, processes=2, patience=PATIENCE, tell=print):
             counts += corners or Counter()
             if texts:
                 faults[seed] = texts
-                tell(f"{kind} {seed} ({seconds:.1f} s)", *texts, sep="\n    ", flush=True)
+                tell(
+                    f"{kind} {seed} ({seconds:.1f} s)", *texts, sep="\n    ", flush=True
+                )
             worker.give(left.pop() if left else None)
     return faults, counts
 
 
 if __name__ == "__main__":
     kind, first, last = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
-    faults, counts = go_through(kind, range(first, last), int(sys.argv[4]) if len(sys.argv) > 4 else 2)
+    faults, counts = go_through(
+        kind, range(first, last), int(sys.argv[4]) if len(sys.argv) > 4 else 2
+    )
     print(f"{len(faults)} of {last - first} scenes have faults: {sorted(faults)}")
     print(*(f"{name}: {count}" for name, count in sorted(counts.items())), sep="\n")

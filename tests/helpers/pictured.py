@@ -16,7 +16,12 @@ STEADY = drive.Steady(speed=4e-3)
 
 def field(kind=shear.Modal, spectrum=None, **changes):
     spectrum = spectrum or Band(rms=150e3, longest=60e-6, shortest=16e-6)
-    options = {"correlation": Time(time=0.01), "amplitude": Onset(speed=2.5e-3, width=0.3), "cell": CELL, "points": 32}
+    options = {
+        "correlation": Time(time=0.01),
+        "amplitude": Onset(speed=2.5e-3, width=0.3),
+        "cell": CELL,
+        "points": 32,
+    }
     return kind(spectrum=spectrum, **(options | changes))
 
 
@@ -45,7 +50,11 @@ def drawn(panel, colour, style="-"):
 
 def data_of(panel, colour, style="-"):
     """Return data of all lines of a colour and a style."""
-    lines = [line for line in panel.lines if (line.get_color(), line.get_linestyle()) == (colour, style)]
+    lines = [
+        line
+        for line in panel.lines
+        if (line.get_color(), line.get_linestyle()) == (colour, style)
+    ]
     return [line.get_data() for line in lines if len(line.get_xdata())]
 
 
@@ -57,14 +66,23 @@ def lines_of(panel):
 def legend_of(panel):
     """Entries of a legend, and its title."""
     legend = panel.get_legend()
-    return [text.get_text() for text in legend.get_texts()], legend.get_title().get_text()
+    return [
+        text.get_text() for text in legend.get_texts()
+    ], legend.get_title().get_text()
 
 
 def rendered(figure):
     """The figure went through its whole layout without a warning; panels are labelled and within the picture."""
     figure.draw_without_rendering()
-    assert figure.axes[0].get_ylabel() and figure.axes[-1].get_xlabel() + figure.axes[-1].get_ylabel()
+    assert (
+        figure.axes[0].get_ylabel()
+        and figure.axes[-1].get_xlabel() + figure.axes[-1].get_ylabel()
+    )
     for panel in figure.axes:
         box = panel.get_tightbbox()
-        assert min(box.x0, box.y0) > -1.0 and box.x1 < figure.bbox.x1 + 1.0 and box.y1 < figure.bbox.y1 + 1.0
+        assert (
+            min(box.x0, box.y0) > -1.0
+            and box.x1 < figure.bbox.x1 + 1.0
+            and box.y1 < figure.bbox.y1 + 1.0
+        )
     return figure

@@ -36,14 +36,19 @@ def most_of_drive(scenario, course):
 def check_ends(scenario, course):
     """No member is unresolved, and a runaway is one in which nothing could hold the slider."""
     unresolved = np.isfinite(column(course, "unresolved_time"))
-    assert not np.any(unresolved), f"members {np.flatnonzero(unresolved.any(axis=0))} are unresolved"
+    assert not np.any(unresolved), (
+        f"members {np.flatnonzero(unresolved.any(axis=0))} are unresolved"
+    )
     times = column(course, "runaway_time")
     for member in np.flatnonzero(np.isfinite(times[-1])):
         record = int(np.argmax(np.isfinite(times[:, member])))
         holder = holds(scenario, course, member, max(record, 1))
-        if holder == BORNE_BY_BONDS:  # at the ends of the step, within which the area may have shrunk
+        # at the ends of the step, within which the area may have shrunk
+        if holder == BORNE_BY_BONDS:
             holder = holds_finer(scenario, member, record)
-        assert not holder, f"a runaway at {times[record, member]:.6g} s, record {record}, though {holder}"
+        assert not holder, (
+            f"a runaway at {times[record, member]:.6g} s, record {record}, though {holder}"
+        )
 
 
 def holds(scenario, course, member, record):
@@ -54,7 +59,10 @@ def holds(scenario, course, member, record):
     Then an open contact holds nothing. In a closed contact a viscosity holds the slider at a finite speed. Otherwise
     the bonds must bear the force.
     """
-    drive, radius = scenario.drive, float(course.radius[record - 1, member % course.radius.shape[1]])
+    drive, radius = (
+        scenario.drive,
+        float(course.radius[record - 1, member % course.radius.shape[1]]),
+    )
     area = math.pi * np.nan_to_num(radius) ** 2
     delays = drive.mass + drive.damping > 0.0
     if drive.spring:
@@ -69,7 +77,12 @@ def holds(scenario, course, member, record):
     area = min(area, math.pi * after**2) if after > 0.0 else area
     least, most = most_of_drive(scenario, course)
     force = max(abs(least[record - 1, 0]), abs(most[record - 1, 0]))
-    bonds = [min(course.fraction[k, member % course.fraction.shape[1]] for k in (record - 1, record))]
+    bonds = [
+        min(
+            course.fraction[k, member % course.fraction.shape[1]]
+            for k in (record - 1, record)
+        )
+    ]
     return BORNE_BY_BONDS if bears(scenario, force / area, bonds[0]) else ""
 
 
@@ -79,7 +92,11 @@ def holds_finer(scenario, member, record):
     noise = MemberNoise.of(finer.seed, np.array([member]))
     _, course = follow(finer, noise, None, range(16 * max(record, 1) + 17))
     ends = np.isfinite(column(course, "runaway_time")[:, 0])
-    return holds(finer, course, 0, max(int(np.argmax(ends)), 1)) if ends.any() else "finer steps hold it"
+    return (
+        holds(finer, course, 0, max(int(np.argmax(ends)), 1))
+        if ends.any()
+        else "finer steps hold it"
+    )
 
 
 #: Holder of a slider under a force that its bonds bear.
@@ -116,11 +133,17 @@ def check_spring(scenario, course):
     going, force = ~has_ended(course), column(course, "spring_force")
     stage, position = column(course, "stage_position"), course.position
     size = np.maximum.accumulate(np.where(going, np.abs(force), 0.0))
-    far = np.maximum.accumulate(np.where(going, np.maximum(np.abs(stage), np.abs(position)), 0.0))
+    far = np.maximum.accumulate(
+        np.where(going, np.maximum(np.abs(stage), np.abs(position)), 0.0)
+    )
     bound = HOOKE * size + ROUNDED * scenario.drive.spring * far
-    off = np.where(going, np.abs(force - scenario.drive.spring * (stage - position)), 0.0)
+    off = np.where(
+        going, np.abs(force - scenario.drive.spring * (stage - position)), 0.0
+    )
     worst = np.max(off / np.maximum(size, 1e-300), initial=0.0)
-    assert np.all(off <= bound), f"the spring force is off by {worst:.1e} of the largest so far"
+    assert np.all(off <= bound), (
+        f"the spring force is off by {worst:.1e} of the largest so far"
+    )
 
 
 #: Tolerance of the motion of a slider in an open contact, over its largest force or displacement. It is that of the
@@ -134,34 +157,57 @@ def check_open(scenario, course):
     Without mass and damping no spring force is left. With damping c the spring force relaxes with c/K towards c times
     the speed of the stage. With a mass the linear equation is solved with the mean speed of the stage, if it is steady.
     """
-    drive, is_open = scenario.drive, np.isnan(course.radius) & np.ones(course.position.shape, bool)
+    drive, is_open = (
+        scenario.drive,
+        np.isnan(course.radius) & np.ones(course.position.shape, bool),
+    )
     pairs = is_open[:-1] & is_open[1:] & ~has_ended(course)[1:]
     if not pairs.any():
         return
     stiffness, mass, damping = drive.spring, drive.mass, drive.damping
-    force, position, step = column(course, "spring_force"), course.position, np.diff(course.time.reshape(-1, 1), axis=0)
+    force, position, step = (
+        column(course, "spring_force"),
+        course.position,
+        np.diff(course.time.reshape(-1, 1), axis=0),
+    )
     least, most = most_of_drive(scenario, course)
     size = np.nanmax(np.abs(force))
     if not mass + damping:
-        assert drive.spring, "nothing holds the slider under a force in an open contact, and it goes on"
+        assert drive.spring, (
+            "nothing holds the slider under a force in an open contact, and it goes on"
+        )
         rounding = ROUNDED * stiffness * np.nanmax(np.abs(position))
-        assert np.all(np.abs(force[1:][pairs]) <= HOOKE * size + rounding), "a spring bears a force without a contact"
+        assert np.all(np.abs(force[1:][pairs]) <= HOOKE * size + rounding), (
+            "a spring bears a force without a contact"
+        )
         return
     if not mass and stiffness:
         left = np.exp(-stiffness / damping * step)
-        low, high = (left * force[:-1] + damping * speed * (1.0 - left) for speed in (least, most))
-        off, bound = np.fmax(low - force[1:], force[1:] - high), FREE * (size + damping * np.max(np.abs(most)))
+        low, high = (
+            left * force[:-1] + damping * speed * (1.0 - left)
+            for speed in (least, most)
+        )
+        off, bound = (
+            np.fmax(low - force[1:], force[1:] - high),
+            FREE * (size + damping * np.max(np.abs(most))),
+        )
     elif not mass:
         low, high = (position[:-1] + pull / damping * step for pull in (least, most))
-        off, bound = np.fmax(low - position[1:], position[1:] - high), FREE * np.nanmax(np.abs(position[is_open]))
+        off, bound = (
+            np.fmax(low - position[1:], position[1:] - high),
+            FREE * np.nanmax(np.abs(position[is_open])),
+        )
     else:
         ahead, bound = after_free_step(scenario, course, 0.5 * (least + most), step)
         pairs &= most == least
-        pairs[1:] &= is_open[:-2]  # the speed at a record that closed before is that of the interface
+        # the speed at a record that closed before is that of the interface
+        pairs[1:] &= is_open[:-2]
         pairs[0] = False
         off, bound = np.abs(ahead - position[1:]), FREE * bound
     worst = np.max(np.where(pairs, off, 0.0), initial=0.0)
-    assert worst <= bound, f"in an open contact the motion is off by {worst / bound * FREE:.1e}"
+    assert worst <= bound, (
+        f"in an open contact the motion is off by {worst / bound * FREE:.1e}"
+    )
 
 
 def after_free_step(scenario, course, drawn, step):
@@ -169,12 +215,22 @@ def after_free_step(scenario, course, drawn, step):
 
     The body is pulled by a force, or by a stage of steady speed, both ``drawn``.
     """
-    stiffness, mass, damping = scenario.drive.spring, scenario.drive.mass, scenario.drive.damping
+    stiffness, mass, damping = (
+        scenario.drive.spring,
+        scenario.drive.mass,
+        scenario.drive.damping,
+    )
     position, speed = course.position[:-1], course.speed[:-1]
-    behind = column(course, "spring_force")[:-1] / stiffness if stiffness else 0.0 * position
+    behind = (
+        column(course, "spring_force")[:-1] / stiffness if stiffness else 0.0 * position
+    )
     ahead = np.empty(position.shape)
     rate = np.array(
-        [[0.0, 1.0, 0.0], [0.0, -damping / mass, stiffness / mass if stiffness else 1.0 / mass], [0.0, -1.0, 0.0]]
+        [
+            [0.0, 1.0, 0.0],
+            [0.0, -damping / mass, stiffness / mass if stiffness else 1.0 / mass],
+            [0.0, -1.0, 0.0],
+        ]
     )
     if not stiffness:
         rate[2, 1] = 0.0
@@ -200,7 +256,9 @@ def check_dissipated(scenario, course, bound, size):
     for name in ("damping", "viscosity", "rupture", "snaps"):
         fall = -np.nan_to_num(np.diff(column(course, f"dissipated_by_{name}"), axis=0))
         worst = np.max(fall / np.maximum(size[1:], 1e-300), initial=0.0)
-        assert np.all(fall <= bound * size[1:]), f"dissipated_by_{name} falls by {worst:.1e} of the largest energy"
+        assert np.all(fall <= bound * size[1:]), (
+            f"dissipated_by_{name} falls by {worst:.1e} of the largest energy"
+        )
 
 
 #: Tolerance of a strength of bonds.
@@ -210,7 +268,10 @@ STRENGTH = 1e-6
 def check_peaks(scenario, course, end):
     """No recorded peak exceeds the strength of the bonds, nor the force that a spring without a body bears."""
     drive, bonds = scenario.drive, scenario.bonds
-    stress, friction = (float(end.events.largest(name)["largest"].max()) for name in ("stress", "friction"))
+    stress, friction = (
+        float(end.events.largest(name)["largest"].max())
+        for name in ("stress", "friction")
+    )
     area = math.pi * np.nan_to_num(course.radius) ** 2
     widest = np.max(area) + np.max(np.abs(np.diff(area, axis=0)), initial=0.0)
     strength = math.inf
@@ -219,14 +280,22 @@ def check_peaks(scenario, course, end):
     elif bonds.law.limit < math.inf:
         strength = bonds.site_density * bonds.bond_stiffness * bonds.law.limit
     if strength < math.inf and not drive.viscosity:
-        assert stress <= strength * (1.0 + STRENGTH), f"peak_stress is {stress / strength:.6g} of the strength"
-        assert friction <= strength * widest * (1.0 + STRENGTH), "peak_friction exceeds the strength"
+        assert stress <= strength * (1.0 + STRENGTH), (
+            f"peak_stress is {stress / strength:.6g} of the strength"
+        )
+        assert friction <= strength * widest * (1.0 + STRENGTH), (
+            "peak_friction exceeds the strength"
+        )
     if drive.spring and not drive.mass + drive.damping:
         going = ~has_ended(course)
-        borne = np.max(np.abs(np.where(going, column(course, "spring_force"), 0.0)), initial=0.0)
+        borne = np.max(
+            np.abs(np.where(going, column(course, "spring_force"), 0.0)), initial=0.0
+        )
         stage = column(course, "stage_position")
         borne += drive.spring * np.max(np.abs(np.diff(stage, axis=0)), initial=0.0)
-        assert friction <= borne * (1.0 + STRENGTH), f"peak_friction is {friction / borne:.6g} of what the spring bears"
+        assert friction <= borne * (1.0 + STRENGTH), (
+            f"peak_friction is {friction / borne:.6g} of what the spring bears"
+        )
 
 
 #: Tolerance of the load or displacement at which a contact pulls off, over the scale of the pull-off.
@@ -244,22 +313,39 @@ def check_turns(scenario, course):
     if contact.lags or contact.reversible or scenario.margin is not None:
         return
     time = course.time.reshape(-1, 1)
-    value = np.asarray(contact.course.at(time, scenario.times.duration)).reshape(-1, 1) + 0.0 * time
+    value = (
+        np.asarray(contact.course.at(time, scenario.times.duration)).reshape(-1, 1)
+        + 0.0 * time
+    )
     least = max(LEAST_WORK * scenario.adhesion.work, 1e-12)
     work, is_open = np.fmax(course.work, least), np.isnan(course.radius)
     fold, scale = pull_off(contact, work, bodies.sphere_radius, bodies.modulus)
     near = TURN * np.maximum(scale, np.max(np.abs(value)))
     again = contact.after_pull_off == "reattach"
     is_open, value, fold = np.broadcast_arrays(is_open, value, fold)
-    before, after, has_work = is_open[:-1], is_open[1:], np.broadcast_to(work > least, is_open.shape)[1:]
+    before, after, has_work = (
+        is_open[:-1],
+        is_open[1:],
+        np.broadcast_to(work > least, is_open.shape)[1:],
+    )
     lost, holds_on = value[1:] < fold[1:] - near, value[1:] > fold[1:] + near
     touches, apart = value[1:] > near, value[1:] < -near
     never_closed = np.logical_and.accumulate(is_open)[:-1]
-    assert not np.any(~before & ~after & lost), "a contact is closed beyond its pull-off"
-    assert not np.any(~before & after & holds_on & has_work), "a contact opens before its pull-off"
-    assert not np.any(before & after & touches & (again | never_closed)), "a contact is open though the sphere touches"
-    assert not np.any(before & ~after & apart), "a contact closes before the sphere touches"
-    assert again or not np.any(before & ~after & ~never_closed), "a contact closes that should stay open"
+    assert not np.any(~before & ~after & lost), (
+        "a contact is closed beyond its pull-off"
+    )
+    assert not np.any(~before & after & holds_on & has_work), (
+        "a contact opens before its pull-off"
+    )
+    assert not np.any(before & after & touches & (again | never_closed)), (
+        "a contact is open though the sphere touches"
+    )
+    assert not np.any(before & ~after & apart), (
+        "a contact closes before the sphere touches"
+    )
+    assert again or not np.any(before & ~after & ~never_closed), (
+        "a contact closes that should stay open"
+    )
 
 
 def pull_off(contact, work, sphere_radius, modulus):
@@ -269,17 +355,27 @@ def pull_off(contact, work, sphere_radius, modulus):
     which rises, is zero.
     """
     if contact.load is not None:
-        return -1.5 * math.pi * work * sphere_radius, 1.5 * math.pi * np.max(work) * sphere_radius
+        return -1.5 * math.pi * work * sphere_radius, 1.5 * math.pi * np.max(
+            work
+        ) * sphere_radius
     compliance = 1.0 / contact.stiffness if contact.stiffness else 0.0
-    low, high = np.zeros(work.shape), 4.0 * np.cbrt(math.pi * work * sphere_radius**2 / modulus)
+    low, high = (
+        np.zeros(work.shape),
+        4.0 * np.cbrt(math.pi * work * sphere_radius**2 / modulus),
+    )
     for _ in range(100):
         a = 0.5 * (low + high)
         slope = 2.0 * a / sphere_radius - np.sqrt(0.5 * math.pi * work / (modulus * a))
-        slope += compliance * (4.0 * modulus * a**2 / sphere_radius - 3.0 * np.sqrt(2.0 * math.pi * work * modulus * a))
+        slope += compliance * (
+            4.0 * modulus * a**2 / sphere_radius
+            - 3.0 * np.sqrt(2.0 * math.pi * work * modulus * a)
+        )
         low, high = np.where(slope < 0.0, a, low), np.where(slope < 0.0, high, a)
     a = high
     depth = a**2 / sphere_radius - np.sqrt(2.0 * math.pi * a * work / modulus)
-    load = 4.0 * modulus * a**3 / (3.0 * sphere_radius) - np.sqrt(8.0 * math.pi * work * modulus * a**3)
+    load = 4.0 * modulus * a**3 / (3.0 * sphere_radius) - np.sqrt(
+        8.0 * math.pi * work * modulus * a**3
+    )
     fold = depth + compliance * load
     return fold, np.max(np.abs(fold)) + np.max(a**2) / sphere_radius
 
@@ -297,12 +393,18 @@ def reached(scenario, course):
     rings = scenario.drive.mass > 0.0 and turns >= TURNS
     events = np.diff(column(course, "substeps")[:, 0])
     many = int(np.sum(events >= EVENTS)) if scenario.bonds.model == "tracked" else 0
-    return Counter({
-        "openings behind springs": opens * spring,
-        "openings under forces": opens * (not spring),
-        "closings": closes,
-        "ringing bodies on cohorts": int(rings and scenario.bonds.model == "cohort"),
-        "ringing bodies on other bonds": int(rings and scenario.bonds.model != "cohort"),
-        "clock steps with a million events": many,
-        "runaways": int(np.isfinite(column(course, "runaway_time")[-1, 0])),
-    })  # fmt: skip
+    return Counter(
+        {
+            "openings behind springs": opens * spring,
+            "openings under forces": opens * (not spring),
+            "closings": closes,
+            "ringing bodies on cohorts": int(
+                rings and scenario.bonds.model == "cohort"
+            ),
+            "ringing bodies on other bonds": int(
+                rings and scenario.bonds.model != "cohort"
+            ),
+            "clock steps with a million events": many,
+            "runaways": int(np.isfinite(column(course, "runaway_time")[-1, 0])),
+        }
+    )

@@ -6,7 +6,9 @@ from unittest.mock import Mock
 from sim.numerics import disk_cache
 
 
-def test_a_result_is_cached_for_each_key_and_only_if_it_took_long(tmp_path, monkeypatch):
+def test_a_result_is_cached_for_each_key_and_only_if_it_took_long(
+    tmp_path, monkeypatch
+):
     monkeypatch.setenv("SIM_CACHE_DIR", str(tmp_path))
     computed = []
     for key in ("a", "a", "b"):
@@ -14,7 +16,10 @@ def test_a_result_is_cached_for_each_key_and_only_if_it_took_long(tmp_path, monk
     assert computed == ["a", "a", "b"]
     monkeypatch.setattr(disk_cache, "_WORTH", -1.0)
     for key in ("a", "a", "b", "a"):
-        assert disk_cache.cached(key, lambda key=key: computed.append(key) or f"of {key}") == f"of {key}"
+        assert (
+            disk_cache.cached(key, lambda key=key: computed.append(key) or f"of {key}")
+            == f"of {key}"
+        )
     assert computed[3:] == ["a", "b"]
     for path in tmp_path.rglob("found/*"):
         path.write_bytes(path.read_bytes()[:-1])

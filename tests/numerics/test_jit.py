@@ -17,11 +17,20 @@ from sim.numerics.special import lambert_w
 def test_a_law_of_arrays_is_that_of_single_numbers():
     random = np.random.default_rng(3)
     for size in [1, 3, 255, 256, 4095, 4096, 4097, 10_000]:
-        load, work = random.uniform(-1e-4, 4e-3, size), random.uniform(-1e-2, 42e-3, size)
+        load, work = (
+            random.uniform(-1e-4, 4e-3, size),
+            random.uniform(-1e-2, 42e-3, size),
+        )
         whole = jkr.radius_at_load(load, work, 2e-3, 6.4e6)
         some = random.integers(0, size, 50)
-        assert_array_equal(whole[some], [jkr.radius_at_load(load[i], work[i], 2e-3, 6.4e6) for i in some])
-    load, work = np.linspace(0, 4e-3, 30).reshape(5, 1, 6), np.linspace(0, 42e-3, 40).reshape(40, 1)
+        assert_array_equal(
+            whole[some],
+            [jkr.radius_at_load(load[i], work[i], 2e-3, 6.4e6) for i in some],
+        )
+    load, work = (
+        np.linspace(0, 4e-3, 30).reshape(5, 1, 6),
+        np.linspace(0, 42e-3, 40).reshape(40, 1),
+    )
     assert jkr.radius_at_load(load, work, 2e-3, 6.4e6).shape == (5, 40, 6)
     square = np.linspace(0, 4e-3, 90_000).reshape(300, 300)
     whole = jkr.radius_at_load(square, 0.042, 2e-3, 6.4e6)
@@ -48,11 +57,22 @@ print(np.concatenate(numbers).tobytes().hex())
 """
 
 
-def test_without_an_internal_of_numba_the_public_decorators_give_the_same_bits(tmp_path):
-    environment = {**os.environ, "SIM_CACHE_DIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
+def test_without_an_internal_of_numba_the_public_decorators_give_the_same_bits(
+    tmp_path,
+):
+    environment = {
+        **os.environ,
+        "SIM_CACHE_DIR": str(tmp_path),
+        "PYTHONPATH": os.pathsep.join(sys.path),
+    }
     command = [sys.executable, "-c", WITHOUT_INTERNALS]
-    printed = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
-    numbers = lambert_w(np.linspace(0.0, 4.0, 7)), Noise(7, "shear", np.arange(2)).normals(3, 300).ravel()
+    printed = subprocess.run(
+        command, env=environment, capture_output=True, text=True, check=True
+    ).stdout
+    numbers = (
+        lambert_w(np.linspace(0.0, 4.0, 7)),
+        Noise(7, "shear", np.arange(2)).normals(3, 300).ravel(),
+    )
     assert printed.strip() == np.concatenate(numbers).tobytes().hex()
 
 
@@ -82,7 +102,9 @@ def compiled_in(tmp_path, monkeypatch):
     jit._cache_folder.cache_clear()
 
 
-def test_a_missing_broken_read_only_or_full_cache_stops_no_run(tmp_path, compiled_in, room, monkeypatch):
+def test_a_missing_broken_read_only_or_full_cache_stops_no_run(
+    tmp_path, compiled_in, room, monkeypatch
+):
     compilings = []
     monkeypatch.setattr(jit, "on_compiling", [compilings.append])
     fresh = compiled_in(tmp_path / "cache")

@@ -24,7 +24,10 @@ def followed(samples, step=0.5, slopes=None, radii=(ONE, ONE), stretched=True):
     zero, slopes = np.zeros(1), slopes or [np.full(1, np.nan)] * len(samples)
     forces = zero if stretched else zero + np.nan
     pairs = zip(samples, slopes, strict=True)
-    bondings = [Bonding(zero, np.asarray(one), zero, zero, slope, forces) for one, slope in pairs]
+    bondings = [
+        Bonding(zero, np.asarray(one), zero, zero, slope, forces)
+        for one, slope in pairs
+    ]
     maxima = events.first(bondings[0], contact(radii[0]), zero, np.empty(0))
     whole = _after(maxima, bondings, radii, step, 1)
     for number in range(1, len(bondings)):
@@ -37,12 +40,19 @@ def followed(samples, step=0.5, slopes=None, radii=(ONE, ONE), stretched=True):
 def _after(maxima, bondings, radii, step, number):
     """Maxima after a block of steps."""
     steps = len(bondings) - 1
-    still, times = np.zeros((steps, 1)), step * np.arange(number, number + steps)[:, None]
-    motions = Motion(number, times, np.full((steps, 1), step), still, still, still, still, still)
+    still, times = (
+        np.zeros((steps, 1)),
+        step * np.arange(number, number + steps)[:, None],
+    )
+    motions = Motion(
+        number, times, np.full((steps, 1), step), still, still, still, still, still
+    )
     bonding = Bonding(*(np.array(values[1:]) for values in zip(*bondings, strict=True)))
     # the radius jumps at the beginning of a step: only the last row of a block is its end
     ends = np.repeat(radii[1][None], steps, axis=0)
-    return events.after(maxima, (bondings[0], radii[0]), bonding, contact(ends), still, motions)
+    return events.after(
+        maxima, (bondings[0], radii[0]), bonding, contact(ends), still, motions
+    )
 
 
 def stress(*course, **kind):
@@ -57,7 +67,11 @@ def test_parabolas_and_cubics_are_found_between_samples_and_friction_over_a_grow
     assert_allclose(column("time", maxima), where, rtol=1e-12)
     top, where = np.array([2.0, 7.0]), np.array([1.6, 2.9])
     away = [t - where for t in 0.5 * np.arange(7)]
-    maxima = stress([top - 0.05 * u**2 * (1.5 - u) for u in away], 0.5, [0.15 * u * (u - 1.0) for u in away])
+    maxima = stress(
+        [top - 0.05 * u**2 * (1.5 - u) for u in away],
+        0.5,
+        [0.15 * u * (u - 1.0) for u in away],
+    )
     assert_allclose(column("largest", maxima), top, rtol=1e-14)
     assert_allclose(column("time", maxima), where, rtol=1e-12)
     # Hermite's cubic from 0 with slope 1 to 0.5 with slope −0.5, of either sign.
@@ -66,11 +80,18 @@ def test_parabolas_and_cubics_are_found_between_samples_and_friction_over_a_grow
     cubic = 0.5 * t**2 * (3.0 - 2.0 * t) + t * (1.0 - t) ** 2 - 0.5 * t**2 * (t - 1.0)
     assert_allclose(column("largest", maxima), cubic.max(), rtol=1e-9)
     # Stress 1 − (t − 1/2)² over an area that doubles in a step of 1: cubic, (1 + t)(3/4 + t − t²).
-    values, slopes = [np.array([0.75]), np.array([0.75])], [np.array([1.0]), np.array([-1.0])]
+    values, slopes = (
+        [np.array([0.75]), np.array([0.75])],
+        [np.array([1.0]), np.array([-1.0])],
+    )
     maxima = followed(values, 1.0, slopes, (ONE, np.sqrt(2.0) * ONE))
     top = 0.5 * np.sqrt(7.0 / 3.0)  # where 7/4 − 3 t² is 0: 0.76
     assert_allclose(maxima.stress[0, 0, 3:5], [1.0, 0.5], rtol=1e-14)
-    assert_allclose(maxima.friction[0, 0, 3:5], [(1.0 + top) * (0.75 + top - top**2), top], rtol=1e-14)
+    assert_allclose(
+        maxima.friction[0, 0, 3:5],
+        [(1.0 + top) * (0.75 + top - top**2), top],
+        rtol=1e-14,
+    )
 
 
 def test_a_jump_keeps_its_sample_and_nothing_is_larger_than_nan():
@@ -80,25 +101,37 @@ def test_a_jump_keeps_its_sample_and_nothing_is_larger_than_nan():
         assert column("time", maxima)[0] == 0.5 * samples.index(5.0)
     maxima = stress([np.array([np.nan]), np.array([2.0]), np.array([np.nan])])
     assert column("largest", maxima)[0] == 2.0
-    maxima = stress([np.zeros(1), np.ones(1)], 1.0, [np.full(1, 30.0), np.full(1, -1.0)])
+    maxima = stress(
+        [np.zeros(1), np.ones(1)], 1.0, [np.full(1, 30.0), np.full(1, -1.0)]
+    )
     assert column("largest", maxima)[0] == 1.0
     samples = [np.array([1.0]), np.array([2.0]), np.array([1.5])]
-    assert_array_equal(np.repeat(stress(samples), 3, axis=0), stress([np.repeat(values, 3) for values in samples]))
+    assert_array_equal(
+        np.repeat(stress(samples), 3, axis=0),
+        stress([np.repeat(values, 3) for values in samples]),
+    )
 
 
 def test_no_maximum_exceeds_a_kink_between_two_straight_courses():
     # From the start up with slope 1 to a kink of height 1, from there down with slope −0.01.
     place = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
-    samples, slopes = [1.0 - place, 1.0 - 0.01 * (1.0 - place)], [np.ones(5), np.full(5, -0.01)]
+    samples, slopes = (
+        [1.0 - place, 1.0 - 0.01 * (1.0 - place)],
+        [np.ones(5), np.full(5, -0.01)],
+    )
     largest = column("largest", stress(samples, 1.0, slopes))
     assert np.all(largest <= 1.0 + 1e-15) and np.all(largest >= samples[1])
     # Hermite's cubic from 0 with slope 1 to 0.3 with slope −0.01 exceeds the tangent at its end.
-    largest = column("largest", stress([np.zeros(1), np.full(1, 0.3)], 1.0, [np.ones(1), np.full(1, -0.01)]))
+    largest = column(
+        "largest",
+        stress([np.zeros(1), np.full(1, 0.3)], 1.0, [np.ones(1), np.full(1, -0.01)]),
+    )
     assert 0.3 <= largest < 0.3 + 0.01 * 0.2
 
 
 def test_a_stress_of_bonds_without_a_stretch_is_never_refined_by_a_parabola():
-    for samples in ([0.8, 1.0, 0.98], [1.0, 1.0, 0.6]):  # the end of a stick phase, a jump of the speed
+    # the end of a stick phase, a jump of the speed
+    for samples in ([0.8, 1.0, 0.98], [1.0, 1.0, 0.6]):
         course = [np.full(1, value) for value in samples]
         parabola = column("largest", stress(course))
         largest = column("largest", stress(course, stretched=False))
@@ -110,8 +143,14 @@ def peak_errors(counts, known):
     exact, errors = np.sin(np.pi / 4) * np.exp(-np.pi / 4), []
     for count in counts:
         times = 0.013 + np.linspace(0.0, 3.0, count + 1)
-        slopes = [np.array([(np.cos(t) - np.sin(t)) * np.exp(-t)]) for t in times] if known else None
-        maxima = stress([np.array([np.sin(t) * np.exp(-t)]) for t in times], 3.0 / count, slopes)
+        slopes = (
+            [np.array([(np.cos(t) - np.sin(t)) * np.exp(-t)]) for t in times]
+            if known
+            else None
+        )
+        maxima = stress(
+            [np.array([np.sin(t) * np.exp(-t)]) for t in times], 3.0 / count, slopes
+        )
         errors.append(abs(column("largest", maxima)[0] / exact - 1.0))
     return np.array(errors)
 
@@ -121,4 +160,7 @@ def test_the_error_is_of_third_order_in_the_step_and_of_fourth_with_slopes():
     assert max(errors) < 1e-4 and errors[-1] < 2e-6 and errors[-1] < errors[0] / 100.0
     counts = np.array([10, 20, 40, 80])
     errors = peak_errors(counts, known=True)
-    assert np.all(errors < (3.0 / counts) ** 4 / 90.0) and errors[-1] < errors[0] / 100.0  # h⁴ f⁗/384, f⁗ = 4 f
+    # h⁴ f⁗/384, f⁗ = 4 f
+    assert (
+        np.all(errors < (3.0 / counts) ** 4 / 90.0) and errors[-1] < errors[0] / 100.0
+    )

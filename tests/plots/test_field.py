@@ -21,7 +21,9 @@ STARTER = Path(__file__).parents[2] / "sim" / "starter.toml"
 
 def test_a_ripple_and_its_displacement_have_the_closed_amplitudes_and_an_arrow_points_ahead():
     ripple = Ripple(amplitude=3e5, wavelength=24e-6)
-    dataset = mapped(spectrum=ripple, mode_amplitudes="fixed", amplitude=Onset(speed=1e-9, width=0.1))
+    dataset = mapped(
+        spectrum=ripple, mode_amplitudes="fixed", amplitude=Onset(speed=1e-9, width=0.1)
+    )
     shown = [panel.images[0] for panel in plots.draw(dataset, "map").axes]
     # 384 pixels to ten waves: the highest pixel is at most half a pixel's phase from the crest
     near = 1.0 - np.cos(np.pi * 10 / field_figures.PIXELS)
@@ -30,28 +32,52 @@ def test_a_ripple_and_its_displacement_have_the_closed_amplitudes_and_an_arrow_p
     assert_allclose(shown[1].get_array().max(), 1e9 * 3e5 * compliance, rtol=near)
     along, across = (np.ptp(shown[0].get_array(), axis=axis).max() for axis in (1, 0))
     assert along > 500.0 and across < 1e-6  # x to the right
-    for speed, text in [(4e-3, r"sliding $\longrightarrow$"), (-4e-3, r"$\longleftarrow$ sliding"), (0.0, "at rest")]:
-        parts = {"shear": field(shear.Mapped, amplitude=Stress(reference=3e5)), "record": Record(maps=(0.4,))}
-        dataset = simulated(drive=drive.Steady(speed=speed), ensemble=Ensemble(members=1), **parts)
-        assert text in [label.get_text() for label in plots.draw(dataset, "map").axes[0].texts]
+    for speed, text in [
+        (4e-3, r"sliding $\longrightarrow$"),
+        (-4e-3, r"$\longleftarrow$ sliding"),
+        (0.0, "at rest"),
+    ]:
+        parts = {
+            "shear": field(shear.Mapped, amplitude=Stress(reference=3e5)),
+            "record": Record(maps=(0.4,)),
+        }
+        dataset = simulated(
+            drive=drive.Steady(speed=speed), ensemble=Ensemble(members=1), **parts
+        )
+        assert text in [
+            label.get_text() for label in plots.draw(dataset, "map").axes[0].texts
+        ]
 
 
 def test_maps_that_cannot_be_drawn_say_why():
-    parts = {"shear": field(shear.Mapped), "record": Record(maps=(0.4,)), "ensemble": Ensemble(members=1)}
+    parts = {
+        "shear": field(shear.Mapped),
+        "record": Record(maps=(0.4,)),
+        "ensemble": Ensemble(members=1),
+    }
     with pytest.raises(ValueError, match=r'\[record\] maps = \["1 s"\]'):
         plots.draw(simulated(), "map")
     assert plots.draw(simulated(drive=drive.Steady(), **parts), "map").axes
 
 
-ANISOTROPIC = {"model": "anisotropic_gaussian", "rms": "100 kPa", "length_x": "12 um", "length_y": "40 um"}
+ANISOTROPIC = {
+    "model": "anisotropic_gaussian",
+    "rms": "100 kPa",
+    "length_x": "12 um",
+    "length_y": "40 um",
+}
 
 
 def before(**spectrum):
     """The figure of a scene that has not run."""
-    return field_figures.density_figure(load(tomllib.loads(LENS) | {"shear": {"model": "mean", "spectrum": spectrum}}))
+    return field_figures.density_figure(
+        load(tomllib.loads(LENS) | {"shear": {"model": "mean", "spectrum": spectrum}})
+    )
 
 
-def test_a_spectrum_is_drawn_before_any_run_also_by_the_command_which_replaces_nothing(tmp_path, monkeypatch):
+def test_a_spectrum_is_drawn_before_any_run_also_by_the_command_which_replaces_nothing(
+    tmp_path, monkeypatch
+):
     q, density = np.geomspace(1e4, 1e6, 9), np.geomspace(1.0, 1e-4, 9)
     monkeypatch.chdir(tmp_path)
     rows = "\n".join(f"{a}; {b}" for a, b in zip(q, density, strict=True))
@@ -61,22 +87,36 @@ def test_a_spectrum_is_drawn_before_any_run_also_by_the_command_which_replaces_n
     table = Tabulated(q, density)
     assert_allclose(line.get_xdata() * 1e6, np.geomspace(7e3, 1.4e6, 1500), rtol=1e-12)
     inside = np.isfinite(line.get_ydata())
-    assert_allclose(line.get_ydata()[inside], table.radial_density(line.get_xdata()[inside] * 1e6), rtol=1e-9)
+    assert_allclose(
+        line.get_ydata()[inside],
+        table.radial_density(line.get_xdata()[inside] * 1e6),
+        rtol=1e-9,
+    )
     assert_allclose(rows.get_ydata(), density, rtol=1e-9)
     # by trapezoids, one of which begins at the jump of the density: half of it counts too much
     variance = below.lines[-2]
     exact = table.cumulative(variance.get_xdata() * 1e6) / table.variance
     assert_allclose(variance.get_ydata(), exact, rtol=0, atol=1e-3)
     along, across = before(**ANISOTROPIC).axes[0].lines[:2]
-    assert [line.get_label() for line in (along, across)] == ["along the sliding", "across it"]
+    assert [line.get_label() for line in (along, across)] == [
+        "along the sliding",
+        "across it",
+    ]
     spectrum = AnisotropicGaussian(1e5, 12e-6, 40e-6)
     q = along.get_xdata() * 1e6
-    assert_allclose(np.nan_to_num(along.get_ydata()), spectrum.density(q, 0.0), rtol=1e-12)
-    assert_allclose(np.nan_to_num(across.get_ydata()), spectrum.density(0.0, q), rtol=1e-12)
+    assert_allclose(
+        np.nan_to_num(along.get_ydata()), spectrum.density(q, 0.0), rtol=1e-12
+    )
+    assert_allclose(
+        np.nan_to_num(across.get_ydata()), spectrum.density(0.0, q), rtol=1e-12
+    )
     monkeypatch.chdir(tmp_path)
     Path("scene.toml").write_text(STARTER.read_text(encoding="utf-8"), encoding="utf-8")
     answer = sim("plot", "scene.toml")
-    assert (answer.exit_code, answer.stdout) == (0, f"{Path('outputs/scene-spectrum.png')}\n")
+    assert (answer.exit_code, answer.stdout) == (
+        0,
+        f"{Path('outputs/scene-spectrum.png')}\n",
+    )
     made = Path("outputs/scene-spectrum.png").read_bytes()
     assert made.startswith(b"\x89PNG") and sim("plot", "scene.toml").exit_code == 73
     for arguments, words in (
@@ -86,10 +126,14 @@ def test_a_spectrum_is_drawn_before_any_run_also_by_the_command_which_replaces_n
     ):
         answer = sim("plot", *arguments)
         assert answer.exit_code == 2 and words in answer.stderr
-    Path("ripple.toml").write_text(STARTER.read_text(encoding="utf-8").partition("[shear]")[0], encoding="utf-8")
+    Path("ripple.toml").write_text(
+        STARTER.read_text(encoding="utf-8").partition("[shear]")[0], encoding="utf-8"
+    )
     answer = sim("plot", "ripple.toml")
     assert answer.exit_code == 2 and "no spectrum before a run" in answer.stderr
-    assert sorted(path.name for path in Path("outputs").iterdir()) == ["scene-spectrum.png"]
+    assert sorted(path.name for path in Path("outputs").iterdir()) == [
+        "scene-spectrum.png"
+    ]
 
 
 def test_a_map_passes_through_every_sample_and_a_measured_one_is_drawn_as_it_is():
@@ -103,22 +147,36 @@ def test_a_map_passes_through_every_sample_and_a_measured_one_is_drawn_as_it_is(
         # the middle of the picture is the corner of the cell's array; rounding of the transform of |stress|
         at = half + fine * np.arange(points // 2)
         rounding = 1e-13 * np.max(np.abs(stress))
-        assert_allclose(shown[np.ix_(at, at)], stress[: points // 2, : points // 2], rtol=0, atol=rounding)
+        assert_allclose(
+            shown[np.ix_(at, at)],
+            stress[: points // 2, : points // 2],
+            rtol=0,
+            atol=rounding,
+        )
     values = np.random.default_rng(2).normal(size=(40, 32)) * 1e4
-    found = StressMap(file="map.npy", pixel=9e-6, values=values.tobytes(), shape=values.shape)
+    found = StressMap(
+        file="map.npy", pixel=9e-6, values=values.tobytes(), shape=values.shape
+    )
     dataset = simulated(
-        drive=drive.Steady(speed=0.0), shear=Carried(field=found, contact="disc"), record=Record(maps=(0.4,)),
+        drive=drive.Steady(speed=0.0),
+        shear=Carried(field=found, contact="disc"),
+        record=Record(maps=(0.4,)),
         ensemble=Ensemble(members=1),
-    )  # fmt: skip
+    )
     panel = plots.draw(dataset, "map").axes[0]
     (image,) = panel.images
-    assert_allclose(image.get_array().T * 1e3, values - values.mean(), rtol=0, atol=1e-6)
+    assert_allclose(
+        image.get_array().T * 1e3, values - values.mean(), rtol=0, atol=1e-6
+    )
     left, right, low, high = image.get_extent()
     bar = panel.child_axes[0]
-    most = 1e-3 * np.quantile(np.abs(values - values.mean()), 0.999)  # of 1280 normal numbers one is larger
+    # of 1280 normal numbers one is larger
+    most = 1e-3 * np.quantile(np.abs(values - values.mean()), 0.999)
     assert_allclose(image.get_clim(), [-most, most], rtol=1e-12)
     assert_allclose(sorted(np.abs(bar.get_ylim()))[-1], most, rtol=1e-12)
     assert np.all(np.abs(bar.get_ylim()) <= 1e-3 * np.abs(values - values.mean()).max())
-    assert_allclose((left, right, low, high), 9.0 * np.array([-20.5, 19.5, -16.5, 15.5]), rtol=1e-12)
+    assert_allclose(
+        (left, right, low, high), 9.0 * np.array([-20.5, 19.5, -16.5, 15.5]), rtol=1e-12
+    )
     (circle,) = (patch for patch in panel.patches if isinstance(patch, Circle))
     assert circle.center == (0.0, 0.0)

@@ -5,13 +5,35 @@ import sys
 import matplotlib as mpl
 import numpy as np
 import pytest
-from helpers.parts import Band, Bell, Clock, Ensemble, Equilibrium, Record, analysis, bonds, drive, shear
-from helpers.pictured import STEADY, drawn, field, legend_of, lines_of, mapped, rendered, simulated
+from helpers.parts import (
+    Band,
+    Bell,
+    Clock,
+    Ensemble,
+    Equilibrium,
+    Record,
+    analysis,
+    bonds,
+    drive,
+    shear,
+)
+from helpers.pictured import (
+    STEADY,
+    drawn,
+    field,
+    legend_of,
+    lines_of,
+    mapped,
+    rendered,
+    simulated,
+)
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.plots import Choices, kinds as plots, style as pictures
 
-REVERSING = drive.Table(time=(0.0, 0.1, 0.1, 0.3, 0.3, 0.4), speed=(2e-3, 2e-3, -2e-3, -2e-3, 2e-3, 2e-3))
+REVERSING = drive.Table(
+    time=(0.0, 0.1, 0.1, 0.3, 0.3, 0.4), speed=(2e-3, 2e-3, -2e-3, -2e-3, 2e-3, 2e-3)
+)
 
 
 @pytest.fixture(scope="module")
@@ -20,8 +42,16 @@ def ramp():
 
 
 def swept(**sweep):
-    axes = {key.replace("_", "."): {"from": 1e-3, "to": 2e-3, "count": count} for key, count in sweep.items()}
-    return simulated(drive=STEADY, shear=shear.Uniform(), sweep=axes, clock=Clock(duration=0.04, step=0.02))
+    axes = {
+        key.replace("_", "."): {"from": 1e-3, "to": 2e-3, "count": count}
+        for key, count in sweep.items()
+    }
+    return simulated(
+        drive=STEADY,
+        shear=shear.Uniform(),
+        sweep=axes,
+        clock=Clock(duration=0.04, step=0.02),
+    )
 
 
 def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_with_a_colour_bar():
@@ -31,22 +61,46 @@ def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_wi
     load, radius = drawn(figure.axes[0], pictures.BOTH)
     assert_allclose(load, [1.0, 4.0, 16.0], rtol=1e-14)
     assert_allclose(radius, 1e6 * found["contact_radius_mean"].isel(t=0), rtol=1e-14)
-    assert_allclose(drawn(figure.axes[0], pictures.REFERENCE, "--")[1], 1e6 * dataset["radius_at_rest"], rtol=1e-14)
-    assert figure.axes[-1].get_xlabel() == "normal load $P$ (mN)" and figure.axes[0].get_xscale() == "log"
-    tables = [{"model": "none", "stress": "0.3 MPa"}, {"model": "steady", "critical_speed": "10 mm/s"}]
+    assert_allclose(
+        drawn(figure.axes[0], pictures.REFERENCE, "--")[1],
+        1e6 * dataset["radius_at_rest"],
+        rtol=1e-14,
+    )
+    assert (
+        figure.axes[-1].get_xlabel() == "normal load $P$ (mN)"
+        and figure.axes[0].get_xscale() == "log"
+    )
+    tables = [
+        {"model": "none", "stress": "0.3 MPa"},
+        {"model": "steady", "critical_speed": "10 mm/s"},
+    ]
     keys = {"bonds": tables, "contact.load": [1e-3, 4e-3]}
     dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep=keys)
     figure = plots.draw(dataset, "sweep")
     for panel in figure.axes:
         for line in panel.lines:
             x, y = (np.asarray(values) for values in line.get_data())
-            joined = np.isfinite(y[1:]) & np.isfinite(y[:-1]) & (line.get_linestyle() != "None")
+            joined = (
+                np.isfinite(y[1:])
+                & np.isfinite(y[:-1])
+                & (line.get_linestyle() != "None")
+            )
             # a line within a category, or the one at zero across them all
             assert np.all(np.abs(np.diff(x))[joined] < 0.5) or np.all(y == 0.0)
     radii = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
-    assert_allclose(radii[1].get_ydata(), 1e6 * dataset["contact_radius"].isel(contact_load=1, t=-1), rtol=1e-14)
-    assert np.all(radii[0].get_xdata() < [0.0, 1.0]) and np.all(radii[1].get_xdata() > [0.0, 1.0])  # side by side
-    assert [text.get_text() for text in figure.axes[-1].get_xticklabels()] == ["none", "steady"]
+    assert_allclose(
+        radii[1].get_ydata(),
+        1e6 * dataset["contact_radius"].isel(contact_load=1, t=-1),
+        rtol=1e-14,
+    )
+    # side by side
+    assert np.all(radii[0].get_xdata() < [0.0, 1.0]) and np.all(
+        radii[1].get_xdata() > [0.0, 1.0]
+    )
+    assert [text.get_text() for text in figure.axes[-1].get_xticklabels()] == [
+        "none",
+        "steady",
+    ]
     keys = {"contact.load": [0.0, 4e-3], "sphere.radius": ["1 mm", "2 mm"]}
     dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep=keys)
     panel = plots.draw(dataset).axes[0]
@@ -55,72 +109,137 @@ def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_wi
     assert_allclose(drawn(panel, pictures.LINES[1])[1], radius, rtol=1e-14)
     dataset = simulated(sweep={"drive.to": ["10 mm/s", "100 mm/s"]})
     figure = plots.draw(dataset, "sweep")
-    assert legend_of(figure.axes[0])[1] == "at the end: $t$ = 400 ms, $V$ = 10 mm/s to 100 mm/s"
+    assert (
+        legend_of(figure.axes[0])[1]
+        == "at the end: $t$ = 400 ms, $V$ = 10 mm/s to 100 mm/s"
+    )
     panel = plots.draw(dataset).axes[0]
     ends = [drawn(panel, colour)[0][-1] for colour in pictures.LINES[:2]]
     assert_allclose(ends, [10.0, 100.0], rtol=1e-12)
-    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep={"contact.load": list(np.linspace(1e-3, 9e-3, 9))})
+    dataset = simulated(
+        drive=STEADY,
+        shear=shear.Uniform(),
+        sweep={"contact.load": list(np.linspace(1e-3, 9e-3, 9))},
+    )
     panel, *_, bar = rendered(plots.draw(dataset, "time")).axes
-    assert bar.get_ylabel() == "normal load $P$ (mN)" and not any("$P$" in name for name in legend_of(panel)[0])
+    assert bar.get_ylabel() == "normal load $P$ (mN)" and not any(
+        "$P$" in name for name in legend_of(panel)[0]
+    )
     colours = [line.get_color() for line in panel.lines if line.get_linestyle() == "-"]
-    assert len(colours) == 9 and colours == sorted(colours, key=lambda c: sum(mpl.colors.to_rgb(c)[:2]))
+    assert len(colours) == 9 and colours == sorted(
+        colours, key=lambda c: sum(mpl.colors.to_rgb(c)[:2])
+    )
     dataset = swept(contact_load=41)
     panel = plots.draw(dataset, "time").axes[0]
     ends = [line.get_ydata()[0] for line in panel.lines if line.get_linestyle() == "-"]
     places = np.rint(np.linspace(0, 40, 20)).astype(int)
-    assert_allclose(ends, 1e6 * dataset["contact_radius"].isel(contact_load=places, t=0), rtol=1e-14)
-    assert "20 of 41 curves drawn (choose others by --where)" in legend_of(panel)[1].replace("\n", " ")
+    assert_allclose(
+        ends, 1e6 * dataset["contact_radius"].isel(contact_load=places, t=0), rtol=1e-14
+    )
+    assert "20 of 41 curves drawn (choose others by --where)" in legend_of(panel)[
+        1
+    ].replace("\n", " ")
     chosen = plots.draw(analysis.where(dataset, {"contact.load": "1 mN"}), "time")
     assert chosen.get_suptitle() == "$P$ = 1 mN"
     dataset = swept(contact_load=9, sphere_radius=3)
     panel = rendered(plots.draw(dataset, "time")).axes[0]
-    ends = [line.get_ydata()[-1] for line in panel.lines if np.size(line.get_ydata()) and line.get_linestyle() == "-"]
-    radii = dataset["contact_radius"].isel(t=-1).stack(point=["contact_load", "sphere_radius"]).to_numpy().ravel()
-    assert_allclose(ends, 1e6 * radii[np.rint(np.linspace(0, 26, 10)).astype(int)], rtol=1e-14)
+    ends = [
+        line.get_ydata()[-1]
+        for line in panel.lines
+        if np.size(line.get_ydata()) and line.get_linestyle() == "-"
+    ]
+    radii = (
+        dataset["contact_radius"]
+        .isel(t=-1)
+        .stack(point=["contact_load", "sphere_radius"])
+        .to_numpy()
+        .ravel()
+    )
+    assert_allclose(
+        ends, 1e6 * radii[np.rint(np.linspace(0, 26, 10)).astype(int)], rtol=1e-14
+    )
     names, title = legend_of(panel)
-    assert "$P$ = 2 mN, $R$ = 2 mm" in names and "10 of 27 curves drawn" in title.replace("\n", " ")
+    assert (
+        "$P$ = 2 mN, $R$ = 2 mm" in names
+        and "10 of 27 curves drawn" in title.replace("\n", " ")
+    )
 
 
 def test_several_curves_keep_their_mechanisms_by_a_line_of_the_area_with_the_bonds_left():
     loads = {"contact.load": ["1 mN", "4 mN"]}
-    dataset = simulated(bonds=bonds.Steady(critical_speed=2e-2, stress=3e5), sweep=loads)
+    dataset = simulated(
+        bonds=bonds.Steady(critical_speed=2e-2, stress=3e5), sweep=loads
+    )
     panel = plots.draw(dataset, "curve").axes[0]
     lost = analysis.shares(dataset)["lost_to_bonds_mean"].transpose("contact_load", "t")
     for colour, share in zip(pictures.LINES, lost, strict=False):
         assert_allclose(drawn(panel, colour, "-.")[1], 1.0 - share, rtol=1e-12)
     assert "with intact bonds only" in legend_of(panel)[0]
-    alone = simulated(bonds=bonds.Steady(critical_speed=2e-2, stress=3e5), shear=shear.Uniform(), sweep=loads)
-    assert "with intact bonds only" not in legend_of(plots.draw(alone, "curve").axes[0])[0]  # the curves themselves
+    alone = simulated(
+        bonds=bonds.Steady(critical_speed=2e-2, stress=3e5),
+        shear=shear.Uniform(),
+        sweep=loads,
+    )
+    # the curves themselves
+    assert (
+        "with intact bonds only" not in legend_of(plots.draw(alone, "curve").axes[0])[0]
+    )
 
 
-def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the_speed_jumps(ramp):
+def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the_speed_jumps(
+    ramp,
+):
     figure = rendered(plots.draw(ramp, "curve"))
     found, shares = analysis.statistics(ramp), analysis.shares(ramp)
     area, energies, friction = figure.axes
     speed, ratio = drawn(area, pictures.BOTH)
     assert_allclose(speed, 1e3 * ramp["speed"], rtol=1e-14)  # mm/s
     assert_allclose(ratio, found["area_ratio_mean"], rtol=1e-14)
-    assert_allclose(drawn(area, pictures.REFERENCE, ":")[1], shares["area_ratio_hertz"], rtol=1e-14)
-    assert area.get_xscale() == "log" and friction.get_xlabel() == "sliding speed $V$ (mm/s)"
+    assert_allclose(
+        drawn(area, pictures.REFERENCE, ":")[1], shares["area_ratio_hertz"], rtol=1e-14
+    )
+    assert (
+        area.get_xscale() == "log"
+        and friction.get_xlabel() == "sliding speed $V$ (mm/s)"
+    )
     edges = [shade.get_paths()[0].vertices[:, 1] for shade in area.collections[:2]]
-    colours = [mpl.colors.to_hex(shade.get_facecolor()[0]).upper() for shade in area.collections[:2]]
+    colours = [
+        mpl.colors.to_hex(shade.get_facecolor()[0]).upper()
+        for shade in area.collections[:2]
+    ]
     assert colours == [pictures.BONDS, pictures.FLUCTUATIONS]
     least = [1.0 - shares["lost_to_bonds_mean"].max(), found["area_ratio_mean"].min()]
     assert_allclose([edge.min() for edge in edges], least, rtol=1e-12)
-    assert_allclose([edge.max() for edge in edges], [1.0, 1.0 - shares["lost_to_bonds_mean"].min()], rtol=1e-12)
+    assert_allclose(
+        [edge.max() for edge in edges],
+        [1.0, 1.0 - shares["lost_to_bonds_mean"].min()],
+        rtol=1e-12,
+    )
     _, left = drawn(energies, pictures.BOTH)
     assert_allclose(left, 1e3 * found["work_of_adhesion_mean"], rtol=1e-14)
     _, fluctuations = drawn(energies, pictures.FLUCTUATIONS, "--")
     assert_allclose(fluctuations, 1e3 * found["fluctuation_energy_mean"], rtol=1e-14)
     _, bonded = drawn(energies, pictures.BONDS, "-.")
     assert_allclose(bonded, 1e3 * analysis.bond_work(ramp), rtol=1e-14)
-    assert_allclose(drawn(friction, pictures.BOTH)[1], 1e3 * found["friction_force_mean"], rtol=1e-14)
+    assert_allclose(
+        drawn(friction, pictures.BOTH)[1],
+        1e3 * found["friction_force_mean"],
+        rtol=1e-14,
+    )
     band = plots.draw(ramp, "time").axes[0].collections[0].get_paths()[0].vertices[:, 1]
     quantiles = 1e6 * found["contact_radius_quantile"].sel(quantile=[0.05, 0.95])
-    assert (band.min(), band.max()) == (quantiles[{"quantile": 0}].min(), quantiles[{"quantile": 1}].max())
-    small = simulated(shear=field(spectrum=Band(rms=10e3, longest=60e-6, shortest=16e-6)))
+    assert (band.min(), band.max()) == (
+        quantiles[{"quantile": 0}].min(),
+        quantiles[{"quantile": 1}].max(),
+    )
+    small = simulated(
+        shear=field(spectrum=Band(rms=10e3, longest=60e-6, shortest=16e-6))
+    )
     panels = plots.draw(small, "curve").axes
-    assert panels[2].get_ylabel().startswith(r"fluctuations $\Delta\Gamma$") and len(panels) == 4
+    assert (
+        panels[2].get_ylabel().startswith(r"fluctuations $\Delta\Gamma$")
+        and len(panels) == 4
+    )
     _, energy = drawn(panels[2], pictures.BOTH)
     found = analysis.statistics(small)["fluctuation_energy_mean"]
     assert_allclose(energy / energy[-1], found / found[-1], rtol=1e-13)
@@ -128,7 +247,9 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
     dataset = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())
     closed = dataset["in_contact"].to_numpy() == 1
     last = int(np.flatnonzero(closed)[-1])
-    assert 0 < last < len(closed) - 1 and np.all(dataset["contact_radius"][~closed] == 0.0)
+    assert 0 < last < len(closed) - 1 and np.all(
+        dataset["contact_radius"][~closed] == 0.0
+    )
     panel = plots.draw(dataset, "time").axes[0]
     _, radius = drawn(panel, pictures.BOTH)
     np.testing.assert_array_equal(np.isfinite(radius), closed)
@@ -137,7 +258,12 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
     assert_allclose(np.ravel(cross), at, rtol=1e-14)
     assert "pull-off" in legend_of(panel)[0] and "Hertz" not in legend_of(panel)[0]
     loads = [-3.9e-4, -2e-4, 0.0, 1e-3, 4e-3]
-    dataset = simulated(drive=STEADY, shear=shear.Uniform(), bonds=bonds.Unbroken(), sweep={"contact.load": loads})
+    dataset = simulated(
+        drive=STEADY,
+        shear=shear.Uniform(),
+        bonds=bonds.Unbroken(),
+        sweep={"contact.load": loads},
+    )
     panel = plots.draw(dataset, "sweep").axes[0]
     _, hertz = drawn(panel, pictures.REFERENCE, ":")
     assert np.all(np.isnan(hertz[:2])) and hertz[2] == 0.0 and np.all(hertz[3:] > 0.0)
@@ -146,19 +272,27 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
     speed = dataset["speed"].to_numpy()
     for kind in ("curve", "friction", "stress"):
         for panel in plots.draw(dataset, kind).axes:
-            for line in (line for line in panel.lines if np.size(line.get_ydata()) > 10):
+            for line in (
+                line for line in panel.lines if np.size(line.get_ydata()) > 10
+            ):
                 x = np.asarray(line.get_xdata(), float)
                 speeds = np.insert(speed, np.flatnonzero(np.diff(speed)) + 1, np.nan)
-                assert len(x) == len(speeds) and np.all(np.isnan(x) == np.isnan(speeds)), kind
+                assert len(x) == len(speeds) and np.all(
+                    np.isnan(x) == np.isnan(speeds)
+                ), kind
 
 
 def test_of_members_that_come_off_at_different_times_the_closed_ones_are_drawn_beside_the_share_of_open_ones():
     counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=200)
-    dataset = simulated(contact=Equilibrium(load=-3e-4), bonds=counted, ensemble=Ensemble(members=8))
+    dataset = simulated(
+        contact=Equilibrium(load=-3e-4), bonds=counted, ensemble=Ensemble(members=8)
+    )
     closed = dataset["in_contact"] == 1
     count = closed.sum("member").to_numpy()
     assert {8, 0} < {*count}
-    radius, *_, opened = rendered(plots.draw(dataset, "curve", Choices(absolute=True))).axes
+    radius, *_, opened = rendered(
+        plots.draw(dataset, "curve", Choices(absolute=True))
+    ).axes
     mean = 1e6 * dataset["contact_area"].where(closed).mean("member").to_numpy()
     speed, area = drawn(radius, pictures.BOTH)
     assert_allclose(area, np.where(count > 2, mean, np.nan), rtol=1e-12)
@@ -166,98 +300,175 @@ def test_of_members_that_come_off_at_different_times_the_closed_ones_are_drawn_b
     last = np.flatnonzero(count > 2)[-1]
     assert_allclose(cross, [[speed[last], area[last]]], rtol=1e-14)
     assert opened.get_ylabel() == "open contacts"
-    assert_allclose(drawn(opened, pictures.BOTH)[1], 1.0 - count / 8, rtol=0, atol=1e-15)
+    assert_allclose(
+        drawn(opened, pictures.BOTH)[1], 1.0 - count / 8, rtol=0, atol=1e-15
+    )
 
 
 def test_branches_of_a_course_are_apart_and_shuffled_speeds_make_the_same_curves():
     course = drive.Table(time=(0.0, 0.2, 0.4), speed=(1e-4, 1e-2, 1e-4))
-    dataset = simulated(drive=course, bonds=bonds.Rate(critical_speed=1e-3, rebinding_rate=50.0, stress=1e5))
+    dataset = simulated(
+        drive=course,
+        bonds=bonds.Rate(critical_speed=1e-3, rebinding_rate=50.0, stress=1e5),
+    )
     area = rendered(plots.draw(dataset, "curve")).axes[0]
     ways = [line for line in area.lines if "speed" in str(line.get_label())]
-    assert [line.get_label() for line in ways] == ["increasing speed", "decreasing speed"]
+    assert [line.get_label() for line in ways] == [
+        "increasing speed",
+        "decreasing speed",
+    ]
     parts = [line.get_xdata()[np.isfinite(line.get_ydata())] for line in ways]
     assert np.all(np.diff(parts[0]) > 0.0) and np.all(np.diff(parts[1]) < 0.0)
-    assert sum(map(len, parts)) == dataset.sizes["t"] + 1  # all records; that of the turn is in both
+    # all records; that of the turn is in both
+    assert sum(map(len, parts)) == dataset.sizes["t"] + 1
     speeds, curves = [3e-3, 3e-4, 1e-3, 1e-2], []
     for order in (speeds, sorted(speeds)):
-        dataset = simulated(drive=drive.Steady(speed=1e-3), sweep={"drive.speed": order})
+        dataset = simulated(
+            drive=drive.Steady(speed=1e-3), sweep={"drive.speed": order}
+        )
         for kind in ("curve", "sweep"):
-            curves.append([line.get_xydata() for line in plots.draw(dataset, kind).axes[0].lines])
+            curves.append(
+                [line.get_xydata() for line in plots.draw(dataset, kind).axes[0].lines]
+            )
     for mixed, ordered in zip(curves[:2], curves[2:], strict=True):
         for one, other in zip(mixed, ordered, strict=True):
             assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.verify)])
-def test_every_shape_of_dataset_is_drawn_as_what_fits_it_and_a_quantity_not_recorded_is_named(every):
+def test_every_shape_of_dataset_is_drawn_as_what_fits_it_and_a_quantity_not_recorded_is_named(
+    every,
+):
     waves = {"model": "band", "rms": "10 kPa", "longest": "60 um", "shortest": "16 um"}
     shears = [{"model": "uniform"}, {"model": "mean", "spectrum": waves}]
     counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=5e2, sites=9)
-    contacts = [{"model": "equilibrium", "load": 4e-3}, {"model": "equilibrium", "indentation": 1e-6}]
+    contacts = [
+        {"model": "equilibrium", "load": 4e-3},
+        {"model": "equilibrium", "indentation": 1e-6},
+    ]
     moving = {"model": "equilibrium", "indentation": {"from": "2 um", "to": "-2 um"}}
-    tracked = bonds.Tracked(rupture=Bell(zero_force_rate=1e4, bell_force=4e-12), bond_stiffness=4e-4,
-                            rebinding_rate=1e5, site_density=9e16, sites=50)  # fmt: skip
+    tracked = bonds.Tracked(
+        rupture=Bell(zero_force_rate=1e4, bell_force=4e-12),
+        bond_stiffness=4e-4,
+        rebinding_rate=1e5,
+        site_density=9e16,
+        sites=50,
+    )
     known = set()
     shapes = [
-        {"record": Record(per_member=False)}, {"ensemble": Ensemble(members=1)},
-        {"record": Record(precision="float32")}, {"drive": drive.Ramp(start=-2e-3, stop=8e-3)},
-        {"drive": drive.Table(time=(0.0, 0.2, 0.4), speed=(0.0, 0.02, 0.0))}, {"contact": Equilibrium(load=-3e-4)},
+        {"record": Record(per_member=False)},
+        {"ensemble": Ensemble(members=1)},
+        {"record": Record(precision="float32")},
+        {"drive": drive.Ramp(start=-2e-3, stop=8e-3)},
+        {"drive": drive.Table(time=(0.0, 0.2, 0.4), speed=(0.0, 0.02, 0.0))},
+        {"contact": Equilibrium(load=-3e-4)},
         {"contact": Equilibrium(load=-1.0), "shear": shear.Uniform()},
-        {"contact": Equilibrium(indentation=1e-6), "bonds": counted, "record": Record(per_member=False)},
-        {"sweep": {"contact": contacts}}, {"sweep": {"contact.load": {"from": "0 mN", "to": "20 mN", "count": 12}}},
+        {
+            "contact": Equilibrium(indentation=1e-6),
+            "bonds": counted,
+            "record": Record(per_member=False),
+        },
+        {"sweep": {"contact": contacts}},
+        {"sweep": {"contact.load": {"from": "0 mN", "to": "20 mN", "count": 12}}},
         {"drive": STEADY, "sweep": {"shear": shears, "contact.load": [0.0, 1e-3]}},
-        {"shear": shear.Uniform(), "bonds": bonds.Unbroken()}, {"bonds": tracked, "record": Record(per_member=False)},
-        {"contact": Equilibrium(indentation={"from": -4e-6, "to": -2e-6})}, {"sweep": {"contact": [moving, *contacts]}},
+        {"shear": shear.Uniform(), "bonds": bonds.Unbroken()},
+        {"bonds": tracked, "record": Record(per_member=False)},
+        {"contact": Equilibrium(indentation={"from": -4e-6, "to": -2e-6})},
+        {"sweep": {"contact": [moving, *contacts]}},
         {"drive": STEADY, "clock": Clock(duration=0.02, step=0.02)},
-    ]  # fmt: skip
+    ]
     for changes in shapes[::every]:
-        dataset, scenes = simulated(**changes), repr([changes.get(key) for key in ("contact", "sweep", "shear")])
+        dataset, scenes = (
+            simulated(**changes),
+            repr([changes.get(key) for key in ("contact", "sweep", "shear")]),
+        )
         for kind in plots.drawable(dataset):
             if kind == "theories" and (kind, scenes) in known:
-                continue  # one of the same contact: it has no speeds, members or records
+                # one of the same contact: it has no speeds, members or records
+                continue
             known.add((kind, scenes))
             figure = plots.draw(dataset, kind)
-            assert any(panel.get_xlabel() for panel in figure.axes) and figure.axes[0].get_ylabel()
+            assert (
+                any(panel.get_xlabel() for panel in figure.axes)
+                and figure.axes[0].get_ylabel()
+            )
             for panel in figure.axes:
-                assert lines_of(panel) or panel.texts or panel.collections or panel.images, (changes, kind)
+                assert (
+                    lines_of(panel) or panel.texts or panel.collections or panel.images
+                ), (changes, kind)
     loads, start = {"contact.load": [1e-3, 4e-3]}, drive.Start(rest=0.1, speed=1e-3)
-    moved = {"contact": Equilibrium(load={"from": 0.0, "to": 4e-3}), "sweep": {"sphere.radius": [1e-3, 2e-3]}}
+    moved = {
+        "contact": Equilibrium(load={"from": 0.0, "to": 4e-3}),
+        "sweep": {"sphere.radius": [1e-3, 2e-3]},
+    }
     for changes, kind in (
-        ({}, "curve"), ({"sweep": loads}, "curve"),
+        ({}, "curve"),
+        ({"sweep": loads}, "curve"),
         ({"drive": STEADY, "sweep": {"drive.speed": [1e-3, 4e-3]}}, "curve"),
-        ({"drive": STEADY, "sweep": loads}, "sweep"), ({"drive": STEADY}, "time"), ({"drive": STEADY, **moved}, "loop"),
-        ({"drive": start}, "stress"), ({"drive": start, "bonds": bonds.Unbroken()}, "time"),
-        ({"drive": REVERSING}, "friction"), ({"drive": REVERSING, "bonds": bonds.Unbroken()}, "time"),
+        ({"drive": STEADY, "sweep": loads}, "sweep"),
+        ({"drive": STEADY}, "time"),
+        ({"drive": STEADY, **moved}, "loop"),
+        ({"drive": start}, "stress"),
+        ({"drive": start, "bonds": bonds.Unbroken()}, "time"),
+        ({"drive": REVERSING}, "friction"),
+        ({"drive": REVERSING, "bonds": bonds.Unbroken()}, "time"),
         ({"drive": STEADY, "sweep": {"contact.reversible": [0.0, 0.1]}}, "theories"),
-    ):  # fmt: skip
-        assert plots.default(simulated(shear=shear.Uniform(), **changes)) == kind, changes
-    dataset = simulated(record=Record(quantities=("speed", "friction_force", "jkr_radius", "hertz_radius")))
-    for kind, name in (("curve", "contact_area"), ("stress", "shear_stress"), ("friction", "slider_position")):
-        with pytest.raises(ValueError, match=f'^{name} was not recorded; add "{name}" to record.quantities'):
+    ):
+        assert plots.default(simulated(shear=shear.Uniform(), **changes)) == kind, (
+            changes
+        )
+    dataset = simulated(
+        record=Record(
+            quantities=("speed", "friction_force", "jkr_radius", "hertz_radius")
+        )
+    )
+    for kind, name in (
+        ("curve", "contact_area"),
+        ("stress", "shear_stress"),
+        ("friction", "slider_position"),
+    ):
+        with pytest.raises(
+            ValueError,
+            match=f'^{name} was not recorded; add "{name}" to record.quantities',
+        ):
             plots.draw(dataset, kind)
     assert plots.default(dataset) == "time" and rendered(plots.draw(dataset))
-    with pytest.raises(ValueError, match=r"\[sweep\].*drawn as: theories, stress, friction, curve, time"):
+    with pytest.raises(
+        ValueError,
+        match=r"\[sweep\].*drawn as: theories, stress, friction, curve, time",
+    ):
         plots.draw(simulated(), "sweep")
     with pytest.raises(ValueError, match=r'\[drive\] model = "ramp"'):
         plots.draw(simulated(drive=STEADY, shear=shear.Uniform()), "curve")
 
 
-def test_equal_figures_give_equal_files_of_one_or_two_columns_and_leave_matplotlib_alone(ramp, tmp_path, monkeypatch):
+def test_equal_figures_give_equal_files_of_one_or_two_columns_and_leave_matplotlib_alone(
+    ramp, tmp_path, monkeypatch
+):
     before = mpl.rcParams.copy()
-    monkeypatch.delitem(sys.modules, "matplotlib.pyplot", raising=False)  # which code of the pages imports
+    # which code of the pages imports
+    monkeypatch.delitem(sys.modules, "matplotlib.pyplot", raising=False)
     for name in ("first", "second"):
         figure = plots.draw(ramp, "friction")
         for suffix in ("png", "pdf"):
             figure.savefig(tmp_path / f"{name}.{suffix}")
     for suffix in ("png", "pdf"):
-        assert (tmp_path / f"first.{suffix}").read_bytes() == (tmp_path / f"second.{suffix}").read_bytes()
+        assert (tmp_path / f"first.{suffix}").read_bytes() == (
+            tmp_path / f"second.{suffix}"
+        ).read_bytes()
     plots.draw(mapped(), "map").savefig(tmp_path / "map.png")
-    widths = [int.from_bytes((tmp_path / f"{name}.png").read_bytes()[16:20], "big") for name in ("first", "map")]
+    widths = [
+        int.from_bytes((tmp_path / f"{name}.png").read_bytes()[16:20], "big")
+        for name in ("first", "map")
+    ]
     assert widths == [680, 1400]  # at 200 dpi
     assert mpl.rcParams.copy() == before and "matplotlib.pyplot" not in sys.modules
 
 
 def test_a_band_of_few_members_is_named_as_interpolated_between_them():
-    for members, name in ((3, "5–95 %, interpolated between 3 members"), (20, "5–95 % of members")):
+    for members, name in (
+        (3, "5–95 %, interpolated between 3 members"),
+        (20, "5–95 % of members"),
+    ):
         figure = plots.draw(simulated(ensemble=Ensemble(members=members)))
         assert name in legend_of(figure.axes[0])[0]

@@ -12,7 +12,12 @@ from numpy.testing import assert_allclose
 
 import sim
 from sim.analysis import slips
-from sim.laws.schallamach import Body, first_moment_onset, first_moment_peak, resolved_onset
+from sim.laws.schallamach import (
+    Body,
+    first_moment_onset,
+    first_moment_peak,
+    resolved_onset,
+)
 from sim.parts.bonds.models import Cohort, FirstMoment
 from sim.plots import curves, draw
 
@@ -28,23 +33,42 @@ def driven(kind):
     most = first_moment_peak(*NUMBERS).stress * scene(1).contact_area
     ramp = {"from": 1e-3, "to": 3e-2, "scale": "log", "cycles": 1}
     drives = {
-        "creep": (Force(force=0.5 * most), 0.2, {"drive.force": [0.5 * most, 1.3 * most]}),
-        "map": (Spring(stage=ramp, stiffness=100.0, damping=1e-2, start="steady"), 4.0,
-                {"drive.stiffness": [100.0, 1e4]}),
+        "creep": (
+            Force(force=0.5 * most),
+            0.2,
+            {"drive.force": [0.5 * most, 1.3 * most]},
+        ),
+        "map": (
+            Spring(stage=ramp, stiffness=100.0, damping=1e-2, start="steady"),
+            4.0,
+            {"drive.stiffness": [100.0, 1e4]},
+        ),
         "pull": (Spring(stage=2e-3, stiffness=300.0), 0.1, {}),
-    }  # fmt: skip
+    }
     drive, duration, sweep = drives[kind]
     if kind == "pull":
         parts["adhesion"] = Adhesion(work=42e-3)
-    return sim.run(scene(2, clock=Clock(duration=duration, step=duration / 400), drive=drive, sweep=sweep, **parts))
+    return sim.run(
+        scene(
+            2,
+            clock=Clock(duration=duration, step=duration / 400),
+            drive=drive,
+            sweep=sweep,
+            **parts,
+        )
+    )
 
 
 def test_slips_that_last_few_records_are_remarked_on_with_the_key_that_shows_them():
     dataset = driven("map").isel(drive_stiffness=[0])
-    lasting = float(slips(dataset)["slip_duration"].median() / (dataset["t"][1] - dataset["t"][0]))
+    lasting = float(
+        slips(dataset)["slip_duration"].median() / (dataset["t"][1] - dataset["t"][0])
+    )
     assert lasting < 3.0
     title = draw(dataset, "time").axes[0].get_legend().get_title().get_text()
-    assert "clock.step" in title and "clock.record" in curves.coarse_slips(dataset.isel(t=slice(None, None, 2)))
+    assert "clock.step" in title and "clock.record" in curves.coarse_slips(
+        dataset.isel(t=slice(None, None, 2))
+    )
     assert curves.coarse_slips(driven("pull")) == ""
 
 
@@ -54,13 +78,23 @@ def test_few_fast_records_do_not_rule_the_axis_of_the_speed_and_are_stated_and_w
     dataset["speed"][..., 7] = 0.5
     panel = draw(dataset, "time").axes[-1]
     assert panel.get_ylim()[0] < 1.0 and 2.0 < panel.get_ylim()[1] < 3.0
-    assert [text.get_text() for text in panel.texts if "largest" in text.get_text()] == ["largest record 500 mm/s"]
-    assert not any("largest" in text.get_text() for text in draw(driven("pull"), "time").axes[-1].texts)
+    assert [
+        text.get_text() for text in panel.texts if "largest" in text.get_text()
+    ] == ["largest record 500 mm/s"]
+    assert not any(
+        "largest" in text.get_text()
+        for text in draw(driven("pull"), "time").axes[-1].texts
+    )
     stays, changes = (
-        draw(driven(kind).isel(drive_stiffness=0) if kind == "map" else driven(kind), "time")
+        draw(
+            driven(kind).isel(drive_stiffness=0) if kind == "map" else driven(kind),
+            "time",
+        )
         for kind in ("map", "pull")
     )
-    assert "radius" in changes.axes[0].get_ylabel() and not any("radius" in panel.get_ylabel() for panel in stays.axes)
+    assert "radius" in changes.axes[0].get_ylabel() and not any(
+        "radius" in panel.get_ylabel() for panel in stays.axes
+    )
 
 
 def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_its_bonds():
@@ -72,7 +106,9 @@ def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_its_bonds():
         assert words in legend_of(panel)[1]
         ((speed, stiffness),) = lines_of(panel)
         firm = 0.5 * np.pi**2 * 1.6e6 * float(dataset["radius_at_rest"][0])
-        exact = first_moment_onset(1e-3 * speed, *NUMBERS, body._replace(contact_stiffness=firm)).stiffness
+        exact = first_moment_onset(
+            1e-3 * speed, *NUMBERS, body._replace(contact_stiffness=firm)
+        ).stiffness
         assert_allclose(stiffness, 1e-3 * exact, rtol=1e-6)
         swings = panel.collections[0].get_array().reshape(2, -1)
         # a soft spring sticks and slips at 30 mm/s, one stiffer than the boundary nowhere
@@ -80,11 +116,32 @@ def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_its_bonds():
     # and nothing does below the friction maximum on the way up
     slow = first_moment_peak(*NUMBERS).speed
     edges = np.geomspace(1e-3, 3e-2, swings.shape[1] + 1)
-    assert np.nanmax(up.collections[0].get_array().reshape(2, -1)[:, edges[1:] < slow]) < 0.1
-    bonds = Cohort(BONDS.rupture, BONDS.bond_stiffness, BONDS.rebinding_rate, BONDS.site_density, tolerance=1e-2)
-    drive = Spring(stage={"from": 1e-3, "to": 3e-2, "scale": "log"}, stiffness=1e4, damping=1.0, start="steady")
-    parts = {"bonds": bonds, "drive": drive, "sweep": {"drive.stiffness": [5e3, 1e4]}, "clock": Clock(2.0, 0.05)}
-    panel = rendered(draw(sim.run(scene(1, adhesion=Adhesion(work=42e-3, bond_share=0.0), **parts)))).axes[0]
+    assert (
+        np.nanmax(up.collections[0].get_array().reshape(2, -1)[:, edges[1:] < slow])
+        < 0.1
+    )
+    bonds = Cohort(
+        BONDS.rupture,
+        BONDS.bond_stiffness,
+        BONDS.rebinding_rate,
+        BONDS.site_density,
+        tolerance=1e-2,
+    )
+    drive = Spring(
+        stage={"from": 1e-3, "to": 3e-2, "scale": "log"},
+        stiffness=1e4,
+        damping=1.0,
+        start="steady",
+    )
+    parts = {
+        "bonds": bonds,
+        "drive": drive,
+        "sweep": {"drive.stiffness": [5e3, 1e4]},
+        "clock": Clock(2.0, 0.05),
+    }
+    panel = rendered(
+        draw(sim.run(scene(1, adhesion=Adhesion(work=42e-3, bond_share=0.0), **parts)))
+    ).axes[0]
     ((speed, stiffness),) = lines_of(panel)
     firm = 0.5 * np.pi**2 * 1.6e6 * math.sqrt(scene(1).contact_area / np.pi)
     body = Body(scene(1).contact_area, damping=1.0, contact_stiffness=firm)
@@ -97,15 +154,23 @@ def test_creep_and_the_way_to_sliding_are_drawn_from_the_first_step_beside_the_l
     figure = rendered(draw(dataset))  # the default
     position, speed = figure.axes
     slow, fast = lines_of(speed)[:2]
-    assert_allclose(slow[1], 1e3 * dataset["speed"].isel(drive_force=0, member=0, t=slice(1, None)), rtol=1e-12)
+    assert_allclose(
+        slow[1],
+        1e3 * dataset["speed"].isel(drive_force=0, member=0, t=slice(1, None)),
+        rtol=1e-12,
+    )
     assert slow[0][0] > 0.0 and position.get_yscale() == position.get_xscale() == "log"
     last = int(np.isfinite(fast[1]).sum()) - 1
     crosses = [line for line in speed.lines if line.get_marker() == "x"]
-    assert len(crosses) == 1 and crosses[0].get_xydata().tolist() == [[fast[0][last], fast[1][last]]]
+    assert len(crosses) == 1 and crosses[0].get_xydata().tolist() == [
+        [fast[0][last], fast[1][last]]
+    ]
     assert "runaway" in legend_of(position)[0]
     dataset = driven("pull")
     figure = rendered(draw(dataset, "incipient"))
-    force, area = (dataset[name].isel(member=0).values for name in ("spring_force", "contact_area"))
+    force, area = (
+        dataset[name].isel(member=0).values for name in ("spring_force", "contact_area")
+    )
     top = int(np.argmax(force)) + 1
     own, law = lines_of(figure.axes[0])[:2]
     assert_allclose(own[0], 1e3 * force[:top], rtol=1e-12)
@@ -113,15 +178,21 @@ def test_creep_and_the_way_to_sliding_are_drawn_from_the_first_step_beside_the_l
     half = own[0] <= 0.5 * own[0][-1]
     # least squares: what is left of the loss has no component along the law
     loss, fitted = 1.0 - own[1][half], 1.0 - law[1][half]
-    assert_allclose(np.sum((loss - fitted) * fitted), 0.0, atol=1e-12 * np.sum(fitted**2))
-    assert_allclose(np.diff(np.log(1.0 - law[1][1:])), 2.0 * np.diff(np.log(own[0][1:])), rtol=1e-6)
+    assert_allclose(
+        np.sum((loss - fitted) * fitted), 0.0, atol=1e-12 * np.sum(fitted**2)
+    )
+    assert_allclose(
+        np.diff(np.log(1.0 - law[1][1:])), 2.0 * np.diff(np.log(own[0][1:])), rtol=1e-6
+    )
     assert any("alpha" in text for text in legend_of(figure.axes[0])[0])
 
 
 def test_figures_of_a_slider_are_refused_with_the_cure_where_they_cannot_be_drawn():
     for kind, of, cure in (
-        ("creep", "pull", "force"), ("stability", "pull", "drive.stiffness"), ("stability", "creep", "spring"),
+        ("creep", "pull", "force"),
+        ("stability", "pull", "drive.stiffness"),
+        ("stability", "creep", "spring"),
         ("incipient", "map", "rest"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(ValueError, match=cure):
             draw(driven(of), kind)

@@ -15,9 +15,12 @@ NUMBERS = (42e-3, 2e-3, 6.4e6, 0.5, 0.1)
 
 def plain(**changes):
     parts = {
-        "bonds": bonds.Unbroken(stress=3e5), "shear": shear.Uniform(), "drive": STEADY,
-        "clock": Clock(duration=0.04, step=0.02), "ensemble": Ensemble(members=1),
-    }  # fmt: skip
+        "bonds": bonds.Unbroken(stress=3e5),
+        "shear": shear.Uniform(),
+        "drive": STEADY,
+        "clock": Clock(duration=0.04, step=0.02),
+        "ensemble": Ensemble(members=1),
+    }
     return simulated(**(parts | changes))
 
 
@@ -34,32 +37,57 @@ def test_every_theory_is_drawn_as_far_as_adhesion_holds_with_a_dot_at_its_end():
         (Equilibrium(indentation=2e-6), theories.compare_at_indentation, 2e-6),
         (Equilibrium(load=-3e-4), theories.compare_at_load, -3e-4),
     ]:
-        stresses, forces = drawn_at[value] = plots.draw(plain(contact=contact), "theories").axes
+        stresses, forces = drawn_at[value] = plots.draw(
+            plain(contact=contact), "theories"
+        ).axes
         factor = 1e3 if "kPa" in stresses.get_xlabel() else 1.0
         drawn, _ = curve_of(stresses, "uncorrected")
         radii = law(factor * drawn, value, *NUMBERS)
-        names = ("uncorrected", "savkoor_briggs", "reversible_force", "reversible_stress", "fraction")
+        names = (
+            "uncorrected",
+            "savkoor_briggs",
+            "reversible_force",
+            "reversible_stress",
+            "fraction",
+        )
         for name in (*names, "scaled_angle", "shear_share", "scaled_tangent"):
             stress, area = curve_of(stresses, name)
             assert np.array_equal(stress, drawn)
             held = np.isfinite(area)
-            assert held[0] and np.all(radii[name][held] > np.nan_to_num(radii["hertz"][held]))
-            per_area = {"mm²": 1e6, "µm²": 1e12}[stresses.get_ylabel()[-4:-1].strip("(")]
+            assert held[0] and np.all(
+                radii[name][held] > np.nan_to_num(radii["hertz"][held])
+            )
+            per_area = {"mm²": 1e6, "µm²": 1e12}[
+                stresses.get_ylabel()[-4:-1].strip("(")
+            ]
             # rounding of the axis's unit, which a fold has the square root of
-            assert_allclose(area[held], per_area * np.pi * radii[name][held] ** 2, rtol=1e-6)
+            assert_allclose(
+                area[held], per_area * np.pi * radii[name][held] ** 2, rtol=1e-6
+            )
             force, again = curve_of(forces, name)
             assert_allclose(again, area, rtol=1e-14)
             newton = {"mN": 1e3, "µN": 1e6}[forces.get_xlabel()[-3:-1]]
-            assert_allclose(force[held], newton * factor * stress[held] * area[held] / per_area, rtol=1e-12)
+            assert_allclose(
+                force[held],
+                newton * factor * stress[held] * area[held] / per_area,
+                rtol=1e-12,
+            )
     at_stress, panel = drawn_at[4e-3]
     _, colour, _ = rival_figures._THEORIES["savkoor_briggs"]
-    (dot,) = (line for line in panel.lines if line.get_color() == colour and line.get_marker() == "o")
+    (dot,) = (
+        line
+        for line in panel.lines
+        if line.get_color() == colour and line.get_marker() == "o"
+    )
     limit = 1e3 * float(theories.savkoor_briggs_limit(4e-3, 42e-3, 2e-3))
     # 1500 stresses over the axis's decades; the force is flat at its largest, so a step costs its square
     assert limit * 0.999 < dot.get_xdata()[0] <= limit * (1.0 + 1e-12)
     grey = [line for line in at_stress.lines if line.get_color() == pictures.REFERENCE]
     lines = {line.get_linestyle(): line.get_ydata()[0] for line in grey}
-    at = {"--": jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6), ":": jkr.hertz_radius_at_load(4e-3, 2e-3, 6.4e6)}
+    at = {
+        "--": jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6),
+        ":": jkr.hertz_radius_at_load(4e-3, 2e-3, 6.4e6),
+    }
     for style, radius in at.items():
         assert_allclose(lines[style], 1e6 * np.pi * radius**2, rtol=1e-14)
 
@@ -79,24 +107,40 @@ def test_points_are_means_over_members_and_the_second_half_and_lie_on_the_theori
     assert "$P$ = 4 mN, $w$ = 42 mJ/m²" in figure.legends[0].get_title().get_text()
     dataset = simulated(shear=shear.Uniform())
     panel = plots.draw(dataset, "theories").axes[0]
-    (last,) = (line for line in panel.lines if line.get_label() == "simulated, last record")
+    (last,) = (
+        line for line in panel.lines if line.get_label() == "simulated, last record"
+    )
     at = [1e-3 * dataset["shear_stress"][-1], 1e6 * dataset["contact_area"][-1]]
     assert_allclose(np.ravel(last.get_data()), at, rtol=1e-14)
     contact = Equilibrium(load=4e-3, reversible=0.02)
-    dataset = plain(contact=contact, sweep={"contact.reversible": [0.0, 0.02, 1.0], "bonds.stress": [1e4, 3e4]})
+    dataset = plain(
+        contact=contact,
+        sweep={"contact.reversible": [0.0, 0.02, 1.0], "bonds.stress": [1e4, 3e4]},
+    )
     case = rival_figures.case_of(dataset)
     assert case.reversible == 0.02 and rival_figures.case_of(plain()).reversible == 0.1
     stress, area = rival_figures.points_of(dataset)
     theories = case.radii(np.array([1e4, 3e4]))
-    exact = np.concatenate([np.pi * theories[name] ** 2 for name in ("jkr", "fraction", "reversible_stress")])
+    exact = np.concatenate(
+        [
+            np.pi * theories[name] ** 2
+            for name in ("jkr", "fraction", "reversible_stress")
+        ]
+    )
     assert_allclose(np.sort(area), np.sort(exact), rtol=1e-9)
     assert len(stress) == 6
 
 
 def test_scenes_that_theories_do_not_describe_are_refused_with_the_cure():
     for changes, words in (
-        ({"contact": Equilibrium(displacement=1e-6, stiffness=100.0)}, "load = .*indentation; .*drawn as: .*time"),
-        ({"contact": Equilibrium(load={"from": 0.0, "to": 4e-3})}, "load = .*indentation; .*drawn as: .*time"),
+        (
+            {"contact": Equilibrium(displacement=1e-6, stiffness=100.0)},
+            "load = .*indentation; .*drawn as: .*time",
+        ),
+        (
+            {"contact": Equilibrium(load={"from": 0.0, "to": 4e-3})},
+            "load = .*indentation; .*drawn as: .*time",
+        ),
         ({"adhesion": Adhesion(work=0.0)}, "only with adhesion"),
         ({"contact": Equilibrium(load=-1.0)}, "no contact at rest.*drawn as: time$"),
     ):

@@ -12,7 +12,16 @@ import netCDF4
 import numpy as np
 import pytest
 from helpers.commands import SCENE, sim
-from helpers.parts import Clock, Ensemble, Equilibrium, Record, analysis, load, run, shear
+from helpers.parts import (
+    Clock,
+    Ensemble,
+    Equilibrium,
+    Record,
+    analysis,
+    load,
+    run,
+    shear,
+)
 from helpers.pictured import STEADY, mapped, simulated
 
 from sim.analysis.observables import full_area
@@ -21,10 +30,38 @@ from sim.report import html, report
 
 VOID = {"meta", "link", "img", "br", "hr", "input"}
 TAGS = {
-    "html", "head", "meta", "title", "style", "body", "main", "header", "h1", "h2", "p", "b", "code", "pre", "div",
-    "figure", "figcaption", "table", "thead", "tbody", "tr", "th", "td",
-    "svg", "g", "defs", "path", "use", "clippath", "rect", "image",
-}  # fmt: skip
+    "html",
+    "head",
+    "meta",
+    "title",
+    "style",
+    "body",
+    "main",
+    "header",
+    "h1",
+    "h2",
+    "p",
+    "b",
+    "code",
+    "pre",
+    "div",
+    "figure",
+    "figcaption",
+    "table",
+    "thead",
+    "tbody",
+    "tr",
+    "th",
+    "td",
+    "svg",
+    "g",
+    "defs",
+    "path",
+    "use",
+    "clippath",
+    "rect",
+    "image",
+}
 
 
 class Page(HTMLParser):
@@ -63,8 +100,12 @@ def harmless(page):
         assert not [name for name in attributes if name.startswith("on")]
         for key in ("src", "href", "xlink:href"):
             assert attributes.get(key, "#").startswith(("#", "data:image/png;base64,"))
-        used = [attributes["href"]] if attributes.get("href", "").startswith("#") else []
-        used += re.findall(r"url\(([^)]*)\)", " ".join(str(value) for value in attributes.values()))
+        used = (
+            [attributes["href"]] if attributes.get("href", "").startswith("#") else []
+        )
+        used += re.findall(
+            r"url\(([^)]*)\)", " ".join(str(value) for value in attributes.values())
+        )
         assert {name.lstrip("#") for name in used} <= set(names)
     return page
 
@@ -85,8 +126,13 @@ def run_folder(tmp_path_factory):
     """A folder with a scenario, its dataset and the log of its run."""
     folder = tmp_path_factory.mktemp("run")
     with contextlib.chdir(folder):
-        Path("scene.toml").write_text(f"# Does it stick?\n#\n# Nobody\n# knows.\n\n{SCENE}", encoding="utf-8")
-        assert sim("run", "scene.toml", "-o", "x.nc", "--quiet", "--no-table").exit_code == 0
+        Path("scene.toml").write_text(
+            f"# Does it stick?\n#\n# Nobody\n# knows.\n\n{SCENE}", encoding="utf-8"
+        )
+        assert (
+            sim("run", "scene.toml", "-o", "x.nc", "--quiet", "--no-table").exit_code
+            == 0
+        )
     return folder
 
 
@@ -119,44 +165,102 @@ def shipped(name, **changes):
 def test_every_shape_of_dataset_has_its_page():
     for changes in [
         {"sweep": {"contact.load": [1e-3, 4e-3]}, "record": Record(per_member=False)},
-        {"contact": Equilibrium(load=-1.0), "shear": shear.Uniform(), "ensemble": Ensemble(members=1)},
+        {
+            "contact": Equilibrium(load=-1.0),
+            "shear": shear.Uniform(),
+            "ensemble": Ensemble(members=1),
+        },
         {"drive": STEADY, "clock": Clock(duration=0.02, step=0.02)},
     ]:
         harmless(Page(html(simulated(**changes))))
-    text = html(simulated(sweep={"adhesion.bond_share": [0.0, 1.0], "contact.load": [1e-3, 4e-3]}))
-    heads = re.findall("<thead>(.*?)</thead>", text.partition("<h2>Figures")[0], re.DOTALL)
-    assert len(heads) > 1 and all("bond_share" in head and "load (mN)" in head for head in heads)
+    text = html(
+        simulated(
+            sweep={"adhesion.bond_share": [0.0, 1.0], "contact.load": [1e-3, 4e-3]}
+        )
+    )
+    heads = re.findall(
+        "<thead>(.*?)</thead>", text.partition("<h2>Figures")[0], re.DOTALL
+    )
+    assert len(heads) > 1 and all(
+        "bond_share" in head and "load (mN)" in head for head in heads
+    )
 
 
 @pytest.mark.usefixtures("unwritten")
-def test_the_figures_of_a_page_are_those_that_show_more_of_a_run_and_others_have_a_reason(monkeypatch, smooth):
+def test_the_figures_of_a_page_are_those_that_show_more_of_a_run_and_others_have_a_reason(
+    monkeypatch, smooth
+):
     course = {"time": [0.0, 0.02, 0.02, 0.06], "value": [2e-4, 2e-4, 2e-3, 2e-3]}
-    stepped = shipped("velocity_step", **{"drive.stage": course}, clock={"duration": "60 ms", "step": "1 ms"})
-    crept = shipped("creep", clock={"duration": "0.1 s", "step": "2 ms"}, sweep={"drive.force": [4e-3, 8e-3]})
+    stepped = shipped(
+        "velocity_step",
+        **{"drive.stage": course},
+        clock={"duration": "60 ms", "step": "1 ms"},
+    )
+    crept = shipped(
+        "creep",
+        clock={"duration": "0.1 s", "step": "2 ms"},
+        sweep={"drive.force": [4e-3, 8e-3]},
+    )
     loads = {"contact.load": {"from": 1e-3, "to": 2e-3, "count": 21}}
-    steady = simulated(drive=STEADY, shear=shear.Uniform(), sweep=loads, clock=Clock(duration=0.04, step=0.02))
-    up_and_down = {"model": "table", "time": [0.0, 0.01, 0.02], "speed": [1e-4, 2e-2, 1e-4]}
-    both_ways = shipped("uniform_stress", drive=up_and_down, sweep={}, clock={"duration": 0.02, "step": 1e-3})
+    steady = simulated(
+        drive=STEADY,
+        shear=shear.Uniform(),
+        sweep=loads,
+        clock=Clock(duration=0.04, step=0.02),
+    )
+    up_and_down = {
+        "model": "table",
+        "time": [0.0, 0.01, 0.02],
+        "speed": [1e-4, 2e-2, 1e-4],
+    }
+    both_ways = shipped(
+        "uniform_stress",
+        drive=up_and_down,
+        sweep={},
+        clock={"duration": 0.02, "step": 1e-3},
+    )
     for dataset, best, shown, left_out in (
         (both_ways, "friction", {"curve"}, set()),  # a branch for each sense
-        (stepped, "curve", set(), {"stress"}),  # transients are no curve of stress over speed
+        # transients are no curve of stress over speed
+        (stepped, "curve", set(), {"stress"}),
         (crept, "creep", {"sweep"}, {"stress", "time", "curve"}),
         (steady, "sweep", set(), {"time"}),  # nothing changes in time
     ):
         drawings = [drawing.kind for drawing in report.drawings(dataset)]
-        assert drawings[0] == best and shown <= {*drawings} and not left_out & {*drawings}
+        assert (
+            drawings[0] == best and shown <= {*drawings} and not left_out & {*drawings}
+        )
     draw = report.kinds.draw
-    monkeypatch.setattr(report.kinds, "draw", lambda dataset, kind: draw(dataset, "map"))
-    assert ["no stress maps" in drawing.lacks for drawing in report.drawings(smooth)] == [True]
+    monkeypatch.setattr(
+        report.kinds, "draw", lambda dataset, kind: draw(dataset, "map")
+    )
+    assert [
+        "no stress maps" in drawing.lacks for drawing in report.drawings(smooth)
+    ] == [True]
 
 
 def test_figures_are_in_the_pages_colours(ramp):
     dataset = shipped("stability_map", sweep={"drive.stiffness": [50.0, 1600.0]})
-    for figure, count in ((kinds.draw(mapped(), "map"), 2), (kinds.draw(dataset, "stability"), 3)):
-        images = [given for tag, given in harmless(Page(report.svg_of(figure, "x-"))).elements if tag == "image"]
-        assert sum(image["href"].startswith("data:image/png") for image in images) >= count  # bars are images, too
+    for figure, count in (
+        (kinds.draw(mapped(), "map"), 2),
+        (kinds.draw(dataset, "stability"), 3),
+    ):
+        images = [
+            given
+            for tag, given in harmless(Page(report.svg_of(figure, "x-"))).elements
+            if tag == "image"
+        ]
+        # bars are images, too
+        assert (
+            sum(image["href"].startswith("data:image/png") for image in images) >= count
+        )
     text = report.svg_of(kinds.draw(ramp, "curve"), "x-")
-    assert "currentColor" in text and "#0072b2" in text and "#000000" not in text and "#ffffff" not in text
+    assert (
+        "currentColor" in text
+        and "#0072b2" in text
+        and "#000000" not in text
+        and "#ffffff" not in text
+    )
 
 
 def measured_about(dataset, *distances):
@@ -165,14 +269,21 @@ def measured_about(dataset, *distances):
     records = dataset.isel(t=at)
     area = records["contact_area"].to_numpy() / float(full_area(records).mean())
     error = np.full(len(distances), 0.01)
-    points = {"speed": records["speed"].to_numpy().reshape(-1, len(at))[0], "area_ratio": area + error * distances}
+    points = {
+        "speed": records["speed"].to_numpy().reshape(-1, len(at))[0],
+        "area_ratio": area + error * distances,
+    }
     return points | {"area_ratio_error": error}
 
 
-def test_measured_points_are_in_the_figure_that_has_their_axis_with_their_distances_from_its_curve(smooth, ramp):
+def test_measured_points_are_in_the_figure_that_has_their_axis_with_their_distances_from_its_curve(
+    smooth, ramp
+):
     distances = (0.5, -4.0, 1.5, 0.2)
     (drawing,) = report.drawings(smooth, measured_about(smooth, *distances))
-    np.testing.assert_allclose(drawing.measured.residuals[0].values, distances, rtol=1e-6)
+    np.testing.assert_allclose(
+        drawing.measured.residuals[0].values, distances, rtol=1e-6
+    )
     time = {"t": ramp["t"].to_numpy()[[5, 9]], "friction_force": [1e-3, 1e-3]}
     first, second = report.drawings(ramp, time)
     assert (first.kind, second.kind, second.measured) == ("time", "curve", None)
@@ -182,32 +293,56 @@ def test_measured_points_are_in_the_figure_that_has_their_axis_with_their_distan
 
 @pytest.mark.usefixtures("unwritten")
 def test_hostile_headings_are_refused_in_one_line(here):
-    columns = ("<script>alert(1)</script>", "x" * 10**6, "area_ratio [<b>]", "area\x1b[31m_ratio", "$\\frac{1}{0}$")
+    columns = (
+        "<script>alert(1)</script>",
+        "x" * 10**6,
+        "area_ratio [<b>]",
+        "area\x1b[31m_ratio",
+        "$\\frac{1}{0}$",
+    )
     for column in columns:
         Path("file").write_bytes(f"speed [mm/s], {column}\n1, 0.9\n".encode("latin-1"))
         result = sim("report", "x.nc", "--data", "file")
-        assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1) and len(result.stderr) < 400
+        assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1) and len(
+            result.stderr
+        ) < 400
         assert "file" in result.stderr and "\x1b" not in result.stderr
     assert not Path("x.html").exists()
 
 
-def test_a_page_has_the_numbers_of_the_statistics_its_question_and_error_estimates(ramp):
+def test_a_page_has_the_numbers_of_the_statistics_its_question_and_error_estimates(
+    ramp,
+):
     page = harmless(Page(html(ramp)))
     assert [tag for tag, _ in page.elements].count("svg") == len(page.words("b")) == 1
     stated = analysis.statements(ramp)
     figures = analysis.tables.key_figures(ramp, stated)
-    assert len(figures) > 3 and {"5 % of area lost at V", "first masked"} <= {row[""] for row in figures}
+    assert len(figures) > 3 and {"5 % of area lost at V", "first masked"} <= {
+        row[""] for row in figures
+    }
     for row in (*analysis.table(ramp, 24), *figures):
         assert set(row.values()) <= set(page.words("td"))
     document = json.loads(ramp.attrs["scenario_resolved"]) | {"<b>small</b>": 1}
     remarked = ramp.assign_attrs(scenario_resolved=json.dumps(document))
-    assert any("<b>small</b>" in words for words in harmless(Page(html(remarked))).words("p"))
+    assert any(
+        "<b>small</b>" in words for words in harmless(Page(html(remarked))).words("p")
+    )
     assert set(report.remarks(ramp)) < set(page.words("p"))
     assert html(ramp) == html(ramp)
-    text = "# Why\n# so?\n#\n# Because\n# of that.\n#\n# Really.\nname = 'x'\n# no more\n"
-    for toml, question, rest in ((text, "Why so?", ["Because of that.", "Really."]), ("", "x", [])):
-        assert report.question(ramp.assign_attrs(scenario_toml=toml, title="x")) == ("x", question, rest)
-    error = float(analysis.statistics(ramp)["area_ratio_sem"].max())  # of all records, of which 24 are looked at
+    text = (
+        "# Why\n# so?\n#\n# Because\n# of that.\n#\n# Really.\nname = 'x'\n# no more\n"
+    )
+    for toml, question, rest in (
+        (text, "Why so?", ["Because of that.", "Really."]),
+        ("", "x", []),
+    ):
+        assert report.question(ramp.assign_attrs(scenario_toml=toml, title="x")) == (
+            "x",
+            question,
+            rest,
+        )
+    # of all records, of which 24 are looked at
+    error = float(analysis.statistics(ramp)["area_ratio_sem"].max())
     *_, row = report.known(ramp)
     assert 0.5 * error < 0.01 * float(row["size"].removesuffix(" %")) <= error * 1.005
 
@@ -227,7 +362,9 @@ MARKUP = "</pre></style><script>alert(1)</script><img src=x onerror=alert(1)>{{ 
 def test_markup_in_a_file_and_in_measured_data_is_shown_and_does_nothing(here):
     with netCDF4.Dataset("x.nc", "a") as file:
         file.title = MARKUP
-        file.scenario_toml = f"# {MARKUP}\n#\n# {MARKUP}\n\x1b]0;x\x07\u202e\nname = '{MARKUP}'\n"
+        file.scenario_toml = (
+            f"# {MARKUP}\n#\n# {MARKUP}\n\x1b]0;x\x07\u202e\nname = '{MARKUP}'\n"
+        )
         file.scenario_overrides = f'{{"{MARKUP[:30]}": "{MARKUP[:30]}"}}'
         file.scenario_files = f'{{"{MARKUP[:30]}": 1}}'
         file.history = file.source = file.references = MARKUP
@@ -236,12 +373,19 @@ def test_markup_in_a_file_and_in_measured_data_is_shown_and_does_nothing(here):
             if name != "t":
                 variable.symbol = "<b>"
     table = "d\u202e{{ 7 + 42 }}.csv"
-    Path(table).write_text("speed [mm/s], area_ratio, area_ratio_error\n1, 0.9, 0.1\n9, 0.8, 0.1\n", encoding="utf-8")
+    Path(table).write_text(
+        "speed [mm/s], area_ratio, area_ratio_error\n1, 0.9, 0.1\n9, 0.8, 0.1\n",
+        encoding="utf-8",
+    )
     assert sim("report", "x.nc", "--data", table).exit_code == 0
     text = Path("x.html").read_text(encoding="utf-8")
     page = harmless(Page(text))
     assert page.words("h1") == [MARKUP] and page.words("title")[0] == MARKUP
-    assert [words for words in page.words("pre") if MARKUP in words and r"\x1b]0;x\x07\u202e" in words]
+    assert [
+        words
+        for words in page.words("pre")
+        if MARKUP in words and r"\x1b]0;x\x07\u202e" in words
+    ]
     assert "\x1b" not in text and "\u202e" not in text
     assert [attributes for tag, attributes in page.elements if tag == "style"] == [{}]
     assert any(r"d\u202e{{ 7 + 42 }}" in paragraph for paragraph in page.words("p"))
@@ -249,29 +393,56 @@ def test_markup_in_a_file_and_in_measured_data_is_shown_and_does_nothing(here):
 
 
 @pytest.mark.usefixtures("bare")
-def test_the_page_of_a_file_is_replaced_only_if_asked_and_has_the_commands_that_repeat_it(here):
+def test_the_page_of_a_file_is_replaced_only_if_asked_and_has_the_commands_that_repeat_it(
+    here,
+):
     override = ["--set", 'contact.load="2 mN"', "--seed", "7"]
-    assert sim("run", "scene.toml", *override, "-o", "y.nc", "--quiet", "--no-table").exit_code == 0
+    assert (
+        sim(
+            "run", "scene.toml", *override, "-o", "y.nc", "--quiet", "--no-table"
+        ).exit_code
+        == 0
+    )
     result = sim("report", "y.nc")
     assert (result.exit_code, result.stdout) == (0, "y.html\n")
     page = harmless(Page(Path("y.html").read_text(encoding="utf-8")))
     assert page.words("h1") == ["Does it stick?"] and "Nobody knows." in page.words("p")
     assert page.words("pre")[0] == Path("scene.toml").read_text(encoding="utf-8")
     command = page.words("pre")[-1].splitlines()[0]
-    assert command == "sim run y.toml -o y.nc --set 'contact.load=\"2 mN\"' --set seed=7"
+    assert (
+        command == "sim run y.toml -o y.nc --set 'contact.load=\"2 mN\"' --set seed=7"
+    )
     Path("y.toml").write_text(page.words("pre")[0], encoding="utf-8")
-    arguments = ["-o", "z.nc", "--set", 'contact.load="2 mN"', "--set", "seed=7", "--quiet", "--no-table"]
+    arguments = [
+        "-o",
+        "z.nc",
+        "--set",
+        'contact.load="2 mN"',
+        "--set",
+        "seed=7",
+        "--quiet",
+        "--no-table",
+    ]
     assert sim("run", "y.toml", *arguments).exit_code == 0
     with analysis.dataset.open("y.nc") as first, analysis.dataset.open("z.nc") as again:
         assert first.equals(again)
     Path("x.html").write_text("mine", encoding="utf-8")
-    for arguments, code in (((), 73), (("-o", "x.nc", "--force"), 2), (("-o", "none/of/it/x.html"), 0)):
+    for arguments, code in (
+        ((), 73),
+        (("-o", "x.nc", "--force"), 2),
+        (("-o", "none/of/it/x.html"), 0),
+    ):
         assert sim("report", "x.nc", *arguments).exit_code == code
         assert Path("x.html").read_text(encoding="utf-8") == "mine"
-    assert sim("report", "x.nc", "--force").exit_code == 0 and "<h1>" in Path("x.html").read_text(encoding="utf-8")
+    assert sim("report", "x.nc", "--force").exit_code == 0 and "<h1>" in Path(
+        "x.html"
+    ).read_text(encoding="utf-8")
 
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),
+    None,
+)
 
 
 @pytest.mark.verify
@@ -281,18 +452,50 @@ def test_a_browser_shows_the_page_without_complaint(here, width):
     from matplotlib.image import imread
 
     assert sim("report", "x.nc").exit_code == 0
-    options = ["--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={here}/browser"]
-    options += ["--enable-logging=stderr", "--v=0", f"--window-size={width},3000", "--screenshot=x.png"]
-    done = subprocess.run([BROWSER, *options, f"file://{here}/x.html"], capture_output=True, text=True, timeout=120)
+    options = [
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-gpu",
+        f"--user-data-dir={here}/browser",
+    ]
+    options += [
+        "--enable-logging=stderr",
+        "--v=0",
+        f"--window-size={width},3000",
+        "--screenshot=x.png",
+    ]
+    done = subprocess.run(
+        [BROWSER, *options, f"file://{here}/x.html"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert done.returncode == 0 and "CONSOLE" not in done.stderr
     shown = np.round(255.0 * imread("x.png"))
     assert shown.shape[:2] == (3000, width)
     ink = np.any(shown[..., :3] < 128, axis=-1)
-    assert ink[:300].any() and ink[1000:].any() and not ink[:, -8:].any()  # text and figures, nothing cut at the edge
+    # text and figures, nothing cut at the edge
+    assert ink[:300].any() and ink[1000:].any() and not ink[:, -8:].any()
 
 
 @pytest.mark.verify
 def test_a_page_of_a_thousand_members_at_five_loads_is_below_5_mb(here):
     sweep = 'sweep={"contact.load" = {from = "1 mN", to = "16 mN", count = 5}}'
-    assert sim("run", "scene.toml", "--members", 1000, "--set", sweep, "-o", "large.nc", "--quiet").exit_code == 0
-    assert sim("report", "large.nc").exit_code == 0 and Path("large.html").stat().st_size < 5e6
+    assert (
+        sim(
+            "run",
+            "scene.toml",
+            "--members",
+            1000,
+            "--set",
+            sweep,
+            "-o",
+            "large.nc",
+            "--quiet",
+        ).exit_code
+        == 0
+    )
+    assert (
+        sim("report", "large.nc").exit_code == 0
+        and Path("large.html").stat().st_size < 5e6
+    )

@@ -9,7 +9,15 @@ from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 from scipy import integrate
 
-from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Spectrum, VonKarman
+from sim.spectrum import (
+    AnisotropicGaussian,
+    Band,
+    Gaussian,
+    Ripple,
+    SelfAffine,
+    Spectrum,
+    VonKarman,
+)
 from sim.spectrum.measured import Measured, Tabulated
 
 TURN = 2 * math.pi
@@ -21,8 +29,12 @@ ISOTROPIC = {
     "exponential": VonKarman(1.3, 0.8, 0.5),
     "von_karman_smooth": VonKarman(1.3, 0.8, 1.0),
     "self_affine": SelfAffine(1.3, 0.8, longest=5.0, rolloff=2.0, shortest=0.1),
-    "self_affine_no_plateau": SelfAffine(1.3, 0.3, longest=5.0, rolloff=5.0, shortest=0.1),
-    "self_affine_plateau_only": SelfAffine(1.3, 0.3, longest=5.0, rolloff=0.1, shortest=0.1),
+    "self_affine_no_plateau": SelfAffine(
+        1.3, 0.3, longest=5.0, rolloff=5.0, shortest=0.1
+    ),
+    "self_affine_plateau_only": SelfAffine(
+        1.3, 0.3, longest=5.0, rolloff=0.1, shortest=0.1
+    ),
     "self_affine_h0": SelfAffine(1.3, 0.0, longest=5.0, rolloff=2.0, shortest=0.1),
     "self_affine_h1": SelfAffine(1.3, 1.0, longest=5.0, rolloff=2.0, shortest=0.1),
     "tabulated": Tabulated((1.0, 2.0, 3.0, 5.0, 9.0), (0.0, 3.0, 3.0, 0.2, 0.0)),
@@ -35,7 +47,9 @@ ANISOTROPIC = {
 WITH_DENSITY = ISOTROPIC | ANISOTROPIC
 ALL = WITH_DENSITY | {
     "ripple": Ripple(2.0, 3.0, 0.3),
-    "measured": Measured("map.csv", 0.1, "hann", wavenumbers=(1.0, 2.0), densities=(3.0, 4.0)),
+    "measured": Measured(
+        "map.csv", 0.1, "hann", wavenumbers=(1.0, 2.0), densities=(3.0, 4.0)
+    ),
 }
 
 
@@ -46,7 +60,9 @@ def along_ray(spectrum, angle, power):
 
     def integrand(u):
         q = math.exp(u)
-        return q ** (power + 1) * float(spectrum.density(q * math.cos(angle), q * math.sin(angle)))
+        return q ** (power + 1) * float(
+            spectrum.density(q * math.cos(angle), q * math.sin(angle))
+        )
 
     pieces = [
         integrate.quad(integrand, a, b, epsabs=0.0, epsrel=1e-11, limit=400)[0]
@@ -67,14 +83,25 @@ def angular_mean(spectrum, power, weight):
 
 def test_variance_and_energy_are_the_integrals_of_the_density_and_the_square_of_the_rms():
     for spectrum in WITH_DENSITY.values():
-        assert_allclose(spectrum.variance, angular_mean(spectrum, 1, np.ones_like) / TURN, rtol=1e-9, atol=0)
-    for spectrum in [s for s in ALL.values() if s.model != "tabulated" and s.model != "measured"]:
-        exact = spectrum.amplitude**2 / 2 if spectrum.model == "ripple" else spectrum.rms**2
+        assert_allclose(
+            spectrum.variance,
+            angular_mean(spectrum, 1, np.ones_like) / TURN,
+            rtol=1e-9,
+            atol=0,
+        )
+    for spectrum in [
+        s for s in ALL.values() if s.model != "tabulated" and s.model != "measured"
+    ]:
+        exact = (
+            spectrum.amplitude**2 / 2 if spectrum.model == "ripple" else spectrum.rms**2
+        )
         assert_allclose(spectrum.variance, exact, rtol=2e-15, atol=0)  # a few roundings
     for poisson_ratio in [0.5, 0.3, 0.0]:
         for spectrum in WITH_DENSITY.values():
             modulus = 1.7
-            mean = angular_mean(spectrum, 0, lambda t: 1 - poisson_ratio * np.cos(t) ** 2)
+            mean = angular_mean(
+                spectrum, 0, lambda t: 1 - poisson_ratio * np.cos(t) ** 2
+            )
             energy = spectrum.surface_energy(modulus, poisson_ratio)
             assert_allclose(energy, mean / (2 * TURN * modulus), rtol=1e-8, atol=0)
 
@@ -83,15 +110,30 @@ def test_variance_within_a_circle_grows_as_the_density_says_between_the_cut_offs
     for spectrum in ISOTROPIC.values():
         low, high = spectrum.support
         q = np.geomspace(max(low, 1e-2), min(high, 1e2), 23)[1:-1]
-        q = q[np.min(np.abs(q[:, None] / np.append(spectrum.breaks, np.inf) - 1), axis=1) > 1e-3]
+        q = q[
+            np.min(np.abs(q[:, None] / np.append(spectrum.breaks, np.inf) - 1), axis=1)
+            > 1e-3
+        ]
         step = 1e-4
-        slope = (spectrum.cumulative(q * (1 + step)) - spectrum.cumulative(q * (1 - step))) / (2 * step * q)
+        slope = (
+            spectrum.cumulative(q * (1 + step)) - spectrum.cumulative(q * (1 - step))
+        ) / (2 * step * q)
         # central differences: second order, a few 1e-8 times the second derivative of a steep piece,
         # and rounding of the difference 1e-16 variance / (step q² C)
-        assert_allclose(slope, q * spectrum.radial_density(q) / TURN, rtol=1e-6, atol=1e-11 * spectrum.variance)
+        assert_allclose(
+            slope,
+            q * spectrum.radial_density(q) / TURN,
+            rtol=1e-6,
+            atol=1e-11 * spectrum.variance,
+        )
     for spectrum in ISOTROPIC.values():
         q = np.concatenate([[0.0], np.geomspace(1e-3, 1e3, 61), spectrum.breaks])
-        assert_allclose(spectrum.cumulative(q) + spectrum.beyond(q), spectrum.variance, rtol=1e-14, atol=0)
+        assert_allclose(
+            spectrum.cumulative(q) + spectrum.beyond(q),
+            spectrum.variance,
+            rtol=1e-14,
+            atol=0,
+        )
         assert spectrum.cumulative(0.0) == 0.0
         assert np.all(np.diff(spectrum.cumulative(np.sort(q))) >= 0.0)
     for name in ["band", "self_affine", "tabulated"]:
@@ -109,7 +151,9 @@ def test_density_broadcasts_is_even_and_has_an_anisotropic_first_length_along_th
         density = spectrum.density(qx, qy)
         assert density.shape == (5, 4)
         assert_allclose(density, density[::-1, ::-1], rtol=1e-14, atol=0)
-        energies = spectrum.surface_energy(np.array([1.0, 2.0])[:, None], np.array([0.0, 0.3, 0.5]))
+        energies = spectrum.surface_energy(
+            np.array([1.0, 2.0])[:, None], np.array([0.0, 0.3, 0.5])
+        )
         assert energies.shape == (2, 3)
         assert_allclose(energies[0], 2 * energies[1], rtol=1e-15, atol=0)
     a, b, angle, q = 0.5, 2.0, 0.4, np.array([0.3, 1.0, 2.0])
@@ -119,8 +163,15 @@ def test_density_broadcasts_is_even_and_has_an_anisotropic_first_length_along_th
         density = spectrum.density(q * math.cos(direction), q * math.sin(direction))
         assert_allclose(density, exact, rtol=1e-14, atol=0)
     equal, isotropic = AnisotropicGaussian(1.3, 0.8, 0.8, 2.0), Gaussian(1.3, 0.8)
-    assert_allclose(equal.surface_energy(1.0, 0.3), isotropic.surface_energy(1.0, 0.3), rtol=1e-14, atol=0)
-    assert_allclose(equal.density(1.0, 2.0), isotropic.density(1.0, 2.0), rtol=1e-14, atol=0)
+    assert_allclose(
+        equal.surface_energy(1.0, 0.3),
+        isotropic.surface_energy(1.0, 0.3),
+        rtol=1e-14,
+        atol=0,
+    )
+    assert_allclose(
+        equal.density(1.0, 2.0), isotropic.density(1.0, 2.0), rtol=1e-14, atol=0
+    )
 
 
 def test_energies_have_their_known_coefficients_and_textbook_limits():
@@ -134,7 +185,12 @@ def test_energies_have_their_known_coefficients_and_textbook_limits():
         (Ripple(1.0, TURN, 0.7), (1 + math.sin(0.7) ** 2) / 8),
     ]:
         assert_allclose(spectrum.surface_energy(1.0), exact, rtol=1e-15, atol=0)
-    assert_allclose(Ripple(2.0, 3.0).surface_energy(1.5, 0.3), 0.7 * 4.0 / (4 * 1.5 * TURN / 3.0), rtol=1e-15, atol=0)
+    assert_allclose(
+        Ripple(2.0, 3.0).surface_energy(1.5, 0.3),
+        0.7 * 4.0 / (4 * 1.5 * TURN / 3.0),
+        rtol=1e-15,
+        atol=0,
+    )
     with pytest.raises(ValueError, match="no density"):
         Ripple(1.0, 1.0).density(0.0, 0.0)
     for hurst in [0.3, 0.8, 1.0]:
@@ -143,20 +199,32 @@ def test_energies_have_their_known_coefficients_and_textbook_limits():
         upper = 1 - ratio + (1 - reach ** (-1 - 2 * hurst)) / (1 + 2 * hurst)
         lower = 1 - ratio**2 + (1 - reach ** (-2 * hurst)) / hurst
         exact = 3 * 150e3**2 / (4 * 1.6e6 * q) * upper / lower
-        energy = SelfAffine(150e3, hurst, longest, rolloff, shortest).surface_energy(1.6e6)
+        energy = SelfAffine(150e3, hurst, longest, rolloff, shortest).surface_energy(
+            1.6e6
+        )
         assert_allclose(energy, exact, rtol=1e-14, atol=0)
 
     def energy(hurst):
         return SelfAffine(1.0, hurst, 5.0, 2.0, 0.1).surface_energy(1.0)
 
     rises = [energy(h) - energy(0.0) for h in (1e-6, 1e-8)]
-    assert_allclose(rises[0] / rises[1], 100.0, rtol=1e-4, atol=0)  # linear in H; 1e-16 / 1e-8 of rounding
+    # linear in H; 1e-16 / 1e-8 of rounding
+    assert_allclose(rises[0] / rises[1], 100.0, rtol=1e-4, atol=0)
     assert_allclose(energy(1e-15), energy(0.0), rtol=1e-13, atol=0)
     q = np.array([0.0, 0.5, 3.0, 100.0])
     exact = TURN * 0.8**2 * 1.3**2 * (1 + (0.8 * q) ** 2) ** -1.5
-    assert_allclose(ISOTROPIC["exponential"].radial_density(q), exact, rtol=1e-14, atol=0)
-    assert_allclose(Band(1.0, TURN / 2.0, TURN / 2.0002).surface_energy(1.0), 3 / (8 * 2.0001), rtol=1e-11, atol=0)
-    energies = [AnisotropicGaussian(1.0, 1.0, b).surface_energy(1.0) for b in (1e4, 1e6, 1e8)]
+    assert_allclose(
+        ISOTROPIC["exponential"].radial_density(q), exact, rtol=1e-14, atol=0
+    )
+    assert_allclose(
+        Band(1.0, TURN / 2.0, TURN / 2.0002).surface_energy(1.0),
+        3 / (8 * 2.0001),
+        rtol=1e-11,
+        atol=0,
+    )
+    energies = [
+        AnisotropicGaussian(1.0, 1.0, b).surface_energy(1.0) for b in (1e4, 1e6, 1e8)
+    ]
     assert_allclose(np.diff(energies)[1], np.diff(energies)[0], rtol=1e-6, atol=0)
 
 
@@ -167,11 +235,28 @@ def test_a_spectrum_survives_dumping_and_reading_and_a_wrong_one_is_refused():
             assert again == spectrum
             assert reader.validate_json(reader.dump_json(spectrum)) == spectrum
             assert hash(again) == hash(spectrum)
-    ripple = {"model": "ripple", "amplitude": "3 kPa", "wavelength": "2 mm", "angle": "180 deg"}
-    assert TypeAdapter(Spectrum).validate_python(ripple) == Ripple(3000.0, 0.002, math.pi)
-    self_affine = {"model": "self_affine", "rms": 1, "hurst": 1, "longest": 5, "rolloff": 3, "shortest": 1}
+    ripple = {
+        "model": "ripple",
+        "amplitude": "3 kPa",
+        "wavelength": "2 mm",
+        "angle": "180 deg",
+    }
+    assert TypeAdapter(Spectrum).validate_python(ripple) == Ripple(
+        3000.0, 0.002, math.pi
+    )
+    self_affine = {
+        "model": "self_affine",
+        "rms": 1,
+        "hurst": 1,
+        "longest": 5,
+        "rolloff": 3,
+        "shortest": 1,
+    }
     for keys, fault in [
-        ({"model": "band", "rms": 1, "longest": 1, "shortest": 2}, "longest .* is shorter than shortest"),
+        (
+            {"model": "band", "rms": 1, "longest": 1, "shortest": 2},
+            "longest .* is shorter than shortest",
+        ),
         (self_affine | {"shortest": 4}, "rolloff .* is shorter than shortest"),
         (self_affine | {"longest": 1, "rolloff": 1}, "no band"),
     ]:

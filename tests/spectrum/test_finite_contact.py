@@ -9,7 +9,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import special
 
 from sim.laws import halfspace
-from sim.spectrum.families import AnisotropicGaussian, Band, BondMade, Gaussian, Ripple, SelfAffine, VonKarman
+from sim.spectrum.families import (
+    AnisotropicGaussian,
+    Band,
+    BondMade,
+    Gaussian,
+    Ripple,
+    SelfAffine,
+    VonKarman,
+)
 from sim.spectrum.measured import Tabulated
 from sim.spectrum.radial import disc_energy, marginal_energy
 
@@ -56,14 +64,23 @@ def isotropic(correlation, nu=0.5):
 def jinc_correlation(band):
     """Autocorrelation of a flat band, sigma = 1."""
     q1, q2 = band.support
-    return lambda s: 2.0 * (q2 * special.j1(q2 * s) - q1 * special.j1(q1 * s)) / ((q2**2 - q1**2) * s)
+    return lambda s: (
+        2.0
+        * (q2 * special.j1(q2 * s) - q1 * special.j1(q1 * s))
+        / ((q2**2 - q1**2) * s)
+    )
 
 
 def test_waves_along_and_across_a_disc_store_the_tabulated_energy():
     for k, along, across, marginal in TABLE:
         for angle, ratio in ((0.0, along), (math.pi / 2, across)):
             wave = Ripple(2.0, 2e-5 / k, angle)
-            assert_allclose(disc_energy(wave, 1e-5, 1.6e6) / wave.surface_energy(1.6e6), ratio, rtol=1e-10, atol=0)
+            assert_allclose(
+                disc_energy(wave, 1e-5, 1.6e6) / wave.surface_energy(1.6e6),
+                ratio,
+                rtol=1e-10,
+                atol=0,
+            )
             # the five digits given
             edge = marginal_energy(wave, 1e-5, 1.6e6) / wave.surface_energy(1.6e6)
             assert_allclose(edge, marginal, rtol=5e-6 / 0.9, atol=0)
@@ -74,11 +91,18 @@ def test_factors_are_the_bessel_integrals_of_the_overlap():
     def of_disc(t):
         return mpmath.acos(t) - t * mpmath.sqrt(1 - t * t)
 
-    for factors, area in ((halfspace.energy_factors, of_disc), (halfspace.marginal_factors, mpmath.acos)):
+    for factors, area in (
+        (halfspace.energy_factors, of_disc),
+        (halfspace.marginal_factors, mpmath.acos),
+    ):
         for x in (1e-3, 0.7, 2.999, 3.001, 9.0, 40.0):
             cuts = mpmath.linspace(0, 1, 2 + int(x / 3))
-            mean = x * mpmath.quad(lambda t, x=x, area=area: area(t) * mpmath.besselj(0, x * t), cuts)
-            skew = -x * mpmath.quad(lambda t, x=x, area=area: area(t) * mpmath.besselj(2, x * t), cuts)
+            mean = x * mpmath.quad(
+                lambda t, x=x, area=area: area(t) * mpmath.besselj(0, x * t), cuts
+            )
+            skew = -x * mpmath.quad(
+                lambda t, x=x, area=area: area(t) * mpmath.besselj(2, x * t), cuts
+            )
             # P = q/(2 a^2) integral of A J0 ds; s = 2 a t. At x = 3 the closed form of S loses a digit
             assert_allclose(factors(x), [float(mean), float(skew)], rtol=3e-14, atol=0)
 
@@ -88,28 +112,58 @@ def test_gaussian_exponential_and_band_fields_obey_the_overlap_integral():
         for nu in RATIOS:
             gaussian, exponential = Gaussian(1.0, xi), VonKarman(1.0, xi, 0.5)
             for marginal, energy in ((False, disc_energy), (True, marginal_energy)):
-                exact = overlap_integral(isotropic(lambda s: np.exp(-((s / xi) ** 2)), nu), marginal)
-                assert_allclose(energy(gaussian, 1.0, 1.0, nu), exact, rtol=1e-12, atol=0)
-                exact = overlap_integral(isotropic(lambda s: np.exp(-s / xi), nu), marginal)
-                assert_allclose(energy(exponential, 1.0, 1.0, nu), exact, rtol=1e-11, atol=0)
-    for waves in [(50.0, 20.0), (1.0, 0.5), (0.1, 0.09), (0.02, 0.015), (0.002, 0.0018)]:
+                exact = overlap_integral(
+                    isotropic(lambda s: np.exp(-((s / xi) ** 2)), nu), marginal
+                )
+                assert_allclose(
+                    energy(gaussian, 1.0, 1.0, nu), exact, rtol=1e-12, atol=0
+                )
+                exact = overlap_integral(
+                    isotropic(lambda s: np.exp(-s / xi), nu), marginal
+                )
+                assert_allclose(
+                    energy(exponential, 1.0, 1.0, nu), exact, rtol=1e-11, atol=0
+                )
+    for waves in [
+        (50.0, 20.0),
+        (1.0, 0.5),
+        (0.1, 0.09),
+        (0.02, 0.015),
+        (0.002, 0.0018),
+    ]:
         band = Band(1.0, *waves)
         for marginal, energy in ((False, disc_energy), (True, marginal_energy)):
-            exact = overlap_integral(isotropic(jinc_correlation(band)), marginal, panels=400 + int(12.0 / waves[1]))
+            exact = overlap_integral(
+                isotropic(jinc_correlation(band)),
+                marginal,
+                panels=400 + int(12.0 / waves[1]),
+            )
             assert_allclose(energy(band, 1.0, 1.0), exact, rtol=1e-11, atol=0)
 
 
 def test_streaks_obey_the_overlap_integral_and_a_self_affine_field_is_the_sum_of_its_bands():
     for angle in [0.0, 0.6, math.pi / 2]:
         for nu in [0.0, 0.4]:
-            spectrum, turn = AnisotropicGaussian(1.0, 0.2, 0.7, angle), 2 * np.pi * np.arange(256) / 256
-            kernel = halfspace.point_displacement(np.cos(turn), np.sin(turn), 1.0, nu)  # falls as 1/s
-            squares = (np.cos(turn - angle) / 0.2) ** 2 + (np.sin(turn - angle) / 0.7) ** 2
+            spectrum, turn = (
+                AnisotropicGaussian(1.0, 0.2, 0.7, angle),
+                2 * np.pi * np.arange(256) / 256,
+            )
+            # falls as 1/s
+            kernel = halfspace.point_displacement(np.cos(turn), np.sin(turn), 1.0, nu)
+            squares = (np.cos(turn - angle) / 0.2) ** 2 + (
+                np.sin(turn - angle) / 0.7
+            ) ** 2
             for marginal, energy in ((False, disc_energy), (True, marginal_energy)):
                 exact = overlap_integral(
-                    lambda s: np.mean(kernel * np.exp(-squares * s[..., np.newaxis] ** 2), axis=-1), marginal, 40
+                    lambda s: np.mean(
+                        kernel * np.exp(-squares * s[..., np.newaxis] ** 2), axis=-1
+                    ),
+                    marginal,
+                    40,
                 )
-                assert_allclose(energy(spectrum, 1.0, 1.0, nu), exact, rtol=1e-11, atol=0)
+                assert_allclose(
+                    energy(spectrum, 1.0, 1.0, nu), exact, rtol=1e-11, atol=0
+                )
     spectrum = SelfAffine(1.0, 0.8, 0.8, 0.3, 0.01)
     q1, q2 = spectrum.support
     edge = np.geomspace(q1, q2, 4001)
@@ -128,22 +182,36 @@ def test_a_disc_of_many_waves_is_the_plane_and_below_every_wavelength_the_stress
             plane = spectrum.surface_energy(1.6e6, nu)
             for energy in (disc_energy, marginal_energy):
                 # the deficit is of first order in length/a or less, with a factor below 2
-                assert_allclose(energy(spectrum, 1e6, 1.6e6, nu), plane, rtol=1e-6, atol=0)
-                assert_allclose(energy(spectrum, np.inf, 1.6e6, nu), plane, rtol=1e-14, atol=0)
+                assert_allclose(
+                    energy(spectrum, 1e6, 1.6e6, nu), plane, rtol=1e-6, atol=0
+                )
+                assert_allclose(
+                    energy(spectrum, np.inf, 1.6e6, nu), plane, rtol=1e-14, atol=0
+                )
                 assert energy(spectrum, 0.0, 1.6e6, nu) == 0.0
     spectrum = Gaussian(1.0, 1e-3)
     plane, deficit = spectrum.surface_energy(1.0), 2 / np.pi * 1e-3 / math.sqrt(math.pi)
     # 1 - (2/pi) xi/(sqrt(pi) a), and half of it for the margin; the next term is cubic in xi/a
-    assert_allclose(1 - disc_energy(spectrum, 1.0, 1.0) / plane, deficit, rtol=2e-6, atol=0)
-    assert_allclose(1 - marginal_energy(spectrum, 1.0, 1.0) / plane, deficit / 2, rtol=2e-6, atol=0)
+    assert_allclose(
+        1 - disc_energy(spectrum, 1.0, 1.0) / plane, deficit, rtol=2e-6, atol=0
+    )
+    assert_allclose(
+        1 - marginal_energy(spectrum, 1.0, 1.0) / plane, deficit / 2, rtol=2e-6, atol=0
+    )
     for spectrum in SPECTRA:
         for nu in RATIOS:
             a = 1e-7
-            uniform = halfspace.disc_tangential_energy(a, math.sqrt(spectrum.variance), 1.0, nu) / (np.pi * a * a)
+            uniform = halfspace.disc_tangential_energy(
+                a, math.sqrt(spectrum.variance), 1.0, nu
+            ) / (np.pi * a * a)
             # a correlation that falls like s^(2H) is the slowest: 1.1 (a/xi)^0.6 at H = 0.3
             rtol = 2e-4 if spectrum.model == "von_karman" else 2e-5
-            assert_allclose(disc_energy(spectrum, a, 1.0, nu), uniform, rtol=rtol, atol=0)
-            assert_allclose(marginal_energy(spectrum, a, 1.0, nu), 1.5 * uniform, rtol=rtol, atol=0)
+            assert_allclose(
+                disc_energy(spectrum, a, 1.0, nu), uniform, rtol=rtol, atol=0
+            )
+            assert_allclose(
+                marginal_energy(spectrum, a, 1.0, nu), 1.5 * uniform, rtol=rtol, atol=0
+            )
 
 
 def test_marginal_energy_is_the_derivative_of_the_energy():
@@ -155,7 +223,13 @@ def test_marginal_energy_is_the_derivative_of_the_energy():
         total = radius**2 * disc_energy(spectrum, radius, 1.0, 0.3)
         slope = np.sum(weight * total, axis=1) / (2 * h * a**2)
         # x = 2qa reaches 1200 for the largest disc; that part of E is a millionth, its h^6 term stays below 1e-7
-        assert_allclose(slope, marginal_energy(spectrum, a, 1.0, 0.3), rtol=2e-7, atol=0, err_msg=spectrum.model)
+        assert_allclose(
+            slope,
+            marginal_energy(spectrum, a, 1.0, 0.3),
+            rtol=2e-7,
+            atol=0,
+            err_msg=spectrum.model,
+        )
 
 
 def test_a_radius_that_is_no_length_is_refused():
@@ -163,7 +237,9 @@ def test_a_radius_that_is_no_length_is_refused():
         with pytest.raises(ValueError, match="at least zero"):
             disc_energy(spectrum, np.nan, 1.0)
     with pytest.raises(ValueError, match="at least twice the radius"):
-        halfspace.disc_energy_of_map(np.ones((2, 8, 8)), 1.0, np.array([0.1, np.inf]), 1.0)
+        halfspace.disc_energy_of_map(
+            np.ones((2, 8, 8)), 1.0, np.array([0.1, np.inf]), 1.0
+        )
 
 
 def test_the_map_of_a_wave_converges_to_the_table_in_second_order():
@@ -171,7 +247,10 @@ def test_the_map_of_a_wave_converges_to_the_table_in_second_order():
         for angle, ratio in ((0.0, along), (math.pi / 2, across)):
             exact = ratio * PLANE[angle] / (np.pi * k)
             coarse, fine = (
-                np.mean(halfspace.disc_energy_of_map(wave_maps(n, k, angle), 2.0, 1.0, 1.0)) for n in (128, 256)
+                np.mean(
+                    halfspace.disc_energy_of_map(wave_maps(n, k, angle), 2.0, 1.0, 1.0)
+                )
+                for n in (128, 256)
             )
             # a quarter of the error, 0.24 k (pixel/a)^2 at most
             assert abs(coarse / exact - 1) < 0.3 * k * (2 / 128) ** 2
@@ -179,11 +258,18 @@ def test_the_map_of_a_wave_converges_to_the_table_in_second_order():
             assert_allclose((4 * fine - coarse) / 3, exact, rtol=1e-5, atol=0)
     for nu in [0.0, 0.3]:  # oblique, at any Poisson ratio
         exact = disc_energy(Ripple(1.0, 2 / 3, 0.5), 0.77, 1.0, nu)
-        energy = np.mean(halfspace.disc_energy_of_map(wave_maps(160, 3, 0.5), 2.0, 0.77, 1.0, nu))
+        energy = np.mean(
+            halfspace.disc_energy_of_map(wave_maps(160, 3, 0.5), 2.0, 0.77, 1.0, nu)
+        )
         assert_allclose(energy, exact, rtol=0.3 * 3 * (2 / 160 / 0.77) ** 2, atol=0)
     # the disc has no images of itself: the cell around it does not matter
     small = halfspace.disc_energy_of_map(np.ones((40, 40)), 1.0, 0.5, 1.0)
-    assert_allclose(small, halfspace.disc_energy_of_map(np.ones((120, 120)), 3.0, 0.5, 1.0), rtol=1e-13, atol=0)
+    assert_allclose(
+        small,
+        halfspace.disc_energy_of_map(np.ones((120, 120)), 3.0, 0.5, 1.0),
+        rtol=1e-13,
+        atol=0,
+    )
 
 
 def test_a_uniform_map_stores_its_energy():
@@ -193,7 +279,12 @@ def test_a_uniform_map_stores_its_energy():
         field = np.full((points, points), 3.0)
         # the edge is blurred over a pixel: 0.1 (pixel/a)^2 relative
         rtol = 0.1 * (2.0 / points / a) ** 2
-        assert_allclose(halfspace.disc_energy_of_map(field, 2.0, a, 2.0, nu), exact, rtol=rtol, atol=0)
+        assert_allclose(
+            halfspace.disc_energy_of_map(field, 2.0, a, 2.0, nu),
+            exact,
+            rtol=rtol,
+            atol=0,
+        )
 
 
 def wave_maps(points, k, angle, cell=2.0):
@@ -222,25 +313,38 @@ def five_sigma_of_spread(sample):
 def test_discs_of_random_maps_average_to_the_overlap_integral_that_is_expected():
     # a cell of 3 a: the ends of the disc are 1 a apart through the border, correlated by e^-44
     xi, members, pixel = 0.15, 2000, 0.05
-    energy = halfspace.disc_energy_of_map(gaussian_maps(members, 60, 3.0, xi, seed=11), 3.0, 1.0, 1.0)
-    exact, plane = disc_energy(Gaussian(1.0, xi), 1.0, 1.0), Gaussian(1.0, xi).surface_energy(1.0)
+    energy = halfspace.disc_energy_of_map(
+        gaussian_maps(members, 60, 3.0, xi, seed=11), 3.0, 1.0, 1.0
+    )
+    exact, plane = (
+        disc_energy(Gaussian(1.0, xi), 1.0, 1.0),
+        Gaussian(1.0, xi).surface_energy(1.0),
+    )
     error = 5 * energy.std() / math.sqrt(members)
     assert abs(energy.mean() - exact) < error + 0.6 * pixel**2 * exact
     # known from another simulation to three digits: mean over the plane's 0.939, coefficient of variation 0.265
     assert abs(energy.mean() / plane - 0.939) < error / plane + 0.6 * pixel**2 + 0.0005
-    assert abs(energy.std() / energy.mean() - 0.265) < five_sigma_of_spread(energy) / energy.mean() + 0.0005
+    assert (
+        abs(energy.std() / energy.mean() - 0.265)
+        < five_sigma_of_spread(energy) / energy.mean() + 0.0005
+    )
     # and exactly, to the same two digits
     assert_allclose(exact / plane, 0.939, rtol=0.01, atol=0)
 
 
 def test_a_map_has_the_same_energy_alone_and_in_a_batch():
-    maps, radius = gaussian_maps(5, 40, 2.0, 0.3, seed=3), np.array([0.4, 1.0, 0.0, 0.77, 0.4])
+    maps, radius = (
+        gaussian_maps(5, 40, 2.0, 0.3, seed=3),
+        np.array([0.4, 1.0, 0.0, 0.77, 0.4]),
+    )
 
     def energy(field, a):
         return halfspace.disc_energy_of_map(field, 2.0, a, 1.6e6)
 
     batch = energy(maps, radius)
-    assert_array_equal(batch, [energy(field, a) for field, a in zip(maps, radius, strict=True)])
+    assert_array_equal(
+        batch, [energy(field, a) for field, a in zip(maps, radius, strict=True)]
+    )
     assert_array_equal(batch[3:], energy(maps[3:], radius[3:]))
     assert batch[2] == 0.0
     assert energy(maps[:, None], radius[:2]).shape == (5, 2)

@@ -11,7 +11,14 @@ from pydantic import TypeAdapter, ValidationError
 
 from sim.numerics.grid import Grid, Lattice
 from sim.scenario.files import Files
-from sim.spectrum import Measured, SelfAffine, Spectrum, Tabulated, periodogram, radial_average
+from sim.spectrum import (
+    Measured,
+    SelfAffine,
+    Spectrum,
+    Tabulated,
+    periodogram,
+    radial_average,
+)
 
 TURN = 2 * math.pi
 
@@ -22,7 +29,9 @@ def files(tmp_path):
 
 
 def read(files, **keys):
-    return TypeAdapter(Spectrum).validate_python(keys, context={"files": Files(files.folder)})
+    return TypeAdapter(Spectrum).validate_python(
+        keys, context={"files": Files(files.folder)}
+    )
 
 
 def white_map(points, level, cell, seed=1):
@@ -39,9 +48,19 @@ def test_a_table_in_persson_s_convention_is_four_pi_squared_larger_and_may_fall(
     rows = (1.0, 2.0, 4.0), (3.0, 2.0, 0.5)
     plain, persson = Tabulated(*rows), Tabulated(*rows, normalization="in_density")
     factor = 4 * math.pi**2
-    assert_allclose(persson.radial_density(1.7), factor * plain.radial_density(1.7), rtol=1e-15, atol=0)
+    assert_allclose(
+        persson.radial_density(1.7),
+        factor * plain.radial_density(1.7),
+        rtol=1e-15,
+        atol=0,
+    )
     assert_allclose(persson.variance, factor * plain.variance, rtol=1e-15, atol=0)
-    assert_allclose(persson.surface_energy(1.0), factor * plain.surface_energy(1.0), rtol=1e-15, atol=0)
+    assert_allclose(
+        persson.surface_energy(1.0),
+        factor * plain.surface_energy(1.0),
+        rtol=1e-15,
+        atol=0,
+    )
     rows = np.array([1.0, 2.0, 4.0]), np.array([3.0, 2.0, 0.5])
     rising, falling = Tabulated(*rows), Tabulated(rows[0][::-1], rows[1][::-1])
     q = np.geomspace(1.0, 4.0, 9)
@@ -50,16 +69,24 @@ def test_a_table_in_persson_s_convention_is_four_pi_squared_larger_and_may_fall(
 
 
 def test_a_table_is_read_from_csv_with_its_units_or_a_header_that_is_given(files):
-    (files.folder / "psd.csv").write_text("# rubber\nq [rad/mm], C [kPa^2 um^2]\n1, 2\n3, 4\n", encoding="utf-8")
+    (files.folder / "psd.csv").write_text(
+        "# rubber\nq [rad/mm], C [kPa^2 um^2]\n1, 2\n3, 4\n", encoding="utf-8"
+    )
     table = read(files, model="tabulated", file="psd.csv", normalization="in_density")
     assert_allclose(table.wavenumbers, [1e3, 3e3], rtol=1e-15, atol=0)
     assert_allclose(table.densities, [2e-6, 4e-6], rtol=1e-15, atol=0)
-    assert_allclose(table.radial_density(3e3), 4e-6 * 4 * math.pi**2, rtol=1e-13, atol=0)
+    assert_allclose(
+        table.radial_density(3e3), 4e-6 * 4 * math.pi**2, rtol=1e-13, atol=0
+    )
     (files.folder / "psd.csv").unlink()  # which is not read again
     assert read(files, **TypeAdapter(Tabulated).dump_python(table)) == table
     q, density = np.geomspace(1.0, 4.0, 5), np.array([2.0, 1.0, 0.5, 0.2, 0.1])
-    np.savetxt(files.folder / "psd.txt", np.c_[q, density], header="wavevector, density")
-    result = read(files, model="tabulated", file="psd.txt", header="q [cycles/um], C [kPa^2 um^2]")
+    np.savetxt(
+        files.folder / "psd.txt", np.c_[q, density], header="wavevector, density"
+    )
+    result = read(
+        files, model="tabulated", file="psd.txt", header="q [cycles/um], C [kPa^2 um^2]"
+    )
     assert_allclose(result.wavenumbers, q * TURN * 1e6, rtol=1e-15, atol=0)
     assert_allclose(result.densities, density * 1e-6, rtol=1e-15, atol=0)
 
@@ -70,7 +97,10 @@ def test_a_wrong_table_is_refused_with_file_line_and_cure(files):
         ("q [rad/m], C [Pa^2 m^2]\n3, 1\n1, 1\n2, 1", "row 3 .* sort"),
         ("q [rad/m], C [Pa^2 m^2]\n1, 0\n2, 0\n", "every density is zero"),
         ("q [rad/m], C [Pa^2 m^2]\n1, 0\n2, 1\n3, 0\n4, 1\n5, 0", "row 3 is zero"),
-        ("q [1/um], C [Pa^2 m^2]\n1, 1\n2, 1\n", 'psd.csv: line 1: column "q" .* "rad/um"'),
+        (
+            "q [1/um], C [Pa^2 m^2]\n1, 1\n2, 1\n",
+            'psd.csv: line 1: column "q" .* "rad/um"',
+        ),
         ("q [rad/m], C [um^4]\n1, 1\n2, 1\n", 'column "C" .* spectrum of heights'),
         ("q [rad/m], C [kPa^2 um]\n1, 1\n2, 1\n", "spectrum of a line"),
     ]:
@@ -88,10 +118,16 @@ def test_a_table_between_its_rows_is_a_power_law_or_linear_next_to_a_zero():
     q[[0, -1]] = low, high
     table = Tabulated(q, law.radial_density(q))
     between = np.geomspace(low * 1.001, high * 0.999, 50)
-    assert_allclose(table.radial_density(between), law.radial_density(between), rtol=1e-13, atol=0)
+    assert_allclose(
+        table.radial_density(between), law.radial_density(between), rtol=1e-13, atol=0
+    )
     assert_allclose(table.variance, law.variance, rtol=1e-13, atol=0)
-    assert_allclose(table.surface_energy(2.0, 0.3), law.surface_energy(2.0, 0.3), rtol=1e-13, atol=0)
-    linear = Tabulated((1.0, 3.0, 4.0), (0.0, 4.0, 0.0)).radial_density([1.0, 2.0, 3.0, 3.5, 4.0, 4.1])
+    assert_allclose(
+        table.surface_energy(2.0, 0.3), law.surface_energy(2.0, 0.3), rtol=1e-13, atol=0
+    )
+    linear = Tabulated((1.0, 3.0, 4.0), (0.0, 4.0, 0.0)).radial_density(
+        [1.0, 2.0, 3.0, 3.5, 4.0, 4.1]
+    )
     assert_allclose(linear, [0, 2, 4, 2, 0, 0], rtol=1e-15, atol=0)
     assert 0.0 < Tabulated((1e-3, 1.0, 1e3), (1e-39, 1e39, 1e-39)).variance < math.inf
 
@@ -100,7 +136,9 @@ def test_periodogram_sums_to_the_mean_square_is_flat_for_white_noise_and_a_rippl
     for points in [15, 16]:
         field = np.random.default_rng(2).normal(size=(3, points, points)) + 7.0
         grid = Grid(2.0, points)
-        total = np.sum(grid.multiplicity * periodogram(field, 2.0), axis=(1, 2)) / 2.0**2
+        total = (
+            np.sum(grid.multiplicity * periodogram(field, 2.0), axis=(1, 2)) / 2.0**2
+        )
         assert_allclose(total, np.var(field, axis=(1, 2)), rtol=1e-13, atol=0)
     with pytest.raises(ValueError, match='"none" or "hann"'):
         periodogram(np.ones((8, 8)), 1.0, "box")
@@ -120,8 +158,14 @@ def test_periodogram_sums_to_the_mean_square_is_flat_for_white_noise_and_a_rippl
             level = grid.spacing**2  # unit variance spread over (2π/spacing)²
             inner = density[2:-2, 2:-2] / level  # away from what the mean takes with it
             # Hann correlates neighbouring amplitudes by 2/3 and 1/6, powers by the squares, in each direction
-            clumps = (1 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2) ** 2 if window == "hann" else 1.0
-            assert abs(np.mean(inner) - 1) < 5 * math.sqrt(clumps / (count * inner.size))
+            clumps = (
+                (1 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2) ** 2
+                if window == "hann"
+                else 1.0
+            )
+            assert abs(np.mean(inner) - 1) < 5 * math.sqrt(
+                clumps / (count * inner.size)
+            )
             assert np.all(np.abs(inner - 1) < 5 / math.sqrt(count))
             assert density[0, 0] == 0.0
 
@@ -136,13 +180,18 @@ def test_rings_hold_every_mode_once_with_the_standard_error_of_exponential_scatt
         for k in range(1, reach + 1):
             inside = (radius >= k - 0.5) & (radius < k + 0.5)
             assert ring.pairs[k - 1] == inside.sum() / 2
-            assert_allclose(ring.q[k - 1], np.mean(radius[inside]) * TURN / 2.0, rtol=1e-14, atol=0)
+            assert_allclose(
+                ring.q[k - 1], np.mean(radius[inside]) * TURN / 2.0, rtol=1e-14, atol=0
+            )
         assert len(ring.q) == reach
         assert_allclose(ring.density, 1.0, rtol=1e-14, atol=0)
         assert np.max(ring.standard_error) < 1e-15
     grid = Grid(1.0, 101)
-    ring = radial_average(periodogram(np.random.default_rng(3).normal(size=(101, 101)), 1.0), grid)
-    ratio = (ring.standard_error * np.sqrt(ring.pairs) / ring.density)[20:]  # one for an exponential law
+    ring = radial_average(
+        periodogram(np.random.default_rng(3).normal(size=(101, 101)), 1.0), grid
+    )
+    # one for an exponential law
+    ratio = (ring.standard_error * np.sqrt(ring.pairs) / ring.density)[20:]
     # scatter over mean of n exponential numbers has variance (2 + 1 - 2)/n: that of s, of m, their covariance
     error = 1 / math.sqrt(np.sum(ring.pairs[20:]))
     assert abs(np.average(ratio, weights=ring.pairs[20:]) - 1) < 5 * error
@@ -153,12 +202,20 @@ def test_rings_hold_every_mode_once_with_the_standard_error_of_exponential_scatt
 @pytest.mark.parametrize("points", [31, 32])
 def test_a_measured_map_is_a_table_of_its_own_density(files, points):
     level, spacing = 2.5, 0.1
-    np.savetxt(files.folder / "map.csv", white_map(points, level, points * spacing), delimiter=",", header="Pa")
+    np.savetxt(
+        files.folder / "map.csv",
+        white_map(points, level, points * spacing),
+        delimiter=",",
+        header="Pa",
+    )
     result = read(files, model="measured", file="map.csv", spacing="10 cm")
     assert_allclose(result.densities, level, rtol=1e-10, atol=0)
     low, high = result.support
-    assert_allclose(result.variance, level * (high**2 - low**2) / (4 * math.pi), rtol=1e-9, atol=0)
-    exact = 0.75 / (4 * math.pi) * level * (high - low)  # (2 - ν)/(8πG) ∫ C dq at ν = 1/2
+    assert_allclose(
+        result.variance, level * (high**2 - low**2) / (4 * math.pi), rtol=1e-9, atol=0
+    )
+    # (2 - ν)/(8πG) ∫ C dq at ν = 1/2
+    exact = 0.75 / (4 * math.pi) * level * (high - low)
     assert_allclose(result.surface_energy(1.0), exact, rtol=1e-9, atol=0)
     table = Tabulated(result.wavenumbers, result.densities)
     q = np.linspace(0.0, 50.0, 99)
@@ -172,18 +229,33 @@ def test_a_map_that_is_not_square_is_used_whole(files):
     field = np.random.default_rng(3).normal(size=(48, 30))
     np.savetxt(files.folder / "a.csv", field, delimiter=";")
     np.save(files.folder / "b.npy", np.asfortranarray(field.T))
-    a, b = (read(files, model="measured", file=name, spacing=0.1) for name in ("a.csv", "b.npy"))
+    a, b = (
+        read(files, model="measured", file=name, spacing=0.1)
+        for name in ("a.csv", "b.npy")
+    )
     assert_allclose(a.densities, b.densities, rtol=1e-12, atol=0)  # exchange of x and y
     lattice = Lattice((4.8, 3.0), (48, 30))
     density, (qx, qy) = periodogram(field, lattice.sides), lattice.wavevectors
-    assert_allclose(np.sum(lattice.multiplicity * density) / lattice.area, np.var(field), rtol=1e-13, atol=0)
+    assert_allclose(
+        np.sum(lattice.multiplicity * density) / lattice.area,
+        np.var(field),
+        rtol=1e-13,
+        atol=0,
+    )
     width = TURN / math.sqrt(4.8 * 3.0)
     ring = np.maximum(np.floor(np.hypot(qx, qy) / width + 0.5), 1.0)
     ring[0, 0] = 0.0
     counted = lattice.multiplicity * np.ones(ring.shape)
     for k, result in enumerate(a.densities[1:-1], 1):
-        assert_allclose(result, np.average(density[ring == k], weights=counted[ring == k]), rtol=1e-12, atol=0)
-    assert_allclose(a.support, (0.5 * width, (len(a.densities) - 1.5) * width), rtol=1e-15, atol=0)
+        assert_allclose(
+            result,
+            np.average(density[ring == k], weights=counted[ring == k]),
+            rtol=1e-12,
+            atol=0,
+        )
+    assert_allclose(
+        a.support, (0.5 * width, (len(a.densities) - 1.5) * width), rtol=1e-15, atol=0
+    )
     assert a.support[1] > 0.9 * math.pi / 0.1
 
 
@@ -200,42 +272,70 @@ def test_a_spectrum_keeps_its_shape_at_another_rms(files):
             scaled = TypeAdapter(Spectrum).validate_python(dumped | {"rms": rms})
             factor = rms**2 / spectrum.variance
             assert_allclose(scaled.variance, rms**2, rtol=1e-14, atol=0)
-            assert_allclose(scaled.radial_density(q), factor * spectrum.radial_density(q), rtol=1e-13, atol=0)
-            assert_allclose(scaled.surface_energy(1.0), factor * spectrum.surface_energy(1.0), rtol=1e-13, atol=0)
+            assert_allclose(
+                scaled.radial_density(q),
+                factor * spectrum.radial_density(q),
+                rtol=1e-13,
+                atol=0,
+            )
+            assert_allclose(
+                scaled.surface_energy(1.0),
+                factor * spectrum.surface_energy(1.0),
+                rtol=1e-13,
+                atol=0,
+            )
 
 
 def test_a_table_of_a_file_remarks_on_the_other_normalization_and_on_a_plateau(files):
     (files.folder / "psd.csv").write_text("q [rad/m], C [Pa^2 m^2]\n1e5, 2\n3e5, 2\n")
     keys = {"model": "tabulated", "file": "psd.csv"}
     normalization, plateau = read(files, **keys).remarks
-    assert "1.13e+05 Pa" in normalization and "7.09e+05 Pa" in normalization and "39.5" in normalization
+    assert (
+        "1.13e+05 Pa" in normalization
+        and "7.09e+05 Pa" in normalization
+        and "39.5" in normalization
+    )
     assert "plateau" in plateau and "50%" in plateau  # of ∫ C dq
     normalization, _ = read(files, **keys, normalization="in_density").remarks
     assert "7.09e+05 Pa" in normalization and "1.13e+05 Pa" in normalization
     normalization, _ = read(files, **keys, rms="0.7 MPa").remarks
     assert 'normalization = "in_density"' in normalization
-    (files.folder / "psd.csv").write_text("q [rad/m], C [Pa^2 m^2]\n1e5, 2\n3e5, 1\n")  # falls as q^-0.63
+    # falls as q^-0.63
+    (files.folder / "psd.csv").write_text("q [rad/m], C [Pa^2 m^2]\n1e5, 2\n3e5, 1\n")
     assert read(files, **keys, rms="400 kPa").remarks == ()
     assert Tabulated((1.0, 2.0), (1.0, 1.0)).remarks == ()
 
 
-def dataset(fields, spacing, units="Pa", metre=1.0, unit="m", dims=("member", "x", "y")):
+def dataset(
+    fields, spacing, units="Pa", metre=1.0, unit="m", dims=("member", "x", "y")
+):
     position = np.arange(fields.shape[-1]) * spacing / metre
     data = xr.DataArray(fields, dims=dims, attrs={"units": units})
     coordinates = {axis: (axis, position, {"units": unit}) for axis in ("x", "y")}
     return xr.Dataset({"shear_map": data}).assign_coords(coordinates)
 
 
-def test_netcdf_maps_give_units_spacing_or_take_that_of_the_key_and_average_over_members(files):
-    fields = np.stack([white_map(16, level, 1.6, seed=int(level)) for level in (1.0, 3.0)])
+def test_netcdf_maps_give_units_spacing_or_take_that_of_the_key_and_average_over_members(
+    files,
+):
+    fields = np.stack(
+        [white_map(16, level, 1.6, seed=int(level)) for level in (1.0, 3.0)]
+    )
     dataset(fields * 1e-3, 0.1, "kPa", 1e-3, "mm").to_netcdf(files.folder / "maps.nc")
     result = read(files, model="measured", file="maps.nc")
     assert_allclose(result.spacing, 0.1, rtol=1e-12, atol=0)
     assert_allclose(result.densities, 2.0, rtol=1e-10, atol=0)
     assert read(files, **TypeAdapter(Measured).dump_python(result)) == result
-    xr.Dataset({"tau": (("row", "column"), white_map(16, 1.0, 1.6))}).to_netcdf(files.folder / "maps.nc")
+    xr.Dataset({"tau": (("row", "column"), white_map(16, 1.0, 1.6))}).to_netcdf(
+        files.folder / "maps.nc"
+    )
     keys = {"model": "measured", "file": "maps.nc"}
-    assert_allclose(read(files, **keys, variable="tau", spacing="10 cm").densities, 1.0, rtol=1e-10, atol=0)
+    assert_allclose(
+        read(files, **keys, variable="tau", spacing="10 cm").densities,
+        1.0,
+        rtol=1e-10,
+        atol=0,
+    )
     with pytest.raises(ValidationError, match="give spacing"):
         read(files, **keys, variable="tau")
     with pytest.raises(ValidationError, match='no variable "tua"'):
@@ -246,19 +346,28 @@ def rescaled(data, x, y, attrs=None):
     """A dataset with other coordinates, in metres or without units."""
     axes = {"x": x * data.x.to_numpy(), "y": y * data.y.to_numpy()}
     return data.assign_coords(
-        {name: (name, axis, {"units": "m"} if attrs is None else attrs) for name, axis in axes.items()}
+        {
+            name: (name, axis, {"units": "m"} if attrs is None else attrs)
+            for name, axis in axes.items()
+        }
     )
 
 
 WRONG_DATASETS = [
-    (lambda data: data.assign_coords(x=data.x.to_numpy() ** 2), "not spaced by one step"),
+    (
+        lambda data: data.assign_coords(x=data.x.to_numpy() ** 2),
+        "not spaced by one step",
+    ),
     (lambda data: rescaled(data, 2.0, 2.0), "0.2 m apart, not 0.1 m"),
     (lambda data: rescaled(data, 2.0, 1.0, {}), "no units"),
     (lambda data: data.where(data.x > 0.05), "gaps"),
     (lambda data: data * 0.0, "every density is zero"),
     (lambda data: data.isel(x=slice(5)), "too small"),
     (lambda data: data.isel(x=0, member=0), "in two dimensions"),
-    (lambda data: data.assign(shear_map=data.shear_map.assign_attrs(units="N")), "not a unit of Pa"),
+    (
+        lambda data: data.assign(shear_map=data.shear_map.assign_attrs(units="N")),
+        "not a unit of Pa",
+    ),
 ]
 
 
@@ -297,9 +406,13 @@ def test_a_hann_window_keeps_the_border_of_a_steep_map_from_leaking():
     rings = slice(11, 23)
     ratio = {}
     for window in ("none", "hann"):
-        ring = radial_average(np.mean(periodogram(fields, part.cell, window), axis=0) / density_of_part, part)
+        ring = radial_average(
+            np.mean(periodogram(fields, part.cell, window), axis=0) / density_of_part,
+            part,
+        )
         ratio[window] = np.average(ring.density[rings], weights=ring.pairs[rings])
         pairs = np.sum(ring.pairs[rings])
-    error = math.sqrt(4 / (count * pairs))  # about four neighbours share their numbers under Hann
+    # about four neighbours share their numbers under Hann
+    error = math.sqrt(4 / (count * pairs))
     assert abs(ratio["hann"] - 1) < 5 * error + 16 / (6 * 12**2)
     assert ratio["none"] > 1.5

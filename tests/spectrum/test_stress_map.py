@@ -30,7 +30,9 @@ def files(tmp_path):
 
 
 def read(files, **keys):
-    return TypeAdapter(StressMap).validate_python(keys, context={"files": Files(files.folder)})
+    return TypeAdapter(StressMap).validate_python(
+        keys, context={"files": Files(files.folder)}
+    )
 
 
 def written(files, name, field=FIELD):
@@ -39,9 +41,14 @@ def written(files, name, field=FIELD):
     if name.endswith(".npy"):
         np.save(path, field.T)
     elif name.endswith(".nc"):
-        axes = {"x": np.arange(field.shape[0]) * PIXEL * 1e6, "y": np.arange(field.shape[1]) * PIXEL_Y * 1e6}
+        axes = {
+            "x": np.arange(field.shape[0]) * PIXEL * 1e6,
+            "y": np.arange(field.shape[1]) * PIXEL_Y * 1e6,
+        }
         data = xr.Dataset({"shear_map": (("y", "x"), field.T * 1e-3, {"units": "kPa"})})
-        data.assign_coords({k: (k, v, {"units": "um"}) for k, v in axes.items()}).to_netcdf(path)
+        data.assign_coords(
+            {k: (k, v, {"units": "um"}) for k, v in axes.items()}
+        ).to_netcdf(path)
     else:
         np.savetxt(path, field.T, delimiter=",", fmt="%.17g")
     return name
@@ -56,21 +63,46 @@ def test_the_energy_of_a_map_is_that_of_its_file(files, name):
     assert_allclose(result.mean, FIELD.mean(), rtol=1e-12)
     assert_allclose(result.rms, FIELD.std(), rtol=1e-12)
     assert_allclose(result.field, FIELD - FIELD.mean(), rtol=0.0, atol=1e-9)
-    turned = read(files, file=name, rows="x", **keys)  # which exchanges x and y, where the file does not name them
+    # which exchanges x and y, where the file does not name them
+    turned = read(files, file=name, rows="x", **keys)
     assert turned.shape == ((24, 16) if name.endswith(".nc") else (16, 24))
-    again = TypeAdapter(StressMap).validate_python(TypeAdapter(StressMap).dump_python(result))
+    again = TypeAdapter(StressMap).validate_python(
+        TypeAdapter(StressMap).dump_python(result)
+    )
     assert again == result and hash(again) == hash(result)
-    assert len(TypeAdapter(StressMap).dump_python(result, mode="json")["values"]) == 64  # a digest, not the numbers
+    # a digest, not the numbers
+    assert len(TypeAdapter(StressMap).dump_python(result, mode="json")["values"]) == 64
 
 
-def test_a_map_has_the_unit_of_its_file_or_of_the_key_and_axes_without_units_the_pixels_of_the_key(files):
+def test_a_map_has_the_unit_of_its_file_or_of_the_key_and_axes_without_units_the_pixels_of_the_key(
+    files,
+):
     kilo = FIELD * 1e-3
-    for name, unit in (("a.csv", "kPa"), ("a.npy", "kPa"), ("b.csv", ""), ("b.csv", "kPa")):
+    for name, unit in (
+        ("a.csv", "kPa"),
+        ("a.npy", "kPa"),
+        ("b.csv", ""),
+        ("b.csv", "kPa"),
+    ):
         written(files, name, kilo)
         if name == "b.csv":
-            np.savetxt(files.folder / name, kilo.T, delimiter=",", fmt="%.17g", header="stress in kPa")
-        assert_allclose(read(files, file=name, pixel=PIXEL, unit=unit).mean, FIELD.mean(), rtol=1e-12)
-    for unit, fault in (("MPa", "MPa and kPa"), ("mm", "not a unit of Pa"), (3, "string")):
+            np.savetxt(
+                files.folder / name,
+                kilo.T,
+                delimiter=",",
+                fmt="%.17g",
+                header="stress in kPa",
+            )
+        assert_allclose(
+            read(files, file=name, pixel=PIXEL, unit=unit).mean,
+            FIELD.mean(),
+            rtol=1e-12,
+        )
+    for unit, fault in (
+        ("MPa", "MPa and kPa"),
+        ("mm", "not a unit of Pa"),
+        (3, "string"),
+    ):
         with pytest.raises(ValidationError, match=fault):
             read(files, file="b.csv", pixel=1e-6, unit=unit)
     data = xr.load_dataset(files.folder / written(files, "map.nc"))
@@ -81,34 +113,61 @@ def test_a_map_has_the_unit_of_its_file_or_of_the_key_and_axes_without_units_the
     with pytest.raises(ValidationError, match="no coordinates with units; give pixel"):
         read(files, file="bare.nc", unit="kPa")
     result = read(files, file="bare.nc", unit="kPa", pixel=PIXEL, pixel_y=PIXEL_Y)
-    assert_allclose(result.surface_energy(G, NU), read(files, file="map.nc").surface_energy(G, NU), rtol=1e-12)
-    np.savetxt(files.folder / "index.csv", np.c_[np.arange(16), kilo.T], delimiter=",", fmt="%.9g")
+    assert_allclose(
+        result.surface_energy(G, NU),
+        read(files, file="map.nc").surface_energy(G, NU),
+        rtol=1e-12,
+    )
+    np.savetxt(
+        files.folder / "index.csv",
+        np.c_[np.arange(16), kilo.T],
+        delimiter=",",
+        fmt="%.9g",
+    )
     with pytest.raises(ValidationError, match="only numbers"):
         read(files, file="index.csv", pixel=1e-6)
 
 
 @pytest.mark.parametrize("model", ["mapped", "mean"])
 @pytest.mark.parametrize(("factor", "count"), [(1.0, 0), (1e-3, 1), (1e3, 1)])
-def test_a_map_that_is_a_thousand_times_off_the_stress_of_the_bonds_is_remarked(tmp_path, model, factor, count):
+def test_a_map_that_is_a_thousand_times_off_the_stress_of_the_bonds_is_remarked(
+    tmp_path, model, factor, count
+):
     np.save(tmp_path / "map.npy", FIELD.T * factor)
     shear = {"model": model, "paid_by_adhesion": 0.0}
     if model == "mean":
-        shear |= {"spectrum": {"model": "measured", "file": str(tmp_path / "map.npy"), "spacing": PIXEL}}
+        shear |= {
+            "spectrum": {
+                "model": "measured",
+                "file": str(tmp_path / "map.npy"),
+                "spacing": PIXEL,
+            }
+        }
     else:
         shear |= {"field": {"file": str(tmp_path / "map.npy"), "pixel": PIXEL}}
-    scene = load(tomllib.loads(LENS) | {"bonds": {"model": "none", "stress": "0.1 MPa"}, "shear": shear})
+    scene = load(
+        tomllib.loads(LENS)
+        | {"bonds": {"model": "none", "stress": "0.1 MPa"}, "shear": shear}
+    )
     assert sum(".unit right?" in remark for remark in scene.remarks()) == count
 
 
 def test_a_window_keeps_the_rms_and_takes_the_seam(files):
     x = (np.arange(64) + 0.5) / 64
-    ramp = (1e5 * (x - 0.5))[:, None] * np.ones(64) + 3e4  # which ends elsewhere than it begins
+    # which ends elsewhere than it begins
+    ramp = (1e5 * (x - 0.5))[:, None] * np.ones(64) + 3e4
     name = written(files, "map.csv", ramp)
-    plain, hann = (read(files, file=name, pixel=1e-6, window=window) for window in ("none", "hann"))
+    plain, hann = (
+        read(files, file=name, pixel=1e-6, window=window) for window in ("none", "hann")
+    )
     weight = (1 - np.cos(2 * np.pi * x))[:, None] * (1 - np.cos(2 * np.pi * x))
     exact = (ramp - np.mean(ramp * weight)) * weight / math.sqrt(np.mean(weight**2))
-    assert_allclose(hann.surface_energy(G), halfspace.surface_energy(exact, 64e-6, G), rtol=1e-12)
-    assert_allclose(plain.surface_energy(G), halfspace.surface_energy(ramp, 64e-6, G), rtol=1e-12)
+    assert_allclose(
+        hann.surface_energy(G), halfspace.surface_energy(exact, 64e-6, G), rtol=1e-12
+    )
+    assert_allclose(
+        plain.surface_energy(G), halfspace.surface_energy(ramp, 64e-6, G), rtol=1e-12
+    )
     assert_allclose(hann.mean, plain.mean, rtol=1e-12)
 
 
@@ -120,7 +179,11 @@ def test_the_stress_of_a_contact_in_a_mask_is_that_of_a_free_disc(files, pixels)
     energy = []
     for phase in (0.0, 0.5 * math.pi):
         wave = np.cos(3.831705970207512 * x + phase)[:, None] * np.ones(x.size)
-        keys = {"file": written(files, "map.csv", np.where(inside, wave, np.nan)), "pixel": 1.0 / pixels, "mask": True}
+        keys = {
+            "file": written(files, "map.csv", np.where(inside, wave, np.nan)),
+            "pixel": 1.0 / pixels,
+            "mask": True,
+        }
         result = read(files, **keys)
         assert_allclose(result.inside, inside.mean(), rtol=1e-12)
         assert np.all(result.field[~inside] == 0.0)
@@ -134,7 +197,9 @@ def test_the_noise_and_the_radial_spectrum_of_a_map_are_reported(files):
     result = read(files, file=written(files, "map.csv"), pixel="5 um", noise="2 kPa")
     exact = 3 * math.asinh(1.0) / (4 * math.pi) * 2e3**2 * 5e-6 / G
     assert_allclose(result.noise_energy(G), exact, rtol=1e-14)
-    assert read(files, file="map.csv", pixel="5 um").surface_energy(G) == result.surface_energy(G)
+    assert read(files, file="map.csv", pixel="5 um").surface_energy(
+        G
+    ) == result.surface_energy(G)
     exact = TypeAdapter(Measured).validate_python(
         {"file": "map.csv", "spacing": 5e-6}, context={"files": Files(files.folder)}
     )
@@ -155,7 +220,9 @@ WRONG_ARRAYS = {
 }
 
 
-def test_an_array_that_is_no_map_is_refused_and_nothing_in_it_is_executed(files, monkeypatch):
+def test_an_array_that_is_no_map_is_refused_and_nothing_in_it_is_executed(
+    files, monkeypatch
+):
     monkeypatch.chdir(files.folder)
     for kind, array in WRONG_ARRAYS.items():
         np.save(files.folder / f"{kind}.npy", array, allow_pickle=True)

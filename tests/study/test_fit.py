@@ -28,8 +28,14 @@ from sim.study.paper import Check, checks
 from sim.units.errors import BadInput
 from sim.units.notation import in_units
 
-SELF_AFFINE = {"model": "self_affine", "rms": "150 kPa", "hurst": 0.8, "longest": "60 um", "shortest": "1 um",
-               "rolloff": "24 um"}  # fmt: skip
+SELF_AFFINE = {
+    "model": "self_affine",
+    "rms": "150 kPa",
+    "hurst": 0.8,
+    "longest": "60 um",
+    "shortest": "1 um",
+    "rolloff": "24 um",
+}
 #: Waves of the same energy, in closed form: quicker.
 SPECTRUM = {"model": "gaussian", "rms": "150 kPa", "length": "4.075 um"}
 LENS = {
@@ -41,15 +47,23 @@ LENS = {
     "adhesion": {"work": "42 mJ/m^2", "bond_share": 0.6},
     "drive": {"model": "steady", "speed": "1 mm/s"},
     "bonds": {"model": "steady", "critical_speed": "10 mm/s", "stress": "0.3 MPa"},
-    "shear": {"model": "mean", "spectrum": SPECTRUM,
-              "amplitude": {"model": "onset", "speed": "1 mm/s", "width": 0.3, "floor": 0.05}},
+    "shear": {
+        "model": "mean",
+        "spectrum": SPECTRUM,
+        "amplitude": {"model": "onset", "speed": "1 mm/s", "width": 0.3, "floor": 0.05},
+    },
     "contact": {"model": "equilibrium", "load": "4 mN"},
-}  # fmt: skip
+}
 SPEEDS = np.geomspace(1e-5, 5e-2, 10)
 #: What the curves of the lens are fitted for, and its true values.
 KEYS = {"bonds.critical_speed": 0.01, "bonds.stress": 3e5, "shear.spectrum.rms": 1.5e5}
-UNITS = {"contact_area": ("mm^2", 1e6), "friction_force": ("mN", 1e3), "contact_radius": ("um", 1e6),
-         "spring_force": ("mN", 1e3), "shear_stress": ("kPa", 1e-3)}  # fmt: skip
+UNITS = {
+    "contact_area": ("mm^2", 1e6),
+    "friction_force": ("mN", 1e3),
+    "contact_radius": ("um", 1e6),
+    "spring_force": ("mN", 1e3),
+    "shear_stress": ("kPa", 1e-3),
+}
 
 
 @pytest.fixture(scope="module")
@@ -57,22 +71,36 @@ def truth():
     """Area and friction of the lens at the speeds, by its own run."""
     scene = load(LENS | {"sweep": {"drive.speed": SPEEDS.tolist()}})
     dataset = sim.run(scene).isel(t=-1)
-    return {name: dataset[name].to_numpy() for name in ("contact_area", "friction_force")}
+    return {
+        name: dataset[name].to_numpy() for name in ("contact_area", "friction_force")
+    }
 
 
 def noisy(truth, error, seed):
     """Curves with relative errors, as a table and as they would be written."""
     rng = np.random.default_rng([1234, seed])
-    return {name: values * (1.0 + error * rng.standard_normal(len(values))) for name, values in truth.items()}
+    return {
+        name: values * (1.0 + error * rng.standard_normal(len(values)))
+        for name, values in truth.items()
+    }
 
 
 def table(path, conditions, curves, error=None):
     """Write a CSV table of conditions (header by values) and curves."""
-    columns = {f"{name} [{UNITS[name][0]}]": UNITS[name][1] * values for name, values in curves.items()}
+    columns = {
+        f"{name} [{UNITS[name][0]}]": UNITS[name][1] * values
+        for name, values in curves.items()
+    }
     columns = dict(conditions) | columns
     if error is not None:
-        columns |= {f"{name}_error [%]": np.full(len(values), 100.0 * error) for name, values in curves.items()}
-    rows = [",".join(f"{value:.12g}" for value in row) for row in zip(*columns.values(), strict=True)]
+        columns |= {
+            f"{name}_error [%]": np.full(len(values), 100.0 * error)
+            for name, values in curves.items()
+        }
+    rows = [
+        ",".join(f"{value:.12g}" for value in row)
+        for row in zip(*columns.values(), strict=True)
+    ]
     path.write_text("\n".join([",".join(columns), *rows]) + "\n", encoding="utf-8")
     return path
 
@@ -80,46 +108,96 @@ def table(path, conditions, curves, error=None):
 @pytest.fixture
 def curves(tmp_path, truth):
     """The table of the lens with errors of half a percent."""
-    return table(tmp_path / "lens.csv", {"speed [mm/s]": 1e3 * SPEEDS}, noisy(truth, 0.005, 1), 0.005)
+    return table(
+        tmp_path / "lens.csv",
+        {"speed [mm/s]": 1e3 * SPEEDS},
+        noisy(truth, 0.005, 1),
+        0.005,
+    )
 
 
 def rows_of(scene, **conditions):
     count = len(next(iter(conditions.values())))
-    names = ("contact_radius", "friction_force", "work_of_adhesion", "indentation", "normal_load", "bond_fraction")
+    names = (
+        "contact_radius",
+        "friction_force",
+        "work_of_adhesion",
+        "indentation",
+        "normal_load",
+        "bond_fraction",
+    )
     curves = tuple(Curve(name, np.ones(count), None) for name in names)
-    return Measured(Path("made.csv"), scene.contact.kind, conditions, curves), list(names)
+    return Measured(Path("made.csv"), scene.contact.kind, conditions, curves), list(
+        names
+    )
 
 
 def test_steady_sliding_is_what_a_run_ends_in_also_for_rows_of_loads_and_solids_of_their_own():
-    stretched = {"rupture": {"model": "bell", "zero_force_rate": "100 1/s", "bell_force": "4 pN"},
-                 "bond_stiffness": "1 mN/m", "rebinding_rate": "500 1/s", "site_density": "1e15 1/m^2"}  # fmt: skip
+    stretched = {
+        "rupture": {
+            "model": "bell",
+            "zero_force_rate": "100 1/s",
+            "bell_force": "4 pN",
+        },
+        "bond_stiffness": "1 mN/m",
+        "rebinding_rate": "500 1/s",
+        "site_density": "1e15 1/m^2",
+    }
     scenes = {
         "lens": {},
         "self-affine": {"shear.spectrum": SELF_AFFINE},
         "pulled": {"contact.load": -2e-5, "shear.spectrum.rms": 5e4},
         "indentation": {"contact": {"indentation": "2 um"}},
-        "behind a spring": {"contact": {"displacement": "2 um", "stiffness": "100 N/m"}},
+        "behind a spring": {
+            "contact": {"displacement": "2 um", "stiffness": "100 N/m"}
+        },
         "reversible share": {"contact.reversible": 0.01},
         "disc": {"shear.contact": "disc"},
         "bonds with a stretch": {"bonds": {"model": "rate"} | stretched},
-        "size by stress": {"shear.amplitude": {"model": "stress", "reference": "0.3 MPa"}},
-        "size by unsteadiness": {"shear.amplitude": {"model": "slip_rate", "memory_length": "5 um", "floor": 0.4}},
-        "field of the bonds": {"bonds": {"model": "cohort"} | stretched,
-                               "shear": {"model": "mean", "spectrum": {"model": "bonds", "footprint": "1 nm"}}},
-        "slow edge": {"contact": {"model": "rate_dependent", "load": "4 mN", "front_speed": "1 mm/s"}},
-    }  # fmt: skip
+        "size by stress": {
+            "shear.amplitude": {"model": "stress", "reference": "0.3 MPa"}
+        },
+        "size by unsteadiness": {
+            "shear.amplitude": {
+                "model": "slip_rate",
+                "memory_length": "5 um",
+                "floor": 0.4,
+            }
+        },
+        "field of the bonds": {
+            "bonds": {"model": "cohort"} | stretched,
+            "shear": {
+                "model": "mean",
+                "spectrum": {"model": "bonds", "footprint": "1 nm"},
+            },
+        },
+        "slow edge": {
+            "contact": {
+                "model": "rate_dependent",
+                "load": "4 mN",
+                "front_speed": "1 mm/s",
+            }
+        },
+    }
     for label, changes in scenes.items():
         scene = load(LENS).with_values(changes)
         made, names = rows_of(scene, speed=SPEEDS[::3])
         (group,) = likelihood.groups(scene, made)
         alone = likelihood.by_steady_sliding(group, {}, names)
-        for name, mean, error in zip(names, *likelihood.by_runs([group], {}, names, False), strict=True):
-            assert_allclose(alone[name], mean, rtol=1e-12, atol=0, equal_nan=False, err_msg=label)
+        for name, mean, error in zip(
+            names, *likelihood.by_runs([group], {}, names, False), strict=True
+        ):
+            assert_allclose(
+                alone[name], mean, rtol=1e-12, atol=0, equal_nan=False, err_msg=label
+            )
             assert np.all(error == 0.0)
     # between the records of a run as well
     ramp = {"model": "ramp", "from": "10 um/s", "to": "0.1 m/s", "scale": "log"}
     unloading = {"contact.load": {"from": "4 mN", "to": "0.1 mN"}}
-    for changes, conditions in ({"drive": ramp}, {"speed": SPEEDS}), (unloading, {"t": np.array([0.1, 0.7, 1.6])}):
+    for changes, conditions in (
+        ({"drive": ramp}, {"speed": SPEEDS}),
+        (unloading, {"t": np.array([0.1, 0.7, 1.6])}),
+    ):
         scene = load(LENS).with_values(changes)
         made, names = rows_of(scene, **conditions)
         (group,) = likelihood.groups(scene, made)
@@ -134,56 +212,105 @@ def test_steady_sliding_is_what_a_run_ends_in_also_for_rows_of_loads_and_solids_
     for group in groups:
         found = likelihood.by_steady_sliding(group, {"adhesion.work": 0.05}, names)
         for k, row in enumerate(group.rows):
-            one = {"contact.load": loads[row], "solid.shear_modulus": moduli[row], "adhesion.work": 0.05}
+            one = {
+                "contact.load": loads[row],
+                "solid.shear_modulus": moduli[row],
+                "adhesion.work": 0.05,
+            }
             point = sim.run(scene.with_values(one)).isel(t=-1)
             for name in names:
                 assert_allclose(found[name][k], point[name], rtol=1e-12, atol=0)
     values = {
-        "shear.spectrum.rms": 2e5, "shear.amplitude.speed": 3e-3, "contact.load": 1e-3, "solid.shear_modulus": 1e6,
-    }  # fmt: skip
+        "shear.spectrum.rms": 2e5,
+        "shear.amplitude.speed": 3e-3,
+        "contact.load": 1e-3,
+        "solid.shear_modulus": 1e6,
+    }
     found = likelihood.changed(scene, values)
     assert quantities(found) == quantities(scene.with_values(values))
-    assert found.rest_radius == scene.with_values(values).rest_radius != scene.rest_radius
+    assert (
+        found.rest_radius == scene.with_values(values).rest_radius != scene.rest_radius
+    )
 
 
 @pytest.mark.parametrize(
-    ("fits", "least", "most"), [(20, 0.8, 1.0), pytest.param(500, 0.92, 0.98, marks=pytest.mark.verify)]
+    ("fits", "least", "most"),
+    [(20, 0.8, 1.0), pytest.param(500, 0.92, 0.98, marks=pytest.mark.verify)],
 )
-def test_intervals_hold_the_truth_in_95_of_100_fits(truth, monkeypatch, fits, least, most):
+def test_intervals_hold_the_truth_in_95_of_100_fits(
+    truth, monkeypatch, fits, least, most
+):
     scene, rows = load(LENS), []
     for seed in range(fits):
-        curves = tuple(Curve(n, v, 0.01 * np.abs(truth[n])) for n, v in noisy(truth, 0.01, seed).items())
+        curves = tuple(
+            Curve(n, v, 0.01 * np.abs(truth[n]))
+            for n, v in noisy(truth, 0.01, seed).items()
+        )
         data = Measured(Path("made.csv"), "load", {"speed": SPEEDS}, curves)
         monkeypatch.setattr(likelihood, "read", lambda path, base: data)
         result = fit(scene, [Path("made.csv")], KEYS, steady=True)
         assert result.converged
-        rows.append([item.interval.low < KEYS[item.free.key] < item.interval.high for item in result.numbers])
+        rows.append(
+            [
+                item.interval.low < KEYS[item.free.key] < item.interval.high
+                for item in result.numbers
+            ]
+        )
     held = np.mean(rows, axis=0)
     # of 20 fits more than 4 fail with a probability of 0.3 %; of 500 the binomial standard error is 1 %, three of them
     assert np.all((held >= least) & (held <= most)), held
 
 
-def test_the_critical_speed_and_stress_of_bells_bonds_are_fitted_as_they_are_given(tmp_path):
-    rupture = {"model": "bell", "bell_force": 4e-12, "critical_speed": 3e-3, "stress": 2e5}
-    bonds = {"model": "cohort", "rupture": rupture, "bond_stiffness": 8e-7, "rebinding_ratio": 10.0}
+def test_the_critical_speed_and_stress_of_bells_bonds_are_fitted_as_they_are_given(
+    tmp_path,
+):
+    rupture = {
+        "model": "bell",
+        "bell_force": 4e-12,
+        "critical_speed": 3e-3,
+        "stress": 2e5,
+    }
+    bonds = {
+        "model": "cohort",
+        "rupture": rupture,
+        "bond_stiffness": 8e-7,
+        "rebinding_ratio": 10.0,
+    }
     lens, speeds = load(LENS | {"bonds": bonds}), np.geomspace(1e-5, 1e-1, 9)
     stress = lens.population.steady(speeds).strength
-    path = table(tmp_path / "stress.csv", {"speed [m/s]": speeds}, noisy({"shear_stress": stress}, 0.01, 5), 0.01)
-    start, keys = lens.with_values({"bonds.rupture.critical_speed": 1e-3}), ("critical_speed", "stress")
+    path = table(
+        tmp_path / "stress.csv",
+        {"speed [m/s]": speeds},
+        noisy({"shear_stress": stress}, 0.01, 5),
+        0.01,
+    )
+    start, keys = (
+        lens.with_values({"bonds.rupture.critical_speed": 1e-3}),
+        ("critical_speed", "stress"),
+    )
     result = fit(start, [path], [f"bonds.rupture.{key}" for key in keys], steady=True)
     for key, item in zip(keys, result.numbers, strict=True):
         assert abs(item.value - rupture[key]) < 4.0 * item.error
-    speed, largest, chi_square = repr(result).splitlines()  # a line for each number, and the chi^2
-    assert speed.startswith("bonds.rupture.critical_speed = ") and speed.endswith("] mm/s")
+    # a line for each number, and the chi^2
+    speed, largest, chi_square = repr(result).splitlines()
+    assert speed.startswith("bonds.rupture.critical_speed = ") and speed.endswith(
+        "] mm/s"
+    )
     low, high = map(float, re.findall(r"\[(.*), (.*)\] kPa", largest)[0])
-    assert_allclose([low, high], 1e-3 * np.array(result.numbers[1].interval[:2]), rtol=1e-3)
+    assert_allclose(
+        [low, high], 1e-3 * np.array(result.numbers[1].interval[:2]), rtol=1e-3
+    )
     assert f"at 7 degrees of freedom, p = {result.p_value:.2g}" in chi_square
 
 
-def test_curves_without_errors_are_weighed_by_scatter_and_errors_of_all_areas_widen_what_they_touch(tmp_path, truth):
+def test_curves_without_errors_are_weighed_by_scatter_and_errors_of_all_areas_widen_what_they_touch(
+    tmp_path, truth
+):
     drawn = noisy(truth, 0.01, 4)
     path = table(tmp_path / "bare.csv", {"speed [m/s]": SPEEDS}, drawn)
-    found = fit(load(LENS), [path], ["bonds.critical_speed", "bonds.stress"], steady=True)
+    found = fit(
+        load(LENS), [path], ["bonds.critical_speed", "bonds.stress"], steady=True
+    )
     assert any("without errors" in said for said in found.remarks)
     for name, number in (("contact_area", 0), ("friction_force", 1)):
         sigma = found.problem.sigma[found.problem.curve == number]
@@ -200,68 +327,178 @@ def test_curves_without_errors_are_weighed_by_scatter_and_errors_of_all_areas_wi
     plain = sim.fit(LENS, path, keys, steady=True)
     shared = fit(load(LENS), [path], keys, {"contact_area": 0.03}, steady=True)
     assert_allclose(0.03 * shared.best.x[3], 0.03, atol=0.03)
-    widths = [found.numbers[2].interval.high - found.numbers[2].interval.low for found in (plain, shared)]
+    widths = [
+        found.numbers[2].interval.high - found.numbers[2].interval.low
+        for found in (plain, shared)
+    ]
     assert widths[1] > 1.5 * widths[0]
     assert shared.numbers[2].interval.low < 42e-3 < shared.numbers[2].interval.high
 
 
 def still():
     """A lens that sticks to nothing sideways."""
-    return load(LENS | {"drive": {"model": "steady"}, "shear": {"model": "uniform"}, "bonds": {"model": "none"}})
+    return load(
+        LENS
+        | {
+            "drive": {"model": "steady"},
+            "shear": {"model": "uniform"},
+            "bonds": {"model": "none"},
+        }
+    )
 
 
-def test_jkrs_loads_fit_the_work_and_times_are_read_along_a_run_whose_edge_may_lag(tmp_path):
-    loads, works = np.array([0.0, 1e-3, 2e-3, 2e-3, 1e-3, 0.0, -4e-4]), np.repeat([30e-3, 60e-3], [3, 4])
+def test_jkrs_loads_fit_the_work_and_times_are_read_along_a_run_whose_edge_may_lag(
+    tmp_path,
+):
+    loads, works = (
+        np.array([0.0, 1e-3, 2e-3, 2e-3, 1e-3, 0.0, -4e-4]),
+        np.repeat([30e-3, 60e-3], [3, 4]),
+    )
     measured = sim.laws.jkr.radius_at_load(loads, works, 2e-3, 6.4e6)
-    path = table(tmp_path / "both.csv", {"normal_load [N]": loads}, {"contact_radius": measured}, 0.01)
-    found = fit(still().with_values({"adhesion.work": 33e-3}), [path], ["adhesion.work"], steady=True)
-    tried = np.linspace(42.5e-3, 60e-3, 1000)[:, np.newaxis]  # closed at the lowest load
+    path = table(
+        tmp_path / "both.csv",
+        {"normal_load [N]": loads},
+        {"contact_radius": measured},
+        0.01,
+    )
+    found = fit(
+        still().with_values({"adhesion.work": 33e-3}),
+        [path],
+        ["adhesion.work"],
+        steady=True,
+    )
+    # closed at the lowest load
+    tried = np.linspace(42.5e-3, 60e-3, 1000)[:, np.newaxis]
     radii = sim.laws.jkr.radius_at_load(loads, tried, 2e-3, 6.4e6)
     least = np.min(np.sum(((radii - measured) / (0.01 * measured)) ** 2, axis=1))
-    assert found.best.chi_square < least and not any("open" in said for said in found.remarks)
-    scene = load(LENS).with_values({
-        "drive": {"model": "ramp", "from": "10 um/s", "to": "50 mm/s", "scale": "log"}, "clock.step": "0.01 s"
-    })  # fmt: skip
+    assert found.best.chi_square < least and not any(
+        "open" in said for said in found.remarks
+    )
+    scene = load(LENS).with_values(
+        {
+            "drive": {
+                "model": "ramp",
+                "from": "10 um/s",
+                "to": "50 mm/s",
+                "scale": "log",
+            },
+            "clock.step": "0.01 s",
+        }
+    )
     run = sim.run(scene)
-    start, area = scene.with_values({"bonds.critical_speed": 5e-3}), {"contact_area": run.contact_area[::20].values}
-    for condition in ({"t [s]": run.t[::20].values}, {"speed [m/s]": run.speed[::20].values}):
+    start, area = (
+        scene.with_values({"bonds.critical_speed": 5e-3}),
+        {"contact_area": run.contact_area[::20].values},
+    )
+    for condition in (
+        {"t [s]": run.t[::20].values},
+        {"speed [m/s]": run.speed[::20].values},
+    ):
         path = table(tmp_path / "run.csv", condition, area, 0.001)
-        assert_allclose(fit(start, [path], ["bonds.critical_speed"]).values["bonds.critical_speed"], 0.01, rtol=1e-6)
-    far = table(tmp_path / "far.csv", {"speed [m/s]": [1e-4, 1.0]}, {"contact_area": np.full(2, 4e-8)}, 0.001)
-    with pytest.raises(BadInput, match=r"drive.speed: the run goes from 1e-05 to 0.05 m/s, the data from 0.0001 to 1"):
+        assert_allclose(
+            fit(start, [path], ["bonds.critical_speed"]).values["bonds.critical_speed"],
+            0.01,
+            rtol=1e-6,
+        )
+    far = table(
+        tmp_path / "far.csv",
+        {"speed [m/s]": [1e-4, 1.0]},
+        {"contact_area": np.full(2, 4e-8)},
+        0.001,
+    )
+    with pytest.raises(
+        BadInput,
+        match=r"drive.speed: the run goes from 1e-05 to 0.05 m/s, the data from 0.0001 to 1",
+    ):
         fit(start, [far], ["bonds.critical_speed"])
-    scene = load(LENS | {
-        "clock": {"duration": "20 s", "step": "0.2 s"}, "drive": {"model": "steady"}, "shear": {"model": "uniform"},
-        "bonds": {"model": "none"}, "contact": {"model": "rate_dependent", "front_speed": "10 um/s",
-                                                "load": {"from": "1 mN", "to": "4 mN", "cycles": 1}},
-    })  # fmt: skip
+    scene = load(
+        LENS
+        | {
+            "clock": {"duration": "20 s", "step": "0.2 s"},
+            "drive": {"model": "steady"},
+            "shear": {"model": "uniform"},
+            "bonds": {"model": "none"},
+            "contact": {
+                "model": "rate_dependent",
+                "front_speed": "10 um/s",
+                "load": {"from": "1 mN", "to": "4 mN", "cycles": 1},
+            },
+        }
+    )
     run = sim.run(scene).isel(t=slice(0, None, 5))
-    path = table(tmp_path / "jkr.csv", {"t [s]": run.t.values}, {"contact_radius": run.contact_radius.values}, 0.001)
+    path = table(
+        tmp_path / "jkr.csv",
+        {"t [s]": run.t.values},
+        {"contact_radius": run.contact_radius.values},
+        0.001,
+    )
     keys = ["adhesion.work", "contact.front_speed"]
-    found = fit(scene.with_values({"adhesion.work": 30e-3, "contact.front_speed": 2e-5}), [path], keys)
+    found = fit(
+        scene.with_values({"adhesion.work": 30e-3, "contact.front_speed": 2e-5}),
+        [path],
+        keys,
+    )
     assert found.problem.by_run and found.converged
     # the edge is integrated to 1e-8, which a number that the radius depends on weakly feels amplified
     assert_allclose([*found.values.values()], [42e-3, 1e-5], rtol=1e-4)
 
 
-def test_a_ramp_that_lags_behind_points_of_steady_speeds_is_named_with_its_size_and_the_cure(tmp_path):
-    rate = {"model": "rate", "critical_speed": 5e-3, "rebinding_rate": 15.0, "stress": 2e5}
+def test_a_ramp_that_lags_behind_points_of_steady_speeds_is_named_with_its_size_and_the_cure(
+    tmp_path,
+):
+    rate = {
+        "model": "rate",
+        "critical_speed": 5e-3,
+        "rebinding_rate": 15.0,
+        "stress": 2e5,
+    }
     ramp = {"model": "ramp", "from": 1e-5, "to": 2e-2}
-    fast = load(LENS | {"clock": {"duration": "1 s", "step": "1 ms"}, "drive": ramp, "bonds": rate,
-                        "shear": {"model": "uniform"}})  # fmt: skip
+    fast = load(
+        LENS
+        | {
+            "clock": {"duration": "1 s", "step": "1 ms"},
+            "drive": ramp,
+            "bonds": rate,
+            "shear": {"model": "uniform"},
+        }
+    )
     slow = fast.with_values({"clock.duration": 2000.0, "clock.step": 1.0})
     speeds = np.array([1e-3, 3e-3, 1e-2])
-    force = [float(sim.run(fast.with_values({"drive": {"speed": v}})).friction_force[-1]) for v in speeds]
-    path = table(tmp_path / "steady.csv", {"speed [m/s]": speeds}, {"friction_force": np.array(force)}, 0.01)
+    force = [
+        float(sim.run(fast.with_values({"drive": {"speed": v}})).friction_force[-1])
+        for v in speeds
+    ]
+    path = table(
+        tmp_path / "steady.csv",
+        {"speed [m/s]": speeds},
+        {"friction_force": np.array(force)},
+        0.01,
+    )
     result = fit(fast, [path], ["bonds.critical_speed"])
-    values = {"bonds.critical_speed": result.values["bonds.critical_speed"], "clock.step": 1e-4}
+    values = {
+        "bonds.critical_speed": result.values["bonds.critical_speed"],
+        "clock.step": 1e-4,
+    }
     passing = sim.run(fast.with_values(values))
-    (remark,) = (text for text in result.remarks if result.lag and text.startswith(result.lag))
-    speed, share, errors = map(float, re.search(r"at (\d+) mm/s .* is (\S+) % above .*, (\S+) errors", remark).groups())
-    still = sim.run(fast.with_values(values | {"drive": {"speed": 1e-3 * speed}})).friction_force[-1]
-    ratio = np.interp(1e-3 * speed, passing.speed, passing.friction_force) / float(still)
+    (remark,) = (
+        text for text in result.remarks if result.lag and text.startswith(result.lag)
+    )
+    speed, share, errors = map(
+        float,
+        re.search(
+            r"at (\d+) mm/s .* is (\S+) % above .*, (\S+) errors", remark
+        ).groups(),
+    )
+    still = sim.run(
+        fast.with_values(values | {"drive": {"speed": 1e-3 * speed}})
+    ).friction_force[-1]
+    ratio = np.interp(1e-3 * speed, passing.speed, passing.friction_force) / float(
+        still
+    )
     # two digits; the clock step of 1 ms is 1.5 % of the bonds' memory
-    assert_allclose([share, errors], [100.0 * (ratio - 1.0), (ratio - 1.0) / 0.01], rtol=0.1)
+    assert_allclose(
+        [share, errors], [100.0 * (ratio - 1.0), (ratio - 1.0) / 0.01], rtol=0.1
+    )
     assert 1e-3 * speed in speeds and share > 3.0 and "--steady" in remark
     for cure in (repr(result._replace(converged=False)), *result.remarks):
         assert "fewer keys" not in cure and "the model is incomplete" not in cure
@@ -272,50 +509,118 @@ def test_a_ramp_that_lags_behind_points_of_steady_speeds_is_named_with_its_size_
 
 #: A body behind a spring on bonds whose stress is constant, and a stage that is suddenly faster.
 BEHIND = LENS | {
-    "clock": {"duration": "0.05 s", "step": "1 ms"}, "shear": {"model": "uniform"},
+    "clock": {"duration": "0.05 s", "step": "1 ms"},
+    "shear": {"model": "uniform"},
     "bonds": {"model": "none", "stress": "0.3 MPa"},
-    "drive": {"model": "spring", "stiffness": "100 N/m", "mass": "1 g", "damping": "50 mN s/m", "start": "steady",
-              "contact_stiffness": "rigid",
-              "stage": {"time": [0.0, 0.01, 0.01, 0.2], "value": [2e-3, 2e-3, 3e-3, 3e-3]}},
-}  # fmt: skip
+    "drive": {
+        "model": "spring",
+        "stiffness": "100 N/m",
+        "mass": "1 g",
+        "damping": "50 mN s/m",
+        "start": "steady",
+        "contact_stiffness": "rigid",
+        "stage": {"time": [0.0, 0.01, 0.01, 0.2], "value": [2e-3, 2e-3, 3e-3, 3e-3]},
+    },
+}
 
 
-def test_a_driven_slider_is_fitted_to_force_and_stage_and_members_shift_the_fit_and_widen_its_errors(tmp_path, truth):
-    scene = load(BEHIND).with_values({
-        "bonds": {"model": "steady", "critical_speed": 0.01, "stress": 3e5}, "drive.stage": 1e-3, "drive.damping": 5.0,
-        "adhesion.bond_share": 0.0, "clock.duration": 0.02,  # damped: steady sliding is stable
-    })  # fmt: skip
+def test_a_driven_slider_is_fitted_to_force_and_stage_and_members_shift_the_fit_and_widen_its_errors(
+    tmp_path, truth
+):
+    scene = load(BEHIND).with_values(
+        {
+            "bonds": {"model": "steady", "critical_speed": 0.01, "stress": 3e5},
+            "drive.stage": 1e-3,
+            "drive.damping": 5.0,
+            # damped: steady sliding is stable
+            "adhesion.bond_share": 0.0,
+            "clock.duration": 0.02,
+        }
+    )
     speeds = np.array([0.5e-3, 1e-3, 2e-3])
     force = 3e5 * math.pi * scene.rest_radius**2 / (1.0 + speeds / 0.01)
-    path = table(tmp_path / "steady.csv", {"stage_speed [m/s]": speeds}, {"friction_force": force}, 0.001)
-    found = fit(scene.with_values({"bonds.critical_speed": 0.02}), [path], ["bonds.critical_speed"])
+    path = table(
+        tmp_path / "steady.csv",
+        {"stage_speed [m/s]": speeds},
+        {"friction_force": force},
+        0.001,
+    )
+    found = fit(
+        scene.with_values({"bonds.critical_speed": 0.02}),
+        [path],
+        ["bonds.critical_speed"],
+    )
     assert_allclose(found.values["bonds.critical_speed"], 0.01, rtol=1e-4)
     stiffness, mass, damping, step = 100.0, 1e-3, 0.05, 1e-3
     scene, after = load(BEHIND), np.linspace(0.0, 0.04, 41)
     decay = damping / (2.0 * mass)
     rate = math.sqrt(stiffness / mass - decay**2)
-    slower = step * np.exp(-decay * after) * (np.cos(rate * after) + decay / rate * np.sin(rate * after))
-    growth = -step * stiffness / (mass * rate) * np.exp(-decay * after) * np.sin(rate * after)
-    force = 0.3e6 * math.pi * scene.rest_radius**2 + damping * 3e-3 - mass * growth - damping * slower
-    path = table(tmp_path / "ring.csv", {"t [s]": 0.01 + after}, {"spring_force": force}, 0.001)
+    slower = (
+        step
+        * np.exp(-decay * after)
+        * (np.cos(rate * after) + decay / rate * np.sin(rate * after))
+    )
+    growth = (
+        -step
+        * stiffness
+        / (mass * rate)
+        * np.exp(-decay * after)
+        * np.sin(rate * after)
+    )
+    force = (
+        0.3e6 * math.pi * scene.rest_radius**2
+        + damping * 3e-3
+        - mass * growth
+        - damping * slower
+    )
+    path = table(
+        tmp_path / "ring.csv", {"t [s]": 0.01 + after}, {"spring_force": force}, 0.001
+    )
     start = scene.with_values({"drive.stiffness": 110.0, "drive.mass": 0.9e-3})
     found = fit(start, [path], ["drive.stiffness", "drive.mass"])
     assert found.problem.by_run and found.converged
     # steps in time have a tolerance of 1e-6
     assert_allclose([*found.values.values()], [stiffness, mass], rtol=1e-4)
     scene = load(BEHIND)
-    for column, steady, said in (("speed [mm/s]", False, 'add "t \\[s\\]"'), ("t [s]", True, "--steady: drive.model")):
-        path = table(tmp_path / "one.csv", {column: np.array([0.02, 0.03])}, {"spring_force": np.ones(2)})
+    for column, steady, said in (
+        ("speed [mm/s]", False, 'add "t \\[s\\]"'),
+        ("t [s]", True, "--steady: drive.model"),
+    ):
+        path = table(
+            tmp_path / "one.csv",
+            {column: np.array([0.02, 0.03])},
+            {"spring_force": np.ones(2)},
+        )
         with pytest.raises(BadInput, match=said):
             fit(scene, [path], ["drive.mass"], steady=steady)
     slip = {"model": "slip", "length": "5 um"}
-    shear = LENS["shear"] | {"model": "banded", "spectrum": SELF_AFFINE, "cell": "0.12 mm", "correlation": slip}
-    scene = load(LENS | {"shear": shear, "ensemble": {"members": 64}, "clock": {"duration": "2 s", "step": "0.1 s"}})
-    path = table(tmp_path / "lens.csv", {"speed [m/s]": SPEEDS}, noisy(truth, 0.002, 6), 0.002)
+    shear = LENS["shear"] | {
+        "model": "banded",
+        "spectrum": SELF_AFFINE,
+        "cell": "0.12 mm",
+        "correlation": slip,
+    }
+    scene = load(
+        LENS
+        | {
+            "shear": shear,
+            "ensemble": {"members": 64},
+            "clock": {"duration": "2 s", "step": "0.1 s"},
+        }
+    )
+    path = table(
+        tmp_path / "lens.csv", {"speed [m/s]": SPEEDS}, noisy(truth, 0.002, 6), 0.002
+    )
     found = fit(scene, [path], ["shear.spectrum.rms", "bonds.stress"])
     (rms, _), noise = found.numbers, found.problem.noise
-    assert found.converged and abs(rms.value - rms.steady) > rms.error and np.all(noise[6:9] > 0.0)
-    mean, error = likelihood.by_runs(found.problem.groups[0], found.values, ["contact_area"], False)[:, 0]
+    assert (
+        found.converged
+        and abs(rms.value - rms.steady) > rms.error
+        and np.all(noise[6:9] > 0.0)
+    )
+    mean, error = likelihood.by_runs(
+        found.problem.groups[0], found.values, ["contact_area"], False
+    )[:, 0]
     assert_allclose(found.problem.predicted(found.best.x)[:10], mean, rtol=2e-4)
     assert_allclose(noise[:10], error, rtol=0.05)
 
@@ -330,62 +635,138 @@ def drawn_by_colour(panel):
     return points, fits
 
 
-@pytest.mark.parametrize("tables", [[[2e-3, 1e-2]], [[2e-3], [1e-2]], [[1e-3, 2e-3, 5e-3, 1e-2, 2e-2]], [[None]]])
-def test_the_figure_has_one_curve_and_colour_for_each_load_in_one_table_or_in_several(tmp_path, tables):
+@pytest.mark.parametrize(
+    "tables",
+    [[[2e-3, 1e-2]], [[2e-3], [1e-2]], [[1e-3, 2e-3, 5e-3, 1e-2, 2e-2]], [[None]]],
+)
+def test_the_figure_has_one_curve_and_colour_for_each_load_in_one_table_or_in_several(
+    tmp_path, tables
+):
     scene, forces, paths, rng = load(LENS), {}, [], np.random.default_rng(5)
     for loads in tables:
         for each in loads:
             under = scene.with_values({"contact.load": each or 4e-3})
             (group,) = likelihood.groups(under, rows_of(under, speed=SPEEDS)[0])
-            forces[each] = likelihood.by_steady_sliding(group, {}, ["friction_force"])["friction_force"]
-        rows = [(v, each or 4e-3, force) for each in loads for v, force in zip(SPEEDS, forces[each], strict=True)]
+            forces[each] = likelihood.by_steady_sliding(group, {}, ["friction_force"])[
+                "friction_force"
+            ]
+        rows = [
+            (v, each or 4e-3, force)
+            for each in loads
+            for v, force in zip(SPEEDS, forces[each], strict=True)
+        ]
         speed, held, force = rng.permutation(rows).T
-        conditions = {"speed [um/s]": 1e6 * speed} | ({} if loads == [None] else {"load [N]": held})
-        paths.append(table(tmp_path / f"{len(paths)}.csv", conditions, {"friction_force": 1.03 * force}, 0.05))
+        conditions = {"speed [um/s]": 1e6 * speed} | (
+            {} if loads == [None] else {"load [N]": held}
+        )
+        paths.append(
+            table(
+                tmp_path / f"{len(paths)}.csv",
+                conditions,
+                {"friction_force": 1.03 * force},
+                0.05,
+            )
+        )
     read = [likelihood.read(path, scene) for path in paths]
     problem = problem_of(scene, read, [], {})
     with in_units(["mm/s", "mN"]):
-        upper, lower = figure(problem, likelihood.Minimum(problem.start, 0.0, None, True)).axes
+        upper, lower = figure(
+            problem, likelihood.Minimum(problem.start, 0.0, None, True)
+        ).axes
     assert "(mN)" in upper.get_ylabel() and "(mm/s)" in lower.get_xlabel()
     (points, fits), (residuals, _) = drawn_by_colour(upper), drawn_by_colour(lower)
-    assert len(points) == len(forces) and points.keys() == fits.keys() == residuals.keys()
+    assert (
+        len(points) == len(forces) and points.keys() == fits.keys() == residuals.keys()
+    )
     labels = [text.get_text() for text in upper.get_legend().get_texts()][2:]
-    assert [label.partition("= ")[2] for label in labels] == [f"{1e3 * each:g} mN" for each in forces if each]
+    assert [label.partition("= ")[2] for label in labels] == [
+        f"{1e3 * each:g} mN" for each in forces if each
+    ]
     for force, colour in zip(forces.values(), fits, strict=True):
         (line,), (measured,), (off,) = fits[colour], points[colour], residuals[colour]
         assert_allclose(measured, [1e3 * SPEEDS, 1.03e3 * force], rtol=1e-10)
         # between 200 speeds the curve is straight to a few parts in ten thousand
-        assert_allclose(np.interp(np.log(1e3 * SPEEDS), np.log(line[0]), line[1]), 1e3 * force, rtol=1e-3)
-        assert_allclose(off, [1e3 * SPEEDS, np.full(len(SPEEDS), 0.03 / (0.05 * 1.03))], rtol=1e-8)
+        assert_allclose(
+            np.interp(np.log(1e3 * SPEEDS), np.log(line[0]), line[1]),
+            1e3 * force,
+            rtol=1e-3,
+        )
+        assert_allclose(
+            off, [1e3 * SPEEDS, np.full(len(SPEEDS), 0.03 / (0.05 * 1.03))], rtol=1e-8
+        )
 
 
-def test_keys_that_data_cannot_tell_apart_are_remarked_or_refused(curves, tmp_path, truth):
-    path = table(tmp_path / "um.csv", {"speed [m/s]": SPEEDS}, {"contact_area": 1e6 * truth["contact_area"]}, 0.01)
+def test_keys_that_data_cannot_tell_apart_are_remarked_or_refused(
+    curves, tmp_path, truth
+):
+    path = table(
+        tmp_path / "um.csv",
+        {"speed [m/s]": SPEEDS},
+        {"contact_area": 1e6 * truth["contact_area"]},
+        0.01,
+    )
     result = fit(load(LENS), [path], ["bonds.critical_speed"], steady=True)
     (remark,) = (remark for remark in result.remarks if "unit" in remark)
-    assert 0.5e6 < float(remark.removeprefix("contact_area is ").partition(" ")[0]) < 2e6
-    found = fit(load(LENS), [curves], ["adhesion.bond_share", "shear.spectrum.rms", "bonds.stress"], steady=True)
+    assert (
+        0.5e6 < float(remark.removeprefix("contact_area is ").partition(" ")[0]) < 2e6
+    )
+    found = fit(
+        load(LENS),
+        [curves],
+        ["adhesion.bond_share", "shear.spectrum.rms", "bonds.stress"],
+        steady=True,
+    )
     assert abs(found.correlations[0, 1]) > 0.95
-    assert [said for said in found.remarks if "adhesion.bond_share and shear.spectrum.rms (corr" in said]
+    assert [
+        said
+        for said in found.remarks
+        if "adhesion.bond_share and shear.spectrum.rms (corr" in said
+    ]
     with pytest.raises(BadInput, match=r"only together") as refused:
-        fit(load(LENS), [curves], ["shear.spectrum.rms", "shear.paid_by_adhesion", "bonds.critical_speed"], steady=True)
+        fit(
+            load(LENS),
+            [curves],
+            ["shear.spectrum.rms", "shear.paid_by_adhesion", "bonds.critical_speed"],
+            steady=True,
+        )
     (said,) = refused.value.problems
-    assert "shear.spectrum.rms, shear.paid_by_adhesion" in said and "critical_speed" not in said
-    scene = load(LENS).with_values({"bonds": {"model": "rate", "critical_speed": 0.01, "rebinding_rate": 100.0,
-                                              "stress": 3e5}})  # fmt: skip
+    assert (
+        "shear.spectrum.rms, shear.paid_by_adhesion" in said
+        and "critical_speed" not in said
+    )
+    scene = load(LENS).with_values(
+        {
+            "bonds": {
+                "model": "rate",
+                "critical_speed": 0.01,
+                "rebinding_rate": 100.0,
+                "stress": 3e5,
+            }
+        }
+    )
     with pytest.raises(BadInput, match=r"^--free bonds.rebinding_rate: has no effect"):
         fit(scene, [curves], ["bonds.rebinding_rate", "bonds.stress"])
     for free, cure in (
-        ("bonds.crital_speed", 'did you mean "bonds.critical_speed"'), ("clock.step", "not a physical key"),
-        ("bonds.stress=1:2", "start inside"), ("bonds.stress=2 kPa:1 kPa", "lower one first"),
+        ("bonds.crital_speed", 'did you mean "bonds.critical_speed"'),
+        ("clock.step", "not a physical key"),
+        ("bonds.stress=1:2", "start inside"),
+        ("bonds.stress=2 kPa:1 kPa", "lower one first"),
         ("bonds.critical_speed=0:1 m/s", "LOW:HIGH, bound 0: must be above 0 m/s"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(BadInput, match=cure):
             fit(load(LENS), [curves], [free], steady=True)
     bare = load(LENS).with_values({"shear.spectrum.rms": 1.0})
-    runs = [sim.run(bare.with_values({"drive.speed": float(speed)})).isel(t=-1) for speed in SPEEDS]
-    exact = {name: np.array([float(run[name].item()) for run in runs]) for name in ("contact_area", "friction_force")}
-    path = table(tmp_path / "bare.csv", {"speed [m/s]": SPEEDS}, noisy(exact, 0.02, 5), 0.02)
+    runs = [
+        sim.run(bare.with_values({"drive.speed": float(speed)})).isel(t=-1)
+        for speed in SPEEDS
+    ]
+    exact = {
+        name: np.array([float(run[name].item()) for run in runs])
+        for name in ("contact_area", "friction_force")
+    }
+    path = table(
+        tmp_path / "bare.csv", {"speed [m/s]": SPEEDS}, noisy(exact, 0.02, 5), 0.02
+    )
     keys = ["bonds.critical_speed", "bonds.stress"]
     alone = fit(bare, [path], keys, steady=True).numbers
     beside = fit(load(LENS), [path], [*keys, "shear.spectrum.rms"], steady=True).numbers
@@ -396,65 +777,129 @@ def test_keys_that_data_cannot_tell_apart_are_remarked_or_refused(curves, tmp_pa
     assert beside[2].interval.low_open and not beside[2].interval.high_open
     slow = {name: values[:4] for name, values in noisy(truth, 0.02, 7).items()}
     path = table(tmp_path / "slow.csv", {"speed [m/s]": SPEEDS[:4]}, slow, 0.02)
-    (one,) = fit(load(LENS), [path], ["bonds.critical_speed=1 mm/s:10 m/s"], steady=True).numbers
-    assert one.interval.high_open and one.interval.high == 10.0 and not one.interval.low_open
+    (one,) = fit(
+        load(LENS), [path], ["bonds.critical_speed=1 mm/s:10 m/s"], steady=True
+    ).numbers
+    assert (
+        one.interval.high_open
+        and one.interval.high == 10.0
+        and not one.interval.low_open
+    )
 
 
 def judged(scene, made, keys, draws, seed=LENS["seed"]):
     free = [calibration.free_number(scene, key) for key in keys]
     problem = problem_of(scene, [made], free, {})
-    return mechanisms.compare(problem, minimum(problem, problem.start, errors=True), seed, draws)
+    return mechanisms.compare(
+        problem, minimum(problem, problem.start, errors=True), seed, draws
+    )
 
 
-def drawn_of(scene, error, seed, speeds=SPEEDS, names=("contact_area", "friction_force")):
+def drawn_of(
+    scene, error, seed, speeds=SPEEDS, names=("contact_area", "friction_force")
+):
     """Curves of a scene at speeds, with errors."""
     made, _ = rows_of(scene, speed=speeds)
     (group,) = likelihood.groups(scene, made)
     exact = likelihood.by_steady_sliding(group, {}, list(names))
     curves = noisy(exact, error, seed)
-    return made._replace(curves=tuple(Curve(n, v, error * np.abs(exact[n])) for n, v in curves.items()))
+    return made._replace(
+        curves=tuple(Curve(n, v, error * np.abs(exact[n])) for n, v in curves.items())
+    )
 
 
 #: A contact for which theories are not compared: bonds, fluctuations or both.
-SPRUNG = LENS | {"contact": {"model": "equilibrium", "displacement": "2 um", "stiffness": "1 kN/m"}}
-MECHANISM_KEYS = ["adhesion.bond_share", "bonds.critical_speed", "bonds.stress", "shear.spectrum.rms"]
+SPRUNG = LENS | {
+    "contact": {"model": "equilibrium", "displacement": "2 um", "stiffness": "1 kN/m"}
+}
+MECHANISM_KEYS = [
+    "adhesion.bond_share",
+    "bonds.critical_speed",
+    "bonds.stress",
+    "shear.spectrum.rms",
+]
 #: What leaves one of the two out.
-ONE_ALONE = {"bonds only": {"shear.paid_by_adhesion": 0.0}, "fluctuations only": {"adhesion.bond_share": 0.0}}
+ONE_ALONE = {
+    "bonds only": {"shear.paid_by_adhesion": 0.0},
+    "fluctuations only": {"adhesion.bond_share": 0.0},
+}
 
 
-def test_curves_are_doubted_beyond_errors_and_the_mechanism_that_made_them_excludes_no_other(tmp_path, truth, curves):
+def test_curves_are_doubted_beyond_errors_and_the_mechanism_that_made_them_excludes_no_other(
+    tmp_path, truth, curves
+):
     scene = load(SPRUNG)
     made = drawn_of(scene, 0.01, 3)
-    problem = problem_of(scene, [made], [calibration.free_number(scene, "bonds.stress")], {})
+    problem = problem_of(
+        scene, [made], [calibration.free_number(scene, "bonds.stress")], {}
+    )
     best = minimum(problem, problem.start, errors=True)
     for less in (0.0, 1e-6, -1e-6):  # as precisely as a minimum is known
         least = best._replace(chi_square=best.chi_square * (1.0 + less))
-        assert mechanisms._p_value(problem, least, problem, best, np.random.default_rng(1), 20) == 1.0
-    noisier = table(tmp_path / "noisier.csv", {"speed [mm/s]": 1e3 * SPEEDS}, noisy(truth, 0.01, 1), 0.005)
+        assert (
+            mechanisms._p_value(
+                problem, least, problem, best, np.random.default_rng(1), 20
+            )
+            == 1.0
+        )
+    noisier = table(
+        tmp_path / "noisier.csv",
+        {"speed [mm/s]": 1e3 * SPEEDS},
+        noisy(truth, 0.01, 1),
+        0.005,
+    )
     for path, doubted in ((curves, False), (noisier, True)):
-        result = fit(load(LENS), [path], ["bonds.critical_speed", "bonds.stress"], steady=True)
+        result = fit(
+            load(LENS), [path], ["bonds.critical_speed", "bonds.stress"], steady=True
+        )
         tail = stats.chi2.sf(result.best.chi_square, result.problem.freedom)
         assert_allclose(result.p_value, tail, rtol=1e-10)
-        assert (tail < 0.05) == any("p = " in remark for remark in result.remarks) == doubted
+        assert (
+            (tail < 0.05)
+            == any("p = " in remark for remark in result.remarks)
+            == doubted
+        )
     verdict = judged(load(SPRUNG), drawn_of(load(SPRUNG), 0.005, 8), MECHANISM_KEYS, 20)
     assert verdict.sufficient == verdict.judged[0].name == mechanisms.WHOLE
-    assert {one.name for one in verdict.judged if one.rejected} == {"bonds only", "fluctuations only"}
-    verdict = judged(load(SPRUNG), drawn_of(load(SPRUNG), 0.3, 9), ["adhesion.bond_share", "shear.spectrum.rms"], 5)
+    assert {one.name for one in verdict.judged if one.rejected} == {
+        "bonds only",
+        "fluctuations only",
+    }
+    verdict = judged(
+        load(SPRUNG),
+        drawn_of(load(SPRUNG), 0.3, 9),
+        ["adhesion.bond_share", "shear.spectrum.rms"],
+        5,
+    )
     assert verdict.sufficient == "" and verdict.words.startswith("the data cannot tell")
     scene = load(SPRUNG | {"shear": {"model": "uniform"}})
-    verdict = judged(scene, drawn_of(scene, 0.01, 12), ["bonds.critical_speed", "bonds.stress"], 2)
+    verdict = judged(
+        scene, drawn_of(scene, 0.01, 12), ["bonds.critical_speed", "bonds.stress"], 2
+    )
     assert verdict.sufficient == "" and len(verdict.judged) == 1
     assert "[shear]" in verdict.words
     loads = np.array([0.0, 1e-3, 2e-3, 4e-3])
     radii = sim.laws.jkr.radius_at_load(loads, 42e-3, 2e-3, 6.4e6)
-    data = Measured(Path("data.csv"), "load", {"mount": loads}, (Curve("contact_radius", radii, 0.01 * radii),))
-    assert "bonds" in judged(still(), data, ["adhesion.work"], 2).words  # at rest all theories are one
+    data = Measured(
+        Path("data.csv"),
+        "load",
+        {"mount": loads},
+        (Curve("contact_radius", radii, 0.01 * radii),),
+    )
+    # at rest all theories are one
+    assert "bonds" in judged(still(), data, ["adhesion.work"], 2).words
 
-    def weighed(*others):  # the scenario itself by its AICc of 10, others by name, AICc, p and rejection
+    # the scenario itself by its AICc of 10, others by name, AICc, p and rejection
+    def weighed(*others):
         rows = [(mechanisms.WHOLE, 10.0, math.nan, False), *others]
-        return mechanisms._verdict([mechanisms.Judged(name, {}, 1.0, *rest) for name, *rest in rows])
+        return mechanisms._verdict(
+            [mechanisms.Judged(name, {}, 1.0, *rest) for name, *rest in rows]
+        )
 
-    others = ("fluctuations only", 40.0, 0.01, True), ("JKR, independent of shear", 70.0, math.nan, True)
+    others = (
+        ("fluctuations only", 40.0, 0.01, True),
+        ("JKR, independent of shear", 70.0, math.nan, True),
+    )
     for aicc, p in ((8.0, 0.4), (12.0, 0.2), (12.0, 0.01)):
         name, words = weighed(("bonds only", aicc, p, False), *others)
         assert name == "bonds only" and "cannot tell whether fluctuations act" in words
@@ -465,38 +910,76 @@ def test_curves_are_doubted_beyond_errors_and_the_mechanism_that_made_them_exclu
 
 
 def test_searches_for_drawn_curves_find_the_minima_of_many_full_refits_and_so_the_same_p_values():
-    slow, keys = np.geomspace(1e-5, 9e-4, 8), [key for key in MECHANISM_KEYS if key != "bonds.stress"]
+    slow, keys = (
+        np.geomspace(1e-5, 9e-4, 8),
+        [key for key in MECHANISM_KEYS if key != "bonds.stress"],
+    )
     made = drawn_of(load(LENS), 0.03, 1000, slow, ["contact_area"])
-    whole = problem_of(load(LENS), [made], [calibration.free_number(load(LENS), key) for key in keys], {})
+    whole = problem_of(
+        load(LENS),
+        [made],
+        [calibration.free_number(load(LENS), key) for key in keys],
+        {},
+    )
     search, steps = mechanisms.Search(whole, [whole.start]), 2.0 * np.eye(len(keys))
-    starts, rng, draws = [whole.start, *(whole.start + steps), *(whole.start - steps)], np.random.default_rng(3), 20
+    starts, rng, draws = (
+        [whole.start, *(whole.start + steps), *(whole.start - steps)],
+        np.random.default_rng(3),
+        20,
+    )
     others = dict(mechanisms.others(whole))
     for name in ("fluctuations only", "JKR, independent of shear"):
         null = mechanisms.Search(others[name], [others[name].start])
-        expected, ratios, refitted = others[name].predicted(null.least(whole.values).x), [], []
-        for values in itertools.islice(mechanisms.draws_of(whole, expected, rng), draws):
+        expected, ratios, refitted = (
+            others[name].predicted(null.least(whole.values).x),
+            [],
+            [],
+        )
+        for values in itertools.islice(
+            mechanisms.draws_of(whole, expected, rng), draws
+        ):
             drawn = replace(whole, values=values)
-            least = min(minimum(drawn, start, precision=1e-4).chi_square for start in starts)
-            poorer = minimum(replace(others[name], values=values), others[name].start).chi_square
-            ratios.append(null.least(values).chi_square - search.least(values).chi_square)
+            least = min(
+                minimum(drawn, start, precision=1e-4).chi_square for start in starts
+            )
+            poorer = minimum(
+                replace(others[name], values=values), others[name].start
+            ).chi_square
+            ratios.append(
+                null.least(values).chi_square - search.least(values).chi_square
+            )
             refitted.append(poorer - least)
         for share in (0.5, 0.8):
             measured = np.quantile(refitted, share)
             # the draws are the same, so the difference is far below that of two sets of draws
-            assert abs(np.mean(np.array(ratios) >= measured) - (1.0 - share)) <= math.sqrt(
-                share * (1.0 - share) / draws
-            )
+            assert abs(
+                np.mean(np.array(ratios) >= measured) - (1.0 - share)
+            ) <= math.sqrt(share * (1.0 - share) / draws)
 
 
 @pytest.mark.verify
-def test_the_right_mechanism_is_sufficient_or_at_least_not_rejected_in_95_of_100(monkeypatch):
+def test_the_right_mechanism_is_sufficient_or_at_least_not_rejected_in_95_of_100(
+    monkeypatch,
+):
     for truth in ["both", "bonds only", "fluctuations only"]:
-        scene, wanted = load(SPRUNG).with_values(ONE_ALONE.get(truth, {})), {"both": mechanisms.WHOLE}.get(truth, truth)
+        scene, wanted = (
+            load(SPRUNG).with_values(ONE_ALONE.get(truth, {})),
+            {"both": mechanisms.WHOLE}.get(truth, truth),
+        )
         drawn = (drawn_of(scene, 0.005, seed) for seed in range(100))
-        assert sum(judged(load(SPRUNG), data, MECHANISM_KEYS, 40).sufficient == wanted for data in drawn) >= 95
+        assert (
+            sum(
+                judged(load(SPRUNG), data, MECHANISM_KEYS, 40).sufficient == wanted
+                for data in drawn
+            )
+            >= 95
+        )
     for truth in ["both", "bonds only", "fluctuations only"]:
         # the area alone, below the onset; of a test at the level of 5 % one in twenty is rejected by chance
-        scene, slow = load(SPRUNG).with_values(ONE_ALONE.get(truth, {})), np.geomspace(1e-5, 9e-4, 8)
+        scene, slow = (
+            load(SPRUNG).with_values(ONE_ALONE.get(truth, {})),
+            np.geomspace(1e-5, 9e-4, 8),
+        )
         keys = [key for key in MECHANISM_KEYS if key != "bonds.stress"]
         monkeypatch.setattr(mechanisms, "_ENOUGH", 2)
         verdicts = []
@@ -504,14 +987,29 @@ def test_the_right_mechanism_is_sufficient_or_at_least_not_rejected_in_95_of_100
         for seed in range(1000, 1100):
             data = drawn_of(scene, 0.03, seed, slow, ["contact_area"])
             verdicts.append(judged(load(SPRUNG), data, keys, 39, seed))
-        results = [item for verdict in verdicts for item in verdict.judged if item.name == truth]
+        results = [
+            item
+            for verdict in verdicts
+            for item in verdict.judged
+            if item.name == truth
+        ]
         assert sum(item.rejected for item in results) <= 5
-        assert truth == "both" or sum(verdict.sufficient == mechanisms.WHOLE for verdict in verdicts) <= 5
-        if results:  # p of at most 0.05 is at most one draw of 39 as large: a probability of 2/40
-            assert 1 <= sum(item.p_value <= 0.05 for item in results) <= stats.binom.ppf(0.999, 100, 0.05)
+        assert (
+            truth == "both"
+            or sum(verdict.sufficient == mechanisms.WHOLE for verdict in verdicts) <= 5
+        )
+        # p of at most 0.05 is at most one draw of 39 as large: a probability of 2/40
+        if results:
+            assert (
+                1
+                <= sum(item.p_value <= 0.05 for item in results)
+                <= stats.binom.ppf(0.999, 100, 0.05)
+            )
 
 
-def test_the_lines_of_the_documentation_sample_a_posterior_that_agrees_with_the_intervals(monkeypatch):
+def test_the_lines_of_the_documentation_sample_a_posterior_that_agrees_with_the_intervals(
+    monkeypatch,
+):
     root = Path(__file__).parents[2]
     text = (root / "docs" / "fit.md").read_text(encoding="utf-8")
     lines = re.search(r"```python\n(import lmfit.*?flatchain)\n", text, re.DOTALL)[1]
@@ -519,16 +1017,22 @@ def test_the_lines_of_the_documentation_sample_a_posterior_that_agrees_with_the_
     values = {}
     exec(lines.replace("1000", "300"), values)
     # 2,000 samples that are some 24 steps alike: a quantile is off by 0.2 standard deviations
-    for number, samples in zip(values["fit"].numbers, values["chain"].to_numpy().T, strict=True):
+    for number, samples in zip(
+        values["fit"].numbers, values["chain"].to_numpy().T, strict=True
+    ):
         low, middle, high = np.exp(np.quantile(samples, [0.025, 0.5, 0.975]))
-        assert_allclose([low, high], number.interval[:2], rtol=0, atol=1.5 * number.error)
+        assert_allclose(
+            [low, high], number.interval[:2], rtol=0, atol=1.5 * number.error
+        )
         assert_allclose(middle, number.value, rtol=0, atol=0.5 * number.error)
 
 
 @pytest.fixture
 def scenario(tmp_path):
     path = tmp_path / "lens.toml"
-    path.write_text(f"# How fast are its bonds?\n#\n# Made up.\n\n{written(LENS)}", encoding="utf-8")
+    path.write_text(
+        f"# How fast are its bonds?\n#\n# Made up.\n\n{written(LENS)}", encoding="utf-8"
+    )
     return path
 
 
@@ -536,56 +1040,96 @@ def command(*arguments):
     return CliRunner().invoke(cli, ["fit", *map(str, arguments)])
 
 
-def test_a_bad_table_or_unit_is_refused_and_a_fit_without_convergence_exits_1(scenario, tmp_path, curves, monkeypatch):
+def test_a_bad_table_or_unit_is_refused_and_a_fit_without_convergence_exits_1(
+    scenario, tmp_path, curves, monkeypatch
+):
     path, header = tmp_path / "bad.csv", "speed [mm/s],contact_area [mm^2]"
     for text, cure in {
         "speed [mm/s],contact_area [mm]\n1,2\n3,4\n": "not a unit of m",
         "V (mm/s),contact_arae (mm2),speed_error [%]\n1,2,3\n": "V → speed, contact_arae → contact_area, speed_error",
         "speed [mm/s]\n1\n3\n": "no column was measured",
-        "contact_area [mm^2]\n0.04\n0.05\n": "add \"t [s]\"",
+        "contact_area [mm^2]\n0.04\n0.05\n": 'add "t [s]"',
         f"{header}\n1,0.04\n2,-0.04\n": "line 3: contact_area must be at least 0 m^2",
         f"{header}\n1,0\n2,0\n3,0\n": "contact_area is 0 in all rows",
         f"{header}\n1,0.04\n": "free fewer keys",
         "t [s],speed [mm/s],contact_area [mm^2]\n0,1,2\n1,2,3\n": "omit t",
         "speed [mm/s],friction_force [mN]\n-1,2\n-2,3\n": "needs the sign of the speed",
-    }.items():  # fmt: skip
+    }.items():
         path.write_text(text, encoding="utf-8")
         done = command(scenario, path, "--free", "bonds.critical_speed")
         assert isinstance(done.exception, BadInput) and done.exception.exit_code == 2
         (line,) = done.exception.problems
         assert cure in line and "\n" not in line and str(path) in line
-    assert {item.name for item in tmp_path.iterdir()} == {"lens.toml", "lens.csv", "bad.csv"}
+    assert {item.name for item in tmp_path.iterdir()} == {
+        "lens.toml",
+        "lens.csv",
+        "bad.csv",
+    }
     with monkeypatch.context() as patched:
         patched.setattr(calibration, "fit", None)
-        done = command(scenario, curves, "--free", "bonds.stress", "--units", "um/s", "--units", "kPa")
+        done = command(
+            scenario,
+            curves,
+            "--free",
+            "bonds.stress",
+            "--units",
+            "um/s",
+            "--units",
+            "kPa",
+        )
     assert isinstance(done.exception, BadInput)
     assert '--units: no number here can be in "kPa"' in str(done.exception)
-    monkeypatch.setattr(calibration, "with_errors", lambda problem, start: (
-        problem, minimum(problem, start, errors=True)._replace(converged=False)))  # fmt: skip
+    monkeypatch.setattr(
+        calibration,
+        "with_errors",
+        lambda problem, start: (
+            problem,
+            minimum(problem, start, errors=True)._replace(converged=False),
+        ),
+    )
     done = command(scenario, curves, "--free", "bonds.stress", "--steady")
     assert done.exit_code == 1 and "has not converged" in done.output
 
 
-def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unasked(scenario, curves, tmp_path):
+def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unasked(
+    scenario, curves, tmp_path
+):
     free = [word for key in KEYS for word in ("--free", key)]
-    result = command(scenario, curves, *free, "--steady", "--common", "contact_area=0.1 %")
+    result = command(
+        scenario, curves, *free, "--steady", "--common", "contact_area=0.1 %"
+    )
     assert result.exit_code == 0, result.output
-    toml, document, png = outputs = [tmp_path / f"lens_fit.{ending}" for ending in ("toml", "json", "png")]
+    toml, document, png = outputs = [
+        tmp_path / f"lens_fit.{ending}" for ending in ("toml", "json", "png")
+    ]
     assert result.output.rstrip().endswith("\n".join(map(str, outputs)))
-    numbers, fitted = json.loads(document.read_text(encoding="utf-8")), quantities(load(toml))
+    numbers, fitted = (
+        json.loads(document.read_text(encoding="utf-8")),
+        quantities(load(toml)),
+    )
     for key, value in KEYS.items():
         estimate = numbers["numbers"][key]
         assert estimate["low"] < value < estimate["high"] and estimate["start"] == value
         assert_allclose(fitted[key][1], estimate["value"], rtol=1e-11)
-    assert {**fitted, **dict.fromkeys(KEYS)} == {**quantities(load(scenario)), **dict.fromkeys(KEYS)}
-    assert toml.read_text(encoding="utf-8").startswith("# How fast are its bonds?\n#\n# Made up.\n")
+    assert {**fitted, **dict.fromkeys(KEYS)} == {
+        **quantities(load(scenario)),
+        **dict.fromkeys(KEYS),
+    }
+    assert toml.read_text(encoding="utf-8").startswith(
+        "# How fast are its bonds?\n#\n# Made up.\n"
+    )
     assert png.read_bytes().startswith(b"\x89PNG")
     assert numbers["converged"] and "contact_area" in numbers["common_errors"]
     before = [path.read_bytes() for path in outputs]
-    assert getattr(command(scenario, curves, *free, "--steady").exception, "exit_code", 0) == 73
+    assert (
+        getattr(command(scenario, curves, *free, "--steady").exception, "exit_code", 0)
+        == 73
+    )
     again = ("--free", "bonds.stress", "--steady", "--force")
     assert command(scenario, curves, *again, "--units", "um/s").exit_code == 0
-    assert all(path.read_bytes() != old for path, old in zip(outputs, before, strict=True))
+    assert all(
+        path.read_bytes() != old for path, old in zip(outputs, before, strict=True)
+    )
     toml.write_text("# not written by a fit\n", encoding="utf-8")
     assert isinstance(command(scenario, curves, *again).exception, BadInput)
     assert toml.read_text(encoding="utf-8") == "# not written by a fit\n"
@@ -595,9 +1139,15 @@ def condition_tables(scene, changes, error, seed, noise=1.0, **chosen):
     """Tables named after conditions, each of the scene with its changes, with noise in units of the stated errors."""
     tables = []
     for k, (name, changed) in enumerate(changes.items()):
-        drawn, exact = (drawn_of(scene.with_values(changed), e, 2 * seed + k, **chosen) for e in (error, 1e-300))
+        drawn, exact = (
+            drawn_of(scene.with_values(changed), e, 2 * seed + k, **chosen)
+            for e in (error, 1e-300)
+        )
         pairs = zip(drawn.curves, exact.curves, strict=True)
-        curves = [c._replace(values=e.values + noise * (c.values - e.values)) for c, e in pairs]
+        curves = [
+            c._replace(values=e.values + noise * (c.values - e.values))
+            for c, e in pairs
+        ]
         tables.append(drawn._replace(path=Path(f"{name}.csv"), curves=tuple(curves)))
     return tables
 
@@ -606,11 +1156,16 @@ SPEED = "bonds.critical_speed"
 THREE = {"dry": {SPEED: 0.01}, "wet": {SPEED: 0.015}, "oil": {SPEED: 0.01}}
 
 
-@pytest.mark.parametrize(("folder", "name"), [
-    (r"C:\lab\fits", "../data/psd.csv"),
-    (r"D:\fits", "C:/lab/data/psd.csv"),  # to which no way leads
-])  # fmt: skip
-def test_a_fitted_scenario_names_files_as_all_systems_read_them(folder, name, monkeypatch):
+@pytest.mark.parametrize(
+    ("folder", "name"),
+    [
+        (r"C:\lab\fits", "../data/psd.csv"),
+        (r"D:\fits", "C:/lab/data/psd.csv"),  # to which no way leads
+    ],
+)
+def test_a_fitted_scenario_names_files_as_all_systems_read_them(
+    folder, name, monkeypatch
+):
     monkeypatch.setattr(calibration, "os", SimpleNamespace(path=ntpath))
     tables = {"shear": {"spectrum": {"model": "tabulated", "file": r"data\psd.csv"}}}
     calibration._move(tables, PureWindowsPath(r"C:\lab"), PureWindowsPath(folder))
@@ -618,44 +1173,73 @@ def test_a_fitted_scenario_names_files_as_all_systems_read_them(folder, name, mo
 
 
 def test_tables_without_noise_give_their_exact_ratios_and_keys_all_per_table_give_the_separate_fits():
-    scene, start = load(LENS), load(LENS).with_values({SPEED: 0.012, "bonds.stress": 2.5e5})
+    scene, start = (
+        load(LENS),
+        load(LENS).with_values({SPEED: 0.012, "bonds.stress": 2.5e5}),
+    )
     tables = condition_tables(scene, THREE, 0.01, 1, 0.0)
     result = fit(start, tables, ["bonds.stress"], steady=True, per_table=[SPEED])
     wet, oil, by_wet, by_oil = result.differences
-    assert [item.free.key for item in (wet, by_oil)] == [f"{SPEED} (wet / dry)", f"{SPEED} (oil - dry)"]
+    assert [item.free.key for item in (wet, by_oil)] == [
+        f"{SPEED} (wet / dry)",
+        f"{SPEED} (oil - dry)",
+    ]
     assert_allclose([wet.value, oil.value, by_wet.value], [1.5, 1.0, 5e-3], rtol=1e-5)
     assert abs(by_oil.value) < 1e-5 * by_oil.error
-    assert result.no_difference[SPEED].freedom == 2 and result.no_difference[SPEED].p_value < 1e-9
+    assert (
+        result.no_difference[SPEED].freedom == 2
+        and result.no_difference[SPEED].p_value < 1e-9
+    )
     assert [scene.population.critical_speed for scene in result.scenarios.values()] == [
-        result.values[f"{SPEED} ({name})"] for name in THREE]  # fmt: skip
+        result.values[f"{SPEED} ({name})"] for name in THREE
+    ]
     same = {name: {} for name in THREE}
     tables = condition_tables(scene, same, 0.01, 1, 0.0)
     result = fit(start, tables, ["bonds.stress"], steady=True, per_table=[SPEED])
-    assert result.no_difference[SPEED].p_value > 1.0 - 1e-5  # chi^2 is 0 to the precision of a minimum
-    tables = condition_tables(scene, {name: THREE[name] for name in ("dry", "wet")}, 0.01, 2)
+    # chi^2 is 0 to the precision of a minimum
+    assert result.no_difference[SPEED].p_value > 1.0 - 1e-5
+    tables = condition_tables(
+        scene, {name: THREE[name] for name in ("dry", "wet")}, 0.01, 2
+    )
     result = fit(scene, tables, [], steady=True, per_table=KEYS)
     alone = [fit(scene, [table], KEYS, steady=True) for table in tables]
     separate = [alone[k % 2].numbers[k // 2] for k in range(2 * len(KEYS))]
-    assert_allclose(result.best.chi_square, sum(item.best.chi_square for item in alone), rtol=1e-7)
+    assert_allclose(
+        result.best.chi_square, sum(item.best.chi_square for item in alone), rtol=1e-7
+    )
     for item, other in zip(result.numbers, separate, strict=True):
         assert_allclose(item.value, other.value, rtol=1e-3 * other.error / other.value)
-        assert_allclose(item.interval[:2], other.interval[:2], rtol=3e-3 * other.error / other.value)
+        assert_allclose(
+            item.interval[:2], other.interval[:2], rtol=3e-3 * other.error / other.value
+        )
 
 
 @pytest.mark.parametrize("case", ["plain", "bound", "without errors"])
-def test_intervals_and_p_of_a_force_proportional_to_a_stress_per_table_follow_from_closed_forms(case):
+def test_intervals_and_p_of_a_force_proportional_to_a_stress_per_table_follow_from_closed_forms(
+    case,
+):
     """Both estimates are normal, so the interval of the ratio is that of Fieller; a bound clips a parabola."""
-    scene = load(LENS).with_values({"adhesion.bond_share": 0.0, "shear": {"model": "uniform"}})
+    scene = load(LENS).with_values(
+        {"adhesion.bond_share": 0.0, "shear": {"model": "uniform"}}
+    )
     changes = {"dry": {"bonds.stress": 3e5}, "wet": {"bonds.stress": 3.1e5}}
     tables = condition_tables(scene, changes, 0.03, 5, names=["friction_force"])
-    (unit,) = drawn_of(scene.with_values({"bonds.stress": 1.0}), 1e-300, 0, names=["friction_force"]).curves
+    (unit,) = drawn_of(
+        scene.with_values({"bonds.stress": 1.0}), 1e-300, 0, names=["friction_force"]
+    ).curves
     is_bare, stresses, errors, bound = case == "without errors", [], [], math.inf
     for k, ((curve,), table) in enumerate((table.curves, table) for table in tables):
         weight = (unit.values / (1.0 if is_bare else curve.errors)) ** 2
         stresses.append(np.sum(weight * curve.values / unit.values) / np.sum(weight))
-        left = np.sum((curve.values - stresses[k] * unit.values) ** 2) / (len(SPEEDS) - 1) if is_bare else 1.0
+        left = (
+            np.sum((curve.values - stresses[k] * unit.values) ** 2) / (len(SPEEDS) - 1)
+            if is_bare
+            else 1.0
+        )
         errors.append(math.sqrt(left / np.sum(weight)))
-        tables[k] = table._replace(curves=(curve._replace(errors=None if is_bare else curve.errors),))
+        tables[k] = table._replace(
+            curves=(curve._replace(errors=None if is_bare else curve.errors),)
+        )
     (dry, wet), (of_dry, of_wet) = stresses, errors
     if case == "bound":
         bound = wet + 0.5 * of_wet
@@ -663,17 +1247,34 @@ def test_intervals_and_p_of_a_force_proportional_to_a_stress_per_table_follow_fr
 
     def above(slope, offset):  # the value of wet is slope times that of dry plus offset
         weights = np.array([1.0 / of_dry**2, slope**2 / of_wet**2])
-        value = min(np.average([dry, (wet - offset) / slope], weights=weights), bound, (bound - offset) / slope)
-        return ((value - dry) / of_dry) ** 2 + ((slope * value + offset - wet) / of_wet) ** 2 - law.ppf(0.95)
+        value = min(
+            np.average([dry, (wet - offset) / slope], weights=weights),
+            bound,
+            (bound - offset) / slope,
+        )
+        return (
+            ((value - dry) / of_dry) ** 2
+            + ((slope * value + offset - wet) / of_wet) ** 2
+            - law.ppf(0.95)
+        )
 
     text = f"bonds.stress=1 kPa:{bound:.17g}" if case == "bound" else "bonds.stress"
     result = fit(scene, tables, [], steady=True, per_table=[text])
     both = math.hypot(of_dry, of_wet)
-    for item, best, of in zip(result.differences, (wet / dry, wet - dry), (both / dry, both), strict=True):
+    for item, best, of in zip(
+        result.differences, (wet / dry, wet - dry), (both / dry, both), strict=True
+    ):
         assert_allclose(item.value, best, rtol=0, atol=1e-4 * of)
-        root = (lambda x: above(x, 0.0)) if item.free.quantity.unit == "1" else (lambda x: above(1.0, x))
-        ends = [optimize.brentq(root, best, best + sign * 9.0 * of) for sign in (-1.0, 1.0)]
-        assert_allclose(item.interval[:2], ends, rtol=0, atol=3e-3 * of)  # a thousandth of the half width is promised
+        root = (
+            (lambda x: above(x, 0.0))
+            if item.free.quantity.unit == "1"
+            else (lambda x: above(1.0, x))
+        )
+        ends = [
+            optimize.brentq(root, best, best + sign * 9.0 * of) for sign in (-1.0, 1.0)
+        ]
+        # a thousandth of the half width is promised
+        assert_allclose(item.interval[:2], ends, rtol=0, atol=3e-3 * of)
         assert item.interval[2:] == (False, case == "bound")
     test = result.no_difference["bonds.stress"]
     assert_allclose(test.chi_square, (wet - dry) ** 2 / both**2, rtol=1e-4)
@@ -696,12 +1297,20 @@ def test_differences_of_values_at_a_bound_agree_with_their_chi_square_and_mark_t
     seed, is_excluded, monkeypatch
 ):
     monkeypatch.setattr(calibration, "DRAWS", 1)
-    key, changes = "shear.spectrum.rms", {name: {"shear.paid_by_adhesion": 0.0} for name in ("dry", "wet")}
+    key, changes = (
+        "shear.spectrum.rms",
+        {name: {"shear.paid_by_adhesion": 0.0} for name in ("dry", "wet")},
+    )
     tables = condition_tables(load(LENS), changes, 0.02, seed)
     for order in (tables, tables[::-1]):
         result = fit(load(LENS), order, [SPEED], steady=True, per_table=[key])
-        (of_ratio, of_difference), test = (item.interval for item in result.differences), result.no_difference[key]
-        assert (test.chi_square > stats.chi2.ppf(0.95, 1)) == is_excluded and test.draws == 1
+        (of_ratio, of_difference), test = (
+            (item.interval for item in result.differences),
+            result.no_difference[key],
+        )
+        assert (
+            test.chi_square > stats.chi2.ppf(0.95, 1)
+        ) == is_excluded and test.draws == 1
         assert (of_ratio.low < 1.0 < of_ratio.high) != is_excluded
         assert (of_difference.low < 0.0 < of_difference.high) != is_excluded
         base, other = (item.interval for item in result.numbers[1:])
@@ -715,7 +1324,9 @@ def test_differences_of_values_at_a_bound_agree_with_their_chi_square_and_mark_t
         assert not other.low_open or of_ratio.low < 2.0 * other.low / base.high
 
 
-def test_values_per_table_that_do_not_go_together_are_refused_in_one_line(scenario, tmp_path, truth):
+def test_values_per_table_that_do_not_go_together_are_refused_in_one_line(
+    scenario, tmp_path, truth
+):
     def written_to(name, curves, text=""):
         path = table(tmp_path / name, {"speed [m/s]": SPEEDS}, curves, 0.01)
         path.write_text(text + path.read_text(encoding="utf-8"), encoding="utf-8")
@@ -725,17 +1336,29 @@ def test_values_per_table_that_do_not_go_together_are_refused_in_one_line(scenar
     dry, twin = written_to("dry.csv", truth), written_to("b/Dry.csv", truth)
     stress = written_to("stress.csv", {"shear_stress": np.full(len(SPEEDS), 3e5)})
     load_of = written_to("load.csv", truth, "# contact.load = 8 mN\n")
-    wrong, unknown = written_to("m.csv", truth, "# load = 8 mm\n"), written_to("u.csv", truth, "#contact.laod=8 mN\n")
+    wrong, unknown = (
+        written_to("m.csv", truth, "# load = 8 mm\n"),
+        written_to("u.csv", truth, "#contact.laod=8 mN\n"),
+    )
     twice = written_to("t.csv", truth, "# speed = 1 mm/s\n")
     split = ("--per-table", SPEED)
     for words, cure in (
-        ((dry, *split), "one table only"), ((dry, twin, *split), "rename"), ((dry, stress), "--per-table"),
+        ((dry, *split), "one table only"),
+        ((dry, twin, *split), "rename"),
+        ((dry, stress), "--per-table"),
         ((dry, stress, *split, "--free", SPEED), f"{SPEED} is there twice"),
-        ((dry, stress, "--per-table", "shear.spectrum.rms"), "rms: has no effect on what was measured in stress"),
-        ((dry, load_of, "--free", "contact.load"), f"{load_of}: has values of contact.load"),
-        ((dry, wrong, *split), 'not a unit of N'), ((dry, unknown, *split), "contact_laod → contact_load"),
+        (
+            (dry, stress, "--per-table", "shear.spectrum.rms"),
+            "rms: has no effect on what was measured in stress",
+        ),
+        (
+            (dry, load_of, "--free", "contact.load"),
+            f"{load_of}: has values of contact.load",
+        ),
+        ((dry, wrong, *split), "not a unit of N"),
+        ((dry, unknown, *split), "contact_laod → contact_load"),
         ((dry, twice, *split), '"speed" is a column and a comment'),
-    ):  # fmt: skip
+    ):
         done = command(scenario, *words, "--steady")
         assert isinstance(done.exception, BadInput), (words, done.output)
         (line,) = done.exception.problems
@@ -743,34 +1366,68 @@ def test_values_per_table_that_do_not_go_together_are_refused_in_one_line(scenar
     assert not [*tmp_path.glob("lens_fit*")]
 
 
-def test_the_command_writes_a_scenario_for_each_table_with_its_load_and_draws_a_colour_for_each(scenario, tmp_path):
-    conditions = {"dry": {}, "wet": {SPEED: 0.02, "contact.load": 8e-3, "solid.shear_modulus": 1e6}}
+def test_the_command_writes_a_scenario_for_each_table_with_its_load_and_draws_a_colour_for_each(
+    scenario, tmp_path
+):
+    conditions = {
+        "dry": {},
+        "wet": {SPEED: 0.02, "contact.load": 8e-3, "solid.shear_modulus": 1e6},
+    }
     paths = []
     for name, changes in conditions.items():
         drawn = drawn_of(load(LENS).with_values(changes), 0.01, 3)
         curves = {curve.name: curve.values for curve in drawn.curves}
-        paths.append(table(tmp_path / f"{name}.csv", {"speed [m/s]": SPEEDS}, curves, 0.01))
+        paths.append(
+            table(tmp_path / f"{name}.csv", {"speed [m/s]": SPEEDS}, curves, 0.01)
+        )
     header = "# T = 25 C\n# contact.load = 8 mN\n# solid.shear_modulus = 1 MPa\n"
     paths[1].write_text(header + paths[1].read_text(encoding="utf-8"), encoding="utf-8")
-    words = (scenario, *paths, "--free", "bonds.stress", "--per-table", SPEED, "--steady")
+    words = (
+        scenario,
+        *paths,
+        "--free",
+        "bonds.stress",
+        "--per-table",
+        SPEED,
+        "--steady",
+    )
     done = command(*words)
     assert done.exit_code == 0, done.output
     document = json.loads((tmp_path / "lens_fit.json").read_text(encoding="utf-8"))
     ratio = document["differences"][f"{SPEED} (wet / dry)"]
-    assert ratio["low"] < 2.0 < ratio["high"] and document["no_difference"][SPEED]["p_value"] < 1e-6
+    assert (
+        ratio["low"] < 2.0 < ratio["high"]
+        and document["no_difference"][SPEED]["p_value"] < 1e-6
+    )
     for name, changes in conditions.items():
-        fitted, numbers = quantities(load(tmp_path / f"lens_fit_{name}.toml")), document["numbers"]
-        expected = {key: numbers[key]["value"] for key in ("bonds.stress", f"{SPEED} ({name})")} | changes
+        fitted, numbers = (
+            quantities(load(tmp_path / f"lens_fit_{name}.toml")),
+            document["numbers"],
+        )
+        expected = {
+            key: numbers[key]["value"] for key in ("bonds.stress", f"{SPEED} ({name})")
+        } | changes
         expected[SPEED] = expected.pop(f"{SPEED} ({name})")
-        assert_allclose([fitted[key][1] for key in expected], [*expected.values()], rtol=1e-11)
+        assert_allclose(
+            [fitted[key][1] for key in expected], [*expected.values()], rtol=1e-11
+        )
     assert not (tmp_path / "lens_fit.toml").exists()
     assert command(*words, "--force").exit_code == 0 and "(wet / dry)" in done.output
     result = sim.fit(LENS, paths, ["bonds.stress"], steady=True, per_table=[SPEED])
-    assert f"{SPEED}: p of no difference {result.no_difference[SPEED]}" in repr(result).splitlines()
+    assert (
+        f"{SPEED}: p of no difference {result.no_difference[SPEED]}"
+        in repr(result).splitlines()
+    )
     upper, *_ = figure(result.problem, result.best).axes
     points, fits = drawn_by_colour(upper)
-    labels = [text.get_text().partition(",")[0] for text in upper.get_legend().get_texts()]
-    assert len(points) == 2 and points.keys() == fits.keys() and labels[-2:] == ["dry", "wet"]
+    labels = [
+        text.get_text().partition(",")[0] for text in upper.get_legend().get_texts()
+    ]
+    assert (
+        len(points) == 2
+        and points.keys() == fits.keys()
+        and labels[-2:] == ["dry", "wet"]
+    )
 
 
 @pytest.mark.verify
@@ -780,7 +1437,9 @@ def test_the_interval_of_a_ratio_holds_it_and_no_difference_is_rejected_as_often
         for ratio in (1.5, 1.0):
             changes = {"dry": {SPEED: 0.01}, "wet": {SPEED: 0.01 * ratio}}
             tables = condition_tables(scene, changes, 0.02, seed)
-            result = fit(scene, tables, ["bonds.stress"], steady=True, per_table=[SPEED])
+            result = fit(
+                scene, tables, ["bonds.stress"], steady=True, per_table=[SPEED]
+            )
             low, high, *_ = result.differences[0].interval
             held += ratio > 1.0 and low < ratio < high
             rejected += ratio == 1.0 and result.no_difference[SPEED].p_value < 0.05
@@ -790,22 +1449,38 @@ def test_the_interval_of_a_ratio_holds_it_and_no_difference_is_rejected_as_often
 
 @pytest.mark.verify
 def test_p_of_no_difference_is_as_often_small_as_it_says_if_values_stand_at_their_bounds():
-    scene, changes, values = load(LENS), {name: {"shear.paid_by_adhesion": 0.0} for name in ("dry", "wet")}, []
+    scene, changes, values = (
+        load(LENS),
+        {name: {"shear.paid_by_adhesion": 0.0} for name in ("dry", "wet")},
+        [],
+    )
     for seed in range(7000, 7040):
         tables = condition_tables(scene, changes, 0.02, seed)
         of_seed = scene.with_values({"seed": seed})
-        result = fit(of_seed, tables, [SPEED], steady=True, per_table=["shear.spectrum.rms"])
+        result = fit(
+            of_seed, tables, [SPEED], steady=True, per_table=["shear.spectrum.rms"]
+        )
         test = result.no_difference["shear.spectrum.rms"]
-        assert test.draws > 0 or test.p_value == 1.0 or not any(item.interval.low_open for item in result.numbers)
+        assert (
+            test.draws > 0
+            or test.p_value == 1.0
+            or not any(item.interval.low_open for item in result.numbers)
+        )
         values.append(test.p_value)
-    assert stats.binom.ppf(0.0005, 40, 0.3) <= sum(p <= 0.3 for p in values) <= stats.binom.ppf(0.9995, 40, 0.3)
+    assert (
+        stats.binom.ppf(0.0005, 40, 0.3)
+        <= sum(p <= 0.3 for p in values)
+        <= stats.binom.ppf(0.9995, 40, 0.3)
+    )
     assert sum(p <= 0.05 for p in values) <= stats.binom.ppf(0.999, 40, 0.05)
 
 
 def test_every_line_of_the_paper_holds_and_a_wrong_value_or_law_fails(monkeypatch):
     lines = checks()
     assert len(lines) >= 30 and [line.name for line in lines if not line.holds] == []
-    assert len({(line.name, line.equation, line.computed) for line in lines}) == len(lines)
+    assert len({(line.name, line.equation, line.computed) for line in lines}) == len(
+        lines
+    )
     loose = [line.name for line in lines if line.tolerance > 1e-7]
     assert len(loose) == 3 and all("as printed" in name for name in loose)
     assert not Check("", "", 1.1, 1.0, 0.1, 1e-3).holds
@@ -821,5 +1496,11 @@ def test_every_line_of_the_paper_holds_and_a_wrong_value_or_law_fails(monkeypatc
         right = getattr(module, law)
         assert all(paper._check(*row).holds for row in section())
         with monkeypatch.context() as patched:
-            patched.setattr(module, law, lambda *values, right=right, **named: right(*values, **named) * (1.0 + 1e-6))
+            patched.setattr(
+                module,
+                law,
+                lambda *values, right=right, **named: (
+                    right(*values, **named) * (1.0 + 1e-6)
+                ),
+            )
             assert not all(paper._check(*row).holds for row in section()), law

@@ -27,7 +27,12 @@ def test_numbers_read_back_to_what_they_were():
     for unit in ("m", "m/s", "J/m^2", "m^2", "N", "Pa"):
         numbers = 3.25 * 10.0 ** np.arange(-14, 12)
         texts = [engineering(number, unit).replace("²", "^2") for number in numbers]
-        np.testing.assert_allclose([Quantity(unit, "number").read(text) for text in texts], numbers, rtol=1e-12, atol=0)
+        np.testing.assert_allclose(
+            [Quantity(unit, "number").read(text) for text in texts],
+            numbers,
+            rtol=1e-12,
+            atol=0,
+        )
 
 
 def test_a_mean_carries_its_standard_error_in_brackets():
@@ -47,11 +52,17 @@ def test_a_mean_carries_its_standard_error_in_brackets():
 
 def test_an_error_is_never_written_as_nothing():
     rng = np.random.default_rng(11)
-    for mean, sem in zip(10.0 ** rng.uniform(-6, 6, 2000), 10.0 ** rng.uniform(-9, 3, 2000), strict=True):
+    for mean, sem in zip(
+        10.0 ** rng.uniform(-6, 6, 2000), 10.0 ** rng.uniform(-9, 3, 2000), strict=True
+    ):
         text = concise(mean, mean * sem)
         assert "(0)" not in text
-        if "(" in text:  # the digits in the brackets are the error to a unit of the last, half of it but for rounding
+        # the digits in the brackets are the error to a unit of the last, half of it but for rounding
+        if "(" in text:
             shown, digits = text.rstrip(")").split("(")
             unit = 10.0 ** -len(shown.partition(".")[2])
             largest = 0.51 * max(unit, 10.0 ** math.floor(math.log10(mean * sem)))
-            assert abs(int(digits) * unit - mean * sem) <= largest and abs(float(shown) - mean) <= largest
+            assert (
+                abs(int(digits) * unit - mean * sem) <= largest
+                and abs(float(shown) - mean) <= largest
+            )

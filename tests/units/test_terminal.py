@@ -11,7 +11,9 @@ from sim.units.terminal import accept_all_letters, plain, print_rows, say, while
 
 @pytest.mark.parametrize("encoding", ["cp1252", "cp850", "ascii"])
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])
-def test_an_output_that_lacks_a_letter_keeps_the_sense_of_a_formula(encoding, stream, monkeypatch):
+def test_an_output_that_lacks_a_letter_keeps_the_sense_of_a_formula(
+    encoding, stream, monkeypatch
+):
     screen = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
     monkeypatch.setattr(sys, stream, screen)
     accept_all_letters()
@@ -57,16 +59,23 @@ class Left(io.RawIOBase):
         raise OSError(self.number, "a fault")
 
 
-@pytest.mark.parametrize(("number", "is_left"), [(errno.EPIPE, True), (errno.EINVAL, True), (errno.ENOSPC, False)])
-def test_a_reader_that_leaves_ends_a_command_with_success_by_the_errors_of_all_systems(number, is_left, monkeypatch):
+@pytest.mark.parametrize(
+    ("number", "is_left"),
+    [(errno.EPIPE, True), (errno.EINVAL, True), (errno.ENOSPC, False)],
+)
+def test_a_reader_that_leaves_ends_a_command_with_success_by_the_errors_of_all_systems(
+    number, is_left, monkeypatch
+):
     raw = Left(number)
     screen = io.TextIOWrapper(io.BufferedWriter(raw), encoding="utf-8")
     monkeypatch.setattr(sys, "stdout", screen)
-    monkeypatch.setattr("os.dup2", lambda *numbers: None)  # which would close the output of the tests
+    # which would close the output of the tests
+    monkeypatch.setattr("os.dup2", lambda *numbers: None)
     with pytest.raises(SystemExit if is_left else OSError) as end, while_read():
         say("a line")
     assert not is_left or end.value.code == 0
-    raw.number = None  # so that the text that waits can be written when the stream is closed
+    # so that the text that waits can be written when the stream is closed
+    raw.number = None
 
 
 def test_an_invalid_argument_of_another_file_is_not_a_reader_that_left(capsys):

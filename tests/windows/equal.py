@@ -10,7 +10,10 @@ def numbers(path):
     """Return the bytes of each variable of a file."""
     with netCDF4.Dataset(path) as file:
         file.set_auto_mask(False)
-        return {name: np.asarray(variable[:]).tobytes() for name, variable in file.variables.items()}
+        return {
+            name: np.asarray(variable[:]).tobytes()
+            for name, variable in file.variables.items()
+        }
 
 
 if __name__ == "__main__":

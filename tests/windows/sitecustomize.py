@@ -21,6 +21,13 @@ def _time() -> float:
     return _time_ns() / 1e9
 
 
-for _function, _name in ((_time, "time"), (_time_ns, "time_ns")) if sys.platform == "win32" else ():
-    _function.__module__, _function.__name__, _function.__qualname__ = "time", _name, _name  # so that it is pickled
+for _function, _name in (
+    ((_time, "time"), (_time_ns, "time_ns")) if sys.platform == "win32" else ()
+):
+    # so that it is pickled
+    _function.__module__, _function.__name__, _function.__qualname__ = (
+        "time",
+        _name,
+        _name,
+    )
     setattr(time, _name, _function)

@@ -17,7 +17,14 @@ import numpy as np
 
 from sim.numerics.jit import device, kernel
 from sim.numerics.special import exp
-from sim.parts.bonds.rupture import RuptureRate, fresh_integral, growth, hazard_integral, hazard_time, rate_at
+from sim.parts.bonds.rupture import (
+    RuptureRate,
+    fresh_integral,
+    growth,
+    hazard_integral,
+    hazard_time,
+    rate_at,
+)
 from sim.parts.exchange import Array, Flags
 
 
@@ -29,7 +36,9 @@ def settle(weight, stretch, width, count, direction, travelled, rules):
     """
     _sort(weight, stretch, width, count, direction)
     finest, cell, fronts = 64, rules.cell, rules.limit < math.inf
-    count = _merge(weight, stretch, width, count, travelled, cell, finest, fronts, rules)
+    count = _merge(
+        weight, stretch, width, count, travelled, cell, finest, fronts, rules
+    )
     while count > rules.most:
         if finest > 1:
             finest //= 2
@@ -37,7 +46,9 @@ def settle(weight, stretch, width, count, direction, travelled, rules):
             fronts = False
         else:
             cell *= 2.0
-        count = _merge(weight, stretch, width, count, travelled, cell, finest, fronts, rules)
+        count = _merge(
+            weight, stretch, width, count, travelled, cell, finest, fronts, rules
+        )
     return count
 
 
@@ -48,7 +59,11 @@ def _sort(weight, stretch, width, count, direction):
         w, x, b = weight[i], stretch[i], width[i]
         j = i
         while j > 0 and (x - stretch[j - 1]) * direction > 0.0:
-            weight[j], stretch[j], width[j] = weight[j - 1], stretch[j - 1], width[j - 1]
+            weight[j], stretch[j], width[j] = (
+                weight[j - 1],
+                stretch[j - 1],
+                width[j - 1],
+            )
             j -= 1
         weight[j], stretch[j], width[j] = w, x, b
 
@@ -71,15 +86,31 @@ def _merge(weight, stretch, width, count, travelled, cell, finest, fronts, rules
             inside += weight[last]
             last += 1
         parts = 1
-        while parts < finest and cell * rules.steepness * inside > rules.heavy * whole * parts * parts:
+        while (
+            parts < finest
+            and cell * rules.steepness * inside > rules.heavy * whole * parts * parts
+        ):
             parts *= 2
-        left = _merge_cell(weight, stretch, width, first, last, left, travelled, cell / parts, fronts, rules)
+        left = _merge_cell(
+            weight,
+            stretch,
+            width,
+            first,
+            last,
+            left,
+            travelled,
+            cell / parts,
+            fronts,
+            rules,
+        )
         first = last
     return left
 
 
 @device
-def _merge_cell(weight, stretch, width, first, last, left, travelled, cell, fronts, rules):
+def _merge_cell(
+    weight, stretch, width, first, last, left, travelled, cell, fronts, rules
+):
     """Merge the cohorts ``first`` to ``last`` in cells of one width, writing from ``left`` on; return the end."""
     while first < last:
         place = math.floor((stretch[first] - travelled) / cell)
@@ -129,11 +160,20 @@ def _gauss(weight, stretch, width, first, end, left, segments):
     lean = 0.5 * cube / total / square
     reach = math.sqrt(lean * lean + square)
     below = reach + math.fabs(lean)
-    above = square / below  # the nearer node's distance from the mean, without cancellation
+    # the nearer node's distance from the mean, without cancellation
+    above = square / below
     if lean > 0.0:
         above, below = below, above
-    weight[left], stretch[left], width[left] = total * (below / (above + below)), mean + above, 0.0
-    weight[left + 1], stretch[left + 1], width[left + 1] = total * (above / (above + below)), mean - below, 0.0
+    weight[left], stretch[left], width[left] = (
+        total * (below / (above + below)),
+        mean + above,
+        0.0,
+    )
+    weight[left + 1], stretch[left + 1], width[left + 1] = (
+        total * (above / (above + below)),
+        mean - below,
+        0.0,
+    )
     return 2
 
 
@@ -159,7 +199,9 @@ def inside(stretch, width, limit):
     """Return the share of a segment that lies between ± ``limit`` [1]."""
     if width == 0.0:
         return 1.0 if math.fabs(stretch) < limit else 0.0
-    over = max(0.0, stretch + 0.5 * width - limit) + max(0.0, -limit - stretch + 0.5 * width)
+    over = max(0.0, stretch + 0.5 * width - limit) + max(
+        0.0, -limit - stretch + 0.5 * width
+    )
     return max(0.0, 1.0 - over / width)
 
 
@@ -169,17 +211,31 @@ def survive(pool, count, move, speed, step, off, rules):
 
     ``off`` is the mean deviation of their stretch from that of a motion at constant speed [m].
     """
-    weight, stretch, width, steepness, survivors, survivors_early = pool[0], pool[1], pool[2], pool[3], pool[4], pool[8]
+    weight, stretch, width, steepness, survivors, survivors_early = (
+        pool[0],
+        pool[1],
+        pool[2],
+        pool[3],
+        pool[4],
+        pool[8],
+    )
     early, short = step / 3.0, move / 3.0
-    soon, late = fresh_integral(early, speed, rules.law), fresh_integral(step, speed, rules.law)
+    soon, late = (
+        fresh_integral(early, speed, rules.law),
+        fresh_integral(step, speed, rules.law),
+    )
     for i in range(count):
         survivors_early[i] = weight[i] * exp(-steepness[i] * soon)
         survivors[i] = weight[i] * exp(-steepness[i] * late)
     at_early, at_end = 0.0, 0.0
     for i in range(count):
         if steepness[i] == 0.0:
-            survivors_early[i] = weight[i] * math.exp(-hazard_integral(stretch[i] + off, short, early, rules.law))
-            survivors[i] = weight[i] * math.exp(-hazard_integral(stretch[i] + off, move, step, rules.law))
+            survivors_early[i] = weight[i] * math.exp(
+                -hazard_integral(stretch[i] + off, short, early, rules.law)
+            )
+            survivors[i] = weight[i] * math.exp(
+                -hazard_integral(stretch[i] + off, move, step, rules.law)
+            )
         if rules.limit < math.inf:
             survivors_early[i] *= inside(stretch[i] + short, width[i], rules.limit)
             survivors[i] *= inside(stretch[i] + move, width[i], rules.limit)
@@ -205,7 +261,12 @@ def births(free, early, late, step, speed, rules):
     z = rules.rebinding * step
     before = math.exp(-fresh_integral(-2.0 / 3.0 * step, speed, rules.law))
     after = math.exp(-fresh_integral(2.0 / 3.0 * step, speed, rules.law))
-    a, b, c, d = 1.0 + 5.0 / 12.0 * z, -z / 12.0 * before, 0.75 * z * after, 1.0 + 0.25 * z
+    a, b, c, d = (
+        1.0 + 5.0 / 12.0 * z,
+        -z / 12.0 * before,
+        0.75 * z * after,
+        1.0 + 0.25 * z,
+    )
     p, q = max(0.0, 1.0 - early), max(0.0, 1.0 - late)
     whole = a * d - b * c
     first, last = (p * d - b * q) / whole, (a * q - c * p) / whole
@@ -213,8 +274,14 @@ def births(free, early, late, step, speed, rules):
     error = math.fabs(other + 0.25 * z * last - c * first)
     if min(first, last) >= 0.0:
         return c * first, 0.25 * z * last, 0.0, error
-    born = min(max(q - last, 0.0), q)  # only roundings, or a step too short to refuse, end with these
-    return (born if first > 0.0 else 0.0), (0.0 if first > 0.0 else born), min(first, last), error
+    # only roundings, or a step too short to refuse, end with these
+    born = min(max(q - last, 0.0), q)
+    return (
+        (born if first > 0.0 else 0.0),
+        (0.0 if first > 0.0 else born),
+        min(first, last),
+        error,
+    )
 
 
 @device
@@ -227,7 +294,11 @@ def carry(pool, count, move, off, born_early, born_late, rules):
     left = 0
     for i in range(count):
         if survivors[i] > 1e-18 * whole:
-            weight[left], stretch[left], width[left] = survivors[i], stretch[i] + move, width[i]
+            weight[left], stretch[left], width[left] = (
+                survivors[i],
+                stretch[i] + move,
+                width[i],
+            )
             if rules.limit < math.inf:
                 low = max(stretch[left] - 0.5 * width[i], -rules.limit)
                 high = min(stretch[left] + 0.5 * width[i], rules.limit)
@@ -238,7 +309,11 @@ def carry(pool, count, move, off, born_early, born_late, rules):
     far = 2.0 / 3.0 * move - 4.0 / 3.0 * off
     if rules.limit < math.inf or far == 0.0:
         share = born_early / (born_early + born_late)
-        weight[left], stretch[left], width[left] = born_early + born_late, share * far, 0.0
+        weight[left], stretch[left], width[left] = (
+            born_early + born_late,
+            share * far,
+            0.0,
+        )
         width[left] = math.sqrt(12.0 * share * (1.0 - share)) * math.fabs(far)
         return left + 1
     weight[left], stretch[left], width[left] = born_early, far, 0.0
@@ -255,7 +330,10 @@ def try_step(pool, count, move, speed, step, off, free, rules):
     born_early, born_late, lowest, error = births(free, early, late, step, speed, rules)
     if lowest < -1e-14:
         return born_early, born_late, 0.2
-    bound, rounding = late + born_early + born_late + 1e-9 * (1.0 - free), 1e-15 * (1.0 + rules.rebinding * step)
+    bound, rounding = (
+        late + born_early + born_late + 1e-9 * (1.0 - free),
+        1e-15 * (1.0 + rules.rebinding * step),
+    )
     allowed = rules.tolerance / 3.0 * bound + rounding
     factor = 4.0 if error <= 0.0 else (allowed / error) ** (1.0 / 3.0)
     if factor < 1.0:
@@ -267,12 +345,17 @@ def try_step(pool, count, move, speed, step, off, free, rules):
 def _forgets(pool, other, count, speed, duration, rules):
     """Return the number of cohorts of the steady state, written to ``other``, if a step forgets its start, else 0."""
     depth = math.log(100.0 / rules.tolerance)
-    if rules.rebinding == 0.0 or not duration > depth * hazard_time(0.0, speed, 1.0, rules.law):
+    if rules.rebinding == 0.0 or not duration > depth * hazard_time(
+        0.0, speed, 1.0, rules.law
+    ):
         return 0
     steady_count, life, square = fill_steady(other, speed, rules)
     pause = 1.0 / rules.rebinding
     cycle = life + pause
-    spread = max(0.0, 2.0 * square / life / life - 1.0) * (life / cycle) ** 2 + (pause / cycle) ** 2
+    spread = (
+        max(0.0, 2.0 * square / life / life - 1.0) * (life / cycle) ** 2
+        + (pause / cycle) ** 2
+    )
     lives = min(300.0, depth / min(1.0, 2.0 * math.pi**2 * spread))
     rest = duration - lives * life
     if rest <= 0.0:
@@ -307,12 +390,18 @@ def _step_row(pool, count, travelled, settled, slip, duration, rules):
         step = min(step, longest)
         remaining = duration - done
         going = step < 0.999 * remaining
-        step = (step if step < 0.5 * remaining else 0.5 * remaining) if going else remaining
+        step = (
+            (step if step < 0.5 * remaining else 0.5 * remaining)
+            if going
+            else remaining
+        )
         bound = 0.0
         for i in range(count):
             bound += pool[0, i]
         move = speed * step if done > 0.0 or going else slip
-        born_early, born_late, factor = try_step(pool, count, move, speed, step, 0.0, max(0.0, 1.0 - bound), rules)
+        born_early, born_late, factor = try_step(
+            pool, count, move, speed, step, 0.0, max(0.0, 1.0 - bound), rules
+        )
         if factor < 1.0 and step > shortest:
             step, going = max(step * factor, shortest), True
             continue
@@ -321,7 +410,9 @@ def _step_row(pool, count, travelled, settled, slip, duration, rules):
         done += step
         step *= max(factor, 1.0)
         if count > 1.25 * settled + 16.0 or count + 2 > pool.shape[1]:
-            count = settle(pool[0], pool[1], pool[2], count, direction, travelled, rules)
+            count = settle(
+                pool[0], pool[1], pool[2], count, direction, travelled, rules
+            )
             settled = count
         if going:
             steepen(pool, count, slip, 0.0, rules)
@@ -344,23 +435,39 @@ def read_row(pool, weight, stretch, width, share):
     return count
 
 
-@kernel(f"void({_COHORTS}, float64[:], float64[:,:], float64[:], {RULES}, {_COHORTS}, float64[:,:,::1])")
+@kernel(
+    f"void({_COHORTS}, float64[:], float64[:,:], float64[:], {RULES}, {_COHORTS}, float64[:,:,::1])"
+)
 def step_rows(before, share, slip, duration, numbers, after, sums):
     """Advance all rows by all steps, each row from a ``share`` of its bonds, and write its sums after each step."""
-    (weight, stretch, width, lattice), (new_weight, new_stretch, new_width, new_lattice) = before, after
+    (
+        (weight, stretch, width, lattice),
+        (new_weight, new_stretch, new_width, new_lattice),
+    ) = before, after
     rules = Rules(*numbers)
     pool = np.empty((9, new_weight.shape[1] + 520))
     for m in range(len(new_weight)):
         old = m % len(weight)
-        count = read_row(pool, weight[old], stretch[old], width[old], share[m % share.size])
+        count = read_row(
+            pool, weight[old], stretch[old], width[old], share[m % share.size]
+        )
         travelled, settled = lattice[old, 0], lattice[old, 1]
         row = new_weight[m], new_stretch[m], new_width[m], new_lattice[m]
         for k in range(duration.size):
             moved = slip[k, m % slip.shape[1]]
-            count, travelled, settled = _step_row(pool, count, travelled, settled, moved, duration[k], rules)
+            count, travelled, settled = _step_row(
+                pool, count, travelled, settled, moved, duration[k], rules
+            )
             count = write_row(pool, count, travelled, settled, moved, rules, row)
             travelled, settled = row[3][0], row[3][1]
-            sum_row(new_weight[m, :count], new_stretch[m], new_width[m], rules, pool[4], sums[:, k, m])
+            sum_row(
+                new_weight[m, :count],
+                new_stretch[m],
+                new_width[m],
+                rules,
+                pool[4],
+                sums[:, k, m],
+            )
             count = read_row(pool, new_weight[m], new_stretch[m], new_width[m], 1.0)
 
 
@@ -372,9 +479,19 @@ def write_row(pool, count, travelled, settled, slip, rules, row):
     """
     weight, stretch, width, lattice = row
     if count > weight.size:
-        count = settle(pool[0], pool[1], pool[2], count, -1.0 if slip < 0.0 else 1.0, travelled, rules)
+        count = settle(
+            pool[0],
+            pool[1],
+            pool[2],
+            count,
+            -1.0 if slip < 0.0 else 1.0,
+            travelled,
+            rules,
+        )
         settled = count
-    lattice[0] = travelled % (1048576.0 * rules.cell) if rules.cell < math.inf else travelled
+    lattice[0] = (
+        travelled % (1048576.0 * rules.cell) if rules.cell < math.inf else travelled
+    )
     lattice[1] = settled
     weight[:count], stretch[:count] = pool[0, :count], pool[1, :count]
     weight[count:], stretch[count:] = 0.0, 0.0
@@ -404,7 +521,9 @@ def sum_row(weight, stretch, width, rules, lost, sums):
         sums[4] += lost[i]
 
 
-@kernel(f"void(float64[:,::1], float64[:,::1], float64[:,::1], {RULES}, float64[:,::1])")
+@kernel(
+    f"void(float64[:,::1], float64[:,::1], float64[:,::1], {RULES}, float64[:,::1])"
+)
 def sum_rows(weight, stretch, width, numbers, sums):
     """Write the sums over the cohorts of each row, shape (5, rows)."""
     rules, lost = Rules(*numbers), np.empty(weight.shape[1])
@@ -412,18 +531,33 @@ def sum_rows(weight, stretch, width, numbers, sums):
         sum_row(weight[m], stretch[m], width[m], rules, lost, sums[:, m])
 
 
-@kernel(f"void(float64, {RULES}, float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")
+@kernel(
+    f"void(float64, {RULES}, float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])"
+)
 def settle_steady(speed, numbers, weight, stretch, width, lattice):
     """Write the merged steady state of one row."""
     rules = Rules(*numbers)
     pool = np.empty((3, weight.shape[1] + 520))
     count, _, _ = fill_steady(pool, min(max(speed, -1e200), 1e200), rules)
-    count = settle(pool[0], pool[1], pool[2], count, math.copysign(1.0, speed), 0.0, rules)
-    write_row(pool, count, 0.0, count, speed, rules, (weight[0], stretch[0], width[0], lattice[0]))
+    count = settle(
+        pool[0], pool[1], pool[2], count, math.copysign(1.0, speed), 0.0, rules
+    )
+    write_row(
+        pool,
+        count,
+        0.0,
+        count,
+        speed,
+        rules,
+        (weight[0], stretch[0], width[0], lattice[0]),
+    )
 
 
 _POINTS = np.polynomial.legendre.leggauss(5)
-_NODES, _SHARES = tuple((0.5 + 0.5 * _POINTS[0]).tolist()), tuple((0.5 * _POINTS[1]).tolist())
+_NODES, _SHARES = (
+    tuple((0.5 + 0.5 * _POINTS[0]).tolist()),
+    tuple((0.5 * _POINTS[1]).tolist()),
+)
 
 
 @device
@@ -450,12 +584,20 @@ def fill_steady(room, speed, rules):
         mass, mean, spread = 0.0, 0.0, 0.0
         for node, share in zip(_NODES, _SHARES):  # noqa: B905 - compiled
             age = (k + node) * panel
-            survivors = share * panel * math.exp(-hazard_integral(0.0, speed * age, age, rules.law))
+            survivors = (
+                share
+                * panel
+                * math.exp(-hazard_integral(0.0, speed * age, age, rules.law))
+            )
             mass += survivors
             mean += survivors * age
             spread += survivors * age * age
             if not segments and survivors > 0.0:
-                room[0, count], room[1, count], room[2, count] = survivors, speed * age, 0.0
+                room[0, count], room[1, count], room[2, count] = (
+                    survivors,
+                    speed * age,
+                    0.0,
+                )
                 count += 1
         if segments and mass > 0.0:
             centre = mean / mass
@@ -508,7 +650,9 @@ def unstretched(rupture: RuptureRate, tolerance: float, share: float) -> Cohorts
     return Cohorts(weight, np.zeros((1, capacity)), width, np.zeros((1, 2)))
 
 
-def steady(rupture: RuptureRate, rebinding_rate: float, speed: float, tolerance: float) -> Cohorts:
+def steady(
+    rupture: RuptureRate, rebinding_rate: float, speed: float, tolerance: float
+) -> Cohorts:
     """Return a population in steady sliding at ``speed`` [m/s], of any sign.
 
     Notes
@@ -526,10 +670,16 @@ def steady(rupture: RuptureRate, rebinding_rate: float, speed: float, tolerance:
     >>> print(f"{moving.weight.sum():.3f} of {steady(bell, 1.0, 0.0, 1e-4).weight.sum():.1f}")
     0.374 of 0.5
     """
-    at_rest = rebinding_rate / (rebinding_rate + rupture.at_rest) if rebinding_rate > 0.0 else 0.0
+    at_rest = (
+        rebinding_rate / (rebinding_rate + rupture.at_rest)
+        if rebinding_rate > 0.0
+        else 0.0
+    )
     result = unstretched(rupture, tolerance, at_rest)
     if rebinding_rate > 0.0 and speed != 0.0:
-        settle_steady(float(speed), numbers_of(rupture, rebinding_rate, tolerance), *result)
+        settle_steady(
+            float(speed), numbers_of(rupture, rebinding_rate, tolerance), *result
+        )
     return result
 
 
@@ -577,8 +727,19 @@ def advance(
     outlives ends in the steady state.
     """
     rows = max(slip.shape[1], len(cohorts.weight), len(share))
-    after, sums = tuple(np.zeros((rows, a.shape[1])) for a in cohorts), np.empty((5, len(duration), rows))
-    step_rows(tuple(cohorts), share, slip, duration, numbers_of(rupture, rebinding_rate, tolerance), after, sums)
+    after, sums = (
+        tuple(np.zeros((rows, a.shape[1])) for a in cohorts),
+        np.empty((5, len(duration), rows)),
+    )
+    step_rows(
+        tuple(cohorts),
+        share,
+        slip,
+        duration,
+        numbers_of(rupture, rebinding_rate, tolerance),
+        after,
+        sums,
+    )
     return Cohorts(*after), sums
 
 
@@ -593,7 +754,13 @@ def moments(cohorts: Cohorts, rupture: RuptureRate, tolerance: float) -> Array:
     - Stretch that thermal rupture takes in unit time [m/s], the sum of w x k(|x|).
     """
     sums = np.empty((5, len(cohorts.weight)))
-    sum_rows(cohorts.weight, cohorts.stretch, cohorts.width, numbers_of(rupture, 0.0, tolerance), sums)
+    sum_rows(
+        cohorts.weight,
+        cohorts.stretch,
+        cohorts.width,
+        numbers_of(rupture, 0.0, tolerance),
+        sums,
+    )
     return sums
 
 
@@ -604,14 +771,18 @@ def _most(rupture: RuptureRate, tolerance: float) -> int:
     if rupture.steepness == 0.0:
         return 8
     cell = (432.0 * tolerance) ** 0.25
-    return int(min(4096.0, 40.0 / cell + 2.0 * math.sqrt(10.0 / (_KINK * tolerance)) + 16.0))
+    return int(
+        min(4096.0, 40.0 / cell + 2.0 * math.sqrt(10.0 / (_KINK * tolerance)) + 16.0)
+    )
 
 
 _KINK = 66.0
 
 
 @functools.lru_cache(maxsize=256)
-def numbers_of(rupture: RuptureRate, rebinding_rate: float, tolerance: float) -> tuple[object, ...]:
+def numbers_of(
+    rupture: RuptureRate, rebinding_rate: float, tolerance: float
+) -> tuple[object, ...]:
     """Return the numbers of ``Rules``.
 
     A two-point Gauss rule over a cell of width d errs by d⁴/4320 of the cell's bonds, a uniform segment
@@ -623,5 +794,18 @@ def numbers_of(rupture: RuptureRate, rebinding_rate: float, tolerance: float) ->
         cell = rupture.limit * max(math.sqrt(tolerance), 1.0 / 1800.0)
     elif rupture.steepness > 0.0:
         cell = (432.0 * tolerance) ** 0.25 / rupture.steepness
-    law, bound, left = tuple(map(float, rupture)), float(rebinding_rate), float(_most(rupture, tolerance))
-    return law, law[2], float(rupture.steepness), bound, float(tolerance), cell, _KINK * tolerance, left
+    law, bound, left = (
+        tuple(map(float, rupture)),
+        float(rebinding_rate),
+        float(_most(rupture, tolerance)),
+    )
+    return (
+        law,
+        law[2],
+        float(rupture.steepness),
+        bound,
+        float(tolerance),
+        cell,
+        _KINK * tolerance,
+        left,
+    )

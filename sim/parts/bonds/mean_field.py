@@ -33,11 +33,14 @@ LOCAL_ERROR = 1e-9
 #: take less than a thousand.
 MOST_STEPS = 10_000
 
-_SMALL = 1e-10  # stretch in units of Bell's below which the rate is taken as constant: an error of N and M no larger
+# stretch in units of Bell's below which the rate is taken as constant: an error of N and M no larger
+_SMALL = 1e-10
 _NONE = 1e-290  # share below which no site is bound
 
 
-def advance(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding_rate) -> tuple[Array, Array]:
+def advance(
+    bound, moment, slip, path, duration, rupture: RuptureRate, rebinding_rate
+) -> tuple[Array, Array]:
     """Return the population after each of many steps of constant speed.
 
     Parameters
@@ -154,7 +157,11 @@ def _young(low, gap, high):
     if high == 0.0:
         return 0.5
     fade = math.exp(-low)
-    first = fade * low * _second(low) if low <= 0.5 else (-math.expm1(-low) - low * fade) / low
+    first = (
+        fade * low * _second(low)
+        if low <= 0.5
+        else (-math.expm1(-low) - low * fade) / low
+    )
     return (first + fade * gap * _second(-gap)) / high
 
 
@@ -178,7 +185,9 @@ def _linear(bound, moment, slip, binding, breaking, travel):
     low, high, gap = min(p, q), max(p, q), math.fabs(travel - binding)
     old = math.exp(-low) * _mean_decay(gap)
     after = bound * math.exp(-p) + binding * _mean_decay(p)
-    return min(after, 1.0), moment * math.exp(-q) + slip * (bound * old + binding * _young(low, gap, high))
+    return min(after, 1.0), moment * math.exp(-q) + slip * (
+        bound * old + binding * _young(low, gap, high)
+    )
 
 
 def _lower(*rows: list[float]) -> Array:
@@ -188,7 +197,13 @@ def _lower(*rows: list[float]) -> Array:
 
 # Rodas5P in the form without products of Jacobian and vector (Hairer & Wanner II, IV.7): row i is stage i
 _GAMMA = 0.21193756319429014
-_LAST = [-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946]
+_LAST = [
+    -7.502846399306121,
+    2.561846144803919,
+    -11.627539656261098,
+    -0.18268767659942256,
+    0.030198172008377946,
+]
 _STATE = _lower(
     [],
     [3.0],
@@ -205,7 +220,13 @@ _SLOPE = _lower(
     [-17.97296035885952, -2.859693295451294],
     [147.12150275711716, -1.41221402718213, 71.68940251302358],
     [165.43517024871676, -0.4592823456491126, 42.90938336958603, -5.961986721573306],
-    [24.854864614690072, -3.0009227002832186, 47.4931110020768, 5.5814197821558125, -0.6610691825249471],
+    [
+        24.854864614690072,
+        -3.0009227002832186,
+        47.4931110020768,
+        5.5814197821558125,
+        -0.6610691825249471,
+    ],
     [30.91273214028599, -3.1208243349937974, 77.79954646070892, 34.28646028294783]
     + [-19.097331116725623, -28.087943162872662],
     [37.80277123390563, -3.2571969029072276, 112.26918849496327, 66.9347231244047]
@@ -242,7 +263,10 @@ def _rosenbrock(bound, moment, step, speed, rate, binding, work):
         work[i, 0] = (d * fn - b * fm) * scale
         work[i, 1] = (a * fm - c * fn) * scale
     n, m = n + work[7, 0], m + work[7, 1]
-    error = max(math.fabs(work[7, 0]) / max(bound, n), math.fabs(work[7, 1]) / max(moment, math.fabs(m)))
+    error = max(
+        math.fabs(work[7, 0]) / max(bound, n),
+        math.fabs(work[7, 1]) / max(moment, math.fabs(m)),
+    )
     return n, m, error if n > 0.0 else math.inf
 
 
@@ -308,21 +332,40 @@ def _bell(bound, moment, speed, rate, binding, work):
             sign = -sign
         size, pull = sign * moment, sign * speed
         if size <= _SMALL * bound and math.fabs(pull) <= _SMALL * rate:
-            return _linear(bound, moment, speed * left, binding * left, _slow(pull, rate) * left, 0.0)
+            return _linear(
+                bound,
+                moment,
+                speed * left,
+                binding * left,
+                _slow(pull, rate) * left,
+                0.0,
+            )
         if bound == 0.0:
             # the first bonds are hardly stretched yet: the rate grows by rate × pull × time
             part = min(left, 0.1 * math.sqrt(LOCAL_ERROR / (rate * pull)), 1.0 / pull)
-            bound, moment = _linear(bound, moment, speed * part, binding * part, rate * part, 0.0)
+            bound, moment = _linear(
+                bound, moment, speed * part, binding * part, rate * part, 0.0
+            )
             left -= part
         else:
-            step = _first_step(bound, size, pull, rate, binding) if step == 0.0 else step
+            step = (
+                _first_step(bound, size, pull, rate, binding) if step == 0.0 else step
+            )
             part = min(step, left)
-            after, rest, error = _rosenbrock(bound, size, part, pull, rate, binding, work)
+            after, rest, error = _rosenbrock(
+                bound, size, part, pull, rate, binding, work
+            )
             error = error / LOCAL_ERROR if rest >= 0.0 or pull < 0.0 else math.inf
-            step = part * min(6.0, max(0.1, 0.9 * error**-0.2)) if error >= 0.0 else 0.1 * part
+            step = (
+                part * min(6.0, max(0.1, 0.9 * error**-0.2))
+                if error >= 0.0
+                else 0.1 * part
+            )
             if error <= 1.0:
                 if rest < 0.0:
-                    part, after = _to_zero(bound, size, part, rest, pull, rate, binding, work)
+                    part, after = _to_zero(
+                        bound, size, part, rest, pull, rate, binding, work
+                    )
                     rest = 0.0
                 bound, moment, left = min(after, 1.0), sign * rest, left - part
         if left <= 0.0 or (bound == 0.0 and binding == 0.0):
@@ -330,19 +373,45 @@ def _bell(bound, moment, speed, rate, binding, work):
     return math.nan, math.nan
 
 
-@kernel("void(f8[::1], f8[::1], f8[:,:], f8[:,:], f8[:], f8, f8, f8, f8, f8[:,::1], f8[:,::1])")
-def _advance(bound, moment, slip, path, duration, rate, softness, limit, rebinding, bound_after, moment_after):
+@kernel(
+    "void(f8[::1], f8[::1], f8[:,:], f8[:,:], f8[:], f8, f8, f8, f8, f8[:,::1], f8[:,::1])"
+)
+def _advance(
+    bound,
+    moment,
+    slip,
+    path,
+    duration,
+    rate,
+    softness,
+    limit,
+    rebinding,
+    bound_after,
+    moment_after,
+):
     """Write N and M after all steps of every row, each row by itself."""
     work = np.empty((8, 2))
     for i in range(bound_after.shape[1]):
         share, stretch = bound[i % bound.size], moment[i % moment.size]
         for k in range(duration.size):
-            move, breaking, binding = slip[k, i % slip.shape[1]], rate * duration[k], rebinding * duration[k]
-            stiff = softness * math.fabs(stretch) <= _SMALL * share and softness * math.fabs(move) <= _SMALL * breaking
+            move, breaking, binding = (
+                slip[k, i % slip.shape[1]],
+                rate * duration[k],
+                rebinding * duration[k],
+            )
+            stiff = (
+                softness * math.fabs(stretch) <= _SMALL * share
+                and softness * math.fabs(move) <= _SMALL * breaking
+            )
             if stiff or softness == 0.0 or breaking == 0.0:
-                events, travel = _slow(softness * move, breaking), path[k, i % path.shape[1]] / limit
+                events, travel = (
+                    _slow(softness * move, breaking),
+                    path[k, i % path.shape[1]] / limit,
+                )
                 share, stretch = _linear(share, stretch, move, binding, events, travel)
             else:
-                share, rest = _bell(share, softness * stretch, softness * move, breaking, binding, work)
+                share, rest = _bell(
+                    share, softness * stretch, softness * move, breaking, binding, work
+                )
                 stretch = rest / softness
             bound_after[k, i], moment_after[k, i] = share, stretch

@@ -27,7 +27,14 @@ import sim.parts.bonds.cohorts as cohorts
 import sim.parts.bonds.mean_field as mean_field
 import sim.parts.bonds.tracked as tracks
 from sim.laws import schallamach
-from sim.laws.schallamach import Body, Onset, linear_onset, relaxed, steady_fraction, transition_probabilities
+from sim.laws.schallamach import (
+    Body,
+    Onset,
+    linear_onset,
+    relaxed,
+    steady_fraction,
+    transition_probabilities,
+)
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise, binomial, stream, success
 from sim.parts.bonds.cohorts import Cohorts
@@ -36,7 +43,10 @@ from sim.parts.bonds.tracked import CYCLES, Tracks
 from sim.parts.exchange import UNKNOWN, Array, Bonding, Motion, Part, Setting
 from sim.units.quantity import Quantity, keyed, tagged
 
-Area = Annotated[Literal["present", "carried"], Field(description='"carried": new contact area has no bonds')]
+Area = Annotated[
+    Literal["present", "carried"],
+    Field(description='"carried": new contact area has no bonds'),
+]
 
 #: Contact radius of a population that does not depend on the area, or has not had a contact yet.
 _NO_AREA = UNKNOWN
@@ -51,7 +61,11 @@ def share_kept(before: Array, radius: Array) -> Array:
     [0.25 1.   0.   1.  ]
     """
     grown = radius > before
-    return np.where(grown, np.square(np.divide(before, radius, out=np.ones(grown.shape), where=grown)), 1.0)
+    return np.where(
+        grown,
+        np.square(np.divide(before, radius, out=np.ones(grown.shape), where=grown)),
+        1.0,
+    )
 
 
 class _BondModel(Part):
@@ -117,17 +131,39 @@ class _OverArea(_BondModel):
         if self.area == "present":
             return super().diluted(before, radius)
         now = np.where(np.isnan(radius), 0.0, radius)
-        return np.where(now > 0.0, share_kept(before, now), 0.0), now  # an open contact has no bonds to fill
+        # an open contact has no bonds to fill
+        return np.where(now > 0.0, share_kept(before, now), 0.0), now
 
 
-Stress = Annotated[float, Quantity("Pa", "shear stress with the bonds of the contact at rest", "tau_0", at_least=0)]
-CriticalSpeed = Annotated[float, Quantity("m/s", "critical speed of the bonds", "V_c", above=0)]
-RebindingRate = Annotated[float, Quantity("1/s", "rate at which a free site binds", "h", above=0)]
+Stress = Annotated[
+    float,
+    Quantity(
+        "Pa", "shear stress with the bonds of the contact at rest", "tau_0", at_least=0
+    ),
+]
+CriticalSpeed = Annotated[
+    float, Quantity("m/s", "critical speed of the bonds", "V_c", above=0)
+]
+RebindingRate = Annotated[
+    float, Quantity("1/s", "rate at which a free site binds", "h", above=0)
+]
 Start = Annotated[
     Literal["steady", "bonded", "empty"],
-    Field(alias="start", description='bonds at the start; "bonded": all sites, unstretched'),
+    Field(
+        alias="start",
+        description='bonds at the start; "bonded": all sites, unstretched',
+    ),
 ]
-Sites = Annotated[int, Quantity("1", "number of bond sites of the contact", at_least=1, at_most=10**9, whole=True)]
+Sites = Annotated[
+    int,
+    Quantity(
+        "1",
+        "number of bond sites of the contact",
+        at_least=1,
+        at_most=10**9,
+        whole=True,
+    ),
+]
 
 
 class Population(NamedTuple):
@@ -162,13 +198,19 @@ class _WithoutStretch(_BondModel):
         """True if there is a shear stress at all."""
         return self.stress > 0.0
 
-    def advance(self, state: Population, motions: Motion, radius: Array, noise: Noise) -> tuple[Population, Bonding]:
+    def advance(
+        self, state: Population, motions: Motion, radius: Array, noise: Noise
+    ) -> tuple[Population, Bonding]:
         bound, area_radius = self._bound(state, motions, radius, noise)
         sense = np.empty(motions.slip.shape)
         _last_signs(motions.speed, motions.slip, state.sense, sense)
-        return Population(bound[-1], sense[-1], area_radius), self.bonding(Population(bound, sense))
+        return Population(bound[-1], sense[-1], area_radius), self.bonding(
+            Population(bound, sense)
+        )
 
-    def _bound(self, state: Population, motions: Motion, radius: Array, noise: Noise) -> tuple[Array, Array]:
+    def _bound(
+        self, state: Population, motions: Motion, radius: Array, noise: Noise
+    ) -> tuple[Array, Array]:
         """Return the bonds at the end of each step, shape (steps, 1) or (steps, members), and their contact radius."""
         raise NotImplementedError
 
@@ -200,7 +242,13 @@ def _last_signs(speed, slip, first, sense):
     for m in range(sense.shape[1]):
         last = first[m]
         for k in range(len(sense)):
-            last = speed[k, m] if speed[k, m] != 0.0 else slip[k, m] if slip[k, m] != 0.0 else last
+            last = (
+                speed[k, m]
+                if speed[k, m] != 0.0
+                else slip[k, m]
+                if slip[k, m] != 0.0
+                else last
+            )
             sense[k, m] = last = np.sign(last)
 
 
@@ -210,7 +258,9 @@ def _relax(bound, path, duration, critical_speed, rebinding_rate, relaxed_bound)
     for k in range(len(path)):
         for m in range(len(bound)):
             before = bound[m] if k == 0 else relaxed_bound[k - 1, m]
-            relaxed_bound[k, m] = relaxed(before, path[k], duration[k], critical_speed, rebinding_rate)
+            relaxed_bound[k, m] = relaxed(
+                before, path[k], duration[k], critical_speed, rebinding_rate
+            )
 
 
 class _AtOnce(_WithoutStretch):
@@ -221,7 +271,9 @@ class _AtOnce(_WithoutStretch):
     def start(self, motion: Motion, noise: Noise) -> Population:
         return Population(self._steady_fraction(motion.speed), np.sign(motion.speed))
 
-    def _bound(self, state: Population, motions: Motion, radius: Array, noise: Noise) -> tuple[Array, Array]:
+    def _bound(
+        self, state: Population, motions: Motion, radius: Array, noise: Noise
+    ) -> tuple[Array, Array]:
         return self._steady_fraction(motions.speed), state.area_radius
 
 
@@ -262,17 +314,26 @@ class Rate(_OverArea, _WithoutStretch):
     in_blocks: ClassVar[bool] = True
 
     def start(self, motion: Motion, noise: Noise) -> Population:
-        rows = self.rows(noise) + 0.0 * motion.speed  # a drive that solves the motion has its members
-        return Population(rows * self._first_fraction(self.start_from, motion), np.sign(motion.speed))
+        # a drive that solves the motion has its members
+        rows = self.rows(noise) + 0.0 * motion.speed
+        return Population(
+            rows * self._first_fraction(self.start_from, motion), np.sign(motion.speed)
+        )
 
     def onset(self, speed: Array, body: Body) -> Onset:
-        drag, strength = np.multiply(body.viscosity, body.area), self.stress * np.asarray(body.area)
-        viscous = drag * np.abs(speed) / (strength * self._steady_fraction(speed))  # grows with the area, too
+        drag, strength = (
+            np.multiply(body.viscosity, body.area),
+            self.stress * np.asarray(body.area),
+        )
+        # grows with the area, too
+        viscous = drag * np.abs(speed) / (strength * self._steady_fraction(speed))
         recipe = self.critical_speed, self.rebinding_rate, strength, body.damping + drag
         growth = np.add(body.area_growth, body.stress_growth) * (1.0 + viscous)
         return linear_onset(speed, *recipe, body.mass, growth)
 
-    def _bound(self, state: Population, motions: Motion, radius: Array, noise: Noise) -> tuple[Array, Array]:
+    def _bound(
+        self, state: Population, motions: Motion, radius: Array, noise: Noise
+    ) -> tuple[Array, Array]:
         share, area_radius = self.diluted(state.area_radius, radius)
         before, rates = state.bound * share, (self.critical_speed, self.rebinding_rate)
         bound = np.empty((len(motions.path), len(before)))
@@ -281,7 +342,9 @@ class Rate(_OverArea, _WithoutStretch):
 
     def bonding(self, state: Population) -> Bonding:
         bonding = super().bonding(state)
-        return bonding._replace(stiffness=-self.rebinding_rate / self.critical_speed * bonding.strength)
+        return bonding._replace(
+            stiffness=-self.rebinding_rate / self.critical_speed * bonding.strength
+        )
 
 
 @keyed()
@@ -310,14 +373,25 @@ class Counted(_WithoutStretch):
     def start(self, motion: Motion, noise: Noise) -> Population:
         bound = np.zeros(len(noise.members))
         first = self._first_fraction(self.start_from, motion)[np.newaxis]
-        return Population(self._counted(bound, first, first, motion.step, noise)[0], np.sign(motion.speed))
+        return Population(
+            self._counted(bound, first, first, motion.step, noise)[0],
+            np.sign(motion.speed),
+        )
 
-    def _bound(self, state: Population, motions: Motion, radius: Array, noise: Noise) -> tuple[Array, Array]:
+    def _bound(
+        self, state: Population, motions: Motion, radius: Array, noise: Noise
+    ) -> tuple[Array, Array]:
         over = motions.path, motions.duration
-        stay, bind = transition_probabilities(*over, self.critical_speed, self.rebinding_rate)
-        return self._counted(state.bound, stay, bind, motions.step, noise), state.area_radius
+        stay, bind = transition_probabilities(
+            *over, self.critical_speed, self.rebinding_rate
+        )
+        return self._counted(
+            state.bound, stay, bind, motions.step, noise
+        ), state.area_radius
 
-    def _counted(self, bound: Array, stay: Array, bind: Array, step: int, noise: Noise) -> Array:
+    def _counted(
+        self, bound: Array, stay: Array, bind: Array, step: int, noise: Noise
+    ) -> Array:
         """Return the bound sites at the end of each step, shape (steps, members).
 
         ``stay`` and ``bind`` are the chances that a bound and a free site are bound after a step, shape (steps, 1) or
@@ -328,7 +402,9 @@ class Counted(_WithoutStretch):
         return counted
 
 
-@kernel("void(float64[:], float64[:, :], float64[:, :], float64, uint64, uint64, uint64[::1], int64, float64[:, ::1])")
+@kernel(
+    "void(float64[:], float64[:, :], float64[:, :], float64, uint64, uint64, uint64[::1], int64, float64[:, ::1])"
+)
 def _count(bound, stay, bind, sites, seed, part, members, step, counted):
     """Write the bound sites of all members at the end of each step."""
     for k in range(len(stay)):
@@ -343,10 +419,22 @@ def _count(bound, stay, bind, sites, seed, part, members, step, counted):
             counted[k, m] = still_bound + new
 
 
-Stiffness = Annotated[float, Quantity("N/m", "stiffness of a bond", "kappa", above=0, typical="0.4 mN/m")]
-Rebinding = Annotated[float, Quantity("1/s", "rate at which a free site binds", "k_on", at_least=0, typical="1e5 1/s")]
-Density = Annotated[float, Quantity("1/m^2", "bond sites per area", "n", above=0, typical="1e17 1/m^2")]
-Ratio = Annotated[float, Quantity("1", "rebinding_rate over zero_force_rate", "beta", above=0, typical="10")]
+Stiffness = Annotated[
+    float, Quantity("N/m", "stiffness of a bond", "kappa", above=0, typical="0.4 mN/m")
+]
+Rebinding = Annotated[
+    float,
+    Quantity(
+        "1/s", "rate at which a free site binds", "k_on", at_least=0, typical="1e5 1/s"
+    ),
+]
+Density = Annotated[
+    float, Quantity("1/m^2", "bond sites per area", "n", above=0, typical="1e17 1/m^2")
+]
+Ratio = Annotated[
+    float,
+    Quantity("1", "rebinding_rate over zero_force_rate", "beta", above=0, typical="10"),
+]
 _BY_SPEED = ("rupture.critical_speed", "rupture.stress", "rebinding_ratio")
 _T = TypeVar("_T", bound="_Stretched | Auto")
 
@@ -354,13 +442,24 @@ _T = TypeVar("_T", bound="_Stretched | Auto")
 def _one_way(bonds: _T) -> _T:
     """Return bonds that have either their rates and site density, or a critical speed and a stress; refuse others."""
     is_bell = isinstance(bonds.rupture, Bell)
-    by_rates = (*(("rupture.zero_force_rate",) if is_bell else ()), "rebinding_rate", "site_density")
+    by_rates = (
+        *(("rupture.zero_force_rate",) if is_bell else ()),
+        "rebinding_rate",
+        "site_density",
+    )
     keys = (*by_rates, *(_BY_SPEED if is_bell else _BY_SPEED[-1:]))
     present = [key for key in keys if attrgetter(key)(bonds) is not None]
     if set(present) <= set(by_rates):
-        missing = [key.replace("rupture.", "rupture.bell.").split(".") for key in by_rates if key not in present]
+        missing = [
+            key.replace("rupture.", "rupture.bell.").split(".")
+            for key in by_rates
+            if key not in present
+        ]
         if missing:
-            errors = [InitErrorDetails(type="missing", loc=tuple(place), input=None) for place in missing]
+            errors = [
+                InitErrorDetails(type="missing", loc=tuple(place), input=None)
+                for place in missing
+            ]
             raise ValidationError.from_exception_data("bonds", errors)
     elif not is_bell or {*present} != {*_BY_SPEED}:
         ways = f"give either {', '.join(by_rates)} or, of Bell's rupture, {', '.join(_BY_SPEED)}"
@@ -396,10 +495,22 @@ class _Stretched(_BondModel):
         if self.rebinding_ratio is None:
             return self
         bell = cast(Bell, self.rupture)
-        wanted = bell.critical_speed, bell.stress, bell.bell_force, self.bond_stiffness, self.rebinding_ratio
+        wanted = (
+            bell.critical_speed,
+            bell.stress,
+            bell.bell_force,
+            self.bond_stiffness,
+            self.rebinding_ratio,
+        )
         rate, rebinding, density = map(float, self.numbers_of(*wanted))
         rupture = replace(bell, zero_force_rate=rate, critical_speed=None, stress=None)
-        result = replace(self, rupture=rupture, rebinding_rate=rebinding, rebinding_ratio=None, site_density=density)
+        result = replace(
+            self,
+            rupture=rupture,
+            rebinding_rate=rebinding,
+            rebinding_ratio=None,
+            site_density=density,
+        )
         vars(result)["has_stress"] = True
         return result
 
@@ -411,7 +522,11 @@ class _Stretched(_BondModel):
     @cached_property
     def bound_at_rest(self) -> float:
         """Share of sites bound at a bond fraction of 1 [1]: that at rest, or all if no bond can form."""
-        return self.rebinding_rate / (self.rebinding_rate + self.law.at_rest) if self.rebinding_rate > 0.0 else 1.0
+        return (
+            self.rebinding_rate / (self.rebinding_rate + self.law.at_rest)
+            if self.rebinding_rate > 0.0
+            else 1.0
+        )
 
     def remarks(self, setting: Setting) -> list[str]:
         number = 1.0 / self.bound_at_rest
@@ -421,9 +536,13 @@ class _Stretched(_BondModel):
 
     def onset(self, speed: Array, body: Body) -> Onset:
         """Return the onset of oscillations behind a spring at speeds [m/s], nan if unknown."""
-        return self.rupture.resolved_onset(speed, (self.bond_stiffness, self.rebinding_rate, self.site_density), body)
+        return self.rupture.resolved_onset(
+            speed, (self.bond_stiffness, self.rebinding_rate, self.site_density), body
+        )
 
-    def _bonding(self, bound: Array, stretch: Array, square: Array, breaking: Array, lost: Array) -> Bonding:
+    def _bonding(
+        self, bound: Array, stretch: Array, square: Array, breaking: Array, lost: Array
+    ) -> Bonding:
         """Return the readings of a population of these moments per site.
 
         The stress is n κ x̄. With f̄ and E[f²] per site the powers are n f̄² and n (E[f²] − f̄²). Slip stretches all
@@ -434,8 +553,19 @@ class _Stretched(_BondModel):
         frozen, scale = stretch**2, self.site_density * self.bond_stiffness**2
         varying = np.maximum(square - frozen, 0.0)  # nan stays nan
         stress, stiffness = per_stretch * stretch, per_stretch * (bound - breaking)
-        powers = scale * frozen, scale * varying, 0.5 * self.site_density * self.bond_stiffness * square
-        return Bonding(bound / self.bound_at_rest, stress, np.abs(stress), stiffness, -per_stretch * lost, *powers)
+        powers = (
+            scale * frozen,
+            scale * varying,
+            0.5 * self.site_density * self.bond_stiffness * square,
+        )
+        return Bonding(
+            bound / self.bound_at_rest,
+            stress,
+            np.abs(stress),
+            stiffness,
+            -per_stretch * lost,
+            *powers,
+        )
 
 
 class Stretches(NamedTuple):
@@ -453,8 +583,12 @@ class _Separable(_Stretched):
     @model_validator(mode="after")
     def _one_clock(self) -> Self:
         if not self.rupture.separable:
-            message = f'rupture model "{self.rupture.model}" needs the density of the stretch'
-            raise PydanticCustomError("not_separable", f'{message}; use bonds.model = "cohort"')
+            message = (
+                f'rupture model "{self.rupture.model}" needs the density of the stretch'
+            )
+            raise PydanticCustomError(
+                "not_separable", f'{message}; use bonds.model = "cohort"'
+            )
         return self
 
 
@@ -477,18 +611,30 @@ class FirstMoment(_OverArea, _Separable):
 
     def start(self, motion: Motion, noise: Noise) -> Stretches:
         if self.start_from == "steady":
-            bound, stretch = mean_field.steady(motion.first, self.law, self.rebinding_rate)
+            bound, stretch = mean_field.steady(
+                motion.first, self.law, self.rebinding_rate
+            )
         else:
             bound = np.full(1, 1.0 if self.start_from == "bonded" else 0.0)
             stretch = np.zeros(1)
-        rows = self.rows(noise) + 0.0 * motion.first  # a drive that solves the motion has its members
+        # a drive that solves the motion has its members
+        rows = self.rows(noise) + 0.0 * motion.first
         return Stretches(rows * bound, rows * stretch)
 
-    def advance(self, state: Stretches, motions: Motion, radius: Array, noise: Noise) -> tuple[Stretches, Bonding]:
+    def advance(
+        self, state: Stretches, motions: Motion, radius: Array, noise: Noise
+    ) -> tuple[Stretches, Bonding]:
         share, area_radius = self.diluted(state.area_radius, radius)
-        before, sliding = (state.bound * share, state.stretch * share), (motions.slip, motions.path)
-        bound, stretch = mean_field.advance(*before, *sliding, motions.duration[:, 0], self.law, self.rebinding_rate)
-        return Stretches(bound[-1], stretch[-1], area_radius), self.bonding(Stretches(bound, stretch))
+        before, sliding = (
+            (state.bound * share, state.stretch * share),
+            (motions.slip, motions.path),
+        )
+        bound, stretch = mean_field.advance(
+            *before, *sliding, motions.duration[:, 0], self.law, self.rebinding_rate
+        )
+        return Stretches(bound[-1], stretch[-1], area_radius), self.bonding(
+            Stretches(bound, stretch)
+        )
 
     def onset(self, speed: Array, body: Body) -> Onset:
         numbers = self.bond_stiffness, self.rebinding_rate, self.site_density
@@ -496,18 +642,34 @@ class FirstMoment(_OverArea, _Separable):
 
     def remarks(self, setting: Setting) -> list[str]:
         remarks, rebinding = super().remarks(setting), self.rebinding_rate
-        excess = self.rupture.first_moment_excess(self.bond_stiffness, rebinding) if rebinding > 0.0 else 0.0
+        excess = (
+            self.rupture.first_moment_excess(self.bond_stiffness, rebinding)
+            if rebinding > 0.0
+            else 0.0
+        )
         remark = f'the mean stretch overpredicts the friction maximum by {excess:.0%}; bonds.model = "cohort" is exact'
         return [*remarks, remark] if excess and not self.has_stress else remarks
 
     def bonding(self, state: Stretches) -> Bonding:
-        mean = np.divide(state.stretch, state.bound, out=np.zeros(state.bound.shape), where=state.bound > 0.0)
-        breaking, lost = 2.0 * np.abs(state.stretch) / self.law.limit, state.stretch * self.law.at(mean)
+        mean = np.divide(
+            state.stretch,
+            state.bound,
+            out=np.zeros(state.bound.shape),
+            where=state.bound > 0.0,
+        )
+        breaking, lost = (
+            2.0 * np.abs(state.stretch) / self.law.limit,
+            state.stretch * self.law.at(mean),
+        )
         stored = 0.5 * self.site_density * self.bond_stiffness * mean * state.stretch
-        return self._bonding(state.bound, state.stretch, UNKNOWN, breaking, lost)._replace(stored=stored)
+        return self._bonding(
+            state.bound, state.stretch, UNKNOWN, breaking, lost
+        )._replace(stored=stored)
 
     def steady(self, speed: Array) -> Bonding:
-        return self.bonding(Stretches(*mean_field.steady(speed, self.law, self.rebinding_rate)))
+        return self.bonding(
+            Stretches(*mean_field.steady(speed, self.law, self.rebinding_rate))
+        )
 
 
 class Ages(NamedTuple):
@@ -525,7 +687,9 @@ class Cohort(_OverArea, _Stretched):
     within a step, and the merging of old cohorts that bounds the cost, are held to ``tolerance``.
     """
 
-    tolerance: Annotated[float, Quantity("1", "tolerance of the cohorts", "", at_least=1e-12, below=0.1)] = 1e-4
+    tolerance: Annotated[
+        float, Quantity("1", "tolerance of the cohorts", "", at_least=1e-12, below=0.1)
+    ] = 1e-4
     start_from: Start = "steady"
     area: Area = "present"
     model: Literal["cohort"] = "cohort"
@@ -536,16 +700,28 @@ class Cohort(_OverArea, _Stretched):
 
     def start(self, motion: Motion, noise: Noise) -> Ages:
         if self.start_from == "steady":
-            first = cohorts.steady(self.law, self.rebinding_rate, float(motion.first[0]), self.tolerance)
+            first = cohorts.steady(
+                self.law, self.rebinding_rate, float(motion.first[0]), self.tolerance
+            )
         else:
-            first = cohorts.unstretched(self.law, self.tolerance, 1.0 if self.start_from == "bonded" else 0.0)
-        rows = max(len(self.rows(noise)), len(motion.first))  # a drive that solves the motion has its members
+            first = cohorts.unstretched(
+                self.law, self.tolerance, 1.0 if self.start_from == "bonded" else 0.0
+            )
+        # a drive that solves the motion has its members
+        rows = max(len(self.rows(noise)), len(motion.first))
         return Ages(Cohorts(*(np.repeat(array, rows, axis=0) for array in first)))
 
-    def advance(self, state: Ages, motions: Motion, radius: Array, noise: Noise) -> tuple[Ages, Bonding]:
+    def advance(
+        self, state: Ages, motions: Motion, radius: Array, noise: Noise
+    ) -> tuple[Ages, Bonding]:
         share, area_radius = self.diluted(state.area_radius, radius)
-        recipe, duration = (self.law, self.rebinding_rate, self.tolerance), motions.duration[:, 0]
-        after, sums = cohorts.advance(state.cohorts, motions.slip, duration, *recipe, share)
+        recipe, duration = (
+            (self.law, self.rebinding_rate, self.tolerance),
+            motions.duration[:, 0],
+        )
+        after, sums = cohorts.advance(
+            state.cohorts, motions.slip, duration, *recipe, share
+        )
         return Ages(after, area_radius), self.read(sums)
 
     def bonding(self, state: Ages) -> Bonding:
@@ -556,7 +732,10 @@ class Cohort(_OverArea, _Stretched):
         return self._bonding(*sums)
 
     def steady(self, speed: Array) -> Bonding:
-        rows = [cohorts.steady(self.law, self.rebinding_rate, float(v), self.tolerance) for v in np.atleast_1d(speed)]
+        rows = [
+            cohorts.steady(self.law, self.rebinding_rate, float(v), self.tolerance)
+            for v in np.atleast_1d(speed)
+        ]
         readings = zip(*(self.bonding(Ages(row)) for row in rows), strict=True)
         return Bonding(*map(np.concatenate, readings))
 
@@ -570,7 +749,14 @@ class Tracked(_Separable):
     """
 
     sites: Annotated[
-        int, Quantity("1", "number of bond sites in the simulation", at_least=1, at_most=10**6, whole=True)
+        int,
+        Quantity(
+            "1",
+            "number of bond sites in the simulation",
+            at_least=1,
+            at_most=10**6,
+            whole=True,
+        ),
     ] = Field(kw_only=True)
     start_from: Start = "steady"
     model: Literal["tracked"] = "tracked"
@@ -588,14 +774,23 @@ class Tracked(_Separable):
         laws, address = (self.law, self.rebinding_rate), (noise.seed, noise.members)
         return tracks.start(*laws, self.sites, motion.first, self.start_from, *address)
 
-    def advance(self, state: Tracks, motions: Motion, radius: Array, noise: Noise) -> tuple[Tracks, Bonding]:
+    def advance(
+        self, state: Tracks, motions: Motion, radius: Array, noise: Noise
+    ) -> tuple[Tracks, Bonding]:
         laws, address = (self.law, self.rebinding_rate), (noise.seed, noise.members)
-        state, frames = tracks.advance(state, motions.slip, motions.duration[:, 0], *laws, *address)
+        state, frames = tracks.advance(
+            state, motions.slip, motions.duration[:, 0], *laws, *address
+        )
         return state, self.read(frames)
 
     def followed(self, speeds: Array, step: float) -> float:
         wait = 1.0 / self.rebinding_rate if self.rebinding_rate > 0.0 else math.inf
-        return float(self.sites * np.mean(np.minimum(step / (tracks.mean_life(speeds, self.law) + wait), CYCLES)))
+        return float(
+            self.sites
+            * np.mean(
+                np.minimum(step / (tracks.mean_life(speeds, self.law) + wait), CYCLES)
+            )
+        )
 
     def remarks(self, setting: Setting) -> list[str]:
         number, remarks = self.site_density * setting.cell**2, super().remarks(setting)
@@ -611,7 +806,9 @@ class Tracked(_Separable):
         return self._bonding(*tracks.moments(frames, self.sites), np.zeros(1), UNKNOWN)
 
     def steady(self, speed: Array) -> Bonding:
-        return Cohort(self.rupture, self.bond_stiffness, self.rebinding_rate, self.site_density).steady(speed)
+        return Cohort(
+            self.rupture, self.bond_stiffness, self.rebinding_rate, self.site_density
+        ).steady(speed)
 
 
 _MOST_TRACKED = 10**6
@@ -641,7 +838,9 @@ class Auto:
     rebinding_ratio: Ratio | None = None
     site_density: Density | None = None
     sites: Sites | None = None
-    tolerance: Annotated[float, Quantity("1", "tolerated noise of the bonds", "", above=0, below=1)] = 0.01
+    tolerance: Annotated[
+        float, Quantity("1", "tolerated noise of the bonds", "", above=0, below=1)
+    ] = 0.01
     start_from: Start = "steady"
     area: Area = "present"
     model: Literal["auto"] = "auto"
@@ -652,14 +851,26 @@ class Auto:
         if (self.critical_speed is not None) == with_:
             message = f"give either {' and '.join(_WITHOUT)}, or {', '.join(_WITH)}, rebinding_rate and site_density"
             raise PydanticCustomError("one_kind", message)
-        missing = [name for name in (_WITH if with_ else _WITHOUT) if getattr(self, name) is None]
+        missing = [
+            name
+            for name in (_WITH if with_ else _WITHOUT)
+            if getattr(self, name) is None
+        ]
         if missing:
             are = "is" if len(missing) == 1 else "are"
-            raise PydanticCustomError("one_kind", f"{' and '.join(missing)} {are} missing, but required here")
+            raise PydanticCustomError(
+                "one_kind", f"{' and '.join(missing)} {are} missing, but required here"
+            )
         if not with_ and self.rebinding_rate == 0.0:
-            raise PydanticCustomError("one_kind", "rebinding_rate must be above 0 1/s for bonds without a rupture")
+            raise PydanticCustomError(
+                "one_kind",
+                "rebinding_rate must be above 0 1/s for bonds without a rupture",
+            )
         if with_ and self.stress:
-            raise PydanticCustomError("one_kind", "the stress of bonds with a rupture is computed; omit stress")
+            raise PydanticCustomError(
+                "one_kind",
+                "the stress of bonds with a rupture is computed; omit stress",
+            )
         return _one_way(self) if with_ else self
 
     def number(self, area: float) -> float:
@@ -668,8 +879,16 @@ class Auto:
             return self.sites
         density = self.site_density
         if self.rebinding_ratio is not None:
-            density = Cohort(**{name: getattr(self, name) for name in _NUMBERS}).chosen(area, False).site_density
-        return math.inf if density is None or not area > 0.0 else max(1.0, round(density * area))
+            density = (
+                Cohort(**{name: getattr(self, name) for name in _NUMBERS})
+                .chosen(area, False)
+                .site_density
+            )
+        return (
+            math.inf
+            if density is None or not area > 0.0
+            else max(1.0, round(density * area))
+        )
 
     def chosen(self, area: float, forces: bool) -> Model:
         """Return the model for a contact of this ``area`` [m²]; ``forces`` is true if the field reads the forces."""
@@ -678,15 +897,21 @@ class Auto:
         if self.rupture is None:
             plain = {name: getattr(self, name) for name in _WITHOUT}
             if noisy:
-                return Counted(**plain, sites=int(number), stress=self.stress, start_from=start)
+                return Counted(
+                    **plain, sites=int(number), stress=self.stress, start_from=start
+                )
             return Rate(**plain, stress=self.stress, start_from=start, area=self.area)
         rest = {name: getattr(self, name) for name in _NUMBERS}
         if noisy and number <= _MOST_TRACKED and self.rupture.separable:
-            return Tracked(**rest, sites=int(number), start_from=start).chosen(area, forces)
+            return Tracked(**rest, sites=int(number), start_from=start).chosen(
+                area, forces
+            )
         if not self.rupture.depends_on_stretch and not forces:
             return FirstMoment(**rest, start_from=start, area=self.area)
         tolerance = max(1e-12, min(1e-4, 0.1 * self.tolerance))
-        return Cohort(**rest, tolerance=tolerance, start_from=start, area=self.area).chosen(area, forces)
+        return Cohort(
+            **rest, tolerance=tolerance, start_from=start, area=self.area
+        ).chosen(area, forces)
 
     def why(self, area: float, forces: bool) -> str:
         """Return the reason for the choice, in words."""

@@ -5,7 +5,16 @@ integral of the rate along a motion, the same of a fresh bond, the time to ruptu
 """
 
 import math
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple, Optional, TypeVar, cast
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    ClassVar,
+    Literal,
+    NamedTuple,
+    Optional,
+    TypeVar,
+    cast,
+)
 
 import numpy as np
 from pydantic import Field
@@ -39,7 +48,11 @@ class RuptureRate(NamedTuple):
         """Return the rupture rate of bonds of a stretch [m] below any limit [1/s]."""
         size = np.abs(stretch)
         rate = self.rate * np.exp(size * self.softness)
-        return rate + self.catch * np.exp(-size * self.relief) if self.catch > 0.0 else rate
+        return (
+            rate + self.catch * np.exp(-size * self.relief)
+            if self.catch > 0.0
+            else rate
+        )
 
     @property
     def steepness(self) -> float:
@@ -77,7 +90,9 @@ class _Law:
     #: Pathways of rupture as of the law ``resolved_onset``; none if force opens no pathway.
     pathways: ClassVar[tuple[tuple[float, float], ...]] = ()
 
-    def first_moment_excess(self, bond_stiffness: float, rebinding_rate: float) -> float:
+    def first_moment_excess(
+        self, bond_stiffness: float, rebinding_rate: float
+    ) -> float:
         """Return the relative error of the friction maximum if every bond has the mean stretch [1]."""
         return 0.0
 
@@ -104,15 +119,27 @@ class Constant(_Law):
     def law(self, bond_stiffness: float) -> RuptureRate:
         return RuptureRate(self.rate, 0.0, math.inf)
 
-    def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
-        return schallamach.constant_moments(speed, self.rate, bond_stiffness, rebinding_rate)
+    def closed_form(
+        self, speed: Array, bond_stiffness: float, rebinding_rate: float
+    ) -> SiteMoments:
+        return schallamach.constant_moments(
+            speed, self.rate, bond_stiffness, rebinding_rate
+        )
 
 
 ZeroForceRate = Annotated[
-    float, Quantity("1/s", "rupture rate of an unstretched bond", "k_0", above=0, typical="1e4 1/s")
+    float,
+    Quantity(
+        "1/s", "rupture rate of an unstretched bond", "k_0", above=0, typical="1e4 1/s"
+    ),
 ]
-HalfSpeed = Annotated[float, Quantity("m/s", "speed at which half of the bonds are intact", "V_c", above=0)]
-LargestStress = Annotated[float, Quantity("Pa", "largest shear stress in steady sliding", "tau", above=0)]
+HalfSpeed = Annotated[
+    float,
+    Quantity("m/s", "speed at which half of the bonds are intact", "V_c", above=0),
+]
+LargestStress = Annotated[
+    float, Quantity("Pa", "largest shear stress in steady sliding", "tau", above=0)
+]
 
 
 @keyed()
@@ -124,7 +151,14 @@ class Bell(_Law):
     """
 
     bell_force: Annotated[
-        float, Quantity("N", "force that multiplies the rupture rate by e", "f_b", above=0, typical="4 pN")
+        float,
+        Quantity(
+            "N",
+            "force that multiplies the rupture rate by e",
+            "f_b",
+            above=0,
+            typical="4 pN",
+        ),
     ]
     zero_force_rate: Derivable[ZeroForceRate] = cast(float, None)
     critical_speed: HalfSpeed | None = None
@@ -136,33 +170,61 @@ class Bell(_Law):
         return ((self.zero_force_rate, self.bell_force),)
 
     def law(self, bond_stiffness: float) -> RuptureRate:
-        return RuptureRate(self.zero_force_rate, bond_stiffness / self.bell_force, math.inf)
+        return RuptureRate(
+            self.zero_force_rate, bond_stiffness / self.bell_force, math.inf
+        )
 
-    def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
-        return schallamach.bell_moments(speed, self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate)
+    def closed_form(
+        self, speed: Array, bond_stiffness: float, rebinding_rate: float
+    ) -> SiteMoments:
+        return schallamach.bell_moments(
+            speed, self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate
+        )
 
-    def first_moment_excess(self, bond_stiffness: float, rebinding_rate: float) -> float:
+    def first_moment_excess(
+        self, bond_stiffness: float, rebinding_rate: float
+    ) -> float:
         recipe = self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate
-        mean_field, exact = schallamach.first_moment_peak(*recipe, 1.0), schallamach.bell_peak(*recipe, 1.0)
+        mean_field, exact = (
+            schallamach.first_moment_peak(*recipe, 1.0),
+            schallamach.bell_peak(*recipe, 1.0),
+        )
         return float(mean_field.stress / exact.stress - 1.0)
 
     def first_moment_onset(self, speed: Array, bonds: BondNumbers, body: Body) -> Onset:
-        return cast(Onset, schallamach.first_moment_onset(speed, self.zero_force_rate, self.bell_force, *bonds, body))
+        return cast(
+            Onset,
+            schallamach.first_moment_onset(
+                speed, self.zero_force_rate, self.bell_force, *bonds, body
+            ),
+        )
 
 
 @keyed()
 class CutOff(_Law):
     """A bond opens by itself at one rate and breaks at a stretch for certain (after Chernyak & Leonov)."""
 
-    stretch: Annotated[float, Quantity("m", "stretch at which a bond breaks", "l", above=0, typical="30 nm")]
-    rate: Annotated[float, Quantity("1/s", "rupture rate of a bond below that stretch", "1/t_0", at_least=0)] = 0.0
+    stretch: Annotated[
+        float,
+        Quantity("m", "stretch at which a bond breaks", "l", above=0, typical="30 nm"),
+    ]
+    rate: Annotated[
+        float,
+        Quantity(
+            "1/s", "rupture rate of a bond below that stretch", "1/t_0", at_least=0
+        ),
+    ] = 0.0
     model: Literal["cut_off"] = "cut_off"
 
     def law(self, bond_stiffness: float) -> RuptureRate:
         return RuptureRate(self.rate, 0.0, self.stretch)
 
-    def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
-        return schallamach.cut_off_moments(speed, self.rate, self.stretch, bond_stiffness, rebinding_rate)
+    def closed_form(
+        self, speed: Array, bond_stiffness: float, rebinding_rate: float
+    ) -> SiteMoments:
+        return schallamach.cut_off_moments(
+            speed, self.rate, self.stretch, bond_stiffness, rebinding_rate
+        )
 
 
 @keyed()
@@ -172,16 +234,44 @@ class Catch(_Law):
     separable: ClassVar[bool] = False
 
     catch_rate: Annotated[
-        float, Quantity("1/s", "rate of the pathway that is slowed by force", "k_c", at_least=0, typical="1e5 1/s")
+        float,
+        Quantity(
+            "1/s",
+            "rate of the pathway that is slowed by force",
+            "k_c",
+            at_least=0,
+            typical="1e5 1/s",
+        ),
     ]
     catch_force: Annotated[
-        float, Quantity("N", "force that divides the catch rate by e", "f_c", above=0, typical="4 pN")
+        float,
+        Quantity(
+            "N",
+            "force that divides the catch rate by e",
+            "f_c",
+            above=0,
+            typical="4 pN",
+        ),
     ]
     slip_rate: Annotated[
-        float, Quantity("1/s", "rate of the pathway that is accelerated by force", "k_s", above=0, typical="1e3 1/s")
+        float,
+        Quantity(
+            "1/s",
+            "rate of the pathway that is accelerated by force",
+            "k_s",
+            above=0,
+            typical="1e3 1/s",
+        ),
     ]
     slip_force: Annotated[
-        float, Quantity("N", "force that multiplies the slip rate by e", "f_s", above=0, typical="8 pN")
+        float,
+        Quantity(
+            "N",
+            "force that multiplies the slip rate by e",
+            "f_s",
+            above=0,
+            typical="8 pN",
+        ),
     ]
     model: Literal["catch"] = "catch"
 
@@ -190,10 +280,15 @@ class Catch(_Law):
         return (self.catch_rate, -self.catch_force), (self.slip_rate, self.slip_force)
 
     def law(self, bond_stiffness: float) -> RuptureRate:
-        slip, catch = bond_stiffness / self.slip_force, bond_stiffness / self.catch_force
+        slip, catch = (
+            bond_stiffness / self.slip_force,
+            bond_stiffness / self.catch_force,
+        )
         return RuptureRate(self.slip_rate, slip, math.inf, self.catch_rate, catch)
 
-    def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
+    def closed_form(
+        self, speed: Array, bond_stiffness: float, rebinding_rate: float
+    ) -> SiteMoments:
         law = self.catch_rate, self.catch_force, self.slip_rate, self.slip_force
         return schallamach.catch_moments(speed, *law, bond_stiffness, rebinding_rate)
 
@@ -254,7 +349,11 @@ def time_to_rupture(stretch, speed, threshold, rate, softness, limit):
             time = size / pace + math.log1p(pace * (threshold - spent) / rate) / pace
     if speed != 0.0 and limit < math.inf:
         ahead = stretch if speed > 0.0 else -stretch
-        time = min(time, (limit - ahead) / math.fabs(speed)) if time == time else (limit - ahead) / math.fabs(speed)
+        time = (
+            min(time, (limit - ahead) / math.fabs(speed))
+            if time == time
+            else (limit - ahead) / math.fabs(speed)
+        )
     return time
 
 
@@ -263,7 +362,11 @@ def hazard_integral(stretch, slip, duration, law):
     """Return ∫k dt under a ``RuptureRate`` of a bond whose stretch goes from ``stretch`` by ``slip``."""
     rate, softness, _, catch, relief = law
     slipping = rupture_integral(stretch, slip, duration, rate, softness)
-    return slipping + rupture_integral(stretch, slip, duration, catch, -relief) if catch > 0.0 else slipping
+    return (
+        slipping + rupture_integral(stretch, slip, duration, catch, -relief)
+        if catch > 0.0
+        else slipping
+    )
 
 
 @device
@@ -275,7 +378,9 @@ def fresh_integral(age, speed, law):
     if catch == 0.0:
         return slipping
     change = -math.fabs(speed) * relief * age
-    return slipping + catch * age * (math.expm1(change) / change if change != 0.0 else 1.0)
+    return slipping + catch * age * (
+        math.expm1(change) / change if change != 0.0 else 1.0
+    )
 
 
 @device
@@ -296,7 +401,9 @@ def hazard_time(stretch, speed, threshold, law):
     if catch == 0.0:
         return slipping
     low, high = 0.0, min(slipping, 1e300)
-    time = min(high, threshold / (rate * math.exp(math.fabs(stretch) * softness) + catch))
+    time = min(
+        high, threshold / (rate * math.exp(math.fabs(stretch) * softness) + catch)
+    )
     for _ in range(200):
         over = hazard_integral(stretch, speed * time, time, law) - threshold
         if over > 0.0:

@@ -32,7 +32,10 @@ import numpy as np
 
 from sim.numerics.jit import device, kernel
 from sim.numerics.noise import PARTS, exponential, logarithm, unit_at, words_at
-from sim.numerics.special import reduced_exponential_integral, scaled_exponential_integral
+from sim.numerics.special import (
+    reduced_exponential_integral,
+    scaled_exponential_integral,
+)
 from sim.parts.bonds.rupture import RuptureRate, rupture_integral, time_to_rupture
 from sim.parts.exchange import Array, record
 
@@ -49,7 +52,8 @@ AT_ONCE = 1024
 
 _U = np.uint64
 PART = _U(PARTS["bonds"])
-LIVES = 4096  # of one site in one step: a safeguard, because the rule for long steps comes first
+# of one site in one step: a safeguard, because the rule for long steps comes first
+LIVES = 4096
 TINY = 2.2250738585072014e-308
 
 #: A step: slider, time and clock at its beginning, the rate of a bond born at the frame's origin then and
@@ -68,14 +72,26 @@ def room():
     The last array is the number of the first range of the index.
     """
     steps, index = np.empty(AT_ONCE, _STEP), np.empty((2, _RANGES), np.int16)
-    return steps, np.empty((3, AT_ONCE)), np.empty((3, AT_ONCE)), index, np.empty(2, np.int64)
+    return (
+        steps,
+        np.empty((3, AT_ONCE)),
+        np.empty((3, AT_ONCE)),
+        index,
+        np.empty(2, np.int64),
+    )
 
 
 @device
 def views(due, soonest):
     """Return a row's due as signed and unsigned integers, and first binding, first rupture and rearmost of blocks."""
     whole = soonest.view(np.int64)
-    return due.view(np.int64), due.view(np.uint64), whole[1], soonest.view(np.uint64)[0], soonest[2]
+    return (
+        due.view(np.int64),
+        due.view(np.uint64),
+        whole[1],
+        soonest.view(np.uint64)[0],
+        soonest[2],
+    )
 
 
 @device
@@ -112,7 +128,11 @@ def lay_out(step, slip, duration, x, time, clock, law, space):
     at = steps[step]
     at.x, at.time, at.clock, at.rate = x, time, clock, first
     at.grown, at.pace, at.duration, at.speed = grown, speed * softness, duration, speed
-    ends[RUPTURE, step], ends[BINDING, step], ends[_CUT, step] = after, time + duration, x + slip - limit
+    ends[RUPTURE, step], ends[BINDING, step], ends[_CUT, step] = (
+        after,
+        time + duration,
+        x + slip - limit,
+    )
     return after
 
 
@@ -152,22 +172,45 @@ def follow(bonds, soonest, count, law, address, space):
     ``bonds`` are its births, dues and lives, ``address`` seed and member of its draws. Arrays are not passed on from
     the loop over events: counting their references takes as long as an event.
     """
-    (birth, due, life), (steps, ends, changes, index, lowest), (_, _, limit, rebinding) = bonds, space, law
+    (
+        (birth, due, life),
+        (steps, ends, changes, index, lowest),
+        (_, _, limit, rebinding),
+    ) = bonds, space, law
     bits, bounded, (seed, member) = views(due, soonest), limit < math.inf, address
     signed, unsigned, binding, rupture, rear = bits
-    clock, time, cut = ends[RUPTURE, count - 1], ends[BINDING, count - 1], ends[_CUT, count - 1]
-    clock_bits, time_bits = np.float64(clock).view(np.uint64), np.float64(-time).view(np.int64)
+    clock, time, cut = (
+        ends[RUPTURE, count - 1],
+        ends[BINDING, count - 1],
+        ends[_CUT, count - 1],
+    )
+    clock_bits, time_bits = (
+        np.float64(clock).view(np.uint64),
+        np.float64(-time).view(np.int64),
+    )
     changes[:, :count] = 0.0
     for block in range(rear.size):
-        if not (rupture[block] <= clock_bits or binding[block] <= time_bits or rear[block] <= cut):
+        if not (
+            rupture[block] <= clock_bits
+            or binding[block] <= time_bits
+            or rear[block] <= cut
+        ):
             continue
         for i in range(block * BLOCK, min((block + 1) * BLOCK, due.size)):
-            if not (unsigned[i] <= clock_bits or signed[i] <= time_bits or (bounded and birth[i] <= cut)):
+            if not (
+                unsigned[i] <= clock_bits
+                or signed[i] <= time_bits
+                or (bounded and birth[i] <= cut)
+            ):
                 continue
             at, x, k, events, number = due[i], birth[i], 0, 0, life[i]
             bound = signed[i] >= 0
             while True:
-                row, value, next_ = (RUPTURE if bound else BINDING), math.fabs(at), count
+                row, value, next_ = (
+                    (RUPTURE if bound else BINDING),
+                    math.fabs(at),
+                    count,
+                )
                 if value <= ends[row, count - 1]:
                     place = min(max(_range(value) - lowest[row], 0), _RANGES - 1)
                     next_ = max(k, np.int64(index[row, place]))
@@ -191,17 +234,32 @@ def follow(bonds, soonest, count, law, address, space):
                     changes[1, k] -= x
                     changes[2, k] -= x * x
                     number += np.uint32(1)
-                    first, second, _, _ = words_at(seed, PART, _U(i + 1), _U(number), member, _U(0))
-                    end = (x + limit - step.x) / speed if bounded and speed > 0.0 else math.inf
+                    first, second, _, _ = words_at(
+                        seed, PART, _U(i + 1), _U(number), member, _U(0)
+                    )
+                    end = (
+                        (x + limit - step.x) / speed
+                        if bounded and speed > 0.0
+                        else math.inf
+                    )
                     elapsed = moment(at - step.clock, rate, pace, end, step.duration)
                     x, wait = exponential(first), exponential(second) / rebinding
-                    at = -max(step.time + elapsed + wait, TINY) if rebinding > 0.0 else -math.inf
+                    at = (
+                        -max(step.time + elapsed + wait, TINY)
+                        if rebinding > 0.0
+                        else -math.inf
+                    )
                 else:
                     elapsed = max(value - step.time, 0.0)
                     bell = pace * elapsed
                     more = math.expm1(bell)
-                    clock = step.clock + rate * elapsed * (more / bell if bell > 0.0 else 1.0)
-                    at, x = clock + x * step.grown * (1.0 + more), step.x + speed * elapsed
+                    clock = step.clock + rate * elapsed * (
+                        more / bell if bell > 0.0 else 1.0
+                    )
+                    at, x = (
+                        clock + x * step.grown * (1.0 + more),
+                        step.x + speed * elapsed,
+                    )
                     changes[0, k] += 1.0
                     changes[1, k] += x
                     changes[2, k] += x * x
@@ -215,8 +273,10 @@ SPENT, ENDLESS = -1, -2
 
 #: Lives of a site in one step beyond which the step ends in the stationary law of its speed.
 CYCLES = 300.0
-_FAR = 16.0  # Bell forces, cut-off stretches or natural lives after which a frame is set anew
-_LEAP = 24.0  # Bell forces within a step above which bonds are stepped one by one, because the clock could overflow
+# Bell forces, cut-off stretches or natural lives after which a frame is set anew
+_FAR = 16.0
+# Bell forces within a step above which bonds are stepped one by one, because the clock could overflow
+_LEAP = 24.0
 
 
 @device
@@ -239,7 +299,11 @@ def _cycle(speed, law):
 @device
 def _one_by_one(bonds, row, slip, duration, law, address):
     """Advance a row by a step bond by bond; return True if all stretches then have the sign of the motion."""
-    (birth, due, life), (seed, member), (rate, softness, limit, rebinding) = bonds, address, law
+    (birth, due, life), (seed, member), (rate, softness, limit, rebinding) = (
+        bonds,
+        address,
+        law,
+    )
     x0, t0, speed = row[SLIDER], row[TIME], slip / duration
     bound, total, squares, lowest, highest = 0.0, 0.0, 0.0, math.inf, -math.inf
     for i in range(due.size):
@@ -255,9 +319,15 @@ def _one_by_one(bonds, row, slip, duration, law, address):
                 lasts = time_to_rupture(stretch, speed, due[i], rate, softness, limit)
                 time += min(lasts, left) if lasts > 0.0 else 0.0
                 life[i] += np.uint32(1)
-                first, second, _, _ = words_at(seed, PART, _U(i + 1), _U(life[i]), member, _U(0))
+                first, second, _, _ = words_at(
+                    seed, PART, _U(i + 1), _U(life[i]), member, _U(0)
+                )
                 birth[i] = exponential(first)
-                due[i] = -max(t0 + time + exponential(second) / rebinding, TINY) if rebinding > 0.0 else -math.inf
+                due[i] = (
+                    -max(t0 + time + exponential(second) / rebinding, TINY)
+                    if rebinding > 0.0
+                    else -math.inf
+                )
             elif -due[i] > t0 + duration:
                 break
             else:
@@ -292,7 +362,9 @@ def _set(bonds, soonest, row, law, singly, turn):
             continue
         x = sign * (birth[i] - x0)
         if not was_single:
-            due[i] = max(due[i] - clock, 0.0) * (math.exp(-softness * birth[i]) if singly else scale)
+            due[i] = max(due[i] - clock, 0.0) * (
+                math.exp(-softness * birth[i]) if singly else scale
+            )
         elif not singly:
             due[i] *= math.exp(softness * x)
         birth[i] = x
@@ -305,7 +377,12 @@ def _set(bonds, soonest, row, law, singly, turn):
         for block in range(soonest.shape[1]):
             least(bits, birth, block, limit < math.inf)
     row[SLIDER], row[TIME], row[CLOCK], row[SENSE] = 0.0, 0.0, 0.0, sign * row[SENSE]
-    row[SINGLY], row[BOUND], row[SUM], row[SQUARES] = 1.0 if singly else 0.0, bound, total, squares
+    row[SINGLY], row[BOUND], row[SUM], row[SQUARES] = (
+        1.0 if singly else 0.0,
+        bound,
+        total,
+        squares,
+    )
 
 
 #: Arrays of ``Tracks``.
@@ -328,7 +405,9 @@ def _together(row, slip, duration, law, space):
     ahead.
     """
     x, time, clock, count = row[SLIDER], row[TIME], row[CLOCK], 0
-    while count < min(duration.size, AT_ONCE) and not (count > 0 and _far(x, time, law)):
+    while count < min(duration.size, AT_ONCE) and not (
+        count > 0 and _far(x, time, law)
+    ):
         along = row[SENSE] * slip[count]
         if along < 0.0 or law[1] * along > _LEAP:
             break
@@ -345,7 +424,11 @@ def _keep(row, slip, duration, count, space, frames):
     """Write the frames of a row after each of ``count`` steps that were followed together."""
     _, ends, changes, _, _ = space
     for k in range(count):
-        row[SLIDER], row[TIME], row[CLOCK] = row[SLIDER] + row[SENSE] * slip[k], row[TIME] + duration[k], ends[0, k]
+        row[SLIDER], row[TIME], row[CLOCK] = (
+            row[SLIDER] + row[SENSE] * slip[k],
+            row[TIME] + duration[k],
+            ends[0, k],
+        )
         row[BOUND] += changes[0, k]
         row[SUM] += changes[1, k]
         row[SQUARES] += changes[2, k]
@@ -354,7 +437,9 @@ def _keep(row, slip, duration, count, space, frames):
 
 
 @device
-def _advance(bonds, soonest, row, slip, duration, law, address, space, laid, shared, frames):
+def _advance(
+    bonds, soonest, row, slip, duration, law, address, space, laid, shared, frames
+):
     """Advance a row by some of the steps ahead, write its frame after each of them, and return their number.
 
     ``laid`` is the frame of a row whose steps are laid out, and their number. They serve all rows of a ``shared`` slip
@@ -362,9 +447,16 @@ def _advance(bonds, soonest, row, slip, duration, law, address, space, laid, sha
     """
     count = 0
     if row[SINGLY] == 0.0:
-        here = shared and row[STEPS] == laid[STEPS] and np.all(row[:SINGLY] == laid[:SINGLY])
+        here = (
+            shared
+            and row[STEPS] == laid[STEPS]
+            and np.all(row[:SINGLY] == laid[:SINGLY])
+        )
         if not (here and laid[COLUMNS] <= duration.size):
-            laid[:COLUMNS], laid[COLUMNS] = row, _together(row, slip, duration, law, space)
+            laid[:COLUMNS], laid[COLUMNS] = (
+                row,
+                _together(row, slip, duration, law, space),
+            )
         count = np.int64(laid[COLUMNS])
     if count > 0:
         follow(bonds, soonest, count, law, address, space)
@@ -386,10 +478,14 @@ def _advance(bonds, soonest, row, slip, duration, law, address, space, laid, sha
 def one_step(bonds, soonest, row, slip, duration, law, address, space, laid, frame):
     """Advance a row by one step, of arrays of length one; ``laid`` and ``frame`` are work arrays."""
     laid[0] = math.nan
-    _advance(bonds, soonest, row, slip, duration, law, address, space, laid, False, frame)
+    _advance(
+        bonds, soonest, row, slip, duration, law, address, space, laid, False, frame
+    )
 
 
-@kernel(f"int64({TRACKS}, float64[:,:], float64[:], UniTuple(float64, 4), uint64, uint64[:], int64, float64[:,:,::1])")
+@kernel(
+    f"int64({TRACKS}, float64[:,:], float64[:], UniTuple(float64, 4), uint64, uint64[:], int64, float64[:,:,::1])"
+)
 def live(tracks, slip, duration, law, seed, members, first, frames):
     """Advance all rows from step ``first`` on, in place; return the number of steps, ``SPENT`` or ``ENDLESS``.
 
@@ -404,13 +500,20 @@ def live(tracks, slip, duration, law, seed, members, first, frames):
             return SPENT
     long = np.zeros(rows, np.bool_)
     while end < duration.size and not long.any():
-        if not (0.0 < duration[end] < math.inf and np.all(np.abs(slip[end]) < math.inf)):
+        if not (
+            0.0 < duration[end] < math.inf and np.all(np.abs(slip[end]) < math.inf)
+        ):
             return ENDLESS
         for m in range(rows):
             speed = slip[end, m % slip.shape[1]] / duration[end]
             long[m] = duration[end] > CYCLES * _cycle(speed, law)
         end += 1
-    space, laid, shared, start = room(), np.full(COLUMNS + 1, math.nan), slip.shape[1] == 1, first
+    space, laid, shared, start = (
+        room(),
+        np.full(COLUMNS + 1, math.nan),
+        slip.shape[1] == 1,
+        first,
+    )
     while start < end:
         stop = end
         for m in range(rows):
@@ -419,7 +522,18 @@ def live(tracks, slip, duration, law, seed, members, first, frames):
             while k < until:
                 ahead = slip[k:until, m % slip.shape[1]], duration[k:until]
                 row, after = frame[m], frames[m, :, k:until]
-                k += _advance(bonds, soonest[m], row, *ahead, law, address, space, laid, shared, after)
+                k += _advance(
+                    bonds,
+                    soonest[m],
+                    row,
+                    *ahead,
+                    law,
+                    address,
+                    space,
+                    laid,
+                    shared,
+                    after,
+                )
                 if m == 0:  # the other rows use the same steps
                     until = stop = k
             stamp[m] = np.int64(frame[m, STEPS])
@@ -446,7 +560,9 @@ def relax(tracks, rows, law):
         _set(bonds, soonest[m], row, of_rates, False, False)
 
 
-@kernel(f"void({TRACKS}, boolean[:], float64[:], float64[:], float64[:], UniTuple(float64, 4), uint64, uint64[:])")
+@kernel(
+    f"void({TRACKS}, boolean[:], float64[:], float64[:], float64[:], UniTuple(float64, 4), uint64, uint64[:])"
+)
 def draw(tracks, chosen, speed, share, age, law, seed, members):
     """Draw chosen rows anew: a ``share`` of sites bound, their ages by the survival law of a bond of mean life ``age``.
 
@@ -454,23 +570,42 @@ def draw(tracks, chosen, speed, share, age, law, seed, members):
     every second proposal (Devroye, Non-Uniform Random Variate Generation, 1986, VII.2). A bond of any age still has an
     exponential threshold ahead.
     """
-    (birth, due, life, soonest, stamp, frame), (rate, softness, limit, rebinding) = tracks, law
+    (birth, due, life, soonest, stamp, frame), (rate, softness, limit, rebinding) = (
+        tracks,
+        law,
+    )
     for m in range(due.shape[0]):
         if not chosen[m % chosen.size]:
             continue
-        v, mean, bonded = speed[m % speed.size], age[m % age.size], share[m % share.size]
+        v, mean, bonded = (
+            speed[m % speed.size],
+            age[m % age.size],
+            share[m % share.size],
+        )
         for i in range(due.shape[1]):
             life[m, i] += np.uint32(1)
             site, number = _U(i + 1), _U(life[m, i])
-            first, second, third, _ = words_at(seed, PART, site, number, members[m], _U(1))
+            first, second, third, _ = words_at(
+                seed, PART, site, number, members[m], _U(1)
+            )
             birth[m, i] = exponential(second)
-            due[m, i] = -max(exponential(third) / rebinding, TINY) if rebinding > 0.0 else -math.inf
+            due[m, i] = (
+                -max(exponential(third) / rebinding, TINY)
+                if rebinding > 0.0
+                else -math.inf
+            )
             if unit_at(first) >= bonded:
                 continue
             due[m, i], elapsed = birth[m, i], 0.0
             for lane in range(2, 256 if mean > 0.0 else 2):
-                first, second, third, _ = words_at(seed, PART, site, number, members[m], _U(lane))
-                tail = 1.0 + exponential(second) if unit_at(first) >= 0.5 else unit_at(second)
+                first, second, third, _ = words_at(
+                    seed, PART, site, number, members[m], _U(lane)
+                )
+                tail = (
+                    1.0 + exponential(second)
+                    if unit_at(first) >= 0.5
+                    else unit_at(second)
+                )
                 elapsed, bar = tail * mean, exponential(third) + max(tail - 1.0, 0.0)
                 spent = rupture_integral(0.0, v * elapsed, elapsed, rate, softness)
                 if spent <= bar and math.fabs(v) * elapsed < limit:
@@ -490,8 +625,16 @@ def _rank(place, winners, soonest):
     block = place - winners.shape[1] // 2
     for row in range(2):
         soon = soonest[row, block] if 0 <= block < soonest.shape[1] else math.nan
-        value = math.fabs(soon) if math.copysign(1.0, soon) == 1.0 - 2.0 * row and soon == soon else math.inf
-        winners[row, place] = value if block >= 0 else min(winners[row, 2 * place], winners[row, 2 * place + 1])
+        value = (
+            math.fabs(soon)
+            if math.copysign(1.0, soon) == 1.0 - 2.0 * row and soon == soon
+            else math.inf
+        )
+        winners[row, place] = (
+            value
+            if block >= 0
+            else min(winners[row, 2 * place], winners[row, 2 * place + 1])
+        )
 
 
 @device
@@ -514,7 +657,11 @@ def rank(tracks, law, winners):
 @device
 def let_pass(frame, slip, duration, clock, winners):
     """Advance a row whose bonds are stepped together, by a slip and to a ``clock``, while nothing happens to them."""
-    frame[SLIDER], frame[TIME], frame[CLOCK] = frame[SLIDER] + slip, frame[TIME] + duration, clock
+    frame[SLIDER], frame[TIME], frame[CLOCK] = (
+        frame[SLIDER] + slip,
+        frame[TIME] + duration,
+        clock,
+    )
     frame[STEPS] += 1.0
     winners[0, 0] = frame[STEPS]
 
@@ -522,7 +669,11 @@ def let_pass(frame, slip, duration, clock, winners):
 @device
 def happen(tracks, event, law, address, winners):
     """Break the bond, or bind the site, that is first among the ``winners``: at the place and time of the frame."""
-    ((birth, due, life), soonest, frame), (_, softness, limit, rebinding), (seed, member) = tracks, law, address
+    (
+        ((birth, due, life), soonest, frame),
+        (_, softness, limit, rebinding),
+        (seed, member),
+    ) = tracks, law, address
     place, value, x, sign = 1, winners[event, 1], frame[SLIDER], 1.0
     while place < winners.shape[1] // 2:
         place = 2 * place if winners[event, 2 * place] == value else 2 * place + 1
@@ -535,10 +686,16 @@ def happen(tracks, event, law, address, winners):
     else:
         x, sign = birth[i], -1.0
         life[i] += np.uint32(1)
-        first, second, _, _ = words_at(seed, PART, _U(i + 1), _U(life[i]), member, _U(0))
+        first, second, _, _ = words_at(
+            seed, PART, _U(i + 1), _U(life[i]), member, _U(0)
+        )
         birth[i], wait = exponential(first), exponential(second) / rebinding
         due[i] = -max(frame[TIME] + wait, TINY) if rebinding > 0.0 else -math.inf
-    frame[BOUND], frame[SUM], frame[SQUARES] = frame[BOUND] + sign, frame[SUM] + sign * x, frame[SQUARES] + sign * x * x
+    frame[BOUND], frame[SUM], frame[SQUARES] = (
+        frame[BOUND] + sign,
+        frame[SUM] + sign * x,
+        frame[SQUARES] + sign * x * x,
+    )
     least(views(due, soonest), birth, block, limit < math.inf)
     while place > 0:
         _rank(place, winners, soonest)
@@ -552,10 +709,17 @@ def next_event(tracks, speed, most, law, winners):
     along = frame[SENSE] * speed
     if frame[SINGLY] == 0.0 and along >= 0.0:
         rank(tracks, law, winners)
-        x, soon, first = frame[SLIDER], min(most, winners[BINDING, 1] - frame[TIME]), winners[RUPTURE, 1]
+        x, soon, first = (
+            frame[SLIDER],
+            min(most, winners[BINDING, 1] - frame[TIME]),
+            winners[RUPTURE, 1],
+        )
         if first < math.inf and rate > 0.0:
             grown = rate * math.exp(softness * x)
-            soon = min(soon, moment(first - frame[CLOCK], grown, along * softness, math.inf, most))
+            soon = min(
+                soon,
+                moment(first - frame[CLOCK], grown, along * softness, math.inf, most),
+            )
         if along > 0.0 and limit < math.inf:
             soon = min(soon, (np.min(soonest[2]) + limit - x) / along)
         return max(soon, 0.0)
@@ -565,8 +729,17 @@ def next_event(tracks, speed, most, law, winners):
         if math.copysign(1.0, due[i]) < 0.0:
             soon = min(soon, -due[i] - frame[TIME])
         else:
-            left = due[i] if frame[SINGLY] > 0.0 else (due[i] - clock) * math.exp(-softness * birth[i])
-            soon = min(soon, time_to_rupture(x - birth[i], along, max(left, 0.0), rate, softness, limit))
+            left = (
+                due[i]
+                if frame[SINGLY] > 0.0
+                else (due[i] - clock) * math.exp(-softness * birth[i])
+            )
+            soon = min(
+                soon,
+                time_to_rupture(
+                    x - birth[i], along, max(left, 0.0), rate, softness, limit
+                ),
+            )
     return max(soon, 0.0)
 
 
@@ -619,7 +792,13 @@ class Tracks(NamedTuple):
 
 
 def start(
-    rupture: RuptureRate, rebinding_rate: float, sites: int, speed: Array, begin: str, seed: int, members: Array
+    rupture: RuptureRate,
+    rebinding_rate: float,
+    sites: int,
+    speed: Array,
+    begin: str,
+    seed: int,
+    members: Array,
 ) -> Tracks:
     """Return the bonds at the start of a run.
 
@@ -667,12 +846,27 @@ def start(
         stamp=np.zeros(rows, np.int64),
         frame=np.zeros((rows, COLUMNS)),
     )
-    _draw(tracks, np.ones(1, bool), begin, np.asarray(speed, dtype=float), rupture, rebinding_rate, seed, members)
+    _draw(
+        tracks,
+        np.ones(1, bool),
+        begin,
+        np.asarray(speed, dtype=float),
+        rupture,
+        rebinding_rate,
+        seed,
+        members,
+    )
     return tracks
 
 
 def advance(
-    tracks: Tracks, slip: Array, duration: Array, rupture: RuptureRate, rebinding_rate: float, seed: int, members: Array
+    tracks: Tracks,
+    slip: Array,
+    duration: Array,
+    rupture: RuptureRate,
+    rebinding_rate: float,
+    seed: int,
+    members: Array,
 ) -> tuple[Tracks, Array]:
     """Return the bonds after steps of constant speed each, and their frames.
 
@@ -706,17 +900,35 @@ def advance(
     The result is exact for any length of a step. After a step of more than about 300 lives of a site the bonds are
     drawn from the stationary law of its speed.
     """
-    members, after = np.asarray(members, dtype=np.uint64), tracks._replace(frame=tracks.frame.copy())
-    frames, done, law = np.empty((*after.frame.shape, len(duration))), 0, (*rupture[:3], rebinding_rate)
+    members, after = (
+        np.asarray(members, dtype=np.uint64),
+        tracks._replace(frame=tracks.frame.copy()),
+    )
+    frames, done, law = (
+        np.empty((*after.frame.shape, len(duration))),
+        0,
+        (*rupture[:3], rebinding_rate),
+    )
     while done < len(duration):
         done = live(tuple(after), slip, duration, law, seed, members, done, frames)
         if done == SPENT:
             raise RuntimeError(AGAIN)
         if done == ENDLESS:
-            raise ValueError("slip and duration of a step must be finite, and its duration positive")
+            raise ValueError(
+                "slip and duration of a step must be finite, and its duration positive"
+            )
         left = after.frame[:, STEPS] < tracks.frame[:, STEPS] + done
         if left.any():
-            _draw(after, left, "steady", slip[done - 1] / duration[done - 1], rupture, rebinding_rate, seed, members)
+            _draw(
+                after,
+                left,
+                "steady",
+                slip[done - 1] / duration[done - 1],
+                rupture,
+                rebinding_rate,
+                seed,
+                members,
+            )
             frames[:, :, done - 1] = after.frame
     return after, frames.transpose(2, 0, 1)
 
@@ -726,9 +938,15 @@ def moments(frames: Array, sites: int) -> tuple[Array, Array, Array]:
 
     Frames of shape (..., columns) give arrays of shape (...).
     """
-    number, slider, total, squares = (frames[..., column] for column in (BOUND, SLIDER, SUM, SQUARES))
+    number, slider, total, squares = (
+        frames[..., column] for column in (BOUND, SLIDER, SUM, SQUARES)
+    )
     square = np.maximum(slider * (number * slider - 2.0 * total) + squares, 0.0)
-    return number / sites, frames[..., SENSE] * (number * slider - total) / sites, square / sites
+    return (
+        number / sites,
+        frames[..., SENSE] * (number * slider - total) / sites,
+        square / sites,
+    )
 
 
 def mean_life(speed: Array, rupture: RuptureRate) -> Array:
@@ -759,7 +977,9 @@ def mean_life(speed: Array, rupture: RuptureRate) -> Array:
     >>> print("%.4f %.4f %.4f" % tuple(lives))
     1.0000 0.2015 0.0063
     """
-    return np.array([_mean_life(abs(v), rupture) for v in np.atleast_1d(speed).tolist()])
+    return np.array(
+        [_mean_life(abs(v), rupture) for v in np.atleast_1d(speed).tolist()]
+    )
 
 
 def _mean_life(speed: float, rupture: RuptureRate) -> float:
@@ -790,8 +1010,24 @@ def _draw(tracks, chosen, begin, speed, rupture, rebinding_rate, seed, members) 
     if begin == "steady":
         age = mean_life(speed, rupture)
         if np.any(np.isinf(age) & (speed != 0.0)):
-            raise ValueError("bonds that never break have no stationary stretch: start bonded or empty")
+            raise ValueError(
+                "bonds that never break have no stationary stretch: start bonded or empty"
+            )
         with np.errstate(invalid="ignore", over="ignore"):
-            share = np.where(np.isinf(age), 1.0, rebinding_rate * age / (rebinding_rate * age + 1.0))
-    law, addresses = (*rupture[:3], rebinding_rate), np.asarray(members, dtype=np.uint64)
-    draw(tuple(tracks), chosen, speed, share, np.where(np.isinf(age), 0.0, age), law, seed, addresses)
+            share = np.where(
+                np.isinf(age), 1.0, rebinding_rate * age / (rebinding_rate * age + 1.0)
+            )
+    law, addresses = (
+        (*rupture[:3], rebinding_rate),
+        np.asarray(members, dtype=np.uint64),
+    )
+    draw(
+        tuple(tracks),
+        chosen,
+        speed,
+        share,
+        np.where(np.isinf(age), 0.0, age),
+        law,
+        seed,
+        addresses,
+    )

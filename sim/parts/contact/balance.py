@@ -19,7 +19,11 @@ import numpy as np
 
 from sim.laws import jkr
 from sim.laws.jkr import series_shares
-from sim.laws.reversible import mean_stress_energy, radius_at_displacement_reversible, radius_at_load_reversible
+from sim.laws.reversible import (
+    mean_stress_energy,
+    radius_at_displacement_reversible,
+    radius_at_load_reversible,
+)
 from sim.numerics.jit import device, kernel
 from sim.parts.exchange import Array, Flags, Mount
 from sim.spectrum.radial import Terms, share_of
@@ -41,7 +45,11 @@ def elastic_energy(radius: Array, indentation: Array, bodies: Bodies) -> Array:
     """
     a, curvature = radius, 1.0 / bodies.sphere_radius
     third = a**3 * curvature
-    return bodies.modulus * (a * indentation**2 - 2.0 / 3.0 * third * indentation + 0.2 * third * a**2 * curvature)
+    return bodies.modulus * (
+        a * indentation**2
+        - 2.0 / 3.0 * third * indentation
+        + 0.2 * third * a**2 * curvature
+    )
 
 
 @dataclass(frozen=True)
@@ -60,11 +68,15 @@ class LoadControl:
         """True if a detached sphere comes back into contact, because the load is not tensile."""
         return self.load >= 0.0
 
-    def radius(self, work: Array, stress: Array, reversible: float, bodies: Bodies) -> Array:
+    def radius(
+        self, work: Array, stress: Array, reversible: float, bodies: Bodies
+    ) -> Array:
         """Return the largest stable equilibrium radius [m]: Hertz's if no work of adhesion is left, nan without one."""
         if reversible == 0.0:
             return np.asarray(jkr.radius_at_load(self.load, work, *bodies[:2]))
-        return np.asarray(radius_at_load_reversible(self.load, work, stress, reversible, *bodies))
+        return np.asarray(
+            radius_at_load_reversible(self.load, work, stress, reversible, *bodies)
+        )
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
         """Return the load on the sphere [N]; 0 if the contact is open."""
@@ -72,7 +84,11 @@ class LoadControl:
 
     def indentation(self, radius: Array, bodies: Bodies) -> Array:
         """Return the indentation [m]; nan if the contact is open, because a dead load does not place the sphere."""
-        return np.asarray(jkr.indentation_under_load(radius, self.load, bodies.sphere_radius, bodies.modulus))
+        return np.asarray(
+            jkr.indentation_under_load(
+                radius, self.load, bodies.sphere_radius, bodies.modulus
+            )
+        )
 
     def displacement(self, radius: Array, bodies: Bodies) -> Array:
         """Return the displacement of the base [m], which is the indentation without a spring."""
@@ -86,7 +102,11 @@ class LoadControl:
         """
         radius = np.where(self.closes & (radius > 0.0), radius, np.nan)
         indentation = self.indentation(radius, bodies)
-        energy = elastic_energy(radius, indentation, bodies) - self.load * indentation - gained
+        energy = (
+            elastic_energy(radius, indentation, bodies)
+            - self.load * indentation
+            - gained
+        )
         return np.where(np.isnan(radius), 0.0, energy)
 
 
@@ -107,21 +127,31 @@ class DisplacementControl:
         """True if a detached sphere comes back into contact: at a displacement of zero or more."""
         return self.base >= 0.0
 
-    def radius(self, work: Array, stress: Array, reversible: float, bodies: Bodies) -> Array:
+    def radius(
+        self, work: Array, stress: Array, reversible: float, bodies: Bodies
+    ) -> Array:
         """Return the largest stable equilibrium radius [m]: Hertz's if no work of adhesion is left, nan without one."""
         machine = self.base, self.stiffness
         if reversible == 0.0:
             return np.asarray(jkr.radius_at_displacement(*machine, work, *bodies[:2]))
-        return np.asarray(radius_at_displacement_reversible(*machine, work, stress, reversible, *bodies))
+        return np.asarray(
+            radius_at_displacement_reversible(
+                *machine, work, stress, reversible, *bodies
+            )
+        )
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
         """Return the load on the sphere [N]; 0 if the contact is open."""
-        load = jkr.load_under_displacement(radius, self.base, self.stiffness, *bodies[:2])
+        load = jkr.load_under_displacement(
+            radius, self.base, self.stiffness, *bodies[:2]
+        )
         return np.where(np.isnan(radius), 0.0, load)
 
     def indentation(self, radius: Array, bodies: Bodies) -> Array:
         """Return the indentation [m]; if the contact is open, the displacement of the base of the unloaded spring."""
-        closed = jkr.indentation_under_displacement(radius, self.base, self.stiffness, *bodies[:2])
+        closed = jkr.indentation_under_displacement(
+            radius, self.base, self.stiffness, *bodies[:2]
+        )
         return np.where(np.isnan(radius), self.base, closed)
 
     def displacement(self, radius: Array, bodies: Bodies) -> Array:
@@ -131,7 +161,11 @@ class DisplacementControl:
     def energy(self, radius: Array, gained: Array, bodies: Bodies) -> Array:
         """Return the energy of this contact above that of an open one [J]: elastic, of the spring, and of adhesion."""
         indentation = self.indentation(radius, bodies)
-        spring = 0.0 if math.isinf(self.stiffness) else 0.5 * self.stiffness * (self.base - indentation) ** 2
+        spring = (
+            0.0
+            if math.isinf(self.stiffness)
+            else 0.5 * self.stiffness * (self.base - indentation) ** 2
+        )
         return elastic_energy(radius, indentation, bodies) + spring - gained
 
 
@@ -192,7 +226,9 @@ class Balance(NamedTuple):
     def at(self, k: int) -> "Balance":
         """Return the terms at the end of step k of a block."""
         stress = self.stress[k] if self.stress.ndim > 1 else self.stress
-        return self._replace(bonded=self.bonded[k], fluctuating=self.fluctuating[k], stress=stress)
+        return self._replace(
+            bonded=self.bonded[k], fluctuating=self.fluctuating[k], stress=stress
+        )
 
     def without_stress(self) -> "Balance":
         """Return the terms without that of the mean stress."""
@@ -210,7 +246,9 @@ class Balance(NamedTuple):
         It is 6 τ0² a/(π E*) for an incompressible half-space.
         """
         _, modulus, poisson_ratio = self.bodies
-        return np.asarray(mean_stress_energy(radius, self.stress, modulus, poisson_ratio))
+        return np.asarray(
+            mean_stress_energy(radius, self.stress, modulus, poisson_ratio)
+        )
 
     def gained(self, radius: Array, reversible: float) -> Array:
         """Return the energy that adhesion has released for the area of a contact: ∫ w dA over its radii [J]."""
@@ -233,20 +271,31 @@ _PER_TURN = 0.5 / math.pi
 @device
 def _surplus(radius, contact):
     """Return the energy release rate, negative below Hertz's radius, minus the work left at a radius [J/m²]."""
-    (load, base, bonded, fluctuating, reversible), (curvature, modulus, stiffness), (wave, ends, cubics) = contact
+    (
+        (load, base, bonded, fluctuating, reversible),
+        (curvature, modulus, stiffness),
+        (wave, ends, cubics),
+    ) = contact
     inverse, hertz = 1.0 / radius, radius * radius * curvature
     missing = 2.0 / 3.0 * hertz - 0.5 * load / modulus * inverse
     if stiffness > 0.0:
         grips, dead = series_shares(stiffness, 2.0 * modulus * radius)
         missing = grips * (hertz - base) + dead * (2.0 / 3.0 * hertz)
     rate = _PER_TURN * modulus * inverse * missing * abs(missing)
-    return rate - (bonded - fluctuating * share_of(radius, wave, ends, cubics) - reversible * radius)
+    return rate - (
+        bonded
+        - fluctuating * share_of(radius, wave, ends, cubics)
+        - reversible * radius
+    )
 
 
 @device
 def _dip(inside, outside, contact):
     """Return the radius between two others at which the surplus is least, by golden section."""
-    low, high = outside - _GOLDEN * (outside - inside), inside + _GOLDEN * (outside - inside)
+    low, high = (
+        outside - _GOLDEN * (outside - inside),
+        inside + _GOLDEN * (outside - inside),
+    )
     at_low, at_high = _surplus(low, contact), _surplus(high, contact)
     for _ in range(_TURNS):
         if at_low < at_high:
@@ -269,7 +318,9 @@ def _narrowed(inside, outside, contact):
             break
         middle = 0.5 * (inside + outside)
         value = _surplus(middle, contact)
-        guess = middle + (middle - inside) * (-value) / math.sqrt(value * value - low * high)
+        guess = middle + (middle - inside) * (-value) / math.sqrt(
+            value * value - low * high
+        )
         guess = min(max(guess, inside), outside)
         if abs(guess - before) <= 4e-16 * guess:
             return guess
@@ -315,5 +366,11 @@ def widest_crossings(contacts, bodies, share, radius):
     its start.
     """
     for i in range(radius.size):
-        terms = contacts[2, i], contacts[3, i], contacts[4, i], contacts[5, i], contacts[6, i]
+        terms = (
+            contacts[2, i],
+            contacts[3, i],
+            contacts[4, i],
+            contacts[5, i],
+            contacts[6, i],
+        )
         radius[i] = widest(contacts[0, i], contacts[1, i], (terms, bodies, share))

@@ -49,7 +49,18 @@ def excess(t, a, scene):
     Below Hertz's radius G continues as -G: only a monotone continuation for the inner
     solver, which never ends there.
     """
-    modulus, curvature, stiffness, load, load_rate, base, base_rate, work, work_rate, scale = scene
+    (
+        modulus,
+        curvature,
+        stiffness,
+        load,
+        load_rate,
+        base,
+        base_rate,
+        work,
+        work_rate,
+        scale,
+    ) = scene
     if stiffness == math.inf:
         spring, yielding = 1.0, 0.0
     else:
@@ -71,7 +82,9 @@ def edge_speed(s, front):
 
     Closer to equilibrium than rounding resolves, the law is a straight line, because its slope would be 0 or infinite.
     """
-    speed, power = (front.speed, front.power) if s > 0.0 else (front.heal_speed, front.heal_power)
+    speed, power = (
+        (front.speed, front.power) if s > 0.0 else (front.heal_speed, front.heal_power)
+    )
     near = ROUNDING if power >= 1.0 else 1e3 * ROUNDING
     if abs(s) < near:
         slope = -speed * math.pow(near, power - 1.0)
@@ -84,14 +97,22 @@ def edge_speed(s, front):
 def bare_force(t, scene):
     """Return the force on a contact of vanishing radius [N], or the indentation [m] if the stiffness is infinite."""
     base = scene.base + scene.base_rate * t
-    return base if scene.stiffness == math.inf else scene.load + scene.load_rate * t + scene.stiffness * base
+    return (
+        base
+        if scene.stiffness == math.inf
+        else scene.load + scene.load_rate * t + scene.stiffness * base
+    )
 
 
 @device
 def hertz_force(a, scene):
     """Return the bare force of Hertz's contact of radius a."""
     hertz = a * a * scene.curvature
-    return hertz if scene.stiffness == math.inf else hertz * (scene.stiffness + 4.0 / 3.0 * scene.modulus * a)
+    return (
+        hertz
+        if scene.stiffness == math.inf
+        else hertz * (scene.stiffness + 4.0 / 3.0 * scene.modulus * a)
+    )
 
 
 @device
@@ -100,7 +121,12 @@ def hertz_radius(t, scene):
 
     The force grows with the radius and is convex, so Newton's steps from the right go left.
     """
-    modulus, curvature, stiffness, force = scene.modulus, scene.curvature, scene.stiffness, bare_force(t, scene)
+    modulus, curvature, stiffness, force = (
+        scene.modulus,
+        scene.curvature,
+        scene.stiffness,
+        bare_force(t, scene),
+    )
     if not force > 0.0:
         return 0.0
     if stiffness == math.inf:
@@ -109,7 +135,9 @@ def hertz_radius(t, scene):
     if stiffness > 0.0:
         a = min(a, math.sqrt(force / (curvature * stiffness)))
     for _ in range(60):
-        lower = a - (hertz_force(a, scene) - force) / (a * curvature * (2.0 * stiffness + 4.0 * modulus * a))
+        lower = a - (hertz_force(a, scene) - force) / (
+            a * curvature * (2.0 * stiffness + 4.0 * modulus * a)
+        )
         if not lower < a:
             break
         a = lower
@@ -122,7 +150,9 @@ def pushed(t, scene, front):
     a, stiffness, indenting = hertz_radius(t, scene), scene.stiffness, scene.base_rate
     rate, _ = edge_speed(-(scene.work + scene.work_rate * t) / scene.scale, front)
     if stiffness < math.inf:
-        indenting = (scene.load_rate + stiffness * indenting) / (stiffness + 2.0 * scene.modulus * a)
+        indenting = (scene.load_rate + stiffness * indenting) / (
+            stiffness + 2.0 * scene.modulus * a
+        )
     return rate <= indenting / (2.0 * a * scene.curvature), a
 
 
@@ -156,7 +186,10 @@ class Kinetics(NamedTuple):
 
 #: Contact modulus, curvature of the sphere, stiffness; load, displacement of the base and work of adhesion at the
 #: start, each with its rate; unit of the excess.
-Scene = namedtuple("Scene", "modulus curvature stiffness load load_rate base base_rate work work_rate scale")
+Scene = namedtuple(
+    "Scene",
+    "modulus curvature stiffness load load_rate base base_rate work work_rate scale",
+)
 #: Speed and power of an opening edge, and of a healing one.
 Front = namedtuple("Front", "speed power heal_speed heal_power")
 
@@ -210,7 +243,11 @@ def _stages(running, x, y, h, z1, z2, z3, start, scene, front):
     r1 = _I11 * z1 + _I12 * z2 + _I13 * z3 - h * f1
     r2 = _I21 * z1 + _I22 * z2 + _I23 * z3 - h * f2
     r3 = _I31 * z1 + _I32 * z2 + _I33 * z3 - h * f3
-    misfit = abs(r1) / (1.0 + h * abs(j1)) + abs(r2) / (1.0 + h * abs(j2)) + abs(r3) / (1.0 + h * abs(j3))
+    misfit = (
+        abs(r1) / (1.0 + h * abs(j1))
+        + abs(r2) / (1.0 + h * abs(j2))
+        + abs(r3) / (1.0 + h * abs(j3))
+    )
     return r1, r2, r3, j1, j2, j3, s1, s2, s3, misfit
 
 
@@ -239,7 +276,9 @@ def _radau(running, x, y, h, size, first, start, scene, front):
         change = max(abs(d1), abs(d2), abs(d3))
         if change <= 1e-3 * TOLERANCE * size:
             z1, z2, z3 = z1 - d1, z2 - d2, z3 - d3
-            error = (h * f + _E1 * z1 + _E2 * z2 + _E3 * z3) / (_REAL - h * min(0.0, j3))
+            error = (h * f + _E1 * z1 + _E2 * z2 + _E3 * z3) / (
+                _REAL - h * min(0.0, j3)
+            )
             v1 = _I11 * z1 + _I12 * z2 + _I13 * z3
             v2 = _I21 * z1 + _I22 * z2 + _I23 * z3
             v3 = _I31 * z1 + _I32 * z2 + _I33 * z3
@@ -250,7 +289,9 @@ def _radau(running, x, y, h, size, first, start, scene, front):
         if not change < math.inf:
             return 0.0, math.nan, 0.0
         for _ in range(12):
-            now = _stages(running, x, y, h, z1 - d1, z2 - d2, z3 - d3, start, scene, front)
+            now = _stages(
+                running, x, y, h, z1 - d1, z2 - d2, z3 - d3, start, scene, front
+            )
             if now[9] < residual:
                 break
             d1, d2, d3 = 0.5 * d1, 0.5 * d2, 0.5 * d3
@@ -276,14 +317,26 @@ def _ride(t, a, end, least, scene, front):
         _, b = pushed(end, scene, front)
     if b <= least and b < a:
         b, before, after = min(a, least), bare_force(t, scene), bare_force(end, scene)
-        end = t + (end - t) * min(max((before - hertz_force(b, scene)) / (before - after), 0.0), 1.0)
+        end = t + (end - t) * min(
+            max((before - hertz_force(b, scene)) / (before - after), 0.0), 1.0
+        )
     energy = 0.0
     if b > a and scene.work + scene.work_rate * 0.5 * (t + end) > 0.0:
         low, span = hertz_force(a, scene), hertz_force(b, scene) - hertz_force(a, scene)
-        for node, weight in ((-math.sqrt(0.6), 5.0 / 18.0), (0.0, 8.0 / 18.0), (math.sqrt(0.6), 5.0 / 18.0)):
+        for node, weight in (
+            (-math.sqrt(0.6), 5.0 / 18.0),
+            (0.0, 8.0 / 18.0),
+            (math.sqrt(0.6), 5.0 / 18.0),
+        ):
             c = 0.5 * (a + b) + 0.5 * node * (b - a)
             moment = t + (end - t) * (hertz_force(c, scene) - low) / span
-            energy += weight * (b - a) * c * max(0.0, scene.work + scene.work_rate * moment) / scene.scale
+            energy += (
+                weight
+                * (b - a)
+                * c
+                * max(0.0, scene.work + scene.work_rate * moment)
+                / scene.scale
+            )
     return end, b, energy
 
 
@@ -306,7 +359,11 @@ def _fallback(t, a, stop, least, scene, front):
             for _ in range(60):
                 middle = 0.5 * (low + high)
                 f, _ = edge_speed(excess(stop, middle, scene)[1], front)
-                low, high = (low, middle) if (middle - a - (stop - t) * f) * rate >= 0.0 else (middle, high)
+                low, high = (
+                    (low, middle)
+                    if (middle - a - (stop - t) * f) * rate >= 0.0
+                    else (middle, high)
+                )
             break
         energy += abs(s * high * (high - low))
         low = high
@@ -327,7 +384,9 @@ def _try(running, t, a, h, size, scene, front):
     """Return time and radius after an inner step, error over tolerance, and energy/(2 pi work)."""
     x, now = (0.0, t) if running else (t, a)
     f, j, f_x, _ = _slope(running, x, now, a, scene, front)
-    change, error, energy = _radau(running, x, now, h, size, (f, j, f_x), a, scene, front)
+    change, error, energy = _radau(
+        running, x, now, h, size, (f, j, f_x), a, scene, front
+    )
     if running:
         return t + change, a * math.exp(-h), error, energy
     return t + h, a + change, error, energy
@@ -353,9 +412,18 @@ def _piece(t, a, stop, least, tries, scene, front):
             continue
         if a <= least and rate < 0.0:
             return t, 0.0, energy, tries
-        running = rate < 0.0 and not shy and (cross or _runs(a, rate, bend, s_a, s_t, stop - t))
+        running = (
+            rate < 0.0
+            and not shy
+            and (cross or _runs(a, rate, bend, s_a, s_t, stop - t))
+        )
         # first step, longest step, and size of an error that counts, in the time or, running, in the logarithm
-        first, longest, reach, size = min(stop - t, 0.1 * a / abs(rate)), stop - t, stop - t, a
+        first, longest, reach, size = (
+            min(stop - t, 0.1 * a / abs(rate)),
+            stop - t,
+            stop - t,
+            a,
+        )
         if running:
             reach, size = math.log(a / least), 1e-3 * stop - a / rate
             first, longest = 0.1, min(reach, _LONGEST)
@@ -370,7 +438,11 @@ def _piece(t, a, stop, least, tries, scene, front):
             refused = True
             continue
         refused = False
-        if running and t1 > stop and not (cross and whole and t1 - stop < 1e-6 * (stop - t)):
+        if (
+            running
+            and t1 > stop
+            and not (cross and whole and t1 - stop < 1e-6 * (stop - t))
+        ):
             h *= 0.8 * (stop - t) / (t1 - t)
             continue
         if not running and a1 < min(least, a):
@@ -381,7 +453,11 @@ def _piece(t, a, stop, least, tries, scene, front):
         if y1 < -edge and y > edge:
             h *= max(1e-6, y / (y - y1))
             continue
-        t, energy, shy = (stop if whole and not running else min(t1, stop)), energy + more, False
+        t, energy, shy = (
+            (stop if whole and not running else min(t1, stop)),
+            energy + more,
+            False,
+        )
         a = max(a1, hertz_radius(t, scene)) if y1 < edge else a1
         if running and whole:
             return t, 0.0, energy, tries
@@ -425,11 +501,25 @@ def _zero(before, after, duration):
 def scene_of(works, loads, bases, stiffness, duration, scale, bodies):
     """Return the ``Scene`` of work, load and displacement at start and end of a time."""
     per, (sphere_radius, modulus) = (1.0 / duration if duration > 0.0 else 0.0), bodies
-    load, base = (0.0 if stiffness == math.inf else loads[0]), (0.0 if stiffness == 0.0 else bases[0])
+    load, base = (
+        (0.0 if stiffness == math.inf else loads[0]),
+        (0.0 if stiffness == 0.0 else bases[0]),
+    )
     load_rate = 0.0 if stiffness == math.inf else (loads[1] - loads[0]) * per
     base_rate = 0.0 if stiffness == 0.0 else (bases[1] - bases[0]) * per
     work_rate = (works[1] - works[0]) * per
-    return Scene(modulus, 1.0 / sphere_radius, stiffness, load, load_rate, base, base_rate, works[0], work_rate, scale)
+    return Scene(
+        modulus,
+        1.0 / sphere_radius,
+        stiffness,
+        load,
+        load_rate,
+        base,
+        base_rate,
+        works[0],
+        work_rate,
+        scale,
+    )
 
 
 @device
@@ -468,9 +558,13 @@ def moved_edge(a, works, loads, bases, stiffness, duration, kinetics, bodies, le
     scale, speed, exponent, heal_speed, heal_exponent = kinetics
     scene = scene_of(works, loads, bases, stiffness, duration, scale, bodies)
     ends = abs(scene.load) + abs(scene.base) + abs(works[0]) + abs(works[1])
-    ends += (0.0 if stiffness == math.inf else abs(loads[1])) + (0.0 if stiffness == 0.0 else abs(bases[1]))
+    ends += (0.0 if stiffness == math.inf else abs(loads[1])) + (
+        0.0 if stiffness == 0.0 else abs(bases[1])
+    )
     positive = min(scale, exponent, heal_exponent, bodies[0], bodies[1])
-    wide = max(abs(a), scale, exponent, heal_exponent, bodies[0], bodies[1], duration, least)
+    wide = max(
+        abs(a), scale, exponent, heal_exponent, bodies[0], bodies[1], duration, least
+    )
     lowest = min(stiffness, duration, speed, heal_speed, least)
     if ends + wide < math.inf and positive > 0.0 and lowest >= 0.0:
         per = 1.0 / duration if duration > 0.0 else 0.0
@@ -501,11 +595,32 @@ def _left(radius, bonded, fluctuating, reversible, share):
 @device
 def _energy(t, a, scene):
     """Return the energy of a contact above that of an open one: elastic, of the spring or the load, of adhesion."""
-    modulus, curvature, stiffness, load, load_rate, base, base_rate, work, work_rate, _ = scene
+    (
+        modulus,
+        curvature,
+        stiffness,
+        load,
+        load_rate,
+        base,
+        base_rate,
+        work,
+        work_rate,
+        _,
+    ) = scene
     hertz = a * a * curvature
     indentation = hertz - excess(t, a, scene)[0]
-    energy = modulus * a * (indentation * indentation - 2.0 / 3.0 * hertz * indentation + 0.2 * hertz * hertz)
-    energy -= (load + load_rate * t) * indentation + math.pi * a * a * (work + work_rate * t)
+    energy = (
+        modulus
+        * a
+        * (
+            indentation * indentation
+            - 2.0 / 3.0 * hertz * indentation
+            + 0.2 * hertz * hertz
+        )
+    )
+    energy -= (load + load_rate * t) * indentation + math.pi * a * a * (
+        work + work_rate * t
+    )
     if stiffness < math.inf:
         stretch = base + base_rate * t - indentation
         energy += 0.5 * stiffness * stretch * stretch
@@ -513,7 +628,9 @@ def _energy(t, a, scene):
 
 
 @device
-def _moved(radius, touches, works, loads, bases, stiffness, duration, kinetics, bodies, spot):
+def _moved(
+    radius, touches, works, loads, bases, stiffness, duration, kinetics, bodies, spot
+):
     """Return radius or nan, time of opening or nan, and dissipated energy after a part of a clock step.
 
     Energy that is stored as the edge opens counts as dissipated, and so does the energy that a spot gains at a touch.
@@ -523,11 +640,22 @@ def _moved(radius, touches, works, loads, bases, stiffness, duration, kinetics, 
     a = spot if touches else radius
     if math.isnan(a):
         return math.nan, math.nan, 0.0
-    end, opened, lost = moved_edge(a, works, loads, bases, stiffness, duration, kinetics, bodies, 0.5 * spot)
-    scene, opens = scene_of(works, loads, bases, stiffness, duration, kinetics[0], bodies), math.isnan(end)
+    end, opened, lost = moved_edge(
+        a, works, loads, bases, stiffness, duration, kinetics, bodies, 0.5 * spot
+    )
+    scene, opens = (
+        scene_of(works, loads, bases, stiffness, duration, kinetics[0], bodies),
+        math.isnan(end),
+    )
     if stiffness == 0.0:
         sphere_radius, modulus = bodies
-        fold = cube_root(9.0 * math.pi * max(works[1], 0.0) * sphere_radius * (sphere_radius / (8.0 * modulus)))
+        fold = cube_root(
+            9.0
+            * math.pi
+            * max(works[1], 0.0)
+            * sphere_radius
+            * (sphere_radius / (8.0 * modulus))
+        )
         if opens or (loads[1] < 0.0 and radius < fold):
             lost = 0.0
     elif opens:
@@ -542,36 +670,87 @@ def _moved(radius, touches, works, loads, bases, stiffness, duration, kinetics, 
     f" UniTuple(float64, 5), UniTuple(float64, 2), float64, boolean, {SHARE}, float64[:, :, ::1])"
 )
 def _follow(
-    state, durations, opening, pieces, bonded, fluctuating, reversible, stiffness, kinetics, bodies, spot, again, share,
+    state,
+    durations,
+    opening,
+    pieces,
+    bonded,
+    fluctuating,
+    reversible,
+    stiffness,
+    kinetics,
+    bodies,
+    spot,
+    again,
+    share,
     out,
-):  # fmt: skip
+):
     """Write work, radius, time of detachment and dissipated energy at the end of each step; see ``follow``."""
     for m in range(state.shape[1]):
-        work, radius, detached, dissipated = state[0, m], state[1, m], state[2, m], state[3, m]
+        work, radius, detached, dissipated = (
+            state[0, m],
+            state[1, m],
+            state[2, m],
+            state[3, m],
+        )
         for k in range(len(durations)):
-            last = _left(radius, bonded[k, m], fluctuating[k, m], reversible[k, m], share)
+            last = _left(
+                radius, bonded[k, m], fluctuating[k, m], reversible[k, m], share
+            )
             first, end = (last if math.isnan(radius) else work), 0.0
             for p in range(opening[k], opening[k + 1]):
                 begin, end = end, pieces[1, p]
-                works = (1.0 - begin) * first + begin * last, (1.0 - end) * first + end * last
+                works = (
+                    (1.0 - begin) * first + begin * last,
+                    (1.0 - end) * first + end * last,
+                )
                 mount, none = (pieces[2, p], pieces[3, p]), (0.0, 0.0)
                 loads, bases = (mount, none) if stiffness == 0.0 else (none, mount)
-                touches = math.isnan(radius) and (math.isnan(detached) or again) and mount[0] >= 0.0
-                closed, duration = touches or not math.isnan(radius), durations[k] * (end - begin)
+                touches = (
+                    math.isnan(radius)
+                    and (math.isnan(detached) or again)
+                    and mount[0] >= 0.0
+                )
+                closed, duration = (
+                    touches or not math.isnan(radius),
+                    durations[k] * (end - begin),
+                )
                 radius, opened, lost = _moved(
-                    radius, touches, works, loads, bases, stiffness, duration, kinetics, bodies, spot
+                    radius,
+                    touches,
+                    works,
+                    loads,
+                    bases,
+                    stiffness,
+                    duration,
+                    kinetics,
+                    bodies,
+                    spot,
                 )
                 dissipated += lost
                 if closed and math.isnan(radius):
                     detached = pieces[0, p] - duration + opened
-            work = _left(radius, bonded[k, m], fluctuating[k, m], reversible[k, m], share)
-            out[0, k, m], out[1, k, m], out[2, k, m], out[3, k, m] = work, radius, detached, dissipated
+            work = _left(
+                radius, bonded[k, m], fluctuating[k, m], reversible[k, m], share
+            )
+            out[0, k, m], out[1, k, m], out[2, k, m], out[3, k, m] = (
+                work,
+                radius,
+                detached,
+                dissipated,
+            )
 
 
 def follow(
-    state: ContactState, durations: Array, pieces: Pieces, stiffness: float, balance: Balance, reversible: float,
-    kinetics: Kinetics, again: bool,
-) -> Array:  # fmt: skip
+    state: ContactState,
+    durations: Array,
+    pieces: Pieces,
+    stiffness: float,
+    balance: Balance,
+    reversible: float,
+    kinetics: Kinetics,
+    again: bool,
+) -> Array:
     """Return the first four quantities of ``ContactState`` at the end of each step of a block, (4, steps, rows).
 
     Parameters
@@ -594,17 +773,30 @@ def follow(
     opening = np.searchsorted(pieces.interval, np.arange(len(durations) + 1))
     begin, end = pieces.start[opening[:-1]], pieces.stop[opening[1:] - 1]
     shares = (pieces.stop - begin[pieces.interval]) / (end - begin)[pieces.interval]
-    of_stress = reversible * balance.reversible(np.ones(1)) if reversible else np.zeros(1)
+    of_stress = (
+        reversible * balance.reversible(np.ones(1)) if reversible else np.zeros(1)
+    )
     of_steps = balance.bonded, balance.fluctuating, of_stress
-    _, rows = np.broadcast_shapes(state.radius.shape, *((1, *values.shape)[-2:] for values in of_steps))
+    _, rows = np.broadcast_shapes(
+        state.radius.shape, *((1, *values.shape)[-2:] for values in of_steps)
+    )
     before, out = np.empty((4, rows)), np.empty((4, len(durations), rows))
     for row, values in zip(before, state, strict=False):
         row[:] = values
     sphere_radius, modulus, _ = balance.bodies
     spot = _SPOT * math.cbrt(balance.reference * sphere_radius**2 / modulus)
     _follow(
-        before, durations, opening, np.array([pieces.stop, shares, pieces.first, pieces.last]),
-        *(np.broadcast_to(values, out.shape[1:]) for values in of_steps), stiffness, tuple(kinetics),
-        (sphere_radius, modulus), spot, again, PLANE if balance.margin is None else balance.margin.each[0], out,
-    )  # fmt: skip
+        before,
+        durations,
+        opening,
+        np.array([pieces.stop, shares, pieces.first, pieces.last]),
+        *(np.broadcast_to(values, out.shape[1:]) for values in of_steps),
+        stiffness,
+        tuple(kinetics),
+        (sphere_radius, modulus),
+        spot,
+        again,
+        PLANE if balance.margin is None else balance.margin.each[0],
+        out,
+    )
     return out

@@ -44,16 +44,26 @@ class Body:
         nu [1].
     """
 
-    shear_modulus: Annotated[float, Quantity("Pa", "shear modulus", "G", above=0)] | None = None
-    youngs_modulus: Annotated[float, Quantity("Pa", "Young's modulus", "E", above=0)] | None = None
-    poisson_ratio: Annotated[float, Quantity("1", "Poisson ratio", "nu", at_least=0, at_most=0.5)] = 0.5
+    shear_modulus: (
+        Annotated[float, Quantity("Pa", "shear modulus", "G", above=0)] | None
+    ) = None
+    youngs_modulus: (
+        Annotated[float, Quantity("Pa", "Young's modulus", "E", above=0)] | None
+    ) = None
+    poisson_ratio: Annotated[
+        float, Quantity("1", "Poisson ratio", "nu", at_least=0, at_most=0.5)
+    ] = 0.5
 
     @model_validator(mode="after")
     def _one_modulus(self) -> "Body":
         if (self.shear_modulus is None) == (self.youngs_modulus is None):
             count = "none is" if self.shear_modulus is None else "both are"
-            cure = 'write either shear_modulus = "1.6 MPa" or youngs_modulus = "4.8 MPa"'
-            raise PydanticCustomError("one_modulus", f"needs exactly one modulus, but {count} given: {cure}")
+            cure = (
+                'write either shear_modulus = "1.6 MPa" or youngs_modulus = "4.8 MPa"'
+            )
+            raise PydanticCustomError(
+                "one_modulus", f"needs exactly one modulus, but {count} given: {cure}"
+            )
         return self
 
     @cached_property
@@ -98,7 +108,12 @@ class Solid(Body):
         if self.counter_body is None:
             return self.own_shear_modulus, self.poisson_ratio
         other = self.counter_body
-        return in_series(self.own_shear_modulus, self.poisson_ratio, other.own_shear_modulus, other.poisson_ratio)
+        return in_series(
+            self.own_shear_modulus,
+            self.poisson_ratio,
+            other.own_shear_modulus,
+            other.poisson_ratio,
+        )
 
     @cached_property
     def contact_modulus(self) -> float:
@@ -143,9 +158,18 @@ class Adhesion:
     0.0315
     """
 
-    work: Annotated[float, Quantity("J/m^2", "work of adhesion at rest", "Δγ", at_least=0)]
+    work: Annotated[
+        float, Quantity("J/m^2", "work of adhesion at rest", "Δγ", at_least=0)
+    ]
     bond_share: Annotated[
-        float, Quantity("1", "share of the work of adhesion carried by bonds", "β", at_least=0, at_most=1)
+        float,
+        Quantity(
+            "1",
+            "share of the work of adhesion carried by bonds",
+            "β",
+            at_least=0,
+            at_most=1,
+        ),
     ] = 1.0
 
     def work_of_bonds(self, fraction):
@@ -158,13 +182,32 @@ _LARGEST_SHARE = 0.3
 _KINDS = ("load", "indentation", "displacement")
 
 _Load = over_time(Quantity("N", "normal load, compression positive", "P"), "load")
-_Indentation = over_time(Quantity("m", "indentation of the sphere", "delta"), "indentation")
-_Displacement = over_time(Quantity("m", "displacement of the mount", "Delta"), "displacement")
-_Healing = Annotated[float, Quantity("m/s", "speed of a healing edge; if omitted, that of opening", "v_h", above=0)]
-_HealingExponent = Annotated[
-    float, Quantity("1", "exponent of healing; if omitted, that of opening", "n_h", above=0, at_most=1)
+_Indentation = over_time(
+    Quantity("m", "indentation of the sphere", "delta"), "indentation"
+)
+_Displacement = over_time(
+    Quantity("m", "displacement of the mount", "Delta"), "displacement"
+)
+_Healing = Annotated[
+    float,
+    Quantity(
+        "m/s", "speed of a healing edge; if omitted, that of opening", "v_h", above=0
+    ),
 ]
-_Policy = Annotated[Literal["stay_open", "reattach", "stop"], Field(description="what follows a pull-off")]
+_HealingExponent = Annotated[
+    float,
+    Quantity(
+        "1",
+        "exponent of healing; if omitted, that of opening",
+        "n_h",
+        above=0,
+        at_most=1,
+    ),
+]
+_Policy = Annotated[
+    Literal["stay_open", "reattach", "stop"],
+    Field(description="what follows a pull-off"),
+]
 
 
 @keyed()
@@ -182,9 +225,21 @@ class _Controlled:
     load: _Load | None = None  # type: ignore[valid-type]
     indentation: _Indentation | None = None  # type: ignore[valid-type]
     displacement: _Displacement | None = None  # type: ignore[valid-type]
-    stiffness: Annotated[float, Quantity("N/m", "stiffness between mount and sphere", "k", above=0)] | None = None
+    stiffness: (
+        Annotated[
+            float, Quantity("N/m", "stiffness between mount and sphere", "k", above=0)
+        ]
+        | None
+    ) = None
     reversible: Annotated[
-        float, Quantity("1", "share of the mean-stress energy paid by adhesion", "alpha", at_least=0, at_most=1)
+        float,
+        Quantity(
+            "1",
+            "share of the mean-stress energy paid by adhesion",
+            "alpha",
+            at_least=0,
+            at_most=1,
+        ),
     ] = 0.0
     after_pull_off: _Policy = "stay_open"
 
@@ -196,7 +251,9 @@ class _Controlled:
             message = 'the sphere has no mount; give a load such as "4 mN", an indentation such as "2 um", '
             message += "or a displacement with a stiffness"
         elif len(kinds) > 1:
-            names = " and ".join(f"an {name}" if name == "indentation" else f"a {name}" for name in kinds)
+            names = " and ".join(
+                f"an {name}" if name == "indentation" else f"a {name}" for name in kinds
+            )
             message = f"{names} exclude each other; omit one of them"
         elif self.displacement is not None and self.stiffness is None:
             message = 'a displacement needs the stiffness between mount and sphere, such as "1 kN/m"'
@@ -210,7 +267,9 @@ class _Controlled:
         remarks = []
         if setting.rest_radius > _LARGEST_SHARE * setting.sphere_radius:
             limit = f"{_LARGEST_SHARE} of the sphere's radius"
-            remarks.append(f"the contact exceeds {limit}: the theory is valid for small contacts")
+            remarks.append(
+                f"the contact exceeds {limit}: the theory is valid for small contacts"
+            )
         if math.isnan(setting.rest_radius):
             never = "is open for the whole run: raise contact.{} to zero, where the sphere touches"
             jumps = "begins open and jumps in where contact.{} first reaches zero"
@@ -241,7 +300,11 @@ class _Controlled:
         return self._control(self.course.at(np.zeros(()), 0.0).item())
 
     def _control(self, value: float | Array) -> Control:
-        return DisplacementControl(value, self.stiffness or math.inf) if self.load is None else LoadControl(value)
+        return (
+            DisplacementControl(value, self.stiffness or math.inf)
+            if self.load is None
+            else LoadControl(value)
+        )
 
     def mount_between(self, ends: Array, duration: float) -> tuple[Control, Control]:
         """Return the control at start and end of each interval between times of a run [s], before a jump at its end."""
@@ -260,14 +323,22 @@ class _Controlled:
         """True if the control changes in time."""
         return self.course.changes
 
-    def equilibrium_radius(self, work: Array, sphere_radius: float, modulus: float) -> Array:
+    def equilibrium_radius(
+        self, work: Array, sphere_radius: float, modulus: float
+    ) -> Array:
         """Return the JKR radius at the start for a work of adhesion; Hertz's if it is not positive; nan if open."""
-        return self.control(0.0, 0.0).radius(work, np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5))
+        return self.control(0.0, 0.0).radius(
+            work, np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5)
+        )
 
-    def largest_radius(self, work: float, sphere_radius: float, modulus: float) -> float:
+    def largest_radius(
+        self, work: float, sphere_radius: float, modulus: float
+    ) -> float:
         """Return the JKR radius for a work of adhesion as the control presses most [m]; 0 without equilibrium."""
         control = self._control(max(self.course.extremes))
-        radius = control.radius(np.array([work]), np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5))
+        radius = control.radius(
+            np.array([work]), np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5)
+        )
         return float(np.nan_to_num(radius[0]))
 
     def start(self, motion: Motion, duration: float, balance: Balance) -> ContactState:
@@ -276,7 +347,9 @@ class _Controlled:
         radius = self.equilibrium(control, balance)
         phases = np.where(self._without_equilibrium(control, balance), AHEAD, CLOSED)
         unknown = np.full(radius.shape, np.nan)
-        return ContactState(self._left(radius, balance), radius, unknown, np.zeros(radius.shape), phases)
+        return ContactState(
+            self._left(radius, balance), radius, unknown, np.zeros(radius.shape), phases
+        )
 
     def stopped(self, radius: Array, detached: Array) -> Flags:
         """True if a trajectory has ended, at the pull-off of a contact that stops then."""
@@ -285,17 +358,33 @@ class _Controlled:
     def _without_equilibrium(self, control: Control, balance: Balance) -> Flags:
         """True if a reference contact has no equilibrium, shape (..., rows, 4); those not followed as the first."""
         whole = np.full((*balance.bonded.shape[:-1], 1), balance.reference)
-        radii = control.radius(np.concatenate([whole, balance.bonded], axis=-1), np.zeros(1), 0.0, balance.bodies)
+        radii = control.radius(
+            np.concatenate([whole, balance.bonded], axis=-1),
+            np.zeros(1),
+            0.0,
+            balance.bodies,
+        )
         jkr, bonds_only = radii[..., :1], radii[..., 1:]
-        no_mean_stress = self.equilibrium(control, balance.without_stress()) if self.reversible else jkr
+        no_mean_stress = (
+            self.equilibrium(control, balance.without_stress())
+            if self.reversible
+            else jkr
+        )
         equilibrium = self.equilibrium(control, balance) if self.lags else jkr
-        return np.isnan(np.stack(np.broadcast_arrays(jkr, bonds_only, no_mean_stress, equilibrium), axis=-1))
+        return np.isnan(
+            np.stack(
+                np.broadcast_arrays(jkr, bonds_only, no_mean_stress, equilibrium),
+                axis=-1,
+            )
+        )
 
     def _phases(self, state: ContactState, control: Control, balance: Balance) -> Array:
         """Return the phases of the reference contacts at the end of each step, shape (steps, rows, 4)."""
         if min(self.course.extremes) >= 0.0:
             return during(state.phases, len(balance.bonded))
-        return self._followed(state.phases, control, self._without_equilibrium(control, balance))
+        return self._followed(
+            state.phases, control, self._without_equilibrium(control, balance)
+        )
 
     def _followed(self, phases: Array, control: Control, lost: Flags) -> Array:
         """Return phases at the end of each step, shape (steps, rows, contacts), of contacts that have ``lost`` it."""
@@ -306,19 +395,33 @@ class _Controlled:
     def equilibrium(self, control: Control, balance: Balance) -> Array:
         """Return the largest stable radius in equilibrium with the work left there [m], nan without one."""
         if balance.margin is None:
-            return control.radius(balance.work(np.zeros(1)), balance.stress, self.reversible, balance.bodies)
+            return control.radius(
+                balance.work(np.zeros(1)),
+                balance.stress,
+                self.reversible,
+                balance.bodies,
+            )
         bodies = balance.bodies
         most = balance.bonded - balance.margin.least * balance.fluctuating
         wide = control.radius(most, balance.stress, self.reversible, bodies)
         hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, bodies)
-        of_stress = self.reversible * balance.reversible(np.ones(1)) if self.reversible else 0.0
+        of_stress = (
+            self.reversible * balance.reversible(np.ones(1)) if self.reversible else 0.0
+        )
         load, base, stiffness = control.mount
         terms = wide, hertz, load, base, balance.bonded, balance.fluctuating, of_stress
-        shares, sphere = balance.margin.each, (1.0 / bodies.sphere_radius, bodies.modulus, stiffness)
-        contacts = np.stack(np.broadcast_arrays(*terms)).reshape(len(terms), len(shares), -1)
+        shares, sphere = (
+            balance.margin.each,
+            (1.0 / bodies.sphere_radius, bodies.modulus, stiffness),
+        )
+        contacts = np.stack(np.broadcast_arrays(*terms)).reshape(
+            len(terms), len(shares), -1
+        )
         radius = np.empty(contacts.shape[1:])
         for k, share in enumerate(shares):
-            widest_crossings(np.ascontiguousarray(contacts[:, k]), sphere, share, radius[k])
+            widest_crossings(
+                np.ascontiguousarray(contacts[:, k]), sphere, share, radius[k]
+            )
         return radius.reshape(wide.shape)
 
     def _left(self, radius: Array, balance: Balance) -> Array:
@@ -327,7 +430,11 @@ class _Controlled:
             return balance.work(radius)
         size = np.nan_to_num(radius, nan=0.0)
         work = balance.work(size)
-        return work - self.reversible * balance.reversible(size) if self.reversible else work
+        return (
+            work - self.reversible * balance.reversible(size)
+            if self.reversible
+            else work
+        )
 
 
 @keyed()
@@ -342,25 +449,45 @@ class Equilibrium(_Controlled):
 
     model: Literal["equilibrium"] = "equilibrium"
 
-    def advance(self, state: ContactState, motions: Motion, duration: float, balance: Balance) -> ContactState:
+    def advance(
+        self, state: ContactState, motions: Motion, duration: float, balance: Balance
+    ) -> ContactState:
         control = self.control(motions.time, duration)
         radius = self.equilibrium(control, balance)
-        detached, dissipated = during(state.detached, len(radius)), during(state.dissipated, len(radius))
+        detached, dissipated = (
+            during(state.detached, len(radius)),
+            during(state.dissipated, len(radius)),
+        )
         if np.isnan(radius).any() or np.isnan(state.radius).any():
-            phase = np.where(np.isnan(state.radius), np.where(np.isnan(state.detached), AHEAD, OPEN), CLOSED)
-            followed = self._followed(phase[:, np.newaxis], control, np.isnan(radius)[:, :, np.newaxis])
+            phase = np.where(
+                np.isnan(state.radius),
+                np.where(np.isnan(state.detached), AHEAD, OPEN),
+                CLOSED,
+            )
+            followed = self._followed(
+                phase[:, np.newaxis], control, np.isnan(radius)[:, :, np.newaxis]
+            )
             radius = np.where(followed[:, :, 0] == CLOSED, radius, np.nan)
             before = np.concatenate([state.radius[np.newaxis], radius[:-1]])
-            is_open, was_open, lost = np.isnan(radius), np.isnan(before), np.zeros(radius.shape)
+            is_open, was_open, lost = (
+                np.isnan(radius),
+                np.isnan(before),
+                np.zeros(radius.shape),
+            )
             opens, closes = is_open & ~was_open, was_open & ~is_open
             for happens, size, sign in ((opens, before, 1.0), (closes, radius, -1.0)):
                 if happens.any():
-                    energy = control.energy(size, balance.gained(size, self.reversible), balance.bodies)
+                    energy = control.energy(
+                        size, balance.gained(size, self.reversible), balance.bodies
+                    )
                     lost += np.where(happens, np.maximum(sign * energy, 0.0), 0.0)
             dissipated = np.add.accumulate(np.concatenate([dissipated[:1], lost]))[1:]
             opened = np.where(opens, motions.time, np.nan)
             detached = np.fmax.accumulate(np.concatenate([detached[:1], opened]))[1:]
-        work, phases = self._left(radius, balance), self._phases(state, control, balance)
+        work, phases = (
+            self._left(radius, balance),
+            self._phases(state, control, balance),
+        )
         return ContactState(work, radius, detached, dissipated, phases)
 
 
@@ -378,26 +505,48 @@ class RateDependent(_Controlled):
     lags: ClassVar[bool] = True
     edge_seconds: ClassVar[float] = 1.5e-6
 
-    front_speed: Annotated[float, Quantity("m/s", "speed of an opening edge at G - w = work at rest", "v_0", above=0)]
-    front_exponent: Annotated[float, Quantity("1", "exponent of the edge's speed", "n", above=0, at_most=1)] = 0.6
+    front_speed: Annotated[
+        float,
+        Quantity(
+            "m/s", "speed of an opening edge at G - w = work at rest", "v_0", above=0
+        ),
+    ]
+    front_exponent: Annotated[
+        float, Quantity("1", "exponent of the edge's speed", "n", above=0, at_most=1)
+    ] = 0.6
     heal_speed: _Healing | None = None
     heal_exponent: _HealingExponent | None = None
     model: Literal["rate_dependent"] = "rate_dependent"
 
-    def advance(self, state: ContactState, motions: Motion, duration: float, balance: Balance) -> ContactState:
+    def advance(
+        self, state: ContactState, motions: Motion, duration: float, balance: Balance
+    ) -> ContactState:
         ends = np.append(motions.time[0] - motions.duration[0], motions.time)
         stiffness = 0.0 if self.load is not None else self.stiffness or math.inf
         speed, exponent = self.front_speed, self.front_exponent
         work, radius, detached, dissipated = follow_front(
-            state, motions.duration[:, 0], self.course.pieces(ends, duration), stiffness, balance, self.reversible,
-            Kinetics(balance.reference, speed, exponent, self.heal_speed or speed, self.heal_exponent or exponent),
+            state,
+            motions.duration[:, 0],
+            self.course.pieces(ends, duration),
+            stiffness,
+            balance,
+            self.reversible,
+            Kinetics(
+                balance.reference,
+                speed,
+                exponent,
+                self.heal_speed or speed,
+                self.heal_exponent or exponent,
+            ),
             self.after_pull_off == "reattach",
-        )  # fmt: skip
+        )
         phases = self._phases(state, self.control(motions.time, duration), balance)
         return ContactState(work, radius, detached, dissipated, phases)
 
 
-@kernel("void(float64[:, :], boolean[:], boolean[:, :, :], boolean, float64[:, :, ::1])")
+@kernel(
+    "void(float64[:, :], boolean[:], boolean[:, :, :], boolean, float64[:, :, ::1])"
+)
 def _follow(phases, closes, lost, again, after):
     """Write the phases of contacts at the end of each step; ``phases`` are those before the steps."""
     steps, rows, contacts = after.shape
@@ -414,9 +563,15 @@ def _follow(phases, closes, lost, again, after):
 
 def _model(value: object) -> object:
     """Return the name of a contact's model, by default equilibrium."""
-    return value.get("model", "equilibrium") if isinstance(value, dict) else getattr(value, "model", None)
+    return (
+        value.get("model", "equilibrium")
+        if isinstance(value, dict)
+        else getattr(value, "model", None)
+    )
 
 
 Contact = Annotated[
-    Annotated[Equilibrium, Tag("equilibrium")] | Annotated[RateDependent, Tag("rate_dependent")], Discriminator(_model)
+    Annotated[Equilibrium, Tag("equilibrium")]
+    | Annotated[RateDependent, Tag("rate_dependent")],
+    Discriminator(_model),
 ]

@@ -14,7 +14,18 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.numerics.jit import device, kernel
-from sim.parts.bonds.cohorts import RULES, Rules, carry, inside, read_row, settle, steepen, sum_row, try_step, write_row
+from sim.parts.bonds.cohorts import (
+    RULES,
+    Rules,
+    carry,
+    inside,
+    read_row,
+    settle,
+    steepen,
+    sum_row,
+    try_step,
+    write_row,
+)
 from sim.parts.bonds.rupture import hazard_integral, hazard_time, rate_at
 from sim.parts.coupled import mechanics
 from sim.parts.coupled.redraw import DRAWS, redraw
@@ -50,7 +61,10 @@ _FEW_BIRTHS = 0.1
 @device
 def slopes(first, middle, last, step):
     """Return the slopes at start and nodes of the parabola through values there."""
-    early, late = (middle - first) / (GAMMA * step), (last - middle) / ((1.0 - GAMMA) * step)
+    early, late = (
+        (middle - first) / (GAMMA * step),
+        (last - middle) / ((1.0 - GAMMA) * step),
+    )
     bend = late - early
     return early - GAMMA * bend, early + GAMMA * bend, late + (1.0 - GAMMA) * bend
 
@@ -78,7 +92,9 @@ def _try_motion(pool, count, shift, duration, off, free, rules):
 
     Below 1 the factor refuses the step, as births are not good to the tolerance of the bonds.
     """
-    early, late, factor = try_step(pool, count, shift, shift / duration, duration, off, free, rules)
+    early, late, factor = try_step(
+        pool, count, shift, shift / duration, duration, off, free, rules
+    )
     limit, far = rules.limit, 2.0 / 3.0 * shift - 4.0 / 3.0 * off
     bound, moment = early + late, early * far
     if limit < math.inf:
@@ -101,7 +117,11 @@ def _cut(pool, count, shift, duration, rules):
     for i in range(count):
         most = math.fabs(pool[1, i] + shift) + 0.5 * pool[2, i]
         if most > rules.limit:
-            cut += pool[0, i] * math.exp(-hazard_integral(pool[1, i], shift, duration, rules.law)) - pool[4, i]
+            cut += (
+                pool[0, i]
+                * math.exp(-hazard_integral(pool[1, i], shift, duration, rules.law))
+                - pool[4, i]
+            )
     return max(cut, 0.0)
 
 
@@ -126,7 +146,9 @@ def start_of(row, node, yields, slider):
 @device
 def begin_sub_step(row, node, start, slider, contact):
     """Set the contact at the start of a sub-step, whose bonds are known, and return its ``start_of``."""
-    node.radius, node.area, _, _ = mechanics.contact_area(node.bound, node.moment, start, row.radius, contact)
+    node.radius, node.area, _, _ = mechanics.contact_area(
+        node.bound, node.moment, start, row.radius, contact
+    )
     node.sheared = row.sheared
     yields, _ = mechanics.compliance(node.radius, slider)
     return start_of(row, node, yields, slider)
@@ -155,7 +177,11 @@ def before_node(place, nodes, at_start, start, step, scale, row, slider):
     none = scale * slider.tolerance
     mass, (speed, body_speed, force_on_mass) = slider.mass, at_start
     duration = (GAMMA if place == 1 else 1.0 - GAMMA) * step
-    time, rate, share = start + PLACES[place] * step, 2.0 / (GAMMA * step), 1.0 / (GAMMA * (1.0 - GAMMA) * step)
+    time, rate, share = (
+        start + PLACES[place] * step,
+        2.0 / (GAMMA * step),
+        1.0 / (GAMMA * (1.0 - GAMMA) * step),
+    )
     if place == 1:
         momentum = mass * rate * body_speed + force_on_mass
         slip = duration * (speed + 0.5 * row.acceleration * duration)
@@ -163,7 +189,16 @@ def before_node(place, nodes, at_start, start, step, scale, row, slider):
     before = nodes[1]
     momentum = mass * (rate * body_speed + share * (before.body_speed - body_speed))
     slip = duration * (before.slip / (GAMMA * step) + 0.5 * row.acceleration * step)
-    return Approach(duration, time, rate, share * before.slip, share * before.body, momentum, slip, none)
+    return Approach(
+        duration,
+        time,
+        rate,
+        share * before.slip,
+        share * before.body,
+        momentum,
+        slip,
+        none,
+    )
 
 
 @device
@@ -172,9 +207,21 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
 
     What belongs to the slip is written to the node.
     """
-    stiffness, mass, damping, viscosity = slider.stiffness, slider.mass, slider.damping, slider.viscosity
-    time, rate, momentum, tolerance = approach.time, approach.rate, approach.momentum, slider.tolerance
-    radius, area, _, by_moment = mechanics.contact_area(bound, moment, time, row.radius, contact)
+    stiffness, mass, damping, viscosity = (
+        slider.stiffness,
+        slider.mass,
+        slider.damping,
+        slider.viscosity,
+    )
+    time, rate, momentum, tolerance = (
+        approach.time,
+        approach.rate,
+        approach.momentum,
+        slider.tolerance,
+    )
+    radius, area, _, by_moment = mechanics.contact_area(
+        bound, moment, time, row.radius, contact
+    )
     if not area >= 0.0:
         return math.nan, math.nan, math.nan
     yields, softer = mechanics.compliance(radius, slider)
@@ -183,27 +230,58 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
     force = area * stress
     body = slip + yields * force - row.sheared
     pull = mechanics.pull_on(time, start, body, row, slider)
-    over = force + (damping + mass * rate) * (rate * body - approach.body_offset) - momentum - pull
+    over = (
+        force
+        + (damping + mass * rate) * (rate * body - approach.body_offset)
+        - momentum
+        - pull
+    )
     grows = area * (bound + viscosity * rate) + by_moment * stress * bound
     softer = bound * mechanics.softening(softer, radius, by_moment, contact) * force
     loads = stiffness + rate * (damping + mass * rate)
     after.slip, after.body, after.area, after.radius = slip, body, area, radius
     after.sheared = yields * force
-    if mass > 0.0:  # by its momentum: differences of positions are roundings in the shortest sub-steps
+    # by its momentum: differences of positions are roundings in the shortest sub-steps
+    if mass > 0.0:
         after.body_speed = (momentum + pull - force) / (damping + mass * rate)
-    firmest, bears = max(stiffness, mechanics.stiffness_of(radius, slider)), area * (bound + mechanics.SOME)
+    firmest, bears = (
+        max(stiffness, mechanics.stiffness_of(radius, slider)),
+        area * (bound + mechanics.SOME),
+    )
     firm = firmest / bears if area > 0.0 else 1.0
-    none, slope = 1e-3 * approach.none / max(1.0, firm), grows + loads * (1.0 + softer + yields * grows)
-    if mass + damping > 0.0:  # what is left of the forces is work on the body, whose displacement may be the longer
-        none = min(none, 1e-3 * tolerance * (math.fabs(force) + math.fabs(pull)) / slope)
+    none, slope = (
+        1e-3 * approach.none / max(1.0, firm),
+        grows + loads * (1.0 + softer + yields * grows),
+    )
+    # what is left of the forces is work on the body, whose displacement may be the longer
+    if mass + damping > 0.0:
+        none = min(
+            none, 1e-3 * tolerance * (math.fabs(force) + math.fabs(pull)) / slope
+        )
     # roundings of the displacement of the body and of the forces matter less to a slip that viscosity makes stiff
-    roundings = loads * (math.fabs(slip) + yields * math.fabs(force) + math.fabs(row.sheared))
+    roundings = loads * (
+        math.fabs(slip) + yields * math.fabs(force) + math.fabs(row.sheared)
+    )
     roundings += math.fabs(force) + math.fabs(pull)
     return over, slope, max(none, 1e-15 * (math.fabs(slip) + roundings / slope))
 
 
 @device
-def go_to_node(place, nodes, at_start, pool, count, start, step, scale, row, slider, contact, unit, rules):
+def go_to_node(
+    place,
+    nodes,
+    at_start,
+    pool,
+    count,
+    start,
+    step,
+    scale,
+    row,
+    slider,
+    contact,
+    unit,
+    rules,
+):
     """Find the slip to a node and move the bonds; return their number, and the factor of the step for births.
 
     A number below zero where there is no balance of forces or its slope is not that of a short sub-step.
@@ -220,17 +298,28 @@ def go_to_node(place, nodes, at_start, pool, count, start, step, scale, row, sli
         if (shift >= 0.0) != ahead:
             ahead = shift >= 0.0
             steepen(pool, count, shift, off, rules)
-        bound, moment, early, late, factor = _try_motion(pool, count, unit * shift, duration, off, free, rules)
+        bound, moment, early, late, factor = _try_motion(
+            pool, count, unit * shift, duration, off, free, rules
+        )
         moment /= unit
-        over, elasticity, none = balance(shift, bound, moment, before, after, approach, start, row, slider, contact)
+        over, elasticity, none = balance(
+            shift, bound, moment, before, after, approach, start, row, slider, contact
+        )
         if turn == 0:
             slope = elasticity
-        elif math.fabs(shift - last_shift) > (1e-9 * (1.0 + math.fabs(shift)) if turn < _SLOW else _RESOLVED * none):
+        elif math.fabs(shift - last_shift) > (
+            1e-9 * (1.0 + math.fabs(shift)) if turn < _SLOW else _RESOLVED * none
+        ):
             slope = (over - last_over) / (shift - last_shift)
         if not slope > (_FALLING if rules.limit == math.inf else _FLAT) * elasticity:
             return -1, 0.0
-        if math.fabs(over / slope) <= none and (turn > 0 or after.area > 0.0):  # else roundings of open contacts add up
-            after.cut = _cut(pool, count, unit * shift, duration, rules) if rules.limit < math.inf else 0.0
+        # else roundings of open contacts add up
+        if math.fabs(over / slope) <= none and (turn > 0 or after.area > 0.0):
+            after.cut = (
+                _cut(pool, count, unit * shift, duration, rules)
+                if rules.limit < math.inf
+                else 0.0
+            )
             count = carry(pool, count, unit * shift, off, early, late, rules)
             sums_at(pool, count, unit, rules, after)
             return count, factor
@@ -253,16 +342,28 @@ def accept_nodes(row, nodes, start, step, slider, contact, limit, energy):
     for i in range(3):
         node, share, time = nodes[i], PARTS[i] * step, start + PLACES[i] * step
         pull = mechanics.pull_on(time, start, node.body, row, slider)
-        energy.work += share * pull * (bodies[i] if slider.forced > 0.0 else mechanics.driven(time, slider)[1])
+        energy.work += (
+            share
+            * pull
+            * (bodies[i] if slider.forced > 0.0 else mechanics.driven(time, slider)[1])
+        )
         energy.damping += share * damping * bodies[i] * bodies[i]
         energy.viscosity += share * node.area * viscosity * speeds[i] * speeds[i]
         energy.rupture += share * 0.5 * node.area * node.lost
-        energy.area -= share * 0.5 * (node.square * spreads[i] + node.sheared * node.sheared * firmer[i])
+        energy.area -= (
+            share
+            * 0.5
+            * (node.square * spreads[i] + node.sheared * node.sheared * firmer[i])
+        )
         if i > 0:
             if node.cut > 0.0:
-                energy.rupture += 0.25 * (nodes[i - 1].area + node.area) * node.cut * limit * limit
+                energy.rupture += (
+                    0.25 * (nodes[i - 1].area + node.area) * node.cut * limit * limit
+                )
             shift, share = node.slip - nodes[i - 1].slip, PLACES[i] - PLACES[i - 1]
-            mechanics.remember(row, shift, speeds[i - 1], speeds[i], share * step, contact)
+            mechanics.remember(
+                row, shift, speeds[i - 1], speeds[i], share * step, contact
+            )
     last = nodes[2]
     row.spring_force = mechanics.pull_on(start + step, start, last.body, row, slider)
     row.speed, row.sheared, row.radius = speeds[2], last.sheared, last.radius
@@ -295,7 +396,9 @@ def bend_of(nodes, step, scale, row, slider):
     slip = nodes[2].slip
     early, late = nodes[1].slip / GAMMA, (slip - nodes[1].slip) / (1.0 - GAMMA)
     bend = 2.0 / step * (late - early) / step
-    return bend, step * step / 24.0 * math.fabs(bend - row.acceleration) / (scale + math.fabs(slip)) / slider.tolerance
+    return bend, step * step / 24.0 * math.fabs(bend - row.acceleration) / (
+        scale + math.fabs(slip)
+    ) / slider.tolerance
 
 
 @device
@@ -307,9 +410,14 @@ def stretch_scale(row, node, slider):
     periods, so that a fiftieth of the stretch counts.
     """
     bears = node.area * node.bound + slider.stiffness
-    part = _RINGING if slider.damping * slider.damping < 4.0 * slider.mass * bears else 1.0
+    part = (
+        _RINGING if slider.damping * slider.damping < 4.0 * slider.mass * bears else 1.0
+    )
     mean = node.moment / node.bound if node.bound > 0.0 else 0.0
-    square = row.spring_force * row.spring_force + bears * slider.mass * row.body_speed * row.body_speed
+    square = (
+        row.spring_force * row.spring_force
+        + bears * slider.mass * row.body_speed * row.body_speed
+    )
     if not mean * mean * bears * bears + square < bears * bears:
         return part
     return part * max(math.sqrt(mean * mean + square / (bears * bears)), _LEAST_SCALE)
@@ -322,7 +430,11 @@ def stored_energy(row, square, time, slider, contact):
     _, area, _, _ = mechanics.area_or_last(row.bound, row.moment, time, row, contact)
     energy = 0.5 * mass * row.body_speed * row.body_speed + 0.5 * area * square
     energy += mechanics.contact_energy(row, area, slider)
-    return energy + 0.5 * row.spring_force * row.spring_force / stiffness if stiffness > 0.0 else energy
+    return (
+        energy + 0.5 * row.spring_force * row.spring_force / stiffness
+        if stiffness > 0.0
+        else energy
+    )
 
 
 #: Share of a limit that is tried.
@@ -350,7 +462,9 @@ def _lacking(shift, pool, count, row, time, slider, contact, unit, rules):
     A body that mass or damping holds stays. Then the displacement that is missing is returned instead of the force.
     """
     bound, moment = _at_once(pool, count, shift, unit, rules)
-    radius, area, _, _ = mechanics.contact_area(bound, moment, time, row.radius, contact)
+    radius, area, _, _ = mechanics.contact_area(
+        bound, moment, time, row.radius, contact
+    )
     yields, _ = mechanics.compliance(radius, slider)
     sheared = yields * area * moment
     body = shift + sheared - row.sheared
@@ -366,17 +480,30 @@ def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, ener
 
     The first such place is looked for in steps of at most half the width to which stretches are resolved.
     """
-    is_held, step, limit = slider.mass + slider.damping > 0.0, 0.5 * rules.cell / unit, rules.limit / unit
+    is_held, step, limit = (
+        slider.mass + slider.damping > 0.0,
+        0.5 * rules.cell / unit,
+        rules.limit / unit,
+    )
     sense = math.copysign(1.0, row.moment if is_held else row.spring_force)
-    here, area, _, _, _ = _lacking(0.0, pool, count, row, time, slider, contact, unit, rules)
-    near, _, _, _, _ = _lacking(sense * _TRIED * limit, pool, count, row, time, slider, contact, unit, rules)
+    here, area, _, _, _ = _lacking(
+        0.0, pool, count, row, time, slider, contact, unit, rules
+    )
+    near, _, _, _, _ = _lacking(
+        sense * _TRIED * limit, pool, count, row, time, slider, contact, unit, rules
+    )
     # merged stretches reach a little beyond the limit
-    if not (near > here or here > _TRIED * (limit if is_held else math.fabs(row.spring_force))):
+    if not (
+        near > here
+        or here > _TRIED * (limit if is_held else math.fabs(row.spring_force))
+    ):
         return -1
     shift, low, high, begun = 0.0, 0.0, _TRIED * limit, near > 0.0
     while high < 2.0 * limit:
         low, high = high, high + min(high, step)
-        lacks, _, _, _, _ = _lacking(sense * high, pool, count, row, time, slider, contact, unit, rules)
+        lacks, _, _, _, _ = _lacking(
+            sense * high, pool, count, row, time, slider, contact, unit, rules
+        )
         if begun and lacks <= 0.0:
             break
         begun = begun or lacks > 0.0
@@ -385,7 +512,9 @@ def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, ener
     if high < 2.0 * limit:
         for _ in range(60):
             middle = 0.5 * (low + high)
-            lacks, _, _, _, _ = _lacking(sense * middle, pool, count, row, time, slider, contact, unit, rules)
+            lacks, _, _, _, _ = _lacking(
+                sense * middle, pool, count, row, time, slider, contact, unit, rules
+            )
             low, high = (middle, high) if lacks > 0.0 else (low, middle)
         shift = sense * high
     elif is_held:
@@ -394,13 +523,20 @@ def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, ener
         shift = row.spring_force / slider.stiffness + row.sheared
     else:
         return -1
-    _, after, radius, sheared, body = _lacking(shift, pool, count, row, time, slider, contact, unit, rules)
+    _, after, radius, sheared, body = _lacking(
+        shift, pool, count, row, time, slider, contact, unit, rules
+    )
     if not after >= 0.0:
         return -1
     stored, bound = stored_energy(row, node.square, time, slider, contact), node.bound
     count = carry(pool, count, unit * shift, 0.0, 0.0, 0.0, rules)
     sums_at(pool, count, unit, rules, node)
-    row.radius, row.sheared, row.bound, row.moment = radius, sheared, node.bound, node.moment
+    row.radius, row.sheared, row.bound, row.moment = (
+        radius,
+        sheared,
+        node.bound,
+        node.moment,
+    )
     mechanics.displace(row, shift, body, slider)
     row.acceleration = 0.0
     broken = 0.25 * (area + after) * (bound - node.bound) * limit * limit
@@ -408,12 +544,16 @@ def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, ener
     if slider.forced > 0.0:
         energy.work += row.spring_force * body
         stored += row.spring_force * body
-    energy.snaps += stored - stored_energy(row, node.square, time, slider, contact) - broken
+    energy.snaps += (
+        stored - stored_energy(row, node.square, time, slider, contact) - broken
+    )
     return count
 
 
 @device
-def _break_stretched(row, pool, count, time, reach, slider, contact, unit, rules, node, energy):
+def _break_stretched(
+    row, pool, count, time, reach, slider, contact, unit, rules, node, energy
+):
     """Break bonds of one stretch within a ``reach`` of its limit; return the bonds left, less than 0 without such.
 
     Their force falls in no time, so that no sub-step leads over it where something delays the slip.
@@ -431,12 +571,16 @@ def _break_stretched(row, pool, count, time, reach, slider, contact, unit, rules
     _, area, _, _ = mechanics.area_or_last(row.bound, row.moment, time, row, contact)
     sums_at(pool, left, unit, rules, node)
     row.bound, row.moment, row.acceleration = node.bound, node.moment, 0.0
-    row.radius, node.area, _, _ = mechanics.area_or_last(row.bound, row.moment, time, row, contact)
+    row.radius, node.area, _, _ = mechanics.area_or_last(
+        row.bound, row.moment, time, row, contact
+    )
     yields, _ = mechanics.compliance(row.radius, slider)
     row.speed, row.body_speed, _ = start_of(row, node, yields, slider)
     broken = 0.5 * area * gone * limit * limit
     energy.rupture += broken
-    energy.snaps += stored - stored_energy(row, node.square, time, slider, contact) - broken
+    energy.snaps += (
+        stored - stored_energy(row, node.square, time, slider, contact) - broken
+    )
     return left
 
 
@@ -483,10 +627,23 @@ def _piece(line, bonds, slider, contact, unit, rules, room, books):
             return length, count, travelled, settled, contact.stays
         if not step > mechanics.LEAST * length:
             slid, row.next_step = row.slip, 0.0
-            if _break_all(row, pool, start, mechanics.BRIEF * length, slider, contact, unit, rules, nodes[0], energy):
+            if _break_all(
+                row,
+                pool,
+                start,
+                mechanics.BRIEF * length,
+                slider,
+                contact,
+                unit,
+                rules,
+                nodes[0],
+                energy,
+            ):
                 count = settled = 1
                 travelled += unit * (row.slip - slid)
-            elif rules.limit == math.inf and mechanics.snap(row, nodes[0].square, start, slider, contact, energy):
+            elif rules.limit == math.inf and mechanics.snap(
+                row, nodes[0].square, start, slider, contact, energy
+            ):
                 for i in range(count):
                     pool[1, i] += unit * (row.slip - slid)
                 travelled += unit * (row.slip - slid)
@@ -494,38 +651,95 @@ def _piece(line, bonds, slider, contact, unit, rules, room, books):
                 row.acceleration = 0.0
             elif contact.stays > 0.0:
                 return start, count, travelled, settled, contact.stays
-            else:  # the interface slips with the body from there on, however fast the contact was lost
-                contact, row.speed, row.acceleration = mechanics.later(contact, 0.0, 1.0), row.body_speed, 0.0
+            else:
+                # the interface slips with the body from there on, however fast the contact was lost
+                contact, row.speed, row.acceleration = (
+                    mechanics.later(contact, 0.0, 1.0),
+                    row.body_speed,
+                    0.0,
+                )
             continue
         saved[:, :count] = pool[:3, :count]
         first, contact = nodes[0], mechanics.following(contact, row, start, step)
         at_start = begin_sub_step(row, first, start, slider, contact)
         scale = stretch_scale(row, first, slider)
         new_count, factor = go_to_node(
-            1, nodes, at_start, pool, count, start, step, scale, row, slider, contact, unit, rules
+            1,
+            nodes,
+            at_start,
+            pool,
+            count,
+            start,
+            step,
+            scale,
+            row,
+            slider,
+            contact,
+            unit,
+            rules,
         )
         if new_count >= 0:
             new_count, other = go_to_node(
-                2, nodes, at_start, pool, new_count, start, step, scale, row, slider, contact, unit, rules
+                2,
+                nodes,
+                at_start,
+                pool,
+                new_count,
+                start,
+                step,
+                scale,
+                row,
+                slider,
+                contact,
+                unit,
+                rules,
             )
             factor = min(factor, other)
         shift, bend, error = nodes[2].slip, 0.0, math.inf
         within = mechanics.within_reach(shift, step, row, contact)
         if new_count >= 0:
             bend, error = bend_of(nodes, step, scale, row, slider)
-        grows = min(factor, 4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else min(factor, 4.0)
+        grows = (
+            min(factor, 4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0)))
+            if error > 0.0
+            else min(factor, 4.0)
+        )
         grows = min(grows, 0.9 * within)
         if not (error <= 1.0 and factor >= 1.0 and within >= 1.0):
             pool[:3, :count] = saved[:, :count]
             row.next_step = step * (grows if error < math.inf else 0.25)
             if rules.limit < math.inf and step < mechanics.BRIEF * length:
-                slid, reach = row.slip, _AROUND * step * math.fabs(row.speed) + _TRIED * rules.limit / unit
+                slid, reach = (
+                    row.slip,
+                    _AROUND * step * math.fabs(row.speed) + _TRIED * rules.limit / unit,
+                )
                 new_count = -1
                 if brittle:
-                    new_count = _slip_event(row, pool, count, start, slider, contact, unit, rules, first, energy)
+                    new_count = _slip_event(
+                        row,
+                        pool,
+                        count,
+                        start,
+                        slider,
+                        contact,
+                        unit,
+                        rules,
+                        first,
+                        energy,
+                    )
                 if new_count < 0 and (is_held or slider.viscosity > 0.0):
                     new_count = _break_stretched(
-                        row, pool, count, start, reach, slider, contact, unit, rules, first, energy
+                        row,
+                        pool,
+                        count,
+                        start,
+                        reach,
+                        slider,
+                        contact,
+                        unit,
+                        rules,
+                        first,
+                        energy,
                     )
                 if new_count >= 0:
                     count, row.next_step = new_count, 1e-6 * length
@@ -533,7 +747,9 @@ def _piece(line, bonds, slider, contact, unit, rules, room, books):
             continue
         line[1], books[1] = row, energy
         before = stored_energy(row, first.square, start, slider, contact)
-        accept_nodes(row, nodes, start, step, slider, contact, rules.limit / unit, energy)
+        accept_nodes(
+            row, nodes, start, step, slider, contact, rules.limit / unit, energy
+        )
         after = stored_energy(row, nodes[2].square, start + step, slider, contact)
         if mechanics.misses(before, after, books[1], energy, row, balanced, step):
             pool[:3, :count] = saved[:, :count]
@@ -545,12 +761,21 @@ def _piece(line, bonds, slider, contact, unit, rules, room, books):
         travelled += unit * shift
         if count > 1.25 * settled + 16.0 or count + 4 > pool.shape[1]:
             direction = -1.0 if shift < 0.0 else 1.0
-            count = settled = settle(pool[0], pool[1], pool[2], count, direction, travelled, rules)
+            count = settled = settle(
+                pool[0], pool[1], pool[2], count, direction, travelled, rules
+            )
             sums_at(pool, count, unit, rules, first)
         else:
             last = nodes[2]
-            first.bound, first.moment, first.square, first.lost = last.bound, last.moment, last.square, last.lost
-        row.next_step = max(row.next_step, step * grows) if step == left else step * grows
+            first.bound, first.moment, first.square, first.lost = (
+                last.bound,
+                last.moment,
+                last.square,
+                last.lost,
+            )
+        row.next_step = (
+            max(row.next_step, step * grows) if step == left else step * grows
+        )
         if step == left:
             return length, count, travelled, settled, contact.stays
         start += step
@@ -563,7 +788,13 @@ def _through(line, books, pieces, slider, contact, unit, share, rules, bonds, ro
     pool, _, nodes = room
     row, energy = line[0], books[0]
     count = read_row(pool, bonds[0], bonds[1], bonds[2], share)
-    time, going, travelled, settled, stays = 0.0, True, bonds[3][0], bonds[3][1], contact.stays
+    time, going, travelled, settled, stays = (
+        0.0,
+        True,
+        bonds[3][0],
+        bonds[3][1],
+        contact.stays,
+    )
     for p in range(len(pieces)):
         slider = mechanics.slider_in(slider, pieces[p])
         from_here = mechanics.later(mechanics.feeling(contact, row), time, stays)
@@ -574,7 +805,9 @@ def _through(line, books, pieces, slider, contact, unit, share, rules, bonds, ro
         row.bound, row.moment = nodes[0].bound, nodes[0].moment
         jumps, unslipped = mechanics.force_jumps(row, slider), before
         if jumps:
-            unslipped = stored_energy(row, nodes[0].square, 0.0, slider, mechanics.drawn(from_here, row, p))
+            unslipped = stored_energy(
+                row, nodes[0].square, 0.0, slider, mechanics.drawn(from_here, row, p)
+            )
         going, from_here = mechanics.answer(row, p, slider, from_here, energy)
         if going:
             for i in range(count):
@@ -582,9 +815,18 @@ def _through(line, books, pieces, slider, contact, unit, share, rules, bonds, ro
             travelled += unit * (row.slip - slid)
             sums_at(pool, count, unit, rules, nodes[0])
             left = stored_energy(row, nodes[0].square, 0.0, slider, from_here)
-            mechanics.book_slip(energy.work - worked - left + before, before - unslipped, jumps, energy)
+            mechanics.book_slip(
+                energy.work - worked - left + before, before - unslipped, jumps, energy
+            )
             reached, count, travelled, settled, stays = _piece(
-                line, (count, travelled, settled), slider, from_here, unit, rules, room, books
+                line,
+                (count, travelled, settled),
+                slider,
+                from_here,
+                unit,
+                rules,
+                room,
+                books,
             )
         time += reached
         going = going and reached == slider.length
@@ -602,19 +844,36 @@ def _through(line, books, pieces, slider, contact, unit, share, rules, bonds, ro
     f"void({mechanics.ARGUMENTS}, {DRAWS}, float64[::1], {RULES},"
     " float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1])"
 )
-def advance_cohorts(inputs, numbers, outputs, draws, share, rules, weight, stretch, width, lattice, sums):
+def advance_cohorts(
+    inputs, numbers, outputs, draws, share, rules, weight, stretch, width, lattice, sums
+):
     """Advance all rows, their energies and cohorts through some clock steps, each row by itself.
 
     ``share`` of each row's bonds that is left at the start; ``sums`` get those of the cohorts after each step. The rest
     as in ``mean_field.advance_rows``.
     """
     rows, energies, pieces, clock, units, work = inputs
-    slider, contact, (reached, spent) = mechanics.Slider(*numbers[0]), mechanics.contact_of(numbers), outputs
+    slider, contact, (reached, spent) = (
+        mechanics.Slider(*numbers[0]),
+        mechanics.contact_of(numbers),
+        outputs,
+    )
     rules, most, unit = Rules(*rules), weight.shape[1] + 520, units[mechanics.SLIP]
-    both, nodes = (np.empty(2 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES)), np.zeros(3, NODE)
-    line, books = both[0].view(mechanics.ROW), both[1].view(ENERGY)  # as they are, and before the last sub-step
-    columns, booked, row = both[0][: mechanics.COLUMNS], both[1][: mechanics.ENERGIES], line[0]
-    room, of_draws = (np.empty((9, most)), np.empty((3, most)), nodes), np.empty((2, draws[4].size))
+    both, nodes = (
+        (np.empty(2 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES)),
+        np.zeros(3, NODE),
+    )
+    # as they are, and before the last sub-step
+    line, books = both[0].view(mechanics.ROW), both[1].view(ENERGY)
+    columns, booked, row = (
+        both[0][: mechanics.COLUMNS],
+        both[1][: mechanics.ENERGIES],
+        line[0],
+    )
+    room, of_draws = (
+        (np.empty((9, most)), np.empty((3, most)), nodes),
+        np.empty((2, draws[4].size)),
+    )
     has_draws = len(draws[0]) > 0
     for m in range(len(rows)):
         stop, left = 0, share[m % share.size]
@@ -624,12 +883,30 @@ def advance_cohorts(inputs, numbers, outputs, draws, share, rules, weight, stret
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
             now = mechanics.contact_at(contact, clock[k], row)
             if not mechanics.has_ended(row):
-                time, going = _through(line, books, pieces[start:stop], slider, now, unit, left, rules, bonds, room)
+                time, going = _through(
+                    line,
+                    books,
+                    pieces[start:stop],
+                    slider,
+                    now,
+                    unit,
+                    left,
+                    rules,
+                    bonds,
+                    room,
+                )
                 if not going:
                     mechanics.end(row, booked, clock[k, 0] + time, slider)
                 left = 1.0
             mechanics.from_units(
-                columns, booked, rows[m], energies[m], units, work, pieces[start:stop], slider.stiffness
+                columns,
+                booked,
+                rows[m],
+                energies[m],
+                units,
+                work,
+                pieces[start:stop],
+                slider.stiffness,
             )
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
             if has_draws:

@@ -46,8 +46,17 @@ _NAMES = ROW.names or ()
 _SHARED = [name for name in Driven._fields if name in _NAMES]
 #: Columns of a row that are measured by a stretch.
 _STRETCHED = [
-    "body_speed", "sheared", "moment", "speed", "position", "slip", "path", "acceleration", "mean", "recalled",
-]  # fmt: skip
+    "body_speed",
+    "sheared",
+    "moment",
+    "speed",
+    "position",
+    "slip",
+    "path",
+    "acceleration",
+    "mean",
+    "recalled",
+]
 #: Relative difference up to which two radii are the same equilibrium, found by two methods.
 _SAME = 1e-9
 #: Numbers of slider, bonds, contact and fluctuations.
@@ -101,10 +110,14 @@ class StepContact(NamedTuple):
 
 #: Bonds that are solved together with a slider; of them those with a stretch first.
 _WITH_STRETCH = models.FirstMoment | models.Cohort | models.Tracked
-_SolvedBonds = _WITH_STRETCH | models.Unbroken | models.Steady | models.Rate | models.Counted
+_SolvedBonds = (
+    _WITH_STRETCH | models.Unbroken | models.Steady | models.Rate | models.Counted
+)
 
 
-def _units(drive: Force | Spring, bonds: _SolvedBonds, contact: StepContact, step: float) -> tuple[float, float]:
+def _units(
+    drive: Force | Spring, bonds: _SolvedBonds, contact: StepContact, step: float
+) -> tuple[float, float]:
     """Return the units in which a step is computed: a stretch b [m], and a force over the area at rest [N].
 
     The force is that of all sites at the stretch b, n κ b A0. In models without stretch it is their strength, τ A0.
@@ -122,7 +135,10 @@ def _units(drive: Force | Spring, bonds: _SolvedBonds, contact: StepContact, ste
     elif law.limit < math.inf:
         stretch = law.limit
     else:
-        stretch = most / (law.rate if drive.spring else bears * bonds.bound_at_rest) or _STRETCH
+        stretch = (
+            most / (law.rate if drive.spring else bears * bonds.bound_at_rest)
+            or _STRETCH
+        )
     return stretch, bears * stretch
 
 
@@ -138,44 +154,87 @@ def _of_columns(stretch: float, force: float) -> Array:
 
 def _renewing(bonds: _SolvedBonds) -> float:
     """Return the displacement on which sliding renews bonds of the rate equation, V_c/h [m], infinite for others."""
-    return bonds.critical_speed / bonds.rebinding_rate if isinstance(bonds, models.Rate) else math.inf
+    return (
+        bonds.critical_speed / bonds.rebinding_rate
+        if isinstance(bonds, models.Rate)
+        else math.inf
+    )
 
 
-def load(parts: Parts, slider: Sliding, bonding: Bonding, contact: StepContact, duration: float) -> Driven:
+def load(
+    parts: Parts,
+    slider: Sliding,
+    bonding: Bonding,
+    contact: StepContact,
+    duration: float,
+) -> Driven:
     """Return the slider at t = 0, with its spring loaded for its motion, and the stored energy."""
     drive, slider = cast(Force | Spring, parts.drive), cast(Driven, slider)
     speed, radius = slider.speed, np.fmax(contact.radius, 0.0)
-    area, (yields, slope) = np.pi * radius**2, drive.yields(contact.shear_modulus, contact.bodies.poisson_ratio)
+    area, (yields, slope) = (
+        np.pi * radius**2,
+        drive.yields(contact.shear_modulus, contact.bodies.poisson_ratio),
+    )
     friction = area * bonding.stress
-    sheared = friction * (yields + np.divide(slope, radius, out=np.zeros(radius.shape), where=radius > 0.0))
+    sheared = friction * (
+        yields
+        + np.divide(slope, radius, out=np.zeros(radius.shape), where=radius > 0.0)
+    )
     first = drive.first(duration)
     pull = friction + drive.damping * speed if drive.spring else first + 0.0 * friction
-    ahead, stage = (pull / drive.spring, first + 0.0 * pull) if drive.spring else (0.0 * pull, 0.0 * pull)
+    ahead, stage = (
+        (pull / drive.spring, first + 0.0 * pull)
+        if drive.spring
+        else (0.0 * pull, 0.0 * pull)
+    )
     energies = np.zeros((len(speed), 1), ENERGY)
-    stored = 0.5 * (ahead * pull + drive.mass * speed**2 + sheared * friction) + area * bonding.stored
+    stored = (
+        0.5 * (ahead * pull + drive.mass * speed**2 + sheared * friction)
+        + area * bonding.stored
+    )
     energies["stored"] = energies["first"] = stored[:, np.newaxis]
-    loaded = {"spring_force": pull, "sheared": sheared, "stage_position": ahead, "stage_speed": stage}
+    loaded = {
+        "spring_force": pull,
+        "sheared": sheared,
+        "stage_position": ahead,
+        "stage_speed": stage,
+    }
     return slider._replace(**loaded, energies=energies.view(float))
 
 
 def with_contact_stress(parts: Parts, bonding: Bonding, speed: Array) -> Bonding:
     """Return bonds whose strength is their actual stress, with the viscous stress added to their stress."""
     viscosity = cast(Force | Spring, parts.drive).viscosity
-    return bonding._replace(stress=bonding.stress + viscosity * speed, strength=np.abs(bonding.stress))
+    return bonding._replace(
+        stress=bonding.stress + viscosity * speed, strength=np.abs(bonding.stress)
+    )
 
 
 def advance(
-    parts: Parts, slider: Sliding, population: tuple[object, ...], contact: StepContact, times: Times, steps: range,
-    noise: Noise, draws: Draws = NO_DRAWS,
-) -> tuple[Driven, Motion, tuple[object, ...], Bonding]:  # fmt: skip
+    parts: Parts,
+    slider: Sliding,
+    population: tuple[object, ...],
+    contact: StepContact,
+    times: Times,
+    steps: range,
+    noise: Noise,
+    draws: Draws = NO_DRAWS,
+) -> tuple[Driven, Motion, tuple[object, ...], Bonding]:
     """Return the slider at the end of each of some clock steps, its motion, the bonds at the end and their readings.
 
     The contact is that at the start, except for its equilibrium with the bonds, and with the fluctuations that the loop
     over the steps ``draws``; ``steps_until_contact_changes`` counts the valid steps. ``counted`` bonds stay as well:
     they are drawn at the end of a step, with the slip in it.
     """
-    drive, bonds, slider = cast(Force | Spring, parts.drive), cast(_SolvedBonds, parts.bonds), cast(Driven, slider)
-    ends, members = times.at(np.arange(steps.start - 1.0, steps.stop)), len(slider.speed)
+    drive, bonds, slider = (
+        cast(Force | Spring, parts.drive),
+        cast(_SolvedBonds, parts.bonds),
+        cast(Driven, slider),
+    )
+    ends, members = (
+        times.at(np.arange(steps.start - 1.0, steps.stop)),
+        len(slider.speed),
+    )
     units = _units(drive, bonds, contact, times.step)
     stretch, force = units
     rows = np.zeros(members, ROW)
@@ -186,10 +245,18 @@ def advance(
     rows["radius"] = contact.radius
     pieces, duration = drive.driven(ends, times.duration), ends[1:] - ends[:-1]
     scale = 1.0 / (stretch if drive.spring else force)
-    course = np.stack([pieces.interval, pieces.stop - pieces.start, *(scale * piece for piece in pieces[3:6])], axis=1)
+    course = np.stack(
+        [
+            pieces.interval,
+            pieces.stop - pieces.start,
+            *(scale * piece for piece in pieces[3:6]),
+        ],
+        axis=1,
+    )
     law, shear = parts.shear.field_law, contact.shear
     rows["paid"], rows["drawn"] = contact.paid, contact.paid * shear.energy
-    answers = isinstance(bonds, _WITH_STRETCH) and shear.expected.size  # others hold a contact that is rigid
+    # others hold a contact that is rigid
+    answers = isinstance(bonds, _WITH_STRETCH) and shear.expected.size
     rows["felt"] = contact.paid * (shear.expected if answers else shear.energy)
     if law.length < math.inf:
         for name, values in shear.past._asdict().items():
@@ -197,36 +264,83 @@ def advance(
         law = law._replace(length=law.length / stretch, by_slip=law.by_slip * stretch)
     state = rows.view(float).reshape(members, COLUMNS)
     clock, work = _clock(contact, ends), stretch * force
-    inputs = Inputs(state, slider.energies.copy(), course, clock, _of_columns(*units), work)
-    columns, energies = np.empty((COLUMNS, len(steps), members)), np.empty((len(steps), *slider.energies.shape))
+    inputs = Inputs(
+        state, slider.energies.copy(), course, clock, _of_columns(*units), work
+    )
+    columns, energies = (
+        np.empty((COLUMNS, len(steps), members)),
+        np.empty((len(steps), *slider.energies.shape)),
+    )
     numbers = *_numbers(drive, bonds, contact, units), tuple(law)
     reached = dict(zip(_NAMES, columns, strict=True))
-    loop = tuple(inputs), numbers, (columns, energies), tuple(draws._replace(answers=draws.answers and bool(answers)))
-    closes = (slider.radius == 0.0) & (contact.radius > 0.0) & np.full(members, steps.start > 1)
-    end, bonding = _advanced(bonds, population, contact.radius, closes, inputs, loop, reached, noise)
+    loop = (
+        tuple(inputs),
+        numbers,
+        (columns, energies),
+        tuple(draws._replace(answers=draws.answers and bool(answers))),
+    )
+    closes = (
+        (slider.radius == 0.0)
+        & (contact.radius > 0.0)
+        & np.full(members, steps.start > 1)
+    )
+    end, bonding = _advanced(
+        bonds, population, contact.radius, closes, inputs, loop, reached, noise
+    )
     stage, stage_speed = np.zeros((2, len(steps), members))
     if drive.spring:
         whole = pieces.joined
-        stage[:], stage_speed[:] = whole.integral[:, np.newaxis], whole.last[:, np.newaxis]
+        stage[:], stage_speed[:] = (
+            whole.integral[:, np.newaxis],
+            whole.last[:, np.newaxis],
+        )
         stage[0] += slider.stage_position
         np.add.accumulate(stage, out=stage)
     shared = {name: reached[name] for name in _SHARED}
-    after = Driven(**shared, stage_position=stage, stage_speed=stage_speed, energies=energies)
+    after = Driven(
+        **shared, stage_position=stage, stage_speed=stage_speed, energies=energies
+    )
     first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
     way = duration[:, np.newaxis], reached["slip"], reached["path"], first, after.speed
-    memory = Memory(*(reached[name] for name in Memory._fields)) if law.length < math.inf else Memory()
-    motions = Motion(steps.start, ends[1:, np.newaxis], *way, position=after.position, memory=memory, draws=draws)
+    memory = (
+        Memory(*(reached[name] for name in Memory._fields))
+        if law.length < math.inf
+        else Memory()
+    )
+    motions = Motion(
+        steps.start,
+        ends[1:, np.newaxis],
+        *way,
+        position=after.position,
+        memory=memory,
+        draws=draws,
+    )
     if not isinstance(bonds, _WITH_STRETCH):
         plain = cast(models.Population, population)
-        start = bonds.bonding(plain).fraction * bonds.diluted(plain.area_radius, contact.radius)[0]
+        start = (
+            bonds.bonding(plain).fraction
+            * bonds.diluted(plain.area_radius, contact.radius)[0]
+        )
         fractions = _from_start(start, bonding.fraction)
         radii = np.fmax(_from_start(contact.radius, after.radius), 0.0)
-        motions = motions._replace(stick_ends=_stick_ends(drive, bonds, (slider, after), motions, fractions, radii))
+        motions = motions._replace(
+            stick_ends=_stick_ends(
+                drive, bonds, (slider, after), motions, fractions, radii
+            )
+        )
     if isinstance(bonds, models.Counted):
-        end, drawn = bonds.advance(cast(models.Population, population), motions, contact.radius, noise)
+        end, drawn = bonds.advance(
+            cast(models.Population, population), motions, contact.radius, noise
+        )
         strength = np.where(after.speed != 0.0, drawn.strength, np.abs(bonding.stress))
-        stress = bonding.stress if drive.mass == 0.0 else np.where(after.speed != 0.0, drawn.stress, bonding.stress)
-        bonding = with_contact_stress(parts, Bonding(drawn.fraction, stress, strength), after.speed)
+        stress = (
+            bonding.stress
+            if drive.mass == 0.0
+            else np.where(after.speed != 0.0, drawn.stress, bonding.stress)
+        )
+        bonding = with_contact_stress(
+            parts, Bonding(drawn.fraction, stress, strength), after.speed
+        )
         return after, motions, end, bonding._replace(strength=strength)
     return after, motions, end, with_contact_stress(parts, bonding, after.speed)
 
@@ -239,9 +353,13 @@ def _from_start(start: Array, ends: Array) -> Array:
 
 
 def _stick_ends(
-    drive: Force | Spring, bonds: models.Unbroken | models.Steady | models.Rate | models.Counted,
-    sliders: tuple[Driven, Driven], motions: Motion, fractions: Array, radii: Array,
-) -> StickEnds:  # fmt: skip
+    drive: Force | Spring,
+    bonds: models.Unbroken | models.Steady | models.Rate | models.Counted,
+    sliders: tuple[Driven, Driven],
+    motions: Motion,
+    fractions: Array,
+    radii: Array,
+) -> StickEnds:
     """Return the ends of stick phases in some clock steps of a slider on bonds without a stretch.
 
     ``sliders`` are that at the start of the first step and that at the end of each, ``fractions`` and ``radii`` [m]
@@ -251,18 +369,32 @@ def _stick_ends(
     """
     before, after = sliders
     rate = bonds.rebinding_rate if isinstance(bonds, models.Rate) else 0.0
-    free, area, sense = bonds.stress * (1.0 - fractions), np.pi * radii**2, np.sign(motions.slip)
+    free, area, sense = (
+        bonds.stress * (1.0 - fractions),
+        np.pi * radii**2,
+        np.sign(motions.slip),
+    )
     forces = _from_start(before.spring_force, after.spring_force)
     growth = after.spring_force - forces
     if drive.spring:
-        growth = drive.spring * (after.stage_position - _from_start(before.stage_position, after.stage_position))
+        growth = drive.spring * (
+            after.stage_position
+            - _from_start(before.stage_position, after.stage_position)
+        )
     lacking = area * bonds.stress * fractions - sense * forces
     gaining = sense * growth + area * free * np.expm1(-rate * motions.duration)
-    share = np.divide(lacking, gaining, out=np.zeros(area.shape), where=(lacking > 0.0) & (gaining > 0.0))
+    share = np.divide(
+        lacking,
+        gaining,
+        out=np.zeros(area.shape),
+        where=(lacking > 0.0) & (gaining > 0.0),
+    )
     time = np.minimum(share, 1.0) * motions.duration
     stress = bonds.stress * fractions - free * np.expm1(-rate * time)
     ends = (motions.first == 0.0) & (motions.path > 0.0) & (area > 0.0)
-    return StickEnds(np.where(ends, stress, np.nan), np.where(ends, motions.duration - time, np.nan))
+    return StickEnds(
+        np.where(ends, stress, np.nan), np.where(ends, motions.duration - time, np.nan)
+    )
 
 
 def with_contact(
@@ -284,35 +416,63 @@ def with_contact(
     drive, area = cast(Force | Spring, parts.drive), np.pi * np.fmax(radius, 0.0) ** 2
     closes = (area > 0.0) & (sliders.radius == 0.0)
     # where neither bonds nor fluctuations are drawn at the end of a step, the loop follows the contact
-    if contact.undisturbed and not contact.stays and not isinstance(parts.bonds, models.Counted):
+    if (
+        contact.undisturbed
+        and not contact.stays
+        and not isinstance(parts.bonds, models.Counted)
+    ):
         closes = closes | ((area > 0.0) & ~_agree(sliders.radius, radius))
     if closes.any():
-        yields, slope = drive.yields(contact.shear_modulus, contact.bodies.poisson_ratio)
-        force, is_stretched = area * bonding.stress, isinstance(parts.bonds, _WITH_STRETCH)
+        yields, slope = drive.yields(
+            contact.shear_modulus, contact.bodies.poisson_ratio
+        )
+        force, is_stretched = (
+            area * bonding.stress,
+            isinstance(parts.bonds, _WITH_STRETCH),
+        )
         if drive.mass == 0.0 and (drive.damping == 0.0 or not is_stretched):
             force = sliders.spring_force - drive.damping * sliders.speed
         elif yields + slope > 0.0:
             force = sliders.sheared / (yields + slope / radius)
         elif is_stretched:
-            force = np.where(sliders.radius > 0.0, force, area * drive.viscosity * sliders.speed)
-        stress = np.divide(force, area, out=bonding.stress + np.zeros(area.shape), where=closes)
+            force = np.where(
+                sliders.radius > 0.0, force, area * drive.viscosity * sliders.speed
+            )
+        stress = np.divide(
+            force, area, out=bonding.stress + np.zeros(area.shape), where=closes
+        )
         bonding = bonding._replace(stress=stress)
     if isinstance(parts.bonds, models.Counted) and drive.mass == 0.0:
         pull, sense = sliders.spring_force, np.sign(sliders.speed)
         grows = area > np.pi * sliders.radius**2
         friction = pull - drive.damping * sliders.speed
-        bonding = bonding._replace(stress=np.divide(friction, area, out=bonding.stress.copy(), where=grows))
-        excess = np.maximum(sense * pull - area * parts.bonds.stress * bonding.fraction, 0.0)
+        bonding = bonding._replace(
+            stress=np.divide(friction, area, out=bonding.stress.copy(), where=grows)
+        )
+        excess = np.maximum(
+            sense * pull - area * parts.bonds.stress * bonding.fraction, 0.0
+        )
         drag = drive.damping + drive.viscosity * area
-        speed = np.divide(sense * excess, drag, out=np.where(excess > 0.0, sliders.speed, 0.0), where=drag > 0.0)
+        speed = np.divide(
+            sense * excess,
+            drag,
+            out=np.where(excess > 0.0, sliders.speed, 0.0),
+            where=drag > 0.0,
+        )
         sliders = sliders._replace(speed=speed, body_speed=speed)
     return sliders, bonding
 
 
 def _advanced(
-    bonds: _SolvedBonds, population: tuple[object, ...], radius: Array, closes: Flags, inputs: Inputs,
-    loop: tuple[tuple, ...], reached: dict[str, Array], noise: Noise,
-) -> tuple[tuple[object, ...], Bonding]:  # fmt: skip
+    bonds: _SolvedBonds,
+    population: tuple[object, ...],
+    radius: Array,
+    closes: Flags,
+    inputs: Inputs,
+    loop: tuple[tuple, ...],
+    reached: dict[str, Array],
+    noise: Noise,
+) -> tuple[tuple[object, ...], Bonding]:
     """Return the bonds after some clock steps and their readings at each.
 
     ``radius`` of the contact at the start [m]; its bonds are unstretched if it ``closes`` there. ``loop``: arguments of
@@ -323,7 +483,10 @@ def _advanced(
     if isinstance(bonds, models.Cohort):
         ages = cast(models.Ages, population)
         share, area_radius = bonds.diluted(ages.area_radius, radius)
-        cohorts, sums = Cohorts(*(array.copy() for array in ages.cohorts)), np.empty((5, *shape))
+        cohorts, sums = (
+            Cohorts(*(array.copy() for array in ages.cohorts)),
+            np.empty((5, *shape)),
+        )
         relax(cohorts, closes)
         rules = numbers_of(bonds.law, bonds.rebinding_rate, bonds.tolerance)
         advance_cohorts(*loop, share, rules, *cohorts, sums)
@@ -333,14 +496,21 @@ def _advanced(
         tracks = tracks._replace(frame=tracks.frame.copy())
         tracked.relax(tuple(tracks), closes, tuple(bonds.law[:3]))
         frames = np.empty((*shape, tracks.frame.shape[1]))
-        lives = (*bonds.law[:3], bonds.rebinding_rate), noise.seed, np.asarray(noise.members, dtype=np.uint64)
+        lives = (
+            (*bonds.law[:3], bonds.rebinding_rate),
+            noise.seed,
+            np.asarray(noise.members, dtype=np.uint64),
+        )
         if advance_tracks(*loop[:3], tuple(tracks), *lives, frames):
             raise RuntimeError(AGAIN)
         return tracks, bonds.read(frames)
     if isinstance(bonds, models.FirstMoment):
         stretches = cast(models.Stretches, population)
         share, area_radius = bonds.diluted(stretches.area_radius, radius)
-        rows["bound"], rows["moment"] = stretches.bound * share, np.where(closes, 0.0, stretches.stretch * share)
+        rows["bound"], rows["moment"] = (
+            stretches.bound * share,
+            np.where(closes, 0.0, stretches.stretch * share),
+        )
     else:
         before = cast(models.Population, population)
         share, area_radius = bonds.diluted(before.area_radius, radius)
@@ -352,7 +522,9 @@ def _advanced(
         return end, bonds.bonding(models.Stretches(bound, moment))
     stretch = float(inputs.units.view(ROW)["slip"][0])
     stress = bonds.stress / stretch * moment
-    return models.Population(bound[-1].copy(), np.sign(stress[-1]), area_radius), Bonding(bound, stress, stress)
+    return models.Population(
+        bound[-1].copy(), np.sign(stress[-1]), area_radius
+    ), Bonding(bound, stress, stress)
 
 
 def steps_until_contact_changes(slider: Driven, radius: Array) -> int:
@@ -376,26 +548,76 @@ def _agree(slider_radius: Array, radius: Array) -> Flags:
     return same
 
 
-def _numbers(drive: Force | Spring, bonds: _SolvedBonds, contact: StepContact, units: tuple[float, float]) -> _Numbers:
+def _numbers(
+    drive: Force | Spring,
+    bonds: _SolvedBonds,
+    contact: StepContact,
+    units: tuple[float, float],
+) -> _Numbers:
     """Return the numbers of slider, bonds and contact in their units, without load and base of the mount."""
     stretch, force = units
     stiff, density = force / stretch, force / (stretch * contact.area)
     bodies = contact.bodies
-    yields, slope = (stiff * value for value in drive.yields(contact.shear_modulus, bodies.poisson_ratio))
-    body = drive.spring / stiff, drive.mass / stiff, drive.damping / stiff, drive.viscosity / density
-    slider = Slider(0.0, 0.0, 0.0, 0.0, *body, 0.0 if drive.spring else 1.0, yields, slope, drive.tolerance)
+    yields, slope = (
+        stiff * value
+        for value in drive.yields(contact.shear_modulus, bodies.poisson_ratio)
+    )
+    body = (
+        drive.spring / stiff,
+        drive.mass / stiff,
+        drive.damping / stiff,
+        drive.viscosity / density,
+    )
+    slider = Slider(
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        *body,
+        0.0 if drive.spring else 1.0,
+        yields,
+        slope,
+        drive.tolerance,
+    )
     if isinstance(bonds, _WITH_STRETCH):
         law, of_rest = bonds.law, bonds.bound_at_rest
-        breaking = Law(law.rate, 1.0 if law.softness > 0.0 else 0.0, stretch / law.limit, bonds.rebinding_rate, 1.0)
+        breaking = Law(
+            law.rate,
+            1.0 if law.softness > 0.0 else 0.0,
+            stretch / law.limit,
+            bonds.rebinding_rate,
+            1.0,
+        )
     else:
-        slows = stretch / bonds.critical_speed if isinstance(bonds, models.Steady) else 0.0
+        slows = (
+            stretch / bonds.critical_speed if isinstance(bonds, models.Steady) else 0.0
+        )
         binding = bonds.rebinding_rate if isinstance(bonds, models.Rate) else 0.0
-        breaking, of_rest = Law(0.0, 0.0, stretch / _renewing(bonds), binding, 1.0, 1.0, slows), 1.0
+        breaking, of_rest = (
+            Law(0.0, 0.0, stretch / _renewing(bonds), binding, 1.0, 1.0, slows),
+            1.0,
+        )
     mean_stress = 0.0
     if contact.reversible:
-        mean_stress = contact.reversible * float(mean_stress_energy(1.0, density * stretch, *bodies[1:]))
-    still = contact.bare, 0.0, 0.0, 0.0, 0.0, float(contact.stays), contact.bonded / of_rest, mean_stress
-    solid = contact.mounts[0].stiffness, 1.0 / bodies.sphere_radius, bodies.modulus, contact.area
+        mean_stress = contact.reversible * float(
+            mean_stress_energy(1.0, density * stretch, *bodies[1:])
+        )
+    still = (
+        contact.bare,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        float(contact.stays),
+        contact.bonded / of_rest,
+        mean_stress,
+    )
+    solid = (
+        contact.mounts[0].stiffness,
+        1.0 / bodies.sphere_radius,
+        bodies.modulus,
+        contact.area,
+    )
     return tuple(slider), tuple(breaking), (*still, *solid)
 
 
@@ -405,5 +627,8 @@ def _clock(contact: StepContact, ends: Array) -> Array:
     (load, base, _), last = contact.mounts
     clock = np.empty((len(duration), 6))
     clock[:, 0], clock[:, 1], clock[:, 3], clock[:, 5] = ends[:-1], load, base, duration
-    clock[:, 2], clock[:, 4] = (last.load - load) / duration, (last.base - base) / duration
+    clock[:, 2], clock[:, 4] = (
+        (last.load - load) / duration,
+        (last.base - base) / duration,
+    )
     return clock

@@ -7,7 +7,9 @@ import numpy as np
 from sim.numerics.jit import device, kernel
 from sim.parts.bonds.mean_field import regula_falsi
 from sim.parts.coupled import mechanics, radau
-from sim.parts.coupled.radau import accept, try_sub_step  # by name: numba inlines no attribute of a module
+
+# by name: numba inlines no attribute of a module
+from sim.parts.coupled.radau import accept, try_sub_step
 from sim.parts.coupled.redraw import DRAWS, redraw
 from sim.parts.drive import ENERGY
 
@@ -29,8 +31,13 @@ def _lacking(shift, row, time, slider, law, contact):
     Also N, M, radius, area, u then, and the displacement of the body.
     """
     left, sense = math.exp(-math.fabs(shift) * law.cuts), math.copysign(1.0, row.moment)
-    bound, moment = row.bound * left, (row.moment * left + sense * row.bound * (1.0 - left) / law.cuts) * left
-    radius, area, _, _ = mechanics.contact_area(bound, moment, time, row.radius, contact)
+    bound, moment = (
+        row.bound * left,
+        (row.moment * left + sense * row.bound * (1.0 - left) / law.cuts) * left,
+    )
+    radius, area, _, _ = mechanics.contact_area(
+        bound, moment, time, row.radius, contact
+    )
     yields, _ = mechanics.compliance(radius, slider)
     sheared = yields * area * moment
     body = shift + sheared - row.sheared
@@ -49,7 +56,11 @@ def slip_event(row, time, reach, slider, law, contact, nodes, energy):
     """
     if not slider.stiffness + slider.mass + slider.damping > 0.0:
         return contact
-    sense, high, limit = math.copysign(1.0, row.moment), _TRIED / law.cuts, 1.0 / law.cuts
+    sense, high, limit = (
+        math.copysign(1.0, row.moment),
+        _TRIED / law.cuts,
+        1.0 / law.cuts,
+    )
     here, _, _, _, first, _, _ = _lacking(0.0, row, time, slider, law, contact)
     lacks = _lacking(sense * high, row, time, slider, law, contact)[0]
     while not lacks > max(here, 0.0):
@@ -67,16 +78,26 @@ def slip_event(row, time, reach, slider, law, contact, nodes, energy):
             middle = 0.5 * (low + high)
             over = _lacking(sense * middle, row, time, slider, law, contact)[0] > 0.0
             low, high = (middle, high) if over else (low, middle)
-        _, bound, moment, radius, area, sheared, body = _lacking(sense * high, row, time, slider, law, contact)
+        _, bound, moment, radius, area, sheared, body = _lacking(
+            sense * high, row, time, slider, law, contact
+        )
         if area >= 0.0:
             break
-        lacks, _, _, last_radius, _, _, _ = _lacking(sense * low, row, time, slider, law, contact)
+        lacks, _, _, last_radius, _, _, _ = _lacking(
+            sense * low, row, time, slider, law, contact
+        )
         row.radius = last_radius if last_radius > 0.0 else row.radius
         contact = mechanics.later(contact, 0.0, 1.0)
     # in a slip ds the share ds/l of the bonds breaks, stretched by twice the mean: 3/2 n κ M²/(N l) is lost with it
     left, mean = math.exp(-high * law.cuts), sense * row.moment
     later = mean * left + row.bound * limit * (1.0 - left)
-    broken = 0.25 * (first + area) * (1.0 - left) * (mean * mean + mean * later + later * later) / row.bound
+    broken = (
+        0.25
+        * (first + area)
+        * (1.0 - left)
+        * (mean * mean + mean * later + later * later)
+        / row.bound
+    )
     row.bound, row.moment, row.radius, row.sheared = bound, moment, radius, sheared
     mechanics.displace(row, sense * high, body, slider)
     energy.rupture += broken
@@ -156,16 +177,29 @@ def _piece(line, slider, law, contact, nodes, books):
     """
     start, length, row, energy = 0.0, slider.length, line[0], books[0]
     yields, _ = mechanics.compliance(row.radius, slider)
-    brittle = law.cuts > 0.0 and slider.viscosity == 0.0 and (slider.mass + slider.damping == 0.0 or yields > 0.0)
+    brittle = (
+        law.cuts > 0.0
+        and slider.viscosity == 0.0
+        and (slider.mass + slider.damping == 0.0 or yields > 0.0)
+    )
     turns, checked = 0, 0.0
     while turns >= 0:
         turns, checked = mechanics.judged(turns, checked, start, length)
         left = length - start
         step = mechanics.next_step(row, left, length, math.inf)
         if not step > mechanics.LEAST * length:
-            gone = break_all(row, start, mechanics.BRIEF * length, slider, law, contact, energy)
+            gone = break_all(
+                row, start, mechanics.BRIEF * length, slider, law, contact, energy
+            )
             if law.cuts == 0.0 and not gone:
-                gone = mechanics.snap(row, row.moment * row.moment / row.bound, start, slider, contact, energy)
+                gone = mechanics.snap(
+                    row,
+                    row.moment * row.moment / row.bound,
+                    start,
+                    slider,
+                    contact,
+                    energy,
+                )
             if contact.stays > 0.0 and not gone:
                 return start, contact.stays
             contact = contact if gone else mechanics.later(contact, 0.0, 1.0)
@@ -176,12 +210,19 @@ def _piece(line, slider, law, contact, nodes, books):
         if not accepted:
             row.next_step = step * grows
             if brittle and step < mechanics.BRIEF * length:
-                contact = slip_event(row, start, NEAR, slider, law, contact, nodes, energy)
+                contact = slip_event(
+                    row, start, NEAR, slider, law, contact, nodes, energy
+                )
             continue
         ahead = max(row.next_step, step * grows) if step == left else step * grows
         none = _NONE * slider.tolerance * row.bound
-        reverses = law.softness > 0.0 and math.fabs(row.moment) > none and _at_end(row, nodes, step, law) < 0.0
-        if reverses:  # there the rupture rate has a kink, which no sub-step leads across
+        reverses = (
+            law.softness > 0.0
+            and math.fabs(row.moment) > none
+            and _at_end(row, nodes, step, law) < 0.0
+        )
+        # there the rupture rate has a kink, which no sub-step leads across
+        if reverses:
             step, solved = _to_zero(row, start, step, none, slider, law, contact, nodes)
             if not solved:
                 row.next_step = 0.5 * step
@@ -189,17 +230,27 @@ def _piece(line, slider, law, contact, nodes, books):
         line[1], books[1] = row, energy
         before, after = accept(row, start, step, slider, law, contact, nodes, energy)
         is_lost = math.isnan(row.radius)  # at its end the contact has no equilibrium
-        if is_lost or mechanics.misses(before, after, books[1], energy, row, slider, step):
-            line[0], books[0], nodes.last_step, row.next_step = line[1], books[1], 0.0, 0.25 * step
+        if is_lost or mechanics.misses(
+            before, after, books[1], energy, row, slider, step
+        ):
+            line[0], books[0], nodes.last_step, row.next_step = (
+                line[1],
+                books[1],
+                0.0,
+                0.25 * step,
+            )
             continue
         row.next_step = ahead
         if step <= mechanics.BRIEF * length and contact.stays == 0.0:
             mechanics.book_jump(line, after - before, books)
         if reverses:
             row.moment, nodes.last_step = 0.0, 0.0
-        reach = NEAR if line[1].speed * row.speed < 0.0 else 0.0  # it turns in vain where the force of the bonds falls
+        # it turns in vain where the force of the bonds falls
+        reach = NEAR if line[1].speed * row.speed < 0.0 else 0.0
         if brittle:
-            contact = slip_event(row, start + step, reach, slider, law, contact, nodes, energy)
+            contact = slip_event(
+                row, start + step, reach, slider, law, contact, nodes, energy
+            )
         if step == left:
             return length, contact.stays
         start += step
@@ -238,7 +289,8 @@ def _rest(row, start, settles, slider, law, contact, energy):
     if slider.forced == 0.0:
         energy.work += 0.5 * (last - first) * (last + first) / slider.stiffness
     moment, share = 0.0, radau.share_after_rest(row.bound, end - start, law)
-    for _ in range(_FEW_TURNS):  # the stress takes a little of the area, if adhesion pays for it
+    # the stress takes a little of the area, if adhesion pays for it
+    for _ in range(_FEW_TURNS):
         radius, area, _, _ = mechanics.area_or_last(share, moment, end, row, contact)
         moment = last / area if area > 0.0 else 0.0
     row.spring_force, row.bound, row.radius, row.moment = last, share, radius, moment
@@ -253,9 +305,13 @@ def _unbalanced(speed, row, time, slider, law, contact):
     """Return the resistance of a body without mass at a speed less the pull, and its slope over the speed."""
     damping, viscosity = slider.damping, slider.viscosity
     share = row.bound * radau.share_left(law.sense * speed, law)
-    _, area, by_bound, by_moment = mechanics.area_or_last(share, share, time, row, contact)
+    _, area, by_bound, by_moment = mechanics.area_or_last(
+        share, share, time, row, contact
+    )
     bears = damping + area * viscosity
-    slope = bears - law.slows * share * share * (area + (by_bound + by_moment) * (share + viscosity * speed))
+    slope = bears - law.slows * share * share * (
+        area + (by_bound + by_moment) * (share + viscosity * speed)
+    )
     return bears * speed + area * share - math.fabs(row.spring_force), slope
 
 
@@ -285,7 +341,9 @@ def _jump(row, time, slider, law, contact):
 @device
 def _below(high, row, time, slider, law, contact):
     """Return the highest speed below another one at which the resistance of a body without mass equals the pull."""
-    while high < math.inf and _unbalanced(high, row, time, slider, law, contact)[0] < 0.0:
+    while (
+        high < math.inf and _unbalanced(high, row, time, slider, law, contact)[0] < 0.0
+    ):
         high *= 2.0
     low, least = _SLOWER * high, _SLOWEST * high
     while low > least and _unbalanced(low, row, time, slider, law, contact)[0] > 0.0:
@@ -305,8 +363,13 @@ def _below(high, row, time, slider, law, contact):
 def _set_off(row, time, slider, law, contact, nodes):
     """Give a slider at the start of a slip its speed, which is zero with a mass, and its bonds their share there."""
     row.bound = 1.0 if law.slows != 0.0 else row.bound
-    speed = law.sense * _jump(row, time, slider, law, contact) if slider.mass == 0.0 else 0.0
-    row.speed, row.body_speed, nodes.last_step = speed, speed, 0.0  # no guess from the slip before
+    speed = (
+        law.sense * _jump(row, time, slider, law, contact)
+        if slider.mass == 0.0
+        else 0.0
+    )
+    # no guess from the slip before
+    row.speed, row.body_speed, nodes.last_step = speed, speed, 0.0
     row.bound *= radau.share_left(speed, law)
     row.moment = law.sense * row.bound
 
@@ -323,7 +386,9 @@ def _slide(line, start, slider, along, contact, nodes, books):
         if not step > mechanics.LEAST * length:
             row.next_step = 0.0
             bound, later = row.bound * (1.0 - _NEXT_TO), start + _NEXT_TO * length
-            _, area, _, _ = mechanics.contact_area(bound, row.moment, later, row.radius, contact)
+            _, area, _, _ = mechanics.contact_area(
+                bound, row.moment, later, row.radius, contact
+            )
             if not area >= 0.0:  # lost: the radius stays for the rest of the clock step
                 contact = mechanics.later(contact, 0.0, 1.0)
                 if slider.mass == 0.0:
@@ -337,17 +402,36 @@ def _slide(line, start, slider, along, contact, nodes, books):
             continue
         stops = _at_end(row, nodes, step, along) <= 0.0
         if stops and row.speed != 0.0:
-            step, _ = _to_zero(row, start, step, 1e-13 * math.fabs(row.speed), slider, along, contact, nodes)
-        if stops and not nodes.slip[2] * along.sense > 0.0:  # too long for a speed that grows from nearly zero
+            step, _ = _to_zero(
+                row,
+                start,
+                step,
+                1e-13 * math.fabs(row.speed),
+                slider,
+                along,
+                contact,
+                nodes,
+            )
+        # too long for a speed that grows from nearly zero
+        if stops and not nodes.slip[2] * along.sense > 0.0:
             row.next_step = 0.25 * step
             continue
         line[1], books[1] = row, energy
         before, after = accept(row, start, step, slider, along, contact, nodes, energy)
         is_lost = math.isnan(row.radius)  # at its end the contact has no equilibrium
-        if is_lost or mechanics.misses(before, after, books[1], energy, row, slider, step):
-            line[0], books[0], nodes.last_step, row.next_step = line[1], books[1], 0.0, 0.25 * step
+        if is_lost or mechanics.misses(
+            before, after, books[1], energy, row, slider, step
+        ):
+            line[0], books[0], nodes.last_step, row.next_step = (
+                line[1],
+                books[1],
+                0.0,
+                0.25 * step,
+            )
             continue
-        row.next_step = max(row.next_step, step * grows) if step == left else step * grows
+        row.next_step = (
+            max(row.next_step, step * grows) if step == left else step * grows
+        )
         start = length if step == left else start + step
         if stops:
             row.speed, row.body_speed = 0.0, 0.0
@@ -371,10 +455,13 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
             if start >= length:
                 break
         sense = math.copysign(1.0, row.spring_force if rests else row.speed)
-        if rests and stuck > 0 and not row.radius > 0.0:  # the pull is a rounding, which may have the wrong sign
+        # the pull is a rounding, which may have the wrong sign
+        if rests and stuck > 0 and not row.radius > 0.0:
             sense = -sense if stuck % 2 == 1 else sense
             row.next_step = 0.0
-        along = mechanics.Law(law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows)
+        along = mechanics.Law(
+            law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows
+        )
         if rests:
             felt, at_rest = row.felt, contact
             contact = mechanics.leaving_rest(contact, row)
@@ -395,9 +482,17 @@ def _clock_step(line, slider, law, contact, pieces, nodes, books):
     row, energy = line[0], books[0]
     is_open, time, going, stays = row.radius == 0.0, 0.0, True, contact.stays
     for p in range(len(pieces)):
-        slider, reached, nodes.last_step = mechanics.slider_in(slider, pieces[p]), 0.0, 0.0
+        slider, reached, nodes.last_step = (
+            mechanics.slider_in(slider, pieces[p]),
+            0.0,
+            0.0,
+        )
         ahead = mechanics.later(mechanics.feeling(contact, row), time, stays)
-        if is_open and law.sense != 0.0 and slider.mass + slider.damping + slider.forced == 0.0:
+        if (
+            is_open
+            and law.sense != 0.0
+            and slider.mass + slider.damping + slider.forced == 0.0
+        ):
             # as nothing else holds an open contact, it goes along with the stage
             slip, _ = mechanics.free_shifts(row, slider)
             mechanics.displace(row, slip, slip, slider)
@@ -409,13 +504,17 @@ def _clock_step(line, slider, law, contact, pieces, nodes, books):
         if p == 0 or jumps:
             unslipped = energy.stored
             if jumps:
-                unslipped = stored_in(row, 0.0, slider, law, mechanics.drawn(ahead, row, p))
+                unslipped = stored_in(
+                    row, 0.0, slider, law, mechanics.drawn(ahead, row, p)
+                )
             before, worked = energy.stored if p == 0 else unslipped, energy.work
             if law.sense == 0.0:
                 going, ahead = mechanics.answer(row, p, slider, ahead, energy)
             elif slider.forced > 0.0:
                 row.spring_force = mechanics.driven(0.0, slider)[1]
-            lost = energy.work - worked - stored_in(row, 0.0, slider, law, ahead) + before
+            lost = (
+                energy.work - worked - stored_in(row, 0.0, slider, law, ahead) + before
+            )
             mechanics.book_slip(lost, before - unslipped, jumps, energy)
         if going and law.sense == 0.0:
             reached, stays = _piece(line, slider, law, ahead, nodes, books)
@@ -438,11 +537,23 @@ def advance_rows(inputs, numbers, outputs, draws):
     none if their ``values`` have no rows. Values of a row are missing once its motion has ended (``mechanics.end``).
     """
     rows, energies, pieces, clock, units, work = inputs
-    slider, law, contact = mechanics.Slider(*numbers[0]), mechanics.Law(*numbers[1]), mechanics.contact_of(numbers)
+    slider, law, contact = (
+        mechanics.Slider(*numbers[0]),
+        mechanics.Law(*numbers[1]),
+        mechanics.contact_of(numbers),
+    )
     reached, spent = outputs
-    both, nodes = (np.empty(2 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES)), np.empty(1, radau.NODE_VALUES)
-    line, books = both[0].view(mechanics.ROW), both[1].view(ENERGY)  # as they are, and before the last sub-step
-    columns, booked, row = both[0][: mechanics.COLUMNS], both[1][: mechanics.ENERGIES], line[0]
+    both, nodes = (
+        (np.empty(2 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES)),
+        np.empty(1, radau.NODE_VALUES),
+    )
+    # as they are, and before the last sub-step
+    line, books = both[0].view(mechanics.ROW), both[1].view(ENERGY)
+    columns, booked, row = (
+        both[0][: mechanics.COLUMNS],
+        both[1][: mechanics.ENERGIES],
+        line[0],
+    )
     room, has_draws = np.empty((2, draws[4].size)), len(draws[0]) > 0
     for m in range(len(rows)):
         stop = 0
@@ -450,14 +561,25 @@ def advance_rows(inputs, numbers, outputs, draws):
             start, stop = stop, mechanics.pieces_to(k, stop, pieces)
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
             if law.sense != 0.0:
-                row.moment = math.copysign(row.bound, row.speed) if row.speed != 0.0 else 0.0
+                row.moment = (
+                    math.copysign(row.bound, row.speed) if row.speed != 0.0 else 0.0
+                )
             now = mechanics.contact_at(contact, clock[k], row)
             if not mechanics.has_ended(row):
-                time, going = _clock_step(line, slider, law, now, pieces[start:stop], nodes[0], books)
+                time, going = _clock_step(
+                    line, slider, law, now, pieces[start:stop], nodes[0], books
+                )
                 if not going:
                     mechanics.end(row, booked, clock[k, 0] + time, slider)
             mechanics.from_units(
-                columns, booked, rows[m], energies[m], units, work, pieces[start:stop], slider.stiffness
+                columns,
+                booked,
+                rows[m],
+                energies[m],
+                units,
+                work,
+                pieces[start:stop],
+                slider.stiffness,
             )
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
             if has_draws:

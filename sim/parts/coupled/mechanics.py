@@ -111,13 +111,23 @@ class Inputs(NamedTuple):
 @device
 def _missing(a, load, base, contact):
     """Return the depth of a Hertzian contact of this radius beyond that of the mount, and its slope over the radius."""
-    stiffness, curvature, modulus = contact.stiffness, contact.curvature, contact.modulus
+    stiffness, curvature, modulus = (
+        contact.stiffness,
+        contact.curvature,
+        contact.modulus,
+    )
     hertz = a * a * curvature
     if stiffness == math.inf:
         return hertz - base, 2.0 * a * curvature
     series = stiffness + 2.0 * modulus * a
-    missing = (stiffness * (hertz - base) + 4.0 / 3.0 * modulus * a * hertz - load) / series
-    return missing, (2.0 * stiffness * a * curvature + 4.0 * modulus * hertz - 2.0 * modulus * missing) / series
+    missing = (
+        stiffness * (hertz - base) + 4.0 / 3.0 * modulus * a * hertz - load
+    ) / series
+    return missing, (
+        2.0 * stiffness * a * curvature
+        + 4.0 * modulus * hertz
+        - 2.0 * modulus * missing
+    ) / series
 
 
 @device
@@ -130,10 +140,21 @@ def contact_area(bound, moment, time, radius, contact):
     """
     if contact.stays > 0.0:
         return radius, math.pi * radius * radius / contact.area, 0.0, 0.0
-    bonded, mean_stress, unit, modulus = contact.bonded, contact.mean_stress, contact.area, contact.modulus
+    bonded, mean_stress, unit, modulus = (
+        contact.bonded,
+        contact.mean_stress,
+        contact.area,
+        contact.modulus,
+    )
     fluctuating = contact.fluctuating + contact.fluctuating_rate * time
-    work, tilt = contact.bare - fluctuating + bonded * bound, mean_stress * moment * moment
-    load, base = contact.load + contact.load_rate * time, contact.base + contact.base_rate * time
+    work, tilt = (
+        contact.bare - fluctuating + bonded * bound,
+        mean_stress * moment * moment,
+    )
+    load, base = (
+        contact.load + contact.load_rate * time,
+        contact.base + contact.base_rate * time,
+    )
     a, slope = radius, 1.0
     if work > 0.0 and tilt > 0.0 and load + base > 0.0:  # the edge can pull, not push
         for _ in range(60):
@@ -144,16 +165,24 @@ def contact_area(bound, moment, time, radius, contact):
         if not work - tilt * a > 0.0:
             return a, math.pi * a * a / unit, 0.0, 0.0
         a = max(a, radius)
-    elif not (work > 0.0 or load + base > 0.0):  # nothing presses a contact without adhesion together
+    elif not (work > 0.0 or load + base > 0.0):
+        # nothing presses a contact without adhesion together
         return math.nan, math.nan, 0.0, 0.0
     for _ in range(60):
         missing, growth = _missing(a, load, base, contact)
         if work > 0.0:
             over = 0.5 / math.pi * modulus * missing * missing / a - work + tilt * a
-            slope = 0.5 / math.pi * modulus * missing / a * (2.0 * growth - missing / a) + tilt
+            slope = (
+                0.5 / math.pi * modulus * missing / a * (2.0 * growth - missing / a)
+                + tilt
+            )
             left = work - tilt * a
-            if missing < 0.0 or over < -0.75 * left:  # next to Hertz's radius, where the slope vanishes: by the depths
-                over, slope = missing - math.sqrt(2.0 * math.pi * a * max(left, 0.0) / modulus), growth
+            # next to Hertz's radius, where the slope vanishes: by the depths
+            if missing < 0.0 or over < -0.75 * left:
+                over, slope = (
+                    missing - math.sqrt(2.0 * math.pi * a * max(left, 0.0) / modulus),
+                    growth,
+                )
         else:
             over, slope = missing, growth
         if not slope > 0.0:
@@ -165,7 +194,12 @@ def contact_area(bound, moment, time, radius, contact):
     if work <= 0.0:
         return a, math.pi * a * a / unit, 0.0, 0.0
     growth = 2.0 * math.pi * a / unit / slope
-    return a, math.pi * a * a / unit, growth * bonded, -2.0 * growth * mean_stress * moment * a
+    return (
+        a,
+        math.pi * a * a / unit,
+        growth * bonded,
+        -2.0 * growth * mean_stress * moment * a,
+    )
 
 
 @device
@@ -175,7 +209,10 @@ def compliance(radius, slider):
         return 0.0, 0.0
     if slider.yielding_radius == 0.0:
         return slider.yielding, 0.0
-    return slider.yielding + slider.yielding_radius / radius, -slider.yielding_radius / (radius * radius)
+    return (
+        slider.yielding + slider.yielding_radius / radius,
+        -slider.yielding_radius / (radius * radius),
+    )
 
 
 @device
@@ -188,13 +225,22 @@ def stiffness_of(radius, slider):
 @device
 def softening(slope, radius, by_moment, contact):
     """Return the slope of 1/k_t over M from that over the radius and that of the area."""
-    return slope * by_moment * contact.area / (2.0 * math.pi * radius) if by_moment != 0.0 else 0.0
+    return (
+        slope * by_moment * contact.area / (2.0 * math.pi * radius)
+        if by_moment != 0.0
+        else 0.0
+    )
 
 
 @device
 def driven(time, slider):
     """Return the integral of a prescribed value from the start of its piece, and the value: a cubic in time."""
-    length, first, last, integral = slider.length, slider.first, slider.last, slider.integral
+    length, first, last, integral = (
+        slider.length,
+        slider.first,
+        slider.last,
+        slider.integral,
+    )
     share = time / length
     cubic = (first + last) * length - 2.0 * integral
     square = integral - first * length - cubic
@@ -207,7 +253,9 @@ def pull_on(time, start, shift, row, slider):
     """Return the spring force after a displacement ``shift`` of the body since ``start``, or the prescribed force."""
     if slider.forced > 0.0:
         return driven(time, slider)[1]
-    return row.spring_force + slider.stiffness * (driven(time, slider)[0] - driven(start, slider)[0] - shift)
+    return row.spring_force + slider.stiffness * (
+        driven(time, slider)[0] - driven(start, slider)[0] - shift
+    )
 
 
 #: Shares of sites bound below which their relative error is no matter, and below which forces are those of so many.
@@ -239,16 +287,29 @@ def contact_at(contact, clock, row):
     if is_open:
         row.radius = 0.0
     stays = 1.0 if is_open else contact.stays
-    return Contact(contact.bare, clock[1], clock[2], clock[3], clock[4], stays, *contact[6:])
+    return Contact(
+        contact.bare, clock[1], clock[2], clock[3], clock[4], stays, *contact[6:]
+    )
 
 
 @device
 def later(contact, time, stays):
     """Return the numbers of the contact some time later; its radius is fixed from there on if it ``stays``."""
-    load, base = contact.load + contact.load_rate * time, contact.base + contact.base_rate * time
+    load, base = (
+        contact.load + contact.load_rate * time,
+        contact.base + contact.base_rate * time,
+    )
     fluctuating = contact.fluctuating + contact.fluctuating_rate * time
     of_mount = load, contact.load_rate, base, contact.base_rate
-    return Contact(contact.bare, *of_mount, stays, *contact[6:12], fluctuating, contact.fluctuating_rate, contact.field)
+    return Contact(
+        contact.bare,
+        *of_mount,
+        stays,
+        *contact[6:12],
+        fluctuating,
+        contact.fluctuating_rate,
+        contact.field,
+    )
 
 
 @device
@@ -269,8 +330,15 @@ def _after(row, path, duration, spread, field):
     """Return the memory of the amplitude after a part of a sub-step, and g² before and after it."""
     before = row.weight, row.mean, row.spread
     after = remembered(before, path, duration, spread, field.length)
-    first, last = unsteadiness(before[0], before[1], before[2]), unsteadiness(after[0], after[1], after[2])
-    return after, field.floor + (1.0 - field.floor) * first, field.floor + (1.0 - field.floor) * last
+    first, last = (
+        unsteadiness(before[0], before[1], before[2]),
+        unsteadiness(after[0], after[1], after[2]),
+    )
+    return (
+        after,
+        field.floor + (1.0 - field.floor) * first,
+        field.floor + (1.0 - field.floor) * last,
+    )
 
 
 @device
@@ -286,11 +354,21 @@ def following(contact, row, start, step):
         return contact
     path = math.fabs(row.speed) * step
     exponent = 2.0 * (field.by_slip * path + field.by_time * step)
-    lost, share = -math.expm1(-exponent), min(1.0, _CORRECTED * (exponent + path / field.length))
+    lost, share = (
+        -math.expm1(-exponent),
+        min(1.0, _CORRECTED * (exponent + path / field.length)),
+    )
     _, first, last = _after(row, path, step, 0.0, field)
-    renewed, first, last = (0.5 * (first + last), 1.0, 1.0) if field.relaxing > 0.0 else (1.0, first, last)
-    mean, change = row.paid * first * row.energy, lost * (renewed * field.energy - row.energy)
-    rate = (row.paid * last * (row.energy + change) - mean + share * (mean - row.felt)) / step
+    renewed, first, last = (
+        (0.5 * (first + last), 1.0, 1.0) if field.relaxing > 0.0 else (1.0, first, last)
+    )
+    mean, change = (
+        row.paid * first * row.energy,
+        lost * (renewed * field.energy - row.energy),
+    )
+    rate = (
+        row.paid * last * (row.energy + change) - mean + share * (mean - row.felt)
+    ) / step
     return Contact(*contact[:12], row.felt - rate * start, rate, field)
 
 
@@ -321,7 +399,10 @@ def remember(row, slip, first_speed, last_speed, duration, contact):
         return
     path = row.path - row.recalled
     change = math.fabs(last_speed) - math.fabs(first_speed)
-    bend = 0.5 * (math.fabs(first_speed) + math.fabs(last_speed)) - math.fabs(slip) / duration
+    bend = (
+        0.5 * (math.fabs(first_speed) + math.fabs(last_speed))
+        - math.fabs(slip) / duration
+    )
     spread = duration * (change * change / 12.0 + bend * bend / 5.0)
     after, first, last = _after(row, path, duration, spread, field)
     row.weight, row.mean, row.spread = after
@@ -340,7 +421,12 @@ def remember(row, slip, first_speed, last_speed, duration, contact):
 def _has_slipped(row, contact):
     """True if the memory of the fluctuations holds any slip, or if fluctuations need none."""
     field = contact.field
-    return row.mean > 0.0 or field.follows == 0.0 or field.relaxing > 0.0 or field.length == math.inf
+    return (
+        row.mean > 0.0
+        or field.follows == 0.0
+        or field.relaxing > 0.0
+        or field.length == math.inf
+    )
 
 
 @device
@@ -368,7 +454,9 @@ def remember_first(row, slider, contact):
     if not path < _NO_TIME * slider.length * speed:
         return False
     before = row.weight, row.mean, row.spread
-    row.weight, row.mean, row.spread = remembered(before, path, path / speed, 0.0, contact.field.length)
+    row.weight, row.mean, row.spread = remembered(
+        before, path, path / speed, 0.0, contact.field.length
+    )
     return True
 
 
@@ -430,7 +518,14 @@ def pieces_to(step, start, pieces):
 @device
 def retained(energy):
     """Return the work less all that is dissipated."""
-    return energy.work - energy.damping - energy.viscosity - energy.rupture - energy.snaps - energy.area
+    return (
+        energy.work
+        - energy.damping
+        - energy.viscosity
+        - energy.rupture
+        - energy.snaps
+        - energy.area
+    )
 
 
 @device
@@ -438,11 +533,21 @@ def to_units(columns, spent, state, totals, units, work):
     """Convert a row and its energies to the units of the equations, at the start of a clock step."""
     columns[:] = state / units
     row = columns.view(ROW)[0]
-    row.position, row.slip, row.path, row.recalled, row.renewed, row.substeps = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    row.position, row.slip, row.path, row.recalled, row.renewed, row.substeps = (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
     spent[:] = 0.0
     spent[_STORED] = totals[_STORED] / work
     total = totals.view(ENERGY)[0]
-    row.worked, row.missed = total.work / work, (retained(total) - (total.stored - total.first)) / work
+    row.worked, row.missed = (
+        total.work / work,
+        (retained(total) - (total.stored - total.first)) / work,
+    )
 
 
 @device
@@ -454,8 +559,12 @@ def from_units(columns, spent, state, totals, units, work, pieces, stiffness):
     """
     before, row = state.view(ROW)[0], columns.view(ROW)[0]
     position, substeps, units_of = before.position, before.substeps, units.view(ROW)[0]
-    if stiffness > 0.0 and math.fabs(row.position) * stiffness > math.fabs(row.spring_force):
-        lengthened = (row.spring_force - before.spring_force / units_of.spring_force) / stiffness
+    if stiffness > 0.0 and math.fabs(row.position) * stiffness > math.fabs(
+        row.spring_force
+    ):
+        lengthened = (
+            row.spring_force - before.spring_force / units_of.spring_force
+        ) / stiffness
         row.position = pieces[:, 4].sum() - lengthened
     state[:] = columns * units
     before.position += position
@@ -477,7 +586,9 @@ def end(row, spent, time, slider):
     A slider loses stability only under a prescribed force, and only if neither mass, damping nor the viscosity of a
     closed contact limits its speed. In all other scenes the equations have a solution, which has not been found.
     """
-    is_limited = slider.mass + slider.damping > 0.0 or (slider.viscosity > 0.0 and row.radius > 0.0)
+    is_limited = slider.mass + slider.damping > 0.0 or (
+        slider.viscosity > 0.0 and row.radius > 0.0
+    )
     if slider.forced > 0.0 and not is_limited:
         row.runaway_time = time
     else:
@@ -489,7 +600,9 @@ def end(row, spent, time, slider):
 @device
 def area_or_last(bound, moment, time, row, contact):
     """Return ``contact_area`` for these bonds; if there is no equilibrium, radius and area of the row."""
-    radius, area, by_bound, by_moment = contact_area(bound, moment, time, row.radius, contact)
+    radius, area, by_bound, by_moment = contact_area(
+        bound, moment, time, row.radius, contact
+    )
     if area >= 0.0:
         return radius, area, by_bound, by_moment
     return row.radius, math.pi * row.radius * row.radius / contact.area, 0.0, 0.0
@@ -524,14 +637,20 @@ def slip_from(first, row, time, slider, contact):
         low, high = high, 2.0 * high
     for _ in range(60):
         middle = 0.5 * (low + high)
-        goes_on = sense * _missing_slip(sense * middle, row, time, slider, contact)[0] > 0.0
+        goes_on = (
+            sense * _missing_slip(sense * middle, row, time, slider, contact)[0] > 0.0
+        )
         low, high = (middle, high) if goes_on else (low, middle)
     slip = sense * high
-    _, _, moment, sheared, radius, area = _missing_slip(slip, row, time, slider, contact)
+    _, _, moment, sheared, radius, area = _missing_slip(
+        slip, row, time, slider, contact
+    )
     if not area >= 0.0:
         return False, 0.0, area
     for i in range(_PARTS):
-        missing, yields, _, _, _, _ = _missing_slip((i + 0.5) / _PARTS * slip, row, time, slider, contact)
+        missing, yields, _, _, _, _ = _missing_slip(
+            (i + 0.5) / _PARTS * slip, row, time, slider, contact
+        )
         lost += missing / yields * slip / _PARTS
     row.moment, row.sheared, row.radius = moment, sheared, radius
     displace(row, slip, 0.0, slider)
@@ -546,18 +665,37 @@ def snap(row, square, time, slider, contact, energy):
     of the squared stretches. No bond breaks in a slip that nothing delays.
     """
     here, yields, moment, _, _, area = _missing_slip(0.0, row, time, slider, contact)
-    stretch, stored, slid = moment / row.bound, area * (square + row.sheared * moment), row.slip
-    held_back = slider.viscosity == 0.0 and slider.mass + slider.damping > 0.0 and yields > 0.0
-    if not (held_back and contact.stays == 0.0 and contact.mean_stress * math.fabs(stretch) > 0.0):
+    stretch, stored, slid = (
+        moment / row.bound,
+        area * (square + row.sheared * moment),
+        row.slip,
+    )
+    held_back = (
+        slider.viscosity == 0.0 and slider.mass + slider.damping > 0.0 and yields > 0.0
+    )
+    if not (
+        held_back
+        and contact.stays == 0.0
+        and contact.mean_stress * math.fabs(stretch) > 0.0
+    ):
         return False
     for sense in (1.0, -1.0):
         part, least = sense * _TRIED, max(0.0, sense * here / stretch)
         while math.fabs(part) < _REACH:
-            if sense * _missing_slip(part * stretch, row, time, slider, contact)[0] / stretch > least:
-                slipped, lost, area = slip_from(part * stretch, row, time, slider, contact)
+            if (
+                sense
+                * _missing_slip(part * stretch, row, time, slider, contact)[0]
+                / stretch
+                > least
+            ):
+                slipped, lost, area = slip_from(
+                    part * stretch, row, time, slider, contact
+                )
                 square += (row.moment + moment) * (row.slip - slid)
                 energy.snaps += lost
-                energy.area += 0.5 * (stored - area * (square + row.sheared * row.moment)) - lost
+                energy.area += (
+                    0.5 * (stored - area * (square + row.sheared * row.moment)) - lost
+                )
                 return slipped
             part *= 2.0
     return False
@@ -589,9 +727,14 @@ def misses(before, after, last, energy, row, slider, step):
     """
     tolerance, size = slider.tolerance, max(before, after)
     missing = retained(energy) - retained(last) - (after - before)
-    if step > BRIEF * slider.length and math.fabs(missing) > tolerance * max(size, math.fabs(energy.work), tolerance):
+    if step > BRIEF * slider.length and math.fabs(missing) > tolerance * max(
+        size, math.fabs(energy.work), tolerance
+    ):
         return True
-    size, total = max(size, math.fabs(row.worked + energy.work)), row.missed + retained(energy) - after + energy.stored
+    size, total = (
+        max(size, math.fabs(row.worked + energy.work)),
+        row.missed + retained(energy) - after + energy.stored,
+    )
     rounding = _ROUNDED * (size + slider.stiffness * row.position * row.position)
     excess = math.fabs(total) - _MISSED * tolerance * size - rounding
     if step <= 1e2 * LEAST * slider.length or total * missing <= 0.0 or excess <= 0.0:
@@ -625,7 +768,9 @@ _JUMPS = 1e-9
 def force_jumps(row, slider):
     """True if the prescribed force is another at the start of a piece than at the end of that before."""
     force = driven(0.0, slider)[1]
-    return slider.forced > 0.0 and math.fabs(force - row.spring_force) > _JUMPS * math.fabs(force)
+    return slider.forced > 0.0 and math.fabs(
+        force - row.spring_force
+    ) > _JUMPS * math.fabs(force)
 
 
 @device
@@ -658,16 +803,27 @@ def elastic(row, time, slider, contact, energy):
     Behind a contact that yields the interface alone slips if the body cannot, and the body alone if viscosity holds the
     interface.
     """
-    stiffness, forced, held_back = slider.stiffness, slider.forced, slider.mass + slider.damping > 0.0
+    stiffness, forced, held_back = (
+        slider.stiffness,
+        slider.forced,
+        slider.mass + slider.damping > 0.0,
+    )
     yields, _ = compliance(row.radius, slider)
     row.spring_force = driven(time, slider)[1] if forced > 0.0 else row.spring_force
     if not row.radius > 0.0:
         return _come_off(row, slider)
     if slider.viscosity > 0.0:
         if forced > 0.0 or slider.yielding_radius > 0.0:
-            row.radius, _, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
+            row.radius, _, _, _ = area_or_last(
+                row.bound, row.moment, time, row, contact
+            )
             yields, _ = compliance(row.radius, slider)
-            shift = 0.0 if held_back else (row.spring_force * yields - row.sheared) / (1.0 + stiffness * yields)
+            shift = (
+                0.0
+                if held_back
+                else (row.spring_force * yields - row.sheared)
+                / (1.0 + stiffness * yields)
+            )
             row.sheared += shift
             row.position += shift
             energy.work += row.spring_force * shift if forced > 0.0 else 0.0
@@ -675,9 +831,18 @@ def elastic(row, time, slider, contact, energy):
         return True
     if held_back and yields == 0.0:
         return True
-    slip, bound, moment, shift, radius, area = 0.0, row.bound, row.moment, 0.0, row.radius, 0.0
+    slip, bound, moment, shift, radius, area = (
+        0.0,
+        row.bound,
+        row.moment,
+        0.0,
+        row.radius,
+        0.0,
+    )
     for _ in range(40):
-        radius, area, _, by_moment = contact_area(bound, moment + bound * slip, time, radius, contact)
+        radius, area, _, by_moment = contact_area(
+            bound, moment + bound * slip, time, radius, contact
+        )
         if not area >= 0.0:
             return False
         yields, softer = compliance(radius, slider)
@@ -685,11 +850,21 @@ def elastic(row, time, slider, contact, energy):
         slope = (area + by_moment * (moment + bound * slip)) * bound
         softer = bound * softening(softer, radius, by_moment, contact) * force
         shift = 0.0 if held_back else slip + yields * force - row.sheared
-        over = slip + yields * force - row.sheared if held_back else stiffness * shift + force - row.spring_force
-        slope = 1.0 + softer + yields * slope if held_back else stiffness * (1.0 + softer + yields * slope) + slope
+        over = (
+            slip + yields * force - row.sheared
+            if held_back
+            else stiffness * shift + force - row.spring_force
+        )
+        slope = (
+            1.0 + softer + yields * slope
+            if held_back
+            else stiffness * (1.0 + softer + yields * slope) + slope
+        )
         if not slope > 0.0:
             first = _GUESS * _missing_slip(0.0, row, time, slider, contact)[0]
-            return over == 0.0 or (held_back and slip_from(first, row, time, slider, contact)[0])
+            return over == 0.0 or (
+                held_back and slip_from(first, row, time, slider, contact)[0]
+            )
         slip -= over / slope
         if math.fabs(over / slope) <= 1e-14 * (math.fabs(slip) + math.fabs(moment)):
             break
@@ -721,13 +896,19 @@ def answer(row, piece, slider, contact, energy):
 def slips_free(row, slider):
     """True if a slip without bonds takes no time and has an end: behind a spring, or ahead of a body that stays."""
     yields, _ = compliance(row.radius, slider)
-    return slider.viscosity == 0.0 and (yields > 0.0 if slider.mass + slider.damping > 0.0 else slider.stiffness > 0.0)
+    return slider.viscosity == 0.0 and (
+        yields > 0.0 if slider.mass + slider.damping > 0.0 else slider.stiffness > 0.0
+    )
 
 
 @device
 def free_shifts(row, slider):
     """Return the displacements of an interface without bonds, and of its body, to where no force acts."""
-    body = 0.0 if slider.mass + slider.damping > 0.0 else row.spring_force / slider.stiffness
+    body = (
+        0.0
+        if slider.mass + slider.damping > 0.0
+        else row.spring_force / slider.stiffness
+    )
     return body + row.sheared, body
 
 
@@ -736,5 +917,10 @@ def slip_free(row, time, slider, contact):
     """Slip at once, with next to no bonds, to where no force acts on the interface."""
     slip, body = free_shifts(row, slider)
     radius, area, _, _ = contact_area(FEW, 0.0, time, row.radius, contact)
-    row.bound, row.moment, row.sheared, row.radius = FEW, 0.0, 0.0, radius if area >= 0.0 else row.radius
+    row.bound, row.moment, row.sheared, row.radius = (
+        FEW,
+        0.0,
+        0.0,
+        radius if area >= 0.0 else row.radius,
+    )
     displace(row, slip, body, slider)

@@ -31,7 +31,9 @@ RATES = np.array(
         [-1.0 + 8.0 * _S6 / 3.0, -1.0 - 8.0 * _S6 / 3.0, 5.0],
     ]
 )
-BENDS = np.array([[sum(row[k] * RATES[k, j] for k in range(3)) for j in range(3)] for row in RATES])
+BENDS = np.array(
+    [[sum(row[k] * RATES[k, j] for k in range(3)) for j in range(3)] for row in RATES]
+)
 _OFF = np.array([sum(row) for row in RATES])
 
 
@@ -60,27 +62,58 @@ _THREE = ("f8", 3)
 NODE_VALUES = np.dtype(
     {
         "names": [
-            "values", "slip", "sheared", "bound", "moment", "residuals", "past", "radii", "pulls", "areas", "firms",
-            "last_step", "last_root",
+            "values",
+            "slip",
+            "sheared",
+            "bound",
+            "moment",
+            "residuals",
+            "past",
+            "radii",
+            "pulls",
+            "areas",
+            "firms",
+            "last_step",
+            "last_root",
         ],
-        "formats": [("f8", (4, 3)), *4 * [_THREE], *2 * [("f8", (4, 3))], *4 * [_THREE], "f8", "f8"],
+        "formats": [
+            ("f8", (4, 3)),
+            *4 * [_THREE],
+            *2 * [("f8", (4, 3))],
+            *4 * [_THREE],
+            "f8",
+            "f8",
+        ],
         "offsets": [0, 0, 24, 48, 72, 96, 192, 288, 312, 336, 360, 384, 392],
     }
-)  # fmt: skip
+)
 
 
 @device
 def kinetics(bound, moment, speed, law):
     """Ṅ and slopes over N and M; Ṁ and slope over N; that over M, and over the speed; Ṅ's; k, \\|speed\\|/l."""
-    rate, softness, cuts, binding, sense = law.rate, law.softness, law.cuts, law.binding, law.sense
+    rate, softness, cuts, binding, sense = (
+        law.rate,
+        law.softness,
+        law.cuts,
+        law.binding,
+        law.sense,
+    )
     stretch = moment / bound if bound > 0.0 else 0.0
     k = rate * math.exp(min(softness * math.fabs(stretch), 690.0))
     steeper = math.copysign(k * softness, stretch)
     travel, turn = math.fabs(speed) * cuts, math.copysign(cuts, speed)
     if sense != 0.0:  # smoothly through a speed of zero, where the sliding ends
         travel, turn = sense * speed * cuts, sense * cuts
-    to_bound = binding * (1.0 - bound) - (k + travel) * bound, -binding - k - travel + steeper * stretch, -steeper
-    to_moment = bound * speed - (k + 2.0 * travel) * moment, speed + steeper * stretch * stretch
+    to_bound = (
+        binding * (1.0 - bound) - (k + travel) * bound,
+        -binding - k - travel + steeper * stretch,
+        -steeper,
+    )
+    to_moment = (
+        bound * speed - (k + 2.0 * travel) * moment,
+        speed + steeper * stretch * stretch,
+    )
     moment_turn = -(k + 2.0 * travel) - steeper * stretch, bound - 2.0 * turn * moment
     return to_bound, to_moment, moment_turn, -turn * bound, k, travel
 
@@ -94,13 +127,21 @@ def share_left(speed, law):
 @device
 def share_after_rest(bound, time, law):
     """Return the bond fraction after some time at rest: 1 if bonds follow the speed at once."""
-    return 1.0 if law.slows != 0.0 else bound - (1.0 - bound) * math.expm1(-law.binding * time)
+    return (
+        1.0
+        if law.slows != 0.0
+        else bound - (1.0 - bound) * math.expm1(-law.binding * time)
+    )
 
 
 @device
 def sum_over(weights, i, values):
     """Return the sum over the three nodes of values times a row of weights."""
-    return weights[i, 0] * values[0] + weights[i, 1] * values[1] + weights[i, 2] * values[2]
+    return (
+        weights[i, 0] * values[0]
+        + weights[i, 1] * values[1]
+        + weights[i, 2] * values[2]
+    )
 
 
 @inlined
@@ -110,7 +151,12 @@ def equations(row, nodes, start, step, slider, law, contact):
     The slopes are those of the balance of forces over N, M and the speed, of u over the same, of Ṅ and of Ṁ. They are
     nan if there is no equilibrium.
     """
-    stiffness, mass, damping, viscosity = slider.stiffness, slider.mass, slider.damping, slider.viscosity
+    stiffness, mass, damping, viscosity = (
+        slider.stiffness,
+        slider.mass,
+        slider.damping,
+        slider.viscosity,
+    )
     over, gives = 1.0 / step, slider.yielding + slider.yielding_radius > 0.0
     radius, area, by_bound, by_moment = row.radius, 0.0, 0.0, 0.0
     if contact.stays > 0.0:
@@ -121,7 +167,9 @@ def equations(row, nodes, start, step, slider, law, contact):
         bound, moment = row.bound + nodes.bound[i], row.moment + nodes.moment[i]
         if contact.stays == 0.0:
             now = start + NODES[i] * step
-            radius, area, by_bound, by_moment = mechanics.contact_area(bound, moment, now, nodes.radii[i], contact)
+            radius, area, by_bound, by_moment = mechanics.contact_area(
+                bound, moment, now, nodes.radii[i], contact
+            )
             nodes.radii[i] = radius
         if not (bound >= 0.0 and area >= 0.0):
             return math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -130,9 +178,13 @@ def equations(row, nodes, start, step, slider, law, contact):
         stress = moment + viscosity * speed
         yields, softer = mechanics.compliance(radius, slider)
         shift = nodes.slip[i] + nodes.sheared[i]
-        nodes.residuals[0, i] = area * stress + damping * body - nodes.pulls[i] + stiffness * shift
+        nodes.residuals[0, i] = (
+            area * stress + damping * body - nodes.pulls[i] + stiffness * shift
+        )
         if mass > 0.0:
-            bend = (sum_over(BENDS, i, nodes.slip) + sum_over(BENDS, i, nodes.sheared)) * over
+            bend = (
+                sum_over(BENDS, i, nodes.slip) + sum_over(BENDS, i, nodes.sheared)
+            ) * over
             bend -= _OFF[i] * row.body_speed
             nodes.residuals[0, i] += mass * bend * over
         nodes.residuals[1, i] = row.sheared + nodes.sheared[i] - yields * area * stress
@@ -149,7 +201,14 @@ def equations(row, nodes, start, step, slider, law, contact):
             left = share_left(speed, law)
             nodes.residuals[2, i] = bound - left
             if i == 1:
-                of_bonds = -1.0, 0.0, -law.slows * law.sense * left * left, law.sense, -1.0, 0.0
+                of_bonds = (
+                    -1.0,
+                    0.0,
+                    -law.slows * law.sense * left * left,
+                    law.sense,
+                    -1.0,
+                    0.0,
+                )
         if i == 1:
             of_balance = by_bound * stress, area + by_moment * stress, area * viscosity
             if yields > 0.0:
@@ -165,7 +224,9 @@ def equations(row, nodes, start, step, slider, law, contact):
 @device
 def _over(number):
     """Return 1/number, with a single division if it is complex."""
-    return number.conjugate() * (1.0 / (number.real * number.real + number.imag * number.imag))
+    return number.conjugate() * (
+        1.0 / (number.real * number.real + number.imag * number.imag)
+    )
 
 
 @device
@@ -181,12 +242,22 @@ def _resolved(rate, slopes, slider, law):
     m = (rate if law.sense == 0.0 else 0.0 * rate) - m_moment
     scale = _over(n * m - n_moment * m_bound)
     nn, nm, mn, mm = m * scale, n_moment * scale, m_bound * scale, n * scale
-    n_slip, m_slip = rate * (nn * n_speed + nm * m_speed), rate * (mn * n_speed + mm * m_speed)
+    n_slip, m_slip = (
+        rate * (nn * n_speed + nm * m_speed),
+        rate * (mn * n_speed + mm * m_speed),
+    )
     u_slip = -(u_speed * rate + u_bound * n_slip + u_moment * m_slip)
     firm = slider.stiffness + rate * (slider.damping + rate * slider.mass)
-    yields = _over(firm * (1.0 + u_slip) + rate * thick + to_bound * n_slip + to_moment * m_slip)
+    yields = _over(
+        firm * (1.0 + u_slip) + rate * thick + to_bound * n_slip + to_moment * m_slip
+    )
     by_n, by_m = firm * u_bound - to_bound, firm * u_moment - to_moment
-    slip = yields, -firm * yields, (by_n * nn + by_m * mn) * yields, (by_n * nm + by_m * mm) * yields
+    slip = (
+        yields,
+        -firm * yields,
+        (by_n * nn + by_m * mn) * yields,
+        (by_n * nm + by_m * mm) * yields,
+    )
     return (nn, nm, mn, mm, n_slip, m_slip, u_slip) + slip
 
 
@@ -203,16 +274,31 @@ def _correction(mode, slopes, balance, yielding, bonds, stretches):
 @inlined
 def correct(modes, slopes, slider, nodes):
     """Replace the residuals at the nodes by the changes that remove them."""
-    balance, yielding, bonds, stretches = nodes.residuals[0], nodes.residuals[1], nodes.residuals[2], nodes.residuals[3]
+    balance, yielding, bonds, stretches = (
+        nodes.residuals[0],
+        nodes.residuals[1],
+        nodes.residuals[2],
+        nodes.residuals[3],
+    )
     gives = slider.yielding + slider.yielding_radius > 0.0
-    real = sum_over(BACK, 0, balance), sum_over(BACK, 0, yielding) if gives else 0.0, sum_over(BACK, 0, bonds)
-    by_real = _correction(modes[0], slopes, real[0], real[1], real[2], sum_over(BACK, 0, stretches))
+    real = (
+        sum_over(BACK, 0, balance),
+        sum_over(BACK, 0, yielding) if gives else 0.0,
+        sum_over(BACK, 0, bonds),
+    )
+    by_real = _correction(
+        modes[0], slopes, real[0], real[1], real[2], sum_over(BACK, 0, stretches)
+    )
     turned = _turned(yielding) if gives else complex(0.0, 0.0)
-    by_pair = _correction(modes[1], slopes, _turned(balance), turned, _turned(bonds), _turned(stretches))
+    by_pair = _correction(
+        modes[1], slopes, _turned(balance), turned, _turned(bonds), _turned(stretches)
+    )
     for i in range(3):
         first, second, third = FORTH[i, 0], FORTH[i, 1], FORTH[i, 2]
         for k in range(4):
-            nodes.residuals[k, i] = first * by_real[k] + second * by_pair[k].real + third * by_pair[k].imag
+            nodes.residuals[k, i] = (
+                first * by_real[k] + second * by_pair[k].real + third * by_pair[k].imag
+            )
 
 
 @device
@@ -224,8 +310,12 @@ def _turned(residuals):
 #: Share of a sub-step after which the defect of the equations is measured, between the first two nodes; there values
 #: and slopes of the polynomials through the nodes and the start, that of the start last.
 BETWEEN = 0.4
-VALUES = np.array([0.915959179422654, 0.5240408205773457, -0.07999999999999999, -0.3599999999999999])
-SLOPES = np.array([-2.9760883751542693, 2.576088375154268, -0.19999999999999984, 0.5999999999999996])
+VALUES = np.array(
+    [0.915959179422654, 0.5240408205773457, -0.07999999999999999, -0.3599999999999999]
+)
+SLOPES = np.array(
+    [-2.9760883751542693, 2.576088375154268, -0.19999999999999984, 0.5999999999999996]
+)
 #: Most turns of Newton's method.
 _TURNS = 12
 #: Slopes, and solutions of the modes, before the first ones are known.
@@ -234,7 +324,9 @@ _NO_MODES = (0.0,) * 11, (0.0j,) * 11
 #: Correction over the last one above which the slopes are taken anew.
 _SLOW = 0.1
 #: Lagrange's denominators at the nodes, the polynomial through the start as well.
-_BASE = np.array([1.0 / np.prod([c - d for d in (0.0, *NODES) if d != c]) for c in NODES])
+_BASE = np.array(
+    [1.0 / np.prod([c - d for d in (0.0, *NODES) if d != c]) for c in NODES]
+)
 
 
 @inlined
@@ -249,13 +341,26 @@ def _ahead(row, nodes, step, law):
             middle = x * first * (x - 1.0) * _BASE[1]
             last = x * first * second * _BASE[2] - 1.0
             for k in range(4):
-                nodes.values[k, i] = early * nodes.past[k, 0] + middle * nodes.past[k, 1] + last * nodes.past[k, 2]
+                nodes.values[k, i] = (
+                    early * nodes.past[k, 0]
+                    + middle * nodes.past[k, 1]
+                    + last * nodes.past[k, 2]
+                )
         else:
             time = NODES[i] * step
-            nodes.slip[i], nodes.sheared[i], nodes.bound[i], nodes.moment[i] = row.speed * time, 0.0, 0.0, 0.0
+            nodes.slip[i], nodes.sheared[i], nodes.bound[i], nodes.moment[i] = (
+                row.speed * time,
+                0.0,
+                0.0,
+                0.0,
+            )
             if law.slows == 0.0:
                 nodes.bound[i] = of_bound[0] * time
-                nodes.moment[i] = of_moment[0] * time if law.sense == 0.0 else law.sense * nodes.bound[i]
+                nodes.moment[i] = (
+                    of_moment[0] * time
+                    if law.sense == 0.0
+                    else law.sense * nodes.bound[i]
+                )
         nodes.bound[i] = max(nodes.bound[i], -0.5 * row.bound)
 
 
@@ -268,7 +373,9 @@ def newton(row, start, step, slider, law, contact, nodes):
     _ahead(row, nodes, step, law)
     for i in range(3):
         nodes.radii[i] = row.radius
-        nodes.pulls[i] = mechanics.pull_on(start + NODES[i] * step, start, 0.0, row, slider)
+        nodes.pulls[i] = mechanics.pull_on(
+            start + NODES[i] * step, start, 0.0, row, slider
+        )
     bound = min(row.bound, row.bound + nodes.bound[2]) + mechanics.FEW
     moment = min(math.fabs(row.moment), math.fabs(row.moment + nodes.moment[2]))
     of_slip, of_bound = 1.0 / (law.scale + math.fabs(nodes.slip[2])), 1.0 / bound
@@ -283,7 +390,10 @@ def newton(row, start, step, slider, law, contact, nodes):
         if shrinks > _SLOW:
             slopes = latest
             turning = complex(TURNING.real / step, TURNING.imag / step)
-            modes = _resolved(PACE / step, slopes, slider, law), _resolved(turning, slopes, slider, law)
+            modes = (
+                _resolved(PACE / step, slopes, slider, law),
+                _resolved(turning, slopes, slider, law),
+            )
         correct(modes, slopes, slider, nodes)
         part, change = 1.0, 0.0
         for i in range(3):
@@ -312,7 +422,12 @@ def error_of(row, start, step, slider, law, contact, nodes):
     The polynomials through start and nodes solve the equations at the nodes alone. What is missing between them of the
     balance of forces, of N, of M and, with a mass, of the speed is taken over what resists it.
     """
-    stiffness, mass, damping, viscosity = slider.stiffness, slider.mass, slider.damping, slider.viscosity
+    stiffness, mass, damping, viscosity = (
+        slider.stiffness,
+        slider.mass,
+        slider.damping,
+        slider.viscosity,
+    )
     slip, body, bound, moment = 0.0, 0.0, row.bound, row.moment
     speed, to_bound, to_moment, going = 0.0, 0.0, 0.0, 0.0
     pace, bend = VALUES[3] * row.body_speed, SLOPES[3] * row.body_speed / step
@@ -331,7 +446,9 @@ def error_of(row, start, step, slider, law, contact, nodes):
         to_bound += SLOPES[j] * nodes.bound[j]
         to_moment += SLOPES[j] * nodes.moment[j]
     time = start + BETWEEN * step
-    radius, area, _, _ = mechanics.contact_area(bound, moment, time, nodes.radii[0], contact)
+    radius, area, _, _ = mechanics.contact_area(
+        bound, moment, time, nodes.radii[0], contact
+    )
     if not (area >= 0.0 and bound >= 0.0):
         return math.inf
     of_bound, of_moment, on, _, _, _ = kinetics(bound, moment, speed, law)
@@ -345,20 +462,37 @@ def error_of(row, start, step, slider, law, contact, nodes):
     if law.slows != 0.0:
         to_bound = step * of_bound[0] + bound - share_left(speed, law)
     error = max(
-        math.fabs(to_bound - step * of_bound[0]) / (1.0 + step * math.fabs(of_bound[1])) / (bound + mechanics.FEW),
-        math.fabs(to_moment - step * of_moment[0]) / (1.0 + step * math.fabs(on[0])) / scale,
+        math.fabs(to_bound - step * of_bound[0])
+        / (1.0 + step * math.fabs(of_bound[1]))
+        / (bound + mechanics.FEW),
+        math.fabs(to_moment - step * of_moment[0])
+        / (1.0 + step * math.fabs(on[0]))
+        / scale,
     )
     # a mass between stiff springs rings within a small part of a stretch: as a force that is no small part
     yields, _ = mechanics.compliance(radius, slider)
-    if contact.mean_stress > 0.0:  # in a slip that takes no time u leaves its polynomial first
+    # in a slip that takes no time u leaves its polynomial first
+    if contact.mean_stress > 0.0:
         sheared = yields * area * (moment + viscosity * speed)
         error = max(error, math.fabs(row.sheared + body - slip - sheared) / law.scale)
     stiffest = max(stiffness, mechanics.stiffness_of(radius, slider))
-    firm = max(1.0, stiffest / (area * (bound + mechanics.SOME))) if mass > 0.0 and area > 0.0 else 1.0
+    firm = (
+        max(1.0, stiffest / (area * (bound + mechanics.SOME)))
+        if mass > 0.0 and area > 0.0
+        else 1.0
+    )
     # an open contact or the last bonds bear next to nothing: then the force that is missing displaces the spring
     bears += stiffness * mechanics.FEW / (area * bound + mechanics.FEW)
-    error = max(error, firm * math.fabs(balance) / bears / law.scale) if bears > 0.0 else error
-    return max(error, firm * step * math.fabs(going - pace) / law.scale) if mass > 0.0 else error
+    error = (
+        max(error, firm * math.fabs(balance) / bears / law.scale)
+        if bears > 0.0
+        else error
+    )
+    return (
+        max(error, firm * step * math.fabs(going - pace) / law.scale)
+        if mass > 0.0
+        else error
+    )
 
 
 @inlined
@@ -391,7 +525,10 @@ def try_sub_step(row, start, step, slider, law, contact, nodes):
 @device
 def stored_with(row, area, slider, law):
     """Return the elastic and kinetic energy of spring, body, contact of some area and bonds."""
-    energy = 0.5 * slider.mass * row.body_speed * row.body_speed + mechanics.contact_energy(row, area, slider)
+    energy = (
+        0.5 * slider.mass * row.body_speed * row.body_speed
+        + mechanics.contact_energy(row, area, slider)
+    )
     if slider.stiffness > 0.0:
         energy += 0.5 * row.spring_force * row.spring_force / slider.stiffness
     if row.bound > 0.0 and law.sense == 0.0:
@@ -407,15 +544,27 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
     """
     damping, viscosity = slider.damping, slider.viscosity
     shift, speed, body, going, passed = 0.0, 0.0, 0.0, row.speed, 0.0
-    _, first, _, _ = mechanics.contact_area(row.bound, row.moment, start, row.radius, contact)
+    _, first, _, _ = mechanics.contact_area(
+        row.bound, row.moment, start, row.radius, contact
+    )
     firm = mechanics.stiffness_of(row.radius, slider)
     for i in range(3):
-        bound, moment, time = row.bound + nodes.bound[i], row.moment + nodes.moment[i], start + NODES[i] * step
-        nodes.radii[i], nodes.areas[i], _, _ = mechanics.contact_area(bound, moment, time, nodes.radii[i], contact)
+        bound, moment, time = (
+            row.bound + nodes.bound[i],
+            row.moment + nodes.moment[i],
+            start + NODES[i] * step,
+        )
+        nodes.radii[i], nodes.areas[i], _, _ = mechanics.contact_area(
+            bound, moment, time, nodes.radii[i], contact
+        )
         nodes.firms[i] = mechanics.stiffness_of(nodes.radii[i], slider)
     before = stored_with(row, first, slider, law)
     for i in range(3):
-        bound, moment, area = row.bound + nodes.bound[i], row.moment + nodes.moment[i], nodes.areas[i]
+        bound, moment, area = (
+            row.bound + nodes.bound[i],
+            row.moment + nodes.moment[i],
+            nodes.areas[i],
+        )
         speed, body, spreads, firms = 0.0, 0.0, 0.0, 0.0
         for j in range(3):
             speed += RATES[i, j] * nodes.slip[j] / step
@@ -424,7 +573,11 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
             firms += RATES[i, j] * (nodes.firms[j] - firm)
         sheared = row.sheared + nodes.sheared[i]
         pull = nodes.pulls[i] - slider.stiffness * (nodes.slip[i] + nodes.sheared[i])
-        drive_speed = body if slider.forced > 0.0 else mechanics.driven(start + NODES[i] * step, slider)[1]
+        drive_speed = (
+            body
+            if slider.forced > 0.0
+            else mechanics.driven(start + NODES[i] * step, slider)[1]
+        )
         _, _, _, _, k, travel = kinetics(bound, moment, speed, law)
         square = moment * moment / bound if bound > 0.0 and law.sense == 0.0 else 0.0
         fresh = law.binding * (1.0 - bound) * square / bound if bound > 0.0 else 0.0
@@ -436,15 +589,29 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
         if law.sense != 0.0:
             energy.rupture += share * area * moment * speed
         energy.area -= SHARES[i] * 0.5 * (square * spreads + sheared * sheared * firms)
-        mechanics.remember(row, nodes.slip[i] - shift, going, speed, (NODES[i] - passed) * step, contact)
+        mechanics.remember(
+            row,
+            nodes.slip[i] - shift,
+            going,
+            speed,
+            (NODES[i] - passed) * step,
+            contact,
+        )
         shift, going, passed = nodes.slip[i], speed, NODES[i]
-    row.spring_force = nodes.pulls[2] - slider.stiffness * (nodes.slip[2] + nodes.sheared[2])
+    row.spring_force = nodes.pulls[2] - slider.stiffness * (
+        nodes.slip[2] + nodes.sheared[2]
+    )
     row.body_speed, row.speed, row.radius = body, speed, nodes.radii[2]
     row.sheared += nodes.sheared[2]
     row.bound = min(row.bound + nodes.bound[2], 1.0)
     row.moment += nodes.moment[2]
-    if law.binding == 0.0 and law.sense == 0.0 and row.bound < mechanics.FEW:  # the last bonds, which none replaces
-        energy.rupture += 0.5 * nodes.areas[2] * row.moment * row.moment / row.bound if row.bound > 0.0 else 0.0
+    # the last bonds, which none replaces
+    if law.binding == 0.0 and law.sense == 0.0 and row.bound < mechanics.FEW:
+        energy.rupture += (
+            0.5 * nodes.areas[2] * row.moment * row.moment / row.bound
+            if row.bound > 0.0
+            else 0.0
+        )
         row.bound, row.moment = 0.0, 0.0
     row.position += nodes.slip[2] + nodes.sheared[2]
     row.slip += nodes.slip[2]

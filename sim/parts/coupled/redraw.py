@@ -23,19 +23,33 @@ def _radius(row, time, energy, contact, share):
 
     On a disc it is found as ``balance.widest_crossings`` has it.
     """
-    load, base = contact.load + contact.load_rate * time, contact.base + contact.base_rate * time
+    load, base = (
+        contact.load + contact.load_rate * time,
+        contact.base + contact.base_rate * time,
+    )
     mount, body = (load, 0.0, base, 0.0, 0.0), contact[8:12]
     on_disc = len(share[2]) > 0
     fluctuating = 0.0 if on_disc else energy
-    bound, moment, tilt, radius = contact.bonded, row.moment, contact.mean_stress, row.radius
-    free = mechanics.Contact(contact.bare, *mount, bound, tilt, *body, fluctuating, 0.0, contact.field)
+    bound, moment, tilt, radius = (
+        contact.bonded,
+        row.moment,
+        contact.mean_stress,
+        row.radius,
+    )
+    free = mechanics.Contact(
+        contact.bare, *mount, bound, tilt, *body, fluctuating, 0.0, contact.field
+    )
     wide, _, _, _ = mechanics.contact_area(row.bound, moment, 0.0, radius, free)
     if not on_disc:
         return wide
     none = mechanics.Contact(0.0, *mount, 0.0, 0.0, *body, 0.0, 0.0, contact.field)
     hertz, _, _, _ = mechanics.contact_area(0.0, 0.0, 0.0, radius, none)
     terms = load, base, contact.bare + bound * row.bound, energy, tilt * moment * moment
-    return widest(wide, hertz, (terms, (contact.curvature, contact.modulus, contact.stiffness), share))
+    return widest(
+        wide,
+        hertz,
+        (terms, (contact.curvature, contact.modulus, contact.stiffness), share),
+    )
 
 
 @device
@@ -45,11 +59,28 @@ def redraw(row, columns, m, k, clock, contact, draws, room, reached):
     ``row`` is that of member ``m`` in the units of the equations. ``columns`` are the same [SI], with which the next
     step begins. ``contact`` is as at the start of the step, ``room`` for the shares of all factors, shape (2, factors).
     """
-    values, energies, shapes, half_weight, factors, by_slip, span, mean, relaxing, answers, address, paid, share = draws
+    (
+        values,
+        energies,
+        shapes,
+        half_weight,
+        factors,
+        by_slip,
+        span,
+        mean,
+        relaxing,
+        answers,
+        address,
+        paid,
+        share,
+    ) = draws
     state, field, duration = columns.view(mechanics.ROW)[0], contact.field, clock[k, 5]
     size, energy, expected = 1.0, mean, energies[k, m]
     if field.length < math.inf and not relaxing:
-        size = math.sqrt(field.floor + (1.0 - field.floor) * unsteadiness(state.weight, state.mean, state.spread))
+        size = math.sqrt(
+            field.floor
+            + (1.0 - field.floor) * unsteadiness(state.weight, state.mean, state.spread)
+        )
     if shapes.size > 0:
         keep, renew = room[0], room[1]
         passed = (state.path if by_slip else duration) / span
@@ -62,7 +93,9 @@ def redraw(row, columns, m, k, clock, contact, draws, room, reached):
         energy = 0.0
         for j in range(shapes.size):
             i = j if factors.size > 1 else 0
-            x, numbers = renew_band(values[m, j], keep[i], renew[i], 1.0, shapes[j], numbers)
+            x, numbers = renew_band(
+                values[m, j], keep[i], renew[i], 1.0, shapes[j], numbers
+            )
             values[m, j] = x
             energy += half_weight[j] * x
         if factors.size == 1:
@@ -74,6 +107,10 @@ def redraw(row, columns, m, k, clock, contact, draws, room, reached):
         reached[mechanics.RADIUS, k, m] = state.radius
     state.paid = paid
     if len(share[2]) > 0:
-        state.paid = paid * (share_of(state.radius, share[0], share[1], share[2]) if state.radius > 0.0 else 0.0)
+        state.paid = paid * (
+            share_of(state.radius, share[0], share[1], share[2])
+            if state.radius > 0.0
+            else 0.0
+        )
     state.drawn = state.paid * drawn
     state.felt = state.paid * expected if answers else state.drawn

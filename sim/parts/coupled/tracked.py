@@ -15,7 +15,15 @@ import numpy as np
 from sim.numerics.jit import borrowed, device, kernel
 from sim.parts.bonds import tracked
 from sim.parts.coupled import mechanics
-from sim.parts.coupled.cohorts import NODE, accept_nodes, balance, before_node, begin_sub_step, bend_of, stored_energy
+from sim.parts.coupled.cohorts import (
+    NODE,
+    accept_nodes,
+    balance,
+    before_node,
+    begin_sub_step,
+    bend_of,
+    stored_energy,
+)
 from sim.parts.drive import ENERGY
 from sim.parts.exchange import Array
 
@@ -53,7 +61,11 @@ class Ground(NamedTuple):
 def _sums(tracks, ground, node):
     """Compute the share bound, sum of the stretches and of their squares over the sites, stretches over their unit."""
     frame, unit, sites = tracks[2], ground.unit, ground.sites
-    number, slider, births = frame[tracked.BOUND], frame[tracked.SLIDER], frame[tracked.SUM]
+    number, slider, births = (
+        frame[tracked.BOUND],
+        frame[tracked.SLIDER],
+        frame[tracked.SUM],
+    )
     node.bound = number / sites
     node.moment = frame[tracked.SENSE] * (number * slider - births) / (sites * unit)
     squares = slider * (number * slider - 2.0 * births) + frame[tracked.SQUARES]
@@ -63,9 +75,23 @@ def _sums(tracks, ground, node):
 @device
 def _go(tracks, shift, duration, ground):
     """Advance the bonds by a displacement of the slider in a time."""
-    (bonds, soonest, frame), (events, shifts, durations, laid, after) = tracks, ground.space
+    (bonds, soonest, frame), (events, shifts, durations, laid, after) = (
+        tracks,
+        ground.space,
+    )
     shifts[0], durations[0] = shift * ground.unit, duration
-    tracked.one_step(bonds, soonest, frame, shifts, durations, ground.law, ground.address, events, laid, after)
+    tracked.one_step(
+        bonds,
+        soonest,
+        frame,
+        shifts,
+        durations,
+        ground.law,
+        ground.address,
+        events,
+        laid,
+        after,
+    )
 
 
 @device
@@ -82,14 +108,23 @@ def _go_at_once(tracks, shift, length, ground):
 @device
 def _same(node, bound, total):
     """True if number and stretch of the bonds of a node are these, except for rounding."""
-    return node.bound == bound and math.fabs(node.moment - total) <= 1e-9 * (math.fabs(total) + bound)
+    return node.bound == bound and math.fabs(node.moment - total) <= 1e-9 * (
+        math.fabs(total) + bound
+    )
 
 
 @device
 def _rebalance(line, time, tracks, slider, contact, ground, energy, node):
     """Slip at once to where bonds bear the pull, as far as nothing delays it; True if there is such a place."""
-    row, trial, worked, unit, limit = line[0], line[2], energy.work, ground.unit, ground.law[2]
-    for _ in range(_SETTLING + int(ground.sites)):  # each turn but the last ones breaks a bond
+    row, trial, worked, unit, limit = (
+        line[0],
+        line[2],
+        energy.work,
+        ground.unit,
+        ground.law[2],
+    )
+    # each turn but the last ones breaks a bond
+    for _ in range(_SETTLING + int(ground.sites)):
         energy.work = worked
         _sums(tracks, ground, node)
         row.bound, row.moment = node.bound, node.moment
@@ -100,12 +135,25 @@ def _rebalance(line, time, tracks, slider, contact, ground, energy, node):
         if not math.fabs(slip) > _ROUNDING * (math.fabs(node.moment) + node.bound):
             line[0] = trial
             return True
-        nearest = tracked.next_cut(tracks, slip, limit) / unit if limit < math.inf else math.inf
+        nearest = (
+            tracked.next_cut(tracks, slip, limit) / unit
+            if limit < math.inf
+            else math.inf
+        )
         whole = nearest >= math.fabs(slip)
-        slip = slip if whole else math.copysign(nearest * (1.0 + 1e-12) + 1e-12 * limit / unit, slip)
+        slip = (
+            slip
+            if whole
+            else math.copysign(nearest * (1.0 + 1e-12) + 1e-12 * limit / unit, slip)
+        )
         _go_at_once(tracks, slip, slider.length, ground)
-        total, expected = row.moment + row.bound * slip, square + slip * (2.0 * row.moment + row.bound * slip)
-        _, area, _, _ = mechanics.contact_area(row.bound, row.moment, time, row.radius, contact)
+        total, expected = (
+            row.moment + row.bound * slip,
+            square + slip * (2.0 * row.moment + row.bound * slip),
+        )
+        _, area, _, _ = mechanics.contact_area(
+            row.bound, row.moment, time, row.radius, contact
+        )
         _sums(tracks, ground, node)
         broken = not _same(node, row.bound, total)
         if broken:
@@ -135,12 +183,25 @@ def _try(nodes, at_start, start, step, row, slider, contact):
         shift, bound, is_solved = approach.slip, before.bound, False
         for turn in range(_TURNS):
             total = before.moment + bound * shift
-            over, slope, none = balance(shift, bound, total, before, after, approach, start, row, slider, contact)
+            over, slope, none = balance(
+                shift,
+                bound,
+                total,
+                before,
+                after,
+                approach,
+                start,
+                row,
+                slider,
+                contact,
+            )
             if not slope > 0.0:
                 return False
             if turn > 0 and math.fabs(over / slope) <= none:
                 after.bound, after.moment = bound, total
-                after.square = before.square + shift * (2.0 * before.moment + bound * shift)
+                after.square = before.square + shift * (
+                    2.0 * before.moment + bound * shift
+                )
                 is_solved = True
                 break
             shift -= over / slope
@@ -154,22 +215,37 @@ def _after_event(line, time, tracks, slider, contact, ground, energy, nodes):
     """Balance the forces after a bond has formed or broken; return True if possible, and the contact then."""
     row, node, area_before = line[0], nodes[0], nodes[2].area
     row.acceleration = 0.0
-    radius, area, _, _ = mechanics.contact_area(row.bound, row.moment, time, row.radius, contact)
+    radius, area, _, _ = mechanics.contact_area(
+        row.bound, row.moment, time, row.radius, contact
+    )
     area = area if area >= 0.0 else area_before  # else no equilibrium is left
     energy.area -= 0.5 * node.square * (area - area_before)
-    if slider.viscosity > 0.0 and radius > 0.0:  # it holds the shear displacement, not the stiffness of the contact
+    # it holds the shear displacement, not the stiffness of the contact
+    if slider.viscosity > 0.0 and radius > 0.0:
         energy.area += mechanics.contact_energy(row, area, slider)
         row.radius = radius
         energy.area -= mechanics.contact_energy(row, area, slider)
-    before, worked, lost = stored_energy(row, node.square, time, slider, contact), energy.work, energy.rupture
+    before, worked, lost = (
+        stored_energy(row, node.square, time, slider, contact),
+        energy.work,
+        energy.rupture,
+    )
     yields, _ = mechanics.compliance(radius if radius > 0.0 else row.radius, slider)
-    if yields > 0.0 and slider.viscosity == 0.0:  # it is sheared as by the bonds before, in the area that there is now
+    # it is sheared as by the bonds before, in the area that there is now
+    if yields > 0.0 and slider.viscosity == 0.0:
         before += 0.5 * row.sheared * (row.sheared / yields - area * row.moment)
-        energy.area -= 0.5 * row.sheared * row.sheared * (1.0 / yields - mechanics.stiffness_of(row.radius, slider))
+        energy.area -= (
+            0.5
+            * row.sheared
+            * row.sheared
+            * (1.0 / yields - mechanics.stiffness_of(row.radius, slider))
+        )
     is_balanced = _rebalance(line, time, tracks, slider, contact, ground, energy, node)
     if not is_balanced and contact.stays == 0.0:
         contact = mechanics.later(contact, 0.0, 1.0)
-        is_balanced = _rebalance(line, time, tracks, slider, contact, ground, energy, node)
+        is_balanced = _rebalance(
+            line, time, tracks, slider, contact, ground, energy, node
+        )
     after = stored_energy(row, node.square, time, slider, contact)
     energy.snaps += before - after + energy.work - worked - (energy.rupture - lost)
     return is_balanced, contact
@@ -179,11 +255,22 @@ def _after_event(line, time, tracks, slider, contact, ground, energy, nodes):
 def _is_closed(slider, contact, limit):
     """True if the motion between events has a closed form: pull linear in time, area constant, stretch not limited."""
     first, last, mean = slider.first, slider.last, slider.integral / slider.length
-    bends = math.fabs(mean - 0.5 * (first + last)) + (0.0 if slider.forced > 0.0 else math.fabs(last - first))
+    bends = math.fabs(mean - 0.5 * (first + last)) + (
+        0.0 if slider.forced > 0.0 else math.fabs(last - first)
+    )
     is_linear = bends <= _STEADY * (math.fabs(first) + math.fabs(last))
-    changes = contact.load_rate != 0.0 or contact.base_rate != 0.0 or contact.mean_stress != 0.0
+    changes = (
+        contact.load_rate != 0.0
+        or contact.base_rate != 0.0
+        or contact.mean_stress != 0.0
+    )
     is_held = contact.field.length == math.inf and (contact.stays > 0.0 or not changes)
-    return is_linear and is_held and slider.mass + slider.viscosity == 0.0 and limit == math.inf
+    return (
+        is_linear
+        and is_held
+        and slider.mass + slider.viscosity == 0.0
+        and limit == math.inf
+    )
 
 
 @device
@@ -202,8 +289,12 @@ def _clock(time, motion, pace):
     mean = 0.0
     for i in range(len(_PLACES)):
         part = _PLACES[i] * time
-        mean += _SHARES[i] * math.exp(pace * part * (last + (first - last) * _relaxed(rate * part)))
-    return time * mean, math.exp(pace * time * (last + (first - last) * _relaxed(rate * time)))
+        mean += _SHARES[i] * math.exp(
+            pace * part * (last + (first - last) * _relaxed(rate * part))
+        )
+    return time * mean, math.exp(
+        pace * time * (last + (first - last) * _relaxed(rate * time))
+    )
 
 
 @device
@@ -213,7 +304,10 @@ def _time_of(value, most, whole, grown, motion, pace):
     The first guess is a cubic in the clock, by its slopes at both ends.
     """
     share, left = value / whole, 1.0 - value / whole
-    time = share * share * (most * (1.0 + 2.0 * left) - whole / grown * left) + share * left * left * whole
+    time = (
+        share * share * (most * (1.0 + 2.0 * left) - whole / grown * left)
+        + share * left * left * whole
+    )
     for _ in range(_TURNS):
         passed, slope = _clock(time, motion, pace)
         change = (value - passed) / slope
@@ -229,50 +323,107 @@ def _to_event(row, start, left, tracks, slider, ground, energy, node):
 
     Return the time that has passed, below zero if the closed form does not apply, and the event, or -1.
     """
-    frame, (rate, softness, _, _), winners, event = tracks[2], ground.law, ground.winners, -1
+    frame, (rate, softness, _, _), winners, event = (
+        tracks[2],
+        ground.law,
+        ground.winners,
+        -1,
+    )
     if frame[tracked.SINGLY] > 0.0 or not node.area >= 0.0:
         return -1.0, event
-    pull, bears = mechanics.pull_on(start, start, 0.0, row, slider), node.area * node.bound
-    body, force = 1.0 + mechanics.compliance(node.radius, slider)[0] * bears, node.area * node.moment
-    growth = (slider.last - slider.first if slider.forced > 0.0 else slider.stiffness * slider.integral) / slider.length
-    stiffness, damping = slider.stiffness * body + bears, slider.damping * body  # of the slip: it moves the body more
+    pull, bears = (
+        mechanics.pull_on(start, start, 0.0, row, slider),
+        node.area * node.bound,
+    )
+    body, force = (
+        1.0 + mechanics.compliance(node.radius, slider)[0] * bears,
+        node.area * node.moment,
+    )
+    growth = (
+        slider.last - slider.first
+        if slider.forced > 0.0
+        else slider.stiffness * slider.integral
+    ) / slider.length
+    # of the slip: it moves the body more
+    stiffness, damping = slider.stiffness * body + bears, slider.damping * body
     last = growth / stiffness if stiffness > 0.0 else 0.0
     first, relaxes, sense = last, 0.0, frame[tracked.SENSE]
     if damping > 0.0:
         over, relaxes = pull - force, stiffness / damping
-        first = over / damping if math.fabs(over) > _BALANCED * (math.fabs(pull) + math.fabs(force)) else 0.0
+        first = (
+            over / damping
+            if math.fabs(over) > _BALANCED * (math.fabs(pull) + math.fabs(force))
+            else 0.0
+        )
         last = last if stiffness > 0.0 else first
-    if sense * first < 0.0 or sense * last < 0.0 or (stiffness == 0.0 and (damping == 0.0 or growth != 0.0)):
+    if (
+        sense * first < 0.0
+        or sense * last < 0.0
+        or (stiffness == 0.0 and (damping == 0.0 or growth != 0.0))
+    ):
         return -1.0, event
     tracked.rank(tracks, ground.law, winners)
     motion, bent = (first, last, relaxes), first - last
     clock, pace = frame[tracked.CLOCK], softness * ground.unit * sense
-    binding, rupture = max(winners[tracked.BINDING, 1] - frame[tracked.TIME], 0.0), winners[tracked.RUPTURE, 1]
-    time, fastest = min(left, binding), math.fabs(pace) * max(math.fabs(first), math.fabs(last))
+    binding, rupture = (
+        max(winners[tracked.BINDING, 1] - frame[tracked.TIME], 0.0),
+        winners[tracked.RUPTURE, 1],
+    )
+    time, fastest = (
+        min(left, binding),
+        math.fabs(pace) * max(math.fabs(first), math.fabs(last)),
+    )
     time = time if fastest * time <= _MOST else _MOST / fastest
-    if relaxes * time > _MOST:  # the error of the rule is of order 13 in the time, and of first order in this change
+    # the error of the rule is of order 13 in the time, and of first order in this change
+    if relaxes * time > _MOST:
         change = min(max(math.fabs(pace * bent) / relaxes, 1e-16), 1.0)
         time = min(time, _MOST * change ** (-1.0 / 13.0) / relaxes)
     event = tracked.BINDING if time == binding else event
-    grown, (whole, slope) = rate * math.exp(softness * frame[tracked.SLIDER]), _clock(time, motion, pace)
+    grown, (whole, slope) = (
+        rate * math.exp(softness * frame[tracked.SLIDER]),
+        _clock(time, motion, pace),
+    )
     waits, clock = rupture - clock, clock + grown * whole
     if rupture <= clock:
-        time = _time_of(waits / grown, time, whole, slope, motion, pace) if waits > 0.0 else 0.0
+        time = (
+            _time_of(waits / grown, time, whole, slope, motion, pace)
+            if waits > 0.0
+            else 0.0
+        )
         event, clock = tracked.RUPTURE, rupture
     x = relaxes * time
     early, twice = _relaxed(x), _relaxed(2.0 * x)
-    late = (1.0 - early) / x if x > 1e-3 else 0.5 - x / 6.0 + x * x / 24.0 - x * x * x / 120.0
-    slip, travelled = time * (last + bent * early), body * time * time * (0.5 * last + bent * late)
+    late = (
+        (1.0 - early) / x
+        if x > 1e-3
+        else 0.5 - x / 6.0 + x * x / 24.0 - x * x * x / 120.0
+    )
+    slip, travelled = (
+        time * (last + bent * early),
+        body * time * time * (0.5 * last + bent * late),
+    )
     if slider.forced > 0.0:
         energy.work += body * slip * (pull + growth * time) - growth * travelled
     else:
         pulled = time * (pull + 0.5 * growth * time) - slider.stiffness * travelled
         energy.work += slider.integral / slider.length * pulled
-    energy.damping += damping * body * time * (last * (last + 2.0 * bent * early) + bent * bent * twice)
+    energy.damping += (
+        damping
+        * body
+        * time
+        * (last * (last + 2.0 * bent * early) + bent * bent * twice)
+    )
     row.spring_force = mechanics.pull_on(start + time, start, 0.0, row, slider)
     mechanics.displace(row, slip, body * slip, slider)
-    row.speed, row.acceleration = last + bent * (1.0 - x * early), -relaxes * bent * (1.0 - x * early)
-    row.body_speed, row.sheared, row.substeps = body * row.speed, row.sheared + (body - 1.0) * slip, row.substeps + 1.0
+    row.speed, row.acceleration = (
+        last + bent * (1.0 - x * early),
+        -relaxes * bent * (1.0 - x * early),
+    )
+    row.body_speed, row.sheared, row.substeps = (
+        body * row.speed,
+        row.sheared + (body - 1.0) * slip,
+        row.substeps + 1.0,
+    )
     row.radius = node.radius
     tracked.let_pass(frame, math.fabs(slip) * ground.unit, time, clock, winners)
     if event >= 0:
@@ -301,7 +452,9 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
         at_start = begin_sub_step(row, first, start, slider, contact)
         if is_closed:
             slid = row.slip
-            time, event = _to_event(row, start, left, tracks, slider, ground, energy, first)
+            time, event = _to_event(
+                row, start, left, tracks, slider, ground, energy, first
+            )
             if time >= 0.0:
                 start = length if event < 0 and time == left else start + time
                 slip, last.area = row.slip - slid, first.area
@@ -310,8 +463,12 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
                 row.bound, row.moment = first.bound, first.moment
                 if event == tracked.RUPTURE:
                     energy.rupture += 0.5 * last.area * (square - first.square)
-                if event == tracked.RUPTURE or (event >= 0 and contact.stays == 0.0 and contact.bonded != 0.0):
-                    is_balanced, contact = _after_event(line, start, tracks, slider, contact, ground, energy, nodes)
+                if event == tracked.RUPTURE or (
+                    event >= 0 and contact.stays == 0.0 and contact.bonded != 0.0
+                ):
+                    is_balanced, contact = _after_event(
+                        line, start, tracks, slider, contact, ground, energy, nodes
+                    )
                     if not is_balanced:
                         return start, contact.stays
                 continue
@@ -326,28 +483,41 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
                 continue
             within = mechanics.within_reach(last.slip, step, row, contact)
             bend, error = bend_of(nodes, step, 1.0, row, slider)
-            grows = min(4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else 4.0
+            grows = (
+                min(4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else 4.0
+            )
             grows = min(grows, 0.9 * within)
             if not (error <= 1.0 and within >= 1.0):
                 step, cut = step * grows, False
                 continue
             whole = step if not cut else whole
-            soon = tracked.next_event(tracks, last.slip * unit / step, whole, law, ground.winners)
+            soon = tracked.next_event(
+                tracks, last.slip * unit / step, whole, law, ground.winners
+            )
             if cuts < _TURNS and (soon < (1.0 - _NEAR) * step or (cut and soon > step)):
                 cut, cuts = soon < whole, cuts + 1
-                step = min(max(soon * (1.0 + 0.5 * _NEAR), 2.0 * mechanics.LEAST * length), whole)
+                step = min(
+                    max(soon * (1.0 + 0.5 * _NEAR), 2.0 * mechanics.LEAST * length),
+                    whole,
+                )
                 continue
             break
         if not step > mechanics.LEAST * length:
             slid, row.next_step = row.slip, 0.0
-            if law[2] == math.inf and mechanics.snap(row, first.square, start, slider, contact, energy):
+            if law[2] == math.inf and mechanics.snap(
+                row, first.square, start, slider, contact, energy
+            ):
                 _go_at_once(tracks, row.slip - slid, length, ground)
                 row.acceleration = 0.0
                 continue
             if contact.stays > 0.0:
                 return start, contact.stays
             # the interface slips with the body from there on, however fast the contact was lost
-            contact, row.speed, row.acceleration = mechanics.later(contact, 0.0, 1.0), row.body_speed, 0.0
+            contact, row.speed, row.acceleration = (
+                mechanics.later(contact, 0.0, 1.0),
+                row.body_speed,
+                0.0,
+            )
             continue
         line[1], books[1] = row, energy
         before = stored_energy(row, first.square, start, slider, contact)
@@ -356,14 +526,18 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
         if mechanics.misses(before, after, books[1], energy, row, slider, step):
             line[0], books[0], row.next_step = line[1], books[1], 0.25 * step
             continue
-        row.next_step = max(row.next_step, step * grows) if cut or step == left else step * grows
+        row.next_step = (
+            max(row.next_step, step * grows) if cut or step == left else step * grows
+        )
         start = length if step == left else start + step
         _go(tracks, last.slip, step, ground)
         _sums(tracks, ground, first)
         row.bound, row.moment, row.acceleration = first.bound, first.moment, bend
         energy.rupture += 0.5 * last.area * (last.square - first.square)
         if cut or not _same(first, last.bound, last.moment):
-            is_balanced, contact = _after_event(line, start, tracks, slider, contact, ground, energy, nodes)
+            is_balanced, contact = _after_event(
+                line, start, tracks, slider, contact, ground, energy, nodes
+            )
             if not is_balanced:
                 return start, contact.stays
         if start == length:
@@ -385,11 +559,20 @@ def _through(line, books, pieces, slider, contact, tracks, ground, nodes):
             before = stored_energy(row, first.square, 0.0, slider, from_here)
         jumps, unslipped = mechanics.force_jumps(row, slider), before
         if jumps:
-            unslipped = stored_energy(row, first.square, 0.0, slider, mechanics.drawn(from_here, row, p))
+            unslipped = stored_energy(
+                row, first.square, 0.0, slider, mechanics.drawn(from_here, row, p)
+            )
         going = _rebalance(line, 0.0, tracks, slider, from_here, ground, energy, first)
-        if p == 0 and row.felt != row.drawn:  # the answer to what was drawn is no sliding
-            path, row.felt, from_here = row.path, row.drawn, mechanics.drawn(from_here, row, p)
-            going = _rebalance(line, 0.0, tracks, slider, from_here, ground, energy, first)
+        # the answer to what was drawn is no sliding
+        if p == 0 and row.felt != row.drawn:
+            path, row.felt, from_here = (
+                row.path,
+                row.drawn,
+                mechanics.drawn(from_here, row, p),
+            )
+            going = _rebalance(
+                line, 0.0, tracks, slider, from_here, ground, energy, first
+            )
             row.path = path
         if not going:
             return time, False
@@ -407,7 +590,9 @@ def _through(line, books, pieces, slider, contact, tracks, ground, nodes):
     return time, True
 
 
-@kernel(f"int64({mechanics.ARGUMENTS}, {tracked.TRACKS}, UniTuple(float64, 4), uint64, uint64[:], float64[:, :, ::1])")
+@kernel(
+    f"int64({mechanics.ARGUMENTS}, {tracked.TRACKS}, UniTuple(float64, 4), uint64, uint64[:], float64[:, :, ::1])"
+)
 def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames):
     """Advance all rows, their energies and their bonds, in place, through some clock steps, each row by itself.
 
@@ -416,30 +601,66 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
     zero, or ``SPENT`` if the bonds have been advanced already.
     """
     rows, energies, pieces, clock, units, work = inputs
-    slider, contact, (reached, spent) = mechanics.Slider(*numbers[0]), mechanics.contact_of(numbers), outputs
+    slider, contact, (reached, spent) = (
+        mechanics.Slider(*numbers[0]),
+        mechanics.contact_of(numbers),
+        outputs,
+    )
     birth, due, life, soonest, stamp, frame = tracks
     for m in range(len(rows)):
         if stamp[m] != np.int64(frame[m, tracked.STEPS]):
             return tracked.SPENT
-    space = tracked.room(), np.empty(1), np.empty(1), np.empty(tracked.COLUMNS + 1), np.empty((tracked.COLUMNS, 1))
+    space = (
+        tracked.room(),
+        np.empty(1),
+        np.empty(1),
+        np.empty(tracked.COLUMNS + 1),
+        np.empty((tracked.COLUMNS, 1)),
+    )
     width = 2 << np.int64(math.ceil(math.log2(soonest.shape[2])))
-    rooms = np.empty(3 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES), np.zeros(3, NODE), np.empty((2, width))
+    rooms = (
+        np.empty(3 * mechanics.COLUMNS),
+        np.empty(2 * mechanics.ENERGIES),
+        np.zeros(3, NODE),
+        np.empty((2, width)),
+    )
     for m in range(len(rows)):
         (columns, booked, nodes, winners), work_room = borrowed(rooms), borrowed(space)
-        line, books = columns.view(mechanics.ROW), booked.view(ENERGY)  # as they are, before a sub-step, in a trial
+        # as they are, before a sub-step, in a trial
+        line, books = columns.view(mechanics.ROW), booked.view(ENERGY)
         stop, bonds = 0, borrowed(((birth[m], due[m], life[m]), soonest[m], frame[m]))
-        ground = Ground(units[mechanics.SLIP], np.float64(due.shape[1]), law, (seed, members[m]), work_room, winners)
-        columns, booked, winners[0, 0] = columns[: mechanics.COLUMNS], booked[: mechanics.ENERGIES], -1.0
+        ground = Ground(
+            units[mechanics.SLIP],
+            np.float64(due.shape[1]),
+            law,
+            (seed, members[m]),
+            work_room,
+            winners,
+        )
+        columns, booked, winners[0, 0] = (
+            columns[: mechanics.COLUMNS],
+            booked[: mechanics.ENERGIES],
+            -1.0,
+        )
         for k in range(len(clock)):
             start, stop = stop, mechanics.pieces_to(k, stop, pieces)
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
             if not mechanics.has_ended(line[0]):
                 now = mechanics.contact_at(contact, clock[k], line[0])
-                time, going = _through(line, books, pieces[start:stop], slider, now, bonds, ground, nodes)
+                time, going = _through(
+                    line, books, pieces[start:stop], slider, now, bonds, ground, nodes
+                )
                 if not going:
                     mechanics.end(line[0], booked, clock[k, 0] + time, slider)
             mechanics.from_units(
-                columns, booked, rows[m], energies[m], units, work, pieces[start:stop], slider.stiffness
+                columns,
+                booked,
+                rows[m],
+                energies[m],
+                units,
+                work,
+                pieces[start:stop],
+                slider.stiffness,
             )
             reached[:, k, m], spent[k, m], frames[k, m] = rows[m], energies[m], frame[m]
         stamp[m] = np.int64(frame[m, tracked.STEPS])

@@ -24,7 +24,13 @@ from sim.numerics.jit import inlined, kernel
 from sim.numerics.noise import Noise, gamma, normal, stream
 from sim.parts.exchange import Array, Draws, Gammas, Indices, during
 from sim.parts.shear.modes import grid_reach, half_lattice, modes
-from sim.parts.shear.process import Amplitude, Correlation, Fluctuation, Renewing, factors
+from sim.parts.shear.process import (
+    Amplitude,
+    Correlation,
+    Fluctuation,
+    Renewing,
+    factors,
+)
 from sim.spectrum.family import Family
 
 #: Squares handled at a time.
@@ -52,7 +58,13 @@ class Pairs:
     count: Array
 
 
-def cell_pairs(spectrum: Family, cell: float, points: int | None, shear_modulus: float, poisson_ratio: float) -> Pairs:
+def cell_pairs(
+    spectrum: Family,
+    cell: float,
+    points: int | None,
+    shear_modulus: float,
+    poisson_ratio: float,
+) -> Pairs:
     """Return the mode pairs of a cell, listed near q = 0 where the weight is, counted in blocks beyond.
 
     Parameters
@@ -88,7 +100,9 @@ def cell_pairs(spectrum: Family, cell: float, points: int | None, shear_modulus:
     reach, _ = grid_reach(spectrum, cell, points)
     levels, block = [], 1
     while block == 1 or _LISTED * (block // 3) + block // 6 < reach:
-        levels.append(_level(spectrum, cell, reach, block, shear_modulus, poisson_ratio))
+        levels.append(
+            _level(spectrum, cell, reach, block, shear_modulus, poisson_ratio)
+        )
         block *= 3
     pairs = Pairs(*(np.concatenate(parts) for parts in zip(*levels, strict=True)))
     if not pairs.weight.size:
@@ -97,7 +111,12 @@ def cell_pairs(spectrum: Family, cell: float, points: int | None, shear_modulus:
 
 
 def _level(
-    spectrum: Family, cell: float, reach: int, block: int, shear_modulus: float, poisson_ratio: float
+    spectrum: Family,
+    cell: float,
+    reach: int,
+    block: int,
+    shear_modulus: float,
+    poisson_ratio: float,
 ) -> tuple[Array, Array, Array]:
     """Return weight, wavenumber and count of the blocks of block² pixels around the finer ones."""
     step = 2.0 * math.pi / cell
@@ -113,20 +132,47 @@ def _level(
     ends = (np.abs(radius - limit / step) < block for limit in spectrum.support)
     cut = functools.reduce(np.logical_or, ends, block * farthest > reach - block)
     rows = [np.empty((3, 0))]
-    for blocks, side in ((np.flatnonzero(~cut), 3), (np.flatnonzero(cut), min(block, 27))):
+    for blocks, side in (
+        (np.flatnonzero(~cut), 3),
+        (np.flatnonzero(cut), min(block, 27)),
+    ):
         for first in range(0, blocks.size, _SQUARES // side**2):
             some, size = blocks[first : first + _SQUARES // side**2], block / side
-            sums = _counted(spectrum, step, reach, block * ix[some], block * iy[some], size, side, poisson_ratio)
+            sums = _counted(
+                spectrum,
+                step,
+                reach,
+                block * ix[some],
+                block * iy[some],
+                size,
+                side,
+                poisson_ratio,
+            )
             full = sums[-1] > 0.0
             stress, energy, outward, square = (values[full] for values in sums)
             count = size**2 * energy * (energy / square)
-            rows.append(np.stack([share[some][full] * (energy / stress) / count, outward / energy, count]))
+            rows.append(
+                np.stack(
+                    [
+                        share[some][full] * (energy / stress) / count,
+                        outward / energy,
+                        count,
+                    ]
+                )
+            )
     weight, wavenumber, count = np.concatenate(rows, axis=1)
     return weight / (shear_modulus * step), step * wavenumber, count
 
 
 def _counted(
-    spectrum: Family, step: float, reach: int, x: Indices, y: Indices, size: float, side: int, poisson_ratio: float
+    spectrum: Family,
+    step: float,
+    reach: int,
+    x: Indices,
+    y: Indices,
+    size: float,
+    side: int,
+    poisson_ratio: float,
 ) -> tuple[Array, ...]:
     """Return sums over blocks around (x, y) [pixels]: stress, energy, energy × wavenumber, energy squared.
 
@@ -141,8 +187,11 @@ def _counted(
     inside = _within(high, qx, qy, radius, size) - _within(low, qx, qy, radius, size)
     scale = step * np.clip(radius, low * (1.0 + 1e-12), high * (1.0 - 1e-12)) / radius
     density = spectrum.density(scale * qx, scale * qy)
-    last = reach + 0.5 if math.isinf(high) else math.inf  # a spectrum that ends is all on the grid
-    on_grid = np.clip((last - np.abs(qx)) / size + 0.5, 0.0, 1.0) * np.clip((last - qy) / size + 0.5, 0.0, 1.0)
+    # a spectrum that ends is all on the grid
+    last = reach + 0.5 if math.isinf(high) else math.inf
+    on_grid = np.clip((last - np.abs(qx)) / size + 0.5, 0.0, 1.0) * np.clip(
+        (last - qy) / size + 0.5, 0.0, 1.0
+    )
     energy = compliance(qx, qy, 1.0, poisson_ratio) * on_grid * density
     # of the pixels in a square only those on the edge are inside in part
     square = energy**2 * inside * (1.0 - (1.0 - inside) / size)
@@ -159,7 +208,9 @@ def _within(edge: float, qx: Array, qy: Array, radius: Array, size: float) -> Ar
     depth = (edge - radius) / size - size / (24.0 * radius)
     far, near = 0.5 * (along + across), 0.5 * (along - across)
     ramps = [np.maximum(depth + shift, 0.0) ** 2 for shift in (far, near, -near, -far)]
-    return np.clip((ramps[0] - ramps[1] - ramps[2] + ramps[3]) / (2.0 * along * across), 0.0, 1.0)
+    return np.clip(
+        (ramps[0] - ramps[1] - ramps[2] + ramps[3]) / (2.0 * along * across), 0.0, 1.0
+    )
 
 
 #: Lags at which the autocorrelation of bands is compared.
@@ -167,7 +218,13 @@ _LAGS = 120
 
 #: Errors of a grouping but for that of a mean that relaxes.
 _ERRORS = tuple(
-    f"banded_error_{name}" for name in ("third_cumulant", "fourth_cumulant", "correlation_time", "autocorrelation")
+    f"banded_error_{name}"
+    for name in (
+        "third_cumulant",
+        "fourth_cumulant",
+        "correlation_time",
+        "autocorrelation",
+    )
 )
 
 #: Number of errors that a candidate's score adds up, each in units of what the tolerance allows.
@@ -233,19 +290,28 @@ def group(pairs: Pairs, power: int, tolerance: float, relaxing: bool = False) ->
     1 10000 0.010
     """
     if not pairs.weight.any():  # a ripple of no amplitude
-        return Bands(np.zeros(1), np.full(1, 2.0), pairs.wavenumber[:1], dict.fromkeys(_ERRORS, 0.0))
+        return Bands(
+            np.zeros(1),
+            np.full(1, 2.0),
+            pairs.wavenumber[:1],
+            dict.fromkeys(_ERRORS, 0.0),
+        )
     scaled = _Scaled.of(pairs, power, relaxing)
     live = [_Candidate.of(scaled, np.arange(scaled.weight.size), tolerance)]
     heap = [(-live[0].gain, 0)]
     alive = {0}
     while True:
         if sum(live[i].score for i in alive) < _SCORES:
-            bands = _merged(scaled, [live[i].entries for i in sorted(alive)], pairs, power)
+            bands = _merged(
+                scaled, [live[i].entries for i in sorted(alive)], pairs, power
+            )
             if max(bands.errors.values()) <= tolerance:
                 return bands
         gain, worst = heapq.heappop(heap)
         if gain == 0.0:
-            return _merged(scaled, [live[i].entries for i in sorted(alive)], pairs, power)
+            return _merged(
+                scaled, [live[i].entries for i in sorted(alive)], pairs, power
+            )
         alive.remove(worst)
         for part in live[worst].parts(scaled):
             alive.add(len(live))
@@ -277,7 +343,17 @@ class _Scaled:
 
     def score(self, sums: Array, tolerance: float) -> Array:
         """Return the sum of the four errors of bands with these sums of moments, each over its tolerance."""
-        s1, s2, s3, s4, by_rate, over_rate, by_rate_squared, once_by_rate, once_by_rate_squared = sums
+        (
+            s1,
+            s2,
+            s3,
+            s4,
+            by_rate,
+            over_rate,
+            by_rate_squared,
+            once_by_rate,
+            once_by_rate_squared,
+        ) = sums
         mean = by_rate / s2
         third = (s3 - s2 * (s2 / s1)) / self.totals[2]
         fourth = (s4 - s2 * (s2 / s1) ** 2) / self.totals[3]
@@ -327,10 +403,14 @@ class _Candidate:
 
 
 def _merged(scaled: _Scaled, groups: list[Indices], pairs: Pairs, power: int) -> Bands:
-    sums = np.stack([scaled.moments[:, entries].sum(axis=1) for entries in groups], axis=1)
+    sums = np.stack(
+        [scaled.moments[:, entries].sum(axis=1) for entries in groups], axis=1
+    )
     s1, s2, _, _, by_rate, *_ = sums
     rate = by_rate / s2
-    wavenumber = pairs.wavenumber.max() * (rate ** (1.0 / power) if power else np.ones_like(rate))
+    wavenumber = pairs.wavenumber.max() * (
+        rate ** (1.0 / power) if power else np.ones_like(rate)
+    )
     relative = (
         1.0 - float(np.sum(s2 * (s2 / s1))) / scaled.totals[2],
         1.0 - float(np.sum(s2 * (s2 / s1) ** 2)) / scaled.totals[3],
@@ -341,7 +421,12 @@ def _merged(scaled: _Scaled, groups: list[Indices], pairs: Pairs, power: int) ->
     if scaled.relaxing:
         errors["banded_error_relaxing_mean"] = _relaxation_error(scaled, 0, s1, rate)
     freedom = np.maximum(2.0 * s1 * (s1 / s2), 2.0)
-    return Bands(pairs.weight.max() * s2 / s1, freedom, wavenumber, {k: max(float(v), 0.0) for k, v in errors.items()})
+    return Bands(
+        pairs.weight.max() * s2 / s1,
+        freedom,
+        wavenumber,
+        {k: max(float(v), 0.0) for k, v in errors.items()},
+    )
 
 
 def _relaxation_error(scaled: _Scaled, moment: int, sums: Array, rate: Array) -> float:
@@ -353,17 +438,25 @@ def _relaxation_error(scaled: _Scaled, moment: int, sums: Array, rate: Array) ->
     edges = np.geomspace(slowest, 1.0 + 1e-12, 4001)
     place = np.clip(np.searchsorted(edges, scaled.rate, side="right") - 1, 0, 3999)
     part = np.bincount(place, scaled.moments[moment], 4000)
-    mean = np.bincount(place, scaled.moments[moment] * scaled.rate, 4000) / np.where(part > 0.0, part, 1.0)
+    mean = np.bincount(place, scaled.moments[moment] * scaled.rate, 4000) / np.where(
+        part > 0.0, part, 1.0
+    )
 
     def difference(lags: Array) -> Array:
         exact = np.sum(part * np.exp(-2.0 * mean * lags[:, np.newaxis]), axis=1)
-        return np.abs(exact - np.sum(sums * np.exp(-2.0 * rate * lags[:, np.newaxis]), axis=1))
+        return np.abs(
+            exact - np.sum(sums * np.exp(-2.0 * rate * lags[:, np.newaxis]), axis=1)
+        )
 
     lags = np.geomspace(1e-2, 20.0 / slowest, _LAGS)
     coarse = difference(lags)
     high = np.flatnonzero(coarse >= 0.95 * coarse.max())
-    near = np.linspace(lags[np.maximum(high - 1, 0)], lags[np.minimum(high + 1, _LAGS - 1)], 40)
-    return float(max(coarse.max(), difference(near.ravel()).max())) / scaled.totals[moment]
+    near = np.linspace(
+        lags[np.maximum(high - 1, 0)], lags[np.minimum(high + 1, _LAGS - 1)], 40
+    )
+    return (
+        float(max(coarse.max(), difference(near.ravel()).max())) / scaled.totals[moment]
+    )
 
 
 @dataclass(frozen=True)
@@ -406,9 +499,26 @@ class BandedProcess(Renewing):
     def _empty(self, members: int) -> Array:
         return np.zeros((members, self.bands.weight.size))
 
-    def _renew(self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise) -> Array:
+    def _renew(
+        self,
+        values: Array,
+        keep: Array,
+        renew: Array,
+        size: Array,
+        step: int,
+        noise: Noise,
+    ) -> Array:
         energy = np.empty((len(keep), len(values)))
-        _renew_bands(values, keep, renew, size, self.shapes, self.half_weight, *noise.at(step), energy)
+        _renew_bands(
+            values,
+            keep,
+            renew,
+            size,
+            self.shapes,
+            self.half_weight,
+            *noise.at(step),
+            energy,
+        )
         return energy
 
     @property
@@ -417,13 +527,28 @@ class BandedProcess(Renewing):
 
     def draws(self, state: Fluctuation, steps: range, noise: Noise) -> Draws:
         law = self.correlation
-        of_bands = self.shapes, self.half_weight, factors(law, self.wavenumber), law.by_slip, law.span
+        of_bands = (
+            self.shapes,
+            self.half_weight,
+            factors(law, self.wavenumber),
+            law.by_slip,
+            law.span,
+        )
         rules = *of_bands, self.mean, self.amplitude.relaxing, self._forgets_by_slip
-        return Draws(state.values.copy(), during(state.past.energy, len(steps) + 1), *rules, noise.at(steps.start))
+        return Draws(
+            state.values.copy(),
+            during(state.past.energy, len(steps) + 1),
+            *rules,
+            noise.at(steps.start),
+        )
 
     def known_errors(self) -> dict[str, float]:
         """Return the errors that banding adds to the mode sum of the cell, and the errors of the cell."""
-        return self.cell_errors | self.bands.errors | {"bands": float(self.bands.weight.size)}
+        return (
+            self.cell_errors
+            | self.bands.errors
+            | {"bands": float(self.bands.weight.size)}
+        )
 
 
 @inlined
@@ -442,7 +567,9 @@ def renew_band(x, keep, share, unit, shape, numbers):
     "void(float64[:,::1], float64[:,:,:], float64[:,:,:], float64[:,:], float64[::1], float64[::1],"
     " uint64, uint64, uint64[::1], int64, float64[:,::1])"
 )
-def _renew_bands(values, keep, renew, size, shapes, half_weight, seed, part, members, step, energy):
+def _renew_bands(
+    values, keep, renew, size, shapes, half_weight, seed, part, members, step, energy
+):
     """Advance all bands of all members in place by exact steps, and write their energy after each step."""
     many = keep.shape[2] > 1
     for m in range(members.size):
@@ -452,7 +579,14 @@ def _renew_bands(values, keep, renew, size, shapes, half_weight, seed, part, mem
             total, unit = 0.0, size[s, m % size.shape[1]]
             for k in range(shapes.size):
                 i = k if many else 0
-                x, numbers = renew_band(values[m, k], keep[s, row, i], renew[s, row, i], unit, shapes[k], numbers)
+                x, numbers = renew_band(
+                    values[m, k],
+                    keep[s, row, i],
+                    renew[s, row, i],
+                    unit,
+                    shapes[k],
+                    numbers,
+                )
                 values[m, k] = x
                 total += half_weight[k] * x
             energy[s, m] = total

@@ -46,11 +46,20 @@ class CarriedProcess(SmoothProcess):
         At ``position`` X [m] the pattern has moved by X. Under a disc the contact is in the middle of the pattern,
         without stress beyond the pattern. Otherwise the pattern is periodic.
         """
-        lattice, ahead = self.field.lattice, self.field.middle - self.field.begin if self.on_disc else 0.0
+        lattice, ahead = (
+            self.field.lattice,
+            self.field.middle - self.field.begin if self.on_disc else 0.0,
+        )
         places = lattice.sides[0] / lattice.shape[0] * np.arange(lattice.shape[0])
-        spectrum, (qx, _), nyquist = np.fft.rfft2(self.field.field), lattice.wavevectors, lattice.shape[0] // 2
+        spectrum, (qx, _), nyquist = (
+            np.fft.rfft2(self.field.field),
+            lattice.wavevectors,
+            lattice.shape[0] // 2,
+        )
         moved = np.empty((members, *lattice.shape))
-        positions, sizes = (np.broadcast_to(values, members) for values in (position, state.amplitude))
+        positions, sizes = (
+            np.broadcast_to(values, members) for values in (position, state.amplitude)
+        )
         for map_, x, size in zip(moved, positions, sizes, strict=True):
             turned = np.exp(-1j * qx * (x + ahead))
             if lattice.shape[0] % 2 == 0:  # the Nyquist row holds both signs
@@ -89,7 +98,9 @@ class Passing:
 
     @cached_property
     def _discs(self) -> list[Array]:
-        return [soft_disc(float(radius / self.field.pixels[0])) for radius in self.radii]
+        return [
+            soft_disc(float(radius / self.field.pixels[0])) for radius in self.radii
+        ]
 
     @cached_property
     def radii(self) -> Array:
@@ -105,8 +116,12 @@ class Passing:
             half = math.ceil(self.widest / pixel) + _AROUND
             padded = np.pad(self.field.field, half)
             window = padded[place : place + 2 * half, across : across + 2 * half]
-            energies = disc_energies_of_map(window, pixel, self.radii, 1.0, self.poisson_ratio, self._discs)
-            self._rows[place] = energies / self.field.surface_energy(1.0, self.poisson_ratio)
+            energies = disc_energies_of_map(
+                window, pixel, self.radii, 1.0, self.poisson_ratio, self._discs
+            )
+            self._rows[place] = energies / self.field.surface_energy(
+                1.0, self.poisson_ratio
+            )
         return self._rows[place]
 
     @cached_property
@@ -116,14 +131,24 @@ class Passing:
         last = self.field.shape[0]
         for row, x in zip(shares, self.position.flat, strict=True):
             place = (self.field.begin - x) / self.field.pixels[0]
-            nodes = [min(max(math.floor(place) + int(node), 0), last) for node in _NODES]
+            nodes = [
+                min(max(math.floor(place) + int(node), 0), last) for node in _NODES
+            ]
             s = place - math.floor(place)
             weights = (
-                -s * (s - 1.0) * (s - 2.0) / 6.0, (s + 1.0) * (s - 1.0) * (s - 2.0) / 2.0,
-                -(s + 1.0) * s * (s - 2.0) / 2.0, (s + 1.0) * s * (s - 1.0) / 6.0,
-            )  # fmt: skip
-            row[:] = sum(weight * self._row(node) for weight, node in zip(weights, nodes, strict=True) if weight != 0.0)
-        return scipy.interpolate.CubicSpline(np.log(self.radii), shares, axis=1).c.transpose(2, 0, 1)
+                -s * (s - 1.0) * (s - 2.0) / 6.0,
+                (s + 1.0) * (s - 1.0) * (s - 2.0) / 2.0,
+                -(s + 1.0) * s * (s - 2.0) / 2.0,
+                (s + 1.0) * s * (s - 1.0) / 6.0,
+            )
+            row[:] = sum(
+                weight * self._row(node)
+                for weight, node in zip(weights, nodes, strict=True)
+                if weight != 0.0
+            )
+        return scipy.interpolate.CubicSpline(
+            np.log(self.radii), shares, axis=1
+        ).c.transpose(2, 0, 1)
 
     @cached_property
     def _new(self) -> Array:
@@ -143,7 +168,10 @@ class Passing:
         shape = np.broadcast_shapes(self.position.shape, radius.shape)
         radii = np.broadcast_to(radius, shape).reshape(len(cubics), -1)
         low, step = self.radii[0], self._step
-        at = np.log(np.clip(np.nan_to_num(radii, nan=low), low, self.radii[-1]) / low) / step
+        at = (
+            np.log(np.clip(np.nan_to_num(radii, nan=low), low, self.radii[-1]) / low)
+            / step
+        )
         piece = np.minimum(at.astype(int), self.radii.size - 2)
         s = (at - piece) * step
         a, b, c, d = (np.take_along_axis(cubics[:, k], piece, axis=1) for k in range(4))
@@ -166,4 +194,6 @@ class Passing:
         low = float(self.radii[0])
         cubics = self._new.transpose(0, 2, 1) * self._step ** np.arange(3, -1, -1)
         ends = low, math.log(low), 1.0 / self._step
-        return [((0.0, 0.0, 0.0), ends, np.ascontiguousarray(cubic)) for cubic in cubics]
+        return [
+            ((0.0, 0.0, 0.0), ends, np.ascontiguousarray(cubic)) for cubic in cubics
+        ]

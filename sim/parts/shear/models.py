@@ -19,7 +19,14 @@ from sim.numerics import disk_cache, jit
 from sim.parts.exchange import Setting
 from sim.parts.shear.bands import BandedProcess, Bands, cell_pairs, group
 from sim.parts.shear.maps import CarriedProcess, Passing
-from sim.parts.shear.modes import FixedProcess, ModalProcess, SiteMean, SiteModes, cell_variance, modes
+from sim.parts.shear.modes import (
+    FixedProcess,
+    ModalProcess,
+    SiteMean,
+    SiteModes,
+    cell_variance,
+    modes,
+)
 from sim.parts.shear.process import Amplitude, Constant, Correlation, SmoothProcess
 from sim.spectrum.families import Ripple, Spectrum
 from sim.spectrum.family import Family
@@ -29,17 +36,42 @@ from sim.units.quantity import Quantity, keyed, tagged
 
 #: Side and points of a cell, Poisson's ratio; power of the rates, tolerance, and whether the amplitude relaxes.
 _CellOf = tuple[float, int | None, float, int, float, bool]
-Paid = Annotated[float, Quantity("1", "share of the fluctuation energy paid by adhesion", "chi", at_least=0, at_most=1)]
+Paid = Annotated[
+    float,
+    Quantity(
+        "1",
+        "share of the fluctuation energy paid by adhesion",
+        "chi",
+        at_least=0,
+        at_most=1,
+    ),
+]
 _Cell = Annotated[float, Quantity("m", "side of the periodic cell", "L", above=0)]
-_Tolerance = Annotated[float, Quantity("1", "tolerance of the errors of banding", "", above=0, below=1)]
+_Tolerance = Annotated[
+    float, Quantity("1", "tolerance of the errors of banding", "", above=0, below=1)
+]
 Contact = Annotated[
     Literal["plane", "disc"],
-    Field(description='"disc": energy per new area of a finite contact, instead of that of the plane'),
+    Field(
+        description='"disc": energy per new area of a finite contact, instead of that of the plane'
+    ),
 ]
 _ModeAmplitudes = Annotated[
-    Literal["gaussian", "fixed"], Field(description='"fixed": modes have a constant modulus, so the energy is constant')
+    Literal["gaussian", "fixed"],
+    Field(
+        description='"fixed": modes have a constant modulus, so the energy is constant'
+    ),
 ]
-_Points = Annotated[int, Quantity("1", "grid points along a side of the cell", at_least=2, at_most=2**14, whole=True)]
+_Points = Annotated[
+    int,
+    Quantity(
+        "1",
+        "grid points along a side of the cell",
+        at_least=2,
+        at_most=2**14,
+        whole=True,
+    ),
+]
 
 #: Mode pairs of a cell beyond which neither time nor memory suffices: those of a grid of 2048 × 2048.
 _MOST_PAIRS = 2**21
@@ -87,13 +119,23 @@ class ShearModel:
             message = 'fixed mode_amplitudes are never renewed; use mode_amplitudes = "gaussian" or relaxing = false'
             raise PydanticCustomError("fixed_cannot_relax", message)
         if self.spectrum.bond_made and law.model != "constant":
-            raise PydanticCustomError("bond_made", "the bonds set the amplitude of their field; omit amplitude")
-        if law.model == "slip_rate" and law.memory_length is None and math.isnan(self._memory):
+            raise PydanticCustomError(
+                "bond_made",
+                "the bonds set the amplitude of their field; omit amplitude",
+            )
+        if (
+            law.model == "slip_rate"
+            and law.memory_length is None
+            and math.isnan(self._memory)
+        ):
             message = 'slip_rate needs a memory distance: give memory_length, or shear.correlation.model = "slip"'
             raise PydanticCustomError("no_memory", message)
         if self.spectrum.bond_made and fixed:
             cure = "leave it out"
-            raise PydanticCustomError("bond_made", f'bonds at random places make mode_amplitudes = "gaussian"; {cure}')
+            raise PydanticCustomError(
+                "bond_made",
+                f'bonds at random places make mode_amplitudes = "gaussian"; {cure}',
+            )
         return self
 
     @property
@@ -118,19 +160,27 @@ class ShearModel:
         """Return the reason for the choice, in words; empty without a choice."""
         return ""
 
-    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> Process:
+    def process(
+        self, shear_modulus: float, poisson_ratio: float, cell: float
+    ) -> Process:
         """Return the process on a solid, by default with a ``cell`` of this side [m]."""
         raise NotImplementedError
 
-    def faults(self, shear_modulus: float, poisson_ratio: float, rest_radius: float) -> list[tuple[str, str]]:
+    def faults(
+        self, shear_modulus: float, poisson_ratio: float, rest_radius: float
+    ) -> list[tuple[str, str]]:
         """Return reasons why the process cannot be built on a solid and a contact at rest, each as (key, words)."""
         return []
 
-    def margin(self, solid: tuple[float, float], sphere_radius: float, widest: float) -> Margin | Passing:
+    def margin(
+        self, solid: tuple[float, float], sphere_radius: float, widest: float
+    ) -> Margin | Passing:
         """Return the share of ΔΓ that a contact of up to the ``widest`` radius [m] pays on a solid (G, ν)."""
         return _margin(self.spectrum, *solid, sphere_radius)
 
-    def off_the_map(self, positions: tuple[float, float], radius: float) -> list[tuple[str, str]]:
+    def off_the_map(
+        self, positions: tuple[float, float], radius: float
+    ) -> list[tuple[str, str]]:
         """Return reasons why a contact of a radius [m] cannot slide between two positions [m], as (key, words)."""
         return []
 
@@ -139,29 +189,51 @@ class ShearModel:
         return []
 
     def remarks(self, setting: Setting) -> list[str]:
-        spectrum, radius, solid = self.spectrum, setting.rest_radius, (setting.shear_modulus, setting.poisson_ratio)
-        plane, rms = float(spectrum.surface_energy(*solid)), math.sqrt(spectrum.variance)
+        spectrum, radius, solid = (
+            self.spectrum,
+            setting.rest_radius,
+            (setting.shear_modulus, setting.poisson_ratio),
+        )
+        plane, rms = (
+            float(spectrum.surface_energy(*solid)),
+            math.sqrt(spectrum.variance),
+        )
         if not plane > 0.0:
             return []
         remarks = list(spectrum.remarks)
         if self.paid_by_adhesion > 0.0:
-            remarks.append("adhesion pays for the stored energy: the paper's assumption (shear.paid_by_adhesion)")
+            remarks.append(
+                "adhesion pays for the stored energy: the paper's assumption (shear.paid_by_adhesion)"
+            )
             if spectrum.bond_made:
                 twice = "with paid_by_adhesion the energy counts twice"
-                remarks.append(f"friction already supplies the energy under each bond: {twice}")
-        longest, side = 2.0 * math.pi / max(spectrum.support[0], 1e-300), self.side(setting.cell)
+                remarks.append(
+                    f"friction already supplies the energy under each bond: {twice}"
+                )
+        longest, side = (
+            2.0 * math.pi / max(spectrum.support[0], 1e-300),
+            self.side(setting.cell),
+        )
         if spectrum.wavevector is None and side < longest < 1e300:
-            remarks.append("the spectrum has waves longer than the cell, which are omitted: give a larger shear.cell")
+            remarks.append(
+                "the spectrum has waves longer than the cell, which are omitted: give a larger shear.cell"
+            )
         if self.contact == "plane" and radius > 0.0:
             share = float(marginal_energy(spectrum, radius, *solid)) / plane
             long = min(longest, side) > 2.0 * radius
-            what = "the longest waves exceed the contact, which" if long else "a contact of this size"
+            what = (
+                "the longest waves exceed the contact, which"
+                if long
+                else "a contact of this size"
+            )
             off = f"{what} stores {share:.1%} of the fluctuation energy of the plane per new area"
             if abs(share - 1.0) > self.tolerance:
                 remarks.append(f'{off}: shear.contact = "disc" takes that into account')
         if not spectrum.bond_made and rms > setting.shear_modulus:
             times = f"{rms / setting.shear_modulus:.3g} times the shear modulus"
-            remarks.append(f"the rms of the fluctuations is {times}, beyond linear elasticity: check shear.spectrum")
+            remarks.append(
+                f"the rms of the fluctuations is {times}, beyond linear elasticity: check shear.spectrum"
+            )
         return remarks
 
 
@@ -177,7 +249,9 @@ class Uniform(ShearModel):
     model: Literal["uniform"] = "uniform"
     stays: ClassVar[bool] = True
 
-    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
+    def process(
+        self, shear_modulus: float, poisson_ratio: float, cell: float
+    ) -> SmoothProcess:
         return SmoothProcess(0.0, Constant())
 
 
@@ -200,15 +274,23 @@ class Mean(ShearModel):
 
     @property
     def stays(self) -> bool:  # type: ignore[override]
-        return self.amplitude.model == "constant" and self.contact == "plane" and not self.spectrum.bond_made
+        return (
+            self.amplitude.model == "constant"
+            and self.contact == "plane"
+            and not self.spectrum.bond_made
+        )
 
     @property
     def in_blocks(self) -> bool:  # type: ignore[override]
         return self.amplitude.model in _FOLLOWED and not self.spectrum.bond_made
 
-    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
+    def process(
+        self, shear_modulus: float, poisson_ratio: float, cell: float
+    ) -> SmoothProcess:
         kind = SiteMean if self.spectrum.bond_made else SmoothProcess
-        return kind(float(self.spectrum.surface_energy(shear_modulus, poisson_ratio)), self.law)
+        return kind(
+            float(self.spectrum.surface_energy(shear_modulus, poisson_ratio)), self.law
+        )
 
 
 @keyed()
@@ -239,16 +321,35 @@ class _Fluctuating(ShearModel):
     def side(self, cell: float) -> float:
         return cell if self.cell is None else self.cell
 
-    def faults(self, shear_modulus: float, poisson_ratio: float, rest_radius: float) -> list[tuple[str, str]]:
+    def faults(
+        self, shear_modulus: float, poisson_ratio: float, rest_radius: float
+    ) -> list[tuple[str, str]]:
         cell = self.side(math.sqrt(math.pi) * rest_radius)
         if self.contact == "disc" and self.draws_maps and not 2.0 * rest_radius <= cell:
             if math.isnan(rest_radius):
-                message = "there is no contact at rest, so the size of the cell is unknown"
-                return [("contact", f'{message}; move the sphere closer by a key of [contact], or give "plane"')]
+                message = (
+                    "there is no contact at rest, so the size of the cell is unknown"
+                )
+                return [
+                    (
+                        "contact",
+                        f'{message}; move the sphere closer by a key of [contact], or give "plane"',
+                    )
+                ]
             message = f"the cell of {cell:g} m is smaller than the contact: {2.0 * rest_radius:g} m wide at rest"
-            return [("cell", f'{message}; give shear.cell = "{2.2e6 * rest_radius:.3g} um" or more')]
+            return [
+                (
+                    "cell",
+                    f'{message}; give shear.cell = "{2.2e6 * rest_radius:.3g} um" or more',
+                )
+            ]
         if too_many := self.too_many_modes(cell):
-            return [("", f'{too_many}; take a smaller cell, longer waves or fewer points, or model = "mean"')]
+            return [
+                (
+                    "",
+                    f'{too_many}; take a smaller cell, longer waves or fewer points, or model = "mean"',
+                )
+            ]
         try:
             self.process(shear_modulus, poisson_ratio, cell)
         except PydanticCustomError as fault:
@@ -258,7 +359,11 @@ class _Fluctuating(ShearModel):
     def too_many_modes(self, cell: float) -> str:
         """Return the reason why the grid, or the smallest that holds the spectrum, is too large; empty if it is not."""
         ripple = self.spectrum.wavevector
-        waves = (max(map(abs, ripple)) if ripple else self.spectrum.support[1]) * cell / (2.0 * math.pi)
+        waves = (
+            (max(map(abs, ripple)) if ripple else self.spectrum.support[1])
+            * cell
+            / (2.0 * math.pi)
+        )
         if math.isfinite(waves) and waves > _MOST_WAVES:
             return f"the cell of {cell:g} m holds {waves:.2g} of the shortest waves along a side"
         reach = waves if self.points is None else min(waves, (self.points - 1) // 2)
@@ -277,8 +382,12 @@ class Modal(_Fluctuating):
 
     keeps_modes: ClassVar[bool] = True
 
-    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
-        free_or_fixed = FixedProcess if self.mode_amplitudes == "fixed" else ModalProcess
+    def process(
+        self, shear_modulus: float, poisson_ratio: float, cell: float
+    ) -> ModalProcess:
+        free_or_fixed = (
+            FixedProcess if self.mode_amplitudes == "fixed" else ModalProcess
+        )
         kind = SiteModes if self.spectrum.bond_made else free_or_fixed
         of_cell = modes(self.spectrum, self.side(cell), self.points)
         return kind(of_cell, shear_modulus, poisson_ratio, self.correlation, self.law)
@@ -295,7 +404,9 @@ class Mapped(Modal):
 
     draws_maps: ClassVar[bool] = True
 
-    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
+    def process(
+        self, shear_modulus: float, poisson_ratio: float, cell: float
+    ) -> ModalProcess:
         process = super().process(shear_modulus, poisson_ratio, cell)
         if not process.modes.on_lattice:
             message = "a map is periodic: make the cell a whole number of wavelengths along x and along y"
@@ -320,7 +431,9 @@ class Banded(_Fluctuating):
 
     @property
     def in_blocks(self) -> bool:  # type: ignore[override]
-        return self.amplitude.model in _FOLLOWED and not (self.amplitude.relaxing and self.correlation.power)
+        return self.amplitude.model in _FOLLOWED and not (
+            self.amplitude.relaxing and self.correlation.power
+        )
 
     @model_validator(mode="after")
     def _not_of_bonds(self) -> "Banded":
@@ -329,10 +442,19 @@ class Banded(_Fluctuating):
             raise PydanticCustomError("bond_made", message)
         return self
 
-    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> BandedProcess | SmoothProcess:
+    def process(
+        self, shear_modulus: float, poisson_ratio: float, cell: float
+    ) -> BandedProcess | SmoothProcess:
         spectrum, size = _of_unit_size(self.spectrum)
         power, relaxing = self.correlation.power, self.amplitude.relaxing
-        cell_of = self.side(cell), self.points, poisson_ratio, power, self.tolerance, relaxing
+        cell_of = (
+            self.side(cell),
+            self.points,
+            poisson_ratio,
+            power,
+            self.tolerance,
+            relaxing,
+        )
         unit, errors = _grouped(spectrum, cell_of)
         bands = replace(unit, weight=unit.weight * (size / shear_modulus))
         if self.mode_amplitudes == "fixed":
@@ -348,7 +470,8 @@ def _of_unit_size(spectrum: Family) -> tuple[Family, float]:
     return replace(spectrum, rms=1.0), spectrum.variance  # type: ignore[type-var]
 
 
-@functools.lru_cache(maxsize=20_000)  # as many as a sweep has points, each a few kilobytes
+# as many as a sweep has points, each a few kilobytes
+@functools.lru_cache(maxsize=20_000)
 def _grouped(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, float]]:
     """Return ``_grouped_anew``, from the disk if an earlier run has grouped the same modes."""
     key = jit.machine(), scipy.__version__, astuple(spectrum), cell_of  # type: ignore[call-overload]
@@ -364,7 +487,9 @@ def _grouped_anew(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, 
     spread = math.sqrt(float(np.sum(pairs.count * pairs.weight**2)))
     variance = spectrum.variance
     errors = {
-        "cell_error_variance": cell_variance(spectrum, cell, points) / variance - 1.0 if variance else 0.0,
+        "cell_error_variance": cell_variance(spectrum, cell, points) / variance - 1.0
+        if variance
+        else 0.0,
         "cell_error_energy": energy / infinite - 1.0 if infinite else 0.0,
         "member_spread_energy": spread / energy if energy else 0.0,
         "mode_pairs": float(np.sum(pairs.count)),
@@ -389,25 +514,41 @@ class Auto(_Fluctuating):
             If maps are recorded and no correlation is given.
         """
         if self.correlation is None and maps:
-            raise PydanticCustomError("maps_need_memory", "maps change in time: give shear.correlation")
+            raise PydanticCustomError(
+                "maps_need_memory", "maps change in time: give shear.correlation"
+            )
         fitting = Modal if self.spectrum.bond_made else Banded
-        kind: type[Mean | Banded | Modal] = Mean if self.correlation is None else Mapped if maps else fitting
-        return kind(**{key.name: getattr(self, key.name) for key in fields(kind) if key.name != "model"})
+        kind: type[Mean | Banded | Modal] = (
+            Mean if self.correlation is None else Mapped if maps else fitting
+        )
+        return kind(
+            **{
+                key.name: getattr(self, key.name)
+                for key in fields(kind)
+                if key.name != "model"
+            }
+        )
 
     def why(self, maps: bool) -> str:
         """Return the reason for the choice, in words."""
         if self.correlation is None:
-            return "no correlation is given, so the ensemble mean is exact, without noise"
+            return (
+                "no correlation is given, so the ensemble mean is exact, without noise"
+            )
         if maps:
             return "maps are recorded"
         if self.spectrum.bond_made:
-            return "the field of the bonds has a constant part, so each mode is computed"
+            return (
+                "the field of the bonds has a constant part, so each mode is computed"
+            )
         return "a correlation is given and no maps are recorded, so the energy over time is sufficient"
 
 
 #: Radius up to which energies on discs are found, over the largest of the contact without fluctuations.
 _BEYOND = 1.25
-_passing = functools.lru_cache(maxsize=8)(lambda field, ratio, widest: Passing(field, ratio, widest, np.zeros(1)))
+_passing = functools.lru_cache(maxsize=8)(
+    lambda field, ratio, widest: Passing(field, ratio, widest, np.zeros(1))
+)
 
 
 @keyed()
@@ -430,8 +571,12 @@ class Carried(ShearModel):
     @model_validator(mode="after")
     def _goes_with_the_contact(self) -> "Carried":
         if self.amplitude.relaxing:
-            raise PydanticCustomError("never_renewed", "a measured map does not change: give relaxing = false")
-        if self.contact == "disc" and (self.field.window != "none" or not self.field.square):
+            raise PydanticCustomError(
+                "never_renewed", "a measured map does not change: give relaxing = false"
+            )
+        if self.contact == "disc" and (
+            self.field.window != "none" or not self.field.square
+        ):
             message = 'a disc needs square pixels and no window; interpolate the map, or take contact = "plane"'
             raise PydanticCustomError("disc_of_map", message)
         if self.contact == "plane" and self.field.start is not None:
@@ -456,41 +601,80 @@ class Carried(ShearModel):
         """The radially averaged spectrum of the map."""
         return self.field.spectrum
 
-    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> CarriedProcess:
+    def process(
+        self, shear_modulus: float, poisson_ratio: float, cell: float
+    ) -> CarriedProcess:
         energy = self.field.surface_energy(shear_modulus, poisson_ratio)
         return CarriedProcess(energy, self.law, self.field, self.passes)
 
-    def margin(self, solid: tuple[float, float], sphere_radius: float, widest: float) -> Passing:
+    def margin(
+        self, solid: tuple[float, float], sphere_radius: float, widest: float
+    ) -> Passing:
         shorter = 0.5 * min(self.field.lattice.sides)
-        return _passing(self.field, solid[1], min(_BEYOND * widest or 0.5 * shorter, shorter))
+        return _passing(
+            self.field, solid[1], min(_BEYOND * widest or 0.5 * shorter, shorter)
+        )
 
-    def off_the_map(self, positions: tuple[float, float], radius: float) -> list[tuple[str, str]]:
-        (low, high), (length, width), begin = positions, self.field.lattice.sides, self.field.begin
+    def off_the_map(
+        self, positions: tuple[float, float], radius: float
+    ) -> list[tuple[str, str]]:
+        (low, high), (length, width), begin = (
+            positions,
+            self.field.lattice.sides,
+            self.field.begin,
+        )
         if 2.0 * radius > width:
-            return [("", f"the map is {width:g} m wide, the contact up to {2.0 * radius:g} m; give a wider map")]
+            return [
+                (
+                    "",
+                    f"the map is {width:g} m wide, the contact up to {2.0 * radius:g} m; give a wider map",
+                )
+            ]
         first, last = radius + high, length - radius + low
         if first <= begin <= last:
             return []
         message = f"the contact, {2.0 * radius:g} m wide, slides beyond the end of the map, which is {length:g} m long"
         if first <= last:
-            return [("", f'{message}; begin elsewhere: start = "{0.5e6 * (first + last):.4g} um"')]
-        return [("", f"{message}; shorten the slip to {max(length - 2.0 * radius, 0.0):.3g} m, or give a longer map")]
+            return [
+                (
+                    "",
+                    f'{message}; begin elsewhere: start = "{0.5e6 * (first + last):.4g} um"',
+                )
+            ]
+        return [
+            (
+                "",
+                f"{message}; shorten the slip to {max(length - 2.0 * radius, 0.0):.3g} m, or give a longer map",
+            )
+        ]
 
     def details(self, setting: Setting) -> list[tuple[str, str]]:
         field, solid = self.field, (setting.shear_modulus, setting.poisson_ratio)
-        energy, radial = field.surface_energy(*solid), float(field.spectrum.surface_energy(*solid))
+        energy, radial = (
+            field.surface_energy(*solid),
+            float(field.spectrum.surface_energy(*solid)),
+        )
         (nx, ny), (along, across) = field.shape, field.pixels
         size = f"{nx} × {ny} points of {along:.4g} m × {across:.4g} m along and across the sliding"
         less = f"{100.0 * abs(energy / radial - 1.0):.2g} % {'more' if energy > radial else 'less'}"
         mean = f"{field.mean:.4g} Pa, not part of the field; bonds at rest: {setting.strength:.4g} Pa"
-        rows = [("rms of the stress", f"{field.rms:.4g} Pa at amplitude 1"), ("map", size), ("mean of the map", mean)]
+        rows = [
+            ("rms of the stress", f"{field.rms:.4g} Pa at amplitude 1"),
+            ("map", size),
+            ("mean of the map", mean),
+        ]
         stored = f"{energy:.4g} J/m^2 at amplitude 1 of the map itself, {less} than that of its radial spectrum"
         rows.append(("stored energy", stored))
         if field.mask:
             rows.append(("inside of the contact", f"{field.inside:.1%} of the map"))
         if field.noise:
             noise = field.noise_energy(*solid)
-            rows.append(("noise of the map", f"seems to store {noise:.3g} J/m^2, {noise / energy:.1%} of that energy"))
+            rows.append(
+                (
+                    "noise of the map",
+                    f"seems to store {noise:.3g} J/m^2, {noise / energy:.1%} of that energy",
+                )
+            )
         return rows
 
 

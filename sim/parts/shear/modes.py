@@ -26,7 +26,14 @@ from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise, normal, stream
 from sim.parts.exchange import Array, Bonding, FieldLaw, Gammas, Indices, Motion
-from sim.parts.shear.process import Amplitude, Correlation, Fluctuation, Renewing, SmoothProcess, exponents
+from sim.parts.shear.process import (
+    Amplitude,
+    Correlation,
+    Fluctuation,
+    Renewing,
+    SmoothProcess,
+    exponents,
+)
 from sim.spectrum.family import Family
 
 #: Pairs below this share of the variance are left out: all of them together would not change a bit.
@@ -76,9 +83,15 @@ class Modes:
         ``½ G_x(q) · variance = G_x(q) C(q) / L²`` with C averaged over the pixel and G_x by
         ``sim.laws.halfspace.compliance``. The cell's mean ΔΓ is their sum.
         """
-        return 0.5 * compliance(self.qx, self.qy, shear_modulus, poisson_ratio) * self.variance
+        return (
+            0.5
+            * compliance(self.qx, self.qy, shear_modulus, poisson_ratio)
+            * self.variance
+        )
 
-    def errors(self, shear_modulus: float = 1.0, poisson_ratio: float = 0.5) -> dict[str, float]:
+    def errors(
+        self, shear_modulus: float = 1.0, poisson_ratio: float = 0.5
+    ) -> dict[str, float]:
         """Return the relative errors of the cell against the infinite plane, and the spreads of one realisation.
 
         The errors are those of the variance and of the mean ΔΓ. The spreads are the expected relative standard
@@ -87,7 +100,9 @@ class Modes:
         energy = float(np.sum(self.energies(shear_modulus, poisson_ratio)))
         infinite = float(self.spectrum.surface_energy(shear_modulus, poisson_ratio))
         return {
-            "cell_error_variance": _relative(float(np.sum(self.variance)), self.spectrum.variance),
+            "cell_error_variance": _relative(
+                float(np.sum(self.variance)), self.spectrum.variance
+            ),
             "cell_error_energy": _relative(energy, infinite),
             "member_spread_variance": _spread(self.variance),
             "member_spread_energy": _spread(self.energies(1.0, poisson_ratio)),
@@ -154,7 +169,13 @@ def modes(spectrum: Family, cell: float, points: int | None = None) -> Modes:
     return _frozen(spectrum, cell, points, ix, iy, step * ix, step * iy, 2 * share)
 
 
-def _frozen(spectrum: Family, cell: float, points: int, *arrays: NDArray, on_lattice: bool = True) -> Modes:
+def _frozen(
+    spectrum: Family,
+    cell: float,
+    points: int,
+    *arrays: NDArray,
+    on_lattice: bool = True,
+) -> Modes:
     """Return modes with read-only arrays, because callers share them."""
     for array in arrays:
         array.flags.writeable = False
@@ -166,7 +187,10 @@ def grid_reach(spectrum: Family, cell: float, points: int | None) -> tuple[int, 
     """Return the largest lattice index of modes of a spectrum, and the points of the grid; raise as ``modes``."""
     _, high = spectrum.support
     step = 2 * math.pi / cell
-    return _reach(None if math.isinf(high) else math.ceil(high / step * (1 - _TOUCH) - 0.5), points)
+    return _reach(
+        None if math.isinf(high) else math.ceil(high / step * (1 - _TOUCH) - 0.5),
+        points,
+    )
 
 
 def _reach(needed: int | None, points: int | None) -> tuple[int, int]:
@@ -177,7 +201,11 @@ def _reach(needed: int | None, points: int | None) -> tuple[int, int]:
             raise PydanticCustomError("points_needed", message)
         points = 2 * (needed + 1)
     elif points < 3:
-        raise PydanticCustomError("too_few_points", "points must be at least 3, not {points}", {"points": points})
+        raise PydanticCustomError(
+            "too_few_points",
+            "points must be at least 3, not {points}",
+            {"points": points},
+        )
     reach = (points - 1) // 2
     if needed is not None and needed > reach:
         message = f"the shortest wavelength needs at least {2 * needed + 1} points, not {points}"
@@ -186,7 +214,9 @@ def _reach(needed: int | None, points: int | None) -> tuple[int, int]:
     return (reach if needed is None else needed), points
 
 
-def _single(spectrum: Family, cell: float, points: int | None, wavevector: tuple[float, float]) -> Modes:
+def _single(
+    spectrum: Family, cell: float, points: int | None, wavevector: tuple[float, float]
+) -> Modes:
     """Return the single pair of a ripple, at the wavevector of the ripple."""
     qx, qy = wavevector
     size = math.hypot(qx, qy)
@@ -196,10 +226,18 @@ def _single(spectrum: Family, cell: float, points: int | None, wavevector: tuple
         qx, qy = -qx, -qy
     exact = np.array([qx, qy]) * cell / (2 * math.pi)
     nearest = np.rint(exact).astype(np.int64)
-    on_lattice = bool(np.all(np.abs(exact - nearest) <= _TOUCH * np.hypot(*exact)) and nearest.any())
+    on_lattice = bool(
+        np.all(np.abs(exact - nearest) <= _TOUCH * np.hypot(*exact)) and nearest.any()
+    )
     needed = nearest if on_lattice else np.ceil(np.abs(exact)).astype(np.int64)
     _, points = _reach(int(np.max(np.abs(needed))), points)
-    arrays = nearest[:1], nearest[1:], np.array([qx]), np.array([qy]), np.array([spectrum.variance])
+    arrays = (
+        nearest[:1],
+        nearest[1:],
+        np.array([qx]),
+        np.array([qy]),
+        np.array([spectrum.variance]),
+    )
     return _frozen(spectrum, cell, points, *arrays, on_lattice=on_lattice)
 
 
@@ -212,11 +250,15 @@ def cell_variance(spectrum: Family, cell: float, points: int | None = None) -> f
         return spectrum.variance
     reach, _ = grid_reach(spectrum, cell, points)
     step = 2 * math.pi / cell
-    whole, middle = (spectrum.pixels(side * step, 0)[0, 0] for side in (2 * reach + 1, 1))
+    whole, middle = (
+        spectrum.pixels(side * step, 0)[0, 0] for side in (2 * reach + 1, 1)
+    )
     return float(whole - middle)
 
 
-def half_lattice(spectrum: Family, cell: float, reach: int) -> tuple[Indices, Indices, Array]:
+def half_lattice(
+    spectrum: Family, cell: float, reach: int
+) -> tuple[Indices, Indices, Array]:
     """Return lattice indices and pixel variance of each pair up to ``reach``, without q = 0 and negligible pairs."""
     pixels = spectrum.pixels(2 * math.pi / cell, reach)
     ix, iy = (index.ravel() for index in np.mgrid[-reach : reach + 1, 0 : reach + 1])
@@ -267,14 +309,24 @@ class ModalProcess(Renewing):
     def _empty(self, members: int) -> Array:
         return np.zeros((members, 2, self.pairs))
 
-    def _renew(self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise) -> Array:
+    def _renew(
+        self,
+        values: Array,
+        keep: Array,
+        renew: Array,
+        size: Array,
+        step: int,
+        noise: Noise,
+    ) -> Array:
         energy = np.empty((len(keep), len(values)))
         renew_modes(values, keep, renew, size, self.weights, *noise.at(step), energy)
         return energy
 
     def _standard(self, state: Fluctuation) -> tuple[Array, Array]:
         """Return real and imaginary parts, shape (members, 2, pairs), and their size in units of the deviation."""
-        return state.values, 0.5 * (np.ones(1) if self.amplitude.relaxing else state.amplitude)
+        return state.values, 0.5 * (
+            np.ones(1) if self.amplitude.relaxing else state.amplitude
+        )
 
     def maps(self, state: Fluctuation, position: Array, members: int) -> Array:
         """Return stress maps τ1(x, y) of the first ``members``, shape (members, points, points) [Pa].
@@ -287,12 +339,17 @@ class ModalProcess(Renewing):
             first = first._replace(amplitude=state.amplitude[:members])
         parts, size = self._standard(first)
         points, shift = self.modes.points, 2.0 * np.pi / self.modes.cell * position
-        maps, shifts, sizes = np.empty((members, points, points)), *(np.broadcast_to(a, members) for a in (shift, size))
+        maps, shifts, sizes = (
+            np.empty((members, points, points)),
+            *(np.broadcast_to(a, members) for a in (shift, size)),
+        )
         try:
             half = self._spare.pop()
         except IndexError:  # the first map, or another thread has it
             half = np.empty((points, points // 2 + 1), dtype=complex)
-        for part, shift, amplitude, field in zip(parts, shifts, sizes, maps, strict=True):
+        for part, shift, amplitude, field in zip(
+            parts, shifts, sizes, maps, strict=True
+        ):
             spread_modes(part, amplitude, self.deviation, *self._places, shift, half)
             self.lattice.superpose(half, field)
         self._spare.append(half)
@@ -331,10 +388,16 @@ class FixedProcess(ModalProcess):
         phases = 2.0 * np.pi * noise.uniforms(motion.step, len(self.wavenumber))
         return Fluctuation(self._energy(amplitude), amplitude, phases, past)
 
-    def advance(self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[Fluctuation, Array]:
+    def advance(
+        self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise
+    ) -> tuple[Fluctuation, Array]:
         past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
         phases = state.values.copy()
-        turn_phases(phases, exponents(self.correlation, self.wavenumber, motions), *noise.at(motions.step))
+        turn_phases(
+            phases,
+            exponents(self.correlation, self.wavenumber, motions),
+            *noise.at(motions.step),
+        )
         energy = self._energy(amplitude)
         return Fluctuation(energy[-1], amplitude[-1], phases, past), energy
 
@@ -346,7 +409,9 @@ class FixedProcess(ModalProcess):
         return amplitude**2 * (2.0 * np.sum(self.weights))
 
     def _standard(self, state: Fluctuation) -> tuple[Array, Array]:
-        return np.stack([np.cos(state.values), np.sin(state.values)], axis=1), np.sqrt(0.5) * state.amplitude
+        return np.stack([np.cos(state.values), np.sin(state.values)], axis=1), np.sqrt(
+            0.5
+        ) * state.amplitude
 
     @property
     def gammas(self) -> Gammas:
@@ -395,10 +460,14 @@ def turn_phases(phases, exponents, seed, part, members, step):
             numbers = stream(seed, part, members[m], step + s, 0)
             for k in range(phases.shape[1]):
                 turn, numbers = normal(numbers)
-                phases[m, k] += math.sqrt(2.0 * exponents[s, row, k if many else 0]) * turn
+                phases[m, k] += (
+                    math.sqrt(2.0 * exponents[s, row, k if many else 0]) * turn
+                )
 
 
-@kernel("void(float64[:,::1], float64, float64[::1], int32[::1], int32[::1], float64, complex128[:,::1])")
+@kernel(
+    "void(float64[:,::1], float64, float64[::1], int32[::1], int32[::1], float64, complex128[:,::1])"
+)
 def spread_modes(parts, size, deviation, rows, places, shift, half):
     """Write a half spectrum that has the amplitudes of mode pairs at their places, each turned by exp(−i ix shift)."""
     points = len(half)
@@ -410,7 +479,9 @@ def spread_modes(parts, size, deviation, rows, places, shift, half):
     for k in range(places.size):
         turn, unit = turns[np.uint64(rows[k])], size * deviation[k]
         x, y = unit * parts[0, k], unit * parts[1, k]
-        flat[np.uint64(places[k])] = complex(x * turn.real - y * turn.imag, x * turn.imag + y * turn.real)
+        flat[np.uint64(places[k])] = complex(
+            x * turn.real - y * turn.imag, x * turn.imag + y * turn.real
+        )
     for j in range(1, (points + 1) // 2):  # the first column holds both of a pair
         half[points - j, 0] = half[j, 0].conjugate()
 
@@ -432,26 +503,44 @@ class SiteModes(ModalProcess):
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         parts, sizes = np.zeros((len(noise.members), 4, self.pairs)), _sizes(bonding)
-        whole, energy = (np.zeros((1, 1, 1)), np.ones((1, 1, 1))), np.empty((1, len(parts)))
-        renew_modes(parts, *whole, np.ones((1, 1)), self.weights, *noise.at(motion.step), energy)
+        whole, energy = (
+            (np.zeros((1, 1, 1)), np.ones((1, 1, 1))),
+            np.empty((1, len(parts))),
+        )
+        renew_modes(
+            parts, *whole, np.ones((1, 1)), self.weights, *noise.at(motion.step), energy
+        )
         _renew_sites(parts, *whole, sizes, self.weights, *noise.at(motion.step), energy)
         return Fluctuation(energy[0], sizes[:, 0].T, parts, expected=energy[0])
 
-    def advance(self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[Fluctuation, Array]:
+    def advance(
+        self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise
+    ) -> tuple[Fluctuation, Array]:
         parts, sizes = state.values.copy(), _sizes(bonding)
         energy = np.empty((len(motions.time), len(parts)))
-        _renew_sites(parts, *self._shares(motions), sizes, self.weights, *noise.at(motions.step), energy)
+        _renew_sites(
+            parts,
+            *self._shares(motions),
+            sizes,
+            self.weights,
+            *noise.at(motions.step),
+            energy,
+        )
         expected = state.energy if self.correlation.by_slip else energy[-1]
         return Fluctuation(energy[-1], sizes[:, -1].T, parts, expected=expected), energy
 
     def _standard(self, state: Fluctuation) -> tuple[Array, Array]:
         frozen, varying = state.amplitude.T[:, :, np.newaxis, np.newaxis]
-        return frozen * state.values[:, :2] + varying * state.values[:, 2:], np.array([0.5])
+        return frozen * state.values[:, :2] + varying * state.values[:, 2:], np.array(
+            [0.5]
+        )
 
 
 def _sizes(bonding: Bonding) -> Array:
     """Return the sizes of frozen and renewed part, shape (2, steps, 1) or (2, steps, members), or of a single step."""
-    sizes = np.sqrt(np.stack([np.atleast_2d(bonding.frozen), np.atleast_2d(bonding.varying)]))
+    sizes = np.sqrt(
+        np.stack([np.atleast_2d(bonding.frozen), np.atleast_2d(bonding.varying)])
+    )
     sizes[0] *= np.where(bonding.stress < 0.0, -1.0, 1.0)
     return sizes
 
@@ -475,8 +564,12 @@ def _renew_sites(parts, keep, renew, sizes, weights, seed, part, members, step, 
                 first, numbers = normal(numbers)
                 second, numbers = normal(numbers)
                 i = k if many else 0
-                parts[m, 2, k] = keep[s, row, i] * parts[m, 2, k] + renew[s, row, i] * first
-                parts[m, 3, k] = keep[s, row, i] * parts[m, 3, k] + renew[s, row, i] * second
+                parts[m, 2, k] = (
+                    keep[s, row, i] * parts[m, 2, k] + renew[s, row, i] * first
+                )
+                parts[m, 3, k] = (
+                    keep[s, row, i] * parts[m, 3, k] + renew[s, row, i] * second
+                )
                 x = frozen * parts[m, 0, k] + varying * parts[m, 2, k]
                 y = frozen * parts[m, 1, k] + varying * parts[m, 3, k]
                 total += weights[k] * (x * x + y * y)

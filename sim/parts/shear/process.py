@@ -19,9 +19,20 @@ from sim.parts.exchange import Array, Bonding, Draws, FieldLaw, Gammas, Memory, 
 from sim.units.quantity import Quantity, keyed
 
 _Memory = Annotated[
-    float, Quantity("m", "memory length of the fluctuations, by default the correlation length", "l_m", above=0)
+    float,
+    Quantity(
+        "m",
+        "memory length of the fluctuations, by default the correlation length",
+        "l_m",
+        above=0,
+    ),
 ]
-Relaxing = Annotated[bool, Field(description="true: the amplitude changes only as the correlation renews the field")]
+Relaxing = Annotated[
+    bool,
+    Field(
+        description="true: the amplitude changes only as the correlation renews the field"
+    ),
+]
 #: Memory of a law that depends on the moment alone.
 NO_PAST = Memory()
 
@@ -46,11 +57,15 @@ class _OfTheMoment:
         """Return the memory of the past at t = 0, and g [1]."""
         return NO_PAST, self.factor(motion.speed, stress)
 
-    def followed(self, past: Memory, motions: Motion, stress: Array) -> tuple[Memory, Array]:
+    def followed(
+        self, past: Memory, motions: Motion, stress: Array
+    ) -> tuple[Memory, Array]:
         """Return the memory of the past after a block of steps, and g [1] at the end of each."""
         return past, self.factor(motions.speed, stress)
 
-    def field_law(self, energy: float, rates: tuple[float, float] | None = (0.0, 0.0)) -> FieldLaw:
+    def field_law(
+        self, energy: float, rates: tuple[float, float] | None = (0.0, 0.0)
+    ) -> FieldLaw:
         """Return the numbers of a field of this mean energy [J/m²], whose ``rates`` are None if each mode has its own.
 
         The rates are those of ``FieldLaw``.
@@ -79,9 +94,19 @@ class Onset(_OfTheMoment):
     at once.
     """
 
-    speed: Annotated[float, Quantity("m/s", "speed at the onset of the fluctuations", "V_0", above=0)]
-    width: Annotated[float, Quantity("1", "width of the onset in the logarithm of speed", "b", above=0)]
-    floor: Annotated[float, Quantity("1", "share of the rms far below the onset", "g_0", at_least=0, at_most=1)] = 0.0
+    speed: Annotated[
+        float, Quantity("m/s", "speed at the onset of the fluctuations", "V_0", above=0)
+    ]
+    width: Annotated[
+        float,
+        Quantity("1", "width of the onset in the logarithm of speed", "b", above=0),
+    ]
+    floor: Annotated[
+        float,
+        Quantity(
+            "1", "share of the rms far below the onset", "g_0", at_least=0, at_most=1
+        ),
+    ] = 0.0
     relaxing: Relaxing = False
     model: Literal["onset"] = "onset"
 
@@ -91,7 +116,9 @@ class Onset(_OfTheMoment):
 
 @law
 def _onset(speed, onset, exponent, floor):
-    return floor + (1.0 - floor) * (1.0 / (1.0 + math.pow(math.fabs(speed) / onset, exponent)))
+    return floor + (1.0 - floor) * (
+        1.0 / (1.0 + math.pow(math.fabs(speed) / onset, exponent))
+    )
 
 
 @keyed()
@@ -100,7 +127,12 @@ class Stress(_OfTheMoment):
 
     reads_stress: ClassVar[bool] = True
 
-    reference: Annotated[float, Quantity("Pa", "mean shear stress at the rms of the spectrum", "tau_ref", above=0)]
+    reference: Annotated[
+        float,
+        Quantity(
+            "Pa", "mean shear stress at the rms of the spectrum", "tau_ref", above=0
+        ),
+    ]
     relaxing: Relaxing = False
     model: Literal["stress"] = "stress"
 
@@ -127,12 +159,21 @@ class SlipRate(_OfTheMoment):
     remembers: ClassVar[bool] = True
 
     memory_length: _Memory | None = None
-    floor: Annotated[float, Quantity("1", "share of the rms in steady sliding", "g_0", at_least=0, at_most=1)] = 0.0
+    floor: Annotated[
+        float,
+        Quantity(
+            "1", "share of the rms in steady sliding", "g_0", at_least=0, at_most=1
+        ),
+    ] = 0.0
     relaxing: Relaxing = False
     model: Literal["slip_rate"] = "slip_rate"
 
     def within(self, length: float) -> Self:
-        return self if self.memory_length is not None else dataclasses.replace(self, memory_length=length)
+        return (
+            self
+            if self.memory_length is not None
+            else dataclasses.replace(self, memory_length=length)
+        )
 
     def factor(self, speed: Array, stress: Array) -> Array:
         return np.full(speed.shape, self.floor)
@@ -141,22 +182,40 @@ class SlipRate(_OfTheMoment):
         none = np.zeros(motion.speed.shape)
         return Memory(none, none, none, none), self.factor(motion.speed, stress)
 
-    def followed(self, past: Memory, motions: Motion, stress: Array) -> tuple[Memory, Array]:
+    def followed(
+        self, past: Memory, motions: Motion, stress: Array
+    ) -> tuple[Memory, Array]:
         if motions.memory.weight.size:
-            past, (weight, mean, spread, *_) = Memory(*(values[-1] for values in motions.memory)), motions.memory
-            unsteady = np.where(spread > 0.0, spread, 0.0) / np.where(spread > 0.0, spread + weight * mean * mean, 1.0)
+            past, (weight, mean, spread, *_) = (
+                Memory(*(values[-1] for values in motions.memory)),
+                motions.memory,
+            )
+            unsteady = np.where(spread > 0.0, spread, 0.0) / np.where(
+                spread > 0.0, spread + weight * mean * mean, 1.0
+            )
         else:
             columns, unsteady = np.stack(past[:3], axis=1), np.empty(motions.path.shape)
             spread = motions.unsteady + np.zeros(motions.path.shape)
-            _remember(columns, motions.path, motions.duration.ravel(), spread, self.memory_length, unsteady)
+            _remember(
+                columns,
+                motions.path,
+                motions.duration.ravel(),
+                spread,
+                self.memory_length,
+                unsteady,
+            )
             past = past._replace(**dict(zip(Memory._fields, columns.T, strict=False)))
         return past, np.sqrt(self.floor**2 + (1.0 - self.floor**2) * unsteady)
 
-    def field_law(self, energy: float, rates: tuple[float, float] | None = (0.0, 0.0)) -> FieldLaw:
+    def field_law(
+        self, energy: float, rates: tuple[float, float] | None = (0.0, 0.0)
+    ) -> FieldLaw:
         memory = cast(float, self.memory_length), self.floor**2
         if rates is None:
             return FieldLaw(*memory)
-        return FieldLaw(*memory, *rates, float(self.relaxing and any(rates)), energy, 1.0)
+        return FieldLaw(
+            *memory, *rates, float(self.relaxing and any(rates)), energy, 1.0
+        )
 
 
 @device
@@ -171,14 +230,20 @@ def remembered(memory, path, duration, unsteady, length):
     weight, mean, spread = memory
     renewed = -math.expm1(-path / length)
     share = renewed * length / path if renewed > 0.0 else 1.0
-    weight, spread, gained = weight * (1.0 - renewed), spread * (1.0 - renewed), duration * share
+    weight, spread, gained = (
+        weight * (1.0 - renewed),
+        spread * (1.0 - renewed),
+        duration * share,
+    )
     further = path / duration - mean
     spread += share * unsteady + weight * gained / (weight + gained) * further * further
     mean += further * gained / (weight + gained)
     return weight + gained, mean, spread
 
 
-@kernel("void(float64[:, ::1], float64[:,:], float64[:], float64[:,:], float64, float64[:, ::1])")
+@kernel(
+    "void(float64[:, ::1], float64[:,:], float64[:], float64[:,:], float64, float64[:, ::1])"
+)
 def _remember(past, path, duration, spent, length, unsteady):
     """Update the memory of each row in place, step by step, and write the unsteadiness after each step."""
     for m in range(len(past)):
@@ -189,7 +254,9 @@ def _remember(past, path, duration, spent, length, unsteady):
         past[m, 0], past[m, 1], past[m, 2] = memory
 
 
-Amplitude = Annotated[Constant | Onset | Stress | SlipRate, Field(discriminator="model")]
+Amplitude = Annotated[
+    Constant | Onset | Stress | SlipRate, Field(discriminator="model")
+]
 
 
 @keyed()
@@ -200,7 +267,9 @@ class Time:
     power: ClassVar[int] = 0
     by_slip: ClassVar[bool] = False
 
-    time: Annotated[float, Quantity("s", "correlation time of the fluctuations", "t_m", above=0)]
+    time: Annotated[
+        float, Quantity("s", "correlation time of the fluctuations", "t_m", above=0)
+    ]
     model: Literal["time"] = "time"
 
     @property
@@ -216,7 +285,9 @@ class Slip:
     power: ClassVar[int] = 0
     by_slip: ClassVar[bool] = True
 
-    length: Annotated[float, Quantity("m", "correlation length of the fluctuations", "l", above=0)]
+    length: Annotated[
+        float, Quantity("m", "correlation length of the fluctuations", "l", above=0)
+    ]
     model: Literal["slip"] = "slip"
 
     @property
@@ -231,7 +302,12 @@ class Wave:
     power: ClassVar[int] = 1
     by_slip: ClassVar[bool] = True
 
-    waves: Annotated[float, Quantity("1", "number of wavelengths after which a mode is renewed", "n", above=0)]
+    waves: Annotated[
+        float,
+        Quantity(
+            "1", "number of wavelengths after which a mode is renewed", "n", above=0
+        ),
+    ]
     model: Literal["wave"] = "wave"
 
     @property
@@ -246,7 +322,9 @@ class Diffusion:
     power: ClassVar[int] = 2
     by_slip: ClassVar[bool] = False
 
-    diffusivity: Annotated[float, Quantity("m^2/s", "diffusivity of the fluctuations", "D", above=0)]
+    diffusivity: Annotated[
+        float, Quantity("m^2/s", "diffusivity of the fluctuations", "D", above=0)
+    ]
     model: Literal["diffusion"] = "diffusion"
 
     @property
@@ -307,9 +385,13 @@ class SmoothProcess:
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         past, amplitude = self.amplitude.started(motion, bonding.strength)
-        return Fluctuation(self._level(amplitude, bonding), amplitude, np.empty(0), past)
+        return Fluctuation(
+            self._level(amplitude, bonding), amplitude, np.empty(0), past
+        )
 
-    def advance(self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[Fluctuation, Array]:
+    def advance(
+        self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise
+    ) -> tuple[Fluctuation, Array]:
         past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
         energy = self._level(amplitude, bonding)
         return Fluctuation(energy[-1], amplitude[-1], np.empty(0), past), energy
@@ -325,8 +407,19 @@ class SmoothProcess:
     def draws(self, state: Fluctuation, steps: range, noise: Noise) -> Draws:
         """Return what a compiled loop needs to follow the energy in some ``steps``, which it does not draw."""
         none, members = np.empty(0), len(noise.members)
-        energy, constant = np.empty((len(steps) + 1, members)), (True, 1.0, self.energy, self.amplitude.relaxing, False)
-        return Draws(np.empty((members, 0)), energy, none, none, none, *constant, noise.at(steps.start))
+        energy, constant = (
+            np.empty((len(steps) + 1, members)),
+            (True, 1.0, self.energy, self.amplitude.relaxing, False),
+        )
+        return Draws(
+            np.empty((members, 0)),
+            energy,
+            none,
+            none,
+            none,
+            *constant,
+            noise.at(steps.start),
+        )
 
     @property
     def gammas(self) -> Gammas:
@@ -367,8 +460,12 @@ class Renewing:
         """
         terms, none = self.gammas, np.zeros(path.shape)
         motion = Motion(0, none, np.full(path.shape, duration), path, path, none, none)
-        renewed = -np.expm1(-2.0 * exponents(self.correlation, terms.wavenumber, motion))
-        return np.asarray(np.sqrt(2.0 * np.sum(terms.shape * terms.weight**2 * renewed, axis=-1)))
+        renewed = -np.expm1(
+            -2.0 * exponents(self.correlation, terms.wavenumber, motion)
+        )
+        return np.asarray(
+            np.sqrt(2.0 * np.sum(terms.shape * terms.weight**2 * renewed, axis=-1))
+        )
 
     @cached_property
     def field_law(self) -> FieldLaw:
@@ -381,7 +478,15 @@ class Renewing:
         """Return the numbers of a state without any fluctuation."""
         raise NotImplementedError
 
-    def _renew(self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise) -> Array:
+    def _renew(
+        self,
+        values: Array,
+        keep: Array,
+        renew: Array,
+        size: Array,
+        step: int,
+        noise: Noise,
+    ) -> Array:
         """Renew a share of the numbers at a size, in place, step by step, and return their energy after each step.
 
         Shares have the shape (steps, 1 or members, 1 or numbers of a member), sizes (steps, 1 or members), energies
@@ -393,26 +498,60 @@ class Renewing:
         past, amplitude = self.amplitude.started(motion, bonding.strength)
         size = amplitude if self.amplitude.relaxing else np.ones(1)
         values = self._empty(len(noise.members))
-        energy = self._renew(values, np.zeros((1, 1, 1)), np.ones((1, 1, 1)), size[np.newaxis], motion.step, noise)
+        energy = self._renew(
+            values,
+            np.zeros((1, 1, 1)),
+            np.ones((1, 1, 1)),
+            size[np.newaxis],
+            motion.step,
+            noise,
+        )
         first = self._scaled(amplitude, energy[0])
-        return Fluctuation(first, amplitude, values, past._replace(energy=energy[0]), first)
+        return Fluctuation(
+            first, amplitude, values, past._replace(energy=energy[0]), first
+        )
 
-    def advance(self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise) -> tuple[Fluctuation, Array]:
+    def advance(
+        self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise
+    ) -> tuple[Fluctuation, Array]:
         past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
-        size, (keep, renew) = renewed_size(self.amplitude, state, motions, amplitude), self._shares(motions)
-        if self.amplitude.relaxing and self.field_law.follows and motions.memory.renewed.size:
-            renew, size = np.sqrt(motions.memory.renewed)[..., np.newaxis], np.ones((1, 1))
+        size, (keep, renew) = (
+            renewed_size(self.amplitude, state, motions, amplitude),
+            self._shares(motions),
+        )
+        if (
+            self.amplitude.relaxing
+            and self.field_law.follows
+            and motions.memory.renewed.size
+        ):
+            renew, size = (
+                np.sqrt(motions.memory.renewed)[..., np.newaxis],
+                np.ones((1, 1)),
+            )
             keep, size = keep + np.zeros(renew.shape), size + np.zeros((len(renew), 1))
         draws = motions.draws  # without rows if the loop of the drive draws nothing
         values = draws.values if len(draws.values) else state.values.copy()
-        drawn = draws.energy[1:] if len(draws.values) else self._renew(values, keep, renew, size, motions.step, noise)
+        drawn = (
+            draws.energy[1:]
+            if len(draws.values)
+            else self._renew(values, keep, renew, size, motions.step, noise)
+        )
         energy = expected = self._scaled(amplitude, drawn)
         if self._forgets_by_slip:
             before = drawn[-2] if len(drawn) > 1 else state.past.energy
             if keep.shape[2] == 1:
-                before = keep[-1, :, 0] ** 2 * before + (renew[-1, :, 0] * size[-1]) ** 2 * self.mean
+                before = (
+                    keep[-1, :, 0] ** 2 * before
+                    + (renew[-1, :, 0] * size[-1]) ** 2 * self.mean
+                )
             expected = self._scaled(amplitude[-1:], before[np.newaxis])
-        return Fluctuation(energy[-1], amplitude[-1], values, past._replace(energy=drawn[-1]), expected[-1]), energy
+        return Fluctuation(
+            energy[-1],
+            amplitude[-1],
+            values,
+            past._replace(energy=drawn[-1]),
+            expected[-1],
+        ), energy
 
     def _shares(self, motions: Motion) -> tuple[Array, Array]:
         """Return the shares of a number that a step keeps and renews, whose squares add up to one."""
@@ -426,7 +565,9 @@ class Renewing:
         return energy if self.amplitude.relaxing else amplitude**2 * energy
 
 
-def renewed_size(law: Amplitude, state: Fluctuation, motions: Motion, amplitude: Array) -> Array:
+def renewed_size(
+    law: Amplitude, state: Fluctuation, motions: Motion, amplitude: Array
+) -> Array:
     """Return the amplitude of the part that a step renews: 1 unless it relaxes.
 
     If it relaxes, its square is the mean of those at the two ends of the step: second order in the step. The start of

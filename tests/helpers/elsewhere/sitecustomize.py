@@ -15,7 +15,15 @@ import types
 
 HIDDEN_MODULES = {"fcntl", "resource", "pwd", "grp", "termios"}
 HIDDEN_NAMES = {
-    os: ("fork", "sched_getaffinity", "O_NOFOLLOW", "O_NONBLOCK", "getuid", "geteuid", "mkfifo"),
+    os: (
+        "fork",
+        "sched_getaffinity",
+        "O_NOFOLLOW",
+        "O_NONBLOCK",
+        "getuid",
+        "geteuid",
+        "mkfifo",
+    ),
     signal: ("SIGHUP", "SIGUSR1", "SIGXCPU", "pthread_sigmask"),
 }
 
@@ -36,7 +44,9 @@ def _hide(module, names):
     class Hidden(types.ModuleType):
         def __getattribute__(self, name):
             if name in names and _asks(1):
-                raise AttributeError(f"module {module.__name__!r} has no attribute {name!r}")
+                raise AttributeError(
+                    f"module {module.__name__!r} has no attribute {name!r}"
+                )
             return super().__getattribute__(name)
 
     module.__class__ = Hidden

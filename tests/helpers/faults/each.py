@@ -15,7 +15,18 @@ import struct
 import sys
 from pathlib import Path
 
-CALLS = ("open", "write", "pwrite", "ftruncate", "rename", "fsync", "mkdir", "unlink", "link", "flock")
+CALLS = (
+    "open",
+    "write",
+    "pwrite",
+    "ftruncate",
+    "rename",
+    "fsync",
+    "mkdir",
+    "unlink",
+    "link",
+    "flock",
+)
 _WRITES = ("write", "pwrite", "ftruncate", "rename", "fsync")
 ERRORS = (errno.ENOSPC, errno.EIO)
 #: Calls of a large dataset of which one fails, because each fault of it takes seconds.
@@ -104,19 +115,32 @@ def cases(counts, calls, all_of_them, thinned=1):
         if number % thinned == 1 % thinned or number > counts[call] - thinned
     ]
     chosen = {call: counts[call] if call in _WRITES else 1 for call in calls}
-    return every if all_of_them else [case for case in every if case[1:] == (chosen[case[0]], False, errno.ENOSPC)]
+    return (
+        every
+        if all_of_them
+        else [
+            case for case in every if case[1:] == (chosen[case[0]], False, errno.ENOSPC)
+        ]
+    )
 
 
 def tell(case, reason, text):
     """Print a fault that ended wrong."""
     call, number, onward, error = case
     fault = f"{call} {number}{'+' if onward else ''} {errno.errorcode[error]}"
-    print(json.dumps({"fault": fault, "reason": reason, "text": text[-600:]}), flush=True)
+    print(
+        json.dumps({"fault": fault, "reason": reason, "text": text[-600:]}), flush=True
+    )
 
 
 def main(state, calls, all_of_them, words, again, large):
     """Let calls fail, all of them or one of each kind, and then run ``again``, which must write the output."""
-    folder, faults, failed, made = Path(os.environ["FAULTS_FOLDER"]), Faults(state), 0, 0
+    folder, faults, failed, made = (
+        Path(os.environ["FAULTS_FOLDER"]),
+        Faults(state),
+        0,
+        0,
+    )
     output = folder / "out.nc"
 
     def begin():
@@ -129,7 +153,8 @@ def main(state, calls, all_of_them, words, again, large):
 
         dataset.IN_MEMORY = 0
     begin()
-    assert not here(words)  # in this process, so that those of the faults have all modules and kernels
+    # in this process, so that those of the faults have all modules and kernels
+    assert not here(words)
     begin()
     ended, text = command(words)
     assert not ended, text
@@ -140,13 +165,18 @@ def main(state, calls, all_of_them, words, again, large):
         ended, text = command(words)
         met = faults.counts()[case[0]] >= case[1]
         faults.arm()
-        reason = wrong(ended, text, output, whole) or ("" if met or not ended else "failed without a fault")
+        reason = wrong(ended, text, output, whole) or (
+            "" if met or not ended else "failed without a fault"
+        )
         if not reason and ended:
             ended, later = command(again)
-            reason = wrong(ended, later, output, whole) or (f"then {ended}: {later}" if ended else "")
+            reason = wrong(ended, later, output, whole) or (
+                f"then {ended}: {later}" if ended else ""
+            )
             left = sorted(path.name for path in folder.iterdir())
             reason = reason or ("" if left == [output.name] else f"left {left}")
-        made += met  # a lock that is asked for once more makes a call that others do not make
+        # a lock that is asked for once more makes a call that others do not make
+        made += met
         failed += bool(reason)
         if reason:
             tell(case, reason, text)
@@ -157,7 +187,12 @@ def study(state, all_of_them, words):
     """Let calls of a study fail that replaces a dataset and a picture; each of them is the old one or the new one."""
     from sim.study import converge
 
-    folder, faults, made, failed = Path(os.environ["FAULTS_FOLDER"]), Faults(state), 0, 0
+    folder, faults, made, failed = (
+        Path(os.environ["FAULTS_FOLDER"]),
+        Faults(state),
+        0,
+        0,
+    )
     older = {"out.nc": b"older dataset", "out.png": b"older picture"}
 
     def content():
@@ -177,7 +212,8 @@ def study(state, all_of_them, words):
     compute, results = converge.converge, []
     converge.converge = keep  # because measured times differ from run to run
     begin()
-    with contextlib.redirect_stdout(sys.stderr):  # because only faults are told on the standard output
+    # because only faults are told on the standard output
+    with contextlib.redirect_stdout(sys.stderr):
         assert not here(words)
     begin()
     ended, text = command(words)
@@ -190,10 +226,17 @@ def study(state, all_of_them, words):
         met = faults.counts()[case[0]] >= case[1]
         faults.arm()
         now = content()
-        reason = wrong(ended, text, folder / "out.nc", newer["out.nc"] if not ended else now["out.nc"])
+        reason = wrong(
+            ended,
+            text,
+            folder / "out.nc",
+            newer["out.nc"] if not ended else now["out.nc"],
+        )
         if not reason and now.keys() != older.keys():
             reason = f"left {sorted(now)}"
-        if not reason and not all(each in (older[name], newer[name]) for name, each in now.items()):
+        if not reason and not all(
+            each in (older[name], newer[name]) for name, each in now.items()
+        ):
             reason = "half a file"
         made += met
         failed += bool(reason)

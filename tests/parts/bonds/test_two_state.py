@@ -7,56 +7,98 @@ from itertools import product
 import numpy as np
 import pytest
 from helpers.draws import fits
-from helpers.scenes import BELL, STRETCHED, Clock, Constant, bonds, drive, march, scene, shear
+from helpers.scenes import (
+    BELL,
+    STRETCHED,
+    Clock,
+    Constant,
+    bonds,
+    drive,
+    march,
+    scene,
+    shear,
+)
 from numpy.testing import assert_allclose
 from scipy.stats import binom
 
 from sim.spectrum.families import BondMade
 
-STEPPED = drive.Table(time=(0.0, 0.7, 0.7, 1.4, 1.4, 2.1), speed=(1e-5, 1e-5, 8e-2, 8e-2, 2e-3, 2e-3))
+STEPPED = drive.Table(
+    time=(0.0, 0.7, 0.7, 1.4, 1.4, 2.1), speed=(1e-5, 1e-5, 8e-2, 8e-2, 2e-3, 2e-3)
+)
 
 
 def fractions(population, motion, steps, members=1, seed=5, duration=2.1):
-    scenario = scene(bonds=population, drive=motion, clock=Clock(duration=duration, step=duration / steps), seed=seed)
+    scenario = scene(
+        bonds=population,
+        drive=motion,
+        clock=Clock(duration=duration, step=duration / steps),
+        seed=seed,
+    )
     # 2500 members at a time: each draws the numbers of 4096 steps ahead
-    batches = [np.arange(first, min(first + 2500, members)) for first in range(0, members, 2500)]
-    marched = [[state.bonding.fraction for state in march(scenario, batch)] for batch in batches]
+    batches = [
+        np.arange(first, min(first + 2500, members))
+        for first in range(0, members, 2500)
+    ]
+    marched = [
+        [state.bonding.fraction for state in march(scenario, batch)]
+        for batch in batches
+    ]
     return np.concatenate(marched, axis=1)
 
 
 def test_the_rate_equation_has_no_step_error_at_steady_speeds_and_one_of_second_order_under_a_ramp():
-    for motion, start in product([drive.Steady(speed=3e-3), STEPPED], ["steady", "bonded", "empty"]):
+    for motion, start in product(
+        [drive.Steady(speed=3e-3), STEPPED], ["steady", "bonded", "empty"]
+    ):
         rate = bonds.Rate(critical_speed=1e-2, rebinding_rate=3.0, start_from=start)
         coarse, fine = fractions(rate, motion, 21), fractions(rate, motion, 147)
         assert_allclose(fine[::7], coarse, rtol=1e-12, atol=0)
-    rate, ramp = bonds.Rate(critical_speed=1e-2, rebinding_rate=3.0), drive.Ramp(start=1e-3, stop=5e-2)
-    steps = np.diff([fractions(rate, ramp, steps)[-1, 0] for steps in (32, 64, 128, 256)])
+    rate, ramp = (
+        bonds.Rate(critical_speed=1e-2, rebinding_rate=3.0),
+        drive.Ramp(start=1e-3, stop=5e-2),
+    )
+    steps = np.diff(
+        [fractions(rate, ramp, steps)[-1, 0] for steps in (32, 64, 128, 256)]
+    )
     assert_allclose(np.log2(steps[:-1] / steps[1:]), 2.0, atol=0.1)
 
 
-@pytest.mark.parametrize("members", [2_000, pytest.param(20_000, marks=pytest.mark.verify)])
+@pytest.mark.parametrize(
+    "members", [2_000, pytest.param(20_000, marks=pytest.mark.verify)]
+)
 @pytest.mark.parametrize("start", ["bonded", "empty"])
 def test_counted_bonds_have_the_exact_distribution_at_every_time(members, start):
     # sites are independent, so their number is binomial at all times, with the probability of the rate equation
     sites = 6
     rate = bonds.Rate(critical_speed=1e-2, rebinding_rate=3.0, start_from=start)
-    counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=3.0, sites=sites, start_from=start)
+    counted = bonds.Counted(
+        critical_speed=1e-2, rebinding_rate=3.0, sites=sites, start_from=start
+    )
     expected = fractions(rate, STEPPED, 9)[:, 0]
     numbers = np.rint(sites * fractions(counted, STEPPED, 9, members)).astype(int)
-    enough = members * sites * (1.0 - expected) > 25.0  # broken bonds, for more than a single cell
+    # broken bonds, for more than a single cell
+    enough = members * sites * (1.0 - expected) > 25.0
     enough[0] = False  # at the start all are in one cell
     assert enough.sum() > 5
     for probability, bound in zip(expected[enough], numbers[enough], strict=True):
-        fits(np.bincount(bound, minlength=sites + 1), members * binom.pmf(np.arange(sites + 1), sites, probability))
+        fits(
+            np.bincount(bound, minlength=sites + 1),
+            members * binom.pmf(np.arange(sites + 1), sites, probability),
+        )
 
 
 def test_counted_bonds_remember_with_the_rate_of_the_population():
     # correlation over one step of a stationary two-state site: exp(-(h + h V/Vc) dt)
     sites, members, rebinding_rate, step = 30, 5_000, 3.0, 0.1
-    counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=rebinding_rate, sites=sites)
+    counted = bonds.Counted(
+        critical_speed=1e-2, rebinding_rate=rebinding_rate, sites=sites
+    )
     values = fractions(counted, drive.Steady(speed=1e-2), 3, members, duration=3 * step)
     expected = np.exp(-2.0 * rebinding_rate * step)
-    assert abs(np.corrcoef(values[1], values[2])[0, 1] - expected) < 5.0 * (1.0 - expected**2) / np.sqrt(members)
+    assert abs(np.corrcoef(values[1], values[2])[0, 1] - expected) < 5.0 * (
+        1.0 - expected**2
+    ) / np.sqrt(members)
 
 
 LINEAR = {"critical_speed": 1e-2, "rebinding_rate": 3.0}
@@ -79,16 +121,31 @@ def test_the_depth_left_open_is_chosen_by_noise_rupture_and_the_number_of_sites(
         scenario = scene(bonds=auto)
         assert type(scenario.population) is depth
         assert scenario.varies["bonds"] == (depth in (bonds.Counted, bonds.Tracked))
-        assert scene(bonds=replace(auto, start_from="empty")).population.start_from == "empty"
-    assert scene(bonds=bonds.Auto(**LINEAR, area="carried")).population.area == "carried"
-    read = bonds.Auto(rupture=Constant(rate=9.0), **STRETCHED)  # at a constant rate, but the force of each is needed
+        assert (
+            scene(bonds=replace(auto, start_from="empty")).population.start_from
+            == "empty"
+        )
+    assert (
+        scene(bonds=bonds.Auto(**LINEAR, area="carried")).population.area == "carried"
+    )
+    # at a constant rate, but the force of each is needed
+    read = bonds.Auto(rupture=Constant(rate=9.0), **STRETCHED)
     assert type(scene(bonds=read, shear=FIELD).population) is bonds.Cohort
     area = math.pi * scene().rest_radius ** 2
     by_density = bonds.Auto(rupture=BELL, **STRETCHED | {"site_density": 1e11})
-    assert by_density.number(area) == scene(bonds=by_density).population.sites == round(1e11 * area)
+    assert (
+        by_density.number(area)
+        == scene(bonds=by_density).population.sites
+        == round(1e11 * area)
+    )
     assert bonds.Auto(rupture=BELL, **STRETCHED, sites=12).number(area) == 12
     assert by_density.number(1e-15) == 1.0  # the smallest contact holds one
-    assert by_density.number(0.0) == by_density.number(math.nan) == bonds.Auto(**LINEAR).number(area) == math.inf
+    assert (
+        by_density.number(0.0)
+        == by_density.number(math.nan)
+        == bonds.Auto(**LINEAR).number(area)
+        == math.inf
+    )
     for tolerance, cohorts in [(0.5, 1e-4), (1e-2, 1e-4), (1e-4, 1e-5)]:
         auto = bonds.Auto(rupture=BELL, **STRETCHED, tolerance=tolerance)
         assert_allclose(scene(bonds=auto).population.tolerance, cohorts, rtol=1e-15)

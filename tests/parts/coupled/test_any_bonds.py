@@ -8,7 +8,20 @@ import re
 import numpy as np
 import pytest
 from helpers import driven
-from helpers.driven import AREA, STRETCH, UNIT, force, jkr, march, marched, pulled, residual, scenario, spring, stuck
+from helpers.driven import (
+    AREA,
+    STRETCH,
+    UNIT,
+    force,
+    jkr,
+    march,
+    marched,
+    pulled,
+    residual,
+    scenario,
+    spring,
+    stuck,
+)
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
@@ -27,12 +40,23 @@ SITES, MANY = (functools.partial(Tracked, sites=sites) for sites in (100, 300))
 BODY = {"mass": 1e-3, "damping": 1e-3}
 
 
-@pytest.mark.parametrize(("make", "tolerance"), [(MOMENT, 1e-6), (functools.partial(Cohort, tolerance=1e-8), 1e-8)])
-def test_a_stage_that_begins_in_steady_sliding_keeps_the_stress_of_a_prescribed_speed(make, tolerance):
+@pytest.mark.parametrize(
+    ("make", "tolerance"),
+    [(MOMENT, 1e-6), (functools.partial(Cohort, tolerance=1e-8), 1e-8)],
+)
+def test_a_stage_that_begins_in_steady_sliding_keeps_the_stress_of_a_prescribed_speed(
+    make, tolerance
+):
     lens = {"share": 0.3, "start": "steady", "make": make}
     for keys in ({}, {"mass": 1e-3, "damping": 2e-3, "contact": 0.5}):
-        drives = spring(1.0, start="steady", tolerance=tolerance, **keys), AtSpeed(speed=10.0 * STRETCH)
-        one, other = (list(march(scenario(1.0, 4, drive, **lens), np.arange(1)))[-1] for drive in drives)
+        drives = (
+            spring(1.0, start="steady", tolerance=tolerance, **keys),
+            AtSpeed(speed=10.0 * STRETCH),
+        )
+        one, other = (
+            list(march(scenario(1.0, 4, drive, **lens), np.arange(1)))[-1]
+            for drive in drives
+        )
         assert_allclose(one.bonding.stress, other.bonding.stress, rtol=1e-8)
         assert_allclose(one.drive.speed, other.drive.speed, rtol=1e-8)
 
@@ -40,24 +64,49 @@ def test_a_stage_that_begins_in_steady_sliding_keeps_the_stress_of_a_prescribed_
 @pytest.mark.parametrize("make", [MOMENT, functools.partial(Cohort, tolerance=1e-7)])
 def test_a_stiff_spring_becomes_the_prescribed_drive_as_one_over_its_stiffness(make):
     prescribed = scenario(1.0, 10, Start(rest=1e-12, speed=10.0 * STRETCH), make=make)
-    exact, errors = np.array([state.bonding.stress[0] for state in march(prescribed, np.arange(1))]), []
+    exact, errors = (
+        np.array(
+            [state.bonding.stress[0] for state in march(prescribed, np.arange(1))]
+        ),
+        [],
+    )
     for stiffness in (40.0, 4e2, 4e3):
-        states, _ = marched(scenario(1.0, 10, spring(stiffness, tolerance=1e-8), make=make))
-        errors.append(np.max(np.abs([state.bonding.stress[0] for state in states] - exact)) / max(exact))
+        states, _ = marched(
+            scenario(1.0, 10, spring(stiffness, tolerance=1e-8), make=make)
+        )
+        errors.append(
+            np.max(np.abs([state.bonding.stress[0] for state in states] - exact))
+            / max(exact)
+        )
         assert errors[-1] < 10.0 / (stiffness / 0.0390213)
     assert_allclose(np.divide(errors[:-1], errors[1:]), 10.0, rtol=0.05)
 
 
 @pytest.mark.parametrize("make", [MOMENT, FINE])
-@pytest.mark.parametrize(("x0", "time", "later"), [(0.5, 0.559773594776, ((5, 0.858292500361), (9, 1.90289022829))),
-                                                   (2.0, 0.0489005107, ())])  # fmt: skip
-def test_bonds_that_are_not_remade_share_one_stretch_until_they_run_away(make, x0, time, later):
+@pytest.mark.parametrize(
+    ("x0", "time", "later"),
+    [
+        (0.5, 0.559773594776, ((5, 0.858292500361), (9, 1.90289022829))),
+        (2.0, 0.0489005107, ()),
+    ],
+)
+def test_bonds_that_are_not_remade_share_one_stretch_until_they_run_away(
+    make, x0, time, later
+):
     # E1(x(t)) = E1(x0) − k0 t
-    scene = scenario(2.0 * time, 20, force(x0, tolerance=1e-9), rebinding=0.0, start="bonded", make=make)
+    scene = scenario(
+        2.0 * time,
+        20,
+        force(x0, tolerance=1e-9),
+        rebinding=0.0,
+        start="bonded",
+        make=make,
+    )
     states = list(march(scene, np.arange(1)))
     assert_allclose(states[-1].drive.runaway_time, time, rtol=1e-7)
     for place, stretch in later:
-        bonding = states[place].bonding  # the force is constant, so that the stretch is its share per bond
+        # the force is constant, so that the stretch is its share per bond
+        bonding = states[place].bonding
         assert_allclose(x0 / bonding.fraction[0], stretch, rtol=1e-7)
 
 
@@ -65,14 +114,26 @@ def test_bonds_that_are_not_remade_share_one_stretch_until_they_run_away(make, x
 def test_springs_from_soft_to_stiff_keep_the_energies_balanced(make):
     for stiffness in (4e-8, 1.0, 4e4):
         for keys in ({}, {"damping": 1e-3}, {"mass": 1e-9}, {"contact": 1.0}):
-            _, read = marched(scenario(20.0, 5, spring(stiffness, **keys), share=0.3, make=make))
+            _, read = marched(
+                scenario(20.0, 5, spring(stiffness, **keys), share=0.3, make=make)
+            )
             assert residual(read) < 1e-5, (stiffness, keys)
 
 
-@pytest.mark.parametrize(("make", "keys"), [(MOMENT, {}), (MOMENT, {"contact": 0.2, "mass": 1e-4, "viscosity": 1e-3}),
-                                            (COHORTS, BODY), (COHORTS, {"contact": 0.2, "viscosity": 1e-3}),
-                                            (SITES, {}), (SITES, BODY)])  # fmt: skip
-def test_a_member_is_the_same_alone_resumed_in_the_middle_of_a_slip_and_with_few_records(make, keys):
+@pytest.mark.parametrize(
+    ("make", "keys"),
+    [
+        (MOMENT, {}),
+        (MOMENT, {"contact": 0.2, "mass": 1e-4, "viscosity": 1e-3}),
+        (COHORTS, BODY),
+        (COHORTS, {"contact": 0.2, "viscosity": 1e-3}),
+        (SITES, {}),
+        (SITES, BODY),
+    ],
+)
+def test_a_member_is_the_same_alone_resumed_in_the_middle_of_a_slip_and_with_few_records(
+    make, keys
+):
     scene = scenario(4.0, 200, spring(0.02, **keys), share=0.5, make=make, members=3)
     end, course = run(scene, range(3), range(201))
     way = np.diff(course.position[:, 0])
@@ -80,14 +141,34 @@ def test_a_member_is_the_same_alone_resumed_in_the_middle_of_a_slip_and_with_few
     check_cuts(scene, course, end, cut=int(np.argmax(way)))
 
 
-@pytest.mark.parametrize(("make", "keys", "start"), [(MOMENT, {"damping": 1e-2}, "bonded"), (COHORTS, {}, "empty"),
-                                                     (COHORTS, BODY, "steady"), (MANY, {}, "bonded")])  # fmt: skip
-def test_a_stage_that_rests_turns_and_stops_keeps_the_energies_balanced_and_the_signs(make, keys, start):
+@pytest.mark.parametrize(
+    ("make", "keys", "start"),
+    [
+        (MOMENT, {"damping": 1e-2}, "bonded"),
+        (COHORTS, {}, "empty"),
+        (COHORTS, BODY, "steady"),
+        (MANY, {}, "bonded"),
+    ],
+)
+def test_a_stage_that_rests_turns_and_stops_keeps_the_energies_balanced_and_the_signs(
+    make, keys, start
+):
     speeds = (10.0, 10.0, -10.0, -10.0, 0.0, 0.0)
-    stage = {"time": (0.0, 2.0, 2.0, 4.0, 4.0, 9.0), "value": tuple(v * STRETCH for v in speeds)}
+    stage = {
+        "time": (0.0, 2.0, 2.0, 4.0, 4.0, 9.0),
+        "value": tuple(v * STRETCH for v in speeds),
+    }
     drive = spring(0.2, stage, start_after=1.0, **keys)
-    states, read = marched(scenario(8.0, 16, drive, share=0.0 if make is MANY else 0.5, make=make, start=start))
-    assert_allclose(read["stage_position"][[2, 6, 10, 16]] / STRETCH, [0.0, 20.0, 0.0, 0.0], atol=1e-12)
+    states, read = marched(
+        scenario(
+            8.0, 16, drive, share=0.0 if make is MANY else 0.5, make=make, start=start
+        )
+    )
+    assert_allclose(
+        read["stage_position"][[2, 6, 10, 16]] / STRETCH,
+        [0.0, 20.0, 0.0, 0.0],
+        atol=1e-12,
+    )
     assert states[6].bonding.stress[0] > 0.0 > states[10].bonding.stress[0]
     assert abs(states[16].bonding.stress[0]) < 0.2 * abs(states[10].bonding.stress[0])
     assert residual(read) < 1e-5
@@ -104,43 +185,79 @@ VISCOUS = {"viscosity": 0.1 * driven.COULOMB / STRETCH}
 
 @pytest.mark.parametrize(
     ("make", "keys"),
-    [*((make, {}) for make in (MOMENT, COHORTS, SITES, CARRIED)), (MOMENT, {"viscosity": 0.1}),
-     *itertools.product((STICKING, COULOMB), ({"damping": 0.1}, {"mass": 0.05}, VISCOUS))],
-)  # fmt: skip
-def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_again(make, keys):
+    [
+        *((make, {}) for make in (MOMENT, COHORTS, SITES, CARRIED)),
+        (MOMENT, {"viscosity": 0.1}),
+        *itertools.product(
+            (STICKING, COULOMB), ({"damping": 0.1}, {"mass": 0.05}, VISCOUS)
+        ),
+    ],
+)
+def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_again(
+    make, keys
+):
     pull = driven.PULLED_OFF
     if make is SITES:  # a load at which pull-off is not left to chance
-        load = pull["load"] | {"value": tuple(min(value, 2.0 * value) for value in pull["load"]["value"])}
+        load = pull["load"] | {
+            "value": tuple(min(value, 2.0 * value) for value in pull["load"]["value"])
+        }
         pull = pull | {"load": load}
     if callable(make):
-        states, read = marched(scenario(3.0, 30, spring(1.0, **keys), share=0.5, make=make, **pull))
+        states, read = marched(
+            scenario(3.0, 30, spring(1.0, **keys), share=0.5, make=make, **pull)
+        )
     else:
-        states, read = marched(stuck(3.0, 30, make, pulled(1.0, 1.0, **keys), share=0.5, **pull))
+        states, read = marched(
+            stuck(3.0, 30, make, pulled(1.0, 1.0, **keys), share=0.5, **pull)
+        )
     open_ = np.isnan([state.contact.radius[0] for state in states])
     assert open_[11 if callable(make) else 15 : 20].all() and not open_[21:].any()
     assert np.isnan(read["runaway_time"]).all() and residual(read) < 1e-5
-    if not callable(make) and "mass" not in keys:  # neither its place nor its pull shows a push back
+    # neither its place nor its pull shows a push back
+    if not callable(make) and "mass" not in keys:
         positions = np.array([state.drive.position[0] for state in states])
         assert np.min(np.diff(positions)[20:]) >= 0.0
-        friction = [state.bonding.stress[0] * np.pi * state.contact.radius[0] ** 2 for state in states]
+        friction = [
+            state.bonding.stress[0] * np.pi * state.contact.radius[0] ** 2
+            for state in states
+        ]
         pushed = np.where(open_, 0.0, friction - read["spring_force"])
         assert np.max(pushed) <= 1e-5 * np.max(read["spring_force"])
-    if not {"damping", "mass"} & keys.keys():  # nothing bears the force in an open contact
+    # nothing bears the force in an open contact
+    if not {"damping", "mass"} & keys.keys():
         assert_allclose(read["spring_force"][16:20], 0.0, atol=1e-12 * driven.UNIT)
         assert read["spring_force"][-1] > 0.05 * driven.UNIT
         # the friction of a closed contact is what the spring bears, at the record of its closing as well
-        friction = [state.bonding.stress[0] * np.pi * state.contact.radius[0] ** 2 for state in states]
+        friction = [
+            state.bonding.stress[0] * np.pi * state.contact.radius[0] ** 2
+            for state in states
+        ]
         missing = np.where(open_, 0.0, friction - read["spring_force"])
-        assert_allclose(missing, 0.0, atol=1e-5 * np.max(read["spring_force"]))  # the motion has 1e-6
+        # the motion has 1e-6
+        assert_allclose(missing, 0.0, atol=1e-5 * np.max(read["spring_force"]))
 
 
-@pytest.mark.parametrize(("make", "keys"), [(MOMENT, {"mass": 0.1, "damping": 0.1}),
-                                            (FINE, {"contact": 50.0, "viscosity": 1.0}),
-                                            (MANY, {"mass": 0.1, "damping": 0.1})])  # fmt: skip
-def test_a_contact_that_pays_for_its_mean_stress_shrinks_to_that_of_hertz_within_the_sub_steps(make, keys):
+@pytest.mark.parametrize(
+    ("make", "keys"),
+    [
+        (MOMENT, {"mass": 0.1, "damping": 0.1}),
+        (FINE, {"contact": 50.0, "viscosity": 1.0}),
+        (MANY, {"mass": 0.1, "damping": 0.1}),
+    ],
+)
+def test_a_contact_that_pays_for_its_mean_stress_shrinks_to_that_of_hertz_within_the_sub_steps(
+    make, keys
+):
     # strong bonds: at their peak the whole energy of the mean stress is more than adhesion can pay
-    strong = {"make": lambda **recipe: make(**(recipe | {"site_density": 100.0 * driven.DENSITY})), "share": 0.5}
-    states, read = marched(scenario(4.0, 80, spring(2.0, **keys), reversible=1.0, **strong))
+    strong = {
+        "make": lambda **recipe: make(
+            **(recipe | {"site_density": 100.0 * driven.DENSITY})
+        ),
+        "share": 0.5,
+    }
+    states, read = marched(
+        scenario(4.0, 80, spring(2.0, **keys), reversible=1.0, **strong)
+    )
     radii = np.array([state.contact.radius[0] for state in states[1:]])
     assert_allclose([state.drive.radius[0] for state in states[1:]], radii, rtol=1e-12)
     hertz = jkr.radius_at_load(driven.LOAD, 0.0, driven.R, driven.MODULUS)
@@ -156,11 +273,15 @@ LIGHT = {"speed": 1000.0, "mass": 1e-6, "contact": 4e-3}
 
 @pytest.mark.parametrize(
     ("make", "share", "duration", "stiffness", "keys", "delay", "most"),
-    [(MOMENT, 0.0, 2.5, 2.5e-4, LIGHT, "viscosity", 1e-8), (MOMENT, 1.0, 2.5, 2.5e-4, LIGHT, "viscosity", 1e-8),
-     (MOMENT, 0.5, 2.5, 2e-4, {"speed": 1000.0}, "damping", 1e-8),
-     (Cohort, 0.5, 2.5, 2e-4, {"speed": 1000.0}, "damping", 1e-7), (Cohort, 0.0, 1.0, 2e-3, LAGS, "viscosity", 1e-7),
-     (Cohort, 0.5, 1.0, 2e-3, LAGS | {"mass": 1e-4}, "viscosity", 1e-7)],
-)  # fmt: skip
+    [
+        (MOMENT, 0.0, 2.5, 2.5e-4, LIGHT, "viscosity", 1e-8),
+        (MOMENT, 1.0, 2.5, 2.5e-4, LIGHT, "viscosity", 1e-8),
+        (MOMENT, 0.5, 2.5, 2e-4, {"speed": 1000.0}, "damping", 1e-8),
+        (Cohort, 0.5, 2.5, 2e-4, {"speed": 1000.0}, "damping", 1e-7),
+        (Cohort, 0.0, 1.0, 2e-3, LAGS, "viscosity", 1e-7),
+        (Cohort, 0.5, 1.0, 2e-3, LAGS | {"mass": 1e-4}, "viscosity", 1e-7),
+    ],
+)
 def test_bonds_that_break_ever_faster_slip_at_once_which_is_the_limit_of_little_damping_or_viscosity(
     make, share, duration, stiffness, keys, delay, most
 ):
@@ -171,7 +292,14 @@ def test_bonds_that_break_ever_faster_slip_at_once_which_is_the_limit_of_little_
         states, read = marched(scenario(duration, 5, drive, share=share, make=make))
         assert np.isnan(read["runaway_time"]).all() and residual(read) < 1e-5
         assert (read["dissipated_by_snaps"][-1] > 0.0) == (size == 0.0)
-        courses.append(np.stack([read["spring_force"] / driven.UNIT, [state.bonding.fraction[0] for state in states]]))
+        courses.append(
+            np.stack(
+                [
+                    read["spring_force"] / driven.UNIT,
+                    [state.bonding.fraction[0] for state in states],
+                ]
+            )
+        )
     near, far = (np.max(np.abs(course - courses[0]), axis=1) for course in courses[1:])
     assert np.all(far < 0.01) and np.all(near < 0.3 * far)
 
@@ -179,24 +307,43 @@ def test_bonds_that_break_ever_faster_slip_at_once_which_is_the_limit_of_little_
 def test_a_check_shows_below_which_spring_the_slider_oscillates():
     for scene, onset, frequency in (
         (scenario(1.0, 4, spring(1.0)), 0.0390213 * driven.STIFF, 4.691569),
-        (scenario(1.0, 4, spring(1.0), make=COHORTS), 0.0295565 * driven.STIFF, 4.25784),
-        (stuck(1.0, 4, STICKING, pulled(1.0, 1.0, 0.01, 0.05)), 2.2733333 * driven.HELD / STRETCH, 11.1355287),
+        (
+            scenario(1.0, 4, spring(1.0), make=COHORTS),
+            0.0295565 * driven.STIFF,
+            4.25784,
+        ),
+        (
+            stuck(1.0, 4, STICKING, pulled(1.0, 1.0, 0.01, 0.05)),
+            2.2733333 * driven.HELD / STRETCH,
+            11.1355287,
+        ),
     ):
         text = sim.check(scene).partition("\nslider\n")[2]
-        rows = dict(re.split(" {2,}", line.strip(), maxsplit=1) for line in text.partition("\n\n")[0].splitlines())
+        rows = dict(
+            re.split(" {2,}", line.strip(), maxsplit=1)
+            for line in text.partition("\n\n")[0].splitlines()
+        )
         assert rows["oscillates below"].startswith(f"{onset:.4g} N/m")
         assert rows["frequency then"] == f"{frequency / (2.0 * math.pi):.4g} Hz"
-    assert re.search("oscillates below +0 N/m", sim.check(stuck(1.0, 4, STICKING, pulled(1.0, 1.0, damping=10.0))))
+    assert re.search(
+        "oscillates below +0 N/m",
+        sim.check(stuck(1.0, 4, STICKING, pulled(1.0, 1.0, damping=10.0))),
+    )
 
 
 #: Stress of a unit of stretch; k_t is a fifth of the stiffness of all bonds, of which next to none break.
 STRESS, SOFT = driven.DENSITY * driven.KAPPA * STRETCH, 5.0
-LASTING = {"rupture": Bell(zero_force_rate=1e-30, bell_force=driven.BELL.bell_force), "reversible": 1.0}
+LASTING = {
+    "rupture": Bell(zero_force_rate=1e-30, bell_force=driven.BELL.bell_force),
+    "reversible": 1.0,
+}
 
 
 def friction(slip, load=driven.LOAD):
     """Force of lasting bonds after a slip, in their units, where adhesion pays for all of the mean stress."""
-    radius = radius_at_load_reversible(load, driven.WORK, STRESS * slip, 1.0, driven.R, driven.MODULUS)
+    radius = radius_at_load_reversible(
+        load, driven.WORK, STRESS * slip, 1.0, driven.R, driven.MODULUS
+    )
     return slip * np.pi * radius**2 / AREA
 
 
@@ -213,62 +360,121 @@ def cusp(load=driven.LOAD):
 
 def held(speeds, make, load=driven.LOAD, **body):
     """States and readings of lasting bonds while the stage goes at each of four speeds for a second."""
-    stage = {"time": (0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 4.0), "value": tuple(np.repeat(speeds, 2) * STRETCH)}
+    stage = {
+        "time": (0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 4.0),
+        "value": tuple(np.repeat(speeds, 2) * STRETCH),
+    }
     drive = spring(1.0, stage, contact=1.0 / SOFT, tolerance=1e-8, damping=1e-3, **body)
     return marched(scenario(4.0, 8, drive, make=make, load=load, **LASTING))
 
 
 @pytest.mark.parametrize("make", [MOMENT, FINE, SITES])
 @pytest.mark.parametrize("mass", [0.0, 1e-8])
-def test_the_interface_slips_at_once_to_a_hertzian_contact_and_back_where_adhesion_pays_for_the_stress(make, mass):
+def test_the_interface_slips_at_once_to_a_hertzian_contact_and_back_where_adhesion_pays_for_the_stress(
+    make, mass
+):
     # while the place rises the slip jumps at its maximum, while it falls at its minimum
-    top, end = minimize_scalar(lambda slip: -place(slip), bounds=(0.0, cusp()), method="bounded").x, 10.0 * cusp()
+    top, end = (
+        minimize_scalar(
+            lambda slip: -place(slip), bounds=(0.0, cusp()), method="bounded"
+        ).x,
+        10.0 * cusp(),
+    )
     ahead = brentq(lambda slip: place(slip) - place(top), cusp(), end)
     behind = brentq(lambda slip: place(slip) - place(cusp()), 0.0, top)
     states, read = held([130.0, 0.0, -70.0, 0.0], make, mass=mass)
     lost = within = 0.0
     for k, stage, among, (first, last) in (
-        (4, 130.0, (cusp(), end), (top, ahead)), (8, 60.0, (0.0, top), (cusp(), behind)),
-    ):  # fmt: skip
+        (4, 130.0, (cusp(), end), (top, ahead)),
+        (8, 60.0, (0.0, top), (cusp(), behind)),
+    ):
         slip = brentq(lambda slip, stage=stage: place(slip, SOFT + 1.0) - stage, *among)
         assert_allclose(states[k].drive.position / STRETCH, place(slip), rtol=1e-6)
         assert_allclose(states[k].drive.spring_force / UNIT, friction(slip), rtol=1e-6)
         # 128 midpoints of the power are off by at most h²/8 times the total variation of its slope
         slips = np.linspace(first, last, 2001)
-        lost += quad(lambda slip, at=first: (place(at) - place(slip)) / SOFT, first, last, points=[cusp()])[0]
+        lost += quad(
+            lambda slip, at=first: (place(at) - place(slip)) / SOFT,
+            first,
+            last,
+            points=[cusp()],
+        )[0]
         bent = np.sum(np.abs(np.diff(np.gradient(place(slips) / SOFT, slips))))
         within += ((last - first) / 128.0) ** 2 / 8.0 * bent
-        assert_allclose(read["dissipated_by_snaps"][k] / driven.ENERGY, lost, rtol=0.0, atol=within)
+        assert_allclose(
+            read["dissipated_by_snaps"][k] / driven.ENERGY, lost, rtol=0.0, atol=within
+        )
     assert residual(read) < 1e-7
 
 
 @pytest.mark.parametrize("make", [MOMENT, FINE, SITES])
 def test_a_load_that_halves_for_a_while_leaves_a_contact_hertzian(make):
     whole, half = driven.LOAD, 0.5 * driven.LOAD
-    load = {"time": (0.0, 2.0, 2.0, 3.0, 3.0, 4.0), "value": (whole, whole, half, half, whole, whole)}
+    load = {
+        "time": (0.0, 2.0, 2.0, 3.0, 3.0, 4.0),
+        "value": (whole, whole, half, half, whole, whole),
+    }
     states, read = held([106.0, 0.0, 0.0, 0.0], make, load)
-    for k, at, low, high in ((3, whole, 0.0, 25.0), (5, half, cusp(half), 1e3), (8, whole, cusp(), 1e3)):
-        slip = brentq(lambda slip, at=at: place(slip, SOFT + 1.0, at) - 106.0, low, high)
-        assert_allclose(states[k].drive.spring_force / UNIT, friction(slip, at), rtol=1e-6)
+    for k, at, low, high in (
+        (3, whole, 0.0, 25.0),
+        (5, half, cusp(half), 1e3),
+        (8, whole, cusp(), 1e3),
+    ):
+        slip = brentq(
+            lambda slip, at=at: place(slip, SOFT + 1.0, at) - 106.0, low, high
+        )
+        assert_allclose(
+            states[k].drive.spring_force / UNIT, friction(slip, at), rtol=1e-6
+        )
     assert residual(read) < 1e-7
 
 
 def test_a_slip_to_a_hertzian_contact_is_the_limit_of_ever_less_viscosity_and_keeps_its_energies():
     # force at 89 and 100 ms by an integrator of the equations with viscosities of 10 and 1 Pa s/m, whose difference
     # falls as the viscosity to the power of 2/3: extrapolated to none
-    rates = {"rupture": {"model": "constant", "rate": "24 1/s"}, "rebinding_rate": "84 1/s"}
-    bonds = {"model": "rate", "bond_stiffness": "0.6 uN/m", "site_density": "3.8e16 1/m^2"} | rates
-    drive = {"model": "spring", "stage": "1.9 mm/s", "stiffness": "96 N/m", "mass": "1.07 g"}
+    rates = {
+        "rupture": {"model": "constant", "rate": "24 1/s"},
+        "rebinding_rate": "84 1/s",
+    }
+    bonds = {
+        "model": "rate",
+        "bond_stiffness": "0.6 uN/m",
+        "site_density": "3.8e16 1/m^2",
+    } | rates
+    drive = {
+        "model": "spring",
+        "stage": "1.9 mm/s",
+        "stiffness": "96 N/m",
+        "mass": "1.07 g",
+    }
     lens = {"solid": {"shear_modulus": "0.233 MPa"}, "sphere": {"radius": "0.309 mm"}}
-    lens |= {"clock": {"duration": "0.1 s", "step": "1 ms"}, "adhesion": {"work": "32.6 mJ/m^2", "bond_share": 0}}
+    lens |= {
+        "clock": {"duration": "0.1 s", "step": "1 ms"},
+        "adhesion": {"work": "32.6 mJ/m^2", "bond_share": 0},
+    }
     lens |= {"contact": {"load": "33 uN", "reversible": 0.0039}, "bonds": bonds}
     none, some, lost = [0.7890906e-3, 0.8940730e-3], [0.78909e-3, 0.8941e-3], []
-    for viscosity, tolerance, exact, off in ((0.0, 1e-9, none, 1e-7), (1e2, 1e-6, some, 2e-4), (1e4, 1e-6, some, 2e-4)):
-        keys = {"contact_stiffness": "7.5 N/m", "viscosity": viscosity, "tolerance": tolerance}
+    for viscosity, tolerance, exact, off in (
+        (0.0, 1e-9, none, 1e-7),
+        (1e2, 1e-6, some, 2e-4),
+        (1e4, 1e-6, some, 2e-4),
+    ):
+        keys = {
+            "contact_stiffness": "7.5 N/m",
+            "viscosity": viscosity,
+            "tolerance": tolerance,
+        }
         dataset = sim.run(sim.load(lens | {"drive": drive | keys})).isel(member=0)
         assert_allclose(dataset["friction_force"][[89, 100]], exact, rtol=off)
         assert (
-            residual({name: dataset[name].to_numpy() for name in driven.READINGS if name in dataset}) < 10.0 * tolerance
+            residual(
+                {
+                    name: dataset[name].to_numpy()
+                    for name in driven.READINGS
+                    if name in dataset
+                }
+            )
+            < 10.0 * tolerance
         )
         lost.append(float(dataset["dissipated_by_area"][-1]))
     assert_allclose(lost[1], lost[2], rtol=1e-3)

@@ -31,40 +31,84 @@ LENS = Path(__file__).parents[3] / "scenarios" / "pdms_lens_spring.toml"
 FEW_SITES = functools.partial(Tracked, sites=9)
 
 
-@pytest.mark.parametrize(("make", "correlation", "relaxing"), [(FirstMoment, Slip, True), (Cohort, Time, True),
-                                                               (FEW_SITES, Slip, False)])  # fmt: skip
-def test_the_memory_within_a_clock_step_is_the_integral_along_the_slip(make, correlation, relaxing):
+@pytest.mark.parametrize(
+    ("make", "correlation", "relaxing"),
+    [(FirstMoment, Slip, True), (Cohort, Time, True), (FEW_SITES, Slip, False)],
+)
+def test_the_memory_within_a_clock_step_is_the_integral_along_the_slip(
+    make, correlation, relaxing
+):
     # from rest a mass on a spring moves with V (1 − cos ωt), past next to no bonds: 2.5 memories in a clock step
-    speed, turn, memory, floor = 10.0 * driven.STRETCH, 2.0 * math.pi, 2.0 * driven.STRETCH, 0.3
+    speed, turn, memory, floor = (
+        10.0 * driven.STRETCH,
+        2.0 * math.pi,
+        2.0 * driven.STRETCH,
+        0.3,
+    )
     law = correlation(1.5 * memory if correlation is Slip else 0.4)
     amplitude = SlipRate(memory_length=memory, floor=floor, relaxing=relaxing)
-    shear = Banded(spectrum=SPECTRUM, cell=CELL, correlation=law, amplitude=amplitude, paid_by_adhesion=0.0)
-    few = {"make": lambda **keys: make(**(keys | {"site_density": 1e-7 * driven.DENSITY}))}
-    lens = driven.scenario(1.75, 7, driven.spring(1.0, mass=turn**-2, tolerance=1e-8), **few)
+    shear = Banded(
+        spectrum=SPECTRUM,
+        cell=CELL,
+        correlation=law,
+        amplitude=amplitude,
+        paid_by_adhesion=0.0,
+    )
+    few = {
+        "make": lambda **keys: make(**(keys | {"site_density": 1e-7 * driven.DENSITY}))
+    }
+    lens = driven.scenario(
+        1.75, 7, driven.spring(1.0, mass=turn**-2, tolerance=1e-8), **few
+    )
 
     def rates(time, values):
         (a0, a1, a2, renewed), v = values, speed * (1.0 - math.cos(turn * time))
-        size = floor**2 + (1.0 - floor**2) * (1.0 - a1 * a1 / (a0 * a2)) if relaxing else 1.0
+        size = (
+            floor**2 + (1.0 - floor**2) * (1.0 - a1 * a1 / (a0 * a2))
+            if relaxing
+            else 1.0
+        )
         rate = 2.0 * v / law.length if correlation is Slip else 2.0 / law.time
-        return 1.0 - v * a0 / memory, v - v * a1 / memory, v * v - v * a2 / memory, rate * (size - renewed)
+        return (
+            1.0 - v * a0 / memory,
+            v - v * a1 / memory,
+            v * v - v * a2 / memory,
+            rate * (size - renewed),
+        )
 
     begin, bend = 1e-4, 0.5 * speed * turn**2  # V = bend t² at first
     values = np.array([begin, bend * begin**3 / 3.0, bend**2 * begin**5 / 5.0, 0.0])
     for state in list(march(dataclasses.replace(lens, shear=shear), np.arange(1)))[1:]:
         end = lens.times.at(state.step)
-        values = solve_ivp(rates, (begin, end), values, "LSODA", rtol=1e-9, atol=1e-30).y[:, -1]
+        values = solve_ivp(
+            rates, (begin, end), values, "LSODA", rtol=1e-9, atol=1e-30
+        ).y[:, -1]
         (a0, a1, a2, renewed), past = values, state.shear.past
         exact = a0, a1 / a0, a2 - a1**2 / a0, renewed
-        assert_allclose(np.concatenate([past.weight, past.mean, past.spread, past.renewed]), exact, rtol=ERROR)
+        assert_allclose(
+            np.concatenate([past.weight, past.mean, past.spread, past.renewed]),
+            exact,
+            rtol=ERROR,
+        )
         begin, values[3] = end, 0.0  # ΔΓ is drawn
 
 
 def at_once(lens, state, expected, drawn):
     """Slip and path in next to no time, where ΔΓ was ``expected`` and is ``drawn``."""
-    shear = state.shear._replace(energy=drawn, expected=expected, past=state.shear.past._replace(energy=drawn))
+    shear = state.shear._replace(
+        energy=drawn, expected=expected, past=state.shear.past._replace(energy=drawn)
+    )
     around = _step_contact(lens, state.contact, shear, range(1, 2))
     noise, bonds = MemberNoise.of(1, np.arange(1)).bonds, deepcopy(state.bonds)
-    motions = coupled.advance(lens.parts, state.drive, bonds, around, Times(1e-15, 1, 1e-15), range(1, 2), noise)[1]
+    motions = coupled.advance(
+        lens.parts,
+        state.drive,
+        bonds,
+        around,
+        Times(1e-15, 1, 1e-15),
+        range(1, 2),
+        noise,
+    )[1]
     return motions.slip[0, 0], motions.path[0, 0]
 
 
@@ -74,17 +118,31 @@ def test_sliding_at_one_speed_over_millions_of_memories_needs_few_sub_steps(make
     memory, few = 1e-7 * driven.STRETCH, {"site_density": 1e-9 * driven.DENSITY}
     drive = driven.force(1.0, viscosity=driven.DENSITY * driven.KAPPA)
     lens = driven.scenario(2.0, 2, drive, make=lambda **keys: make(**(keys | few)))
-    shear = Mean(spectrum=SPECTRUM, amplitude=SlipRate(memory_length=memory), paid_by_adhesion=0.0)
+    shear = Mean(
+        spectrum=SPECTRUM,
+        amplitude=SlipRate(memory_length=memory),
+        paid_by_adhesion=0.0,
+    )
     end = list(march(dataclasses.replace(lens, shear=shear), np.arange(1)))[-1]
     assert_allclose(end.drive.position, 2.0 * driven.STRETCH, rtol=1e-6)
-    assert_allclose([end.shear.past.weight, end.shear.past.mean], [[1e-7], [driven.STRETCH]], rtol=1e-6)
+    assert_allclose(
+        [end.shear.past.weight, end.shear.past.mean],
+        [[1e-7], [driven.STRETCH]],
+        rtol=1e-6,
+    )
     assert end.drive.substeps[0] < 2000.0
 
 
 @pytest.mark.parametrize("bonds", ["rate, bell", "cohort", "tracked"])
-def test_the_elastic_answer_to_noise_is_no_path_but_that_to_the_mean_and_to_a_force_is(bonds):
-    shear = Banded(**BY_SLIP, amplitude=SlipRate(floor=0.5, relaxing=True), paid_by_adhesion=0.1)
-    lens = scene(1, 8, drive=Spring(stage=2e-2, stiffness=100.0), bonds=BONDS[bonds], shear=shear)
+def test_the_elastic_answer_to_noise_is_no_path_but_that_to_the_mean_and_to_a_force_is(
+    bonds,
+):
+    shear = Banded(
+        **BY_SLIP, amplitude=SlipRate(floor=0.5, relaxing=True), paid_by_adhesion=0.1
+    )
+    lens = scene(
+        1, 8, drive=Spring(stage=2e-2, stiffness=100.0), bonds=BONDS[bonds], shear=shear
+    )
     *_, state = march(lens, np.arange(1))
     read = dict(zip(READINGS, lens.parts.drive.readings(state.drive)[0], strict=True))
     assert abs(read["energy_residual"]) < 1e-6 * read["drive_work"]
@@ -103,12 +161,20 @@ def test_the_elastic_answer_to_noise_is_no_path_but_that_to_the_mean_and_to_a_fo
 
 def slipping(step, duration, speed, members=1, **keys):
     """The spring-driven lens, in clock steps of some ms."""
-    values = {"clock.step": f"{step} ms", "clock.duration": f"{duration} s", "drive.stage": f"{speed} mm/s"}
+    values = {
+        "clock.step": f"{step} ms",
+        "clock.duration": f"{duration} s",
+        "drive.stage": f"{speed} mm/s",
+    }
     return sim.load(LENS).with_values(values | {"ensemble.members": members} | keys)
 
 
-@pytest.mark.parametrize("keys", [{}, {"shear.amplitude.relaxing": False}, {"bonds.model": "cohort"}])
-def test_the_loop_of_the_drive_draws_the_numbers_of_the_process_bit_for_bit(keys, monkeypatch):
+@pytest.mark.parametrize(
+    "keys", [{}, {"shear.amplitude.relaxing": False}, {"bonds.model": "cohort"}]
+)
+def test_the_loop_of_the_drive_draws_the_numbers_of_the_process_bit_for_bit(
+    keys, monkeypatch
+):
     drawn, advance = [], BandedProcess.advance
 
     def by_both(process, state, motions, *others):
@@ -119,39 +185,71 @@ def test_the_loop_of_the_drive_draws_the_numbers_of_the_process_bit_for_bit(keys
         return by_loop
 
     monkeypatch.setattr(BandedProcess, "advance", by_both)
-    follow(slipping(1.0, 0.1, 20, 2, **keys), MemberNoise.of(1, np.arange(2)), None, range(1, 101))
+    follow(
+        slipping(1.0, 0.1, 20, 2, **keys),
+        MemberNoise.of(1, np.arange(2)),
+        None,
+        range(1, 101),
+    )
     assert len(drawn) >= 2
 
 
 def losses(lens, first):
     """Area over JKR's that fluctuations take from each member after a time; energies must be balanced."""
     members = np.arange(lens.ensemble.members)
-    course = follow(lens, MemberNoise.of(lens.seed, members), None, range(lens.times.steps + 1))[1]
+    course = follow(
+        lens, MemberNoise.of(lens.seed, members), None, range(lens.times.steps + 1)
+    )[1]
     read = dict(zip(READINGS, np.moveaxis(course.driven[-1], -1, 0), strict=True))
     assert np.max(np.abs(read["energy_residual"] / read["drive_work"])) < 1e-6
     late = course.time.ravel() >= first
     work = lens.adhesion.work_of_bonds(course.fraction[late])
-    bonded = jkr.radius_at_load(lens.contact.load, work, lens.sphere.radius, lens.bodies.modulus)
+    bonded = jkr.radius_at_load(
+        lens.contact.load, work, lens.sphere.radius, lens.bodies.modulus
+    )
     return np.mean(bonded**2 - course.radius[late] ** 2, axis=0) / lens.rest_radius**2
 
 
-BY_TIME = {"shear.correlation": {"model": "time", "time": "0.1 ms"}, "shear.amplitude.memory_length": "5 um"}
-MEAN = {"shear": Mean(spectrum=sim.load(LENS).shear.spectrum, amplitude=SlipRate(memory_length=5e-6, floor=0.05))}
+BY_TIME = {
+    "shear.correlation": {"model": "time", "time": "0.1 ms"},
+    "shear.amplitude.memory_length": "5 um",
+}
+MEAN = {
+    "shear": Mean(
+        spectrum=sim.load(LENS).shear.spectrum,
+        amplitude=SlipRate(memory_length=5e-6, floor=0.05),
+    )
+}
 
 
-@pytest.mark.parametrize("keys", [{}] + [pytest.param(keys, marks=pytest.mark.verify) for keys in (
-    {"shear.amplitude.relaxing": False}, BY_TIME, MEAN)])  # fmt: skip
+@pytest.mark.parametrize(
+    "keys",
+    [{}]
+    + [
+        pytest.param(keys, marks=pytest.mark.verify)
+        for keys in ({"shear.amplitude.relaxing": False}, BY_TIME, MEAN)
+    ],
+)
 def test_without_noise_a_slip_does_not_depend_on_the_clock_step(keys):
     coarse, fine = (slipping(step, 1.0, 20, **keys) for step in (1.0, 0.125))
-    for lens in (coarse, fine) if keys is not MEAN else ():  # next to no noise with so many degrees of freedom
-        bands = dataclasses.replace(lens.process.bands, weight=lens.process.bands.weight / 1e12)
+    # next to no noise with so many degrees of freedom
+    for lens in (coarse, fine) if keys is not MEAN else ():
+        bands = dataclasses.replace(
+            lens.process.bands, weight=lens.process.bands.weight / 1e12
+        )
         bands = dataclasses.replace(bands, freedom=1e12 * bands.freedom)
         lens.__dict__["process"] = dataclasses.replace(lens.process, bands=bands)
     assert_allclose(losses(coarse, 0.2), losses(fine, 0.2), rtol=3e-3)
 
 
 @pytest.mark.verify
-@pytest.mark.parametrize(("speed", "limit", "step"), [(20, 0.05092, 1.0), (20, 0.05092, 0.0625), (3, 0.05738, 1.0)])
+@pytest.mark.parametrize(
+    ("speed", "limit", "step"),
+    [(20, 0.05092, 1.0), (20, 0.05092, 0.0625), (3, 0.05738, 1.0)],
+)
 def test_the_loss_to_fluctuations_is_that_of_two_independent_codes(speed, limit, step):
     lost = losses(slipping(step, 2.0, speed, members=16), 0.5)
-    assert abs(np.mean(lost) / limit - 1.0) < 2e-3 + 5.0 * np.std(lost, ddof=1) / math.sqrt(len(lost)) / limit
+    assert (
+        abs(np.mean(lost) / limit - 1.0)
+        < 2e-3 + 5.0 * np.std(lost, ddof=1) / math.sqrt(len(lost)) / limit
+    )

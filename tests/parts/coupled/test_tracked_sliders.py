@@ -6,7 +6,19 @@ import math
 
 import numpy as np
 import pytest
-from helpers.driven import AREA, LOAD, STRETCH, UNIT, force, march, marched, reached, residual, scenario, spring
+from helpers.driven import (
+    AREA,
+    LOAD,
+    STRETCH,
+    UNIT,
+    force,
+    march,
+    marched,
+    reached,
+    residual,
+    scenario,
+    spring,
+)
 from helpers.scenes import IN_TIME
 from numpy.testing import assert_allclose
 
@@ -20,7 +32,9 @@ from sim.parts.shear import Banded
 
 def tracked(duration, steps, drive, sites, **keys):
     """A lens whose bonds are followed one by one."""
-    return scenario(duration, steps, drive, make=functools.partial(Tracked, sites=sites), **keys)
+    return scenario(
+        duration, steps, drive, make=functools.partial(Tracked, sites=sites), **keys
+    )
 
 
 def forces(states):
@@ -28,50 +42,105 @@ def forces(states):
     return np.array([state.bonding.stress * AREA / UNIT for state in states])
 
 
-@pytest.mark.parametrize(("sites", "load", "mean"), [(5, 2.0, 0.776110717635), (10, 5.0, 0.589619750203)])
-def test_bonds_that_share_a_force_and_are_not_remade_all_break_in_the_time_of_a_pure_death_process(sites, load, mean):
+@pytest.mark.parametrize(
+    ("sites", "load", "mean"), [(5, 2.0, 0.776110717635), (10, 5.0, 0.589619750203)]
+)
+def test_bonds_that_share_a_force_and_are_not_remade_all_break_in_the_time_of_a_pure_death_process(
+    sites, load, mean
+):
     # i bonds break at the rate i exp(f/i): the mean is the sum of exp(-f/i)/i, its variance that of the squares
     members = np.arange(4000)
-    bound, lonely = (tracked(8.0, 2, force(load / sites), sites, rebinding=rate) for rate in (1e15, 1e-15))
+    bound, lonely = (
+        tracked(8.0, 2, force(load / sites), sites, rebinding=rate)
+        for rate in (1e15, 1e-15)
+    )
     states = list(march(lonely, members, next(march(bound, members))))
     each = [math.exp(-load / i) / i for i in range(1, sites + 1)]
     assert_allclose(sum(each), mean, rtol=1e-9)
-    assert abs(np.mean(states[-1].drive.runaway_time) - mean) < 4.0 * math.sqrt(sum(np.square(each)) / len(members))
+    assert abs(np.mean(states[-1].drive.runaway_time) - mean) < 4.0 * math.sqrt(
+        sum(np.square(each)) / len(members)
+    )
 
 
-@pytest.mark.parametrize("rupture", [{}, {"rupture": CutOff(stretch=STRETCH)}, {"rupture": Constant(rate=1.0)}])
-def test_the_energies_of_every_slider_are_balanced_and_bonds_snap_where_nothing_delays_them(rupture):
+@pytest.mark.parametrize(
+    "rupture",
+    [{}, {"rupture": CutOff(stretch=STRETCH)}, {"rupture": Constant(rate=1.0)}],
+)
+def test_the_energies_of_every_slider_are_balanced_and_bonds_snap_where_nothing_delays_them(
+    rupture,
+):
     alone = {}, {"damping": 0.01}, {"mass": 1e-3, "damping": 1e-3}
     alone += ({"contact": "half_space", "viscosity": 0.01, "damping": 0.01},)
-    for keys in alone + ({"contact": 0.2}, {"contact": 0.2, "viscosity": 0.01}, {"contact": 0.3, "mass": 1e-2}):
+    for keys in alone + (
+        {"contact": 0.2},
+        {"contact": 0.2, "viscosity": 0.01},
+        {"contact": 0.3, "mass": 1e-2},
+    ):
         missing = []
         for tolerance in (1e-6, 1e-8):
-            _, read = marched(tracked(8.0, 8, spring(0.2, tolerance=tolerance, **keys), 100, share=0.3, **rupture))
+            _, read = marched(
+                tracked(
+                    8.0,
+                    8,
+                    spring(0.2, tolerance=tolerance, **keys),
+                    100,
+                    share=0.3,
+                    **rupture,
+                )
+            )
             missing.append(residual(read))
         assert missing[0] < 1e-3
         assert missing[1] < max(0.3 * missing[0], 1e-10)
         slips_at_once = "viscosity" not in keys and ("contact" in keys or not keys)
-        assert (read["dissipated_by_snaps"][-1] > 1e-12 * read["drive_work"][-1]) == slips_at_once
+        assert (
+            read["dissipated_by_snaps"][-1] > 1e-12 * read["drive_work"][-1]
+        ) == slips_at_once
 
 
 @pytest.mark.parametrize("rupture", [{}, {"rupture": Constant(rate=1.0)}])
 @pytest.mark.parametrize("share", [0.0, 0.3])
-def test_the_closed_form_from_event_to_event_is_the_limit_of_short_sub_steps(rupture, share):
+def test_the_closed_form_from_event_to_event_is_the_limit_of_short_sub_steps(
+    rupture, share
+):
     # the area changes with the bonds and with the fluctuations; a load that hardly changes takes the sub-steps
-    fluctuating, firm = Banded(**IN_TIME), {"damping": 0.3 * UNIT / STRETCH, "tolerance": 1e-10}
-    slow, grows = {"stiffness": 0.2, "tolerance": 1e-10}, {"from": 0.1 * UNIT, "to": UNIT}
-    of_spring = {}, {"damping": 0.05}, {"contact": 0.2}, {"contact": 0.2, "damping": 0.3}
-    drives = [spring(**slow, **keys) for keys in of_spring] + [force(0.5, **firm), Force(force=grows, **firm)]
+    fluctuating, firm = (
+        Banded(**IN_TIME),
+        {"damping": 0.3 * UNIT / STRETCH, "tolerance": 1e-10},
+    )
+    slow, grows = (
+        {"stiffness": 0.2, "tolerance": 1e-10},
+        {"from": 0.1 * UNIT, "to": UNIT},
+    )
+    of_spring = (
+        {},
+        {"damping": 0.05},
+        {"contact": 0.2},
+        {"contact": 0.2, "damping": 0.3},
+    )
+    drives = [spring(**slow, **keys) for keys in of_spring] + [
+        force(0.5, **firm),
+        Force(force=grows, **firm),
+    ]
     for drive in drives:
         still, moving = (
-            dataclasses.replace(tracked(3.0, 6, drive, 20, share=share, load=load, **rupture), shear=fluctuating)
+            dataclasses.replace(
+                tracked(3.0, 6, drive, 20, share=share, load=load, **rupture),
+                shear=fluctuating,
+            )
             for load in (LOAD, {"from": LOAD, "to": LOAD * (1.0 + 1e-12)})
         )
         (closed, read), (stepped, other) = marched(still), marched(moving)
         ends = [reached(states, "position") for states in (closed, stepped)]
         assert_allclose(*ends, rtol=1e-6, atol=1e-8)
-        assert all(np.array_equal(*lives) for lives in zip(closed[-1].bonds.life, stepped[-1].bonds.life, strict=True))
-        assert share > 0.0 or drive.damping == 0.0 or read["substeps"][-1] < 0.5 * other["substeps"][-1]
+        assert all(
+            np.array_equal(*lives)
+            for lives in zip(closed[-1].bonds.life, stepped[-1].bonds.life, strict=True)
+        )
+        assert (
+            share > 0.0
+            or drive.damping == 0.0
+            or read["substeps"][-1] < 0.5 * other["substeps"][-1]
+        )
         assert residual(read) < 1e-9
 
 
@@ -79,11 +148,15 @@ def test_many_bonds_above_the_onset_fluctuate_as_one_over_the_root_of_their_numb
     clock, keys = (2.0, 20), {"start": "steady"}
     drive = spring(0.3, start="steady")
     make = functools.partial(Cohort, tolerance=1e-5)
-    mean = forces(list(march(scenario(*clock, drive, make=make, **keys), np.arange(1))))[10:, 0]
+    mean = forces(
+        list(march(scenario(*clock, drive, make=make, **keys), np.arange(1)))
+    )[10:, 0]
     spreads, biases = [], []
     cases = (25, 200), (400, 60)
     for sites, members in cases:
-        found = forces(list(march(tracked(*clock, drive, sites, **keys), np.arange(members))))[10:]
+        found = forces(
+            list(march(tracked(*clock, drive, sites, **keys), np.arange(members)))
+        )[10:]
         error = np.std(found, axis=1) / math.sqrt(members)
         spreads.append(np.mean(np.std(found, axis=1)))
         biases.append(np.mean(found.mean(axis=1) - mean))
@@ -97,10 +170,16 @@ def test_many_bonds_above_the_onset_fluctuate_as_one_over_the_root_of_their_numb
 def test_above_the_onset_the_mean_force_of_few_bonds_is_off_by_one_over_their_number():
     clock, drive = (2.0, 20), spring(0.3, start="steady")
     make = functools.partial(Cohort, tolerance=1e-6)
-    mean = forces(list(march(scenario(*clock, drive, make=make, start="steady"), np.arange(1))))[10:].mean()
+    mean = forces(
+        list(march(scenario(*clock, drive, make=make, start="steady"), np.arange(1)))
+    )[10:].mean()
     off, errors, spreads = [], [], []
     for sites, members in ((25, 8000), (100, 4000)):
-        found = forces(list(march(tracked(*clock, drive, sites, start="steady"), np.arange(members))))[10:]
+        found = forces(
+            list(
+                march(tracked(*clock, drive, sites, start="steady"), np.arange(members))
+            )
+        )[10:]
         own = found.mean(axis=0) - mean
         off.append(sites * own.mean())
         errors.append(sites * own.std(ddof=1) / math.sqrt(members))
@@ -113,20 +192,38 @@ def test_above_the_onset_the_mean_force_of_few_bonds_is_off_by_one_over_their_nu
 @pytest.mark.verify
 def test_below_the_onset_period_size_and_peak_of_slips_approach_those_of_the_cohorts():
     def slips(make, members):
-        found = stick_slip(run(scenario(30.0, 1500, spring(0.015), make=make, members=members)))
+        found = stick_slip(
+            run(scenario(30.0, 1500, spring(0.015), make=make, members=members))
+        )
         return {name: found[name].to_numpy() for name in (*sizes, "slip_spread")}
 
     sizes = "recurrence_time", "slip_amplitude", "force_drop", "static_friction"
     exact = slips(functools.partial(Cohort, tolerance=1e-5), 1)
-    few, many = (slips(functools.partial(Tracked, sites=sites), members) for sites, members in ((100, 32), (400, 16)))
+    few, many = (
+        slips(functools.partial(Tracked, sites=sites), members)
+        for sites, members in ((100, 32), (400, 16))
+    )
     for name in sizes:
         off = [np.mean(found[name]) - exact[name].item() for found in (few, many)]
-        errors = [np.std(found[name], ddof=1) / math.sqrt(len(found[name])) for found in (few, many)]
-        assert abs(off[1]) < abs(off[0]) / 4.0 + 3.0 * math.hypot(errors[0] / 4.0, errors[1]), name
+        errors = [
+            np.std(found[name], ddof=1) / math.sqrt(len(found[name]))
+            for found in (few, many)
+        ]
+        assert abs(off[1]) < abs(off[0]) / 4.0 + 3.0 * math.hypot(
+            errors[0] / 4.0, errors[1]
+        ), name
     # the sizes of slips spread by one over the root of the number at most, within three standard errors
     spreads = [found["slip_spread"] for found in (few, many)]
-    means, errors = zip(*((np.mean(s), np.std(s, ddof=1) / math.sqrt(len(s))) for s in spreads), strict=True)
-    assert exact["slip_spread"].item() < 0.01 < means[1] < 0.5 * means[0] + 3.0 * math.hypot(0.5 * errors[0], errors[1])
+    means, errors = zip(
+        *((np.mean(s), np.std(s, ddof=1) / math.sqrt(len(s))) for s in spreads),
+        strict=True,
+    )
+    assert (
+        exact["slip_spread"].item()
+        < 0.01
+        < means[1]
+        < 0.5 * means[0] + 3.0 * math.hypot(0.5 * errors[0], errors[1])
+    )
 
 
 def test_a_state_that_has_been_advanced_is_not_advanced_again():

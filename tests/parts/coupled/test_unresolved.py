@@ -34,16 +34,34 @@ rebinding_rate = "3 1/s"
 site_density = "1e17 1/m^2"
 """
 #: Models of bonds by their loops, of which the last has noise.
-MODELS = {"rate": 'model = "rate"', "cohort": 'model = "cohort"', "tracked": 'model = "tracked"\nsites = 50'}
+MODELS = {
+    "rate": 'model = "rate"',
+    "cohort": 'model = "cohort"',
+    "tracked": 'model = "tracked"\nsites = 50',
+}
 
 
 @pytest.mark.verify
 @pytest.mark.parametrize("model", MODELS)
-def test_a_motion_that_hardly_advances_ends_as_unresolved_and_the_run_ends_with_1(model, tmp_path):
+def test_a_motion_that_hardly_advances_ends_as_unresolved_and_the_run_ends_with_1(
+    model, tmp_path
+):
     scene, output = tmp_path / "scene.toml", tmp_path / "out.nc"
     scene.write_text(SCENE.replace("MODEL", MODELS[model]), encoding="utf-8")
-    environment = {**os.environ, "SIM_CACHE_DIR": str(tmp_path / "cache")}  # because constants are compiled in
-    words = [sys.executable, "-c", PROGRAM, "run", str(scene), "-o", str(output), "-j", "1", "--quiet"]
+    # because constants are compiled in
+    environment = {**os.environ, "SIM_CACHE_DIR": str(tmp_path / "cache")}
+    words = [
+        sys.executable,
+        "-c",
+        PROGRAM,
+        "run",
+        str(scene),
+        "-o",
+        str(output),
+        "-j",
+        "1",
+        "--quiet",
+    ]
     ended = subprocess.run(words, env=environment, capture_output=True, text=True)
     assert ended.returncode == 1, ended.stderr
     assert "could not be resolved" in ended.stderr and "Traceback" not in ended.stderr

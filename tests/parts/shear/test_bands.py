@@ -20,7 +20,16 @@ from sim.parts.shear import models as shear
 from sim.parts.shear.bands import Pairs, cell_pairs, group
 from sim.parts.shear.modes import modes
 from sim.parts.shear.process import Diffusion, Slip, Time, Wave
-from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Measured, Ripple, SelfAffine, Tabulated, VonKarman
+from sim.spectrum import (
+    AnisotropicGaussian,
+    Band,
+    Gaussian,
+    Measured,
+    Ripple,
+    SelfAffine,
+    Tabulated,
+    VonKarman,
+)
 
 G, CELL, RMS = 1.6e6, 100e-6, 150e3
 FAMILIES = {
@@ -30,11 +39,19 @@ FAMILIES = {
     "von karman 0.3": VonKarman(RMS, 8e-6, 0.3),
     "von karman 0.8": VonKarman(RMS, 8e-6, 0.8),
     "von karman 1": VonKarman(RMS, 8e-6, 1.0),
-    "self-affine 0": SelfAffine(RMS, 0.0, longest=50e-6, rolloff=20e-6, shortest=5.6e-6),
-    "self-affine 0.8": SelfAffine(RMS, 0.8, longest=50e-6, rolloff=20e-6, shortest=5.6e-6),
-    "self-affine 1": SelfAffine(RMS, 1.0, longest=100e-6, rolloff=100e-6, shortest=5.6e-6),
+    "self-affine 0": SelfAffine(
+        RMS, 0.0, longest=50e-6, rolloff=20e-6, shortest=5.6e-6
+    ),
+    "self-affine 0.8": SelfAffine(
+        RMS, 0.8, longest=50e-6, rolloff=20e-6, shortest=5.6e-6
+    ),
+    "self-affine 1": SelfAffine(
+        RMS, 1.0, longest=100e-6, rolloff=100e-6, shortest=5.6e-6
+    ),
     "tabulated": Tabulated((1e5, 2e5, 3e5, 5e5, 9e5), (0.0, 3.0, 3.0, 0.2, 0.0)),
-    "measured": Measured("map.csv", 1e-6, wavenumbers=(6e4, 3e5, 1e6), densities=(3.0, 4.0, 0.1)),
+    "measured": Measured(
+        "map.csv", 1e-6, wavenumbers=(6e4, 3e5, 1e6), densities=(3.0, 4.0, 0.1)
+    ),
     "ripple": Ripple(RMS, 20e-6, 0.3),
 }
 MEMORIES = {
@@ -63,46 +80,85 @@ def relative_errors(weights, rates, bands, power):
     for order, name in ((3, "third"), (4, "fourth")):
         exact = math.factorial(order - 1) * math.fsum(weights**order)
         # κn of ½ W chi-square(k) is ½ (n − 1)! k W^n
-        banded = 0.5 * math.factorial(order - 1) * math.fsum(bands.freedom * bands.weight**order)
+        banded = (
+            0.5
+            * math.factorial(order - 1)
+            * math.fsum(bands.freedom * bands.weight**order)
+        )
         lacks[f"banded_error_{name}_cumulant"] = 1.0 - banded / exact
     squares = 0.5 * bands.weight**2 * bands.freedom
     exact = math.fsum(weights**2 / (2.0 * rates))
-    lacks["banded_error_correlation_time"] = 1.0 - math.fsum(squares / (2.0 * own_rates)) / exact
+    lacks["banded_error_correlation_time"] = (
+        1.0 - math.fsum(squares / (2.0 * own_rates)) / exact
+    )
     return lacks, squares, own_rates
 
 
 def test_mean_and_variance_are_those_of_all_modes_which_small_cells_list_pair_by_pair():
-    cases = [*product(FAMILIES, ["wave"], [41], [0.3]), *product(["gaussian"], MEMORIES, [42], [0.5])]
-    for (name, correlation, points, poisson_ratio), tolerance in product(cases, (0.3, 0.01)):
+    cases = [
+        *product(FAMILIES, ["wave"], [41], [0.3]),
+        *product(["gaussian"], MEMORIES, [42], [0.5]),
+    ]
+    for (name, correlation, points, poisson_ratio), tolerance in product(
+        cases, (0.3, 0.01)
+    ):
         weights, _ = listed(FAMILIES[name], points, poisson_ratio)
         recipe = shear.Banded(
-            spectrum=FAMILIES[name], correlation=MEMORIES[correlation][0], cell=CELL, points=points, tolerance=tolerance
+            spectrum=FAMILIES[name],
+            correlation=MEMORIES[correlation][0],
+            cell=CELL,
+            points=points,
+            tolerance=tolerance,
         )
-        process, sums = recipe.process(G, poisson_ratio, 1.0), (math.fsum(weights), math.fsum(weights**2))
+        process, sums = (
+            recipe.process(G, poisson_ratio, 1.0),
+            (math.fsum(weights), math.fsum(weights**2)),
+        )
         bands, spread = process.bands, process.known_errors()["member_spread_energy"]
-        assert_allclose([bands.mean, variance_of(bands), spread], [*sums, sums[1] ** 0.5 / sums[0]], rtol=1e-12, atol=0)
+        assert_allclose(
+            [bands.mean, variance_of(bands), spread],
+            [*sums, sums[1] ** 0.5 / sums[0]],
+            rtol=1e-12,
+            atol=0,
+        )
         assert np.all(bands.freedom >= 2.0)
-    cells = [*product([12, 13, 256, 257], ["von karman 0.3", "anisotropic, turned", "ripple"], [0.5, 0.3])]
-    for points, name, poisson_ratio in [*cells, (512, "von karman 0.3", 0.3), (513, "von karman 0.3", 0.3)]:
+    cells = [
+        *product(
+            [12, 13, 256, 257],
+            ["von karman 0.3", "anisotropic, turned", "ripple"],
+            [0.5, 0.3],
+        )
+    ]
+    for points, name, poisson_ratio in [
+        *cells,
+        (512, "von karman 0.3", 0.3),
+        (513, "von karman 0.3", 0.3),
+    ]:
         pairs = cell_pairs(FAMILIES[name], CELL, points, G, poisson_ratio)
         weights, wavenumbers = listed(FAMILIES[name], points, poisson_ratio)
         assert np.all(pairs.count == 1.0)
         assert_allclose(np.sort(pairs.weight), np.sort(weights), rtol=1e-13, atol=0)
-        assert_allclose(np.sort(pairs.wavenumber), np.sort(wavenumbers), rtol=1e-13, atol=0)
+        assert_allclose(
+            np.sort(pairs.wavenumber), np.sort(wavenumbers), rtol=1e-13, atol=0
+        )
 
 
 @pytest.mark.parametrize(
     ("name", "power"),
     some(
-        list(product(FAMILIES, (0, 1, 2))), *((name, 2) for name in FAMILIES),
-        ("tabulated", 0), ("anisotropic, turned", 1),
+        list(product(FAMILIES, (0, 1, 2))),
+        *((name, 2) for name in FAMILIES),
+        ("tabulated", 0),
+        ("anisotropic, turned", 1),
     ),
-)  # fmt: skip
+)
 def test_every_other_error_is_the_one_told_and_within_the_tolerance(name, power):
     weights, wavenumbers = listed(FAMILIES[name])
     rates, ones = (wavenumbers / 1e5) ** power, np.ones(len(weights))
     spread = math.log(rates.max() / rates.min())
-    lags = np.concatenate([[0.0], np.geomspace(1e-3 / rates.max(), 100.0 / rates.min(), 1000)])
+    lags = np.concatenate(
+        [[0.0], np.geomspace(1e-3 / rates.max(), 100.0 / rates.min(), 1000)]
+    )
     # between two of the lags, h apart in the logarithm, a largest value is missed by h² of it at the most, as
     # |d²/du² (x e^-x)^2| is below 8 times its largest, x = e^u; rates fall into 4000 classes
     missed, merged = math.log(lags[2] / lags[1]) ** 2, (spread / 4000) ** 2
@@ -125,20 +181,32 @@ def test_every_other_error_is_the_one_told_and_within_the_tolerance(name, power)
     assert numbers == sorted(numbers)
 
 
-@pytest.mark.parametrize(("name", "power"), [("band", 0), ("von karman 0.3", 1), ("self-affine 0", 2)])
+@pytest.mark.parametrize(
+    ("name", "power"), [("band", 0), ("von karman 0.3", 1), ("self-affine 0", 2)]
+)
 def test_under_amplitude_that_relaxes_the_mean_follows_all_modes(name, power):
     weights, wavenumbers = listed(FAMILIES[name])
-    pairs, rates = Pairs(weights, wavenumbers, np.ones(len(weights))), (wavenumbers / 1e5) ** power
+    pairs, rates = (
+        Pairs(weights, wavenumbers, np.ones(len(weights))),
+        (wavenumbers / 1e5) ** power,
+    )
     lags = np.geomspace(1e-3 / rates.max(), 100.0 / rates.min(), 2000)
     for tolerance in TOLERANCES:
         bands = group(pairs, power, tolerance, relaxing=True)
         _, _, own_rates = relative_errors(weights, rates, bands, power)
         exact = np.exp(-2.0 * np.multiply.outer(lags, rates)) @ weights
-        banded = np.exp(-2.0 * np.multiply.outer(lags, own_rates)) @ (0.5 * bands.weight * bands.freedom)
+        banded = np.exp(-2.0 * np.multiply.outer(lags, own_rates)) @ (
+            0.5 * bands.weight * bands.freedom
+        )
         lack = np.max(np.abs(exact - banded)) / math.fsum(weights)
         # rates in 4000 classes, largest value between lags as above
         known = bands.errors.get("banded_error_relaxing_mean", 0.0)
-        assert_allclose(known, lack, rtol=1e-4, atol=(math.log(rates.max() / rates.min()) / 4000) ** 2 + 1e-14)
+        assert_allclose(
+            known,
+            lack,
+            rtol=1e-4,
+            atol=(math.log(rates.max() / rates.min()) / 4000) ** 2 + 1e-14,
+        )
         assert max(bands.errors.values()) <= tolerance
         assert ("banded_error_relaxing_mean" in bands.errors) == (power > 0)
 
@@ -160,24 +228,42 @@ def scattered(rng):
 def test_any_pairs_are_grouped_within_the_tolerance(seed):
     rng = np.random.default_rng(seed)
     for _ in range(2000 if seed == 3 else 40):
-        pairs, power, tolerance = scattered(rng), int(rng.integers(0, 3)), 10.0 ** rng.uniform(-4.0, -0.01)
+        pairs, power, tolerance = (
+            scattered(rng),
+            int(rng.integers(0, 3)),
+            10.0 ** rng.uniform(-4.0, -0.01),
+        )
         bands = group(pairs, power, tolerance)
         weights, counts = pairs.weight, pairs.count
         assert_allclose(bands.mean, math.fsum(counts * weights), rtol=1e-12, atol=0)
-        assert_allclose(variance_of(bands), math.fsum(counts * weights**2), rtol=1e-12, atol=0)
+        assert_allclose(
+            variance_of(bands), math.fsum(counts * weights**2), rtol=1e-12, atol=0
+        )
         assert np.all(bands.freedom >= 2.0)
         assert max(bands.errors.values()) <= tolerance
         assert min(bands.errors.values()) >= 0.0
-        slowest, fastest = pairs.wavenumber.min() * (1 - 1e-12), pairs.wavenumber.max() * (1 + 1e-12)
-        assert power == 0 or np.all((bands.wavenumber >= slowest) & (bands.wavenumber <= fastest))
+        slowest, fastest = (
+            pairs.wavenumber.min() * (1 - 1e-12),
+            pairs.wavenumber.max() * (1 + 1e-12),
+        )
+        assert power == 0 or np.all(
+            (bands.wavenumber >= slowest) & (bands.wavenumber <= fastest)
+        )
 
 
 def test_equal_pairs_are_one_band_a_ripple_one_of_two_degrees_and_any_within_a_tolerance_of_zero_single():
     for correlation, _ in MEMORIES.values():
-        process = shear.Banded(spectrum=FAMILIES["ripple"], correlation=correlation, cell=CELL).process(G, 0.5, 1.0)
+        process = shear.Banded(
+            spectrum=FAMILIES["ripple"], correlation=correlation, cell=CELL
+        ).process(G, 0.5, 1.0)
         assert process.bands.freedom.tolist() == [2.0]
         assert set(process.bands.errors.values()) == {0.0}
-        assert_allclose(process.bands.weight, FAMILIES["ripple"].surface_energy(G), rtol=1e-14, atol=0)
+        assert_allclose(
+            process.bands.weight,
+            FAMILIES["ripple"].surface_energy(G),
+            rtol=1e-14,
+            atol=0,
+        )
         assert_allclose(process.bands.wavenumber, 2 * np.pi / 20e-6, rtol=1e-14, atol=0)
     many = Pairs(np.full(700, 3e-7), np.full(700, 2e5), np.ones(700))
     counted = Pairs(np.array([3e-7]), np.array([2e5]), np.array([700.0]))
@@ -206,7 +292,10 @@ def counted_and_listed(spectrum, points):
     pairs = cell_pairs(spectrum, CELL, points, G, 0.3)
     weights, wavenumbers = listed(spectrum, points, 0.3)
     assert len(pairs.weight) < len(weights)
-    return sums(pairs.weight, pairs.wavenumber, pairs.count) / sums(weights, wavenumbers) - 1.0
+    return (
+        sums(pairs.weight, pairs.wavenumber, pairs.count) / sums(weights, wavenumbers)
+        - 1.0
+    )
 
 
 #: Cells with weight where pairs are counted; a wavelength that the grid just holds, or a share of it.
@@ -224,20 +313,32 @@ COUNTED = {
 
 @pytest.mark.parametrize(
     ("name", "points"),
-    some(list(product(COUNTED, (704, 1500))), ("anisotropic, turned", 704), ("narrow high band", 704)),
+    some(
+        list(product(COUNTED, (704, 1500))),
+        ("anisotropic, turned", 704),
+        ("narrow high band", 704),
+    ),
 )
 def test_counted_cells_have_the_mean_and_variance_of_all_modes(name, points):
     off = counted_and_listed(COUNTED[name](CELL / ((points - 1) // 2 - 0.6)), points)
     assert np.all(np.abs(off[:2]) < (5e-9, 3e-7))
     # w varies within a block; a band a few pixels wide has pairs at its ends that hold any share of a full one
-    assert np.all(np.abs(off[2:]) < {"narrow high band": 0.1, "high band": 1e-2, "wide band": 1e-5}.get(name, 1e-6))
+    assert np.all(
+        np.abs(off[2:])
+        < {"narrow high band": 0.1, "high band": 1e-2, "wide band": 1e-5}.get(
+            name, 1e-6
+        )
+    )
     assert np.all(off[2:4] < 1e-6)  # and like banding, blocks can but lower κ3 and κ4
 
 
 def test_a_cliff_in_a_table_is_counted_to_a_few_parts_in_ten_thousand():
     # the density falls to zero within less than two pixels, 320 from the origin, and rises again
     q = 2 * np.pi / CELL * np.array([160.0, 240.0, 318.0, 319.6, 342.0])
-    off = counted_and_listed(Measured("map.csv", wavenumbers=tuple(q), densities=(0.0, 1.0, 1.0, 0.0, 1.0)), 700)
+    off = counted_and_listed(
+        Measured("map.csv", wavenumbers=tuple(q), densities=(0.0, 1.0, 1.0, 0.0, 1.0)),
+        700,
+    )
     assert np.all(np.abs(off[:2]) < (1e-6, 3e-4))
     assert np.all(np.abs(off[2:]) < 3e-3)
 
@@ -251,7 +352,9 @@ def test_a_hundred_million_pairs_are_counted_in_bounded_memory():
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     low, high = (limit * cell / (2 * np.pi) for limit in spectrum.support)
-    assert_allclose(pairs.count.sum(), 0.5 * np.pi * (high**2 - low**2), rtol=1e-3, atol=0)
+    assert_allclose(
+        pairs.count.sum(), 0.5 * np.pi * (high**2 - low**2), rtol=1e-3, atol=0
+    )
     assert len(pairs.weight) < 1e6
     assert peak < 256e6
     # the lattice near q = 0 is the same as in a cell that can be listed
@@ -260,28 +363,56 @@ def test_a_hundred_million_pairs_are_counted_in_bounded_memory():
     infinite, short = (float(s.surface_energy(G)) for s in (spectrum, listable))
     per_variance = [s.radial_density(2e5) for s in (spectrum, listable)]
     lattice = math.fsum(pairs.weight * pairs.count) - infinite
-    assert_allclose(lattice / per_variance[0], (math.fsum(coarse.weight) - short) / per_variance[1], rtol=1e-4, atol=0)
+    assert_allclose(
+        lattice / per_variance[0],
+        (math.fsum(coarse.weight) - short) / per_variance[1],
+        rtol=1e-4,
+        atol=0,
+    )
 
 
 @pytest.mark.parametrize(
     "waves",
-    [(2000, 2200), *(pytest.param(w, marks=pytest.mark.verify) for w in [(7000, 8000), (7_000_000, 7_070_000)])],
+    [
+        (2000, 2200),
+        *(
+            pytest.param(w, marks=pytest.mark.verify)
+            for w in [(7000, 8000), (7_000_000, 7_070_000)]
+        ),
+    ],
 )
 def test_far_from_the_origin_a_band_holds_the_energy_of_the_infinite_plane(waves):
     spectrum = Band(RMS, CELL / waves[0], CELL / waves[1])
     pairs = cell_pairs(spectrum, CELL, None, G, 0.5)
     # blocks narrower than 1/85 of their wavenumber in 3 × 3 squares: (1/85/3)² / 24 = 6e-7 at the most
-    assert_allclose(math.fsum(pairs.weight * pairs.count), spectrum.surface_energy(G), rtol=6e-7, atol=0)
-    assert_allclose(pairs.count.sum(), 0.5 * np.pi * (waves[1] ** 2 - waves[0] ** 2), rtol=5e-3, atol=0)
+    assert_allclose(
+        math.fsum(pairs.weight * pairs.count),
+        spectrum.surface_energy(G),
+        rtol=6e-7,
+        atol=0,
+    )
+    assert_allclose(
+        pairs.count.sum(),
+        0.5 * np.pi * (waves[1] ** 2 - waves[0] ** 2),
+        rtol=5e-3,
+        atol=0,
+    )
 
 
 def test_a_longest_wave_beyond_the_cell_costs_the_cells_error_and_a_cell_without_modes_is_refused():
     spectrum = Band(RMS, longest=4 * CELL, shortest=10e-6)
-    recipe = functools.partial(shear.Banded, spectrum=spectrum, correlation=Slip(length=1e-6))
+    recipe = functools.partial(
+        shear.Banded, spectrum=spectrum, correlation=Slip(length=1e-6)
+    )
     short, long = (recipe(cell=side).process(G, 0.5, 1.0) for side in (CELL, 40 * CELL))
     exact = float(spectrum.surface_energy(G))
     errors = [process.known_errors()["cell_error_energy"] for process in (short, long)]
-    assert_allclose(errors, [process.bands.mean / exact - 1.0 for process in (short, long)], rtol=1e-9, atol=0)
+    assert_allclose(
+        errors,
+        [process.bands.mean / exact - 1.0 for process in (short, long)],
+        rtol=1e-9,
+        atol=0,
+    )
     assert errors[0] < -0.01 and abs(errors[1]) < 1e-4
     for spectrum, points, cure in (
         (Band(RMS, 300e-6, 250e-6), None, "make the cell longer"),
@@ -295,7 +426,10 @@ def test_a_longest_wave_beyond_the_cell_costs_the_cells_error_and_a_cell_without
 def test_bands_from_the_disk_are_those_grouped_anew(tmp_path, monkeypatch):
     monkeypatch.setenv("SIM_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(disk_cache, "_WORTH", -1.0)
-    spectra = [SelfAffine(1.0, 0.8, 60e-6, 24e-6, 4e-6), SelfAffine(1.0, 0.7, 60e-6, 24e-6, 4e-6)]
+    spectra = [
+        SelfAffine(1.0, 0.8, 60e-6, 24e-6, 4e-6),
+        SelfAffine(1.0, 0.7, 60e-6, 24e-6, 4e-6),
+    ]
     cell = (240e-6, None, 0.5, 1, 0.01, False)
     for spectrum in spectra:
         bands, errors = shear._grouped_anew(spectrum, cell)

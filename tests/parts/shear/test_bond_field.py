@@ -47,27 +47,48 @@ def test_energy_variance_map_and_sign_of_the_field_of_discs():
             assert_allclose(exact, 1.0 / (math.pi**2 * G * B), rtol=1e-15)
         # work of a unit force on its own mean displacement, ½ f u = ½ f²/stiffest
         assert_allclose(0.5 / SPECTRUM.stiffest(G, poisson_ratio), exact, rtol=1e-14)
-    assert_allclose(BondMade(footprint=1e-9).stiffest(1.6e6), 7.8957e-3, rtol=1e-4)  # half of π² G b
+    # half of π² G b
+    assert_allclose(BondMade(footprint=1e-9).stiffest(1.6e6), 7.8957e-3, rtol=1e-4)
     edges = np.linspace(0.0, 400.0, 801) / B
-    radial = sum(quad(lambda q: q * SPECTRUM.radial_density(q), a, b)[0] for a, b in itertools.pairwise(edges))
+    radial = sum(
+        quad(lambda q: q * SPECTRUM.radial_density(q), a, b)[0]
+        for a, b in itertools.pairwise(edges)
+    )
     assert_allclose(radial / (2 * math.pi), SPECTRUM.cumulative(edges[-1]), rtol=1e-9)
-    line = sum(quad(SPECTRUM.radial_density, a, b)[0] for a, b in itertools.pairwise(edges))
-    assert_allclose(line, SPECTRUM.line_integral, rtol=1e-4)  # the tail beyond falls as 1/q²: 4/(pi x²) / 2 at x = 400
+    line = sum(
+        quad(SPECTRUM.radial_density, a, b)[0] for a, b in itertools.pairwise(edges)
+    )
+    # the tail beyond falls as 1/q²: 4/(pi x²) / 2 at x = 400
+    assert_allclose(line, SPECTRUM.line_integral, rtol=1e-4)
     q = np.geomspace(1e-6, 1e3, 200) / B
-    assert_allclose(SPECTRUM.cumulative(q) + SPECTRUM.beyond(q), SPECTRUM.variance, rtol=1e-14)
-    slope = (SPECTRUM.cumulative(q * 1.0001) - SPECTRUM.cumulative(q / 1.0001)) / (q * (1.0001 - 1 / 1.0001))
+    assert_allclose(
+        SPECTRUM.cumulative(q) + SPECTRUM.beyond(q), SPECTRUM.variance, rtol=1e-14
+    )
+    slope = (SPECTRUM.cumulative(q * 1.0001) - SPECTRUM.cumulative(q / 1.0001)) / (
+        q * (1.0001 - 1 / 1.0001)
+    )
     low = q * B < 1.0
-    assert_allclose(slope[low], (q * SPECTRUM.radial_density(q) / (2 * math.pi))[low], rtol=1e-6)
-    state = SiteMean(SPECTRUM.surface_energy(G), Constant()).start(moved(0), bonding(3.0, 2.0), None)
+    assert_allclose(
+        slope[low], (q * SPECTRUM.radial_density(q) / (2 * math.pi))[low], rtol=1e-6
+    )
+    state = SiteMean(SPECTRUM.surface_energy(G), Constant()).start(
+        moved(0), bonding(3.0, 2.0), None
+    )
     assert_allclose(state.energy, 13.0 / (math.pi**2 * G * B), rtol=1e-14)
     field, noise = process(), Noise(2, "shear", np.arange(3))
     first = field.start(moved(0), bonding(0.8, 0.0), noise)
     back = advanced(field, first, moved(1, 1.0), bonding(-0.8, 0.0), noise)
-    assert_allclose(complex_amplitudes(field, back), -complex_amplitudes(field, first), rtol=1e-14)
+    assert_allclose(
+        complex_amplitudes(field, back), -complex_amplitudes(field, first), rtol=1e-14
+    )
     field, noise = process(), Noise(3, "shear", np.arange(2))
     state = field.start(moved(0), bonding(0.8, 0.6), noise)
     maps = field.maps(state, np.zeros(1), 2)
-    assert_allclose([surface_energy(field_map, CELL, G) for field_map in maps], state.energy, rtol=1e-12)
+    assert_allclose(
+        [surface_energy(field_map, CELL, G) for field_map in maps],
+        state.energy,
+        rtol=1e-12,
+    )
 
 
 @pytest.mark.parametrize("members", MEMBERS)
@@ -82,7 +103,9 @@ def test_the_modes_hold_the_energy_of_frozen_and_varying_forces(members):
 
 
 @pytest.mark.parametrize("members", MEMBERS)
-def test_forces_that_differ_are_forgotten_and_the_pattern_of_the_mean_force_is_not(members):
+def test_forces_that_differ_are_forgotten_and_the_pattern_of_the_mean_force_is_not(
+    members,
+):
     # correlation of the amplitudes over one correlation time: (f² + Var e^-1)/(f² + Var), f² = 0.64, Var = 0.36
     field, noise = process(), Noise(2, "shear", np.arange(members))
     carried = bonding(-0.8, 0.6)
@@ -90,4 +113,6 @@ def test_forces_that_differ_are_forgotten_and_the_pattern_of_the_mean_force_is_n
     then = advanced(field, first, moved(1, 1.0), carried, noise)
     before, after = (complex_amplitudes(field, state) for state in (first, then))
     correlation = np.real(np.mean(before * after.conj())) / np.mean(np.abs(before) ** 2)
-    assert abs(correlation - (0.64 + 0.36 * math.exp(-1.0))) < 5.0 / math.sqrt(before.size)
+    assert abs(correlation - (0.64 + 0.36 * math.exp(-1.0))) < 5.0 / math.sqrt(
+        before.size
+    )

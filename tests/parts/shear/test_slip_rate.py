@@ -5,7 +5,17 @@ from itertools import product
 
 import numpy as np
 import pytest
-from helpers.scenes import CELL, SPECTRUM, Clock, Gaussian, Slip, SlipRate, Wave, march, scene
+from helpers.scenes import (
+    CELL,
+    SPECTRUM,
+    Clock,
+    Gaussian,
+    Slip,
+    SlipRate,
+    Wave,
+    march,
+    scene,
+)
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
@@ -24,7 +34,10 @@ SHORT = 1e-6
 def moved(path, square, step=PERIOD / STEPS):
     """Motion of given paths [m] and integrals of the squared speed [m²/s] in equal steps."""
     path, square = np.asarray(path)[:, np.newaxis], np.asarray(square)[:, np.newaxis]
-    time, still = step * np.arange(1.0, len(path) + 1.0)[:, np.newaxis], np.zeros(path.shape)
+    time, still = (
+        step * np.arange(1.0, len(path) + 1.0)[:, np.newaxis],
+        np.zeros(path.shape),
+    )
     spread = np.maximum(square - path**2 / step, 0.0)
     return Motion(1, time, np.full(path.shape, step), path, path, still, still, spread)
 
@@ -48,7 +61,9 @@ def wave(mean, swing):
     """Paths and integrals of the squared speed of mean + swing cos(2π t/PERIOD)."""
     turn = 2.0 * math.pi / PERIOD
     path = mean * TIMES + swing * np.sin(turn * TIMES) / turn
-    square = (mean**2 + 0.5 * swing**2) * TIMES + 2.0 * mean * swing * np.sin(turn * TIMES) / turn
+    square = (mean**2 + 0.5 * swing**2) * TIMES + 2.0 * mean * swing * np.sin(
+        turn * TIMES
+    ) / turn
     square += 0.25 * swing**2 * np.sin(2.0 * turn * TIMES) / turn
     return np.diff(path), np.diff(square)
 
@@ -57,27 +72,57 @@ def test_unsteady_speeds_have_half_their_square_over_the_mean_square_even_on_cou
     for floor, swing in product([0.0, 0.3], [0.0, 0.1, 0.7, 1.0]):
         (last,) = amplitudes(law(floor=floor), moved(*wave(SPEED, swing * SPEED)))[-1:]
         unsteady = 0.5 * swing**2 / (1.0 + 0.5 * swing**2)
-        assert_allclose(last**2, floor**2 + (1.0 - floor**2) * unsteady, rtol=2.0 * SHORT, atol=1e-14)
+        assert_allclose(
+            last**2,
+            floor**2 + (1.0 - floor**2) * unsteady,
+            rtol=2.0 * SHORT,
+            atol=1e-14,
+        )
         if swing == 1.0:
             assert_allclose(unsteady, 1.0 / 3.0, rtol=1e-15)
     for share in [0.1, 0.5]:
-        path = np.where(np.tile(np.arange(STEPS) < share * STEPS, 3), SPEED * PERIOD / STEPS, 0.0)
+        path = np.where(
+            np.tile(np.arange(STEPS) < share * STEPS, 3), SPEED * PERIOD / STEPS, 0.0
+        )
         motions = moved(path, path**2 / (PERIOD / STEPS))
-        ends = amplitudes(law(), motions, moved(path[:1], path[:1] ** 2 / (PERIOD / STEPS)))
+        ends = amplitudes(
+            law(), motions, moved(path[:1], path[:1] ** 2 / (PERIOD / STEPS))
+        )
         moving = 3 * round(share * STEPS) + 1  # with the step that resumes the sliding
         assert_allclose(ends[-1] ** 2, 1.0 - moving / (3 * STEPS + 1), rtol=6.0 * SHORT)
     # from rest it moves with V (1 − cos ωt), whose unsteadiness over whole periods is a third
     mass, stiffness, stage, strength = 1e-3, 1e3, 1e-3, 1e-3
-    period, begins = 2.0 * math.pi * math.sqrt(mass / stiffness), strength / (stiffness * stage)
-    drive = Spring(stage=stage, stiffness=stiffness, mass=mass, contact_stiffness="rigid", tolerance=1e-10)
-    shear = Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=law(1e3), paid_by_adhesion=0.0)
+    period, begins = (
+        2.0 * math.pi * math.sqrt(mass / stiffness),
+        strength / (stiffness * stage),
+    )
+    drive = Spring(
+        stage=stage,
+        stiffness=stiffness,
+        mass=mass,
+        contact_stiffness="rigid",
+        tolerance=1e-10,
+    )
+    shear = Mean(
+        spectrum=Gaussian(rms=1e5, length=5e-6),
+        amplitude=law(1e3),
+        paid_by_adhesion=0.0,
+    )
     bonds = Unbroken(stress=strength / scene(1).contact_area)
     duration = begins + 2.0 * period
     clock = Clock(duration=duration, step=duration / 7)
-    states = list(march(scene(1, clock=clock, drive=drive, bonds=bonds, shear=shear), np.arange(1)))
+    states = list(
+        march(
+            scene(1, clock=clock, drive=drive, bonds=bonds, shear=shear), np.arange(1)
+        )
+    )
     weight, mean, spread, *_ = (values[0] for values in states[-1].shear.past)
     slip = 2.0 * period * stage
-    assert_allclose([weight * mean, spread + weight * mean**2], [slip, 1.5 * stage * slip], rtol=1e-8)
+    assert_allclose(
+        [weight * mean, spread + weight * mean**2],
+        [slip, 1.5 * stage * slip],
+        rtol=1e-8,
+    )
 
 
 def test_rest_is_the_limit_of_ever_slower_sliding_and_sliding_at_one_speed_has_the_floor():
@@ -91,9 +136,15 @@ def test_rest_is_the_limit_of_ever_slower_sliding_and_sliding_at_one_speed_has_t
                 np.full(round(stop / step), slow * step),
                 np.full(30, SPEED * step),
             ]
-            ends = amplitudes(law(length, floor), *(moved(path, path**2 / step, step) for path in blocks if path.size))
+            ends = amplitudes(
+                law(length, floor),
+                *(moved(path, path**2 / step, step) for path in blocks if path.size),
+            )
             rested = np.minimum(np.arange(1.0, 1.0 + len(ends) - before) * step, stop)
-            slid = np.maximum(np.arange(1.0, 1.0 + len(ends) - before) * step - stop, 0.0) * SPEED
+            slid = (
+                np.maximum(np.arange(1.0, 1.0 + len(ends) - before) * step - stop, 0.0)
+                * SPEED
+            )
             moving = -np.expm1(-slid / length - before * SPEED * step / length) * length
             unsteady = 1.0 - moving / (moving + SPEED * rested * np.exp(-slid / length))
             unsteady = np.where(moving > 0.0, unsteady, 0.0)
@@ -103,8 +154,12 @@ def test_rest_is_the_limit_of_ever_slower_sliding_and_sliding_at_one_speed_has_t
             off = 2.0 * slow / SPEED + slow * stop / length
             assert_allclose(ends[before:] ** 2, exact, rtol=1e-12, atol=off + 1e-14)
     for floor in (0.0, 0.2):
-        shear = Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=law(1e-6, floor))
-        for state in march(scene(1, 16, drive=Steady(speed=SPEED), shear=shear), np.arange(1)):
+        shear = Mean(
+            spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=law(1e-6, floor)
+        )
+        for state in march(
+            scene(1, 16, drive=Steady(speed=SPEED), shear=shear), np.arange(1)
+        ):
             assert_allclose(state.shear.amplitude, floor, rtol=1e-14, atol=1e-15)
 
 
@@ -113,7 +168,11 @@ def test_a_step_of_the_speed_is_forgotten_with_the_slip_and_errors_fall_with_its
     length, ratio, slip = 1e-6, 8.0, np.array([0.1, 0.5, 1.0, 3.0, 9.0]) * 1e-6
     speed, paths = ratio * SPEED, np.diff(slip, prepend=0.0)
     long = moved([60.0 * length], [60.0 * length * SPEED], 60.0 * length / SPEED)
-    ends = amplitudes(law(length), long, *(moved([path], [path * speed], path / speed) for path in paths))[1:]
+    ends = amplitudes(
+        law(length),
+        long,
+        *(moved([path], [path * speed], path / speed) for path in paths),
+    )[1:]
     left = np.exp(-slip / length)
     exact = 1.0 - 1.0 / ((left + (1.0 - left) / ratio) * (left + (1.0 - left) * ratio))
     assert_allclose(ends**2, exact, rtol=1e-12)
@@ -128,14 +187,26 @@ def test_a_step_of_the_speed_is_forgotten_with_the_slip_and_errors_fall_with_its
 
     sums = []
     for j in range(3):
-        part = quad(lambda t, j=j: math.exp(-to_the_end(t) / length) * speed(t) ** j, 0.0, duration, epsabs=0.0)[0]
+        part = quad(
+            lambda t, j=j: math.exp(-to_the_end(t) / length) * speed(t) ** j,
+            0.0,
+            duration,
+            epsabs=0.0,
+        )[0]
         sums.append(part)
     exact = 1.0 - sums[1] ** 2 / (sums[0] * sums[2])
     errors = []
     for steps in (32, 64, 128):
         clock = Clock(duration=duration, step=duration / steps)
-        shear = Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=SlipRate(memory_length=length))
-        parts = {"clock": clock, "drive": Ramp(start=first, stop=last, scale="log"), "shear": shear}
+        shear = Mean(
+            spectrum=Gaussian(rms=1e5, length=5e-6),
+            amplitude=SlipRate(memory_length=length),
+        )
+        parts = {
+            "clock": clock,
+            "drive": Ramp(start=first, stop=last, scale="log"),
+            "shear": shear,
+        }
         *_, state = march(scene(1, **parts), np.arange(1))
         errors.append(state.shear.amplitude[0] ** 2 - exact)
     assert_allclose([errors[0] / errors[1], errors[1] / errors[2]], 4.0, rtol=0.02)
