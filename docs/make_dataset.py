@@ -4,7 +4,8 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from sim.ensemble.variables import LARGEST, MAP, NUMBERS, SYSTEMATIC, VARIABLES
+from sim.ensemble.variables import LARGEST
+from sim.quantities import ERRORS, MAP, NUMBERS, RECORDS, Definition
 
 TARGET = Path(__file__).with_name("dataset.md")
 HEAD = """# The variables of a dataset
@@ -55,7 +56,9 @@ import sim
 few = {"ensemble.members": 8}
 loads = {"sweep": {"contact.load": ["1 mN", "4 mN"]}}
 dataset = sim.run(sim.load("scenarios/pdms_lens.toml", few | loads))
-change = sim.analysis.distribution(dataset, ["contact_area"], minus={"contact.load": "4 mN"})
+change = sim.analysis.distribution(
+    dataset, ["contact_area"], minus={"contact.load": "4 mN"}
+)
 change.contact_area_mean, change.contact_area_sem
 ```
 
@@ -105,12 +108,28 @@ different seeds are joined along `member`. `sim.stats`, `sim.plot` and `sim.anal
 ```python
 import xarray
 
-for name, value in [("contact.load", "2 mN"), ("contact.load", "3 mN"), ("seed", 1), ("seed", 2)]:
-    sim.run(sim.load("scenarios/pdms_lens.toml", few | {name: value}), to=f"{name}_{value}.nc")
-by_load = {"concat_dim": "contact_load", "preprocess": lambda run: run.set_coords("contact_load")}
+for name, value in [
+    ("contact.load", "2 mN"),
+    ("contact.load", "3 mN"),
+    ("seed", 1),
+    ("seed", 2),
+]:
+    sim.run(
+        sim.load("scenarios/pdms_lens.toml", few | {name: value}),
+        to=f"{name}_{value}.nc",
+    )
+by_load = {
+    "concat_dim": "contact_load",
+    "preprocess": lambda run: run.set_coords("contact_load"),
+}
 runs = xarray.open_mfdataset("contact.load_*.nc", combine="nested", **by_load)
 seeds = xarray.open_mfdataset(
-    "seed_*.nc", combine="nested", concat_dim="member", data_vars="minimal", coords="minimal", compat="override"
+    "seed_*.nc",
+    combine="nested",
+    concat_dim="member",
+    data_vars="minimal",
+    coords="minimal",
+    compat="override",
 )
 ```
 
@@ -176,32 +195,33 @@ COORDINATES = (
 )
 
 
+def described(definition: Definition, dimensions: str) -> tuple[str, ...]:
+    """The columns of a quantity."""
+    row = definition
+    return row.name, row.unit, dimensions, row.meaning, row.exists_when.words
+
+
 def text() -> str:
     """The page."""
     where = "*sweep*, map_member, map_time"
     tables: tuple[Iterable[tuple[str, ...]], ...] = (
         COORDINATES,
-        ((v.name, v.unit, "*sweep*, t", v.long_name, v.condition) for v in VARIABLES),
+        (described(definition, "*sweep*, t") for definition in RECORDS),
         [
-            *((n.name, n.unit, "*sweep*", n.long_name, n.condition) for n in NUMBERS),
+            *(described(definition, "*sweep*") for definition in NUMBERS),
             *(
-                (
-                    one.name,
-                    one.unit,
+                described(
+                    one.definition,
                     ", ".join(filter(None, ("*sweep*, member", one.axis))),
-                    one.long_name,
-                    one.condition,
                 )
                 for one in LARGEST
             ),
         ],
         [
-            *(
-                (name, unit, "*sweep*", meaning, "a periodic cell")
-                for name, (unit, meaning) in SYSTEMATIC.items()
-            )
+            (*described(definition, "*sweep*")[:4], "a periodic cell")
+            for definition in ERRORS
         ],
-        [(MAP[0], MAP[1], f"{where}, x, y", MAP[2], MAPS)],
+        [(*described(MAP, f"{where}, x, y")[:4], MAPS)],
     )
     lines = [HEAD]
     for (title, note), rows in zip(SECTIONS.items(), tables, strict=True):
