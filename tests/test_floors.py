@@ -23,6 +23,7 @@ BESIDE |= {
 FLOORS = (
     "units",
     "numerics",
+    "quantities",
     "laws",
     "spectrum",
     "parts",

@@ -9,15 +9,15 @@ import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from sim.numerics import files, hdf5
 from sim.numerics.lazy import Refused, open_lazily
+from sim.quantities import RECORDED
 from sim.units.errors import BadInput
-from sim.units.notation import Recorded
 from sim.units.tables import decoded, same_line_ends
 
 MEMBERS = "member"
@@ -50,7 +50,7 @@ _DERIVED = (
 )
 #: Other numbers of a run, and the dimensions that a run has beside those of its sweep.
 _RECORDED = {
-    *get_args(Recorded),
+    *RECORDED,
     "t",
     MEMBERS,
     "slip",
@@ -67,7 +67,7 @@ _RECORDED = {
     "member_spread_area",
 }
 #: Numbers on slip events, which are recorded together unless a scenario chooses some.
-_SLIPS = [name for name in get_args(Recorded) if name.startswith(("slip_", "late_"))]
+_SLIPS = [name for name in RECORDED if name.startswith(("slip_", "late_"))]
 #: Names of systematic errors.
 _ERRORS = re.compile("(cell|banded|step)_error_")
 _DIMENSIONS = ("t", "slip", "phase", "late", "map_member", "map_time", "x", "y")
@@ -359,7 +359,7 @@ def answered() -> Iterator[None]:
         yield
     except KeyError as fault:
         name = match[1] if (match := _MISSING.search(str(fault.args[0]))) else ""
-        if name not in get_args(Recorded):
+        if name not in RECORDED:
             raise
         raise BadInput(
             [

@@ -22,7 +22,7 @@ from sim.analysis.dataset import (
     word,
 )
 from sim.laws import jkr
-from sim.units.notation import OF_CONTACT
+from sim.quantities import OF_CONTACT
 
 KEPT = ("mean", "std", "sem")
 #: Endings of a variable of each member, and of those of its recorded statistics.

@@ -35,8 +35,9 @@ from sim.analysis.observables import (
     restricted,
     share_observables,
 )
+from sim.quantities import has_mean
 from sim.units.errors import BadInput
-from sim.units.notation import CUMULATIVE, engineering, scaled, second_half
+from sim.units.notation import engineering, scaled, second_half
 from sim.units.quantity import read_option
 
 Array = np.ndarray
@@ -1173,7 +1174,7 @@ def distribution(
     for name in map(
         str, chosen_observables(restricted(late, names).isel(t=[-1]), names)
     ):
-        if name in CUMULATIVE:
+        if not has_mean(name):
             continue
         variable = readers[0](name)
         differ, values = (
@@ -1308,7 +1309,7 @@ def of_second_half(
     result: dict[str, xr.Variable] = {}
     for key in (str(key) for key in courses if not str(key).endswith(("_std", "_sem"))):
         name, differ = key.removesuffix("_mean"), noisy & key.endswith("_mean")
-        if name in CUMULATIVE:
+        if not has_mean(name):
             continue
         ends = [key, f"{name}_sem" if key.endswith("_mean") else key]
         (mean, sem), (after, error) = (

@@ -17,11 +17,12 @@ import netCDF4
 import numpy as np
 from pydantic import TypeAdapter
 
+import sim.quantities as registry
 from sim.ensemble.diagnosis import cure, systematic_errors, worst
 from sim.ensemble.execute import pool
 from sim.ensemble.plan import IN_MEMORY, Plan, part_name
 from sim.ensemble.store import Blocks
-from sim.ensemble.variables import MAP, NUMBERS, SYSTEMATIC, Variable
+from sim.ensemble.variables import NUMBERS, Variable
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice
 from sim.numerics.hdf5 import (
@@ -402,11 +403,8 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
             described = quantity.unit, quantity.meaning, quantity.symbol, value
             content.add(variable_name(key), "f8", (), *described)
     described_as = {
-        number.name: (number.unit, number.long_name, number.symbol)
-        for number in NUMBERS
-    }
-    described_as |= {
-        name: (*unit_and_text, "") for name, unit_and_text in SYSTEMATIC.items()
+        row.name: (row.unit, row.meaning, row.symbol)
+        for row in (*registry.NUMBERS, *registry.ERRORS)
     }
     derived: dict[str, list[float]] = {}
     errors = []
@@ -474,7 +472,11 @@ def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:
                 "flag_meanings": _FLAGS,
             }
         names[statistic] = "_".join(filter(None, (name, statistic)))
-        described = recorded.unit, f"{of} {recorded.long_name}".strip(), recorded.symbol
+        described = (
+            recorded.definition.unit,
+            f"{of} {recorded.definition.meaning}".strip(),
+            recorded.definition.symbol,
+        )
         content.add(
             names[statistic],
             kind,
@@ -494,9 +496,9 @@ def _add_late(content: Outline, recorded: Variable) -> None:
     text = "statistic of the members' means over the second half of the run, and of their drift"
     content.add("late", str, ("late",), "", text, "", np.array(LATE, object))
     about = (
-        recorded.unit,
-        f"over the second half of the run: {recorded.long_name}",
-        recorded.symbol,
+        recorded.definition.unit,
+        f"over the second half of the run: {recorded.definition.meaning}",
+        recorded.definition.symbol,
     )
     content.add(f"late_{recorded.name}", "f8", (*content.sweep, "late"), *about)
 
@@ -586,10 +588,10 @@ def _add_maps(content: Outline, plan: Plan) -> None:
             positions,
         )
     names = (*content.sweep, "map_member", "map_time", "x", "y")
-    content.add(
-        MAP[0], "f8", names, *MAP[1:], None, (1,) * (len(names) - 2) + lattice.shape
-    )
-    content.places[MAP[0]] = Place({"": MAP[0]})
+    shape = (1,) * (len(names) - 2) + lattice.shape
+    described = registry.MAP.unit, registry.MAP.meaning, registry.MAP.symbol
+    content.add(registry.MAP.name, "f8", names, *described, None, shape)
+    content.places[registry.MAP.name] = Place({"": registry.MAP.name})
 
 
 def in_memory(

@@ -10,12 +10,12 @@ import numpy as np
 from sim.engine import MemberNoise, follow
 from sim.ensemble.plan import Plan
 from sim.ensemble.steady import changed, plane_energy, sensitivities, steady_course
-from sim.ensemble.variables import SYSTEMATIC
 from sim.laws.schallamach import Body
 from sim.parts.bonds.models import Cohort, FirstMoment, Rate
 from sim.parts.drive import Spring
 from sim.parts.exchange import Array
 from sim.parts.shear import Mean
+from sim.quantities import ERRORS
 from sim.scenario.checks import renewed
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
@@ -86,7 +86,7 @@ def _jkr_radius(point: Scenario, times: Array) -> Array:
 
 
 def systematic_errors(point: Scenario) -> dict[str, float]:
-    """Return the known errors of the shear process, and those of area and friction by the names of ``SYSTEMATIC``.
+    """Return the known errors of the shear process, and those of area and friction by the names of ``ERRORS``.
 
     There are none of area and friction without a cell. They are those of the mean over members in steady sliding. The
     energy of a member is a gamma number with an offset, of the mean, variance and skewness in the cell. The error of
@@ -132,7 +132,8 @@ def systematic_errors(point: Scenario) -> dict[str, float]:
     worst = int(np.argmax(np.nan_to_num(np.sum(np.abs(errors), axis=0))))
     relative = errors[:, worst] / (exact[worst] or math.nan)
     values = *errors[:, worst], *relative, speeds[worst, 0], np.std(areas[worst, 0])
-    return known | dict(zip(SYSTEMATIC, map(float, values), strict=True))
+    names = (row.name for row in ERRORS)
+    return known | dict(zip(names, map(float, values), strict=True))
 
 
 def _scores(skewness: float, count: int) -> Array:

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.ensemble.variables import LARGEST, VARIABLES, Variable
+from sim.quantities import Mean
 from sim.scenario.scenario import Scenario
-from sim.units.notation import CUMULATIVE
 
 _GROUP = 256
 _PART_NUMBERS = 2**22
@@ -249,7 +249,8 @@ class Plan:
 
     def keeps_late(self, variable: Variable) -> bool:
         """Return True if statistics of a quantity over the second half of the run are recorded, for want of members."""
-        is_averaged = variable in self.variables and variable.name not in CUMULATIVE
+        has_mean = variable.definition.mean is not Mean.NONE
+        is_averaged = variable in self.variables and has_mean
         return is_averaged and self.varies(variable) and not self.per_member
 
     @cached_property

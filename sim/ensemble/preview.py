@@ -21,12 +21,12 @@ from sim.ensemble.diagnosis import (
 )
 from sim.ensemble.pace import counted, pace as pace_of
 from sim.ensemble.plan import IN_MEMORY, Plan, map_bytes, state_numbers, work
-from sim.ensemble.variables import SOURCES
 from sim.laws import jkr
 from sim.parts.bonds.models import Cohort, FirstMoment, Rate
 from sim.parts.drive import Spring
 from sim.parts.exchange import Parts
 from sim.parts.shear.modes import ModalProcess
+from sim.quantities import SOURCES
 from sim.scenario.scenario import Record, Scenario
 from sim.scenario.schema import Entry, distinct, entries
 from sim.units.quantity import read_option

@@ -36,15 +36,16 @@ from sim.ensemble.store import (
     Stopped,
     Unfinished,
 )
-from sim.ensemble.variables import LARGEST, MAP, VARIABLES, Variable
+from sim.ensemble.variables import LARGEST, VARIABLES, Variable
 from sim.numerics.files import DiskFull, OutputExists, explained
 from sim.numerics.hdf5 import claim, located
 from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
 from sim.parts.shear.process import Fluctuation
+from sim.quantities import MAP, OF_CONTACT, Mean
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read
-from sim.units.notation import CUMULATIVE, OF_CONTACT, second_half
+from sim.units.notation import second_half
 
 Progress = Callable[[int], None]
 
@@ -294,7 +295,7 @@ def _record(
                 part = rows[variable.name][:, first:last]
                 part.T[:] = _read(variable, point, course)
         if drawn and steps[-1] in drawn_at:
-            maps[f"{MAP[0]}@{drawn_at.index(steps[-1])}"] = _maps(point, state, drawn)
+            maps[f"{MAP.name}@{drawn_at.index(steps[-1])}"] = _maps(point, state, drawn)
     end = cast(State, state)
     if block.end == clock.steps:
         for largest in LARGEST:
@@ -314,7 +315,7 @@ def _record(
             averaged = (
                 v.name
                 for v in variables
-                if v.name in task.each and v.name not in CUMULATIVE
+                if v.name in task.each and v.definition.mean is not Mean.NONE
             )
             late = {
                 f"late {name}": _late_sums(name, rows, records, clock.records)
@@ -346,7 +347,11 @@ def _late_sums(
 def _read(variable: Variable, point: Scenario, course: Trajectory) -> np.ndarray:
     """Return a recorded quantity, nan once the motion of the slider has ended; a flag or a count stays."""
     values = variable.read(point, course)
-    ends = point.varies["drive"] and point.varies[variable.part] and variable.symbol
+    ends = (
+        point.varies["drive"]
+        and point.varies[variable.part]
+        and variable.definition.symbol
+    )
     if not ends or variable.name == "runaway_time":
         return cast(np.ndarray, values)
     return np.where(np.isnan(course.position), np.nan, values)

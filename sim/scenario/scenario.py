@@ -29,13 +29,13 @@ from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
 from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
+from sim.quantities import RECORDED
 from sim.scenario.checks import faults_across, pulled, remarks_between
 from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
 from sim.scenario.schema import quantities, with_models
 from sim.scenario.sweep import read_sweep, rows, set_key, spaced
 from sim.units.errors import BadInput
-from sim.units.notation import Recorded
 from sim.units.quantity import Quantity
 from sim.units.tables import Pieces
 
@@ -177,7 +177,7 @@ class Record:
         ),
     ] = 1
     quantities: Annotated[
-        tuple[Recorded, ...] | None,
+        tuple[Literal[RECORDED], ...] | None,  # type: ignore[valid-type]
         Field(
             description="quantities to record beside contact_radius; if omitted: all"
         ),

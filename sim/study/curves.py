@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sim.ensemble.steady import steady_course
-from sim.ensemble.variables import READ, VARIABLES
+from sim.ensemble.variables import READ
 from sim.parts.exchange import Array
+from sim.quantities import RECORDS
 from sim.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def steady_curves(scenario: Scenario, speeds: Array, time: float = 0.0) -> "xr.D
     """Return the curves of steady sliding as a dataset; see ``sim.steady_curves``."""
     import xarray as xr
 
-    described = {item.name: (item.unit, item.long_name) for item in VARIABLES}
+    described = {row.name: (row.unit, row.meaning) for row in RECORDS}
     described |= {name: ("1", text) for name, text in SHARES.items()}
     axis = "speed", speeds, {"units": "m/s", "long_name": "sliding speed"}
     result = xr.Dataset(coords={"speed": axis}, attrs={"title": scenario.name})

@@ -658,10 +658,10 @@ def figure(problem: Problem, best: Minimum) -> Figure:
                 np.concatenate([along[place].values for _, place in panels[name, key]]),
             )
             scale, (_, words, si, _) = style.axis_scale(every), along[drawn[0][1]]
-            variable = Curve(name, every, None).variable
+            definition = Curve(name, every, None).definition
             x, y = (
                 Unit.of(every, si, scale == "log"),
-                Unit.of(problem.values[problem.of(name)], variable.unit),
+                Unit.of(problem.values[problem.of(name)], definition.unit),
             )
             for (number, place), condition in itertools.product(
                 drawn, range(len(labels))
@@ -708,7 +708,7 @@ def figure(problem: Problem, best: Minimum) -> Figure:
                         zorder=2,
                     )
             upper.set_ylabel(
-                y.label(f"{variable.long_name.partition(',')[0]} ${variable.symbol}$")
+                y.label(f"{definition.meaning.partition(',')[0]} ${definition.symbol}$")
             )
             upper.tick_params(labelbottom=False)
             lower.axhline(0.0, **style.GUIDE)
@@ -853,7 +853,7 @@ def carried_out(
         for table in tables:
             for unit in (
                 _along(table).unit,
-                *(curve.variable.unit for curve in table.curves),
+                *(curve.definition.unit for curve in table.curves),
             ):
                 scaled(1.0, unit)
     result = fit(scenario, tables, free, sizes, steady, per_table)

@@ -22,9 +22,10 @@ from scipy import optimize, stats
 
 from sim.ensemble.dataset import variable_name
 from sim.ensemble.steady import Values, changed, steady_course
-from sim.ensemble.variables import READ, VARIABLES, Variable
+from sim.ensemble.variables import READ, VARIABLES
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.parts.exchange import Array
+from sim.quantities import QUANTITIES, Definition
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
 from sim.units.errors import BadInput
@@ -59,9 +60,9 @@ class Curve(NamedTuple):
     errors: Array | None
 
     @property
-    def variable(self) -> Variable:
-        """Declaration of the variable."""
-        return next(item for item in VARIABLES if item.name == self.name)
+    def definition(self) -> Definition:
+        """The row of the variable in the registry of quantities."""
+        return QUANTITIES[self.name]
 
 
 class Measured(NamedTuple):
@@ -167,7 +168,9 @@ def outcomes_of(scenario: Scenario) -> dict[str, Quantity]:
     by_run = scenario.drive.solves_motion
     return {
         item.name: Quantity(
-            item.unit, item.long_name, at_least=0 if item.name in _SIZES else -math.inf
+            item.definition.unit,
+            item.definition.meaning,
+            at_least=0 if item.name in _SIZES else -math.inf,
         )
         for item in VARIABLES
         if item.name not in _NOT_MEASURED

@@ -1,11 +1,10 @@
-"""Numbers as text, with a suitable prefix and their error in the last digits; names of recorded quantities."""
+"""Numbers as text, with a suitable prefix and their error in the last digits."""
 
 import contextlib
 import math
 import re
 from collections.abc import Iterable, Iterator
 from contextvars import ContextVar
-from typing import Literal
 
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
@@ -26,128 +25,6 @@ _PREFIXES = {
     12: "T",
 }
 _PREFIXABLE = re.compile(r"(?P<base>m|s|N|Pa|J)(?:\^(?P<power>\d))?(?P<rest>|[/ ].*)")
-
-#: Names of the quantities of each record and of each whole run, of which ``record.quantities`` chooses.
-Recorded = Literal[
-    "speed",
-    "slider_position",
-    "bond_fraction",
-    "shear_stress",
-    "fluctuation_energy",
-    "edge_energy",
-    "work_of_adhesion",
-    "contact_radius",
-    "contact_area",
-    "normal_load",
-    "indentation",
-    "displacement",
-    "friction_force",
-    "in_contact",
-    "masked",
-    "detachment_time",
-    "dissipated_energy",
-    "jkr_radius",
-    "hertz_radius",
-    "bonds_radius",
-    "fluctuations_radius",
-    "equilibrium_radius",
-    "applied_load",
-    "stage_position",
-    "stage_speed",
-    "spring_force",
-    "drive_work",
-    "stored_energy",
-    "dissipated_by_damping",
-    "dissipated_by_viscosity",
-    "dissipated_by_rupture",
-    "dissipated_by_snaps",
-    "dissipated_by_area",
-    "energy_residual",
-    "substeps",
-    "runaway_time",
-    "peak_stress",
-    "peak_time",
-    "peak_speed",
-    "peak_area",
-    "peak_friction",
-    "peak_friction_time",
-    "peak_friction_speed",
-    "peak_friction_area",
-    "pull_off_load",
-    "pull_off_time",
-    "pull_off_displacement",
-    "first_detachment",
-    "first_closing",
-    "detachments",
-    "closing_displacement",
-    "closing_load",
-    "first_masked",
-    "time_masked",
-    "runaway_force",
-    "unresolved_time",
-    "step_renewal",
-    "pull_off_error",
-    "phase_peak_stress",
-    "phase_peak_time",
-    "phase_peak_speed",
-    "phase_peak_area",
-    "phase_peak_friction",
-    "phase_peak_friction_time",
-    "phase_peak_friction_speed",
-    "phase_peak_friction_area",
-    "phase_pull_off_load",
-    "phase_pull_off_time",
-    "phase_pull_off_displacement",
-    "phase_detachment",
-    "phase_closing",
-    "slip_time",
-    "slip_end",
-    "slip_amplitude",
-    "slip_speed",
-    "slip_force_before",
-    "slip_force_after",
-    "slip_stress_before",
-    "slip_stress_after",
-    "slip_count",
-    "slip_count_late",
-    "late_force_before_mean",
-    "late_force_before_std",
-    "late_force_before_least",
-    "late_force_before_largest",
-    "late_force_drop_mean",
-    "late_force_drop_std",
-    "late_force_drop_least",
-    "late_force_drop_largest",
-    "late_amplitude_mean",
-    "late_amplitude_std",
-    "late_amplitude_least",
-    "late_amplitude_largest",
-    "late_recurrence_mean",
-    "late_recurrence_std",
-    "late_recurrence_least",
-    "late_recurrence_largest",
-    "kinetic_friction",
-]
-
-
-#: Quantities that only a closed contact has; they are recorded as 0 while it is open.
-OF_CONTACT = ("contact_radius", "contact_area", "normal_load", "friction_force")
-#: Quantities that grow over a run or are times, of which a mean over time is none.
-CUMULATIVE = (
-    "slider_position",
-    "stage_position",
-    "detachment_time",
-    "dissipated_energy",
-    "drive_work",
-    "dissipated_by_damping",
-    "dissipated_by_viscosity",
-    "dissipated_by_rupture",
-    "dissipated_by_snaps",
-    "dissipated_by_area",
-    "energy_residual",
-    "substeps",
-    "runaway_time",
-)
 
 
 def second_half(records: int) -> tuple[int, int]:

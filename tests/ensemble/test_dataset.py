@@ -5,7 +5,6 @@ import os
 import pickle
 import subprocess
 import sys
-import typing
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
 from pathlib import Path
@@ -30,10 +29,10 @@ from sim.ensemble.variables import LARGEST, VARIABLES
 from sim.numerics import hdf5, lazy
 from sim.numerics.files import HDF5, StoreTrouble
 from sim.parts.drive import READINGS
+from sim.quantities import ALWAYS, RECORDED
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import all_tables, keys, quantities, tables
 from sim.units.errors import BadInput
-from sim.units.notation import Recorded
 
 MAPPED = shear.Mapped(
     spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6)
@@ -295,9 +294,7 @@ def test_no_file_is_read_or_written_while_another_thread_reads_through_xarray(tm
 
 
 def test_names_that_may_be_recorded_are_the_quantities_and_none_is_that_of_a_key():
-    assert typing.get_args(Recorded) == tuple(
-        variable.name for variable in VARIABLES + LARGEST
-    )
+    assert tuple(variable.name for variable in VARIABLES + LARGEST) == RECORDED
     mapped = sample(shear=MAPPED, record=Record(maps=(2e-3,)))
     numbers = {variable_name(key) for key in quantities(mapped)}
     names = {
@@ -327,7 +324,7 @@ def test_six_digits_are_kept_if_asked_and_none_is_lost_otherwise(tmp_path):
         assert not bare["contact_radius"].filters()["zlib"]
         assert file["contact_radius"].quantization() == (20, "BitRound")
         for variable in VARIABLES:
-            if not variable.condition:
+            if variable.definition.exists_when is ALWAYS:
                 values = exact[variable.name][:]
                 assert np.array_equal(bare[variable.name][:], values, equal_nan=True), (
                     variable.name
@@ -355,7 +352,7 @@ def test_every_variable_has_unit_and_long_name_and_stands_where_its_condition_ho
     numbers = {variable_name(key) for key in quantities(scenario)}
     for name, variable in dataset.variables.items():
         assert name in numbers or f"| `{name}` |" in page, (
-            f"{name}: declare it in sim.ensemble.variables"
+            f"{name}: declare it in sim.quantities"
         )
         assert variable.attrs["long_name"], name
         assert "units" in variable.attrs or "flag_values" in variable.attrs, name
@@ -383,12 +380,18 @@ def test_every_variable_has_unit_and_long_name_and_stands_where_its_condition_ho
         (driven - stage, sample(drive=DRIVES["force"], **bell)),
     ]
     some = set.union(*(names for names, _ in scenes))
-    assert some == {variable.name for variable in VARIABLES if variable.condition}
+    assert some == {
+        variable.name
+        for variable in VARIABLES
+        if variable.definition.exists_when is not ALWAYS
+    }
     for names, scenario in scenes:
         variables = set(ensemble.run(scenario).variables)
         assert variables & some == names
         assert {
-            variable.name for variable in VARIABLES if not variable.condition
+            variable.name
+            for variable in VARIABLES
+            if variable.definition.exists_when is ALWAYS
         } <= variables
 
 

@@ -1,0 +1,740 @@
+"""The registry of quantities: a row for each, which all that records, averages or prints a quantity reads."""
+
+from collections.abc import Callable
+from enum import Enum
+from typing import Any, NamedTuple
+
+
+class Mean(Enum):
+    """The mean over time that a quantity has."""
+
+    #: That of all records.
+    OF_ALL = "of all records"
+    #: That of the records at which the contact is closed; the quantity is recorded as 0 while it is open.
+    WHILE_CLOSED = "while closed"
+    #: None, because the quantity grows over a run, or is a time or an event.
+    NONE = "none"
+
+
+class Condition(NamedTuple):
+    """The scenes of which a quantity is recorded.
+
+    Attributes
+    ----------
+    words : str
+        The condition as a key of the scenario, or in words; empty for all scenes.
+    holds : callable
+        Takes a ``Scenario`` and returns True if the quantity is recorded of it.
+    """
+
+    words: str
+    holds: Callable[[Any], bool]
+
+
+ALWAYS = Condition("", lambda scene: True)
+BEHIND_A_SPRING = Condition(
+    'drive.model = "spring"', lambda scene: scene.drive.model == "spring"
+)
+UNDER_A_FORCE = Condition(
+    'drive.model = "force"', lambda scene: scene.drive.model == "force"
+)
+DRIVEN = Condition(
+    'drive.model = "spring" or "force"', lambda scene: scene.drive.solves_motion
+)
+ONE_AREA = Condition(
+    "members with different stresses, or one area",
+    lambda scene: scene.varies["bonds"] == scene.varies["contact"],
+)
+ON_A_DISC = Condition('shear.contact = "disc"', lambda scene: scene.margin is not None)
+REVERSIBLE = Condition(
+    "contact.reversible above 0", lambda scene: scene.contact.reversible > 0.0
+)
+LAGGING_EDGE = Condition(
+    'contact.model = "rate_dependent"', lambda scene: scene.contact.lags
+)
+AT_A_LOAD = Condition("contact.load", lambda scene: scene.contact.load is not None)
+CHANGING_APPLIED_LOAD = Condition(
+    "a contact.load that changes",
+    lambda scene: scene.contact.load is not None and scene.contact.changes,
+)
+CHANGING_LOAD = Condition("a load that changes", lambda scene: scene.contact.makes_load)
+FEELS_STEPS = Condition(
+    "an edge that lags, or tension", lambda scene: scene.feels_steps
+)
+PULLED = Condition(
+    "fluctuations, and a negative contact.load",
+    lambda scene: (
+        scene.feels_steps
+        and scene.contact.load is not None
+        and min(scene.contact.course.extremes) < 0.0
+    ),
+)
+
+
+class Definition(NamedTuple):
+    """The definition of a quantity.
+
+    Attributes
+    ----------
+    name : str
+        Name of its variable in a dataset.
+    unit : str
+        SI unit, "1" for a number.
+    meaning : str
+        Meaning in a phrase, the ``long_name`` of the variable.
+    symbol : str
+        Symbol in mathtext, or empty.
+    exists_when : Condition
+        Scenes of which it is recorded.
+    mean : Mean
+        Mean over time that it has.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    symbol: str = ""
+    exists_when: Condition = ALWAYS
+    mean: Mean = Mean.OF_ALL
+
+
+#: Quantities over time, read at each record.
+RECORDS: tuple[Definition, ...] = (
+    Definition("speed", "m/s", "sliding speed", symbol="V"),
+    Definition(
+        "slider_position", "m", "displacement of the slider", symbol="X", mean=Mean.NONE
+    ),
+    Definition(
+        "bond_fraction", "1", "number of bonds over that at rest", symbol="N/N_0"
+    ),
+    Definition(
+        "shear_stress", "Pa", "mean shear stress at the interface", symbol="tau_0"
+    ),
+    Definition(
+        "fluctuation_energy",
+        "J/m^2",
+        "elastic energy of the shear-stress fluctuations per area",
+        symbol="DeltaGamma",
+    ),
+    Definition(
+        "edge_energy",
+        "J/m^2",
+        "fluctuation energy per unit of new contact area at the edge of the disc",
+        symbol="dE/dA",
+        exists_when=ON_A_DISC,
+    ),
+    Definition("work_of_adhesion", "J/m^2", "effective work of adhesion", symbol="w"),
+    Definition(
+        "contact_radius", "m", "contact radius", symbol="a", mean=Mean.WHILE_CLOSED
+    ),
+    Definition(
+        "contact_area", "m^2", "contact area", symbol="A", mean=Mean.WHILE_CLOSED
+    ),
+    Definition(
+        "normal_load",
+        "N",
+        "normal load on the sphere, compression positive",
+        symbol="P",
+        mean=Mean.WHILE_CLOSED,
+    ),
+    Definition("indentation", "m", "indentation of the sphere", symbol="delta"),
+    Definition("displacement", "m", "displacement of the mount", symbol="Delta"),
+    Definition(
+        "friction_force",
+        "N",
+        "friction force, shear stress times contact area",
+        symbol="F",
+        mean=Mean.WHILE_CLOSED,
+    ),
+    Definition("in_contact", "1", "1 if the contact is closed"),
+    Definition(
+        "masked",
+        "1",
+        "1 if the effective work of adhesion is not positive (a Hertz contact)",
+    ),
+    Definition(
+        "detachment_time",
+        "s",
+        "time of the last detachment",
+        symbol="t_d",
+        mean=Mean.NONE,
+    ),
+    Definition(
+        "dissipated_energy",
+        "J",
+        "energy dissipated by the edge and the jumps of the contact",
+        symbol="W",
+        mean=Mean.NONE,
+    ),
+    Definition(
+        "jkr_radius",
+        "m",
+        (
+            "equilibrium radius at the full work of adhesion, with the same mount and "
+            "rule after pull-off; 0 while that contact is open"
+        ),
+        symbol="a_JKR",
+    ),
+    Definition(
+        "hertz_radius",
+        "m",
+        "radius without adhesion, with the same mount; 0 without compression",
+        symbol="a_H",
+    ),
+    Definition(
+        "bonds_radius",
+        "m",
+        (
+            "equilibrium radius at the work of adhesion of the bonds alone, with the "
+            "same mount and rule after pull-off; 0 while that contact is open"
+        ),
+        symbol="a_b",
+    ),
+    Definition(
+        "fluctuations_radius",
+        "m",
+        (
+            "equilibrium radius at the work of adhesion after the fluctuations and "
+            "before the mean stress, with the same mount and rule after pull-off; 0 "
+            "while that contact is open"
+        ),
+        symbol="a_f",
+        exists_when=REVERSIBLE,
+    ),
+    Definition(
+        "equilibrium_radius",
+        "m",
+        (
+            "equilibrium radius at the effective work of adhesion, with the same mount "
+            "and rule after pull-off; 0 while that contact is open"
+        ),
+        symbol="a_e",
+        exists_when=LAGGING_EDGE,
+    ),
+    Definition(
+        "applied_load",
+        "N",
+        "load applied to the sphere, in contact or open",
+        symbol="P_a",
+        exists_when=CHANGING_APPLIED_LOAD,
+    ),
+    Definition(
+        "stage_position",
+        "m",
+        "displacement of the stage",
+        symbol="X_s",
+        exists_when=BEHIND_A_SPRING,
+        mean=Mean.NONE,
+    ),
+    Definition(
+        "stage_speed",
+        "m/s",
+        "speed of the stage",
+        symbol="V_s",
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "spring_force",
+        "N",
+        "force of the spring on the body, or the prescribed force",
+        symbol="Q",
+        exists_when=DRIVEN,
+    ),
+    Definition(
+        "drive_work",
+        "J",
+        "work of the stage or of the prescribed force",
+        symbol="W_d",
+        exists_when=DRIVEN,
+        mean=Mean.NONE,
+    ),
+    Definition(
+        "stored_energy",
+        "J",
+        "energy of spring, mass, yielding contact and bonds",
+        symbol="U",
+        exists_when=DRIVEN,
+    ),
+    Definition(
+        "dissipated_by_damping",
+        "J",
+        "energy dissipated by the damping of the body",
+        symbol="W_c",
+        exists_when=DRIVEN,
+        mean=Mean.NONE,
+    ),
+    Definition(
+        "dissipated_by_viscosity",
+        "J",
+        "energy dissipated by the viscosity of the interface",
+        symbol="W_v",
+        exists_when=DRIVEN,
+        mean=Mean.NONE,
+    ),
+    Definition(
+        "dissipated_by_rupture",
+        "J",
+        "energy dissipated as bonds break and form",
+        symbol="W_b",
+        exists_when=DRIVEN,
+        mean=Mean.NONE,
+    ),
+    Definition(
+        "dissipated_by_snaps",
+        "J",
+        (
+            "energy dissipated in instantaneous slips, except that of the bonds: "
+            "avalanches and jumps of the force"
+        ),
+        symbol="W_s",
+        exists_when=DRIVEN,
+        mean=Mean.NONE,
+    ),
+    Definition(
+        "dissipated_by_area",
+        "J",
+        "stored energy of the area that is lost, minus that of the area gained",
+        symbol="W_A",
+        exists_when=DRIVEN,
+        mean=Mean.NONE,
+    ),
+    Definition(
+        "energy_residual",
+        "J",
+        (
+            "work of the drive minus the increase of stored energy and the dissipated "
+            "energy"
+        ),
+        symbol="W_0",
+        exists_when=DRIVEN,
+        mean=Mean.NONE,
+    ),
+    Definition(
+        "substeps",
+        "1",
+        "number of sub-steps since the start",
+        exists_when=DRIVEN,
+        mean=Mean.NONE,
+    ),
+    Definition(
+        "runaway_time",
+        "s",
+        "time at which the slider lost stability",
+        symbol="t_r",
+        exists_when=UNDER_A_FORCE,
+        mean=Mean.NONE,
+    ),
+)
+
+#: Quantities of an event, of the whole run and of each of its phases.
+WITH_PHASES: tuple[Definition, ...] = (
+    Definition(
+        "peak_stress",
+        "Pa",
+        (
+            "largest magnitude of the mean shear stress of the run, of the highest "
+            "start; open contacts included"
+        ),
+        symbol="tau_p",
+    ),
+    Definition("peak_time", "s", "time of the largest shear stress", symbol="t_p"),
+    Definition("peak_speed", "m/s", "sliding speed at the largest shear stress"),
+    Definition(
+        "peak_area",
+        "m^2",
+        "contact area at the largest shear stress",
+        exists_when=ONE_AREA,
+    ),
+    Definition(
+        "peak_friction",
+        "N",
+        "largest magnitude of the friction force of the run, of the highest start",
+        symbol="F_p",
+    ),
+    Definition("peak_friction_time", "s", "time of the largest friction force"),
+    Definition(
+        "peak_friction_speed", "m/s", "sliding speed at the largest friction force"
+    ),
+    Definition(
+        "peak_friction_area", "m^2", "contact area at the largest friction force"
+    ),
+    Definition(
+        "pull_off_load",
+        "N",
+        "lowest normal load of the contact, a tension; nan without tension",
+        symbol="P_min",
+        exists_when=CHANGING_LOAD,
+    ),
+    Definition(
+        "pull_off_time",
+        "s",
+        "time of the lowest normal load",
+        symbol="t_min",
+        exists_when=CHANGING_LOAD,
+    ),
+    Definition(
+        "pull_off_displacement",
+        "m",
+        "displacement of the mount at the lowest normal load",
+        exists_when=CHANGING_LOAD,
+    ),
+    Definition(
+        "first_detachment",
+        "s",
+        "time of the first detachment; nan if there is none",
+        symbol="t_d",
+    ),
+    Definition(
+        "first_closing",
+        "s",
+        "time at which an open contact first closes; nan if there is none",
+    ),
+)
+
+#: Other quantities of a whole run, read at its end.
+OF_THE_RUN: tuple[Definition, ...] = (
+    Definition("detachments", "1", "number of detachments"),
+    Definition(
+        "closing_displacement", "m", "displacement of the mount at the first closing"
+    ),
+    Definition("closing_load", "N", "normal load after the first closing"),
+    Definition(
+        "first_masked",
+        "s",
+        "time at which the contact is first masked; nan if it never is",
+    ),
+    Definition(
+        "time_masked", "1", "share of the closed time in which the contact is masked"
+    ),
+    Definition(
+        "runaway_force",
+        "N",
+        "force at which the slider lost stability; nan if it never did",
+        exists_when=UNDER_A_FORCE,
+    ),
+    Definition(
+        "unresolved_time",
+        "s",
+        (
+            "time from which on the motion of the slider could not be resolved, so "
+            "that its values are missing; nan if it was resolved to the end"
+        ),
+        exists_when=DRIVEN,
+    ),
+    Definition(
+        "step_renewal",
+        "1",
+        "largest share of the variance of DeltaGamma renewed in a clock step",
+        exists_when=FEELS_STEPS,
+    ),
+    Definition(
+        "pull_off_error",
+        "N",
+        "approximate systematic error of the pull-off load by the clock step",
+        exists_when=PULLED,
+    ),
+)
+
+#: Quantities of slip events, and their moments over the second half of the run.
+OF_SLIPS: tuple[Definition, ...] = (
+    Definition(
+        "slip_time",
+        "s",
+        "time at which a slip event begins, at the largest spring force",
+        symbol="t_s",
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "slip_end",
+        "s",
+        "time at which a slip event ends, at the smallest spring force",
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "slip_amplitude",
+        "m",
+        "displacement of the slider in a slip event",
+        symbol="S",
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "slip_speed",
+        "m/s",
+        "speed of the stage at the start of a slip event",
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "slip_force_before",
+        "N",
+        "spring force at the start of a slip event, positive along the stage motion",
+        symbol="Q_s",
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "slip_force_after",
+        "N",
+        "spring force at the end of a slip event, positive along the stage motion",
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "slip_stress_before",
+        "Pa",
+        "largest shear stress since the previous slip event",
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "slip_stress_after",
+        "Pa",
+        "smallest shear stress in a slip event",
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition("slip_count", "1", "number of slip events", exists_when=BEHIND_A_SPRING),
+    Definition(
+        "slip_count_late",
+        "1",
+        "number of slip events that begin in the second half of the run",
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_force_before_mean",
+        "N",
+        (
+            "mean over slip events that begin in the second half of the run: spring "
+            "force at the start of a slip event, positive along the stage motion"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_force_before_std",
+        "N",
+        (
+            "standard deviation over slip events that begin in the second half of the "
+            "run: spring force at the start of a slip event, positive along the stage "
+            "motion"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_force_before_least",
+        "N",
+        (
+            "smallest over slip events that begin in the second half of the run: "
+            "spring force at the start of a slip event, positive along the stage "
+            "motion"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_force_before_largest",
+        "N",
+        (
+            "largest over slip events that begin in the second half of the run: spring "
+            "force at the start of a slip event, positive along the stage motion"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_force_drop_mean",
+        "N",
+        (
+            "mean over slip events that begin in the second half of the run: drop of "
+            "the spring force in a slip event"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_force_drop_std",
+        "N",
+        (
+            "standard deviation over slip events that begin in the second half of the "
+            "run: drop of the spring force in a slip event"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_force_drop_least",
+        "N",
+        (
+            "smallest over slip events that begin in the second half of the run: drop "
+            "of the spring force in a slip event"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_force_drop_largest",
+        "N",
+        (
+            "largest over slip events that begin in the second half of the run: drop "
+            "of the spring force in a slip event"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_amplitude_mean",
+        "m",
+        (
+            "mean over slip events that begin in the second half of the run: "
+            "displacement of the slider in a slip event"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_amplitude_std",
+        "m",
+        (
+            "standard deviation over slip events that begin in the second half of the "
+            "run: displacement of the slider in a slip event"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_amplitude_least",
+        "m",
+        (
+            "smallest over slip events that begin in the second half of the run: "
+            "displacement of the slider in a slip event"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_amplitude_largest",
+        "m",
+        (
+            "largest over slip events that begin in the second half of the run: "
+            "displacement of the slider in a slip event"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_recurrence_mean",
+        "s",
+        (
+            "mean over slip events that begin in the second half of the run: time from "
+            "the start of a slip event to the start of the next one"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_recurrence_std",
+        "s",
+        (
+            "standard deviation over slip events that begin in the second half of the "
+            "run: time from the start of a slip event to the start of the next one"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_recurrence_least",
+        "s",
+        (
+            "smallest over slip events that begin in the second half of the run: time "
+            "from the start of a slip event to the start of the next one"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "late_recurrence_largest",
+        "s",
+        (
+            "largest over slip events that begin in the second half of the run: time "
+            "from the start of a slip event to the start of the next one"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
+        "kinetic_friction",
+        "N",
+        (
+            "work of the stage over its path, from the first slip event in the second "
+            "half of the run to the last; with fewer than two, over the whole second "
+            "half"
+        ),
+        symbol="F_k",
+        exists_when=BEHIND_A_SPRING,
+    ),
+)
+
+#: Numbers of a scene, written for each point of a sweep.
+NUMBERS: tuple[Definition, ...] = (
+    Definition("contact_modulus", "Pa", "contact modulus", symbol="E*"),
+    Definition(
+        "effective_shear_modulus",
+        "Pa",
+        "shear modulus of the tangential compliance",
+        symbol="G",
+    ),
+    Definition(
+        "effective_poisson_ratio",
+        "1",
+        "Poisson ratio of the tangential compliance",
+        symbol="nu",
+    ),
+    Definition(
+        "has_noise", "1", "1 if the scenario has random parts, so that members differ"
+    ),
+    Definition(
+        "radius_at_rest", "m", "JKR radius at the full work of adhesion", symbol="a_0"
+    ),
+    Definition("radius_without_adhesion", "m", "Hertz radius", symbol="a_H"),
+    Definition(
+        "jkr_pull_off_load",
+        "N",
+        "load at pull-off with the full work of adhesion",
+        symbol="P_c",
+        exists_when=AT_A_LOAD,
+    ),
+)
+
+
+def in_a_phase(event: Definition) -> Definition:
+    """Return the definition of a quantity of an event in each phase from that of the whole run."""
+    name = f"phase_{event.name.removeprefix('first_')}"
+    meaning = f"in a phase: {event.meaning}".replace("of the run", "of it")
+    return event._replace(name=name, meaning=meaning, symbol="")
+
+
+#: Quantities of a whole run, in the order in which a dataset has them.
+EVENTS = (*WITH_PHASES, *OF_THE_RUN, *map(in_a_phase, WITH_PHASES), *OF_SLIPS)
+#: Quantities by their names.
+QUANTITIES = {row.name: row for row in (*RECORDS, *EVENTS, *NUMBERS)}
+#: Names of the quantities among which ``record.quantities`` chooses.
+RECORDED = tuple(row.name for row in (*RECORDS, *EVENTS))
+
+
+def has_mean(name: str) -> bool:
+    """Return True if a quantity has a mean over time; derived ones have."""
+    return name not in QUANTITIES or QUANTITIES[name].mean is not Mean.NONE
+
+
+#: Names of the quantities that only a closed contact has.
+OF_CONTACT = tuple(row.name for row in RECORDS if row.mean is Mean.WHILE_CLOSED)
+
+#: What leaves something out, by the first word of its errors.
+SOURCES = {"cell": "cell", "banded": "bands", "step": "clock step"}
+#: Systematic errors of a run, known before it.
+ERRORS = (
+    *(
+        Definition(
+            f"{name}_error_{of}",
+            "1",
+            f"{words} by the {source}, at the largest error of the area",
+        )
+        for of, words in (
+            ("area", "error of the mean A/A_JKR"),
+            ("friction", "relative error of the mean friction"),
+        )
+        for name, source in SOURCES.items()
+    ),
+    Definition(
+        "error_speed",
+        "m/s",
+        "sliding speed at which systematic errors of the area are largest",
+    ),
+    Definition(
+        "member_spread_area",
+        "1",
+        "standard deviation of A/A_JKR between members at that speed",
+    ),
+)
+#: A recorded stress map.
+MAP = Definition("shear_map", "Pa", "shear-stress fluctuation", "tau_1")
