@@ -344,8 +344,10 @@ def test_the_budget_is_kept_in_cpu_time(budget):
     began = time.process_time()
     dataset = converge(scenario, budget)
     assert time.process_time() - began < 1.3 * budget
-    fits = "modal" in dataset["row"].to_numpy()
-    assert fits == (budget > 5.0) == ("Omitted: modal" not in explanation(dataset))
+    fits = (
+        "modal" in dataset["row"].to_numpy()
+    )  # which depends on the machine and its load
+    assert fits == ("Omitted: modal" not in explanation(dataset))
     assert fits or dataset.attrs["left_out"] == "modal: does not fit into the budget"
 
 

@@ -132,6 +132,8 @@ _SLOWER, _SLOWEST = 0.95, 1e-12
 _PLACES, _HALVINGS = 32, 60
 #: Shares of bonds and of a piece beyond which equilibrium is looked for where no sub-step is accepted.
 _NEXT_TO = 1e-6
+#: Force over that of damping and spring which is a rounding.
+_NO_FORCE = 1e-12
 #: Turns in which area and stress of a slider at rest settle.
 _FEW_TURNS = 20
 
@@ -441,6 +443,14 @@ def _slide(line, start, slider, along, contact, nodes, books):
 
 
 @device
+def _is_rounding(force, slider):
+    """True if a force is next to nothing beside those by which spring and damping may change it in a piece."""
+    speed = max(math.fabs(slider.first), math.fabs(slider.last))
+    change = speed * (slider.damping + slider.stiffness * slider.length)
+    return math.fabs(force) <= _NO_FORCE * change
+
+
+@device
 def _sticking_piece(line, slider, law, contact, nodes, books):
     """Go through one piece with bonds that bear any pull up to their strength at rest. Return the time reached."""
     start, length, row, energy = 0.0, slider.length, line[0], books[0]
@@ -457,8 +467,10 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
         sense = math.copysign(1.0, row.spring_force if rests else row.speed)
         # the pull is a rounding, which may have the wrong sign
         if rests and stuck > 0 and not row.radius > 0.0:
-            sense = -sense if stuck % 2 == 1 else sense
             row.next_step = 0.0
+            # whose sign may be the wrong one
+            if stuck % 2 == 1 and _is_rounding(row.spring_force, slider):
+                sense = -sense
         along = mechanics.Law(
             law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows
         )
