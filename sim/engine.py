@@ -173,7 +173,7 @@ def advance(
     if drive.solves_motion:
         reached = sliders, bonding, step_contact, contact_state.radius
         sliders, bonding = coupled.with_contact(scenario.parts, *reached)
-        slider, motions = sliders.at(-1), motions._replace(speed=sliders.speed)
+        slider = sliders.at(-1)
     at_start, pull = (
         (state.bonding, state.contact.radius),
         _pull(scenario, motions.time, contact_state.radius),

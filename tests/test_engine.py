@@ -116,7 +116,12 @@ def check_case(case, members=3, steps=6, **parts):
 
 
 def check_blocks(scenario, states, members):
-    """Blocks of steps pass what the march passes, and end where it ends, recorded always or at every second step."""
+    """Blocks of steps pass what the march passes, and end where it ends, recorded always or at every second step.
+
+    The speed of a driven slider on ``counted`` bonds is recorded as it is before the bonds are drawn at the end of a
+    step. The slider goes on with its answer to the draw, which only the states have.
+    """
+    answers = scenario.drive.solves_motion and scenario.bonds.model == "counted"
     for steps, some in (
         (range(len(states)), states),
         (range(0, len(states), 2), states[::2]),
@@ -129,7 +134,8 @@ def check_blocks(scenario, states, members):
             zip(*(trajectory_of(scenario, state) for state in some), strict=True),
         )
         for name, one, other in zip(passed._fields, passed, marched, strict=True):
-            assert np.array_equal(one, other, equal_nan=True), name
+            if name != "speed" or not answers:
+                assert np.array_equal(one, other, equal_nan=True), name
         assert same(end, some[-1])
 
 
