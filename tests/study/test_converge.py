@@ -337,17 +337,15 @@ def test_the_budget_is_kept_and_what_does_not_fit_is_named(budget, slower, monke
 
 
 @pytest.mark.verify
-@pytest.mark.parametrize("budget", [1.5, 8.0])
+@pytest.mark.parametrize("budget", [1.5, 30.0])
 def test_the_budget_is_kept_in_cpu_time(budget):
     scenario = scene(**WIDE, members=64)
     scenario.process  # noqa: B018 - its library is loaded before the time counts
     began = time.process_time()
     dataset = converge(scenario, budget)
     assert time.process_time() - began < 1.3 * budget
-    fits = (
-        "modal" in dataset["row"].to_numpy()
-    )  # which depends on the machine and its load
-    assert fits == ("Omitted: modal" not in explanation(dataset))
+    fits = "modal" in dataset["row"].to_numpy()
+    assert fits == (budget > 5.0) == ("Omitted: modal" not in explanation(dataset))
     assert fits or dataset.attrs["left_out"] == "modal: does not fit into the budget"
 
 
