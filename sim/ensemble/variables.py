@@ -44,7 +44,7 @@ class Variable(NamedTuple):
 
     @property
     def definition(self) -> Definition:
-        """Its row in the registry of quantities."""
+        """The row of the quantity in the registry."""
         return QUANTITIES[self.name]
 
     def applies(self, scene: Scenario) -> bool:

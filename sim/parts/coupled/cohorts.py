@@ -258,11 +258,11 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
         none = min(
             none, 1e-3 * tolerance * (math.fabs(force) + math.fabs(pull)) / slope
         )
-    # roundings of the displacement of the body and of the forces matter less to a slip that viscosity makes stiff
-    roundings = loads * (
-        math.fabs(slip) + yields * math.fabs(force) + math.fabs(row.sheared)
-    )
-    roundings += math.fabs(force) + math.fabs(pull)
+    # Roundings of the displacement of the body and of the forces matter less to a slip
+    # that viscosity makes stiff. The force of bonds of both signs is a small difference.
+    size = max(math.fabs(force), area * math.sqrt(bound * before.square))
+    roundings = loads * (math.fabs(slip) + yields * size + math.fabs(row.sheared))
+    roundings += size + math.fabs(pull)
     return over, slope, max(none, 1e-15 * (math.fabs(slip) + roundings / slope))
 
 
