@@ -435,8 +435,8 @@ OF_THE_RUN: tuple[Definition, ...] = (
     ),
 )
 
-#: Quantities of slip events, and their moments over the second half of the run.
-OF_SLIPS: tuple[Definition, ...] = (
+#: Quantities of each slip event.
+OF_EACH_SLIP: tuple[Definition, ...] = (
     Definition(
         "slip_time",
         "s",
@@ -488,6 +488,11 @@ OF_SLIPS: tuple[Definition, ...] = (
         "smallest shear stress in a slip event",
         exists_when=BEHIND_A_SPRING,
     ),
+)
+
+#: Quantities of slip events, and their moments over the second half of the run.
+OF_SLIPS: tuple[Definition, ...] = (
+    *OF_EACH_SLIP,
     Definition("slip_count", "1", "number of slip events", exists_when=BEHIND_A_SPRING),
     Definition(
         "slip_count_late",
@@ -706,6 +711,8 @@ def has_mean(name: str) -> bool:
     return name not in QUANTITIES or QUANTITIES[name].mean is not Mean.NONE
 
 
+#: Names of the quantities of each slip event, without ``slip_``.
+SLIP_EVENT = tuple(row.name.removeprefix("slip_") for row in OF_EACH_SLIP)
 #: Names of the quantities that only a closed contact has.
 OF_CONTACT = tuple(row.name for row in RECORDS if row.mean is Mean.WHILE_CLOSED)
 

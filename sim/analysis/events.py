@@ -26,7 +26,8 @@ from sim.analysis.dataset import (
 )
 from sim.analysis.observables import ENDINGS, labelled, pure
 from sim.analysis.statistics import LEVEL, WIDE, Array, observable_of
-from sim.units.notation import SLIP_EVENT, engineering
+from sim.quantities import SLIP_EVENT
+from sim.units.notation import engineering
 
 #: Relative changes below it are rounding.
 _ROUNDING = 1e-9

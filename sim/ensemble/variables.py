@@ -20,8 +20,15 @@ from sim.parts.contact.balance import (
     Shares,
 )
 from sim.parts.drive import READINGS, Driven, Force
-from sim.parts.events import LATE, MOMENTS, SLIP, TURN, Slips
-from sim.quantities import OF_SLIPS, QUANTITIES, RECORDS, Definition, in_a_phase
+from sim.parts.events import LATE, MOMENTS, TURN, Slips
+from sim.quantities import (
+    OF_EACH_SLIP,
+    OF_SLIPS,
+    QUANTITIES,
+    RECORDS,
+    Definition,
+    in_a_phase,
+)
 from sim.scenario.checks import pull_off_error, renewed
 from sim.scenario.scenario import Scenario
 
@@ -280,7 +287,7 @@ def _of_slips(name: str) -> Callable[[Slips], Any]:
 def _slip(name: str) -> Variable:
     """Return a quantity of slip events; those of single events have a dimension of their own."""
     read = _of_slips(name)
-    is_single = name.removeprefix("slip_") in (SLIP.names or ())
+    is_single = QUANTITIES[name] in OF_EACH_SLIP
     return Variable(
         name,
         "drive",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sim.numerics.jit import device, kernel
 from sim.parts.exchange import Array, Bonding, ContactState, Motion, during, record
-from sim.units.notation import SLIP_EVENT
+from sim.quantities import SLIP_EVENT
 
 #: Arrays that are read alone, as they come.
 _READ = "Array(float64, 2, 'A', readonly=True), "

@@ -33,17 +33,6 @@ def second_half(records: int) -> tuple[int, int]:
     return first, first + (records - first) // 2
 
 
-#: What is recorded of each slip event, as ``slip_<name>``.
-SLIP_EVENT = (
-    "time",
-    "end",
-    "amplitude",
-    "speed",
-    "force_before",
-    "force_after",
-    "stress_before",
-    "stress_after",
-)
 #: Units that a person has chosen for numbers of their dimensions, and whether any number has had them.
 _CHOSEN: ContextVar[dict[str, bool]] = ContextVar("chosen units")
 
