@@ -45,7 +45,7 @@ has four values:
 Radius, area, load and friction are averaged over the times at which the contact is closed.
 
 `speed` is the speed at the time of the record. In stick-slip it is mostly far below the speed of the stage, and rarely
-far above it. `sim.analysis.distribution(dataset, ["speed"])` has its mean over the second half of the run.
+far above it. `sim.read.distribution(dataset, ["speed"])` has its mean over the second half of the run.
 
 A member has the same noise at all points of a sweep. The error of a difference between two points is therefore that of
 the members' differences. It is often much smaller than the two errors added in quadrature:
@@ -56,7 +56,7 @@ import sim
 few = {"ensemble.members": 8}
 loads = {"sweep": {"contact.load": ["1 mN", "4 mN"]}}
 dataset = sim.run(sim.load("scenarios/pdms_lens.toml", few | loads))
-change = sim.analysis.distribution(
+change = sim.read.distribution(
     dataset, ["contact_area"], minus={"contact.load": "4 mN"}
 )
 change.contact_area_mean, change.contact_area_sem
@@ -103,7 +103,7 @@ OTHERS = """
 ## Other programs
 
 **xarray** joins runs that differ in one key. The result has the form of a sweep of this key. Runs of
-different seeds are joined along `member`. `sim.stats`, `sim.plot` and `sim.analysis` accept the joined dataset:
+different seeds are joined along `member`. `sim.stats`, `sim.plot` and `sim.read` accept the joined dataset:
 
 ```python
 import xarray

@@ -19,9 +19,9 @@ import xarray as xr
 from PIL import Image
 
 import sim
-from sim import analysis, laws
-from sim.analysis import concise, distribution, shares, statistics
-from sim.analysis.events import incipient_law
+from sim import laws, read
+from sim.read import concise, distribution, shares, statistics
+from sim.read.events import incipient_law
 from sim.study.fit import Fit, figure as fitted
 from sim.study.likelihood import LEVEL
 from sim.study.mechanisms import WHOLE
@@ -241,7 +241,7 @@ def nearest(values: xr.DataArray, wanted: float) -> int:
 
 def speeds(dataset: xr.Dataset) -> xr.DataArray:
     """Prescribed speed over time, at the first point of the sweep [m/s]."""
-    course = analysis.speed_of(dataset)
+    course = read.speed_of(dataset)
     return course.isel({name: 0 for name in course.dims if name != "t"})
 
 
@@ -431,10 +431,10 @@ def decomposition(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def soft_lens(dataset: xr.Dataset) -> dict[str, Number]:
     rms = 30e3
-    late = analysis.summary(analysis.settled(analysis.observables(dataset))).sel(
+    late = read.summary(read.settled(read.observables(dataset))).sel(
         shear_spectrum_rms=rms
     )
-    work = analysis.bond_work(dataset).isel(t=-1)
+    work = read.bond_work(dataset).isel(t=-1)
     return {
         "modulus": 1e-6 * modulus_of(dataset),
         "width": 2e3 * float(dataset["radius_at_rest"].max()),
@@ -656,7 +656,7 @@ def creep(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
     pulls, load = (
-        analysis.events(dataset).isel(member=0),
+        read.events(dataset).isel(member=0),
         1e3 * dataset["contact_load"].to_numpy(),
     )
     lost, area = (
@@ -706,7 +706,7 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     # the first event begins at the maximum of friction, long before it slips
     end = float(run["slip_end"].min())
     mean, last = (
-        analysis.slips(run).isel(slip=slice(1, None)).mean("slip"),
+        read.slips(run).isel(slip=slice(1, None)).mean("slip"),
         float(run["slip_time"].max()),
     )
     stage = run.sel(t=slice(end, last))
@@ -735,7 +735,7 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
     events, stiffness = (
-        analysis.stick_slip(dataset).isel(member=0),
+        read.stick_slip(dataset).isel(member=0),
         dataset["drive_stiffness"].to_numpy(),
     )
     up, down = (
@@ -760,7 +760,7 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
     {length:g} µm of sliding, and a damping. Without the damping the area would not fall there.""",
 )
 def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
-    late = analysis.distribution(dataset)
+    late = read.distribution(dataset)
     slow, fast = (late.sel(drive_stage=speed) for speed in (2e-3, 3e-3))
     names = {"before": slow, "after": fast}
     numbers: dict[str, Number] = {
@@ -828,9 +828,7 @@ def slip_event(dataset: xr.Dataset) -> dict[str, Number]:
     kind="sweep",
 )
 def motor_clutch(dataset: xr.Dataset) -> dict[str, Number]:
-    late = analysis.summary(
-        analysis.settled(dataset[["friction_force"]]), quantiles=False
-    )
+    late = read.summary(read.settled(dataset[["friction_force"]]), quantiles=False)
     stiffness, best = (
         dataset["drive_contact_stiffness"].to_numpy(),
         int(np.argmax(late["friction_force_mean"].to_numpy())),
@@ -907,7 +905,7 @@ def fixed_grips(dataset: xr.Dataset) -> dict[str, Number]:
     nothing.""",
 )
 def pull_off(dataset: xr.Dataset) -> dict[str, Number]:
-    lost = 1e9 * analysis.loop_energy(dataset)["loop_dissipation"].mean("cycle")
+    lost = 1e9 * read.loop_energy(dataset)["loop_dissipation"].mean("cycle")
     stiffness = dataset["contact_stiffness"]
     return {
         "pull": -1e3 * float(dataset["pull_off_load"].min()),
@@ -928,7 +926,7 @@ def pull_off(dataset: xr.Dataset) -> dict[str, Number]:
 def peeling(dataset: xr.Dataset) -> dict[str, Number]:
     pull, speed = -1e3 * dataset["pull_off_load"], dataset["contact_front_speed"]
     work, size = float(dataset["adhesion_work"]), float(dataset["sphere_radius"])
-    lost = 1e9 * analysis.loop_energy(dataset)["loop_dissipation"].mean("cycle")
+    lost = 1e9 * read.loop_energy(dataset)["loop_dissipation"].mean("cycle")
     return {
         "fast": 1e3 * float(speed[-1]),
         "slow": 1e6 * float(speed[0]),
@@ -1063,14 +1061,14 @@ def jkr_test(dataset: xr.Dataset) -> dict[str, Number]:
         .transpose("contact_front_speed", "t")
         .to_numpy()
     )
-    read = 1e3 * laws.jkr.energy_release_rate(radius, 1e-3, size, modulus)
+    rates = 1e3 * laws.jkr.energy_release_rate(radius, 1e-3, size, modulus)
     speed = 1e6 * dataset["contact_front_speed"]
     return {
         "load": 1.0,
-        "loading": read[0, 0],
-        "unloading": read[0, 1],
-        "closer": read[-1, 0],
-        "nearer": read[-1, 1],
+        "loading": rates[0, 0],
+        "unloading": rates[0, 1],
+        "closer": rates[-1, 0],
+        "nearer": rates[-1, 1],
         "work": 1e3 * float(dataset["adhesion_work"]),
         "speed": float(speed[0]),
         "faster": float(speed[-1]),

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 Path = str | os.PathLike[str]
 _FROM = {"Scenario": "sim.scenario.scenario", "load": "sim.scenario.reader"}
-_FOLDERS = ("analysis", "laws", "plots", "report", "spectrum")
+_FOLDERS = ("read", "laws", "plots", "report", "spectrum")
 _FUNCTIONS = (
     "check",
     "converge",
@@ -160,7 +160,7 @@ def open(path: Path) -> "xarray.Dataset":
     BadInput
         If there is no such file, or it is none of our datasets.
     """
-    from sim.analysis import dataset
+    from sim.read import dataset
 
     return dataset.open(path)
 
@@ -172,7 +172,7 @@ def stats(
 
     ``where`` gives values of swept keys, ``{"contact.load": "4 mN"}``.
     """
-    from sim.analysis.tables import frame
+    from sim.read.tables import frame
 
     return _plainly(frame, dataset, where)
 
@@ -429,7 +429,7 @@ def _plainly(
     where: dict[str, Any] | None,
 ) -> Any:
     """Return the result of a function of a dataset, or of a file with one; its faults become ``BadInput``."""
-    from sim.analysis.statistics import where as chosen
+    from sim.read.statistics import where as chosen
 
     with (
         naming(),

@@ -343,7 +343,7 @@ def run(
 
 def _unresolved(target: Path) -> str:
     """Return a sentence on the trajectories of a run that were not resolved to the end, or "" without any."""
-    from sim.analysis.tables import unresolved
+    from sim.read.tables import unresolved
 
     with _opened(target) as dataset:
         return unresolved(dataset)
@@ -353,16 +353,16 @@ def _tables(
     dataset: Any, most: int = _ROWS, lost: tuple[str, ...] = (), every: Any = None
 ) -> tuple[Any, list[str]]:
     """Return the tables of statistics of a dataset, and notes on their numbers."""
-    from sim import analysis
+    from sim import read
 
-    stated = analysis.tables.stated(dataset, lost, every)
+    stated = read.tables.stated(dataset, lost, every)
     rows, once = (
-        analysis.table(dataset, most, stated),
-        analysis.highlights(dataset, most, stated),
+        read.table(dataset, most, stated),
+        read.highlights(dataset, most, stated),
     )
-    further = [of(dataset, most, stated) for of in (analysis.losses, analysis.phases)]
-    further.append(analysis.spread(dataset, stated))
-    return [shown for shown in (rows, once, *further) if shown], analysis.notes(
+    further = [of(dataset, most, stated) for of in (read.losses, read.phases)]
+    further.append(read.spread(dataset, stated))
+    return [shown for shown in (rows, once, *further) if shown], read.notes(
         dataset, rows, once, stated
     )
 
@@ -425,7 +425,7 @@ def stats(
 ) -> None:
     """Print tables of ensemble statistics over time and sweep."""
     _import_xarray()
-    from sim import analysis
+    from sim import read
     from sim.units.notation import in_units
 
     if form["wide"] and csv is None:
@@ -433,10 +433,10 @@ def stats(
     with _opened(output, chosen) as dataset, in_units(form["units"]):
         every = None
         if csv is not None:
-            analysis.dataset.claim(dataset, output, csv, force)
-            every = analysis.statements(dataset, lost=form["lost"])
+            read.dataset.claim(dataset, output, csv, force)
+            every = read.statements(dataset, lost=form["lost"])
             # before any printing, as nobody may read it to its end
-            analysis.to_csv(dataset, csv, form["wide"], whole, form["lost"], every)
+            read.to_csv(dataset, csv, form["wide"], whole, form["lost"], every)
         _print_tables(
             *_tables(dataset, sys.maxsize if whole else _ROWS, form["lost"], every)
         )
@@ -595,13 +595,13 @@ def _import_xarray() -> None:
 def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     """Open a dataset at chosen values of its sweep."""
     _import_xarray()
-    from sim import analysis
-    from sim.analysis.dataset import lacking, open as opened
+    from sim import read
+    from sim.read.dataset import lacking, open as opened
 
     with opened(path) as dataset:
         if message := lacking(dataset):
             note(f"note: {path}: {message}")
-        yield analysis.where(dataset, _values(chosen, "--where"))
+        yield read.where(dataset, _values(chosen, "--where"))
 
 
 @cli.command()

@@ -301,7 +301,7 @@ def test_nothing_after_the_rename_makes_a_failure_of_a_run(here, monkeypatch):
         patched.setattr("os.replace", replaced)
         for name in ("os.unlink", "os.rmdir", "os.fsync"):
             patched.setattr(name, broken(getattr(os, name.partition(".")[2])))
-        patched.setattr("sim.analysis.table", broken(lambda *_: done.append("read")))
+        patched.setattr("sim.read.table", broken(lambda *_: done.append("read")))
         found = sim("run", "scene.toml", "-o", "x.nc")
     assert found.exit_code == 0
     assert (

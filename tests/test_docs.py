@@ -21,7 +21,7 @@ from numpy.testing import assert_allclose
 from PIL import Image
 
 import sim
-from sim import analysis
+from sim import read
 from sim.cli import _values, cli
 from sim.plots.kinds import KINDS
 from sim.scenario.reader import load
@@ -282,7 +282,7 @@ def test_the_findings_have_the_numbers_of_the_lens_behind_a_spring_at_a_16_times
             {"sweep": {}, "drive.stage": f"{speed} mm/s"},
         )
         fine = values | {"clock.step": "62.5 us", "clock.record": "1 ms"} | keys
-        late = analysis.distribution(sim.run(load(path, fine)))
+        late = read.distribution(sim.run(load(path, fine)))
         for _, _, name, factor, text in (
             row for row in SLIDING if row[:2] == (keys, speed)
         ):

@@ -31,18 +31,18 @@ FLOORS = (
     "engine",
     "ensemble",
 )
-FLOORS += ("analysis", "plots", "report", "study", "explorer", "cli", "__main__")
+FLOORS += ("read", "plots", "report", "study", "explorer", "cli", "__main__")
 #: Floors that a floor must not import although they are below it.
 FORBIDDEN = {
-    "analysis": {"parts", "scenario", "engine", "ensemble"},
+    "read": {"parts", "scenario", "engine", "ensemble"},
     "plots": {"engine", "ensemble"},
 }
 FORBIDDEN |= {"report": {"ensemble"}}
 #: The lag of a ramp needs the steady law of bonds, made of the numbers that a dataset records.
-ALLOWED = {("analysis.over_speed", "parts.bonds.rupture")}
+ALLOWED = {("read.over_speed", "parts.bonds.rupture")}
 #: A report shows the remarks of ``sim check``, a figure the boundary of steady sliding, of a stored scenario.
 ALLOWED |= {
-    ("analysis.errors", f"ensemble.{name}") for name in ("dataset", "diagnosis", "plan")
+    ("read.errors", f"ensemble.{name}") for name in ("dataset", "diagnosis", "plan")
 }
 ALLOWED |= {("plots.slider", f"ensemble.{name}") for name in ("dataset", "diagnosis")}
 #: Names that hold a part outside of ``parts``.

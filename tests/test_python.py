@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from helpers.commands import LENS
 
 import sim
-from sim import analysis
+from sim import read
 from sim.cli import cli
 from sim.numerics.files import StoreTrouble
 from sim.scenario.files import written
@@ -41,7 +41,7 @@ def test_importing_the_package_imports_nothing_heavy_and_dir_lists_what_is_publi
     heavy = "{'numpy', 'pydantic', 'xarray', 'matplotlib', 'click'}"
     code = f"import sys, sim; sim.run, sim.check, sim.stats, dir(sim); sys.exit(len({heavy} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
-    for module in (sim, sim.analysis, sim.laws, sim.plots, sim.spectrum):
+    for module in (sim, sim.read, sim.laws, sim.plots, sim.spectrum):
         assert set(dir(module)) == set(module.__all__)
         assert all(hasattr(module, name) for name in dir(module))
     assert sim.__version__ == version("sliding-sim")
@@ -106,8 +106,8 @@ def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statist
             dataset.reset_coords("speed"),
             ("observables", "statistics", "events", "shares"),
         )
-        expected = {name: getattr(analysis, name)(variable) for name in functions}
-        table = analysis.table(variable)
+        expected = {name: getattr(read, name)(variable) for name in functions}
+        table = read.table(variable)
         for found in (dataset, opened, plainly):
             assert "speed" in found.contact_area.coords
             assert (
@@ -116,9 +116,9 @@ def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statist
             )
             for name in functions:
                 xr.testing.assert_identical(
-                    getattr(analysis, name)(found), expected[name]
+                    getattr(read, name)(found), expected[name]
                 )
-            assert analysis.table(found) == table
+            assert read.table(found) == table
         opened.to_netcdf(tmp_path / "again.nc")
     with netCDF4.Dataset(file, "a"):  # as nothing holds it any longer
         pass

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.parts import analysis, jkr, load, run
+from helpers.parts import jkr, load, read, run
 from numpy.testing import assert_allclose
 from scipy.optimize import curve_fit
 
@@ -258,7 +258,7 @@ def test_stick_slip_sets_in_beyond_the_friction_maximum():
     dataset = four("stick_slip")
     peak, slips = (
         law.first_moment_peak(*mean_field(dataset)),
-        analysis.slips(dataset).isel(member=0),
+        read.slips(dataset).isel(member=0),
     )
     force = dataset["spring_force"].isel(member=0).values
     began = int(np.argmax(force < 0.5 * np.maximum.accumulate(force)))
@@ -303,7 +303,7 @@ def test_the_area_falls_with_the_square_of_the_force_and_more_under_a_smaller_lo
 def test_at_the_onset_of_stick_slip_fluctuations_take_more_area_than_the_bonds_give_back(
     name,
 ):
-    found = analysis.shares(four(name))
+    found = read.shares(four(name))
     late = found.isel(t=slice(found.sizes["t"] // 2, None)).mean("t")
     before, after = (late.sel(drive_stage=speed) for speed in (2e-3, 3e-3))
     bonds, noise = (
@@ -311,7 +311,7 @@ def test_at_the_onset_of_stick_slip_fluctuations_take_more_area_than_the_bonds_g
         for w in ("bonds", "fluctuations")
     )
     assert -0.04 < bonds < -0.015 and 0.05 < noise < 0.075
-    slips = analysis.stick_slip(four(name))["slip_count"]
+    slips = read.stick_slip(four(name))["slip_count"]
     assert np.all(slips.sel(drive_stage=2e-3) == 0.0) and np.all(
         slips.sel(drive_stage=3e-3) > 1.0
     )

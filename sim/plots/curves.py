@@ -12,27 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
-from sim.analysis import (
-    bond_work,
-    is_stationary,
-    is_steady,
-    setting,
-    settled,
-    slips,
-    statements,
-    sweep_dims,
-)
-from sim.analysis.dataset import MEMBERS, speed_name, speed_of, stays_held
-from sim.analysis.events import jumps
-from sim.analysis.over_speed import speed_dim
-from sim.analysis.statistics import (
-    FOR_TAILS,
-    Array,
-    averaging,
-    of_second_half,
-    over_members,
-    summary,
-)
 from sim.plots import style
 from sim.plots.measured import Compared, Line, Measured
 from sim.plots.style import (
@@ -44,6 +23,27 @@ from sim.plots.style import (
     fill,
     named,
     swept_value,
+)
+from sim.read import (
+    bond_work,
+    is_stationary,
+    is_steady,
+    setting,
+    settled,
+    slips,
+    statements,
+    sweep_dims,
+)
+from sim.read.dataset import MEMBERS, speed_name, speed_of, stays_held
+from sim.read.events import jumps
+from sim.read.over_speed import speed_dim
+from sim.read.statistics import (
+    FOR_TAILS,
+    Array,
+    averaging,
+    of_second_half,
+    over_members,
+    summary,
 )
 
 #: Largest number of points of a curve that carry markers.

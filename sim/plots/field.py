@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from sim.analysis.dataset import sweep_dims, where_recorded, word
 from sim.laws.halfspace import angular_compliance, displacement
 from sim.plots import style
+from sim.read.dataset import sweep_dims, where_recorded, word
 from sim.spectrum.radial import Rowed, Waves
 
 if TYPE_CHECKING:

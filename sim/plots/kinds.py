@@ -14,12 +14,12 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sim.analysis import engineering, statements, sweep_dims
-from sim.analysis.dataset import MEMBERS, answered, claim, plain, speed_name
 from sim.numerics.files import claim as claim_file
 from sim.plots import curves, field, movie, slider, style, theories
 from sim.plots.measured import Measured
 from sim.plots.style import STYLE, recorded, save, swept_value
+from sim.read import engineering, statements, sweep_dims
+from sim.read.dataset import MEMBERS, answered, claim, plain, speed_name
 from sim.units.errors import BadInput, naming
 from sim.units.notation import in_units
 from sim.units.quantity import read_option
@@ -285,7 +285,7 @@ def draw(
     Parameters
     ----------
     dataset : xarray.Dataset
-        As ``sim run`` writes it; ``sim.analysis.where`` chooses values of its sweep.
+        As ``sim run`` writes it; ``sim.read.where`` chooses values of its sweep.
     kind : str, optional
         One of ``KINDS``, whose ``shows`` describes it; by default the kind that fits the dataset best.
     choices : Choices, optional

@@ -12,8 +12,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sim.analysis.dataset import plain, speed_name, sweep_dims
 from sim.plots.style import BOTH, GUIDE, HOLLOW, legend
+from sim.read.dataset import plain, speed_name, sweep_dims
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
 from sim.units.tables import Points, measured_points, names_of, read_measured

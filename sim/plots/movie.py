@@ -12,9 +12,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Circle
 from PIL import Image
 
-from sim.analysis import sweep_dims
-from sim.analysis.dataset import MEMBERS, word
 from sim.plots import field, style
+from sim.read import sweep_dims
+from sim.read.dataset import MEMBERS, word
 from sim.units.terminal import LOG
 
 #: Most frames of a movie by format, and least; frames a second; dots an inch by format.

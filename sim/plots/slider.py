@@ -10,11 +10,6 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sim.analysis import is_steady, setting, statements, sweep_dims
-from sim.analysis.dataset import MEMBERS, stays_held, word
-from sim.analysis.events import incipient_law, jumps
-from sim.analysis.observables import with_slips
-from sim.analysis.over_speed import population_of, speed_dim
 from sim.laws import schallamach
 from sim.plots import style
 from sim.plots.curves import (
@@ -28,6 +23,11 @@ from sim.plots.curves import (
     statement_curves,
 )
 from sim.plots.measured import Line, Measured
+from sim.read import is_steady, setting, statements, sweep_dims
+from sim.read.dataset import MEMBERS, stays_held, word
+from sim.read.events import incipient_law, jumps
+from sim.read.observables import with_slips
+from sim.read.over_speed import population_of, speed_dim
 from sim.units.errors import BadInput
 
 

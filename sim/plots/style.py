@@ -23,8 +23,8 @@ from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from sim.analysis import engineering, scaled, sweep_dims
 from sim.numerics.files import output
+from sim.read import engineering, scaled, sweep_dims
 
 COLUMN, WIDE = 3.4, 7.0  # inches: one column, both columns
 _ON_SCREEN = 120  # dots an inch

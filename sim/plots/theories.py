@@ -8,14 +8,14 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sim.analysis import control, is_steady, setting, settled, statements
-from sim.analysis.dataset import plain, stays_held
-from sim.analysis.events import cycles_of, pull_offs
 from sim.laws import jkr
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.plots import style
 from sim.plots.curves import Scene, beside, colour_bar, mark_jumps, scene_along
 from sim.plots.measured import Line, Measured
+from sim.read import control, is_steady, setting, settled, statements
+from sim.read.dataset import plain, stays_held
+from sim.read.events import cycles_of, pull_offs
 
 #: Name of each theory, its colour and line style.
 _THEORIES: dict[str, tuple[str, str, Any]] = {

@@ -17,11 +17,17 @@ import xarray as xr
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from sim.analysis import is_stationary, is_steady, speed_of, statements, sweep_dims
-from sim.analysis.dataset import claim, speed_name
-from sim.analysis.errors import remarks, systematic_errors
-from sim.analysis.statistics import averaging, over_members
-from sim.analysis.tables import (
+from sim.numerics import hdf5
+from sim.numerics.files import output
+from sim.plots import kinds
+from sim.plots.kinds import Choices
+from sim.plots.measured import Measured
+from sim.plots.style import STYLE
+from sim.read import is_stationary, is_steady, speed_of, statements, sweep_dims
+from sim.read.dataset import claim, speed_name
+from sim.read.errors import remarks, systematic_errors
+from sim.read.statistics import averaging, over_members
+from sim.read.tables import (
     highlights,
     key_figures,
     losses,
@@ -30,12 +36,6 @@ from sim.analysis.tables import (
     phases,
     table,
 )
-from sim.numerics import hdf5
-from sim.numerics.files import output
-from sim.plots import kinds
-from sim.plots.kinds import Choices
-from sim.plots.measured import Measured
-from sim.plots.style import STYLE
 from sim.scenario.files import toml
 from sim.units.errors import naming
 from sim.units.terminal import plain
@@ -256,7 +256,7 @@ def html(
     Parameters
     ----------
     dataset : xarray.Dataset
-        As ``sim run`` writes it; ``sim.analysis.where`` chooses values of its sweep.
+        As ``sim run`` writes it; ``sim.read.where`` chooses values of its sweep.
     source : path
         The file that it is of: its name is in the commands that repeat the run.
     data : path or dict of str to array, optional

@@ -26,7 +26,6 @@ from matplotlib.figure import Figure
 from pydantic import TypeAdapter
 from scipy import special
 
-from sim.analysis import engineering
 from sim.engine import MemberNoise, Trajectory, follow
 from sim.ensemble.plan import seconds_a_step, together
 from sim.ensemble.variables import READ
@@ -46,6 +45,7 @@ from sim.plots.style import (
     rows,
     save,
 )
+from sim.read import engineering
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read, keys, model, tables
 from sim.units.errors import BadInput

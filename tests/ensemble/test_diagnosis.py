@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy
-from helpers.parts import analysis, jkr, load, run
+from helpers.parts import jkr, load, read, run
 from helpers.scenes import BONDS, CONTACTS, DRIVES, SHEARS, scene as small
 from numpy.testing import assert_allclose
 
@@ -349,9 +349,9 @@ def test_the_diagnosis_has_the_numbers_of_closed_forms_and_goes_with_the_dataset
     assert strict.endswith(f"(shear.paid_by_adhesion = 0) A/A_JKR is {bonded:.3g} %")
     dataset = run(lens)
     printed = preview(lens)
-    assert analysis.remarks(dataset) == [*remarks(plan), *texts]
-    assert all(text in printed for text in analysis.remarks(dataset))
-    errors = {each.name: each for each in analysis.systematic_errors(dataset)}
+    assert read.remarks(dataset) == [*remarks(plan), *texts]
+    assert all(text in printed for text in read.remarks(dataset))
+    errors = {each.name: each for each in read.systematic_errors(dataset)}
     most = errors["cell_error_area"]
     assert_allclose(
         most.value, 100 * float(dataset["cell_error_area"].max()), rtol=1e-12
@@ -370,18 +370,18 @@ def test_remarks_on_a_dataset_need_no_file_but_a_measured_map(scene, tmp_path):
     )
     np.save(stress_map, 1e5 * np.random.default_rng(1).random((16, 16)))
     tabulated = {"model": "tabulated", "file": str(table)}
-    read = scene(shear={"model": "mean", "spectrum": tabulated})
+    of_table = scene(shear={"model": "mean", "spectrum": tabulated})
     mapped = scene(
         shear={"model": "mapped", "field": {"file": str(stress_map), "pixel": "50 um"}}
     )
     datasets, expected = (
-        [run(read), run(mapped)],
-        [*remarks(Plan.of(read)), *diagnosis(Plan.of(read))],
+        [run(of_table), run(mapped)],
+        [*remarks(Plan.of(of_table)), *diagnosis(Plan.of(read))],
     )
     for path in (table, stress_map):
         path.unlink()
-    assert analysis.remarks(datasets[0]) == expected != []
-    (reason,) = analysis.remarks(datasets[1])
+    assert read.remarks(datasets[0]) == expected != []
+    (reason,) = read.remarks(datasets[1])
     assert "sim check" in reason and "shear.field" in reason
 
 

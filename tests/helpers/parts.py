@@ -1,6 +1,6 @@
 """Parts and functions that most tests use, to import in one line."""
 
-from sim import analysis as analysis
+from sim import read as read
 from sim.ensemble.simulate import run as run
 from sim.laws import jkr as jkr
 from sim.parts import drive as drive

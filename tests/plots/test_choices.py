@@ -6,7 +6,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from helpers.commands import sim as command
-from helpers.parts import Equilibrium, RateDependent, Record, analysis, shear
+from helpers.parts import Equilibrium, RateDependent, Record, read, shear
 from helpers.pictured import (
     STEADY,
     drawn,
@@ -161,7 +161,7 @@ def test_measured_points_lie_where_they_were_measured_in_curves_and_loops(loads,
     assert colours == list(pictures.LINES[:2])
     for (_, shown), area in zip(points_of(panel), areas, strict=True):
         assert_allclose(shown, area, rtol=1e-12)
-    one = analysis.where(loads, {"contact.load": "1 mN"})
+    one = read.where(loads, {"contact.load": "1 mN"})
     assert_allclose(
         points_of(draw(one, "curve", data=path).axes[0])[0][0], [1.0], rtol=1e-14
     )

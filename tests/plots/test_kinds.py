@@ -12,9 +12,9 @@ from helpers.parts import (
     Ensemble,
     Equilibrium,
     Record,
-    analysis,
     bonds,
     drive,
+    read,
     shear,
 )
 from helpers.pictured import (
@@ -57,7 +57,7 @@ def swept(**sweep):
 def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_with_a_colour_bar():
     dataset = simulated(drive=STEADY, sweep={"contact.load": ["1 mN", "4 mN", "16 mN"]})
     figure = plots.draw(dataset)
-    found = analysis.summary(analysis.settled(analysis.observables(dataset)))
+    found = read.summary(read.settled(read.observables(dataset)))
     load, radius = drawn(figure.axes[0], pictures.BOTH)
     assert_allclose(load, [1.0, 4.0, 16.0], rtol=1e-14)
     assert_allclose(radius, 1e6 * found["contact_radius_mean"].isel(t=0), rtol=1e-14)
@@ -139,7 +139,7 @@ def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_wi
     assert "20 of 41 curves drawn (choose others by --where)" in legend_of(panel)[
         1
     ].replace("\n", " ")
-    chosen = plots.draw(analysis.where(dataset, {"contact.load": "1 mN"}), "time")
+    chosen = plots.draw(read.where(dataset, {"contact.load": "1 mN"}), "time")
     assert chosen.get_suptitle() == "$P$ = 1 mN"
     dataset = swept(contact_load=9, sphere_radius=3)
     panel = rendered(plots.draw(dataset, "time")).axes[0]
@@ -171,7 +171,7 @@ def test_several_curves_keep_their_mechanisms_by_a_line_of_the_area_with_the_bon
         bonds=bonds.Steady(critical_speed=2e-2, stress=3e5), sweep=loads
     )
     panel = plots.draw(dataset, "curve").axes[0]
-    lost = analysis.shares(dataset)["lost_to_bonds_mean"].transpose("contact_load", "t")
+    lost = read.shares(dataset)["lost_to_bonds_mean"].transpose("contact_load", "t")
     for colour, share in zip(pictures.LINES, lost, strict=False):
         assert_allclose(drawn(panel, colour, "-.")[1], 1.0 - share, rtol=1e-12)
     assert "with intact bonds only" in legend_of(panel)[0]
@@ -190,7 +190,7 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
     ramp,
 ):
     figure = rendered(plots.draw(ramp, "curve"))
-    found, shares = analysis.statistics(ramp), analysis.shares(ramp)
+    found, shares = read.statistics(ramp), read.shares(ramp)
     area, energies, friction = figure.axes
     speed, ratio = drawn(area, pictures.BOTH)
     assert_allclose(speed, 1e3 * ramp["speed"], rtol=1e-14)  # mm/s
@@ -220,7 +220,7 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
     _, fluctuations = drawn(energies, pictures.FLUCTUATIONS, "--")
     assert_allclose(fluctuations, 1e3 * found["fluctuation_energy_mean"], rtol=1e-14)
     _, bonded = drawn(energies, pictures.BONDS, "-.")
-    assert_allclose(bonded, 1e3 * analysis.bond_work(ramp), rtol=1e-14)
+    assert_allclose(bonded, 1e3 * read.bond_work(ramp), rtol=1e-14)
     assert_allclose(
         drawn(friction, pictures.BOTH)[1],
         1e3 * found["friction_force_mean"],
@@ -241,7 +241,7 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
         and len(panels) == 4
     )
     _, energy = drawn(panels[2], pictures.BOTH)
-    found = analysis.statistics(small)["fluctuation_energy_mean"]
+    found = read.statistics(small)["fluctuation_energy_mean"]
     assert_allclose(energy / energy[-1], found / found[-1], rtol=1e-13)
     assert len(plots.draw(ramp, "curve").axes) == 3
     dataset = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())

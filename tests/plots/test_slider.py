@@ -11,7 +11,6 @@ from helpers.scenes import scene
 from numpy.testing import assert_allclose
 
 import sim
-from sim.analysis import slips
 from sim.laws.schallamach import (
     Body,
     first_moment_onset,
@@ -20,6 +19,7 @@ from sim.laws.schallamach import (
 )
 from sim.parts.bonds.models import Cohort, FirstMoment
 from sim.plots import curves, draw
+from sim.read import slips
 
 #: Bonds of a unit of stretch of 5 µm, and their numbers as the laws take them; the area stays.
 NUMBERS = (25.0, 4e-12, 8e-7, 250.0, 6.5e16)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from helpers.lens import scene
-from helpers.parts import analysis, drive, run, shear
+from helpers.parts import drive, read, run, shear
 from helpers.pictured import legend_of, simulated
 from numpy.testing import assert_allclose
 
@@ -22,7 +22,7 @@ def speeds():
 
 
 def test_a_statement_is_drawn_over_the_sorted_sweep_with_its_interval(speeds):
-    stated = analysis.statements(speeds)
+    stated = read.statements(speeds)
     figure = kinds.draw(speeds, "contact_area")
     (panel,) = figure.axes
     x, y = panel.lines[-1].get_data()

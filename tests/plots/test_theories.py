@@ -6,9 +6,9 @@ from helpers.parts import Adhesion, Clock, Ensemble, Equilibrium, bonds, shear
 from helpers.pictured import STEADY, data_of, simulated
 from numpy.testing import assert_allclose
 
-from sim.analysis import where
 from sim.laws import jkr, theories
 from sim.plots import kinds as plots, style as pictures, theories as rival_figures
+from sim.read import where
 
 NUMBERS = (42e-3, 2e-3, 6.4e6, 0.5, 0.1)
 

@@ -12,20 +12,11 @@ import netCDF4
 import numpy as np
 import pytest
 from helpers.commands import SCENE, sim
-from helpers.parts import (
-    Clock,
-    Ensemble,
-    Equilibrium,
-    Record,
-    analysis,
-    load,
-    run,
-    shear,
-)
+from helpers.parts import Clock, Ensemble, Equilibrium, Record, load, read, run, shear
 from helpers.pictured import STEADY, mapped, simulated
 
-from sim.analysis.observables import full_area
 from sim.plots import kinds
+from sim.read.observables import full_area
 from sim.report import html, report
 
 VOID = {"meta", "link", "img", "br", "hr", "input"}
@@ -315,12 +306,12 @@ def test_a_page_has_the_numbers_of_the_statistics_its_question_and_error_estimat
 ):
     page = harmless(Page(html(ramp)))
     assert [tag for tag, _ in page.elements].count("svg") == len(page.words("b")) == 1
-    stated = analysis.statements(ramp)
-    figures = analysis.tables.key_figures(ramp, stated)
+    stated = read.statements(ramp)
+    figures = read.tables.key_figures(ramp, stated)
     assert len(figures) > 3 and {"5 % of area lost at V", "first masked"} <= {
         row[""] for row in figures
     }
-    for row in (*analysis.table(ramp, 24), *figures):
+    for row in (*read.table(ramp, 24), *figures):
         assert set(row.values()) <= set(page.words("td"))
     document = json.loads(ramp.attrs["scenario_resolved"]) | {"<b>small</b>": 1}
     remarked = ramp.assign_attrs(scenario_resolved=json.dumps(document))
@@ -342,7 +333,7 @@ def test_a_page_has_the_numbers_of_the_statistics_its_question_and_error_estimat
             rest,
         )
     # of all records, of which 24 are looked at
-    error = float(analysis.statistics(ramp)["area_ratio_sem"].max())
+    error = float(read.statistics(ramp)["area_ratio_sem"].max())
     *_, row = report.known(ramp)
     assert 0.5 * error < 0.01 * float(row["size"].removesuffix(" %")) <= error * 1.005
 
@@ -424,7 +415,7 @@ def test_the_page_of_a_file_is_replaced_only_if_asked_and_has_the_commands_that_
         "--no-table",
     ]
     assert sim("run", "y.toml", *arguments).exit_code == 0
-    with analysis.dataset.open("y.nc") as first, analysis.dataset.open("z.nc") as again:
+    with read.dataset.open("y.nc") as first, read.dataset.open("z.nc") as again:
         assert first.equals(again)
     Path("x.html").write_text("mine", encoding="utf-8")
     for arguments, code in (

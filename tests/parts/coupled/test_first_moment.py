@@ -25,7 +25,6 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import sim
-from sim.analysis.tables import notes
 from sim.engine import MemberNoise, follow
 from sim.ensemble.preview import slider_body
 from sim.laws.schallamach import Body, first_moment_onset
@@ -33,6 +32,7 @@ from sim.parts.bonds.models import FirstMoment, Steady, Unbroken
 from sim.parts.bonds.rupture import Constant, CutOff
 from sim.parts.contact.models import Adhesion
 from sim.parts.drive import Force
+from sim.read.tables import notes
 from sim.scenario.scenario import Scenario
 from sim.units.errors import BadInput
 

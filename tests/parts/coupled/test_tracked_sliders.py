@@ -23,11 +23,11 @@ from helpers.scenes import IN_TIME
 from numpy.testing import assert_allclose
 
 from sim import run
-from sim.analysis import stick_slip
 from sim.parts.bonds.models import Cohort, Tracked
 from sim.parts.bonds.rupture import Constant, CutOff
 from sim.parts.drive import Force
 from sim.parts.shear import Banded
+from sim.read import stick_slip
 
 
 def tracked(duration, steps, drive, sites, **keys):

@@ -19,12 +19,12 @@ from helpers.scenes import (
 from numpy.testing import assert_allclose
 
 import sim
-from sim.analysis.tables import table
 from sim.laws import halfspace, jkr
 from sim.numerics.grid import Grid
 from sim.parts.bonds.models import Counted, Unbroken
 from sim.parts.shear import Carried, Mapped
 from sim.parts.shear.maps import Passing
+from sim.read.tables import table
 from sim.scenario.scenario import Record
 from sim.spectrum.families import Ripple
 from sim.spectrum.measured import StressMap

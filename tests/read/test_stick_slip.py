@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from helpers.driven import force, scenario
-from helpers.parts import Adhesion, Bell, Clock, Force, Record, Spring, analysis, run
+from helpers.parts import Adhesion, Bell, Clock, Force, Record, Spring, read, run
 from helpers.scenes import scene
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -17,7 +17,7 @@ import sim
 from sim.ensemble.dataset import moments, pooled as pooled_moments
 from sim.parts.bonds.models import Cohort, FirstMoment, Steady, Unbroken
 from sim.parts.events import LATE, SLIP, Slips
-from tests.analysis.test_invariance import LENS, SCENES, STRETCHED
+from tests.read.test_invariance import LENS, SCENES, STRETCHED
 
 NAN = math.nan
 #: A slider of 5 g that sticks and slips at four speeds.
@@ -113,7 +113,7 @@ def of(result, name):
 
 
 def test_stick_slip_mean_force_statistics_and_tables_are_those_of_the_closed_cycle_to_a_record():
-    result = analysis.slips(cycles())
+    result = read.slips(cycles())
     first, twice = 1.0, 2.0 * RECORD
     period, count = STICKS + SLIPS, 6
     assert result.sizes["slip"] == count and result["slip_time"].dims == (
@@ -140,7 +140,7 @@ def test_stick_slip_mean_force_statistics_and_tables_are_those_of_the_closed_cyc
     moved = drop + result["slip_duration"]
     assert_allclose(result["slip_amplitude"] / LENGTH, moved, rtol=1e-6)
     assert_allclose(result["slip_speed"], LENGTH, rtol=1e-14)
-    result = analysis.stick_slip(cycles())
+    result = read.stick_slip(cycles())
     begins = 1.0 + (STICKS + SLIPS) * np.arange(6)
     late = begins[begins >= 2.5]
     assert np.all(result["slip_count"] == late.size)
@@ -153,10 +153,10 @@ def test_stick_slip_mean_force_statistics_and_tables_are_those_of_the_closed_cyc
         atol=2.0 * RECORD / (late.size - 1),
         rtol=0,
     )
-    result = analysis.statistics(cycles())
+    result = read.statistics(cycles())
     assert_allclose(result["static_friction_mean"] / FORCE, 1.0, atol=2.0 * RECORD)
     assert result["static_friction_mean"].attrs["units"] == "N"
-    (row,) = analysis.highlights(cycles())
+    (row,) = read.highlights(cycles())
     cells = {" ".join(heading.split()): cell for heading, cell in row.items()}
     assert cells["slips"].startswith("3") and cells["kinetic friction (mN)"].startswith(
         "3.3"
@@ -164,19 +164,17 @@ def test_stick_slip_mean_force_statistics_and_tables_are_those_of_the_closed_cyc
     faster = cycles().assign(
         stage_speed=cycles()["stage_speed"] * (1.0 + cycles()["t"])
     )
-    rows = analysis.table(faster)
+    rows = read.table(faster)
     (stage,) = (heading for heading in rows[0] if heading.startswith("stage"))
     # four digits are shown
     assert_allclose(float(rows[-1][stage]), 6.0 * float(rows[0][stage]), rtol=1e-3)
-    assert not any(
-        heading.startswith("stage") for heading in analysis.table(cycles())[0]
-    )
+    assert not any(heading.startswith("stage") for heading in read.table(cycles())[0])
     # kinetic friction would be a mean over speeds
     for dataset, is_shown in ((cycles(), True), (faster, False)):
         assert (
             any(
                 heading.startswith("kinetic")
-                for row in analysis.highlights(dataset)
+                for row in read.highlights(dataset)
                 for heading in row
             )
             is is_shown
@@ -184,14 +182,14 @@ def test_stick_slip_mean_force_statistics_and_tables_are_those_of_the_closed_cyc
 
 
 def test_the_mean_speed_is_that_of_the_way_and_without_slips_there_is_kinetic_friction_alone():
-    result = analysis.distribution(cycles(10.0))
+    result = read.distribution(cycles(10.0))
     for name, exact in (("speed", LENGTH), ("spring_force", MEAN * FORCE)):
         assert result[f"{name}_reason"] == "" and math.isnan(result[f"{name}_sem"])
         # whole cycles, of which each end is known to a record
         assert_allclose(
             result[f"{name}_mean"], exact, rtol=2.0 * RECORD / (6.0 * (STICKS + SLIPS))
         )
-    few = analysis.distribution(cycles())  # of 3.6 cycles in the second half
+    few = read.distribution(cycles())  # of 3.6 cycles in the second half
     assert str(few["speed_reason"].item()).startswith("too short") and math.isnan(
         few["speed_low"]
     )
@@ -206,7 +204,7 @@ def test_the_mean_speed_is_that_of_the_way_and_without_slips_there_is_kinetic_fr
             bonds=Unbroken(stress=FORCE / area),
         )
     )
-    result = analysis.stick_slip(dataset)
+    result = read.stick_slip(dataset)
     assert result["slip_count"].item() == 0.0 and math.isnan(
         result["static_friction"].item()
     )
@@ -292,9 +290,9 @@ def test_a_stage_at_many_speeds_slips_between_two():
     seldom = up_and_down.isel(t=[0, -1]).assign(names)
     for name in ("slips_from", "slips_down_to"):
         assert_array_equal(
-            analysis.stick_slip(seldom)[name], analysis.stick_slip(up_and_down)[name]
+            read.stick_slip(seldom)[name], read.stick_slip(up_and_down)[name]
         )
-    result = analysis.stick_slip(up_and_down)
+    result = read.stick_slip(up_and_down)
     assert_allclose(result["slip_count"], [3.0, 4.0])
     assert_allclose(result["slips_from"], [1.0, 2.0])
     assert_allclose(result["slips_down_to"], [3.0, 3.0])
@@ -311,9 +309,7 @@ def test_the_scene_of_slips_has_the_counts_of_its_hysteresis_whatever_the_record
         late = 0.5 * (result["slip_time"] + result["slip_end"]) > 0.4
         assert late.sum("slip").values.ravel().tolist() == [8, 9, 12, 15]
     for each in results[1:]:
-        xr.testing.assert_identical(
-            analysis.stick_slip(each), analysis.stick_slip(results[0])
-        )
+        xr.testing.assert_identical(read.stick_slip(each), read.stick_slip(results[0]))
 
 
 def test_slip_events_after_a_hold_are_told_apart_from_those_before_whatever_the_records():
@@ -321,8 +317,8 @@ def test_slip_events_after_a_hold_are_told_apart_from_those_before_whatever_the_
     dataset = run(sim.Scenario(**HELD))
     assert dataset["phase_name"].values.tolist() == ["sliding", "rest", "sliding"]
     each, result = (
-        analysis.slips(dataset).isel(member=0),
-        analysis.slips_by_phase(dataset).isel(member=0),
+        read.slips(dataset).isel(member=0),
+        read.slips_by_phase(dataset).isel(member=0),
     )
     assert_allclose(
         1e6 * each["static_friction"], [1255.0, 1158.0, *[475.0] * 5], rtol=6e-4
@@ -331,15 +327,15 @@ def test_slip_events_after_a_hold_are_told_apart_from_those_before_whatever_the_
     assert_array_equal(result["slip_count"], [1.0, 0.0, 6.0])
     assert_allclose(1e6 * result["first_friction"], [1255.0, NAN, 1158.0], rtol=6e-4)
     assert_array_equal(result["time_held"], [NAN, NAN, 1.0])
-    rows = analysis.phases(dataset)
+    rows = read.phases(dataset)
     assert [row["first slip\nat (mN)"] for row in rows] == ["1.255", "–", "1.158"]
     assert [row["held\nbefore (s)"] for row in rows] == ["–", "–", "1"]
     seldom = run(sim.Scenario(**HELD | {"clock": HELD["clock"] | {"record": "3 s"}}))
     xr.testing.assert_identical(
-        analysis.slips_by_phase(seldom), analysis.slips_by_phase(dataset)
+        read.slips_by_phase(seldom), read.slips_by_phase(dataset)
     )
     # it would be a mean over phases
-    assert "static_friction" not in analysis.stick_slip(dataset)
+    assert "static_friction" not in read.stick_slip(dataset)
 
 
 def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused():
@@ -355,7 +351,7 @@ def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused(
     dataset = run(
         scene(2, clock=Clock(duration=12.0, step=0.1), drive=drive, bonds=bonds)
     )
-    result = analysis.stick_slip(dataset)
+    result = read.stick_slip(dataset)
     when = dataset["runaway_time"].isel(t=-1).values
     assert np.all(when > 1.0) and np.all(result["ran_away"] == 1.0)
     assert_allclose(result["runaway_after"], when, rtol=1e-14)
@@ -363,31 +359,31 @@ def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused(
         result["static_friction"], force * (0.2 + 1.8 * (when - 1.0) / 19.0), rtol=1e-12
     )
     # none after its end
-    assert all("–" not in row.values() for row in analysis.table(dataset)[-3:])
+    assert all("–" not in row.values() for row in read.table(dataset)[-3:])
     held = run(scene(1, clock=Clock(duration=0.5, step=0.1), drive=drive, bonds=bonds))
-    calm = analysis.stick_slip(held)
+    calm = read.stick_slip(held)
     assert calm["ran_away"].item() == 0.0 and np.isnan(calm["static_friction"]).all()
     cells = {
         " ".join(heading.split()): cell
-        for heading, cell in analysis.highlights(dataset)[0].items()
+        for heading, cell in read.highlights(dataset)[0].items()
     }
     assert cells["ran away, of members (%)"] == "100"
     assert not any(
-        "ran away" in heading for row in analysis.highlights(held) for heading in row
+        "ran away" in heading for row in read.highlights(held) for heading in row
     )
     with pytest.raises(ValueError, match="spring"):
-        analysis.slips(dataset)
-    assert not analysis.stick_slip(dataset.drop_vars("runaway_time"))
+        read.slips(dataset)
+    assert not read.stick_slip(dataset.drop_vars("runaway_time"))
 
 
 def test_statistics_alone_have_the_means_of_slip_events_over_the_members_that_slip():
     pooled, each = (
         run(replace(cycled(), record=Record(per_member=False))),
-        analysis.stick_slip(cycles()),
+        read.stick_slip(cycles()),
     )
     with pytest.raises(ValueError, match="per_member"):
-        analysis.slips(pooled)
-    result = analysis.stick_slip(pooled)
+        read.slips(pooled)
+    result = read.stick_slip(pooled)
     for name in (
         "slip_count",
         "static_friction",
@@ -411,8 +407,7 @@ def test_statistics_alone_have_the_means_of_slip_events_over_the_members_that_sl
 
 def test_a_settled_creep_without_noise_has_no_spread():
     assert (
-        analysis.spread(run(scenario(20.0, 60, force(0.05), make=Cohort, members=1)))
-        == []
+        read.spread(run(scenario(20.0, 60, force(0.05), make=Cohort, members=1))) == []
     )
 
 
@@ -422,7 +417,7 @@ def test_a_stage_that_jumps_between_speeds_has_no_onset_of_slips_and_no_end():
         "value": ["3 mm/s", "3 mm/s", "8 mm/s", "8 mm/s"],
     }
     alone = {key: value for key, value in PULLED.items() if key != "sweep"}
-    result = analysis.stick_slip(
+    result = read.stick_slip(
         run(sim.Scenario(**alone | {"drive": PULLED["drive"] | {"stage": stage}}))
     )
     assert (
@@ -440,7 +435,7 @@ def test_slip_events_of_few_clock_steps_are_named_in_the_table(step, is_named):
             path, {"drive.stage": "5 mm/s", "clock.step": step, "clock.record": "20 ms"}
         )
     )
-    lines = analysis.tables.notes(dataset, [], [])
+    lines = read.tables.notes(dataset, [], [])
     assert (
         any("slip events last fewer than 3 clock steps" in line for line in lines)
         is is_named

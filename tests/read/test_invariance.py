@@ -10,7 +10,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from helpers.parts import analysis, run
+from helpers.parts import read, run
 
 import sim
 
@@ -244,7 +244,7 @@ def by_name(dataset):
                 for value in one.at.values()
             ),
         ): one
-        for one in analysis.each(analysis.statements(dataset))
+        for one in read.each(read.statements(dataset))
     }
 
 

@@ -11,7 +11,9 @@ from collections.abc import Collection
 import numpy as np
 import xarray as xr
 
-from sim.analysis.dataset import (
+from sim.laws import jkr
+from sim.quantities import OF_CONTACT
+from sim.read.dataset import (
     MEMBERS,
     control,
     plain,
@@ -21,8 +23,6 @@ from sim.analysis.dataset import (
     with_trajectories,
     word,
 )
-from sim.laws import jkr
-from sim.quantities import OF_CONTACT
 
 KEPT = ("mean", "std", "sem")
 #: Endings of a variable of each member, and of those of its recorded statistics.

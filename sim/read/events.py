@@ -8,7 +8,8 @@ import numpy as np
 import xarray as xr
 from scipy import special
 
-from sim.analysis.dataset import (
+from sim.quantities import SLIP_EVENT
+from sim.read.dataset import (
     MEMBERS,
     answered,
     control,
@@ -24,9 +25,8 @@ from sim.analysis.dataset import (
     with_trajectories,
     word,
 )
-from sim.analysis.observables import ENDINGS, labelled, pure
-from sim.analysis.statistics import LEVEL, WIDE, Array, observable_of
-from sim.quantities import SLIP_EVENT
+from sim.read.observables import ENDINGS, labelled, pure
+from sim.read.statistics import LEVEL, WIDE, Array, observable_of
 from sim.units.notation import engineering
 
 #: Relative changes below it are rounding.

@@ -17,17 +17,17 @@ from helpers.parts import (
     Ensemble,
     Equilibrium,
     Record,
-    analysis,
     bonds,
     drive,
+    read,
     run,
     shear,
 )
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
-from sim.analysis import tables
-from sim.analysis.observables import with_slips
+from sim.read import tables
+from sim.read.observables import with_slips
 from sim.units.errors import BadInput
 from sim.units.notation import in_units
 
@@ -44,19 +44,17 @@ def test_a_reduced_dataset_has_the_columns_that_it_can(per_member):
         )
         for quantities in (None, recorded)
     )
-    rows = analysis.table(some)
+    rows = read.table(some)
     assert "A/A_JKR\n(%)" not in rows[0] and {"a\n(µm)", "ΔΓ\n(mJ/m²)"} < set(rows[0])
-    for full, row in zip(analysis.table(whole), rows, strict=True):
+    for full, row in zip(read.table(whole), rows, strict=True):
         assert row.items() <= full.items()
     alone = run(scene(record=Record(per_member=per_member, quantities=())))
-    assert [set(row) for row in analysis.table(alone)] == 12 * [{"t\n(ms)", "a\n(µm)"}]
-    assert analysis.highlights(alone) == [] and "contact_radius_mean" in sim.stats(
-        alone
-    )
+    assert [set(row) for row in read.table(alone)] == 12 * [{"t\n(ms)", "a\n(µm)"}]
+    assert read.highlights(alone) == [] and "contact_radius_mean" in sim.stats(alone)
 
 
 def test_tables_have_a_dozen_rows_or_one_for_each_point(ramp):
-    rows, result = analysis.table(ramp), analysis.statistics(ramp)
+    rows, result = read.table(ramp), read.statistics(ramp)
     assert len(rows) == 12 and all(set(row) == set(rows[0]) for row in rows)
     assert [rows[0]["t\n(ms)"], rows[-1]["t\n(ms)"]] == ["0", "400"]
     for row, at in ((rows[0], 0), (rows[-1], -1)):
@@ -77,12 +75,12 @@ def test_tables_have_a_dozen_rows_or_one_for_each_point(ramp):
         dataset = run(
             scene(drive=drive.Steady(speed=1e-2), shear=shear.Uniform(), sweep=sweep)
         )
-        table = analysis.table(dataset)
+        table = read.table(dataset)
         assert len(table) == rows and [
             row["contact_\nload (mN)"] for row in (table[0], table[-1])
         ] == ["1", "9"]
         assert not any(heading.startswith("t\n") for heading in table[0])
-    rows = analysis.table(
+    rows = read.table(
         run(scene(sweep={"contact.load": ["1 mN", "4 mN"]}, shear=shear.Uniform()))
     )
     points = [(row["contact_load\n(mN)"], row["t\n(ms)"]) for row in rows]
@@ -91,7 +89,7 @@ def test_tables_have_a_dozen_rows_or_one_for_each_point(ramp):
     )
     ripple = {"model": "ripple", "amplitude": 1e5, "wavelength": 24e-6}
     fields = {"shear": [{"model": "uniform"}, {"model": "mean", "spectrum": ripple}]}
-    rows = analysis.table(run(scene(drive=drive.Steady(speed=1e-2), sweep=fields)))
+    rows = read.table(run(scene(drive=drive.Steady(speed=1e-2), sweep=fields)))
     assert [row["shear"] for row in rows] == ["uniform", "mean"]
 
 
@@ -111,7 +109,7 @@ def numbers_of(path):
 def long(ramp, tmp_path_factory):
     """The CSV of the ramp, as whoever has it reads it."""
     path = tmp_path_factory.mktemp("csv") / "out.csv"
-    analysis.to_csv(ramp, path)
+    read.to_csv(ramp, path)
     return numbers_of(path)
 
 
@@ -120,7 +118,7 @@ def of(long, quantity):
 
 
 def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp_path):
-    result, rows = analysis.statistics(ramp), of(long, "contact_radius")
+    result, rows = read.statistics(ramp), of(long, "contact_radius")
     names = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": "std"}
     assert_array_equal(rows["t [s]"], ramp["t"])
     assert_array_equal(rows["speed [m/s]"], ramp["speed"])
@@ -132,7 +130,7 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
     assert_array_equal(
         rows["q50_low"], result["contact_radius_quantile_low"].sel(quantile=0.5)
     )
-    lost = analysis.shares(ramp)["lost_to_fluctuations_first_mean"]
+    lost = read.shares(ramp)["lost_to_fluctuations_first_mean"]
     assert_array_equal(of(long, "lost_to_fluctuations_first")["mean"], lost)
     assert (
         set(rows["unit"]) == {"m"}
@@ -141,28 +139,28 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
     )
     (masked,) = of(long, "time_masked").to_dict("records")
     assert masked["mean"] == float(
-        analysis.statistics(ramp)["time_masked_mean"]
+        read.statistics(ramp)["time_masked_mean"]
     ) and math.isnan(masked["t [s]"])
     (dissipated,) = of(long, "total_dissipated").to_dict("records")
     assert dissipated["q95"] == 0.0 and dissipated["unit"] == "J"
     (speed,) = of(long, "speed_at_5_percent_lost").to_dict("records")
-    result = analysis.loss_speeds(ramp)["speed_at_5_percent_lost_low"]
+    result = read.loss_speeds(ramp)["speed_at_5_percent_lost_low"]
     assert speed["low"] == float(result) and speed["unit"] == "m/s"
     sweep = {"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 0.5, 1.0]}
     dataset = run(scene(sweep=sweep, shear=shear.Uniform()))
-    analysis.to_csv(dataset, tmp_path / "out.csv")
+    read.to_csv(dataset, tmp_path / "out.csv")
     rows = of(numbers_of(tmp_path / "out.csv"), "contact_area")
     expected = itertools.product([1e-3, 4e-3], [0.0, 0.5, 1.0], dataset["t"].to_numpy())
-    read = rows[["contact_load [N]", "adhesion_bond_share", "t [s]"]].itertuples(
+    columns = rows[["contact_load [N]", "adhesion_bond_share", "t [s]"]].itertuples(
         index=False, name=None
     )
-    assert list(read) == list(expected)
+    assert list(columns) == list(expected)
     assert_array_equal(rows["mean"], dataset["contact_area"].to_numpy().ravel())
     text, how = (
         (tmp_path / "out.csv").read_bytes().decode(),
         {"index": False, "na_rep": "nan", "lineterminator": "\n"},
     )
-    assert text == analysis.tidy(dataset).to_csv(
+    assert text == read.tidy(dataset).to_csv(
         header=text.partition("\n")[0].split(","), **how
     )
 
@@ -200,8 +198,8 @@ def test_a_wide_csv_has_a_row_for_each_point_or_record_in_the_units_that_are_cho
     )
     for every in (False, True):
         with in_units(["mm/s", "mm^2", "mN", "ms"]):
-            analysis.to_csv(dataset, path, wide=True, every=every)
-        rows, long = pd.read_csv(path), analysis.tidy(dataset)
+            read.to_csv(dataset, path, wide=True, every=every)
+        rows, long = pd.read_csv(path), read.tidy(dataset)
         long = long[long["t"].notna() == every]
         assert_allclose(np.unique(rows["drive_speed [mm/s]"]), [1.0, 10.0], rtol=1e-15)
         assert (
@@ -219,7 +217,7 @@ def test_a_wide_csv_has_a_row_for_each_point_or_record_in_the_units_that_are_cho
                 atol=0,
             )
     assert_allclose(rows["t [ms]"], np.tile(1e3 * dataset["t"], 2), rtol=1e-15)
-    analysis.to_csv(run(scene(shear=shear.Uniform())), path, wide=True)
+    read.to_csv(run(scene(shear=shear.Uniform())), path, wide=True)
     # of one run without noise: the statements of its events, without errors
     rows = pd.read_csv(path)
     assert (
@@ -228,13 +226,13 @@ def test_a_wide_csv_has_a_row_for_each_point_or_record_in_the_units_that_are_cho
         and not any("_error" in name for name in rows)
     )
     with pytest.raises(BadInput, match=r"--units: .*kg"), in_units(["mm/s", "kg"]):
-        assert {"drive_speed\n(mm/s)", "F\n(mN)"} < set(analysis.table(dataset)[0])
+        assert {"drive_speed\n(mm/s)", "F\n(mN)"} < set(read.table(dataset)[0])
 
 
 def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_spread():
     dataset = run(scene(bonds=bonds.Unbroken(), shear=shear.Uniform()))
-    rows = analysis.table(dataset, rows=5)
-    assert len(rows) == 5 and analysis.highlights(dataset) == []
+    rows = read.table(dataset, rows=5)
+    assert len(rows) == 5 and read.highlights(dataset) == []
     assert list(rows[0]) == [
         "t\n(ms)",
         "V\n(mm/s)",
@@ -250,7 +248,7 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
         "shear": shear.Uniform(),
         "drive": drive.Steady(speed=0.0),
     }
-    rows = analysis.table(run(scene(contact=cycle, **still)), rows=5)
+    rows = read.table(run(scene(contact=cycle, **still)), rows=5)
     assert [row["Δ\n(µm)"] for row in rows] == ["1", "-0.5", "-2", "-0.5", "1"]
     assert {heading.partition("\n")[0] for heading in rows[0]} >= {
         "t",
@@ -259,7 +257,7 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
         "open",
     }
     pulled = Equilibrium(load={"from": 1e-3, "to": -1e-3})
-    rows = analysis.table(run(scene(contact=pulled, **still)), rows=3)
+    rows = read.table(run(scene(contact=pulled, **still)), rows=3)
     # of the free sphere too
     assert [row["P\n(mN)"] for row in rows] == ["1", "0", "-1"]
     dataset = run(
@@ -269,9 +267,7 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
             ensemble=Ensemble(members=20),
         )
     )
-    result = {
-        row["quantity"].partition(" (")[0]: row for row in analysis.spread(dataset)
-    }
+    result = {row["quantity"].partition(" (")[0]: row for row in read.spread(dataset)}
     assert set(result) == {
         "ΔΓ",
         "w",
@@ -281,7 +277,7 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
         "fluct. first",
         "F",
     }
-    energy, law = result["ΔΓ"], analysis.distribution(dataset)
+    energy, law = result["ΔΓ"], read.distribution(dataset)
     assert list(energy) == [
         "quantity",
         "mean",
@@ -302,18 +298,15 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
         and "(" in energy["95 %"]
         and energy["t_c"].endswith(" ms")
     )
-    assert analysis.spread(lens.ramp()) == []
+    assert read.spread(lens.ramp()) == []
     sweep = {"contact.load": [1e-3, 4e-3]}
-    (low, high) = analysis.losses(run(scene(sweep=sweep)))
+    (low, high) = read.losses(run(scene(sweep=sweep)))
     assert low["contact_load\n(mN)"] == "1" and high["contact_load\n(mN)"] == "4"
     slow, fast = (
         float(row["5 % of area\nlost at V (mm/s)"].partition("(")[0])
         for row in (low, high)
     )
-    assert (
-        slow < fast
-        and analysis.losses(run(scene(drive=drive.Steady(speed=1e-3)))) == []
-    )
+    assert slow < fast and read.losses(run(scene(drive=drive.Steady(speed=1e-3)))) == []
 
 
 @pytest.mark.parametrize("cycles", [0, 1])
@@ -328,9 +321,9 @@ def test_rows_of_the_whole_run_have_no_time_whether_or_not_a_loop_is_closed(cycl
         "drive": drive.Steady(speed=0.0),
     }
     dataset = run(scene(contact=course, **quiet))
-    rows = analysis.tidy(dataset)
+    rows = read.tidy(dataset)
     of_run = rows["quantity"].isin(
-        [name.removesuffix("_mean") for name in map(str, analysis.statements(dataset))]
+        [name.removesuffix("_mean") for name in map(str, read.statements(dataset))]
     )
     assert (
         ("loop_energy" in set(rows["quantity"])) == bool(cycles)
@@ -343,14 +336,14 @@ def test_rows_of_the_whole_run_have_no_time_whether_or_not_a_loop_is_closed(cycl
 @posix
 def test_csv_goes_through_a_link_to_where_it_points(ramp, tmp_path):
     (tmp_path / "out.csv").symlink_to(tmp_path / "far.csv")
-    analysis.to_csv(ramp, tmp_path / "out.csv")
+    read.to_csv(ramp, tmp_path / "out.csv")
     assert (tmp_path / "out.csv").is_symlink()
     assert (tmp_path / "far.csv").read_text(encoding="utf-8").startswith("t [s],")
 
 
 def test_notes_say_what_is_averaged_how_many_rows_are_shown_and_what_symbols_mean(ramp):
-    rows = analysis.table(ramp)
-    lines = analysis.notes(ramp, rows, analysis.highlights(ramp))
+    rows = read.table(ramp)
+    lines = read.notes(ramp, rows, read.highlights(ramp))
     assert (
         "6 members" in lines[0]
         and "12 of 21" in lines[1]
@@ -363,11 +356,11 @@ def test_notes_say_what_is_averaged_how_many_rows_are_shown_and_what_symbols_mea
             sweep={"drive.speed": list(np.geomspace(1e-4, 1e-1, 16))},
         )
     )
-    rows = analysis.table(dataset)
-    assert analysis.notes(dataset, rows, [])[0].startswith(
+    rows = read.table(dataset)
+    assert read.notes(dataset, rows, [])[0].startswith(
         "mean over the second half of the run and 6 members"
     )
-    assert analysis.notes(dataset, rows, [])[1].startswith("12 of 16 rows shown")
+    assert read.notes(dataset, rows, [])[1].startswith("12 of 16 rows shown")
     assert [heading for heading in rows[0] if heading.endswith("(mm/s)")] == [
         "drive_speed\n(mm/s)"
     ]
@@ -394,12 +387,11 @@ def test_the_speed_of_a_slider_on_single_bonds_is_its_displacement_over_the_time
         dataset["t"].to_numpy(),
     )
     shown = [
-        float(re.match(r"[\d.]+", row["V\n(µm/s)"])[0])
-        for row in analysis.table(dataset)
+        float(re.match(r"[\d.]+", row["V\n(µm/s)"])[0]) for row in read.table(dataset)
     ]
     at = np.rint(np.linspace(0, 200, 12)).astype(int)[1:-1]
     speed = 1e6 * (position[at + 1] - position[at - 1]) / (2.0 * time[1])
-    few = analysis.distribution(dataset.isel(t=[0, 100, 200]), ["speed"])["speed_mean"]
+    few = read.distribution(dataset.isel(t=[0, 100, 200]), ["speed"])["speed_mean"]
     np.testing.assert_allclose(
         few, (position[200] - position[100]) / (time[200] - time[100]), rtol=1e-9
     )

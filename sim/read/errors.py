@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from sim.analysis.dataset import sweep_dims
+from sim.read.dataset import sweep_dims
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
 

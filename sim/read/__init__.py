@@ -5,7 +5,7 @@ Some are recorded, others are derived (such as the share of the area lost to bro
 run, such as the detachment or the friction peak. ``summary`` returns statistics of both over the members.
 """
 
-from sim.analysis.dataset import (
+from sim.read.dataset import (
     Control,
     control,
     is_stationary,
@@ -14,8 +14,8 @@ from sim.analysis.dataset import (
     speed_of,
     sweep_dims,
 )
-from sim.analysis.errors import SystematicError, remarks, systematic_errors
-from sim.analysis.events import (
+from sim.read.errors import SystematicError, remarks, systematic_errors
+from sim.read.events import (
     Lifetime,
     events,
     lifetime,
@@ -26,16 +26,16 @@ from sim.analysis.events import (
     slips_by_phase,
     stick_slip,
 )
-from sim.analysis.observables import (
+from sim.read.observables import (
     bond_work,
     observables,
     reference_radii,
     settled,
     share_observables,
 )
-from sim.analysis.over_speed import crossing, extremes, loss_speeds, steady_speeds
-from sim.analysis.statements import Statement, each, relaxation, statements, statistics
-from sim.analysis.statistics import (
+from sim.read.over_speed import crossing, extremes, loss_speeds, steady_speeds
+from sim.read.statements import Statement, each, relaxation, statements, statistics
+from sim.read.statistics import (
     QUANTILES,
     IntegralTime,
     averaging,
@@ -47,7 +47,7 @@ from sim.analysis.statistics import (
     summary,
     where,
 )
-from sim.analysis.tables import (
+from sim.read.tables import (
     highlights,
     in_columns,
     losses,

@@ -7,11 +7,11 @@ import pytest
 import xarray as xr
 from helpers.draws import ornstein_uhlenbeck
 from helpers.lens import scene
-from helpers.parts import Bell, Clock, Ensemble, analysis, bonds, drive, run, shear
+from helpers.parts import Bell, Clock, Ensemble, bonds, drive, read, run, shear
 from numpy.testing import assert_allclose
 
-from sim.analysis.errors import SystematicError
-from sim.analysis.statements import Statement, reasons
+from sim.read.errors import SystematicError
+from sim.read.statements import Statement, reasons
 
 
 def test_a_statement_prints_its_error_its_bounds_or_its_reason():
@@ -37,15 +37,15 @@ def test_a_statement_prints_its_error_its_bounds_or_its_reason():
 def test_table_csv_and_statements_have_the_same_numbers_and_samples():
     speeds = ["1 mm/s", "3 mm/s", "10 mm/s"]
     dataset = run(scene(drive=drive.Steady(speed=1e-3), sweep={"drive.speed": speeds}))
-    stated = analysis.statements(dataset)
+    stated = read.statements(dataset)
     assert (
         stated["contact_area_mean"].attrs["over"]
         == "second half of the run and 6 members"
     )
     assert stated["speed_at_5_percent_lost_mean"].attrs["over"] == "6 members"
-    rows = analysis.tidy(dataset).set_index("quantity")
+    rows = read.tidy(dataset).set_index("quantity")
     whole_run = rows[rows["t"].isna()]
-    for statement in analysis.each(stated):
+    for statement in read.each(stated):
         row = whole_run.loc[[statement.name]]
         at = (
             row
@@ -54,21 +54,21 @@ def test_table_csv_and_statements_have_the_same_numbers_and_samples():
         )
         np.testing.assert_array_equal(at["mean"], statement.value)
         assert set(at["over"]) == {statement.over or "one run"}
-    areas = [s.value for s in analysis.each(stated) if s.name == "area_ratio"]
+    areas = [s.value for s in read.each(stated) if s.name == "area_ratio"]
     np.testing.assert_array_equal(areas, stated["area_ratio_mean"])
-    assert analysis.table(dataset) == analysis.table(dataset, stated=stated)
+    assert read.table(dataset) == read.table(dataset, stated=stated)
 
 
 def test_key_figures_have_the_errors_of_the_table():
     dataset = run(scene(drive=drive.Steady(speed=1e-3)))
-    stated = analysis.statements(dataset)
+    stated = read.statements(dataset)
     values = {
         row[""]: row["value"].split()[0]
-        for row in analysis.tables.key_figures(dataset, stated)
+        for row in read.tables.key_figures(dataset, stated)
     }
     rows = {
         row["quantity"].partition(" (")[0]: row["mean"]
-        for row in analysis.tables.spread(dataset, stated)
+        for row in read.tables.spread(dataset, stated)
     }
     assert {"ΔΓ", "w", "a", "A/A_JKR"} <= rows.keys() and all(
         "(" in values[name] for name in rows
@@ -86,16 +86,16 @@ def test_a_reason_marks_its_cell_and_is_a_note_of_the_table():
             sweep={"contact.load": [1e-3, 4e-3]},
         )
     )
-    stated = analysis.statements(dataset)
+    stated = read.statements(dataset)
     stated = stated.assign(
         area_ratio_reason=("contact_load", np.array(["", "not settled"], object))
     )
-    rows = analysis.table(dataset, stated=stated)
+    rows = read.table(dataset, stated=stated)
     marked = [row["A/A_JKR\n(%)"].endswith("*") for row in rows]
     assert marked == [False, True] and reasons(stated) == {
         "not settled": ["area_ratio"]
     }
-    assert "* A/A_JKR: not settled" in analysis.notes(dataset, rows, [], stated)
+    assert "* A/A_JKR: not settled" in read.notes(dataset, rows, [], stated)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_memb
         "clock": Clock(duration=2.0, step=0.01),
     }
     exact = 1.0 / (5.0 * (1.0 + 1.0 / 3.0))  # dN/dt = h (N0 - N) - h (V/Vc) N
-    found = analysis.relaxation(
+    found = read.relaxation(
         run(scene(bonds=bonds.Rate(**rates, start_from="empty"), **lens)),
         "shear_stress",
     )
@@ -122,7 +122,7 @@ def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_memb
     # no noise, no interval
     assert math.isnan(found.error) and math.isnan(found.low) and not found.reason
     counted = bonds.Counted(**rates, start_from="empty", sites=50)
-    found = analysis.relaxation(
+    found = read.relaxation(
         run(scene(bonds=counted, ensemble=Ensemble(members=40), **lens)), "shear_stress"
     )
     assert found.low < exact < found.high and found.error < 0.1 * exact
@@ -134,15 +134,14 @@ def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_memb
         return xr.Dataset({"x": (("member", "t"), mean + 0.1 * noise)}, {"t": time})
 
     intervals = [
-        analysis.relaxation(course(1.0 - np.exp(-time / 0.63)), "x")
-        for _ in range(count)
+        read.relaxation(course(1.0 - np.exp(-time / 0.63)), "x") for _ in range(count)
     ]
     # a band of 99.9 %
     assert least <= sum(each.low < 0.63 < each.high for each in intervals) <= most
     rests = xr.Dataset(
         {"x": ("t", np.exp(-np.maximum(time - 1.0, 0.0) / 0.4))}, {"t": time}
     )
-    later = analysis.relaxation(rests, "x", 1.0)
+    later = read.relaxation(rests, "x", 1.0)
     assert_allclose(later.value, 0.4, rtol=1e-9)
     cases = {
         "not exponential": np.exp(-np.sqrt(time)),
@@ -150,10 +149,10 @@ def test_a_relaxation_time_is_that_of_the_rate_equation_with_an_interval_by_memb
         "not change": 0.0 * time,
     }
     for words, mean in cases.items():
-        refused = analysis.relaxation(xr.Dataset({"x": ("t", mean)}, {"t": time}), "x")
+        refused = read.relaxation(xr.Dataset({"x": ("t", mean)}, {"t": time}), "x")
         assert words in refused.reason and math.isnan(refused.value)
     of_noise = [
-        analysis.relaxation(course(0.0 * time), "x").reason for _ in range(count // 4)
+        read.relaxation(course(0.0 * time), "x").reason for _ in range(count // 4)
     ]
     assert of_noise.count("") <= 2
 
@@ -175,8 +174,8 @@ def test_a_maximum_inside_a_sweep_and_a_systematic_error_are_notes():
     dataset = run(scenario)
     friction = dataset["friction_force"].isel(t=-1).to_numpy()
     assert friction[2] > friction.max(initial=0.0, where=[True, True, False])
-    stated = analysis.statements(dataset)
-    lines = analysis.notes(dataset, analysis.table(dataset, stated=stated), [], stated)
+    stated = read.statements(dataset)
+    lines = read.notes(dataset, read.table(dataset, stated=stated), [], stated)
     (line,) = [line for line in lines if line.startswith("friction force is largest")]
     assert line.endswith("at drive_speed = 4 mm/s (between 100 µm/s and 100 mm/s)")
     # it falls all the way
@@ -186,7 +185,7 @@ def test_a_maximum_inside_a_sweep_and_a_systematic_error_are_notes():
     )
     assert not [
         line
-        for line in analysis.notes(dataset, [], [], drifting)
+        for line in read.notes(dataset, [], [], drifting)
         if "friction force is" in line
     ]
     error = SystematicError(

@@ -11,7 +11,8 @@ import scipy
 import xarray as xr
 from scipy import special
 
-from sim.analysis.dataset import (
+from sim.quantities import has_mean
+from sim.read.dataset import (
     MEMBERS,
     ROOM,
     has_noise,
@@ -21,7 +22,7 @@ from sim.analysis.dataset import (
     sweep_dims,
     word,
 )
-from sim.analysis.observables import (
+from sim.read.observables import (
     FEW_LEFT,
     KEPT,
     charges,
@@ -35,7 +36,6 @@ from sim.analysis.observables import (
     restricted,
     share_observables,
 )
-from sim.quantities import has_mean
 from sim.units.errors import BadInput
 from sim.units.notation import engineering, scaled, second_half
 from sim.units.quantity import read_option
@@ -638,7 +638,7 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
         Statistics (``…_mean``, ``…_std``, ``…_sem``, ``…_quantile``) over the members of
         ``lost_to_bonds`` and ``lost_to_fluctuations``, with ``contact.reversible`` above zero
         ``lost_to_mean_stress``, in a rate-dependent contact ``lost_to_lag``; of the other order of charging, see
-        ``sim.analysis.observables.charges``; and ``radius_jkr``, ``radius_hertz``
+        ``sim.read.observables.charges``; and ``radius_jkr``, ``radius_hertz``
         [m] and ``area_ratio_hertz`` at each sweep value, and time where what holds the sphere changes.
         nan where the contact with the full work of adhesion is open.
 

@@ -14,18 +14,18 @@ from helpers.parts import (
     Equilibrium,
     RateDependent,
     Record,
-    analysis,
     bonds,
     drive,
+    read,
     run,
     shear,
 )
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import PchipInterpolator
 
-from sim.analysis import dataset as dataset_module, over_speed
-from sim.analysis.observables import charges, closed_observables
 from sim.laws import jkr
+from sim.read import dataset as dataset_module, over_speed
+from sim.read.observables import charges, closed_observables
 from sim.units.errors import BadInput
 
 LONG = pytest.mark.verify
@@ -61,7 +61,7 @@ def test_intervals_of_a_speed_hold_what_they_promise(groups, count, spread):
             size=(groups, about.sum())
         )
         means = falling(speeds) + spread * math.sqrt(groups / 64.0 / 2.0) * noise
-        result = analysis.crossing(speeds, means, np.full(groups, 64.0 / groups), 0.5)
+        result = read.crossing(speeds, means, np.full(groups, 64.0 / groups), 0.5)
         hits.append(result.low <= 1.0 <= result.high)
     assert 0.92 < np.mean(hits) < 0.98
 
@@ -98,9 +98,7 @@ def test_interpolated_speeds_hold_the_truth_however_many_speeds_there_are(count,
             common + rng.normal(size=(6, count))
         )
         mixed = rng.permutation(count)
-        result = analysis.crossing(
-            speeds[mixed], groups[:, mixed], np.ones(6), 1.0 - loss
-        )
+        result = read.crossing(speeds[mixed], groups[:, mixed], np.ones(6), 1.0 - loss)
         assert result.reason or np.isfinite(result.speed)
         hits.append(not (result.low > truth or result.high < truth))
         widths.append(
@@ -123,7 +121,7 @@ def test_shares_of_a_loss_add_up_in_both_orders_and_are_those_of_the_laws_there(
     sweep = {"drive.speed": list(np.geomspace(1e-5, 1.0, 41))}
     dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep=sweep, **parts))
     energy = float(dataset["fluctuation_energy"][0, 0])
-    result = analysis.loss_speeds(dataset, ["20 %", 0.9, 1e-3])
+    result = read.loss_speeds(dataset, ["20 %", 0.9, 1e-3])
     works = np.linspace(0.0, WORK, 200_001)
     left = np.interp(0.8, jkr_area(works) / jkr_area(WORK), works)
     speed = 1e-2 * (WORK / (left + energy) - 1.0)
@@ -169,7 +167,7 @@ def test_area_that_a_contact_loses_as_it_comes_off_is_no_loss_to_a_speed():
         "shear": shear.Uniform(),
         "clock": Clock(0.4, 1e-3),
     }
-    result = analysis.loss_speeds(run(scene(contact=pulled, **parts)), ["10 %", "90 %"])
+    result = read.loss_speeds(run(scene(contact=pulled, **parts)), ["10 %", "90 %"])
     assert math.isfinite(result["speed_at_10_percent_lost"]) and math.isnan(
         result["speed_at_90_percent_lost"]
     )
@@ -189,7 +187,7 @@ def test_branches_of_a_course_lag_both_ways_and_the_steady_speed_is_that_of_the_
         bonds.Rate(critical_speed=5e-3, rebinding_rate=5.0),
         Clock(duration, duration / 2000),
     )
-    result = analysis.loss_speeds(
+    result = read.loss_speeds(
         run(scene(drive=course, bonds=late, shear=shear.Uniform(), clock=clock))
     )
     assert result["branch"].values.tolist() == ["increasing speed", "decreasing speed"]
@@ -219,7 +217,7 @@ def test_an_extreme_inside_a_sweep_is_named_and_one_at_its_end_or_within_the_err
         curves = xr.Dataset(
             {name: ("V", values) for name, values in columns.items()}, {"V": speeds}
         )
-        result = analysis.extremes(curves, "F", "V")
+        result = read.extremes(curves, "F", "V")
         places = [float(result[f"F_largest_at{end}"]) for end in ("", "_low", "_high")]
         assert_array_equal(places, [1.0, 0.1, 10.0] if named else [math.nan] * 3)
         assert_array_equal(result["F_largest"], 1.034 if named else math.nan)
@@ -248,26 +246,26 @@ def test_crossings_are_exact_on_straight_lines_and_a_ramp_is_read_in_pieces(
     monkeypatch,
 ):
     curve = 1.0 - 0.1 * np.log(SPEEDS / SPEEDS[0])
-    result = analysis.crossing(SPEEDS, curve[None], np.ones(1), 0.55)
+    result = read.crossing(SPEEDS, curve[None], np.ones(1), 0.55)
     assert_allclose(result.speed, SPEEDS[0] * math.exp(4.5), rtol=1e-12)
     assert_allclose([result.low, result.high], result.speed, rtol=1e-12)
     for level, low, high in ((1.5, math.nan, SPEEDS[0]), (-1.0, SPEEDS[-1], math.nan)):
-        result = analysis.crossing(SPEEDS, curve[None], np.ones(1), level)
+        result = read.crossing(SPEEDS, curve[None], np.ones(1), level)
         assert math.isnan(result.speed) and result.reason
         assert_allclose([result.low, result.high], [low, high], rtol=1e-12)
-    ramp, read = lens.ramp().isel(member=[0]), []
-    whole = analysis.loss_speeds(ramp)
+    ramp, sizes = lens.ramp().isel(member=[0]), []
+    whole = read.loss_speeds(ramp)
     monkeypatch.setattr(dataset_module, "ROOM", 500)
 
     def reading(some, names):
-        read.append(some.sizes["t"])
+        sizes.append(some.sizes["t"])
         return closed_observables(some, names)
 
     monkeypatch.setattr(over_speed, "closed_observables", reading)
-    xr.testing.assert_identical(analysis.loss_speeds(ramp), whole)
+    xr.testing.assert_identical(read.loss_speeds(ramp), whole)
     assert (
-        len(read) > 1
-        and sum(read) == ramp.sizes["t"]
+        len(sizes) > 1
+        and sum(sizes) == ramp.sizes["t"]
         and math.isfinite(whole[NAMES[0]])
     )
 
@@ -287,7 +285,7 @@ def test_the_order_of_charging_changes_no_sum_and_fluctuations_alone_leave_the_a
         )
         assert_allclose(fluctuations_first - bonds_first, 0.0, rtol=0, atol=1e-14)
         assert float(abs(shares["order_of_charging"]).max()) > 1e-3
-    shared, charged = analysis.shares(lens.ramp()), charges(lens.ramp())
+    shared, charged = read.shares(lens.ramp()), charges(lens.ramp())
     apart = np.hypot(
         shared["lost_to_fluctuations_sem"], shared["lost_to_fluctuations_first_sem"]
     )
@@ -305,10 +303,10 @@ def test_the_order_of_charging_changes_no_sum_and_fluctuations_alone_leave_the_a
 
 
 def test_speeds_of_loss_of_what_stays_or_is_missing_are_refused_or_left_out():
-    result = analysis.loss_speeds(lens.ramp())
+    result = read.loss_speeds(lens.ramp())
     low, at, high = (float(result[NAMES[0] + end]) for end in ("_low", "", "_high"))
     assert 1e-5 < low < at < high < 1e-1
-    pooled = analysis.loss_speeds(run(scene(record=Record(per_member=False))))
+    pooled = read.loss_speeds(run(scene(record=Record(per_member=False))))
     # errors of neighbouring records count as in common
     assert_allclose(pooled[NAMES[0]], at, rtol=1e-3)
     assert (
@@ -317,11 +315,11 @@ def test_speeds_of_loss_of_what_stays_or_is_missing_are_refused_or_left_out():
         < (high / low) ** 4
     )
     with pytest.raises(ValueError, match="nor is swept"):
-        analysis.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2))), ["10 %"])
+        read.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2))), ["10 %"])
     with pytest.raises(ValueError, match="must be below 1"):
-        analysis.loss_speeds(lens.ramp(), ["100 %"])
-    assert not analysis.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2))))
-    assert "order_of_charging_mean" not in analysis.shares(
+        read.loss_speeds(lens.ramp(), ["100 %"])
+    assert not read.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2))))
+    assert "order_of_charging_mean" not in read.shares(
         run(scene(record=Record(per_member=False)))
     )
 
@@ -348,8 +346,8 @@ def test_shares_of_a_sweep_are_those_of_its_points():
         swept = scene(sweep=sweep)
         dataset = run(swept)
         together, ratio = (
-            analysis.share_observables(dataset),
-            analysis.observables(dataset)["area_ratio"],
+            read.share_observables(dataset),
+            read.observables(dataset)["area_ratio"],
         )
         dims = [name for name in ratio.dims if name not in ("member", "t")]
         for k, point in enumerate(swept.points()):
@@ -361,10 +359,8 @@ def test_shares_of_a_sweep_are_those_of_its_points():
                 )
             )
             alone = run(point)
-            assert_array_equal(
-                ratio.isel(place), analysis.observables(alone)["area_ratio"]
-            )
-            shares = analysis.share_observables(alone)
+            assert_array_equal(ratio.isel(place), read.observables(alone)["area_ratio"])
+            shares = read.share_observables(alone)
             for name in together:  # a mechanism that a point lacks takes nothing there
                 assert_array_equal(
                     together[name].isel(place) - shares.get(name, 0.0), 0.0
@@ -375,15 +371,15 @@ def test_shares_and_what_is_left_add_up_to_one_and_are_unknown_without_contact_o
     ramp,
 ):
     lost, left = (
-        analysis.share_observables(ramp),
-        analysis.observables(ramp)["area_ratio"],
+        read.share_observables(ramp),
+        read.observables(ramp)["area_ratio"],
     )
     total = lost["lost_to_bonds"] + lost["lost_to_fluctuations"] + left
     assert_allclose(total, 1.0, rtol=1e-15)
     assert lost["lost_to_fluctuations"].dims == ("member", "t")
     shares, lost = (
-        analysis.shares(ramp),
-        analysis.share_observables(ramp)["lost_to_fluctuations"].to_numpy(),
+        read.shares(ramp),
+        read.share_observables(ramp)["lost_to_fluctuations"].to_numpy(),
     )
     assert_allclose(
         shares["lost_to_fluctuations_sem"],
@@ -393,7 +389,7 @@ def test_shares_and_what_is_left_add_up_to_one_and_are_unknown_without_contact_o
     # a mean-field population does not fluctuate: nothing but rounding is left
     assert_allclose(shares["lost_to_bonds_sem"], 0.0, rtol=0, atol=1e-15)
     lifted = Equilibrium(load=1.5 * float(jkr.pull_off_load(WORK, RADIUS)))
-    shares = analysis.shares(run(scene(contact=lifted, shear=shear.Uniform())))
+    shares = read.shares(run(scene(contact=lifted, shear=shear.Uniform())))
     assert bool(shares["lost_to_bonds_mean"].isnull().all()) and math.isnan(
         shares["area_ratio_hertz"]
     )
@@ -403,12 +399,12 @@ def test_shares_and_what_is_left_add_up_to_one_and_are_unknown_without_contact_o
         {"contact": RateDependent(load=LOAD, front_speed=1e-3)},
     ):
         with pytest.raises(ValueError, match="per_member = true"):
-            analysis.shares(run(scene(record=Record(per_member=False), **parts)))
+            read.shares(run(scene(record=Record(per_member=False), **parts)))
 
 
 def test_bonds_fluctuations_and_mean_stress_take_what_their_laws_say():
     masking = shear.Mean(spectrum=Band(rms=1e6, longest=60e-6, shortest=24e-6))
-    shares = analysis.shares(
+    shares = read.shares(
         run(scene(adhesion=Adhesion(work=WORK, bond_share=0.0), shear=masking))
     )
     hertz, full = (
@@ -439,7 +435,7 @@ def test_bonds_fluctuations_and_mean_stress_take_what_their_laws_say():
                 shear=field,
             )
         )
-        shares = analysis.shares(dataset)
+        shares = read.shares(dataset)
         bonded = WORK / (1.0 + np.geomspace(1e-5, 1e-1, 21) / 1e-2)
         areas = [
             radius(w) ** 2
@@ -467,7 +463,7 @@ def test_a_lagging_edge_loses_nothing_that_it_has_still_to_lose_and_has_its_own_
     jump = drive.Table(time=(0.0, 0.1, 0.1, 0.4), speed=(0.0, 0.0, 1e-2, 1e-2))
     part = RateDependent(load=LOAD, front_speed=1e-4)
     population = bonds.Steady(critical_speed=1e-2)
-    shares = analysis.shares(
+    shares = read.shares(
         run(scene(contact=part, drive=jump, bonds=population, shear=shear.Uniform()))
     )
     assert_allclose(shares["lost_to_fluctuations_mean"], 0.0, rtol=0, atol=1e-13)
@@ -479,7 +475,7 @@ def test_a_lagging_edge_loses_nothing_that_it_has_still_to_lose_and_has_its_own_
     # the area is still there that the bonds no longer pay for
     assert lag.min() < -0.3 * lost[-1]
     assert np.all(np.diff(lag[6:]) > 0.0)
-    assert "lost_to_lag_mean" not in analysis.shares(run(scene(shear=shear.Uniform())))
+    assert "lost_to_lag_mean" not in read.shares(run(scene(shear=shear.Uniform())))
     down = RateDependent(indentation={"from": -1e-5, "to": 1e-5}, front_speed=1e-3)
     dataset = run(
         scene(
@@ -490,7 +486,7 @@ def test_a_lagging_edge_loses_nothing_that_it_has_still_to_lose_and_has_its_own_
         )
     )
     assert dataset["in_contact"].to_numpy()[9:12].tolist() == [0, 0, 1]
-    lost = analysis.share_observables(dataset)
+    lost = read.share_observables(dataset)
     assert_array_equal(lost["lost_to_lag"].isnull(), np.arange(21) < 10)
     assert float(lost["lost_to_lag"][10]) == 1.0
     assert_array_equal(lost["lost_to_fluctuations"][10:], 0.0)
@@ -532,7 +528,7 @@ def test_shares_of_a_moved_sphere_are_those_at_its_present_place(records, contro
     parts["shear"] = shear.Mean(spectrum=Band(rms=60e3, longest=60e-6, shortest=24e-6))
     moving = Equilibrium(**MOVED[control])
     dataset = run(scene(contact=moving, **parts))
-    moved = analysis.share_observables(dataset)
+    moved = read.share_observables(dataset)
     kind = next(
         name
         for name in ("load", "indentation", "displacement")
@@ -547,11 +543,11 @@ def test_shares_of_a_moved_sphere_are_those_at_its_present_place(records, contro
                 contact=Equilibrium(**(held | {kind: float(held[kind][at])})), **parts
             )
         )
-        lost = analysis.share_observables(still)
+        lost = read.share_observables(still)
         for name in ("lost_to_bonds", "lost_to_fluctuations"):
             assert_allclose(moved[name][at], lost[name][0], rtol=1e-11, atol=1e-14)
         moving_ratio, ratio = (
-            analysis.observables(each)["area_ratio"] for each in (dataset, still)
+            read.observables(each)["area_ratio"] for each in (dataset, still)
         )
         assert_allclose(moving_ratio[at], ratio[0], rtol=1e-12)
 
@@ -570,15 +566,15 @@ def test_a_moved_sphere_comes_off_by_its_policy():
         dataset["applied_load"], np.linspace(-0.1e-3, -0.3e-3, 21), rtol=1e-12
     )
     # it is lost to the detachment
-    assert math.isnan(analysis.shares(dataset)["lost_to_bonds_mean"][-1])
-    assert float(analysis.observables(dataset)["area_ratio"][-1]) == 0.0
+    assert math.isnan(read.shares(dataset)["lost_to_bonds_mean"][-1])
+    assert float(read.observables(dataset)["area_ratio"][-1]) == 0.0
     course = {"from": 2e-6, "to": -3e-6, "cycles": 1}
     for policy, closes in (("stay_open", False), ("reattach", True), ("stop", False)):
         part = Equilibrium(indentation=course, after_pull_off=policy)
         dataset = run(
             scene(contact=part, bonds=bonds.Unbroken(), shear=shear.Uniform())
         )
-        reference = analysis.reference_radii(dataset)["radius_jkr"].to_numpy()
+        reference = read.reference_radii(dataset)["radius_jkr"].to_numpy()
         recorded = dataset["contact_radius"].to_numpy()
         assert_array_equal(np.isnan(reference), ~(recorded > 0.0))
         assert (reference[-1] > 0.0) == closes and np.isnan(reference[10])
@@ -589,11 +585,11 @@ def test_a_moved_sphere_comes_off_by_its_policy():
     dataset = run(scene(contact=part, drive=drive.Steady(speed=3e-3)))
     gone = dataset["contact_area"].isnull()
     assert 0 < int(gone.sum()) < gone.size
-    lost = analysis.share_observables(dataset)
+    lost = read.share_observables(dataset)
     for name in lost:
         assert_array_equal(
             lost[name].isnull(),
-            gone | analysis.reference_radii(dataset)["radius_jkr"].isnull(),
+            gone | read.reference_radii(dataset)["radius_jkr"].isnull(),
         )
 
 
@@ -601,7 +597,7 @@ def test_no_speed_is_stated_at_which_more_is_lost_than_can_be_nor_under_a_force(
     scenario = scene(
         shear=shear.Uniform(), adhesion=Adhesion(work=WORK, bond_share=0.3)
     )
-    speeds = analysis.loss_speeds(run(scenario))
+    speeds = read.loss_speeds(run(scenario))
     # JKR's areas with 70 % of the work of adhesion and with all of it
     left, full = (
         jkr.radius_at_load(LOAD, share * WORK, RADIUS, MODULUS) ** 2
@@ -620,6 +616,6 @@ def test_no_speed_is_stated_at_which_more_is_lost_than_can_be_nor_under_a_force(
             site_density=6.5e16,
         ),
     )
-    assert not analysis.loss_speeds(run(creeping))
+    assert not read.loss_speeds(run(creeping))
     with pytest.raises(BadInput, match="force"):
-        analysis.loss_speeds(run(creeping), ["10 %"])
+        read.loss_speeds(run(creeping), ["10 %"])

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from helpers.lens import RADIUS, scene
-from helpers.parts import Equilibrium, Record, analysis, drive, run, shear
+from helpers.parts import Equilibrium, Record, drive, read, run, shear
 from numpy.testing import assert_allclose
 
-from sim.analysis import dataset as dataset_module
-from sim.analysis.dataset import word
 from sim.parts.drive import Steady
+from sim.read import dataset as dataset_module
+from sim.read.dataset import word
 
 
 @pytest.fixture(scope="module")
@@ -44,11 +44,11 @@ def test_runs_joined_as_the_page_says_have_the_table_of_a_sweep(tmp_path):
     }
     with xr.open_mfdataset(loads, combine="nested", **key) as runs:
         swept = run(scene(sweep={"contact.load": [2e-3, 4e-3]}, **parts))
-        assert analysis.table(runs) == analysis.table(swept)
+        assert read.table(runs) == read.table(swept)
 
 
 def test_statistics_of_known_numbers_few_members_and_missing_values(known, ramp):
-    result, t = analysis.statistics(known), known["t"].to_numpy()
+    result, t = read.statistics(known), known["t"].to_numpy()
     sorted_numbers = np.stack([t - 10.0, 2.0 * t, 3.0 * t, 4.0 * t, 5.0 * t])
     mean = 3.0 * t - 2.0
     deviation = np.sqrt(np.sum((sorted_numbers - mean) ** 2, axis=0) / 4.0)
@@ -66,7 +66,7 @@ def test_statistics_of_known_numbers_few_members_and_missing_values(known, ramp)
         result["work_of_adhesion_quantile"].sel(quantile=0.5), 3.0 * t, rtol=1e-13
     )
     assert result["work_of_adhesion_mean"].attrs["units"] == "J/m^2"
-    result = analysis.statistics(known)
+    result = read.statistics(known)
     assert_allclose(result["fraction_detached_mean"], 0.2, rtol=1e-14)
     assert_allclose(
         result["fraction_detached_sem"], math.sqrt(0.2 * 0.8 / 4.0), rtol=1e-14
@@ -77,11 +77,11 @@ def test_statistics_of_known_numbers_few_members_and_missing_values(known, ramp)
         [0.8] + [0.2] * (known.sizes["t"] - 1),
         rtol=1e-14,
     )
-    result = analysis.statistics(ramp)
+    result = read.statistics(ramp)
     np.testing.assert_array_equal(result["speed_mean"], ramp["speed"])
     assert np.all(result["speed_sem"] == 0.0)
     assert np.all(result["speed_quantile"].sel(quantile=0.95) == ramp["speed"])
-    result = analysis.statistics(ramp.isel(member=[0]))
+    result = read.statistics(ramp.isel(member=[0]))
     np.testing.assert_array_equal(
         result["contact_radius_mean"], ramp["contact_radius"][0]
     )
@@ -91,14 +91,14 @@ def test_statistics_of_known_numbers_few_members_and_missing_values(known, ramp)
     )
     depth = ramp["indentation"].copy()
     depth[0] = math.nan
-    result = analysis.statistics(ramp.assign(indentation=depth))
-    rest = analysis.statistics(ramp.isel(member=slice(1, None)))
+    result = read.statistics(ramp.assign(indentation=depth))
+    rest = read.statistics(ramp.isel(member=slice(1, None)))
     for kind in ("mean", "std", "sem", "quantile"):
         assert_allclose(
             result[f"indentation_{kind}"], rest[f"indentation_{kind}"], rtol=1e-12
         )
     depth[:, :3] = math.nan
-    none = analysis.statistics(ramp.assign(indentation=depth))
+    none = read.statistics(ramp.assign(indentation=depth))
     assert bool(none["indentation_mean"][:3].isnull().all()) and bool(
         none["indentation_mean"][3:].notnull().all()
     )
@@ -108,7 +108,7 @@ def test_statistics_of_known_numbers_few_members_and_missing_values(known, ramp)
     )
     levels[:, : ramp.sizes["t"] // 2] = 1e9  # a start-up that must not count
     members = xr.Dataset({"level": (dims, levels)}, {"t": ramp["t"]})
-    result = analysis.summary(analysis.settled(members))
+    result = read.summary(read.settled(members))
     assert result["level_mean"].dims == ("t",) and result.sizes["t"] == 1
     assert_allclose(result["level_mean"], 4.0, rtol=1e-14)
     assert_allclose(result["level_sem"], math.sqrt(30.0 / 5.0 / 6.0), rtol=1e-14)
@@ -118,8 +118,8 @@ def test_recorded_statistics_and_those_of_files_and_pieces_are_those_of_the_memb
     ramp, tmp_path, monkeypatch
 ):
     result, recorded = (
-        analysis.statistics(ramp),
-        analysis.statistics(run(scene(record=Record(per_member=False)))),
+        read.statistics(ramp),
+        read.statistics(run(scene(record=Record(per_member=False)))),
     )
     for name in (
         "contact_radius",
@@ -139,22 +139,22 @@ def test_recorded_statistics_and_those_of_files_and_pieces_are_those_of_the_memb
             )
     assert "contact_radius_quantile" not in recorded
     pooled, each = (
-        analysis.shares(run(scene(record=Record(per_member=False)))),
-        analysis.shares(ramp),
+        read.shares(run(scene(record=Record(per_member=False)))),
+        read.shares(ramp),
     )
     for name in ("lost_to_fluctuations_mean", "lost_to_fluctuations_sem"):
         assert_allclose(pooled[name], each[name], rtol=1e-10, atol=1e-14)
     recorded = run(scene(record=Record(per_member=False)))
     closed = recorded["in_contact_mean"].copy()
     closed[3:6] = 0.5
-    result = analysis.observables(recorded.assign(in_contact_mean=closed))[
+    result = read.observables(recorded.assign(in_contact_mean=closed))[
         "fraction_masked_mean"
     ]
     assert result.isnull().to_numpy().tolist() == [3 <= k < 6 for k in range(21)]
     path = run(scene(), to=tmp_path / "out.nc")
     with xr.open_dataset(path) as opened:
         xr.testing.assert_identical(
-            analysis.statistics(opened).load(), analysis.statistics(ramp)
+            read.statistics(opened).load(), read.statistics(ramp)
         )
     path = run(
         scene(record=Record(quantities=["friction_force", "masked"])),
@@ -167,19 +167,17 @@ def test_recorded_statistics_and_those_of_files_and_pieces_are_those_of_the_memb
     for room in (2**27, 1000):
         monkeypatch.setattr(dataset_module, "ROOM", room)
         with xr.open_dataset(path) as opened:
-            results.append(
-                (analysis.statistics(opened).load(), analysis.loop_energy(cycles))
-            )
+            results.append((read.statistics(opened).load(), read.loop_energy(cycles)))
     for whole, pieces in zip(*results, strict=True):
         xr.testing.assert_identical(pieces, whole)
 
 
 def test_words_and_settings_are_known_whether_swept_or_not_and_a_run_that_is_stationary():
     dataset = run(scene(sweep={"contact.load": [1e-3, 4e-3]}, shear=shear.Uniform()))
-    assert analysis.setting(dataset, "contact.load").to_numpy().tolist() == [1e-3, 4e-3]
-    assert float(analysis.setting(dataset, "sphere.radius")) == RADIUS
+    assert read.setting(dataset, "contact.load").to_numpy().tolist() == [1e-3, 4e-3]
+    assert float(read.setting(dataset, "sphere.radius")) == RADIUS
     with pytest.raises(KeyError, match=r"contact\.indentation"):
-        analysis.setting(dataset, "contact.indentation")
+        read.setting(dataset, "contact.indentation")
     contact = Equilibrium(indentation={"from": 1e-6, "to": 2e-6})
     dataset = run(
         scene(
@@ -208,12 +206,12 @@ def test_words_and_settings_are_known_whether_swept_or_not_and_a_run_that_is_sta
     dataset = run(scene(shear=shear.Uniform(), sweep={"drive": drives}))
     assert word(dataset, "drive.model", "").to_numpy().tolist() == ["ramp", "start"]
     steady = {"drive": drive.Steady(speed=1e-3), "shear": shear.Uniform()}
-    assert analysis.is_stationary(run(scene(**steady)))
+    assert read.is_stationary(run(scene(**steady)))
     ended = run(scene(**steady))
     # as after a runaway
     ended["speed"] = ended["speed"].where(ended["t"] < ended["t"][2])
-    assert analysis.is_steady(ended) and not analysis.is_stationary(
+    assert read.is_steady(ended) and not read.is_stationary(
         run(scene(shear=shear.Uniform()))
     )
     moved = run(scene(contact=Equilibrium(load={"from": 1e-3, "to": 2e-3}), **steady))
-    assert analysis.is_steady(moved) and not analysis.is_stationary(moved)
+    assert read.is_steady(moved) and not read.is_stationary(moved)

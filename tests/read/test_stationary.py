@@ -15,18 +15,18 @@ from helpers.parts import (
     Ensemble,
     Equilibrium,
     Time,
-    analysis,
     bonds,
     drive,
+    read,
     run,
     shear,
 )
 from numpy.testing import assert_allclose
 from scipy import special, stats
 
-from sim.analysis.events import lifetimes
-from sim.analysis.statistics import QUANTILES, covariance_of, quantile_ranks
 from sim.parts.contact.models import Solid, Sphere
+from sim.read.events import lifetimes
+from sim.read.statistics import QUANTILES, covariance_of, quantile_ranks
 from sim.spectrum.families import Gaussian
 
 LEVELS = np.array(QUANTILES)
@@ -55,7 +55,7 @@ def ensembles(request):
     of, law = LAWS[request.param]
     drawn = of(np.random.default_rng(11).normal(size=(64, ENSEMBLES)))
     numbers = xr.Dataset({"x": (("member", "t"), drawn)})
-    return analysis.summary(numbers), law
+    return read.summary(numbers), law
 
 
 def test_quantiles_and_intervals_of_64_members_hold_what_they_promise(ensembles):
@@ -92,7 +92,7 @@ def test_few_members_bound_no_quantile():
 def test_few_members_widen_an_interval_and_those_of_shares_hold_what_they_promise():
     for members in [2, 3, 5]:
         drawn = np.random.default_rng(12).normal(size=(members, ENSEMBLES))
-        result = analysis.summary(xr.Dataset({"x": (("member", "t"), drawn)}))
+        result = read.summary(xr.Dataset({"x": (("member", "t"), drawn)}))
         assert LEAST < share_holding(result["x_low"], result["x_high"], 0.0) < MOST
         low, high = (result["x_mean"] + z * result["x_sem"] for z in (-1.96, 1.96))
         assert share_holding(low, high, 0.0) < LEAST
@@ -100,12 +100,12 @@ def test_few_members_widen_an_interval_and_those_of_shares_hold_what_they_promis
         opened = (np.random.default_rng(13).random((64, ENSEMBLES)) < detached).astype(
             float
         )
-        result = analysis.summary(
+        result = read.summary(
             xr.Dataset({"fraction_detached": (("member", "t"), opened)})
         )
         low, high = result["fraction_detached_low"], result["fraction_detached_high"]
         assert share_holding(low, high, detached) > LEAST and float(low.min()) >= -1e-15
-        none = analysis.summary(
+        none = read.summary(
             xr.Dataset({"fraction_detached": (("member",), np.zeros(64))})
         )
         # Wilson's bound of none in 64: z^2/(64 + z^2)
@@ -122,7 +122,7 @@ def covered(law, members, length, ensembles):
     of, exact = LAWS[law]
     shape = ensembles, members, 5 * length  # five records a correlation time
     drawn = of(ornstein_uhlenbeck(np.random.default_rng(14), shape, math.exp(-0.2)))
-    result = [analysis.over_time(series) for series in drawn]
+    result = [read.over_time(series) for series in drawn]
     ends = [
         np.column_stack(
             [[estimate[end], *estimate[f"quantile_{end}"]] for estimate in result]
@@ -171,15 +171,15 @@ def test_a_single_series_that_is_short_for_its_memory_has_no_interval():
 
 def test_correlation_times_and_free_values_are_those_of_the_law_and_of_white_noise():
     series = ornstein_uhlenbeck(np.random.default_rng(17), (64, 2000), math.exp(-0.2))
-    result = analysis.over_time(series, step=0.1)
+    result = read.over_time(series, step=0.1)
     assert abs(result["correlation_time"] - 0.5) < 5.0 * result["correlation_time_sem"]
     # the mean of n records has the variance (1 + k)/(1 - k)/n, its estimate from 64 means the error sqrt(2/63)
     keep = math.exp(-0.2)
     exact = 64 * 2000 * (1.0 - keep) / (1.0 + keep)
     assert abs(result["effective_samples"] / exact - 1.0) < 5.0 * math.sqrt(2.0 / 63.0)
     series = ornstein_uhlenbeck(np.random.default_rng(16), (1, 50), math.exp(-0.2))
-    assert np.all(np.isnan(analysis.over_time(series)["quantile_low"]))
-    result = analysis.over_time(np.random.default_rng(18).normal(size=(1, 20_000)))
+    assert np.all(np.isnan(read.over_time(series)["quantile_low"]))
+    result = read.over_time(np.random.default_rng(18).normal(size=(1, 20_000)))
     assert abs(result["effective_samples"] / 20_000 - 1.0) < 0.1 and math.isnan(
         result["correlation_time"]
     )
@@ -197,7 +197,7 @@ def test_statistics_leave_out_missing_values_and_a_distribution_is_over_members_
             ** 2
         )
         values[0, 100:] = math.nan
-        result, known = analysis.over_time(values), values[np.isfinite(values)]
+        result, known = read.over_time(values), values[np.isfinite(values)]
         assert_allclose(result["quantile"], np.quantile(known, LEVELS), rtol=1e-13)
         assert_allclose(result["mean"], np.nanmean(values, axis=1).mean(), rtol=1e-13)
         assert math.isnan(result.get("correlation_time", math.nan)) and (
@@ -210,7 +210,7 @@ def test_statistics_leave_out_missing_values_and_a_distribution_is_over_members_
             sweep={"contact.load": [1e-3, 4e-3]},
         )
     )
-    result = analysis.distribution(dataset)
+    result = read.distribution(dataset)
     late = dataset["contact_area"].isel(t=slice(dataset.sizes["t"] // 2, None))
     assert_allclose(result["contact_area_mean"], late.mean(("member", "t")), rtol=1e-13)
     assert_allclose(result["contact_area_std"], late.std(("member", "t")), rtol=1e-9)
@@ -256,7 +256,7 @@ def test_correlation_time_is_within_its_errors_or_a_bound_of_records_that_are_to
         energy = squared_ornstein_uhlenbeck(
             np.random.default_rng(7), members, records, keep
         )
-        time, sem, _ = analysis.integral_time(energy, step=0.01)
+        time, sem, _ = read.integral_time(energy, step=0.01)
         assert abs(time - exact_time(keep, 0.01)) < 5.0 * sem and sem < 0.3 * time
     for records_a_time in [1.6, 2.4]:
         keep = math.exp(-0.5 / records_a_time)
@@ -264,7 +264,7 @@ def test_correlation_time_is_within_its_errors_or_a_bound_of_records_that_are_to
             energy = squared_ornstein_uhlenbeck(
                 np.random.default_rng(seed), 64, 400, keep
             )
-            time, sem, below = analysis.integral_time(energy, step=0.01)
+            time, sem, below = read.integral_time(energy, step=0.01)
             if records_a_time < 2.0:
                 assert math.isnan(time) and below == 0.02
             else:
@@ -283,7 +283,7 @@ def test_energy_forgets_twice_as_fast_as_its_amplitudes_and_records_too_seldom_a
         clock=Clock(duration=0.4, step=0.001),
         ensemble=Ensemble(members=128),
     )
-    result = analysis.statistics(run(steady))
+    result = read.statistics(run(steady))
     assert abs(float(result["correlation_time"]) - 0.01) < 5.0 * float(
         result["correlation_time_sem"]
     )
@@ -297,8 +297,8 @@ def test_energy_forgets_twice_as_fast_as_its_amplitudes_and_records_too_seldom_a
             ensemble=Ensemble(members=16),
         )
     )
-    assert float(analysis.statistics(coarse)["correlation_time_below"]) == 0.04
-    assert {row["t_c\n(ms)"] for row in analysis.table(coarse)} == {"<40"}
+    assert float(read.statistics(coarse)["correlation_time_below"]) == 0.04
+    assert {row["t_c\n(ms)"] for row in read.table(coarse)} == {"<40"}
 
 
 def test_there_is_no_correlation_time_where_nothing_decays_visibly_or_on_a_ramp():
@@ -312,12 +312,10 @@ def test_there_is_no_correlation_time_where_nothing_decays_visibly_or_on_a_ramp(
         np.full((4, 100), math.nan),
         squared_ornstein_uhlenbeck(np.random.default_rng(3), 256, 20, 0.99),
     ]:
-        assert all(
-            math.isnan(number) for number in analysis.integral_time(energy, 0.1)[:2]
-        )
+        assert all(math.isnan(number) for number in read.integral_time(energy, 0.1)[:2])
     energy = squared_ornstein_uhlenbeck(np.random.default_rng(4), 2, 12, 0.1)
-    assert all(math.isnan(number) for number in analysis.integral_time(energy, 1.0))
-    assert math.isnan(analysis.correlation_time(lens.ramp())["correlation_time"])
+    assert all(math.isnan(number) for number in read.integral_time(energy, 1.0))
+    assert math.isnan(read.correlation_time(lens.ramp())["correlation_time"])
 
 
 def test_a_covariance_is_the_mean_of_products_of_deviations_and_sees_nothing_that_members_share():
@@ -325,13 +323,13 @@ def test_a_covariance_is_the_mean_of_products_of_deviations_and_sees_nothing_tha
     difference -= difference.mean()
     shared = np.random.default_rng(10).normal(size=2000)
     pair = np.stack([shared + difference / 2.0, shared - difference / 2.0])
-    alone = analysis.integral_time(difference[np.newaxis], 1.0)
-    assert_allclose(analysis.integral_time(pair, 1.0), alone, rtol=1e-9)
+    alone = read.integral_time(difference[np.newaxis], 1.0)
+    assert_allclose(read.integral_time(pair, 1.0), alone, rtol=1e-9)
     energy = squared_ornstein_uhlenbeck(np.random.default_rng(8), 64, 400, 0.8)
     drift = np.linspace(0.0, 100.0, 400)
     assert_allclose(
-        analysis.integral_time(energy + drift, 1.0),
-        analysis.integral_time(energy, 1.0),
+        read.integral_time(energy + drift, 1.0),
+        read.integral_time(energy, 1.0),
         rtol=1e-9,
     )
 
@@ -368,8 +366,7 @@ def censored(rng, end, members=64):
 )
 def test_intervals_of_censored_lifetimes_hold_what_they_promise(end):
     estimates = [
-        analysis.lifetime(times, end)
-        for times in censored(np.random.default_rng(21), end)
+        read.lifetime(times, end) for times in censored(np.random.default_rng(21), end)
     ]
     for name, truth in (("rate", 1.0), ("half", math.log(2.0))):
         low, high = (
@@ -387,9 +384,7 @@ def test_contacts_that_close_late_count_as_long_as_they_are_closed():
     for _ in range(ENSEMBLES):
         begins = np.where(rng.random(64) < 0.6, rng.exponential(size=64), 0.0)
         times = begins + rng.exponential(size=64)
-        estimate = analysis.lifetime(
-            np.where(times <= 3.0, times, math.nan), 3.0, begins
-        )
+        estimate = read.lifetime(np.where(times <= 3.0, times, math.nan), 3.0, begins)
         hits["rate"].append(estimate.rate_low <= 1.0 <= estimate.rate_high)
         hits["half"].append(
             estimate.half_low
@@ -412,7 +407,7 @@ def test_censored_lifetimes_have_the_median_of_scipy_and_the_rate_of_chi_square(
         ).sf
         with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
             interval = survival.confidence_interval(0.95, method="log-log")
-        result = analysis.lifetime(times, end)
+        result = read.lifetime(times, end)
         for name, curve in (
             ("half", survival),
             ("half_low", interval.low),
@@ -422,7 +417,7 @@ def test_censored_lifetimes_have_the_median_of_scipy_and_the_rate_of_chi_square(
             np.testing.assert_equal(
                 getattr(result, name), below[0] if below.size else math.nan, name
             )
-    result = analysis.lifetime(
+    result = read.lifetime(
         np.array([1.0, 2.0, math.nan, math.nan]), np.array([9.0, 9.0, 3.0, 4.0])
     )
     assert_allclose(result.rate, 2.0 / 10.0, rtol=1e-15)
@@ -432,11 +427,11 @@ def test_censored_lifetimes_have_the_median_of_scipy_and_the_rate_of_chi_square(
         [0.48441855708793 / 20, 14.4493753354 / 20],
         rtol=1e-10,
     )
-    none = analysis.lifetime(np.full(8, math.nan), 5.0)
+    none = read.lifetime(np.full(8, math.nan), 5.0)
     assert math.isnan(none.half) and none.rate == none.rate_low == 0.0
     # nobody in 40 s: with 95 % the rate is below the 97.5 % quantile of an exponential law over 40 s
     assert_allclose(none.rate_high, -math.log(0.025) / 40.0, rtol=1e-12)
-    few = analysis.lifetime(np.array([1.0, math.nan, math.nan, math.nan]), 5.0)
+    few = read.lifetime(np.array([1.0, math.nan, math.nan, math.nan]), 5.0)
     assert math.isnan(few.half) and few.rate == 1.0 / 16.0
 
 
@@ -468,7 +463,7 @@ def test_members_that_are_never_in_contact_are_no_survivors():
     )
     closed = (dataset["contact_radius"].isel(t=0) > 0.0).to_numpy()
     assert 20 < closed.sum() < 80
-    times = analysis.events(dataset)["first_detachment"]
+    times = read.events(dataset)["first_detachment"]
     every, alone = (
         lifetimes(
             dataset.isel(member=who), times.isel(member=who), "detached", "detached"

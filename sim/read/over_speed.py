@@ -11,7 +11,8 @@ import xarray as xr
 from pydantic import TypeAdapter
 from scipy import special
 
-from sim.analysis.dataset import (
+from sim.laws import schallamach
+from sim.read.dataset import (
     MEMBERS,
     in_pieces,
     is_steady,
@@ -23,15 +24,14 @@ from sim.analysis.dataset import (
     sweep_dims,
     word,
 )
-from sim.analysis.observables import (
+from sim.read.observables import (
     closed_observables,
     labelled,
     radius_at_work,
     reference_radii,
     restricted,
 )
-from sim.analysis.statistics import LEVEL, Array
-from sim.laws import schallamach
+from sim.read.statistics import LEVEL, Array
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
 from sim.units.quantity import read_option

@@ -7,10 +7,10 @@ import numpy as np
 import scipy
 import xarray as xr
 
-from sim.analysis.dataset import MEMBERS, is_stationary, plain, sweep_dims
-from sim.analysis.events import ensemble_peaks, events, half_lives, slips_by_phase
-from sim.analysis.over_speed import loss_speeds
-from sim.analysis.statistics import (
+from sim.read.dataset import MEMBERS, is_stationary, plain, sweep_dims
+from sim.read.events import ensemble_peaks, events, half_lives, slips_by_phase
+from sim.read.over_speed import loss_speeds
+from sim.read.statistics import (
     WIDE,
     Array,
     averaging,

@@ -14,20 +14,20 @@ from helpers.parts import (
     Equilibrium,
     Record,
     Time,
-    analysis,
     bonds,
     drive,
+    read,
     run,
     shear,
 )
 from numpy.testing import assert_allclose
 
 import sim
-from sim.analysis.events import peak_of_mean
-from sim.analysis.statistics import closed_only, of_second_half, settlements
 from sim.ensemble import plan as plans
 from sim.parts.contact.models import Adhesion
-from tests.analysis.test_invariance import SCENES
+from sim.read.events import peak_of_mean
+from sim.read.statistics import closed_only, of_second_half, settlements
+from tests.read.test_invariance import SCENES
 
 ENSEMBLES, LEAST, MOST = 1000, 0.92, 0.98
 TIME = np.linspace(0.0, 1.0, 400)
@@ -49,7 +49,7 @@ def test_settled_series_are_so_in_99_of_100_cases_and_their_intervals_hold_while
     members, times
 ):
     values = series(np.random.default_rng(31), members, times)
-    results = [analysis.over_time(each) for each in values]
+    results = [read.over_time(each) for each in values]
     means, lows, highs, errors = (
         np.array([each[k] for each in results]) for k in ("mean", "low", "high", "sem")
     )
@@ -168,10 +168,10 @@ def test_contacts_that_come_off_lose_no_area_to_bonds_and_too_few_or_those_that_
         abs(result["area_ratio_mean"] - 1.0) < 0.1
         and 0.0 < result["area_ratio_sem"] < 0.05
     )
-    shares = analysis.shares(dataset)
+    shares = read.shares(dataset)
     assert_allclose(
         shares["lost_to_bonds_mean"]
-        + analysis.statistics(closed_only(dataset))["area_ratio_mean"],
+        + read.statistics(closed_only(dataset))["area_ratio_mean"],
         1.0,
     )
     lasting = np.flatnonzero(~gone[:, -1])[:2]
@@ -229,9 +229,7 @@ def test_the_peak_after_a_rest_does_not_grow_with_the_time_of_sliding():
         "adhesion": Adhesion(work=42e-3, bond_share=0.0),
     }
     clocks = (Clock(duration=duration, step=1e-3) for duration in (0.3, 1.0))
-    results = [
-        analysis.statements(run(scene(**parts, clock=clock))) for clock in clocks
-    ]
+    results = [read.statements(run(scene(**parts, clock=clock))) for clock in clocks]
     for name in ("peak_stress", "peak_friction", "peak_time", "peak_friction_time"):
         assert_allclose(*(result[f"{name}_mean"] for result in results), rtol=1e-6)
     # bond by bond, in 400 ensembles of another code: 32.1 kPa
@@ -256,7 +254,7 @@ def test_a_difference_along_a_sweep_has_the_error_of_the_members_differences(mem
     )
     alone, change = (
         of_second_half(dataset),
-        analysis.distribution(dataset, minus={"contact.load": 4e-3}),
+        read.distribution(dataset, minus={"contact.load": 4e-3}),
     )
     area, late = (of["contact_area_mean"] for of in (change, alone))
     assert_allclose(area[1], late[1] - late[0], rtol=1e-9)
@@ -288,7 +286,7 @@ def test_joined_runs_are_described_as_what_they_are(tmp_path):
     swept = run(scene(**FLUCTUATING))
     with sim.open(tmp_path / "loads.nc") as dataset:
         assert dataset.attrs["joined"] == "joined along contact_load"
-        assert analysis.table(dataset) == analysis.table(swept)
+        assert read.table(dataset) == read.table(swept)
     seeds = [run(scene(**parts, seed=seed)) for seed in (1, 2)]
     how = {"data_vars": "minimal", "coords": "minimal", "compat": "override"}
     both = xr.concat(seeds, "member", **how)
@@ -313,7 +311,7 @@ def test_joined_runs_are_described_as_what_they_are(tmp_path):
 def test_two_records_one_of_which_is_the_start_have_no_mean_but_the_value_at_the_end():
     parts = {"drive": drive.Steady(speed=4e-3), "ensemble": Ensemble(members=20)}
     dataset = run(scene(**parts, clock=Clock(0.8, 2e-3)))
-    ends = analysis.distribution(dataset.isel(t=[0, -1]))
+    ends = read.distribution(dataset.isel(t=[0, -1]))
     for name in ("contact_area", "friction_force"):
         assert_allclose(
             ends[f"{name}_mean"], dataset[name].isel(t=-1).mean(), rtol=1e-12
@@ -321,9 +319,7 @@ def test_two_records_one_of_which_is_the_start_have_no_mean_but_the_value_at_the
         assert math.isnan(ends[f"{name}_sem"]) and ends[
             f"{name}_reason"
         ].item().startswith("too few records")
-    assert (
-        analysis.distribution(dataset.isel(t=[0, 10, -1]))["contact_area_reason"] == ""
-    )
+    assert read.distribution(dataset.isel(t=[0, 10, -1]))["contact_area_reason"] == ""
     pooled = of_second_half(
         run(
             scene(

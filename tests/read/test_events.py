@@ -13,19 +13,19 @@ from helpers.parts import (
     Clock,
     Ensemble,
     Equilibrium,
-    analysis,
     bonds,
     drive,
     jkr,
+    read,
     run,
     shear,
 )
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
-from sim.analysis.events import static_threshold
 from sim.laws.schallamach import bell_peak
-from tests.analysis.test_invariance import LENS, SCENES
+from sim.read.events import static_threshold
+from tests.read.test_invariance import LENS, SCENES
 
 NAN = math.nan
 
@@ -39,7 +39,7 @@ def per_member(dataset, **values):
 
 def test_first_detachment_and_masking_are_told_of_those_members_that_had_them(ramp):
     # Three of six open, one of them twice: its first time counts.
-    result = analysis.statistics(
+    result = read.statistics(
         per_member(ramp, first_detachment=[0.07, 0.19, 0.3, NAN, NAN, NAN])
     )
     assert_allclose(result["ever_detached_mean"], 0.5, rtol=1e-14)
@@ -54,13 +54,13 @@ def test_first_detachment_and_masking_are_told_of_those_members_that_had_them(ra
     assert_allclose(
         result["first_detachment_quantile"], [0.082, 0.19, 0.289], rtol=1e-13
     )
-    result = analysis.statistics(ramp)
+    result = read.statistics(ramp)
     assert float(result["ever_detached_mean"]) == 0.0 and math.isnan(
         result["first_detachment_mean"]
     )
     assert not any("_reading" in str(name) for name in result)
     assert not any(
-        "detached" in heading for row in analysis.highlights(ramp) for heading in row
+        "detached" in heading for row in read.highlights(ramp) for heading in row
     )
     lifted = Equilibrium(indentation=-0.4e-6)
     dataset = run(
@@ -70,27 +70,27 @@ def test_first_detachment_and_masking_are_told_of_those_members_that_had_them(ra
             ensemble=Ensemble(members=24),
         )
     )
-    result, opened = analysis.statistics(dataset), dataset["in_contact"] == 0
+    result, opened = read.statistics(dataset), dataset["in_contact"] == 0
     assert_allclose(
         result["ever_detached_mean"], float(opened.any("t").mean()), rtol=1e-14
     )
     first = dataset["t"].to_numpy()[opened.argmax("t")][opened.any("t").to_numpy()]
     assert_allclose(result["first_detachment_mean"], first.mean(), rtol=1e-12)
     assert 2 <= len(first) < 24
-    (row,) = analysis.highlights(dataset, stated=analysis.statements(dataset))
+    (row,) = read.highlights(dataset, stated=read.statements(dataset))
     assert row["detached,\nof members (%)"].startswith(
         f"{100.0 * len(first) / 24.0:.0f}("
     )
     assert "5 to 95 %\nof members, interpolated (ms)" in row  # 5 of 24 detached
     at, masked = ramp["t"].to_numpy()[[11, 4]], [0.0, 0.5, 0.75, 0.0, 0.0, 0.0]
-    (row,) = analysis.highlights(
+    (row,) = read.highlights(
         per_member(ramp, time_masked=masked, first_masked=[NAN, *at, NAN, NAN, NAN])
     )
     # a third of the members were
     assert (
         row["first\nmasked (ms)"] == "200(500)" and row["half\nmasked (ms)"] == "> 80"
     )
-    (row,) = analysis.highlights(
+    (row,) = read.highlights(
         per_member(
             ramp, time_masked=masked, first_masked=[NAN, *at, *[ramp["t"][9]] * 3]
         )
@@ -171,7 +171,7 @@ def test_a_loop_is_what_its_jumps_dissipate_nothing_without_and_the_area_of_a_ci
     angle = 2.0 * math.pi * 2.0 * dataset["t"]
     drawn = dataset.assign(normal_load=np.cos(angle), displacement=np.sin(angle))
     # a polygon of 400 corners
-    result = analysis.loop_energy(drawn)["loop_energy"]
+    result = read.loop_energy(drawn)["loop_energy"]
     assert_allclose(result, 200.0 * math.sin(2.0 * math.pi / 400.0), rtol=1e-12)
     assert (
         result["cycle"].to_numpy().tolist() == [1, 2] and result.attrs["units"] == "J"
@@ -185,14 +185,12 @@ def test_a_loop_is_what_its_jumps_dissipate_nothing_without_and_the_area_of_a_ci
         stored = np.trapezoid(
             dataset["normal_load"][:101], dataset["displacement"][:101]
         )
-        result = analysis.loop_energy(dataset)
+        result = read.loop_energy(dataset)
         assert abs(stored) > 1e-12  # J, given back on the way up
         assert_array_equal(result["loop_energy"], 0.0)
         assert_array_equal(result["loop_dissipation"], 0.0)
         assert not any(
-            "cycle" in heading
-            for row in analysis.highlights(dataset)
-            for heading in row
+            "cycle" in heading for row in read.highlights(dataset) for heading in row
         )
     for held in [
         {"indentation": {"from": 1e-6, "to": -2e-6}},
@@ -201,7 +199,7 @@ def test_a_loop_is_what_its_jumps_dissipate_nothing_without_and_the_area_of_a_ci
         errors = []
         for steps in (600, 2400):
             dataset = cycled(steps=steps, **held)
-            result = analysis.loop_energy(dataset)
+            result = read.loop_energy(dataset)
             step = 2.0 * abs(held[next(iter(held))]["to"] - 1e-6) * 2 / steps
             most = (
                 1.5
@@ -219,7 +217,7 @@ def test_a_loop_is_what_its_jumps_dissipate_nothing_without_and_the_area_of_a_ci
             errors.append(float(np.abs(result["loop_energy"] - lost).max()))
             assert_allclose(lost.sum(), dataset["dissipated_energy"][-1], rtol=1e-12)
         assert errors[1] < 0.5 * errors[0]
-        headings = set(analysis.highlights(dataset)[0])
+        headings = set(read.highlights(dataset)[0])
         assert {heading.partition("\n")[0] for heading in headings} >= {
             "∮P dΔ,",
             "dissipated,",
@@ -235,9 +233,9 @@ def test_loops_of_points_are_those_of_the_whole_and_there_are_none_without_trips
     swept = scene(
         contact=course, sweep=sweep, bonds=bonds.Unbroken(), shear=shear.Uniform()
     )
-    together = analysis.loop_energy(run(swept))
+    together = read.loop_energy(run(swept))
     for k, point in enumerate(swept.points()):
-        alone, where = analysis.loop_energy(run(point)), divmod(k, 2)
+        alone, where = read.loop_energy(run(point)), divmod(k, 2)
         for name in alone:
             values = together[name].isel(
                 contact_indentation_cycles=where[0], adhesion_work=where[1]
@@ -245,10 +243,10 @@ def test_loops_of_points_are_those_of_the_whole_and_there_are_none_without_trips
             assert_array_equal(values[: alone.sizes["cycle"]], alone[name])
             assert bool(values[alone.sizes["cycle"] :].isnull().all())
     dataset = cycled(cycles=2, load={"from": 4e-3, "to": -1e-3})
-    assert bool(analysis.loop_energy(dataset)["loop_energy"].isnull().all())
+    assert bool(read.loop_energy(dataset)["loop_energy"].isnull().all())
     dataset = cycled(cycles=4, indentation={"from": 2e-6, "to": 1e-6})
     stopped = dataset["contact_radius"].where(dataset["t"] < 0.6)
-    result = analysis.loop_energy(dataset.assign(contact_radius=stopped))
+    result = read.loop_energy(dataset.assign(contact_radius=stopped))
     assert result["loop_energy"].isnull().to_numpy().tolist() == [
         False,
         False,
@@ -256,8 +254,8 @@ def test_loops_of_points_are_those_of_the_whole_and_there_are_none_without_trips
         True,
     ]
     with pytest.raises(ValueError, match="cycles = 2"):
-        analysis.loop_energy(ramp)
-    assert "loop_energy_mean" not in analysis.statistics(ramp)
+        read.loop_energy(ramp)
+    assert "loop_energy_mean" not in read.statistics(ramp)
 
 
 @pytest.fixture(scope="module")
@@ -286,7 +284,7 @@ def started():
 def test_a_static_peak_is_timed_from_the_start_among_steps_and_of_statistics_that_of_the_mean(
     started,
 ):
-    result = analysis.events(started)
+    result = read.events(started)
     for k, rest in enumerate((0.1, 0.2)):
         stress, t = started["shear_stress"][k].to_numpy(), started["t"].to_numpy()
         at = int(np.argmax(stress))
@@ -300,7 +298,7 @@ def test_a_static_peak_is_timed_from_the_start_among_steps_and_of_statistics_tha
         assert abs(float(result["peak_time"][k]) - (t[at] - rest)) < 2e-3
     # more bonds after a longer rest
     assert float(result["peak_stress"][1]) > float(result["peak_stress"][0])
-    rows = analysis.highlights(started)
+    rows = read.highlights(started)
     assert [row["drive_rest\n(ms)"] for row in rows] == ["100", "200"]
     assert {"peak of\nstress (kPa)", "peak of\nfriction (mN)", "after\n(ms)"} < set(
         rows[0]
@@ -333,14 +331,12 @@ def test_the_friction_maximum_and_the_static_peak_are_those_of_the_clock_steps_w
     start = {"model": "start", "rest": "1 s", "speed": "3 um/s"}
     # the first record and the last alone
     clock = {"duration": "100 s", "step": "0.1 s", "record": "100 s"}
-    result = analysis.peaks(
-        run(sim.Scenario(**parts | {"drive": ramp, "clock": clock}))
-    )
+    result = read.peaks(run(sim.Scenario(**parts | {"drive": ramp, "clock": clock})))
     assert_allclose(result["peak_stress"], 24.40e3, rtol=2e-4)
     for name in ("peak_speed", "peak_friction_speed"):
         assert_allclose(result[name], 2.270e-3, rtol=1e6 ** (0.1 / 100.0) - 1.0)
     clock = {"duration": "2 s", "step": "0.1 ms", "record": "2 s"}
-    result = analysis.peaks(
+    result = read.peaks(
         run(sim.Scenario(**parts | {"bonds": slow, "drive": start, "clock": clock}))
     )
     assert_allclose(result["peak_stress"], 59.32e3, rtol=1e-4)
@@ -356,7 +352,7 @@ def test_pull_offs_of_cycles_are_those_of_all_cycles_and_not_the_lowest(cycles):
     )
     clock = {"duration": 2.0 * cycles, "step": "1 ms", "record": 1.0 * cycles}
     dataset = run(scenario.with_values({"clock": clock, "ensemble.members": 20}))
-    loads = analysis.pull_offs(dataset)["pull_off_load"]
+    loads = read.pull_offs(dataset)["pull_off_load"]
     every = 1e9 * loads.values[np.isfinite(loads.values)]
     assert (
         every.size == 20 * cycles
@@ -368,7 +364,7 @@ def test_pull_offs_of_cycles_are_those_of_all_cycles_and_not_the_lowest(cycles):
         assert_allclose(
             np.quantile(every, [0.05, 0.5, 0.95]), [-451.0, -370.0, -255.0], atol=1.0
         )
-    result = analysis.events(dataset)
+    result = read.events(dataset)
     assert_allclose(result["pull_off_load"].mean(), 1e-9 * every.mean(), rtol=1e-12)
     assert_array_equal(result["pull_offs"], cycles)
     assert_allclose(result["pull_off_load_least"], loads.min("phase"), rtol=1e-14)
@@ -392,20 +388,20 @@ def test_peaks_are_maxima_inside_a_ramp_or_at_once_after_a_start_and_none_is_of_
         made_up = {"shear_stress": values, "friction_force": -values}
         made_up = {key: ("t", series) for key, series in made_up.items()}
         made_up |= dict.fromkeys(("peak_stress", "peak_friction"), np.abs(values).max())
-        result = analysis.peaks(one.assign(made_up))
+        result = read.peaks(one.assign(made_up))
         known = [bool(result[key].notnull()) for key in result]
         assert len(known) == 10 and set(known) == {name == "peak"}
     # members differ by noise
-    assert not any("friction" in name for name in analysis.peaks(ramp))
+    assert not any("friction" in name for name in read.peaks(ramp))
     # Bonds without a stretch bear most at the first slip: the first record after it, two lives of the transient on.
     part = drive.Start(rest=0.1, speed=1e-2)
     population = bonds.Rate(critical_speed=1e-2, rebinding_rate=50.0, stress=3e5)
     dataset = run(scene(drive=part, bonds=population, shear=shear.Uniform()))
-    result = analysis.events(dataset)
+    result = read.events(dataset)
     assert_allclose(result["peak_stress"], 3e5 * (0.5 + 0.5 * np.exp(-2.0)), rtol=1e-12)
     assert_allclose(result["peak_time"], 0.02, rtol=1e-12)
     dataset = run(scene(drive=drive.Steady(speed=1e-3)))
-    assert not any(str(name).startswith("peak") for name in analysis.events(dataset))
+    assert not any(str(name).startswith("peak") for name in read.events(dataset))
     contact = Equilibrium(displacement={"from": 1e-6, "to": -3e-5}, stiffness=50.0)
     dataset = run(
         scene(
@@ -432,7 +428,7 @@ def test_the_speed_of_a_friction_maximum_has_the_closed_form_in_its_interval_at_
         {"clock.step": step},
     )
     stated, law, rupture = (
-        analysis.statements(run(point)),
+        read.statements(run(point)),
         point.bonds,
         point.bonds.rupture,
     )
@@ -480,7 +476,7 @@ def test_a_pull_from_rest_has_the_largest_force_of_all_clock_steps_and_the_area_
     )
     top = int(np.argmax(force))
     assert 0 < top < len(force) - 1
-    result = analysis.events(dense).isel(member=0)
+    result = read.events(dense).isel(member=0)
     # between two clock steps it is higher, but below the lines through its neighbours: it is concave there
     assert (
         force[top]

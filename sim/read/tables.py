@@ -15,7 +15,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from sim.analysis.dataset import (
+from sim.numerics.files import output
+from sim.read.dataset import (
     MEMBERS,
     has_noise,
     is_stationary,
@@ -28,11 +29,11 @@ from sim.analysis.dataset import (
     sweep_dims,
     word,
 )
-from sim.analysis.errors import systematic_errors
-from sim.analysis.events import unresolved_slips, varies
-from sim.analysis.observables import restricted, with_slips
-from sim.analysis.over_speed import extremes, loss_speeds
-from sim.analysis.statements import (
+from sim.read.errors import systematic_errors
+from sim.read.events import unresolved_slips, varies
+from sim.read.observables import restricted, with_slips
+from sim.read.over_speed import extremes, loss_speeds
+from sim.read.statements import (
     BOUNDED,
     COUNTS,
     as_means,
@@ -42,7 +43,7 @@ from sim.analysis.statements import (
     statements,
     statistics,
 )
-from sim.analysis.statistics import (
+from sim.read.statistics import (
     FOR_TAILS,
     QUANTILES,
     WIDE,
@@ -51,7 +52,6 @@ from sim.analysis.statistics import (
     correlation_time,
     over_members,
 )
-from sim.numerics.files import output
 from sim.units.notation import bounded, chosen_unit, concise, engineering, scaled, share
 
 #: Cells of columns by heading.
