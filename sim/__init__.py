@@ -46,8 +46,12 @@ if TYPE_CHECKING:
     from sim.study.plan import Plan
 
 Path = str | os.PathLike[str]
-_FROM = {"Scenario": "sim.scenario.scenario", "load": "sim.scenario.reader"}
-_FOLDERS = ("read", "laws", "plots", "report", "spectrum")
+_FROM = {
+    "Run": "sim.read.run",
+    "Scenario": "sim.scenario.scenario",
+    "load": "sim.scenario.reader",
+}
+_FOLDERS = ("laws", "plots", "read", "report", "spectrum")
 _FUNCTIONS = (
     "check",
     "converge",
@@ -166,15 +170,29 @@ def open(path: Path) -> "xarray.Dataset":
 
 
 def stats(
-    dataset: "xarray.Dataset | Path", where: dict[str, Any] | None = None
+    dataset: "xarray.Dataset | Path",
+    where: dict[str, Any] | None = None,
+    show: "Sequence[str]" = (),
 ) -> "pandas.DataFrame":
-    """Return ensemble statistics of a run in SI units, a row for each sweep value and time; units are in ``attrs``.
+    """Return the columns of the tables of ``sim stats`` in SI, a row for each sweep value and time.
 
-    ``where`` gives values of swept keys, ``{"contact.load": "4 mN"}``.
+    Parameters
+    ----------
+    dataset : xarray.Dataset or path
+        As ``run`` makes it.
+    where : dict, optional
+        Values of swept keys, ``{"contact.load": "4 mN"}``.
+    show : sequence of str
+        Groups of further columns: ``"losses"`` of area, ``"slips"``, ``"all"``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        See ``sim.read.frame``. ``Run(dataset).statistic(name)`` has any other quantity.
     """
-    from sim.read.tables import frame
+    from sim.read import Run, frame
 
-    return _plainly(frame, dataset, where)
+    return _plainly(lambda data: frame(Run(data), show), dataset, where)
 
 
 def plot(

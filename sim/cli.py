@@ -78,8 +78,8 @@ _CODES = (
     " (continue with --resume), or another run writes the output; 130 stopped at once."
 )
 
-#: Rows of a table on the terminal.
-_ROWS = 12
+#: Rows of a table on the terminal, and notes below tables.
+_ROWS, _NOTES = 12, 5
 
 
 def main() -> None:
@@ -349,40 +349,35 @@ def _unresolved(target: Path) -> str:
         return unresolved(dataset)
 
 
-def _tables(
-    dataset: Any, most: int = _ROWS, lost: tuple[str, ...] = (), every: Any = None
-) -> tuple[Any, list[str]]:
-    """Return the tables of statistics of a dataset, and notes on their numbers."""
+def _tables_of(target: Path) -> tuple[Any, list[str]]:
+    """Return the tables of a run that is done, and their notes; trouble with them is a note."""
     from sim import read
 
-    stated = read.tables.stated(dataset, lost, every)
-    rows, once = (
-        read.table(dataset, most, stated),
-        read.highlights(dataset, most, stated),
-    )
-    further = [of(dataset, most, stated) for of in (read.losses, read.phases)]
-    further.append(read.spread(dataset, stated))
-    return [shown for shown in (rows, once, *further) if shown], read.notes(
-        dataset, rows, once, stated
-    )
-
-
-def _tables_of(target: Path) -> tuple[list[list[dict[str, str]]], list[str]]:
-    """Return the tables of a run that is done; trouble with them is a note."""
     try:
         with _opened(target) as dataset:
             trajectories = dataset.drop_dims("map_time", errors="ignore").load()
         # of a closed file, because an open one keeps what was read in its cache
-        return _tables(trajectories)
+        run = read.Run(trajectories)
+        shown = read.tables_of(run, _ROWS)
+        return shown, _chosen(read.notes(run, shown), every=False)
     except (MemoryError, OSError) as trouble:
         return [], [
             f"the output is complete, but its table could not be made: {trouble or 'not enough memory'}"
         ]
 
 
-def _print_tables(tables: list[list[dict[str, str]]], notes: list[str]) -> None:
-    for rows in tables:
-        print_table(rows, "")
+def _chosen(notes: Any, every: bool) -> list[str]:
+    """Return the notes that are printed: those that are needed, and five in all unless ``every`` one is wanted."""
+    if every:
+        return [*notes.needed, *notes.further, *notes.headings]
+    room = max(_NOTES - 1 - len(notes.needed), 0)
+    more = "all columns: sim stats FILE --show all; all notes and the headings: --notes"
+    return [*notes.needed, *notes.further[:room], more]
+
+
+def _print_tables(tables: Any, notes: list[str]) -> None:
+    for table in tables:
+        print_table(table.rows, "", table.keys)
     for line in notes:
         say(line)
 
@@ -406,20 +401,26 @@ def check(scenario: Path, **overrides: Any) -> None:
 @click.option("--all", "whole", is_flag=True, help="Show all times and sweep values.")
 @_LOST
 @click.option(
-    "--csv", type=_PATH, help="Also write every time and sweep value to this CSV file."
+    "--show",
+    multiple=True,
+    type=click.Choice(["losses", "slips", "all"]),
+    help="Add the columns of a group: losses of area, slip events, or all.",
+)
+@click.option("--notes", "every", is_flag=True, help="Print all notes.")
+@click.option(
+    "--csv", type=_PATH, help="Also write these columns, at all times, to a CSV file."
 )
 @click.option(
-    "--wide",
-    is_flag=True,
-    help="In the CSV, one row per sweep value; with --all, per record.",
+    "--csv-all", type=_PATH, help="Also write all quantities in long form, in SI."
 )
 @_UNITS
 @_FORCE
 def stats(
     output: Path,
     chosen: tuple[str, ...],
-    whole: bool,
+    lost: tuple[str, ...],
     csv: Path | None,
+    csv_all: Path | None,
     force: bool,
     **form: Any,
 ) -> None:
@@ -428,20 +429,20 @@ def stats(
     from sim import read
     from sim.units.notation import in_units
 
-    if form["wide"] and csv is None:
-        raise click.UsageError("--wide is a form of --csv FILE, which is missing")
     with _opened(output, chosen) as dataset, in_units(form["units"]):
-        every = None
+        run = read.Run(dataset, lost)
+        for path in filter(None, (csv, csv_all)):
+            read.dataset.claim(dataset, output, path, force)
+        # before any printing, as nobody may read it to its end
         if csv is not None:
-            read.dataset.claim(dataset, output, csv, force)
-            every = read.statements(dataset, lost=form["lost"])
-            # before any printing, as nobody may read it to its end
-            read.to_csv(dataset, csv, form["wide"], whole, form["lost"], every)
-        _print_tables(
-            *_tables(dataset, sys.maxsize if whole else _ROWS, form["lost"], every)
-        )
-        if csv is not None:
-            say(str(csv))
+            read.to_csv(run, csv, form["show"])
+        if csv_all is not None:
+            read.to_long_csv(run, csv_all)
+        rows = sys.maxsize if form["whole"] else _ROWS
+        shown = read.tables_of(run, rows, form["show"])
+        _print_tables(shown, _chosen(read.notes(run, shown), form["every"]))
+        for path in filter(None, (csv, csv_all)):
+            say(str(path))
 
 
 #: Kinds of figures with their content and options, here because the help must not import what draws them.
@@ -651,7 +652,7 @@ def converge(
     from sim.study.converge import study
 
     target = output or Path("outputs") / f"{scenario.stem}-converge.nc"
-    print_table(*study(scene, target, force, seconds, accepted))
+    print_table(*study(scene, target, force, seconds, accepted), keys=1)
 
 
 @cli.command(
@@ -759,7 +760,7 @@ def fit(
         result, shown = fit.carried_out(scene, stem=stem, replace=force, **options)
         has_converged = result.converged
     for rows, text in shown:
-        print_table(rows, text)
+        print_table(rows, text, keys=1)
     sys.exit(DONE if has_converged else FAILED)
 
 
@@ -769,7 +770,7 @@ def paper() -> None:
     from sim.study.paper import checks
 
     results = checks()
-    print_rows([line.row for line in results])
+    print_rows([line.row for line in results], keys=1)
     failed = sum(not line.holds for line in results)
     say(f"{len(results) - failed} of {len(results)} hold")
     sys.exit(FAILED if failed else DONE)

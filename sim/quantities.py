@@ -16,6 +16,17 @@ class Mean(Enum):
     NONE = "none"
 
 
+class Form(Enum):
+    """The form in which a number without a unit is printed; numbers with a unit are printed in it."""
+
+    #: As it is: a count, or a ratio that people do not give in percent.
+    PLAIN = "plain"
+    #: In percent.
+    PERCENT = "percent"
+    #: In percent, at least 0 and at most 100.
+    SHARE = "share"
+
+
 class Condition(NamedTuple):
     """The scenes of which a quantity is recorded.
 
@@ -88,6 +99,10 @@ class Definition(NamedTuple):
         Scenes of which it is recorded.
     mean : Mean
         Mean over time that it has.
+    heading : str
+        Heading of its column in a table; empty if no table has one.
+    form : Form
+        Form in which it is printed.
     """
 
     name: str
@@ -96,16 +111,22 @@ class Definition(NamedTuple):
     symbol: str = ""
     exists_when: Condition = ALWAYS
     mean: Mean = Mean.OF_ALL
+    heading: str = ""
+    form: Form = Form.PLAIN
 
 
 #: Quantities over time, read at each record.
 RECORDS: tuple[Definition, ...] = (
-    Definition("speed", "m/s", "sliding speed", symbol="V"),
+    Definition("speed", "m/s", "sliding speed", symbol="V", heading="V"),
     Definition(
         "slider_position", "m", "displacement of the slider", symbol="X", mean=Mean.NONE
     ),
     Definition(
-        "bond_fraction", "1", "number of bonds over that at rest", symbol="N/N_0"
+        "bond_fraction",
+        "1",
+        "number of bonds over that at rest",
+        symbol="N/N_0",
+        heading="N/N0",
     ),
     Definition(
         "shear_stress", "Pa", "mean shear stress at the interface", symbol="tau_0"
@@ -115,6 +136,7 @@ RECORDS: tuple[Definition, ...] = (
         "J/m^2",
         "elastic energy of the shear-stress fluctuations per area",
         symbol="DeltaGamma",
+        heading="ΔΓ",
     ),
     Definition(
         "edge_energy",
@@ -122,10 +144,22 @@ RECORDS: tuple[Definition, ...] = (
         "fluctuation energy per unit of new contact area at the edge of the disc",
         symbol="dE/dA",
         exists_when=ON_A_DISC,
+        heading="edge",
     ),
-    Definition("work_of_adhesion", "J/m^2", "effective work of adhesion", symbol="w"),
     Definition(
-        "contact_radius", "m", "contact radius", symbol="a", mean=Mean.WHILE_CLOSED
+        "work_of_adhesion",
+        "J/m^2",
+        "effective work of adhesion",
+        symbol="w",
+        heading="w",
+    ),
+    Definition(
+        "contact_radius",
+        "m",
+        "contact radius",
+        symbol="a",
+        mean=Mean.WHILE_CLOSED,
+        heading="a",
     ),
     Definition(
         "contact_area", "m^2", "contact area", symbol="A", mean=Mean.WHILE_CLOSED
@@ -136,15 +170,19 @@ RECORDS: tuple[Definition, ...] = (
         "normal load on the sphere, compression positive",
         symbol="P",
         mean=Mean.WHILE_CLOSED,
+        heading="P",
     ),
     Definition("indentation", "m", "indentation of the sphere", symbol="delta"),
-    Definition("displacement", "m", "displacement of the mount", symbol="Delta"),
+    Definition(
+        "displacement", "m", "displacement of the mount", symbol="Delta", heading="Δ"
+    ),
     Definition(
         "friction_force",
         "N",
         "friction force, shear stress times contact area",
         symbol="F",
         mean=Mean.WHILE_CLOSED,
+        heading="F",
     ),
     Definition("in_contact", "1", "1 if the contact is closed"),
     Definition(
@@ -165,6 +203,7 @@ RECORDS: tuple[Definition, ...] = (
         "energy dissipated by the edge and the jumps of the contact",
         symbol="W",
         mean=Mean.NONE,
+        heading="W",
     ),
     Definition(
         "jkr_radius",
@@ -232,6 +271,7 @@ RECORDS: tuple[Definition, ...] = (
         "speed of the stage",
         symbol="V_s",
         exists_when=BEHIND_A_SPRING,
+        heading="stage",
     ),
     Definition(
         "spring_force",
@@ -326,6 +366,104 @@ RECORDS: tuple[Definition, ...] = (
     ),
 )
 
+#: Quantities over time that follow from recorded ones.
+DERIVED: tuple[Definition, ...] = (
+    Definition(
+        "area_ratio",
+        "1",
+        "contact area over the JKR area at the full work of adhesion",
+        symbol="A/A_JKR",
+        heading="A/A_JKR",
+        form=Form.PERCENT,
+    ),
+    Definition(
+        "lost_to_bonds",
+        "1",
+        "share of the JKR area lost to broken bonds, which are subtracted first",
+        heading="lost to bonds",
+        form=Form.PERCENT,
+    ),
+    Definition(
+        "lost_to_fluctuations",
+        "1",
+        (
+            "share of the JKR area lost to fluctuations, which are subtracted after the "
+            "bonds; by the paper's strict energy balance there is no such loss"
+        ),
+        heading="lost to fluct.",
+        form=Form.PERCENT,
+    ),
+    Definition(
+        "lost_to_fluctuations_first",
+        "1",
+        "share of the JKR area lost to fluctuations, if they are subtracted first",
+        heading="fluct. first",
+        form=Form.PERCENT,
+    ),
+    Definition(
+        "lost_to_bonds_last",
+        "1",
+        (
+            "share of the JKR area lost to broken bonds, if they are subtracted after "
+            "the fluctuations"
+        ),
+        heading="bonds last",
+        form=Form.PERCENT,
+    ),
+    Definition(
+        "lost_to_mean_stress",
+        "1",
+        (
+            "share of the JKR area lost to the mean stress, which is subtracted after "
+            "bonds and fluctuations"
+        ),
+        exists_when=REVERSIBLE,
+        heading="lost to stress",
+        form=Form.PERCENT,
+    ),
+    Definition(
+        "lost_to_lag",
+        "1",
+        (
+            "share of the JKR area lost to the lag of the edge, which is subtracted "
+            "last; negative if the edge retreats late"
+        ),
+        exists_when=LAGGING_EDGE,
+        heading="lost to lag",
+        form=Form.PERCENT,
+    ),
+    Definition(
+        "order_of_charging",
+        "1",
+        (
+            "additional share of the JKR area lost to fluctuations if they are "
+            "subtracted first"
+        ),
+        form=Form.PERCENT,
+    ),
+    Definition(
+        "fraction_detached",
+        "1",
+        "share of open contacts",
+        heading="open",
+        form=Form.SHARE,
+    ),
+    Definition(
+        "fraction_masked",
+        "1",
+        "share of closed contacts without effective work of adhesion",
+        heading="masked",
+        form=Form.SHARE,
+    ),
+    Definition(
+        "correlation_time",
+        "s",
+        "integral correlation time of the fluctuation energy",
+        symbol="t_c",
+        heading="t_c",
+    ),
+)
+
 #: Quantities of an event, of the whole run and of each of its phases.
 WITH_PHASES: tuple[Definition, ...] = (
     Definition(
@@ -404,7 +542,11 @@ OF_THE_RUN: tuple[Definition, ...] = (
         "time at which the contact is first masked; nan if it never is",
     ),
     Definition(
-        "time_masked", "1", "share of the closed time in which the contact is masked"
+        "time_masked",
+        "1",
+        "share of the closed time in which the contact is masked",
+        heading="masked, of the time",
+        form=Form.SHARE,
     ),
     Definition(
         "runaway_force",
@@ -690,6 +832,141 @@ NUMBERS: tuple[Definition, ...] = (
     ),
 )
 
+#: Quantities of events over members, cycles or slip events, which follow from recorded ones.
+OF_MEMBERS: tuple[Definition, ...] = (
+    Definition(
+        "ever_detached",
+        "1",
+        "share of members whose contact opened",
+        heading="detached, of members",
+        form=Form.SHARE,
+    ),
+    Definition(
+        "half_detached",
+        "s",
+        "time at which half of the members had detached",
+        heading="half detached",
+    ),
+    Definition(
+        "detached_rate",
+        "1/s",
+        "detachments per time in contact, of all members",
+        heading="rate of detaching",
+    ),
+    Definition(
+        "half_masked",
+        "s",
+        "time at which half of the members had been masked",
+        heading="half masked",
+    ),
+    Definition(
+        "masked_rate", "1/s", "first maskings per time before them, of all members"
+    ),
+    Definition(
+        "loop_energy",
+        "J",
+        "work of the mount in a cycle, the closed integral of load over displacement",
+        heading="∮P dΔ, per cycle",
+    ),
+    Definition(
+        "loop_dissipation",
+        "J",
+        "energy dissipated by opening and closing in a cycle",
+        heading="dissipated, per cycle",
+    ),
+    Definition(
+        "total_dissipated",
+        "J",
+        "energy dissipated by opening and closing to the end of the run",
+        symbol="W",
+        heading="dissipated, in all",
+    ),
+    Definition("pull_offs", "1", "number of phases with a pull-off"),
+    Definition(
+        "static_friction",
+        "N",
+        "force at the start of a slip event, or at which the slider lost stability",
+        heading="static friction",
+    ),
+    Definition(
+        "force_drop", "N", "drop of the spring force in a slip event", heading="drop"
+    ),
+    Definition(
+        "stress_drop",
+        "Pa",
+        "drop of the shear stress in a slip event",
+        heading="drop of stress",
+    ),
+    Definition(
+        "slip_spread",
+        "1",
+        "standard deviation of the slips over their mean",
+        heading="spread of slips",
+        form=Form.PERCENT,
+    ),
+    Definition("slip_duration", "s", "duration of a slip event", heading="slip lasts"),
+    Definition(
+        "stick_duration", "s", "duration of a stick phase", heading="stick lasts"
+    ),
+    Definition(
+        "recurrence_time",
+        "s",
+        "time between the starts of two slip events",
+        heading="slip every",
+    ),
+    Definition(
+        "ran_away",
+        "1",
+        "share of members that lost stability",
+        heading="lost stability, of members",
+        form=Form.SHARE,
+    ),
+    Definition(
+        "runaway_after",
+        "s",
+        "time at which members lost stability, the mean of those that did",
+        heading="lost stability after",
+    ),
+)
+
+#: Quantities of the slip events in a phase of the course of a stage.
+OF_PHASES: tuple[Definition, ...] = (
+    Definition("phase_start", "s", "start of the phase", heading="starts"),
+    Definition(
+        "phase_time_held",
+        "s",
+        "time at rest of the stage before the phase",
+        heading="held before",
+    ),
+    Definition(
+        "phase_slip_count", "1", "number of slip events in the phase", heading="slips"
+    ),
+    Definition(
+        "phase_first_friction",
+        "N",
+        "spring force at which the first slip event of the phase begins",
+        heading="first slip at",
+    ),
+    Definition(
+        "phase_static_friction",
+        "N",
+        "mean spring force at the starts of slip events in the phase",
+        heading="static friction",
+    ),
+    Definition(
+        "phase_force_drop",
+        "N",
+        "mean drop of the spring force in slip events of the phase",
+        heading="drop",
+    ),
+    Definition(
+        "phase_recurrence_time",
+        "s",
+        "mean time between the starts of slip events of the phase",
+        heading="slip every",
+    ),
+)
+
 
 def in_a_phase(event: Definition) -> Definition:
     """Return the definition of a quantity of an event in each phase from that of the whole run."""
@@ -701,9 +978,19 @@ def in_a_phase(event: Definition) -> Definition:
 #: Quantities of a whole run, in the order in which a dataset has them.
 EVENTS = (*WITH_PHASES, *OF_THE_RUN, *map(in_a_phase, WITH_PHASES), *OF_SLIPS)
 #: Quantities by their names.
-QUANTITIES = {row.name: row for row in (*RECORDS, *EVENTS, *NUMBERS)}
+QUANTITIES = {
+    row.name: row
+    for row in (*RECORDS, *DERIVED, *EVENTS, *NUMBERS, *OF_MEMBERS, *OF_PHASES)
+}
 #: Names of the quantities among which ``record.quantities`` chooses.
 RECORDED = tuple(row.name for row in (*RECORDS, *EVENTS))
+
+
+def form_of(name: str, unit: str) -> Form:
+    """Return the form of a quantity; a number without a unit at a loss of area is a share of it."""
+    if name in QUANTITIES:
+        return QUANTITIES[name].form
+    return Form.PERCENT if unit == "1" else Form.PLAIN
 
 
 def has_mean(name: str) -> bool:
@@ -713,7 +1000,7 @@ def has_mean(name: str) -> bool:
 
 #: Names of the quantities of each slip event, without ``slip_``.
 SLIP_EVENT = tuple(row.name.removeprefix("slip_") for row in OF_EACH_SLIP)
-#: Names of the quantities that only a closed contact has.
+#: Names of the recorded quantities that only a closed contact has.
 OF_CONTACT = tuple(row.name for row in RECORDS if row.mean is Mean.WHILE_CLOSED)
 
 #: What leaves something out, by the first word of its errors.

@@ -301,7 +301,7 @@ def test_nothing_after_the_rename_makes_a_failure_of_a_run(here, monkeypatch):
         patched.setattr("os.replace", replaced)
         for name in ("os.unlink", "os.rmdir", "os.fsync"):
             patched.setattr(name, broken(getattr(os, name.partition(".")[2])))
-        patched.setattr("sim.read.table", broken(lambda *_: done.append("read")))
+        patched.setattr("sim.read.tables_of", broken(lambda *_: done.append("read")))
         found = sim("run", "scene.toml", "-o", "x.nc")
     assert found.exit_code == 0
     assert (
@@ -513,13 +513,16 @@ def test_stats_and_plot_write_beside_the_dataset_or_where_asked_or_refuse_in_one
     header, *rows = csv.reader(
         Path("new/table.csv").read_text(encoding="utf-8").splitlines()
     )
-    assert (
-        len({len(row) for row in (header, *rows)}) == 1
-        and sum("contact_area" in row for row in rows) == 11
-    )
+    assert len({len(row) for row in (header, *rows)}) == 1 and len(rows) == 11
+    assert "contact_radius [m]" in header
+    assert sim("stats", dataset, "--csv-all", "new/all.csv").exit_code == 0
+    lines = Path("new/all.csv").read_text(encoding="utf-8").splitlines()
+    rows = list(csv.reader(lines))
+    assert len({len(row) for row in rows}) == 1
+    assert sum("contact_area" in row for row in rows) == 11
     assert sim("stats", dataset, "--csv", "scene.toml/table.csv").exit_code == 74
     # a bound or a reason, if not a speed
-    assert "10 % of area" in sim("stats", dataset, "--lost", "10 %").stdout
+    assert "10 % lost" in sim("stats", dataset, "--lost", "10 %").stdout
     assert "lost 10" in sim("stats", dataset, "--lost", "10").stderr
     done = sim("plot", dataset, "time", "-o", "new/picture.svg")
     assert (done.exit_code, done.stdout) == (0, f"{Path('new/picture.svg')}\n")

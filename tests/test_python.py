@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 from helpers.commands import LENS
+from helpers.printed import rows_of
 
 import sim
 from sim import read
@@ -107,7 +108,7 @@ def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statist
             ("observables", "statistics", "events", "shares"),
         )
         expected = {name: getattr(read, name)(variable) for name in functions}
-        table = read.table(variable)
+        table = rows_of(variable)
         for found in (dataset, opened, plainly):
             assert "speed" in found.contact_area.coords
             assert (
@@ -115,10 +116,8 @@ def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statist
                 == dataset.contact_area[5]
             )
             for name in functions:
-                xr.testing.assert_identical(
-                    getattr(read, name)(found), expected[name]
-                )
-            assert read.table(found) == table
+                xr.testing.assert_identical(getattr(read, name)(found), expected[name])
+            assert rows_of(found) == table
         opened.to_netcdf(tmp_path / "again.nc")
     with netCDF4.Dataset(file, "a"):  # as nothing holds it any longer
         pass
@@ -163,9 +162,9 @@ def test_stats_are_a_data_frame_in_si_and_plot_draws_and_saves(file, dataset, tm
     for source in (file, str(file), dataset):
         table = sim.stats(source)
         np.testing.assert_array_equal(
-            table["contact_radius_mean"], dataset.contact_radius.to_numpy().ravel()
+            table["contact_radius"], dataset.contact_radius.to_numpy().ravel()
         )
-        assert table.attrs["units"]["contact_radius_mean"] == "m"
+        assert table.attrs["units"]["contact_radius"] == "m"
     assert sim.plot(dataset).axes
     sim.plot(file, "time", to=tmp_path / "time.png")
     assert (tmp_path / "time.png").stat().st_size > 1000

@@ -26,6 +26,7 @@ from sim.read.events import (
     slips_by_phase,
     stick_slip,
 )
+from sim.read.export import frame, long, to_csv, to_long_csv
 from sim.read.observables import (
     bond_work,
     observables,
@@ -34,6 +35,7 @@ from sim.read.observables import (
     share_observables,
 )
 from sim.read.over_speed import crossing, extremes, loss_speeds, steady_speeds
+from sim.read.run import Run
 from sim.read.statements import Statement, each, relaxation, statements, statistics
 from sim.read.statistics import (
     QUANTILES,
@@ -48,25 +50,28 @@ from sim.read.statistics import (
     where,
 )
 from sim.read.tables import (
+    GROUPS,
+    Table,
     highlights,
-    in_columns,
     losses,
     notes,
     phases,
     spread,
     table,
-    tidy,
-    to_csv,
+    tables_of,
 )
 from sim.units.notation import concise, engineering, scaled
 
 __all__ = [
+    "GROUPS",
     "QUANTILES",
     "Control",
     "IntegralTime",
     "Lifetime",
+    "Run",
     "Statement",
     "SystematicError",
+    "Table",
     "averaging",
     "bond_work",
     "concise",
@@ -78,12 +83,13 @@ __all__ = [
     "engineering",
     "events",
     "extremes",
+    "frame",
     "highlights",
-    "in_columns",
     "integral_time",
     "is_stationary",
     "is_steady",
     "lifetime",
+    "long",
     "loop_energy",
     "loss_speeds",
     "losses",
@@ -112,8 +118,9 @@ __all__ = [
     "sweep_dims",
     "systematic_errors",
     "table",
-    "tidy",
+    "tables_of",
     "to_csv",
+    "to_long_csv",
     "where",
 ]
 

@@ -196,7 +196,10 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
         }
         errors |= of_late | {"kinetic_friction": 0.5 * of_late["force_drop"]}
         result = result.assign(
-            {f"{name}_reading": _WIDE * error for name, error in errors.items()}
+            {
+                f"{name}_bound": (_WIDE * error).assign_attrs(source="slip events")
+                for name, error in errors.items()
+            }
         )
     return result
 
@@ -479,7 +482,9 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
             means = loops.mean("cycle", keep_attrs=True)
             coarse = loop_energy(dataset.isel(t=slice(None, None, 2))).mean("cycle")
             for name in [name for name in _LOOPS if name in coarse]:
-                means[f"{name}_reading"] = abs(means[name] - coarse[name])
+                means[f"{name}_bound"] = abs(means[name] - coarse[name]).assign_attrs(
+                    source="records"
+                )
             result = result.merge(means, compat="no_conflicts")
     return result
 
@@ -619,12 +624,12 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
                 is_log, high - low
             )
             half = 0.5 * abs(change) * step / setting(dataset, "clock.duration")
-            described[f"{prefix}_time_reading"] = 0.5 * step + 0.0 * when, "s", ""
-            described[f"{prefix}_speed_reading"] = half, "m/s", ""
+            described[f"{prefix}_time_bound"] = 0.5 * step + 0.0 * when, "s", ""
+            described[f"{prefix}_speed_bound"] = half, "m/s", ""
         for key, (values, *about) in described.items():
             result[key] = labelled(
                 values.where(known).drop_vars("phase", errors="ignore"), *about
-            )
+            ).assign_attrs({"source": "step"} if key.endswith("_bound") else {})
     return xr.Dataset(result)
 
 

@@ -43,6 +43,7 @@ _REFERENCES = ("jkr_radius", "hertz_radius")
 FEW_LEFT = 2
 #: Trajectories from which observables of other names follow; those of shares, beside the radii of their losses.
 _SOURCES = {
+    "normal_load": ("normal_load", "applied_load"),
     "area_ratio": ("contact_area",),
     "fraction_detached": ("in_contact",),
     "fraction_masked": ("masked", "in_contact"),

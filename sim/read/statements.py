@@ -7,11 +7,11 @@ import numpy as np
 import scipy
 import xarray as xr
 
+from sim.quantities import Form, form_of
 from sim.read.dataset import MEMBERS, is_stationary, plain, sweep_dims
 from sim.read.events import ensemble_peaks, events, half_lives, slips_by_phase
 from sim.read.over_speed import loss_speeds
 from sim.read.statistics import (
-    WIDE,
     Array,
     averaging,
     correlation_time,
@@ -23,22 +23,7 @@ from sim.units.errors import BadInput
 from sim.units.notation import bounded, scaled, share
 
 #: Endings of the variables of a statement beside its value.
-_BESIDE = ("sem", "low", "high", "reason")
-#: Pure numbers that are no shares, so that they are not printed in percent.
-COUNTS = frozenset(
-    (
-        "bond_fraction",
-        "slip_count",
-        "phase_slip_count",
-        "pull_offs",
-        "detachments",
-        "step_renewal",
-    )
-)
-#: Shares that are at least 0 and at most 1.
-BOUNDED = frozenset(
-    ("fraction_detached", "fraction_masked", "time_masked", "ever_detached", "ran_away")
-)
+_BESIDE = ("sem", "low", "high", "bound", "reason")
 
 
 class Statement(NamedTuple):
@@ -50,6 +35,9 @@ class Statement(NamedTuple):
         Name of the variable, its meaning, and its unit.
     value, error, low, high : float
         Value, standard error, and ends of the 95 % interval; nan if unknown. An end alone is a bound.
+    bound, source : float, str
+        Bound of an error that members do not reduce, such as that of the clock step, and
+        its cause; nan if there is none.
     over : str
         Sample of the value: members, span, phase; "" of a single run.
     reason : str
@@ -65,6 +53,8 @@ class Statement(NamedTuple):
     error: float
     low: float
     high: float
+    bound: float
+    source: str
     over: str
     reason: str
     at: dict[str, Any]
@@ -74,17 +64,22 @@ class Statement(NamedTuple):
         sizes = [
             abs(size) for size in (self.value, self.low, self.high) if np.isfinite(size)
         ]
-        is_share = self.unit == "1" and self.name not in COUNTS
-        factor, unit = (
-            (100.0, "%") if is_share else scaled(max(sizes, default=0.0), self.unit)
+        form = form_of(self.name, self.unit)
+        factor, unit = scaled(max(sizes, default=0.0), self.unit)
+        if form is not Form.PLAIN:
+            factor, unit = 100.0, "%"
+        text = share(self.value, self.low, self.high) if form is Form.SHARE else ""
+        value, error, low, high, bound = (
+            factor * number
+            for number in (
+                self.value,
+                self.error,
+                self.low,
+                self.high,
+                np.nan_to_num(self.bound),
+            )
         )
-        # of few members above the standard error
-        error = (self.high - self.low) / (2.0 * WIDE)
-        numbers = (
-            factor * number for number in (self.value, error, self.low, self.high)
-        )
-        text = share(self.value, self.low, self.high) if self.name in BOUNDED else ""
-        text = text or bounded(*numbers)
+        text = text or bounded(value, error, low, high, bound, self.source)
         return "; ".join(
             filter(None, (f"{text} {unit}".rstrip() if sizes else "", self.reason))
         )
@@ -122,21 +117,17 @@ def statements(
         raise BadInput(
             [f"numbers of the scenario differ between members; join runs by {cure}"]
         )
+    members, late = (
+        averaging(dataset, half).removeprefix("mean over the ")
+        for half in (False, True)
+    )
     groups = [
-        (of_events(dataset), False),
-        (as_means(loss_speeds(dataset, lost)), False),
+        sampled(of_events(dataset), members),
+        sampled(as_means(loss_speeds(dataset, lost)), members),
     ]
     if is_stationary(dataset):
-        groups.append((of_second_half(dataset, names), True))
-    result = xr.Dataset()
-    for group, late in groups:
-        over = averaging(dataset, late).removeprefix("mean over the ")
-        means = {
-            key: group[key].assign_attrs(over=over)
-            for key in group
-            if str(key).endswith("_mean")
-        }
-        result = result.merge(group.assign(means), compat="no_conflicts", join="outer")
+        groups.append(sampled(of_second_half(dataset, names), late))
+    result = xr.merge(groups, compat="no_conflicts", join="outer")
     # of a record that a number was taken from: a statement has no time
     result = result.drop_vars("t", errors="ignore")
     # with their units
@@ -168,27 +159,20 @@ def statistics(dataset: xr.Dataset) -> xr.Dataset:
 def of_events(dataset: xr.Dataset) -> xr.Dataset:
     """Return statistics of the events of a run over the members, with medians and rates of lifetimes.
 
-    An event that is read off the records has an interval wider by what it changes if every second record is left out.
+    An event that is read off the records has a bound: the change if every second record is left out.
     """
     result = events(dataset)
-    beside = {
-        end: result[[name for name in result if str(name).endswith(f"_{end}")]]
-        for end in ("reason", "reading")
-    }
-    members = summary(
-        result.drop_vars([*beside["reason"], *beside["reading"]]).assign_attrs(
-            dataset.attrs
-        )
-    )
-    for key, reading in beside["reading"].items():
-        name = str(key).removesuffix("_reading")
-        half = reading.mean(MEMBERS) if MEMBERS in reading.dims else reading
-        for end, sign in (("low", -1.0), ("high", 1.0)):
-            known = members[f"{name}_{end}"].fillna(members[f"{name}_mean"])
-            members[f"{name}_{end}"] = (known + sign * half).assign_attrs(
-                members[f"{name}_{end}"].attrs
-            )
-    for further in (as_means(half_lives(dataset, result)), beside["reason"]):
+    beside = result[
+        [name for name in result if str(name).endswith(("_reason", "_bound"))]
+    ]
+    members = summary(result.drop_vars(list(beside)).assign_attrs(dataset.attrs))
+    if {"pull_off_error", "pull_off_load"} <= set(dataset):
+        error = abs(dataset["pull_off_error"]).assign_attrs(source="step")
+        beside["pull_off_load_bound"] = error
+    for name, bound in beside.items():
+        if MEMBERS in bound.dims and str(name).endswith("_bound"):
+            beside[name] = bound.mean(MEMBERS, keep_attrs=True)
+    for further in (as_means(half_lives(dataset, result)), beside):
         members = members.merge(further, compat="no_conflicts", join="outer")
     if {
         "phase_start",
@@ -202,6 +186,16 @@ def of_events(dataset: xr.Dataset) -> xr.Dataset:
             join="outer",
         )
     return members.assign(ensemble_peaks(dataset))
+
+
+def sampled(group: xr.Dataset, over: str) -> xr.Dataset:
+    """Return statistics whose means have the attribute ``over``, which names their sample."""
+    means = {
+        key: group[key].assign_attrs(over=over)
+        for key in group
+        if str(key).endswith("_mean")
+    }
+    return group.assign(means)
 
 
 def as_means(values: xr.Dataset) -> xr.Dataset:
@@ -233,9 +227,12 @@ def each(group: xr.Dataset) -> Iterator[Statement]:
         )
         for place in np.ndindex(*values.shape):
             index = dict(zip(values.dims, place, strict=True))
-            error, low, high = (
+            error, low, high, bound = (
                 float(beside[end][index]) if end in beside else np.nan
-                for end in _BESIDE[:3]
+                for end in _BESIDE[:4]
+            )
+            source = (
+                beside["bound"].attrs.get("source", "") if "bound" in beside else ""
             )
             reason = str(beside["reason"][index].item()) if "reason" in beside else ""
             at = {
@@ -251,6 +248,8 @@ def each(group: xr.Dataset) -> Iterator[Statement]:
                 error,
                 low,
                 high,
+                bound,
+                source,
                 over,
                 reason,
                 at,
@@ -308,7 +307,7 @@ def relaxation(dataset: xr.Dataset, name: str, start: float = 0.0) -> Statement:
         np.nan,
     )
     result = Statement(
-        f"{name}_relaxation_time", text, "s", nan, nan, nan, nan, over, "", {}
+        f"{name}_relaxation_time", text, "s", nan, nan, nan, nan, nan, "", over, "", {}
     )
     change, is_noisy = mean[0] - mean[-1], bool(np.ptp(values, axis=0).any())
     if not (np.isfinite(mean).all() and change != 0.0):

@@ -1,382 +1,446 @@
-"""Statistics as rows: a dozen for the terminal, all of them as CSV."""
+"""Tables of statistics for people: a few columns that the scene is about, and notes on what they hold."""
 
-import bisect
-import contextlib
-import csv
-import io
 import math
-import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
-from sim.numerics.files import output
-from sim.read.dataset import (
-    MEMBERS,
-    has_noise,
-    is_stationary,
-    is_steady,
-    resolved,
-    speed_name,
-    speed_of,
-    stays_held,
-    steady_points,
-    sweep_dims,
-    word,
-)
+from sim.quantities import QUANTITIES, Definition, Form
 from sim.read.errors import systematic_errors
 from sim.read.events import unresolved_slips, varies
 from sim.read.observables import restricted, with_slips
-from sim.read.over_speed import extremes, loss_speeds
-from sim.read.statements import (
-    BOUNDED,
-    COUNTS,
-    as_means,
-    each,
-    of_events,
-    reasons,
-    statements,
-    statistics,
-)
-from sim.read.statistics import (
-    FOR_TAILS,
-    QUANTILES,
-    WIDE,
-    Array,
-    averaging,
-    correlation_time,
-    over_members,
-)
-from sim.units.notation import bounded, chosen_unit, concise, engineering, scaled, share
+from sim.read.over_speed import extremes
+from sim.read.run import Run
+from sim.read.statements import each
+from sim.read.statistics import QUANTILES, WIDE, Array, over_members
+from sim.units.notation import bounded, concise, engineering, scaled, share
 
 #: Cells of columns by heading.
-Columns = dict[str, list[str]]
+Cells = dict[str, list[str]]
 #: The index of each row along the dimensions of sweep and time.
 Points = dict[str, xr.Variable]
 
-
-class _Column(NamedTuple):
-    """An observable's column; it is left out where all of its values are the ``dull`` one."""
-
-    name: str
-    heading: str
-    dull: float = 0.0
-    # only in rows over time, of a contact whose control or of a stage whose speed changes
-    changing: bool = False
-    meaning: str = ""
-
-
-_COLUMNS = (
-    _Column("stage_speed", "stage", changing=True, meaning="speed of the stage"),
-    _Column("speed", "V"),
-    _Column("normal_load", "P", changing=True),
-    _Column(
-        "displacement",
-        "Δ",
-        changing=True,
-        meaning="displacement of the mount, or the indentation",
-    ),
-    _Column("bond_fraction", "N/N0", 1.0),
-    _Column("fluctuation_energy", "ΔΓ"),
-    _Column(
-        "edge_energy",
-        "edge",
-        meaning="fluctuation energy per unit of new contact area at the edge, dE/dA",
-    ),
-    _Column("work_of_adhesion", "w", math.nan),
-    _Column("contact_radius", "a", math.nan),
-    _Column(
-        "area_ratio",
-        "A/A_JKR",
-        meaning="contact area over the JKR area at the full work of adhesion",
-    ),
-    _Column(
-        "lost_to_bonds",
-        "lost to\nbonds",
-        meaning="share of A_JKR, with bonds subtracted first",
-    ),
-    _Column(
-        "lost_to_fluctuations",
-        "lost to\nfluct.",
-        meaning="depends on shear.paid_by_adhesion; the paper's strict energy balance has no such loss",
-    ),
-    _Column(
-        "lost_to_fluctuations_first",
-        "fluct.\nfirst",
-        meaning="lost to fluctuations if subtracted before bonds",
-    ),
-    _Column("lost_to_mean_stress", "lost to\nstress"),
-    _Column(
-        "lost_to_lag",
-        "lost to\nlag",
-        meaning="by the lag of the edge; negative if the edge retreats late",
-    ),
-    _Column("friction_force", "F"),
-    _Column("fraction_detached", "open"),
-    _Column(
-        "fraction_masked",
-        "masked",
-        meaning="share of closed contacts without effective work of adhesion",
-    ),
-    _Column(
-        "dissipated_energy",
-        "W",
-        changing=True,
-        meaning="energy dissipated so far by opening and closing",
-    ),
-)
-
-_EVENTS = (
-    _Column("time_masked", "masked,\nof the time"),
-    _Column("ever_detached", "detached,\nof members"),
-    _Column(
-        "first_detachment",
-        "first\ndetached",
-        meaning="mean time of the first detachment, at ends of clock steps",
-    ),
-    _Column(
-        "half_detached",
-        "half\ndetached",
-        math.nan,
-        meaning="time at which half of the members had detached",
-    ),
-    _Column(
-        "detached_rate",
-        "rate of\ndetaching",
-        meaning="detachments per time in contact, of all members",
-    ),
-    _Column("first_masked", "first\nmasked", meaning="mean time of the masked members"),
-    _Column(
-        "half_masked",
-        "half\nmasked",
-        math.nan,
-        meaning="time at which half of the members had been masked",
-    ),
-    _Column(
-        "loop_energy", "∮P dΔ,\nper cycle", meaning="work done by the mount in a cycle"
-    ),
-    _Column("loop_dissipation", "dissipated,\nper cycle"),
-    _Column("total_dissipated", "dissipated,\nin all"),
-    _Column("pull_off_load", "pull-off\nload"),
-    _Column(
-        "pull_off_time",
-        "pull-off\nafter",
-        math.nan,
-        meaning="end of the clock step with the pull-off",
-    ),
-    _Column("peak_stress", "peak of\nstress"),
-    _Column("peak_speed", "at V", math.nan),
-    _Column("peak_time", "after", math.nan),
-    _Column("peak_friction", "peak of\nfriction"),
-    _Column("peak_friction_speed", "at V ", math.nan),
-    _Column("peak_friction_time", "after ", math.nan),
-    _Column(
-        "static_threshold",
-        "static\nthreshold",
-        math.nan,
-        meaning="largest friction after the start",
-    ),
-    _Column(
-        "area_at_threshold",
-        "A/A0\nthere",
-        1.0,
-        meaning="contact area at the threshold over the area at rest",
-    ),
-    _Column(
-        "slip_count",
-        "slips",
-        meaning="drops of the spring force by more than 0.3 of its maximum so far",
-    ),
-    _Column(
-        "slips_from",
-        "slips\nfrom",
-        math.nan,
-        meaning="stage speed at the first slip event before another",
-    ),
-    _Column(
-        "slips_down_to",
-        "slips\ndown to",
-        math.nan,
-        meaning="at decreasing speed: at the last after another",
-    ),
-    _Column("ran_away", "ran away,\nof members"),
-    _Column("runaway_after", "ran away\nafter", math.nan),
-    _Column(
-        "static_friction",
-        "static\nfriction",
-        math.nan,
-        meaning="force at the start of a slip event or a runaway",
-    ),
-    _Column(
-        "kinetic_friction",
-        "kinetic\nfriction",
-        math.nan,
-        meaning="work of the stage divided by its displacement",
-    ),
-    _Column("force_drop", "drop", math.nan),
-    _Column("stress_drop", "drop of\nstress", math.nan),
-    _Column("slip_amplitude", "slip", math.nan),
-    _Column(
-        "slip_spread",
-        "spread\nof slips",
-        math.nan,
-        meaning="standard deviation of the slip over its mean",
-    ),
-    _Column("slip_duration", "slip\nlasts", math.nan),
-    _Column("stick_duration", "stick\nlasts", math.nan),
-    _Column("recurrence_time", "slip\nevery", math.nan),
-)
-
-_PHASES = (
-    _Column("phase_start", "starts"),
-    _Column("phase_time_held", "held\nbefore"),
-    _Column("phase_slip_count", "slips"),
-    _Column("phase_first_friction", "first slip\nat", math.nan),
-    _Column("phase_static_friction", "static\nfriction", math.nan),
-    _Column("phase_force_drop", "drop", math.nan),
-    _Column("phase_recurrence_time", "slip\nevery", math.nan),
-)
-
-#: Name of such a statement, its kind, and the share.
-_LOSS = re.compile(r"((\w+?)_(?:at_(.+)_percent_lost|halfway_to_hertz))_mean")
-#: Headings of what is known where a share of the area is lost, and meanings.
-_LOSSES = {
-    "speed": ("{long} at {V}", ""),
-    "steady_speed": (
-        "{short}, if\nsteady, at {V}",
-        "about the speed of the same loss in steady sliding",
-    ),
-    "lost_to_bonds": ("at {short} lost:\nto bonds", "share of A_JKR, subtracted first"),
-    "lost_to_fluctuations": (
-        "at {short} lost:\nto fluct.",
-        "share of A_JKR, subtracted after the bonds",
-    ),
-    "lost_to_fluctuations_first": (
-        "at {short} lost: to\nfluct. (first)",
-        "share of A_JKR, subtracted before the bonds",
-    ),
-    "lost_to_bonds_last": (
-        "at {short} lost: to\nbonds (last)",
-        "share of A_JKR, subtracted after the fluctuations",
-    ),
-    "lost_to_mean_stress": ("at {short} lost:\nto stress", "share of A_JKR"),
-    "lost_to_lag": ("at {short} lost:\nto lag", "share of A_JKR"),
-}
-
-#: Heading and meaning of the correlation time.
-_MEMORY = _Column("correlation_time", "t_c", meaning="integral correlation time of ΔΓ")
-
+#: Columns of a table at most, those of its place included.
+MOST = 10
 #: Values of a sweep from which on an extreme inside is worth a note.
 _TURNS = 3
 #: Shares below it are nothing; spread over the mean below which a motion without noise has settled.
 _ROUNDING, _SETTLED = 1e-13, 1e-3
-#: Rows of a CSV file that are written at once.
-_LINES = 2**15
+#: A number in a sentence, in place of which sentences are compared.
+_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
-def stated(
-    dataset: xr.Dataset, lost: Sequence[str] = (), every: xr.Dataset | None = None
-) -> xr.Dataset:
-    """Return the statements that the tables print, with speeds at which shares of the area are ``lost``.
+class Column(NamedTuple):
+    """A column of a table.
 
-    If ``every`` statement has been computed before, they are chosen from these.
+    Attributes
+    ----------
+    definition : Definition
+        The row of its quantity in the registry.
+    dull : float
+        A value that says nothing: a column of it alone is left out; nan if none.
     """
-    if every is None:
-        return statements(dataset, [column.name for column in _COLUMNS], lost)
-    printed = tuple(
-        f"{column.name}_"
-        for column in (*_COLUMNS, *_EVENTS, *_PHASES, *_of_losses(every))
-    )
-    return every.drop_vars(
-        [name for name in every if not str(name).startswith(printed)]
-    )
+
+    definition: Definition
+    dull: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """The name of its quantity."""
+        return self.definition.name
+
+    @property
+    def heading(self) -> str:
+        """The heading of the quantity in the registry."""
+        return self.definition.heading
 
 
-def _of_losses(stated: xr.Dataset, symbol: str = "V") -> list[_Column]:
-    """Return the columns of losses of area."""
+class Table(NamedTuple):
+    """A table for people: cells by heading, with the unit of the column in the heading.
+
+    Attributes
+    ----------
+    rows : list of dict
+        Cells by heading.
+    keys : int
+        Number of columns that say where a row belongs: swept keys and time.
+    total : int
+        Number of rows that there are, of which those of the table are a part.
+    columns : tuple of Column
+        The columns that are no keys.
+    left_out : tuple of Column
+        Columns that would make the table too wide.
+    """
+
+    rows: list[dict[str, str]]
+    keys: int = 0
+    total: int = 0
+    columns: tuple[Column, ...] = ()
+    left_out: tuple[Column, ...] = ()
+
+
+def _columns(*names: str, dull: float = 0.0) -> tuple[Column, ...]:
+    return tuple(Column(QUANTITIES[name], dull) for name in names)
+
+
+#: Columns over time or sweep.
+MAIN = (
+    *_columns("stage_speed", "speed", "normal_load", "displacement"),
+    *_columns("bond_fraction", dull=1.0),
+    *_columns("fluctuation_energy", "edge_energy"),
+    *_columns("work_of_adhesion", "contact_radius", dull=math.nan),
+    *_columns("area_ratio", "friction_force", "fraction_detached", "fraction_masked"),
+    *_columns("dissipated_energy"),
+    *_columns("correlation_time", dull=math.nan),
+)
+#: Those of them that are left out first, if there are too many.
+_LEFT_OUT_FIRST = (
+    "edge_energy",
+    "dissipated_energy",
+    "work_of_adhesion",
+    "bond_fraction",
+    "correlation_time",
+    "fluctuation_energy",
+    "displacement",
+)
+#: Shares of the JKR area by mechanism.
+LOSSES = _columns(
+    "lost_to_bonds",
+    "lost_to_fluctuations",
+    "lost_to_fluctuations_first",
+    "lost_to_bonds_last",
+    "lost_to_mean_stress",
+    "lost_to_lag",
+)
+#: Groups of columns that are printed if a person asks for them, and what they hold.
+GROUPS = {
+    "losses": "shares of the JKR area by mechanism, in both orders",
+    "slips": "further properties of slip events, and of each phase",
+    "all": "all columns",
+}
+
+
+#: Headings of recorded events.
+_HEADINGS = {
+    "first_masked": "first masked",
+    "first_detachment": "first detached",
+    "pull_off_load": "pull-off load",
+    "pull_off_time": "pull-off after",
+    "peak_stress": "peak of stress",
+    "peak_speed": "at V",
+    "peak_time": "after",
+    "peak_friction": "peak of friction",
+    "peak_friction_speed": "at V ",
+    "peak_friction_time": "after ",
+    "slip_count": "slips",
+    "kinetic_friction": "kinetic friction",
+    "slip_amplitude": "slip",
+}
+
+
+def _events(*names: str, dull: float = 0.0) -> tuple[Column, ...]:
+    rows = (QUANTITIES[name] for name in names)
+    headed = (row._replace(heading=row.heading or _HEADINGS[row.name]) for row in rows)
+    return tuple(Column(row, dull) for row in headed)
+
+
+#: Columns of a whole run.
+EVENTS = (
+    *_events("time_masked", "ever_detached", "half_detached", "detached_rate"),
+    *_events("half_masked", dull=math.nan),
+    *_events("loop_energy", "loop_dissipation", "total_dissipated"),
+    *_events("pull_off_load"),
+    *_events("pull_off_time", dull=math.nan),
+    *_events("peak_stress"),
+    *_events("peak_speed", "peak_time", dull=math.nan),
+    *_events("peak_friction"),
+    *_events("peak_friction_speed", "peak_friction_time", dull=math.nan),
+    *_events("slip_count", "ran_away"),
+    *_events(
+        "runaway_after",
+        "static_friction",
+        "kinetic_friction",
+        "force_drop",
+        "slip_amplitude",
+        "recurrence_time",
+        dull=math.nan,
+    ),
+)
+#: Further columns of slip events.
+SLIPS = _events(
+    "stress_drop", "slip_spread", "slip_duration", "stick_duration", dull=math.nan
+)
+#: Columns of each phase.
+PHASES = (
+    *_columns("phase_start", "phase_time_held", "phase_slip_count"),
+    *_columns("phase_first_friction", "phase_static_friction", dull=math.nan),
+    *_columns("phase_force_drop", "phase_recurrence_time", dull=math.nan),
+)
+
+#: Name of such a statement, its kind, and the share.
+_LOSS = re.compile(r"((\w+?)_(?:at_(.+)_percent_lost|halfway_to_hertz))_mean")
+#: Headings of what is known where a share of the area is lost.
+
+_LOSSES = {
+    "speed": "{place} at {V}",
+    "steady_speed": "{place}, if steady at {V}",
+    "lost_to_bonds": "{place}: to bonds",
+    "lost_to_fluctuations": "{place}: to fluct.",
+    "lost_to_fluctuations_first": "{place}: to fluct. (first)",
+    "lost_to_bonds_last": "{place}: to bonds (last)",
+    "lost_to_mean_stress": "{place}: to stress",
+    "lost_to_lag": "{place}: to lag",
+}
+
+
+def of_losses(stated: xr.Dataset, symbol: str = "V") -> tuple[Column, ...]:
+    """Return the columns of what is known where a share of the area is lost."""
     columns = []
     for match in filter(None, map(_LOSS.fullmatch, map(str, stated))):
-        name, kind, share = match.groups()
-        heading, meaning = _LOSSES[kind]
-        long, short = (
-            (f"{share} % of area\nlost", f"{share} %")
-            if share
-            else ("halfway to\nHertz", "halfway")
+        name, kind, level = match.groups()
+        place = f"{level} % lost" if level else "halfway to Hertz"
+        about = stated[f"{name}_mean"].attrs
+        row = Definition(
+            name,
+            about.get("units", "1"),
+            about.get("long_name", ""),
+            heading=_LOSSES[kind].format(place=place, V=symbol),
+            form=Form.PERCENT,
         )
-        heading = heading.format(long=long, short=short, V=symbol)
-        columns.append(
-            _Column(
-                name, heading, math.nan if "speed" in kind else 0.0, meaning=meaning
-            )
-        )
-    return columns
+        columns.append(Column(row, math.nan if "speed" in kind else 0.0))
+    return tuple(columns)
 
 
-def table(
-    dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None
-) -> list[dict[str, str]]:
-    """Return the statistics in about a dozen rows for the terminal.
+# --- the tables of a run ---
+
+
+def tables_of(run: Run, rows: int = 12, show: Sequence[str] = ()) -> list[Table]:
+    """Return the tables of a run: over time or sweep, of its events, phases and losses.
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it.
-    stated : xarray.Dataset, optional
-        Its ``statements``, if they have been computed before.
+    run : Run
+        The run.
     rows : int
-        How many rows at most (at least one). Where speed and control are steady each point of a sweep has
-        one row, its mean over the second half of the run; else rows are spread evenly over time.
+        Rows of a table at most.
+    show : sequence of str
+        Names of ``GROUPS`` that are printed, too.
+    """
+    result = [table(run, rows, show)]
+    if {"losses", "all"} & {*show}:
+        result.append(_over_rows(run, LOSSES, rows, len(LOSSES)))
+    result += [highlights(run, rows, show), losses(run, rows), phases(run, rows)]
+    result.append(spread(run))
+    return [each_table for each_table in result if each_table.rows]
+
+
+def table(run: Run, rows: int = 12, show: Sequence[str] = ()) -> Table:
+    """Return the statistics over time or sweep.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    rows : int
+        Rows at most (at least one). If speed and mount are steady, each point of a sweep
+        has one row, its mean over the second half of the run. Else rows are spread evenly
+        over time.
+    show : sequence of str
+        ``"all"`` for all columns that say something, else at most ten.
 
     Returns
     -------
-    list of dict
-        Cells by heading (of two lines, with the unit of the column): means over the members, of a swept steady run
-        over its second half, too; ``averaging`` says which. A number in brackets is the standard error in the last
-        digits; columns that are zero or constant throughout (no friction, no open contacts) are left out.
-        "lost to bonds" and "lost to fluct." are the shares of JKR's area that each mechanism takes.
+    Table
+        Means over the members. A number in brackets is the standard error in the last
+        digits. Columns that are constant throughout (no friction, no open contacts) are
+        left out.
     """
-    held, steady = bool(stays_held(dataset).all()), is_steady(dataset)
-    columns = [
-        c
-        for c in _COLUMNS
-        if not (c.changing and (steady if c.name == "stage_speed" else held))
+    most = len(MAIN) if "all" in show else MOST
+    return _over_rows(run, main_columns(run), rows, most)
+
+
+def main_columns(run: Run) -> tuple[Column, ...]:
+    """Return the columns over time or sweep that a run of this kind can have."""
+    skipped = set[str]()
+    if run.is_steady:
+        skipped.add("stage_speed")
+    if run.is_held:
+        skipped |= {"normal_load", "displacement", "dissipated_energy"}
+    if not run.has_one_row_each:
+        skipped.add("correlation_time")
+    if run.has_one_row_each and "drive_speed" in run.dataset.coords:
+        skipped.add("speed")  # it is a column of its place already
+    return tuple(column for column in MAIN if column.name not in skipped)
+
+
+def highlights(run: Run, rows: int = 12, show: Sequence[str] = ()) -> Table:
+    """Return the events of each point of the sweep; no rows without events."""
+    columns = [column for column in EVENTS if _of_drive(run, column.name)]
+    if {"slips", "all"} & {*show}:
+        columns += SLIPS
+    most = len(columns) if show else MOST
+    return _once(run, run.events, columns, rows, most)
+
+
+def losses(run: Run, rows: int = 12) -> Table:
+    """Return the speeds of losses of area, with a row for each point of the sweep of other keys."""
+    symbol = "stage" if run.speed_name == "stage_speed" else "V"
+    return _once(run, run.losses, of_losses(run.losses, symbol), rows, MOST)
+
+
+def phases(run: Run, rows: int = 12) -> Table:
+    """Return the slip events in each phase of the course of a stage, with a row for each phase."""
+    return _once(run, run.events, PHASES, rows, MOST)
+
+
+def spread(run: Run) -> Table:
+    """Return the spread of each quantity over members and stationary time, a row each; no rows of a sweep."""
+    if not run.is_one_ensemble:
+        return Table([])
+    columns = main_columns(run)
+    late = run.late([*(column.name for column in columns), "correlation_time"])
+    late = late.isel(dict.fromkeys(run.sweep, 0))
+    least = _ROUNDING if run.has_noise else _SETTLED
+    rows = [
+        _spread_of(late, column.definition)
+        for column in columns
+        if f"{column.name}_std" in late
+        and late[f"{column.name}_std"] > least * abs(late[f"{column.name}_mean"])
     ]
-    means, points = _tabulated(
-        dataset, rows, [column.name for column in columns], stated
-    )
-    one_row_each = _has_one_row_each(dataset)
-    cells = _places(
-        means,
-        {
-            name: index
-            for name, index in points.items()
-            if name != "t" or not one_row_each
-        },
-    )
-    if one_row_each and any(
-        name in points
-        for name in dataset.coords.get("drive_speed", xr.DataArray()).dims
-    ):
-        # V is a column already
-        columns = [column for column in columns if column.name != "speed"]
-    cells |= _shown(means, points, columns)
-    times, errors, below = (
-        _at(means[f"correlation_time{kind}"], points) for kind in ("", "_sem", "_below")
-    )
-    if np.any(np.isfinite(times) | np.isfinite(below)):
-        ((heading, texts),) = _cells(
-            _MEMORY.heading, "s", np.where(np.isnan(times), below, times), errors
-        ).items()
-        cells[heading] = [
-            f"<{text}" if math.isfinite(most) else text
-            for text, most in zip(texts, below, strict=True)
-        ]
-    return _rows(cells)
+    return Table(rows, keys=1, total=len(rows))
+
+
+def _over_rows(run: Run, columns: Sequence[Column], rows: int, most: int) -> Table:
+    """Return the table of some columns over sweep and time."""
+    means, points = _tabulated(run, rows, [column.name for column in columns])
+    once = run.has_one_row_each
+    placed = {n: index for n, index in points.items() if n != "t" or not once}
+    cells = _places(means, placed)
+    known = [column for column in columns if _says_something(means, column, points)]
+    kept, left_out = _fitting(known, most - len(cells))
+    total = run.points if once else run.points * run.dataset.sizes["t"]
+    shown = {**cells, **_shown(means, points, kept)}
+    return Table(_rows(shown), len(cells), total, kept, left_out)
+
+
+def _once(
+    run: Run, stated: xr.Dataset, columns: Sequence[Column], rows: int, most: int
+) -> Table:
+    """Return a table of numbers of a whole run, a row for each point; no rows if there are none."""
+    chosen = stated[
+        [f"{column.name}_mean" for column in columns if f"{column.name}_mean" in stated]
+    ]
+    sizes = {str(name): size for name, size in chosen.sizes.items()}
+    points = _points(sizes, _thinned(sizes, rows))
+    known = [column for column in columns if _says_something(stated, column, points)]
+    if not known:
+        return Table([])
+    places = _places(chosen, points)
+    kept, left_out = _fitting(known, most - len(places))
+    shown = {**places, **_shown(stated, points, kept)}
+    total = math.prod(sizes.values())
+    return Table(_rows(shown), len(places), total, kept, left_out)
+
+
+def _fitting(
+    columns: Sequence[Column], most: int
+) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
+    """Return the columns that a table has room for, and those that it leaves out."""
+    kept = list(columns)
+    for name in _LEFT_OUT_FIRST:
+        if len(kept) > most:
+            kept = [column for column in kept if column.name != name]
+    kept = kept[: max(most, 1)]
+    return tuple(kept), tuple(column for column in columns if column not in kept)
+
+
+def _of_drive(run: Run, name: str) -> bool:
+    """Return True if an event is shown under this drive: the speed of a peak on a ramp, its time after a start.
+
+    And kinetic friction of a stage at one speed, else it is a mean over speeds.
+    """
+    if name == "kinetic_friction" and run.speed_name == "stage_speed":
+        return not varies(run.dataset)
+    if name in ("peak_speed", "peak_friction_speed"):
+        return "ramp" in run.drive
+    if name in ("peak_time", "peak_friction_time"):
+        return "start" in run.drive
+    return True
+
+
+# --- notes ---
+
+
+class Notes(NamedTuple):
+    """Notes on tables: those that qualify printed numbers, others, and the meanings of headings."""
+
+    needed: list[str]
+    further: list[str]
+    headings: list[str]
+
+
+def notes(run: Run, shown: Sequence[Table]) -> Notes:
+    """Return notes on printed tables: sample, missing trajectories and numbers, systematic errors, headings.
+
+    A note that qualifies a printed number is needed. All others are few: the number of
+    rows, columns that are left out, and the meaning of headings.
+    """
+    columns = [column for each_table in shown for column in each_table.columns]
+    needed = [*_samples(run, shown), *_missing(run, shown)]
+    needed += [
+        f"systematic error: {error}"
+        for error in systematic_errors(run.dataset)
+        if error.matters
+    ]
+    needed += filter(None, [unresolved_slips(run.dataset)])
+    further = [*_turning(run)] if run.has_one_row_each else []
+    further += [
+        f"{len(each_table.rows)} of {each_table.total} rows shown; see --all, --csv FILE and --where KEY=VALUE"
+        for each_table in shown
+        if 0 < len(each_table.rows) < each_table.total
+    ]
+    if left_out := [c for each_table in shown for c in each_table.left_out]:
+        names = ", ".join(dict.fromkeys(column.heading for column in left_out))
+        further.append(f"further columns, with --show all: {names}")
+    chosen = run.chosen_quantities
+    if chosen is not None:
+        names = ", ".join(chosen) or "contact_radius alone"
+        further.append(
+            f"no columns for quantities that were not recorded; record.quantities has {names}"
+        )
+    meanings = {column.heading: column.definition.meaning for column in columns}
+    headings = [f"{heading}: {meaning}" for heading, meaning in meanings.items()]
+    return Notes([*dict.fromkeys(needed)], [*dict.fromkeys(further)], headings)
+
+
+def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
+    """Yield the sample of the means, the meaning of brackets, and trajectories that end early."""
+    cells = [cell for t in shown for row in t.rows for cell in row.values()]
+    phrases = []
+    if sample := run.sample(run.has_one_row_each):
+        phrases.append(f"mean over the {sample}")
+    if any(re.search(r"\d\(", cell) for cell in cells):
+        phrases.append("brackets: standard error in the last digits")
+    if any("±" in cell for cell in cells):
+        phrases.append("±: bound of an error that members do not reduce")
+    if any(re.search(r"\(.* |\([<>]", cell.partition("±")[0]) for cell in cells):
+        phrases.append("near 0 and 100 %: 95 % interval")
+    if run.is_one_ensemble:
+        sample = run.sample(late=True)
+        phrases.append(
+            f"by quantity: over the {sample}; free values: the effective number of independent values"
+        )
+    if phrases:
+        yield "; ".join(phrases)
+    if "runaway_time" in run.dataset:
+        times = run.dataset["runaway_time"].isel(t=-1)
+        if count := int(times.notnull().sum()):
+            yield f"{count} of {times.size} trajectories end because the slider lost stability"
+    if sentence := unresolved(run.dataset):
+        yield sentence
 
 
 def unresolved(dataset: xr.Dataset) -> str:
@@ -397,320 +461,231 @@ def unresolved(dataset: xr.Dataset) -> str:
     )
 
 
-def notes(
-    dataset: xr.Dataset,
-    rows: list[dict[str, str]],
-    once: list[dict[str, str]],
-    stated: xr.Dataset | None = None,
-) -> list[str]:
-    """Return notes on the rows of ``table`` and ``highlights``: sample of the means, number of rows,
-    symbols, and reasons for missing statements.
+def _missing(run: Run, shown: Sequence[Table]) -> Iterator[str]:
+    """Yield the reasons of printed columns in which a number is missing or is no mean, each with its points.
+
+    Reasons that differ in their numbers only are one, with those of the first point.
     """
-    one_row_each, points = _has_one_row_each(dataset), dataset["contact_modulus"].size
-    phrases = [words] if (words := averaging(dataset, one_row_each)) else []
-    if "runaway_time" in dataset and (
-        gone := int(dataset["runaway_time"].isel(t=-1).notnull().sum())
-    ):
-        phrases.append(
-            f"{gone} of {dataset['runaway_time'].isel(t=-1).size} trajectories end in a runaway: the slider lost"
-            " stability"
+    headings = {c.name: c.heading for each_table in shown for c in each_table.columns}
+    names = [name for name in headings if not _is_of_rows(run, name)]
+    groups = [run.events, run.losses]
+    if run.has_one_row_each:
+        late = [name for name in headings if name in QUANTITIES]
+        groups.append(run.late(late))
+        names = [*headings]
+    alike: dict[str, list[tuple[str, str, str]]] = {}
+    for group in groups:
+        for name in names:
+            for reason, place in _reasons(group, name):
+                key = _NUMBER.sub("#", reason)
+                alike.setdefault(key, []).append((headings[name], reason, place))
+    for entries in alike.values():
+        affected = ", ".join(dict.fromkeys(heading for heading, *_ in entries))
+        _, reason, place = entries[0]
+        others = len({place for *_, place in entries}) - 1
+        at = (
+            f" (at {place}{f', and {others} more points' if others else ''})"
+            if place
+            else ""
         )
-    if sentence := unresolved(dataset):
-        phrases.append(sentence)
-    if any("(" in cell for row in rows for cell in row.values()):
-        phrases.append(
-            "brackets: standard error in the last digits, larger if there are few members"
-        )
-    if any(
-        " to " in cell for row in (*rows, *once) for cell in row.values() if "(" in cell
-    ):
-        phrases.append("near 0 and 100 %: 95 % interval")
-    lines = ["; ".join(phrases)] if phrases else []
-    for shown, total in (
-        (rows, points if one_row_each else points * dataset.sizes["t"]),
-        (once, points),
-    ):
-        if 0 < len(shown) < total:
-            lines.append(
-                f"{len(shown)} of {total} rows shown; see --all, --csv FILE and --where KEY=VALUE"
-            )
-    headings = {
-        re.sub(r"[ \n]\([^()]*\)$", "", heading)
-        for row in (*rows[:1], *once[:1])
-        for heading in row
-    }
-    # not of every dataset; none where all was recorded
-    with contextlib.suppress(KeyError, TypeError):
-        recorded = (
-            ", ".join(resolved(dataset, "record.quantities")) or "contact_radius alone"
-        )
-        lines.append(
-            f"no columns for quantities that were not recorded; record.quantities has {recorded}"
-        )
-    columns = (*_COLUMNS, *_EVENTS, *_of_losses(stated or xr.Dataset()))
-    headed = {c.name: " ".join(c.heading.split()) for c in columns}
-    for reason, names in reasons(stated or xr.Dataset()).items():
-        if shown_names := [headed[name] for name in names if name in headed]:
-            lines.append(f"* {', '.join(dict.fromkeys(shown_names))}: {reason}")
-    lines += [
-        f"systematic error: {error}"
-        for error in systematic_errors(dataset)
-        if error.matters
-    ]
-    lines += filter(None, [unresolved_slips(dataset)])
-    lines += _turning(dataset, stated) if one_row_each and stated else []
-    known = [
-        c for c in (*_COLUMNS, _MEMORY, *_EVENTS) if c.meaning and c.heading in headings
-    ]
-    if _spreads(dataset):
-        over = averaging(dataset, True).removeprefix("mean over the ")
-        lines.append(
-            f"by quantity: over the {over}; free values: the effective number of independent values"
-        )
-    words = "; ".join(
-        f"{' '.join(column.heading.split())}: {column.meaning}" for column in known
-    )
-    return [*dict.fromkeys(lines), *filter(None, [words])]
+        yield f"* {affected}: {reason}{at}"
 
 
-def _turning(dataset: xr.Dataset, stated: xr.Dataset) -> Iterator[str]:
+def _is_of_rows(run: Run, name: str) -> bool:
+    """Return True for a quantity over time."""
+    return f"{name}_mean" not in run.events and f"{name}_mean" not in run.losses
+
+
+def _reasons(group: xr.Dataset, name: str) -> Iterator[tuple[str, str]]:
+    """Yield each reason of a quantity with the point of the sweep in words, "" without a sweep."""
+    variable = group.get(f"{name}_reason")
+    if variable is None:
+        return
+    for place in np.ndindex(*variable.shape):
+        if text := str(variable.to_numpy()[place]):
+            point = variable[dict(zip(variable.dims, place, strict=True))]
+            yield text, _in_words(point)
+
+
+def _in_words(point: xr.DataArray) -> str:
+    """Return the coordinates of a point in words."""
+    words = []
+    for name, value in point.coords.items():
+        if value.dtype.kind == "f":
+            text = engineering(float(value), value.attrs.get("units", "1"))
+        else:
+            text = str(value.item())
+        words.append(f"{name} = {text}")
+    return ", ".join(words)
+
+
+def _turning(run: Run) -> Iterator[str]:
     """Yield where area and friction are largest or least inside a sweep of one number: they are not monotonic."""
-    swept = [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
+    swept = [name for name in run.sweep if run.dataset.sizes[name] > 1]
     if (
         len(swept) != 1
-        or dataset[swept[0]].dtype.kind not in "fi"
-        or dataset.sizes[swept[0]] < _TURNS
+        or run.dataset[swept[0]].dtype.kind not in "fi"
+        or run.dataset.sizes[swept[0]] < _TURNS
     ):
         return
-    for name in (
-        name for name in ("contact_area", "friction_force") if f"{name}_mean" in stated
-    ):
-        if bool((stated.get(f"{name}_reason", xr.DataArray("")) != "").any()):
+    names = ("contact_area", "friction_force")
+    late = run.late(names).isel({n: 0 for n in run.sweep if n != swept[0]})
+    for name in names:
+        if f"{name}_mean" not in late or bool((late[f"{name}_reason"] != "").any()):
             continue  # values at an end are no means
-        curves = stated[[f"{name}_{end}" for end in ("mean", "low", "high")]]
-        inside = extremes(
-            curves.isel({n: 0 for n in sweep_dims(dataset) if n != swept[0]}),
-            name,
-            swept[0],
-        )
+        inside = extremes(late, name, swept[0])
         for extreme in ("largest", "least"):
-            if math.isfinite(value := float(inside[f"{name}_{extreme}"])):
-                places = (
-                    inside[f"{name}_{extreme}_at{end}"] for end in ("", "_low", "_high")
-                )
-                at, low, high = (
-                    engineering(float(place), place.units) for place in places
-                )
-                size = engineering(value, stated[f"{name}_mean"].attrs["units"])
-                yield f"{name.replace('_', ' ')} is {extreme}, {size}, at {swept[0]} = {at} (between {low} and {high})"
+            value = float(inside[f"{name}_{extreme}"])
+            if not math.isfinite(value):
+                continue
+            places = (
+                inside[f"{name}_{extreme}_at{end}"] for end in ("", "_low", "_high")
+            )
+            at, low, high = (engineering(float(place), place.units) for place in places)
+            size = engineering(value, late[f"{name}_mean"].attrs["units"])
+            yield f"{name.replace('_', ' ')} is {extreme}, {size}, at {swept[0]} = {at} (between {low} and {high})"
 
 
-def highlights(
-    dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None
-) -> list[dict[str, str]]:
-    """Return the events of each point of the sweep, in at most a dozen rows; none without events.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it.
-    rows : int
-        How many rows at most (at least one).
-
-    Returns
-    -------
-    list of dict
-        Cells by heading, as those of ``table``: how long adhesion was masked, how many members detached and when
-        (the mean, and the 5 and 95 % quantiles of those that did), what a cycle there and back took and
-        how much it dissipated, and the friction peak of a start or a ramp.
-    """
-    once = of_events(dataset) if stated is None else stated
-    return _once(
-        once, [column for column in _EVENTS if _of_drive(dataset, column.name)], rows
-    )
+# --- a run without a sweep in a report ---
 
 
-def losses(
-    dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None
-) -> list[dict[str, str]]:
-    """Return the speeds of losses of area, with a row for each point of the sweep of other keys."""
-    speeds = as_means(loss_speeds(dataset)) if stated is None else stated
-    return _once(
-        speeds,
-        _of_losses(speeds, "stage" if speed_name(dataset) == "stage_speed" else "V"),
-        rows,
-    )
-
-
-def phases(
-    dataset: xr.Dataset, rows: int = 12, stated: xr.Dataset | None = None
-) -> list[dict[str, str]]:
-    """Return the slip events in each phase of the course of a stage, with a row for each phase."""
-    return _once(of_events(dataset) if stated is None else stated, _PHASES, rows)
-
-
-def _once(
-    stated: xr.Dataset, columns: Sequence[_Column], rows: int
-) -> list[dict[str, str]]:
-    """Return statements of a whole run, a row for each point of their dimensions; no rows if there are none."""
-    chosen = stated[
-        [
-            name
-            for name in stated
-            if str(name).startswith(tuple(f"{c.name}_" for c in columns))
-        ]
-    ]
-    sizes = {
-        str(name): size for name, size in chosen.sizes.items() if name != "quantile"
-    }
-    points = _points(sizes, _thinned(sizes, rows))
-    shown = _shown(chosen, points, columns)
-    return _rows(_places(chosen, points) | shown) if shown else []
-
-
-def key_figures(dataset: xr.Dataset, stated: xr.Dataset) -> list[dict[str, str]]:
-    """Return the statements of a run without a sweep, a row each: symbol, value, and definition with the sample."""
-    known = (*_COLUMNS, *_EVENTS, *_PHASES, *_of_losses(stated))
+def key_figures(run: Run) -> list[dict[str, str]]:
+    """Return the numbers of a run without a sweep, a row each: symbol, value, and definition with the sample."""
     columns = {
-        c.name: c for c in known if not c.changing and _of_drive(dataset, c.name)
+        column.name: column
+        for column in (*MAIN, *LOSSES, *EVENTS, *SLIPS, *of_losses(run.losses))
+        if _of_drive(run, column.name)
     }
+    groups = [run.events, run.losses]
+    if run.is_stationary:
+        groups.append(run.late(c.name for c in (*main_columns(run), *LOSSES)))
     rows = []
-    for statement in each(stated):
+    for statement in (one for group in groups for one in each(group)):
         column = columns.get(statement.name)
-        unknown = math.isnan(statement.value) and not statement.reason
-        if column is None or unknown or abs(statement.value - column.dull) < _ROUNDING:
+        is_missing = math.isnan(statement.value) and not statement.reason
+        if column is None or is_missing:
             continue
-        text, over = (
-            column.meaning or statement.text,
-            statement.over and f"; mean over the {statement.over}",
-        )
+        if abs(statement.value - column.dull) < _ROUNDING:
+            continue
+        meaning = column.definition.meaning
+        over = f"; mean over the {statement.over}" if statement.over else ""
         places = [
             f"phase {at}" if name == "phase" else str(at)
             for name, at in statement.at.items()
         ]
-        heading = ", ".join([" ".join(column.heading.split()), *places])
         rows.append(
             {
-                "": heading,
+                "": ", ".join([column.heading, *places]),
                 "value": str(statement),
-                "definition": text[:1].upper() + text[1:] + over,
+                "definition": meaning[:1].upper() + meaning[1:] + over,
             }
         )
     return rows
 
 
-def _of_drive(dataset: xr.Dataset, name: str) -> bool:
-    """Return True if an event is shown under this drive: the speed of a peak on a ramp, its time after a start.
-
-    And kinetic friction of a stage at one speed, else it is a mean over speeds.
-    """
-    if name == "kinetic_friction" and "stage_speed" in dataset:
-        return not varies(dataset)
-    drives = {"speed": "ramp", "time": "start"}
-    wanted = drives.get(name.rpartition("_")[2]) if name.startswith("peak_") else None
-    return wanted is None or bool((word(dataset, "drive.model", "") == wanted).any())
+# --- cells ---
 
 
-def narrow(
-    rows: list[dict[str, str]], keys: int, most: int = 10
-) -> list[list[dict[str, str]]]:
-    """Return a table as several of at most so many columns, each with the first ``keys`` columns of the table."""
-    headings = list(rows[0]) if rows else []
-    values = headings[keys:]
-    count = math.ceil(len(values) / max(most - keys, 1))
-    parts = [
-        [str(name) for name in part]
-        for part in np.array_split(np.array(values, object), max(count, 1))
-    ]
-    return [
-        [{name: row[name] for name in (*headings[:keys], *part)} for row in rows]
-        for part in parts
-        if rows
-    ]
-
-
-def _places(places: xr.Dataset, points: Points) -> Columns:
+def _places(places: xr.Dataset, points: Points) -> Cells:
     """Return the columns of the place in the sweep and the time of each row."""
-    cells: Columns = {}
-    # then long names on one line part their values
-    several = len(points.keys() - {"t"}) > 1
+    cells: Cells = {}
     for name, index in points.items():
-        heading = name.replace("_", "_\n", 1) if several else name
-        cells |= _cells(
-            heading,
-            places[name].attrs.get("units", "1"),
-            places[name][index].to_numpy(),
-        )
+        unit = places[name].attrs.get("units", "1")
+        heading, texts = _column_of(name, unit, places[name][index].to_numpy())
+        cells[heading] = texts
     return cells
 
 
-def _range(means: xr.Dataset, name: str, heading: str, points: Points) -> Columns:
-    """Return the least and largest value of an event over its cycles, or the quantiles of a time over members."""
-    if name == "first_detachment" and f"{name}_quantile" in means:
-        low, high = (
-            _at(means[f"{name}_quantile"].isel(quantile=end), points) for end in (0, -1)
-        )
-        count = re.match(r"\d+(?= member)", means[f"{name}_mean"].attrs.get("over", ""))
-        fewest = (
-            float(count[0]) * np.nanmin(_at(means["ever_detached_mean"], points))
-            if count
-            else math.inf
-        )
-        heading = "5 to 95 %\nof members" + (
-            ", interpolated" if fewest < FOR_TAILS else ""
-        )
-    elif f"{name}_least_mean" in means:
-        low, high = (
-            _at(means[f"{name}_{end}_mean"], points) for end in ("least", "largest")
-        )
-        heading = f"{' '.join(heading.split())},\nleast to largest"
-    else:
-        return {}
-    factor, shown = scaled(
-        float(np.nanmax(np.abs([low, high]), initial=0.0)),
-        means[f"{name}_mean"].attrs["units"],
+def _says_something(means: xr.Dataset, column: Column, points: Points) -> bool:
+    """Return True if a column is known and not constant at its dull value at these points."""
+    if f"{column.name}_mean" not in means:
+        return False
+    mean, low, high = (
+        _at(means.get(f"{column.name}_{kind}"), points)
+        for kind in ("mean", "low", "high")
     )
-    ends = [[concise(factor * end, 0.0) for end in column] for column in (low, high)]
-    if ends[0] == ends[1]:
-        return {}
-    texts = [" to ".join(pair) for pair in zip(*ends, strict=True)]
-    return {f"{heading} ({shown})": texts}
+    if column.definition.form is not Form.PLAIN:
+        mean = np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
+    is_missing = np.isnan(mean) & np.isnan(low) & np.isnan(high)
+    return not np.all((mean == column.dull) | is_missing)
 
 
-def _shown(means: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Columns:
-    """Return the columns that are not constant at their dull value at these points."""
-    cells: Columns = {}
+def _shown(means: xr.Dataset, points: Points, columns: Iterable[Column]) -> Cells:
+    """Return the cells of columns at some points."""
+    cells: Cells = {}
     for column in columns:
-        name, heading, dull, *_ = column
-        if f"{name}_mean" not in means:
-            continue
-        mean, low, high = (
-            _at(means.get(f"{name}_{kind}"), points) for kind in ("mean", "low", "high")
-        )
-        unit = means[f"{name}_mean"].attrs.get("units", "1")
-        # differences of areas leave rounding behind
-        if unit == "1" and name not in COUNTS:
-            unit, mean = "%", np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
-        if not np.all(
-            (mean == dull) | (np.isnan(mean) & np.isnan(low) & np.isnan(high))
-        ):
-            # of few members above the standard error
-            error = (high - low) / (2.0 * WIDE)
-            ((heading, texts),) = _cells(heading, unit, mean, error, low, high).items()
-            if name in BOUNDED:
-                texts = [
-                    share(*ends) or text
-                    for *ends, text in zip(mean, low, high, texts, strict=True)
-                ]
-            if f"{name}_reason" in means:
-                has_reason = _at(means[f"{name}_reason"], points) != ""
-                texts = [
-                    f"{text}*" if marked else text
-                    for text, marked in zip(texts, has_reason, strict=True)
-                ]
-            cells[heading] = texts
-            cells |= _range(means, name, column.heading, points)
+        heading, texts = _texts_of(means, points, column.definition)
+        while heading in cells:  # of two peaks, each with its speed
+            heading += " "
+        cells[heading] = texts
     return cells
+
+
+def _texts_of(
+    means: xr.Dataset, points: Points, row: Definition
+) -> tuple[str, list[str]]:
+    """Return the heading of a column with its unit, and its cells."""
+    mean, error, low, high, bound = (
+        _at(means.get(f"{row.name}_{kind}"), points)
+        for kind in ("mean", "sem", "low", "high", "bound")
+    )
+    known = means[f"{row.name}_mean"]
+    source = str(means.get(f"{row.name}_bound", known).attrs.get("source", ""))
+    unit = known.attrs.get("units", "1")
+    if row.form is not Form.PLAIN and unit == "1":
+        unit, mean = "%", np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
+    errors = (error, low, high, np.nan_to_num(bound))
+    heading, texts = _column_of(row.heading, unit, mean, errors, source)
+    if row.form is Form.SHARE:
+        texts = [
+            share(*ends) or text
+            for *ends, text in zip(mean, low, high, texts, strict=True)
+        ]
+    if f"{row.name}_reason" in means:
+        has_reason = _at(means[f"{row.name}_reason"], points) != ""
+        texts = [
+            f"{text}*" if marked else text
+            for text, marked in zip(texts, has_reason, strict=True)
+        ]
+    return heading, texts
+
+
+#: Standard error, ends of the interval and systematic error of a number without any.
+_EXACT = tuple(np.array(number) for number in (0.0, math.nan, math.nan, 0.0))
+
+
+def _column_of(
+    heading: str,
+    unit: str,
+    values: Array,
+    errors: Sequence[Array] = _EXACT,
+    source: str = "",
+) -> tuple[str, list[str]]:
+    """Return a heading with the unit that suits the largest value, and the cells of a column.
+
+    ``errors`` are standard errors, both ends of intervals, and systematic errors.
+    """
+    if values.dtype.kind not in "fi":
+        return heading, [str(value) for value in values]
+    sizes = np.abs(values)
+    if not np.any(np.isfinite(sizes)):
+        sizes = np.abs(np.append(errors[1], errors[2]))
+    finite = sizes[np.isfinite(sizes)]
+    factor, shown = scaled(finite.max(initial=0.0), unit)
+    if unit == "%":
+        factor, shown = 100.0, "%"
+    texts = [
+        bounded(
+            factor * value,
+            factor * error,
+            factor * low,
+            factor * high,
+            factor * bound,
+            source,
+        )
+        for value, error, low, high, bound in np.broadcast(values, *errors)
+    ]
+    return f"{heading} ({shown})" if shown else heading, texts
 
 
 def _at(variable: xr.DataArray | None, points: Points) -> Array:
@@ -724,69 +699,33 @@ def _at(variable: xr.DataArray | None, points: Points) -> Array:
     return np.broadcast_to(values, count)
 
 
-def _rows(cells: Columns) -> list[dict[str, str]]:
+def _rows(cells: Cells) -> list[dict[str, str]]:
     return [
         dict(zip(cells, row, strict=True)) for row in zip(*cells.values(), strict=True)
     ]
 
 
-def _tabulated(
-    dataset: xr.Dataset, rows: int, names: list[str], stated: xr.Dataset | None
-) -> tuple[xr.Dataset, Points]:
-    """Return statistics of observables to tabulate, and the index of each row in every dimension of sweep and time."""
-    memory, counts = (
-        correlation_time(dataset),
-        _thinned(dataset["contact_modulus"].sizes, rows),
-    )
+def _tabulated(run: Run, rows: int, names: list[str]) -> tuple[xr.Dataset, Points]:
+    """Return statistics to tabulate, and the index of each row in every dimension of sweep and time."""
+    dataset = run.dataset
+    counts = _thinned(dataset["contact_modulus"].sizes, rows)
     counts["t"] = max(1, rows // math.prod(counts.values()))
-    if _has_one_row_each(dataset):
-        result = statements(dataset, names) if stated is None else stated
-    else:
-        dataset = with_slips(dataset)
-        # of the records only those that are shown, none after all have ended
-        if counts["t"] < dataset.sizes["t"]:
-            dataset = dataset.isel(t=slice(_last(dataset) + 1))
-            dataset = restricted(dataset, names).isel(
-                t=_spread(dataset.sizes["t"], counts["t"])
+    if run.has_one_row_each:
+        result = run.late(names)
+        return result, _points({**result.sizes, "t": 1}, counts)
+    dataset = with_slips(dataset)
+    # of the records only those that are shown, none after all have ended
+    if counts["t"] < dataset.sizes["t"]:
+        dataset = restricted(dataset.isel(t=slice(run.last + 1)), names)
+        dataset = dataset.isel(t=_spread(dataset.sizes["t"], counts["t"]))
+    result = over_members(dataset, names, quantiles=False)
+    # it is known of open contacts too
+    if "applied_load" in dataset and "normal_load_mean" in result:
+        for kind in ("mean", "low", "high"):
+            result[f"normal_load_{kind}"] = dataset["applied_load"].fillna(
+                result[f"normal_load_{kind}"]
             )
-        result = over_members(dataset, names, quantiles=False)
-        # it is known of open contacts too
-        if "applied_load" in dataset and "normal_load_mean" in result:
-            for kind in ("mean", "low", "high"):
-                result[f"normal_load_{kind}"] = dataset["applied_load"].fillna(
-                    result[f"normal_load_{kind}"]
-                )
-    return result.merge(memory, compat="no_conflicts"), _points(
-        {**result.sizes, "t": result.sizes.get("t", 1)}, counts
-    )
-
-
-def _has_one_row_each(dataset: xr.Dataset) -> bool:
-    """Return True if each point of a sweep has one row, its mean over the second half of the run."""
-    return bool(sweep_dims(dataset)) and _lasts(dataset)
-
-
-def _lasts(dataset: xr.Dataset) -> bool:
-    """Return True if speed and control are constant and a trajectory lasts to the second half of the run."""
-    return is_stationary(dataset) and _last(dataset) >= dataset.sizes["t"] // 2
-
-
-def _last(dataset: xr.Dataset) -> int:
-    """Return the last record of any trajectory: after it all of them have stopped."""
-    radius = next(
-        (
-            dataset[name]
-            for name in ("contact_radius", "contact_radius_mean")
-            if name in dataset
-        ),
-        None,
-    )
-    last = dataset.sizes["t"] - 1
-    if radius is None or bool(radius.isel(t=last).notnull().any()):
-        return last
-    return bisect.bisect_left(
-        range(1, last), True, key=lambda at: bool(radius.isel(t=at).isnull().all())
-    )
+    return result, _points(dict(result.sizes), counts)
 
 
 def _points(sizes: Mapping[Any, int], counts: dict[str, int]) -> Points:
@@ -811,371 +750,35 @@ def _thinned(sizes: Mapping[Any, int], rows: int) -> dict[str, int]:
 def _spread(size: int, count: int) -> Array:
     """Return at most ``count`` indices evenly over ``size``, the last included."""
     count = min(size, count)
-    return np.rint(np.linspace(0 if count > 1 else size - 1, size - 1, count)).astype(
-        int
-    )
+    first = 0 if count > 1 else size - 1
+    return np.rint(np.linspace(first, size - 1, count)).astype(int)
 
 
-def _cells(
-    heading: str, unit: str, values: Array, errors: Any = 0.0, *ends: Array
-) -> Columns:
-    """Return a column's cells in the unit of its largest value, under its heading with that unit."""
-    if values.dtype.kind not in "fi":
-        return {heading: [str(value) for value in values]}
-    sizes = np.abs(
-        values if np.any(np.isfinite(values)) else np.concatenate([values, *ends])
-    )
-    finite = sizes[np.isfinite(sizes)]
-    factor, shown = (
-        (100.0, "%") if unit == "%" else scaled(finite.max(initial=0.0), unit)
-    )
-    texts = [
-        bounded(*(factor * number for number in numbers))
-        for numbers in np.broadcast(values, errors, *ends)
-    ]
-    gap = " " if "\n" in heading else "\n"
-    return {f"{heading}{gap}({shown})" if shown else heading: texts}
-
-
-def spread(
-    dataset: xr.Dataset, stated: xr.Dataset | None = None
-) -> list[dict[str, str]]:
-    """Return the spread of each quantity over members and stationary time, a row each; no rows of a sweep."""
-    if not _spreads(dataset):
-        return []
-    fixed = [column for column in _COLUMNS if not column.changing]
-    stated = (
-        statements(dataset, [column.name for column in fixed])
-        if stated is None
-        else stated
-    )
-    result = stated.isel(dict.fromkeys(sweep_dims(dataset), 0))
-    fixed = [column for column in fixed if f"{column.name}_std" in result]
-    least = _ROUNDING if bool(has_noise(dataset).any()) else _SETTLED
-    varied = (
-        c
-        for c in fixed
-        if result[f"{c.name}_std"] > least * abs(result[f"{c.name}_mean"])
-    )
-    return [_spread_of(result, column) for column in varied]
-
-
-def _spreads(dataset: xr.Dataset) -> bool:
-    """Return True for one stationary run of members that differ."""
-    return (
-        dataset["contact_modulus"].size == 1
-        and MEMBERS in dataset.sizes
-        and _lasts(dataset)
-    )
-
-
-def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
+def _spread_of(means: xr.Dataset, row: Definition) -> dict[str, str]:
     """Return a row of ``spread``."""
 
     def of(kind: str) -> Array:
-        return means[f"{column.name}_{kind}"].to_numpy()
+        return means[f"{row.name}_{kind}"].to_numpy()
 
-    unit = means[f"{column.name}_mean"].attrs.get("units", "1")
-    factor, shown = (
-        (100.0, "%")
-        if unit == "1"
-        else scaled(float(np.max(np.abs(of("quantile")))), unit)
-    )
-    error, *errors = (
-        factor
-        * np.append(of("high") - of("low"), of("quantile_high") - of("quantile_low"))
-        / (2.0 * WIDE)
-    )
-    row = {"quantity": f"{' '.join(column.heading.split())} ({shown})"}
-    row |= {
-        "mean": concise(factor * float(of("mean")), error),
-        "sd": f"{factor * of('std'):.3g}",
+    factor, shown = scaled(float(np.max(np.abs(of("quantile")))), row.unit)
+    if row.form is not Form.PLAIN:
+        factor, shown = 100.0, "%"
+    heading = f"{row.heading} ({shown})" if shown else row.heading
+    cells = {
+        "quantity": heading,
+        "mean": concise(factor * float(of("mean")), factor * float(of("sem"))),
     }
-    for level, value, sem in zip(
-        QUANTILES, factor * of("quantile"), errors, strict=True
-    ):
-        row[f"{100.0 * level:.0f} %"] = concise(value, sem)
-    time = float(means.get(f"{column.name}_correlation_time", math.nan))
-    step, unit = scaled(time, "s")
-    row["t_c"] = "–"
+    cells["sd"] = f"{factor * of('std'):.3g}"
+    errors = (of("quantile_high") - of("quantile_low")) / (2.0 * WIDE)
+    for level, value, error in zip(QUANTILES, of("quantile"), errors, strict=True):
+        cells[f"{100.0 * level:.0f} %"] = concise(factor * value, factor * error)
+    cells["t_c"] = "–"
+    time = float(means.get(f"{row.name}_correlation_time", math.nan))
+    below = float(means.get("correlation_time_high", math.nan))
+    if row.name == "fluctuation_energy" and below > 0.0:
+        cells["t_c"] = f"< {engineering(below, 's')}"
     if time > 0.0:
-        row["t_c"] = (
-            f"{concise(step * time, step * float(of('correlation_time_sem')))} {unit}"
-        )
-    return row | {"free values": f"{of('effective_samples'):.3g}"}
-
-
-# --- a long table for other programs, and a data frame ---
-
-
-_TEXTS = "quantity", "unit", "over"
-#: Columns of statistics, and the endings of their names in a dataset in which each quantile is a variable.
-_ENDINGS = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": "std"}
-_ALIKE = [
-    f"q{100 * level:02.0f}{end}" for level in QUANTILES for end in ("", "_low", "_high")
-]
-_ENDINGS |= {name: name for name in (*_ALIKE, "effective_samples", "correlation_time")}
-_ENDINGS |= {"correlation_time_error": "correlation_time_sem"}
-
-
-def to_csv(
-    dataset: xr.Dataset,
-    path: str | os.PathLike,
-    wide: bool = False,
-    every: bool = False,
-    lost: Sequence[str] = (),
-    stated: xr.Dataset | None = None,
-) -> None:
-    """Write all statistics as one long table, as ``tidy`` gives them, or as a wide one.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it.
-    path : path
-        The file: a header, then one row for each quantity, sweep value and time. A file is there whole or, in trouble,
-        as it was before.
-    wide : bool
-        True for a row for each point of the sweep, with a column for each statement, its error and its bounds, in the
-        units of ``in_units``, else in SI.
-    every : bool
-        True for a wide table of a row for each record, with all statistics.
-    stated : xarray.Dataset, optional
-        Its ``statements``, if they have been computed before.
-    """
-    if wide:
-        rows = in_columns(dataset, every, lost, stated)
-        names = header = list(rows)
-        parts = [{name: rows[name].to_numpy() for name in names}]
-    else:
-        names, parts = _long(dataset, lost, stated)
-        units = {
-            str(name): variable.attrs.get("units", "1")
-            for name, variable in dataset.coords.items()
-        }
-        header = [
-            _with_unit(name, (units | {"speed": "m/s"}).get(name, "1"))
-            for name in names
-        ]
-    with (
-        output(Path(path)) as beside,
-        beside.open("w", encoding="utf-8", newline="") as file,
-    ):
-        file.write(",".join(_quoted(header)) + "\n")
-        for part in parts:
-            columns = [part.get(name, np.array(np.nan)).ravel() for name in names]
-            count = max(map(len, columns), default=0)
-            # because the texts of all rows together take much memory
-            for start in range(0, count, _LINES):
-                rows = slice(start, min(start + _LINES, count))
-                fields = (
-                    _texts(values[rows])
-                    if len(values) == count
-                    else _texts(values) * (rows.stop - start)
-                    for values in columns
-                )
-                file.writelines(
-                    f"{line}\n" for line in map(",".join, zip(*fields, strict=True))
-                )
-
-
-def _texts(values: Array) -> list[str]:
-    """Return a column as fields of CSV, each different value written once."""
-    # 0.0 and -0.0 differ
-    bits = values.view(np.int64) if values.dtype == np.float64 else values
-    places, alike = pd.factorize(bits, use_na_sentinel=False)
-    texts = (
-        _quoted(alike)
-        if bits is values
-        else list(map(repr, alike.view(np.float64).tolist()))
-    )
-    return list(map(texts.__getitem__, places.tolist()))
-
-
-def _quoted(values: Iterable[Any]) -> list[str]:
-    """Return values as fields of CSV, with quotation marks if they are needed."""
-    fields: list[str] = []
-    for value in values:
-        line = io.StringIO()
-        csv.writer(line, lineterminator="").writerow(
-            ["nan" if pd.isna(value) else value, ""]
-        )
-        fields.append(line.getvalue()[:-1])
-    return fields
-
-
-def _with_unit(name: str, unit: str) -> str:
-    return name if unit in ("1", "") else f"{name} [{unit}]"
-
-
-def in_columns(
-    dataset: xr.Dataset,
-    every: bool = False,
-    lost: Sequence[str] = (),
-    stated: xr.Dataset | None = None,
-) -> pd.DataFrame:
-    """Return the statements of a run, a row for each point of the sweep; with ``every`` all statistics at each record.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A column ``name [unit]`` for each swept key and statement, and if they are known ``name_error``, ``name_low``
-        and ``name_high`` (95 % interval) and ``name_reason``. Units are those of ``in_units``, else SI.
-    """
-    stated = (
-        xr.Dataset()
-        if every
-        else statements(dataset, lost=lost)
-        if stated is None
-        else stated
-    )
-    wanted = re.compile(
-        "(?!.*_(quantile|correlation_time)).*_(mean|sem|low|high|reason)"
-    )
-    stated = stated.drop_dims("phase", errors="ignore")
-    rows = (
-        frame(dataset)
-        if every
-        else _framed(dataset, stated[[n for n in stated if wanted.fullmatch(str(n))]])
-    )
-    units, columns = rows.attrs["units"], {}
-    for name in rows.replace("", np.nan).dropna(axis="columns", how="all"):
-        stem, _, end = name.rpartition("_")
-        exact = (
-            0.0
-            if end == "sem"
-            else rows.get(f"{stem}_mean")
-            if end in ("low", "high")
-            else None
-        )
-        # numbers without noise have no error
-        if exact is None or not np.all(rows[name] == exact):
-            factor, unit = chosen_unit(units.get(name, "1")) or (
-                1.0,
-                units.get(name, "1"),
-            )
-            heading = _with_unit(
-                re.sub("_sem$", "_error", name.removesuffix("_mean")), unit
-            )
-            columns[heading] = rows[name] if factor == 1.0 else factor * rows[name]
-    return pd.DataFrame(columns)
-
-
-def tidy(dataset: xr.Dataset, lost: Sequence[str] = ()) -> pd.DataFrame:
-    """Return all statistics, one row for each quantity, sweep value and time, in SI.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns: the swept keys; ``t`` [s], nan where a number is of the whole run or of its second half; the prescribed
-        ``speed`` [m/s]; ``quantity``, its ``unit``, and what its ``mean`` is ``over``; ``error`` (standard error),
-        ``low`` and ``high`` (95 % interval) of the mean; ``sd``; quantiles ``q05``, ``q50``, ``q95`` with
-        the ends of their intervals; ``effective_samples``, ``correlation_time`` and ``correlation_time_error`` [s].
-    """
-    names, parts = _long(dataset, lost)
-    wholes = (
-        {n: np.broadcast_to(v, part["mean"].shape).ravel() for n, v in part.items()}
-        for part in parts
-    )
-    return pd.concat(map(pd.DataFrame, wholes), ignore_index=True)[names]
-
-
-def _long(
-    dataset: xr.Dataset, lost: Sequence[str], stated: xr.Dataset | None = None
-) -> tuple[list[str], list[dict[str, Array]]]:
-    """Return the columns of ``tidy``, and those of each quantity over its dimensions; a text is shared by all rows."""
-    places, parts, speeds = (
-        [*map(str, dataset["contact_modulus"].coords), "branch", "phase", "t"],
-        [],
-        {},
-    )
-    stated, members = (
-        statements(dataset, lost=lost) if stated is None else stated,
-        averaging(dataset, False),
-    )
-    if speed_name(dataset) in dataset:
-        speed = speed_of(dataset).compute()
-        speeds = {
-            True: speed,
-            False: speed.isel(t=0, drop=True).where(steady_points(dataset)),
-        }
-    for group, sample in (
-        (over_members(dataset), members.removeprefix("mean over the ")),
-        (stated, ""),
-    ):
-        group, dims = _flat(group), (*sweep_dims(dataset), *places[-3:])
-        known = {
-            name: group.coords[name].variable for name in places if name in group.coords
-        }
-        # or none
-        known |= {
-            name: phase.astype(float)
-            for name, phase in known.items()
-            if phase.dtype.kind == "i"
-        }
-        for key in (str(key) for key in group if str(key).endswith("_mean")):
-            name, mean = key.removesuffix("_mean"), group.variables[key]
-            columns: dict[str, Any] = known | (
-                {"speed": speeds["t" in mean.dims].variable} if speeds else {}
-            )
-            columns |= {
-                column: group.variables.get(f"{name}_{end}")
-                for column, end in _ENDINGS.items()
-            }
-            sizes = {dim: mean.sizes[dim] for dim in dims if dim in mean.dims}
-            texts = (
-                name,
-                mean.attrs.get("units", "1"),
-                mean.attrs.get("over", sample) or "one run",
-            )
-            parts.append(
-                dict(
-                    zip(_TEXTS, (np.array(text, object) for text in texts), strict=True)
-                )
-            )
-            for column, values in columns.items():
-                if values is not None and set(values.dims) <= sizes.keys():
-                    parts[-1][column] = (
-                        values.to_base_variable().set_dims(sizes).to_numpy()
-                    )
-    names = (*places, "speed", *_TEXTS, *_ENDINGS)
-    return [name for name in names if any(name in part for part in parts)], parts
-
-
-def frame(dataset: xr.Dataset) -> pd.DataFrame:
-    """Return all statistics at all times and sweep values, one row each; ``attrs["units"]`` holds units by column."""
-    return _framed(dataset, statistics(dataset))
-
-
-def _framed(dataset: xr.Dataset, statistics: xr.Dataset) -> pd.DataFrame:
-    """Return a data frame of a row for each point of the sweep and, if statistics have times, each record."""
-    flat = _flat(statistics)
-    dims = [name for name in (*sweep_dims(dataset), "branch", "t") if name in flat.dims]
-    table = (
-        flat.expand_dims("row")
-        .to_dataframe(dim_order=["row", *dims])
-        .reset_index()
-        .drop(columns="row")
-    )
-    table.attrs["units"] = {
-        str(name): variable.attrs.get("units", "1")
-        for name, variable in flat.variables.items()
-    }
-    return table
-
-
-def _flat(statistics: xr.Dataset) -> xr.Dataset:
-    """Return statistics in which each quantile is a variable."""
-    flat: dict[str, xr.Variable] = {}
-    for key in map(str, statistics):
-        variable, (stem, _, end) = (
-            statistics.variables[key],
-            key.rpartition("_quantile"),
-        )
-        levels = QUANTILES if "quantile" in variable.dims else ()
-        flat |= {
-            f"{stem}_q{100 * level:02.0f}{end}": variable.isel(quantile=k)
-            for k, level in enumerate(levels)
-        }
-        flat |= {} if levels else {key: variable}
-    return statistics.drop_vars([*statistics, "quantile"], errors="ignore").assign(flat)
+        step, unit = scaled(time, "s")
+        error = step * float(of("correlation_time_sem"))
+        cells["t_c"] = f"{concise(step * time, error)} {unit}"
+    return cells | {"free values": f"{of('effective_samples'):.3g}"}

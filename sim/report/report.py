@@ -5,6 +5,7 @@ import copy
 import io
 import itertools
 import json
+import math
 import re
 import shlex
 from collections.abc import Mapping, Sequence
@@ -23,19 +24,12 @@ from sim.plots import kinds
 from sim.plots.kinds import Choices
 from sim.plots.measured import Measured
 from sim.plots.style import STYLE
-from sim.read import is_stationary, is_steady, speed_of, statements, sweep_dims
+from sim.read import is_stationary, is_steady, speed_of
 from sim.read.dataset import claim, speed_name
 from sim.read.errors import remarks, systematic_errors
+from sim.read.run import Run
 from sim.read.statistics import averaging, over_members
-from sim.read.tables import (
-    highlights,
-    key_figures,
-    losses,
-    narrow,
-    notes,
-    phases,
-    table,
-)
+from sim.read.tables import Table, highlights, key_figures, losses, notes, phases, table
 from sim.scenario.files import toml
 from sim.units.errors import naming
 from sim.units.terminal import plain
@@ -276,21 +270,11 @@ def html(
         dataset = dataset.load()
     figures = drawings(dataset, data)
     points = [figure.measured for figure in figures if figure.measured]
-    stated, swept = statements(dataset, lost=lost), sweep_dims(dataset)
-    rows, whole = table(dataset, _ROWS, stated), highlights(dataset, _ROWS, stated)
-    headings = [
-        heading.replace("\n", "").partition("(")[0].strip()
-        for heading in (rows or [{}])[0]
-    ]
-    keys = sum(heading in (*swept, "t") for heading in headings)
-    wide = [
-        rows,
-        *(
-            [whole, *(of(dataset, _ROWS, stated) for of in (losses, phases))]
-            if swept
-            else []
-        ),
-    ]
+    run = Run(dataset, lost)
+    shown = [table(run, _ROWS, ["all"])]
+    if run.sweep:
+        shown += [of(run, _ROWS) for of in (highlights, losses, phases)]
+    remarks_on_numbers = notes(run, [each for each in shown if each.rows])
     stem = Path(source).stem
     page = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
@@ -308,11 +292,11 @@ def html(
         else "",
         averaged=averaging(dataset, is_stationary(dataset)),
         drawings=figures,
-        swept=bool(swept),
-        key_figures=[] if swept else key_figures(dataset, stated),
-        tables=[part for each in wide for part in narrow(each, min(keys, 3))],
+        swept=bool(run.sweep),
+        key_figures=[] if run.sweep else key_figures(run),
+        tables=[part for each in shown for part in narrow(each)],
         remarks=remarks(dataset),
-        notes=notes(dataset, rows, whole, stated),
+        notes=[note for group in remarks_on_numbers for note in group],
         known=known(dataset),
         scenario=scenario(dataset),
         changes=changes(dataset),
@@ -327,6 +311,20 @@ def html(
         source=str(source),
         saved=f"{stem}.toml" if dataset.attrs.get("scenario_toml") else f"{stem}.json",
     )
+
+
+def narrow(table: Table, most: int = 10) -> list[Rows]:
+    """Return a table as several of at most so many columns, each with the columns of its place."""
+    if not table.rows:
+        return []
+    headings = list(table.rows[0])
+    keys = headings[: min(table.keys, 3)]
+    values = np.array(headings[len(keys) :], object)
+    count = max(math.ceil(len(values) / max(most - len(keys), 1)), 1)
+    return [
+        [{name: row[name] for name in (*keys, *part)} for row in table.rows]
+        for part in np.array_split(values, count)
+    ]
 
 
 def question(dataset: xr.Dataset) -> tuple[str, str, list[str]]:

@@ -10,7 +10,7 @@ from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
 
 #: Most digits of a mean with its error.
-_MOST_DIGITS = 7
+_MOST_DIGITS = 6
 
 _PREFIXES = {
     -15: "f",
@@ -114,38 +114,66 @@ def engineering(value: float, unit: str) -> str:
 def concise(mean: float, sem: float) -> str:
     """Return a mean with its standard error in the last digits, as metrologists write it.
 
-    Seven digits of the mean at most: a smaller error stays untold and leaves five. So without brackets
-    there is no error, it is not known, or it is below half of the seventh digit.
+    The error has two digits, and the mean at most six. An error that would need more
+    digits is not stated: the mean then has five digits, and the error is below a unit
+    of the last of them. Without brackets the error is therefore unknown, zero, or
+    smaller than the last digit.
 
-    >>> print(concise(118.2312, 0.0423), concise(0.5, 0.013), concise(1234.0, 56.0), concise(12.5, 0.0))
-    118.23(4) 0.500(13) 1230(60) 12.5
-    >>> print(concise(118.2312, 0.0004), concise(118.2312, 0.000004))
-    118.2312(4) 118.23
+    >>> print(concise(118.2312, 0.0423), concise(0.5, 0.013), concise(1234.0, 56.0))
+    118.231(42) 0.500(13) 1234(56)
+    >>> print(concise(118.2312, 0.0004), concise(12.5, 0.0), concise(12345.0, 567.0))
+    118.23 12.5 12340(570)
     """
     if math.isnan(mean):
         return "–"
     if not sem > 1e-9 * abs(mean) or not math.isfinite(sem):
         return f"{mean:.4g}"
-    decade = math.floor(math.log10(sem))
-    places = -decade + (1 if sem < 2.0 * 10.0**decade else 0)
-    if mean != 0.0:
-        last = _MOST_DIGITS - 1 - math.floor(math.log10(abs(mean)))
-        if sem < 0.5 * 10.0**-last:
-            return f"{mean:.5g}"
-        places = min(places, last)
+    places = _places_of(sem)
+    if mean != 0.0 and places > _MOST_DIGITS - 1 - math.floor(math.log10(abs(mean))):
+        rounded = float(f"{mean:.{_MOST_DIGITS - 1}g}")
+        return f"{rounded:.{_MOST_DIGITS}g}"
     digits = max(places, 0)
-    return f"{round(mean, places) + 0.0:.{digits}f}({round(round(sem, places) * 10**digits)})"
+    error = round(round(sem, places) * 10**digits)
+    return f"{round(mean, places) + 0.0:.{digits}f}({error})"
+
+
+def _places_of(error: float) -> int:
+    """Return the number of decimal places at which an error has two digits."""
+    return 1 - int(f"{error:.1e}".partition("e")[2])
 
 
 def bounded(
-    value: float, sem: float, low: float = math.nan, high: float = math.nan
+    value: float,
+    sem: float,
+    low: float = math.nan,
+    high: float = math.nan,
+    bound: float = 0.0,
+    source: str = "",
 ) -> str:
     """Return a value with its standard error, or with the only end of its interval that is known.
 
-    >>> print(bounded(118.2312, 0.0423), bounded(561.0, math.nan, low=446.0), bounded(math.nan, math.nan, low=50.0))
-    118.23(4) 561 (> 446) > 50
-    >>> print(bounded(math.nan, math.nan, high=0.2), bounded(math.nan, math.nan, 0.3, 3.0), bounded(math.nan, math.nan))
-    < 0.2 0.3 to 3 –
+    Parameters
+    ----------
+    value, sem : float
+        Value and standard error.
+    low, high : float
+        Ends of an interval. An end alone is a bound.
+    bound : float
+        Bound of a systematic error, such as that of the clock step. It stands behind
+        the value, unless it is smaller than the last digit.
+    source : str
+        Cause of that error in a word.
+
+    Examples
+    --------
+    >>> print(bounded(118.2312, 0.0423), bounded(561.0, math.nan, low=446.0))
+    118.231(42) 561 (> 446)
+    >>> print(bounded(math.nan, math.nan, high=0.2), bounded(math.nan, math.nan, 0.3, 3.0))
+    < 0.2 0.3 to 3
+    >>> print(bounded(83.214, 0.2, bound=0.31, source="step"))
+    83.21(20) ± 0.31 (step)
+    >>> print(bounded(116.587, math.nan, bound=0.4, source="step"))
+    116.59 ± 0.40 (step)
     """
     ends = [
         f"{sign} {end:.4g}"
@@ -153,17 +181,29 @@ def bounded(
         if math.isfinite(end)
     ]
     if math.isnan(value):
-        return (
-            f"{low:.4g} to {high:.4g}" if len(ends) == 2 else ends[0] if ends else "–"
-        )
-    return f"{value:.4g} ({ends[0]})" if len(ends) == 1 else concise(value, sem)
+        if len(ends) == 2:
+            return f"{low:.4g} to {high:.4g}"
+        return ends[0] if ends else "–"
+    if len(ends) == 1:
+        return f"{value:.4g} ({ends[0]})"
+    text = concise(value, sem)
+    if not 10.0 ** (1 - _MOST_DIGITS) * abs(value) < bound < math.inf:
+        return text
+    places = max(_places_of(bound), 0)
+    if "(" not in text:
+        text = f"{value:.{places}f}"
+    elif bound < 0.1 * sem:
+        return text
+    return f"{text} ± {bound:.{places}f} ({source})"
 
 
 def share(value: float, low: float, high: float) -> str:
     """Return a share in percent with its 95 % interval if a standard error would leave 0 to 100 %; "" else.
 
-    >>> print(share(0.0, 0.0, 0.39), share(0.5, 0.4, 0.6) == "")
-    0 (0 to 39) True
+    >>> print(share(0.0, 0.0, 0.39), share(1.0, 0.985, 1.0), share(0.02, 0.001, 0.39))
+    0 (<39) 100 (>98.5) 2 (0.1 to 39)
+    >>> share(0.5, 0.4, 0.6)
+    ''
     """
     error = (high - low) / 3.92
     if not (value - error < 0.0 or value + error > 1.0):
@@ -171,4 +211,8 @@ def share(value: float, low: float, high: float) -> str:
     first, middle, last = (
         100.0 * min(max(number, 0.0), 1.0) for number in (low, value, high)
     )
+    if value <= 0.0:
+        return f"0 (<{last:.3g})"
+    if value >= 1.0:
+        return f"100 (>{first:.3g})"
     return f"{middle:.3g} ({first:.2g} to {last:.3g})"

@@ -8,6 +8,7 @@ import logging
 import os
 import signal
 import sys
+import textwrap
 import time
 import unicodedata
 from collections.abc import Callable, Iterator
@@ -20,8 +21,10 @@ LOG = logging.getLogger("sim")
 
 #: Seconds between two lines of progress without a terminal.
 _PAUSE = 30.0
-#: Columns of a terminal on which no table is cut short.
-_WIDE = 100_000
+#: Columns of a terminal on which no table is cut short, and of an output that is none.
+_WIDE, _NO_TERMINAL = 100_000, 100
+#: Letters between two columns of a table, and of a heading before it is wrapped.
+_GAP, _SHORTEST = 2, 9
 #: Signs of formulas in ASCII, for an output whose encoding lacks them: a lost minus sign would change a number.
 _SIGNS = {
     "−": "-",
@@ -148,25 +151,93 @@ class Notes(logging.Handler):
         note(f"note: {record.getMessage()}")
 
 
-def print_rows(rows: list[dict[str, str]]) -> None:
-    """Print a table, as wide as its cells are. The keys of the rows are the headings."""
+def width() -> int:
+    """Return the number of columns of the terminal, 100 if the output is none."""
+    from rich.console import Console
+
+    console = Console(file=sys.stdout)
+    return console.width if console.is_terminal else _NO_TERMINAL
+
+
+def print_rows(rows: list[dict[str, str]], keys: int = 0) -> None:
+    """Print a table that is no wider than the terminal. The keys of the rows are the headings.
+
+    Parameters
+    ----------
+    rows : list of dict
+        Cells by heading. Headings are wrapped to the width of their cells.
+    keys : int
+        Number of first columns that are repeated if the table is printed in several
+        parts, because it is wider than the terminal.
+    """
     if not rows:
         return
+    columns = {
+        heading: [_written(one_line(row[heading])) for row in rows]
+        for heading in rows[0]
+    }
+    wrapped = {
+        heading: _wrapped(_written(plain(heading)), cells)
+        for heading, cells in columns.items()
+    }
+    sizes = {
+        heading: max(map(_cell_width, [*lines, *columns[heading]]))
+        for heading, lines in wrapped.items()
+    }
+    first, *rest = _parts(sizes, keys, width())
+    for number, part in enumerate((first, *rest)):
+        if number:
+            say()
+        _print_part(part, wrapped, columns)
+
+
+def _parts(sizes: dict[str, int], keys: int, room: int) -> list[list[str]]:
+    """Return the headings of each part of a table whose columns have these widths."""
+    headings = list(sizes)
+    repeated = headings[:keys]
+    start = sum(sizes[heading] + _GAP for heading in repeated)
+    parts, used = [list(repeated)], start
+    for heading in headings[keys:]:
+        needed = sizes[heading] + _GAP
+        if used + needed - _GAP > room and len(parts[-1]) > len(repeated):
+            parts.append(list(repeated))
+            used = start
+        parts[-1].append(heading)
+        used += needed
+    return parts
+
+
+def _print_part(
+    part: list[str], wrapped: dict[str, list[str]], columns: dict[str, list[str]]
+) -> None:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in rows[0]:
+    table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
+    for heading in part:
         table.add_column(
-            Text(_written(plain(heading))),
+            Text("\n".join(wrapped[heading])),
             justify="right",
             no_wrap=True,
             vertical="bottom",
         )
-    for row in rows:
-        table.add_row(*(Text(_written(one_line(cell))) for cell in row.values()))
+    for cells in zip(*(columns[heading] for heading in part), strict=True):
+        table.add_row(*map(Text, cells))
     Console(file=sys.stdout, width=_WIDE).print(table)
+
+
+def _wrapped(heading: str, cells: list[str]) -> list[str]:
+    """Return a heading in lines about as long as the cells below it."""
+    longest = max(map(_cell_width, cells))
+    lines = textwrap.wrap(heading, max(longest, _SHORTEST), break_long_words=False)
+    return lines or [""]
+
+
+def _cell_width(text: str) -> int:
+    from rich.cells import cell_len
+
+    return cell_len(text)
 
 
 def _written(text: str) -> str:
@@ -175,9 +246,9 @@ def _written(text: str) -> str:
     return text.encode(encoding, "sim.ascii").decode(encoding)
 
 
-def print_table(rows: list[dict[str, str]], text: str) -> None:
-    """Print a table and the text below it."""
-    print_rows(rows)
+def print_table(rows: list[dict[str, str]], text: str, keys: int = 0) -> None:
+    """Print a table, see ``print_rows``, and the text below it."""
+    print_rows(rows, keys)
     say(text)
 
 

@@ -376,7 +376,7 @@ def test_remarks_on_a_dataset_need_no_file_but_a_measured_map(scene, tmp_path):
     )
     datasets, expected = (
         [run(of_table), run(mapped)],
-        [*remarks(Plan.of(of_table)), *diagnosis(Plan.of(read))],
+        [*remarks(Plan.of(of_table)), *diagnosis(Plan.of(of_table))],
     )
     for path in (table, stress_map):
         path.unlink()

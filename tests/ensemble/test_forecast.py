@@ -12,7 +12,8 @@ import numpy as np
 import psutil
 import pytest
 from helpers.commands import COUNTED, LENS
-from helpers.parts import Record, load, read, run
+from helpers.parts import Record, load, run
+from helpers.printed import rows_of
 from helpers.scenes import sample
 from numpy.testing import assert_allclose
 
@@ -46,7 +47,7 @@ def test_members_are_pooled_with_a_remark_if_their_file_would_be_too_large(monke
         )
         # so that either goes on with the other
         assert identity(dataset.attrs) == identity(alike.attrs)
-        assert read.table(dataset) == read.table(alike) and "member" in run(each).dims
+        assert rows_of(dataset) == rows_of(alike) and "member" in run(each).dims
 
 
 def never_begun(done):

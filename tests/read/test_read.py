@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from helpers.lens import RADIUS, scene
 from helpers.parts import Equilibrium, Record, drive, read, run, shear
+from helpers.printed import rows_of
 from numpy.testing import assert_allclose
 
 from sim.parts.drive import Steady
@@ -44,7 +45,7 @@ def test_runs_joined_as_the_page_says_have_the_table_of_a_sweep(tmp_path):
     }
     with xr.open_mfdataset(loads, combine="nested", **key) as runs:
         swept = run(scene(sweep={"contact.load": [2e-3, 4e-3]}, **parts))
-        assert read.table(runs) == read.table(swept)
+        assert rows_of(runs) == rows_of(swept)
 
 
 def test_statistics_of_known_numbers_few_members_and_missing_values(known, ramp):

@@ -20,6 +20,7 @@ from helpers.parts import (
     run,
     shear,
 )
+from helpers.printed import rows_of
 from numpy.testing import assert_allclose
 
 import sim
@@ -286,7 +287,7 @@ def test_joined_runs_are_described_as_what_they_are(tmp_path):
     swept = run(scene(**FLUCTUATING))
     with sim.open(tmp_path / "loads.nc") as dataset:
         assert dataset.attrs["joined"] == "joined along contact_load"
-        assert read.table(dataset) == read.table(swept)
+        assert rows_of(dataset) == rows_of(swept)
     seeds = [run(scene(**parts, seed=seed)) for seed in (1, 2)]
     how = {"data_vars": "minimal", "coords": "minimal", "compat": "override"}
     both = xr.concat(seeds, "member", **how)

@@ -8,30 +8,35 @@ import xarray as xr
 from helpers.draws import ornstein_uhlenbeck
 from helpers.lens import scene
 from helpers.parts import Bell, Clock, Ensemble, bonds, drive, read, run, shear
+from helpers.printed import rows_of
 from numpy.testing import assert_allclose
 
 from sim.read.errors import SystematicError
-from sim.read.statements import Statement, reasons
+from sim.read.statements import Statement
+from sim.units.notation import concise
 
 
 def test_a_statement_prints_its_error_its_bounds_or_its_reason():
     nan = math.nan
     cases = {
-        "1.57(2) mm/s": (1.57e-3, 2e-5, 1.53e-3, 1.61e-3, ""),
-        "> 50 mm/s": (nan, nan, 0.05, nan, ""),
-        "< 200 µm/s": (nan, nan, nan, 2e-4, ""),
+        "1.570(20) mm/s": (1.57e-3, 2e-5, 1.53e-3, 1.61e-3, nan, ""),
+        "1.570(20) ± 0.031 (step) mm/s": (1.57e-3, 2e-5, 1.53e-3, 1.61e-3, 3.1e-5, ""),
+        "> 50 mm/s": (nan, nan, 0.05, nan, nan, ""),
+        "< 200 µm/s": (nan, nan, nan, 2e-4, nan, ""),
         "0.3 to 3 mm/s; 5 speeds: add some here": (
             nan,
             nan,
             3e-4,
             3e-3,
+            nan,
             "5 speeds: add some here",
         ),
-        "105 µm/s; not settled": (105e-6, nan, nan, nan, "not settled"),
-        "no member is closed": (nan, nan, nan, nan, "no member is closed"),
+        "105 µm/s; not settled": (105e-6, nan, nan, nan, nan, "not settled"),
+        "no member is closed": (nan, nan, nan, nan, nan, "no member is closed"),
     }
     for text, (*numbers, reason) in cases.items():
-        assert str(Statement("speed", "speed", "m/s", *numbers, "", reason, {})) == text
+        statement = Statement("speed", "speed", "m/s", *numbers, "step", "", reason, {})
+        assert str(statement) == text
 
 
 def test_table_csv_and_statements_have_the_same_numbers_and_samples():
@@ -43,7 +48,7 @@ def test_table_csv_and_statements_have_the_same_numbers_and_samples():
         == "second half of the run and 6 members"
     )
     assert stated["speed_at_5_percent_lost_mean"].attrs["over"] == "6 members"
-    rows = read.tidy(dataset).set_index("quantity")
+    rows = read.long(read.Run(dataset)).set_index("quantity")
     whole_run = rows[rows["t"].isna()]
     for statement in read.each(stated):
         row = whole_run.loc[[statement.name]]
@@ -56,46 +61,36 @@ def test_table_csv_and_statements_have_the_same_numbers_and_samples():
         assert set(at["over"]) == {statement.over or "one run"}
     areas = [s.value for s in read.each(stated) if s.name == "area_ratio"]
     np.testing.assert_array_equal(areas, stated["area_ratio_mean"])
-    assert read.table(dataset) == read.table(dataset, stated=stated)
+    (first, *_), frame = rows_of(dataset), read.frame(read.Run(dataset))
+    assert first["A/A_JKR (%)"] == concise(
+        100.0 * frame["area_ratio"][0], 100.0 * frame["area_ratio_error"][0]
+    )
+    np.testing.assert_array_equal(frame["area_ratio"], areas)
 
 
 def test_key_figures_have_the_errors_of_the_table():
-    dataset = run(scene(drive=drive.Steady(speed=1e-3)))
-    stated = read.statements(dataset)
-    values = {
-        row[""]: row["value"].split()[0]
-        for row in read.tables.key_figures(dataset, stated)
-    }
+    one = read.Run(run(scene(drive=drive.Steady(speed=1e-3))))
+    values = {row[""]: row["value"].split()[0] for row in read.tables.key_figures(one)}
     rows = {
-        row["quantity"].partition(" (")[0]: row["mean"]
-        for row in read.tables.spread(dataset, stated)
+        row["quantity"].partition(" (")[0]: row["mean"] for row in read.spread(one).rows
     }
-    assert {"ΔΓ", "w", "a", "A/A_JKR"} <= rows.keys() and all(
-        "(" in values[name] for name in rows
-    )
-    assert {
-        name: values[name] for name in ("ΔΓ", "w", "a", "A/A_JKR")
-    }.items() <= rows.items()
+    assert {"ΔΓ", "w", "a", "A/A_JKR"} <= rows.keys()
+    shown = {name: values[name] for name in ("ΔΓ", "w", "a", "A/A_JKR")}
+    assert shown.items() <= rows.items()
 
 
-def test_a_reason_marks_its_cell_and_is_a_note_of_the_table():
-    dataset = run(
-        scene(
-            drive=drive.Steady(speed=1e-3),
-            shear=shear.Uniform(),
-            sweep={"contact.load": [1e-3, 4e-3]},
-        )
-    )
-    stated = read.statements(dataset)
-    stated = stated.assign(
-        area_ratio_reason=("contact_load", np.array(["", "not settled"], object))
-    )
-    rows = read.table(dataset, stated=stated)
-    marked = [row["A/A_JKR\n(%)"].endswith("*") for row in rows]
-    assert marked == [False, True] and reasons(stated) == {
-        "not settled": ["area_ratio"]
-    }
-    assert "* A/A_JKR: not settled" in read.notes(dataset, rows, [], stated)
+def test_a_reason_marks_its_cell_and_is_a_note_of_the_table_with_its_point():
+    loads = {"contact.load": ["1 mN", "4 mN"]}
+    held = {"drive": drive.Steady(speed=1e-3), "shear": shear.Uniform()}
+    one = read.Run(run(scene(**held, sweep=loads)))
+    late = one.late(column.name for column in read.tables.main_columns(one))
+    reason = ("contact_load", np.array(["", "not settled: 1 → 2"], object))
+    late["area_ratio_reason"] = reason
+    (table,) = read.tables_of(one)
+    marked = [row["A/A_JKR (%)"].endswith("*") for row in table.rows]
+    assert marked == [False, True]
+    needed = read.notes(one, [table]).needed
+    assert "* A/A_JKR: not settled: 1 → 2 (at contact_load = 4 mN)" in needed
 
 
 @pytest.mark.parametrize(
@@ -174,20 +169,19 @@ def test_a_maximum_inside_a_sweep_and_a_systematic_error_are_notes():
     dataset = run(scenario)
     friction = dataset["friction_force"].isel(t=-1).to_numpy()
     assert friction[2] > friction.max(initial=0.0, where=[True, True, False])
-    stated = read.statements(dataset)
-    lines = read.notes(dataset, read.table(dataset, stated=stated), [], stated)
+    one = read.Run(dataset)
+    lines = read.notes(one, []).further
     (line,) = [line for line in lines if line.startswith("friction force is largest")]
     assert line.endswith("at drive_speed = 4 mm/s (between 100 µm/s and 100 mm/s)")
     # it falls all the way
     assert not [line for line in lines if "contact area is" in line]
-    drifting = stated.assign(
-        friction_force_reason=("drive_speed", np.array(["", "not settled", ""], object))
+    late = one.late(("contact_area", "friction_force"))
+    late["friction_force_reason"] = (
+        "drive_speed",
+        np.array(["", "not settled", ""], object),
     )
-    assert not [
-        line
-        for line in read.notes(dataset, [], [], drifting)
-        if "friction force is" in line
-    ]
+    lines = read.notes(one, []).further
+    assert not [line for line in lines if "friction force is" in line]
     error = SystematicError(
         "cell_error_area",
         5.13,

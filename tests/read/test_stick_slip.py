@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 from helpers.driven import force, scenario
 from helpers.parts import Adhesion, Bell, Clock, Force, Record, Spring, read, run
+from helpers.printed import lines_of, rows_of
 from helpers.scenes import scene
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -156,7 +157,7 @@ def test_stick_slip_mean_force_statistics_and_tables_are_those_of_the_closed_cyc
     result = read.statistics(cycles())
     assert_allclose(result["static_friction_mean"] / FORCE, 1.0, atol=2.0 * RECORD)
     assert result["static_friction_mean"].attrs["units"] == "N"
-    (row,) = read.highlights(cycles())
+    (row,) = rows_of(cycles(), read.highlights)
     cells = {" ".join(heading.split()): cell for heading, cell in row.items()}
     assert cells["slips"].startswith("3") and cells["kinetic friction (mN)"].startswith(
         "3.3"
@@ -164,17 +165,17 @@ def test_stick_slip_mean_force_statistics_and_tables_are_those_of_the_closed_cyc
     faster = cycles().assign(
         stage_speed=cycles()["stage_speed"] * (1.0 + cycles()["t"])
     )
-    rows = read.table(faster)
+    rows = rows_of(faster)
     (stage,) = (heading for heading in rows[0] if heading.startswith("stage"))
     # four digits are shown
     assert_allclose(float(rows[-1][stage]), 6.0 * float(rows[0][stage]), rtol=1e-3)
-    assert not any(heading.startswith("stage") for heading in read.table(cycles())[0])
+    assert not any(heading.startswith("stage") for heading in rows_of(cycles())[0])
     # kinetic friction would be a mean over speeds
     for dataset, is_shown in ((cycles(), True), (faster, False)):
         assert (
             any(
                 heading.startswith("kinetic")
-                for row in read.highlights(dataset)
+                for row in rows_of(dataset, read.highlights)
                 for heading in row
             )
             is is_shown
@@ -327,9 +328,9 @@ def test_slip_events_after_a_hold_are_told_apart_from_those_before_whatever_the_
     assert_array_equal(result["slip_count"], [1.0, 0.0, 6.0])
     assert_allclose(1e6 * result["first_friction"], [1255.0, NAN, 1158.0], rtol=6e-4)
     assert_array_equal(result["time_held"], [NAN, NAN, 1.0])
-    rows = read.phases(dataset)
-    assert [row["first slip\nat (mN)"] for row in rows] == ["1.255", "–", "1.158"]
-    assert [row["held\nbefore (s)"] for row in rows] == ["–", "–", "1"]
+    rows = rows_of(dataset, read.phases)
+    assert [row["first slip at (mN)"] for row in rows] == ["1.255", "–", "1.158"]
+    assert [row["held before (s)"] for row in rows] == ["–", "–", "1"]
     seldom = run(sim.Scenario(**HELD | {"clock": HELD["clock"] | {"record": "3 s"}}))
     xr.testing.assert_identical(
         read.slips_by_phase(seldom), read.slips_by_phase(dataset)
@@ -359,17 +360,19 @@ def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused(
         result["static_friction"], force * (0.2 + 1.8 * (when - 1.0) / 19.0), rtol=1e-12
     )
     # none after its end
-    assert all("–" not in row.values() for row in read.table(dataset)[-3:])
+    assert all("–" not in row.values() for row in rows_of(dataset)[-3:])
     held = run(scene(1, clock=Clock(duration=0.5, step=0.1), drive=drive, bonds=bonds))
     calm = read.stick_slip(held)
     assert calm["ran_away"].item() == 0.0 and np.isnan(calm["static_friction"]).all()
     cells = {
         " ".join(heading.split()): cell
-        for heading, cell in read.highlights(dataset)[0].items()
+        for heading, cell in rows_of(dataset, read.highlights)[0].items()
     }
-    assert cells["ran away, of members (%)"] == "100"
+    assert cells["lost stability, of members (%)"] == "100"
     assert not any(
-        "ran away" in heading for row in read.highlights(held) for heading in row
+        "lost stability" in heading
+        for row in rows_of(held, read.highlights)
+        for heading in row
     )
     with pytest.raises(ValueError, match="spring"):
         read.slips(dataset)
@@ -407,7 +410,10 @@ def test_statistics_alone_have_the_means_of_slip_events_over_the_members_that_sl
 
 def test_a_settled_creep_without_noise_has_no_spread():
     assert (
-        read.spread(run(scenario(20.0, 60, force(0.05), make=Cohort, members=1))) == []
+        rows_of(
+            run(scenario(20.0, 60, force(0.05), make=Cohort, members=1)), read.spread
+        )
+        == []
     )
 
 
@@ -435,7 +441,7 @@ def test_slip_events_of_few_clock_steps_are_named_in_the_table(step, is_named):
             path, {"drive.stage": "5 mm/s", "clock.step": step, "clock.record": "20 ms"}
         )
     )
-    lines = read.tables.notes(dataset, [], [])
+    lines = lines_of(dataset)
     assert (
         any("slip events last fewer than 3 clock steps" in line for line in lines)
         is is_named

@@ -23,10 +23,11 @@ from helpers.parts import (
     run,
     shear,
 )
+from helpers.printed import rows_of
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
-from sim.read import tables
+from sim.read import export
 from sim.read.observables import with_slips
 from sim.units.errors import BadInput
 from sim.units.notation import in_units
@@ -44,29 +45,31 @@ def test_a_reduced_dataset_has_the_columns_that_it_can(per_member):
         )
         for quantities in (None, recorded)
     )
-    rows = read.table(some)
-    assert "A/A_JKR\n(%)" not in rows[0] and {"a\n(µm)", "ΔΓ\n(mJ/m²)"} < set(rows[0])
-    for full, row in zip(read.table(whole), rows, strict=True):
+    rows = rows_of(some)
+    assert "A/A_JKR (%)" not in rows[0] and {"a (µm)", "ΔΓ (mJ/m²)"} < set(rows[0])
+    for full, row in zip(rows_of(whole), rows, strict=True):
         assert row.items() <= full.items()
     alone = run(scene(record=Record(per_member=per_member, quantities=())))
-    assert [set(row) for row in read.table(alone)] == 12 * [{"t\n(ms)", "a\n(µm)"}]
-    assert read.highlights(alone) == [] and "contact_radius_mean" in sim.stats(alone)
+    assert [set(row) for row in rows_of(alone)] == 12 * [{"t (ms)", "a (µm)"}]
+    assert rows_of(alone, read.highlights) == []
+    assert "contact_radius" in sim.stats(alone)
 
 
 def test_tables_have_a_dozen_rows_or_one_for_each_point(ramp):
-    rows, result = read.table(ramp), read.statistics(ramp)
+    rows, result = rows_of(ramp), read.statistics(ramp)
     assert len(rows) == 12 and all(set(row) == set(rows[0]) for row in rows)
-    assert [rows[0]["t\n(ms)"], rows[-1]["t\n(ms)"]] == ["0", "400"]
+    assert [rows[0]["t (ms)"], rows[-1]["t (ms)"]] == ["0", "400"]
     for row, at in ((rows[0], 0), (rows[-1], -1)):
-        mean = float(re.match(r"[\d.]+", row["a\n(µm)"])[0])
+        mean = float(re.match(r"[\d.]+", row["a (µm)"])[0])
         # half a unit of the fourth digit, the least that is shown
         np.testing.assert_allclose(
             mean, 1e6 * float(result["contact_radius_mean"][at]), rtol=5e-4
         )
-    assert "open\n(%)" not in rows[0]
+    assert "open (%)" not in rows[0]
     # Wilson's bound of none in six: z²/(6 + z²) = 0.390
-    assert {row["masked\n(%)"] for row in rows} == {"0 (0 to 39)", "100 (61 to 100)"}
-    assert "lost to\nbonds (%)" in rows[0] and "lost to\nfluct. (%)" in rows[0]
+    assert {row["masked (%)"] for row in rows} == {"0 (<39)", "100 (>61)"}
+    shares = read.tables_of(read.Run(ramp), show=["losses"])[1].rows[0]
+    assert "lost to bonds (%)" in shares and "lost to fluct. (%)" in shares
     for loads, shares, rows in [(2, 1, 2), (30, 1, 12), (6, 5, 12)]:
         sweep = {
             "contact.load": list(np.linspace(1e-3, 9e-3, loads)),
@@ -75,21 +78,21 @@ def test_tables_have_a_dozen_rows_or_one_for_each_point(ramp):
         dataset = run(
             scene(drive=drive.Steady(speed=1e-2), shear=shear.Uniform(), sweep=sweep)
         )
-        table = read.table(dataset)
+        table = rows_of(dataset)
         assert len(table) == rows and [
-            row["contact_\nload (mN)"] for row in (table[0], table[-1])
+            row["contact_load (mN)"] for row in (table[0], table[-1])
         ] == ["1", "9"]
-        assert not any(heading.startswith("t\n") for heading in table[0])
-    rows = read.table(
+        assert not any(heading.startswith("t (") for heading in table[0])
+    rows = rows_of(
         run(scene(sweep={"contact.load": ["1 mN", "4 mN"]}, shear=shear.Uniform()))
     )
-    points = [(row["contact_load\n(mN)"], row["t\n(ms)"]) for row in rows]
+    points = [(row["contact_load (mN)"], row["t (ms)"]) for row in rows]
     assert points == list(
         itertools.product(["1", "4"], ["0", "80", "160", "240", "320", "400"])
     )
     ripple = {"model": "ripple", "amplitude": 1e5, "wavelength": 24e-6}
     fields = {"shear": [{"model": "uniform"}, {"model": "mean", "spectrum": ripple}]}
-    rows = read.table(run(scene(drive=drive.Steady(speed=1e-2), sweep=fields)))
+    rows = rows_of(run(scene(drive=drive.Steady(speed=1e-2), sweep=fields)))
     assert [row["shear"] for row in rows] == ["uniform", "mean"]
 
 
@@ -109,7 +112,7 @@ def numbers_of(path):
 def long(ramp, tmp_path_factory):
     """The CSV of the ramp, as whoever has it reads it."""
     path = tmp_path_factory.mktemp("csv") / "out.csv"
-    read.to_csv(ramp, path)
+    read.to_long_csv(read.Run(ramp), path)
     return numbers_of(path)
 
 
@@ -148,7 +151,7 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
     assert speed["low"] == float(result) and speed["unit"] == "m/s"
     sweep = {"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 0.5, 1.0]}
     dataset = run(scene(sweep=sweep, shear=shear.Uniform()))
-    read.to_csv(dataset, tmp_path / "out.csv")
+    read.to_long_csv(read.Run(dataset), tmp_path / "out.csv")
     rows = of(numbers_of(tmp_path / "out.csv"), "contact_area")
     expected = itertools.product([1e-3, 4e-3], [0.0, 0.5, 1.0], dataset["t"].to_numpy())
     columns = rows[["contact_load [N]", "adhesion_bond_share", "t [s]"]].itertuples(
@@ -160,7 +163,7 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
         (tmp_path / "out.csv").read_bytes().decode(),
         {"index": False, "na_rep": "nan", "lineterminator": "\n"},
     )
-    assert text == read.tidy(dataset).to_csv(
+    assert text == read.long(read.Run(dataset)).to_csv(
         header=text.partition("\n")[0].split(","), **how
     )
 
@@ -168,14 +171,15 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
 def test_a_large_csv_is_written_in_pieces_and_an_empty_one_has_no_rows(
     tmp_path, monkeypatch
 ):
-    texts, lengths = tables._texts, []
+    texts, lengths = export._texts, []
     monkeypatch.setattr(
-        tables, "_texts", lambda values: lengths.append(len(values)) or texts(values)
+        export, "_texts", lambda values: lengths.append(len(values)) or texts(values)
     )
     numbers = pd.DataFrame({"a": np.arange(70_000) / 7.0, "b": np.arange(70_000)})
     for rows in (numbers, pd.DataFrame()):
-        monkeypatch.setattr(tables, "in_columns", lambda *_, rows=rows: rows)
-        tables.to_csv(None, tmp_path / "out.csv", wide=True)
+        rows.attrs["units"] = {}
+        monkeypatch.setattr(export, "frame", lambda *_, rows=rows: rows)
+        export.to_csv(None, tmp_path / "out.csv")
         text = (tmp_path / "out.csv").read_bytes().decode()
         assert text == (
             rows.to_csv(index=False, lineterminator="\n") if rows.size else "\n"
@@ -183,31 +187,26 @@ def test_a_large_csv_is_written_in_pieces_and_an_empty_one_has_no_rows(
     assert max(lengths) < 50_000 and sum(lengths) == numbers.size
 
 
-def test_a_wide_csv_has_a_row_for_each_point_or_record_in_the_units_that_are_chosen(
+def test_a_csv_has_a_row_for_each_point_or_record_in_the_units_that_are_chosen(
     tmp_path,
 ):
     path = tmp_path / "out.csv"
-    names = {
-        "contact_area": ("mm^2", 1e6),
-        "friction_force": ("mN", 1e3),
-        "indentation": ("m", 1),
-    }
-    sweep = {"drive.speed": [1e-3, 1e-2]}
-    dataset = run(
-        scene(drive=drive.Steady(speed=1e-2), sweep=sweep, ensemble=Ensemble(members=2))
-    )
-    for every in (False, True):
-        with in_units(["mm/s", "mm^2", "mN", "ms"]):
-            read.to_csv(dataset, path, wide=True, every=every)
-        rows, long = pd.read_csv(path), read.tidy(dataset)
-        long = long[long["t"].notna() == every]
+    units = {"contact_radius": ("mm", 1e3), "friction_force": ("mN", 1e3)}
+    speeds, steady = {"drive.speed": [1e-3, 1e-2]}, drive.Steady(speed=1e-2)
+    two = Ensemble(members=2)
+    steadily = run(scene(drive=steady, sweep=speeds, ensemble=two))
+    pulled = Equilibrium(load={"from": 4e-3, "to": 1e-3})
+    changing = run(scene(drive=steady, sweep=speeds, ensemble=two, contact=pulled))
+    for dataset, times in ((steadily, 1), (changing, changing.sizes["t"])):
+        one = read.Run(dataset)
+        with in_units(["mm/s", "mm", "mN", "mJ/m^2"]):
+            read.to_csv(one, path)
+        rows, long = pd.read_csv(path), read.long(one)
+        long = long[long["t"].notna() == (times > 1)]
         assert_allclose(np.unique(rows["drive_speed [mm/s]"]), [1.0, 10.0], rtol=1e-15)
-        assert (
-            len(rows) == 2 * (dataset.sizes["t"] if every else 1)
-            and any("_q95" in name for name in rows) == every
-        )
+        assert len(rows) == 2 * times and ("t [s]" in rows) == (times > 1)
         for (name, (unit, factor)), kind in itertools.product(
-            names.items(), ("mean", "error", "low", "high")
+            units.items(), ("mean", "error")
         ):
             column = f"{name}{f'_{kind}' * (kind != 'mean')} [{unit}]"
             assert_allclose(
@@ -216,29 +215,25 @@ def test_a_wide_csv_has_a_row_for_each_point_or_record_in_the_units_that_are_cho
                 rtol=1e-15,
                 atol=0,
             )
-    assert_allclose(rows["t [ms]"], np.tile(1e3 * dataset["t"], 2), rtol=1e-15)
-    read.to_csv(run(scene(shear=shear.Uniform())), path, wide=True)
-    # of one run without noise: the statements of its events, without errors
+    read.to_csv(read.Run(run(scene(shear=shear.Uniform()))), path)
+    # of one run without noise: no errors
     rows = pd.read_csv(path)
-    assert (
-        len(rows) == 1
-        and "speed_at_5_percent_lost [m/s]" in rows
-        and not any("_error" in name for name in rows)
-    )
+    assert "speed_at_5_percent_lost [m/s]" in rows
+    assert not any("_error" in name for name in rows)
     with pytest.raises(BadInput, match=r"--units: .*kg"), in_units(["mm/s", "kg"]):
-        assert {"drive_speed\n(mm/s)", "F\n(mN)"} < set(read.table(dataset)[0])
+        assert {"drive_speed (mm/s)", "F (mN)"} < set(rows_of(steadily)[0])
 
 
 def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_spread():
     dataset = run(scene(bonds=bonds.Unbroken(), shear=shear.Uniform()))
-    rows = read.table(dataset, rows=5)
-    assert len(rows) == 5 and read.highlights(dataset) == []
+    rows = rows_of(dataset, rows=5)
+    assert len(rows) == 5 and rows_of(dataset, read.highlights) == []
     assert list(rows[0]) == [
-        "t\n(ms)",
-        "V\n(mm/s)",
-        "w\n(mJ/m²)",
-        "a\n(µm)",
-        "A/A_JKR\n(%)",
+        "t (ms)",
+        "V (mm/s)",
+        "w (mJ/m²)",
+        "a (µm)",
+        "A/A_JKR (%)",
     ]
     cycle = Equilibrium(
         indentation={"from": 1e-6, "to": -2e-6, "cycles": 1}, after_pull_off="reattach"
@@ -248,18 +243,18 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
         "shear": shear.Uniform(),
         "drive": drive.Steady(speed=0.0),
     }
-    rows = read.table(run(scene(contact=cycle, **still)), rows=5)
-    assert [row["Δ\n(µm)"] for row in rows] == ["1", "-0.5", "-2", "-0.5", "1"]
-    assert {heading.partition("\n")[0] for heading in rows[0]} >= {
+    rows = rows_of(run(scene(contact=cycle, **still)), rows=5)
+    assert [row["Δ (µm)"] for row in rows] == ["1", "-0.5", "-2", "-0.5", "1"]
+    assert {heading.partition(" (")[0] for heading in rows[0]} >= {
         "t",
         "P",
         "W",
         "open",
     }
     pulled = Equilibrium(load={"from": 1e-3, "to": -1e-3})
-    rows = read.table(run(scene(contact=pulled, **still)), rows=3)
+    rows = rows_of(run(scene(contact=pulled, **still)), rows=3)
     # of the free sphere too
-    assert [row["P\n(mN)"] for row in rows] == ["1", "0", "-1"]
+    assert [row["P (mN)"] for row in rows] == ["1", "0", "-1"]
     dataset = run(
         scene(
             drive=drive.Steady(speed=4e-3),
@@ -267,14 +262,14 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
             ensemble=Ensemble(members=20),
         )
     )
-    result = {row["quantity"].partition(" (")[0]: row for row in read.spread(dataset)}
+    result = {
+        row["quantity"].partition(" (")[0]: row for row in rows_of(dataset, read.spread)
+    }
     assert set(result) == {
         "ΔΓ",
         "w",
         "a",
         "A/A_JKR",
-        "lost to fluct.",
-        "fluct. first",
         "F",
     }
     energy, law = result["ΔΓ"], read.distribution(dataset)
@@ -298,15 +293,18 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
         and "(" in energy["95 %"]
         and energy["t_c"].endswith(" ms")
     )
-    assert read.spread(lens.ramp()) == []
+    assert rows_of(lens.ramp(), read.spread) == []
     sweep = {"contact.load": [1e-3, 4e-3]}
-    (low, high) = read.losses(run(scene(sweep=sweep)))
-    assert low["contact_load\n(mN)"] == "1" and high["contact_load\n(mN)"] == "4"
+    (low, high) = rows_of(run(scene(sweep=sweep)), read.losses)
+    assert low["contact_load (mN)"] == "1" and high["contact_load (mN)"] == "4"
     slow, fast = (
-        float(row["5 % of area\nlost at V (mm/s)"].partition("(")[0])
+        float(re.match(r"[\d.]+", row["5 % lost at V (mm/s)"])[0])
         for row in (low, high)
     )
-    assert slow < fast and read.losses(run(scene(drive=drive.Steady(speed=1e-3)))) == []
+    assert (
+        slow < fast
+        and rows_of(run(scene(drive=drive.Steady(speed=1e-3))), read.losses) == []
+    )
 
 
 @pytest.mark.parametrize("cycles", [0, 1])
@@ -321,7 +319,7 @@ def test_rows_of_the_whole_run_have_no_time_whether_or_not_a_loop_is_closed(cycl
         "drive": drive.Steady(speed=0.0),
     }
     dataset = run(scene(contact=course, **quiet))
-    rows = read.tidy(dataset)
+    rows = read.long(read.Run(dataset))
     of_run = rows["quantity"].isin(
         [name.removesuffix("_mean") for name in map(str, read.statements(dataset))]
     )
@@ -336,33 +334,26 @@ def test_rows_of_the_whole_run_have_no_time_whether_or_not_a_loop_is_closed(cycl
 @posix
 def test_csv_goes_through_a_link_to_where_it_points(ramp, tmp_path):
     (tmp_path / "out.csv").symlink_to(tmp_path / "far.csv")
-    read.to_csv(ramp, tmp_path / "out.csv")
+    read.to_csv(read.Run(ramp), tmp_path / "out.csv")
     assert (tmp_path / "out.csv").is_symlink()
     assert (tmp_path / "far.csv").read_text(encoding="utf-8").startswith("t [s],")
 
 
 def test_notes_say_what_is_averaged_how_many_rows_are_shown_and_what_symbols_mean(ramp):
-    rows = read.table(ramp)
-    lines = read.notes(ramp, rows, read.highlights(ramp))
-    assert (
-        "6 members" in lines[0]
-        and "12 of 21" in lines[1]
-        and "--where" in lines[1]
-        and "A/A_JKR: " in lines[2]
-    )
-    dataset = run(
-        scene(
-            drive=drive.Steady(speed=1e-2),
-            sweep={"drive.speed": list(np.geomspace(1e-4, 1e-1, 16))},
-        )
-    )
-    rows = read.table(dataset)
-    assert read.notes(dataset, rows, [])[0].startswith(
-        "mean over the second half of the run and 6 members"
-    )
-    assert read.notes(dataset, rows, [])[1].startswith("12 of 16 rows shown")
-    assert [heading for heading in rows[0] if heading.endswith("(mm/s)")] == [
-        "drive_speed\n(mm/s)"
+    one = read.Run(ramp)
+    notes = read.notes(one, [read.table(one)])
+    assert notes.needed[0].startswith("mean over the 6 members; brackets: ")
+    assert "12 of 21 rows shown" in notes.further[0] and "--where" in notes.further[0]
+    assert any(line.startswith("A/A_JKR: contact area") for line in notes.headings)
+    speeds = {"drive.speed": list(np.geomspace(1e-4, 1e-1, 16))}
+    one = read.Run(run(scene(drive=drive.Steady(speed=1e-2), sweep=speeds)))
+    table = read.table(one)
+    notes = read.notes(one, [table])
+    words = "mean over the second half of the run and 6 members"
+    assert notes.needed[0].startswith(words)
+    assert any(line.startswith("12 of 16 rows shown") for line in notes.further)
+    assert [heading for heading in table.rows[0] if heading.endswith("(mm/s)")] == [
+        "drive_speed (mm/s)"
     ]
 
 
@@ -386,9 +377,7 @@ def test_the_speed_of_a_slider_on_single_bonds_is_its_displacement_over_the_time
         dataset["slider_position"].mean("member").to_numpy(),
         dataset["t"].to_numpy(),
     )
-    shown = [
-        float(re.match(r"[\d.]+", row["V\n(µm/s)"])[0]) for row in read.table(dataset)
-    ]
+    shown = [float(re.match(r"[\d.]+", row["V (µm/s)"])[0]) for row in rows_of(dataset)]
     at = np.rint(np.linspace(0, 200, 12)).astype(int)[1:-1]
     speed = 1e6 * (position[at + 1] - position[at - 1]) / (2.0 * time[1])
     few = read.distribution(dataset.isel(t=[0, 100, 200]), ["speed"])["speed_mean"]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from sim.units.notation import concise, engineering
+from sim.units.notation import bounded, concise, engineering
 from sim.units.quantity import Quantity
 
 
@@ -37,15 +37,16 @@ def test_numbers_read_back_to_what_they_were():
 
 def test_a_mean_carries_its_standard_error_in_brackets():
     for mean, sem, text in (
-        (118.2312, 0.0423, "118.23(4)"),
-        (-0.3, 3.0, "0(3)"),
-        (1234.0, 56.0, "1230(60)"),
+        (118.2312, 0.0423, "118.231(42)"),
+        (-0.3, 3.0, "-0.3(30)"),
+        (1234.0, 56.0, "1234(56)"),
         (12.5, 0.0, "12.5"),
         (math.nan, math.nan, "–"),
         (9.999, 0.0999, "10.00(10)"),
         (0.0, 0.00013, "0.00000(13)"),
         (120.27993, 0.000013, "120.28"),
-        (123456.0, 0.4, "123456.0(4)"),
+        (123456.0, 4.0, "123460"),
+        (123456.0, 40.0, "123456(40)"),
     ):
         assert concise(mean, sem) == text
 
@@ -61,8 +62,20 @@ def test_an_error_is_never_written_as_nothing():
         if "(" in text:
             shown, digits = text.rstrip(")").split("(")
             unit = 10.0 ** -len(shown.partition(".")[2])
-            largest = 0.51 * max(unit, 10.0 ** math.floor(math.log10(mean * sem)))
+            largest = 0.51 * max(unit, 0.1 * 10.0 ** math.floor(math.log10(mean * sem)))
             assert (
                 abs(int(digits) * unit - mean * sem) <= largest
                 and abs(float(shown) - mean) <= largest
             )
+
+
+def test_a_systematic_error_stands_behind_the_value_and_never_in_brackets():
+    for numbers, text in (
+        ((83.214, 0.2, math.nan, math.nan, 0.31, "step"), "83.21(20) ± 0.31 (step)"),
+        ((116.587, math.nan, math.nan, math.nan, 0.4, "step"), "116.59 ± 0.40 (step)"),
+        ((83.214, 0.2, math.nan, math.nan, 0.01, "step"), "83.21(20)"),
+        ((116.587, 0.0, math.nan, math.nan, 1e-5, "records"), "116.6"),
+        ((1170.0, 0.0, math.nan, math.nan, 40.0, "records"), "1170 ± 40 (records)"),
+        ((math.nan, math.nan, 0.3, 3.0, 0.4, "step"), "0.3 to 3"),
+    ):
+        assert bounded(*numbers) == text

@@ -20,6 +20,7 @@ from helpers.driven import (
     spring,
     stuck,
 )
+from helpers.printed import lines_of
 from numpy.testing import assert_allclose
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
@@ -32,7 +33,6 @@ from sim.parts.bonds.models import FirstMoment, Steady, Unbroken
 from sim.parts.bonds.rupture import Constant, CutOff
 from sim.parts.contact.models import Adhesion
 from sim.parts.drive import Force
-from sim.read.tables import notes
 from sim.scenario.scenario import Scenario
 from sim.units.errors import BadInput
 
@@ -364,8 +364,8 @@ def test_a_drive_is_refused_with_bonds_it_cannot_be_solved_with_and_a_run_ends_a
         assert np.isnan(dataset[name].isel(t=12)).all(), name
     assert "stage_speed" not in dataset
     assert any(
-        "2 of 2 trajectories end in a runaway" in line
-        for line in notes(dataset, [], [])
+        "2 of 2 trajectories end because the slider lost stability" in line
+        for line in lines_of(dataset)
     )
 
 

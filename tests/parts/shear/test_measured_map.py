@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from helpers.commands import LENS, sim as command
+from helpers.printed import rows_of
 from helpers.scenes import (
     BONDS,
     DRIVES,
@@ -24,7 +25,6 @@ from sim.numerics.grid import Grid
 from sim.parts.bonds.models import Counted, Unbroken
 from sim.parts.shear import Carried, Mapped
 from sim.parts.shear.maps import Passing
-from sim.read.tables import table
 from sim.scenario.scenario import Record
 from sim.spectrum.families import Ripple
 from sim.spectrum.measured import StressMap
@@ -139,7 +139,7 @@ def test_the_edge_pays_what_is_missing_of_the_work_of_adhesion_and_the_table_sho
     assert_allclose(
         dataset["work_of_adhesion"] + dataset["edge_energy"], 42e-3, rtol=1e-12
     )
-    assert any(heading.startswith("edge") for heading in table(dataset)[0])
+    assert any(heading.startswith("edge") for heading in rows_of(dataset)[0])
 
 
 def test_a_map_that_was_drawn_saved_and_read_back_gives_the_same_trajectory(tmp_path):

@@ -1,0 +1,301 @@
+"""Statistics of a run for other programs: a data frame of the printed columns, and all quantities in long form."""
+
+import csv
+import io
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from sim.numerics.files import output
+from sim.read.dataset import steady_points
+from sim.read.run import Run
+from sim.read.statements import statements
+from sim.read.statistics import QUANTILES, Array, over_members
+from sim.read.tables import EVENTS, GROUPS, LOSSES, SLIPS, main_columns, of_losses
+from sim.units.errors import BadInput
+from sim.units.notation import chosen_unit
+
+#: Rows of a CSV file that are written at once.
+_LINES = 2**15
+#: Statistics of a column that stand beside its mean, and the endings of their columns.
+_BESIDE = {"sem": "error", "bound": "bound", "reason": "reason"}
+
+
+def frame(run: Run, show: Sequence[str] = ()) -> pd.DataFrame:
+    """Return the columns of the printed tables in SI, a row for each point of the sweep and time.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    show : sequence of str
+        Names of ``sim.read.GROUPS``, whose columns are added.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The swept keys; ``t`` [s], unless each point has one row, the mean over the second
+        half of the run; and the columns of ``sim stats``, each with ``<name>_error`` (the
+        standard error), ``<name>_bound`` (of the error that members do not reduce) and
+        ``<name>_reason`` (the reason if a value is missing or no mean), if there are any.
+        A number of the whole run is the same in all rows of its point. ``attrs["units"]``
+        holds the units by column.
+
+    Raises
+    ------
+    BadInput
+        If there is no such group.
+    """
+    if unknown := {*show} - GROUPS.keys():
+        raise BadInput(
+            [f"{min(unknown)}: is no group of columns; there are: {', '.join(GROUPS)}"]
+        )
+    names = [column.name for column in main_columns(run)]
+    if {"losses", "all"} & {*show}:
+        names += [column.name for column in LOSSES]
+    each = (
+        run.late(names)
+        if run.has_one_row_each
+        else over_members(run.dataset, names, quantiles=False)
+    )
+    once = [column.name for column in EVENTS]
+    if {"slips", "all"} & {*show}:
+        once += [column.name for column in SLIPS]
+    losses = [column.name for column in of_losses(run.losses)]
+    variables: dict[str, xr.DataArray] = {}
+    for group, wanted in ((each, names), (run.events, once), (run.losses, losses)):
+        for name in wanted:
+            variables |= _columns_of(group, name)
+    coords = {name: run.dataset[name] for name in run.sweep}
+    if not run.has_one_row_each:
+        coords["t"] = run.dataset["t"]
+    flat = (
+        xr.Dataset(variables)
+        .drop_vars("quantile", errors="ignore")
+        .assign_coords(coords)
+    )
+    flat = flat.drop_vars([name for name in flat.coords if name not in flat.dims])
+    dims = [str(name) for name in (*run.sweep, "branch", "t") if name in flat.dims]
+    table = flat.expand_dims("row").to_dataframe(dim_order=["row", *dims])
+    table = table.reset_index().drop(columns="row")
+    table.attrs["units"] = {
+        str(name): variable.attrs.get("units", "1")
+        for name, variable in flat.variables.items()
+    }
+    return table
+
+
+def _columns_of(group: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
+    """Return a mean and what stands beside it, as far as it is known."""
+    if f"{name}_mean" not in group:
+        return {}
+    mean = group[f"{name}_mean"]
+    reason = group.get(f"{name}_reason", xr.DataArray(""))
+    if not bool(mean.notnull().any()) and not bool((reason != "").any()):
+        return {}
+    result = {name: mean}
+    for ending, column in _BESIDE.items():
+        values = group.get(f"{name}_{ending}")
+        if values is None:
+            continue
+        nothing = values == "" if ending == "reason" else ~(values > 0.0)
+        if not bool(nothing.all()):
+            unit = {} if ending == "reason" else {"units": mean.attrs.get("units", "1")}
+            result[f"{name}_{column}"] = values.drop_attrs(deep=False).assign_attrs(
+                unit
+            )
+    return result
+
+
+def to_csv(run: Run, path: str | os.PathLike[str], show: Sequence[str] = ()) -> None:
+    """Write the ``frame`` of a run, a column ``name [unit]`` for each of its own.
+
+    Units are those of ``in_units``, else SI. A file is there whole or, in trouble, as it
+    was before.
+    """
+    rows = frame(run, show)
+    header, columns = [], []
+    for name in rows:
+        unit = rows.attrs["units"].get(name, "1")
+        factor, shown = chosen_unit(unit) or (1.0, unit)
+        header.append(_with_unit(str(name), shown))
+        values = rows[name].to_numpy()
+        columns.append(values if factor == 1.0 else factor * values)
+    _write(Path(path), header, [columns])
+
+
+def to_long_csv(run: Run, path: str | os.PathLike[str]) -> None:
+    """Write all quantities in long form, as ``long`` gives them; files as of ``to_csv``."""
+    names, parts = _long(run)
+    units = {
+        str(name): variable.attrs.get("units", "1")
+        for name, variable in run.dataset.coords.items()
+    }
+    header = [
+        _with_unit(name, (units | {"speed": "m/s"}).get(name, "1")) for name in names
+    ]
+    missing = np.array(np.nan)
+    columns = [[part.get(name, missing).ravel() for name in names] for part in parts]
+    _write(Path(path), header, columns)
+
+
+def _write(path: Path, header: Sequence[str], parts: Iterable[Sequence[Array]]) -> None:
+    """Write parts of a table, each given by columns; a column of one value is that in all rows."""
+    with (
+        output(path) as beside,
+        beside.open("w", encoding="utf-8", newline="") as file,
+    ):
+        file.write(",".join(_quoted(header)) + "\n")
+        for columns in parts:
+            count = max(map(len, columns), default=0)
+            # because the texts of all rows together take much memory
+            for start in range(0, count, _LINES):
+                rows = slice(start, min(start + _LINES, count))
+                fields = (
+                    _texts(values[rows])
+                    if len(values) == count
+                    else _texts(values) * (rows.stop - start)
+                    for values in columns
+                )
+                file.writelines(
+                    f"{line}\n" for line in map(",".join, zip(*fields, strict=True))
+                )
+
+
+def _texts(values: Array) -> list[str]:
+    """Return a column as fields of CSV, each different value written once."""
+    # 0.0 and -0.0 differ
+    bits = values.view(np.int64) if values.dtype == np.float64 else values
+    places, alike = pd.factorize(bits, use_na_sentinel=False)
+    texts = (
+        _quoted(alike)
+        if bits is values
+        else list(map(repr, alike.view(np.float64).tolist()))
+    )
+    return list(map(texts.__getitem__, places.tolist()))
+
+
+def _quoted(values: Iterable[Any]) -> list[str]:
+    """Return values as fields of CSV, with quotation marks if they are needed."""
+    fields: list[str] = []
+    for value in values:
+        line = io.StringIO()
+        csv.writer(line, lineterminator="").writerow(
+            ["nan" if pd.isna(value) else value, ""]
+        )
+        fields.append(line.getvalue()[:-1])
+    return fields
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return name if unit in ("1", "") else f"{name} [{unit}]"
+
+
+#: Columns that are texts, of which a quantity has one.
+_TEXTS = "quantity", "unit", "over", "source"
+#: Columns of statistics in long form, and the endings of their variables.
+_ENDINGS = {
+    "mean": "mean",
+    "error": "sem",
+    "low": "low",
+    "high": "high",
+    "bound": "bound",
+    "sd": "std",
+}
+_ALIKE = [
+    f"q{100 * level:02.0f}{end}" for level in QUANTILES for end in ("", "_low", "_high")
+]
+_ENDINGS |= {name: name for name in (*_ALIKE, "effective_samples", "correlation_time")}
+_ENDINGS |= {"correlation_time_error": "correlation_time_sem"}
+
+
+def long(run: Run) -> pd.DataFrame:
+    """Return all quantities, one row for each quantity, sweep value and time, in SI.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns: the swept keys; ``t`` [s], nan if a number is of the whole run or of its
+        second half; the prescribed ``speed`` [m/s]; ``quantity``, its ``unit``, and what
+        its ``mean`` is ``over``; ``error`` (standard error), ``low`` and ``high`` (95 %
+        interval) of the mean; ``bound`` of the error that members do not reduce, by its
+        ``source``; ``sd``; quantiles ``q05``, ``q50``, ``q95`` with the ends of their
+        intervals; ``effective_samples``, ``correlation_time`` and
+        ``correlation_time_error`` [s].
+    """
+    names, parts = _long(run)
+    wholes = (
+        {n: np.broadcast_to(v, part["mean"].shape).ravel() for n, v in part.items()}
+        for part in parts
+    )
+    return pd.concat(map(pd.DataFrame, wholes), ignore_index=True)[names]
+
+
+def _long(run: Run) -> tuple[list[str], list[dict[str, Array]]]:
+    """Return the columns of ``long``, and those of each quantity; a text is shared by all rows."""
+    dataset = run.dataset
+    places = [*map(str, dataset["contact_modulus"].coords), "branch", "phase", "t"]
+    dims = (*run.sweep, *places[-3:])
+    parts = []
+    at_times, of_run = over_members(dataset), statements(dataset, lost=run.lost)
+    for group, sample in ((at_times, run.sample(late=False)), (of_run, "")):
+        group = _flat(group)
+        known: dict[str, Any] = {}
+        for name in (name for name in places if name in group.coords):
+            place = group.coords[name].variable
+            # as a number that may be missing
+            known[name] = place.astype(float) if place.dtype.kind == "i" else place
+        for key in (str(key) for key in group if str(key).endswith("_mean")):
+            name, mean = key.removesuffix("_mean"), group.variables[key]
+            columns = known | _speed_beside(run, mean)
+            columns |= {
+                column: group.variables.get(f"{name}_{end}")
+                for column, end in _ENDINGS.items()
+            }
+            sizes = {dim: mean.sizes[dim] for dim in dims if dim in mean.dims}
+            bound = group.get(f"{name}_bound", group[key])
+            texts = {
+                "quantity": name,
+                "unit": mean.attrs.get("units", "1"),
+                "over": mean.attrs.get("over", sample) or "one run",
+                "source": bound.attrs.get("source", ""),
+            }
+            part = {column: np.array(text, object) for column, text in texts.items()}
+            for column, values in columns.items():
+                if values is not None and set(values.dims) <= sizes.keys():
+                    part[column] = values.to_base_variable().set_dims(sizes).to_numpy()
+            parts.append(part)
+    names = (*places, "speed", *_TEXTS, *_ENDINGS)
+    return [name for name in names if any(name in part for part in parts)], parts
+
+
+def _speed_beside(run: Run, mean: xr.Variable) -> dict[str, xr.Variable]:
+    """Return the prescribed speed at the times of a mean, or that of a whole steady run."""
+    if run.speed is None:
+        return {}
+    if "t" in mean.dims:
+        return {"speed": run.speed.variable}
+    first = run.speed.isel(t=0, drop=True)
+    return {"speed": first.where(steady_points(run.dataset)).variable}
+
+
+def _flat(statistics: xr.Dataset) -> xr.Dataset:
+    """Return statistics in which each quantile is a variable."""
+    flat: dict[str, xr.Variable] = {}
+    for key in map(str, statistics):
+        variable, (stem, _, end) = (
+            statistics.variables[key],
+            key.rpartition("_quantile"),
+        )
+        levels = QUANTILES if "quantile" in variable.dims else ()
+        flat |= {
+            f"{stem}_q{100 * level:02.0f}{end}": variable.isel(quantile=k)
+            for k, level in enumerate(levels)
+        }
+        flat |= {} if levels else {key: variable}
+    return statistics.drop_vars([*statistics, "quantile"], errors="ignore").assign(flat)
