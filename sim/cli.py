@@ -181,6 +181,17 @@ class _Commands(click.Group):
     make_context = while_read()(click.Group.make_context)
     invoke = while_read()(click.Group.invoke)
 
+    def format_commands(
+        self, ctx: click.Context, formatter: click.HelpFormatter
+    ) -> None:
+        """Write the first sentence of each command, whole: click would cut it to a line."""
+        rows = [
+            (name, (command.help or "").partition("\n")[0])
+            for name, command in sorted(self.commands.items())
+        ]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
 
 @click.group(
     cls=_Commands,

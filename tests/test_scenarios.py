@@ -72,6 +72,16 @@ def at(name, **overrides):
     return run(load(FOLDER / f"{name}.toml", overrides))
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_the_statistics_of_every_scenario_have_sixty_columns_at_most(name):
+    one = read.Run(four(name))
+    assert len(read.frame(one).columns) <= 60
+    tables = read.tables_of(one)
+    assert all(len(table.rows[0]) <= 10 for table in tables)
+    # a column whose number is missing says why, in a note or in the registry
+    assert read.notes(one, tables).headings
+
+
 @functools.cache
 def four(name):
     """A scenario with four members, short or whole, run once for all tests."""

@@ -29,6 +29,8 @@ MOST = 10
 _TURNS = 3
 #: Shares below it are nothing; spread over the mean below which a motion without noise has settled.
 _ROUNDING, _SETTLED = 1e-13, 1e-3
+#: Ratio of the largest value of a column to its least, above which its unit is that of their geometric mean.
+_WIDE = 3e3
 #: A number in a sentence, in place of which sentences are compared.
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
@@ -670,8 +672,12 @@ def _column_of(
     sizes = np.abs(values)
     if not np.any(np.isfinite(sizes)):
         sizes = np.abs(np.append(errors[1], errors[2]))
-    finite = sizes[np.isfinite(sizes)]
-    factor, shown = scaled(finite.max(initial=0.0), unit)
+    finite = sizes[np.isfinite(sizes) & (sizes > 0.0)]
+    largest = finite.max(initial=0.0)
+    # in a unit of the largest value the least of a wide column would be nearly nothing
+    if finite.size and largest > _WIDE * finite.min():
+        largest = float(np.sqrt(largest * finite.min()))
+    factor, shown = scaled(largest, unit)
     if unit == "%":
         factor, shown = 100.0, "%"
     texts = [

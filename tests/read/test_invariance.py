@@ -249,9 +249,9 @@ def by_name(dataset):
 
 
 def half_width(statement):
-    """Return half of the 95 % interval, 0 of an exact value."""
-    width = statement.high - statement.low
-    return 0.0 if math.isnan(width) else 0.5 * width
+    """Return half of the 95 % interval and the bound of the other error, 0 of an exact value."""
+    ends = 0.5 * (statement.high - statement.low), statement.bound
+    return sum(size for size in ends if not math.isnan(size))
 
 
 def agree(first, second):

@@ -2,11 +2,20 @@
 
 import errno
 import io
+import math
 import sys
 
 import pytest
 
-from sim.units.terminal import accept_all_letters, plain, print_rows, say, while_read
+from sim.units import terminal
+from sim.units.terminal import (
+    accept_all_letters,
+    plain,
+    print_rows,
+    say,
+    while_read,
+    width,
+)
 
 
 @pytest.mark.parametrize("encoding", ["cp1252", "cp850", "ascii"])
@@ -33,6 +42,29 @@ def test_columns_of_a_table_are_as_wide_as_what_is_written(monkeypatch):
     lines = screen.buffer.getvalue().decode().splitlines()
     assert [line.split()[-1] for line in lines] == ["a", "-1", "-2"]
     assert len({len(line.rstrip()) for line in lines}) == 1
+
+
+@pytest.mark.parametrize("columns", [20, 43, 44, 60, 61, 100])
+def test_a_table_is_no_wider_than_the_terminal_and_each_part_has_the_columns_of_its_place(
+    columns, monkeypatch, capsys
+):
+    monkeypatch.setattr(terminal, "width", lambda: columns)
+    names = [f"number {k} (µm)" for k in range(6)]
+    rows = [{"t (s)": str(k)} | dict.fromkeys(names, f"1234.{k}(5)") for k in range(3)]
+    print_rows(rows, keys=1)
+    parts = capsys.readouterr().out.split("\n\n")
+    lines = [line for part in parts for line in part.splitlines()]
+    assert max(len(line.rstrip()) for line in lines) <= columns
+    # "t (s)" and six columns of nine letters, each after a gap of two
+    in_a_part = (columns - 5) // 11
+    assert len(parts) == math.ceil(6 / in_a_part)
+    assert all("t (s)" in part for part in parts)
+    assert sum(part.count("1234.2(5)") for part in parts) == 6
+
+
+def test_a_pipe_is_100_columns_wide(monkeypatch):
+    monkeypatch.setattr(sys, "stdout", io.StringIO())
+    assert width() == 100
 
 
 def test_a_utf_8_output_has_every_letter_as_it_is(monkeypatch):
