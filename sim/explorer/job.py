@@ -4,6 +4,7 @@ import json
 import os
 import sys
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -17,6 +18,7 @@ from sim.ensemble.simulate import run
 from sim.explorer.drawing import listed
 from sim.scenario.scenario import Scenario
 from sim.units.errors import BadInput
+from sim.units.terminal import duration
 
 #: Most points of a trace or a band that are drawn.
 _DRAWN = 1000
@@ -30,13 +32,18 @@ Say = Callable[[dict[str, Any]], None]
 
 
 def ensemble(scenes: list[Scenario], say: Say) -> dict[str, Any]:
-    """Run scenes that differ in their speed, and return what is drawn of them; ``say`` takes the share that is done."""
+    """Run scenes that differ in their speed, and return what is drawn of them.
+
+    ``say`` takes the share that is done, and the time that is left in words.
+    """
     whole, done = sum(work(Plan.of(scene)) for scene in scenes), 0
+    began = time.monotonic()
 
     def progress(steps: int) -> None:
         nonlocal done
         done += steps
-        say({"done": done / whole})
+        left = (time.monotonic() - began) * (whole - done) / done
+        say({"done": done / whole, "left": duration(left)})
 
     first, *others = [summary(scene, run(scene, progress=progress)) for scene in scenes]
     for other in others if first["along"] == "speed" else []:

@@ -440,7 +440,7 @@ def test_an_ensemble_is_computed_and_its_result_is_that_of_a_run(changes, drawn)
         server, path="/run", body=json.dumps(table).encode(), headers=headers
     )
     *steps, last = (json.loads(line) for line in body.splitlines())
-    assert status == 200 and steps[-1]["done"] == 1.0
+    assert status == 200 and steps[-1] == {"done": 1.0, "left": "1 s"}
     exact = sim.run(sim.load(_scene(), changes)).contact_area[drawn]
     assert_allclose(last["result"]["curves"]["contact_area"]["mean"], exact, rtol=1e-12)
     assert until(lambda: not workers())

@@ -458,6 +458,7 @@ async function job(request, take) {
       text = lines.pop();
       for (const message of lines.map((each) => JSON.parse(each))) {
         if (message.done !== undefined) $("progress").value = message.done;
+        if (message.left !== undefined) $("ran").textContent = `${message.left} left`;
         if (message.fault) throw new Error(message.fault);
         if (message.result) take(message.result);
       }
