@@ -82,6 +82,11 @@ PULLED = Condition(
 )
 
 
+#: Reasons for missing values that several quantities have.
+OPEN, NO_SLIP = "the contact is open", "there is no slip event"
+NO_SLIPS = "there are no two slip events"
+
+
 class Definition(NamedTuple):
     """The definition of a quantity.
 
@@ -103,6 +108,9 @@ class Definition(NamedTuple):
         Heading of its column in a table; empty if no table has one.
     form : Form
         Form in which it is printed.
+    absent : str
+        Reason if a value is missing, in words; empty if there is none but the kind of
+        the run.
     """
 
     name: str
@@ -113,6 +121,7 @@ class Definition(NamedTuple):
     mean: Mean = Mean.OF_ALL
     heading: str = ""
     form: Form = Form.PLAIN
+    absent: str = ""
 
 
 #: Quantities over time, read at each record.
@@ -152,6 +161,7 @@ RECORDS: tuple[Definition, ...] = (
         "effective work of adhesion",
         symbol="w",
         heading="w",
+        absent=OPEN,
     ),
     Definition(
         "contact_radius",
@@ -160,9 +170,15 @@ RECORDS: tuple[Definition, ...] = (
         symbol="a",
         mean=Mean.WHILE_CLOSED,
         heading="a",
+        absent=OPEN,
     ),
     Definition(
-        "contact_area", "m^2", "contact area", symbol="A", mean=Mean.WHILE_CLOSED
+        "contact_area",
+        "m^2",
+        "contact area",
+        symbol="A",
+        mean=Mean.WHILE_CLOSED,
+        absent=OPEN,
     ),
     Definition(
         "normal_load",
@@ -171,8 +187,11 @@ RECORDS: tuple[Definition, ...] = (
         symbol="P",
         mean=Mean.WHILE_CLOSED,
         heading="P",
+        absent=OPEN,
     ),
-    Definition("indentation", "m", "indentation of the sphere", symbol="delta"),
+    Definition(
+        "indentation", "m", "indentation of the sphere", symbol="delta", absent=OPEN
+    ),
     Definition(
         "displacement", "m", "displacement of the mount", symbol="Delta", heading="Δ"
     ),
@@ -183,6 +202,7 @@ RECORDS: tuple[Definition, ...] = (
         symbol="F",
         mean=Mean.WHILE_CLOSED,
         heading="F",
+        absent=OPEN,
     ),
     Definition("in_contact", "1", "1 if the contact is closed"),
     Definition(
@@ -375,6 +395,7 @@ DERIVED: tuple[Definition, ...] = (
         symbol="A/A_JKR",
         heading="A/A_JKR",
         form=Form.PERCENT,
+        absent=OPEN,
     ),
     Definition(
         "lost_to_bonds",
@@ -382,6 +403,7 @@ DERIVED: tuple[Definition, ...] = (
         "share of the JKR area lost to broken bonds, which are subtracted first",
         heading="lost to bonds",
         form=Form.PERCENT,
+        absent=OPEN,
     ),
     Definition(
         "lost_to_fluctuations",
@@ -392,6 +414,7 @@ DERIVED: tuple[Definition, ...] = (
         ),
         heading="lost to fluct.",
         form=Form.PERCENT,
+        absent=OPEN,
     ),
     Definition(
         "lost_to_fluctuations_first",
@@ -399,6 +422,7 @@ DERIVED: tuple[Definition, ...] = (
         "share of the JKR area lost to fluctuations, if they are subtracted first",
         heading="fluct. first",
         form=Form.PERCENT,
+        absent=OPEN,
     ),
     Definition(
         "lost_to_bonds_last",
@@ -409,6 +433,7 @@ DERIVED: tuple[Definition, ...] = (
         ),
         heading="bonds last",
         form=Form.PERCENT,
+        absent=OPEN,
     ),
     Definition(
         "lost_to_mean_stress",
@@ -420,6 +445,7 @@ DERIVED: tuple[Definition, ...] = (
         exists_when=REVERSIBLE,
         heading="lost to stress",
         form=Form.PERCENT,
+        absent=OPEN,
     ),
     Definition(
         "lost_to_lag",
@@ -431,6 +457,7 @@ DERIVED: tuple[Definition, ...] = (
         exists_when=LAGGING_EDGE,
         heading="lost to lag",
         form=Form.PERCENT,
+        absent=OPEN,
     ),
     Definition(
         "order_of_charging",
@@ -454,6 +481,7 @@ DERIVED: tuple[Definition, ...] = (
         "share of closed contacts without effective work of adhesion",
         heading="masked",
         form=Form.SHARE,
+        absent="no contact is closed",
     ),
     Definition(
         "correlation_time",
@@ -547,6 +575,7 @@ OF_THE_RUN: tuple[Definition, ...] = (
         "share of the closed time in which the contact is masked",
         heading="masked, of the time",
         form=Form.SHARE,
+        absent="the contact was never closed",
     ),
     Definition(
         "runaway_force",
@@ -598,6 +627,7 @@ OF_EACH_SLIP: tuple[Definition, ...] = (
         "displacement of the slider in a slip event",
         symbol="S",
         exists_when=BEHIND_A_SPRING,
+        absent=NO_SLIP,
     ),
     Definition(
         "slip_speed",
@@ -846,6 +876,7 @@ OF_MEMBERS: tuple[Definition, ...] = (
         "s",
         "time at which half of the members had detached",
         heading="half detached",
+        absent="fewer than half of the members detached",
     ),
     Definition(
         "detached_rate",
@@ -858,6 +889,7 @@ OF_MEMBERS: tuple[Definition, ...] = (
         "s",
         "time at which half of the members had been masked",
         heading="half masked",
+        absent="fewer than half of the members were masked",
     ),
     Definition(
         "masked_rate", "1/s", "first maskings per time before them, of all members"
@@ -867,12 +899,14 @@ OF_MEMBERS: tuple[Definition, ...] = (
         "J",
         "work of the mount in a cycle, the closed integral of load over displacement",
         heading="∮P dΔ, per cycle",
+        absent="a cycle is not closed",
     ),
     Definition(
         "loop_dissipation",
         "J",
         "energy dissipated by opening and closing in a cycle",
         heading="dissipated, per cycle",
+        absent="a cycle is not closed",
     ),
     Definition(
         "total_dissipated",
@@ -887,15 +921,21 @@ OF_MEMBERS: tuple[Definition, ...] = (
         "N",
         "force at the start of a slip event, or at which the slider lost stability",
         heading="static friction",
+        absent=NO_SLIP,
     ),
     Definition(
-        "force_drop", "N", "drop of the spring force in a slip event", heading="drop"
+        "force_drop",
+        "N",
+        "drop of the spring force in a slip event",
+        heading="drop",
+        absent=NO_SLIP,
     ),
     Definition(
         "stress_drop",
         "Pa",
         "drop of the shear stress in a slip event",
         heading="drop of stress",
+        absent=NO_SLIP,
     ),
     Definition(
         "slip_spread",
@@ -903,16 +943,28 @@ OF_MEMBERS: tuple[Definition, ...] = (
         "standard deviation of the slips over their mean",
         heading="spread of slips",
         form=Form.PERCENT,
+        absent=NO_SLIP,
     ),
-    Definition("slip_duration", "s", "duration of a slip event", heading="slip lasts"),
     Definition(
-        "stick_duration", "s", "duration of a stick phase", heading="stick lasts"
+        "slip_duration",
+        "s",
+        "duration of a slip event",
+        heading="slip lasts",
+        absent=NO_SLIP,
+    ),
+    Definition(
+        "stick_duration",
+        "s",
+        "duration of a stick phase",
+        heading="stick lasts",
+        absent=NO_SLIPS,
     ),
     Definition(
         "recurrence_time",
         "s",
         "time between the starts of two slip events",
         heading="slip every",
+        absent=NO_SLIPS,
     ),
     Definition(
         "ran_away",
@@ -926,6 +978,7 @@ OF_MEMBERS: tuple[Definition, ...] = (
         "s",
         "time at which members lost stability, the mean of those that did",
         heading="lost stability after",
+        absent="no member lost stability",
     ),
 )
 
@@ -937,6 +990,7 @@ OF_PHASES: tuple[Definition, ...] = (
         "s",
         "time at rest of the stage before the phase",
         heading="held before",
+        absent="the stage did not rest before",
     ),
     Definition(
         "phase_slip_count", "1", "number of slip events in the phase", heading="slips"
@@ -946,24 +1000,28 @@ OF_PHASES: tuple[Definition, ...] = (
         "N",
         "spring force at which the first slip event of the phase begins",
         heading="first slip at",
+        absent=NO_SLIP,
     ),
     Definition(
         "phase_static_friction",
         "N",
         "mean spring force at the starts of slip events in the phase",
         heading="static friction",
+        absent=NO_SLIP,
     ),
     Definition(
         "phase_force_drop",
         "N",
         "mean drop of the spring force in slip events of the phase",
         heading="drop",
+        absent=NO_SLIP,
     ),
     Definition(
         "phase_recurrence_time",
         "s",
         "mean time between the starts of slip events of the phase",
         heading="slip every",
+        absent=NO_SLIPS,
     ),
 )
 

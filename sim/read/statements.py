@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 import xarray as xr
 
-from sim.quantities import Form, form_of
+from sim.quantities import QUANTITIES, Form, form_of
 from sim.read.dataset import MEMBERS, is_stationary, plain, sweep_dims
 from sim.read.events import ensemble_peaks, events, half_lives, slips_by_phase
 from sim.read.over_speed import loss_speeds
@@ -189,13 +189,23 @@ def of_events(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def sampled(group: xr.Dataset, over: str) -> xr.Dataset:
-    """Return statistics whose means have the attribute ``over``, which names their sample."""
-    means = {
-        key: group[key].assign_attrs(over=over)
-        for key in group
-        if str(key).endswith("_mean")
-    }
-    return group.assign(means)
+    """Return statistics whose means have the attribute ``over``, which names their sample.
+
+    A value that is missing without a bound or reason has the reason of the registry.
+    """
+    result = {}
+    for key in (str(key) for key in group if str(key).endswith("_mean")):
+        name = key.removesuffix("_mean")
+        result[key] = group[key].assign_attrs(over=over)
+        row = QUANTITIES.get(name)
+        missing = group[key].isnull()
+        for end in ("low", "high"):
+            missing = missing & group.get(f"{name}_{end}", group[key]).isnull()
+        if row is not None and row.absent and bool(missing.any()):
+            reason = group.get(f"{name}_reason", xr.full_like(missing, "", object))
+            is_unexplained = missing & (reason == "")
+            result[f"{name}_reason"] = xr.where(is_unexplained, row.absent, reason)
+    return group.assign(result)
 
 
 def as_means(values: xr.Dataset) -> xr.Dataset:

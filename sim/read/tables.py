@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,6 +60,14 @@ class Column(NamedTuple):
         return self.definition.heading
 
 
+class Reason(NamedTuple):
+    """The reason of a cell that is missing or no mean: its heading, the reason, and the point of the sweep in words."""
+
+    heading: str
+    text: str
+    place: str
+
+
 class Table(NamedTuple):
     """A table for people: cells by heading, with the unit of the column in the heading.
 
@@ -75,6 +83,8 @@ class Table(NamedTuple):
         The columns that are no keys.
     left_out : tuple of Column
         Columns that would make the table too wide.
+    reasons : tuple of Reason
+        Reasons of its cells that are missing or are no means.
     """
 
     rows: list[dict[str, str]]
@@ -82,6 +92,7 @@ class Table(NamedTuple):
     total: int = 0
     columns: tuple[Column, ...] = ()
     left_out: tuple[Column, ...] = ()
+    reasons: tuple[Reason, ...] = ()
 
 
 def _columns(*names: str, dull: float = 0.0) -> tuple[Column, ...]:
@@ -320,12 +331,12 @@ def _over_rows(run: Run, columns: Sequence[Column], rows: int, most: int) -> Tab
     means, points = _tabulated(run, rows, [column.name for column in columns])
     once = run.has_one_row_each
     placed = {n: index for n, index in points.items() if n != "t" or not once}
-    cells = _places(means, placed)
     known = [column for column in columns if _says_something(means, column, points)]
-    kept, left_out = _fitting(known, most - len(cells))
+    kept, left_out = _fitting(known, most - len(placed))
     total = run.points if once else run.points * run.dataset.sizes["t"]
-    shown = {**cells, **_shown(means, points, kept)}
-    return Table(_rows(shown), len(cells), total, kept, left_out)
+    return _table_of(means, placed, points, kept)._replace(
+        total=total, left_out=left_out
+    )
 
 
 def _once(
@@ -340,11 +351,10 @@ def _once(
     known = [column for column in columns if _says_something(stated, column, points)]
     if not known:
         return Table([])
-    places = _places(chosen, points)
-    kept, left_out = _fitting(known, most - len(places))
-    shown = {**places, **_shown(stated, points, kept)}
-    total = math.prod(sizes.values())
-    return Table(_rows(shown), len(places), total, kept, left_out)
+    kept, left_out = _fitting(known, most - len(points))
+    return _table_of(stated, points, points, kept)._replace(
+        total=math.prod(sizes.values()), left_out=left_out
+    )
 
 
 def _fitting(
@@ -391,7 +401,7 @@ def notes(run: Run, shown: Sequence[Table]) -> Notes:
     rows, columns that are left out, and the meaning of headings.
     """
     columns = [column for each_table in shown for column in each_table.columns]
-    needed = [*_samples(run, shown), *_missing(run, shown)]
+    needed = [*_samples(run, shown), *_missing(shown)]
     needed += [
         f"systematic error: {error}"
         for error in systematic_errors(run.dataset)
@@ -429,7 +439,7 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
     if any("±" in cell for cell in cells):
         phrases.append("±: bound of an error that members do not reduce")
     if any(re.search(r"\(.* |\([<>]", cell.partition("±")[0]) for cell in cells):
-        phrases.append("near 0 and 100 %: 95 % interval")
+        phrases.append("near 0 and 100 %: the end of the 95 % interval")
     if run.is_one_ensemble:
         sample = run.sample(late=True)
         phrases.append(
@@ -463,62 +473,22 @@ def unresolved(dataset: xr.Dataset) -> str:
     )
 
 
-def _missing(run: Run, shown: Sequence[Table]) -> Iterator[str]:
+def _missing(shown: Sequence[Table]) -> Iterator[str]:
     """Yield the reasons of printed columns in which a number is missing or is no mean, each with its points.
 
     Reasons that differ in their numbers only are one, with those of the first point.
     """
-    headings = {c.name: c.heading for each_table in shown for c in each_table.columns}
-    names = [name for name in headings if not _is_of_rows(run, name)]
-    groups = [run.events, run.losses]
-    if run.has_one_row_each:
-        late = [name for name in headings if name in QUANTITIES]
-        groups.append(run.late(late))
-        names = [*headings]
-    alike: dict[str, list[tuple[str, str, str]]] = {}
-    for group in groups:
-        for name in names:
-            for reason, place in _reasons(group, name):
-                key = _NUMBER.sub("#", reason)
-                alike.setdefault(key, []).append((headings[name], reason, place))
+    alike: dict[str, list[Reason]] = {}
+    for reason in (reason for each_table in shown for reason in each_table.reasons):
+        alike.setdefault(_NUMBER.sub("#", reason.text), []).append(reason)
     for entries in alike.values():
-        affected = ", ".join(dict.fromkeys(heading for heading, *_ in entries))
-        _, reason, place = entries[0]
-        others = len({place for *_, place in entries}) - 1
-        at = (
-            f" (at {place}{f', and {others} more points' if others else ''})"
-            if place
-            else ""
-        )
-        yield f"* {affected}: {reason}{at}"
-
-
-def _is_of_rows(run: Run, name: str) -> bool:
-    """Return True for a quantity over time."""
-    return f"{name}_mean" not in run.events and f"{name}_mean" not in run.losses
-
-
-def _reasons(group: xr.Dataset, name: str) -> Iterator[tuple[str, str]]:
-    """Yield each reason of a quantity with the point of the sweep in words, "" without a sweep."""
-    variable = group.get(f"{name}_reason")
-    if variable is None:
-        return
-    for place in np.ndindex(*variable.shape):
-        if text := str(variable.to_numpy()[place]):
-            point = variable[dict(zip(variable.dims, place, strict=True))]
-            yield text, _in_words(point)
-
-
-def _in_words(point: xr.DataArray) -> str:
-    """Return the coordinates of a point in words."""
-    words = []
-    for name, value in point.coords.items():
-        if value.dtype.kind == "f":
-            text = engineering(float(value), value.attrs.get("units", "1"))
-        else:
-            text = str(value.item())
-        words.append(f"{name} = {text}")
-    return ", ".join(words)
+        affected = ", ".join(dict.fromkeys(reason.heading for reason in entries))
+        places = dict.fromkeys(reason.place for reason in entries)
+        first, *others = places
+        points = "points" if len(others) > 1 else "point"
+        more = f", and {len(others)} more {points}" if others else ""
+        at = f" (at {first}{more})" if first else ""
+        yield f"* {affected}: {entries[0].text}{at}"
 
 
 def _turning(run: Run) -> Iterator[str]:
@@ -612,15 +582,55 @@ def _says_something(means: xr.Dataset, column: Column, points: Points) -> bool:
     return not np.all((mean == column.dull) | is_missing)
 
 
-def _shown(means: xr.Dataset, points: Points, columns: Iterable[Column]) -> Cells:
-    """Return the cells of columns at some points."""
-    cells: Cells = {}
+def _table_of(
+    means: xr.Dataset, placed: Points, points: Points, columns: tuple[Column, ...]
+) -> Table:
+    """Return the table of some columns at points, after those of the place of each row."""
+    cells = _places(means, placed)
+    keys = len(cells)
+    count = next(iter(points.values())).size if points else 1
+    swept = {name: index for name, index in placed.items() if name != "t"}
+    words = _in_words(means, swept, count)
+    reasons = []
     for column in columns:
-        heading, texts = _texts_of(means, points, column.definition)
+        row = column.definition
+        heading, texts = _texts_of(means, points, row)
+        for number, reason in enumerate(_reasons_at(means, points, row)):
+            if reason:
+                texts[number] += "*"
+                reasons.append(Reason(row.heading, reason, words[number]))
         while heading in cells:  # of two peaks, each with its speed
             heading += " "
         cells[heading] = texts
-    return cells
+    return Table(_rows(cells), keys, columns=columns, reasons=tuple(reasons))
+
+
+def _in_words(places: xr.Dataset, points: Points, count: int) -> list[str]:
+    """Return the point of the sweep of each of so many rows in words, "" without a sweep."""
+    words = [list[str]() for _ in range(count)]
+    for name, index in points.items():
+        unit = places[name].attrs.get("units", "1")
+        for row, value in zip(words, places[name].to_numpy()[index], strict=True):
+            is_number = places[name].dtype.kind == "f"
+            text = engineering(float(value), unit) if is_number else str(value)
+            row.append(f"{name} = {text}")
+    return [", ".join(row) for row in words]
+
+
+def _reasons_at(means: xr.Dataset, points: Points, row: Definition) -> list[str]:
+    """Return the reason of each row of a column whose value is missing or no mean, "" else."""
+    mean, low, high = (
+        _at(means.get(f"{row.name}_{kind}"), points) for kind in ("mean", "low", "high")
+    )
+    explicit = means.get(f"{row.name}_reason")
+    reasons = (
+        [""] * len(mean) if explicit is None else [*map(str, _at(explicit, points))]
+    )
+    is_missing = np.isnan(mean) & np.isnan(low) & np.isnan(high)
+    return [
+        reason or (row.absent if missing else "")
+        for reason, missing in zip(reasons, is_missing, strict=True)
+    ]
 
 
 def _texts_of(
@@ -642,12 +652,6 @@ def _texts_of(
         texts = [
             share(*ends) or text
             for *ends, text in zip(mean, low, high, texts, strict=True)
-        ]
-    if f"{row.name}_reason" in means:
-        has_reason = _at(means[f"{row.name}_reason"], points) != ""
-        texts = [
-            f"{text}*" if marked else text
-            for text, marked in zip(texts, has_reason, strict=True)
         ]
     return heading, texts
 

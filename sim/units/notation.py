@@ -127,14 +127,18 @@ def concise(mean: float, sem: float) -> str:
     if math.isnan(mean):
         return "–"
     if not sem > 1e-9 * abs(mean) or not math.isfinite(sem):
-        return f"{mean:.4g}"
+        return _digits(mean, 4)
     places = _places_of(sem)
     if mean != 0.0 and places > _MOST_DIGITS - 1 - math.floor(math.log10(abs(mean))):
-        rounded = float(f"{mean:.{_MOST_DIGITS - 1}g}")
-        return f"{rounded:.{_MOST_DIGITS}g}"
+        return _digits(mean, _MOST_DIGITS - 1)
     digits = max(places, 0)
     error = round(round(sem, places) * 10**digits)
     return f"{round(mean, places) + 0.0:.{digits}f}({error})"
+
+
+def _digits(number: float, digits: int) -> str:
+    """Return a number of so many digits; up to a million it has no power of ten."""
+    return f"{float(f'{number:.{digits}g}'):.{_MOST_DIGITS}g}"
 
 
 def _places_of(error: float) -> int:
@@ -198,21 +202,24 @@ def bounded(
 
 
 def share(value: float, low: float, high: float) -> str:
-    """Return a share in percent with its 95 % interval if a standard error would leave 0 to 100 %; "" else.
+    """Return a share in percent with an end of its 95 % interval if a standard error would leave 0 to 100 %; "" else.
 
-    >>> print(share(0.0, 0.0, 0.39), share(1.0, 0.985, 1.0), share(0.02, 0.001, 0.39))
-    0 (<39) 100 (>98.5) 2 (0.1 to 39)
-    >>> share(0.5, 0.4, 0.6)
-    ''
+    The end is that of the side on which there is room.
+
+    >>> print(share(0.0, 0.0, 0.39), share(1.0, 0.985, 1.0), share(0.002, 0.0001, 0.039))
+    0 (<39) 100 (>98.5) 0.2 (<3.9)
+    >>> print(share(0.99998, 0.9998, 1.0), share(0.5, 0.4, 0.6) == "")
+    99.9980 (>99.980) True
     """
     error = (high - low) / 3.92
     if not (value - error < 0.0 or value + error > 1.0):
         return ""
-    first, middle, last = (
-        100.0 * min(max(number, 0.0), 1.0) for number in (low, value, high)
-    )
-    if value <= 0.0:
-        return f"0 (<{last:.3g})"
-    if value >= 1.0:
-        return f"100 (>{first:.3g})"
-    return f"{middle:.3g} ({first:.2g} to {last:.3g})"
+    if value < 0.5:
+        return f"{100.0 * value:.2g} (<{100.0 * high:.2g})"
+    texts = []
+    for number in (value, low):
+        missing = 100.0 * (1.0 - number)
+        # two digits of it
+        places = max(_places_of(missing), 0) if missing > 0.0 else 0
+        texts.append(f"{100.0 * number:.{places}f}")
+    return f"{texts[0]} (>{texts[1]})"

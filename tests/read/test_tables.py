@@ -391,3 +391,22 @@ def test_the_speed_of_a_slider_on_single_bonds_is_its_displacement_over_the_time
     assert_allclose(
         ends[:, 1], dataset["slider_position"][:, -1] / time[-1], rtol=1e-12
     )
+
+
+def test_a_missing_number_has_the_reason_of_the_registry_at_the_first_of_its_points():
+    loads = {"contact.load": ["1 mN", "2 mN", "4 mN"]}
+    quiet = {"drive": drive.Steady(speed=1e-3), "ensemble": Ensemble(members=4)}
+    one = read.Run(run(scene(**quiet, sweep=loads)))
+    # in one of three loads two members of four are masked
+    times = one.dataset["first_masked"].copy(deep=True)
+    times[...] = math.nan
+    times[{"contact_load": 1, "member": slice(2)}] = 0.1
+    one.dataset["first_masked"] = times
+    table = read.highlights(one)
+    shown = [row["half masked (ms)"] for row in table.rows]
+    assert shown == ["–*", "100 (> 100)", "–*"]
+    words = "fewer than half of the members were masked"
+    line = f"* half masked: {words} (at contact_load = 1 mN, and 1 more point)"
+    assert line in read.notes(one, [table]).needed
+    frame = sim.stats(one.dataset)
+    assert_array_equal(frame["half_masked_reason"], [words, "", words])
