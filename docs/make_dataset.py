@@ -5,7 +5,16 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from sim.ensemble.variables import LARGEST
-from sim.quantities import ERRORS, MAP, NUMBERS, RECORDS, Definition
+from sim.quantities import (
+    DERIVED,
+    ERRORS,
+    MAP,
+    NUMBERS,
+    OF_MEMBERS,
+    OF_PHASES,
+    RECORDS,
+    Definition,
+)
 
 TARGET = Path(__file__).with_name("dataset.md")
 HEAD = """# The variables of a dataset
@@ -99,6 +108,12 @@ the mean and its error are taken.
 horizontal. The command `sim plot OUT.nc map` does the same.
 """,
 }
+FOLLOWING = """
+## Quantities that follow from these
+
+`sim stats` prints them, and `sim.Run(dataset).statistic(name)` has their statistics. A column is left out of a table if it says
+nothing, such as the share of open contacts while all are closed. A value that is missing has its reason in a note.
+"""
 OTHERS = """
 ## Other programs
 
@@ -235,6 +250,15 @@ def text() -> str:
             f"| `{name}` | {unit} | {dims} | {meaning} | {there} |"
             for name, unit, dims, meaning, there in rows
         ]
+    lines += [
+        FOLLOWING,
+        "| name | unit | heading | meaning | reason if it is missing |",
+        "| --- " * 5 + "|",
+    ]
+    lines += [
+        f"| `{row.name}` | {row.unit} | {row.heading} | {row.meaning} | {row.absent} |"
+        for row in (*DERIVED, *OF_MEMBERS, *OF_PHASES)
+    ]
     return "\n".join(lines) + "\n" + OTHERS
 
 

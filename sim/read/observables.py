@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from sim.laws import jkr
-from sim.quantities import OF_CONTACT
+from sim.quantities import OF_CONTACT, QUANTITIES
 from sim.read.dataset import (
     MEMBERS,
     control,
@@ -28,14 +28,11 @@ KEPT = ("mean", "std", "sem")
 #: Endings of a variable of each member, and of those of its recorded statistics.
 ENDINGS = ("", *(f"_{kind}" for kind in KEPT))
 
-#: Shares of the area after that lost to bonds, in the order of charging: radius before each, and what it is lost to.
+#: Shares of the area after that lost to bonds, in the order of charging, and the radius before each.
 _LOSSES = {
-    "lost_to_fluctuations": ("bonds_radius", "fluctuations, after the bonds"),
-    "lost_to_mean_stress": (
-        "fluctuations_radius",
-        "the mean stress, after bonds and fluctuations",
-    ),
-    "lost_to_lag": ("equilibrium_radius", "the lag of the edge, subtracted last"),
+    "lost_to_fluctuations": "bonds_radius",
+    "lost_to_mean_stress": "fluctuations_radius",
+    "lost_to_lag": "equilibrium_radius",
 }
 #: Radii that others are compared with.
 _REFERENCES = ("jkr_radius", "hertz_radius")
@@ -69,6 +66,12 @@ def labelled(
 ) -> xr.DataArray:
     """Return values with members and time last, with their unit and meaning."""
     return ordered(values).assign_attrs(units=unit, long_name=text, symbol=symbol)
+
+
+def defined(name: str, values: xr.DataArray) -> xr.DataArray:
+    """Return values of a quantity with members and time last, with its unit and meaning in the registry."""
+    row = QUANTITIES[name]
+    return labelled(values, row.unit, row.meaning, row.symbol)
 
 
 def pure(values: xr.DataArray, text: str, symbol: str = "") -> xr.DataArray:
@@ -217,30 +220,29 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
         full_area(dataset),
     )
     recorded = {str(name).removesuffix("_mean") for name in dataset}
-    charged = {name: loss for name, loss in _LOSSES.items() if loss[0] in recorded}
-    if any(radius not in dataset for radius, _ in charged.values()):
+    charged = {name: radius for name, radius in _LOSSES.items() if radius in recorded}
+    if any(radius not in dataset for radius in charged.values()):
         raise ValueError(
             "shares need every member; record them: [record] per_member = true"
         )
     left = [
         np.pi * dataset[radius].astype(float, copy=False) ** 2
-        for radius, _ in charged.values()
+        for radius in charged.values()
     ]
     left = [level.where(area.notnull()) for level in left]
     levels = [full, *left, area]
-    texts = {"lost_to_bonds": "broken bonds, which are subtracted first"}
-    texts |= {name + suffix: text for name, (_, text) in charged.items()}
     shares = {}
-    for (name, text), (before, after) in zip(
-        texts.items(), itertools.pairwise(levels), strict=False
+    for name, (before, after) in zip(
+        ("lost_to_bonds", *charged), itertools.pairwise(levels), strict=False
     ):
-        shares[name] = pure(
-            (before - after) / full, f"share of the JKR area lost to {text}"
-        )
-    if suffix:  # the bonds are the same for all members, so the spread is the area's
+        # the bonds are the same for all members
+        ending = "" if name == "lost_to_bonds" else suffix
+        shares[name + ending] = defined(name, (before - after) / full)
+    if suffix:  # so the spread is the area's
         for kind in ("std", "sem"):
-            shares[f"lost_to_fluctuations_{kind}"] = pure(
-                dataset[f"contact_area_{kind}"] / full, ""
+            spread = dataset[f"contact_area_{kind}"] / full
+            shares[f"lost_to_fluctuations_{kind}"] = defined(
+                "lost_to_fluctuations", spread
             )
     return xr.Dataset(shares, attrs=dataset.attrs)
 
@@ -297,10 +299,7 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
         ) from None
     full, alone = full_area(dataset), np.pi * radius.fillna(0.0) ** 2
     alone = alone.where(dataset["contact_area"].notnull())
-    return pure(
-        (full - alone) / full,
-        "share of the JKR area lost to fluctuations, which are subtracted first",
-    )
+    return (full - alone) / full
 
 
 def observables(dataset: xr.Dataset) -> xr.Dataset:
@@ -319,13 +318,11 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
             ratio = result[f"contact_area{suffix}"].astype(
                 float, copy=False
             ) / full_area(dataset)
-            result[f"area_ratio{suffix}"] = pure(
-                ratio, "contact area over JKR's", "A/A_JKR"
-            )
+            result[f"area_ratio{suffix}"] = defined("area_ratio", ratio)
         if f"in_contact{suffix}" in result:
             closed = result[f"in_contact{suffix}"].astype(float, copy=False)
             opened = closed if suffix in ("_std", "_sem") else 1.0 - closed
-            result[f"fraction_detached{suffix}"] = pure(opened, "open contacts")
+            result[f"fraction_detached{suffix}"] = defined("fraction_detached", opened)
     with where_recorded():
         result = result.assign(masks(dataset))
     return result.drop_vars(
@@ -357,19 +354,12 @@ def charges(dataset: xr.Dataset) -> xr.Dataset:
     with contextlib.suppress(ValueError), where_recorded():
         shares = share_observables(dataset)
         first, later = _charged_first(dataset), shares["lost_to_fluctuations"]
-        last = shares["lost_to_bonds"] + later - first
-        last = pure(
-            last, "share of the JKR area lost to broken bonds, after the fluctuations"
-        )
-        more = pure(
-            first - later,
-            "additional loss to fluctuations if they are subtracted first",
-        )
-        shares = shares.assign(
-            lost_to_fluctuations_first=first,
-            lost_to_bonds_last=last,
-            order_of_charging=more,
-        )
+        known = {
+            "lost_to_fluctuations_first": first,
+            "lost_to_bonds_last": shares["lost_to_bonds"] + later - first,
+            "order_of_charging": first - later,
+        }
+        shares = shares.assign({name: defined(name, known[name]) for name in known})
     return shares
 
 
@@ -382,7 +372,7 @@ def restricted(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset
         "in_contact",
     }
     if _shares_among(names):
-        sources |= {*_SOURCES_OF_SHARES, *(radius for radius, _ in _LOSSES.values())}
+        sources |= {*_SOURCES_OF_SHARES, *_LOSSES.values()}
     return with_trajectories(
         dataset, *(f"{name}{ending}" for name in sources for ending in ENDINGS)
     )
@@ -417,14 +407,17 @@ def _shares_among(names: Collection[str]) -> bool:
 
 def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
     """Return ``fraction_masked``; of statistics alone it is known if all contacts are closed, else nan."""
-    text = "closed contacts without effective work of adhesion"
     if "masked" in dataset:
         return {
-            "fraction_masked": pure(dataset["masked"].astype(float, copy=False), text)
+            "fraction_masked": defined(
+                "fraction_masked", dataset["masked"].astype(float)
+            )
         }
     closed = dataset["in_contact_mean"] == 1.0
     return {
-        f"fraction_masked_{kind}": pure(dataset[f"masked_{kind}"].where(closed), text)
+        f"fraction_masked_{kind}": defined(
+            "fraction_masked", dataset[f"masked_{kind}"].where(closed)
+        )
         for kind in KEPT
     }
 

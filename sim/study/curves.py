@@ -8,7 +8,7 @@ import numpy as np
 from sim.ensemble.steady import steady_course
 from sim.ensemble.variables import READ
 from sim.parts.exchange import Array
-from sim.quantities import RECORDS
+from sim.quantities import QUANTITIES
 from sim.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -24,15 +24,6 @@ OVER_SPEED = (
     "contact_area",
     "friction_force",
 )
-#: Shares of JKR's area that follow from them.
-SHARES = {
-    "area_ratio": "contact area over JKR's",
-    "lost_to_bonds": "share of JKR's area lost to broken bonds, which are subtracted first",
-    "lost_to_fluctuations": "share of JKR's area lost to fluctuations, after the bonds",
-    "lost_to_mean_stress": "share of JKR's area lost to the mean stress, after bonds and fluctuations",
-    "lost_to_fluctuations_first": "share of JKR's area lost to fluctuations, which are subtracted first",
-    "lost_to_bonds_last": "share of JKR's area lost to broken bonds, after the fluctuations",
-}
 
 
 def curves(scenario: Scenario, speeds: Array, time: float = 0.0) -> dict[str, Array]:
@@ -81,13 +72,11 @@ def steady_curves(scenario: Scenario, speeds: Array, time: float = 0.0) -> "xr.D
     """Return the curves of steady sliding as a dataset; see ``sim.steady_curves``."""
     import xarray as xr
 
-    described = {row.name: (row.unit, row.meaning) for row in RECORDS}
-    described |= {name: ("1", text) for name, text in SHARES.items()}
     axis = "speed", speeds, {"units": "m/s", "long_name": "sliding speed"}
     result = xr.Dataset(coords={"speed": axis}, attrs={"title": scenario.name})
     for name, values in curves(scenario, speeds, time).items():
-        unit, text = described[name]
-        result[name] = "speed", values, {"units": unit, "long_name": text}
+        row = QUANTITIES[name]
+        result[name] = "speed", values, {"units": row.unit, "long_name": row.meaning}
     return result
 
 
