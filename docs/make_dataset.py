@@ -111,8 +111,9 @@ horizontal. The command `sim plot OUT.nc map` does the same.
 FOLLOWING = """
 ## Quantities that follow from these
 
-`sim stats` prints them, and `sim.Run(dataset).statistic(name)` has their statistics. A column is left out of a table if it says
-nothing, such as the share of open contacts while all are closed. A value that is missing has its reason in a note.
+`sim stats` prints them, and `sim.Run(dataset).statistic(name)` has their statistics. A column is left out of a table
+if it says nothing, such as the share of open contacts while all are closed. A value that is missing has its reason in
+a note.
 """
 OTHERS = """
 ## Other programs
