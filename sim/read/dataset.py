@@ -68,6 +68,12 @@ _RECORDED = {
 }
 #: Numbers on slip events, which are recorded together unless a scenario chooses some.
 _SLIPS = [name for name in RECORDED if name.startswith(("slip_", "late_"))]
+#: Begin of the versions whose events of these names had other definitions.
+_FIRST = ("0.", "1.")
+_OLD_EVENTS = re.compile(
+    "(phase_)?(pull_off|closing|slip)_|kinetic_friction"
+    "|late_(force_before|force_drop|amplitude|recurrence)_"
+)
 #: Names of systematic errors.
 _ERRORS = re.compile("(cell|banded|step)_error_")
 _DIMENSIONS = ("t", "slip", "phase", "late", "map_member", "map_time", "x", "y")
@@ -115,7 +121,7 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
                 ]
             )
         dataset.attrs |= _joined(dataset)  # a copy would not close the file
-        result = hdf5.located(dataset)
+        result = hdf5.located(_without_old_events(dataset))
         refused.pop_all()
     return result
 
@@ -243,12 +249,26 @@ def lacking(dataset: xr.Dataset) -> str:
     lost = [
         statement for name, statement in _STATEMENTS.items() if name not in recorded
     ]
-    text = f"made by sim {dataset.attrs['sim_version']}, which did not record all"
+    version = str(dataset.attrs["sim_version"])
+    if version.startswith(_FIRST):
+        lost += ["pull-offs and slip events, which had other definitions"]
+    text = f"made by sim {version}, which did not record all"
     return (
         f"{text}: no {', no '.join(lost)}; run the scenario again for these"
         if lost
         else ""
     )
+
+
+def _without_old_events(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset of a version 1 without events that have another definition now under the same name."""
+    if not str(dataset.attrs["sim_version"]).startswith(_FIRST):
+        return dataset
+    result = dataset.drop_vars(
+        [name for name in dataset.data_vars if _OLD_EVENTS.match(str(name))]
+    )
+    result.set_close(dataset._close)
+    return result
 
 
 def with_trajectories(dataset: xr.Dataset, *names: str) -> xr.Dataset:

@@ -1,7 +1,9 @@
 """Statistics: exact on numbers known beforehand, consistent with the laws on real runs."""
 
 import math
+import shutil
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -10,9 +12,10 @@ from helpers.parts import Equilibrium, Record, drive, read, run, shear
 from helpers.printed import rows_of
 from numpy.testing import assert_allclose
 
+import sim
 from sim.parts.drive import Steady
 from sim.read import dataset as dataset_module
-from sim.read.dataset import word
+from sim.read.dataset import lacking, word
 
 
 @pytest.fixture(scope="module")
@@ -216,3 +219,26 @@ def test_words_and_settings_are_known_whether_swept_or_not_and_a_run_that_is_sta
     )
     moved = run(scene(contact=Equilibrium(load={"from": 1e-3, "to": 2e-3}), **steady))
     assert read.is_steady(moved) and not read.is_stationary(moved)
+
+
+def test_events_of_a_version_with_other_definitions_are_left_out_with_one_sentence(
+    tmp_path,
+):
+    pulled = Equilibrium(load={"from": 4e-3, "to": -1e-3})
+    still = {"drive": drive.Steady(speed=0.0), "shear": shear.Uniform()}
+    path = sim.run(scene(contact=pulled, **still), tmp_path / "new.nc")
+    old = tmp_path / "old.nc"
+    shutil.copy(path, old)
+    with netCDF4.Dataset(old, "a") as file:
+        file.sim_version = "1.3.1"
+    with sim.open(path) as new, sim.open(old) as opened:
+        left_out = set(new.data_vars) - set(opened.data_vars)
+        assert {"pull_off_load", "pull_off_time"} <= left_out
+        assert not {"contact_area", "first_detachment", "jkr_radius"} & left_out
+        assert lacking(new) == ""
+        words = "no pull-offs and slip events, which had other definitions"
+        assert words in lacking(opened) and "run the scenario again" in lacking(opened)
+        assert not [name for name in sim.stats(opened) if name.startswith("pull_off")]
+    # nothing holds it any longer
+    with netCDF4.Dataset(old, "a"):
+        pass
