@@ -35,8 +35,8 @@ from sim.read.observables import (
     share_observables,
 )
 from sim.read.over_speed import crossing, extremes, loss_speeds, steady_speeds
-from sim.read.run import Run
-from sim.read.statements import Statement, each, relaxation, statements, statistics
+from sim.read.run import Run, statements
+from sim.read.statements import Statement, each, relaxation, statistics
 from sim.read.statistics import (
     QUANTILES,
     IntegralTime,

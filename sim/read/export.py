@@ -14,7 +14,6 @@ import xarray as xr
 from sim.numerics.files import output
 from sim.read.dataset import steady_points
 from sim.read.run import Run
-from sim.read.statements import statements
 from sim.read.statistics import QUANTILES, Array, over_members
 from sim.read.tables import EVENTS, GROUPS, LOSSES, SLIPS, main_columns, of_losses
 from sim.units.errors import BadInput
@@ -242,8 +241,8 @@ def _long(run: Run) -> tuple[list[str], list[dict[str, Array]]]:
     places = [*map(str, dataset["contact_modulus"].coords), "branch", "phase", "t"]
     dims = (*run.sweep, *places[-3:])
     parts = []
-    at_times, of_run = over_members(dataset), statements(dataset, lost=run.lost)
-    for group, sample in ((at_times, run.sample(late=False)), (of_run, "")):
+    at_times = over_members(dataset)
+    for group, sample in ((at_times, run.sample(late=False)), (run.statements(), "")):
         group = _flat(group)
         known: dict[str, Any] = {}
         for name in (name for name in places if name in group.coords):

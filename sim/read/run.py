@@ -63,7 +63,12 @@ class Run:
     def __init__(self, dataset: xr.Dataset, lost: Sequence[str | float] = ()) -> None:
         self.dataset = datasets.plain(dataset)
         self.lost = lost
-        self._late, self._known = xr.Dataset(), set[str]()
+        self._late, self._known, self._is_whole = xr.Dataset(), set[str](), False
+        if MEMBERS in self.dataset["contact_modulus"].dims:
+            cure = 'xarray.concat(..., "member", data_vars="minimal", coords="minimal", compat="override")'
+            raise BadInput(
+                [f"numbers of the scenario differ between members; join runs by {cure}"]
+            )
 
     @cached_property
     def sweep(self) -> tuple[str, ...]:
@@ -170,10 +175,16 @@ class Run:
         speeds = as_means(loss_speeds(self.dataset, self.lost))
         return sampled(speeds, self.sample(late=False))
 
-    def late(self, names: Iterable[str]) -> xr.Dataset:
-        """Return statistics over the second half of a stationary run, of these quantities at least."""
+    def late(self, names: Iterable[str] | None = None) -> xr.Dataset:
+        """Return statistics over the second half of a stationary run, of some quantities at least, else of all."""
+        if names is None:
+            if not self._is_whole:
+                group = of_second_half(self.dataset)
+                self._late.update(sampled(group, self.sample(late=True)))
+                self._is_whole = True
+            return self._late
         missing = {*names} - self._known
-        if missing - {_MEMORY}:
+        if missing - {_MEMORY} and not self._is_whole:
             group = of_second_half(self.dataset, missing - {_MEMORY})
             self._late.update(sampled(group, self.sample(late=True)))
         if _MEMORY in missing:
@@ -187,6 +198,17 @@ class Run:
             )
         self._known |= missing
         return self._late
+
+    def statements(self, names: Iterable[str] | None = None) -> xr.Dataset:
+        """Return all numbers of the whole run; see ``sim.read.statements``."""
+        groups = [self.events, self.losses]
+        if self.is_stationary:
+            groups.append(self.late(names))
+        result = xr.merge(groups, compat="no_conflicts", join="outer")
+        # of a record that a number was taken from: a statement has no time
+        result = result.drop_vars("t", errors="ignore")
+        # with their units
+        return result.assign_coords({name: self.dataset[name] for name in self.sweep})
 
     def statistic(self, name: str, late: bool = False) -> xr.DataArray:
         """Return the statistics of one quantity.
@@ -289,3 +311,33 @@ class Run:
             "skewness": third / variance.where(variance > 0.0) ** 1.5,
             "number": sample.count(over).astype(float),
         }
+
+
+def statements(
+    dataset: xr.Dataset,
+    names: Iterable[str] | None = None,
+    lost: Sequence[str | float] = (),
+) -> xr.Dataset:
+    """Return the statements of a run over the sweep.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+    names : iterable of str, optional
+        Observables of which means are wanted, all by default.
+    lost : sequence of float or str, optional
+        Shares of JKR's area whose loss has a speed, see ``Run``.
+
+    Returns
+    -------
+    xarray.Dataset
+        For each statement ``<name>_mean``, its value, with the attribute ``over`` that
+        names the sample, and where they are known ``<name>_sem``, ``<name>_low``,
+        ``<name>_high``, ``<name>_bound`` and ``<name>_reason``:
+
+        - events of a run (see ``events``), with medians and rates of lifetimes,
+        - speeds at which area is lost (see ``loss_speeds``),
+        - of a stationary run means over its second half (see ``distribution``).
+    """
+    return Run(dataset, lost).statements(names)

@@ -1,6 +1,6 @@
 """Statements: each value that a person reads of a run, computed once. Tables, CSV, figures and report print them."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,18 +8,9 @@ import scipy
 import xarray as xr
 
 from sim.quantities import QUANTITIES, Form, form_of
-from sim.read.dataset import MEMBERS, is_stationary, plain, sweep_dims
+from sim.read.dataset import MEMBERS
 from sim.read.events import ensemble_peaks, events, half_lives, slips_by_phase
-from sim.read.over_speed import loss_speeds
-from sim.read.statistics import (
-    Array,
-    averaging,
-    correlation_time,
-    of_second_half,
-    over_members,
-    summary,
-)
-from sim.units.errors import BadInput
+from sim.read.statistics import Array, correlation_time, over_members, summary
 from sim.units.notation import bounded, scaled, share
 
 #: Endings of the variables of a statement beside its value.
@@ -83,55 +74,6 @@ class Statement(NamedTuple):
         return "; ".join(
             filter(None, (f"{text} {unit}".rstrip() if sizes else "", self.reason))
         )
-
-
-def statements(
-    dataset: xr.Dataset,
-    names: Collection[str] | None = None,
-    lost: Sequence[float | str] = (),
-) -> xr.Dataset:
-    """Return the statements of a run over the sweep.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it.
-    names : collection of str, optional
-        Observables of which means are wanted, all by default.
-    lost : sequence of float or str, optional
-        Shares of JKR's area whose loss has a speed, in place of 5 and 50 % and half of all: ``["10 %"]``.
-
-    Returns
-    -------
-    xarray.Dataset
-        For each statement ``<name>_mean``, its value, with the attribute ``over`` that names the sample, and where
-        they are known ``<name>_sem``, ``<name>_low``, ``<name>_high`` and ``<name>_reason``:
-
-        - events of a run (see ``events``), with medians and rates of lifetimes,
-        - speeds at which area is lost (see ``loss_speeds``),
-        - of a stationary run means over its second half (see ``distribution``).
-    """
-    dataset = plain(dataset)
-    if MEMBERS in dataset["contact_modulus"].dims:
-        cure = 'xarray.concat(..., "member", data_vars="minimal", coords="minimal", compat="override")'
-        raise BadInput(
-            [f"numbers of the scenario differ between members; join runs by {cure}"]
-        )
-    members, late = (
-        averaging(dataset, half).removeprefix("mean over the ")
-        for half in (False, True)
-    )
-    groups = [
-        sampled(of_events(dataset), members),
-        sampled(as_means(loss_speeds(dataset, lost)), members),
-    ]
-    if is_stationary(dataset):
-        groups.append(sampled(of_second_half(dataset, names), late))
-    result = xr.merge(groups, compat="no_conflicts", join="outer")
-    # of a record that a number was taken from: a statement has no time
-    result = result.drop_vars("t", errors="ignore")
-    # with their units
-    return result.assign_coords({name: dataset[name] for name in sweep_dims(dataset)})
 
 
 def statistics(dataset: xr.Dataset) -> xr.Dataset:
