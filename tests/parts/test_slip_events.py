@@ -102,14 +102,14 @@ def test_ruptures_of_single_bonds_that_bear_little_of_the_force_are_no_slip_even
 def test_a_stage_that_slows_down_stops_or_turns_makes_no_slip_event_of_a_slider_that_lags():
     time = np.arange(400.0)
     for after in (0.0, 0.01, -1.0):
-        speeds = np.where(time < 200.0, 1.0, after)
+        speeds = np.where((time < 200.0) | (time > 300.0), 1.0, after)
         stage = np.cumsum(speeds)
         slider, lag = np.zeros(400), 0.0
         for k in range(1, 400):
             # viscous friction: the force relaxes in 20 s
             lag = stage[k] - slider[k - 1]
             slider[k] = slider[k - 1] + lag / 20.0
-        ratio = np.diff(slider)[200:] / max(abs(after), 1e-3)
+        ratio = np.diff(slider)[200:300] / max(abs(after), 1e-3)
         assert after == -1.0 or ratio.max() > 10.0
         assert detected(stage, slider).total[0] == 0.0
 
@@ -117,7 +117,9 @@ def test_a_stage_that_slows_down_stops_or_turns_makes_no_slip_event_of_a_slider_
 def test_a_slip_while_the_stage_rests_is_one_and_has_no_recurrence_across_the_stop():
     stage, slider = saw_tooth(3)
     rest = np.full(30, stage[-1])
-    held = np.where(np.arange(30) < 15, slider[-1], slider[-1] + 30.0)
+    # after the slip it creeps at half of the last speed of the stage
+    creep = 30.0 + 0.5 * (np.arange(30) - 15.0)
+    held = slider[-1] + np.where(np.arange(30) < 15, 0.0, creep)
     stage, slider = np.append(stage[:-1], rest), np.append(slider[:-1], held)
     result = detected(stage, slider)
     assert_array_equal(of(result, "time"), [39.0, 79.0, 119.0, 134.0])
@@ -133,10 +135,10 @@ def test_a_member_has_a_thousand_stored_events_at_most_and_all_are_counted():
     assert np.isfinite(many.column("time")[0]).sum() == 1000
 
 
-def test_a_motion_that_is_unknown_from_some_time_on_has_no_events_from_then_on():
+def test_a_motion_that_becomes_unknown_in_a_slip_has_no_event():
     stage, slider = saw_tooth(3)
-    slider[60:] = np.nan
-    assert_array_equal(of(detected(stage, slider), "time"), [39.0])
+    slider[41:] = np.nan
+    assert detected(stage, slider).total == 0.0
 
 
 def test_the_kinetic_friction_of_whole_cycles_is_the_mean_force_and_its_change_that_of_the_parts():
