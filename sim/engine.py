@@ -178,11 +178,10 @@ def advance(
         (state.bonding, state.contact.radius),
         _pull(scenario, motions.time, contact_state.radius),
     )
-    history = (
-        state.events.next_phase()
-        if steps.start in scenario.phases.steps[1:]
-        else state.events
-    )
+    history, phases = state.events, scenario.phases
+    if steps.start in phases.steps[1:]:
+        before = phases.steps.index(steps.start) - 1
+        history = history.next_phase(phases.rests[before])
     with_area = scenario.varies["bonds"] == scenario.varies["contact"]
     history = events.after(
         history,
@@ -195,17 +194,19 @@ def advance(
         with_area,
     )
     if has_stage(scenario):
-        stage = sliders.stage_position, sliders.stage_speed
-        of_slider = (
-            sliders.spring_force,
-            sliders.position,
-            motions.slip,
-            bonding.stress,
-            sliders.work,
+        samples = np.stack(
+            [
+                sliders.stage_position,
+                sliders.stage_speed,
+                sliders.spring_force,
+                sliders.position,
+                bonding.stress,
+                sliders.work,
+            ]
         )
         late = 0.5 * scenario.times.duration
         history = history._replace(
-            slips=history.slips.after(motions.time[:, 0], stage, of_slider, late)
+            slips=history.slips.after(motions.time[:, 0], samples, late)
         )
     end = State(
         steps[-1], slider, bonds, bonding.at(-1), shear, contact_state.at(-1), history

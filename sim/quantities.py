@@ -46,6 +46,21 @@ ALWAYS = Condition("", lambda scene: True)
 BEHIND_A_SPRING = Condition(
     'drive.model = "spring"', lambda scene: scene.drive.model == "spring"
 )
+AT_ONE_STAGE_SPEED = Condition(
+    "a drive.stage at one speed",
+    lambda scene: scene.drive.model == "spring" and not scene.drive.course.changes,
+)
+AT_RISING_OR_FALLING_STAGE_SPEED = Condition(
+    "a drive.stage that gets faster or slower",
+    lambda scene: (
+        scene.drive.model == "spring"
+        and any("ing speed" in name for name in scene.phases.names)
+    ),
+)
+FROM_REST = Condition(
+    "a start from rest or a hold, under a constant control of the contact",
+    lambda scene: scene.loads_from_rest and not scene.contact.changes,
+)
 UNDER_A_FORCE = Condition(
     'drive.model = "force"', lambda scene: scene.drive.model == "force"
 )
@@ -85,6 +100,9 @@ PULLED = Condition(
 #: Reasons for missing values that several quantities have.
 OPEN, NO_SLIP = "the contact is open", "there is no slip event"
 NO_SLIPS = "there are no two slip events"
+NO_ONSET = "slip events do not set in as the stage gets faster, or there are no two"
+NO_END = "slip events do not end as the stage gets slower, or there are no two"
+NO_MAXIMUM = "friction does not fall by 1 % from its first maximum before it exceeds it"
 
 
 class Definition(NamedTuple):
@@ -525,6 +543,31 @@ WITH_PHASES: tuple[Definition, ...] = (
         "peak_friction_area", "m^2", "contact area at the largest friction force"
     ),
     Definition(
+        "static_threshold",
+        "N",
+        (
+            "first maximum of the friction force after a rest, if it then falls by 1 % "
+            "before it exceeds the maximum; else nan"
+        ),
+        symbol="F_s",
+        exists_when=FROM_REST,
+        absent=NO_MAXIMUM,
+    ),
+    Definition(
+        "static_threshold_time",
+        "s",
+        "time of the first maximum of the friction force after a rest",
+        exists_when=FROM_REST,
+        absent=NO_MAXIMUM,
+    ),
+    Definition(
+        "static_threshold_area",
+        "m^2",
+        "contact area at the first maximum of the friction force after a rest",
+        exists_when=FROM_REST,
+        absent=NO_MAXIMUM,
+    ),
+    Definition(
         "pull_off_load",
         "N",
         "lowest normal load of the contact, a tension; nan without tension",
@@ -611,7 +654,7 @@ OF_EACH_SLIP: tuple[Definition, ...] = (
     Definition(
         "slip_time",
         "s",
-        "time at which a slip event begins, at the largest spring force",
+        "time at which a slip event begins",
         symbol="t_s",
         exists_when=BEHIND_A_SPRING,
     ),
@@ -638,7 +681,10 @@ OF_EACH_SLIP: tuple[Definition, ...] = (
     Definition(
         "slip_force_before",
         "N",
-        "spring force at the start of a slip event, positive along the stage motion",
+        (
+            "largest spring force between the previous slip event and this one, "
+            "positive along the stage motion"
+        ),
         symbol="Q_s",
         exists_when=BEHIND_A_SPRING,
     ),
@@ -670,164 +716,78 @@ OF_SLIPS: tuple[Definition, ...] = (
         "slip_count_late",
         "1",
         "number of slip events that begin in the second half of the run",
-        exists_when=BEHIND_A_SPRING,
+        exists_when=AT_ONE_STAGE_SPEED,
     ),
-    Definition(
-        "late_force_before_mean",
-        "N",
-        (
-            "mean over slip events that begin in the second half of the run: spring "
-            "force at the start of a slip event, positive along the stage motion"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_force_before_std",
-        "N",
-        (
-            "standard deviation over slip events that begin in the second half of the "
-            "run: spring force at the start of a slip event, positive along the stage "
-            "motion"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_force_before_least",
-        "N",
-        (
-            "smallest over slip events that begin in the second half of the run: "
-            "spring force at the start of a slip event, positive along the stage "
-            "motion"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_force_before_largest",
-        "N",
-        (
-            "largest over slip events that begin in the second half of the run: spring "
-            "force at the start of a slip event, positive along the stage motion"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_force_drop_mean",
-        "N",
-        (
-            "mean over slip events that begin in the second half of the run: drop of "
-            "the spring force in a slip event"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_force_drop_std",
-        "N",
-        (
-            "standard deviation over slip events that begin in the second half of the "
-            "run: drop of the spring force in a slip event"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_force_drop_least",
-        "N",
-        (
-            "smallest over slip events that begin in the second half of the run: drop "
-            "of the spring force in a slip event"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_force_drop_largest",
-        "N",
-        (
-            "largest over slip events that begin in the second half of the run: drop "
-            "of the spring force in a slip event"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_amplitude_mean",
-        "m",
-        (
-            "mean over slip events that begin in the second half of the run: "
-            "displacement of the slider in a slip event"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_amplitude_std",
-        "m",
-        (
-            "standard deviation over slip events that begin in the second half of the "
-            "run: displacement of the slider in a slip event"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_amplitude_least",
-        "m",
-        (
-            "smallest over slip events that begin in the second half of the run: "
-            "displacement of the slider in a slip event"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_amplitude_largest",
-        "m",
-        (
-            "largest over slip events that begin in the second half of the run: "
-            "displacement of the slider in a slip event"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_recurrence_mean",
-        "s",
-        (
-            "mean over slip events that begin in the second half of the run: time from "
-            "the start of a slip event to the start of the next one"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_recurrence_std",
-        "s",
-        (
-            "standard deviation over slip events that begin in the second half of the "
-            "run: time from the start of a slip event to the start of the next one"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_recurrence_least",
-        "s",
-        (
-            "smallest over slip events that begin in the second half of the run: time "
-            "from the start of a slip event to the start of the next one"
-        ),
-        exists_when=BEHIND_A_SPRING,
-    ),
-    Definition(
-        "late_recurrence_largest",
-        "s",
-        (
-            "largest over slip events that begin in the second half of the run: time "
-            "from the start of a slip event to the start of the next one"
-        ),
-        exists_when=BEHIND_A_SPRING,
+    *(
+        Definition(
+            f"late_{name}_{moment}",
+            unit,
+            f"{words} over slip events that begin in the second half of the run: {text}",
+            exists_when=AT_ONE_STAGE_SPEED,
+        )
+        for name, unit, text in (
+            ("force_before", "N", "largest spring force since the slip event before"),
+            ("force_drop", "N", "drop of the spring force by a slip event"),
+            ("amplitude", "m", "displacement of the slider in a slip event"),
+            ("recurrence", "s", "time from the start of a slip event to the next one"),
+        )
+        for moment, words in (
+            ("mean", "mean"),
+            ("std", "standard deviation"),
+            ("least", "smallest"),
+            ("largest", "largest"),
+        )
     ),
     Definition(
         "kinetic_friction",
         "N",
         (
             "work of the stage over its path, from the first slip event in the second "
-            "half of the run to the last; with fewer than two, over the whole second "
-            "half"
+            "half of the run to the last; without slip events over the second half"
         ),
         symbol="F_k",
-        exists_when=BEHIND_A_SPRING,
+        exists_when=AT_ONE_STAGE_SPEED,
+        absent="the motion has not settled",
+    ),
+    Definition(
+        "kinetic_friction_change",
+        "N",
+        "change of the kinetic friction at about three quarters of the run",
+        exists_when=AT_ONE_STAGE_SPEED,
+    ),
+    Definition(
+        "onset_steady_speed",
+        "m/s",
+        (
+            "speed of a stage that gets faster one recurrence time before its first "
+            "slip event; nan without two slip events, and if they begin at the start"
+        ),
+        exists_when=AT_RISING_OR_FALLING_STAGE_SPEED,
+        absent=NO_ONSET,
+    ),
+    Definition(
+        "onset_slip_speed",
+        "m/s",
+        "speed of a stage that gets faster at its first slip event",
+        exists_when=AT_RISING_OR_FALLING_STAGE_SPEED,
+        absent=NO_ONSET,
+    ),
+    Definition(
+        "end_slip_speed",
+        "m/s",
+        "speed of a stage that gets slower at its last slip event",
+        exists_when=AT_RISING_OR_FALLING_STAGE_SPEED,
+        absent=NO_END,
+    ),
+    Definition(
+        "end_steady_speed",
+        "m/s",
+        (
+            "speed of a stage that gets slower one recurrence time after its last slip "
+            "event; nan without two slip events, and if they last to the end"
+        ),
+        exists_when=AT_RISING_OR_FALLING_STAGE_SPEED,
+        absent=NO_END,
     ),
 )
 
@@ -917,9 +877,23 @@ OF_MEMBERS: tuple[Definition, ...] = (
     ),
     Definition("pull_offs", "1", "number of phases with a pull-off"),
     Definition(
+        "area_at_threshold",
+        "1",
+        "contact area at the static threshold over that at rest",
+        heading="A/A0 there",
+        form=Form.PERCENT,
+        absent=NO_MAXIMUM,
+    ),
+    Definition(
+        "threshold_after",
+        "s",
+        "time of the static threshold",
+        absent=NO_MAXIMUM,
+    ),
+    Definition(
         "static_friction",
         "N",
-        "force at the start of a slip event, or at which the slider lost stability",
+        "largest force before a slip event, or force at which the slider lost stability",
         heading="static friction",
         absent=NO_SLIP,
     ),
@@ -988,24 +962,24 @@ OF_PHASES: tuple[Definition, ...] = (
     Definition(
         "phase_time_held",
         "s",
-        "time at rest of the stage before the phase",
+        "time at rest before the phase",
         heading="held before",
-        absent="the stage did not rest before",
+        absent="there was no rest before",
     ),
     Definition(
         "phase_slip_count", "1", "number of slip events in the phase", heading="slips"
     ),
     Definition(
-        "phase_first_friction",
+        "phase_peak_after_hold",
         "N",
-        "spring force at which the first slip event of the phase begins",
-        heading="first slip at",
-        absent=NO_SLIP,
+        "first maximum of the friction force after a hold",
+        heading="peak after the hold",
+        absent="there was no hold before, or friction does not fall by 1 % from it",
     ),
     Definition(
         "phase_static_friction",
         "N",
-        "mean spring force at the starts of slip events in the phase",
+        "mean of the largest spring force before each slip event of the phase",
         heading="static friction",
         absent=NO_SLIP,
     ),

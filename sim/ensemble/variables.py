@@ -19,8 +19,8 @@ from sim.parts.contact.balance import (
     LoadControl,
     Shares,
 )
-from sim.parts.drive import READINGS, Driven, Force
-from sim.parts.events import LATE, MOMENTS, TURN, Slips
+from sim.parts.drive import READINGS, Driven, Force, Spring
+from sim.parts.events import LATE, MOMENTS, RISE, TURN, Slips
 from sim.quantities import (
     OF_EACH_SLIP,
     OF_SLIPS,
@@ -237,6 +237,40 @@ def _event(
     return Variable(name, part, whole), Variable(of_phase, part, in_phases, "phase")
 
 
+def _first_maxima(scene: Scenario, state: State) -> np.ndarray:
+    """Return the first maximum of the friction after each rest, as records ``RISE``, shape (rows, phases).
+
+    It stands in the phase after the rest, whichever phase it is in before the next rest.
+    """
+    phases, rows = scene.phases, len(state.events.rise)
+    result = np.zeros((rows, len(phases.starts)), RISE)
+    result[:] = np.nan
+    drive = cast(Any, scene.drive)
+    begin = 0 if drive.model == "spring" and drive.start == "rest" else None
+    for phase, rests in enumerate(phases.rests):
+        if rests:
+            begin = phase + 1
+        elif begin is not None:
+            result[:, begin] = state.events.first_maximum(phase)
+    return result
+
+
+def _threshold(name: str, column: str) -> tuple[Variable, Variable]:
+    """Return a quantity of the first maximum of friction after the first rest, and that after each rest."""
+
+    def whole(scene: Scenario, state: State) -> Any:
+        starts_at_rest = scene.phases.rests[0]
+        return _first_maxima(scene, state)[column][:, int(starts_at_rest)]
+
+    of_phase = in_a_phase(QUANTITIES[name]).name
+    return Variable(name, "contact", whole), Variable(
+        of_phase,
+        "contact",
+        lambda scene, state: _first_maxima(scene, state)[column],
+        "phase",
+    )
+
+
 _EVENTS = (
     _event("peak_stress", "stress", _column("largest")),
     _event("peak_time", "stress", _column("time")),
@@ -246,6 +280,9 @@ _EVENTS = (
     _event("peak_friction_time", "friction", _column("time")),
     _event("peak_friction_speed", "friction", _column("speed")),
     _event("peak_friction_area", "friction", _column("area")),
+    _threshold("static_threshold", "largest"),
+    _threshold("static_threshold_time", "time"),
+    _threshold("static_threshold_area", "area"),
     _event("pull_off_load", "pull", lambda scene, rows: -1.0 * _pull("largest", rows)),
     _event("pull_off_time", "pull", lambda scene, rows: _pull("time", rows)),
     _event("pull_off_displacement", "pull", _displaced),
@@ -276,16 +313,46 @@ def _of_slips(name: str) -> Callable[[Slips], Any]:
         return lambda slips: slips.total
     if name == "slip_count_late":
         return lambda slips: slips.late[:, 0, 0]
-    if name == "kinetic_friction":
-        return Slips.kinetic_friction
+    if name.startswith("kinetic_friction"):
+        place = int(name.endswith("_change"))
+        return lambda slips: slips.kinetic_friction()[place]
     if name.startswith("late_"):
         quantity, _, moment = name.removeprefix("late_").rpartition("_")
         return _late(quantity, moment)
     return functools.partial(Slips.column, name=name.removeprefix("slip_"))
 
 
+def _onset(name: str) -> Callable[[Scenario, State], Any]:
+    """Return the reading of a speed of the stage between which and the next one slip events set in or end."""
+    sets_in, at_slip = name.startswith("onset"), name.endswith("slip_speed")
+
+    def read(scene: Scenario, state: State) -> np.ndarray:
+        slips, phases = state.events.slips, scene.phases
+        if sets_in:
+            times = slips.column("time")
+            if times.shape[1] < 2:
+                return np.full(len(times), np.nan)
+            event, before = times[:, 0], 2.0 * times[:, 0] - times[:, 1]
+        else:
+            event = slips.state["latest"]
+            before = event + slips.state["interval"]
+        starts = np.array(phases.starts)
+        stops = np.append(starts[1:], scene.clock.duration)
+        place = np.searchsorted(starts, np.nan_to_num(event), side="right") - 1
+        trend = f"{'in' if sets_in else 'de'}creasing speed"
+        within = np.array([trend in each for each in phases.names])[place]
+        within &= (before >= starts[place]) & (before <= stops[place])
+        at = np.where(within, event if at_slip else before, 0.0)
+        speed = cast(Spring, scene.drive).stage_speed(at, scene.clock.duration)
+        return np.where(within, np.abs(speed), np.nan)
+
+    return read
+
+
 def _slip(name: str) -> Variable:
     """Return a quantity of slip events; those of single events have a dimension of their own."""
+    if name.startswith(("onset_", "end_")):
+        return Variable(name, "drive", _onset(name))
     read = _of_slips(name)
     is_single = QUANTITIES[name] in OF_EACH_SLIP
     return Variable(

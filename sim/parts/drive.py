@@ -417,6 +417,11 @@ class Spring(_Driven):
     def first(self, duration: float) -> float:
         return 0.0 if self.start_after > 0.0 else super().first(duration)
 
+    def stage_speed(self, time: Array, duration: float) -> Array:
+        """Return the speed of the stage at some times after it has started, in a run of a duration [s]."""
+        after = self.start_after
+        return self.course.at(np.maximum(time - after, 0.0), duration - after)
+
     def _first_speed(self, duration: float) -> float:
         return self.first(duration) if self.start == "steady" else 0.0
 

@@ -25,6 +25,13 @@ EXTREME = record("largest time speed area")
 #: by its slopes and -1 if it may have a kink there, and the maximum of the phase so far.
 MAXIMUM = record("before last falls " + " ".join(EXTREME.names or ()))
 _NO_MAXIMUM = np.array([-math.inf, 0.0, 0.0, *(-math.inf for _ in EXTREME.names or ())])
+#: Row of the first maximum of the friction since a rest, or since the start: the friction then, 1 once it has fallen
+#: from the maximum, and the maximum, its time [s] and the contact area [m²] there.
+RISE = record("start fallen largest time area")
+#: Share of a maximum by which the friction must fall before it exceeds the maximum again.
+FALLEN = 0.01
+#: Relative difference up to which a friction is the one at the start.
+_SAME = 1e-9
 #: Time of the first opening and of the first closing of a contact [s], and the radius after that closing [m].
 TURN = record("opening closing radius")
 #: Row of a contact: radius [m] when it last opened or closed, and time of the last detachment [s]; number of
@@ -45,29 +52,31 @@ CONTACT = record(
     _CLOSING,
     _RADIUS,
 ) = range(len(CONTACT.names or ()))
-#: Fall of the spring force that makes a slip event, and rise that ends it, over the largest force so far.
-FALL, RISE = 0.3, 0.1
-#: Slip of the interface over the slider's advance in a slip event, at least.
-_SLIPPED = 0.5
+#: Speed of the slider over that of the stage above which it slips.
+FASTER = 10.0
+#: Least fall of the spring force in a slip event, over the largest force before; largest distance by which the slider
+#: has gone back just before, over its advance in the event.
+LEAST_FALL, MOST_BACK = 0.3, 0.5
 #: Slip events of a member that are stored at most.
 MOST_SLIPS = 1000
-#: A slip event: its time (that of the force's maximum) and its end [s], the slider's advance [m], speed of the stage
-#: at its time [m/s], spring force there and at its end [N], largest stress since the event before and least stress in
-#: the event [Pa]. Forces and stresses are in the sense in which the stage moves.
+#: A slip event: its time and its end [s], the slider's advance [m], speed of the stage at its time [m/s], largest
+#: spring force since the event before and the force at its end [N], largest stress since the event before and least
+#: stress in the event [Pa]. Forces and stresses are in the sense in which the stage moves.
 SLIP = record(" ".join(SLIP_EVENT))
-#: Work of the stage [J], path of the stage and of the slider [m], all since the start.
-_GONE = "work", "path", "gone"
-#: State of the detector: sense in which the stage moves and its position, that of the slider, slip of the interface so
-#: far, largest force so far, 1 once the force has fallen far enough; positions of slider and interface at the last
-#: maximum of the force and at its least value since; time of the event before; count of all events. Then the event that
-#: may come, as ``SLIP``. Last ``_GONE`` now, at the last maximum, at half of the run, and at the first and the last of
-#: the late events.
+#: Work of the stage [J] and its path [m], since the start.
+_SPENT = "work", "path"
+#: Marks at which they are kept: the start of an episode; the half and three quarters of the run; the first of the late
+#: events, the first after three quarters of the run, and the last.
+_MARKS = "begin", "half", "quarter", "first", "middle", "final"
+#: State of the detector: sense in which the stage last moved, and that of its last step (0 at rest). Then the last
+#: sample. Then the speed of the stage when the slider was last not faster, or the largest one since; 1 if the slider is
+#: faster than the stage; 1 if it slips; its place when it was last faster; place and force at which it began to slip.
+#: Then the times of the last two events and their count, the event that may come, as ``SLIP``, and the marks.
 SLIPPING = record(
-    "sense stage position slid largest falling top top_slid low low_slid before count "
-    + " ".join([*(SLIP.names or ()), *_GONE])
-    + "".join(
-        f" {at}_{name}" for at in ("top", "half", "first", "last") for name in _GONE
-    )
+    "sense motion clock stage stage_speed position force work path "
+    "reference faster slips farthest start from_force before latest interval count "
+    + " ".join(SLIP.names or ())
+    + "".join(f" {mark}_{name}" for mark in _MARKS for name in _SPENT)
 )
 #: Quantities of late slip events of which moments are kept, and their moments.
 LATE = "force_before", "force_drop", "amplitude", "recurrence"
@@ -85,6 +94,23 @@ class Slips(NamedTuple):
         Moments of the quantities ``LATE`` of events in the second half of the run, rows of ``MOMENTS``.
     log : array, shape (members, events, 8)
         The first events, rows of ``SLIP``, nan beyond the last.
+
+    Notes
+    -----
+    A slip event is an episode in which the slider is faster than ten times the stage. It ends when the slider is slower
+    than the stage. The speeds are the displacements over a clock step, so that a slip that takes no time counts if it
+    is longer than ten times the path of the stage in a step. Three rules make the number of events independent of the
+    factor ten as long as slips are much faster than the stage:
+
+    - The stage is as fast as when the slider was last slower, or faster. If the stage slows down, stops or turns, the
+      slider lags behind it for a while, and this is no event. While the stage rests, its last speed counts.
+    - The spring force falls by at least 0.3 of the largest force since the event before. A slider on few bonds that are
+      followed one by one jumps at each rupture. Most of these jumps are smaller: of N bonds one bears 1/N of the force.
+    - Just before the event the slider has gone back by less than half of its advance in the event. After a slip a body
+      with mass oscillates on its spring or on bonds that hold. There it goes back as far as it then advances.
+
+    A slow fall of the force beyond a friction maximum is no event, because the slider is hardly faster than the stage.
+    An event that the stage ends by turning back counts; one that lasts beyond the end of the run does not.
     """
 
     running: Array
@@ -98,7 +124,9 @@ class Slips(NamedTuple):
             len(kind.names or ()) for kind in (SLIPPING, MOMENTS, SLIP)
         )
         running = np.zeros((len(stage), slipping))
-        running.view(SLIPPING)[:, 0]["stage"] = stage
+        state = running.view(SLIPPING)[:, 0]
+        state["stage"], state["before"], state["latest"] = stage, np.nan, np.nan
+        state["interval"] = np.nan
         return cls(
             running,
             np.zeros((len(stage), len(LATE), moments)),
@@ -106,11 +134,7 @@ class Slips(NamedTuple):
         )
 
     def after(
-        self,
-        time: Array,
-        stage: tuple[Array, Array],
-        slider: tuple[Array, ...],
-        half: float,
+        self, time: Array, samples: Array, half: float, factor: float = FASTER
     ) -> "Slips":
         """Return the slip events after some more samples.
 
@@ -118,30 +142,35 @@ class Slips(NamedTuple):
         ----------
         time : array, shape (samples,)
             Times [s].
-        stage : tuple of arrays, shape (samples, members)
-            Position [m] and speed [m/s] of the stage.
-        slider : tuple of arrays, shape (samples, members)
-            Spring force [N], position of the slider [m], slip of the interface since the sample before [m], shear
-            stress [Pa], and work of the stage since the start [J].
+        samples : array, shape (6, samples, members)
+            Position [m] and speed [m/s] of the stage, spring force [N], position of the slider [m], shear stress [Pa],
+            and work of the stage since the start [J].
         half : float
             Time from which on events are late [s].
+        factor : float
+            Speed of the slider over that of the stage above which it slips.
         """
-        samples = time, *stage, *slider, half
+        inputs = time, samples, half, factor
         slips = Slips(self.running.copy(), self.late.copy(), self.log[:, :0])
-        if not _follow_slips(*samples, *slips):
+        if not _follow_slips(*inputs, *slips):
             return Slips(*slips[:2], self.log)
         # of the count alone, not of the blocks
         room = 2 ** math.ceil(math.log2(min(slips.total.max(), MOST_SLIPS)))
         log = np.full((len(self.log), room, self.log.shape[2]), np.nan)
         log[:, : self.log.shape[1]] = self.log
         slips = Slips(self.running.copy(), self.late.copy(), log)
-        _follow_slips(*samples, *slips)
+        _follow_slips(*inputs, *slips)
         return slips
+
+    @property
+    def state(self) -> NDArray[np.void]:
+        """Return the state of the detector, as records ``SLIPPING``, shape (members,)."""
+        return self.running.view(SLIPPING)[:, 0]
 
     @property
     def total(self) -> Array:
         """Return the number of slip events of each member so far."""
-        counts: Array = self.running.view(SLIPPING)[:, 0]["count"]
+        counts: Array = self.state["count"]
         return counts
 
     def column(self, name: str) -> Array:
@@ -149,103 +178,121 @@ class Slips(NamedTuple):
         stored = int(min(self.total.max(initial=0.0), MOST_SLIPS))
         return self.log[:, :stored, (SLIP.names or ()).index(name)]
 
-    def kinetic_friction(self) -> Array:
-        """Return the work of the stage over its path [N], from the first late event to the last.
+    def kinetic_friction(self) -> tuple[Array, Array]:
+        """Return the work of the stage over its path [N], and its change from one part of the path to the next [N].
 
-        Without two late events the span is the second half of the run. The result is nan if the slider moved less than
-        half as far as the stage, because the spring is then still extending.
+        The path is that from the first late slip event to the last, so that it has whole cycles. It is parted at the
+        first event after three quarters of the run. Without late events it is the second half of the run, parted in the
+        middle. Both results are nan if a part has no path, as with one or two late events.
         """
-        state = self.running.view(SLIPPING)[:, 0]
-        slips = self.late[:, 0].view(MOMENTS)[:, 0]["count"] > 1.0
-        between = (state[f"last_{name}"] - state[f"first_{name}"] for name in _GONE)
-        since_half = (state[name] - state[f"half_{name}"] for name in _GONE)
-        work, path, gone = (
-            np.where(slips, *spans) for spans in zip(between, since_half, strict=True)
+        slipped = self.late[:, 0].view(MOMENTS)[:, 0]["count"] > 0.0
+        work, path = (
+            [
+                np.where(
+                    slipped, self.state[f"{cycle}{name}"], self.state[f"{mark}{name}"]
+                )
+                for cycle, mark in (
+                    ("first_", "half_"),
+                    ("middle_", "quarter_"),
+                    ("final_", ""),
+                )
+            ]
+            for name in _SPENT
         )
-        follows = (path > 0.0) & (gone > _SLIPPED * path)
-        friction: Array = np.divide(
-            work, path, out=np.full(len(path), np.nan), where=follows
+        parts = np.diff(path, axis=0)
+        known = (parts > 0.0).all(axis=0) & (path[0] > 0.0)
+        first, last = np.divide(
+            np.diff(work, axis=0), parts, out=np.full(parts.shape, np.nan), where=known
         )
-        return friction
+        weight = np.divide(parts[1], parts.sum(axis=0), out=0.0 * first, where=known)
+        return first + weight * (last - first), last - first
 
 
 @device
-def slip_ends(time, stage, speed, force, position, slip, stress, work, state, event):
+def _is_slip(state, event):
+    """Return True if the episode that has ended at the last sample is a slip event, and fill it in."""
+    amplitude = state.sense * state.position - state.start
+    pull = state.sense * state.force
+    least = LEAST_FALL * math.fabs(state.force_before)
+    back = state.farthest - state.start
+    if state.from_force - pull < least or back > MOST_BACK * amplitude:
+        return False
+    event.time, event.end, event.amplitude = state.time, state.end, amplitude
+    event.speed, event.force_before, event.force_after = (
+        state.speed,
+        state.force_before,
+        pull,
+    )
+    event.stress_before, event.stress_after = state.stress_before, state.stress_after
+    state.force_before, state.stress_before = -math.inf, -math.inf
+    return True
+
+
+@device
+def _goes_on(sample, factor, state, event):
+    """Take a sample in the sense in which the stage last moved; return True if a slip event has ended before it."""
+    time, stage, _, force, position, stress, _ = sample
+    pull, bears = state.sense * force, state.sense * stress
+    gone, drawn = (
+        state.sense * (position - state.position),
+        state.sense * (stage - state.stage),
+    )
+    duration, ended = time - state.clock, False
+    if drawn > 0.0 and gone > drawn:
+        state.reference = max(state.reference, drawn / duration)
+    if gone > (drawn if drawn > 0.0 else state.reference * duration):
+        if state.slips == 0.0:
+            slips = gone > factor * state.reference * duration
+            # the step before has the beginning of the slip, if the slider was faster in it
+            if not (slips and state.faster > 0.0):
+                state.time, state.speed = state.clock, state.stage_speed
+                state.start = state.sense * state.position
+                state.from_force = state.sense * state.force
+                state.begin_work, state.begin_path = state.work, state.path
+            if slips:
+                state.slips, state.stress_after = 1.0, math.inf
+        state.faster = 1.0
+    else:
+        ended = state.slips > 0.0 and _is_slip(state, event)
+        if state.faster > 0.0:
+            state.farthest = state.sense * state.position
+        state.slips, state.faster = 0.0, 0.0
+        if drawn > 0.0:
+            state.reference = drawn / duration
+    if state.slips > 0.0:
+        state.end, state.stress_after = time, min(state.stress_after, bears)
+    else:
+        state.force_before = max(state.force_before, pull)
+        state.stress_before = max(state.stress_before, bears)
+    return ended
+
+
+@device
+def slip_ends(sample, factor, state, event):
     """Take one sample of a slider behind a spring; return True if a slip event has ended, and fill it in.
 
-    Notes
-    -----
-    A slip event is a fall of the spring force by more than ``FALL`` of its largest magnitude so far, from a maximum to
-    the next minimum, during which the interface slips at least half of the slider's advance. The minimum is known once
-    the force has risen again by ``RISE`` of the largest. A stage that stops or turns back ends a fall without an event.
+    A ``sample``: its time [s], and the six values that ``Slips.after`` takes.
     """
+    time, stage, speed, force, position, stress, work = sample
     if math.isnan(position):
         return False
-    sense = 1.0 if stage > state.stage else -1.0 if stage < state.stage else 0.0
-    turns = sense != state.sense
+    ended, motion = False, 0.0
+    if stage != state.stage:
+        motion = math.copysign(1.0, stage - state.stage)
+    if motion != state.motion:
+        state.motion, state.before = motion, math.nan
+    if motion != 0.0 and motion != state.sense:
+        ended = state.slips > 0.0 and _is_slip(state, event)
+        state.sense, state.slips, state.faster = motion, 0.0, 0.0
+        state.reference = math.fabs(stage - state.stage) / (time - state.clock)
+        state.farthest = motion * state.position
+        state.force_before, state.stress_before = motion * force, motion * stress
+    elif state.sense != 0.0:
+        ended = _goes_on(sample, factor, state, event)
     state.path += math.fabs(stage - state.stage)
-    state.gone += math.fabs(position - state.position)
-    state.sense, state.stage, state.position, state.work = sense, stage, position, work
-    state.slid += slip
-    if math.fabs(force) > state.largest:
-        state.largest = math.fabs(force)
-    if turns:
-        state.before = math.nan
-    if sense == 0.0:
-        return False
-    pull, bears = sense * force, sense * stress
-    rises = (
-        not turns
-        and state.falling > 0.0
-        and pull - state.force_after > RISE * state.largest
-    )
-    slips = False
-    if rises:
-        advance, slid = (
-            sense * (state.low - state.top),
-            sense * (state.low_slid - state.top_slid),
-        )
-        slips = advance > 0.0 and slid >= _SLIPPED * advance
-        if slips:
-            event.time, event.end, event.amplitude, event.speed = (
-                state.time,
-                state.end,
-                advance,
-                state.speed,
-            )
-            event.force_before, event.force_after = (
-                state.force_before,
-                state.force_after,
-            )
-            event.stress_before, event.stress_after = (
-                state.stress_before,
-                state.stress_after,
-            )
-    if turns or rises:
-        state.falling, state.force_before, state.stress_before = 0.0, -math.inf, bears
-    if bears > state.stress_before:
-        state.stress_before = bears
-    if pull > state.force_before:
-        state.force_before, state.time, state.speed = pull, time, math.fabs(speed)
-        state.top, state.top_slid, state.force_after, state.stress_after = (
-            position,
-            state.slid,
-            math.inf,
-            bears,
-        )
-        state.top_work, state.top_path, state.top_gone = work, state.path, state.gone
-    if bears < state.stress_after:
-        state.stress_after = bears
-    if pull < state.force_after:
-        state.force_after, state.end, state.low, state.low_slid = (
-            pull,
-            time,
-            position,
-            state.slid,
-        )
-    if state.force_before - state.force_after > FALL * state.largest:
-        state.falling = 1.0
-    return slips
+    state.clock, state.stage, state.stage_speed = time, stage, math.fabs(speed)
+    state.position, state.force, state.work = position, force, work
+    return ended
 
 
 @device
@@ -263,13 +310,27 @@ def _gather(value, moments):
         row.largest = value
 
 
+@device
+def _gather_late(event, half, state, late):
+    """Add a late slip event to the moments of those before, and keep the marks at its start."""
+    begin = state.begin_work, state.begin_path
+    state.final_work, state.final_path = begin
+    if late[0, 0] == 0.0:
+        state.first_work, state.first_path = begin
+    if event.time >= 1.5 * half and state.middle_path == 0.0:
+        state.middle_work, state.middle_path = begin
+    _gather(event.force_before, late[0])
+    _gather(event.force_before - event.force_after, late[1])
+    _gather(event.amplitude, late[2])
+    if state.before >= half:
+        _gather(event.time - state.before, late[3])
+
+
 @kernel(
-    f"boolean(Array(float64, 1, 'A', readonly=True), {7 * _READ}float64, "
+    "boolean(Array(float64, 1, 'A', readonly=True), float64[:, :, ::1], float64, float64, "
     "float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1])"
 )
-def _follow_slips(
-    times, stage, speed, force, position, slip, stress, work, half, running, late, log
-):
+def _follow_slips(times, samples, half, factor, running, late, log):
     """Take samples of all members; return True if a slip event has ended."""
     ends = False
     columns = np.zeros(log.shape[2])
@@ -277,39 +338,30 @@ def _follow_slips(
     for i in range(len(running)):
         state = running[i].view(SLIPPING)[0]
         for k in range(len(times)):
-            mark = state.top_work, state.top_path, state.top_gone
             sample = (
                 times[k],
-                stage[k, i],
-                speed[k, i],
-                force[k, i],
-                position[k, i],
-                slip[k, i],
-                stress[k, i],
+                samples[0, k, i],
+                samples[1, k, i],
+                samples[2, k, i],
+                samples[3, k, i],
+                samples[4, k, i],
+                samples[5, k, i],
             )
-            ended = slip_ends(*sample, work[k, i], state, event)
+            ended = slip_ends(sample, factor, state, event)
             # a stage at rest has no path
             if times[k] >= half and state.half_path == 0.0:
-                state.half_work, state.half_path, state.half_gone = (
-                    state.work,
-                    state.path,
-                    state.gone,
-                )
+                state.half_work, state.half_path = state.work, state.path
+            if times[k] >= 1.5 * half and state.quarter_path == 0.0:
+                state.quarter_work, state.quarter_path = state.work, state.path
             if not ended:
                 continue
             ends = True
             if state.count < min(log.shape[1], MOST_SLIPS):
                 log[i, int(state.count)] = columns
             if event.time >= half:
-                state.last_work, state.last_path, state.last_gone = mark
-                if late[i, 0, 0] == 0.0:
-                    state.first_work, state.first_path, state.first_gone = mark
-                _gather(event.force_before, late[i, 0])
-                _gather(event.force_before - event.force_after, late[i, 1])
-                _gather(event.amplitude, late[i, 2])
-                if state.before >= half:
-                    _gather(event.time - state.before, late[i, 3])
+                _gather_late(event, half, state, late[i])
             state.count += 1.0
+            state.interval, state.latest = event.time - state.latest, event.time
             state.before = event.time
     return ends
 
@@ -317,27 +369,30 @@ def _follow_slips(
 class Events(NamedTuple):
     """Events so far; NaN counts as 0 in a maximum; ties keep the first.
 
-    The first four are arrays of the shape (rows, phases, columns), the present phase last. All are rows of ``MAXIMUM``,
-    in magnitude. ``stress`` is that of the shear stress [Pa] and ``friction`` that of the friction force [N]. ``pull``
-    is that of the tensile load of a closed contact [N], without rows if the load is constant. ``contact`` are rows of
-    ``CONTACT``. ``path`` is the longest path within a step [m], shape (1,) or (members,). ``slips`` are the slip
-    events.
+    The first five are arrays of the shape (rows, phases, columns), the present phase last. The first three are rows of
+    ``MAXIMUM``, in magnitude. ``stress`` is that of the shear stress [Pa] and ``friction`` that of the friction force
+    [N]. ``pull`` is that of the tensile load of a closed contact [N], without rows if the load is constant. ``rise``
+    are rows of ``RISE`` for those of ``friction``, and ``contact`` rows of ``CONTACT``. ``path`` is the longest path
+    within a step [m], shape (1,) or (members,). ``slips`` are the slip events.
     """
 
     stress: Array
     friction: Array
     pull: Array
     contact: Array
+    rise: Array
     path: Array
     slips: Slips
 
-    def next_phase(self) -> "Events":
-        """Return the events at the start of another phase."""
-        contact = self.contact[:, -1:].copy()
+    def next_phase(self, after_rest: bool) -> "Events":
+        """Return the events at the start of another phase; a first maximum is looked for anew ``after_rest``."""
+        contact, rise = self.contact[:, -1:].copy(), self.rise[:, -1:]
         contact[..., _OPENING:] = np.nan
-        ahead = *(_started(rows[:, -1, 1]) for rows in self[:3]), contact
+        if after_rest:
+            rise = _rising(self.friction[:, -1, 1])
+        ahead = *(_started(rows[:, -1, 1]) for rows in self[:3]), contact, rise
         phases = (
-            np.concatenate(pair, axis=1) for pair in zip(self[:4], ahead, strict=True)
+            np.concatenate(pair, axis=1) for pair in zip(self[:5], ahead, strict=True)
         )
         return Events._make([*phases, self.path, self.slips])
 
@@ -351,6 +406,17 @@ class Events(NamedTuple):
         maxima = self.by_phase(name)
         first = maxima["largest"].argmax(axis=1)
         return maxima[np.arange(len(maxima)), first]
+
+    def first_maximum(self, phase: int) -> NDArray[np.void]:
+        """Return the first maximum of the friction up to the end of a phase, as a record ``RISE`` in each row.
+
+        It is nan if the friction has not fallen from it.
+        """
+        rows = self.rise[:, phase].copy().view(RISE)[:, 0]
+        for name in EXTREME.names or ():
+            if name in (RISE.names or ()):
+                rows[name][rows["fallen"] == 0.0] = np.nan
+        return rows
 
     def first_turn(self, name: str) -> NDArray[np.void]:
         """Return the first opening or closing of the run, as a record ``CONTACT`` in each row; nan without one."""
@@ -375,11 +441,12 @@ def first(bonding: Bonding, contact: ContactState, pull: Array, stage: Array) ->
     rows[:, 0, _MASKED] = np.where(
         (contact.work <= 0.0) & (contact.radius > 0.0), 0.0, np.nan
     )
-    started = [
-        _started(np.where(np.isnan(values), 0.0, values))
-        for values in (stress, friction, pull)
+    firsts = [
+        np.where(np.isnan(values), 0.0, values) for values in (stress, friction, pull)
     ]
-    return Events._make([*started, rows, np.zeros(1), Slips.none(stage)])
+    maxima = map(_started, firsts)
+    rise = _rising(firsts[1])
+    return Events._make([*maxima, rows, rise, np.zeros(1), Slips.none(stage)])
 
 
 def _started(values: Array) -> Array:
@@ -387,6 +454,13 @@ def _started(values: Array) -> Array:
     rows = np.empty((len(values), 1, len(_NO_MAXIMUM)))
     rows[:], rows[:, 0, 1] = _NO_MAXIMUM, values
     return rows
+
+
+def _rising(friction: Array) -> Array:
+    """Return rows of ``RISE`` before the first step after a rest, from the friction at its end [N]."""
+    rows = np.zeros((len(friction), 1), RISE)
+    rows["start"], rows["largest"] = friction[:, np.newaxis], -math.inf
+    return rows[..., np.newaxis].view(float)
 
 
 def after(
@@ -431,10 +505,11 @@ def after(
         members,
         max(len(so_far.pull), pull.shape[1]),
         max(len(so_far.contact), radii.shape[1]),
+        members,
     )
     now = [
         values + np.zeros((count, 1, 1))
-        for values, count in zip(so_far[:4], counts, strict=True)
+        for values, count in zip(so_far[:5], counts, strict=True)
     ]
     here = (values[:, -1] for values in now)
     ends = (
@@ -490,7 +565,7 @@ def _load(k, i, stress, stiffness, relaxation, speed, radius):
 
 
 @kernel(
-    f"void({11 * _READ}{2 * 'float64[:], '}float64, float64, {', '.join(4 * ['float64[:, :]'])})"
+    f"void({11 * _READ}{2 * 'float64[:], '}float64, float64, {', '.join(5 * ['float64[:, :]'])})"
 )
 def _follow(
     stresses,
@@ -512,6 +587,7 @@ def _follow(
     friction,
     pull,
     contact,
+    rises,
 ):
     bonds, none = (stresses, stiffness, relaxation), (0.0, math.nan, 0.0)
     for k in range(len(times)):
@@ -547,6 +623,7 @@ def _follow(
                 place,
             )
             _keep(value1 * area1, rise, slope, around, kink, friction, i)
+            _rise(friction, rises, i)
         for i in range(len(pull)):
             area0, area1 = (
                 math.pi * _of(radii, k, i) ** 2,
@@ -639,6 +716,22 @@ def _keep(now, rise, slope, around, kink, maxima, i):
             speed1 - place * (speed1 - speed0),
             area1 - place * (area1 - area0),
         )
+
+
+@device
+def _rise(friction, rises, i):
+    """Follow the friction of a row to its first maximum above the friction at the start, and to the fall from it.
+
+    Columns are those of ``RISE`` and ``MAXIMUM``, by their numbers.
+    """
+    start, fallen, largest = rises[i, 0], rises[i, 1], rises[i, 2]
+    if fallen > 0.0:
+        return
+    if friction[i, 3] > largest:
+        largest = friction[i, 3]
+        rises[i, 2], rises[i, 3], rises[i, 4] = largest, friction[i, 4], friction[i, 6]
+    if largest > (1.0 + _SAME) * start and friction[i, 1] < (1.0 - FALLEN) * largest:
+        rises[i, 1] = 1.0
 
 
 @device

@@ -13,13 +13,11 @@ from sim.read.dataset import (
     MEMBERS,
     answered,
     control,
-    has_noise,
     in_pieces,
     is_stationary,
     plain,
     setting,
     speed_of,
-    stays_held,
     sweep_dims,
     where_recorded,
     with_trajectories,
@@ -31,8 +29,8 @@ from sim.units.notation import engineering
 
 #: Relative changes below it are rounding.
 _ROUNDING = 1e-9
-#: Clock steps in a slip event that resolve it.
-_RESOLVED = 3
+#: Path of the stage in a clock step over the advance in a slip event, above which the event is not resolved.
+_COARSE = 0.02
 #: Properties of slip events and the quantities of late ones of which the engine records moments.
 _LATE = {
     "static_friction": "force_before",
@@ -40,6 +38,10 @@ _LATE = {
     "slip_amplitude": "amplitude",
     "recurrence_time": "recurrence",
 }
+#: Speeds of the stage at which slip events set in and end.
+_ONSET = "onset_steady_speed", "onset_slip_speed", "end_slip_speed", "end_steady_speed"
+#: Change of the kinetic friction over it, and beside that in standard errors, up to which the motion has settled.
+_SETTLED, _SURELY = 0.01, 3.0
 #: Half of a 95 % interval of a normal law in standard errors.
 _WIDE = 1.96
 
@@ -66,10 +68,10 @@ def slips(dataset: xr.Dataset) -> xr.Dataset:
 
     Notes
     -----
-    The engine sees slip events at its clock steps: a slip event is a fall of the spring force by more than 0.3 of the
-    largest force so far, from its maximum to the next minimum, during which the interface slips at least half of the
-    slider's advance. Ringing upon an interface that sticks is none. Forces and displacements are taken in the sense in
-    which the stage moves. A member has at most 1,000 of them here; ``stick_slip`` counts all.
+    The engine sees slip events at its clock steps. A slip event is an episode in which the slider is faster than ten
+    times the stage; ``sim.parts.events.Slips`` has the whole definition. Forces and displacements are taken in the
+    sense in which the stage moves. ``force_drop`` is the static friction minus the force at the end of the event. A
+    member has at most 1,000 of them here; ``stick_slip`` counts all.
     """
     if "slip_count_mean" in dataset:
         raise ValueError(
@@ -107,9 +109,9 @@ def slips(dataset: xr.Dataset) -> xr.Dataset:
         "static_friction": (
             event["force_before"],
             "N",
-            "spring force at the start of a slip event",
+            "largest spring force in the stick phase before a slip event",
         ),
-        "force_drop": (drop, "N", "drop of the spring force in a slip event"),
+        "force_drop": (drop, "N", "drop of the spring force by a slip event"),
         "stress_drop": (fall, "Pa", "drop of the shear stress in a slip event"),
     }
     result = xr.Dataset({name: labelled(*column) for name, column in columns.items()})
@@ -130,12 +132,15 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
         Under a stage ``slip_count``, and the means over the slip events of what ``slips`` has of each; of a stage at
         one speed those that begin in the second half of the run, with ``…_least`` and ``…_largest`` of
         ``static_friction``, ``force_drop``, ``slip_amplitude`` and ``recurrence_time``. ``slip_spread`` [1]: the
-        standard deviation of their displacements over its mean. Of a stage at several speeds ``slips_from`` and
-        ``slips_down_to`` [m/s], its lowest speed on the way up at which a slip begins that another one follows, and on
-        the way down at which one begins that follows another: a single one is the fall of friction beyond its maximum.
-        ``kinetic_friction`` [N] is the work of the stage over its
-        path, from the first late slip event to the last, without two over the second half of the run;
-        nan where the slider went less than half as far as the stage, stretching the spring.
+        standard deviation of their displacements over its mean. ``kinetic_friction`` [N] with
+        ``kinetic_friction_reason``: see ``kinetic_friction``.
+
+        Of a stage that gets faster ``onset_steady_speed`` and ``onset_slip_speed`` [m/s]: its speed at the first slip
+        event, and the speed one recurrence time earlier, when another event would have come if the slider had already
+        stuck and slipped. Of a stage that gets slower ``end_slip_speed`` and ``end_steady_speed``: its speed at the
+        last slip event, and one recurrence time later. They are nan with fewer than two slip events, or if slip events
+        begin at the start or last to the end of such a phase.
+
         Under a prescribed force see ``runaways``. Empty for other drives. Where only statistics were recorded, those of
         the means over late slip events.
     """
@@ -143,33 +148,29 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
         dataset
     ):
         return runaways(dataset)
-    late = {"slip_count": "slip_count_late", "kinetic_friction": "kinetic_friction"}
-    late |= {name: f"late_{quantity}_mean" for name, quantity in _LATE.items()}
-    late |= {
+    at_one_speed = any(f"slip_count_late{ending}" in dataset for ending in ENDINGS)
+    sources = {"slip_count": "slip_count_late" if at_one_speed else "slip_count"}
+    sources |= {name: f"late_{quantity}_mean" for name, quantity in _LATE.items()}
+    sources |= {
         f"{name}_{kind}": f"late_{of}_{kind}"
         for name, of in _LATE.items()
         for kind in ("least", "largest")
     }
-    sources = {
-        name + ending: source + ending
-        for ending in ENDINGS
-        for name, source in late.items()
-    }
+    sources |= {name: name for name in _ONSET}
     result = xr.Dataset(
         {
-            name: dataset[source].astype(float)
+            name + ending: dataset[source + ending].astype(float)
+            for ending in ENDINGS
             for name, source in sources.items()
-            if source in dataset
+            if source + ending in dataset
         }
     )
     if "slip_time" not in dataset or not result:
-        return result
+        return result.merge(kinetic_friction(dataset), compat="no_conflicts")
     if not is_stationary(dataset):
         count = pure(dataset["slip_count"].astype(float), "number of slip events")
-        return xr.Dataset(
-            {"slip_count": count}
-            | (_between_speeds(dataset) if varies(dataset) else {})
-        )
+        return result[[n for n in _ONSET if n in result]].assign(slip_count=count)
+    result = result.merge(kinetic_friction(dataset), compat="no_conflicts")
     text = "standard deviation of slip displacements over their mean"
     result["slip_spread"] = pure(
         dataset["late_amplitude_std"] / dataset["late_amplitude_mean"], text
@@ -194,7 +195,7 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
             name: dataset[f"late_{of}_std"] / dataset["slip_count_late"] ** 0.5
             for name, of in _LATE.items()
         }
-        errors |= of_late | {"kinetic_friction": 0.5 * of_late["force_drop"]}
+        errors |= of_late
         result = result.assign(
             {
                 f"{name}_bound": (_WIDE * error).assign_attrs(source="slip events")
@@ -208,14 +209,67 @@ def unresolved_slips(dataset: xr.Dataset) -> str:
     """Return a remark if slip events are hardly longer than a clock step, so that their means are off; "" if not."""
     # of a run without slips, or without single ones
     with contextlib.suppress(ValueError, KeyError):
-        lasting, step = (
-            slips(dataset)["slip_duration"].median(),
-            setting(dataset, "clock.step"),
-        )
-        if bool((lasting < _RESOLVED * step).any()):
-            effect = "drop, duration and friction have an error that the brackets do not hold"
-            return f"slip events last fewer than {_RESOLVED} clock steps: {effect}; reduce clock.step"
+        each, step = slips(dataset), setting(dataset, "clock.step")
+        share = (each["slip_speed"] * step / each["slip_amplitude"]).median()
+        if bool((share > _COARSE).any()):
+            effect = (
+                "their drop and friction have an error that the brackets do not hold"
+            )
+            return (
+                f"the stage moves by more than {100.0 * _COARSE:g} % of a slip event in "
+                f"a clock step: {effect}; reduce clock.step"
+            )
     return ""
+
+
+def kinetic_friction(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the mean friction force of sliding or of whole stick-slip cycles, if the motion has settled to them.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, of a drive ``spring`` with a stage at one speed.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``kinetic_friction`` [N] of each member, the work of the stage over its path from the first slip event in the
+        second half of the run to the last, and without slip events over the second half. ``kinetic_friction_reason``
+        is "" or, at each point of the sweep, the reason why there is none. Empty for other drives.
+
+    Notes
+    -----
+    While a spring still extends, the work of the stage is stored in part. The motion has therefore settled only if the
+    mean over members changes by at most 1 % from one part of the path to the next, beside three standard errors of that
+    change. With slip events, each part must have a whole cycle.
+    """
+    name, drift = "kinetic_friction", "kinetic_friction_change"
+    if not {drift, f"{drift}_mean"} & set(dataset):
+        return xr.Dataset()
+    endings = [ending for ending in ENDINGS if f"{name}{ending}" in dataset]
+    result = dataset[[f"{name}{ending}" for ending in endings]].astype(float)
+    if drift not in dataset:
+        mean, change, error = (
+            dataset[each].astype(float)
+            for each in (f"{name}_mean", f"{drift}_mean", f"{drift}_sem")
+        )
+    elif MEMBERS in dataset[drift].dims:
+        each = dataset[drift].astype(float)
+        mean, change = dataset[name].astype(float).mean(MEMBERS), each.mean(MEMBERS)
+        count = each.count(MEMBERS)
+        freedom = (count * (count - 1.0)).where(count > 1)
+        error = (((each - change) ** 2).sum(MEMBERS) / freedom) ** 0.5
+    else:
+        mean, change = dataset[name].astype(float), dataset[drift].astype(float)
+        error = xr.zeros_like(change)
+    has_settled = abs(change) <= _SETTLED * abs(mean) + _SURELY * error.fillna(0.0)
+    reasons = xr.where(change.isnull(), "no two parts of whole cycles", "not settled")
+    result[f"{name}_reason"] = xr.where(has_settled, "", reasons).assign_attrs(
+        long_name="reason for no kinetic friction"
+    )
+    for ending in endings:
+        result[f"{name}{ending}"] = result[f"{name}{ending}"].where(has_settled)
+    return result.reset_coords(drop=True)
 
 
 def slips_by_phase(dataset: xr.Dataset) -> xr.Dataset:
@@ -230,9 +284,7 @@ def slips_by_phase(dataset: xr.Dataset) -> xr.Dataset:
     -------
     xarray.Dataset
         With the dimension ``phase`` last: ``slip_count``, the means ``static_friction``, ``force_drop`` [N],
-        ``slip_amplitude`` [m] and ``recurrence_time`` [s], and the ``first_friction`` [N] at which the first slip
-        event of a phase begins: after a hold the peak, with the time for which it was held before, ``time_held`` [s];
-        and the ``start`` [s] of the phase.
+        ``slip_amplitude`` [m] and ``recurrence_time`` [s], and the ``start`` [s] of the phase.
     """
     each, start, end = slips(dataset), dataset["phase_start"], dataset["phase_end"]
     inside = (each["slip_time"] >= start) & (each["slip_time"] < end)
@@ -243,64 +295,42 @@ def slips_by_phase(dataset: xr.Dataset) -> xr.Dataset:
     result["slip_count"] = pure(
         inside.sum("slip").astype(float), "number of slip events in a phase"
     )
-    first = (
-        each["static_friction"]
-        .isel(slip=inside.argmax("slip"))
-        .where(inside.any("slip"))
-    )
-    result["first_friction"] = labelled(
-        first, "N", "spring force at which the first slip event of a phase begins"
-    )
-    held = (
-        (end - start).where(dataset["phase_name"].str.contains("rest")).shift(phase=1)
-    )
-    result["time_held"] = labelled(
-        held, "s", "time at rest of the stage before a phase"
-    )
     result["start"] = labelled(start, "s", "start of a phase")
     return result.drop_vars("slip", errors="ignore").transpose(..., "phase")
 
 
-def _between_speeds(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the speeds of a stage between which slips follow each other, as it gets faster and slower."""
-    turn, each_slip = abs(dataset["stage_speed"]).idxmax("t"), slips(dataset)
-    rises = falls = xr.DataArray(True)
-    if "phase_name" in dataset:  # a stage that jumps between speeds does neither
-        rises, falls = (
-            dataset["phase_name"].str.contains(word)
-            for word in ("increasing", "decreasing")
-        )
-        turn = dataset["phase_end"].where(rises).max("phase").fillna(0.0)
-        rises, falls = rises.any("phase"), falls.any("phase")
-    speed, time, later = (
-        each_slip["slip_speed"],
-        each_slip["slip_time"],
-        each_slip["recurrence_time"].notnull(),
-    )
-    after_another = later.shift(slip=1, fill_value=False) & (time > turn)
-    begins = "lowest speed of the stage, as it gets {}, at which a slip begins that {}".format
-    up, down = (
-        begins("faster", "another one follows"),
-        begins("slower", "follows another one"),
-    )
-    return {
-        "slips_from": labelled(
-            speed.where(later & (time <= turn) & rises).min("slip"), "m/s", up
-        ),
-        "slips_down_to": labelled(
-            speed.where(after_another & falls).min("slip"), "m/s", down
-        ),
-    }
+def peaks_after_holds(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the friction peak after each hold, and the time for which the slider or the stage was held before.
 
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, of a drive with more than one phase.
 
-def varies(dataset: xr.Dataset) -> bool:
-    """Return True if the magnitude of the stage's speed changes in a run."""
-    if "phase_name" in dataset and bool(
-        dataset["phase_name"].str.contains("ing speed").any()
-    ):
-        return True
-    stage = abs(dataset["stage_speed"]).where(dataset["stage_speed"] != 0.0)
-    return bool((stage.max("t") > (1.0 + _ROUNDING) * stage.min("t")).any())
+    Returns
+    -------
+    xarray.Dataset
+        With the dimension ``phase`` last: ``peak_after_hold`` [N], the first maximum of the friction after a rest, if
+        the friction then falls by 1 % before it exceeds the maximum; ``time_held`` [s] before; and the ``start`` [s] of
+        the phase. All are nan in other phases. Empty if nothing rests before another phase.
+    """
+    if "phase_static_threshold" not in dataset:
+        return xr.Dataset()
+    start, rests = dataset["phase_start"], dataset["phase_name"].str.contains("rest")
+    held = (dataset["phase_end"] - start).where(rests).shift(phase=1)
+    peak = dataset["phase_static_threshold"].astype(float)
+    result = xr.Dataset(
+        {
+            "peak_after_hold": labelled(
+                peak.where(held.notnull()),
+                "N",
+                "first maximum of the friction force after a hold",
+            ),
+            "time_held": labelled(held, "s", "time at rest before a phase"),
+            "start": labelled(start, "s", "start of a phase"),
+        }
+    )
+    return result.transpose(..., "phase")
 
 
 def runaways(dataset: xr.Dataset) -> xr.Dataset:
@@ -402,8 +432,6 @@ def incipient_law(force: Array, area: Array) -> tuple[int, float]:
 _CORNERS, _LOOPS = 4, ("loop_energy", "loop_dissipation")
 #: A loop below this share of what is put in and given back is nothing.
 _NOTHING = 1e-12
-#: A force begins at zero if it is below this share of its largest.
-_REST = 0.01
 #: Names of a peak, the quantity that it is of, and its unit.
 _PEAKS = (
     ("peak_stress", "shear_stress", "Pa"),
@@ -634,38 +662,44 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def static_threshold(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the largest friction force of a slider that a stage pulls from rest, and the contact area at it.
+    """Return the static threshold: the first maximum of the friction after a start from rest, and the area at it.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        As ``sim run`` writes it.
+        As ``sim run`` writes it, of a drive that starts from rest at a constant control of the contact.
 
     Returns
     -------
     xarray.Dataset
-        ``static_threshold`` [N] and ``area_at_threshold`` [1], the contact area there over that at rest, both of the
-        clock steps. nan if friction does not begin at zero or is as large at the end, if the course of the stage has
-        several phases, the control of the contact changes, or members differ by noise: see ``slips_by_phase``. Empty if
-        no stage pulls.
+        ``static_threshold`` [N]; ``area_at_threshold`` [1], the contact area there over that at rest; and
+        ``threshold_after`` [s], the time of the threshold. nan if the friction does not fall by 1 % from its first
+        maximum before it exceeds the maximum again. Empty of other drives.
+
+    Notes
+    -----
+    The maximum is that of the clock steps of each member, refined between them. If members differ, each has its own
+    threshold. The first maximum from which noise takes 1 % may then come before the maximum of the mean, and it is
+    lower. If the relative noise of the friction is of the order of 1 %, read the peak of the mean instead
+    (``ensemble_peaks``).
     """
-    if "stage_speed" not in dataset:
+    area = dataset.get("static_threshold_area")
+    if area is None:
         return xr.Dataset()
-    force = dataset["peak_friction"]
-    first, last = (
-        abs(dataset["friction_force"]).isel(t=record, drop=True) for record in (0, -1)
-    )
-    known = stays_held(dataset) & ~has_noise(dataset)
-    known = known & (first <= _REST * force) & (last < (1.0 - _ROUNDING) * force)
-    if "phase_start" in dataset:
-        known = known & (dataset["phase_start"].count("phase") == 1)
-    share = dataset["peak_friction_area"] / dataset["contact_area"].isel(t=0, drop=True)
-    text = "largest friction force after a start from rest"
+    text = "first maximum of the friction force after a start from rest"
+    share = area.astype(float) / dataset["contact_area"].isel(t=0, drop=True)
     return xr.Dataset(
         {
-            "static_threshold": labelled(force.where(known), "N", text),
+            "static_threshold": labelled(
+                dataset["static_threshold"].astype(float), "N", text
+            ),
             "area_at_threshold": pure(
-                share.where(known), f"contact area at the {text} over that at rest"
+                share, f"contact area at the {text} over that at rest"
+            ),
+            "threshold_after": labelled(
+                dataset["static_threshold_time"].astype(float),
+                "s",
+                f"time of the {text}",
             ),
         }
     )

@@ -9,7 +9,13 @@ import xarray as xr
 
 from sim.quantities import QUANTITIES, Form, form_of
 from sim.read.dataset import MEMBERS
-from sim.read.events import ensemble_peaks, events, half_lives, slips_by_phase
+from sim.read.events import (
+    ensemble_peaks,
+    events,
+    half_lives,
+    peaks_after_holds,
+    slips_by_phase,
+)
 from sim.read.statistics import Array, correlation_time, over_members, summary
 from sim.units.notation import bounded, scaled, share
 
@@ -116,15 +122,14 @@ def of_events(dataset: xr.Dataset) -> xr.Dataset:
             beside[name] = bound.mean(MEMBERS, keep_attrs=True)
     for further in (as_means(half_lives(dataset, result)), beside):
         members = members.merge(further, compat="no_conflicts", join="outer")
-    if {
-        "phase_start",
-        "slip_time",
-    } <= dataset.keys() | dataset.coords.keys() and dataset.sizes["slip"]:
-        of_phases = summary(
-            slips_by_phase(dataset).assign_attrs(dataset.attrs), quantiles=False
-        )
+    phased = [peaks_after_holds(dataset)]
+    if {"phase_start", "slip_time"} <= set(dataset.variables) and dataset.sizes["slip"]:
+        phased.append(slips_by_phase(dataset))
+    for of_phases in (values for values in phased if values):
+        means = summary(of_phases.assign_attrs(dataset.attrs), quantiles=False)
         members = members.merge(
-            of_phases.rename({name: f"phase_{name}" for name in of_phases}),
+            means.rename({name: f"phase_{name}" for name in means}),
+            compat="no_conflicts",
             join="outer",
         )
     return members.assign(ensemble_peaks(dataset))

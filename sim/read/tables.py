@@ -10,7 +10,7 @@ import xarray as xr
 
 from sim.quantities import QUANTITIES, Definition, Form
 from sim.read.errors import systematic_errors
-from sim.read.events import unresolved_slips, varies
+from sim.read.events import unresolved_slips
 from sim.read.observables import restricted, with_slips
 from sim.read.over_speed import extremes
 from sim.read.run import Run
@@ -149,7 +149,12 @@ _HEADINGS = {
     "peak_friction_speed": "at V ",
     "peak_friction_time": "after ",
     "slip_count": "slips",
+    "static_threshold": "static threshold",
     "kinetic_friction": "kinetic friction",
+    "onset_steady_speed": "no slips up to",
+    "onset_slip_speed": "slips from",
+    "end_slip_speed": "slips down to",
+    "end_steady_speed": "no slips from",
     "slip_amplitude": "slip",
 }
 
@@ -171,7 +176,10 @@ EVENTS = (
     *_events("peak_speed", "peak_time", dull=math.nan),
     *_events("peak_friction"),
     *_events("peak_friction_speed", "peak_friction_time", dull=math.nan),
+    *_events("static_threshold", "area_at_threshold", dull=math.nan),
     *_events("slip_count", "ran_away"),
+    *_events("onset_steady_speed", "onset_slip_speed", dull=math.nan),
+    *_events("end_slip_speed", "end_steady_speed", dull=math.nan),
     *_events(
         "runaway_after",
         "static_friction",
@@ -188,8 +196,10 @@ SLIPS = _events(
 )
 #: Columns of each phase.
 PHASES = (
-    *_columns("phase_start", "phase_time_held", "phase_slip_count"),
-    *_columns("phase_first_friction", "phase_static_friction", dull=math.nan),
+    *_columns("phase_start", "phase_time_held"),
+    *_columns("phase_peak_after_hold", dull=math.nan),
+    *_columns("phase_slip_count"),
+    *_columns("phase_static_friction", dull=math.nan),
     *_columns("phase_force_drop", "phase_recurrence_time", dull=math.nan),
 )
 
@@ -370,12 +380,7 @@ def _fitting(
 
 
 def _of_drive(run: Run, name: str) -> bool:
-    """Return True if an event is shown under this drive: the speed of a peak on a ramp, its time after a start.
-
-    And kinetic friction of a stage at one speed, else it is a mean over speeds.
-    """
-    if name == "kinetic_friction" and run.speed_name == "stage_speed":
-        return not varies(run.dataset)
+    """Return True if an event is shown under this drive: the speed of a peak on a ramp, its time after a start."""
     if name in ("peak_speed", "peak_friction_speed"):
         return "ramp" in run.drive
     if name in ("peak_time", "peak_friction_time"):

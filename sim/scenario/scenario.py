@@ -212,6 +212,11 @@ class Phases(NamedTuple):
     names: tuple[str, ...]
     steps: tuple[int, ...]
 
+    @property
+    def rests(self) -> tuple[bool, ...]:
+        """True for each phase in which the slider or the stage rests."""
+        return tuple("rest" in name.split(", ") for name in self.names)
+
 
 def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
     """Return the phases of a run: maximal intervals in which no prescribed course turns, stops, starts or jumps.
@@ -532,6 +537,15 @@ class Scenario:
     def is_random(self) -> bool:
         """Return True if a part of the scene is random. Members behind a spring differ only then."""
         return self.population.is_random or self.fluctuations.per_member
+
+    @property
+    def loads_from_rest(self) -> bool:
+        """True if a friction force builds up after a rest: of the slider, or of the stage that pulls it."""
+        drive, rests = cast(Any, self.drive), self.phases.rests
+        pulled = drive.model == "spring" and drive.start == "rest"
+        return (pulled and not all(rests)) or (
+            drive.model != "force" and any(rests[:-1])
+        )
 
     @cached_property
     def phases(self) -> Phases:

@@ -164,3 +164,30 @@ def test_the_error_is_of_third_order_in_the_step_and_of_fourth_with_slopes():
     assert (
         np.all(errors < (3.0 / counts) ** 4 / 90.0) and errors[-1] < errors[0] / 100.0
     )
+
+
+def test_the_first_maximum_of_friction_counts_once_friction_has_fallen_from_it_by_a_hundredth():
+    rises = [0.0, 1.0, 2.0, 3.0]
+    for fall, end, largest in (
+        (0.02, 2.98, np.nan),  # by less
+        (0.04, 2.98, 3.0),
+        (0.04, 5.0, 3.0),  # a larger one comes later
+        (0.02, 5.0, np.nan),  # it is exceeded before
+        (-1.0, 9.0, np.nan),
+    ):
+        course = [*rises, 3.0 - fall, end]
+        samples = [np.full(1, value) for value in course]
+        # bonds without a stretch: a maximum is that of the samples
+        top = followed(samples, stretched=False).first_maximum(0)
+        assert_allclose(top["largest"], largest, rtol=1e-14)
+        assert_allclose(top["time"], 1.5 + 0.0 * largest, rtol=1e-14)
+        assert_allclose(top["area"], 1.0 + 0.0 * largest, rtol=1e-14)
+
+
+def test_a_friction_that_only_falls_has_no_first_maximum_and_a_rest_begins_another():
+    falls = [np.full(1, value) for value in (3.0, 2.0, 1.0)]
+    maxima = followed(falls, stretched=False)
+    assert np.isnan(maxima.first_maximum(0)["largest"])
+    for after_rest, start in ((True, 1.0), (False, 3.0)):
+        ahead = maxima.next_phase(after_rest).rise[0, :, 0]
+        assert_allclose(ahead, [3.0, start], rtol=1e-14)

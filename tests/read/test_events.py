@@ -456,7 +456,7 @@ def test_the_speed_of_a_friction_maximum_has_the_closed_form_in_its_interval_at_
     assert abs(off) < float(stated["peak_time_bound"])
 
 
-def test_a_pull_from_rest_has_the_largest_force_of_all_clock_steps_and_the_area_there_unless_it_still_grows():
+def test_a_pull_from_rest_has_a_threshold_between_its_clock_steps_and_the_area_there_unless_friction_still_grows():
     stretched = {
         "rupture": Bell(zero_force_rate=25.0, bell_force=4e-12),
         "bond_stiffness": 8e-7,
@@ -489,3 +489,86 @@ def test_a_pull_from_rest_has_the_largest_force_of_all_clock_steps_and_the_area_
     assert low < result["area_at_threshold"].item() < high
     xr.testing.assert_identical(static_threshold(seldom), static_threshold(dense))
     assert bool(static_threshold(short).to_dataarray().isnull().all())
+
+
+@pytest.mark.parametrize(("peaks", "start"), [(True, "empty"), (False, "steady")])
+def test_a_start_has_a_static_threshold_if_its_friction_falls_again(peaks, start):
+    """Bonds that rest have become many, and sliding renews them; bonds that are as in sliding stay so."""
+    stretched = {
+        "rupture": Bell(zero_force_rate=25.0, bell_force=4e-12),
+        "bond_stiffness": 8e-7,
+    }
+    made = {"rebinding_rate": 250.0, "site_density": 6.5e16, "start_from": start}
+    speed = 2e-3 if peaks else 1e-6
+    dataset = run(
+        scene(
+            shear=shear.Uniform(),
+            bonds=bonds.FirstMoment(**stretched, **made),
+            drive=drive.Start(rest=0.1, speed=speed),
+            clock=Clock(0.3, 1e-4),
+        )
+    )
+    result = static_threshold(dataset)
+    force = dataset["friction_force"].to_numpy()
+    top = int(np.argmax(force))
+    assert bool(force[-1] < 0.99 * force[top]) is peaks
+    if peaks:
+        assert_allclose(result["static_threshold"], force[top], rtol=1e-3)
+        assert_allclose(result["threshold_after"], dataset["t"][top], atol=1e-4)
+        ratio = dataset["contact_area"][top] / dataset["contact_area"][0]
+        assert_allclose(result["area_at_threshold"], ratio, rtol=1e-3)
+    else:
+        assert result.to_dataarray().isnull().all()
+
+
+def test_a_table_of_speeds_has_a_peak_after_each_hold_and_none_after_a_faster_speed():
+    stretched = {
+        "rupture": Bell(zero_force_rate=25.0, bell_force=4e-12),
+        "bond_stiffness": 8e-7,
+    }
+    made = {"rebinding_rate": 250.0, "site_density": 6.5e16, "start_from": "steady"}
+    times = (0.0, 0.1, 0.1, 0.2, 0.2, 0.3, 0.3, 0.35, 0.35, 0.5)
+    speeds = (2e-3, 2e-3, 4e-3, 4e-3, 0.0, 0.0, 4e-3, 4e-3, 2e-3, 2e-3)
+    dataset = run(
+        scene(
+            shear=shear.Uniform(),
+            bonds=bonds.FirstMoment(**stretched, **made),
+            drive=drive.Table(time=times, speed=speeds),
+            clock=Clock(0.5, 1e-4),
+        )
+    )
+    result = read.peaks_after_holds(dataset)
+    force, time = dataset["friction_force"].to_numpy(), dataset["t"].to_numpy()
+    top = np.max(force[(time > 0.3) & (time < 0.35)])
+    nothing = [np.nan] * 3
+    assert_allclose(result["peak_after_hold"], [*nothing, top, np.nan], rtol=1e-3)
+    assert_allclose(result["time_held"], [*nothing, 0.1, np.nan], rtol=1e-12)
+    # it has not started from rest
+    assert np.isnan(dataset["static_threshold"]).all()
+
+
+def test_each_member_with_noise_has_its_own_threshold():
+    """A fall by noise takes one per cent of few bonds at once: the threshold is then the first of them."""
+    rupture = Bell(zero_force_rate=25.0, bell_force=4e-12)
+    tracked = bonds.Tracked(
+        rupture=rupture,
+        bond_stiffness=8e-7,
+        rebinding_rate=250.0,
+        site_density=6.5e16,
+        sites=50,
+        start_from="steady",
+    )
+    dataset = run(
+        scene(
+            shear=shear.Uniform(),
+            bonds=tracked,
+            drive=drive.Spring(stage=2e-3, stiffness=300.0),
+            clock=Clock(0.1, 1e-4),
+        )
+    )
+    for member in range(6):
+        force = dataset["friction_force"][member].to_numpy()
+        fallen = force < 0.99 * np.maximum.accumulate(force)
+        own = force[: int(np.argmax(fallen))].max()
+        assert own <= dataset["static_threshold"][member] < 1.05 * own
+    assert np.unique(dataset["static_threshold"]).size == 6

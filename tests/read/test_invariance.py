@@ -82,10 +82,10 @@ SCENES = {
         "bonds": STRETCHED,
         "drive": {
             "model": "spring",
-            "stage": "10 mm/s",
+            "stage": "5 mm/s",
             "stiffness": "150 N/m",
-            "mass": "5 g",
-            "damping": "40 mN s/m",
+            "mass": "50 mg",
+            "damping": "20 mN s/m",
         },
     },
     "cycles": PROBE
@@ -120,7 +120,8 @@ GROWING = (
     "detachments",
     "total_dissipated",
     "ever_detached",
-    "slips_",
+    "onset_",
+    "end_",
 )
 #: Least and largest values of a run, which a longer run exceeds.
 ENDS = ("_least", "_largest")
