@@ -16,7 +16,7 @@ import xarray as xr
 
 from sim.numerics import files, hdf5
 from sim.numerics.lazy import Refused, open_lazily
-from sim.quantities import RECORDED
+from sim.quantities import OF_EACH_SLIP, RECORDED
 from sim.units.errors import BadInput
 from sim.units.tables import decoded, same_line_ends
 
@@ -66,8 +66,8 @@ _RECORDED = {
     "error_speed",
     "member_spread_area",
 }
-#: Numbers on slip events, which are recorded together unless a scenario chooses some.
-_SLIPS = [name for name in RECORDED if name.startswith(("slip_", "late_"))]
+#: Numbers of each slip event, which are recorded together unless a scenario chooses some.
+_SLIPS = [row.name for row in OF_EACH_SLIP]
 #: Begin of the versions whose events of these names had other definitions.
 _FIRST = ("0.", "1.")
 _OLD_EVENTS = re.compile(

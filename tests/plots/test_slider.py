@@ -2,6 +2,7 @@
 
 import functools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -60,7 +61,8 @@ def driven(kind):
 
 
 def test_slips_that_last_few_records_are_remarked_on_with_the_key_that_shows_them():
-    dataset = driven("map").isel(drive_stiffness=[0])
+    path = Path(sim.__file__).parents[1] / "scenarios" / "stick_slip.toml"
+    dataset = sim.run(path)
     lasting = float(
         slips(dataset)["slip_duration"].median() / (dataset["t"][1] - dataset["t"][0])
     )
