@@ -576,7 +576,7 @@ WITH_PHASES: tuple[Definition, ...] = (
     Definition(
         "pull_off_time",
         "s",
-        "time of the first pull-off, at the lowest load since stability was lost",
+        "time of the first pull-off",
         symbol="t_c",
         exists_when=CAN_OPEN,
         heading="pull-off after",
@@ -585,10 +585,7 @@ WITH_PHASES: tuple[Definition, ...] = (
     Definition(
         "pull_off_load",
         "N",
-        (
-            "normal load at the first pull-off: the lowest from the loss of stability "
-            "to the opening of the contact"
-        ),
+        "normal load at the first pull-off",
         symbol="P_off",
         exists_when=CAN_OPEN,
         heading="pull-off load",

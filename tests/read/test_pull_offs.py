@@ -237,6 +237,42 @@ def test_the_load_at_pull_off_is_that_at_the_fold_at_any_clock_step(stiffness, s
         assert_allclose(dataset["pull_off_load"], -1.3308e-6, rtol=1e-4)
 
 
+@pytest.mark.parametrize("held", ["load", "displacement", "indentation"])
+def test_the_fold_has_no_error_by_the_clock_step_if_adhesion_depends_on_the_radius(
+    held,
+):
+    course = {
+        "load": {"load": {"from": "0.5 mN", "to": "-0.5 mN"}},
+        "displacement": {
+            "displacement": {"from": "1 um", "to": "-9 um"},
+            "stiffness": "500 N/m",
+        },
+        "indentation": {"indentation": {"from": "1 um", "to": "-1.5 um"}},
+    }[held]
+    sliding = {
+        "drive": {"model": "steady", "speed": "3 mm/s"},
+        "bonds": FLUCTUATIONS["bonds"] | {"stress": "20 kPa"},
+    }
+    spectrum = {"model": "gaussian", "rms": "150 kPa", "length": "20 um"}
+    on_disc = {"shear": {"model": "mean", "contact": "disc", "spectrum": spectrum}}
+    for share, tables in ((1.0, sliding), (0.0, sliding | on_disc)):
+        coarse, fine, without = (
+            ran(
+                LENS,
+                course | {"reversible": part},
+                clock={"duration": "1 s", "step": step},
+                **others,
+            )["pull_off_load"]
+            for step, part, others in (
+                ("50 ms", share, tables),
+                ("1 ms", share, tables),
+                ("1 ms", 0.0, sliding),
+            )
+        )
+        assert_allclose(coarse, fine, rtol=1e-6)
+        assert abs(fine) < 0.97 * abs(without)
+
+
 def test_the_load_at_pull_off_is_the_applied_one_whatever_opens_the_contact():
     ramp = {"load": {"from": "1 uN", "to": "-5 uN"}}
     dataset = ran(PROBE, ramp, clock={"duration": "2 s", "step": "0.25 s"})
