@@ -875,7 +875,7 @@ def bond_noise(dataset: xr.Dataset) -> dict[str, Number]:
     "What changes if the indentation is fixed instead of the load?",
     """The contact holds longer. At an indentation of {deep:g} µm it keeps {kept} % of its JKR area at {speed:.0f}
     mm/s. At {high:g} µm the sphere is held above the surface, where no load could hold it. There {open} % of the
-    members detach as the speed increases, on average at {off} ms and a speed of {at:.1f} mm/s.""",
+    members detach as the speed increases, half of them within {off:.0f} ms, at which the speed is {at:.1f} mm/s.""",
 )
 def fixed_grips(dataset: xr.Dataset) -> dict[str, Number]:
     depth, over_members = dataset["contact_indentation"], statistics(dataset)
@@ -883,15 +883,14 @@ def fixed_grips(dataset: xr.Dataset) -> dict[str, Number]:
         over_members.isel(contact_indentation=0),
         over_members.isel(contact_indentation=-1, t=-1),
     )
-    off = pair(high, "first_detachment", 1e3)
-    then = 1e-3 * (off[0] if isinstance(off, tuple) else off)
+    then = float(high["half_detached_mean"])
     return {
         "deep": 1e6 * float(depth[-1]),
         "high": 1e6 * float(depth[0]),
         "kept": pair(deep, "area_ratio", 100.0),
         "speed": 1e3 * float(speeds(dataset)[-1]),
         "open": pair(high, "ever_detached", 100.0),
-        "off": off,
+        "off": 1e3 * then,
         "at": 1e3 * float(speeds(dataset).sel(t=then, method="nearest")),
     }
 
@@ -908,7 +907,7 @@ def pull_off(dataset: xr.Dataset) -> dict[str, Number]:
     lost = 1e9 * read.loop_energy(dataset)["loop_dissipation"].mean("cycle")
     stiffness = dataset["contact_stiffness"]
     return {
-        "pull": -1e3 * float(dataset["pull_off_load"].min()),
+        "pull": -1e3 * float(dataset["lowest_load"].min()),
         "soft": float(lost[0]),
         "stiff": float(lost[-1]),
         "softest": float(stiffness[0]),
@@ -924,7 +923,7 @@ def pull_off(dataset: xr.Dataset) -> dict[str, Number]:
     nJ.""",
 )
 def peeling(dataset: xr.Dataset) -> dict[str, Number]:
-    pull, speed = -1e3 * dataset["pull_off_load"], dataset["contact_front_speed"]
+    pull, speed = -1e3 * dataset["lowest_load"], dataset["contact_front_speed"]
     work, size = float(dataset["adhesion_work"]), float(dataset["sphere_radius"])
     lost = 1e9 * read.loop_energy(dataset)["loop_dissipation"].mean("cycle")
     return {

@@ -60,7 +60,7 @@ class Trajectory(NamedTuple):
 
     ``time`` [s], ``position`` [m] and ``speed`` [m/s] are those of the slider. ``fraction``, ``stress`` and
     ``strength`` of the bonds are as in ``Bonding``; ``energy`` is ΔΓ [J/m²]. ``driven`` has the readings of a drive
-    that solves the motion, in columns. ``work`` and the rest are as in ``ContactState``.
+    that solves the motion, in columns. ``work`` and the rest are as in ``ContactState``, which has no course of turns.
     """
 
     time: Array
@@ -231,7 +231,7 @@ def _trajectory(
 ) -> Trajectory:
     of_bonds = bonding.fraction, bonding.stress, bonding.strength
     return Trajectory(
-        time, motion.position, motion.speed, *of_bonds, energy, driven, *contact
+        time, motion.position, motion.speed, *of_bonds, energy, driven, *contact[:5]
     )
 
 

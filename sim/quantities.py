@@ -87,13 +87,17 @@ CHANGING_LOAD = Condition("a load that changes", lambda scene: scene.contact.mak
 FEELS_STEPS = Condition(
     "an edge that lags, or tension", lambda scene: scene.feels_steps
 )
-PULLED = Condition(
-    "fluctuations, and a negative contact.load",
-    lambda scene: (
-        scene.feels_steps
-        and scene.contact.load is not None
-        and min(scene.contact.course.extremes) < 0.0
-    ),
+CAN_OPEN = Condition(
+    "a load, indentation or displacement below zero",
+    lambda scene: min(scene.contact.course.extremes) < 0.0,
+)
+CAN_JUMP_IN = Condition(
+    f'{CAN_OPEN.words}, and contact.model other than "rate_dependent"',
+    lambda scene: CAN_OPEN.holds(scene) and not scene.contact.lags,
+)
+LATE_PULL_OFF = Condition(
+    f"fluctuations or an edge that lags, and {CAN_OPEN.words}",
+    lambda scene: CAN_OPEN.holds(scene) and (scene.feels_steps or scene.contact.lags),
 )
 
 
@@ -103,6 +107,8 @@ NO_SLIPS = "there are no two slip events"
 NO_ONSET = "slip events do not set in as the stage gets faster, or there are no two"
 NO_END = "slip events do not end as the stage gets slower, or there are no two"
 NO_MAXIMUM = "friction does not fall by 1 % from its first maximum before it exceeds it"
+STAYS_CLOSED, NO_JUMP_IN = "the contact does not open", "no contact jumps in"
+WITHOUT_TENSION = "the contact bears no tension"
 
 
 class Definition(NamedTuple):
@@ -568,35 +574,29 @@ WITH_PHASES: tuple[Definition, ...] = (
         absent=NO_MAXIMUM,
     ),
     Definition(
-        "pull_off_load",
-        "N",
-        "lowest normal load of the contact, a tension; nan without tension",
-        symbol="P_min",
-        exists_when=CHANGING_LOAD,
-    ),
-    Definition(
         "pull_off_time",
         "s",
-        "time of the lowest normal load",
-        symbol="t_min",
-        exists_when=CHANGING_LOAD,
+        "time of the first pull-off",
+        symbol="t_c",
+        exists_when=CAN_OPEN,
+        heading="pull-off after",
+        absent=STAYS_CLOSED,
+    ),
+    Definition(
+        "pull_off_load",
+        "N",
+        "normal load at the first pull-off",
+        symbol="P_off",
+        exists_when=CAN_OPEN,
+        heading="pull-off load",
+        absent=STAYS_CLOSED,
     ),
     Definition(
         "pull_off_displacement",
         "m",
-        "displacement of the mount at the lowest normal load",
-        exists_when=CHANGING_LOAD,
-    ),
-    Definition(
-        "first_detachment",
-        "s",
-        "time of the first detachment; nan if there is none",
-        symbol="t_d",
-    ),
-    Definition(
-        "first_closing",
-        "s",
-        "time at which an open contact first closes; nan if there is none",
+        "displacement of the mount at the first pull-off",
+        exists_when=CAN_OPEN,
+        absent=STAYS_CLOSED,
     ),
 )
 
@@ -604,13 +604,69 @@ WITH_PHASES: tuple[Definition, ...] = (
 OF_THE_RUN: tuple[Definition, ...] = (
     Definition("detachments", "1", "number of detachments"),
     Definition(
-        "closing_displacement", "m", "displacement of the mount at the first closing"
+        "lowest_load",
+        "N",
+        "lowest normal load that the contact bears, a tension",
+        symbol="P_min",
+        exists_when=CHANGING_LOAD,
+        heading="lowest load",
+        absent=WITHOUT_TENSION,
     ),
-    Definition("closing_load", "N", "normal load after the first closing"),
+    Definition(
+        "lowest_load_time",
+        "s",
+        "time of the lowest normal load",
+        symbol="t_min",
+        exists_when=CHANGING_LOAD,
+        absent=WITHOUT_TENSION,
+    ),
+    Definition(
+        "lowest_load_displacement",
+        "m",
+        "displacement of the mount at the lowest normal load",
+        exists_when=CHANGING_LOAD,
+        absent=WITHOUT_TENSION,
+    ),
+    Definition(
+        "jump_in_time",
+        "s",
+        "time of the first jump into contact",
+        exists_when=CAN_JUMP_IN,
+        absent=NO_JUMP_IN,
+    ),
+    Definition(
+        "jump_in_load",
+        "N",
+        "normal load just after the first jump into contact",
+        exists_when=CAN_JUMP_IN,
+        heading="jump-in load",
+        absent=NO_JUMP_IN,
+    ),
+    Definition(
+        "jump_in_displacement",
+        "m",
+        "displacement of the mount at the first jump into contact",
+        exists_when=CAN_JUMP_IN,
+        absent=NO_JUMP_IN,
+    ),
+    Definition(
+        "first_detachment",
+        "s",
+        "end of the clock step in which the contact first opens",
+        symbol="t_d",
+        absent=STAYS_CLOSED,
+    ),
+    Definition(
+        "first_closing",
+        "s",
+        "end of the clock step in which an open contact first closes",
+        absent="no open contact closes",
+    ),
     Definition(
         "first_masked",
         "s",
-        "time at which the contact is first masked; nan if it never is",
+        "time at which the contact is first masked",
+        absent="the contact is never masked",
     ),
     Definition(
         "time_masked",
@@ -645,7 +701,8 @@ OF_THE_RUN: tuple[Definition, ...] = (
         "pull_off_error",
         "N",
         "approximate systematic error of the pull-off load by the clock step",
-        exists_when=PULLED,
+        exists_when=LATE_PULL_OFF,
+        absent=STAYS_CLOSED,
     ),
 )
 
@@ -843,6 +900,13 @@ OF_MEMBERS: tuple[Definition, ...] = (
         "1/s",
         "detachments per time in contact, of all members",
         heading="rate of detaching",
+    ),
+    Definition(
+        "ever_masked",
+        "1",
+        "share of members that were masked at some time",
+        heading="masked, of members",
+        form=Form.SHARE,
     ),
     Definition(
         "half_masked",

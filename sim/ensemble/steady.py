@@ -78,7 +78,7 @@ def steady_course(
         bonding.strength,
         energy,
     )
-    return Trajectory(*moving, np.empty((len(speed), 1, 0)), *touch)
+    return Trajectory(*moving, np.empty((len(speed), 1, 0)), *touch[:5])
 
 
 # points of a sweep and shares of the energy have the same bonds at the same speeds

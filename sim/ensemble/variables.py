@@ -20,7 +20,8 @@ from sim.parts.contact.balance import (
     Shares,
 )
 from sim.parts.drive import READINGS, Driven, Force, Spring
-from sim.parts.events import LATE, MOMENTS, RISE, TURN, Slips
+from sim.parts.events import LATE, MOMENTS, RISE, TURNS, Slips
+from sim.parts.exchange import TURN
 from sim.quantities import (
     OF_EACH_SLIP,
     OF_SLIPS,
@@ -160,35 +161,45 @@ def _column(name: str) -> Callable[[Scenario, Any], Any]:
     return lambda scene, rows: np.nan_to_num(rows[name])
 
 
-def _pull(column: str, pulls: Any) -> Any:
-    """Return a column of largest pulls; nan for a contact that was never pulled."""
-    return np.where(pulls["largest"] > 0.0, pulls[column], np.nan)
+def _column_of_turns(name: str) -> Callable[[Scenario, Any], Any]:
+    """Return the reading of a column of the turns of contacts, nan without one."""
+    return lambda scene, rows: rows[name]
 
 
-def _displaced(scene: Scenario, pulls: Any) -> Any:
-    """Return the displacement of the mount at largest pulls [m]."""
-    radius, time = (
-        np.sqrt(_pull("area", pulls) / np.pi),
-        np.nan_to_num(_pull("time", pulls)),
-    )
-    return scene.contact.control(time, scene.clock.duration).displacement(
-        radius, scene.bodies
-    )
+def _first(turn: str, column: str = "") -> Callable[[Scenario, State], Any]:
+    """Return the reading of a column of the first turn of a contact, by default its time."""
+    return lambda scene, state: state.events.first_turn(turn)[column or turn]
 
 
-def _at_closing(of: str) -> Callable[[Scenario, State], Any]:
-    """Return the reading of a quantity of the control at the first closing."""
+def _lowest(quantity: str) -> Callable[[Scenario, State], Any]:
+    """Return the reading of time, load or displacement of the mount at the lowest load, a name of ``TURN``.
+
+    It is the lowest of those at the clock steps, at pull-offs and at jumps into contact, nan if none is a tension.
+    """
 
     def read(scene: Scenario, state: State) -> Any:
-        turn = state.events.first_turn("closing")
-        control = scene.contact.control(
-            np.nan_to_num(turn["closing"]), scene.clock.duration
-        )
-        return np.where(
-            np.isfinite(turn["closing"]),
-            getattr(control, of)(turn["radius"], scene.bodies),
-            np.nan,
-        )
+        pulls, turns = state.events.by_phase("pull"), state.events.by_phase("contact")
+        pulled = pulls["largest"] > 0.0
+        radius = np.sqrt(np.where(pulled, pulls["area"], np.nan) / np.pi)
+        time = np.where(pulled, pulls["time"], 0.0)
+        control = scene.contact.control(time, scene.clock.duration)
+        at_steps = {
+            "time": time,
+            "load": np.where(pulled, -pulls["largest"], 0.0),
+            "displacement": control.displacement(radius, scene.bodies),
+        }
+        shape = np.broadcast_shapes(pulls.shape, turns.shape)
+
+        def candidates(name: str) -> np.ndarray:
+            values = at_steps[name], turns[f"pull_off_{name}"], turns[f"jump_in_{name}"]
+            return np.concatenate([np.broadcast_to(one, shape) for one in values], 1)
+
+        load = candidates("load")
+        tension = np.where(load < 0.0, -load, 0.0)
+        place = tension.argmax(axis=1)[:, np.newaxis]
+        is_tension = np.take_along_axis(tension, place, 1) > 0.0
+        values = np.take_along_axis(candidates(quantity), place, 1)
+        return np.where(is_tension, values, np.nan)[:, 0]
 
     return read
 
@@ -221,9 +232,9 @@ def _event(
 ) -> tuple[Variable, Variable]:
     """Return a quantity of an event of the whole run, and that of the event in each phase.
 
-    ``read`` takes the scenario and rows of events ``of`` a kind: a largest value, or an opening or closing.
+    ``read`` takes the scenario and rows of events ``of`` a kind: a largest value, or the time of a turn.
     """
-    part, turns = "bonds" if of == "stress" else "contact", of in (TURN.names or ())
+    part, turns = "bonds" if of == "stress" else "contact", of in (TURNS.names or ())
 
     def whole(scene: Scenario, state: State) -> Any:
         return read(
@@ -283,12 +294,17 @@ _EVENTS = (
     _threshold("static_threshold", "largest"),
     _threshold("static_threshold_time", "time"),
     _threshold("static_threshold_area", "area"),
-    _event("pull_off_load", "pull", lambda scene, rows: -1.0 * _pull("largest", rows)),
-    _event("pull_off_time", "pull", lambda scene, rows: _pull("time", rows)),
-    _event("pull_off_displacement", "pull", _displaced),
-    _event("first_detachment", "opening", lambda scene, rows: rows["opening"]),
-    _event("first_closing", "closing", lambda scene, rows: rows["closing"]),
+    *(
+        _event(name, "pull_off_time", _column_of_turns(name))
+        for name in (f"pull_off_{column}" for column in TURN.names or ())
+    ),
 )
+#: Names of the quantities at the lowest load, by those in ``TURN``.
+_AT_LOWEST = {
+    "load": "lowest_load",
+    "time": "lowest_load_time",
+    "displacement": "lowest_load_displacement",
+}
 
 
 def _late(quantity: str, moment: str) -> Callable[[Slips], Any]:
@@ -367,8 +383,16 @@ def _slip(name: str) -> Variable:
 LARGEST: tuple[Variable, ...] = (
     *(of_run for of_run, _ in _EVENTS),
     Variable("detachments", "contact", _of_contact("detachments")),
-    Variable("closing_displacement", "contact", _at_closing("displacement")),
-    Variable("closing_load", "contact", _at_closing("normal_load")),
+    *(
+        Variable(name, "contact", _lowest(column))
+        for column, name in _AT_LOWEST.items()
+    ),
+    *(
+        Variable(name, "contact", _first("jump_in_time", name))
+        for name in (f"jump_in_{column}" for column in TURN.names or ())
+    ),
+    Variable("first_detachment", "contact", _first("opening")),
+    Variable("first_closing", "contact", _first("closing")),
     Variable("first_masked", "contact", _of_contact("masked")),
     Variable("time_masked", "contact", _masked_share),
     Variable("runaway_force", "drive", _runaway_force),
@@ -382,8 +406,12 @@ LARGEST: tuple[Variable, ...] = (
     ),
     Variable(
         "pull_off_error",
-        "drive",
-        lambda scene, state: pull_off_error(scene, state.events.path),
+        "contact",
+        lambda scene, state: np.where(
+            np.isfinite(_first("pull_off_time")(scene, state)),
+            pull_off_error(scene, state.events.path),
+            np.nan,
+        ),
     ),
     *(of_phase for _, of_phase in _EVENTS),
     *(_slip(row.name) for row in OF_SLIPS),

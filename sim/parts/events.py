@@ -10,11 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.numerics.jit import device, kernel
-from sim.parts.exchange import Array, Bonding, ContactState, Motion, during, record
+from sim.parts.exchange import (
+    TURN,
+    Array,
+    Bonding,
+    ContactState,
+    Motion,
+    during,
+    record,
+)
 from sim.quantities import SLIP_EVENT
 
 #: Arrays that are read alone, as they come.
 _READ = "Array(float64, 2, 'A', readonly=True), "
+_READ_ROWS = _READ.replace("2", "3")
 #: What a stress and its slope follow from.
 _OF_THE_STRESS = "stress", "stiffness", "relaxation"
 #: Change over a step, by the slope at one of its ends, over the value, up to which a cubic holds.
@@ -32,13 +41,19 @@ RISE = record("start fallen largest time area")
 FALLEN = 0.01
 #: Relative difference up to which a friction is the one at the start.
 _SAME = 1e-9
-#: Time of the first opening and of the first closing of a contact [s], and the radius after that closing [m].
-TURN = record("opening closing radius")
+#: Times of the first opening and of the first closing of a contact [s]. Time [s], load [N] and displacement of the
+#: mount [m] of its first pull-off, and of its first jump into contact.
+TURNS = record(
+    "opening closing "
+    + " ".join(
+        f"{of}_{name}" for of in ("pull_off", "jump_in") for name in TURN.names or ()
+    )
+)
 #: Row of a contact: radius [m] when it last opened or closed, and time of the last detachment [s]; number of
 #: detachments; time at which it was first masked, time for which it was closed, and of that masked [s]; then the turns
 #: of the phase.
 CONTACT = record(
-    "last detached detachments masked closed hidden " + " ".join(TURN.names or ())
+    "last detached detachments masked closed hidden " + " ".join(TURNS.names or ())
 )
 #: Its columns for the kernel, because a kernel with a view of a record takes 0.1 s to load.
 (
@@ -50,7 +65,12 @@ CONTACT = record(
     _HIDDEN,
     _OPENING,
     _CLOSING,
-    _RADIUS,
+    _PULL_OFF,
+    _PULL_OFF_LOAD,
+    _PULL_OFF_DISPLACEMENT,
+    _JUMP_IN,
+    _JUMP_IN_LOAD,
+    _JUMP_IN_DISPLACEMENT,
 ) = range(len(CONTACT.names or ()))
 #: Speed of the slider over that of the stage above which it slips.
 FASTER = 10.0
@@ -419,7 +439,7 @@ class Events(NamedTuple):
         return rows
 
     def first_turn(self, name: str) -> NDArray[np.void]:
-        """Return the first opening or closing of the run, as a record ``CONTACT`` in each row; nan without one."""
+        """Return the first turn of the run by its time in ``TURNS``, as a record ``CONTACT`` in each row."""
         turns = self.by_phase("contact")
         first = np.isfinite(turns[name]).argmax(axis=1)
         return turns[np.arange(len(turns)), first]
@@ -529,6 +549,7 @@ def after(
         pull,
         contact.work,
         contact.detached,
+        contact.turn,
         *ends,
         *traits,
         *here,
@@ -565,7 +586,8 @@ def _load(k, i, stress, stiffness, relaxation, speed, radius):
 
 
 @kernel(
-    f"void({11 * _READ}{2 * 'float64[:], '}float64, float64, {', '.join(5 * ['float64[:, :]'])})"
+    f"void({7 * _READ}{_READ_ROWS}{4 * _READ}{2 * 'float64[:], '}float64, float64,"
+    f" {', '.join(5 * ['float64[:, :]'])})"
 )
 def _follow(
     stresses,
@@ -575,6 +597,7 @@ def _follow(
     pulls,
     works,
     detached,
+    turns,
     first,
     speed,
     strengths,
@@ -645,12 +668,13 @@ def _follow(
                 or (closed and not work > 0.0)
                 or opening > contact[i, _DETACHED]
             ):
-                _turn(time, step, radius, work, opening, contact[i])
+                turn = turns[k, i if turns.shape[1] > 1 else 0]
+                _turn(time, step, radius, work, opening, turn, contact[i])
 
 
 @device
-def _turn(time, step, radius, work, detached, row):
-    """Take the radius [m], work of adhesion [J/m²] and time of the last detachment of a contact after a step.
+def _turn(time, step, radius, work, detached, turn, row):
+    """Take the radius [m], work of adhesion [J/m²], last detachment [s] and ``TURN`` of a contact after a step.
 
     It is called where one of them matters: a contact that stays open, or closed with work of adhesion left, has no
     events.
@@ -663,6 +687,11 @@ def _turn(time, step, radius, work, detached, row):
         row[_DETACHMENTS] += 1.0
         if math.isnan(row[_OPENING]):
             row[_OPENING] = detached
+            row[_PULL_OFF], row[_PULL_OFF_LOAD], row[_PULL_OFF_DISPLACEMENT] = (
+                turn[0],
+                turn[1],
+                turn[2],
+            )
     if not radius > 0.0:
         return
     if work <= 0.0:
@@ -670,7 +699,13 @@ def _turn(time, step, radius, work, detached, row):
         if math.isnan(row[_MASKED]):
             row[_MASKED] = time
     if was_open and math.isnan(row[_CLOSING]):
-        row[_CLOSING], row[_RADIUS] = time, radius
+        row[_CLOSING] = time
+    if was_open and math.isnan(row[_JUMP_IN]):
+        row[_JUMP_IN], row[_JUMP_IN_LOAD], row[_JUMP_IN_DISPLACEMENT] = (
+            turn[0],
+            turn[1],
+            turn[2],
+        )
 
 
 @device

@@ -374,6 +374,10 @@ class Mount(NamedTuple):
     stiffness: float
 
 
+#: Time [s], normal load [N] and displacement of the mount [m] at a pull-off or a jump into contact.
+TURN = record("time load displacement")
+
+
 class ContactState(NamedTuple):
     """State of a contact; of a block of steps with the step as first axis.
 
@@ -392,6 +396,11 @@ class ContactState(NamedTuple):
         and rule of ``after_pull_off``: with all adhesion, with that of the bonds, with what fluctuations leave of it
         before the mean stress takes its share (followed only where it does), and with the work left (where the edge
         lags).
+    turn : array, shape (1, 3) or (members, 3)
+        Time [s], normal load [N] and displacement of the mount [m] at a pull-off or a jump into contact in this
+        step, as ``TURN``; nan in a step without one. A pull-off has those of the lowest load since the contact lost
+        its stability, because a lagging edge needs time to open from there. A closed contact with such an edge has
+        those so far, while it is unstable.
     """
 
     work: Array
@@ -399,6 +408,7 @@ class ContactState(NamedTuple):
     detached: Array
     dissipated: Array
     phases: Array
+    turn: Array
 
     def at(self, k: int) -> "ContactState":
         """Return the contact at the end of step k of a block."""

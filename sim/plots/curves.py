@@ -997,11 +997,12 @@ def sweep_figure(
 ) -> Figure:
     """Contact radius, energies and friction over the first swept key. Each value of a further key is a curve.
 
-    If all contacts are open at the end, their pull-off loads.
+    If all contacts are open at the end and some pulled off, their pull-off loads.
     """
-    off = "pull_off_load" in dataset or "pull_off_load_mean" in dataset
+    off = dataset.get("pull_off_load", dataset.get("pull_off_load_mean"))
     if (
-        off
+        off is not None
+        and off.notnull().any()
         and data is None
         and ax is None
         and not (style.recorded(dataset, "contact_radius").isel(t=-1) > 0.0).any()

@@ -371,7 +371,7 @@ def _cycle(
 ) -> None:
     """Draw one curve with its jumps: a cross at each pull-off, a ring at each jump-in; thin after its first cycle.
 
-    If members differ, crosses are their own pull-offs, at their lowest loads: their mean ends where the last comes off.
+    If members differ, crosses are their own pull-offs: their mean ends where the last comes off.
     """
     x, gone, loads = scene.x[line.number], scene.opened(line), name == "normal_load"
     mean, _, low, high = (factor * values for values in scene.drawn(name, line))
@@ -432,7 +432,7 @@ def _cycle(
 def _pull_offs(dataset: xr.Dataset, line: Line) -> np.ndarray | None:
     """Return displacements [m] and loads [N] of the pull-offs of members, their means if no more is recorded.
 
-    None if members agree, or without the records; nan where the means are not of pull-offs alone.
+    None if members agree, or without the records.
     """
     names = ("pull_off_displacement", "pull_off_load")
     with contextlib.suppress(KeyError):
@@ -442,18 +442,8 @@ def _pull_offs(dataset: xr.Dataset, line: Line) -> np.ndarray | None:
         ):
             off = pull_offs(dataset)
         elif "pull_off_load_std" in dataset:
-            phase, opened = (
-                ("phase_", "phase_")
-                if "phase_detachment_count" in dataset
-                else ("", "first_")
-            )
-            all_off = (
-                dataset[f"{opened}detachment_count"]
-                == dataset[f"{phase}pull_off_load_count"]
-            )
-            off = xr.Dataset(
-                {name: dataset[f"{phase}{name}_mean"].where(all_off) for name in names}
-            )
+            phase = "phase_" if "phase_pull_off_load_mean" in dataset else ""
+            off = xr.Dataset({name: dataset[f"{phase}{name}_mean"] for name in names})
         else:
             return None
         off = off.isel(line.point, missing_dims="ignore")

@@ -27,6 +27,7 @@ from sim.read.events import (
     slips,
     slips_by_phase,
     stick_slip,
+    survival,
 )
 from sim.read.export import frame, long, to_csv, to_long_csv
 from sim.read.observables import (
@@ -119,6 +120,7 @@ __all__ = [
     "steady_speeds",
     "stick_slip",
     "summary",
+    "survival",
     "sweep_dims",
     "systematic_errors",
     "table",

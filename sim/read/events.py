@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from scipy import special
 
-from sim.quantities import SLIP_EVENT
+from sim.quantities import QUANTITIES, SLIP_EVENT
 from sim.read.dataset import (
     MEMBERS,
     answered,
@@ -437,16 +437,18 @@ _PEAKS = (
     ("peak_stress", "shear_stress", "Pa"),
     ("peak_friction", "friction_force", "N"),
 )
-#: Events of openings, closings and masking.
-_SEEN = (
-    "first_detachment",
+#: Quantities at turns of the contact, and shares of the members that have had an event, with its time and meaning.
+_TURNS = (
     "detachments",
-    "first_closing",
-    "closing_displacement",
-    "closing_load",
-    "first_masked",
     "time_masked",
+    *(f"pull_off_{name}" for name in ("load", "time", "displacement")),
+    *(f"lowest_load{name}" for name in ("", "_time", "_displacement")),
+    *(f"jump_in_{name}" for name in ("load", "time", "displacement")),
 )
+_EVER = {
+    "ever_detached": ("first_detachment", "contacts that detached"),
+    "ever_masked": ("first_masked", "contacts that were masked at some time"),
+}
 
 
 def events(dataset: xr.Dataset) -> xr.Dataset:
@@ -462,11 +464,16 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         Without the dimension ``t``; what a scene cannot have is left out.
 
-        - ``ever_detached``: 1 where the contact opened; ``first_detachment`` [s], nan where it never did; number of
-          ``detachments``; ``first_closing`` [s] with ``closing_load`` [N] and ``closing_displacement`` [m].
-        - ``time_masked``: share of the time closed in which it was masked; ``first_masked`` [s], nan where never.
-        - ``pull_off_load`` [N] and more: of a load that changes; with several pull-offs means over them, and their
-          number ``pull_offs``; see ``pull_offs``.
+        - ``ever_detached``: 1 if the contact opened; number of ``detachments``. The time is in the dataset,
+          ``first_detachment``; ``survival`` and ``lifetime`` take its censoring into account, because a mean over the
+          members that opened would only be as long as the run.
+        - ``time_masked``: share of the time closed in which it was masked; ``ever_masked``: 1 if it ever was.
+        - ``pull_off_load`` [N], ``pull_off_displacement`` [m] and ``pull_off_time`` [s], nan if the contact does not
+          open, and the time also if another member does not; with several pull-offs means over them, and their number
+          ``pull_offs``; see ``pull_offs``.
+        - ``jump_in_load``, ``jump_in_displacement`` and ``jump_in_time``: the same of the first jump into contact.
+        - ``lowest_load`` [N], ``lowest_load_displacement`` and ``lowest_load_time``: of a load that changes, nan
+          without tension.
         - ``total_dissipated`` [J]: by opening and closing, to the end of the run.
         - ``loop_energy``, ``loop_dissipation`` [J]: means over the cycles there and back; see ``loop_energy``.
         - ``peak_stress`` [Pa], ``peak_time`` [s], ``peak_speed`` [m/s], and ``peak_friction`` [N] with
@@ -481,17 +488,29 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
     result = dataset[
         [
             f"{name}{end}"
-            for name in _SEEN
+            for name in _TURNS
             for end in ENDINGS
             if f"{name}{end}" in dataset
         ]
     ].astype(float)
-    if "first_detachment" in result:
-        result["ever_detached"] = pure(
-            result["first_detachment"].notnull().astype(float), "contacts that detached"
-        )
+    for name, (first, words) in _EVER.items():
+        if first in dataset:
+            result[name] = pure(dataset[first].notnull().astype(float), words)
+        elif f"{first}_count" in dataset:
+            share = dataset[f"{first}_count"] / dataset.attrs["members"]
+            result[f"{name}_mean"] = pure(share, words)
     result = result.drop_vars(MEMBERS, errors="ignore").reset_coords(drop=True)
-    result = result.merge(_pulled_off(dataset), compat="no_conflicts")
+    for name in ("pull_off_time", "jump_in_time"):
+        if name in result and MEMBERS in result[name].dims:
+            is_known = result[name].notnull()
+            of_all, of_some = is_known.all(MEMBERS), is_known.any(MEMBERS)
+            reason = f"{QUANTITIES[name].absent} in every member"
+            result[f"{name}_reason"] = xr.where(of_some & ~of_all, reason, "")
+            result[name] = result[name].where(of_all)
+        elif f"{name}_mean" in result:
+            is_of_all = dataset[f"{name}_count"] == dataset.attrs["members"]
+            result[f"{name}_mean"] = result[f"{name}_mean"].where(is_of_all)
+    result = result.assign(_over_pull_offs(dataset))
     for part in (peaks, stick_slip, static_threshold):
         with where_recorded():
             result = result.merge(part(dataset), compat="no_conflicts")
@@ -523,52 +542,37 @@ def pull_offs(dataset: xr.Dataset) -> xr.Dataset:
     Parameters
     ----------
     dataset : xarray.Dataset
-        As ``sim run`` writes it, of a load that changes with each member recorded.
+        As ``sim run`` writes it, of a contact that can open, with each member recorded.
 
     Returns
     -------
     xarray.Dataset
-        ``pull_off_load`` [N], ``pull_off_time`` [s] and ``pull_off_displacement`` [m], the lowest load of each phase
-        in which a contact detaches, with the dimension ``phase`` last if the run has several; nan in the others.
+        ``pull_off_load`` [N], ``pull_off_time`` [s] and ``pull_off_displacement`` [m], those of the first pull-off in
+        each phase, with the dimension ``phase`` last if the run has several; nan in a phase without one.
     """
-    phased = "phase_detachment" in dataset
-    names = [f"pull_off_{name}" for name in ("load", "time", "displacement")]
-    opened = dataset["phase_detachment" if phased else "first_detachment"].notnull()
-    return xr.Dataset(
-        {
-            name: dataset[f"phase_{name}" if phased else name].where(opened)
-            for name in names
-        }
-    )
+    phase = "phase_" if "phase_pull_off_load" in dataset else ""
+    names = (f"pull_off_{name}" for name in ("load", "time", "displacement"))
+    return xr.Dataset({name: dataset[f"{phase}{name}"] for name in names})
 
 
-def _pulled_off(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the lowest load that the contact bore; of several cycles the mean over the pull-offs of a member."""
-    recorded = dataset[
-        [name for name in dataset if str(name).startswith("pull_off_")]
-    ].astype(float)
-    if (
-        not {"phase_detachment", "phase_pull_off_load", "pull_off_load"}
-        <= dataset.keys()
-    ):
-        return recorded
+def _over_pull_offs(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Return the means over the pull-offs of a member, and their number; empty if no member has several."""
+    if "phase_pull_off_load" not in dataset:
+        return {}
     each = pull_offs(dataset)
-    count = each["pull_off_load"].count("phase")
+    load, count = each["pull_off_load"], each["pull_off_load"].count("phase")
     if bool((count <= 1).all()):
-        return recorded
-    several = each[["pull_off_load", "pull_off_displacement"]].mean(
-        "phase", keep_attrs=True
-    )
-    several["pull_offs"] = pure(count.astype(float), "number of phases with a pull-off")
-    text = "of the lowest normal loads over the pull-offs of a member"
-    several["pull_off_load"].attrs["long_name"] = f"mean {text}"
-    several["pull_off_load_least"] = labelled(
-        each["pull_off_load"].min("phase"), "N", f"least {text}"
-    )
-    several["pull_off_load_largest"] = labelled(
-        each["pull_off_load"].max("phase"), "N", f"largest {text}"
-    )
-    return several
+        return {}
+    text = "of the loads over the pull-offs of a member"
+    return {
+        "pull_off_load": labelled(load.mean("phase"), "N", f"mean {text}"),
+        "pull_off_displacement": each["pull_off_displacement"].mean(
+            "phase", keep_attrs=True
+        ),
+        "pull_offs": pure(count.astype(float), "number of phases with a pull-off"),
+        "pull_off_load_least": labelled(load.min("phase"), "N", f"least {text}"),
+        "pull_off_load_largest": labelled(load.max("phase"), "N", f"largest {text}"),
+    }
 
 
 def peaks(dataset: xr.Dataset) -> xr.Dataset:
@@ -1098,12 +1102,18 @@ def lifetime(
     )
     half = low = high = np.nan
     if np.any(happened) and np.all(np.isfinite(watched)):
-        half, low, high = _halves(watched, happened, since)
+        times, *curves = _kaplan_meier(watched, happened, since)
+        below = [np.flatnonzero(curve <= 0.5) for curve in curves]
+        half, low, high = (times[one[0]] if one.size else np.nan for one in below)
     count, exposure, tail = (
         float(happened.sum()),
         float(np.sum(watched - since)) or np.nan,
         0.5 - 0.5 * LEVEL,
     )
+    if np.isnan(low) and watched.size and not np.any(since):
+        going = watched.size - count
+        if going and special.betaincinv(going, count + 1.0, tail) > 0.5:
+            low = float(np.min(watched[~happened]))
     least = special.gammaincinv(count, tail) if count else 0.0
     most = special.gammaincinv(count + 1.0, 1.0 - tail)
     return Lifetime(
@@ -1111,10 +1121,11 @@ def lifetime(
     )
 
 
-def _halves(watched: Array, happened: Array, begins: Array) -> list[float]:
-    """Return the times at which a survival, and the ends of its interval, first are one half or less, or nan.
+def _kaplan_meier(watched: Array, happened: Array, begins: Array) -> list[Array]:
+    """Return the times of events and ends, Kaplan and Meier's survival then, and the ends of its 95 % interval.
 
-    The numbers are those of ``scipy.stats.ecdf``, whose import would make the start of ``sim run`` a quarter longer.
+    The numbers are those of ``scipy.stats.ecdf``, which takes no left truncation, and whose import would make the start
+    of ``sim run`` a quarter longer. They are nan if nobody was watched for a while.
     """
     times, places, counts = np.unique(watched, return_inverse=True, return_counts=True)
     events, at_risk = (
@@ -1126,7 +1137,7 @@ def _halves(watched: Array, happened: Array, begins: Array) -> list[float]:
     )
     left = at_risk - events
     if np.any(left[:-1] <= 0):  # nobody was watched for a while
-        return [np.nan] * 3
+        return [times, *np.full((3, times.size), np.nan)]
     survival = (
         left / watched.size
         if np.all(happened) and not np.any(begins)
@@ -1139,25 +1150,92 @@ def _halves(watched: Array, happened: Array, begins: Array) -> list[float]:
         ends = [
             np.exp(-np.exp(np.log(-logarithm) + side * width)) for side in (1.0, -1.0)
         ]
-    curves = [survival, *ends] if happened.sum() > 1 else [survival]
-    below = [np.flatnonzero(curve <= 0.5) for curve in curves]
-    halves = [float(times[first[0]]) if first.size else np.nan for first in below]
-    return halves + [np.nan] * (3 - len(halves))
+    if happened.sum() < 2:
+        ends = [np.full(times.size, np.nan)] * 2
+    return [times, survival, *ends]
 
 
-def half_lives(dataset: xr.Dataset, event_times: xr.Dataset) -> xr.Dataset:
-    """Return median times of first detachment and masking from ``events``, and rates if the run is stationary."""
+def survival(dataset: xr.Dataset, event: str) -> xr.Dataset:
+    """Return the share of the members that an event has not reached yet, over time.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, with each member recorded.
+    event : str
+        Name of the time of the event: ``"first_masked"`` or ``"first_detachment"``.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``survival`` with the ends ``low`` and ``high`` of its 95 % interval [1], over the dimension ``time`` [s] since
+        the start of the run: the times of the event in all members and points of the sweep, and the end of the run.
+        The estimate is that of Kaplan and Meier with log-log intervals, because the run ends before the event has
+        reached all members (censoring). Members count from the time at which their contact closes. The numbers are nan
+        after the last member is gone.
+    """
+    times = dataset[event].astype(float)
+    begins, end = _at_risk_from(dataset, times), float(dataset["t"][-1])
+    grid = np.unique(np.append(times.to_numpy()[np.isfinite(times.to_numpy())], end))
+
+    def curves(times: Array, begins: Array) -> Array:
+        watched = np.where(np.isfinite(times), times, end)
+        counts = (watched > begins) | ((begins == 0.0) & ~np.isnan(watched))
+        result = np.full((3, grid.size), np.nan)
+        if not counts.any():
+            return result
+        places, *values = _kaplan_meier(
+            watched[counts], np.isfinite(times)[counts], begins[counts]
+        )
+        before = np.searchsorted(places, grid, side="right") - 1
+        start = np.array([1.0, np.nan, np.nan])[:, np.newaxis]
+        return np.where(before < 0, start, np.array(values)[:, before])
+
+    how: Any = {
+        "input_core_dims": [[MEMBERS]] * 2,
+        "output_core_dims": [["estimate", "time"]],
+        "vectorize": True,
+    }
+    result = xr.apply_ufunc(curves, times, begins.broadcast_like(times), **how)
+    words = dataset[event].attrs.get("long_name", event)
+    texts = {
+        "survival": f"share of the members before the {words}",
+        "low": "lower end of its 95 % interval",
+        "high": "upper end of its 95 % interval",
+    }
+    return xr.Dataset(
+        {
+            name: pure(result.isel(estimate=k), text)
+            for k, (name, text) in enumerate(texts.items())
+        },
+        {"time": ("time", grid, {"units": "s", "long_name": "time since the start"})},
+    )
+
+
+def _at_risk_from(dataset: xr.Dataset, times: xr.DataArray) -> xr.DataArray:
+    """Return the times from which on members are in contact [s], nan if they never are."""
+    if not {"contact_radius", "first_closing"} <= dataset.keys():
+        return xr.zeros_like(times, float)
+    closed = dataset["contact_radius"].isel(t=0, drop=True) > 0.0
+    start = float(dataset["t"][0])
+    return (dataset["first_closing"] - start).where(~closed, 0.0)
+
+
+def half_lives(dataset: xr.Dataset) -> xr.Dataset:
+    """Return median times of first detachment and masking, and rates if the run is stationary."""
     result = xr.Dataset()
     happened = {
         "first_detachment": ("detached", "detached"),
         "first_masked": ("masked", "had their adhesion masked"),
     }
     for event, words in happened.items():
-        result.update(
-            lifetimes(dataset, event_times[event], *words)
-            if event in event_times
-            else {}
-        )
+        if event not in dataset:
+            continue
+        lives = lifetimes(dataset, dataset[event].astype(float), *words)
+        # an event that no scene of the sweep knows is not waited for
+        if not bool(dataset[event].notnull().any()):
+            lives = lives.drop_vars([name for name in lives if "half_" in str(name)])
+        result.update(lives)
     return (
         result
         if is_stationary(dataset)
@@ -1189,10 +1267,7 @@ def lifetimes(
     if MEMBERS not in times.dims:
         return xr.Dataset()
     start, end = (float(dataset["t"][record]) for record in (0, -1))
-    begins = xr.zeros_like(times, float)
-    if {"contact_radius", "first_closing"} <= dataset.keys():
-        closed = dataset["contact_radius"].isel(t=0, drop=True) > 0.0
-        begins = (dataset["first_closing"] - start).where(~closed, 0.0)
+    begins = _at_risk_from(dataset, times)
     how: Any = {
         "input_core_dims": [[MEMBERS]] * 3,
         "output_core_dims": [[]] * 6,

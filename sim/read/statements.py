@@ -120,7 +120,7 @@ def of_events(dataset: xr.Dataset) -> xr.Dataset:
     for name, bound in beside.items():
         if MEMBERS in bound.dims and str(name).endswith("_bound"):
             beside[name] = bound.mean(MEMBERS, keep_attrs=True)
-    for further in (as_means(half_lives(dataset, result)), beside):
+    for further in (as_means(half_lives(dataset)), beside):
         members = members.merge(further, compat="no_conflicts", join="outer")
     phased = [peaks_after_holds(dataset)]
     if {"phase_start", "slip_time"} <= set(dataset.variables) and dataset.sizes["slip"]:

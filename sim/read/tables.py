@@ -138,10 +138,6 @@ GROUPS = {
 
 #: Headings of recorded events.
 _HEADINGS = {
-    "first_masked": "first masked",
-    "first_detachment": "first detached",
-    "pull_off_load": "pull-off load",
-    "pull_off_time": "pull-off after",
     "peak_stress": "peak of stress",
     "peak_speed": "at V",
     "peak_time": "after",
@@ -167,11 +163,13 @@ def _events(*names: str, dull: float = 0.0) -> tuple[Column, ...]:
 
 #: Columns of a whole run.
 EVENTS = (
-    *_events("time_masked", "ever_detached", "half_detached", "detached_rate"),
+    *_events("time_masked", "ever_masked"),
     *_events("half_masked", dull=math.nan),
+    *_events("ever_detached", "half_detached", "detached_rate"),
     *_events("loop_energy", "loop_dissipation", "total_dissipated"),
-    *_events("pull_off_load"),
-    *_events("pull_off_time", dull=math.nan),
+    *_events(
+        "pull_off_load", "pull_off_time", "lowest_load", "jump_in_load", dull=math.nan
+    ),
     *_events("peak_stress"),
     *_events("peak_speed", "peak_time", dull=math.nan),
     *_events("peak_friction"),

@@ -303,33 +303,36 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
 
     The first passage of ΔΓ is detected late by the overshoot of its changes (Siegmund, Sequential Analysis, 1985). As a
     load this is 3/2 πR times the overshoot. A prescribed load adds half of its largest change in a step. The two have
-    opposite signs; this is a bound.
+    opposite signs; this is a bound. An edge that lags is seen at the ends of clock steps, between which its load falls
+    by what the mount alone changes at most.
     """
-    shear, clock, settled = (
-        scene.fluctuations,
-        scene.clock,
-        scene.population.steady(path / scene.clock.step),
-    )
-    size = (
-        np.ones(1)
-        if shear.law.remembers
-        else shear.law.factor(path / clock.step, settled.strength)
-    )
-    power = settled.frozen + settled.varying if shear.spectrum.bond_made else size**2
-    late = (
-        _OVERSHOOT
-        * shear.paid_by_adhesion
-        * power
-        * scene.process.change(path, clock.step)
-    )
+    shear, clock, contact = scene.fluctuations, scene.clock, scene.contact
+    late = np.zeros(1)
+    if scene.feels_steps:
+        settled = scene.population.steady(path / clock.step)
+        size = (
+            np.ones(1)
+            if shear.law.remembers
+            else shear.law.factor(path / clock.step, settled.strength)
+        )
+        power = (
+            settled.frozen + settled.varying if shear.spectrum.bond_made else size**2
+        )
+        change = scene.process.change(path, clock.step)
+        late = _OVERSHOOT * shear.paid_by_adhesion * power * change
     times = np.linspace(0.0, clock.duration, min(clock.steps, _MOST_SLIPS) + 1)
     most = (
-        np.abs(np.diff(scene.contact.course.at(times, clock.duration))).max()
+        np.abs(np.diff(contact.course.at(times, clock.duration))).max()
         * (len(times) - 1)
         / clock.steps
     )
-    # else the course is no load
-    ramp = 0.5 * most if scene.contact.kind == "load" else 0.0
+    if contact.kind == "load":
+        ramp = most if contact.lags else 0.5 * most
+    elif contact.lags:
+        of_contact = 2.0 * scene.solid.contact_modulus * scene.widest
+        ramp = most / (1.0 / of_contact + 1.0 / (contact.stiffness or math.inf))
+    else:
+        ramp = 0.0  # the fold is found within the step
     return np.asarray(1.5 * math.pi * scene.sphere.radius * late + ramp)
 
 

@@ -16,7 +16,8 @@ def column(name, maxima):
 def contact(radius):
     """A contact that stays closed, with this radius at the end of each step."""
     zero = np.zeros(radius.shape)
-    return ContactState(zero + 1.0, radius, zero + np.nan, zero, zero)
+    turn = np.full((*radius.shape, 3), np.nan)
+    return ContactState(zero + 1.0, radius, zero + np.nan, zero, zero, turn)
 
 
 def followed(samples, step=0.5, slopes=None, radii=(ONE, ONE), stretched=True):

@@ -172,6 +172,8 @@ _TRIES = 3000
 _TOUCH = 1e-11
 _LEAST = 1e-9
 _LONGEST = 0.2
+#: Relative change of the radius over which the slope of the work of adhesion is taken.
+_NEAR = 1e-6
 
 
 class Kinetics(NamedTuple):
@@ -665,6 +667,77 @@ def _moved(
     return end, opened, lost
 
 
+@device
+def _is_unstable(t, a, steepness, scene):
+    """Return True if an edge at the radius a opens further by itself: if G - w falls as the contact grows.
+
+    ``steepness`` is the slope of w over the radius [J/m^3].
+    """
+    y, _, s_a, _ = excess(t, a, scene)
+    return y > 0.0 and scene.scale * s_a < steepness
+
+
+@device
+def _borne(t, a, scene):
+    """Return the normal load [N] and the displacement of the mount [m] of a contact of radius a."""
+    y, hertz = excess(t, a, scene)[0], a * a * scene.curvature
+    if scene.stiffness == 0.0:
+        return scene.load + scene.load_rate * t, hertz - y
+    load = scene.modulus * a * (4.0 / 3.0 * hertz - 2.0 * y)
+    return load, scene.base + scene.base_rate * t
+
+
+@device
+def _weakest(turn, radii, begin, duration, steepness, scene):
+    """Return the time, load and displacement of the lowest load since a contact lost its stability.
+
+    Parameters
+    ----------
+    turn : tuple of floats
+        Those at the start of a part of a clock step, nan if the contact was stable.
+    radii : pair of floats
+        Radius at start and end of this part; 0 at the end if the contact opens there.
+    begin, duration : float
+        Start and length of the part.
+    steepness : float
+        Slope of the work of adhesion over the radius.
+    scene : Scene
+        The part.
+
+    Notes
+    -----
+    The radius is taken as linear in time, to find the place at which the contact loses its stability. A contact that
+    is stable until it opens is Hertz's, which bears nothing in the end.
+    """
+    first, last = radii
+    opens = not last > 0.0
+    if not (opens or _is_unstable(duration, last, steepness, scene)):
+        return math.nan, math.nan, math.nan
+    time, load, displacement = turn
+    if math.isnan(time):
+        stable, unstable = 0.0, 1.0
+        if _is_unstable(0.0, first, steepness, scene):
+            unstable = 0.0
+        while unstable - stable > ROUNDING:
+            middle = 0.5 * (stable + unstable)
+            a = first + middle * (last - first)
+            if _is_unstable(middle * duration, a, steepness, scene):
+                unstable = middle
+            else:
+                stable = middle
+        t = unstable * duration
+        time = begin + t
+        if unstable == 1.0 and opens:
+            return time, 0.0, scene.base + scene.base_rate * t
+        a = first + unstable * (last - first)
+        load, displacement = _borne(t, a, scene)
+    if not opens:
+        load_now, displacement_now = _borne(duration, last, scene)
+        if load_now < load:
+            return begin + duration, load_now, displacement_now
+    return time, load, displacement
+
+
 @kernel(
     f"void(float64[:, ::1], float64[::1], int64[::1], float64[:, ::1], {_READ}, {_READ}, {_READ}, float64,"
     f" UniTuple(float64, 5), UniTuple(float64, 2), float64, boolean, {SHARE}, float64[:, :, ::1])"
@@ -685,7 +758,7 @@ def _follow(
     share,
     out,
 ):
-    """Write work, radius, time of detachment and dissipated energy at the end of each step; see ``follow``."""
+    """Write the rows of ``follow`` at the end of each step."""
     for m in range(state.shape[1]):
         work, radius, detached, dissipated = (
             state[0, m],
@@ -693,7 +766,10 @@ def _follow(
             state[2, m],
             state[3, m],
         )
+        turn = state[4, m], state[5, m], state[6, m]
         for k in range(len(durations)):
+            if math.isnan(radius):
+                turn = math.nan, math.nan, math.nan
             last = _left(
                 radius, bonded[k, m], fluctuating[k, m], reversible[k, m], share
             )
@@ -715,6 +791,7 @@ def _follow(
                     touches or not math.isnan(radius),
                     durations[k] * (end - begin),
                 )
+                first_radius = spot if touches else radius
                 radius, opened, lost = _moved(
                     radius,
                     touches,
@@ -728,8 +805,26 @@ def _follow(
                     spot,
                 )
                 dissipated += lost
-                if closed and math.isnan(radius):
-                    detached = pieces[0, p] - duration + opened
+                if not closed:
+                    continue
+                start, steepness = pieces[0, p] - duration, 0.0
+                scene = scene_of(
+                    works, loads, bases, stiffness, duration, kinetics[0], bodies
+                )
+                if reversible[k, m] > 0.0 or len(share[2]) > 0:
+                    terms = bonded[k, m], fluctuating[k, m], reversible[k, m], share
+                    wide, narrow = (
+                        (1.0 + _NEAR) * first_radius,
+                        (1.0 - _NEAR) * first_radius,
+                    )
+                    steepness = (_left(wide, *terms) - _left(narrow, *terms)) / (
+                        wide - narrow
+                    )
+                radii = first_radius, radius
+                if math.isnan(radius):
+                    detached, duration = start + opened, opened
+                    radii = first_radius, 0.0
+                turn = _weakest(turn, radii, start, duration, steepness, scene)
             work = _left(
                 radius, bonded[k, m], fluctuating[k, m], reversible[k, m], share
             )
@@ -739,6 +834,7 @@ def _follow(
                 detached,
                 dissipated,
             )
+            out[4, k, m], out[5, k, m], out[6, k, m] = turn
 
 
 def follow(
@@ -750,8 +846,8 @@ def follow(
     reversible: float,
     kinetics: Kinetics,
     again: bool,
-) -> Array:
-    """Return the first four quantities of ``ContactState`` at the end of each step of a block, (4, steps, rows).
+) -> tuple[Array, ...]:
+    """Return the ``ContactState`` without its phases at the end of each step of a block.
 
     Parameters
     ----------
@@ -780,8 +876,9 @@ def follow(
     _, rows = np.broadcast_shapes(
         state.radius.shape, *((1, *values.shape)[-2:] for values in of_steps)
     )
-    before, out = np.empty((4, rows)), np.empty((4, len(durations), rows))
-    for row, values in zip(before, state, strict=False):
+    before = np.empty((4 + state.turn.shape[-1], rows))
+    out = np.empty((len(before), len(durations), rows))
+    for row, values in zip(before, [*state[:4], *state.turn.T], strict=True):
         row[:] = values
     sphere_radius, modulus, _ = balance.bodies
     spot = _SPOT * math.cbrt(balance.reference * sphere_radius**2 / modulus)
@@ -799,4 +896,4 @@ def follow(
         PLANE if balance.margin is None else balance.margin.each[0],
         out,
     )
-    return out
+    return *out[:4], np.moveaxis(out[4:], 0, -1)

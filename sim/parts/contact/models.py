@@ -27,7 +27,7 @@ from sim.parts.contact.balance import (
     widest_crossings,
 )
 from sim.parts.contact.front import Kinetics, follow as follow_front
-from sim.parts.exchange import Array, ContactState, Flags, Motion, Setting, during
+from sim.parts.exchange import TURN, Array, ContactState, Flags, Motion, Setting, during
 from sim.units.quantity import Quantity, keyed
 from sim.units.tables import Prescribed, over_time, prescribed
 
@@ -180,6 +180,8 @@ class Adhesion:
 #: Radius of the contact over that of the sphere above which a parabola is a poor sphere.
 _LARGEST_SHARE = 0.3
 _KINDS = ("load", "indentation", "displacement")
+#: Halvings of a clock step that find a moment in it down to rounding.
+_HALVINGS = 48
 
 _Load = over_time(Quantity("N", "normal load, compression positive", "P"), "load")
 _Indentation = over_time(
@@ -347,8 +349,10 @@ class _Controlled:
         radius = self.equilibrium(control, balance)
         phases = np.where(self._without_equilibrium(control, balance), AHEAD, CLOSED)
         unknown = np.full(radius.shape, np.nan)
+        turn = np.full((*radius.shape, len(TURN.names or ())), np.nan)
+        dissipated = np.zeros(radius.shape)
         return ContactState(
-            self._left(radius, balance), radius, unknown, np.zeros(radius.shape), phases
+            self._left(radius, balance), radius, unknown, dissipated, phases, turn
         )
 
     def stopped(self, radius: Array, detached: Array) -> Flags:
@@ -458,6 +462,7 @@ class Equilibrium(_Controlled):
             during(state.detached, len(radius)),
             during(state.dissipated, len(radius)),
         )
+        turn = np.full((*radius.shape, len(TURN.names or ())), np.nan)
         if np.isnan(radius).any() or np.isnan(state.radius).any():
             phase = np.where(
                 np.isnan(state.radius),
@@ -484,11 +489,101 @@ class Equilibrium(_Controlled):
             dissipated = np.add.accumulate(np.concatenate([dissipated[:1], lost]))[1:]
             opened = np.where(opens, motions.time, np.nan)
             detached = np.fmax.accumulate(np.concatenate([detached[:1], opened]))[1:]
+            left = np.concatenate(
+                [
+                    np.broadcast_to(state.work, radius[:1].shape),
+                    self._left(radius, balance)[:-1],
+                ]
+            )
+            for happens in (opens, closes):
+                if happens.any():
+                    start = left[happens], before[happens]
+                    turn[happens] = self._turns(
+                        happens, start, motions, duration, balance
+                    )
         work, phases = (
             self._left(radius, balance),
             self._phases(state, control, balance),
         )
-        return ContactState(work, radius, detached, dissipated, phases)
+        return ContactState(work, radius, detached, dissipated, phases, turn)
+
+    def _turns(
+        self,
+        happens: Flags,
+        start: tuple[Array, Array],
+        motions: Motion,
+        duration: float,
+        balance: Balance,
+    ) -> Array:
+        """Return the rows ``TURN`` of contacts that open, or of contacts that close, within some steps.
+
+        Parameters
+        ----------
+        happens : array, shape (steps, rows)
+            True for each of them; all open, or all close.
+        start : tuple of arrays, shape (contacts,)
+            Their works of adhesion [J/m²] and radii [m] at the start of the step; the radii are nan if they close.
+        motions, duration, balance
+            As in ``advance``.
+
+        Returns
+        -------
+        array, shape (contacts, 3)
+            Those of the last equilibrium of a contact that opens, and of the first one of a contact that closes;
+            nan if it closes without work of adhesion, because a Hertz contact does not jump.
+
+        Notes
+        -----
+        The moment is found by bisection. In the step the control is what it is, and the work of adhesion changes
+        linearly, so that the load has no error by the length of the step if the control alone opens the contact. A
+        control that jumps acts on the contact as it was before.
+        """
+        steps, rows = np.nonzero(happens)
+        work, radius = (values[:, np.newaxis] for values in start)
+        bonded, fluctuating, stress = (
+            np.broadcast_to(values, happens.shape)[steps, rows][:, np.newaxis]
+            for values in (balance.bonded, balance.fluctuating, balance.stress)
+        )
+        at_end = balance._replace(
+            bonded=bonded,
+            fluctuating=fluctuating,
+            stress=stress,
+            margin=balance.margin and balance.margin.at(motions.position[steps]),
+        )
+        change = self._left(radius, at_end) - work
+        opens = ~np.isnan(radius)
+        before, after = np.zeros(radius.shape), np.ones(radius.shape)
+
+        def at(share: Array) -> tuple[Control, Balance]:
+            rest = 1.0 - share
+            control = self.control(
+                motions.time[steps] - rest * motions.duration[steps], duration
+            )
+            return control, at_end._replace(bonded=at_end.bonded - rest * change)
+
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (before + after)
+            control, there = at(middle)
+            size = self.equilibrium(control, there)
+            turned = np.where(opens, np.isnan(size), control.closes)
+            radius = np.where(opens & ~turned, size, radius)
+            before, after = (
+                np.where(turned, before, middle),
+                np.where(turned, middle, after),
+            )
+        control, there = at(after)
+        radius = np.where(opens, radius, self.equilibrium(control, there))
+        has_adhesion = self._left(radius, there) > 0.0
+        load = np.where(has_adhesion, control.normal_load(radius, there.bodies), 0.0)
+        turn = np.concatenate(
+            [
+                motions.time[steps] - (1.0 - after) * motions.duration[steps],
+                load,
+                control.displacement(radius, there.bodies),
+            ],
+            axis=1,
+        )
+        return np.where(opens | has_adhesion, turn, np.nan)
 
 
 @keyed(kw_only=True)
@@ -524,7 +619,7 @@ class RateDependent(_Controlled):
         ends = np.append(motions.time[0] - motions.duration[0], motions.time)
         stiffness = 0.0 if self.load is not None else self.stiffness or math.inf
         speed, exponent = self.front_speed, self.front_exponent
-        work, radius, detached, dissipated = follow_front(
+        work, radius, detached, dissipated, turn = follow_front(
             state,
             motions.duration[:, 0],
             self.course.pieces(ends, duration),
@@ -541,7 +636,7 @@ class RateDependent(_Controlled):
             self.after_pull_off == "reattach",
         )
         phases = self._phases(state, self.control(motions.time, duration), balance)
-        return ContactState(work, radius, detached, dissipated, phases)
+        return ContactState(work, radius, detached, dissipated, phases, turn)
 
 
 @kernel(
