@@ -194,7 +194,8 @@ PAIRS = {
 @pytest.mark.parametrize("case", PAIRS)
 def test_an_event_has_a_value_if_and_only_if_dense_records_show_it(case):
     contact, tables, expected = PAIRS[case]
-    dataset = members(ran(LENS, contact, **tables))
+    made = ran(LENS, contact, **tables)
+    dataset = members(made)
     loads = openings(dataset)
     opened = np.isfinite(loads[0])
     assert opened.any() == ("off" in expected)
@@ -215,7 +216,7 @@ def test_an_event_has_a_value_if_and_only_if_dense_records_show_it(case):
         assert np.all(lowest <= np.nan_to_num(pull_off.values, nan=0.0))
     headings = [
         key
-        for row in read.highlights(read.Run(dataset), show=["all"]).rows
+        for row in read.highlights(read.Run(made), show=["all"]).rows
         for key in row
     ]
     assert any("pull-off" in key for key in headings) == ("off" in expected)
