@@ -103,6 +103,7 @@ LATE_PULL_OFF = Condition(
 
 #: Reasons for missing values that several quantities have.
 OPEN, NO_SLIP = "the contact is open", "there is no slip event"
+NO_RATIO = "the contact, or that of JKR, is open"
 NO_SLIPS = "there are no two slip events"
 NO_ONSET = "slip events do not set in as the stage gets faster, or there are no two"
 NO_END = "slip events do not end as the stage gets slower, or there are no two"
@@ -419,7 +420,7 @@ DERIVED: tuple[Definition, ...] = (
         symbol="A/A_JKR",
         heading="A/A_JKR",
         form=Form.PERCENT,
-        absent=OPEN,
+        absent=NO_RATIO,
     ),
     Definition(
         "lost_to_bonds",
@@ -427,7 +428,7 @@ DERIVED: tuple[Definition, ...] = (
         "share of the JKR area lost to broken bonds, which are subtracted first",
         heading="lost to bonds",
         form=Form.PERCENT,
-        absent=OPEN,
+        absent=NO_RATIO,
     ),
     Definition(
         "lost_to_fluctuations",
@@ -438,7 +439,7 @@ DERIVED: tuple[Definition, ...] = (
         ),
         heading="lost to fluct.",
         form=Form.PERCENT,
-        absent=OPEN,
+        absent=NO_RATIO,
     ),
     Definition(
         "lost_to_fluctuations_first",
@@ -446,7 +447,7 @@ DERIVED: tuple[Definition, ...] = (
         "share of the JKR area lost to fluctuations, if they are subtracted first",
         heading="fluct. first",
         form=Form.PERCENT,
-        absent=OPEN,
+        absent=NO_RATIO,
     ),
     Definition(
         "lost_to_bonds_last",
@@ -457,7 +458,7 @@ DERIVED: tuple[Definition, ...] = (
         ),
         heading="bonds last",
         form=Form.PERCENT,
-        absent=OPEN,
+        absent=NO_RATIO,
     ),
     Definition(
         "lost_to_mean_stress",
@@ -469,7 +470,7 @@ DERIVED: tuple[Definition, ...] = (
         exists_when=REVERSIBLE,
         heading="lost to stress",
         form=Form.PERCENT,
-        absent=OPEN,
+        absent=NO_RATIO,
     ),
     Definition(
         "lost_to_lag",
@@ -481,7 +482,7 @@ DERIVED: tuple[Definition, ...] = (
         exists_when=LAGGING_EDGE,
         heading="lost to lag",
         form=Form.PERCENT,
-        absent=OPEN,
+        absent=NO_RATIO,
     ),
     Definition(
         "order_of_charging",
