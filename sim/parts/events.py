@@ -409,7 +409,9 @@ class Events(NamedTuple):
         contact, rise = self.contact[:, -1:].copy(), self.rise[:, -1:]
         contact[..., _OPENING:] = np.nan
         if after_rest:
-            rise = _rising(self.friction[:, -1, 1])
+            # a rest that ends within a clock step is followed to the end of that step
+            before, last = self.friction[:, -1, :2].T
+            rise = _rising(np.where(before < last, np.maximum(before, 0.0), last))
         ahead = *(_started(rows[:, -1, 1]) for rows in self[:3]), contact, rise
         phases = (
             np.concatenate(pair, axis=1) for pair in zip(self[:5], ahead, strict=True)

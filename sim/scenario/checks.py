@@ -330,7 +330,9 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
         ramp = most if contact.lags else 0.5 * most
     elif contact.lags:
         of_contact = 2.0 * scene.solid.contact_modulus * scene.widest
-        ramp = most / (1.0 / of_contact + 1.0 / (contact.stiffness or math.inf))
+        # both in series; a contact that is never closed yields without a load
+        mount = contact.stiffness or math.inf
+        ramp = most * of_contact / (1.0 + of_contact / mount)
     else:
         ramp = 0.0  # the fold is found within the step
     return np.asarray(1.5 * math.pi * scene.sphere.radius * late + ramp)

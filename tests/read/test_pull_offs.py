@@ -215,9 +215,7 @@ def test_an_event_has_a_value_if_and_only_if_dense_records_show_it(case):
         assert np.all(lowest <= np.minimum(recorded, 0.0) + rounding)
         assert np.all(lowest <= np.nan_to_num(pull_off.values, nan=0.0))
     headings = [
-        key
-        for row in read.highlights(read.Run(made), show=["all"]).rows
-        for key in row
+        key for row in read.highlights(read.Run(made), show=["all"]).rows for key in row
     ]
     assert any("pull-off" in key for key in headings) == ("off" in expected)
     assert any("jump-in" in key for key in headings) == ("in" in expected)
