@@ -102,8 +102,9 @@ LATE_PULL_OFF = Condition(
 
 
 #: Reasons for missing values that several quantities have.
-OPEN, NO_SLIP = "the contact is open", "there is no slip event"
-NO_RATIO = "the contact, or that of JKR, is open"
+OPEN = "the contact is open, or the trajectory has ended"
+NO_SLIP = "there is no slip event"
+NO_RATIO = "the contact or that of JKR is open, or the trajectory has ended"
 NO_SLIPS = "there are no two slip events"
 NO_ONSET = "slip events do not set in as the stage gets faster, or there are no two"
 NO_END = "slip events do not end as the stage gets slower, or there are no two"
@@ -960,7 +961,7 @@ OF_MEMBERS: tuple[Definition, ...] = (
         "N",
         "largest force before a slip event, or force at which the slider lost stability",
         heading="static friction",
-        absent=NO_SLIP,
+        absent="there is neither a slip event nor a loss of stability",
     ),
     Definition(
         "force_drop",

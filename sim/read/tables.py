@@ -443,7 +443,7 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
         phrases.append("±: bound of an error that members do not reduce")
     if any(re.search(r"\(.* |\([<>]", cell.partition("±")[0]) for cell in cells):
         phrases.append("near 0 and 100 %: the end of the 95 % interval")
-    if run.is_one_ensemble:
+    if any("free values" in row for each_table in shown for row in each_table.rows):
         sample = run.sample(late=True)
         phrases.append(
             f"by quantity: over the {sample}; free values: the effective number of independent values"
