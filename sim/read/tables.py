@@ -408,7 +408,8 @@ def notes(run: Run, shown: Sequence[Table]) -> Notes:
     needed += [
         f"systematic error: {error}"
         for error in systematic_errors(run.dataset)
-        if error.matters
+        # that of the load at pull-off stands beside it
+        if error.matters and error.name != "pull_off_error"
     ]
     needed += filter(None, [unresolved_slips(run.dataset)])
     further = [*_turning(run)] if run.has_one_row_each else []
