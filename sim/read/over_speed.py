@@ -53,6 +53,8 @@ _ENDS = {
     "": "",
     "_low": "lower end of the 95 % interval of the ",
     "_high": "upper end of the 95 % interval of the ",
+    "_sem": "standard error of the ",
+    "_bound": "bound of the error by interpolation of the ",
 }
 #: Within how many standard errors of a level speeds are near it.
 _NEAR = 4.0
@@ -81,13 +83,16 @@ _LATE = 0.02
 class Crossing(NamedTuple):
     """A speed, the ends of its 95 % interval, and the reason if there is no speed.
 
-    Unknown numbers are nan: an end alone is a bound. ``beside`` holds further quantities at that speed, each with the
-    ends of its interval, shape (quantities, 3).
+    Unknown numbers are nan: an end alone is a bound. The interval holds the standard ``error`` by the members, with
+    Student's factor, and the ``bound`` of the error of interpolation. ``beside`` holds further quantities at that
+    speed, each with its interval, error and bound, shape (quantities, 5).
     """
 
     speed: float
     low: float
     high: float
+    error: float
+    bound: float
     reason: str
     beside: Array
 
@@ -131,9 +136,8 @@ def crossing(
     free = len(groups) - 1.0
     student = special.stdtrit(free, 0.5 + 0.5 * LEVEL) if free else 0.0
     curves = np.stack([groups - level, *(beside if beside is not None else ())])
-    none = Crossing(
-        math.nan, math.nan, math.nan, "", np.full((len(curves) - 1, 3), math.nan)
-    )
+    nan, nothing = math.nan, np.full((len(curves) - 1, 5), math.nan)
+    none = Crossing(nan, nan, nan, nan, nan, "", nothing)
     highest = np.fmax.reduce(speeds)
     speeds, order = np.unique(
         np.where(np.isfinite(curves[0]).all(axis=0), speeds, 0.0), return_index=True
@@ -159,12 +163,14 @@ def crossing(
             else np.zeros(rows.shape[1:])
         )
 
-    def half(rows: Array, *coarser: Array) -> float:
+    def errors(rows: Array, *coarser: Array) -> tuple[float, float, float]:
+        """Return half of the interval, the standard error, and the bound of the interpolation."""
         off = (each - rows for each in coarser)
-        return math.hypot(
-            student * error(rows),
-            *(math.sqrt(max(0.0, d[0] ** 2 - error(d) ** 2)) for d in off),
+        bound = math.hypot(
+            *(math.sqrt(max(0.0, d[0] ** 2 - error(d) ** 2)) for d in off)
         )
+        scatter = float(error(rows))
+        return math.hypot(student * scatter, bound), scatter, bound
 
     mean, surely = whole[0, 0], max(_NEAR, student) * error(whole[0])
     first = int(np.argmax(mean <= 0.0))
@@ -201,7 +207,7 @@ def crossing(
     x, whole, rows, k = x[near], whole[..., near], rows[:, near], k - near.start
     at = next(place for place in _places(x, rows[0], 0.0) if place >= x[k - 1])
     halves = (_interpolated(x[first::2], rows[:, first::2], at) for first in (0, 1))
-    width = half(_interpolated(x, rows, at), *halves)
+    width, scatter, bound = errors(_interpolated(x, rows, at), *halves)
     above, below = (_places(x, rows[0], end) for end in (width, -width))
     ends = (
         np.fmax(low, max(above[above <= at], default=low)),
@@ -219,16 +225,21 @@ def crossing(
         [over_the_fall(values, k - a, k + b) for a, b in ((1, 0), (2, 0), (1, 1))]
         for values in whole[1:]
     ]
-    intervals = [
-        (each[0][0], each[0][0] - half(*each), each[0][0] + half(*each))
-        for each in others
-    ]
+    intervals = []
+    for rows_beside in others:
+        value, (half, *parts) = rows_beside[0][0], errors(*rows_beside)
+        intervals.append((value, value - half, value + half, *parts))
+    speed, lowest, highest = (float(np.exp(place)) for place in (at, *ends))
+    # the slope of the curve turns errors of the level into errors of the speed
+    slope = 0.5 * (highest - lowest) / width if width > 0.0 else 0.0
     return Crossing(
-        math.exp(at),
-        math.exp(ends[0]),
-        math.exp(ends[1]),
+        speed,
+        lowest,
+        highest,
+        scatter * slope,
+        bound * slope,
         "",
-        np.reshape(intervals, (-1, 3)),
+        np.reshape(intervals, (-1, 5)),
     )
 
 
@@ -624,8 +635,8 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
         ]
     }
     how |= {
-        "output_core_dims": [[], [], [], [], ["quantity", "end"]],
-        "output_dtypes": [*"dddOd"],
+        "output_core_dims": [*[[]] * 6, ["quantity", "end"]],
+        "output_dtypes": [*"dddddOd"],
         "vectorize": True,
     }
     for name, level, loss in left:
@@ -640,7 +651,11 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
         columns["area_ratio"] = xr.concat(ends, "end")
         lag: list[Any] = [math.nan, False]
         if "steady_speed" in columns:
-            columns["steady_speed"] = np.exp(columns["steady_speed"])
+            steady = columns["steady_speed"]
+            value = np.exp(steady[0])
+            # errors of a logarithm are relative ones
+            is_error = xr.DataArray(np.arange(5) >= 3, dims="end")
+            columns["steady_speed"] = xr.where(is_error, value * steady, np.exp(steady))
             lags = abs(np.log(ends[0] / columns["steady_speed"][0])) > np.fmax(
                 0.5 * np.log(ends[2] / ends[1]), _UNSEEN
             )
@@ -668,10 +683,13 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
             text = f"{means[key].attrs.get('long_name', '')}, at the speed at which {loss} is lost"
             stem, unit, text = texts.get(str(key), (key, "1", text))
             for (end, words), values in zip(_ENDS.items(), numbers, strict=True):
-                known = ~never & ~(is_known & alone) if end else ~never
-                result[f"{stem}_{name}{end}"] = labelled(
-                    values.where(known), unit, words + text
-                )
+                known = ~never
+                if end not in ("", "_bound"):
+                    known = known & ~(is_known & alone)
+                column = labelled(values.where(known), unit, words + text)
+                if end == "_bound":
+                    column.attrs["source"] = "interpolation"
+                result[f"{stem}_{name}{end}"] = column
             further = [*reasons, *lag, is_known & alone]
             # a reason of the course says nothing of steady sliding
             if key == "steady_speed":
