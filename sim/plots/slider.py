@@ -135,7 +135,7 @@ def needs_map(dataset: xr.Dataset) -> None:
 def stability_figure(dataset: xr.Dataset) -> Figure:
     """Force amplitude of the spring over speed and stiffness, at increasing and decreasing speed, with theory."""
     force = style.mean_of(
-        dataset.isel({MEMBERS: slice(0, 1)}), "spring_force"
+        dataset.isel({MEMBERS: slice(0, 1)}, missing_dims="ignore"), "spring_force"
     ).transpose(..., "t")
     speed = (
         dataset["stage_speed"]

@@ -180,8 +180,8 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
         ["slip_duration", "stick_duration", "stress_drop"]
     ]
     result = result.merge(each.mean("slip", keep_attrs=True), compat="no_conflicts")
-    # there is no other error than the scatter between slip events
-    if dataset.sizes.get(MEMBERS, 1) == 1:
+    # of one random member there is no other error than the scatter between slip events
+    if dataset.sizes.get(MEMBERS) == 1:
         events, squares = (
             each.count("slip"),
             ((each - each.mean("slip")) ** 2).sum("slip"),

@@ -457,12 +457,12 @@ def test_a_pull_from_rest_has_a_threshold_between_its_clock_steps_and_the_area_t
         for clock in ((0.2, 5e-4), (0.2, 5e-4, 0.2), (0.02, 5e-4))
     )
     force, area = (
-        dense["friction_force"][0].to_numpy(),
-        dense["contact_area"][0].to_numpy(),
+        dense["friction_force"].to_numpy(),
+        dense["contact_area"].to_numpy(),
     )
     top = int(np.argmax(force))
     assert 0 < top < len(force) - 1
-    result = read.events(dense).isel(member=0)
+    result = read.events(dense)
     # between two clock steps it is higher, but below the lines through its neighbours: it is concave there
     assert (
         force[top]
