@@ -714,7 +714,8 @@ def _late_by_steps(
             memory = memory / left
     half = 0.5 * memory * step
     with np.errstate(over="ignore", divide="ignore"):
-        langevin = (1.0 / np.tanh(half) - 1.0 / half).where(half > 1e-3, half / 3.0)
+        exact = 1.0 / np.tanh(half) - 1.0 / half
+        langevin = xr.where(half > 1e-3, exact, half / 3.0)
     late = 0.5 * step * langevin
     change = abs(slope) / size.where(size > 0.0)
     bound = (step * step * change + 1.0 / memory).where(half >= _FORGOTTEN, step)
