@@ -556,13 +556,12 @@ def static_peak(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def velocity_step(dataset: xr.Dataset) -> dict[str, Number]:
     force, stage = (
-        dataset[name].isel(member=0).to_numpy()
-        for name in ("friction_force", "stage_speed")
+        dataset[name].to_numpy() for name in ("friction_force", "stage_speed")
     )
     up, down = (int(place) + 1 for place in np.flatnonzero(np.diff(stage))[[0, -1]])
     top = up + int(np.argmax(force[up:down]))
     position, settled = (
-        1e6 * dataset["slider_position"].isel(member=0).to_numpy(),
+        1e6 * dataset["slider_position"].to_numpy(),
         force[down - 1],
     )
     left = (
@@ -594,16 +593,15 @@ def velocity_step(dataset: xr.Dataset) -> dict[str, Number]:
     in a stroke; all of it is dissipated by bonds that break.""",
 )
 def friction_loop(dataset: xr.Dataset) -> dict[str, Number]:
-    member = dataset.isel(member=0)
-    turns = np.flatnonzero(np.diff(np.sign(member["stage_speed"].to_numpy())[1:])) + 1
+    turns = np.flatnonzero(np.diff(np.sign(dataset["stage_speed"].to_numpy())[1:])) + 1
     stage, slider, work = (
-        member[name].to_numpy()[turns]
+        dataset[name].to_numpy()[turns]
         for name in ("stage_position", "slider_position", "drive_work")
     )
     return {
         "stage": 1e6 * abs(float(stage[2] - stage[1])),
         "slider": 1e6 * abs(float(slider[2] - slider[1])),
-        "force": 1e3 * float(abs(member["friction_force"]).max()),
+        "force": 1e3 * float(abs(dataset["friction_force"]).max()),
         "work": 1e6 * float(work[2] - work[1]),
     }
 
@@ -630,7 +628,7 @@ def creep(dataset: xr.Dataset) -> dict[str, Number]:
         ).stress
         * area
     )
-    force, last = 1e3 * dataset["drive_force"].to_numpy(), dataset.isel(member=0, t=-1)
+    force, last = 1e3 * dataset["drive_force"].to_numpy(), dataset.isel(t=-1)
     gone = np.flatnonzero(last["runaway_time"].notnull())
     speed, ends = 1e3 * last["speed"].to_numpy(), 1e3 * last["runaway_time"].to_numpy()
     return {
@@ -656,18 +654,15 @@ def creep(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
     pulls, load = (
-        read.events(dataset).isel(member=0),
+        read.events(dataset),
         1e3 * dataset["contact_load"].to_numpy(),
     )
     lost, area = (
         100.0 * (1.0 - pulls["area_at_threshold"].to_numpy()),
-        dataset["contact_area"].isel(member=0, t=0),
+        dataset["contact_area"].isel(t=0),
     )
     curves = zip(
-        *(
-            dataset[name].isel(member=0).to_numpy()
-            for name in ("spring_force", "contact_area")
-        ),
+        *(dataset[name].to_numpy() for name in ("spring_force", "contact_area")),
         strict=True,
     )
     power = np.polyfit(
@@ -702,14 +697,13 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     peak = laws.schallamach.first_moment_peak(
         *(float(dataset[f"bonds_{name}"]) for name in names)
     )
-    run = dataset.isel(member=0)
     # the first event begins at the maximum of friction, long before it slips
-    end = float(run["slip_end"].min())
+    end = float(dataset["slip_end"].min())
     mean, last = (
-        read.slips(run).isel(slip=slice(1, None)).mean("slip"),
-        float(run["slip_time"].max()),
+        read.slips(dataset).isel(slip=slice(1, None)).mean("slip"),
+        float(dataset["slip_time"].max()),
     )
-    stage = run.sel(t=slice(end, last))
+    stage = dataset.sel(t=slice(end, last))
     path, work = (
         float(stage[name][-1] - stage[name][0])
         for name in ("stage_position", "drive_work")
@@ -735,7 +729,7 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
     events, stiffness = (
-        read.stick_slip(dataset).isel(member=0),
+        read.stick_slip(dataset),
         dataset["drive_stiffness"].to_numpy(),
     )
     up, down = (

@@ -38,8 +38,10 @@ FORBIDDEN = {
     "plots": {"engine", "ensemble"},
 }
 FORBIDDEN |= {"report": {"ensemble"}}
-#: The lag of a ramp needs the steady law of bonds, made of the numbers that a dataset records.
-ALLOWED = {("read.over_speed", "parts.bonds.rupture")}
+#: Speeds in steady sliding beside those of a course are of the models of a stored scenario.
+ALLOWED = {
+    ("read.over_speed", f"ensemble.{name}") for name in ("dataset", "steady_speed")
+}
 #: A report shows the remarks of ``sim check``, a figure the boundary of steady sliding, of a stored scenario.
 ALLOWED |= {
     ("read.errors", f"ensemble.{name}") for name in ("dataset", "diagnosis", "plan")

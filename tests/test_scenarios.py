@@ -268,24 +268,20 @@ def test_stick_slip_sets_in_beyond_the_friction_maximum():
     dataset = four("stick_slip")
     peak, slips = (
         law.first_moment_peak(*mean_field(dataset)),
-        read.slips(dataset).isel(member=0),
+        read.slips(dataset),
     )
-    force = dataset["spring_force"].isel(member=0).values
+    force = dataset["spring_force"].values
     began = int(np.argmax(force < 0.5 * np.maximum.accumulate(force)))
     assert slips.sizes["slip"] > 10
-    assert (
-        peak.speed
-        < float(dataset["stage_speed"].isel(member=0)[began])
-        < 2.0 * peak.speed
-    )
-    stress, steady = strengths(dataset.isel(member=0, t=slice(0, began - 125)))
+    assert peak.speed < float(dataset["stage_speed"][began]) < 2.0 * peak.speed
+    stress, steady = strengths(dataset.isel(t=slice(0, began - 125)))
     # the ramp is slow beside the bonds: 0.75 decades a second against 25/s
     assert_allclose(stress, steady, rtol=0.02)
     assert np.all(slips["force_drop"][1:] > 0.5 * slips["static_friction"][1:])
 
 
 def test_the_area_falls_with_the_square_of_the_force_and_more_under_a_smaller_load():
-    dataset = four("incipient_shear").isel(member=0)
+    dataset = four("incipient_shear")
     lost = []
     for place in range(dataset.sizes["contact_load"]):
         own = dataset.isel(contact_load=place)
@@ -382,8 +378,6 @@ def test_clutches_bear_what_programs_by_event_or_time_have_and_settle_where_moto
         "ensemble.members": 1,
         "bonds": many,
     }
-    last = at("motor_clutch", **rigid, **{"clock.duration": "60 s"}).isel(
-        t=-1, member=0
-    )
+    last = at("motor_clutch", **rigid, **{"clock.duration": "60 s"}).isel(t=-1)
     assert_allclose(1e12 * last["friction_force"], 10.7105709537, rtol=1e-4)
     assert_allclose(1e9 * last["speed"], 107.147314856, rtol=1e-5)

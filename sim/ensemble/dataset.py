@@ -368,7 +368,7 @@ def attributes(plan: Plan) -> dict[str, Any]:
         "scenario_resolved": resolved,
         "scenario_files": json.dumps(files, sort_keys=True),
         "seed": str(scene.seed),
-        "members": np.int32(scene.ensemble.members),
+        "members": np.int32(plan.members),
         "sim_version": sim_version,
         **{f"{name}_version": version for name, version in versions.items()},
     }
@@ -450,9 +450,8 @@ def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:
     chunks = (
         None if whole else tuple(block.get(dimension, 1) for dimension in dimensions)
     )
-    prescribed = any(
-        variable.name == SPEED and not plan.varies(variable)
-        for variable in plan.variables
+    prescribed = any(variable.name == SPEED for variable in plan.variables) and not any(
+        point.drive.solves_motion for point in plan.points
     )
     names = {}
     statistics = _STATISTICS | (_COUNT if whole else {})

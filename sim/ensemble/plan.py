@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.ensemble.variables import LARGEST, VARIABLES, Variable
+from sim.parts.exchange import Parts
 from sim.quantities import Mean
 from sim.scenario.scenario import Scenario
 
@@ -118,16 +119,26 @@ class Plan:
 
     @cached_property
     def members(self) -> int:
-        """Return the number of members that are advanced: one if no part differs between members."""
+        """Return the number of members that are advanced: one if nothing is random."""
         return self.scenario.ensemble.members if any(self._vary.values()) else 1
 
     @cached_property
     def _vary(self) -> dict[str, bool]:
-        """Map each part to True if members differ in it at any point."""
+        """Map each part to True if members differ in it at any point.
+
+        Members behind a spring have a motion each, which differs only if a part is
+        random at any point.
+        """
+        is_random = any(point.is_random for point in self.points)
         return {
-            part: any(point.varies[part] for point in self.points)
+            part: is_random and any(point.varies[part] for point in self.points)
             for part in self.points[0].varies
         }
+
+    @property
+    def differing(self) -> list[str]:
+        """Return the names of the parts in which members differ."""
+        return [part for part in Parts._fields if self._vary[part]]
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
@@ -352,8 +363,14 @@ class Plan:
 
     @cached_property
     def per_member(self) -> bool:
-        """True if every member is recorded. By default that is so unless the file would be too large."""
+        """True if every member is recorded.
+
+        That is so if they do not differ, and by default unless the file would be too
+        large.
+        """
         record = self.scenario.record
+        if not self.differing:
+            return True
         if record.per_member is not None:
             return record.per_member
         return _PACKED[record.compression] * self._trajectories(True) <= _MOST_BYTES

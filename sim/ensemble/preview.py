@@ -310,15 +310,13 @@ def _models(plan: Plan) -> Rows:
                 chosen = f"→ {point.chosen[place].model}"
                 models[chosen] = ("", chosen, "chosen", point.why[name])
         rows += models.values()
-    differ = ", ".join(
-        name
-        for name in Parts._fields
-        if any(point.varies[name] for point in plan.points)
-    )
+    differ = ", ".join(plan.differing)
     text = (
-        f"differ in {differ}" if differ else "are identical, so one is computed for all"
+        f"differ in {differ}"
+        if differ
+        else "nothing is random, so one member is enough"
     )
-    return [*rows, ("members", str(plan.scenario.ensemble.members), text)]
+    return [*rows, ("members", f"{plan.members:,}", text)]
 
 
 def _meaning(part: Any) -> str:
@@ -513,18 +511,13 @@ def _slider(points: Sequence[Scenario]) -> Rows:
 def _run(plan: Plan) -> Rows:
     """Return the size of a run: steps, members, time, memory and file."""
     scene, clock, jobs = plan.scenario, plan.points[0].clock, usual_jobs(plan)
-    alike = (
-        ", all identical, so one is computed"
-        if scene.ensemble.members > plan.members
-        else ""
-    )
     rows: Rows = [
         (
             "time",
             f"{clock.steps:,} step{'s' if clock.steps > 1 else ''}, {clock.records:,} records",
         )
     ]
-    rows.append(("members", f"{scene.ensemble.members:,}{alike}"))
+    rows.append(("members", f"{plan.members:,}"))
     if scene.sweep:
         axes = " × ".join(f"{len(axis.values)} {axis.keys[0]}" for axis in scene.sweep)
         rows.append(

@@ -3,12 +3,13 @@
 import contextlib
 import re
 from collections.abc import Callable
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast, get_args
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from pydantic import TypeAdapter
 
 from sim.laws import schallamach
 from sim.plots import style
@@ -27,7 +28,7 @@ from sim.read import is_steady, setting, statements, sweep_dims
 from sim.read.dataset import MEMBERS, stays_held, word
 from sim.read.events import incipient_law, jumps
 from sim.read.observables import with_slips
-from sim.read.over_speed import population_of, speed_dim
+from sim.read.over_speed import speed_dim
 from sim.units.errors import BadInput
 
 
@@ -38,6 +39,58 @@ class Steady(NamedTuple):
     style: str
     stress: np.ndarray
     fraction: np.ndarray
+
+
+#: Numbers of bonds that stretch in a dataset, and the beginning of those of a rupture law.
+_BONDS = "bond_stiffness", "rebinding_rate", "site_density"
+_PREFIX = "bonds_rupture_"
+
+
+class Population(NamedTuple):
+    """Bonds that stretch: their rupture law, stiffness [N/m], rebinding rate [1/s] and sites per area [1/m^2]."""
+
+    rupture: Any
+    stiffness: float
+    rebinding: float
+    density: float
+
+    @property
+    def pathway(self) -> tuple[float, float, float] | tuple[()]:
+        """Rate [1/s], Bell force [N] and stiffness [N/m] if all rupture is by one pathway that force opens."""
+        law = self.rupture.law(self.stiffness)
+        return (
+            (law.rate, self.stiffness / law.softness, self.stiffness)
+            if law.one_pathway
+            else ()
+        )
+
+    @property
+    def at_rest(self) -> float:
+        """Share of the sites that are bound at rest."""
+        return float(
+            schallamach.rest_share(
+                self.rupture.law(self.stiffness).at_rest, self.rebinding
+            )
+        )
+
+
+def population_of(point: xr.Dataset) -> Population | None:
+    """Return the bonds of a dataset without a sweep; None if they do not stretch or it lacks their numbers."""
+    if not (
+        keys := [str(name) for name in point.variables if str(name).startswith(_PREFIX)]
+    ):
+        return None
+    # which takes a while, and few datasets need it
+    from sim.parts.bonds.rupture import Rupture
+
+    with contextlib.suppress(KeyError, ValueError):
+        numbers = {key.removeprefix(_PREFIX): float(point[key]) for key in keys}
+        # any law by its numbers alone
+        rupture = TypeAdapter(get_args(Rupture)[0]).validate_python(numbers)
+        return Population(
+            rupture, *(float(setting(point, f"bonds.{key}")) for key in _BONDS)
+        )
+    return None
 
 
 def steady_laws(point: xr.Dataset, speed: np.ndarray) -> list[Steady]:
@@ -135,7 +188,7 @@ def needs_map(dataset: xr.Dataset) -> None:
 def stability_figure(dataset: xr.Dataset) -> Figure:
     """Force amplitude of the spring over speed and stiffness, at increasing and decreasing speed, with theory."""
     force = style.mean_of(
-        dataset.isel({MEMBERS: slice(0, 1)}), "spring_force"
+        dataset.isel({MEMBERS: slice(0, 1)}, missing_dims="ignore"), "spring_force"
     ).transpose(..., "t")
     speed = (
         dataset["stage_speed"]

@@ -37,7 +37,7 @@ from sim.read.observables import (
     settled,
     share_observables,
 )
-from sim.read.over_speed import crossing, extremes, loss_speeds, steady_speeds
+from sim.read.over_speed import crossing, extremes, loss_speeds
 from sim.read.run import Run, statements
 from sim.read.statements import Statement, each, relaxation, statistics
 from sim.read.statistics import (
@@ -117,7 +117,6 @@ __all__ = [
     "spread",
     "statements",
     "statistics",
-    "steady_speeds",
     "stick_slip",
     "summary",
     "survival",

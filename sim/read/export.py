@@ -209,8 +209,7 @@ _ENDINGS = {
 _ALIKE = [
     f"q{100 * level:02.0f}{end}" for level in QUANTILES for end in ("", "_low", "_high")
 ]
-_ENDINGS |= {name: name for name in (*_ALIKE, "effective_samples", "correlation_time")}
-_ENDINGS |= {"correlation_time_error": "correlation_time_sem"}
+_ENDINGS |= {name: name for name in (*_ALIKE, "effective_samples")}
 
 
 def long(run: Run) -> pd.DataFrame:
@@ -224,8 +223,7 @@ def long(run: Run) -> pd.DataFrame:
         its ``mean`` is ``over``; ``error`` (standard error), ``low`` and ``high`` (95 %
         interval) of the mean; ``bound`` of the error that members do not reduce, by its
         ``source``; ``sd``; quantiles ``q05``, ``q50``, ``q95`` with the ends of their
-        intervals; ``effective_samples``, ``correlation_time`` and
-        ``correlation_time_error`` [s].
+        intervals; ``effective_samples``.
     """
     names, parts = _long(run)
     wholes = (

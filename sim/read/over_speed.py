@@ -4,14 +4,12 @@ import contextlib
 import itertools
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from pydantic import TypeAdapter
 from scipy import special
 
-from sim.laws import schallamach
 from sim.read.dataset import (
     MEMBERS,
     in_pieces,
@@ -66,18 +64,10 @@ _BEYOND = (
     "less is lost at the highest speed",
     "the contacts detach before this loss",
 )
-#: Numbers of bonds that stretch, and of a rupture law, in a dataset; speeds at which steady bonds are tabulated.
-_BONDS, _PREFIX, _FINE = (
-    ("bond_stiffness", "rebinding_rate", "site_density"),
-    "bonds_rupture_",
-    600,
-)
 #: Names of branches by the sign of the change of the speed.
 _WAYS = {1.0: "increasing speed", -1.0: "decreasing speed"}
 #: Relative lag of a speed below which it is not stated.
 _UNSEEN = 1e-3
-#: Largest relative lag along a course that is stated where there is no speed.
-_LATE = 0.02
 
 
 class Crossing(NamedTuple):
@@ -439,120 +429,42 @@ def _course(dataset: xr.Dataset) -> tuple[str, xr.DataArray]:
     ).squeeze(drop=len(branches) == 1)
 
 
-class Population(NamedTuple):
-    """Bonds that stretch: their rupture law, stiffness [N/m], rebinding rate [1/s] and sites per area [1/m^2]."""
+def _if_steady(
+    dataset: xr.Dataset, levels: Sequence[xr.DataArray]
+) -> list[tuple[xr.DataArray, xr.DataArray]]:
+    """Return for each share of JKR's area the speed in steady sliding [m/s], and True where that is stable.
 
-    rupture: Any
-    stiffness: float
-    rebinding: float
-    density: float
-
-    @property
-    def pathway(self) -> tuple[float, float, float] | tuple[()]:
-        """Rate [1/s], Bell force [N] and stiffness [N/m] if all rupture is by one pathway that force opens."""
-        law = self.rupture.law(self.stiffness)
-        return (
-            (law.rate, self.stiffness / law.softness, self.stiffness)
-            if law.one_pathway
-            else ()
-        )
-
-    @property
-    def at_rest(self) -> float:
-        """Share of the sites that are bound at rest."""
-        return float(
-            schallamach.rest_share(
-                self.rupture.law(self.stiffness).at_rest, self.rebinding
-            )
-        )
-
-
-def population_of(point: xr.Dataset) -> Population | None:
-    """Return the bonds of a dataset without a sweep; None if they do not stretch or it lacks their numbers."""
-    if not (
-        keys := [str(name) for name in point.variables if str(name).startswith(_PREFIX)]
-    ):
-        return None
-    # which takes a while, and few datasets need it
-    from sim.parts.bonds.rupture import Rupture
-
-    with contextlib.suppress(KeyError, ValueError):
-        numbers = {key.removeprefix(_PREFIX): float(point[key]) for key in keys}
-        # any law by its numbers alone
-        rupture = TypeAdapter(get_args(Rupture)[0]).validate_python(numbers)
-        return Population(
-            rupture, *(float(setting(point, f"bonds.{key}")) for key in _BONDS)
-        )
-    return None
-
-
-def steady_speeds(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the speed at which steady sliding has the bonds of each record, along a course of the speed [m/s].
-
-    If the amplitude of the field relaxes and lags more, it is approximately the speed of the steady field. This is the
-    speed one memory time earlier, to first order in the rate of the course. It is nan if a law is not known.
+    They are those of the scenario's own models. Speeds are nan at points of a sweep whose
+    scenario is not known: of a measured map, of runs that were joined, of swept models.
     """
-    speed = (abs(speed_of(dataset)) + 0.0 * dataset["contact_modulus"]).transpose(
-        *sweep_dims(dataset), "t"
-    )
-    fraction = dataset.get(
-        "bond_fraction", dataset.get("bond_fraction_mean", math.nan * speed)
-    )
-    fraction = fraction.mean(MEMBERS) if MEMBERS in fraction.dims else fraction
-    fraction, result = (
-        fraction.broadcast_like(speed).transpose(*speed.dims),
-        speed.copy(deep=True),
-    )
-    has_memory = any(
-        str(name).startswith("bonds_rebinding") for name in dataset.variables
-    )
-    for place in np.ndindex(speed.shape[:-1] if has_memory else 0):
-        point, sizes = (
-            dataset.isel(dict(zip(speed.dims[:-1], place, strict=True))),
-            speed[place].to_numpy(),
-        )
-        if not np.any(sizes > 0.0):
-            continue
-        fine = np.geomspace(
-            1e-3 * np.min(sizes[sizes > 0.0]), 1e3 * np.nanmax(sizes), _FINE
-        )
-        law = np.full(_FINE, math.nan)
-        if (
-            (bonds := population_of(point))
-            and word(point, "bonds.model", "") == "rate"
-            and bonds.pathway
-        ):
-            law = (
-                schallamach.first_moment_fraction(fine, *bonds.pathway, bonds.rebinding)
-                / bonds.at_rest
-            )
-        elif bonds:
-            law = (
-                bonds.rupture.closed_form(fine, bonds.stiffness, bonds.rebinding).bound
-                / bonds.at_rest
-            )
-        elif "bonds_critical_speed" in point:
-            law = schallamach.steady_fraction(
-                fine, float(point["bonds_critical_speed"])
-            )
-        # else one fraction has several speeds
-        law = law if np.all(np.diff(law) <= 0.0) else math.nan * law
-        result[place] = np.exp(np.interp(-fraction[place], -law, np.log(fine)))
+    sweep = dataset["contact_modulus"]
+    result = [(math.nan * sweep, xr.ones_like(sweep, bool)) for _ in levels]
+    delays = any(str(name).startswith("bonds_rebinding") for name in dataset.variables)
     with contextlib.suppress(KeyError):
-        if resolved(dataset, "shear.amplitude").get("relaxing"):
-            memory = dataset.get("shear_correlation_time", math.nan * speed)
-            memory = dataset.get("shear_correlation_length", memory * speed) / speed
-            along: Any = {
-                "input_core_dims": [["t"]] * 3,
-                "output_core_dims": [["t"]],
-                "vectorize": True,
-            }
-            # energy goes with the square of amplitudes
-            earlier = (dataset["t"] - 0.5 * memory).broadcast_like(speed)
-            field = xr.apply_ufunc(np.interp, earlier, dataset["t"], speed, **along)
-            result = result.where(
-                abs(np.log(result / speed)) > abs(np.log(field / speed)), field
+        delays = delays or bool(resolved(dataset, "shear.amplitude").get("relaxing"))
+    if not delays:
+        return result
+    # slow to import
+    from sim.ensemble.dataset import scenario_of, variable_name
+    from sim.ensemble.steady_speed import speeds_of_areas
+
+    with contextlib.suppress(BadInput, KeyError):
+        scene = scenario_of(dataset.attrs)
+        keys = [key for axis in scene.sweep for key in axis.keys]
+        if {*sweep.dims} - {*map(variable_name, keys)}:
+            return result
+        for index in np.ndindex(sweep.shape):
+            at = dict(zip(sweep.dims, index, strict=True))
+            point = dataset.isel(at)
+            values = {key: float(setting(point, key)) for key in keys}
+            alone = scene.with_values(values) if keys else scene
+            shares = np.array(
+                [float(level.isel(at, missing_dims="ignore")) for level in levels]
             )
+            for (speed, stable), *numbers in zip(
+                result, *speeds_of_areas(alone, shares), strict=True
+            ):
+                speed[at], stable[at] = numbers
     return result
 
 
@@ -572,10 +484,11 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
     xarray.Dataset
         For each point of the sweep of other keys ``speed_at_5_percent_lost`` and so on [m/s], by default also
         ``speed_halfway_to_hertz``, each with ``…_low``, ``…_high`` and ``…_reason`` (see ``crossing``). Branches of a
-        course that rises and falls have the dimension ``branch``. If bonds or field lag behind a course,
-        ``steady_speed_at_5_percent_lost`` is about the speed at which steady sliding loses as much (see
-        ``steady_speeds``). With ``levels`` also the ``charges`` of that loss [1], such as
-        ``lost_to_bonds_at_10_percent_lost``. Without ``levels`` empty if there is no curve of the area over the speed.
+        course that rises and falls have the dimension ``branch``. If bonds lag behind a course,
+        ``steady_speed_at_5_percent_lost`` is the speed at which steady sliding by the scenario's own models loses as
+        much, nan where steady sliding is unstable behind the spring. With ``levels`` also the ``charges`` of that loss
+        [1], such as ``lost_to_bonds_at_10_percent_lost``. Without ``levels`` empty if there is no curve of the area
+        over the speed.
 
     Raises
     ------
@@ -615,12 +528,9 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
         )
     least = _least_area(dataset, hertz)
     means, sizes, alone = _group_means(dataset, along, bool(wanted))
-    if along == "t" and bool(
-        ((steady := steady_speeds(dataset)) != abs(speed_of(dataset))).any()
-    ):
-        means["steady_speed"] = (
-            np.log(steady.where(steady > 0.0)) + 0.0 * means["area_ratio"]
-        )
+    lasting: Any = [None] * len(left)
+    if along == "t":
+        lasting = _if_steady(dataset, [level for _, level, _ in left])
     beside, result = (
         means.to_array("quantity").drop_vars("quantity"),
         dict[str, xr.DataArray](),
@@ -639,49 +549,24 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
         "output_dtypes": [*"dddddOd"],
         "vectorize": True,
     }
-    for name, level, loss in left:
+    for (name, level, loss), steady in zip(left, lasting, strict=True):
         *ends, why, others = xr.apply_ufunc(
             crossing, speed, means["area_ratio"], sizes, level, beside, **how
         )
         is_known, never = ends[0].notnull(), ends[0].isnull() & (level < least)
-        reasons = [why, never, 100.0 * (1.0 - least)]
         columns = dict(
             zip(means, others.transpose("quantity", "end", ...), strict=True)
         )
         columns["area_ratio"] = xr.concat(ends, "end")
-        lag: list[Any] = [math.nan, False]
-        if "steady_speed" in columns:
-            steady = columns["steady_speed"]
-            value = np.exp(steady[0])
-            # errors of a logarithm are relative ones
-            is_error = xr.DataArray(np.arange(5) >= 3, dims="end")
-            columns["steady_speed"] = xr.where(is_error, value * steady, np.exp(steady))
-            lags = abs(np.log(ends[0] / columns["steady_speed"][0])) > np.fmax(
-                0.5 * np.log(ends[2] / ends[1]), _UNSEEN
-            )
-            off = (
-                abs(
-                    means["steady_speed"].isel(group=0)
-                    - np.log(speed.where(speed > 0.0))
-                ).max(along)
-                > _LATE
-            )
-            lag = [columns["steady_speed"][0].where(lags), off & ~is_known]
-        texts = {
-            "area_ratio": (
-                "speed",
-                "m/s",
-                f"sliding speed at which the mean contact area has lost {loss}",
-            )
-        }
-        texts["steady_speed"] = (
-            "steady_speed",
-            "m/s",
-            f"sliding speed, about, at which steady sliding loses {loss}",
-        )
+        lag: list[Any] = [math.nan, True]
+        if steady is not None:
+            lag = _lag(ends, steady[0], steady[1], speed)
         for key, numbers in columns.items():
+            stem, unit = str(key), "1"
             text = f"{means[key].attrs.get('long_name', '')}, at the speed at which {loss} is lost"
-            stem, unit, text = texts.get(str(key), (key, "1", text))
+            if key == "area_ratio":
+                stem, unit = "speed", "m/s"
+                text = f"sliding speed at which the mean contact area has lost {loss}"
             for (end, words), values in zip(_ENDS.items(), numbers, strict=True):
                 known = ~never
                 if end not in ("", "_bound"):
@@ -690,45 +575,53 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
                 if end == "_bound":
                     column.attrs["source"] = "interpolation"
                 result[f"{stem}_{name}{end}"] = column
-            further = [*reasons, *lag, is_known & alone]
-            # a reason of the course says nothing of steady sliding
-            if key == "steady_speed":
-                unmet = (
-                    f"unknown, because the course has no speed with a loss of {loss}"
-                )
-                further = [
-                    xr.where(is_known, why, unmet),
-                    *reasons[1:],
-                    math.nan,
-                    False,
-                    False,
-                ]
+            further = [why, never, 100.0 * (1.0 - least), *lag, is_known & alone]
             reason = xr.apply_ufunc(
                 _in_words, *further, vectorize=True, output_dtypes=[object]
             )
             result[f"{stem}_{name}_reason"] = reason.drop_attrs(deep=False)
+        if steady is not None and bool((lag[0].notnull() & lag[1]).any()):
+            text = f"sliding speed at which steady sliding loses {loss}"
+            result[f"steady_speed_{name}"] = labelled(lag[0].where(lag[1]), "m/s", text)
     # with their units
     return xr.Dataset(result).assign_coords(
         {name: dataset[name] for name in sweep_dims(dataset)}
     )
 
 
+def _lag(
+    ends: Sequence[xr.DataArray],
+    steady: xr.DataArray,
+    stable: xr.DataArray,
+    speed: xr.DataArray,
+) -> list[xr.DataArray]:
+    """Return the speed in steady sliding where that of a course differs from it, and True where it is stable.
+
+    ``ends`` are the speed of the course and its interval. The speed of a course that does
+    not reach the loss differs if its own speeds hold the one in steady sliding.
+    """
+    off = abs(np.log(ends[0] / steady))
+    differs = off > np.fmax(0.5 * np.log(ends[2] / ends[1]), _UNSEEN)
+    moving = speed.where(speed > 0.0)
+    within = (steady > moving.min("t")) & (steady < moving.max("t"))
+    return [steady.where(differs | (ends[0].isnull() & within)), stable]
+
+
 def _in_words(
-    reason: str, never: bool, most: float, steady: float, lags: bool, alone: bool
+    reason: str, never: bool, most: float, steady: float, stable: bool, alone: bool
 ) -> str:
     """Return the reason why there is no speed or no error, from the largest loss [%] and the ``steady`` speed [m/s]."""
     if never:
         return f"never: at most {most:.3g} % of the area can be lost"
-    near = (
-        ""
-        if math.isnan(steady)
-        else f"the course lags: {engineering(float(f'{steady:.3g}'), 'm/s')} if steady"
-    )
-    words = (
-        near or reason,
-        "the course lags" if lags else "",
-        "a single member has no known error" if alone else "",
-    )
+    near = reason
+    if not math.isnan(steady):
+        at = engineering(float(f"{steady:.3g}"), "m/s")
+        near = (
+            f"the course lags: {at} if steady"
+            if stable
+            else f"steady sliding would lose as much at {at}, but is unstable there"
+        )
+    words = near, "a single member has no known error" if alone else ""
     return "; ".join(filter(None, words))
 
 

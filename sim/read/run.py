@@ -177,19 +177,16 @@ class Run:
 
     def late(self, names: Iterable[str] | None = None) -> xr.Dataset:
         """Return statistics over the second half of a stationary run, of some quantities at least, else of all."""
-        if names is None:
-            if not self._is_whole:
-                group = of_second_half(self.dataset)
-                self._late.update(sampled(group, self.sample(late=True)))
-                self._is_whole = True
-            return self._late
-        missing = {*names} - self._known
-        if missing - {_MEMORY} and not self._is_whole:
-            group = of_second_half(self.dataset, missing - {_MEMORY})
+        missing = {_MEMORY} if names is None else {*names}
+        missing -= self._known
+        if not self._is_whole and (names is None or missing - {_MEMORY}):
+            chosen = None if names is None else missing - {_MEMORY}
+            group = of_second_half(self.dataset, chosen)
             self._late.update(sampled(group, self.sample(late=True)))
+            self._is_whole = names is None
         if _MEMORY in missing:
             times = correlation_time(self.dataset)
-            kinds = {"": "mean", "_sem": "sem", "_below": "high"}
+            kinds = {"": "mean", "_sem": "sem", "_below": "high", "_reason": "reason"}
             self._late.update(
                 {
                     f"{_MEMORY}_{kind}": times[f"{_MEMORY}{end}"]

@@ -56,11 +56,15 @@ _LAGS, _SAFELY = (2**13, 2**16), 2.0
 
 
 class IntegralTime(NamedTuple):
-    """An integral correlation time and its standard error [s]; if records are too coarse, what it is below [s]."""
+    """An integral correlation time and its standard error [s], or the reason for none.
 
-    time: float
-    sem: float
+    If records are too coarse, ``below`` is an upper limit [s].
+    """
+
+    time: float = math.nan
+    sem: float = math.nan
     below: float = math.nan
+    reason: str = ""
 
 
 def integral_time(values: Array, step: float) -> IntegralTime:
@@ -97,55 +101,45 @@ def integral_time(values: Array, step: float) -> IntegralTime:
     >>> x = np.zeros((64, 4000))
     >>> for k in range(1, 4000):
     ...     x[:, k] = 0.8 * x[:, k - 1] + rng.normal(size=64)
-    >>> time, sem, _ = integral_time(x, step=1.0)
+    >>> time, sem, *_ = integral_time(x, step=1.0)
     >>> print(f"{-1 / math.log(0.8):.2f} {abs(time - 4.48) < 5 * sem} {sem < 0.1}")
     4.48 True True
 
     Every tenth record tells only that the time is shorter than two of them:
 
-    >>> integral_time(x[:, ::10], step=10.0)
-    IntegralTime(time=nan, sem=nan, below=20.0)
+    >>> print(integral_time(x[:, ::10], step=10.0).below)
+    20.0
     """
-    return IntegralTime(*map(float, _times_of(values, step)))
-
-
-def _times_of(values: Array, step: float) -> Array:
-    """Return the numbers of ``integral_time``, shape (3, ...), of values with the shape (..., members, records)."""
-    points = values.reshape(-1, *values.shape[-2:])
-    ends = np.stack([points.min(axis=(1, 2)), points.max(axis=(1, 2))], axis=-1)
-    return _memory(points, points, points.mean(axis=(1, 2)), ends, step, False)[
-        1
-    ].reshape(3, *values.shape[:-2])
-
-
-def time_of(
-    covariance: Array, members: int, records: int, step: float, largest: Array
-) -> Array:
-    """Return the numbers of ``integral_time`` from autocovariances of values whose largest magnitude is ``largest``."""
+    members, records = values.shape
     if records < 2:
-        return np.full((3, *largest.shape), math.nan)
-    free, lags, coarse = (
-        max(members - 1, 1),
-        np.arange(covariance.shape[-1]),
-        math.exp(-1.0 / _FEWEST),
-    )
-    # nan is the answer if nothing fluctuates
-    with np.errstate(invalid="ignore", divide="ignore"):
-        known = covariance[..., 0] > (1e-10 * largest) ** 2
-        correlation = covariance / covariance[..., :1]
-        weights = np.where(lags % 2, 4.0, 2.0) / 3.0
-        weights[0] /= 2.0
-        sums = np.cumsum(weights * correlation, axis=-1)
-        inside = lags >= _WINDOW * sums
-    window, is_coarse = inside.argmax(axis=-1), correlation[..., 1] < coarse
-    time = step * np.take_along_axis(sums, window[..., np.newaxis], axis=-1)[..., 0]
-    time = np.where(known & ~is_coarse & inside.any(axis=-1), time, math.nan)
-    is_sure = known & (
-        correlation[..., 1] < coarse - _SURELY / math.sqrt(free * records)
-    )
-    below = np.where(is_sure, _FEWEST * step, math.nan)
-    return np.array(
-        [time, time * np.sqrt(2.0 * (2.0 * window + 1.0) / (free * records)), below]
+        return IntegralTime(reason="a single record has none")
+    if not np.isfinite(values).all():
+        return IntegralTime(reason="a contact has no value at some times")
+    free = max(members - 1, 1)
+    common = values.mean(axis=0) if members > 1 else values.mean()
+    covariance = covariance_of(values, common, free)
+    if not covariance[0] > (1e-10 * np.max(np.abs(values))) ** 2:
+        return IntegralTime(reason="nothing fluctuates")
+    correlation, lags = covariance / covariance[0], np.arange(covariance.size)
+    coarse = math.exp(-1.0 / _FEWEST)
+    if correlation[1] < coarse:
+        error = 1.0 / math.sqrt(free * records)
+        is_sure = correlation[1] < coarse - _SURELY * error
+        return IntegralTime(
+            below=_FEWEST * step if is_sure else math.nan,
+            reason="fewer than two records in a correlation time: reduce clock.record",
+        )
+    weights = np.where(lags % 2, 4.0, 2.0) / 3.0
+    weights[0] /= 2.0
+    sums = np.cumsum(weights * correlation)
+    inside = lags >= _WINDOW * sums
+    if not inside.any():
+        cure = "increase clock.duration or ensemble.members"
+        return IntegralTime(reason=f"the run is too short for its memory: {cure}")
+    window = int(inside.argmax())
+    time = step * float(sums[window])
+    return IntegralTime(
+        time, time * math.sqrt(2.0 * (2.0 * window + 1.0) / (free * records))
     )
 
 
@@ -258,45 +252,37 @@ def inflation(covariance: Array, members: int, records: int) -> Array:
 def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
     """Return the integral correlation time of the fluctuation energy ΔΓ(t) at each point of the sweep.
 
-    Defined only for a stationary process: nan wherever the speed changes during the run, and where
-    ``integral_time`` gives none.
+    It is that of the whole run and of a stationary process: there is none if the speed
+    changes during the run, and where ``integral_time`` gives none.
 
     Returns
     -------
     xarray.Dataset
-        ``correlation_time``, ``correlation_time_sem`` and, where records are too coarse for a number,
-        ``correlation_time_below`` [s] with the sweep's dimensions.
+        ``correlation_time``, ``correlation_time_sem`` and, where records are too coarse
+        for a number, ``correlation_time_below`` [s], with the sweep's dimensions, and
+        ``correlation_time_reason``, "" where there is a number.
     """
-    energy = dataset.get("fluctuation_energy")
-    sweep = dataset["contact_modulus"]
-    times = np.full((3, *sweep.shape), math.nan)
-    if energy is not None and MEMBERS in energy.dims and dataset.sizes["t"] > 1:
-        step = float(dataset["t"][1] - dataset["t"][0])
-        energy = energy.isel(
-            {
-                MEMBERS: slice(
-                    members_for_memory(energy.sizes[MEMBERS], energy.sizes["t"])
-                )
-            }
-        )
-        steady = (
-            steady_points(dataset)
-            .broadcast_like(sweep)
-            .transpose(*sweep.dims)
-            .to_numpy()
-        )
-        # a large file is read point by point
-        whole = [()] if energy.nbytes <= ROOM else np.ndindex(steady.shape)
-        for point in (point for point in whole if np.any(steady[point])):
-            values = (
-                energy.isel(dict(zip(sweep.dims, point, strict=False)))
-                .transpose(..., MEMBERS, "t")
-                .to_numpy()
-            )
-            times[:, *point] = np.where(
-                steady[point],
-                _times_of(values.astype(float, copy=False), step),
-                math.nan,
+    energy, sweep = dataset.get("fluctuation_energy"), dataset["contact_modulus"]
+    steady = (
+        steady_points(dataset).broadcast_like(sweep).transpose(*sweep.dims).to_numpy()
+    )
+    times = np.full(sweep.shape, None, object)
+    for point in np.ndindex(sweep.shape):
+        if not steady[point]:
+            times[point] = IntegralTime(reason="the speed changes")
+        elif energy is None:
+            cure = "record fluctuation_energy of each member"
+            times[point] = IntegralTime(reason=cure)
+        elif MEMBERS not in energy.dims:
+            times[point] = IntegralTime(reason="nothing fluctuates")
+        else:
+            count = members_for_memory(energy.sizes[MEMBERS], energy.sizes["t"])
+            series = energy.isel({MEMBERS: slice(count)})
+            # a large file is read point by point
+            values = series.isel(dict(zip(sweep.dims, point, strict=True)))
+            step = float(dataset["t"][-1]) / max(dataset.sizes["t"] - 1, 1)
+            times[point] = integral_time(
+                values.transpose(MEMBERS, "t").to_numpy().astype(float), step
             )
     about = "integral correlation time of the fluctuation energy"
     texts = {
@@ -305,10 +291,15 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
         "_below": f"upper limit of the {about}",
     }
     result = xr.Dataset()
-    for (suffix, text), numbers in zip(texts.items(), times, strict=True):
+    for place, (suffix, text) in enumerate(texts.items()):
+        numbers = np.reshape([time[place] for time in times.flat], sweep.shape)
         result[f"correlation_time{suffix}"] = labelled(
             sweep.copy(data=numbers), "s", text, "" if suffix else "t_c"
         )
+    reasons = np.array([time.reason for time in times.flat], object)
+    result["correlation_time_reason"] = xr.DataArray(
+        reasons.reshape(sweep.shape), sweep.coords, sweep.dims
+    ).assign_attrs(long_name=f"reason for no {about}")
     return result
 
 
@@ -334,19 +325,13 @@ _OF = {
     "low": "lower end of the 95 % interval of the ensemble mean",
     "high": "upper end of the 95 % interval of the ensemble mean",
     "effective_samples": "effective number of independent values of the mean",
-    "correlation_time": "integral correlation time",
-    "correlation_time_sem": "standard error of the integral correlation time",
     "quantile": "quantiles",
     "quantile_low": "lower end of the 95 % intervals of the quantiles",
     "quantile_high": "upper end of the 95 % intervals of the quantiles",
 }
 
 #: Units of statistics that are not in that of their observable.
-_UNITS = {
-    "effective_samples": "1",
-    "correlation_time": "s",
-    "correlation_time_sem": "s",
-}
+_UNITS = {"effective_samples": "1"}
 
 #: How far from a swept value, in parts of it, one may be chosen: as far as rounding to three digits.
 _NEAR = 5e-3
@@ -716,15 +701,13 @@ def _shares(
     return low, high
 
 
-def over_time(values: Array, step: float = 1.0, name: str = "") -> dict[str, Any]:
+def over_time(values: Array, name: str = "") -> dict[str, Any]:
     """Return statistics of a stationary observable over members and records together.
 
     Parameters
     ----------
     values : array, shape (members, records)
         nan where there is none.
-    step : float
-        Time between records [s].
     name : str
         Of the observable; ``"fraction_detached"`` and ``"fraction_masked"`` are shares.
 
@@ -732,9 +715,9 @@ def over_time(values: Array, step: float = 1.0, name: str = "") -> dict[str, Any
     -------
     dict
         ``mean``, ``sem``, ``low`` and ``high`` (95 % interval of the mean), ``std``, ``quantile``,
-        ``quantile_low`` and ``quantile_high`` (three each), ``effective_samples``: so many independent values tell
-        as much of the mean, and ``correlation_time`` with ``correlation_time_sem`` [s], see ``integral_time``. What is
-        not known is nan, as the errors of a single run that is shorter than its memory.
+        ``quantile_low`` and ``quantile_high`` (three each), and ``effective_samples``, the number of independent
+        values with the same error of the mean. A number that is not known is nan, as the errors of a single run that
+        is shorter than its memory.
 
     Notes
     -----
@@ -755,7 +738,7 @@ def over_time(values: Array, step: float = 1.0, name: str = "") -> dict[str, Any
     >>> print(50 < result["effective_samples"] < 200, result["low"] < 0.0 < result["high"])
     True True
     """
-    result, _ = _over_time(values[np.newaxis], step, name, np.array([True]))
+    result, _ = _over_time(values[np.newaxis], name, np.array([True]))
     return {
         kind: numbers[0] if kind.startswith("quantile") else float(numbers[0])
         for kind, numbers in result.items()
@@ -763,7 +746,7 @@ def over_time(values: Array, step: float = 1.0, name: str = "") -> dict[str, Any
 
 
 def _over_time(
-    values: Array, step: float, name: str, noisy: Array
+    values: Array, name: str, noisy: Array
 ) -> tuple[dict[str, Array], Array]:
     """Return the statistics of ``over_time`` at each point of a sweep, and the degrees of freedom of the error.
 
@@ -772,8 +755,8 @@ def _over_time(
     points, members, _ = values.shape
     known = np.isfinite(values)
     counts = known.sum(axis=-1, dtype=float)
-    total, complete = counts.sum(axis=-1), known.all(axis=(1, 2))
-    if not complete.all():
+    total = counts.sum(axis=-1)
+    if not known.all():
         values = np.where(known, values, np.nan)
     ordered = np.sort(values.reshape(points, -1), axis=-1)  # nan last
     levels = values_at_ranks(ordered, _LEVELS * (total[:, np.newaxis] - 1.0))
@@ -789,9 +772,7 @@ def _over_time(
             for k in range(len(_LEVELS))
         ]
         del deviations, known
-        inflated, times = _memory(
-            values, levels, mean, ordered[:, [0, -1]], step, bool(noisy.any())
-        )
+        inflated = _memory(values, levels, mean, ordered[:, [0, -1]], bool(noisy.any()))
         spreads = np.array(
             [
                 spread,
@@ -825,8 +806,6 @@ def _over_time(
         "high": high,
         "effective_samples": effective,
     }
-    if complete.any():
-        result |= {"correlation_time": times[0], "correlation_time_sem": times[1]}
     ranks = np.where(
         (ends >= 0.0) & (ends <= 1.0), ends * (total[:, np.newaxis] - 1.0), np.nan
     )
@@ -845,28 +824,25 @@ def _sum(values: Array, axis: int = -1) -> Array:
 
 
 def _memory(
-    values: Array, levels: Array, mean: Array, extremes: Array, step: float, noisy: bool
-) -> tuple[Array, Array]:
-    """Return how many records count as one, for the mean and each quantile, with degrees of freedom; and the memory.
+    values: Array, levels: Array, mean: Array, extremes: Array, noisy: bool
+) -> Array:
+    """Return how many records count as one, for the mean and each quantile, with degrees of freedom.
 
-    The shapes are (quantities, points, 2) and (3, points). nan at points whose values are not all known or all equal,
-    as their least and largest value say, of many members, whose means give the errors, and of quantiles if nothing is
-    ``noisy``.
+    The shape is (quantities, points, 2). They are nan of many members, whose means give
+    the errors; at points whose values are not all known or all equal, by their least and
+    largest value; and of quantiles if nothing is ``noisy``.
     """
     (points, members, records), free = values.shape, max(values.shape[1] - 1, 1)
-    inflated, times = (
-        np.full((1 + len(_LEVELS), points, 2), np.nan),
-        np.full((3, points), np.nan),
-    )
-    some = members if members < _MANY else members_for_memory(members, records)
-    changes, largest = extremes[:, 0] < extremes[:, 1], np.max(np.abs(extremes), axis=1)
+    inflated = np.full((1 + len(_LEVELS), points, 2), np.nan)
+    changes = extremes[:, 0] < extremes[:, 1]
+    if members >= _MANY or not changes.any():
+        return inflated
     size = max(1, _AT_ONCE // (2 * members * records))
-    for start in range(0, points, size) if changes.any() else ():
+    for start in range(0, points, size):
         part = values[at := slice(start, start + size)]
         common = part.mean(axis=1) if members > 1 else mean[at, np.newaxis]
-        covariance = covariance_of(part[:, :some], common, some * free / members)
-        times[:, at] = time_of(covariance, some, records, step, largest[at])
-        for k in range(1 + len(_LEVELS) * noisy) if members < _MANY else ():
+        covariance = covariance_of(part, common, free)
+        for k in range(1 + len(_LEVELS) * noisy):
             if k:
                 flags, share = (
                     part <= levels[at, k - 1, np.newaxis, np.newaxis],
@@ -880,8 +856,8 @@ def _memory(
                         covariance_of(flags, share, 1.0) - off[:, np.newaxis] ** 2
                     )
             inflated[k, at] = inflation(covariance, members, records)
-    inflated[:, ~changes] = times[:, ~changes] = np.nan
-    return inflated, times
+    inflated[:, ~changes] = np.nan
+    return inflated
 
 
 def _errors(
@@ -1184,7 +1160,7 @@ def distribution(
         if base is not None:
             values = values - _series(base, readers[1](name), step)
         values = values.reshape(-1, *values.shape[-2:])
-        numbers, freedom = _over_time(values, step, name, differ)
+        numbers, freedom = _over_time(values, name, differ)
         states = settlements(values, numbers["sem"], freedom, differ)
         result |= _described(
             variable.rename(name), numbers, sweep, states, openings, words, differ

@@ -331,7 +331,12 @@ def spread(run: Run) -> Table:
         if f"{column.name}_std" in late
         and late[f"{column.name}_std"] > least * abs(late[f"{column.name}_mean"])
     ]
-    return Table(rows, keys=1, total=len(rows))
+    if not rows or not run.has_noise or "fluctuation_energy_mean" not in late:
+        return Table(rows, keys=1, total=len(rows))
+    memory = _table_of(late, {}, {}, _columns("correlation_time"))
+    ((heading, cell),) = memory.rows[0].items()
+    rows.append(dict.fromkeys(rows[0], "") | {"quantity": heading, "mean": cell})
+    return Table(rows, keys=1, total=len(rows), reasons=memory.reasons)
 
 
 def _over_rows(run: Run, columns: Sequence[Column], rows: int, most: int) -> Table:
@@ -786,13 +791,4 @@ def _spread_of(means: xr.Dataset, row: Definition) -> dict[str, str]:
     errors = (of("quantile_high") - of("quantile_low")) / (2.0 * WIDE)
     for level, value, error in zip(QUANTILES, of("quantile"), errors, strict=True):
         cells[f"{100.0 * level:.0f} %"] = concise(factor * value, factor * error)
-    cells["t_c"] = "–"
-    time = float(means.get(f"{row.name}_correlation_time", math.nan))
-    below = float(means.get("correlation_time_high", math.nan))
-    if row.name == "fluctuation_energy" and below > 0.0:
-        cells["t_c"] = f"< {engineering(below, 's')}"
-    if time > 0.0:
-        step, unit = scaled(time, "s")
-        error = step * float(of("correlation_time_sem"))
-        cells["t_c"] = f"{concise(step * time, error)} {unit}"
     return cells | {"free values": f"{of('effective_samples'):.3g}"}

@@ -518,7 +518,10 @@ class Scenario:
 
     @cached_property
     def varies(self) -> dict[str, bool]:
-        """Return, for each part and the control of the contact, True if its values differ between members."""
+        """Return, for each part and the control of the contact, True if each member has values of its own.
+
+        Without a random part these values are equal.
+        """
         driven = self.drive.per_member
         bonded = driven or self.population.per_member
         by_bonds = bonded and (
@@ -535,7 +538,7 @@ class Scenario:
 
     @property
     def is_random(self) -> bool:
-        """Return True if a part of the scene is random. Members behind a spring differ only then."""
+        """Return True if a part of the scene is random. Members differ only then."""
         return self.population.is_random or self.fluctuations.per_member
 
     @property
@@ -618,14 +621,6 @@ class Scenario:
             remark for part in self.chosen for remark in part.remarks(self.setting)
         ]
         remarks += remarks_between(self)
-        if (
-            self.ensemble.members > 1
-            and self.fluctuations.measured
-            and not any(self.varies.values())
-        ):
-            remarks.append(
-                "all members and seeds share the map and nothing else is random, so one member is enough"
-            )
         if (
             (lattice := self.map_lattice)
             and not self.fluctuations.measured

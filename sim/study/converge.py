@@ -158,7 +158,7 @@ class Setting:
     def pace(self) -> float:
         """Return the estimated time of a run of one member [s]."""
         return self.time / (
-            self.scenario.ensemble.members if _fluctuates(self.scenario) else 1
+            self.scenario.ensemble.members if self.scenario.is_random else 1
         )
 
 
@@ -428,15 +428,10 @@ def _at_step(scenario: Scenario, ratio: float) -> Setting:
     return Setting(label, "step", changed, text, int(ratio == 1.0), ratio)
 
 
-def _fluctuates(scenario: Scenario) -> bool:
-    """True if a part of the scene is random. Members behind a spring differ only then."""
-    return scenario.population.per_member or scenario.fluctuations.per_member
-
-
 def _timed(scenario: Scenario, seconds: float) -> float:
     """Return the CPU time of the scene's run [s], by all but the first of the pieces that are run in some seconds."""
     members, last = (
-        scenario.ensemble.members if _fluctuates(scenario) else 1,
+        scenario.ensemble.members if scenario.is_random else 1,
         scenario.clock.steps,
     )
     full = min(together(scenario), members)
@@ -463,9 +458,7 @@ def _timed(scenario: Scenario, seconds: float) -> float:
 def _records(scenario: Scenario) -> range:
     """Return the clock steps at which runs are compared: those of all records, or evenly spaced ones of very many."""
     clock = scenario.clock
-    numbers = (
-        clock.records * len(QUANTITIES) * (_FEWEST if _fluctuates(scenario) else 1)
-    )
+    numbers = clock.records * len(QUANTITIES) * (_FEWEST if scenario.is_random else 1)
     every = clock.stride * -(-numbers // _SAMPLED)
     return range(clock.steps % every, clock.steps + 1, every)
 
@@ -653,7 +646,7 @@ def _judged(settings: list[Setting], until: float, budget: Budget) -> list[Setti
     order = sorted(
         settings, key=lambda row: (row is not own, row is not nearest, row.time)
     )
-    noisy = [row for row in settings if _fluctuates(row.scenario)]
+    noisy = [row for row in settings if row.scenario.is_random]
     steps = _records([own, *noisy][-1].scenario)
     most, wanted = _most_members(own.scenario, steps), _affordable(noisy, until, budget)
     first = int(np.clip(max(0.25 * wanted, min(wanted, _FEWEST)), _LEAST, most))
@@ -857,7 +850,7 @@ def _first_series(
         1,
     )
     cost = pace * sum(1.0 / ratio for ratio in ratios)
-    if _fluctuates(scene):
+    if scene.is_random:
         members = max(min(_most_in_series(scene), int(left / (32.0 * pace))), 4)
         members = max(min(members, int(left / cost)), _LEAST)
     if members * cost > left:

@@ -398,7 +398,7 @@ def _records(point: Scenario, names: list[str]) -> tuple[Array, Array, Array]:
     """
     from sim.study.converge import recorded  # which draws figures
 
-    count = point.ensemble.members if any(point.varies.values()) else 1
+    count = point.ensemble.members if point.is_random else 1
     steps = range(0, point.clock.steps + 1, point.clock.stride)
     speeds, *values = recorded(
         point, range(count), steps, [READ[name] for name in ("speed", *names)]

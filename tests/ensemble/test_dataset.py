@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 import xarray as xr
 from helpers.commands import SCENE, sim as command
-from helpers.parts import Adhesion, Record, Slip, load, read_sweep, run, shear
+from helpers.parts import Adhesion, Record, Slip, load, read, read_sweep, run, shear
+from helpers.printed import rows_of
 from helpers.scenes import BONDS, CELL, CONTACTS, DRIVES, SHEARS, SPECTRUM, march, scene
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter
@@ -62,8 +63,69 @@ def test_the_dataset_is_what_the_engine_marched_with_members_only_if_they_differ
             np.testing.assert_array_equal(recorded, marched, err_msg=variable.name)
     pooled = ensemble.run(sample(record=Record(per_member=False)))
     assert "member" not in pooled.dims and pooled["bond_fraction"].dims == ("t",)
-    # members do not differ
-    assert "member" not in ensemble.run(sample(members=64, shear=shear.Uniform())).dims
+
+
+@pytest.mark.parametrize("drive", ["steady", "spring with mass", "force"])
+@pytest.mark.parametrize(
+    ("bonds", "field", "is_random"),
+    [
+        ("rate", "uniform", False),
+        ("rate, carried", "mean", False),
+        ("cohort", "modal, fixed", False),
+        ("cohort", "modal, time, constant", True),
+        ("counted", "uniform", True),
+    ],
+)
+def test_a_scene_has_a_dimension_of_members_if_and_only_if_a_part_is_random(
+    drive, bonds, field, is_random
+):
+    parts = {
+        "drive": DRIVES[drive],
+        "bonds": BONDS[bonds],
+        "shear": SHEARS[field],
+        "contact": CONTACTS["load"],
+    }
+    scenario = scene(3, 4, **parts)
+    dataset, single = ensemble.run(scenario), ensemble.run(scene(1, 4, **parts))
+    assert ("member" in dataset.sizes) is is_random is bool(dataset["has_noise"])
+    assert dataset.attrs["members"] == (3 if is_random else 1)
+    assert ("speed" in dataset.coords) is (drive == "steady")
+    if not is_random:
+        pooled = ensemble.run(replace(scenario, record=Record(per_member=False)))
+        xr.testing.assert_equal(dataset, pooled)
+        requested = "ensemble_members"
+        xr.testing.assert_equal(
+            dataset.drop_vars(requested), single.drop_vars(requested)
+        )
+        printed = [*rows_of(dataset), *rows_of(dataset, read.highlights)]
+        assert not any("(" in cell for row in printed for cell in row.values())
+
+
+def test_members_of_a_sweep_are_equal_without_an_error_at_the_points_where_nothing_is_random():
+    random = {
+        "model": "modal",
+        "spectrum": {
+            "model": "band",
+            "rms": "20 kPa",
+            "shortest": "60 um",
+            "longest": "120 um",
+        },
+        "cell": "0.24 mm",
+        "correlation": {"model": "time", "time": "2 ms"},
+    }
+    scenario = swept(
+        {"shear": [{"model": "uniform"}, random]},
+        drive=DRIVES["spring"],
+        bonds=BONDS["cohort"],
+        contact=CONTACTS["load"],
+    )
+    dataset = ensemble.run(scenario)
+    area = dataset["contact_area"]
+    assert dataset.sizes["member"] == 5 and dataset.attrs["members"] == 5
+    equal = (area == area.isel(member=0)).all(["member", "t"])
+    assert equal.values.tolist() == [True, False]
+    rows = rows_of(read.where(dataset, {"shear": "uniform"}))
+    assert not any("(" in cell for row in rows for cell in row.values())
 
 
 def test_recording_one_quantity_alone_gives_the_bits_of_the_whole_run():

@@ -158,7 +158,7 @@ def test_creep_and_the_way_to_sliding_are_drawn_from_the_first_step_beside_the_l
     slow, fast = lines_of(speed)[:2]
     assert_allclose(
         slow[1],
-        1e3 * dataset["speed"].isel(drive_force=0, member=0, t=slice(1, None)),
+        1e3 * dataset["speed"].isel(drive_force=0, t=slice(1, None)),
         rtol=1e-12,
     )
     assert slow[0][0] > 0.0 and position.get_yscale() == position.get_xscale() == "log"
@@ -170,9 +170,7 @@ def test_creep_and_the_way_to_sliding_are_drawn_from_the_first_step_beside_the_l
     assert "runaway" in legend_of(position)[0]
     dataset = driven("pull")
     figure = rendered(draw(dataset, "incipient"))
-    force, area = (
-        dataset[name].isel(member=0).values for name in ("spring_force", "contact_area")
-    )
+    force, area = (dataset[name].values for name in ("spring_force", "contact_area"))
     top = int(np.argmax(force)) + 1
     own, law = lines_of(figure.axes[0])[:2]
     assert_allclose(own[0], 1e3 * force[:top], rtol=1e-12)

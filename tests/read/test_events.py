@@ -22,6 +22,9 @@ from helpers.parts import (
 )
 from helpers.printed import rows_of
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy import interpolate
+from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
 
 import sim
 from sim.laws.schallamach import bell_peak
@@ -457,12 +460,12 @@ def test_a_pull_from_rest_has_a_threshold_between_its_clock_steps_and_the_area_t
         for clock in ((0.2, 5e-4), (0.2, 5e-4, 0.2), (0.02, 5e-4))
     )
     force, area = (
-        dense["friction_force"][0].to_numpy(),
-        dense["contact_area"][0].to_numpy(),
+        dense["friction_force"].to_numpy(),
+        dense["contact_area"].to_numpy(),
     )
     top = int(np.argmax(force))
     assert 0 < top < len(force) - 1
-    result = read.events(dense).isel(member=0)
+    result = read.events(dense)
     # between two clock steps it is higher, but below the lines through its neighbours: it is concave there
     assert (
         force[top]
@@ -556,3 +559,71 @@ def test_each_member_with_noise_has_its_own_threshold():
         own = force[: int(np.argmax(fallen))].max()
         assert own <= dataset["static_threshold"][member] < 1.05 * own
     assert np.unique(dataset["static_threshold"]).size == 6
+
+
+#: A lens with bonds of the mean-field model, along a ramp through the friction maximum.
+ALONG_A_RAMP = {
+    "solid": {"shear_modulus": "0.6 MPa"},
+    "sphere": {"radius": "5 mm"},
+    "adhesion": {"work": "30 mJ/m^2", "bond_share": 0.0},
+    "contact": {"load": "5 mN"},
+    "bonds": {
+        "model": "rate",
+        "rupture": {"model": "bell", "bell_force": "6 pN", "zero_force_rate": "1 1/s"},
+        "bond_stiffness": "0.5 mN/m",
+        "rebinding_rate": "5 1/s",
+        "site_density": "1e15 1/m^2",
+        "start": "steady",
+    },
+}
+
+
+def true_maximum(speed_at, times):
+    """Return the time of the largest stress along a course of the speed, by an own integration."""
+    loss = 5e-4 / 6e-12
+
+    def slopes(time, state):
+        bound, stretch = state
+        rebound = 5.0 * (1.0 - bound)
+        rupture = np.exp(loss * stretch)
+        return rebound - rupture * bound, speed_at(time) - stretch * rebound / bound
+
+    start = fsolve(lambda state: slopes(times[0], state), (0.8, speed_at(times[0])))
+    how = {"method": "LSODA", "rtol": 1e-11, "atol": [1e-12, 1e-20]}
+    course = solve_ivp(slopes, times, start, dense_output=True, **how)
+    stress = interpolate.PchipInterpolator(
+        course.t, course.sol(course.t)[0] * course.sol(course.t)[1]
+    )
+    top = course.t[int(np.argmax(stress(course.t)))]
+    near = np.linspace(0.9 * top, min(1.1 * top, times[1]), 200_001)
+    bound, stretch = course.sol(near)
+    return near[int(np.argmax(bound * stretch))]
+
+
+@pytest.mark.parametrize("ends", [(1e-9, 1e-6), (1e-6, 1e-9)])
+@pytest.mark.parametrize("scale", ["log", "linear"])
+@pytest.mark.parametrize(
+    ("duration", "steps", "most"),
+    [(4.0, 400, 1.0), (40.0, 100, 1.0), (400.0, 40, 0.3), (4e4, 400, 0.03)],
+)
+def test_a_maximum_along_a_ramp_is_where_an_own_integration_has_it_within_its_bound(
+    ends, scale, duration, steps, most
+):
+    """From bonds that remember a clock step to bonds without a memory in it, where half a step would be the error."""
+    first, last = ends
+    drive = {"model": "ramp", "from": first, "to": last, "scale": scale}
+    step = duration / steps
+    document = ALONG_A_RAMP | {"clock": {"duration": duration, "step": step}}
+    result = read.peaks(run(sim.Scenario(**document | {"drive": drive})))
+
+    def speed_at(time):
+        share = time / duration
+        if scale == "log":
+            return first * (last / first) ** share
+        return first + (last - first) * share
+
+    exact = true_maximum(speed_at, (0.0, duration))
+    for name, truth in (("time", exact), ("speed", speed_at(exact))):
+        value, bound = (float(result[f"peak_{name}{end}"]) for end in ("", "_bound"))
+        assert abs(value - truth) <= bound
+    assert float(result["peak_time_bound"]) <= most * step

@@ -22,13 +22,14 @@ from helpers.parts import (
     shear,
 )
 from helpers.printed import rows_of
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy import special, stats
 
 from sim.parts.contact.models import Solid, Sphere
 from sim.read.events import lifetimes
 from sim.read.statistics import QUANTILES, covariance_of, quantile_ranks
 from sim.spectrum.families import Gaussian
+from sim.units.notation import concise
 
 LEVELS = np.array(QUANTILES)
 #: Ensembles that a coverage is counted over, and its bounds; five of its standard errors are 3.4 %.
@@ -172,20 +173,20 @@ def test_a_single_series_that_is_short_for_its_memory_has_no_interval():
 
 def test_correlation_times_and_free_values_are_those_of_the_law_and_of_white_noise():
     series = ornstein_uhlenbeck(np.random.default_rng(17), (64, 2000), math.exp(-0.2))
-    result = read.over_time(series, step=0.1)
-    assert abs(result["correlation_time"] - 0.5) < 5.0 * result["correlation_time_sem"]
+    result, memory = read.over_time(series), read.integral_time(series, step=0.1)
+    assert abs(memory.time - 0.5) < 5.0 * memory.sem
     # the mean of n records has the variance (1 + k)/(1 - k)/n, its estimate from 64 means the error sqrt(2/63)
     keep = math.exp(-0.2)
     exact = 64 * 2000 * (1.0 - keep) / (1.0 + keep)
     assert abs(result["effective_samples"] / exact - 1.0) < 5.0 * math.sqrt(2.0 / 63.0)
     series = ornstein_uhlenbeck(np.random.default_rng(16), (1, 50), math.exp(-0.2))
     assert np.all(np.isnan(read.over_time(series)["quantile_low"]))
-    result = read.over_time(np.random.default_rng(18).normal(size=(1, 20_000)))
-    assert abs(result["effective_samples"] / 20_000 - 1.0) < 0.1 and math.isnan(
-        result["correlation_time"]
-    )
+    white = np.random.default_rng(18).normal(size=(1, 20_000))
+    assert abs(read.over_time(white)["effective_samples"] / 20_000 - 1.0) < 0.1
+    assert math.isnan(read.integral_time(white, step=1.0).time)
 
 
+NAME = "correlation_time"
 STEADY = {"drive": drive.Steady(speed=4e-3), "clock": Clock(duration=0.8, step=0.01)}
 
 
@@ -201,9 +202,7 @@ def test_statistics_leave_out_missing_values_and_a_distribution_is_over_members_
         result, known = read.over_time(values), values[np.isfinite(values)]
         assert_allclose(result["quantile"], np.quantile(known, LEVELS), rtol=1e-13)
         assert_allclose(result["mean"], np.nanmean(values, axis=1).mean(), rtol=1e-13)
-        assert math.isnan(result.get("correlation_time", math.nan)) and (
-            members == 1
-        ) == math.isnan(result["sem"])
+        assert (members == 1) == math.isnan(result["sem"])
     dataset = run(
         scene(
             **STEADY,
@@ -257,7 +256,7 @@ def test_correlation_time_is_within_its_errors_or_a_bound_of_records_that_are_to
         energy = squared_ornstein_uhlenbeck(
             np.random.default_rng(7), members, records, keep
         )
-        time, sem, _ = read.integral_time(energy, step=0.01)
+        time, sem, *_ = read.integral_time(energy, step=0.01)
         assert abs(time - exact_time(keep, 0.01)) < 5.0 * sem and sem < 0.3 * time
     for records_a_time in [1.6, 2.4]:
         keep = math.exp(-0.5 / records_a_time)
@@ -265,7 +264,7 @@ def test_correlation_time_is_within_its_errors_or_a_bound_of_records_that_are_to
             energy = squared_ornstein_uhlenbeck(
                 np.random.default_rng(seed), 64, 400, keep
             )
-            time, sem, below = read.integral_time(energy, step=0.01)
+            time, sem, below, _ = read.integral_time(energy, step=0.01)
             if records_a_time < 2.0:
                 assert math.isnan(time) and below == 0.02
             else:
@@ -299,11 +298,45 @@ def test_energy_forgets_twice_as_fast_as_its_amplitudes_and_records_too_seldom_a
         )
     )
     assert float(read.statistics(coarse)["correlation_time_below"]) == 0.04
-    times = {
-        row["quantity"].partition(" ")[0]: row["t_c"]
+    (cell,) = (
+        row["mean"]
         for row in rows_of(coarse, read.spread)
-    }
-    assert times["ΔΓ"] == "< 40 ms"
+        if row["quantity"] == "t_c (ms)"
+    )
+    assert cell == "< 40*"
+
+
+def test_a_correlation_time_is_one_number_in_table_and_csv_and_a_missing_one_has_its_reason():
+    field = shear.Modal(correlation=Time(time=0.02), **FIELD)
+    parts = {"drive": drive.Steady(speed=1e-3), "shear": field}
+    noise = {"ensemble": Ensemble(members=32)}
+    fine, seldom = Clock(0.4, 0.001), Clock(0.4, 0.001, 0.02)
+    for clock, shear_part, reason in (
+        (fine, field, ""),
+        (seldom, field, "reduce clock.record"),
+        (Clock(0.03, 0.001), field, "increase clock.duration"),
+        (fine, shear.Uniform(), "nothing fluctuates"),
+    ):
+        dataset = run(scene(**parts | noise | {"clock": clock, "shear": shear_part}))
+        result = read.correlation_time(dataset)
+        energy = dataset["fluctuation_energy"].transpose(..., "t").to_numpy()
+        exact = read.integral_time(np.atleast_2d(energy), clock.record or clock.step)
+        assert reason in exact.reason and reason in result[f"{NAME}_reason"].item()
+        assert bool(exact.reason) is bool(reason) is math.isnan(exact.time)
+        assert_array_equal(result[NAME], exact.time)
+        frame = read.long(read.Run(dataset)).set_index("quantity")
+        assert_array_equal(frame.loc[[NAME], "mean"], exact.time)
+        assert not any(NAME in column for column in frame.columns)
+    dataset = run(scene(**parts | noise | {"clock": fine}))
+    time = read.correlation_time(dataset)
+    expected = concise(1e3 * float(time[NAME]), 1e3 * float(time[f"{NAME}_sem"]))
+    assert expected in [
+        row["mean"]
+        for row in rows_of(dataset, read.spread)
+        if row["quantity"] == "t_c (ms)"
+    ]
+    ramp = read.correlation_time(lens.ramp())
+    assert ramp[f"{NAME}_reason"].item() == "the speed changes"
 
 
 def test_there_is_no_correlation_time_where_nothing_decays_visibly_or_on_a_ramp():
@@ -319,7 +352,7 @@ def test_there_is_no_correlation_time_where_nothing_decays_visibly_or_on_a_ramp(
     ]:
         assert all(math.isnan(number) for number in read.integral_time(energy, 0.1)[:2])
     energy = squared_ornstein_uhlenbeck(np.random.default_rng(4), 2, 12, 0.1)
-    assert all(math.isnan(number) for number in read.integral_time(energy, 1.0))
+    assert all(math.isnan(number) for number in read.integral_time(energy, 1.0)[:3])
     assert math.isnan(read.correlation_time(lens.ramp())["correlation_time"])
 
 
@@ -329,12 +362,12 @@ def test_a_covariance_is_the_mean_of_products_of_deviations_and_sees_nothing_tha
     shared = np.random.default_rng(10).normal(size=2000)
     pair = np.stack([shared + difference / 2.0, shared - difference / 2.0])
     alone = read.integral_time(difference[np.newaxis], 1.0)
-    assert_allclose(read.integral_time(pair, 1.0), alone, rtol=1e-9)
+    assert_allclose(read.integral_time(pair, 1.0)[:3], alone[:3], rtol=1e-9)
     energy = squared_ornstein_uhlenbeck(np.random.default_rng(8), 64, 400, 0.8)
     drift = np.linspace(0.0, 100.0, 400)
     assert_allclose(
-        read.integral_time(energy + drift, 1.0),
-        read.integral_time(energy, 1.0),
+        read.integral_time(energy + drift, 1.0)[:3],
+        read.integral_time(energy, 1.0)[:3],
         rtol=1e-9,
     )
 

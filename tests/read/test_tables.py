@@ -271,6 +271,7 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
         "a",
         "A/A_JKR",
         "F",
+        "t_c",
     }
     energy, law = result["ΔΓ"], read.distribution(dataset)
     assert list(energy) == [
@@ -280,7 +281,6 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
         "5 %",
         "50 %",
         "95 %",
-        "t_c",
         "free values",
     ]
     np.testing.assert_allclose(
@@ -288,11 +288,7 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
     )
     free_values = float(law["fluctuation_energy_effective_samples"])
     np.testing.assert_allclose(float(energy["free values"]), free_values, rtol=5e-3)
-    assert (
-        "(" in energy["mean"]
-        and "(" in energy["95 %"]
-        and energy["t_c"].endswith(" ms")
-    )
+    assert "(" in energy["mean"] and "(" in energy["95 %"]
     assert rows_of(lens.ramp(), read.spread) == []
     sweep = {"contact.load": [1e-3, 4e-3]}
     (low, high) = rows_of(run(scene(sweep=sweep)), read.losses)

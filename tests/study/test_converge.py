@@ -96,7 +96,7 @@ class CountedTime:
 
     def counted(self, scenario, noise, state, steps):
         result = self.follow(scenario, noise, state, steps)
-        members = scenario.ensemble.members if study._fluctuates(scenario) else 1
+        members = scenario.ensemble.members if scenario.is_random else 1
         share = (steps[-1] - (state.step if state else 0)) / scenario.clock.steps
         self.seconds += (
             self.slower
@@ -686,7 +686,7 @@ def held(scenario, budget, parts=("shear", "bonds", "step")):
         ):
             # else in closed form
             steps = study._records(
-                max((row.scenario for row in rows), key=study._fluctuates)
+                max((row.scenario for row in rows), key=lambda scene: scene.is_random)
             )
             samples = [study.compared(row.scenario, range(512), steps) for row in rows]
         for row, sample in zip(rows[1:], samples[1:], strict=False):
@@ -862,9 +862,7 @@ def test_the_recommended_setting_keeps_its_bound_against_the_finest_models_and_a
             tables | {"clock": {"duration": 0.04, "step": length, "record": 4e-3}}
         )
         steps = range(0, run.clock.steps + 1, run.clock.stride)
-        runs.append(
-            study.compared(run, range(256 if study._fluctuates(run) else 1), steps)
-        )
+        runs.append(study.compared(run, range(256 if run.is_random else 1), steps))
     off, deviation = study._errors(*runs)
     bound = np.fmax(best.error + best.noise, tolerance * good)
     assert np.all((off <= bound + 1e-6 + 5.0 * deviation)[:, :2]), (
