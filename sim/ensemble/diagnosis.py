@@ -1,16 +1,28 @@
 """Judgement of a run before it starts: systematic errors of its results, remarks, and the limits of its contact."""
 
+import functools
 import math
-import re
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, cast
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from sim.engine import MemberNoise, follow
+from sim.ensemble.expected import (
+    TIMES,
+    Expected,
+    StoredEnergy,
+    along,
+    areas,
+    energies_of,
+    expected,
+    jkr_radius,
+    largest_losses,
+)
 from sim.ensemble.plan import Plan
-from sim.ensemble.steady import changed, plane_energy, sensitivities, steady_course
-from sim.laws.schallamach import Body
+from sim.ensemble.steady import changed, plane_energy, sensitivities
+from sim.ensemble.swept import grouped, in_words, places, points_in_words, spread
+from sim.laws.schallamach import Body, Onset
 from sim.parts.bonds.models import Cohort, FirstMoment, Rate
 from sim.parts.drive import Spring
 from sim.parts.exchange import Array
@@ -18,71 +30,29 @@ from sim.parts.shear import Mean
 from sim.quantities import ERRORS
 from sim.scenario.checks import renewed
 from sim.scenario.scenario import Scenario
-from sim.scenario.schema import quantities
 from sim.spectrum.families import Band
 from sim.spectrum.family import Family
 from sim.spectrum.radial import share_of_long_waves
 from sim.units.notation import engineering
-from sim.units.quantity import same_unit
 
-#: Times of a run at which it is judged, steps of a ramp, keys in a sentence; energies of a member, on a disc, and
-#: points at which their density is summed.
-_TIMES, _STEPS, _KEYS, _ENERGIES, _ON_DISC, _POINTS = 21, 1000, 5, 256, 32, 2**12
-#: Error of A/A_JKR and lag that need a sentence; share of the work of adhesion that nearly masks it.
-_ERROR, _LAG, _MASKING = 0.01, 0.005, 0.9
+#: Points of a sweep whose steady sliding is computed, and points that are searched for remarks.
+COMPUTED, SEARCHED = 12, 100
+#: Steps of a ramp, and keys in a sentence.
+_STEPS, _KEYS = 1000, 5
+#: Error of A/A_JKR and lag that need a sentence; share of masked or open contacts and points of the area that do not.
+_ERROR, _LAG, _NEVER, _NO_POINT = 0.01, 0.005, 1e-4, 0.05
 #: Points along a side of a cell beyond which no more are proposed; wavelengths of a band over a correlation length.
 _MOST_POINTS, _BAND = 2**14, (0.8, 1.2)
 #: Relative change of bonds and stress in the derivative of the area; duration over that of a ramp that nothing delays.
 _RELATIVE_STEP, _VERY_SLOW = 1e-4, 1e6
 
-#: A value in a remark with its unit, if it has one; a number after "=" or in quotes is part of a cure.
-_VALUE = re.compile(
-    r'(?<![\w.^"-])(?<!= )\d+(?:\.\d+)?(?:e[+-]?\d+)?\b(?: [pnµmkMG]?(?P<unit>m/s|N/m|Pa|m|s|N)\b)?'
-)
+#: Slowest and fastest speed that is examined, over those of the stage; number of speeds on either side.
+_SLOWER, _FASTER, _AROUND = 0.01, 100.0, 5
+#: Values of K_c/K − 1 from which on no slope is used, and at which a limit is found; width of ln V at which it is, too.
+_STEEP, _ZERO, _NARROW = 10.0, 1e-4, 1e-4
 
 #: A point of a sweep, and its systematic errors.
 Worst = tuple[Scenario, dict[str, float]]
-
-
-def spread(points: Sequence[Scenario], most: int = 8) -> list[Scenario]:
-    """Return some of the points, first and last included."""
-    places = np.unique(
-        np.linspace(0, len(points) - 1, min(most, len(points))).round().astype(int)
-    )
-    return [points[place] for place in places]
-
-
-def _along(point: Scenario) -> tuple[Array, Array]:
-    """Return times [s] and absolute speeds [m/s] of a run, shape (times, 1); one of each if all are alike."""
-    times, speeds = (
-        np.linspace(0.0, point.times.duration, _TIMES),
-        np.abs(point.speeds(_TIMES)),
-    )
-    count = None if point.contact.changes or np.ptp(speeds) else 1
-    return times[:count, np.newaxis], speeds[:count, np.newaxis]
-
-
-def _areas(
-    point: Scenario, times: Array, speeds: Array, stored: Array | None = None
-) -> Array:
-    """Return A/A_JKR in steady sliding, arguments as of ``steady_course``; nan without a contact."""
-    full = _jkr_radius(point, times)
-    return np.asarray(
-        (
-            steady_course(point, times, speeds, stored).radius
-            / np.where(full > 0.0, full, np.nan)
-        )
-        ** 2
-    )
-
-
-def _jkr_radius(point: Scenario, times: Array) -> Array:
-    """Return the radius with all adhesion at times [s], shape (times, 1) [m]."""
-    work, control = (
-        np.full(times.shape, point.adhesion.work),
-        point.contact.control(times, point.clock.duration),
-    )
-    return control.radius(work, np.zeros(1), 0.0, point.bodies)
 
 
 def systematic_errors(point: Scenario) -> dict[str, float]:
@@ -103,57 +73,33 @@ def systematic_errors(point: Scenario) -> dict[str, float]:
         or not plane > 0.0
     ):
         return known
-    weight, shape, _, constant = point.process.gammas
-    mean, sd = (
-        float(np.sum(weight * shape)) + constant,
-        math.sqrt(np.sum(weight**2 * shape)),
-    )
-    skewness = 2.0 * float(np.sum(weight**3 * shape)) / sd**3 if sd else 0.0
-    whole = skewness / (1.0 - known.get("banded_error_third_cumulant", 0.0))
-    count = _ENERGIES if point.margin is None else _ON_DISC
-    scores = sd * _scores(skewness, count)
+    law, count = StoredEnergy.of(point), energies_of(point)
+    whole = law.skewness / (1.0 - known.get("banded_error_third_cumulant", 0.0))
     energies = np.concatenate(
-        [mean + scores, plane + scores, mean + sd * _scores(whole, count)]
+        [
+            each.values(count)
+            for each in (law, law._replace(mean=plane), law._replace(skewness=whole))
+        ]
     )
-    times, speeds = _along(point)
+    times, speeds = along(point)
     scene = (
         changed(point, {"shear.amplitude.floor": 1.0}) if shear.law.remembers else point
     )
-    areas = _areas(scene, times, speeds, energies).reshape(len(times), 3, count)
-    (cell, exact, banded), gained = np.mean(areas, axis=-1).T, np.zeros(len(times))
+    ratios = areas(scene, times, speeds, energies).reshape(len(times), 3, -1)
+    (cell, exact, banded), gained = np.mean(ratios, axis=-1).T, np.zeros(len(times))
     if point.contact.lags and point.feels_steps:
         left = -0.5 * np.log1p(
             -np.clip(renewed(point, speeds[:, 0] * point.clock.step), 1e-12, 0.999)
         )
-        gained = np.var(np.sqrt(areas[:, 0]), axis=-1) * np.minimum(
+        gained = np.var(np.sqrt(ratios[:, 0]), axis=-1) * np.minimum(
             left / np.tanh(left) - 1.0, 1.0
         )
     errors = np.stack([cell - exact, cell - banded, gained])
     worst = int(np.argmax(np.nan_to_num(np.sum(np.abs(errors), axis=0))))
     relative = errors[:, worst] / (exact[worst] or math.nan)
-    values = *errors[:, worst], *relative, speeds[worst, 0], np.std(areas[worst, 0])
+    values = *errors[:, worst], *relative, speeds[worst, 0], np.std(ratios[worst, 0])
     names = (row.name for row in ERRORS)
     return known | dict(zip(names, map(float, values), strict=True))
-
-
-def _scores(skewness: float, count: int) -> Array:
-    """Return equally likely values of a gamma number of this skewness, scaled to the mean 0 and the variance 1.
-
-    They are found by the trapezoidal rule over the logarithm, because to import ``scipy.special`` would make the start
-    of ``sim run`` and ``sim check`` an eighth longer.
-    """
-    shape = 4.0 / max(skewness, 1e-4) ** 2
-    logs = (
-        np.linspace(-1.0 - 1.0 / math.sqrt(shape), 1.0, _POINTS)
-        * 12.0
-        / math.sqrt(shape)
-    )
-    density = np.exp(shape * (logs - np.expm1(logs)))
-    below = np.cumsum(density) - 0.5 * density
-    values = np.exp(
-        np.interp((np.arange(count) + 0.5) / count, below / np.sum(density), logs)
-    )
-    return cast(Array, (values - np.mean(values)) / np.std(values))
 
 
 def worst(candidates: Iterable[Worst]) -> Worst | None:
@@ -204,35 +150,12 @@ def cure(point: Scenario, errors: dict[str, float]) -> str:
     return 'shear.model = "mean"' if many else " and ".join(changes)
 
 
-def place(plan: Plan, point: Scenario, speed: float) -> str:
-    """Return a point of a sweep and a sliding speed [m/s] in words."""
-    swept = [
-        key
-        for axis in plan.scenario.sweep
-        for key in axis.keys
-        if key not in ("drive.speed", "drive.stage")
-    ]
-    numbers = quantities(point)
-    words = [
-        f"{key} = {engineering(numbers[key][1], numbers[key][0].unit)}"
-        for key in swept
-        if key in numbers
-    ]
-    return ", ".join([*words, engineering(speed, "m/s") if speed else "rest"])
-
-
 def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
     """Return the remarks on a run, one sentence each; ``most`` are its ``worst`` errors if they are known."""
-    alike: dict[str, list[str]] = {}
-    for text in (
-        text
-        for point in spread(plan.points)
-        for text in [*point.remarks(), *_outside(point)]
-    ):
-        alike.setdefault(
-            _VALUE.sub(lambda value: f"\0{value['unit'] or ''}", text), []
-        ).append(text)
-    texts = [_in_range(group) for group in alike.values()]
+    # modes are slow to make, and the remarks on a clock step need them
+    many = COMPUTED if plan.points[0].fluctuations.keeps_modes else SEARCHED
+    texts = grouped(plan, places(len(plan.points), many), Scenario.remarks)
+    texts += grouped(plan, places(len(plan.points), COMPUTED), _outside)
     if (most := most or worst_of_sweep(plan.points)) and (keys := cure(*most)):
         point, area, friction = (
             most[0],
@@ -240,7 +163,7 @@ def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
         )
         too, at = (
             "large" if area > 0.0 else "small",
-            place(plan, point, most[1]["error_speed"]),
+            in_words(plan, point, most[1]["error_speed"]),
         )
         size = (
             f"{abs(area):.2g} points and the friction {abs(friction):.2g} % too {too}"
@@ -254,73 +177,165 @@ def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
     return texts
 
 
-def _in_range(texts: Sequence[str]) -> str:
-    """Return the one remark of remarks that are alike, with ranges in place of values."""
-    ends = []
-    for column in zip(
-        *([value[0] for value in _VALUE.finditer(text)] for text in texts), strict=True
-    ):
-        ordered = sorted(
-            column, key=lambda value: (same_unit(column[0], value) or (0.0, 0.0))[1]
-        )
-        ends.append(" to ".join(dict.fromkeys([ordered[0], ordered[-1]])))
-    return _VALUE.sub(lambda _: ends.pop(0), texts[0])
-
-
 def diagnosis(plan: Plan) -> list[str]:
-    """Return what limits the contact at the middle of a sweep and along its run, in sentences."""
-    point = plan.points[len(plan.points) // 2]
-    if not point.rest_radius > 0.0 or point.fluctuations.passes:
+    """Return the expectations of a run in sentences: what masks its contacts, and what reduces their area."""
+    examined = places(len(plan.points), COMPUTED)
+    scenes = {
+        place: plan.points[place]
+        for place in examined
+        if not plan.points[place].fluctuations.passes
+    }
+    courses = {place: expected(scene) for place, scene in scenes.items()}
+    closed = {
+        place: course
+        for place, course in courses.items()
+        if np.any(np.isfinite(course.area))
+    }
+    if not closed:
         return []
-    time, speed = (
-        np.full((1, 1), 0.5 * point.clock.duration),
-        np.abs(point.speeds(3)[1:2, np.newaxis]),
+    middle = plan.points[list(closed)[len(closed) // 2]]
+    return [
+        *_stored(plan, closed),
+        *_masked(plan, closed, examined),
+        *_pulled_off(plan, closed, examined),
+        *_smallest_area(plan, closed),
+        *_largest_losses(plan, list(closed)),
+        *grouped(plan, list(closed), _waves),
+        *_sensitive(plan, middle),
+        *_lagging(plan, middle),
+    ]
+
+
+#: Steady sliding at points of a sweep, by their places.
+Courses = Mapping[int, Expected]
+
+
+def _percents(shares: Iterable[float]) -> str:
+    """Return shares in percent as text, the least and the largest of several; only all is 100 %."""
+    known = [100.0 * share for share in shares if math.isfinite(share)]
+    ends = (
+        "over 99.9" if 99.95 <= value < 100.0 else f"{value:.3g}"
+        for value in (min(known), max(known))
     )
-    at = place(plan, point, float(speed[0, 0]))
-    where, texts = f" at {at}" if len(plan.points) > 1 else "", list[str]()
-    if point.fluctuations.spectrum.variance:
-        texts = [*_fluctuating(point, where), *_mechanisms(point, time, speed, at)]
-    if shown := list(
-        sensitivities(point, float(time[0, 0]), float(speed[0, 0])).items()
-    )[:_KEYS]:
-        words = [
-            f"{key} {area:+.2g}" + f"/{force:+.2g}" * bool(force)
-            for key, (area, force) in shown
-        ]
-        texts.append(
-            f"area/friction change (%) for 1 % more of a key, at {at}: {', '.join(words)}"
+    return f"{' to '.join(dict.fromkeys(ends))} %"
+
+
+def _stored(plan: Plan, courses: Courses) -> Iterator[str]:
+    """Yield a sentence on the size of the stored energy beside the work of adhesion."""
+    most = {place: float(np.max(course.energy)) for place, course in courses.items()}
+    works = [plan.points[place].adhesion.work for place in courses]
+    if not max(most.values()) > 0.0 or not min(works) > 0.0:
+        return
+    ends = (engineering(end(most.values()), "J/m^2") for end in (min, max))
+    shares = (most[place] / plan.points[place].adhesion.work for place in most)
+    yield (
+        f"stored energy in steady sliding {' to '.join(dict.fromkeys(ends))},"
+        f" {_percents(shares)} of the work of adhesion"
+    )
+
+
+def _masked(plan: Plan, courses: Courses, examined: Sequence[int]) -> Iterator[str]:
+    """Yield a sentence on the share of the time in which contacts are masked."""
+    most = {
+        place: float(np.max(course.masked))
+        for place, course in courses.items()
+        if plan.points[place].adhesion.work > 0.0
+    }
+    masked = [place for place, share in most.items() if share > _NEVER]
+    if not masked:
+        return
+    along_run = [courses[place].masked_time for place in masked]
+    varies = any(len(courses[place].masked) > 1 for place in masked)
+    noise = any(plan.points[place].population.per_member for place in masked)
+    text = f"masked for {'about ' * varies}{_percents(along_run)} of the time in steady sliding"
+    text += ", without the noise of the bonds" * noise
+    text += f" {points_in_words(plan, masked, examined)}".rstrip()
+    place = max(masked, key=lambda place: most[place])
+    members = f"{_percents([most[place]])} of the members at one time"
+    if len(masked) > 1 or varies:
+        speed = float(courses[place].speed[np.argmax(courses[place].masked)])
+        at = in_words(plan, plan.points[place], speed)
+        yield f"{text}; most at {at}: {members}"
+    else:
+        yield f"{text}, as are {members}"
+
+
+def _pulled_off(plan: Plan, courses: Courses, examined: Sequence[int]) -> Iterator[str]:
+    """Yield a sentence on contacts that fluctuations and broken bonds open."""
+    # a contact that is open with all its adhesion is none that they open
+    lost = {
+        place: float(np.max(np.where(np.isnan(course.without[0]), 0.0, course.lost)))
+        for place, course in courses.items()
+    }
+    opened = [place for place, share in lost.items() if share > _NEVER]
+    if opened:
+        shares = _percents(lost[place] for place in opened)
+        where = points_in_words(plan, opened, examined)
+        text = (
+            f"pulled off in steady sliding: up to {shares} of the members at one time"
         )
-    return [*texts, *_lagging(point)]
+        yield f"{text} {where}".rstrip()
 
 
-def _fluctuating(point: Scenario, where: str) -> Iterator[str]:
-    """Yield sentences on the size of the stored energy and on the waves that store it."""
-    shear, spectrum, work = (
-        point.fluctuations,
-        point.fluctuations.spectrum,
-        point.adhesion.work or math.inf,
-    )
-    course = steady_course(point, *_along(point))
-    most, paid = (
-        float(np.max(course.energy)),
-        float(np.min(shear.paid_by_adhesion * course.energy)) / work,
-    )
-    masked, always = (
-        course.work <= 0.0,
-        "at any speed" if shear.amplitude.model == "constant" else "throughout the run",
-    )
-    how = (
-        f": masked {always}"
-        if paid >= 1.0
-        else f": nearly masked {always}"
-        if paid > _MASKING
-        else ""
-    )
-    if paid < 1.0 and np.any(masked):
-        noise = " without the noise of the bonds" if point.population.per_member else ""
-        how = f": masked {'throughout' if np.all(masked) else 'in part of'} the run{where}{noise}"
-    share = f"{100.0 * most / work:.2g} % of the work of adhesion"
-    yield f"stored energy in steady sliding {engineering(most, 'J/m^2')}, {share}{how}"
+def _smallest_area(plan: Plan, courses: Courses) -> Iterator[str]:
+    """Yield the mean A/A_JKR where it is smallest, and the points that each mechanism takes in both orders."""
+    place = min(courses, key=lambda place: float(np.nanmin(courses[place].area)))
+    course = courses[place]
+    row = int(np.nanargmin(course.area))
+    rest, bonds, waves, left = 100.0 * course.without[:, row]
+    # if bonds are subtracted before the fluctuations, and after them
+    taken = {
+        "the mean stress": (100.0 - rest, 100.0 - rest),
+        "bonds": (rest - bonds, waves - left),
+        "fluctuations": (bonds - left, rest - waves),
+    }
+    taken = {name: pair for name, pair in taken.items() if max(pair) > _NO_POINT}
+    if not taken:
+        return
+    every = np.concatenate([course.area for course in courses.values()])
+    varies = np.nanmax(every) > np.nanmin(every)
+    smallest = ", smallest" if varies else ""
+    at = in_words(plan, plan.points[place], float(course.speed[row]))
+    text = f"mean A/A_JKR {_percents(every)}{smallest} at {at}: points taken by"
+    text += ",".join(f" {name} {points:.2g}" for name, (points, _) in taken.items())
+    if taken.keys() >= {"bonds", "fluctuations"}:
+        bonds, waves = taken["bonds"][1], taken["fluctuations"][1]
+        text += f" ({bonds:.2g} and {waves:.2g} if fluctuations are subtracted first)"
+    yield text
+
+
+def _largest_losses(plan: Plan, closed: Sequence[int]) -> Iterator[str]:
+    """Yield the largest loss of area that each mechanism can cause at the load of the run."""
+    points = [plan.points[place] for place in closed]
+    losses = [largest_losses(point) for point in points]
+    whole = [float(np.nanmax(loss.waves)) for loss in losses]
+    all_paid = all(point.fluctuations.paid_by_adhesion > 0.0 for point in points)
+    columns: dict[str, list[Array]] = {
+        "broken bonds": [loss.bonds for loss in losses],
+        "fluctuations" + " if shear.paid_by_adhesion = 1" * (not all_paid): [
+            loss.waves for loss in losses
+        ],
+        "the mean stress if contact.reversible = 1": [
+            np.nanmax(loss.mean_stress, keepdims=True) for loss in losses
+        ],
+    }
+    by_size: dict[str, list[str]] = {}
+    for name, column in columns.items():
+        shares = np.concatenate(column)
+        size = _percents(shares) + " (a pull-off)" * bool(np.nanmax(shares) == 1.0)
+        by_size.setdefault(size, []).append(name)
+    at = in_words(plan, points[int(np.argmax(whole))]) if np.ptp(whole) > 0.0 else ""
+    most = f" (most at {at})" if at else ""
+    words = (f"{size} by {' or '.join(names)}" for size, names in by_size.items())
+    kind = points[0].contact.kind
+    yield f"largest loss of area at this {kind}{most}: {', '.join(words)}"
+
+
+def _waves(point: Scenario) -> Iterator[str]:
+    """Yield sentences on the waves that store the energy."""
+    spectrum = point.fluctuations.spectrum
+    if not (spectrum.variance and point.rest_radius > 0.0):
+        return
     long_waves = share_of_long_waves(
         spectrum, 2.0 * point.rest_radius, point.solid.effective[1]
     )
@@ -336,6 +351,21 @@ def _fluctuating(point: Scenario, where: str) -> Iterator[str]:
         )
 
 
+def _sensitive(plan: Plan, point: Scenario) -> Iterator[str]:
+    """Yield the keys that change area and friction most, at the middle of a run."""
+    time, speed = 0.5 * point.clock.duration, abs(float(point.speeds(3)[1]))
+    known = sensitivities(point, time, speed)
+    words = [
+        f"{key} {area:+.2g}" + f"/{force:+.2g}" * bool(force)
+        for key, (area, force) in list(known.items())[:_KEYS]
+    ]
+    if words:
+        at = in_words(plan, point, speed)
+        fluctuates = point.fluctuations_move_contact
+        of_mean = " and the mean ΔΓ" * fluctuates
+        yield f"area/friction change (%) for 1 % more of a key, at {at}{of_mean}: {', '.join(words)}"
+
+
 def over_band(spectrum: Family) -> float | None:
     """Return the energy of a spectrum over that of wavelengths near its correlation length with the same rms.
 
@@ -347,21 +377,6 @@ def over_band(spectrum: Family) -> float | None:
     short, long = (factor * cast(Any, spectrum).length for factor in _BAND)
     band = Band(rms=cast(Any, spectrum).rms, shortest=short, longest=long)
     return plane_energy(spectrum, 1.0, 0.5) / plane_energy(band, 1.0, 0.5)
-
-
-def _mechanisms(point: Scenario, time: Array, speed: Array, at: str) -> Iterator[str]:
-    """Yield the points of A/A_JKR that each mechanism takes, in both orders, and the area without fluctuations."""
-    whole, none = changed(point, {"adhesion.bond_share": 0.0}), np.zeros((1, 1))
-    scenes = (whole, none), (point, none), (whole, None), (point, None)
-    rest, bonds, waves, left = (
-        100.0 * float(_areas(scene, time, speed, stored)[0, 0])
-        for scene, stored in scenes
-    )
-    if bonds > left:
-        first = f"bonds take {rest - bonds:.2g} points, fluctuations {bonds - left:.2g}"
-        other = f" ({waves - left:.2g} and {rest - waves:.2g} if fluctuations are subtracted first)"
-        yield f"the mean A/A_JKR at {at} is {left:.3g} %: {first}{other if bonds < rest else ''}"
-        yield f"by the paper's strict balance (shear.paid_by_adhesion = 0) A/A_JKR is {bonds:.3g} %"
 
 
 def _along_course(point: Scenario, slower: float) -> Array:
@@ -388,7 +403,7 @@ def _along_course(point: Scenario, slower: float) -> Array:
     course = follow(
         scene, MemberNoise.of(0, np.zeros(1, int)), None, range(_STEPS + 1)
     )[1]
-    area = course.radius**2 / _jkr_radius(scene, course.time) ** 2
+    area = course.radius**2 / jkr_radius(scene, course.time) ** 2
     return np.stack([area, area * course.strength, course.speed])[..., 0]
 
 
@@ -415,7 +430,7 @@ def _behind(course: Array, steady: Array) -> tuple[float, float, float]:
     )
 
 
-def _lagging(point: Scenario) -> Iterator[str]:
+def _lagging(plan: Plan, point: Scenario) -> Iterator[str]:
     """Yield how far values along a ramp or table are from steady ones, and how far they would be along a slower one.
 
     There is no statement for few bonds and for a relaxing amplitude, which the course leaves out, nor for a part
@@ -439,9 +454,10 @@ def _lagging(point: Scenario) -> Iterator[str]:
             for value in behind[:2] + _behind(_along_course(point, 10.0), steady)[:2]
         ]
         times = "10 times drive.time and " if rows else ""
+        at = f" at {in_words(plan, point)}" if len(plan.points) > 1 else ""
         yield (
-            f"along the {point.drive.model} A/A_JKR is up to {values[0]:.2g} points off its steady value, the friction"
-            f" {values[1]:.2g} % of its largest (near {engineering(behind[2], 'm/s')});"
+            f"along the {point.drive.model}{at} A/A_JKR is up to {values[0]:.2g} points off its steady value, the"
+            f" friction {values[1]:.2g} % of its largest (near {engineering(behind[2], 'm/s')});"
             f' {times}clock.duration = "{engineering(longer, "s")}" leaves {values[2]:.2g} points and {values[3]:.2g} %'
         )
 
@@ -480,10 +496,108 @@ def slider_body(point: Scenario, speeds: Array) -> Body:
     )
 
 
+class Stability(NamedTuple):
+    """Stability of steady sliding behind the spring of a scene, by the linear theory.
+
+    Attributes
+    ----------
+    stiffness, speed, frequency : float
+        Stiffness below which some speed of the run is unstable [N/m], that speed [m/s], and the frequency of the
+        oscillations [1/s]. The stiffness is 0 if every spring holds, and infinite if none does.
+    unstable : list of (float, float)
+        Ranges of the speed that are unstable behind the spring [m/s]; 0 and infinity are ends that were not found.
+    """
+
+    stiffness: float
+    speed: float
+    frequency: float
+    unstable: list[tuple[float, float]]
+
+
+def stability(point: Scenario) -> Stability:
+    """Return the stability of steady sliding of a scene with a spring, at the speeds of its stage and around them."""
+    spring = cast(Spring, point.drive).spring
+    of_run = _distinct_speeds(point)
+    if not of_run.size:
+        return Stability(0.0, 0.0, math.nan, [])
+    below = of_run[0] * np.geomspace(_SLOWER, 1.0, _AROUND)[:-1]
+    above = of_run[-1] * np.geomspace(1.0, _FASTER, _AROUND)[1:]
+    speeds = np.concatenate([below, of_run, above])
+    known = onset(point, speeds)
+    worst = len(below) + int(np.argmax(known.stiffness[len(below) :][: len(of_run)]))
+    excess = _excess(known, spring)
+    holds = excess <= 0.0
+    places = np.flatnonzero(holds[1:] != holds[:-1])
+    edges = [
+        *[0.0] * (not holds[0]),
+        *(_edge(point, speeds[k : k + 2], excess[k : k + 2]) for k in places),
+        *[math.inf] * (not holds[-1]),
+    ]
+    return Stability(
+        float(known.stiffness[worst]),
+        float(speeds[worst]),
+        float(known.frequency[worst]) / (2.0 * math.pi),
+        list(zip(edges[::2], edges[1::2], strict=True)),
+    )
+
+
+def _distinct_speeds(point: Scenario) -> Array:
+    """Return the distinct speeds of a run above zero [m/s], in increasing order."""
+    speeds = np.unique(np.abs(point.speeds(TIMES)))
+    return np.asarray(speeds[speeds > 0.0])
+
+
+def _excess(known: Onset, spring: float) -> Array:
+    """Return K_c/K − 1, bounded, of a needed stiffness K_c and that of a spring; sliding is unstable above 0."""
+    return np.minimum(known.stiffness / spring - 1.0, _STEEP)
+
+
+def _edge(point: Scenario, speeds: Array, excess: Array) -> float:
+    """Return the limit of stability between two speeds [m/s] by regula falsi, or by halving where no law is smooth."""
+    spring = cast(Spring, point.drive).spring
+    (first, last), (before, after), moved = np.log(speeds), excess, ""
+    while last - first > _NARROW:
+        is_steep = max(before, after) >= _STEEP
+        share = 0.5 if is_steep else before / (before - after)
+        middle = first + share * (last - first)
+        here = float(_excess(onset(point, np.exp([middle])), spring)[0])
+        if abs(here) < _ZERO:
+            return math.exp(middle)
+        # the value at an end that stays twice is halved, so that the other does not move alone
+        if (here > 0.0) == (before > 0.0):
+            after = 0.5 * after if moved == "first" and not is_steep else after
+            first, before, moved = middle, here, "first"
+        else:
+            before = 0.5 * before if moved == "last" and not is_steep else before
+            last, after, moved = middle, here, "last"
+    return math.exp(0.5 * (first + last))
+
+
+def onset(point: Scenario, speeds: Array) -> Onset:
+    """Return the onset of oscillations behind a spring at speeds [m/s], with the stiffness 0 where every spring holds.
+
+    It does not depend on the spring, so points of a sweep over the spring share it.
+    """
+    body = slider_body(point, speeds)
+    terms = tuple(tuple(np.ravel(number)) for number in body)
+    return _onset(cast(Any, point.population), tuple(speeds), terms)
+
+
+@functools.lru_cache(maxsize=64)
+def _onset(
+    bonds: Rate | Cohort | FirstMoment,
+    speeds: tuple[float, ...],
+    body: tuple[tuple[float, ...], ...],
+) -> Onset:
+    """Return the onset of oscillations of a body whose numbers are tuples."""
+    result = bonds.onset(np.array(speeds), Body(*map(np.array, body)))
+    return result._replace(stiffness=np.nan_to_num(result.stiffness, posinf=math.inf))
+
+
 def _outside(point: Scenario) -> Iterator[str]:
     """Yield a remark if sliding is unstable behind the contact's own stiffness: no slider on it is rigid."""
     if point.drive.model == "spring" and point.drive.contact_stiffness == "half_space":
-        speeds = np.abs(point.speeds(_TIMES))
+        speeds = np.unique(np.abs(point.speeds(TIMES)))
         bonds, body = (
             cast(Rate | Cohort | FirstMoment, point.population),
             slider_body(point, speeds),

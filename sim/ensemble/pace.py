@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from sim.engine import MemberNoise, State, follow, pack, start, unpack
-from sim.ensemble.diagnosis import spread
 from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots
+from sim.ensemble.swept import spread
 from sim.numerics.stopwatch import stopwatch
 from sim.scenario.scenario import Scenario
 from sim.units.errors import BadInput

@@ -8,27 +8,28 @@ import tomllib
 from collections.abc import Sequence
 from typing import Any, NamedTuple, cast
 
-import numpy as np
-
 from sim.ensemble.diagnosis import (
+    COMPUTED,
+    SEARCHED,
     Worst,
     diagnosis,
-    place as in_words,
     remarks,
-    slider_body,
-    spread,
+    stability,
     worst_of_sweep,
 )
 from sim.ensemble.pace import counted, pace as pace_of
 from sim.ensemble.plan import IN_MEMORY, Plan, map_bytes, state_numbers, work
+from sim.ensemble.swept import grouped, in_words, places, spread
 from sim.laws import jkr
-from sim.parts.bonds.models import Cohort, FirstMoment, Rate
+from sim.laws.limits import JKR_FROM
 from sim.parts.drive import Spring
 from sim.parts.exchange import Parts
 from sim.parts.shear.modes import ModalProcess
 from sim.quantities import SOURCES
+from sim.scenario.checks import DISTANCES, LARGEST_STRAIN
 from sim.scenario.scenario import Record, Scenario
 from sim.scenario.schema import Entry, distinct, entries
+from sim.units.notation import engineering
 from sim.units.quantity import read_option
 from sim.units.terminal import duration
 
@@ -252,9 +253,10 @@ def preview(scenario: Scenario) -> str:
         "models": _models(plan),
         "quantities in SI": _quantities(plan.points),
         "contact at rest": _contact(plan.points),
+        "limits of the theory": _limits(spread(plan.points, SEARCHED)),
         "fluctuations": _fluctuations(some),
         "errors of the result": _errors(plan, most),
-        "slider": _slider([point for point in some if point.drive.solves_motion]),
+        "slider": _slider(plan),
         "diagnosis": [(text,) for text in diagnosis(plan)],
         "notes": [(text,) for text in remarks(plan, most)],
         "the run": _run(plan),
@@ -394,6 +396,39 @@ def _contact(points: Sequence[Scenario]) -> Rows:
     return [*rows, ("pull-off load", _span(loads, "N"))] if loads else rows
 
 
+def _limits(points: Sequence[Scenario]) -> Rows:
+    """Return the numbers that tell if the scenes lie within the theory, each with its meaning."""
+    known = [point.limits for point in points]
+    near, far = (f"{1e9 * distance:g}" for distance in DISTANCES)
+    rows: Rows = []
+    if tabor := [number for row in known for number in row.tabor if number > 0.0]:
+        meaning = (
+            f"for z0 = {near} to {far} nm; JKR's theory holds above about {JKR_FROM:g}"
+        )
+        rows.append(("Tabor number", _span(tabor, digits=".3g"), meaning))
+    if slopes := [row.slope for row in known if row.slope > 0.0]:
+        meaning = (
+            f"strain of the solid; a parabola is a sphere below about {LARGEST_STRAIN}"
+        )
+        rows.append(("a/R", _span(slopes, digits=".3g"), meaning))
+    if strains := [row.strain for row in known if row.strain > 0.0]:
+        meaning = "shear strain of the surface; finite strains reduce the area from about 0.1 on"
+        rows.append(("tau0/G", _span(strains, digits=".3g"), meaning))
+    tensions = [tension for row in known for tension in row.tensions]
+    low, high = (engineering(end(tensions), "N/m") for end in (min, max))
+    lengths = [length for row in known for length in row.capillary]
+    meaning = f"for gamma = {low} to {high} (half the work of adhesion, water); surface tension"
+    shares = [
+        row.capillary[1] / point.widest
+        for row, point in zip(known, points, strict=True)
+        if point.widest > 0.0
+    ]
+    if shares:
+        meaning += f" matters in smaller contacts, of which this has at least {1.0 / max(shares):.2g} times the radius"
+    rows.append(("gamma/E", _span(lengths, "m", ".3g"), meaning))
+    return rows
+
+
 def _fluctuations(points: Sequence[Scenario]) -> Rows:
     """Return the size of the fluctuations on the infinite plane, and the errors of the cell."""
     fields = [
@@ -474,38 +509,58 @@ def _errors(plan: Plan, most: Worst | None) -> Rows:
     return [*rows, ("largest at", in_words(plan, point, errors["error_speed"]))]
 
 
-def _slider(points: Sequence[Scenario]) -> Rows:
-    """Return the stiffness of the contact, and that of the spring below which sliding is unstable."""
-    rows: dict[tuple[str, str], list[float]] = {}
-    for point in points:
-        drive, speeds = cast(Spring, point.drive), np.abs(point.speeds(41))
-        yields, slope = drive.yields(*point.solid.effective)
-        compliance = yields + slope / math.sqrt(point.contact_area / math.pi)
-        rows.setdefault(("contact k_t", "N/m"), []).append(
-            1.0 / compliance if compliance else math.inf
+def _slider(plan: Plan) -> Rows:
+    """Return the stiffness of the contact, and the springs and speeds at which steady sliding is unstable."""
+    examined = places(len(plan.points), COMPUTED)
+    points = [plan.points[place] for place in examined]
+    driven = [point for point in points if point.drive.solves_motion]
+    compliances = []
+    for point in driven:
+        yields, slope = cast(Spring, point.drive).yields(*point.solid.effective)
+        compliances.append(yields + slope / math.sqrt(point.contact_area / math.pi))
+    rows: Rows = []
+    if compliances:
+        stiffnesses = [1.0 / each if each else math.inf for each in compliances]
+        rows.append(("contact k_t", _span(stiffnesses, "N/m")))
+    sprung = {
+        id(point): stability(point)
+        for point in driven
+        if cast(Spring, point.drive).spring
+    }
+    if not sprung:
+        return rows
+    drives = [cast(Spring, point.drive) for point in driven if id(point) in sprung]
+    if frequencies := [
+        math.sqrt(drive.spring / drive.mass) / (2.0 * math.pi)
+        for drive in drives
+        if drive.mass > 0.0
+    ]:
+        rows.append(
+            ("natural frequency", f"{_span(frequencies)} Hz, of mass and spring")
         )
-        if not drive.spring:
-            continue
-        if drive.mass > 0.0:
-            frequency = math.sqrt(drive.spring / drive.mass) / (2.0 * math.pi)
-            rows.setdefault(("natural frequency", "Hz, of mass and spring"), []).append(
-                frequency
-            )
-        onset = cast(Rate | Cohort | FirstMoment, point.population).onset(
-            speeds, slider_body(point, speeds)
-        )
-        stiffness = np.where(np.isnan(onset.stiffness), 0.0, onset.stiffness)
-        worst = int(np.argmax(stiffness))
-        text = "N/m of the spring (0: never, inf: with any spring)"
-        rows.setdefault(("oscillates below", text), []).append(float(stiffness[worst]))
-        if stiffness[worst] > 0.0:
-            rows.setdefault(("sliding speed then", "m/s"), []).append(
-                float(speeds[worst])
-            )
-            rows.setdefault(("frequency then", "Hz"), []).append(
-                float(onset.frequency[worst]) / (2.0 * math.pi)
-            )
-    return [(name, f"{_span(values)} {text}") for (name, text), values in rows.items()]
+    known = [*sprung.values()]
+    most = max(known, key=lambda each: each.stiffness)
+    text = f"{_span([each.stiffness for each in known])} N/m of the spring"
+    if most.stiffness > 0.0:
+        text += f" (inf: with any spring), at {engineering(most.speed, 'm/s')} with {most.frequency:.4g} Hz"
+    rows.append(("oscillates below", text))
+
+    def speeds(point: Scenario) -> list[str]:
+        return [_unstable(sprung[id(point)].unstable)] if id(point) in sprung else []
+
+    return rows + [("steady sliding", text) for text in grouped(plan, examined, speeds)]
+
+
+def _unstable(ranges: Sequence[tuple[float, float]]) -> str:
+    """Return ranges of unstable speeds in words."""
+    if not ranges:
+        return "stable at any speed behind this spring"
+    words = []
+    for low, high in ranges:
+        above = f"above {engineering(low, 'm/s')}" if low > 0.0 else "if slow"
+        again = f", and stable again above {engineering(high, 'm/s')}"
+        words.append(above + (again if high < math.inf else ""))
+    return f"unstable {', unstable '.join(words)}, behind this spring"
 
 
 def _run(plan: Plan) -> Rows:

@@ -3,7 +3,7 @@
 import importlib
 from types import ModuleType
 
-__all__ = ["halfspace", "jkr", "reversible", "schallamach", "theories"]
+__all__ = ["halfspace", "jkr", "limits", "reversible", "schallamach", "theories"]
 
 
 def __getattr__(name: str) -> ModuleType:

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterator
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
 from sim.laws import jkr
+from sim.laws.limits import JKR_FROM, elastocapillary_length, tabor_number
 from sim.parts.bonds.models import Cohort, Tracked
 from sim.parts.exchange import Array
 from sim.spectrum.families import BondMade, Measured
@@ -213,17 +214,87 @@ def _off_the_map(scene: Scene) -> Faults:
 
 #: Rms of the fluctuations over the mean stress above which a remark is made: some 2 % of the area is reversed.
 _MOST_REVERSED = 0.5
-_LARGEST_STRAIN = 0.3
+#: Strain, and radius over that of the sphere, above which a remark is made; the same of γ/E over the contact radius.
+LARGEST_STRAIN, LARGEST_CAPILLARITY = 0.3, 0.1
+#: Equilibrium distances of two surfaces between which those of most solids lie [m].
+DISTANCES = 0.4e-9, 0.16e-9
+#: Surface tension of water, and so of a wet gel [N/m].
+WATER = 0.072
 #: Decades between the stress of a map and that of the bonds from which a factor of 1000 is nearer than none.
 _FAR = 1.5
 #: Radius of a sphere that is rather a number whose unit was forgotten [m].
 _LARGEST_SPHERE = 1.0
 
 
+class Limits(NamedTuple):
+    """Numbers that tell if a scene lies within the theory of small strains and short-ranged adhesion.
+
+    Attributes
+    ----------
+    tabor : tuple of float
+        Tabor number at each of ``DISTANCES`` [1].
+    slope, strain : float
+        Largest contact radius over that of the sphere, and largest mean stress over the shear modulus [1].
+    tensions, capillary : tuple of float
+        Surface tensions [N/m], which no scenario gives: half of the work of adhesion, as of two equal solids without
+        any energy of their interface, and that of water. The elastocapillary length of each [m].
+    """
+
+    tabor: tuple[float, float]
+    slope: float
+    strain: float
+    tensions: tuple[float, float]
+    capillary: tuple[float, float]
+
+
+def limits(scene: Scene) -> Limits:
+    """Return the numbers that tell if a scene lies within the theory."""
+    work, size, modulus = (
+        scene.adhesion.work,
+        scene.sphere.radius,
+        scene.solid.contact_modulus,
+    )
+    strength = scene.strengths[1]
+    low, high = sorted((0.5 * work, WATER))
+    lengths = elastocapillary_length(np.array([low, high]), *scene.solid.effective)
+    tabor = tabor_number(work, size, modulus, np.array(DISTANCES))
+    return Limits(
+        (float(tabor[0]), float(tabor[1])),
+        scene.widest / size,
+        float(np.max(strength)) / scene.setting.shear_modulus,
+        (low, high),
+        (float(lengths[0]), float(lengths[1])),
+    )
+
+
+def _remarks_on_theory(scene: Scene, known: Limits) -> Iterator[str]:
+    """Yield a remark for each number that lies outside of the theory."""
+    if 0.0 < known.tabor[0] < JKR_FROM:
+        near, far = (f"{distance * 1e9:g} nm" for distance in DISTANCES)
+        yield (
+            f"the Tabor number is {known.tabor[0]:.2g} for z0 = {near} and {known.tabor[1]:.2g} for z0 = {far}:"
+            f" JKR's theory holds above about {JKR_FROM:g}"
+        )
+    if known.slope > LARGEST_STRAIN:
+        yield (
+            f"the contact radius reaches {known.slope:.2g} of the sphere's, beyond {LARGEST_STRAIN}: the theory is"
+            " valid for small contacts"
+        )
+    if known.strain > LARGEST_STRAIN:
+        yield f"the mean stress is {known.strain:.2g} times the shear modulus, beyond linear elasticity"
+    share = known.capillary[1] / scene.widest if scene.widest else 0.0
+    if share > LARGEST_CAPILLARITY:
+        tension = engineering(known.tensions[1], "N/m")
+        yield (
+            f"surface tension, which is left out, may matter: γ/E is {share:.2g} of the contact radius if"
+            f" γ = {tension}"
+        )
+
+
 def remarks_between(scene: Scene) -> list[str]:
     """Return assumptions and limits of the parts together."""
     drive, bonds, shear, contact = scene.chosen
-    speeds = scene.speeds(41)
+    speeds, strength = scene.strengths
     remarks = []
     if (radius := scene.sphere.radius) > _LARGEST_SPHERE:
         remarks.append(
@@ -238,12 +309,7 @@ def remarks_between(scene: Scene) -> list[str]:
         remarks.append(
             'bonds continue to slide while the contact is open; bonds.area = "carried" starts without bonds'
         )
-    strength = np.broadcast_to(bonds.steady(speeds).strength, speeds.shape)
-    strain = strength.max() / scene.setting.shear_modulus
-    if strain > _LARGEST_STRAIN:
-        remarks.append(
-            f"the mean stress is {strain:.2g} times the shear modulus, beyond linear elasticity"
-        )
+    remarks += _remarks_on_theory(scene, scene.limits)
     remarks += _remark_on_unit(shear, float(strength.max()))
     rms = math.sqrt(shear.spectrum.variance) * shear.amplitude.factor(speeds, strength)
     if not shear.spectrum.bond_made and np.any(

@@ -30,7 +30,7 @@ from sim.parts.shear import Model, Process, Shear, Uniform
 from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
 from sim.quantities import RECORDED
-from sim.scenario.checks import faults_across, pulled, remarks_between
+from sim.scenario.checks import Limits, faults_across, limits, pulled, remarks_between
 from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
 from sim.scenario.schema import quantities, with_models
@@ -45,6 +45,8 @@ _Title = Annotated[
         max_length=200, description="subject of the scenario and title of the dataset"
     ),
 ]
+#: Times of a run between which its speeds are looked at for remarks.
+_SPEEDS = 41
 #: Points of a sweep whose shear processes are all tried.
 _MOST_BUILT = 64
 #: Faults of a sweep that are reported at once.
@@ -492,6 +494,18 @@ class Scenario:
             self._square,
             self.times,
         )
+
+    @cached_property
+    def strengths(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return distinct speeds of the run [m/s], and the stress of the bonds in steady sliding at them [Pa]."""
+        speeds = np.unique(self.speeds(_SPEEDS))
+        strength = self.population.steady(speeds).strength
+        return speeds, np.broadcast_to(strength, speeds.shape)
+
+    @cached_property
+    def limits(self) -> Limits:
+        """Return the numbers that tell if the scene lies within the theory."""
+        return limits(self)
 
     @property
     def chosen(self) -> tuple[Drive, BondModel, Model, Contact]:

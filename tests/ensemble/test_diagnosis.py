@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy
-from helpers.parts import jkr, load, read, run
+from helpers.parts import Adhesion, Equilibrium, Time, jkr, load, read, read_sweep, run
 from helpers.scenes import BONDS, CONTACTS, DRIVES, SHEARS, scene as small
 from numpy.testing import assert_allclose
 
@@ -19,11 +19,16 @@ from sim.ensemble.diagnosis import (
     cure,
     diagnosis,
     remarks,
+    stability,
     systematic_errors,
 )
+from sim.ensemble.expected import StoredEnergy
 from sim.ensemble.plan import Plan
 from sim.ensemble.preview import preview
 from sim.ensemble.steady import sensitivities
+from sim.parts.bonds.models import Steady, Unbroken
+from sim.parts.drive import Steady as AtSpeed
+from sim.parts.shear.models import Banded
 from sim.parts.shear.modes import modes
 from sim.spectrum.families import (
     AnisotropicGaussian,
@@ -308,45 +313,70 @@ def test_the_lag_along_a_ramp_is_that_of_the_rate_equation(scene):
     )
 
 
+def said(texts, start):
+    """The sentences that begin with some words."""
+    return [text for text in texts if text.startswith(start)]
+
+
+#: A field of modes whose fifty thousand energies are drawn below, at three loads and behind bonds that break.
+CALM = LENS | {"spectrum": GAUSSIAN | {"rms": "60 kPa"}}
+BROKEN = {"model": "steady", "critical_speed": "9 um/s", "stress": "0.1 MPa"}
+
+
+def drawn(lens, count=50_000):
+    """Energies ΔΓ that a cell stores, as sums of one exponential number for each pair of modes."""
+    cell = modes(
+        lens.fluctuations.spectrum, lens.fluctuations.side(lens.setting.cell), 256
+    )
+    weights = cell.energies(G, 0.5)
+    return np.random.default_rng(4).exponential(size=(count, weights.size)) @ weights
+
+
 def test_the_diagnosis_has_the_numbers_of_closed_forms_and_goes_with_the_dataset(scene):
-    bonds = {"model": "steady", "critical_speed": "9 um/s", "stress": "0.1 MPa"}
-    calm = GAUSSIAN | {"rms": "60 kPa"}
     lens = scene(
-        shear=LENS | {"spectrum": calm},
-        bonds=bonds,
+        shear=CALM,
+        bonds=BROKEN,
         sweep={"contact.load": ["1 mN", "5 mN", "20 mN"]},
     )
     texts = diagnosis(plan := Plan.of(lens))
-    stored = STORED * (60 / 80) ** 2
-    full = area(W, 5e-3)
-    rest, bonded, waves, both = (
-        100 * float(area(w, 5e-3) / full)
-        for w in (W, 0.9 * W, W - stored, 0.9 * W - stored)
+    energies = drawn(plan.points[0])
+    ratio = area(W - energies) / area(W)
+    bonded = area(0.9 * W) / area(W)
+    both = area(0.9 * W - energies) / area(W)
+    (stored,) = said(texts, "stored energy")
+    # the smallest cell, of the smallest load, stores least
+    assert_allclose(
+        float(re.search(r"sliding ([0-9.]+) mJ/m²", stored)[1]),
+        1e3 * energies.mean(),
+        atol=4e3 * energies.std() / math.sqrt(energies.size),
     )
-    energy, long, length, mechanisms, strict, *_ = texts
-    assert energy.startswith(
-        f"stored energy in steady sliding {1e3 * stored:.4g} mJ/m², {100 * stored / W:.2g} % of"
-    )
-    fast = bonds | {"critical_speed": "0.1 um/s"}
-    fast = Plan.of(
-        scene(shear=LENS, bonds=fast, sweep={"contact.load": ["1 mN", "5 mN"]})
-    )
-    assert (
-        "masked throughout the run at contact.load = 5 mN, 1 µm/s" in diagnosis(fast)[0]
-    )
-    radius = math.sqrt(full / math.pi)
-    assert f"store {100 * math.erf(math.pi * 10e-6 / (2 * radius)):.2g} %" in long
+    (mean,) = said(texts, "mean A/A_JKR")
+    smallest, at, taken = re.fullmatch(
+        r"mean A/A_JKR ([0-9.]+) to [0-9.]+ %, smallest at ([^:]*): points taken by"
+        r" (.*) if fluctuations are subtracted first\)",
+        mean,
+    ).groups()
+    assert at == "contact.load = 1 mN, 1 µm/s"
+    points = [float(number) for number in re.findall("[0-9.]+", taken)]
+    shares = 1.0 - bonded, bonded - both, ratio - both, 1.0 - ratio
+    errors = [4.0 * np.std(share) / math.sqrt(ratio.size) for share in shares]
+    for point, share, error in zip(points, shares, errors, strict=True):
+        # two digits are printed
+        digit = 10.0 ** (math.floor(math.log10(point)) - 1)
+        assert_allclose(
+            point, 100.0 * np.mean(share), rtol=0, atol=0.5 * digit + 100.0 * error
+        )
+    assert_allclose(float(smallest), 100.0 * both.mean(), atol=0.05 + 100.0 * errors[1])
+    radius = math.sqrt(area(W, 1e-3) / math.pi)
+    wide = math.sqrt(area(W, 20e-3) / math.pi)
+    long = (100 * math.erf(math.pi * 10e-6 / (2 * size)) for size in (wide, radius))
+    low, high = (f"{share:.2g}" for share in long)
+    assert said(texts, "waves longer") == [
+        f"waves longer than the contact store {low} to {high} % of the energy"
+    ]
     q = 2 * math.pi / np.array([12e-6, 8e-6])
-    assert (
-        f"{math.sqrt(math.pi) / 4 * 10e-6 * q.sum():.2g} times less" in length
-        and "5.8" in length
-    )
-    taken = rest - bonded, bonded - both, waves - both, rest - waves
-    assert mechanisms == (
-        f"the mean A/A_JKR at contact.load = 5 mN, 1 µm/s is {both:.3g} %: bonds take {taken[0]:.2g} points,"
-        f" fluctuations {taken[1]:.2g} ({taken[2]:.2g} and {taken[3]:.2g} if fluctuations are subtracted first)"
-    )
-    assert strict.endswith(f"(shear.paid_by_adhesion = 0) A/A_JKR is {bonded:.3g} %")
+    (length,) = said(texts, "shear.spectrum.length")
+    assert f"{math.sqrt(math.pi) / 4 * 10e-6 * q.sum():.2g} times less" in length
     dataset = run(lens)
     printed = preview(lens)
     assert read.remarks(dataset) == [*remarks(plan), *texts]
@@ -423,6 +453,57 @@ def test_a_contact_softer_than_the_onset_of_oscillations_lies_outside_the_rigid_
     assert "needs {}, but the stiffness of the contact is {}".format(*texts) in found[0]
 
 
+def test_the_speeds_at_which_a_spring_lets_the_slider_oscillate_are_roots_of_its_law(
+    scene,
+):
+    rupture = {"model": "bell", "zero_force_rate": "20 1/s", "bell_force": "4 pN"}
+    bonds = {
+        "model": "rate",
+        "rupture": rupture,
+        "bond_stiffness": "0.8 uN/m",
+        "rebinding_rate": "200 1/s",
+        "site_density": 1.8e16,
+        "start": "steady",
+    }
+
+    def spring(stiffness, stage):
+        drive = {
+            "model": "spring",
+            "stage": stage,
+            "stiffness": stiffness,
+            "contact_stiffness": "rigid",
+        }
+        return scene(drive=drive, bonds=bonds, **{"adhesion.bond_share": 0.0})
+
+    # V = x k(x) in stretches of 5 um, with the mean stretch x
+    def speed(x):
+        return 5e-6 * x * 20.0 * math.exp(x)
+
+    def needed(x):
+        k = 20.0 * math.exp(x)
+        stiffness = 1.8e16 * 0.8e-6 * area(W) * 200.0 / (200.0 + k)
+        return stiffness * (x * k - 200.0 - k) / (200.0 + 2.0 * k)
+
+    peak = scipy.optimize.minimize_scalar(
+        lambda x: -needed(x), bounds=(1.0, 9.0), method="bounded"
+    ).x
+    stiffness = 0.5 * needed(peak)
+    # the law is met to 1e-5 of the stiffness, and is not flat
+    width = 1e-4
+    for stage in (0.2 * speed(peak), 2.0 * speed(peak)):
+        ((low, high),) = stability(spring(stiffness, stage)).unstable
+        for found, ends in ((low, (1.0, peak)), (high, (peak, 9.0))):
+            root = scipy.optimize.brentq(lambda x: needed(x) - stiffness, *ends)
+            assert_allclose(found, speed(root), rtol=width)
+    plan = Plan.of(spring(stiffness, 2.0 * speed(peak)))
+    low, high = (engineering(end, "m/s") for end in (low, high))
+    text = f"unstable above {low}, and stable again above {high}, behind this spring"
+    assert text in preview(plan.scenario)
+    firm = spring(1.01 * needed(peak), speed(peak))
+    assert "stable at any speed behind this spring" in preview(firm)
+    assert "unstable" not in preview(firm)
+
+
 def test_a_sweep_has_one_remark_with_the_range_of_its_values(scene):
     # the mean stress is 0.8 to 2 times the shear modulus; the first and the last of three values lie beyond 0.5
     stresses = [0.8 * G, 0.1 * G, 2.0 * G]
@@ -436,6 +517,7 @@ def test_a_sweep_has_one_remark_with_the_range_of_its_values(scene):
     )
     (text,) = (text for text in found if "linear elasticity" in text)
     assert "is 0.8 to 2 times the shear modulus" in text
+    assert text.endswith("(at bonds.stress = 400 kPa and 1 MPa, 2 of 3 points)")
     spring = {"model": "spring", "stage": "10 mm/s", "stiffness": "100 N/m"}
     bonds = {
         "model": "rate",
@@ -456,6 +538,163 @@ def test_a_sweep_has_one_remark_with_the_range_of_its_values(scene):
         if "the model of a rigid slider does not hold" in text
     )
     assert "at 10 mm/s to 20 mm/s stable" in text
+
+
+#: Fluctuations that mask a lens at high speeds, in a review.
+MASKS = Banded(
+    spectrum=SelfAffine(1e5, 0.8, 50e-6, 50e-6, 1e-6), correlation=Time(time=20e-3)
+)
+MASKED = {"shear": MASKS, "bonds": Steady(critical_speed=10e-3, stress=0.3e6)}
+
+
+def masked_share(lens, speed):
+    law = StoredEnergy.of(lens)
+    exact = scipy.stats.pearson3(law.skewness, law.mean, law.deviation)
+    return 100.0 * exact.sf(42e-3 / (1.0 + speed / 10e-3))
+
+
+def test_masking_is_told_with_its_share_and_its_points_and_not_where_there_is_none():
+    speeds = ["12 mm/s", "20 mm/s", "24 mm/s", "30 mm/s"]
+    sweep = read_sweep({"contact.load": ["4 mN", "32 mN"], "drive.speed": speeds})
+    plan = Plan.of(small(sweep=sweep, **MASKED))
+    (text,) = said(diagnosis(plan), "masked")
+    low, high, most = re.fullmatch(
+        r"masked for ([0-9.]+) to ([0-9.]+) % of the time in steady sliding at"
+        r" drive.speed = 20 mm/s to 30 mm/s, 6 of 8 points; most at"
+        r" contact.load = 32 mN, 30 mm/s: ([0-9.]+) % of the members at one time",
+        text,
+    ).groups()
+    least, largest = (
+        masked_share(plan.points[5], 20e-3),
+        masked_share(plan.points[7], 30e-3),
+    )
+    # three digits are printed
+    for shown, exact in ((low, least), (high, largest), (most, largest)):
+        assert_allclose(float(shown), exact, rtol=5e-3)
+    lens = small(drive=AtSpeed(speed=30e-3), **MASKED)
+    (text,) = said(diagnosis(Plan.of(lens)), "masked")
+    share = f"{masked_share(lens, 30e-3):.3g} %"
+    assert share == "77.8 %"
+    assert text == (
+        f"masked for {share} of the time in steady sliding, as are {share} of the members at one time"
+    )
+    for calm in (
+        small(drive=AtSpeed(speed=1e-3), **MASKED),
+        small(
+            drive=AtSpeed(speed=30e-3),
+            **MASKED | {"shear": replace(MASKS, paid_by_adhesion=0.0)},
+        ),
+    ):
+        assert not any("masked" in text for text in diagnosis(Plan.of(calm)))
+
+
+def test_a_pull_off_by_fluctuations_is_told_and_not_under_a_load_that_holds():
+    def pulled_off(load):
+        contact = Equilibrium(load=load)
+        lens = small(drive=AtSpeed(speed=10e-3), contact=contact, **MASKED)
+        return said(diagnosis(Plan.of(lens)), "pulled off")
+
+    (text,) = pulled_off(-0.1e-3)
+    law = StoredEnergy.of(small(contact=Equilibrium(load=-0.1e-3), **MASKED))
+    exact = scipy.stats.pearson3(law.skewness, law.mean, law.deviation)
+    share = exact.sf(42e-3 / 2.0 - 0.1e-3 / (1.5 * math.pi * 2e-3))
+    # open and closed contacts are told apart between two of 256 energies
+    shown = float(re.search(r"up to ([0-9.]+) %", text)[1])
+    assert_allclose(shown, 100.0 * share, atol=100.0 / 256)
+    assert pulled_off(0.1e-3) == []
+
+
+def test_the_largest_loss_answers_why_no_mechanism_takes_a_tenth_of_the_area():
+    def losses(*loads, share=1.0, **parts):
+        sweep = read_sweep({"contact.load": [f"{load:g} N" for load in loads]})
+        adhesion = Adhesion(work=42e-3, bond_share=share)
+        lens = small(sweep=sweep, adhesion=adhesion, **parts)
+        (text,) = said(diagnosis(Plan.of(lens)), "largest loss")
+        return text
+
+    def lost(load, left=0.0):
+        radii = jkr.radius_at_load(load, np.array([left, 42e-3]), 2e-3, 6.4e6)
+        return f"{100.0 * (1.0 - (radii[0] / radii[1]) ** 2):.3g}"
+
+    stress = "the mean stress if contact.reversible = 1"
+    firm = losses(0.05, 1.0, bonds=Unbroken(stress=1e6))
+    assert firm == (
+        f"largest loss of area at this load (most at contact.load = 50 mN): {lost(1.0)} to {lost(0.05)} % by"
+        f" broken bonds or fluctuations or {stress}"
+    )
+    half = losses(0.05, share=0.5)
+    assert half == (
+        f"largest loss of area at this load: {lost(0.05, 21e-3)} % by broken bonds, {lost(0.05)} % by fluctuations,"
+        f" 0 % by {stress}"
+    )
+    strict = losses(0.05, shear=replace(MASKS, paid_by_adhesion=0.0))
+    assert "fluctuations if shear.paid_by_adhesion = 1" in strict
+    assert "100 % (a pull-off) by broken bonds" in losses(-1e-4)
+    assert "pull-off" not in firm + half + strict
+
+
+TIP = {
+    "solid": {"youngs_modulus": "60 GPa", "poisson_ratio": 0.1},
+    "sphere.radius": "100 nm",
+    "adhesion.work": "0.4 J/m^2",
+}
+GEL = {"solid.shear_modulus": "50 Pa", "adhesion.work": "10 mJ/m^2"}
+
+
+def limits(lens):
+    """The rows of the limits of a theory, each as name, value and meaning."""
+    block = preview(lens).partition("\nlimits of the theory\n")[2].partition("\n\n")[0]
+    rows = (re.split(" {2,}", line.strip()) for line in block.splitlines())
+    return {name: words for name, *words in rows}
+
+
+def test_a_scene_outside_of_the_theory_is_told_with_the_number_and_the_points(scene):
+    tip = scene(**TIP, sweep={"contact.load": ["-160 nN", "1 nN", "400 nN"]})
+    modulus = 60e9 / (1.0 - 0.01)
+    near, far = (
+        (1e-7 * 0.4**2 / modulus**2 / distance**3) ** (1 / 3)
+        for distance in (0.4e-9, 0.16e-9)
+    )
+    assert limits(tip)["Tabor number"][0] == f"{near:.3g} to {far:.3g}"
+    (text,) = said(remarks(Plan.of(tip)), "the Tabor number")
+    assert f"is {near:.2g} for z0 = 0.4 nm and {far:.2g} for z0 = 0.16 nm" in text
+    gel = scene(
+        **GEL,
+        bonds={"model": "none", "stress": "20 Pa"},
+        sweep={"contact.load": ["1 uN", "1 mN"]},
+    )
+    found = remarks(Plan.of(gel))
+    sizes = [jkr.radius_at_load(load, 10e-3, R, 200.0) for load in (1e-6, 1e-3)]
+    (large,) = said(found, "the contact radius")
+    ends = " to ".join(f"{size / R:.2g}" for size in sizes)
+    assert f"reaches {ends} of the sphere's" in large
+    assert limits(gel)["a/R"][0] == " to ".join(f"{size / R:.3g}" for size in sizes)
+    (wet,) = said(found, "surface tension")
+    ends = " to ".join(f"{0.072 / 150.0 / size:.2g}" for size in sizes[::-1])
+    assert f"γ/E is {ends} of the contact radius if γ = 72 mN/m" in wet
+    assert limits(gel)["gamma/E"][0] == f"{5e-3 / 150:.3g} to {0.072 / 150:.3g} m"
+    assert limits(gel)["tau0/G"][0] == "0.4"
+    firm = scene(bonds={"model": "none", "stress": 0.2 * G})
+    assert remarks(Plan.of(firm)) == []
+    assert limits(firm)["tau0/G"][0] == "0.2"
+    # a sphere without adhesion is Hertz's, whatever its Tabor number
+    hertz = scene(**TIP | {"adhesion.work": 0.0}, **{"contact.load": "1 nN"})
+    assert said(remarks(Plan.of(hertz)), "the Tabor number") == []
+    assert "Tabor number" not in limits(hertz)
+
+
+def test_a_remark_on_a_swept_point_names_it_and_is_absent_without_it(scene):
+    loads = ["-200 nN", "-190 nN", "1 nN"]
+    swept = remarks(Plan.of(scene(**TIP, sweep={"contact.load": loads})))
+    (text,) = said(swept, "the contact is open")
+    assert text.endswith("(at contact.load = -200 nN and -190 nN, 2 of 3 points)")
+    closed = remarks(Plan.of(scene(**TIP, sweep={"contact.load": loads[2:]})))
+    assert said(closed, "the contact is open") == []
+    wide = remarks(
+        Plan.of(scene(**GEL, sweep={"solid.shear_modulus": ["50 Pa", "1 MPa"]}))
+    )
+    (text,) = said(wide, "the contact radius")
+    assert text.endswith("(at solid.shear_modulus = 50 Pa, 1 of 2 points)")
 
 
 @pytest.mark.parametrize("drive", ["steady", "spring", "force"])

@@ -186,7 +186,7 @@ def test_limits_of_the_theory_and_of_the_cell_are_noted_once():
         (
             "uniform_stress",
             {"sphere.radius": "100 um"},
-            "the contact exceeds 0.3 of the sphere's radius",
+            "the contact radius reaches",
         ),
         (
             "soft_lens",

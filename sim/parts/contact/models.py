@@ -177,8 +177,6 @@ class Adhesion:
         return self.work * (1.0 - self.bond_share + self.bond_share * fraction)
 
 
-#: Radius of the contact over that of the sphere above which a parabola is a poor sphere.
-_LARGEST_SHARE = 0.3
 _KINDS = ("load", "indentation", "displacement")
 #: Halvings of a clock step that find a moment in it down to rounding.
 _HALVINGS = 48
@@ -266,18 +264,12 @@ class _Controlled:
         return self
 
     def remarks(self, setting: Setting) -> list[str]:
-        remarks = []
-        if setting.rest_radius > _LARGEST_SHARE * setting.sphere_radius:
-            limit = f"{_LARGEST_SHARE} of the sphere's radius"
-            remarks.append(
-                f"the contact exceeds {limit}: the theory is valid for small contacts"
-            )
-        if math.isnan(setting.rest_radius):
-            never = "is open for the whole run: raise contact.{} to zero, where the sphere touches"
-            jumps = "begins open and jumps in where contact.{} first reaches zero"
-            course = jumps if max(self.course.extremes) >= 0.0 else never
-            remarks.append(f"the contact {course.format(self.kind)}")
-        return remarks
+        if not math.isnan(setting.rest_radius):
+            return []
+        never = "is open for the whole run: raise contact.{} to zero, where the sphere touches"
+        jumps = "begins open and jumps in where contact.{} first reaches zero"
+        course = jumps if max(self.course.extremes) >= 0.0 else never
+        return [f"the contact {course.format(self.kind)}"]
 
     @cached_property
     def kind(self) -> str:

@@ -575,7 +575,7 @@ def test_a_contact_that_closes_again_starts_without_the_bonds_it_carried():
     assert np.all(radius[closing] < 0.5 * np.nanmax(radius))
 
 
-def test_a_contact_remarks_on_a_start_out_of_touch_and_on_a_large_area():
+def test_a_contact_remarks_on_a_start_out_of_touch():
     for held, word in (
         ({"load": 4e-3}, ""),
         ({"load": -1e-3}, "contact.load"),
@@ -583,7 +583,7 @@ def test_a_contact_remarks_on_a_start_out_of_touch_and_on_a_large_area():
             {"displacement": {"from": -1e-4, "to": 1e-6}, "stiffness": 1e3},
             "begins open",
         ),
-        ({"load": 40.0}, "0.3 of the sphere"),
+        ({"load": 40.0}, ""),
     ):
         scenario = scene(1, 2, contact=Equilibrium(**held))
         remarks = scenario.contact.remarks(scenario.setting)

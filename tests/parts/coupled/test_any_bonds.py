@@ -27,10 +27,12 @@ from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
 import sim
+from sim.ensemble.diagnosis import stability
 from sim.laws.reversible import mean_stress_energy, radius_at_load_reversible
 from sim.parts.bonds.models import Cohort, FirstMoment, Rate, Steady, Tracked
 from sim.parts.bonds.rupture import Bell
 from sim.parts.drive import Start, Steady as AtSpeed
+from sim.units.notation import engineering
 from tests.test_total import check_cuts, run
 
 MOMENT = FirstMoment
@@ -324,11 +326,36 @@ def test_a_check_shows_below_which_spring_the_slider_oscillates():
             for line in text.partition("\n\n")[0].splitlines()
         )
         assert rows["oscillates below"].startswith(f"{onset:.4g} N/m")
-        assert rows["frequency then"] == f"{frequency / (2.0 * math.pi):.4g} Hz"
+        ends = f"with {frequency / (2.0 * math.pi):.4g} Hz"
+        assert rows["oscillates below"].endswith(ends)
     assert re.search(
         "oscillates below +0 N/m",
         sim.check(stuck(1.0, 4, STICKING, pulled(1.0, 1.0, damping=10.0))),
     )
+
+
+def test_a_check_shows_the_speeds_that_are_unstable_behind_this_spring():
+    mass, damping, rate, critical = 0.01, 0.05, 2.0, 0.5
+
+    def excess(speed, stiffness):
+        """K_c/K − 1 of bonds of the linear rate equation."""
+        pace = rate * (1.0 + speed / critical)
+        falls = rate / critical / (1.0 + speed / critical)
+        onset = (damping + mass * pace) * (falls - damping * pace) / damping
+        return onset / stiffness - 1.0
+
+    for stiffness in (1.0, 3.0):
+        scene = stuck(1.0, 4, STICKING, pulled(stiffness, 1.0, mass, damping))
+        ((low, high),) = stability(scene).unstable
+        last = brentq(excess, 1e-3, 10.0, args=(stiffness,))
+        assert low == 0.0
+        # the law is met to 1e-5 of the stiffness, and falls faster than the square root of the speed
+        assert_allclose(high / STRETCH, last, rtol=2e-5)
+        text = f"unstable if slow, and stable again above {engineering(high, 'm/s')}"
+        assert text in sim.check(scene)
+    firm = stuck(1.0, 4, STICKING, pulled(6.0, 1.0, mass, damping))
+    assert stability(firm).unstable == []
+    assert "unstable" not in sim.check(firm)
 
 
 #: Stress of a unit of stretch; k_t is a fifth of the stiffness of all bonds, of which next to none break.
