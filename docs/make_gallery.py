@@ -697,19 +697,15 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     peak = laws.schallamach.first_moment_peak(
         *(float(dataset[f"bonds_{name}"]) for name in names)
     )
-    # the first event begins at the maximum of friction, long before it slips
-    end = float(dataset["slip_end"].min())
-    mean, last = (
-        read.slips(dataset).isel(slip=slice(1, None)).mean("slip"),
-        float(dataset["slip_time"].max()),
-    )
-    stage = dataset.sel(t=slice(end, last))
+    events, mean = read.stick_slip(dataset), read.slips(dataset).mean("slip")
+    first, last = (float(dataset["slip_time"][k]) for k in (0, -1))
+    stage = dataset.sel(t=slice(first, last))
     path, work = (
         float(stage[name][-1] - stage[name][0])
         for name in ("stage_position", "drive_work")
     )
     return {
-        "onset": 1e3 * float(stage["stage_speed"][0]),
+        "onset": 1e3 * float(events["onset_slip_speed"]),
         "peak": 1e3 * float(peak.speed),
         "drop": 1e3 * float(mean["force_drop"]),
         "slip": 1e6 * float(mean["slip_amplitude"]),
@@ -733,9 +729,9 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
         dataset["drive_stiffness"].to_numpy(),
     )
     up, down = (
-        1e3 * float(events[name][0]) for name in ("slips_from", "slips_down_to")
+        1e3 * float(events[name][0]) for name in ("onset_slip_speed", "end_slip_speed")
     )
-    calm = events["slips_down_to"].isnull().to_numpy()
+    calm = dataset["slip_count"].to_numpy() == 0
     return {
         "soft": float(stiffness[0]),
         "up": up,
