@@ -417,14 +417,18 @@ def _limits(points: Sequence[Scenario]) -> Rows:
     tensions = [tension for row in known for tension in row.tensions]
     low, high = (engineering(end(tensions), "N/m") for end in (min, max))
     lengths = [length for row in known for length in row.capillary]
-    meaning = f"for gamma = {low} to {high} (half the work of adhesion, water); surface tension"
+    meaning = (
+        f"for gamma = {low} to {high} (half the work of adhesion, water); surface tension"
+        " shapes contacts of about this length"
+    )
     shares = [
         row.capillary[1] / point.widest
         for row, point in zip(known, points, strict=True)
         if point.widest > 0.0
     ]
     if shares:
-        meaning += f" matters in smaller contacts, of which this has at least {1.0 / max(shares):.2g} times the radius"
+        times = float(f"{1.0 / max(shares):.2g}")
+        meaning += f", and the radius is at least {times:,.6g} times as large"
     rows.append(("gamma/E", _span(lengths, "m", ".3g"), meaning))
     return rows
 
