@@ -680,10 +680,10 @@ def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "stick_slip",
     "At which speed does a lens behind a soft spring begin to stick and slip?",
-    """The onset is at {onset:.1f} mm/s as the stage speed increases. Nothing prescribes it. The onset lies
-    above the speed of the friction maximum, which is {peak:.1f} mm/s in the mean-field theory. From then on the
-    force falls by {drop:.1f} mN in each slip event of {slip:.0f} µm. Slip events begin at {static:.1f} mN, and the
-    mean force is {kinetic:.1f} mN.""",
+    """Slip events set in between {steady:.1f} and {onset:.1f} mm/s as the stage speed increases. Nothing prescribes
+    the onset. It lies above the speed of the friction maximum, which is {peak:.1f} mm/s in the mean-field theory. From
+    then on the force falls by {drop:.1f} mN in each slip event of {slip:.0f} µm. Slip events begin at {static:.1f} mN,
+    and the mean force is {kinetic:.1f} mN.""",
     kind="time",
 )
 def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
@@ -697,19 +697,16 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     peak = laws.schallamach.first_moment_peak(
         *(float(dataset[f"bonds_{name}"]) for name in names)
     )
-    # the first event begins at the maximum of friction, long before it slips
-    end = float(dataset["slip_end"].min())
-    mean, last = (
-        read.slips(dataset).isel(slip=slice(1, None)).mean("slip"),
-        float(dataset["slip_time"].max()),
-    )
-    stage = dataset.sel(t=slice(end, last))
+    mean, times = read.slips(dataset).mean("slip"), dataset["slip_time"]
+    # from the first slip event to the last
+    stage = dataset.sel(t=slice(float(times[0]), float(times[-1])))
     path, work = (
         float(stage[name][-1] - stage[name][0])
         for name in ("stage_position", "drive_work")
     )
     return {
-        "onset": 1e3 * float(stage["stage_speed"][0]),
+        "steady": 1e3 * float(dataset["onset_steady_speed"]),
+        "onset": 1e3 * float(dataset["onset_slip_speed"]),
         "peak": 1e3 * float(peak.speed),
         "drop": 1e3 * float(mean["force_drop"]),
         "slip": 1e6 * float(mean["slip_amplitude"]),
@@ -733,9 +730,9 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
         dataset["drive_stiffness"].to_numpy(),
     )
     up, down = (
-        1e3 * float(events[name][0]) for name in ("slips_from", "slips_down_to")
+        1e3 * float(events[name][0]) for name in ("onset_slip_speed", "end_slip_speed")
     )
-    calm = events["slips_down_to"].isnull().to_numpy()
+    calm = events["end_slip_speed"].isnull().to_numpy()
     return {
         "soft": float(stiffness[0]),
         "up": up,

@@ -90,11 +90,13 @@ _SPENT = "work", "path"
 _MARKS = "begin", "half", "quarter", "first", "middle", "final"
 #: State of the detector: sense in which the stage last moved, and that of its last step (0 at rest). Then the last
 #: sample. Then the speed of the stage when the slider was last not faster, or the largest one since; 1 if the slider is
-#: faster than the stage; 1 if it slips; its place when it was last faster; place and force at which it began to slip.
-#: Then the times of the last two events and their count, the event that may come, as ``SLIP``, and the marks.
+#: faster than the stage; 1 if it slips; its place when it was last faster; place and force at which it became faster,
+#: and at which it began to slip; number of episodes that are events but for the speed of the slider. Then the times of
+#: the last two events and their count, the event that may come, as ``SLIP``, and the marks.
 SLIPPING = record(
     "sense motion clock stage stage_speed position force work path "
-    "reference faster slips farthest start from_force before latest interval count "
+    "reference faster slips farthest faster_start faster_force start from_force slow "
+    "before latest interval count "
     + " ".join(SLIP.names or ())
     + "".join(f" {mark}_{name}" for mark in _MARKS for name in _SPENT)
 )
@@ -130,6 +132,8 @@ class Slips(NamedTuple):
       with mass oscillates on its spring or on bonds that hold. There it goes back as far as it then advances.
 
     A slow fall of the force beyond a friction maximum is no event, because the slider is hardly faster than the stage.
+    Episodes in which the slider is faster than the stage, but not ten times, and that keep the last two rules, are
+    counted apart: in a fast oscillation, or if a clock step is too long to show the speed of a slip.
     An event that the stage ends by turning back counts; one that lasts beyond the end of the run does not.
     """
 
@@ -229,14 +233,23 @@ class Slips(NamedTuple):
 
 
 @device
+def _falls(start, force, state):
+    """Return True if the force has fallen far enough from a ``force`` at the place ``start``, and not in a swing."""
+    advance, fall = (
+        state.sense * state.position - start,
+        force - state.sense * state.force,
+    )
+    least = LEAST_FALL * math.fabs(state.force_before)
+    return fall >= least and state.farthest - start <= MOST_BACK * advance
+
+
+@device
 def _is_slip(state, event):
     """Return True if the episode that has ended at the last sample is a slip event, and fill it in."""
+    if not _falls(state.start, state.from_force, state):
+        return False
     amplitude = state.sense * state.position - state.start
     pull = state.sense * state.force
-    least = LEAST_FALL * math.fabs(state.force_before)
-    back = state.farthest - state.start
-    if state.from_force - pull < least or back > MOST_BACK * amplitude:
-        return False
     event.time, event.end, event.amplitude = state.time, state.end, amplitude
     event.speed, event.force_before, event.force_after = (
         state.speed,
@@ -261,6 +274,9 @@ def _goes_on(sample, factor, state, event):
     if drawn > 0.0 and gone > drawn:
         state.reference = max(state.reference, drawn / duration)
     if gone > (drawn if drawn > 0.0 else state.reference * duration):
+        if state.faster == 0.0:
+            state.faster_start = state.sense * state.position
+            state.faster_force = state.sense * state.force
         if state.slips == 0.0:
             slips = gone > factor * state.reference * duration
             # the step before has the beginning of the slip, if the slider was faster in it
@@ -275,6 +291,8 @@ def _goes_on(sample, factor, state, event):
     else:
         ended = state.slips > 0.0 and _is_slip(state, event)
         if state.faster > 0.0:
+            if state.slips == 0.0:
+                state.slow += _falls(state.faster_start, state.faster_force, state)
             state.farthest = state.sense * state.position
         state.slips, state.faster = 0.0, 0.0
         if drawn > 0.0:

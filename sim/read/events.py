@@ -206,8 +206,18 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     return result
 
 
-def unresolved_slips(dataset: xr.Dataset) -> str:
-    """Return a remark if slip events are hardly longer than a clock step, so that their means are off; "" if not."""
+def unresolved_slips(dataset: xr.Dataset) -> list[str]:
+    """Return remarks on falls of the force that are no slip events, and on slip events that are hardly resolved."""
+    remarks = []
+    for ending in ("", "_mean"):
+        if bool(
+            (dataset.get(f"slow_fall_count{ending}", xr.DataArray(0.0)) > 0.0).any()
+        ):
+            remarks.append(
+                "the spring force falls by 0.3 or more while the slider is less than ten "
+                "times as fast as the stage, which is no slip event: it oscillates, or a "
+                "smaller clock.step shows that it is faster"
+            )
     # of a run without slips, or without single ones
     with contextlib.suppress(ValueError, KeyError):
         each, step = slips(dataset), setting(dataset, "clock.step")
@@ -216,11 +226,11 @@ def unresolved_slips(dataset: xr.Dataset) -> str:
             effect = (
                 "their drop and friction have an error that the brackets do not hold"
             )
-            return (
+            remarks.append(
                 f"the stage moves by more than {100.0 * _COARSE:g} % of a slip event in "
                 f"a clock step: {effect}; reduce clock.step"
             )
-    return ""
+    return remarks
 
 
 def kinetic_friction(dataset: xr.Dataset) -> xr.Dataset:

@@ -271,6 +271,22 @@ def test_slip_events_are_those_of_an_own_detector_and_as_many_for_a_slider_3_10_
     assert counts == [0, 0, 0, 8, 8, 8, 13, 13, 13, 21, 21, 21]
 
 
+@pytest.mark.parametrize(("mass", "is_named"), [("5 g", True), ("50 mg", False)])
+def test_a_force_that_falls_while_the_slider_is_hardly_faster_than_the_stage_is_named(
+    mass, is_named
+):
+    """A heavy body swings: the force falls to nearly nothing, at five times the speed of the stage at most."""
+    drive = PULLED["drive"] | {"stage": "3 mm/s", "mass": mass}
+    scene = {key: PULLED[key] for key in PULLED if key != "sweep"}
+    dataset = run(sim.Scenario(**scene | {"drive": drive}))
+    assert bool(dataset["slip_count"].item() > 10.0) is not is_named
+    assert bool(dataset["slow_fall_count"].item() > 10.0) is is_named
+    lines = lines_of(dataset)
+    assert (
+        any("while the slider is less than ten" in line for line in lines) is is_named
+    )
+
+
 @pytest.mark.parametrize("record", ["3.2 ms", "1.2 s"])
 def test_the_records_of_a_run_do_not_change_its_slip_events(record):
     clock = PULLED["clock"] | {"record": record}
