@@ -35,7 +35,7 @@ EXTREME = record("largest time speed area")
 MAXIMUM = record("before last falls " + " ".join(EXTREME.names or ()))
 _NO_MAXIMUM = np.array([-math.inf, 0.0, 0.0, *(-math.inf for _ in EXTREME.names or ())])
 #: Row of the first maximum of the friction since a rest, or since the start: the friction then, 1 once it has fallen
-#: from the maximum, and the maximum, its time [s] and the contact area [m²] there.
+#: from the maximum, or if no maximum is looked for, and the maximum, its time [s] and the contact area [m²] there.
 RISE = record("start fallen largest time area")
 #: Share of a maximum by which the friction must fall before it exceeds the maximum again.
 FALLEN = 0.01
@@ -465,10 +465,17 @@ class Events(NamedTuple):
         return turns[np.arange(len(turns)), first]
 
 
-def first(bonding: Bonding, contact: ContactState, pull: Array, stage: Array) -> Events:
+def first(
+    bonding: Bonding,
+    contact: ContactState,
+    pull: Array,
+    stage: Array,
+    from_rest: bool = True,
+) -> Events:
     """Return the events at t = 0, from the bonds, the contact and a pull [N].
 
-    ``stage`` are positions of the stages that pull through a spring [m].
+    ``stage`` are positions of the stages that pull through a spring [m]. A first maximum of the friction is looked for
+    in a scene that starts ``from_rest``.
     """
     stress = np.abs(bonding.stress)
     friction = stress * (np.pi * contact.radius**2)
@@ -486,6 +493,7 @@ def first(bonding: Bonding, contact: ContactState, pull: Array, stage: Array) ->
     ]
     maxima = map(_started, firsts)
     rise = _rising(firsts[1])
+    rise.view(RISE)["fallen"] = not from_rest
     return Events._make([*maxima, rows, rise, np.zeros(1), Slips.none(stage)])
 
 
@@ -666,7 +674,8 @@ def _follow(
                 place,
             )
             _keep(value1 * area1, rise, slope, around, kink, friction, i)
-            _rise(friction, rises, i)
+            if rises[i, 1] == 0.0:
+                _rise(friction, rises, i)
         for i in range(len(pull)):
             area0, area1 = (
                 math.pi * _of(radii, k, i) ** 2,
@@ -779,9 +788,7 @@ def _rise(friction, rises, i):
 
     Columns are those of ``RISE`` and ``MAXIMUM``, by their numbers.
     """
-    start, fallen, largest = rises[i, 0], rises[i, 1], rises[i, 2]
-    if fallen > 0.0:
-        return
+    start, largest = rises[i, 0], rises[i, 2]
     if friction[i, 3] > largest:
         largest = friction[i, 3]
         rises[i, 2], rises[i, 3], rises[i, 4] = largest, friction[i, 4], friction[i, 6]
