@@ -680,10 +680,10 @@ def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "stick_slip",
     "At which speed does a lens behind a soft spring begin to stick and slip?",
-    """The onset is at {onset:.1f} mm/s as the stage speed increases. Nothing prescribes it. The onset lies
-    above the speed of the friction maximum, which is {peak:.1f} mm/s in the mean-field theory. From then on the
-    force falls by {drop:.1f} mN in each slip event of {slip:.0f} µm. Slip events begin at {static:.1f} mN, and the
-    mean force is {kinetic:.1f} mN.""",
+    """Slip events set in between {steady:.1f} and {onset:.1f} mm/s as the stage speed increases. Nothing prescribes
+    the onset. It lies above the speed of the friction maximum, which is {peak:.1f} mm/s in the mean-field theory. From
+    then on the force falls by {drop:.1f} mN in each slip event of {slip:.0f} µm. Slip events begin at {static:.1f} mN,
+    and the mean force is {kinetic:.1f} mN.""",
     kind="time",
 )
 def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
@@ -697,15 +697,16 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     peak = laws.schallamach.first_moment_peak(
         *(float(dataset[f"bonds_{name}"]) for name in names)
     )
-    events, mean = read.stick_slip(dataset), read.slips(dataset).mean("slip")
-    first, last = (float(dataset["slip_time"][k]) for k in (0, -1))
-    stage = dataset.sel(t=slice(first, last))
+    mean, times = read.slips(dataset).mean("slip"), dataset["slip_time"]
+    # from the first slip event to the last
+    stage = dataset.sel(t=slice(float(times[0]), float(times[-1])))
     path, work = (
         float(stage[name][-1] - stage[name][0])
         for name in ("stage_position", "drive_work")
     )
     return {
-        "onset": 1e3 * float(events["onset_slip_speed"]),
+        "steady": 1e3 * float(dataset["onset_steady_speed"]),
+        "onset": 1e3 * float(dataset["onset_slip_speed"]),
         "peak": 1e3 * float(peak.speed),
         "drop": 1e3 * float(mean["force_drop"]),
         "slip": 1e6 * float(mean["slip_amplitude"]),
@@ -731,7 +732,7 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
     up, down = (
         1e3 * float(events[name][0]) for name in ("onset_slip_speed", "end_slip_speed")
     )
-    calm = dataset["slip_count"].to_numpy() == 0
+    calm = events["end_slip_speed"].isnull().to_numpy()
     return {
         "soft": float(stiffness[0]),
         "up": up,

@@ -109,7 +109,11 @@ def start(scenario: Scenario, noise: MemberNoise) -> State:
         )
     stage = cast(Driven, slider).stage_position if has_stage(scenario) else np.empty(0)
     history = events.first(
-        bonding, contact_state, _pull(scenario, 0.0, contact_state.radius), stage
+        bonding,
+        contact_state,
+        _pull(scenario, 0.0, contact_state.radius),
+        stage,
+        scenario.loads_from_rest,
     )
     return State(0, slider, bonds, bonding, shear, contact_state, history)
 

@@ -772,6 +772,15 @@ OF_SLIPS: tuple[Definition, ...] = (
     *OF_EACH_SLIP,
     Definition("slip_count", "1", "number of slip events", exists_when=BEHIND_A_SPRING),
     Definition(
+        "slow_fall_count",
+        "1",
+        (
+            "number of falls of the spring force as in a slip event, in which the "
+            "slider is not ten times as fast as the stage"
+        ),
+        exists_when=BEHIND_A_SPRING,
+    ),
+    Definition(
         "slip_count_late",
         "1",
         "number of slip events that begin in the second half of the run",

@@ -327,6 +327,8 @@ def _of_slips(name: str) -> Callable[[Slips], Any]:
     """Return the reading of a quantity of slip events by its name."""
     if name == "slip_count":
         return lambda slips: slips.total
+    if name == "slow_fall_count":
+        return lambda slips: slips.state["slow"]
     if name == "slip_count_late":
         return lambda slips: slips.late[:, 0, 0]
     if name.startswith("kinetic_friction"):

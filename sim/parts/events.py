@@ -35,7 +35,7 @@ EXTREME = record("largest time speed area")
 MAXIMUM = record("before last falls " + " ".join(EXTREME.names or ()))
 _NO_MAXIMUM = np.array([-math.inf, 0.0, 0.0, *(-math.inf for _ in EXTREME.names or ())])
 #: Row of the first maximum of the friction since a rest, or since the start: the friction then, 1 once it has fallen
-#: from the maximum, and the maximum, its time [s] and the contact area [m²] there.
+#: from the maximum, or if no maximum is looked for, and the maximum, its time [s] and the contact area [m²] there.
 RISE = record("start fallen largest time area")
 #: Share of a maximum by which the friction must fall before it exceeds the maximum again.
 FALLEN = 0.01
@@ -90,11 +90,13 @@ _SPENT = "work", "path"
 _MARKS = "begin", "half", "quarter", "first", "middle", "final"
 #: State of the detector: sense in which the stage last moved, and that of its last step (0 at rest). Then the last
 #: sample. Then the speed of the stage when the slider was last not faster, or the largest one since; 1 if the slider is
-#: faster than the stage; 1 if it slips; its place when it was last faster; place and force at which it began to slip.
-#: Then the times of the last two events and their count, the event that may come, as ``SLIP``, and the marks.
+#: faster than the stage; 1 if it slips; its place when it was last faster; place and force at which it became faster,
+#: and at which it began to slip; number of episodes that are events but for the speed of the slider. Then the times of
+#: the last two events and their count, the event that may come, as ``SLIP``, and the marks.
 SLIPPING = record(
     "sense motion clock stage stage_speed position force work path "
-    "reference faster slips farthest start from_force before latest interval count "
+    "reference faster slips farthest faster_start faster_force start from_force slow "
+    "before latest interval count "
     + " ".join(SLIP.names or ())
     + "".join(f" {mark}_{name}" for mark in _MARKS for name in _SPENT)
 )
@@ -130,6 +132,8 @@ class Slips(NamedTuple):
       with mass oscillates on its spring or on bonds that hold. There it goes back as far as it then advances.
 
     A slow fall of the force beyond a friction maximum is no event, because the slider is hardly faster than the stage.
+    Episodes in which the slider is faster than the stage, but not ten times, and that keep the last two rules, are
+    counted apart: in a fast oscillation, or if a clock step is too long to show the speed of a slip.
     An event that the stage ends by turning back counts; one that lasts beyond the end of the run does not.
     """
 
@@ -229,14 +233,23 @@ class Slips(NamedTuple):
 
 
 @device
+def _falls(start, force, state):
+    """Return True if the force has fallen far enough from a ``force`` at the place ``start``, and not in a swing."""
+    advance, fall = (
+        state.sense * state.position - start,
+        force - state.sense * state.force,
+    )
+    least = LEAST_FALL * math.fabs(state.force_before)
+    return fall >= least and state.farthest - start <= MOST_BACK * advance
+
+
+@device
 def _is_slip(state, event):
     """Return True if the episode that has ended at the last sample is a slip event, and fill it in."""
+    if not _falls(state.start, state.from_force, state):
+        return False
     amplitude = state.sense * state.position - state.start
     pull = state.sense * state.force
-    least = LEAST_FALL * math.fabs(state.force_before)
-    back = state.farthest - state.start
-    if state.from_force - pull < least or back > MOST_BACK * amplitude:
-        return False
     event.time, event.end, event.amplitude = state.time, state.end, amplitude
     event.speed, event.force_before, event.force_after = (
         state.speed,
@@ -261,6 +274,9 @@ def _goes_on(sample, factor, state, event):
     if drawn > 0.0 and gone > drawn:
         state.reference = max(state.reference, drawn / duration)
     if gone > (drawn if drawn > 0.0 else state.reference * duration):
+        if state.faster == 0.0:
+            state.faster_start = state.sense * state.position
+            state.faster_force = state.sense * state.force
         if state.slips == 0.0:
             slips = gone > factor * state.reference * duration
             # the step before has the beginning of the slip, if the slider was faster in it
@@ -275,6 +291,8 @@ def _goes_on(sample, factor, state, event):
     else:
         ended = state.slips > 0.0 and _is_slip(state, event)
         if state.faster > 0.0:
+            if state.slips == 0.0:
+                state.slow += _falls(state.faster_start, state.faster_force, state)
             state.farthest = state.sense * state.position
         state.slips, state.faster = 0.0, 0.0
         if drawn > 0.0:
@@ -447,10 +465,17 @@ class Events(NamedTuple):
         return turns[np.arange(len(turns)), first]
 
 
-def first(bonding: Bonding, contact: ContactState, pull: Array, stage: Array) -> Events:
+def first(
+    bonding: Bonding,
+    contact: ContactState,
+    pull: Array,
+    stage: Array,
+    from_rest: bool = True,
+) -> Events:
     """Return the events at t = 0, from the bonds, the contact and a pull [N].
 
-    ``stage`` are positions of the stages that pull through a spring [m].
+    ``stage`` are positions of the stages that pull through a spring [m]. A first maximum of the friction is looked for
+    in a scene that starts ``from_rest``.
     """
     stress = np.abs(bonding.stress)
     friction = stress * (np.pi * contact.radius**2)
@@ -468,6 +493,7 @@ def first(bonding: Bonding, contact: ContactState, pull: Array, stage: Array) ->
     ]
     maxima = map(_started, firsts)
     rise = _rising(firsts[1])
+    rise.view(RISE)["fallen"] = not from_rest
     return Events._make([*maxima, rows, rise, np.zeros(1), Slips.none(stage)])
 
 
@@ -648,7 +674,8 @@ def _follow(
                 place,
             )
             _keep(value1 * area1, rise, slope, around, kink, friction, i)
-            _rise(friction, rises, i)
+            if rises[i, 1] == 0.0:
+                _rise(friction, rises, i)
         for i in range(len(pull)):
             area0, area1 = (
                 math.pi * _of(radii, k, i) ** 2,
@@ -761,9 +788,7 @@ def _rise(friction, rises, i):
 
     Columns are those of ``RISE`` and ``MAXIMUM``, by their numbers.
     """
-    start, fallen, largest = rises[i, 0], rises[i, 1], rises[i, 2]
-    if fallen > 0.0:
-        return
+    start, largest = rises[i, 0], rises[i, 2]
     if friction[i, 3] > largest:
         largest = friction[i, 3]
         rises[i, 2], rises[i, 3], rises[i, 4] = largest, friction[i, 4], friction[i, 6]

@@ -24,7 +24,7 @@ from sim.read.dataset import (
     word,
 )
 from sim.read.observables import ENDINGS, labelled, pure
-from sim.read.statistics import LEVEL, WIDE, Array, observable_of
+from sim.read.statistics import LEVEL, WIDE, Array, observable_of, summary
 from sim.units.notation import engineering
 
 #: Relative changes below it are rounding.
@@ -40,8 +40,9 @@ _LATE = {
 }
 #: Speeds of the stage at which slip events set in and end.
 _ONSET = "onset_steady_speed", "onset_slip_speed", "end_slip_speed", "end_steady_speed"
-#: Change of the kinetic friction over it, and beside that in standard errors, up to which the motion has settled.
-_SETTLED, _SURELY = 0.01, 3.0
+#: Change of the kinetic friction over it up to which steady sliding and whole cycles have settled: the ends of a cycle
+#: are known to a clock step. Beside that the change in standard errors of members with noise.
+_SETTLED, _SETTLED_CYCLES, _SURELY = 1e-3, 1e-2, 3.0
 #: Half of a 95 % interval of a normal law in standard errors.
 _WIDE = 1.96
 
@@ -205,8 +206,18 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     return result
 
 
-def unresolved_slips(dataset: xr.Dataset) -> str:
-    """Return a remark if slip events are hardly longer than a clock step, so that their means are off; "" if not."""
+def unresolved_slips(dataset: xr.Dataset) -> list[str]:
+    """Return remarks on falls of the force that are no slip events, and on slip events that are hardly resolved."""
+    remarks = []
+    for ending in ("", "_mean"):
+        if bool(
+            (dataset.get(f"slow_fall_count{ending}", xr.DataArray(0.0)) > 0.0).any()
+        ):
+            remarks.append(
+                "the spring force falls by 0.3 or more while the slider is less than ten "
+                "times as fast as the stage, which is no slip event: it oscillates, or a "
+                "smaller clock.step shows that it is faster"
+            )
     # of a run without slips, or without single ones
     with contextlib.suppress(ValueError, KeyError):
         each, step = slips(dataset), setting(dataset, "clock.step")
@@ -215,11 +226,11 @@ def unresolved_slips(dataset: xr.Dataset) -> str:
             effect = (
                 "their drop and friction have an error that the brackets do not hold"
             )
-            return (
+            remarks.append(
                 f"the stage moves by more than {100.0 * _COARSE:g} % of a slip event in "
                 f"a clock step: {effect}; reduce clock.step"
             )
-    return ""
+    return remarks
 
 
 def kinetic_friction(dataset: xr.Dataset) -> xr.Dataset:
@@ -240,35 +251,33 @@ def kinetic_friction(dataset: xr.Dataset) -> xr.Dataset:
     Notes
     -----
     While a spring still extends, the work of the stage is stored in part. The motion has therefore settled only if the
-    mean over members changes by at most 1 % from one part of the path to the next, beside three standard errors of that
-    change. With slip events, each part must have a whole cycle.
+    mean over members changes little from one part of the path to the next: by at most 0.1 % in steady sliding, and by
+    1 % in cycles, whose ends are known to a clock step. Three standard errors of the change are added if members
+    differ. With slip events, each part must have a whole cycle.
     """
-    name, drift = "kinetic_friction", "kinetic_friction_change"
-    if not {drift, f"{drift}_mean"} & set(dataset):
+    names = "kinetic_friction", "kinetic_friction_change", "slip_count_late"
+    stated = dataset
+    if {*names} <= set(dataset):
+        stated = summary(dataset[[*names]], quantiles=False)
+    if not {f"{name}_mean" for name in names} <= set(stated):
         return xr.Dataset()
-    endings = [ending for ending in ENDINGS if f"{name}{ending}" in dataset]
-    result = dataset[[f"{name}{ending}" for ending in endings]].astype(float)
-    if drift not in dataset:
-        mean, change, error = (
-            dataset[each].astype(float)
-            for each in (f"{name}_mean", f"{drift}_mean", f"{drift}_sem")
-        )
-    elif MEMBERS in dataset[drift].dims:
-        each = dataset[drift].astype(float)
-        mean, change = dataset[name].astype(float).mean(MEMBERS), each.mean(MEMBERS)
-        count = each.count(MEMBERS)
-        freedom = (count * (count - 1.0)).where(count > 1)
-        error = (((each - change) ** 2).sum(MEMBERS) / freedom) ** 0.5
-    else:
-        mean, change = dataset[name].astype(float), dataset[drift].astype(float)
-        error = xr.zeros_like(change)
-    has_settled = abs(change) <= _SETTLED * abs(mean) + _SURELY * error.fillna(0.0)
+    mean, change, late = (stated[f"{name}_mean"].astype(float) for name in names)
+    error = stated.get(f"{names[1]}_sem", xr.zeros_like(change)).fillna(0.0)
+    share = xr.where(late > 0.0, _SETTLED_CYCLES, _SETTLED)
+    has_settled = abs(change) <= share * abs(mean) + _SURELY * error
     reasons = xr.where(change.isnull(), "no two parts of whole cycles", "not settled")
-    result[f"{name}_reason"] = xr.where(has_settled, "", reasons).assign_attrs(
+    result = xr.Dataset(
+        {
+            f"{names[0]}{ending}": dataset[f"{names[0]}{ending}"]
+            .astype(float)
+            .where(has_settled)
+            for ending in ENDINGS
+            if f"{names[0]}{ending}" in dataset
+        }
+    )
+    result[f"{names[0]}_reason"] = xr.where(has_settled, "", reasons).assign_attrs(
         long_name="reason for no kinetic friction"
     )
-    for ending in endings:
-        result[f"{name}{ending}"] = result[f"{name}{ending}"].where(has_settled)
     return result.reset_coords(drop=True)
 
 

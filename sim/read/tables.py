@@ -416,7 +416,7 @@ def notes(run: Run, shown: Sequence[Table]) -> Notes:
         # that of the load at pull-off stands beside it
         if error.matters and error.name != "pull_off_error"
     ]
-    needed += filter(None, [unresolved_slips(run.dataset)])
+    needed += unresolved_slips(run.dataset)
     further = [*_turning(run)] if run.has_one_row_each else []
     further += [
         f"{len(each_table.rows)} of {each_table.total} rows shown; see --all, --csv FILE and --where KEY=VALUE"

@@ -69,7 +69,8 @@ def test_a_slider_that_is_not_ten_times_as_fast_as_the_stage_makes_no_slip_event
         slider = np.floor(stage / PERIOD) * PERIOD + rest * (PERIOD - slip) / (
             PERIOD - 1
         )
-        assert detected(stage, slider).total[0] == count
+        result = detected(stage, slider)
+        assert result.total[0] == count and result.state["slow"][0] == 3.0 - count
 
 
 @pytest.mark.parametrize("factor", FACTORS)

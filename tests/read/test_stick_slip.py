@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from helpers.driven import force, scenario
+from helpers.driven import force, scenario, spring
 from helpers.parts import Adhesion, Bell, Clock, Force, Record, Spring, read, run
 from helpers.printed import lines_of, rows_of
 from helpers.scenes import SHEARS, scene
@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
 from sim.ensemble.dataset import moments, pooled as pooled_moments
-from sim.parts.bonds.models import Cohort, FirstMoment, Steady, Unbroken
+from sim.parts.bonds.models import Cohort, FirstMoment, Steady, Tracked, Unbroken
 from sim.parts.events import Slips
 from tests.read.test_invariance import LENS, SCENES, STRETCHED
 
@@ -269,6 +269,44 @@ def test_slip_events_are_those_of_an_own_detector_and_as_many_for_a_slider_3_10_
         assert_allclose(each["slip_end"].values[known], time[ends], rtol=1e-12)
         assert_allclose(each["slip_force_before"].values[known], tops, rtol=1e-12)
     assert counts == [0, 0, 0, 8, 8, 8, 13, 13, 13, 21, 21, 21]
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "duration", "least"), [(1.0, 2.0, 0), (0.015, 20.0, 6)]
+)
+def test_a_slider_that_jumps_at_each_rupture_slips_where_its_bonds_break_together(
+    stiffness, duration, least
+):
+    """Of 100 bonds followed one by one each jumps ahead; behind a stiff spring they do so one after the other."""
+    make = functools.partial(Tracked, sites=100)
+    drive, steps = spring(stiffness), round(duration / 2e-3)
+    dataset = run(
+        replace(
+            scenario(duration, steps, drive, make=make),
+            record=Record(precision="float64"),
+        )
+    ).isel(member=0)
+    ratios = np.diff(dataset["slider_position"]) / np.diff(dataset["stage_position"])
+    assert ratios.max() > 3.0
+    counts = [len(episodes(dataset, factor)) for factor in (3.0, 10.0)]
+    assert counts[0] == counts[1] == dataset["slip_count"].item()
+    assert (counts[0] >= least) if least else (counts[0] == 0)
+
+
+@pytest.mark.parametrize(("mass", "is_named"), [("5 g", True), ("50 mg", False)])
+def test_a_force_that_falls_while_the_slider_is_hardly_faster_than_the_stage_is_named(
+    mass, is_named
+):
+    """A heavy body swings: the force falls to nearly nothing, at five times the speed of the stage at most."""
+    drive = PULLED["drive"] | {"stage": "3 mm/s", "mass": mass}
+    scene = {key: PULLED[key] for key in PULLED if key != "sweep"}
+    dataset = run(sim.Scenario(**scene | {"drive": drive}))
+    assert bool(dataset["slip_count"].item() > 10.0) is not is_named
+    assert bool(dataset["slow_fall_count"].item() > 10.0) is is_named
+    lines = lines_of(dataset)
+    assert (
+        any("while the slider is less than ten" in line for line in lines) is is_named
+    )
 
 
 @pytest.mark.parametrize("record", ["3.2 ms", "1.2 s"])
