@@ -149,7 +149,7 @@ class GammaSum:
 
 
 def gaussian_cell(stress, length, cell, points, shear_modulus):
-    """Return the mean energies of the mode pairs of a Gaussian field on a periodic cell [J/m²].
+    """Return the mode pairs of a Gaussian field on a periodic cell: mean energies [J/m²], wavenumbers [rad/m].
 
     The correlation is σ² exp(−r²/ξ²). Each wave stands for the pixel of the wavevector plane around it,
     over which the spectrum has an integral of error functions. Its energy is ½G_x(q) times its variance,
@@ -164,7 +164,7 @@ def gaussian_cell(stress, length, cell, points, shear_modulus):
     variance = 2.0 * stress**2 * np.outer(share, share)[is_half]
     qx, qy = step * x[is_half], step * y[is_half]
     q = np.hypot(qx, qy)
-    return 0.5 * variance * (1.0 + (qy / q) ** 2) / (2.0 * shear_modulus * q)
+    return 0.5 * variance * (1.0 + (qy / q) ** 2) / (2.0 * shear_modulus * q), q
 
 
 def bell_moments(ratio):

@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from helpers.answers import Lens, RelaxationCycle, bell_moments
+from helpers.answers import GammaSum, Lens, bell_moments, gaussian_cell
 from numpy.testing import assert_allclose
-from scipy import integrate, optimize, special
+from scipy import integrate, optimize, special, stats
 
 import sim
 
@@ -47,10 +47,15 @@ class Answer(NamedTuple):
 
 def check(answer, late=False):
     """Compare the statements of a scene with its answers, each within its bound, or exactly without one."""
-    run = sim.Run(sim.run(scene(**answer.tables)))
+    dataset = sim.run(scene(**answer.tables))
+    run, frame = sim.Run(dataset), sim.stats(dataset)
     for name, expected in answer.expected.items():
         statement = run.statistic(name, late=late)
         mean = statement.sel(statistic="mean")
+        if name in frame:
+            shown = run.statistic(name, late=run.has_one_row_each)
+            shown = shown.sel(statistic="mean").to_numpy().ravel()
+            assert_allclose(frame[name], shown, rtol=1e-14, err_msg=name)
         value = np.broadcast_to(np.asarray(expected, float).T, mean.shape[::-1]).T
         bound = ROUNDING * np.abs(value)
         if "bound" in statement["statistic"]:
@@ -342,3 +347,409 @@ def test_bonds_resolved_by_their_stretch_are_a_renewal_process_within_their_tole
     for name, values in expected.items():
         mean = run.statistic(name, late=True).sel(statistic="mean")
         assert_allclose(mean, values, rtol=tolerance, err_msg=name)
+
+
+# --- statements with noise, of 200 ensembles ---
+
+ENSEMBLES, MEMBERS = 200, 32
+#: Share of the ensembles that state a value: one settled mean of a hundred is taken for a drift.
+LEAST_STATED = 0.95
+#: Clock steps that forget a field whose correlation time is a hundredth of one.
+STEP, FORGOTTEN, NEVER = 0.01, 1e-4, 1e6
+CELL, FIELD_LENGTH, POINTS = 0.24e-3, 15e-6, 32
+UNIT, WAVENUMBERS = gaussian_cell(1.0, FIELD_LENGTH, CELL, POINTS, SHEAR)
+#: Work of adhesion of the bonds at the speed of the scenes with noise, and the field that takes most of it.
+SLOW = 2e-3
+OF_BONDS = WORK * (1.0 - SHARE + SHARE / (1.0 + SLOW / CRITICAL))
+NOISE = math.sqrt(0.95 * OF_BONDS / np.sum(UNIT))
+LAW = GammaSum(NOISE**2 * UNIT)
+
+
+def field(time, rms=NOISE):
+    """Return the table of a Gaussian field on a cell that forgets itself in a time [s]."""
+    return {
+        "model": "modal",
+        "spectrum": {"model": "gaussian", "rms": rms, "length": FIELD_LENGTH},
+        "cell": CELL,
+        "points": POINTS,
+        "correlation": {"model": "time", "time": time},
+    }
+
+
+def in_time(steps, step=STEP):
+    return {"duration": steps * step, "step": step}
+
+
+class Stated(NamedTuple):
+    """A statement with noise and its answer.
+
+    Attributes
+    ----------
+    quantity : str
+        Name of the quantity.
+    answer : float
+        The value that its interval should hold.
+    record : int or None
+        The record that it is of; None for the second half of the run, or of the whole run.
+    late : bool
+        True for the mean over the second half.
+    value : str
+        The statistic.
+    """
+
+    quantity: str
+    answer: float
+    record: int | None = None
+    late: bool = False
+    value: str = "mean"
+
+    def of(self, dataset):
+        """Return value, standard error and ends of the interval in each ensemble."""
+        statement = sim.Run(dataset).statistic(self.quantity, late=self.late)
+        if self.record is not None:
+            statement = statement.isel(t=self.record)
+        names = [self.value, "standard error", "low", "high"]
+        if self.value != "mean":
+            names[1:] = [None, f"{self.value} low", f"{self.value} high"]
+        known = set(statement["statistic"].to_numpy().tolist())
+        shape = statement.isel(statistic=0).shape
+        return [
+            statement.sel(statistic=name).to_numpy()
+            if name in known
+            else np.full(shape, math.nan)
+            for name in names
+        ]
+
+
+class Noisy(NamedTuple):
+    """A scene with noise, its statements, and the number of members of an ensemble."""
+
+    tables: dict[str, Any]
+    stated: tuple[Stated, ...]
+    members: int = MEMBERS
+
+
+def of_work(energy):
+    return OF_BONDS - energy
+
+
+def lost_first(energy):
+    return (FULL - area(WORK - energy)) / FULL
+
+
+def radius(energy):
+    return LENS.at_load(LOAD, of_work(energy))
+
+
+TAU = STRESS / (1.0 + SLOW / CRITICAL)
+AREA = LAW.expected(lambda energy: area(of_work(energy)))
+MASKED = LAW.above(OF_BONDS)
+ALL_BONDS = {"adhesion": {"work": WORK, "bond_share": SHARE}, "bonds": STEADY}
+AT_SLOW = {"drive": {"speed": SLOW}}
+
+#: Each record is drawn anew, so statements of different records are independent.
+AT_RECORDS = (
+    Stated("fluctuation_energy", LAW.mean, 0),
+    Stated("work_of_adhesion", OF_BONDS - LAW.mean, 1),
+    Stated("contact_radius", LAW.expected(radius), 2),
+    Stated("contact_area", AREA, 3),
+    Stated("area_ratio", AREA / FULL, 4),
+    Stated("friction_force", TAU * AREA, 5),
+    Stated("fraction_masked", MASKED, 6),
+    Stated("lost_to_fluctuations", (area(OF_BONDS) - AREA) / FULL, 7),
+    Stated("lost_to_fluctuations_first", LAW.expected(lost_first), 8),
+    Stated(
+        "indentation",
+        LAW.expected(lambda e: LENS.indentation_of(radius(e), of_work(e))),
+        9,
+    ),
+    Stated("fluctuation_energy", LAW.quantile(0.5), 10, value="50 %"),
+    Stated("contact_area", area(OF_BONDS - LAW.quantile(0.5)), 11, value="50 %"),
+)
+WEAK = GammaSum(0.36 * NOISE**2 * UNIT)
+WEAK_AREA = WEAK.expected(lambda energy: area(of_work(energy)))
+#: Radius at an indentation over the energy, which is smooth up to the masked contact.
+GRID = np.append(np.linspace(0.0, OF_BONDS, 400)[:-1], OF_BONDS)
+HELD = [LENS.at_displacement(2e-6, work=max(OF_BONDS - e, 1e-12)) for e in GRID]
+
+
+def held(energy):
+    return np.interp(energy, GRID, HELD)
+
+
+def load_held(energy):
+    return LENS.load_of(held(energy), of_work(energy))
+
+
+#: A contact under this load is open if the work of adhesion left is below a tenth of all.
+PULL = -0.15 * np.pi * RADIUS * OF_BONDS
+OPEN = LAW.above(0.9 * OF_BONDS)
+COUNT = 40
+COUNTS = np.arange(COUNT + 1) / COUNT
+BINOMIAL = special.comb(COUNT, np.arange(COUNT + 1)) / 2.0**COUNT
+#: A field with which a contact is masked at a clock step with a probability of a few per cent.
+RARE = 0.8
+CHANCE = GammaSum(RARE * NOISE**2 * UNIT).above(OF_BONDS)
+#: First clock step at which less than half of the members have never been masked.
+HALF = math.ceil(math.log(0.5) / math.log1p(-CHANCE)) - 1
+#: Maskings over the time before them, in 60 clock steps and at the start.
+RATE = (1.0 - (1.0 - CHANCE) ** 61) * CHANCE
+RATE /= STEP * (1.0 - CHANCE) * (1.0 - (1.0 - CHANCE) ** 60)
+MIDDLE = 0.5 * (1.0 + area(0.0) / FULL)
+WEAKEST = GammaSum(0.25 * NOISE**2 * UNIT)
+
+
+def mean_left(speed):
+    """Return the mean share of the area at a speed."""
+    bonded = WORK * (1.0 - SHARE + SHARE / (1.0 + speed / CRITICAL))
+    return WEAKEST.expected(lambda energy: area(bonded - energy)) / FULL
+
+
+HALFWAY = optimize.brentq(lambda speed: mean_left(speed) - MIDDLE, 1e-4, 1.0)
+
+
+#: A wave forgets its amplitude over its own length, and its energy, whose variance is w², over half of that.
+WAVES_FORGET = np.average(np.pi / (SLOW * WAVENUMBERS), weights=UNIT**2)
+
+
+NOISY = {
+    "a new field at each record": Noisy(
+        ALL_BONDS | AT_SLOW | {"shear": field(FORGOTTEN), "clock": in_time(12)},
+        AT_RECORDS,
+    ),
+    # of three members that are often all masked the area has no spread
+    "three members": Noisy(
+        ALL_BONDS
+        | AT_SLOW
+        | {"shear": field(FORGOTTEN, 0.6 * NOISE), "clock": in_time(3)},
+        (
+            Stated("fluctuation_energy", WEAK.mean, 0),
+            Stated("contact_area", WEAK_AREA, 1),
+            Stated("friction_force", TAU * WEAK_AREA, 2),
+        ),
+        members=3,
+    ),
+    "the second half of a stationary run": Noisy(
+        ALL_BONDS | AT_SLOW | {"shear": field(4.0 * STEP), "clock": in_time(80)},
+        (
+            Stated("fluctuation_energy", LAW.mean, late=True),
+            Stated("area_ratio", AREA / FULL, late=True),
+            Stated("fraction_masked", MASKED, late=True),
+            Stated("fluctuation_energy", LAW.quantile(0.05), late=True, value="5 %"),
+            Stated("fluctuation_energy", LAW.quantile(0.5), late=True, value="50 %"),
+            Stated("fluctuation_energy", LAW.quantile(0.95), late=True, value="95 %"),
+            Stated("time_masked", MASKED),
+        ),
+    ),
+    "a field that forgets in ten clock steps": Noisy(
+        AT_SLOW | {"shear": field(10.0 * STEP), "clock": in_time(400)},
+        # the energy forgets twice as fast as the stress
+        (Stated("correlation_time", 5.0 * STEP),),
+        members=8,
+    ),
+    "waves that forget in proportion to their length": Noisy(
+        AT_SLOW
+        | {
+            "shear": field(1.0) | {"correlation": {"model": "wave", "waves": 1.0}},
+            "clock": in_time(400, 0.25 * STEP),
+        },
+        (Stated("correlation_time", WAVES_FORGET),),
+        members=8,
+    ),
+    "one long run": Noisy(
+        ALL_BONDS | AT_SLOW | {"shear": field(4.0 * STEP), "clock": in_time(1000)},
+        (
+            Stated("fluctuation_energy", LAW.mean, late=True),
+            Stated("area_ratio", AREA / FULL, late=True),
+            Stated("fluctuation_energy", LAW.quantile(0.5), late=True, value="50 %"),
+        ),
+        members=1,
+    ),
+    "a held indentation": Noisy(
+        ALL_BONDS
+        | AT_SLOW
+        | {
+            "shear": field(FORGOTTEN),
+            "contact": {"indentation": 2e-6},
+            "clock": in_time(2),
+        },
+        (
+            Stated("normal_load", LAW.expected(load_held), 0),
+            Stated("contact_area", np.pi * LAW.expected(lambda e: held(e) ** 2), 1),
+        ),
+    ),
+    "a tension": Noisy(
+        ALL_BONDS
+        | AT_SLOW
+        | {"shear": field(FORGOTTEN), "contact": {"load": PULL}, "clock": in_time(1)},
+        (Stated("fraction_detached", OPEN, 0),),
+    ),
+    "counted bonds": Noisy(
+        {
+            "bonds": {
+                "model": "counted",
+                "critical_speed": CRITICAL,
+                "rebinding_rate": 1e5,
+                "sites": COUNT,
+                "stress": STRESS,
+            },
+            "adhesion": {"work": WORK},
+            "drive": {"speed": CRITICAL},
+            "clock": in_time(6),
+        },
+        (
+            Stated("bond_fraction", 0.5, 1),
+            Stated("shear_stress", 0.5 * STRESS, 2),
+            Stated("contact_area", BINOMIAL @ area(WORK * COUNTS), 3),
+            Stated(
+                "friction_force", BINOMIAL @ (STRESS * COUNTS * area(WORK * COUNTS)), 4
+            ),
+            Stated("lost_to_bonds", 1.0 - BINOMIAL @ area(WORK * COUNTS) / FULL, 5),
+            Stated("bond_fraction", 0.5, 0),
+        ),
+    ),
+    "tracked bonds": Noisy(
+        {
+            "bonds": STRETCHED | {"model": "tracked", "rupture": BELL, "sites": COUNT},
+            "drive": {"speed": SPEEDS[2]},
+            "clock": in_time(2, 0.05),
+        },
+        (
+            Stated("bond_fraction", RENEWED[2] / AT_REST_BOUND, 1),
+            Stated("shear_stress", SITES * BELL_FORCE * PULLED[2], 2),
+        ),
+    ),
+    "a field that never changes, under a falling load": Noisy(
+        ALL_BONDS
+        | AT_SLOW
+        | {
+            "shear": field(NEVER, 0.5 * NOISE),
+            "contact": {"load": {"from": -0.2e-3, "to": -0.33e-3}},
+            "clock": in_time(200),
+        },
+        (
+            Stated(
+                "pull_off_load", -1.5 * np.pi * RADIUS * (OF_BONDS - 0.25 * LAW.mean)
+            ),
+        ),
+    ),
+    "a field that may mask the contact at each clock step": Noisy(
+        ALL_BONDS
+        | AT_SLOW
+        | {"shear": field(FORGOTTEN, math.sqrt(RARE) * NOISE), "clock": in_time(60)},
+        (Stated("half_masked", HALF * STEP), Stated("masked_rate", RATE)),
+    ),
+    "a sweep of the speed": Noisy(
+        {
+            "adhesion": {"work": WORK, "bond_share": SHARE},
+            "bonds": STEADY,
+            "shear": field(NEVER, 0.5 * NOISE),
+            "drive": {"speed": 1e-3},
+            "sweep": {
+                "drive.speed": {"from": 3e-4, "to": 1.0, "count": 15, "scale": "log"}
+            },
+            "clock": in_time(1),
+        },
+        (Stated("speed_halfway_to_hertz", HALFWAY),),
+    ),
+}
+
+
+def ensembles(noisy, count):
+    """Return a run of so many ensembles, as runs that were joined along a dimension of this name."""
+    members = count * noisy.members
+    dataset = sim.run(scene(ensemble={"members": members}, **noisy.tables))
+    parts = dataset.coarsen(member=noisy.members)
+    parts = parts.construct(member=("ensemble", "member"))
+    modulus = parts["contact_modulus"].expand_dims(ensemble=np.arange(count))
+    return parts.assign(contact_modulus=modulus).assign_attrs(
+        members=np.int32(noisy.members)
+    )
+
+
+@pytest.mark.parametrize("name", NOISY)
+def test_a_mean_statement_of_20_ensembles_is_its_answer_within_five_errors(name):
+    count = 20
+    dataset = ensembles(NOISY[name], count)
+    for stated in NOISY[name].stated:
+        values = stated.of(dataset)[0]
+        values = values[np.isfinite(values)]
+        error = values.std(ddof=1) / math.sqrt(len(values))
+        assert len(values) > 0.8 * count, stated
+        assert abs(values.mean() - stated.answer) < 5.0 * error, stated
+
+
+def test_an_ensemble_among_others_has_the_statements_of_its_members_alone():
+    noisy = NOISY["a new field at each record"]
+    members, dataset = noisy.members, ensembles(noisy, 3)
+    whole = sim.run(scene(ensemble={"members": 3 * members}, **noisy.tables))
+    alone = whole.isel(member=slice(members, 2 * members))
+    alone = alone.assign_attrs(members=np.int32(members))
+    for name in ("area_ratio", "fraction_masked", "lost_to_fluctuations"):
+        among = sim.Run(dataset).statistic(name).isel(ensemble=1, drop=True)
+        assert_allclose(sim.Run(alone).statistic(name), among, rtol=1e-12)
+
+
+@pytest.mark.verify
+def test_brackets_and_intervals_of_200_ensembles_hold_their_answers_as_often_as_they_promise():
+    misses, pooled = [], {"bracket": [], "interval": []}
+    for noisy in NOISY.values():
+        dataset = ensembles(noisy, ENSEMBLES)
+        free = noisy.members - 1 if noisy.members > 1 else math.inf
+        promised = {"bracket": 2.0 * stats.t.cdf(1.0, free) - 1.0, "interval": 0.95}
+        for stated in noisy.stated:
+            value, error, low, high = stated.of(dataset)
+            held = {
+                "bracket": (error, np.abs(value - stated.answer) <= error),
+                "interval": (
+                    low + high,
+                    (low <= stated.answer) & (stated.answer <= high),
+                ),
+            }
+            for kind, (known, holds) in held.items():
+                holds = holds[np.isfinite(known)]
+                if not holds.size:
+                    continue
+                assert holds.size >= LEAST_STATED * ENSEMBLES, (kind, stated)
+                share, chance = holds.mean(), promised[kind]
+                binomial = math.sqrt(chance * (1.0 - chance) / holds.size)
+                if abs(share - chance) > 3.5 * binomial:
+                    misses.append((kind, share, stated))
+                if noisy.members == MEMBERS:
+                    pooled[kind].append(share)
+    assert not misses
+    assert 0.66 < np.mean(pooled["bracket"]) < 0.70, pooled
+    assert 0.94 < np.mean(pooled["interval"]) < 0.96, pooled
+
+
+def test_spread_and_skewness_of_many_members_are_those_of_a_gamma_sum():
+    members = 6400
+    noisy = NOISY["a new field at each record"]
+    run = sim.Run(sim.run(scene(ensemble={"members": members}, **noisy.tables)))
+    statement = run.statistic("fluctuation_energy").isel(t=0)
+
+    def error_of(influence):
+        """Return the standard error of a moment, by what one member changes of it."""
+        square = LAW.expected(
+            lambda energy: influence((energy - LAW.mean) / LAW.std) ** 2
+        )
+        return math.sqrt(square / members)
+
+    skewness = LAW.skewness
+    error = LAW.std * error_of(lambda z: 0.5 * (z**2 - 1.0))
+    spread = float(statement.sel(statistic="standard deviation"))
+    assert abs(spread - LAW.std) < 5.0 * error
+    error = error_of(
+        lambda z: z**3 - skewness - 1.5 * skewness * (z**2 - 1.0) - 3.0 * z
+    )
+    assert abs(float(statement.sel(statistic="skewness")) - skewness) < 5.0 * error
+    assert statement.sel(statistic="number") == members
+
+
+def test_a_quantity_that_is_the_same_in_all_members_has_no_skewness():
+    masking = ALL_BONDS | AT_SLOW | {"shear": field(FORGOTTEN, 4.0 * NOISE)}
+    run = sim.Run(sim.run(scene(ensemble={"members": MEMBERS}, **masking)))
+    for late in (False, True):
+        ratio = run.statistic("area_ratio", late=late)
+        assert_allclose(ratio.sel(statistic="mean"), area(0.0) / FULL, rtol=ROUNDING)
+        assert np.all(np.isnan(ratio.sel(statistic="skewness")))
