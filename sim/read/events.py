@@ -181,8 +181,10 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
         ["slip_duration", "stick_duration", "stress_drop"]
     ]
     result = result.merge(each.mean("slip", keep_attrs=True), compat="no_conflicts")
+    bounds, source = _of_late_slips(dataset, result), "step"
     # of one random member there is no other error than the scatter between slip events
     if dataset.sizes.get(MEMBERS) == 1:
+        source = "slip events and step"
         events, squares = (
             each.count("slip"),
             ((each - each.mean("slip")) ** 2).sum("slip"),
@@ -192,18 +194,44 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
             ** 0.5
             for n in each
         }
-        of_late = {
+        errors |= {
             name: dataset[f"late_{of}_std"] / dataset["slip_count_late"] ** 0.5
             for name, of in _LATE.items()
         }
-        errors |= of_late
-        result = result.assign(
-            {
-                f"{name}_bound": (_WIDE * error).assign_attrs(source="slip events")
-                for name, error in errors.items()
-            }
-        )
-    return result
+        for name, error in errors.items():
+            bounds[name] = _WIDE * error + bounds.get(name, 0.0)
+    return result.assign(
+        {
+            f"{name}_bound": bound.assign_attrs(source=source)
+            for name, bound in bounds.items()
+            if name in result
+        }
+    )
+
+
+def _of_late_slips(dataset: xr.Dataset, means: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Return bounds of the errors of means over slip events by the clock steps at which these begin and end.
+
+    Within a step the stage extends the spring by its displacement. A slip event and a stick phase begin and end
+    at clock steps, and so does the span over which the stage does work against friction.
+    """
+    step = setting(dataset, "clock.step")
+    path = abs(speed_of(dataset)).max("t") * step
+    rise = setting(dataset, "drive.stiffness") * path
+    of_each = step + 0.0 * means["recurrence_time"]
+    intervals = (dataset["slip_count_late"] - 1.0).where(
+        dataset["slip_count_late"] > 1.0
+    )
+    span = intervals * means["recurrence_time"]
+    return {
+        "static_friction": rise + 0.0 * means["static_friction"],
+        "force_drop": 2.0 * rise + 0.0 * means["force_drop"],
+        "slip_amplitude": path + 0.0 * means["slip_amplitude"],
+        "slip_duration": of_each,
+        "stick_duration": of_each,
+        "recurrence_time": step / intervals,
+        "kinetic_friction": means["force_drop"] * step / span,
+    }
 
 
 def unresolved_slips(dataset: xr.Dataset) -> list[str]:
@@ -437,8 +465,8 @@ def incipient_law(force: Array, area: Array) -> tuple[int, float]:
 # --- all events of a run, once per member ---
 
 
-#: Records that a cycle needs, and the energies of a cycle of each member.
-_CORNERS, _LOOPS = 4, ("loop_energy", "loop_dissipation")
+#: Records that a cycle needs.
+_CORNERS = 4
 #: A loop below this share of what is put in and given back is nothing.
 _NOTHING = 1e-12
 #: Names of a peak, the quantity that it is of, and its unit.
@@ -532,17 +560,45 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
             )
             text = "total energy dissipated by opening and closing"
             result[f"total_dissipated{suffix}"] = labelled(lost, "J", text, "W")
+    with contextlib.suppress(KeyError):
+        result = result.assign(_of_late_jumps(dataset))
     with contextlib.suppress(ValueError), answered():
         loops = loop_energy(dataset)
         if dataset.sizes["t"] > _CORNERS * loops.sizes["cycle"]:
             means = loops.mean("cycle", keep_attrs=True)
             coarse = loop_energy(dataset.isel(t=slice(None, None, 2))).mean("cycle")
-            for name in [name for name in _LOOPS if name in coarse]:
-                means[f"{name}_bound"] = abs(means[name] - coarse[name]).assign_attrs(
-                    source="records"
-                )
+            if "loop_energy" in coarse:
+                change = abs(means["loop_energy"] - coarse["loop_energy"])
+                means["loop_energy_bound"] = change.assign_attrs(source="records")
+            if "total_dissipated_bound" in result and "loop_dissipation" in means:
+                bound = result["total_dissipated_bound"] / loops.sizes["cycle"]
+                means["loop_dissipation_bound"] = bound.assign_attrs(source="step")
             result = result.merge(means, compat="no_conflicts")
     return result
+
+
+def _of_late_jumps(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Return the bound of the energy that jumps of the contact dissipate [J]; nothing if it is not known.
+
+    The stepper opens and closes a contact at the end of a clock step, after the mount has moved on by up to its
+    displacement in a step. It does at most the work of the lowest load over that displacement. A contact closes
+    at most once more than it opens. Under a load a contact that opens dissipates nothing.
+    """
+    needed = {"dissipated_energy", "detachments", "lowest_load"}
+    needed |= {"displacement", "in_contact", "first_closing"}
+    is_equilibrium = word(dataset, "contact.model", "equilibrium") == "equilibrium"
+    if not needed <= dataset.keys() or not bool(is_equilibrium.all()):
+        return {}
+    if dataset.sizes["t"] < 2 or control(dataset).kind == "load":
+        return {}
+    records = float(dataset["t"][1] - dataset["t"][0]) / setting(dataset, "clock.step")
+    moved = abs(dataset["displacement"].astype(float).diff("t")).max("t") / records
+    closes = dataset["first_closing"].notnull()
+    starts_open = dataset["in_contact"].isel(t=0, drop=True) == 0.0
+    closings = (dataset["detachments"] + starts_open).where(closes, 0.0)
+    jumps = dataset["detachments"] + closings
+    bound = jumps * abs(dataset["lowest_load"]).fillna(0.0) * moved
+    return {"total_dissipated_bound": bound.assign_attrs(source="step")}
 
 
 def pull_offs(dataset: xr.Dataset) -> xr.Dataset:

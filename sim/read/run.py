@@ -33,6 +33,8 @@ _KINDS = {
 }
 #: The quantity whose statistics are those of a time.
 _MEMORY = "correlation_time"
+#: A spread below this share of the mean is of rounding.
+_ROUNDING = 1e-12
 #: Names of a quantile and of the ends of its interval.
 _OF_QUANTILES = ("", " low", " high")
 
@@ -302,10 +304,12 @@ class Run:
         if late:
             sample = sample.isel(t=slice(sample.sizes["t"] // 2, None))
             over.append("t")
-        off = sample - sample.mean(over)
+        mean = sample.mean(over)
+        off = sample - mean
         variance, third = (off**2).mean(over), (off**3).mean(over)
         return {
-            "skewness": third / variance.where(variance > 0.0) ** 1.5,
+            "skewness": third
+            / variance.where(variance > (_ROUNDING * mean) ** 2) ** 1.5,
             "number": sample.count(over).astype(float),
         }
 

@@ -312,9 +312,6 @@ QUANTILES = (0.05, 0.5, 0.95)
 LEVEL = 0.95
 WIDE = float(special.ndtri(0.5 + 0.5 * LEVEL))
 
-#: A spread below this share of the mean is of rounding.
-_ROUNDING = 1e-12
-
 #: Observables that are 0 or 1 in each member: the interval of their mean is that of a share.
 _COUNTED = ("fraction_detached", "fraction_masked", "ever_detached")
 

@@ -153,8 +153,9 @@ def test_stick_slip_mean_force_statistics_and_tables_are_those_of_the_closed_cyc
     assert cells["slips"].startswith("3") and cells["kinetic friction (mN)"].startswith(
         "3.3"
     )
-    # nothing is random, so that no error stands beside a mean over slip events
-    assert not any("(" in cell for cell in cells.values())
+    # nothing is random, so that the only error of a mean over slip events is that of the clock step
+    with_errors = [cell for cell in cells.values() if "(" in cell]
+    assert with_errors and all("(step)" in cell for cell in with_errors)
     faster = cycles().assign(
         stage_speed=cycles()["stage_speed"] * (1.0 + cycles()["t"])
     )
