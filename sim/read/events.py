@@ -956,7 +956,8 @@ def peak_of_mean(values: Array, times: Array, unit: str = "1") -> Peak:
             f"too few records to resolve the peak: record every {step} or more often"
         )
     tried, width = [_top(mean, 0, last)], 1
-    while 2 * width <= place:
+    # an average about a record before the last eighth has as many after it
+    while 2 * width <= min(place, records - last + 1):
         weights, at = _top(mean, width, last)
         if any(
             abs((weights - other) @ mean) > _ALIKE * error(weights - other)
