@@ -72,9 +72,15 @@ def numbers_of(seed):
     return statements_of(run_of(seed))
 
 
+def is_cheap(seed):
+    """Return False for a body on single bonds, which rings for millions of sub-steps."""
+    scene = random_scene(seed)
+    return not (scene["bonds"]["model"] == "tracked" and "mass" in scene["drive"])
+
+
 _CASES = [
     pytest.param(seed, marks=() if seed < SHORT else pytest.mark.verify)
-    for seed in range(ALL)
+    for seed in itertools.islice(filter(is_cheap, itertools.count()), ALL)
 ]
 
 
