@@ -106,7 +106,7 @@ def cells_of(run):
 def parsed(text):
     """Return value, standard error and bound of a cell, and the largest difference by rounding; None without a value.
 
-    A value with a bracket or a bound is rounded to the last digit, any other one to four.
+    A value with a bracket, a bound or an end is rounded to its last digit, any other one to four.
     """
     match = _CELL.match(text)
     if match is None or " to " in text:
@@ -118,6 +118,6 @@ def parsed(text):
     rounding = 0.5 * digit
     if match[2]:  # an error of many digits ends in zeros
         rounding = 0.5 * 10.0 ** (math.floor(math.log10(error) + 1e-9) - 1)
-    elif not match[3]:
+    elif not match[3] and " (" not in text:
         rounding = 6e-4 * abs(value)
     return value, error, bound, rounding
