@@ -13,9 +13,18 @@ import xarray as xr
 
 from sim.numerics.files import output
 from sim.read.dataset import steady_points
+from sim.read.observables import with_slips
 from sim.read.run import Run
 from sim.read.statistics import QUANTILES, Array, over_members
-from sim.read.tables import EVENTS, GROUPS, LOSSES, SLIPS, main_columns, of_losses
+from sim.read.tables import (
+    EVENTS,
+    GROUPS,
+    LOSSES,
+    SLIPS,
+    at_records,
+    main_columns,
+    of_losses,
+)
 from sim.units.errors import BadInput
 from sim.units.notation import chosen_unit
 
@@ -60,7 +69,7 @@ def frame(run: Run, show: Sequence[str] = ()) -> pd.DataFrame:
     each = (
         run.late(names)
         if run.has_one_row_each
-        else over_members(run.dataset, names, quantiles=False)
+        else at_records(with_slips(run.dataset), names)
     )
     once = [column.name for column in EVENTS]
     if {"slips", "all"} & {*show}:

@@ -737,14 +737,19 @@ def _tabulated(run: Run, rows: int, names: list[str]) -> tuple[xr.Dataset, Point
     if counts["t"] < dataset.sizes["t"]:
         dataset = restricted(dataset.isel(t=slice(run.last + 1)), names)
         dataset = dataset.isel(t=_spread(dataset.sizes["t"], counts["t"]))
+    result = at_records(dataset, names)
+    return result, _points(dict(result.sizes), counts)
+
+
+def at_records(dataset: xr.Dataset, names: list[str]) -> xr.Dataset:
+    """Return statistics over the members at each record; the load of an open contact is the applied one."""
     result = over_members(dataset, names, quantiles=False)
-    # it is known of open contacts too
     if "applied_load" in dataset and "normal_load_mean" in result:
         for kind in ("mean", "low", "high"):
             result[f"normal_load_{kind}"] = dataset["applied_load"].fillna(
                 result[f"normal_load_{kind}"]
             )
-    return result, _points(dict(result.sizes), counts)
+    return result
 
 
 def _points(sizes: Mapping[Any, int], counts: dict[str, int]) -> Points:

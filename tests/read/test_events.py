@@ -216,6 +216,25 @@ def test_a_loop_is_what_its_jumps_dissipate_nothing_without_and_the_area_of_a_ci
         }
 
 
+def test_a_loop_has_a_bound_that_holds_its_error_by_the_records_or_a_reason():
+    course = {"displacement": {"from": 1e-6, "to": -3e-6}, "stiffness": 500.0}
+    # what one of 2400 records adds is below all bounds
+    exact = read.loop_energy(cycled(steps=2400, **course))["loop_energy"].mean()
+    stated = {}
+    for steps in (24, 34, 50, 98, 200):
+        loop = read.statistics(cycled(steps=steps, **course))
+        value, bound = loop["loop_energy_mean"], loop["loop_energy_bound"]
+        stated[steps] = float(bound)
+        if steps > 32:
+            assert abs(value - exact) <= bound and loop["loop_energy_reason"] == ""
+    assert math.isnan(stated[24])
+    assert loop["loop_energy_bound"].attrs["source"] == "records"
+    assert stated[200] < 0.5 * stated[50]
+    few = read.statistics(cycled(steps=24, **course))
+    assert "fewer than 16 records" in str(few["loop_energy_reason"].item())
+    assert math.isnan(few["loop_energy_mean"])
+
+
 def test_loops_of_points_are_those_of_the_whole_and_there_are_none_without_trips(ramp):
     course = Equilibrium(
         indentation={"from": 1e-6, "to": -2e-6, "cycles": 1}, after_pull_off="reattach"

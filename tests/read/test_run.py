@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy
 from helpers.lens import scene
-from helpers.parts import Ensemble, drive, read, run, shear
+from helpers.parts import Ensemble, Equilibrium, bonds, drive, read, run, shear
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
@@ -100,3 +100,25 @@ def test_a_frame_has_the_columns_of_the_tables_in_si_and_errors_only_of_noise(ra
 def test_a_table_has_ten_columns_at_most(ramp, show):
     for table in read.tables_of(sim.Run(ramp), show=show):
         assert len(table.rows[0]) <= 10
+
+
+def test_a_frame_has_the_speed_and_the_load_that_the_tables_print():
+    """Single bonds slip without duration, and an open contact still has its load."""
+    load = {"from": 4e-3, "to": -2e-3, "cycles": 1}
+    dataset = run(
+        scene(
+            drive=drive.Spring(
+                stage=1e-3, stiffness=100.0, damping=0.1, contact_stiffness="rigid"
+            ),
+            bonds=bonds.Counted(
+                critical_speed=1e-2, rebinding_rate=500.0, stress=3e5, sites=40
+            ),
+            contact=Equilibrium(load=load, after_pull_off="stay_open"),
+            shear=shear.Uniform(),
+        )
+    )
+    frame, position = sim.stats(dataset), dataset["slider_position"].mean("member")
+    moved = np.gradient(position, dataset["t"])
+    assert_allclose(frame["speed"][1:], moved[1:], rtol=1e-9, atol=1e-12)
+    assert_allclose(frame["normal_load"], dataset["applied_load"], rtol=1e-12)
+    assert dataset["in_contact"].min() == 0.0

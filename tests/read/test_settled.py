@@ -213,6 +213,14 @@ def test_a_peak_of_noisy_members_is_that_of_their_mean_or_none_and_its_intervals
     assert_allclose([exact.value, exact.time, exact.sem], [3.0, at, 0.0], rtol=1e-12)
 
 
+def test_a_wide_peak_late_in_a_run_is_found():
+    times, rng = np.arange(160.0), np.random.default_rng(5)
+    noise = rng.normal(size=(40, 1)) * np.cos(times / 40.0 + rng.uniform(0, 6, (40, 1)))
+    mean = 4.0 - ((times - 110.0) / 60.0) ** 2
+    peak = peak_of_mean(mean + 0.1 * noise, times)
+    assert peak.low <= 4.0 <= peak.high and peak.first <= 110.0 <= peak.last
+
+
 def test_the_peak_after_a_rest_does_not_grow_with_the_time_of_sliding():
     start = drive.Start(rest=0.1, speed=3e-6)
     parts = {

@@ -27,7 +27,7 @@ from scipy.optimize import brentq
 
 import sim
 from sim.engine import MemberNoise, follow
-from sim.ensemble.preview import slider_body
+from sim.ensemble.diagnosis import slider_body
 from sim.laws.schallamach import Body, first_moment_onset
 from sim.parts.bonds.models import FirstMoment, Steady, Unbroken
 from sim.parts.bonds.rupture import Constant, CutOff
