@@ -1025,7 +1025,7 @@ OF_MEMBERS: tuple[Definition, ...] = (
     Definition(
         "runaway_after",
         "s",
-        "time at which members lost stability, the mean of those that did",
+        "time at which members lost stability, if all of them did",
         heading="lost stability after",
         absent="no member lost stability",
     ),

@@ -381,21 +381,28 @@ def runaways(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``ran_away``, 1 if the slider lost stability; ``runaway_after`` [s] and ``static_friction`` [N],
-        the force at that time, nan where the body is held to the end.
+        ``ran_away``, 1 if the slider lost stability; ``runaway_after`` [s] and ``static_friction`` [N], the force at
+        that time. Both are nan, with a reason, if some members are held to the end: a mean over the others would grow
+        with the length of the run.
     """
     when = dataset["runaway_time"].isel(t=-1, drop=True).astype(float)
-    return xr.Dataset(
+    force, has_gone = dataset["runaway_force"].astype(float), when.notnull()
+    result = xr.Dataset(
         {
-            "ran_away": pure(when.notnull().astype(float), "members that ran away"),
-            "runaway_after": labelled(when, "s", "mean time of the runaways"),
+            "ran_away": pure(has_gone.astype(float), "members that lost stability"),
+            "runaway_after": labelled(when, "s", "time of the loss of stability"),
             "static_friction": labelled(
-                dataset["runaway_force"],
-                "N",
-                "force at which the slider lost stability",
+                force, "N", "force at which the slider lost stability"
             ),
         }
     )
+    if MEMBERS in when.dims:
+        of_all, of_some = has_gone.all(MEMBERS), has_gone.any(MEMBERS)
+        reason = xr.where(of_some & ~of_all, "not every member loses stability", "")
+        for name in ("runaway_after", "static_friction"):
+            result[name] = result[name].where(of_all)
+            result[f"{name}_reason"] = reason
+    return result
 
 
 def _growth(
@@ -761,7 +768,9 @@ def _late_by_steps(
     """
     step, duration = setting(dataset, "clock.step"), setting(dataset, "clock.duration")
     is_log = word(dataset, "drive.scale", "") == "log"
-    first, last = (setting(dataset, f"drive.{end}") for end in ("from", "to"))
+    first, last = (speed_of(dataset).isel(t=k, drop=True) for k in (0, -1))
+    with contextlib.suppress(KeyError):  # tables of a drive that are swept whole
+        first, last = (setting(dataset, f"drive.{end}") for end in ("from", "to"))
     size = abs(speed)
     ratio = abs(last / first.where(is_log, 1.0)).where(is_log, 1.0)
     # the growth of the magnitude of the speed
@@ -1128,8 +1137,10 @@ def ensemble_peaks(dataset: xr.Dataset) -> xr.Dataset:
     ):
         return result
     rest = xr.DataArray(0.0)
-    with contextlib.suppress(KeyError):
-        rest = setting(dataset, "drive.rest").where(drive == "start", 0.0)
+    if "phase_start" in dataset:  # the last phase of a start is sliding
+        starts = dataset["phase_start"]
+        sliding = starts.isel(phase=starts.count("phase") - 1)
+        rest = sliding.drop_vars("phase", errors="ignore").where(drive == "start", 0.0)
     times, sweep = dataset["t"], xr.zeros_like(dataset["contact_modulus"], float)
     onset, speeds = (
         (times >= rest - 1e-6 * times[-1]).argmax("t"),

@@ -533,3 +533,22 @@ def test_slip_events_of_few_clock_steps_are_named_in_the_table(step, is_named):
     )
     lines = lines_of(dataset)
     assert any("of a slip event in a clock step" in line for line in lines) is is_named
+
+
+def test_the_time_of_a_loss_of_stability_is_no_mean_over_the_members_that_happened_to_lose_it():
+    times = np.array([[np.nan, 1.0], [np.nan, 3.0], [np.nan, np.nan]])
+    members = xr.Dataset(
+        {
+            "runaway_time": (("member", "t"), times),
+            "runaway_force": ("member", np.where(np.isnan(times[:, 1]), np.nan, 2.0)),
+        }
+    )
+    members = members.assign(spring_force=0.0)
+    all_of_them = read.stick_slip(members.isel(member=slice(2)))
+    assert all_of_them["runaway_after"].mean() == 2.0
+    some = read.stick_slip(members)
+    assert some["ran_away"].mean() == 2.0 / 3.0
+    assert (
+        some["runaway_after"].isnull().all() and some["static_friction"].isnull().all()
+    )
+    assert some["runaway_after_reason"] == "not every member loses stability"
