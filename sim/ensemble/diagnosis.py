@@ -326,9 +326,12 @@ def _largest_losses(plan: Plan, closed: Sequence[int]) -> Iterator[str]:
         by_size.setdefault(size, []).append(name)
     at = in_words(plan, points[int(np.argmax(whole))]) if np.ptp(whole) > 0.0 else ""
     most = f" (most at {at})" if at else ""
-    words = (f"{size} by {' or '.join(names)}" for size, names in by_size.items())
+    words = (
+        f"{size} by {', by '.join(names)}{', each alone' if len(names) > 1 else ''}"
+        for size, names in by_size.items()
+    )
     kind = points[0].contact.kind
-    yield f"largest loss of area at this {kind}{most}: {', '.join(words)}"
+    yield f"largest loss of area at this {kind}{most}: {'; '.join(words)}"
 
 
 def _waves(point: Scenario) -> Iterator[str]:

@@ -69,7 +69,8 @@ def speeds_of_areas(scene: Scenario, shares: Array) -> tuple[Array, Array]:
         needed = scene.population.onset(
             speeds[known], slider_body(scene, speeds[known])
         ).stiffness
-        stable[known] = needed <= cast(Spring, scene.drive).stiffness
+        # nan below the maximum of the friction, where any spring is stiff enough
+        stable[known] = ~(needed > cast(Spring, scene.drive).stiffness)
     return speeds, stable
 
 

@@ -251,12 +251,10 @@ def unresolved_slips(dataset: xr.Dataset) -> list[str]:
         each, step = slips(dataset), setting(dataset, "clock.step")
         share = (each["slip_speed"] * step / each["slip_amplitude"]).median()
         if bool((share > _COARSE).any()):
-            effect = (
-                "their drop and friction have an error that the brackets do not hold"
-            )
             remarks.append(
                 f"the stage moves by more than {100.0 * _COARSE:g} % of a slip event in "
-                f"a clock step: {effect}; reduce clock.step"
+                "a clock step: the drop of the spring force is off by about as much; "
+                "reduce clock.step"
             )
     return remarks
 

@@ -139,11 +139,11 @@ GROUPS = {
 #: Headings of recorded events.
 _HEADINGS = {
     "peak_stress": "peak of stress",
-    "peak_speed": "at V",
-    "peak_time": "after",
+    "peak_speed": "peak of stress at V",
+    "peak_time": "peak of stress after",
     "peak_friction": "peak of friction",
-    "peak_friction_speed": "at V ",
-    "peak_friction_time": "after ",
+    "peak_friction_speed": "peak of friction at V",
+    "peak_friction_time": "peak of friction after",
     "slip_count": "slips",
     "static_threshold": "static threshold",
     "kinetic_friction": "kinetic friction",
@@ -608,8 +608,6 @@ def _table_of(
             if reason:
                 texts[number] += "*"
                 reasons.append(Reason(row.heading, reason, words[number]))
-        while heading in cells:  # of two peaks, each with its speed
-            heading += " "
         cells[heading] = texts
     return Table(_rows(cells), keys, columns=columns, reasons=tuple(reasons))
 

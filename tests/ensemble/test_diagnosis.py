@@ -620,11 +620,11 @@ def test_the_largest_loss_answers_why_no_mechanism_takes_a_tenth_of_the_area():
     firm = losses(0.05, 1.0, bonds=Unbroken(stress=1e6))
     assert firm == (
         f"largest loss of area at this load (most at contact.load = 50 mN): {lost(1.0)} to {lost(0.05)} % by"
-        f" broken bonds or fluctuations or {stress}"
+        f" broken bonds, by fluctuations, by {stress}, each alone"
     )
     half = losses(0.05, share=0.5)
     assert half == (
-        f"largest loss of area at this load: {lost(0.05, 21e-3)} % by broken bonds, {lost(0.05)} % by fluctuations,"
+        f"largest loss of area at this load: {lost(0.05, 21e-3)} % by broken bonds; {lost(0.05)} % by fluctuations;"
         f" 0 % by {stress}"
     )
     strict = losses(0.05, shear=replace(MASKS, paid_by_adhesion=0.0))

@@ -310,10 +310,9 @@ def test_a_static_peak_is_timed_from_the_start_among_steps_and_of_statistics_tha
     assert float(result["peak_stress"][1]) > float(result["peak_stress"][0])
     rows = rows_of(started, read.highlights)
     assert [row["drive_rest (ms)"] for row in rows] == ["100", "200"]
-    assert {"peak of stress (kPa)", "peak of friction (mN)", "after (ms)"} < set(
-        rows[0]
-    )
-    assert not any(heading.startswith("at V") for heading in rows[0])
+    assert {"peak of stress (kPa)", "peak of friction (mN)"} < set(rows[0])
+    assert "peak of friction after (ms)" in rows[0]
+    assert not any("at V" in heading for heading in rows[0])
 
 
 def test_the_friction_maximum_and_the_static_peak_are_those_of_the_clock_steps_whatever_the_records():

@@ -1,6 +1,7 @@
 """Speeds at which area is lost, and the loss in both orders of charging: against curves and laws that are known."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -712,3 +713,17 @@ def test_no_speed_is_stated_at_which_more_is_lost_than_can_be_nor_under_a_force(
     assert not read.loss_speeds(run(creeping))
     with pytest.raises(BadInput, match="force"):
         read.loss_speeds(run(creeping), ["10 %"])
+
+
+def test_below_the_maximum_of_friction_any_spring_slides_steadily():
+    path = Path(sim.__file__).parents[1] / "scenarios" / "stick_slip.toml"
+    point = sim.load(path).points()[0]
+    # one speed on either side of the maximum
+    curves = sim.steady_curves(point, [1e-3, 2.33e-3, 4e-3])
+    friction = curves["friction_force"].to_numpy()
+    assert friction[1] > max(friction[0], friction[2])
+    curves = curves.isel(speed=[0, 2])
+    speeds, stable = speeds_of_areas(point, curves["area_ratio"].to_numpy())
+    assert_allclose(speeds, [1e-3, 4e-3], rtol=1e-6)
+    # behind 25 N/m, where 1128 N/m are needed
+    assert stable.tolist() == [True, False]
