@@ -66,8 +66,12 @@ _RECORDED = {
     "error_speed",
     "member_spread_area",
 }
-#: Numbers of each slip event, which are recorded together unless a scenario chooses some.
-_SLIPS = [row.name for row in OF_EACH_SLIP]
+#: Numbers of each slip event, and those of late ones at one speed of the stage, which are recorded together unless a
+#: scenario chooses some, by the first of them.
+_SLIPS = {
+    "slip_time": [row.name for row in OF_EACH_SLIP],
+    "slip_count_late": [name for name in RECORDED if name.startswith("late_")],
+}
 #: Begin of the versions whose events of these names had other definitions.
 _FIRST = ("0.", "1.")
 _OLD_EVENTS = re.compile(
@@ -174,14 +178,11 @@ def _fault(dataset: xr.Dataset) -> str:
     for name in ("t", *_DERIVED, *(key.replace(".", "_") for key in fixed)):
         if name not in dataset.variables:
             return f"lacks the numbers {name}"
-    for name in (
-        _SLIPS
-        if "slip_time" in dataset
-        and not (scenario.get("record") or {}).get("quantities")
-        else ()
-    ):
-        if name not in dataset.variables:
-            return f"lacks the numbers {name}"
+    chooses = bool((scenario.get("record") or {}).get("quantities"))
+    for first, names in _SLIPS.items():
+        for name in names if first in dataset and not chooses else ():
+            if name not in dataset.variables:
+                return f"lacks the numbers {name}"
     if dataset.variables["t"].dims != ("t",):
         return "the numbers t have other dimensions"
     # which are those of this variable; each has its values

@@ -182,9 +182,11 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     ]
     result = result.merge(each.mean("slip", keep_attrs=True), compat="no_conflicts")
     bounds, source = _of_late_slips(dataset, result), "step"
-    # of one random member there is no other error than the scatter between slip events
-    if dataset.sizes.get(MEMBERS) == 1:
-        source = "slip events and step"
+    # of one random member there is no other error than the scatter between slip events,
+    # and of the stress the bound of a clock step is not known
+    if dataset.sizes.get(MEMBERS, 1) == 1:
+        is_random = MEMBERS in dataset.sizes
+        source = "slip events and step" if is_random else "step"
         events, squares = (
             each.count("slip"),
             ((each - each.mean("slip")) ** 2).sum("slip"),
@@ -198,8 +200,8 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
             name: dataset[f"late_{of}_std"] / dataset["slip_count_late"] ** 0.5
             for name, of in _LATE.items()
         }
-        for name, error in errors.items():
-            bounds[name] = _WIDE * error + bounds.get(name, 0.0)
+        for name in errors if is_random else ("stress_drop",):
+            bounds[name] = _WIDE * errors[name] + bounds.get(name, 0.0)
     return result.assign(
         {
             f"{name}_bound": bound.assign_attrs(source=source)

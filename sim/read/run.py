@@ -15,6 +15,7 @@ from sim.read.over_speed import loss_speeds
 from sim.read.statements import as_means, of_events, sampled
 from sim.read.statistics import (
     QUANTILES,
+    WIDE,
     averaging,
     correlation_time,
     of_second_half,
@@ -188,13 +189,16 @@ class Run:
             self._is_whole = names is None
         if _MEMORY in missing:
             times = correlation_time(self.dataset)
-            kinds = {"": "mean", "_sem": "sem", "_below": "high", "_reason": "reason"}
-            self._late.update(
-                {
-                    f"{_MEMORY}_{kind}": times[f"{_MEMORY}{end}"]
-                    for end, kind in kinds.items()
-                }
-            )
+            time, half = times[_MEMORY], WIDE * times[f"{_MEMORY}_sem"]
+            columns = {
+                "mean": time,
+                "sem": times[f"{_MEMORY}_sem"],
+                "low": (time - half).assign_attrs(time.attrs),
+                "high": (time + half).fillna(times[f"{_MEMORY}_below"]),
+                "reason": times[f"{_MEMORY}_reason"],
+            }
+            columns["high"].attrs |= time.attrs
+            self._late.update({f"{_MEMORY}_{kind}": columns[kind] for kind in columns})
         self._known |= missing
         return self._late
 

@@ -355,7 +355,7 @@ def test_the_friction_maximum_and_the_static_peak_are_those_of_the_clock_steps_w
 
 @pytest.mark.parametrize("cycles", [2, pytest.param(10, marks=pytest.mark.verify)])
 def test_pull_offs_of_cycles_are_those_of_all_cycles_and_not_the_lowest(cycles):
-    """Own Gillespie and JKR, 200 pull-offs: mean -364 nN, quantiles of 5, 50 and 95 %."""
+    """Own Gillespie and JKR, 200 pull-offs: mean of the loads -364 nN."""
     scenario = sim.Scenario(**SCENES["cycles"]).with_values(
         {"contact.displacement.cycles": cycles}
     )
@@ -369,10 +369,6 @@ def test_pull_offs_of_cycles_are_those_of_all_cycles_and_not_the_lowest(cycles):
     )
     error = every.std(ddof=1) / math.sqrt(every.size)
     assert abs(every.mean() + 364.0) < 5.0 * error
-    if cycles == 10:  # of the same seed
-        assert_allclose(
-            np.quantile(every, [0.05, 0.5, 0.95]), [-451.0, -370.0, -255.0], atol=1.0
-        )
     result = read.events(dataset)
     assert_allclose(result["pull_off_load"].mean(), 1e-9 * every.mean(), rtol=1e-12)
     assert_array_equal(result["pull_offs"], cycles)

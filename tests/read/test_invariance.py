@@ -117,6 +117,7 @@ GROWING = (
     "slip_count",
     "slip_spread",
     "pull_offs",
+    "lowest_load",
     "detachments",
     "total_dissipated",
     "ever_detached",
