@@ -705,6 +705,14 @@ class Scenario:
                     "the points of the sweep would have different records; give clock.record"
                 ]
             )
+        if len({point.drive.solves_motion for point in points}) > 1:
+            cure = "run them apart"
+            raise BadInput(
+                [
+                    "sweep: some drives prescribe the speed and others solve the motion of"
+                    f" the slider, which record other quantities; {cure}"
+                ]
+            )
         if len({point.map_lattice for point in points}) > 1:
             cure = "run once for each cell and number of points"
             raise BadInput(

@@ -392,6 +392,11 @@ SWEEPS = [
     ),
     ('"clock.step" = ["5 ms", "10 ms"]', "different records...clock.record"),
     (
+        'drive = [{ model = "steady", speed = "1 mm/s" }, { model = "force", force = "1 mN",'
+        ' contact_stiffness = "rigid", damping = "1 mN s/m" }]\n"bonds.stress" = ["0.1 MPa"]',
+        "sweep: some drives prescribe the speed...run them apart",
+    ),
+    (
         'bonds = [{ model = "none" }, { model = "steady" }]',
         "bonds.critical_speed...missing",
     ),
