@@ -308,8 +308,13 @@ def highlights(run: Run, rows: int = 12, show: Sequence[str] = ()) -> Table:
 
 def losses(run: Run, rows: int = 12) -> Table:
     """Return the speeds of losses of area, with a row for each point of the sweep of other keys."""
+    return _once(run, run.losses, _of_losses_of(run), rows, MOST)
+
+
+def _of_losses_of(run: Run) -> tuple[Column, ...]:
+    """Return the columns of losses of a run, at the speed of the slider or of the stage."""
     symbol = "stage" if run.speed_name == "stage_speed" else "V"
-    return _once(run, run.losses, of_losses(run.losses, symbol), rows, MOST)
+    return of_losses(run.losses, symbol)
 
 
 def phases(run: Run, rows: int = 12) -> Table:
@@ -534,7 +539,7 @@ def key_figures(run: Run) -> list[dict[str, str]]:
     """Return the numbers of a run without a sweep, a row each: symbol, value, and definition with the sample."""
     columns = {
         column.name: column
-        for column in (*MAIN, *LOSSES, *EVENTS, *SLIPS, *of_losses(run.losses))
+        for column in (*MAIN, *LOSSES, *EVENTS, *SLIPS, *_of_losses_of(run))
         if _of_drive(run, column.name)
     }
     groups = [run.events, run.losses]
@@ -543,8 +548,12 @@ def key_figures(run: Run) -> list[dict[str, str]]:
     rows = []
     for statement in (one for group in groups for one in each(group)):
         column = columns.get(statement.name)
-        is_missing = math.isnan(statement.value) and not statement.reason
-        if column is None or is_missing:
+        if column is None:
+            continue
+        # an event that did not happen is no key figure
+        reasons = ("", column.definition.absent)
+        numbers = (statement.value, statement.low, statement.high)
+        if all(map(math.isnan, numbers)) and statement.reason in reasons:
             continue
         if abs(statement.value - column.dull) < _ROUNDING:
             continue
