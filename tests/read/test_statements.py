@@ -79,12 +79,6 @@ def test_key_figures_have_the_errors_of_the_table():
     assert shown.items() <= rows.items()
 
 
-def test_an_event_that_did_not_happen_is_no_key_figure(ramp):
-    named = {row[""] for row in read.tables.key_figures(read.Run(ramp))}
-    # adhesion is masked at the end of the ramp, and no contact opens
-    assert "half masked" in named and "half detached" not in named
-
-
 def test_a_reason_marks_its_cell_and_is_a_note_of_the_table_with_its_point():
     loads = {"contact.load": ["1 mN", "4 mN"]}
     held = {"drive": drive.Steady(speed=1e-3), "shear": shear.Uniform()}

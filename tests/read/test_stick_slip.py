@@ -355,6 +355,8 @@ def test_the_static_threshold_of_a_ramp_is_the_first_maximum_and_the_onset_lies_
     assert 0.51e-3 < speeds[0] < speeds[1] < 1e-3
     # the stage does not get slower
     assert np.isnan(events["end_slip_speed"]) and np.isnan(events["end_steady_speed"])
+    named = {row[""] for row in read.tables.key_figures(read.Run(dataset))}
+    assert "slips from" in named and "slips down to" not in named
 
 
 @pytest.mark.parametrize("hold", [False, True])
