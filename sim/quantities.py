@@ -528,9 +528,21 @@ WITH_PHASES: tuple[Definition, ...] = (
             "start; open contacts included"
         ),
         symbol="tau_p",
+        heading="peak of stress",
     ),
-    Definition("peak_time", "s", "time of the largest shear stress", symbol="t_p"),
-    Definition("peak_speed", "m/s", "sliding speed at the largest shear stress"),
+    Definition(
+        "peak_time",
+        "s",
+        "time of the largest shear stress",
+        symbol="t_p",
+        heading="peak of stress after",
+    ),
+    Definition(
+        "peak_speed",
+        "m/s",
+        "sliding speed at the largest shear stress",
+        heading="peak of stress at V",
+    ),
     Definition(
         "peak_area",
         "m^2",
@@ -542,10 +554,19 @@ WITH_PHASES: tuple[Definition, ...] = (
         "N",
         "largest magnitude of the friction force of the run, of the highest start",
         symbol="F_p",
+        heading="peak of friction",
     ),
-    Definition("peak_friction_time", "s", "time of the largest friction force"),
     Definition(
-        "peak_friction_speed", "m/s", "sliding speed at the largest friction force"
+        "peak_friction_time",
+        "s",
+        "time of the largest friction force",
+        heading="peak of friction after",
+    ),
+    Definition(
+        "peak_friction_speed",
+        "m/s",
+        "sliding speed at the largest friction force",
+        heading="peak of friction at V",
     ),
     Definition(
         "peak_friction_area", "m^2", "contact area at the largest friction force"
@@ -560,6 +581,7 @@ WITH_PHASES: tuple[Definition, ...] = (
         symbol="F_s",
         exists_when=FROM_REST,
         absent=NO_MAXIMUM,
+        heading="static threshold",
     ),
     Definition(
         "static_threshold_time",
@@ -730,6 +752,7 @@ OF_EACH_SLIP: tuple[Definition, ...] = (
         symbol="S",
         exists_when=BEHIND_A_SPRING,
         absent=NO_SLIP,
+        heading="slip",
     ),
     Definition(
         "slip_speed",
@@ -770,7 +793,13 @@ OF_EACH_SLIP: tuple[Definition, ...] = (
 #: Quantities of slip events, and their moments over the second half of the run.
 OF_SLIPS: tuple[Definition, ...] = (
     *OF_EACH_SLIP,
-    Definition("slip_count", "1", "number of slip events", exists_when=BEHIND_A_SPRING),
+    Definition(
+        "slip_count",
+        "1",
+        "number of slip events",
+        exists_when=BEHIND_A_SPRING,
+        heading="slips",
+    ),
     Definition(
         "slow_fall_count",
         "1",
@@ -816,6 +845,7 @@ OF_SLIPS: tuple[Definition, ...] = (
         symbol="F_k",
         exists_when=AT_ONE_STAGE_SPEED,
         absent="the motion has not settled",
+        heading="kinetic friction",
     ),
     Definition(
         "kinetic_friction_change",
@@ -832,6 +862,7 @@ OF_SLIPS: tuple[Definition, ...] = (
         ),
         exists_when=AT_RISING_OR_FALLING_STAGE_SPEED,
         absent=NO_ONSET,
+        heading="no slips up to",
     ),
     Definition(
         "onset_slip_speed",
@@ -839,6 +870,7 @@ OF_SLIPS: tuple[Definition, ...] = (
         "speed of a stage that gets faster at its first slip event",
         exists_when=AT_RISING_OR_FALLING_STAGE_SPEED,
         absent=NO_ONSET,
+        heading="slips from",
     ),
     Definition(
         "end_slip_speed",
@@ -846,6 +878,7 @@ OF_SLIPS: tuple[Definition, ...] = (
         "speed of a stage that gets slower at its last slip event",
         exists_when=AT_RISING_OR_FALLING_STAGE_SPEED,
         absent=NO_END,
+        heading="slips down to",
     ),
     Definition(
         "end_steady_speed",
@@ -856,6 +889,7 @@ OF_SLIPS: tuple[Definition, ...] = (
         ),
         exists_when=AT_RISING_OR_FALLING_STAGE_SPEED,
         absent=NO_END,
+        heading="no slips from",
     ),
 )
 
@@ -1079,7 +1113,7 @@ def in_a_phase(event: Definition) -> Definition:
     """Return the definition of a quantity of an event in each phase from that of the whole run."""
     name = f"phase_{event.name.removeprefix('first_')}"
     meaning = f"in a phase: {event.meaning}".replace("of the run", "of it")
-    return event._replace(name=name, meaning=meaning, symbol="")
+    return event._replace(name=name, meaning=meaning, symbol="", heading="")
 
 
 #: Quantities of a whole run, in the order in which a dataset has them.

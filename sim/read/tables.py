@@ -136,49 +136,24 @@ GROUPS = {
 }
 
 
-#: Headings of recorded events.
-_HEADINGS = {
-    "peak_stress": "peak of stress",
-    "peak_speed": "peak of stress at V",
-    "peak_time": "peak of stress after",
-    "peak_friction": "peak of friction",
-    "peak_friction_speed": "peak of friction at V",
-    "peak_friction_time": "peak of friction after",
-    "slip_count": "slips",
-    "static_threshold": "static threshold",
-    "kinetic_friction": "kinetic friction",
-    "onset_steady_speed": "no slips up to",
-    "onset_slip_speed": "slips from",
-    "end_slip_speed": "slips down to",
-    "end_steady_speed": "no slips from",
-    "slip_amplitude": "slip",
-}
-
-
-def _events(*names: str, dull: float = 0.0) -> tuple[Column, ...]:
-    rows = (QUANTITIES[name] for name in names)
-    headed = (row._replace(heading=row.heading or _HEADINGS[row.name]) for row in rows)
-    return tuple(Column(row, dull) for row in headed)
-
-
 #: Columns of a whole run.
 EVENTS = (
-    *_events("time_masked", "ever_masked"),
-    *_events("half_masked", dull=math.nan),
-    *_events("ever_detached", "half_detached", "detached_rate"),
-    *_events("loop_energy", "loop_dissipation", "total_dissipated"),
-    *_events(
+    *_columns("time_masked", "ever_masked"),
+    *_columns("half_masked", dull=math.nan),
+    *_columns("ever_detached", "half_detached", "detached_rate"),
+    *_columns("loop_energy", "loop_dissipation", "total_dissipated"),
+    *_columns(
         "pull_off_load", "pull_off_time", "lowest_load", "jump_in_load", dull=math.nan
     ),
-    *_events("peak_stress"),
-    *_events("peak_speed", "peak_time", dull=math.nan),
-    *_events("peak_friction"),
-    *_events("peak_friction_speed", "peak_friction_time", dull=math.nan),
-    *_events("static_threshold", "area_at_threshold", dull=math.nan),
-    *_events("slip_count", "ran_away"),
-    *_events("onset_steady_speed", "onset_slip_speed", dull=math.nan),
-    *_events("end_slip_speed", "end_steady_speed", dull=math.nan),
-    *_events(
+    *_columns("peak_stress"),
+    *_columns("peak_speed", "peak_time", dull=math.nan),
+    *_columns("peak_friction"),
+    *_columns("peak_friction_speed", "peak_friction_time", dull=math.nan),
+    *_columns("static_threshold", "area_at_threshold", dull=math.nan),
+    *_columns("slip_count", "ran_away"),
+    *_columns("onset_steady_speed", "onset_slip_speed", dull=math.nan),
+    *_columns("end_slip_speed", "end_steady_speed", dull=math.nan),
+    *_columns(
         "runaway_after",
         "static_friction",
         "kinetic_friction",
@@ -189,7 +164,7 @@ EVENTS = (
     ),
 )
 #: Further columns of slip events.
-SLIPS = _events(
+SLIPS = _columns(
     "stress_drop", "slip_spread", "slip_duration", "stick_duration", dull=math.nan
 )
 #: Columns of each phase.
