@@ -447,7 +447,7 @@ def _plainly(
     where: dict[str, Any] | None,
 ) -> Any:
     """Return the result of a function of a dataset, or of a file with one; its faults become ``BadInput``."""
-    from sim.read.statistics import where as chosen
+    from sim.read import where as chosen
 
     with (
         naming(),

@@ -150,6 +150,9 @@ class Definition(NamedTuple):
     absent: str = ""
 
 
+#: Statistics over the members that are recorded in place of these.
+STATISTICS = ("mean", "standard deviation", "standard error")
+
 #: Quantities over time, read at each record.
 RECORDS: tuple[Definition, ...] = (
     Definition("speed", "m/s", "sliding speed", symbol="V", heading="V"),

@@ -103,11 +103,8 @@ def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statist
     }
     assert "speed" in sim.run({**SCENE, "drive": spring}).data_vars
     with sim.open(file) as opened, xr.open_dataset(file, decode_times=False) as plainly:
-        variable, functions = (
-            dataset.reset_coords("speed"),
-            ("observables", "statistics", "events", "shares"),
-        )
-        expected = {name: getattr(read, name)(variable) for name in functions}
+        variable = dataset.reset_coords("speed")
+        expected = read.observables(variable), read.share_observables(variable)
         table = rows_of(variable)
         for found in (dataset, opened, plainly):
             assert "speed" in found.contact_area.coords
@@ -115,8 +112,8 @@ def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statist
                 float(found.contact_area.swap_dims(t="speed").sel(speed=5e-3))
                 == dataset.contact_area[5]
             )
-            for name in functions:
-                xr.testing.assert_identical(getattr(read, name)(found), expected[name])
+            xr.testing.assert_identical(read.observables(found), expected[0])
+            xr.testing.assert_identical(read.share_observables(found), expected[1])
             assert rows_of(found) == table
         opened.to_netcdf(tmp_path / "again.nc")
     with netCDF4.Dataset(file, "a"):  # as nothing holds it any longer

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.parts import jkr, load, read, run
+from helpers.statements import shares
 from numpy.testing import assert_allclose
 from scipy.optimize import curve_fit
 
@@ -309,15 +310,16 @@ def test_the_area_falls_with_the_square_of_the_force_and_more_under_a_smaller_lo
 def test_at_the_onset_of_stick_slip_fluctuations_take_more_area_than_the_bonds_give_back(
     name,
 ):
-    found = read.shares(four(name))
-    late = found.isel(t=slice(found.sizes["t"] // 2, None)).mean("t")
-    before, after = (late.sel(drive_stage=speed) for speed in (2e-3, 3e-3))
-    bonds, noise = (
-        float(after[f"lost_to_{w}_mean"] - before[f"lost_to_{w}_mean"])
-        for w in ("bonds", "fluctuations")
-    )
+    found = shares(four(name))
+
+    def change(share):
+        value = found[share].value
+        late = value.isel(t=slice(value.sizes["t"] // 2, None)).mean("t")
+        return float(late.sel(drive_stage=3e-3) - late.sel(drive_stage=2e-3))
+
+    bonds, noise = change("lost_to_bonds"), change("lost_to_fluctuations")
     assert -0.04 < bonds < -0.015 and 0.05 < noise < 0.075
-    slips = read.stick_slip(four(name))["slip_count"]
+    slips = read.stick_slip(four(name))["slip_count"].value
     assert np.all(slips.sel(drive_stage=2e-3) == 0.0) and np.all(
         slips.sel(drive_stage=3e-3) > 1.0
     )

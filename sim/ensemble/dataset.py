@@ -49,15 +49,6 @@ _FLAGS = "detached in_contact"
 _version = functools.cache(importlib.metadata.version)
 #: The auxiliary coordinate of all variables over time, if it is prescribed.
 SPEED = "speed"
-_STATISTICS = {
-    "mean": "ensemble mean of",
-    "std": "standard deviation over the ensemble of",
-    "sem": "standard error of the ensemble mean of",
-}
-#: Statistic of quantities of the whole run, which members may lack.
-_COUNT = {"count": "number of members with a"}
-
-
 #: Statistics of the members' means over the second half of the run, and of their drift: of the last quarter less that
 #: over the third. They are recorded if the members are not.
 LATE = ("mean", "sem", "drift", "drift_sem")
@@ -75,9 +66,9 @@ class Described(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Variables of a quantity by statistic, "" for itself, and their axes: of members (``each``), of time, ``axis``."""
+    """Axes of the variable of a quantity: of statistics or members (``each``), of time, and another one, ``axis``."""
 
-    names: dict[str, str]
+    pooled: bool = False
     each: bool = True
     timed: bool = True
     axis: str = ""
@@ -85,8 +76,9 @@ class Place(NamedTuple):
     def axes(
         self, piece: "Piece", rows: slice = slice(None)
     ) -> tuple[int | slice, ...]:
-        """Return the index of the numbers of some members in a piece."""
+        """Return the index of the numbers of some members, or of their statistics, in a piece."""
         return (
+            *((slice(None),) if self.pooled else ()),
             *piece.where,
             *((rows,) if self.each else ()),
             *((piece.times,) if self.timed else ()),
@@ -442,9 +434,12 @@ def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:
         recorded in plan.largest,
     )
     varies = plan.varies(recorded)
-    each = varies and plan.per_member
+    each, pooled = varies and plan.per_member, varies and not plan.per_member
     dimensions = (*sweep, *(["member"] if each else []), *([] if whole else ["t"]))
     dimensions += (recorded.axis,) if recorded.axis else ()
+    if pooled:
+        dimensions = ("statistic", *dimensions)
+        _add_statistics(content)
     block = {"member": plan.group, "t": max(1, plan.records_of_block(plan.points[0]))}
     block |= dict.fromkeys(sweep[-1:], len(plan.packs[0]))
     chunks = (
@@ -453,40 +448,43 @@ def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:
     prescribed = any(variable.name == SPEED for variable in plan.variables) and not any(
         point.drive.solves_motion for point in plan.points
     )
-    names = {}
-    statistics = _STATISTICS | (_COUNT if whole else {})
-    for statistic, of in (statistics if varies and not each else {"": ""}).items():
-        kind = (
-            "f4" if record.precision == "float32" and not (statistic or whole) else "f8"
-        )
-        compression: str = "zlib" if whole else record.compression
-        more: dict[str, Any] = (
-            {"coordinates": SPEED} if prescribed and not whole and name != SPEED else {}
-        )
-        if name == "in_contact" and not statistic:
-            kind, compression = "i1", compression.replace("digits", "zlib")
-            more = {
-                "units": "",
-                "flag_values": np.array([0, 1], "i1"),
-                "flag_meanings": _FLAGS,
-            }
-        names[statistic] = "_".join(filter(None, (name, statistic)))
-        described = (
-            recorded.definition.unit,
-            f"{of} {recorded.definition.meaning}".strip(),
-            recorded.definition.symbol,
-        )
-        content.add(
-            names[statistic],
-            kind,
-            dimensions,
-            *described,
-            None,
-            chunks,
-            compression,
-            **more,
-        )
-    return Place(names, each, not whole, recorded.axis)
+    kind = "f4" if record.precision == "float32" and not (pooled or whole) else "f8"
+    compression: str = "zlib" if whole else record.compression
+    more: dict[str, Any] = (
+        {"coordinates": SPEED} if prescribed and not whole and name != SPEED else {}
+    )
+    if name == "in_contact" and not pooled:
+        kind, compression = "i1", compression.replace("digits", "zlib")
+        more = {
+            "units": "",
+            "flag_values": np.array([0, 1], "i1"),
+            "flag_meanings": _FLAGS,
+        }
+    described = recorded.definition
+    content.add(
+        name,
+        kind,
+        dimensions,
+        described.unit,
+        described.meaning,
+        described.symbol,
+        None,
+        chunks,
+        compression,
+        **more,
+    )
+    if pooled and whole:
+        about = "1", f"number of members with a {described.meaning}"
+        content.add(f"{name}_count", "f8", dimensions[1:], *about)
+    return Place(pooled, each, not whole, recorded.axis)
+
+
+def _add_statistics(content: Outline) -> None:
+    """Add the statistics over the members that stand in place of these."""
+    names = registry.STATISTICS
+    content.sizes["statistic"] = len(names)
+    values = np.array(names, object)
+    content.add("statistic", str, ("statistic",), "", "statistic", "", values)
 
 
 def _add_late(content: Outline, recorded: Variable) -> None:
@@ -590,7 +588,7 @@ def _add_maps(content: Outline, plan: Plan) -> None:
     shape = (1,) * (len(names) - 2) + lattice.shape
     described = registry.MAP.unit, registry.MAP.meaning, registry.MAP.symbol
     content.add(registry.MAP.name, "f8", names, *described, None, shape)
-    content.places[registry.MAP.name] = Place({"": registry.MAP.name})
+    content.places[registry.MAP.name] = Place()
 
 
 def in_memory(
@@ -693,7 +691,7 @@ def _fill(outline: Outline, parts: Blocks, variables: Mapping[str, Any]) -> None
                 if snapshot:
                     drawn = slice(rows.start, rows.start + values.shape[rank])
                     variables[name][(*piece.where, drawn, int(snapshot))] = values
-                elif "" in place.names:
+                elif not place.pooled:
                     variables[name][place.axes(piece, rows)] = (
                         values if place.each else values.take(0, rank)
                     )
@@ -701,9 +699,10 @@ def _fill(outline: Outline, parts: Blocks, variables: Mapping[str, Any]) -> None
                     pools.setdefault(name, []).append(np.moveaxis(values, rank, 0))
         for name, groups in pools.items():
             place = outline.places[name]
-            statistics = pooled(groups)
-            for statistic, variable in place.names.items():
-                variables[variable][place.axes(piece)] = statistics[statistic]
+            *statistics, count = pooled(groups)
+            variables[name][place.axes(piece)] = np.stack(statistics)
+            if f"{name}_count" in variables:
+                variables[f"{name}_count"][place.axes(piece)[1:]] = count
         if piece.times.stop == outline.sizes["t"]:
             _fill_late(piece, sums, variables)
             sums = {}
@@ -729,9 +728,9 @@ def _fill_late(
             moments(np.stack([whole, last - first], axis=-1).reshape(len(whole), -1))
         )
     for name, each in pools.items():
-        statistics = pooled(each)
+        mean, _, error, _ = pooled(each)
         name = name.replace(" ", "_")
-        values = np.stack([statistics["mean"], statistics["sem"]], axis=-1)
+        values = np.stack([mean, error], axis=-1)
         shape = variables[name][piece.where].shape
         variables[name][piece.where] = values.reshape(shape)
 
@@ -759,7 +758,7 @@ def moments(values: np.ndarray) -> np.ndarray:
     return np.stack([count, mean, squares])
 
 
-def pooled(groups: list[np.ndarray]) -> dict[str, np.ndarray]:
+def pooled(groups: list[np.ndarray]) -> tuple[np.ndarray, ...]:
     """Return mean, standard deviation, standard error and count of the ``moments`` of groups, pooled in their order."""
     count, mean, squares = groups[0]
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -773,12 +772,7 @@ def pooled(groups: list[np.ndarray]) -> dict[str, np.ndarray]:
             )
             count = total
         deviation = np.sqrt(squares / (count - 1.0))
-        return {
-            "mean": mean,
-            "std": deviation,
-            "sem": deviation / np.sqrt(count),
-            "count": count,
-        }
+        return mean, deviation, deviation / np.sqrt(count), count
 
 
 def attributes_of(path: Path) -> dict[str, Any]:

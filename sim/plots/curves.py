@@ -31,20 +31,23 @@ from sim.read import (
     setting,
     settled,
     slips,
-    statements,
     sweep_dims,
 )
-from sim.read.dataset import MEMBERS, speed_name, speed_of, stays_held
-from sim.read.events import jumps
-from sim.read.over_speed import speed_dim
-from sim.read.statistics import (
-    FOR_TAILS,
-    Array,
-    averaging,
-    of_second_half,
-    over_members,
-    summary,
+from sim.read.correlation import Array
+from sim.read.dataset import (
+    MEMBERS,
+    ensemble_mean,
+    only_statistics,
+    speed_name,
+    speed_of,
+    stays_held,
 )
+from sim.read.estimate import Estimate, Estimates
+from sim.read.events import jumps
+from sim.read.late import distribution
+from sim.read.over_speed import speed_dim
+from sim.read.run import Run
+from sim.read.statistics import FOR_TAILS, averaging, over_members, summary
 
 #: Largest number of points of a curve that carry markers.
 _MARKED = 25
@@ -75,34 +78,35 @@ class Statistics:
     def __init__(self, dataset: xr.Dataset, along: str) -> None:
         self.dataset, self.along = dataset, along
         self.late = along != "t" and is_stationary(dataset)
-        self._computed: dict[str, xr.Dataset] = {}
-        self.stated = xr.Dataset()
+        self._computed: dict[str, Estimate | None] = {}
+        self.stated = Estimates()
 
-    def get(self, name: str) -> xr.DataArray | None:
-        """Return a statistic by its name, such as ``contact_radius_mean``; None if it is not known."""
-        observable = name.rpartition("_")[0]
-        if observable not in self._computed:
-            self._computed[observable] = self._of(observable)
-        return self._computed[observable].get(name, self.stated.get(name))
+    def get(self, name: str, field: str = "value") -> xr.DataArray | None:
+        """Return a field of the ``Estimate`` of a quantity; None if it is not known."""
+        if name not in self._computed:
+            self._computed[name] = self._of(name)
+        one = self._computed[name] or self.stated.get(name)
+        return None if one is None else getattr(one, field)
 
-    def _of(self, name: str) -> xr.Dataset:
-        """Return the statistics of an observable; none if it is not known."""
+    def _of(self, name: str) -> Estimate | None:
+        """Return the statistics of an observable; None if it is not known."""
+        late = self.late and name != "bond_work"
+        if late and (one := distribution(self.dataset, [name]).get(name)):
+            return one
         part = self.dataset if self.along == "t" else self.dataset.isel(t=[-1])
         if name == "bond_work":
-            result = xr.Dataset()
-            with contextlib.suppress(KeyError):
-                left = bond_work(self.dataset if self.late else part).to_dataset(
-                    name=name
-                )
-                result = summary(settled(left) if self.late else left)
+            try:
+                left = bond_work(self.dataset if self.late else part)
+            except KeyError:
+                return None
+            trajectories = left.to_dataset(name=name)
+            means = settled(trajectories) if self.late else trajectories
+            one = summary(means)[name]
         else:
-            result = over_members(part, [name])
-        if self.along == "t":
-            return result
-        result = result.isel(t=0, drop=True, missing_dims="ignore")
-        return (
-            result.assign(of_second_half(self.dataset, [name])) if self.late else result
-        )
+            one = over_members(part, [name]).get(name)
+        if one is None or self.along == "t":
+            return one
+        return one.map(lambda each: each.isel(t=0, drop=True, missing_dims="ignore"))
 
 
 class Scene(NamedTuple):
@@ -189,7 +193,7 @@ class Scene(NamedTuple):
 
     def opened(self, line: Line) -> Array:
         """True where the contacts of all members are open."""
-        return self.values("fraction_detached_mean", line.whole) >= 1.0
+        return self.values("fraction_detached", line.whole) >= 1.0
 
     def openings(self, line: Line) -> tuple[Array, Array]:
         """Return the records after which the contact opens, and those at which it has closed again."""
@@ -198,11 +202,11 @@ class Scene(NamedTuple):
             gone[:-1] & ~gone[1:]
         ) + 1
 
-    def values(self, name: str, line: Line) -> Array:
+    def values(self, name: str, line: Line, field: str = "value") -> Array:
         """Return a statistic along a curve; nan where it is not known."""
         points, known = (
             self.statistics.dataset.sizes[self.statistics.along],
-            self.statistics.get(name),
+            self.statistics.get(name, field),
         )
         if known is None:
             return np.full(points, np.nan)
@@ -223,10 +227,10 @@ class Scene(NamedTuple):
         The band is between the 5 and 95 % quantiles, or one standard deviation to both sides if only that is recorded.
         """
         mean, error, spread = (
-            self.values(f"{name}_{kind}", line) for kind in ("mean", "sem", "std")
+            self.values(name, line, field) for field in ("value", "sem", "std")
         )
         low, high = mean - spread, mean + spread
-        if (quantiles := self.statistics.get(f"{name}_quantile")) is not None:
+        if (quantiles := self.statistics.get(name, "quantile")) is not None:
             low, _, high = (
                 quantiles.isel(line.point).transpose("quantile", ...).to_numpy()
             )
@@ -243,12 +247,12 @@ class Scene(NamedTuple):
 
     def speeds(self, line: Line) -> Array:
         """Return the prescribed speed along a curve [m/s], of the stage if there is one."""
-        staged = self.statistics.get("stage_speed_mean") is not None
-        return self.values("stage_speed_mean" if staged else "speed_mean", line.whole)
+        staged = self.statistics.get("stage_speed") is not None
+        return self.values("stage_speed" if staged else "speed", line.whole)
 
     def varies(self, name: str) -> bool:
         """True if the observable is known and changes along the axis or between the curves."""
-        return _changes(self.all(f"{name}_mean"))
+        return _changes(self.all(name))
 
 
 def _changes(values: Array) -> bool:
@@ -267,9 +271,7 @@ def scene_along(dataset: xr.Dataset, along: str) -> Scene:
         lines = [lines[0]._replace(label=words or "simulated", colour=BOTH)]
     members = dataset.sizes.get(MEMBERS, 0)
     spread = (
-        "± 1 std. dev. of members"
-        if "contact_radius_std" in dataset
-        else "5–95 % of members"
+        "± 1 std. dev. of members" if only_statistics(dataset) else "5–95 % of members"
     )
     if 0 < members < FOR_TAILS and not statistics.late:
         spread = f"5–95 %, interpolated between {members} members"
@@ -432,7 +434,7 @@ def beside(panel: Axes, scene: Scene, name: str, factor: float) -> None:
             mean, error = (
                 factor * values for values in scene.drawn(name, line.whole)[:2]
             )
-            full = np.pi * scene.values("jkr_radius_mean", line) ** 2
+            full = np.pi * scene.values("jkr_radius", line) ** 2
             curves.append(Compared(line, scene.x[line.number], mean, error, full))
         over, at_end = (scene.over, scene.unit.factor), not scene.over_time
         scene.measured.draw(
@@ -449,7 +451,7 @@ def mark_jumps(
     labelled: bool = True,
 ) -> None:
     """Draw a cross at each pull-off and a ring at each jump-in of a curve, at the ends of its parts."""
-    x, mean = scene.x[line.number], factor * scene.values(f"{name}_mean", line)
+    x, mean = scene.x[line.number], factor * scene.values(name, line)
     known, (off, on) = np.flatnonzero(np.isfinite(mean)), scene.openings(line)
     places = np.searchsorted(known, off, "right") - 1, np.searchsorted(known, on)
     for words, place, sign in zip(
@@ -561,14 +563,14 @@ def over(dataset: xr.Dataset, name: str) -> Scene:
     scene = scene_along(dataset, "t")
     if name == "t":
         return scene.placed("t", dataset["t"].to_numpy(), "time $t$", "s")
-    mean = scene.statistics.get(f"{name}_mean")
+    mean = scene.statistics.get(name)
     if mean is None:
         axes = ", ".join(["t", "speed", *swept])
         raise ValueError(
             f'there is no x axis "{name[:40]}"; choose {axes} or a recorded variable'
         )
     return scene.placed(
-        name, scene.all(f"{name}_mean"), named(mean), mean.attrs["units"], broken=True
+        name, scene.all(name), named(mean), mean.attrs["units"], broken=True
     )
 
 
@@ -605,7 +607,7 @@ def series(name: str, words: str, si: str, usual: bool = False) -> Panel:
     """Return a panel of one observable; if ``usual``, few records far from the others are stated and do not rule it."""
 
     def panel_of(panel: Axes, scene: Scene) -> None:
-        values = scene.all(f"{name}_mean")
+        values = scene.all(name)
         factor = style.in_unit(panel.yaxis, words, values, si)
         contact_curves(panel, scene, name, factor)
         low, high = np.nanquantile(values, _USUAL) if usual else (0.0, 0.0)
@@ -630,14 +632,12 @@ def _size_panel(
     """Return a panel of the size of the contact between Hertz's and JKR's, a function of the radius."""
 
     def panel_of(panel: Axes, scene: Scene) -> None:
-        sizes = np.append(
-            scene.all(f"{name}_mean"), of_radius(scene.all("jkr_radius_mean"))
-        )
+        sizes = np.append(scene.all(name), of_radius(scene.all("jkr_radius")))
         factor = style.in_unit(panel.yaxis, words, sizes, si)
         contact_curves(panel, scene, name, factor)
         for theory, dashes in (("JKR", "--"), ("Hertz", ":")):
             radii = [
-                scene.values(f"{theory.lower()}_radius_mean", line.whole)
+                scene.values(f"{theory.lower()}_radius", line.whole)
                 for line in scene.lines
             ]
             _reference(
@@ -702,24 +702,18 @@ _ENERGIES: Any = (
 
 def energy_panel(panel: Axes, scene: Scene) -> None:
     """Draw the work of adhesion of the bonds left, the fluctuation energy, and what both leave to the contact."""
-    shown = [
-        entry
-        for entry in _ENERGIES
-        if np.any(np.nan_to_num(scene.all(f"{entry[0]}_mean")))
-    ]
+    shown = [entry for entry in _ENERGIES if np.any(np.nan_to_num(scene.all(entry[0])))]
     if _small_fluctuations(scene):
         shown = [entry for entry in shown if entry[0] != "fluctuation_energy"]
-    left, work = (
-        scene.all(f"{name}_mean") for name in ("bond_work", "work_of_adhesion")
-    )
+    left, work = (scene.all(name) for name in ("bond_work", "work_of_adhesion"))
     # one colour for each curve leaves line styles for the energies; without fluctuations all is left to the contact
     if not scene.single or np.allclose(left, work, rtol=1e-9, atol=0.0, equal_nan=True):
         shown = [entry for entry in shown if entry[0] != "bond_work"]
-    values = scene.all(*(f"{name}_mean" for name, *_ in shown))
+    values = scene.all(*(name for name, *_ in shown))
     factor = style.in_unit(panel.yaxis, "energy per area", values, "J/m^2")
     for name, text, colour, dashes in shown:
         same = not scene.width and _same(
-            [scene.values(f"{name}_mean", line) for line in scene.lines]
+            [scene.values(name, line) for line in scene.lines]
         )
         colour = colour if scene.single else style.REFERENCE
         for line in scene.lines[:1] if same else scene.lines:
@@ -741,7 +735,7 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
 def _small_fluctuations(scene: Scene) -> bool:
     """True if the fluctuation energy changes, but is much smaller than the work left to the contact."""
     most, work = (
-        np.max(np.nan_to_num(scene.all(f"{n}_mean")))
+        np.max(np.nan_to_num(scene.all(n)))
         for n in ("fluctuation_energy", "work_of_adhesion")
     )
     return 0.0 < most < _SMALL * work and scene.varies("fluctuation_energy")
@@ -757,14 +751,14 @@ def share_panel(panel: Axes, scene: Scene) -> None:
     panel.axhline(1.0, linestyle="--", label="JKR", **style.GREY)
     # of curves that lose to both, in front of a curve without fluctuations
     if not is_shaded:
-        lost = [scene.all(f"lost_to_{name}_mean") for name in ("bonds", "fluctuations")]
+        lost = [scene.all(f"lost_to_{name}") for name in ("bonds", "fluctuations")]
         known = np.all(np.max(np.nan_to_num(lost), axis=2) > _APART, axis=0)
         bonds = list(np.where(known[:, np.newaxis], 1.0 - lost[0], np.nan))
         _reference(panel, scene, bonds, "-.", "with intact bonds only", zorder=2.5)
     ratios = []
     for line in scene.lines:
         hertz, jkr = (
-            scene.values(f"{name}_radius_mean", line.whole) for name in ("hertz", "jkr")
+            scene.values(f"{name}_radius", line.whole) for name in ("hertz", "jkr")
         )
         ratios.append((hertz / np.where(jkr > 0.0, jkr, np.nan)) ** 2)
     _reference(panel, scene, ratios, ":", "Hertz")
@@ -775,8 +769,8 @@ def _stacked_shares(panel: Axes, scene: Scene) -> None:
     """Draw the share of JKR's area that each mechanism takes, as stacked shades."""
     line = scene.lines[0]
     bonds, ratio = (
-        1.0 - scene.values("lost_to_bonds_mean", line),
-        scene.values("area_ratio_mean", line),
+        1.0 - scene.values("lost_to_bonds", line),
+        scene.values("area_ratio", line),
     )
     x, bonds, ratio = scene.parted(line, bonds, ratio)
     if scene.varies("lost_to_bonds"):
@@ -850,7 +844,7 @@ def further_panels(scene: Scene) -> list[tuple[float, Panel]]:
             )
     if scene.varies("friction_force"):
         panels.append((1.2, friction_panel))
-    opened = scene.all("fraction_detached_mean")
+    opened = scene.all("fraction_detached")
     if np.any((opened > 0.0) & (opened < 1.0)):
         panels.append((0.8, series("fraction_detached", "open contacts", "1")))
     return panels
@@ -907,7 +901,7 @@ def time_figure(
         for name in _DRIVEN
         if (name != "displacement" or moved) and name != scene.over
     ]
-    shown = [name for name in shown if any(map(_changes, scene.all(f"{name}_mean")))]
+    shown = [name for name in shown if any(map(_changes, scene.all(name)))]
     driven = [(0.8, series(name, *_DRIVEN[name], usual=True)) for name in shown]
     return _with_size(scene, [*further_panels(scene), *driven], absolute, ax)
 
@@ -965,7 +959,7 @@ def needs_friction(dataset: xr.Dataset) -> None:
 def friction_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     """Friction force over time and over the slider's position: the friction loop."""
     scene = over(dataset, "t")._replace(measured=data, broken=True)
-    position = scene.all("slider_position_mean")
+    position = scene.all("slider_position")
     moved = scene.placed(
         "slider_position", position, "slider position $x$", "m", broken=True
     )
@@ -999,7 +993,7 @@ def sweep_figure(
 
     If all contacts are open at the end and some pulled off, their pull-off loads.
     """
-    off = dataset.get("pull_off_load", dataset.get("pull_off_load_mean"))
+    off = dataset.get("pull_off_load")
     if (
         off is not None
         and off.notnull().any()
@@ -1014,7 +1008,7 @@ def sweep_figure(
     if not is_stationary(dataset):
         words = [f"at the end: $t$ = {style.text_of(dataset['t'][-1], 's')}"]
         if "speed" in dataset:
-            speed = dataset["speed"].isel(t=-1)
+            speed = ensemble_mean(dataset["speed"]).isel(t=-1)
             ends = dict.fromkeys(
                 style.text_of(end, "m/s") for end in (speed.min(), speed.max())
             )
@@ -1029,8 +1023,9 @@ def statement_figure(dataset: xr.Dataset, name: str) -> Figure:
     An arrow is a bound: the value lies beyond. Curves are sorted along numbers.
     """
     scene = over_key(dataset, style.swept(dataset)[0])
-    scene.statistics.stated = statements(scene.statistics.dataset, [name])
-    over = scene.statistics.stated[f"{name}_mean"].attrs["over"]
+    stated = Run(scene.statistics.dataset).statements([name])
+    scene.statistics.stated = stated
+    over = stated[name].value.attrs["over"]
     words = f"mean over the {over}, 95 % intervals" if over else ""
     scene = scene._replace(heading="; ".join(filter(None, [words, scene.left_out])))
     return stacked(
@@ -1040,18 +1035,21 @@ def statement_figure(dataset: xr.Dataset, name: str) -> Figure:
 
 def statement_curves(panel: Axes, scene: Scene, name: str) -> float:
     """Draw a statement over a swept key, and return the factor to the unit of its axis."""
-    mean = cast(xr.DataArray, scene.statistics.get(f"{name}_mean"))
-    ends = [f"{name}_{end}" for end in ("mean", "low", "high")]
-    values, words = (
-        scene.all(*ends),
-        "\n".join(textwrap.wrap(named(mean, with_symbol=False), 36)),
+    mean = cast(xr.DataArray, scene.statistics.get(name))
+    ends = ("value", "low", "high")
+    values = np.stack(
+        [scene.values(name, line, end) for end in ends for line in scene.lines]
     )
+    words = "\n".join(textwrap.wrap(named(mean, with_symbol=False), 36))
     factor = style.in_unit(
         panel.yaxis, words, values, str(mean.attrs.get("units", "1"))
     )
     for line in scene.lines:
         _interval(
-            panel, scene, line, [factor * scene.values(end, line) for end in ends]
+            panel,
+            scene,
+            line,
+            [factor * scene.values(name, line, end) for end in ends],
         )
     panel.set_yscale(
         "log" if axis_scale(values[np.isfinite(values)]) == "log" else "linear"

@@ -18,8 +18,15 @@ from sim.numerics.files import claim as claim_file
 from sim.plots import curves, field, movie, slider, style, theories
 from sim.plots.measured import Measured
 from sim.plots.style import STYLE, recorded, save, swept_value
-from sim.read import engineering, statements, sweep_dims
-from sim.read.dataset import MEMBERS, answered, claim, plain, speed_name
+from sim.read import Run, engineering, sweep_dims
+from sim.read.dataset import (
+    MEMBERS,
+    answered,
+    claim,
+    only_statistics,
+    plain,
+    speed_name,
+)
 from sim.units.errors import BadInput, naming
 from sim.units.notation import in_units
 from sim.units.quantity import read_option
@@ -153,9 +160,7 @@ class Choices(NamedTuple):
             raise ValueError(
                 f"there is no member {self.member}; there are members 0 to {members - 1}"
             )
-        if MEMBERS not in dataset.dims and any(
-            str(name).endswith("_sem") for name in dataset.data_vars
-        ):
+        if only_statistics(dataset):
             raise ValueError(
                 "members were not recorded, only statistics; run again with [record] per_member = true"
             )
@@ -316,7 +321,7 @@ def draw(
     of_statement = (
         kind not in KINDS
         and bool(style.swept(dataset))
-        and f"{kind}_mean" in statements(dataset)
+        and kind in Run(dataset).statements()
     )
     drawing = (
         Kind(lambda run: curves.statement_figure(run, str(kind)))

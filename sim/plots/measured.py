@@ -133,9 +133,7 @@ class Measured:
         }
         for name, variable in self.dataset.variables.items():
             if variable.dtype.kind == "f" and "units" in variable.attrs:
-                units.setdefault(
-                    str(name).removesuffix("_mean"), variable.attrs["units"]
-                )
+                units.setdefault(str(name), variable.attrs["units"])
         self.units = {
             each: unit for name, unit in units.items() for each in names_of(name)
         }

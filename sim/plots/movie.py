@@ -14,7 +14,7 @@ from PIL import Image
 
 from sim.plots import field, style
 from sim.read import sweep_dims
-from sim.read.dataset import MEMBERS, word
+from sim.read.dataset import MEMBERS, only_statistics, word
 from sim.units.terminal import LOG
 
 #: Most frames of a movie by format, and least; frames a second; dots an inch by format.
@@ -131,7 +131,7 @@ def needs_one_contact(dataset: xr.Dataset) -> None:
         raise ValueError(
             "a movie shows one member; choose it by --member, such as --member 0"
         )
-    if "contact_radius" not in dataset:
+    if only_statistics(dataset):
         raise ValueError(
             "members were not recorded, only statistics; run again with [record] per_member = true"
         )

@@ -24,8 +24,9 @@ from sim.plots.curves import (
     statement_curves,
 )
 from sim.plots.measured import Line, Measured
-from sim.read import is_steady, setting, statements, sweep_dims
+from sim.read import Run, is_steady, setting, sweep_dims
 from sim.read.dataset import MEMBERS, stays_held, word
+from sim.read.estimate import Estimates
 from sim.read.events import incipient_law, jumps
 from sim.read.observables import with_slips
 from sim.read.over_speed import speed_dim
@@ -171,7 +172,7 @@ def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
 
 def needs_map(dataset: xr.Dataset) -> None:
     """Refuse a dataset that is no sweep of springs over stage speeds."""
-    if "stage_speed" not in dataset and "stage_speed_mean" not in dataset:
+    if "stage_speed" not in dataset:
         raise ValueError(
             'no stage pulls through a spring; set [drive] model = "spring"'
         )
@@ -286,7 +287,7 @@ def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
 
 def needs_pull(dataset: xr.Dataset) -> None:
     """Refuse a dataset in which no force grows from rest."""
-    if "spring_force" not in dataset and "spring_force_mean" not in dataset:
+    if "spring_force" not in dataset:
         raise ValueError(
             'nothing pulls the slider; add a spring: [drive] model = "spring"'
         )
@@ -311,7 +312,7 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     The law is fitted by least squares up to half of the largest force.
     """
     scene = scene_along(dataset, "t")
-    force, area = np.abs(scene.all("spring_force_mean")), scene.all("contact_area_mean")
+    force, area = np.abs(scene.all("spring_force")), scene.all("contact_area")
     tops, alphas = np.transpose(
         [incipient_law(*curve) for curve in zip(force, area, strict=True)]
     )
@@ -421,7 +422,7 @@ def stress_figure(
     def stress_panel(panel: Axes, scene: Scene) -> None:
         """Draw the shear stress upon closed forms, with the maximum of each curve."""
         factor = style.in_unit(
-            panel.yaxis, r"shear stress $\tau_0$", scene.all("shear_stress_mean"), "Pa"
+            panel.yaxis, r"shear stress $\tau_0$", scene.all("shear_stress"), "Pa"
         )
         contact_curves(
             panel,
@@ -476,7 +477,7 @@ def _marked(panel: Axes, scene: Scene, factor: float) -> list[Line]:
     """Mark the maximum of each curve by a ring and return the curves with the maxima in their names."""
     labelled = []
     for line in scene.lines:
-        speed, stress = scene.speeds(line), scene.values("shear_stress_mean", line)
+        speed, stress = scene.speeds(line), scene.values("shear_stress", line)
         # their transients have no maximum over the speed
         steps = scene.broken and jumps(speed, True).size
         at = None if steps else maximum_of(speed, stress)
@@ -504,8 +505,8 @@ def start_figure(dataset: xr.Dataset) -> Figure:
         {dim: np.flatnonzero(rests == rests.max()) for dim in rests.dims}
     )
     over = [str(dim) for dim in (*speeds.dims, *rests.dims) if dataset.sizes[dim] > 1]
-    stated = statements(longest, [])
-    if not over or "peak_stress_mean" not in stated:
+    stated = Run(longest).statements([])
+    if not over or "peak_stress" not in stated:
         figure, axes = style.rows([2.15])
     else:
         figure, axes = style.pairs(2.9)
@@ -515,7 +516,7 @@ def start_figure(dataset: xr.Dataset) -> Figure:
 
 
 def _time_panel(
-    panel: Axes, dataset: xr.Dataset, rest: float, stated: xr.Dataset
+    panel: Axes, dataset: xr.Dataset, rest: float, stated: Estimates
 ) -> None:
     """Draw the stress over the time since the start; a dot is a stated peak."""
     slid = dataset.isel(t=np.flatnonzero(dataset["t"] > rest + 1e-9 * dataset["t"][-1]))
@@ -525,15 +526,15 @@ def _time_panel(
         "t", slid["t"].to_numpy() - rest, "time since the start", "s", scale
     )
     factor = style.in_unit(
-        panel.yaxis, r"shear stress $\tau_0$", scene.all("shear_stress_mean"), "Pa"
+        panel.yaxis, r"shear stress $\tau_0$", scene.all("shear_stress"), "Pa"
     )
     contact_curves(panel, scene, "shear_stress", factor)
-    for line in scene.lines if "peak_stress_mean" in stated else ():
+    for line in scene.lines if "peak_stress" in stated else ():
         when, peak = (
-            style.number_at(stated[f"peak_{name}_mean"], line.point)
+            style.number_at(stated[f"peak_{name}"].value, line.point)
             for name in ("time", "stress")
         )
-        peak = np.copysign(peak, scene.values("shear_stress_mean", line)[-1])
+        peak = np.copysign(peak, scene.values("shear_stress", line)[-1])
         panel.plot(
             scene.unit.factor * when,
             factor * peak,
@@ -555,12 +556,12 @@ def _peak_panel(panel: Axes, dataset: xr.Dataset, scene: Scene) -> None:
 
     Thin lines over the speed are closed forms: the peak of Bell bonds if none rebinds, and steady sliding.
     """
-    scene.statistics.stated = statements(scene.statistics.dataset, [])
+    scene.statistics.stated = Run(scene.statistics.dataset).statements([])
     factor = statement_curves(panel, scene, "peak_stress")
     for line in scene.lines:
         x, peaks, when = (
             scene.x[line.number],
-            *(scene.values(f"peak_{name}_mean", line) for name in ("stress", "time")),
+            *(scene.values(f"peak_{name}", line) for name in ("stress", "time")),
         )
         few = when <= _STEPS * float(dataset["clock_step"])
         look: Any = {

@@ -25,6 +25,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from sim.numerics.files import output
 from sim.read import engineering, scaled, sweep_dims
+from sim.read.dataset import ensemble_mean
 
 COLUMN, WIDE = 3.4, 7.0  # inches: one column, both columns
 _ON_SCREEN = 120  # dots an inch
@@ -174,7 +175,7 @@ def swept(dataset: xr.Dataset) -> list[str]:
 
 def recorded(dataset: xr.Dataset, name: str) -> xr.DataArray:
     """Return a variable of each member, or its mean if only statistics are recorded."""
-    return dataset[name if name in dataset else f"{name}_mean"].astype(float)
+    return ensemble_mean(dataset[name]).astype(float)
 
 
 def mean_of(dataset: xr.Dataset, name: str) -> xr.DataArray:

@@ -13,9 +13,10 @@ from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.plots import style
 from sim.plots.curves import Scene, beside, colour_bar, mark_jumps, scene_along
 from sim.plots.measured import Line, Measured
-from sim.read import control, is_steady, setting, settled, statements
-from sim.read.dataset import plain, stays_held
-from sim.read.events import cycles_of, pull_offs
+from sim.read import Run, control, is_steady, pull_offs, setting, settled
+from sim.read.dataset import ensemble_mean, only_statistics, plain, stays_held
+from sim.read.loops import cycles_of
+from sim.read.peaks import differ
 
 #: Name of each theory, its colour and line style.
 _THEORIES: dict[str, tuple[str, str, Any]] = {
@@ -290,9 +291,7 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
         kind, stiffness = control(dataset)
     words, symbol = _DISPLACEMENTS.get(kind, ("indentation", r"\delta"))
     over = "displacement" if kind in _DISPLACEMENTS else "indentation"
-    scene = scene.placed(
-        over, scene.all("displacement_mean"), f"{words} ${symbol}$", "m"
-    )
+    scene = scene.placed(over, scene.all("displacement"), f"{words} ${symbol}$", "m")
     work, size = setting(dataset, "adhesion.work"), setting(dataset, "sphere.radius")
     numbers = (work, size, dataset["contact_modulus"], stiffness)
     theories = [
@@ -302,24 +301,22 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     compared = data is not None and data.has_errors
     figure, panels = style.rows([2.1, 1.5, 1.8] + [0.8] * compared, shared=False)
     loads, radii, loaded, *below = panels
-    force = style.in_unit(
-        loads.yaxis, "normal load $P$", scene.all("normal_load_mean"), "N"
-    )
+    force = style.in_unit(loads.yaxis, "normal load $P$", scene.all("normal_load"), "N")
     length = style.in_unit(
-        radii.yaxis, "contact radius $a$", scene.all("contact_radius_mean"), "m"
+        radii.yaxis, "contact radius $a$", scene.all("contact_radius"), "m"
     )
     loaded.set_ylabel(radii.get_ylabel())
     of_load = scene.placed(
-        "normal_load", scene.all("normal_load_mean"), "normal load $P$", "N"
+        "normal_load", scene.all("normal_load"), "normal load $P$", "N"
     )
-    stated, cycles = statements(dataset, []), cycles_of(dataset)
+    stated, cycles = Run(dataset).statements([]), cycles_of(dataset)
     integral = rf"$\oint\,P\,\mathrm{{d}}{symbol}$"
-    in_cycles = "loop_energy_mean" in stated and bool(
-        stated["loop_energy_mean"].notnull().all()
+    in_cycles = "loop_energy" in stated and bool(
+        stated["loop_energy"].value.notnull().all()
     )
-    spent = stated["loop_dissipation_mean" if in_cycles else "total_dissipated_mean"]
+    spent = stated["loop_dissipation" if in_cycles else "total_dissipated"].value
     energies = {"$W$": spent} | (
-        {integral: stated["loop_energy_mean"]} if in_cycles else {}
+        {integral: stated["loop_energy"].value} if in_cycles else {}
     )
     labelled = scene._replace(lines=_labelled(scene, energies))
     for panel, placed, name, factor in (
@@ -378,7 +375,7 @@ def _cycle(
     along_load = scene.over == "normal_load"
     first = int(np.ceil(len(x) / max(cycles, 1.0)))
     # a standard deviation reaches loads that none has
-    known = scene.statistics.get(f"{name}_quantile") is not None
+    known = scene.statistics.get(name, "quantile") is not None
     # a band over a mean of loads says nothing
     if known and np.any(high > low) and not along_load:
         shade: Any = {
@@ -408,7 +405,7 @@ def _cycle(
             }
             words = (
                 "mean pull-off"
-                if "pull_off_load_std" in scene.statistics.dataset
+                if only_statistics(scene.statistics.dataset)
                 else "pull-off of each member"
             )
             panel.plot(
@@ -434,21 +431,11 @@ def _pull_offs(dataset: xr.Dataset, line: Line) -> np.ndarray | None:
 
     None if members agree, or without the records.
     """
+    if "pull_off_load" not in dataset or not differ(dataset["pull_off_load"]):
+        return None
+    off = pull_offs(dataset).isel(line.point, missing_dims="ignore")
     names = ("pull_off_displacement", "pull_off_load")
-    with contextlib.suppress(KeyError):
-        if (
-            dataset.sizes.get("member", 1) > 1
-            and "member" in dataset["pull_off_load"].dims
-        ):
-            off = pull_offs(dataset)
-        elif "pull_off_load_std" in dataset:
-            phase = "phase_" if "phase_pull_off_load_mean" in dataset else ""
-            off = xr.Dataset({name: dataset[f"{phase}{name}_mean"] for name in names})
-        else:
-            return None
-        off = off.isel(line.point, missing_dims="ignore")
-        return np.stack([off[name].to_numpy().ravel() for name in names])
-    return None
+    return np.stack([ensemble_mean(off[name]).to_numpy().ravel() for name in names])
 
 
 def _equilibria(
@@ -457,7 +444,7 @@ def _equilibria(
     """Draw JKR's equilibria up to the largest contact, each different curve once."""
     reached: dict[Theory, float] = {}
     for line, theory in zip(scene.lines, theories, strict=True):
-        most = np.max(np.nan_to_num(scene.values("contact_radius_mean", line)))
+        most = np.max(np.nan_to_num(scene.values("contact_radius", line)))
         reached[theory] = max(reached.get(theory, 0.0), most)
     (loads, radii, loaded), (along, force, length) = panels, factors
     for theory, most in reached.items():

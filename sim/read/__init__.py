@@ -1,10 +1,12 @@
 """Statistics of a dataset: over its members, at each time and sweep value, and what they say about the area.
 
-Everything is read from the file; nothing of the simulation is needed. *Observables* are variables per member and time.
-Some are recorded, others are derived (such as the share of the area lost to broken bonds). *Events* occur once in a
-run, such as the detachment or the friction peak. ``summary`` returns statistics of both over the members.
+Everything is read from the file; nothing of the simulation is needed. A ``Run`` knows the facts of a dataset and has
+the statistics of each quantity. *Observables* are variables per member and time; some are recorded, others are derived
+(such as the share of the area lost to broken bonds). *Events* occur once in a run, such as a pull-off. The statistics
+of a quantity are an ``Estimate``.
 """
 
+from sim.read.correlation import IntegralTime, correlation_time, integral_time
 from sim.read.dataset import (
     Control,
     control,
@@ -13,23 +15,15 @@ from sim.read.dataset import (
     setting,
     speed_of,
     sweep_dims,
+    where,
 )
 from sim.read.errors import SystematicError, remarks, systematic_errors
-from sim.read.events import (
-    Lifetime,
-    events,
-    kinetic_friction,
-    lifetime,
-    loop_energy,
-    peaks,
-    peaks_after_holds,
-    pull_offs,
-    slips,
-    slips_by_phase,
-    stick_slip,
-    survival,
-)
+from sim.read.estimate import Estimate, Estimates
+from sim.read.events import events, pull_offs
 from sim.read.export import frame, long, to_csv, to_long_csv
+from sim.read.late import distribution, over_time
+from sim.read.lifetimes import Lifetime, lifetime, survival
+from sim.read.loops import loop_energy
 from sim.read.observables import (
     bond_work,
     observables,
@@ -38,20 +32,11 @@ from sim.read.observables import (
     share_observables,
 )
 from sim.read.over_speed import crossing, extremes, loss_speeds
-from sim.read.run import Run, statements
-from sim.read.statements import Statement, each, relaxation, statistics
-from sim.read.statistics import (
-    QUANTILES,
-    IntegralTime,
-    averaging,
-    correlation_time,
-    distribution,
-    integral_time,
-    over_time,
-    shares,
-    summary,
-    where,
-)
+from sim.read.peaks import peaks, peaks_after_holds
+from sim.read.run import Run
+from sim.read.slips import kinetic_friction, slips, slips_by_phase, stick_slip
+from sim.read.statements import Statement, each, relaxation
+from sim.read.statistics import QUANTILES, averaging, over_members, summary
 from sim.read.tables import (
     GROUPS,
     Table,
@@ -69,6 +54,8 @@ __all__ = [
     "GROUPS",
     "QUANTILES",
     "Control",
+    "Estimate",
+    "Estimates",
     "IntegralTime",
     "Lifetime",
     "Run",
@@ -99,6 +86,7 @@ __all__ = [
     "losses",
     "notes",
     "observables",
+    "over_members",
     "over_time",
     "peaks",
     "peaks_after_holds",
@@ -111,12 +99,10 @@ __all__ = [
     "setting",
     "settled",
     "share_observables",
-    "shares",
     "slips",
     "slips_by_phase",
+    "speed_of",
     "spread",
-    "statements",
-    "statistics",
     "stick_slip",
     "summary",
     "survival",

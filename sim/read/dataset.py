@@ -7,7 +7,7 @@ import contextlib
 import json
 import os
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,9 +18,13 @@ from sim.numerics import files, hdf5
 from sim.numerics.lazy import Refused, open_lazily
 from sim.quantities import OF_EACH_SLIP, RECORDED
 from sim.units.errors import BadInput
+from sim.units.notation import engineering
+from sim.units.quantity import read_option
 from sim.units.tables import decoded, same_line_ends
 
 MEMBERS = "member"
+#: Dimension of the statistics over the members that stand in place of these.
+STATISTIC = "statistic"
 #: Trajectories that are read and worked on at once [byte].
 ROOM = 2**26
 #: Quantities that every run records unless its scenario chooses some, and the statements that need them.
@@ -35,10 +39,8 @@ _STATEMENTS = {
     "peak_stress": "peak of stress",
     "peak_friction": "peak of friction",
 }
-#: A missing variable in the words of xarray, without the ending of a statistic.
-_MISSING = re.compile(r"(?:^|named ')(\w+?)(?:_mean|_std|_sem)?(?:'|$)")
-#: Ending of a statistic of the members in the name of a variable.
-_STATISTIC = re.compile("_(mean|std|sem|count)$")
+#: A missing variable in the words of xarray.
+_MISSING = re.compile(r"(?:^|named ')(\w+?)(?:'|$)")
 #: Numbers that every run derives from its scenario.
 _DERIVED = (
     "contact_modulus",
@@ -51,8 +53,10 @@ _DERIVED = (
 #: Other numbers of a run, and the dimensions that a run has beside those of its sweep.
 _RECORDED = {
     *RECORDED,
+    *(f"{name}_count" for name in RECORDED),
     "t",
     MEMBERS,
+    STATISTIC,
     "slip",
     "phase",
     "phase_start",
@@ -80,7 +84,17 @@ _OLD_EVENTS = re.compile(
 )
 #: Names of systematic errors.
 _ERRORS = re.compile("(cell|banded|step)_error_")
-_DIMENSIONS = ("t", "slip", "phase", "late", "map_member", "map_time", "x", "y")
+_DIMENSIONS = (
+    STATISTIC,
+    "t",
+    "slip",
+    "phase",
+    "late",
+    "map_member",
+    "map_time",
+    "x",
+    "y",
+)
 _CONTROLS = ("load", "indentation", "displacement")
 
 
@@ -118,6 +132,9 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
             raise BadInput(
                 [f"{path}: was not written by `sim run`; name one of its outputs"]
             )
+        if any(f"{name}_sem" in dataset.variables for name in RECORDED):
+            reason = "holds the statistics of members in the form of version 1"
+            raise BadInput([f"{path}: {reason}; run the scenario again"])
         if reason := _fault(dataset):
             raise BadInput(
                 [
@@ -193,12 +210,8 @@ def _fault(dataset: xr.Dataset) -> str:
         (str(name), variable) for name, variable in dataset.variables.items()
     ):
         over_sweep = name in keys or name in _DERIVED
-        stem = (
-            name
-            if name in _RECORDED
-            else _STATISTIC.sub("", name).removeprefix("late_")
-        )
-        if not (over_sweep or stem in _RECORDED or _ERRORS.match(name)):
+        is_recorded = name in _RECORDED or name.removeprefix("late_") in _RECORDED
+        if not (over_sweep or is_recorded or _ERRORS.match(name)):
             continue
         is_label = (
             name in keys
@@ -246,9 +259,8 @@ def lacking(dataset: xr.Dataset) -> str:
         is not None
     ):
         return ""
-    recorded = {re.sub("_(mean|std|sem)$", "", str(name)) for name in dataset.variables}
     lost = [
-        statement for name, statement in _STATEMENTS.items() if name not in recorded
+        words for name, words in _STATEMENTS.items() if name not in dataset.variables
     ]
     version = str(dataset.attrs["sim_version"])
     if version.startswith(_FIRST):
@@ -282,19 +294,17 @@ def with_trajectories(dataset: xr.Dataset, *names: str) -> xr.Dataset:
     return dataset.drop_vars([name for name in timed if name not in names])
 
 
-def in_pieces(
-    dataset: xr.Dataset, dims: Sequence[str], reduce: Callable[[xr.Dataset], xr.Dataset]
-) -> xr.Dataset:
-    """Apply a function to pieces of a dataset, so that little of a large file is in memory, and join the results.
+def pieces(
+    dataset: xr.Dataset, dims: Sequence[str]
+) -> tuple[str, Iterator[xr.Dataset]]:
+    """Return what a dataset is cut along, and its pieces in memory, so that little of a large file is there at once.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         Opened lazily.
     dims : sequence of str
-        Dimensions along which the function works on each value alone. The longest one is cut, at ends of chunks.
-    reduce : callable
-        Function of a dataset in memory.
+        Dimensions of which each value is worked on alone. The longest one is cut, at ends of chunks.
     """
     dataset = plain(dataset)
     sizes = {name: dataset.sizes[name] for name in dims if name in dataset.sizes}
@@ -308,21 +318,23 @@ def in_pieces(
     size = dataset.sizes[dim]
     share = int(size * ROOM / max(ROOM, sum(variable.nbytes for variable in timed)))
     length = max(share // chunk, 1) * chunk
-    pieces = (
-        dataset.isel({dim: slice(start, start + length)}).compute()
-        for start in range(0, size, length)
+    starts = range(0, size, length)
+    return dim, (
+        dataset.isel({dim: slice(start, start + length)}).compute() for start in starts
     )
-    results = [reduce(piece) for piece in pieces]
-    if len(results) == 1:
-        return results[0]
-    return xr.concat(
-        results,
-        dim,
-        data_vars="minimal",
-        coords="minimal",
-        compat="override",
-        join="override",
-    )
+
+
+def in_pieces(
+    dataset: xr.Dataset, dims: Sequence[str], reduce: Callable[[xr.Dataset], xr.Dataset]
+) -> xr.Dataset:
+    """Apply a function of a dataset in memory to ``pieces`` of a dataset, and join the results."""
+    dim, parts = pieces(dataset, dims)
+    first, *others = map(reduce, parts)
+    if not others:
+        return first
+    how: Any = {"compat": "override", "join": "override"}
+    how |= {"data_vars": "minimal", "coords": "minimal"}
+    return xr.concat([first, *others], dim, **how)
 
 
 def _chunk(variable: xr.Variable, dim: str) -> int:
@@ -406,9 +418,21 @@ def speed_name(dataset: xr.Dataset) -> str:
     return "stage_speed" if "stage_speed" in dataset else "speed"
 
 
+def ensemble_mean(variable: xr.DataArray) -> xr.DataArray:
+    """Return the mean over the members of a variable that holds their statistics, and any other one as it is."""
+    if STATISTIC not in variable.dims:
+        return variable
+    return variable.isel({STATISTIC: 0}, drop=True)
+
+
+def only_statistics(dataset: xr.Dataset) -> bool:
+    """True if statistics over the members were recorded in place of these."""
+    return STATISTIC in dataset.dims
+
+
 def speed_of(dataset: xr.Dataset) -> xr.DataArray:
     """Return the prescribed speed of the slider or of the stage, which is the same for all members [m/s]."""
-    speed = dataset[speed_name(dataset)]
+    speed = ensemble_mean(dataset[speed_name(dataset)])
     return speed.isel({MEMBERS: 0}, drop=True) if MEMBERS in speed.dims else speed
 
 
@@ -574,3 +598,59 @@ def stays_held(dataset: xr.Dataset) -> xr.DataArray:
     ):
         still = still & (radius == radius.isel(t=0)).all("t")
     return still
+
+
+#: How far from a swept value, in parts of it, one may be chosen: as far as rounding to three digits.
+_NEAR = 5e-3
+
+
+def where(dataset: xr.Dataset, chosen: Mapping[str, Any]) -> xr.Dataset:
+    """Choose values of swept keys.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+    chosen : dict
+        Swept keys (``"contact.load"``, or ``"load"`` where that is one only), each with a value: a number in SI,
+        a text with a unit (``"4 mN"``) or a name. The nearest swept value, within half a percent.
+
+    Returns
+    -------
+    xarray.Dataset
+        The dataset at these values; their dimensions stay, of length one.
+
+    Raises
+    ------
+    BadInput
+        If a key is not swept, or has no such value; the message lists those there are.
+    """
+    for key, value in chosen.items():
+        dims = sweep_dims(dataset)
+        full = key.replace(".", "_")
+        fitting = [n for n in dims if n == full] or [
+            n for n in dims if n.endswith(f"_{full}")
+        ]
+        if len(fitting) != 1:
+            raise BadInput(
+                [f"{key} is not swept; swept: {', '.join(dims) or 'nothing'}"]
+            )
+        name = fitting[0]
+        swept = dataset[name]
+        if swept.dtype.kind in "fi":
+            unit = swept.attrs.get("units", "1")
+            wanted = read_option(value, key, unit)
+            off = np.abs(swept.to_numpy() - wanted)
+            places = np.flatnonzero(off <= min(off.min(), _NEAR * abs(wanted)))
+            known = [
+                engineering(float(f"{number:.4g}"), unit) for number in swept.to_numpy()
+            ]
+        else:
+            known = [str(text) for text in swept.to_numpy()]
+            places = np.flatnonzero([text == value for text in known])
+        if not places.size:
+            raise BadInput(
+                [f"{key} has no value {value}; there are: {', '.join(known)}"]
+            )
+        dataset = dataset.isel({name: places[:1]})
+    return dataset

@@ -12,10 +12,12 @@ import pandas as pd
 import xarray as xr
 
 from sim.numerics.files import output
+from sim.read.correlation import Array
 from sim.read.dataset import steady_points
+from sim.read.estimate import Estimate
 from sim.read.observables import with_slips
 from sim.read.run import Run
-from sim.read.statistics import QUANTILES, Array, over_members
+from sim.read.statistics import QUANTILES, over_members
 from sim.read.tables import (
     EVENTS,
     GROUPS,
@@ -30,8 +32,6 @@ from sim.units.notation import chosen_unit
 
 #: Rows of a CSV file that are written at once.
 _LINES = 2**15
-#: Statistics of a column that stand beside its mean, and the endings of their columns.
-_BESIDE = {"sem": "error", "bound": "bound", "reason": "reason"}
 
 
 def frame(run: Run, show: Sequence[str] = ()) -> pd.DataFrame:
@@ -77,8 +77,8 @@ def frame(run: Run, show: Sequence[str] = ()) -> pd.DataFrame:
     losses = [column.name for column in of_losses(run.losses)]
     variables: dict[str, xr.DataArray] = {}
     for group, wanted in ((each, names), (run.events, once), (run.losses, losses)):
-        for name in wanted:
-            variables |= _columns_of(group, name)
+        for name in (name for name in wanted if name in group):
+            variables |= _columns_of(name, group[name])
     coords = {name: run.dataset[name] for name in run.sweep}
     if not run.has_one_row_each:
         coords["t"] = run.dataset["t"]
@@ -98,25 +98,18 @@ def frame(run: Run, show: Sequence[str] = ()) -> pd.DataFrame:
     return table
 
 
-def _columns_of(group: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
-    """Return a mean and what stands beside it, as far as it is known."""
-    if f"{name}_mean" not in group:
+def _columns_of(name: str, one: Estimate) -> dict[str, xr.DataArray]:
+    """Return a value and what stands beside it, as far as it is known."""
+    has_reason = one.reason is not None and bool((one.reason != "").any())
+    if not bool(one.value.notnull().any()) and not has_reason:
         return {}
-    mean = group[f"{name}_mean"]
-    reason = group.get(f"{name}_reason", xr.DataArray(""))
-    if not bool(mean.notnull().any()) and not bool((reason != "").any()):
-        return {}
-    result = {name: mean}
-    for ending, column in _BESIDE.items():
-        values = group.get(f"{name}_{ending}")
-        if values is None:
-            continue
-        nothing = values == "" if ending == "reason" else ~(values > 0.0)
-        if not bool(nothing.all()):
-            unit = {} if ending == "reason" else {"units": mean.attrs.get("units", "1")}
-            result[f"{name}_{column}"] = values.drop_attrs(deep=False).assign_attrs(
-                unit
-            )
+    result = {name: one.value}
+    for ending, values in (("error", one.sem), ("bound", one.bound)):
+        if values is not None and bool((values > 0.0).any()):
+            values = values.drop_attrs(deep=False).assign_attrs(units=one.unit)
+            result[f"{name}_{ending}"] = values
+    if one.reason is not None and has_reason:
+        result[f"{name}_reason"] = one.reason.drop_attrs(deep=False)
     return result
 
 
@@ -206,19 +199,22 @@ def _with_unit(name: str, unit: str) -> str:
 
 #: Columns that are texts, of which a quantity has one.
 _TEXTS = "quantity", "unit", "over", "source"
-#: Columns of statistics in long form, and the endings of their variables.
-_ENDINGS = {
-    "mean": "mean",
+#: Columns of statistics in long form, and the fields of an ``Estimate``.
+_FIELDS = {
+    "mean": "value",
     "error": "sem",
     "low": "low",
     "high": "high",
     "bound": "bound",
     "sd": "std",
 }
-_ALIKE = [
-    f"q{100 * level:02.0f}{end}" for level in QUANTILES for end in ("", "_low", "_high")
+#: Columns of quantiles: field, place, and name.
+_QUANTILES = [
+    (f"quantile{end}", place, f"q{100 * level:02.0f}{end}")
+    for place, level in enumerate(QUANTILES)
+    for end in ("", "_low", "_high")
 ]
-_ENDINGS |= {name: name for name in (*_ALIKE, "effective_samples")}
+_COLUMNS = [*_FIELDS, *(name for _, _, name in _QUANTILES), "effective_samples"]
 
 
 def long(run: Run) -> pd.DataFrame:
@@ -246,38 +242,49 @@ def _long(run: Run) -> tuple[list[str], list[dict[str, Array]]]:
     """Return the columns of ``long``, and those of each quantity; a text is shared by all rows."""
     dataset = run.dataset
     places = [*map(str, dataset["contact_modulus"].coords), "branch", "phase", "t"]
-    dims = (*run.sweep, *places[-3:])
     parts = []
     at_times = over_members(dataset)
     for group, sample in ((at_times, run.sample(late=False)), (run.statements(), "")):
-        group = _flat(group)
-        known: dict[str, Any] = {}
-        for name in (name for name in places if name in group.coords):
-            place = group.coords[name].variable
-            # as a number that may be missing
-            known[name] = place.astype(float) if place.dtype.kind == "i" else place
-        for key in (str(key) for key in group if str(key).endswith("_mean")):
-            name, mean = key.removesuffix("_mean"), group.variables[key]
-            columns = known | _speed_beside(run, mean)
-            columns |= {
-                column: group.variables.get(f"{name}_{end}")
-                for column, end in _ENDINGS.items()
+        for name, one in group.items():
+            value = one.value.variable
+            known = {
+                at: dataset[at].variable if at in dataset else one.value[at].variable
+                for at in places
+                if at in one.value.coords
             }
-            sizes = {dim: mean.sizes[dim] for dim in dims if dim in mean.dims}
-            bound = group.get(f"{name}_bound", group[key])
+            known |= {
+                str(at): place.variable
+                for at, place in dataset["contact_modulus"].coords.items()
+                if {*place.dims} <= {*value.dims}
+            }
+            columns = known | _speed_beside(run, value) | _statistics_of(one)
+            dims = (*run.sweep, *places[-3:])
+            sizes = {dim: value.sizes[dim] for dim in dims if dim in value.dims}
             texts = {
                 "quantity": name,
-                "unit": mean.attrs.get("units", "1"),
-                "over": mean.attrs.get("over", sample) or "one run",
-                "source": bound.attrs.get("source", ""),
+                "unit": one.unit,
+                "over": one.value.attrs.get("over", sample) or "one run",
+                "source": one.source,
             }
             part = {column: np.array(text, object) for column, text in texts.items()}
             for column, values in columns.items():
-                if values is not None and set(values.dims) <= sizes.keys():
-                    part[column] = values.to_base_variable().set_dims(sizes).to_numpy()
+                if {*values.dims} <= sizes.keys():
+                    # an integer as a number that may be missing
+                    kind = float if values.dtype.kind == "i" else values.dtype
+                    part[column] = values.astype(kind).set_dims(sizes).to_numpy()
             parts.append(part)
-    names = (*places, "speed", *_TEXTS, *_ENDINGS)
+    names = (*places, "speed", *_TEXTS, *_COLUMNS)
     return [name for name in names if any(name in part for part in parts)], parts
+
+
+def _statistics_of(one: Estimate) -> dict[str, xr.Variable]:
+    """Return the columns of the statistics of a quantity."""
+    columns = {name: getattr(one, field) for name, field in _FIELDS.items()}
+    columns["effective_samples"] = one.number
+    for field, place, name in _QUANTILES:
+        levels = getattr(one, field)
+        columns[name] = None if levels is None else levels.isel(quantile=place)
+    return {name: v.variable for name, v in columns.items() if v is not None}
 
 
 def _speed_beside(run: Run, mean: xr.Variable) -> dict[str, xr.Variable]:
@@ -288,20 +295,3 @@ def _speed_beside(run: Run, mean: xr.Variable) -> dict[str, xr.Variable]:
         return {"speed": run.speed.variable}
     first = run.speed.isel(t=0, drop=True)
     return {"speed": first.where(steady_points(run.dataset)).variable}
-
-
-def _flat(statistics: xr.Dataset) -> xr.Dataset:
-    """Return statistics in which each quantile is a variable."""
-    flat: dict[str, xr.Variable] = {}
-    for key in map(str, statistics):
-        variable, (stem, _, end) = (
-            statistics.variables[key],
-            key.rpartition("_quantile"),
-        )
-        levels = QUANTILES if "quantile" in variable.dims else ()
-        flat |= {
-            f"{stem}_q{100 * level:02.0f}{end}": variable.isel(quantile=k)
-            for k, level in enumerate(levels)
-        }
-        flat |= {} if levels else {key: variable}
-    return statistics.drop_vars([*statistics, "quantile"], errors="ignore").assign(flat)

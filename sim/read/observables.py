@@ -15,7 +15,10 @@ from sim.laws import jkr
 from sim.quantities import OF_CONTACT, QUANTITIES
 from sim.read.dataset import (
     MEMBERS,
+    STATISTIC,
     control,
+    ensemble_mean,
+    only_statistics,
     plain,
     setting,
     stays_held,
@@ -23,10 +26,6 @@ from sim.read.dataset import (
     with_trajectories,
     word,
 )
-
-KEPT = ("mean", "std", "sem")
-#: Endings of a variable of each member, and of those of its recorded statistics.
-ENDINGS = ("", *(f"_{kind}" for kind in KEPT))
 
 #: Shares of the area after that lost to bonds, in the order of charging, and the radius before each.
 _LOSSES = {
@@ -102,47 +101,52 @@ def is_of_contact(name: str) -> bool:
     return name.startswith((*OF_CONTACT, *_OF_AREA))
 
 
+def with_mean(statistics: xr.DataArray, value: xr.DataArray) -> xr.DataArray:
+    """Return statistics over the members with another mean; a variable of another kind is replaced."""
+    if STATISTIC not in statistics.dims:
+        return value
+    is_mean = xr.DataArray(np.arange(statistics.sizes[STATISTIC]) == 0, dims=STATISTIC)
+    return xr.where(is_mean, value, statistics).transpose(*statistics.dims, ...)
+
+
 def closed_only(dataset: xr.Dataset) -> xr.Dataset:
     """Return radius, area and friction of closed contacts alone: nan while a contact is open.
 
-    Of recorded statistics the moments of the closed members follow from those of all, as an open contact adds zeros.
+    Of recorded statistics those of the closed members follow from those of all, as an open contact adds zeros.
     They are nan if some contacts are open and at most two are closed.
     """
     names = [name for name in OF_CONTACT if name in dataset]
-    if "in_contact" in dataset:
-        closed = dataset["in_contact"] > 0.0
-        if MEMBERS in closed.dims:
-            count = closed.sum(MEMBERS)
-            closed = closed & ((count > FEW_LEFT) | (count == closed.sizes[MEMBERS]))
-        return dataset.assign(
-            {
-                name: dataset[name].astype(float, copy=False).where(closed)
-                for name in names
-            }
-        )
-    if "in_contact_mean" not in dataset or bool(
-        (dataset["in_contact_mean"] == 1.0).all()
-    ):
+    if "in_contact" not in dataset:
         return dataset
-    members, share = float(dataset.attrs["members"]), dataset["in_contact_mean"]
-    stops, count, result = (
-        word(dataset, "contact.after_pull_off", "stop") == "stop",
-        (members * share).round(),
-        {},
-    )
-    recorded, is_known = (
-        count.where(stops, members),
-        (count > FEW_LEFT) | (count == members),
-    )
-    for name in (name for name in OF_CONTACT if f"{name}_mean" in dataset):
-        mean, std = (dataset[f"{name}_{kind}"] for kind in ("mean", "std"))
-        squares = (recorded - 1.0) * std**2 + recorded * mean**2
-        mean = (mean * recorded / count).where(is_known)
-        std = ((squares - count * mean**2) / (count - 1.0)).clip(0.0) ** 0.5
-        for kind, values in zip(KEPT, (mean, std, std / count**0.5), strict=True):
-            result[f"{name}_{kind}"] = values.assign_attrs(
-                dataset[f"{name}_{kind}"].attrs
-            )
+    closed = dataset["in_contact"]
+    if not only_statistics(dataset):
+        is_closed = closed > 0.0
+        if MEMBERS in closed.dims:
+            count = is_closed.sum(MEMBERS)
+            is_enough = (count > FEW_LEFT) | (count == closed.sizes[MEMBERS])
+            is_closed = is_closed & is_enough
+        chosen = {
+            name: dataset[name].astype(float, copy=False).where(is_closed)
+            for name in names
+        }
+        return dataset.assign(chosen)
+    members, share = float(dataset.attrs["members"]), ensemble_mean(closed)
+    if bool((share == 1.0).all()):
+        return dataset
+    stops = word(dataset, "contact.after_pull_off", "stop") == "stop"
+    count = (members * share).round()
+    recorded = count.where(stops, members)
+    is_known = (count > FEW_LEFT) | (count == members)
+    result = {}
+    for name in (name for name in names if STATISTIC in dataset[name].dims):
+        average, spread, _ = dataset[name]
+        squares = (recorded - 1.0) * spread**2 + recorded * average**2
+        average = (average * recorded / count).where(is_known)
+        spread = ((squares - count * average**2) / (count - 1.0)).clip(0.0) ** 0.5
+        moments = [average, spread, spread / count**0.5]
+        changed = xr.concat(moments, dataset[STATISTIC], coords="minimal")
+        changed = changed.transpose(*dataset[name].dims)
+        result[name] = changed.assign_attrs(dataset[name].attrs)
     return dataset.assign(result)
 
 
@@ -151,25 +155,15 @@ def with_slips(dataset: xr.Dataset) -> xr.Dataset:
 
     Such a slider slips without duration as bonds break, which its recorded speed leaves out.
     """
-    if "bonds_sites" not in dataset.variables or dataset.sizes["t"] < 2:
+    needed = {"spring_force", "slider_position", "speed"}
+    is_driven = needed <= {*dataset} and "bonds_sites" in dataset.variables
+    if not is_driven or dataset.sizes["t"] < 2:
         return dataset
-    names = [
-        end
-        for end in ("", "_mean")
-        if f"spring_force{end}" in dataset and f"slider_position{end}" in dataset
-    ]
-    moved = {
-        f"speed{end}": dataset[f"slider_position{end}"].astype(float).differentiate("t")
-        for end in names
-    }
+    moved = ensemble_mean(dataset["slider_position"]).astype(float).differentiate("t")
     later = dataset["t"] > dataset["t"][0]  # at the start nothing has moved yet
-    speeds = {name: speed.where(later, dataset[name]) for name, speed in moved.items()}
-    return dataset.assign(
-        {
-            name: speed.assign_attrs(dataset[name].attrs)
-            for name, speed in speeds.items()
-        }
-    )
+    recorded = dataset["speed"]
+    speed = with_mean(recorded, moved.where(later, ensemble_mean(recorded)))
+    return dataset.assign(speed=speed.assign_attrs(recorded.attrs))
 
 
 def full_area(dataset: xr.Dataset) -> xr.DataArray:
@@ -185,9 +179,7 @@ def bond_work(dataset: xr.Dataset) -> xr.DataArray:
     """
     dataset = plain(dataset)
     share = setting(dataset, "adhesion.bond_share")
-    fraction = dataset[
-        "bond_fraction" if "bond_fraction" in dataset else "bond_fraction_mean"
-    ]
+    fraction = ensemble_mean(dataset["bond_fraction"])
     left = setting(dataset, "adhesion.work") * (1.0 - share + share * fraction)
     return labelled(left, "J/m^2", "work of adhesion of the intact bonds", "Δγ")
 
@@ -214,36 +206,28 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     as recorded.
     """
     dataset = plain(dataset)
-    suffix = "" if "contact_area" in dataset else "_mean"
-    area, full = (
-        dataset[f"contact_area{suffix}"].astype(float, copy=False),
-        full_area(dataset),
-    )
-    recorded = {str(name).removesuffix("_mean") for name in dataset}
-    charged = {name: radius for name, radius in _LOSSES.items() if radius in recorded}
-    if any(radius not in dataset for radius in charged.values()):
+    full = full_area(dataset)
+    area = dataset["contact_area"].astype(float, copy=False)
+    charged = {name: radius for name, radius in _LOSSES.items() if radius in dataset}
+    radii = [dataset[radius] for radius in charged.values()]
+    if any(STATISTIC in radius.dims for radius in radii):
         raise ValueError(
             "shares need every member; record them: [record] per_member = true"
         )
+    is_known = ensemble_mean(area).notnull()
     left = [
-        np.pi * dataset[radius].astype(float, copy=False) ** 2
-        for radius in charged.values()
+        (np.pi * radius.astype(float, copy=False) ** 2).where(is_known)
+        for radius in radii
     ]
-    left = [level.where(area.notnull()) for level in left]
-    levels = [full, *left, area]
+    names = ("lost_to_bonds", *charged)
+    levels = [full, *left, ensemble_mean(area)]
     shares = {}
-    for name, (before, after) in zip(
-        ("lost_to_bonds", *charged), itertools.pairwise(levels), strict=False
-    ):
-        # the bonds are the same for all members
-        ending = "" if name == "lost_to_bonds" else suffix
-        shares[name + ending] = defined(name, (before - after) / full)
-    if suffix:  # so the spread is the area's
-        for kind in ("std", "sem"):
-            spread = dataset[f"contact_area_{kind}"] / full
-            shares[f"lost_to_fluctuations_{kind}"] = defined(
-                "lost_to_fluctuations", spread
-            )
+    for name, (before, after) in zip(names, itertools.pairwise(levels), strict=False):
+        share = (before - after) / full
+        # the spread is the area's; the bonds are the same for all members
+        if name != "lost_to_bonds":
+            share = with_mean(area / full, share)
+        shares[name] = defined(name, share)
     return xr.Dataset(shares, attrs=dataset.attrs)
 
 
@@ -280,9 +264,9 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
     ValueError
         If members were not recorded, or the contact is on a disc of finite radius.
     """
-    if "fluctuation_energy" not in dataset or bool(
-        (word(dataset, "shear.contact", "plane") != "plane").any()
-    ):
+    is_on_a_plane = (word(dataset, "shear.contact", "plane") == "plane").all()
+    is_recorded = "fluctuation_energy" in dataset and not only_statistics(dataset)
+    if not is_recorded or not bool(is_on_a_plane):
         raise ValueError(
             "the other order of losses needs the fluctuation energy of each member, on a plane"
         )
@@ -313,21 +297,19 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     result = dataset.drop_vars(
         [n for n, v in dataset.data_vars.items() if "t" not in v.dims]
     )
-    for suffix in ENDINGS:
-        if f"contact_area{suffix}" in result and set(_REFERENCES) <= set(result):
-            ratio = result[f"contact_area{suffix}"].astype(
-                float, copy=False
-            ) / full_area(dataset)
-            result[f"area_ratio{suffix}"] = defined("area_ratio", ratio)
-        if f"in_contact{suffix}" in result:
-            closed = result[f"in_contact{suffix}"].astype(float, copy=False)
-            opened = closed if suffix in ("_std", "_sem") else 1.0 - closed
-            result[f"fraction_detached{suffix}"] = defined("fraction_detached", opened)
+    if "contact_area" in result and {*_REFERENCES} <= {*result}:
+        area = result["contact_area"].astype(float, copy=False)
+        result["area_ratio"] = defined("area_ratio", area / full_area(dataset))
+    if "in_contact" in result:
+        closed = result["in_contact"].astype(float, copy=False)
+        opened = with_mean(closed, 1.0 - ensemble_mean(closed))
+        result["fraction_detached"] = defined("fraction_detached", opened)
     with where_recorded():
-        result = result.assign(masks(dataset))
-    return result.drop_vars(
-        [n for n in result if str(n).startswith(("in_contact", "masked"))]
-    )
+        masked = dataset["masked"].astype(float, copy=False)
+        if STATISTIC in masked.dims:  # only of closed contacts it is known
+            masked = masked.where(ensemble_mean(dataset["in_contact"]) == 1.0)
+        result["fraction_masked"] = defined("fraction_masked", masked)
+    return result.drop_vars(["in_contact", "masked"], errors="ignore")
 
 
 def charges(dataset: xr.Dataset) -> xr.Dataset:
@@ -373,25 +355,22 @@ def restricted(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset
     }
     if _shares_among(names):
         sources |= {*_SOURCES_OF_SHARES, *_LOSSES.values()}
-    return with_trajectories(
-        dataset, *(f"{name}{ending}" for name in sources for ending in ENDINGS)
-    )
+    return with_trajectories(dataset, *sources)
 
 
 def chosen_observables(
     dataset: xr.Dataset, names: Collection[str] | None
 ) -> xr.Dataset:
-    """Return the observables ``names``, or their statistics if only these were recorded.
+    """Return the observables ``names``.
 
-    If ``names`` is None, return all observables, and the shares of the lost area in both orders if they are known.
+    If it is None, return all observables, and the shares of the lost area in both orders if they are known.
     """
     result = observables(dataset)
     if names is None or _shares_among(names):
         result = result.merge(charges(dataset), compat="no_conflicts")
     if names is None:
         return result
-    wanted = {f"{name}{ending}" for name in names for ending in ENDINGS}
-    return result[[name for name in result if name in wanted]]
+    return result[[name for name in result if name in names]]
 
 
 def closed_observables(
@@ -403,23 +382,6 @@ def closed_observables(
 
 def _shares_among(names: Collection[str]) -> bool:
     return any(name.startswith(("lost_to", "order_of")) for name in names)
-
-
-def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return ``fraction_masked``; of statistics alone it is known if all contacts are closed, else nan."""
-    if "masked" in dataset:
-        return {
-            "fraction_masked": defined(
-                "fraction_masked", dataset["masked"].astype(float)
-            )
-        }
-    closed = dataset["in_contact_mean"] == 1.0
-    return {
-        f"fraction_masked_{kind}": defined(
-            "fraction_masked", dataset[f"masked_{kind}"].where(closed)
-        )
-        for kind in KEPT
-    }
 
 
 def settled(trajectories: xr.Dataset) -> xr.Dataset:

@@ -10,8 +10,11 @@ import numpy as np
 import xarray as xr
 from scipy import special
 
+from sim.read.correlation import LEVEL, Array
 from sim.read.dataset import (
     MEMBERS,
+    STATISTIC,
+    ensemble_mean,
     in_pieces,
     is_steady,
     resolved,
@@ -22,6 +25,7 @@ from sim.read.dataset import (
     sweep_dims,
     word,
 )
+from sim.read.estimate import Estimate, Estimates
 from sim.read.observables import (
     closed_observables,
     labelled,
@@ -29,7 +33,6 @@ from sim.read.observables import (
     reference_radii,
     restricted,
 )
-from sim.read.statistics import LEVEL, Array
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
 from sim.units.quantity import read_option
@@ -47,13 +50,6 @@ _CHARGED = (
 )
 #: Groups of members that are left out in turn, and means of them, at most.
 _GROUPS, _MOST_MEANS = 64, 2**22
-_ENDS = {
-    "": "",
-    "_low": "lower end of the 95 % interval of the ",
-    "_high": "upper end of the 95 % interval of the ",
-    "_sem": "standard error of the ",
-    "_bound": "bound of the error by interpolation of the ",
-}
 #: Within how many standard errors of a level speeds are near it.
 _NEAR = 4.0
 #: Speeds to each side of a level that its interpolation needs.
@@ -183,7 +179,9 @@ def crossing(
     low = max(x[:k][rows[0, :k] > surely[:k]], default=math.nan)
     high = min(x[k:][rows[0, k:] < -surely[k:]], default=math.nan)
     bracket = none._replace(
-        low=math.exp(low), high=math.exp(high), reason=f"{count} speeds: add some here"
+        low=math.exp(low),
+        high=math.exp(high),
+        reason=f"too few of {count} speeds are near",
     )
     if math.isnan(low) and math.isnan(high):
         bracket = bracket._replace(reason="hidden by the noise; add members")
@@ -299,62 +297,53 @@ def speed_dim(dataset: xr.Dataset) -> str | None:
     return next(varying, None)
 
 
-def extremes(curves: xr.Dataset, name: str, along: str) -> xr.Dataset:
+def extremes(curve: Estimate, along: str) -> Estimates:
     """Return where a quantity is largest and least along a sweep, if that is inside: then it is not monotonic.
 
     Parameters
     ----------
-    curves : xarray.Dataset
-        As of ``distribution``, with ``<name>_mean``, ``<name>_low`` and ``<name>_high``.
-    name : str
-        Such as ``"friction_force"``.
+    curve : Estimate
+        As of ``distribution``.
     along : str
         The dimension, whose coordinate holds numbers.
 
     Returns
     -------
-    xarray.Dataset
-        ``<name>_largest`` and ``<name>_least`` with ``…_low`` and ``…_high``; ``<name>_largest_at`` and
-        ``<name>_least_at``, whose ``…_low`` and ``…_high`` are the neighbouring values of the sweep. nan, and
-        ``<name>_largest_reason`` tells it, if the extreme differs from an end of the sweep by less than the errors.
+    dict of str to Estimate
+        ``largest`` and ``least`` with their intervals; ``largest_at`` and ``least_at``, whose intervals end at the
+        neighbouring values of the sweep. nan, with a reason, if the extreme differs from an end of the sweep by less
+        than the errors.
     """
-    curves, result = curves.sortby(along), xr.Dataset()
-    mean, low, high = (curves[f"{name}_{end}"] for end in ("mean", "low", "high"))
-    low, high, last = low.fillna(mean), high.fillna(mean), curves.sizes[along] - 1
+    curve, result = curve.map(lambda each: each.sortby(along)), Estimates()
+    mean, last = curve.value, curve.value.sizes[along] - 1
+    low, high = (mean if end is None else end.fillna(mean) for end in curve[2:4])
     for kind, sign, near, far in (
         ("largest", 1.0, low, high),
         ("least", -1.0, -high, -low),
     ):
         index = (sign * mean).fillna(-np.inf).argmax(along)
         inside = near.isel({along: index}) > far.isel({along: [0, last]}).max(along)
-        for end, step, values in (("", 0, mean), ("_low", -1, low), ("_high", 1, high)):
-            place = (
-                curves[along].isel({along: (index + step).clip(0, last)}).where(inside)
-            )
-            extreme = values.isel({along: index}, drop=True).where(inside)
-            result[f"{name}_{kind}{end}"] = extreme.assign_attrs(mean.attrs)
-            result[f"{name}_{kind}_at{end}"] = place.drop_vars(
-                along, errors="ignore"
-            ).assign_attrs(curves[along].attrs)
-        result[f"{name}_{kind}_reason"] = xr.where(
-            inside, "", "at an end of the sweep, within the errors"
-        )
-    return result.drop_vars(along, errors="ignore")
+        sizes, places = [], []
+        for values, step in ((mean, 0), (low, -1), (high, 1)):
+            sizes.append(values.isel({along: index}, drop=True).where(inside))
+            place = mean[along].isel({along: (index + step).clip(0, last)})
+            places.append(place.where(inside).drop_vars(along, errors="ignore"))
+        reason = xr.where(inside, "", "at an end of the sweep, within the errors")
+        for name, (value, *ends), attrs in (
+            (kind, sizes, mean.attrs),
+            (f"{kind}_at", places, mean[along].attrs),
+        ):
+            value = value.assign_attrs(attrs)
+            low_end, high_end = ends
+            result[name] = Estimate(value, None, low_end, high_end, reason=reason)
+    return result
 
 
 def _least_area(dataset: xr.Dataset, hertz: xr.DataArray) -> xr.DataArray:
     """Return the least area over JKR's that can be left: Hertz's, and without fluctuations that without bonds."""
-    energy = dataset.get(
-        "fluctuation_energy",
-        dataset.get("fluctuation_energy_mean", xr.DataArray(math.nan)),
-    )
-    others = {
-        "fluctuations_radius",
-        "fluctuations_radius_mean",
-        "equilibrium_radius",
-        "equilibrium_radius_mean",
-    }
-    if bool((energy != 0.0).any()) or others & dataset.keys():
+    energy = dataset.get("fluctuation_energy", xr.DataArray(math.nan))
+    others = {"fluctuations_radius", "equilibrium_radius"}
+    if bool((ensemble_mean(energy) != 0.0).any()) or others & dataset.keys():
         return hertz
     with contextlib.suppress(KeyError):
         left = setting(dataset, "adhesion.work") * (
@@ -376,10 +365,8 @@ def _course(dataset: xr.Dataset) -> tuple[str, xr.DataArray]:
     BadInput
         If there is no such curve.
     """
-    has_area = bool({"contact_area", "contact_area_mean"} & dataset.keys())
-    if speed_name(dataset) not in dataset or not (
-        has_area and {"jkr_radius", "hertz_radius"} <= dataset.keys()
-    ):
+    needed = {speed_name(dataset), "contact_area", "jkr_radius", "hertz_radius"}
+    if not needed <= dataset.keys():
         raise BadInput(
             [
                 "speeds of a loss need speed, contact_area, jkr_radius and hertz_radius in record.quantities"
@@ -468,7 +455,7 @@ def _if_steady(
     return result
 
 
-def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.Dataset:
+def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Estimates:
     """Return the speeds at which the mean area has lost shares of JKR's: by default 5 and 50 %, and half of all it can.
 
     Parameters
@@ -481,14 +468,13 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
 
     Returns
     -------
-    xarray.Dataset
+    dict of str to Estimate
         For each point of the sweep of other keys ``speed_at_5_percent_lost`` and so on [m/s], by default also
-        ``speed_halfway_to_hertz``, each with ``…_low``, ``…_high`` and ``…_reason`` (see ``crossing``). Branches of a
-        course that rises and falls have the dimension ``branch``. If bonds lag behind a course,
-        ``steady_speed_at_5_percent_lost`` is the speed at which steady sliding by the scenario's own models loses as
-        much, nan where steady sliding is unstable behind the spring. With ``levels`` also the ``charges`` of that loss
-        [1], such as ``lost_to_bonds_at_10_percent_lost``. Without ``levels`` empty if there is no curve of the area
-        over the speed.
+        ``speed_halfway_to_hertz``; see ``crossing``. Branches of a course that rises and falls have the dimension
+        ``branch``. If bonds lag behind a course, ``steady_speed_at_5_percent_lost`` is the speed at which steady
+        sliding by the scenario's own models loses as much, nan where steady sliding is unstable behind the spring. With
+        ``levels`` also the ``charges`` of that loss [1], such as ``lost_to_bonds_at_10_percent_lost``. Without
+        ``levels`` empty if there is no curve of the area over the speed.
 
     Raises
     ------
@@ -504,7 +490,7 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
     except BadInput:
         if wanted:
             raise
-        return xr.Dataset()
+        return {}
     radii = reference_radii(dataset)
     hertz = (radii["radius_hertz"] / radii["radius_jkr"]) ** 2
     if along in hertz.dims:
@@ -531,10 +517,7 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
     lasting: Any = [None] * len(left)
     if along == "t":
         lasting = _if_steady(dataset, [level for _, level, _ in left])
-    beside, result = (
-        means.to_array("quantity").drop_vars("quantity"),
-        dict[str, xr.DataArray](),
-    )
+    beside, result = means.to_array("quantity").drop_vars("quantity"), Estimates()
     how: Any = {
         "input_core_dims": [
             [along],
@@ -567,26 +550,27 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> xr.D
             if key == "area_ratio":
                 stem, unit = "speed", "m/s"
                 text = f"sliding speed at which the mean contact area has lost {loss}"
-            for (end, words), values in zip(_ENDS.items(), numbers, strict=True):
-                known = ~never
-                if end not in ("", "_bound"):
-                    known = known & ~(is_known & alone)
-                column = labelled(values.where(known), unit, words + text)
-                if end == "_bound":
-                    column.attrs["source"] = "interpolation"
-                result[f"{stem}_{name}{end}"] = column
+            value, *intervals, bound = numbers
+            low, high, error = (
+                each.where(~never & ~(is_known & alone)) for each in intervals
+            )
             further = [why, never, 100.0 * (1.0 - least), *lag, is_known & alone]
             reason = xr.apply_ufunc(
                 _in_words, *further, vectorize=True, output_dtypes=[object]
             )
-            result[f"{stem}_{name}_reason"] = reason.drop_attrs(deep=False)
+            result[f"{stem}_{name}"] = Estimate(
+                labelled(value.where(~never), unit, text),
+                error,
+                low,
+                high,
+                bound.where(~never).assign_attrs(source="interpolation"),
+                reason=reason.drop_attrs(deep=False),
+            )
         if steady is not None and bool((lag[0].notnull() & lag[1]).any()):
             text = f"sliding speed at which steady sliding loses {loss}"
-            result[f"steady_speed_{name}"] = labelled(lag[0].where(lag[1]), "m/s", text)
-    # with their units
-    return xr.Dataset(result).assign_coords(
-        {name: dataset[name] for name in sweep_dims(dataset)}
-    )
+            value = labelled(lag[0].where(lag[1]), "m/s", text)
+            result[f"steady_speed_{name}"] = Estimate(value)
+    return result
 
 
 def _lag(
@@ -633,10 +617,8 @@ def _group_means(
     They are those of ``area_ratio`` and, if ``charged``, of shares of the loss. If only statistics were recorded,
     groups are made up that have their mean and standard error. A member is alone if its noise compares with no other.
     """
-    outer, pooled = (
-        (*sweep_dims(dataset), *(["t"] if along == "t" else [])),
-        "contact_area_sem" in dataset,
-    )
+    outer = (*sweep_dims(dataset), *(["t"] if along == "t" else []))
+    pooled = STATISTIC in dataset["contact_area"].dims
     members = int(dataset.attrs["members"]) if pooled else dataset.sizes.get(MEMBERS, 1)
     count = min(
         members,
@@ -651,13 +633,12 @@ def _group_means(
 
     def means(piece: xr.Dataset) -> xr.Dataset:
         if pooled:
+            average, _, error = piece["area_ratio"].transpose(STATISTIC, ...)
             apart = xr.DataArray(np.linspace(-1.0, 1.0, count), dims="group")
-            apart = (
-                apart
-                * piece["area_ratio_sem"]
-                * math.sqrt(count * (count - 1.0) / float((apart**2).sum()))
-            )
-            return (piece["area_ratio_mean"] + apart).to_dataset(name="area_ratio")
+            factor = math.sqrt(count * (count - 1.0) / float((apart**2).sum()))
+            whole = average + factor * apart * error
+            whole = whole.drop_vars(STATISTIC, errors="ignore")
+            return whole.to_dataset(name="area_ratio")
         piece = piece if MEMBERS in piece.dims else piece.expand_dims(MEMBERS)
         groups = [
             piece.isel({MEMBERS: slice(k, None, count)}).mean(MEMBERS, keep_attrs=True)

@@ -9,23 +9,19 @@ import numpy as np
 import xarray as xr
 
 from sim.read import dataset as datasets
+from sim.read.correlation import correlation_time
 from sim.read.dataset import MEMBERS
+from sim.read.estimate import Estimate, Estimates, explained
+from sim.read.events import of_events
+from sim.read.late import distribution
 from sim.read.observables import closed_observables, restricted
 from sim.read.over_speed import loss_speeds
-from sim.read.statements import as_means, of_events, sampled
-from sim.read.statistics import (
-    QUANTILES,
-    WIDE,
-    averaging,
-    correlation_time,
-    of_second_half,
-    over_members,
-)
+from sim.read.statistics import QUANTILES, averaging, over_members
 from sim.units.errors import BadInput
 
-#: Statistics of a quantity, and the endings of the names of their variables.
-_KINDS = {
-    "mean": "mean",
+#: Statistics of a quantity by their names.
+_FIELDS = {
+    "mean": "value",
     "standard error": "sem",
     "low": "low",
     "high": "high",
@@ -36,8 +32,6 @@ _KINDS = {
 _MEMORY = "correlation_time"
 #: A spread below this share of the mean is of rounding.
 _ROUNDING = 1e-12
-#: Names of a quantile and of the ends of its interval.
-_OF_QUANTILES = ("", " low", " high")
 
 
 class Run:
@@ -66,7 +60,7 @@ class Run:
     def __init__(self, dataset: xr.Dataset, lost: Sequence[str | float] = ()) -> None:
         self.dataset = datasets.plain(dataset)
         self.lost = lost
-        self._late, self._known, self._is_whole = xr.Dataset(), set[str](), False
+        self._late, self._known, self._is_whole = Estimates(), set[str](), False
         if MEMBERS in self.dataset["contact_modulus"].dims:
             cure = 'xarray.concat(..., "member", data_vars="minimal", coords="minimal", compat="override")'
             raise BadInput(
@@ -129,14 +123,15 @@ class Run:
     @cached_property
     def last(self) -> int:
         """The last record of any trajectory: all of them have stopped after it."""
-        names = ("contact_radius", "contact_radius_mean")
-        radii = [self.dataset[name] for name in names if name in self.dataset]
         end = self.dataset.sizes["t"] - 1
-        if not radii or bool(radii[0].isel(t=end).notnull().any()):
+        if "contact_radius" not in self.dataset:
+            return end
+        radius = datasets.ensemble_mean(self.dataset["contact_radius"])
+        if bool(radius.isel(t=end).notnull().any()):
             return end
 
         def has_stopped(at: int) -> bool:
-            return bool(radii[0].isel(t=at).isnull().all())
+            return bool(radius.isel(t=at).isnull().all())
 
         return bisect.bisect_left(range(1, end), True, key=has_stopped)
 
@@ -168,50 +163,36 @@ class Run:
         return None
 
     @cached_property
-    def events(self) -> xr.Dataset:
+    def events(self) -> Estimates:
         """Statistics of the events of the run over its members."""
-        return sampled(of_events(self.dataset), self.sample(late=False))
+        return of_events(self.dataset, self.sample(late=False))
 
     @cached_property
-    def losses(self) -> xr.Dataset:
+    def losses(self) -> Estimates:
         """Speeds at which shares of the area are lost."""
-        speeds = as_means(loss_speeds(self.dataset, self.lost))
-        return sampled(speeds, self.sample(late=False))
+        speeds = loss_speeds(self.dataset, self.lost)
+        return explained(speeds, self.sample(late=False))
 
-    def late(self, names: Iterable[str] | None = None) -> xr.Dataset:
+    def late(self, names: Iterable[str] | None = None) -> Estimates:
         """Return statistics over the second half of a stationary run, of some quantities at least, else of all."""
-        missing = {_MEMORY} if names is None else {*names}
-        missing -= self._known
-        if not self._is_whole and (names is None or missing - {_MEMORY}):
-            chosen = None if names is None else missing - {_MEMORY}
-            group = of_second_half(self.dataset, chosen)
-            self._late.update(sampled(group, self.sample(late=True)))
-            self._is_whole = names is None
-        if _MEMORY in missing:
-            times = correlation_time(self.dataset)
-            time, half = times[_MEMORY], WIDE * times[f"{_MEMORY}_sem"]
-            columns = {
-                "mean": time,
-                "sem": times[f"{_MEMORY}_sem"],
-                "low": (time - half).assign_attrs(time.attrs),
-                "high": (time + half).fillna(times[f"{_MEMORY}_below"]),
-                "reason": times[f"{_MEMORY}_reason"],
-            }
-            columns["high"].attrs |= time.attrs
-            self._late.update({f"{_MEMORY}_{kind}": columns[kind] for kind in columns})
+        missing = {*([_MEMORY] if names is None else names)} - self._known
         self._known |= missing
+        if _MEMORY in missing:
+            self._late[_MEMORY] = correlation_time(self.dataset)
+        missing.discard(_MEMORY)
+        if not self._is_whole and (names is None or missing):
+            found = distribution(self.dataset, None if names is None else missing)
+            self._late |= explained(found, self.sample(late=True))
+            self._is_whole = names is None
         return self._late
 
-    def statements(self, names: Iterable[str] | None = None) -> xr.Dataset:
-        """Return all numbers of the whole run; see ``sim.read.statements``."""
-        groups = [self.events, self.losses]
-        if self.is_stationary:
-            groups.append(self.late(names))
-        result = xr.merge(groups, compat="no_conflicts", join="outer")
-        # of a record that a number was taken from: a statement has no time
-        result = result.drop_vars("t", errors="ignore")
-        # with their units
-        return result.assign_coords({name: self.dataset[name] for name in self.sweep})
+    def statements(self, names: Iterable[str] | None = None) -> Estimates:
+        """Return all numbers of the whole run: events, speeds of losses, and means over the second half.
+
+        Those are of a stationary run, and of the observables ``names``, all by default.
+        """
+        late = self.late(names) if self.is_stationary else {}
+        return self.events | self.losses | late
 
     def statistic(self, name: str, late: bool = False) -> xr.DataArray:
         """Return the statistics of one quantity.
@@ -245,59 +226,42 @@ class Run:
         if late and not self.is_stationary:
             reason = "speed or mount changes, so that there is no mean over time"
             raise BadInput([f"{name}: {reason}; use late=False"])
-        group, over = self._group(name, late)
-        columns = {
-            kind: group[f"{name}_{ending}"]
-            for kind, ending in _KINDS.items()
-            if f"{name}_{ending}" in group
-        }
-        for ending in _OF_QUANTILES:
-            variable = f"{name}_quantile{ending.replace(' ', '_')}"
-            if variable in group:
-                columns |= {
-                    f"{100 * level:.0f} %{ending}": group[variable].isel(
-                        quantile=k, drop=True
-                    )
-                    for k, level in enumerate(QUANTILES)
-                }
+        one, over = self._found(name, late)
+        columns = {label: getattr(one, field) for label, field in _FIELDS.items()}
+        for ending in ("", " low", " high"):
+            levels = getattr(one, f"quantile{ending.replace(' ', '_')}")
+            for place, level in enumerate(QUANTILES):
+                if levels is not None:
+                    at_level = levels.isel(quantile=place, drop=True)
+                    columns[f"{100 * level:.0f} %{ending}"] = at_level
         columns |= self._of_each(name, late)
-        if f"{name}_effective_samples" in group:
-            columns["number"] = group[f"{name}_effective_samples"]
-        mean = columns["mean"]
-        arrays = [values.broadcast_like(mean) for values in columns.values()]
+        if one.number is not None:
+            columns["number"] = one.number
+        known = {label: each for label, each in columns.items() if each is not None}
+        arrays = [values.broadcast_like(one.value) for values in known.values()]
         result = xr.concat(
             arrays,
-            xr.Variable("statistic", list(columns)),
+            xr.Variable("statistic", list(known)),
             coords="minimal",
             compat="override",
         )
-        source = group.get(f"{name}_bound", mean).attrs.get("source", "")
-        return result.rename(name).assign_attrs(
-            mean.attrs | {"over": mean.attrs.get("over", over), "source": source}
-        )
+        about = {"over": one.value.attrs.get("over", over), "source": one.source}
+        return result.rename(name).assign_attrs(one.value.attrs | about)
 
-    def _group(self, name: str, late: bool) -> tuple[xr.Dataset, str]:
-        """Return a group of statistics with those of a quantity, and its sample."""
+    def _found(self, name: str, late: bool) -> tuple[Estimate, str]:
+        """Return the statistics of a quantity, and their sample."""
         if late or name == _MEMORY:
             group = self.late([name])
         else:
             group = over_members(self.dataset, [name])
-        if f"{name}_mean" in group:
-            return group, self.sample(late)
+        if name in group:
+            return group[name], self.sample(late)
         for once in (self.events, self.losses):
-            if f"{name}_mean" in once:
-                return once, self.sample(late=False)
-        known = sorted(
-            str(key).removesuffix("_mean")
-            for each in (
-                over_members(self.dataset.isel(t=[0])),
-                self.events,
-                self.losses,
-            )
-            for key in each
-            if str(key).endswith("_mean")
-        )
-        raise BadInput([f"{name}: is not known of this run; known: {', '.join(known)}"])
+            if name in once:
+                return once[name], self.sample(late=False)
+        at_records = over_members(self.dataset.isel(t=[0]))
+        known = ", ".join(sorted({*at_records, *self.events, *self.losses}))
+        raise BadInput([f"{name}: is not known of this run; known: {known}"])
 
     def _of_each(self, name: str, late: bool) -> dict[str, xr.DataArray]:
         """Return skewness and number of the values of a quantity, of each member."""
@@ -316,33 +280,3 @@ class Run:
             / variance.where(variance > (_ROUNDING * mean) ** 2) ** 1.5,
             "number": sample.count(over).astype(float),
         }
-
-
-def statements(
-    dataset: xr.Dataset,
-    names: Iterable[str] | None = None,
-    lost: Sequence[str | float] = (),
-) -> xr.Dataset:
-    """Return the statements of a run over the sweep.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it.
-    names : iterable of str, optional
-        Observables of which means are wanted, all by default.
-    lost : sequence of float or str, optional
-        Shares of JKR's area whose loss has a speed, see ``Run``.
-
-    Returns
-    -------
-    xarray.Dataset
-        For each statement ``<name>_mean``, its value, with the attribute ``over`` that
-        names the sample, and where they are known ``<name>_sem``, ``<name>_low``,
-        ``<name>_high``, ``<name>_bound`` and ``<name>_reason``:
-
-        - events of a run (see ``events``), with medians and rates of lifetimes,
-        - speeds at which area is lost (see ``loss_speeds``),
-        - of a stationary run means over its second half (see ``distribution``).
-    """
-    return Run(dataset, lost).statements(names)

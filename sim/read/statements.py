@@ -1,4 +1,4 @@
-"""Statements: each value that a person reads of a run, computed once. Tables, CSV, figures and report print them."""
+"""Statements: each value that a person reads of a run, at one point of the sweep, as tables and report print it."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -7,20 +7,10 @@ import numpy as np
 import scipy
 import xarray as xr
 
-from sim.quantities import QUANTITIES, Form, form_of
-from sim.read.dataset import MEMBERS
-from sim.read.events import (
-    ensemble_peaks,
-    events,
-    half_lives,
-    peaks_after_holds,
-    slips_by_phase,
-)
-from sim.read.statistics import Array, correlation_time, over_members, summary
+from sim.quantities import Form, form_of
+from sim.read.correlation import Array
+from sim.read.estimate import Estimates
 from sim.units.notation import bounded, scaled, share
-
-#: Endings of the variables of a statement beside its value.
-_BESIDE = ("sem", "low", "high", "bound", "reason")
 
 
 class Statement(NamedTuple):
@@ -82,144 +72,31 @@ class Statement(NamedTuple):
         )
 
 
-def statistics(dataset: xr.Dataset) -> xr.Dataset:
-    """Return statistics over the members of everything recorded, at each sweep value and time.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it, with each member or with statistics only.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``…_mean``, ``…_std``, ``…_sem`` and ``…_quantile`` of every trajectory (see ``summary``), the same of
-        ``area_ratio`` (A/A_JKR), of the shares of the lost area (see ``shares``), of ``fraction_detached`` and
-        ``fraction_masked`` (the latter is known of statistics alone only while all contacts are closed), of what a
-        whole run has once (see ``statements``), and ``correlation_time`` with its standard error. A member whose
-        trajectory has stopped is left out from there on; ``fraction_detached`` counts it.
-    """
-    once = of_events(dataset).drop_dims("phase", errors="ignore")
-    each = over_members(dataset), once, correlation_time(dataset)
-    return xr.merge(each, compat="no_conflicts", join="outer", combine_attrs="override")
-
-
-def of_events(dataset: xr.Dataset) -> xr.Dataset:
-    """Return statistics of the events of a run over the members, with medians and rates of lifetimes.
-
-    An event that is read off the records has a bound: the change if every second record is left out.
-    """
-    result = events(dataset)
-    beside = result[
-        [name for name in result if str(name).endswith(("_reason", "_bound"))]
-    ]
-    members = summary(result.drop_vars(list(beside)).assign_attrs(dataset.attrs))
-    if {"pull_off_error", "pull_off_load"} <= set(dataset):
-        error = abs(dataset["pull_off_error"]).assign_attrs(source="step")
-        beside["pull_off_load_bound"] = error
-    for name, bound in beside.items():
-        if MEMBERS in bound.dims and str(name).endswith("_bound"):
-            beside[name] = bound.mean(MEMBERS, keep_attrs=True)
-    for further in (as_means(half_lives(dataset)), beside):
-        members = members.merge(further, compat="no_conflicts", join="outer")
-    phased = [peaks_after_holds(dataset)]
-    if {"phase_start", "slip_time"} <= set(dataset.variables) and dataset.sizes["slip"]:
-        phased.append(slips_by_phase(dataset))
-    for of_phases in (values for values in phased if values):
-        means = summary(of_phases.assign_attrs(dataset.attrs), quantiles=False)
-        members = members.merge(
-            means.rename({name: f"phase_{name}" for name in means}),
-            compat="no_conflicts",
-            join="outer",
-        )
-    return members.assign(ensemble_peaks(dataset))
-
-
-def sampled(group: xr.Dataset, over: str) -> xr.Dataset:
-    """Return statistics whose means have the attribute ``over``, which names their sample.
-
-    A value that is missing without a bound or reason has the reason of the registry.
-    """
-    result = {}
-    for key in (str(key) for key in group if str(key).endswith("_mean")):
-        name = key.removesuffix("_mean")
-        result[key] = group[key].assign_attrs(over=over)
-        row = QUANTITIES.get(name)
-        missing = group[key].isnull()
-        for end in ("low", "high"):
-            missing = missing & group.get(f"{name}_{end}", group[key]).isnull()
-        if row is not None and row.absent and bool(missing.any()):
-            reason = group.get(f"{name}_reason", xr.full_like(missing, "", object))
-            is_unexplained = missing & (reason == "")
-            result[f"{name}_reason"] = xr.where(is_unexplained, row.absent, reason)
-    return group.assign(result)
-
-
-def as_means(values: xr.Dataset) -> xr.Dataset:
-    """Return values with intervals and reasons under names of means."""
-    return values.rename(
-        {
-            n: f"{n}_mean"
-            for n in values
-            if not str(n).endswith(tuple(f"_{end}" for end in _BESIDE))
-        }
-    )
-
-
-def each(group: xr.Dataset) -> Iterator[Statement]:
-    """Yield the statements of a dataset of ``statements``, one for each point of the sweep."""
-    for key in (str(key) for key in group if str(key).endswith("_mean")):
-        name, values = key.removesuffix("_mean"), group[key]
-        beside = {
-            end: group[f"{name}_{end}"].broadcast_like(values)
-            for end in _BESIDE
-            if f"{name}_{end}" in group
-        }
-        text = str(values.attrs.get("long_name", name)).removeprefix(
-            "ensemble mean of "
-        )
-        unit, over = (
-            str(values.attrs.get("units", "1")),
-            str(values.attrs.get("over", "")),
-        )
-        for place in np.ndindex(*values.shape):
-            index = dict(zip(values.dims, place, strict=True))
-            error, low, high, bound = (
-                float(beside[end][index]) if end in beside else np.nan
-                for end in _BESIDE[:4]
+def each(group: Estimates) -> Iterator[Statement]:
+    """Yield the statements of some quantities, one for each point of the sweep."""
+    for name, one in group.items():
+        value, about = one.value, one.value.attrs
+        text, over = str(about.get("long_name", name)), str(about.get("over", ""))
+        missing = xr.full_like(value, np.nan, float)
+        numbers = [
+            (missing if field is None else field.broadcast_like(value)).transpose(
+                *value.dims
             )
-            source = (
-                beside["bound"].attrs.get("source", "") if "bound" in beside else ""
-            )
-            reason = str(beside["reason"][index].item()) if "reason" in beside else ""
+            for field in (value, one.sem, one.low, one.high, one.bound)
+        ]
+        reasons = xr.full_like(value, "", object) if one.reason is None else one.reason
+        reasons = reasons.broadcast_like(value).transpose(*value.dims)
+        for place in np.ndindex(*value.shape):
             at = {
-                str(dim): values[dim][index[dim]].item()
-                for dim in values.dims
-                if dim in values.coords
+                str(dim): value[dim][index].item()
+                for dim, index in zip(value.dims, place, strict=True)
+                if dim in value.coords
             }
-            yield Statement(
-                name,
-                text,
-                unit,
-                float(values[index]),
-                error,
-                low,
-                high,
-                bound,
-                source,
-                over,
-                reason,
-                at,
-            )
-
-
-def reasons(group: xr.Dataset) -> dict[str, list[str]]:
-    """Return the names of statements by the reason that they have somewhere in the sweep."""
-    result: dict[str, list[str]] = {}
-    for key in (str(key) for key in group if str(key).endswith("_reason")):
-        for reason in filter(None, np.unique(group[key].to_numpy().astype(str))):
-            result.setdefault(str(reason), []).append(key.removesuffix("_reason"))
-    return result
+            size, *errors = (float(field.values[place]) for field in numbers)
+            error, low, high, bound = errors
+            why = str(reasons.values[place])
+            beside = (error, low, high, bound, one.source, over, why, at)
+            yield Statement(name, text, one.unit, size, *beside)
 
 
 def relaxation(dataset: xr.Dataset, name: str, start: float = 0.0) -> Statement:

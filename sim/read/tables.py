@@ -9,19 +9,23 @@ import numpy as np
 import xarray as xr
 
 from sim.quantities import QUANTITIES, Definition, Form
+from sim.read.correlation import WIDE, Array
+from sim.read.dataset import ensemble_mean, only_statistics
 from sim.read.errors import systematic_errors
-from sim.read.events import unresolved_slips
+from sim.read.estimate import Estimate, Estimates
 from sim.read.observables import restricted, with_slips
 from sim.read.over_speed import extremes
 from sim.read.run import Run
+from sim.read.slips import unresolved_slips
 from sim.read.statements import each
-from sim.read.statistics import QUANTILES, WIDE, Array, over_members
+from sim.read.statistics import QUANTILES, over_members
 from sim.units.notation import bounded, concise, engineering, scaled, share
 
 #: Cells of columns by heading.
 Cells = dict[str, list[str]]
-#: The index of each row along the dimensions of sweep and time.
+#: The index of each row along the dimensions of sweep and time, and the values along them.
 Points = dict[str, xr.Variable]
+Places = Mapping[Any, xr.DataArray]
 
 #: Columns of a table at most, those of its place included.
 MOST = 10
@@ -177,9 +181,8 @@ PHASES = (
 )
 
 #: Name of such a statement, its kind, and the share.
-_LOSS = re.compile(r"((\w+?)_(?:at_(.+)_percent_lost|halfway_to_hertz))_mean")
+_LOSS = re.compile(r"(\w+?)_(?:at_(.+)_percent_lost|halfway_to_hertz)")
 #: Headings of what is known where a share of the area is lost.
-
 _LOSSES = {
     "speed": "{place} at {V}",
     "steady_speed": "{place}, if steady at {V}",
@@ -192,17 +195,19 @@ _LOSSES = {
 }
 
 
-def of_losses(stated: xr.Dataset, symbol: str = "V") -> tuple[Column, ...]:
+def of_losses(stated: Estimates, symbol: str = "V") -> tuple[Column, ...]:
     """Return the columns of what is known where a share of the area is lost."""
     columns = []
-    for match in filter(None, map(_LOSS.fullmatch, map(str, stated))):
-        name, kind, level = match.groups()
+    for name, one in stated.items():
+        match = _LOSS.fullmatch(name)
+        if match is None:
+            continue
+        kind, level = match.groups()
         place = f"{level} % lost" if level else "halfway to Hertz"
-        about = stated[f"{name}_mean"].attrs
         row = Definition(
             name,
-            about.get("units", "1"),
-            about.get("long_name", ""),
+            one.unit,
+            str(one.value.attrs.get("long_name", "")),
             heading=_LOSSES[kind].format(place=place, V=symbol),
             form=Form.PERCENT,
         )
@@ -303,17 +308,17 @@ def spread(run: Run) -> Table:
         return Table([])
     columns = main_columns(run)
     late = run.late([*(column.name for column in columns), "correlation_time"])
-    late = late.isel(dict.fromkeys(run.sweep, 0))
+    at = dict.fromkeys(run.sweep, 0)
     least = _ROUNDING if run.has_noise else _SETTLED
-    rows = [
-        _spread_of(late, column.definition)
-        for column in columns
-        if f"{column.name}_std" in late
-        and late[f"{column.name}_std"] > least * abs(late[f"{column.name}_mean"])
-    ]
-    if not rows or not run.has_noise or "fluctuation_energy_mean" not in late:
+    rows = []
+    for column in (column for column in columns if column.name in late):
+        one = late[column.name].map(lambda values: values.isel(at))
+        if one.std is not None and one.std > least * abs(one.value):
+            rows.append(_spread_of(one, column.definition))
+    if not rows or not run.has_noise or "fluctuation_energy" not in late:
         return Table(rows, keys=1, total=len(rows))
-    memory = _table_of(late, {}, {}, _columns("correlation_time"))
+    first = {name: xr.Variable("row", [0]) for name in run.sweep}
+    memory = _table_of({}, late, {}, first, _columns("correlation_time"))
     ((heading, cell),) = memory.rows[0].items()
     rows.append(dict.fromkeys(rows[0], "") | {"quantity": heading, "mean": cell})
     return Table(rows, keys=1, total=len(rows), reasons=memory.reasons)
@@ -321,31 +326,36 @@ def spread(run: Run) -> Table:
 
 def _over_rows(run: Run, columns: Sequence[Column], rows: int, most: int) -> Table:
     """Return the table of some columns over sweep and time."""
-    means, points = _tabulated(run, rows, [column.name for column in columns])
+    means, points, places = _tabulated(run, rows, [column.name for column in columns])
     once = run.has_one_row_each
     placed = {n: index for n, index in points.items() if n != "t" or not once}
     known = [column for column in columns if _says_something(means, column, points)]
     kept, left_out = _fitting(known, most - len(placed))
     total = run.points if once else run.points * run.dataset.sizes["t"]
-    return _table_of(means, placed, points, kept)._replace(
+    return _table_of(places, means, placed, points, kept)._replace(
         total=total, left_out=left_out
     )
 
 
 def _once(
-    run: Run, stated: xr.Dataset, columns: Sequence[Column], rows: int, most: int
+    run: Run, stated: Estimates, columns: Sequence[Column], rows: int, most: int
 ) -> Table:
     """Return a table of numbers of a whole run, a row for each point; no rows if there are none."""
-    chosen = stated[
-        [f"{column.name}_mean" for column in columns if f"{column.name}_mean" in stated]
-    ]
-    sizes = {str(name): size for name, size in chosen.sizes.items()}
+    known = [stated[c.name].value for c in columns if c.name in stated]
+    sizes = {str(dim): size for one in known for dim, size in one.sizes.items()}
+    places = {name: run.dataset[name] for name in run.sweep}
+    places |= {
+        name: one[name]
+        for one in known
+        for name in ("branch", "phase")
+        if name in one.dims
+    }
     points = _points(sizes, _thinned(sizes, rows))
-    known = [column for column in columns if _says_something(stated, column, points)]
-    if not known:
+    chosen = [column for column in columns if _says_something(stated, column, points)]
+    if not chosen:
         return Table([])
-    kept, left_out = _fitting(known, most - len(points))
-    return _table_of(stated, points, points, kept)._replace(
+    kept, left_out = _fitting(chosen, most - len(points))
+    return _table_of(places, stated, points, points, kept)._replace(
         total=math.prod(sizes.values()), left_out=left_out
     )
 
@@ -436,7 +446,7 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
         )
     if phrases:
         yield "; ".join(phrases)
-    if "runaway_time" in run.dataset:
+    if "runaway_time" in run.dataset and not only_statistics(run.dataset):
         times = run.dataset["runaway_time"].isel(t=-1)
         if count := int(times.notnull().sum()):
             yield f"{count} of {times.size} trajectories end because the slider lost stability"
@@ -446,14 +456,13 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
 
 def unresolved(dataset: xr.Dataset) -> str:
     """Return a sentence on the trajectories whose motion was not resolved to the end, and its cure; "" without any."""
-    if "unresolved_time" in dataset:
-        times = dataset["unresolved_time"]
-        count, total = int(times.notnull().sum()), times.size
-    elif "unresolved_time_count" in dataset:  # statistics over the members
+    if "unresolved_time" not in dataset:
+        return ""
+    times = dataset["unresolved_time"]
+    count, total = int(times.notnull().sum()), times.size
+    if only_statistics(dataset):
         numbers = dataset["unresolved_time_count"]
         count, total = int(numbers.sum()), numbers.size * int(dataset.attrs["members"])
-    else:
-        return ""
     if not count:
         return ""
     return (
@@ -490,20 +499,26 @@ def _turning(run: Run) -> Iterator[str]:
     ):
         return
     names = ("contact_area", "friction_force")
-    late = run.late(names).isel({n: 0 for n in run.sweep if n != swept[0]})
-    for name in names:
-        if f"{name}_mean" not in late or bool((late[f"{name}_reason"] != "").any()):
+    others = {name: 0 for name in run.sweep if name != swept[0]}
+    late = run.late(names)
+    for name in (name for name in names if name in late):
+        curve = late[name].map(
+            lambda values: values.isel(others, missing_dims="ignore")
+        )
+        if curve.reason is not None and bool((curve.reason != "").any()):
             continue  # values at an end are no means
-        inside = extremes(late, name, swept[0])
+        inside = extremes(curve, swept[0])
         for extreme in ("largest", "least"):
-            value = float(inside[f"{name}_{extreme}"])
+            value = float(inside[extreme].value)
             if not math.isfinite(value):
                 continue
-            places = (
-                inside[f"{name}_{extreme}_at{end}"] for end in ("", "_low", "_high")
+            place = inside[f"{extreme}_at"]
+            at, low, high = (
+                engineering(float(end), place.unit)
+                for end in (place.value, place.low, place.high)
+                if end is not None
             )
-            at, low, high = (engineering(float(place), place.units) for place in places)
-            size = engineering(value, late[f"{name}_mean"].attrs["units"])
+            size = engineering(value, curve.unit)
             yield f"{name.replace('_', ' ')} is {extreme}, {size}, at {swept[0]} = {at} (between {low} and {high})"
 
 
@@ -551,7 +566,7 @@ def key_figures(run: Run) -> list[dict[str, str]]:
 # --- cells ---
 
 
-def _places(places: xr.Dataset, points: Points) -> Cells:
+def _places(places: Places, points: Points) -> Cells:
     """Return the columns of the place in the sweep and the time of each row."""
     cells: Cells = {}
     for name, index in points.items():
@@ -561,34 +576,36 @@ def _places(places: xr.Dataset, points: Points) -> Cells:
     return cells
 
 
-def _says_something(means: xr.Dataset, column: Column, points: Points) -> bool:
+def _says_something(means: Estimates, column: Column, points: Points) -> bool:
     """Return True if a column is known and not constant at its dull value at these points."""
-    if f"{column.name}_mean" not in means:
+    if column.name not in means:
         return False
-    mean, low, high = (
-        _at(means.get(f"{column.name}_{kind}"), points)
-        for kind in ("mean", "low", "high")
-    )
+    one = means[column.name]
+    value, low, high = (_at(field, points) for field in (one.value, one.low, one.high))
     if column.definition.form is not Form.PLAIN:
-        mean = np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
-    is_missing = np.isnan(mean) & np.isnan(low) & np.isnan(high)
-    return not np.all((mean == column.dull) | is_missing)
+        value = np.where(np.abs(value) < _ROUNDING, 0.0, value)
+    is_missing = np.isnan(value) & np.isnan(low) & np.isnan(high)
+    return not np.all((value == column.dull) | is_missing)
 
 
 def _table_of(
-    means: xr.Dataset, placed: Points, points: Points, columns: tuple[Column, ...]
+    places: Places,
+    means: Estimates,
+    placed: Points,
+    points: Points,
+    columns: tuple[Column, ...],
 ) -> Table:
     """Return the table of some columns at points, after those of the place of each row."""
-    cells = _places(means, placed)
+    cells = _places(places, placed)
     keys = len(cells)
     count = next(iter(points.values())).size if points else 1
     swept = {name: index for name, index in placed.items() if name != "t"}
-    words = _in_words(means, swept, count)
+    words = _in_words(places, swept, count)
     reasons = []
     for column in columns:
-        row = column.definition
-        heading, texts = _texts_of(means, points, row)
-        for number, reason in enumerate(_reasons_at(means, points, row)):
+        row, one = column.definition, means[column.name]
+        heading, texts = _texts_of(one, points, row)
+        for number, reason in enumerate(_reasons_at(one, points, row)):
             if reason:
                 texts[number] += "*"
                 reasons.append(Reason(row.heading, reason, words[number]))
@@ -596,7 +613,7 @@ def _table_of(
     return Table(_rows(cells), keys, columns=columns, reasons=tuple(reasons))
 
 
-def _in_words(places: xr.Dataset, points: Points, count: int) -> list[str]:
+def _in_words(places: Places, points: Points, count: int) -> list[str]:
     """Return the point of the sweep of each of so many rows in words, "" without a sweep."""
     words = [list[str]() for _ in range(count)]
     for name, index in points.items():
@@ -608,41 +625,30 @@ def _in_words(places: xr.Dataset, points: Points, count: int) -> list[str]:
     return [", ".join(row) for row in words]
 
 
-def _reasons_at(means: xr.Dataset, points: Points, row: Definition) -> list[str]:
+def _reasons_at(one: Estimate, points: Points, row: Definition) -> list[str]:
     """Return the reason of each row of a column whose value is missing or no mean, "" else."""
-    mean, low, high = (
-        _at(means.get(f"{row.name}_{kind}"), points) for kind in ("mean", "low", "high")
-    )
-    explicit = means.get(f"{row.name}_reason")
-    reasons = (
-        [""] * len(mean) if explicit is None else [*map(str, _at(explicit, points))]
-    )
-    is_missing = np.isnan(mean) & np.isnan(low) & np.isnan(high)
+    is_missing = _at(one.is_missing, points)
+    explicit = [""] * len(is_missing)
+    if one.reason is not None:
+        explicit = [*map(str, _at(one.reason, points))]
     return [
         reason or (row.absent if missing else "")
-        for reason, missing in zip(reasons, is_missing, strict=True)
+        for reason, missing in zip(explicit, is_missing, strict=True)
     ]
 
 
-def _texts_of(
-    means: xr.Dataset, points: Points, row: Definition
-) -> tuple[str, list[str]]:
+def _texts_of(one: Estimate, points: Points, row: Definition) -> tuple[str, list[str]]:
     """Return the heading of a column with its unit, and its cells."""
-    mean, error, low, high, bound = (
-        _at(means.get(f"{row.name}_{kind}"), points)
-        for kind in ("mean", "sem", "low", "high", "bound")
-    )
-    known = means[f"{row.name}_mean"]
-    source = str(means.get(f"{row.name}_bound", known).attrs.get("source", ""))
-    unit = known.attrs.get("units", "1")
+    value, error, low, high, bound = (_at(field, points) for field in one[:5])
+    unit = one.unit
     if row.form is not Form.PLAIN and unit == "1":
-        unit, mean = "%", np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
+        unit, value = "%", np.where(np.abs(value) < _ROUNDING, 0.0, value)
     errors = (error, low, high, np.nan_to_num(bound))
-    heading, texts = _column_of(row.heading, unit, mean, errors, source)
+    heading, texts = _column_of(row.heading, unit, value, errors, one.source)
     if row.form is Form.SHARE:
         texts = [
             share(*ends) or text
-            for *ends, text in zip(mean, low, high, texts, strict=True)
+            for *ends, text in zip(value, low, high, texts, strict=True)
         ]
     return heading, texts
 
@@ -706,31 +712,35 @@ def _rows(cells: Cells) -> list[dict[str, str]]:
     ]
 
 
-def _tabulated(run: Run, rows: int, names: list[str]) -> tuple[xr.Dataset, Points]:
-    """Return statistics to tabulate, and the index of each row in every dimension of sweep and time."""
+def _tabulated(
+    run: Run, rows: int, names: list[str]
+) -> tuple[Estimates, Points, Places]:
+    """Return statistics to tabulate, the index of each row in each dimension, and the places there."""
     dataset = run.dataset
-    counts = _thinned(dataset["contact_modulus"].sizes, rows)
+    sizes = dict(dataset["contact_modulus"].sizes)
+    counts = _thinned(sizes, rows)
     counts["t"] = max(1, rows // math.prod(counts.values()))
     if run.has_one_row_each:
-        result = run.late(names)
-        return result, _points({**result.sizes, "t": 1}, counts)
+        return run.late(names), _points(sizes | {"t": 1}, counts), dataset
     dataset = with_slips(dataset)
     # of the records only those that are shown, none after all have ended
     if counts["t"] < dataset.sizes["t"]:
         dataset = restricted(dataset.isel(t=slice(run.last + 1)), names)
         dataset = dataset.isel(t=_spread(dataset.sizes["t"], counts["t"]))
     result = at_records(dataset, names)
-    return result, _points(dict(result.sizes), counts)
+    return result, _points(sizes | {"t": dataset.sizes["t"]}, counts), dataset
 
 
-def at_records(dataset: xr.Dataset, names: list[str]) -> xr.Dataset:
+def at_records(dataset: xr.Dataset, names: list[str]) -> Estimates:
     """Return statistics over the members at each record; the load of an open contact is the applied one."""
     result = over_members(dataset, names, quantiles=False)
-    if "applied_load" in dataset and "normal_load_mean" in result:
-        for kind in ("mean", "low", "high"):
-            result[f"normal_load_{kind}"] = dataset["applied_load"].fillna(
-                result[f"normal_load_{kind}"]
-            )
+    if "applied_load" in dataset and "normal_load" in result:
+        load, applied = result["normal_load"], ensemble_mean(dataset["applied_load"])
+        fields = {
+            kind: applied.fillna(getattr(load, kind)).assign_attrs(load.value.attrs)
+            for kind in ("value", "low", "high")
+        }
+        result["normal_load"] = load._replace(**fields)
     return result
 
 
@@ -760,22 +770,22 @@ def _spread(size: int, count: int) -> Array:
     return np.rint(np.linspace(first, size - 1, count)).astype(int)
 
 
-def _spread_of(means: xr.Dataset, row: Definition) -> dict[str, str]:
+def _spread_of(one: Estimate, row: Definition) -> dict[str, str]:
     """Return a row of ``spread``."""
-
-    def of(kind: str) -> Array:
-        return means[f"{row.name}_{kind}"].to_numpy()
-
-    factor, shown = scaled(float(np.max(np.abs(of("quantile")))), row.unit)
+    value, error, _, _, _, std, *quantiles, number = (
+        np.array(math.nan) if field is None else field.to_numpy() for field in one[:10]
+    )
+    levels, low, high = quantiles
+    factor, shown = scaled(float(np.max(np.abs(levels))), row.unit)
     if row.form is not Form.PLAIN:
         factor, shown = 100.0, "%"
     heading = f"{row.heading} ({shown})" if shown else row.heading
     cells = {
         "quantity": heading,
-        "mean": concise(factor * float(of("mean")), factor * float(of("sem"))),
+        "mean": concise(factor * float(value), factor * float(error)),
+        "sd": f"{factor * std:.3g}",
     }
-    cells["sd"] = f"{factor * of('std'):.3g}"
-    errors = (of("quantile_high") - of("quantile_low")) / (2.0 * WIDE)
-    for level, value, error in zip(QUANTILES, of("quantile"), errors, strict=True):
-        cells[f"{100.0 * level:.0f} %"] = concise(factor * value, factor * error)
-    return cells | {"free values": f"{of('effective_samples'):.3g}"}
+    errors = (high - low) / (2.0 * WIDE)
+    for level, at_level, off in zip(QUANTILES, levels, errors, strict=True):
+        cells[f"{100.0 * level:.0f} %"] = concise(factor * at_level, factor * off)
+    return cells | {"free values": f"{number:.3g}"}

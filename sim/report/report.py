@@ -390,10 +390,8 @@ def known(dataset: xr.Dataset) -> Rows:
     ]
     times = np.unique(np.linspace(0, dataset.sizes["t"] - 1, _ROWS).round().astype(int))
     ratios = over_members(dataset.isel(t=times), ["area_ratio"], quantiles=False)
-    if (
-        "area_ratio_sem" in ratios
-        and (error := float(ratios["area_ratio_sem"].max())) > _ROUNDING
-    ):
+    errors = ratios["area_ratio"].sem if "area_ratio" in ratios else None
+    if errors is not None and (error := float(errors.max())) > _ROUNDING:
         words = (
             f"largest standard error of the mean area over JKR's, of {times.size} times"
         )

@@ -6,6 +6,7 @@ import sys
 from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from sim import read
 from sim.read.observables import with_slips
@@ -40,6 +41,24 @@ class Number(NamedTuple):
         return bool(self.reason) or math.isfinite(self.low) or math.isfinite(self.high)
 
 
+def statistics(dataset):
+    """Return the statistics of all observables over the members, of the events of the run, and its correlation time."""
+    memory = {"correlation_time": read.correlation_time(dataset)}
+    return read.over_members(dataset) | read.Run(dataset).events | memory
+
+
+def shares(dataset):
+    """Return the statistics over the members of the shares of the area that each mechanism takes, in both orders."""
+    read.share_observables(dataset.isel(t=[0]))  # where they are not known it says why
+    names = [column.name for column in read.tables.LOSSES]
+    return read.over_members(dataset, [*names, "order_of_charging"])
+
+
+def values_of(estimates):
+    """Return the values of quantities without their errors."""
+    return xr.Dataset({name: one.value for name, one in estimates.items()})
+
+
 def statements_of(run):
     """Return the numbers behind the tables of a run by name, point of the sweep, and time or record."""
     over = [*read.tables.main_columns(run), *read.tables.LOSSES]
@@ -56,26 +75,19 @@ def statements_of(run):
     result = {}
     for group, columns, span in groups:
         for column in columns:
-            if f"{column.name}_mean" in group:
-                result |= _numbers_of(run, group, column.name, span)
+            if column.name in group:
+                result |= _numbers_of(run, column.name, group[column.name], span)
     return result
 
 
-def _numbers_of(run, group, name, span):
+def _numbers_of(run, name, one, span):
     """Return the numbers of one quantity; a second dimension beside sweep and time counts branches or phases."""
-    mean = group[f"{name}_mean"]
-    nothing = dict.fromkeys(_PARTS, math.nan) | {"reason": ""}
+    mean = one.value
     parts = [
-        group.get(
-            f"{name}_{part}", nothing[part] + 0 * mean if part != "reason" else None
-        )
+        np.full(mean.shape, "" if part == "reason" else math.nan, object)
+        if getattr(one, part) is None
+        else getattr(one, part).broadcast_like(mean).transpose(*mean.dims).to_numpy()
         for part in _PARTS
-    ]
-    parts = [
-        np.full(mean.shape, "", object)
-        if part is None
-        else part.broadcast_like(mean).transpose(*mean.dims).to_numpy()
-        for part in parts
     ]
     result = {}
     for place, value in np.ndenumerate(mean.to_numpy()):

@@ -27,6 +27,7 @@ from helpers.pictured import (
     rendered,
     simulated,
 )
+from helpers.statements import shares, statistics
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.plots import Choices, kinds as plots, style as pictures
@@ -60,7 +61,7 @@ def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_wi
     found = read.summary(read.settled(read.observables(dataset)))
     load, radius = drawn(figure.axes[0], pictures.BOTH)
     assert_allclose(load, [1.0, 4.0, 16.0], rtol=1e-14)
-    assert_allclose(radius, 1e6 * found["contact_radius_mean"].isel(t=0), rtol=1e-14)
+    assert_allclose(radius, 1e6 * found["contact_radius"].value.isel(t=0), rtol=1e-14)
     assert_allclose(
         drawn(figure.axes[0], pictures.REFERENCE, "--")[1],
         1e6 * dataset["radius_at_rest"],
@@ -171,7 +172,7 @@ def test_several_curves_keep_their_mechanisms_by_a_line_of_the_area_with_the_bon
         bonds=bonds.Steady(critical_speed=2e-2, stress=3e5), sweep=loads
     )
     panel = plots.draw(dataset, "curve").axes[0]
-    lost = read.shares(dataset)["lost_to_bonds_mean"].transpose("contact_load", "t")
+    lost = shares(dataset)["lost_to_bonds"].value.transpose("contact_load", "t")
     for colour, share in zip(pictures.LINES, lost, strict=False):
         assert_allclose(drawn(panel, colour, "-.")[1], 1.0 - share, rtol=1e-12)
     assert "with intact bonds only" in legend_of(panel)[0]
@@ -190,14 +191,14 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
     ramp,
 ):
     figure = rendered(plots.draw(ramp, "curve"))
-    found, shares = read.statistics(ramp), read.shares(ramp)
+    found, lost = statistics(ramp), shares(ramp)["lost_to_bonds"].value
     area, energies, friction = figure.axes
     speed, ratio = drawn(area, pictures.BOTH)
     assert_allclose(speed, 1e3 * ramp["speed"], rtol=1e-14)  # mm/s
-    assert_allclose(ratio, found["area_ratio_mean"], rtol=1e-14)
-    assert_allclose(
-        drawn(area, pictures.REFERENCE, ":")[1], shares["area_ratio_hertz"], rtol=1e-14
-    )
+    assert_allclose(ratio, found["area_ratio"].value, rtol=1e-14)
+    radii = read.reference_radii(ramp)
+    hertz = (radii["radius_hertz"] / radii["radius_jkr"]) ** 2
+    assert_allclose(drawn(area, pictures.REFERENCE, ":")[1], hertz, rtol=1e-14)
     assert (
         area.get_xscale() == "log"
         and friction.get_xlabel() == "sliding speed $V$ (mm/s)"
@@ -208,26 +209,26 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
         for shade in area.collections[:2]
     ]
     assert colours == [pictures.BONDS, pictures.FLUCTUATIONS]
-    least = [1.0 - shares["lost_to_bonds_mean"].max(), found["area_ratio_mean"].min()]
+    least = [1.0 - lost.max(), found["area_ratio"].value.min()]
     assert_allclose([edge.min() for edge in edges], least, rtol=1e-12)
     assert_allclose(
         [edge.max() for edge in edges],
-        [1.0, 1.0 - shares["lost_to_bonds_mean"].min()],
+        [1.0, 1.0 - lost.min()],
         rtol=1e-12,
     )
     _, left = drawn(energies, pictures.BOTH)
-    assert_allclose(left, 1e3 * found["work_of_adhesion_mean"], rtol=1e-14)
+    assert_allclose(left, 1e3 * found["work_of_adhesion"].value, rtol=1e-14)
     _, fluctuations = drawn(energies, pictures.FLUCTUATIONS, "--")
-    assert_allclose(fluctuations, 1e3 * found["fluctuation_energy_mean"], rtol=1e-14)
+    assert_allclose(fluctuations, 1e3 * found["fluctuation_energy"].value, rtol=1e-14)
     _, bonded = drawn(energies, pictures.BONDS, "-.")
     assert_allclose(bonded, 1e3 * read.bond_work(ramp), rtol=1e-14)
     assert_allclose(
         drawn(friction, pictures.BOTH)[1],
-        1e3 * found["friction_force_mean"],
+        1e3 * found["friction_force"].value,
         rtol=1e-14,
     )
     band = plots.draw(ramp, "time").axes[0].collections[0].get_paths()[0].vertices[:, 1]
-    quantiles = 1e6 * found["contact_radius_quantile"].sel(quantile=[0.05, 0.95])
+    quantiles = 1e6 * found["contact_radius"].quantile.sel(quantile=[0.05, 0.95])
     assert (band.min(), band.max()) == (
         quantiles[{"quantile": 0}].min(),
         quantiles[{"quantile": 1}].max(),
@@ -241,7 +242,7 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
         and len(panels) == 4
     )
     _, energy = drawn(panels[2], pictures.BOTH)
-    found = read.statistics(small)["fluctuation_energy_mean"]
+    found = statistics(small)["fluctuation_energy"].value
     assert_allclose(energy / energy[-1], found / found[-1], rtol=1e-13)
     assert len(plots.draw(ramp, "curve").axes) == 3
     dataset = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())

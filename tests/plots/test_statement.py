@@ -22,19 +22,19 @@ def speeds():
 
 
 def test_a_statement_is_drawn_over_the_sorted_sweep_with_its_interval(speeds):
-    stated = read.statements(speeds)
+    stated = read.Run(speeds).statements()
     figure = kinds.draw(speeds, "contact_area")
     (panel,) = figure.axes
     x, y = panel.lines[-1].get_data()
     order = [1, 2, 0]
     assert_allclose(x, [1.0, 3.0, 10.0], rtol=1e-12)
     assert panel.get_xscale() == "log" and "mm/s" in panel.get_xlabel()
-    factor = y[0] / float(stated["contact_area_mean"][1])
-    assert_allclose(y, factor * stated["contact_area_mean"][order], rtol=1e-12)
+    factor = y[0] / float(stated["contact_area"].value[1])
+    assert_allclose(y, factor * stated["contact_area"].value[order], rtol=1e-12)
     (bars,) = panel.collections
     ends = np.array([segment[:, 1] for segment in bars.get_segments()])
-    assert_allclose(ends[:, 0], factor * stated["contact_area_low"][order], rtol=1e-9)
-    assert_allclose(ends[:, 1], factor * stated["contact_area_high"][order], rtol=1e-9)
+    assert_allclose(ends[:, 0], factor * stated["contact_area"].low[order], rtol=1e-9)
+    assert_allclose(ends[:, 1], factor * stated["contact_area"].high[order], rtol=1e-9)
     assert "second half of the run and 6 members" in legend_of(panel)[1].replace(
         "\n", " "
     )

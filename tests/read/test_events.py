@@ -21,6 +21,7 @@ from helpers.parts import (
     shear,
 )
 from helpers.printed import rows_of
+from helpers.statements import statistics, values_of
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import interpolate
 from scipy.integrate import solve_ivp
@@ -28,7 +29,7 @@ from scipy.optimize import fsolve
 
 import sim
 from sim.laws.schallamach import bell_peak
-from sim.read.events import static_threshold
+from sim.read.peaks import static_threshold
 from tests.read.test_invariance import LENS, SCENES
 
 NAN = math.nan
@@ -43,14 +44,14 @@ def per_member(dataset, **values):
 
 def test_detached_and_masked_members_are_counted_and_the_time_of_half_is_bounded(ramp):
     # Three of six open, one of them twice: its first time counts.
-    result = read.statistics(
+    result = statistics(
         per_member(ramp, first_detachment=[0.07, 0.19, 0.3, NAN, NAN, NAN])
     )
-    assert_allclose(result["ever_detached_mean"], 0.5, rtol=1e-14)
-    assert_allclose(result["ever_detached_sem"], math.sqrt(0.25 / 5.0), rtol=1e-13)
-    result = read.statistics(ramp)
-    assert float(result["ever_detached_mean"]) == 0.0
-    assert "half_detached_mean" not in result
+    assert_allclose(result["ever_detached"].value, 0.5, rtol=1e-14)
+    assert_allclose(result["ever_detached"].sem, math.sqrt(0.25 / 5.0), rtol=1e-13)
+    result = statistics(ramp)
+    assert float(result["ever_detached"].value) == 0.0
+    assert "half_detached" not in result
     assert not any("_reading" in str(name) for name in result)
     assert not any(
         "detached" in heading
@@ -65,9 +66,9 @@ def test_detached_and_masked_members_are_counted_and_the_time_of_half_is_bounded
             ensemble=Ensemble(members=24),
         )
     )
-    result, opened = read.statistics(dataset), dataset["in_contact"] == 0
+    result, opened = statistics(dataset), dataset["in_contact"] == 0
     assert_allclose(
-        result["ever_detached_mean"], float(opened.any("t").mean()), rtol=1e-14
+        result["ever_detached"].value, float(opened.any("t").mean()), rtol=1e-14
     )
     first = dataset["t"].to_numpy()[opened.argmax("t")][opened.any("t").to_numpy()]
     assert_allclose(
@@ -222,17 +223,17 @@ def test_a_loop_has_a_bound_that_holds_its_error_by_the_records_or_a_reason():
     exact = read.loop_energy(cycled(steps=2400, **course))["loop_energy"].mean()
     stated = {}
     for steps in (24, 34, 50, 98, 200):
-        loop = read.statistics(cycled(steps=steps, **course))
-        value, bound = loop["loop_energy_mean"], loop["loop_energy_bound"]
+        loop = statistics(cycled(steps=steps, **course))
+        value, bound = loop["loop_energy"].value, loop["loop_energy"].bound
         stated[steps] = float(bound)
         if steps > 32:
-            assert abs(value - exact) <= bound and loop["loop_energy_reason"] == ""
+            assert abs(value - exact) <= bound and loop["loop_energy"].reason == ""
     assert math.isnan(stated[24])
-    assert loop["loop_energy_bound"].attrs["source"] == "records"
+    assert loop["loop_energy"].bound.attrs["source"] == "records"
     assert stated[200] < 0.5 * stated[50]
-    few = read.statistics(cycled(steps=24, **course))
-    assert "fewer than 16 records" in str(few["loop_energy_reason"].item())
-    assert math.isnan(few["loop_energy_mean"])
+    few = statistics(cycled(steps=24, **course))
+    assert "fewer than 16 records" in str(few["loop_energy"].reason.item())
+    assert math.isnan(few["loop_energy"].value)
 
 
 def test_loops_of_points_are_those_of_the_whole_and_there_are_none_without_trips(ramp):
@@ -265,7 +266,7 @@ def test_loops_of_points_are_those_of_the_whole_and_there_are_none_without_trips
     ]
     with pytest.raises(ValueError, match="cycles = 2"):
         read.loop_energy(ramp)
-    assert "loop_energy_mean" not in read.statistics(ramp)
+    assert "loop_energy" not in statistics(ramp)
 
 
 @pytest.fixture(scope="module")
@@ -294,7 +295,7 @@ def started():
 def test_a_static_peak_is_timed_from_the_start_among_steps_and_of_statistics_that_of_the_mean(
     started,
 ):
-    result = read.events(started)
+    result = values_of(read.events(started))
     for k, rest in enumerate((0.1, 0.2)):
         stress, t = started["shear_stress"][k].to_numpy(), started["t"].to_numpy()
         at = int(np.argmax(stress))
@@ -340,13 +341,17 @@ def test_the_friction_maximum_and_the_static_peak_are_those_of_the_clock_steps_w
     start = {"model": "start", "rest": "1 s", "speed": "3 um/s"}
     # the first record and the last alone
     clock = {"duration": "100 s", "step": "0.1 s", "record": "100 s"}
-    result = read.peaks(run(sim.Scenario(**parts | {"drive": ramp, "clock": clock})))
+    result = values_of(
+        read.peaks(run(sim.Scenario(**parts | {"drive": ramp, "clock": clock})))
+    )
     assert_allclose(result["peak_stress"], 24.40e3, rtol=2e-4)
     for name in ("peak_speed", "peak_friction_speed"):
         assert_allclose(result[name], 2.270e-3, rtol=1e6 ** (0.1 / 100.0) - 1.0)
     clock = {"duration": "2 s", "step": "0.1 ms", "record": "2 s"}
-    result = read.peaks(
-        run(sim.Scenario(**parts | {"bonds": slow, "drive": start, "clock": clock}))
+    result = values_of(
+        read.peaks(
+            run(sim.Scenario(**parts | {"bonds": slow, "drive": start, "clock": clock}))
+        )
     )
     assert_allclose(result["peak_stress"], 59.32e3, rtol=1e-4)
     assert_allclose(result["peak_time"], 14.37e-3, atol=1e-4)
@@ -369,7 +374,7 @@ def test_pull_offs_of_cycles_are_those_of_all_cycles_and_not_the_lowest(cycles):
     )
     error = every.std(ddof=1) / math.sqrt(every.size)
     assert abs(every.mean() + 364.0) < 5.0 * error
-    result = read.events(dataset)
+    result = values_of(read.events(dataset))
     assert_allclose(result["pull_off_load"].mean(), 1e-9 * every.mean(), rtol=1e-12)
     assert_array_equal(result["pull_offs"], cycles)
     assert_allclose(result["pull_off_load_least"], loads.min("phase"), rtol=1e-14)
@@ -393,20 +398,22 @@ def test_peaks_are_maxima_inside_a_ramp_or_at_once_after_a_start_and_none_is_of_
         made_up = {"shear_stress": values, "friction_force": -values}
         made_up = {key: ("t", series) for key, series in made_up.items()}
         made_up |= dict.fromkeys(("peak_stress", "peak_friction"), np.abs(values).max())
-        result = read.peaks(one.assign(made_up))
+        result = values_of(read.peaks(one.assign(made_up)))
         known = [bool(result[key].notnull()) for key in result]
-        assert len(known) == 10 and set(known) == {name == "peak"}
+        assert len(known) == 6 and set(known) == {name == "peak"}
     # members differ by noise
-    assert not any("friction" in name for name in read.peaks(ramp))
+    assert not any("friction" in name for name in values_of(read.peaks(ramp)))
     # Bonds without a stretch bear most at the first slip: the first record after it, two lives of the transient on.
     part = drive.Start(rest=0.1, speed=1e-2)
     population = bonds.Rate(critical_speed=1e-2, rebinding_rate=50.0, stress=3e5)
     dataset = run(scene(drive=part, bonds=population, shear=shear.Uniform()))
-    result = read.events(dataset)
+    result = values_of(read.events(dataset))
     assert_allclose(result["peak_stress"], 3e5 * (0.5 + 0.5 * np.exp(-2.0)), rtol=1e-12)
     assert_allclose(result["peak_time"], 0.02, rtol=1e-12)
     dataset = run(scene(drive=drive.Steady(speed=1e-3)))
-    assert not any(str(name).startswith("peak") for name in read.events(dataset))
+    assert not any(
+        str(name).startswith("peak") for name in values_of(read.events(dataset))
+    )
     contact = Equilibrium(displacement={"from": 1e-6, "to": -3e-5}, stiffness=50.0)
     dataset = run(
         scene(
@@ -433,7 +440,7 @@ def test_the_speed_of_a_friction_maximum_has_the_closed_form_in_its_interval_at_
         {"clock.step": step},
     )
     stated, law, rupture = (
-        read.statements(run(point)),
+        read.Run(run(point)).statements(),
         point.bonds,
         point.bonds.rupture,
     )
@@ -444,7 +451,8 @@ def test_the_speed_of_a_friction_maximum_has_the_closed_form_in_its_interval_at_
         law.rebinding_rate,
         1.0,
     ).speed
-    speed, bound = (float(stated[f"peak_speed_{end}"]) for end in ("mean", "bound"))
+    of_speed = stated["peak_speed"]
+    speed, bound = float(of_speed.value), float(of_speed.bound)
     low, high = speed - bound, speed + bound
     # seven decades in all
     assert (
@@ -453,8 +461,8 @@ def test_the_speed_of_a_friction_maximum_has_the_closed_form_in_its_interval_at_
         < high
         < low * 1e7 ** (1.01 * point.clock.step / point.clock.duration)
     )
-    off = float(stated["peak_time_mean"]) - np.log(exact / 1e-7) / np.log(1e7) * 10.0
-    assert abs(off) < float(stated["peak_time_bound"])
+    off = float(stated["peak_time"].value) - np.log(exact / 1e-7) / np.log(1e7) * 10.0
+    assert abs(off) < float(stated["peak_time"].bound)
 
 
 def test_a_pull_from_rest_has_a_threshold_between_its_clock_steps_and_the_area_there_unless_friction_still_grows():
@@ -479,7 +487,7 @@ def test_a_pull_from_rest_has_a_threshold_between_its_clock_steps_and_the_area_t
     )
     top = int(np.argmax(force))
     assert 0 < top < len(force) - 1
-    result = read.events(dense)
+    result = values_of(read.events(dense))
     # between two clock steps it is higher, but below the lines through its neighbours: it is concave there
     assert (
         force[top]
@@ -488,8 +496,10 @@ def test_a_pull_from_rest_has_a_threshold_between_its_clock_steps_and_the_area_t
     )
     low, high = sorted(area[[top - 1, top + 1]] / area[0])
     assert low < result["area_at_threshold"].item() < high
-    xr.testing.assert_identical(static_threshold(seldom), static_threshold(dense))
-    assert bool(static_threshold(short).to_dataarray().isnull().all())
+    xr.testing.assert_identical(
+        values_of(static_threshold(seldom)), values_of(static_threshold(dense))
+    )
+    assert bool(values_of(static_threshold(short)).to_dataarray().isnull().all())
 
 
 @pytest.mark.parametrize(("peaks", "start"), [(True, "empty"), (False, "steady")])
@@ -509,7 +519,7 @@ def test_a_start_has_a_static_threshold_if_its_friction_falls_again(peaks, start
             clock=Clock(0.3, 1e-4),
         )
     )
-    result = static_threshold(dataset)
+    result = values_of(static_threshold(dataset))
     force = dataset["friction_force"].to_numpy()
     top = int(np.argmax(force))
     assert bool(force[-1] < 0.99 * force[top]) is peaks
@@ -638,6 +648,6 @@ def test_a_maximum_along_a_ramp_is_where_an_own_integration_has_it_within_its_bo
 
     exact = true_maximum(speed_at, (0.0, duration))
     for name, truth in (("time", exact), ("speed", speed_at(exact))):
-        value, bound = (float(result[f"peak_{name}{end}"]) for end in ("", "_bound"))
-        assert abs(value - truth) <= bound
-    assert float(result["peak_time_bound"]) <= most * step
+        found = result[f"peak_{name}"]
+        assert abs(float(found.value) - truth) <= float(found.bound)
+    assert float(result["peak_time"].bound) <= most * step

@@ -246,7 +246,7 @@ def by_name(dataset):
                 for value in one.at.values()
             ),
         ): one
-        for one in read.each(read.statements(dataset))
+        for one in read.each(read.Run(dataset).statements())
     }
 
 

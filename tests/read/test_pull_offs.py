@@ -9,6 +9,7 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
+from helpers.statements import statistics
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
 from scipy.integrate import solve_ivp
@@ -407,13 +408,13 @@ def test_the_time_of_a_pull_off_has_no_mean_if_it_comes_after_the_run_in_some_me
     share = float(every["first_detachment"].notnull().mean())
     assert 0.0 < share < 1.0
     for dataset in (every, pooled):
-        result = read.statistics(dataset)
-        assert_allclose(result["ever_detached_mean"], share, rtol=1e-12)
-        assert_allclose(result["pull_off_load_mean"], -0.225e-3, rtol=1e-12)
-        assert np.isnan(result["pull_off_time_mean"])
-        assert not {"first_detachment_mean", "first_masked_mean"} & {*result}
-    statements = read.statements(every)
-    assert "every member" in str(statements["pull_off_time_reason"].values)
+        result = statistics(dataset)
+        assert_allclose(result["ever_detached"].value, share, rtol=1e-12)
+        assert_allclose(result["pull_off_load"].value, -0.225e-3, rtol=1e-12)
+        assert np.isnan(result["pull_off_time"].value)
+        assert not {"first_detachment", "first_masked"} & {*result}
+    statements = read.Run(every).statements()
+    assert "every member" in str(statements["pull_off_time"].reason.values)
 
 
 def test_the_share_that_is_left_has_the_survival_and_the_interval_of_scipy():
@@ -447,11 +448,11 @@ def test_a_median_beyond_the_run_is_bounded_by_its_end_and_no_mean_of_the_masked
     dataset = sim.run(lens | {"sweep": {"drive.speed": [5e-3, 12e-3, 20e-3]}})
     share = dataset["first_masked"].notnull().mean("member").values
     assert share[0] == 0.0 and 0.0 < share[1] < 0.4 and share[2] > 0.5
-    result = read.statements(dataset)
-    assert_allclose(result["ever_masked_mean"], share, rtol=1e-12)
-    assert "first_masked_mean" not in result
-    assert np.isnan(result["half_masked_mean"].values[:2]).all()
-    assert_allclose(result["half_masked_low"].values[:2], 1.0, rtol=1e-12)
+    result = read.Run(dataset).statements()
+    assert_allclose(result["ever_masked"].value, share, rtol=1e-12)
+    assert "first_masked" not in result
+    assert np.isnan(result["half_masked"].value.values[:2]).all()
+    assert_allclose(result["half_masked"].low.values[:2], 1.0, rtol=1e-12)
     rows = read.highlights(read.Run(dataset)).rows
     texts = [text for row in rows for key, text in row.items() if "half" in key]
     assert texts[:2] == ["> 1", "> 1"]

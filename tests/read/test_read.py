@@ -10,6 +10,7 @@ import xarray as xr
 from helpers.lens import RADIUS, scene
 from helpers.parts import Equilibrium, Record, drive, read, run, shear
 from helpers.printed import rows_of
+from helpers.statements import shares, statistics
 from numpy.testing import assert_allclose
 
 import sim
@@ -52,59 +53,58 @@ def test_runs_joined_as_the_page_says_have_the_table_of_a_sweep(tmp_path):
 
 
 def test_statistics_of_known_numbers_few_members_and_missing_values(known, ramp):
-    result, t = read.statistics(known), known["t"].to_numpy()
+    result, t = statistics(known), known["t"].to_numpy()
     sorted_numbers = np.stack([t - 10.0, 2.0 * t, 3.0 * t, 4.0 * t, 5.0 * t])
     mean = 3.0 * t - 2.0
     deviation = np.sqrt(np.sum((sorted_numbers - mean) ** 2, axis=0) / 4.0)
-    assert_allclose(result["work_of_adhesion_mean"], mean, rtol=1e-14)
-    assert_allclose(result["work_of_adhesion_std"], deviation, rtol=1e-13)
+    assert_allclose(result["work_of_adhesion"].value, mean, rtol=1e-14)
+    assert_allclose(result["work_of_adhesion"].std, deviation, rtol=1e-13)
     assert_allclose(
-        result["work_of_adhesion_sem"], deviation / math.sqrt(5.0), rtol=1e-13
+        result["work_of_adhesion"].sem, deviation / math.sqrt(5.0), rtol=1e-13
     )
     # five sorted numbers: the 5 % quantile lies a fifth of the way from the first to the second
     fifth = 0.8 * sorted_numbers[0] + 0.2 * sorted_numbers[1]
     assert_allclose(
-        result["work_of_adhesion_quantile"].sel(quantile=0.05), fifth, rtol=1e-13
+        result["work_of_adhesion"].quantile.sel(quantile=0.05), fifth, rtol=1e-13
     )
     assert_allclose(
-        result["work_of_adhesion_quantile"].sel(quantile=0.5), 3.0 * t, rtol=1e-13
+        result["work_of_adhesion"].quantile.sel(quantile=0.5), 3.0 * t, rtol=1e-13
     )
-    assert result["work_of_adhesion_mean"].attrs["units"] == "J/m^2"
-    result = read.statistics(known)
-    assert_allclose(result["fraction_detached_mean"], 0.2, rtol=1e-14)
+    assert result["work_of_adhesion"].value.attrs["units"] == "J/m^2"
+    result = statistics(known)
+    assert_allclose(result["fraction_detached"].value, 0.2, rtol=1e-14)
     assert_allclose(
-        result["fraction_detached_sem"], math.sqrt(0.2 * 0.8 / 4.0), rtol=1e-14
+        result["fraction_detached"].sem, math.sqrt(0.2 * 0.8 / 4.0), rtol=1e-14
     )
     # member 0 has no work left, at t = 0 all that are closed have none
     assert_allclose(
-        result["fraction_masked_mean"],
+        result["fraction_masked"].value,
         [0.8] + [0.2] * (known.sizes["t"] - 1),
         rtol=1e-14,
     )
-    result = read.statistics(ramp)
-    np.testing.assert_array_equal(result["speed_mean"], ramp["speed"])
-    assert np.all(result["speed_sem"] == 0.0)
-    assert np.all(result["speed_quantile"].sel(quantile=0.95) == ramp["speed"])
-    result = read.statistics(ramp.isel(member=[0]))
+    result = statistics(ramp)
+    np.testing.assert_array_equal(result["speed"].value, ramp["speed"])
+    assert np.all(result["speed"].sem == 0.0)
+    assert np.all(result["speed"].quantile.sel(quantile=0.95) == ramp["speed"])
+    result = statistics(ramp.isel(member=[0]))
     np.testing.assert_array_equal(
-        result["contact_radius_mean"], ramp["contact_radius"][0]
+        result["contact_radius"].value, ramp["contact_radius"][0]
     )
-    assert bool(result["contact_radius_sem"].isnull().all())
+    assert bool(result["contact_radius"].sem.isnull().all())
     np.testing.assert_array_equal(
-        result["contact_radius_quantile"].sel(quantile=0.05), ramp["contact_radius"][0]
+        result["contact_radius"].quantile.sel(quantile=0.05), ramp["contact_radius"][0]
     )
     depth = ramp["indentation"].copy()
     depth[0] = math.nan
-    result = read.statistics(ramp.assign(indentation=depth))
-    rest = read.statistics(ramp.isel(member=slice(1, None)))
-    for kind in ("mean", "std", "sem", "quantile"):
-        assert_allclose(
-            result[f"indentation_{kind}"], rest[f"indentation_{kind}"], rtol=1e-12
-        )
+    result = statistics(ramp.assign(indentation=depth))
+    rest = statistics(ramp.isel(member=slice(1, None)))
+    for kind in ("value", "std", "sem", "quantile"):
+        of_all, of_rest = (getattr(of["indentation"], kind) for of in (result, rest))
+        assert_allclose(of_all, of_rest, rtol=1e-12)
     depth[:, :3] = math.nan
-    none = read.statistics(ramp.assign(indentation=depth))
-    assert bool(none["indentation_mean"][:3].isnull().all()) and bool(
-        none["indentation_mean"][3:].notnull().all()
+    none = statistics(ramp.assign(indentation=depth))
+    assert bool(none["indentation"].value[:3].isnull().all()) and bool(
+        none["indentation"].value[3:].notnull().all()
     )
     dims = ("member", "t")
     levels = np.array([1.0, 2.0, 4.0, 4.0, 5.0, 8.0])[:, None] * np.ones(
@@ -113,17 +113,27 @@ def test_statistics_of_known_numbers_few_members_and_missing_values(known, ramp)
     levels[:, : ramp.sizes["t"] // 2] = 1e9  # a start-up that must not count
     members = xr.Dataset({"level": (dims, levels)}, {"t": ramp["t"]})
     result = read.summary(read.settled(members))
-    assert result["level_mean"].dims == ("t",) and result.sizes["t"] == 1
-    assert_allclose(result["level_mean"], 4.0, rtol=1e-14)
-    assert_allclose(result["level_sem"], math.sqrt(30.0 / 5.0 / 6.0), rtol=1e-14)
+    assert result["level"].value.dims == ("t",) and result["level"].value.size == 1
+    assert_allclose(result["level"].value, 4.0, rtol=1e-14)
+    assert_allclose(result["level"].sem, math.sqrt(30.0 / 5.0 / 6.0), rtol=1e-14)
+
+
+def are_identical(group, other):
+    """Assert that all statistics of two groups are the same numbers."""
+    assert group.keys() == other.keys()
+    for name, one in group.items():
+        for values, expected in zip(one, other[name], strict=True):
+            assert (values is None) is (expected is None)
+            if values is not None:
+                xr.testing.assert_identical(values, expected)
 
 
 def test_recorded_statistics_and_those_of_files_and_pieces_are_those_of_the_members(
     ramp, tmp_path, monkeypatch
 ):
     result, recorded = (
-        read.statistics(ramp),
-        read.statistics(run(scene(record=Record(per_member=False)))),
+        statistics(ramp),
+        statistics(run(scene(record=Record(per_member=False)))),
     )
     for name in (
         "contact_radius",
@@ -132,34 +142,32 @@ def test_recorded_statistics_and_those_of_files_and_pieces_are_those_of_the_memb
         "fraction_masked",
         "area_ratio",
     ):
-        for kind in ("mean", "std", "sem"):
+        for kind in ("value", "std", "sem"):
             # deviations cancel: what is left is rounding of the mean
-            rounding = 1e-14 * float(np.max(np.abs(result[f"{name}_mean"])))
+            rounding = 1e-14 * float(np.max(np.abs(result[name].value)))
             assert_allclose(
-                recorded[f"{name}_{kind}"],
-                result[f"{name}_{kind}"],
+                getattr(recorded[name], kind),
+                getattr(result[name], kind),
                 rtol=1e-12,
                 atol=rounding,
             )
-    assert "contact_radius_quantile" not in recorded
+    assert recorded["contact_radius"].quantile is None
     pooled, each = (
-        read.shares(run(scene(record=Record(per_member=False)))),
-        read.shares(ramp),
+        shares(run(scene(record=Record(per_member=False)))),
+        shares(ramp),
     )
-    for name in ("lost_to_fluctuations_mean", "lost_to_fluctuations_sem"):
-        assert_allclose(pooled[name], each[name], rtol=1e-10, atol=1e-14)
+    for kind in ("value", "sem"):
+        both = (getattr(of["lost_to_fluctuations"], kind) for of in (pooled, each))
+        assert_allclose(*both, rtol=1e-10, atol=1e-14)
     recorded = run(scene(record=Record(per_member=False)))
-    closed = recorded["in_contact_mean"].copy()
-    closed[3:6] = 0.5
-    result = read.observables(recorded.assign(in_contact_mean=closed))[
-        "fraction_masked_mean"
-    ]
+    closed = recorded["in_contact"].copy()
+    closed[0, 3:6] = 0.5
+    result = read.observables(recorded.assign(in_contact=closed))["fraction_masked"]
+    result = result.sel(statistic="mean")
     assert result.isnull().to_numpy().tolist() == [3 <= k < 6 for k in range(21)]
     path = run(scene(), to=tmp_path / "out.nc")
     with xr.open_dataset(path) as opened:
-        xr.testing.assert_identical(
-            read.statistics(opened).load(), read.statistics(ramp)
-        )
+        are_identical(statistics(opened), statistics(ramp))
     path = run(
         scene(record=Record(quantities=["friction_force", "masked"])),
         to=tmp_path / "some.nc",
@@ -171,9 +179,10 @@ def test_recorded_statistics_and_those_of_files_and_pieces_are_those_of_the_memb
     for room in (2**27, 1000):
         monkeypatch.setattr(dataset_module, "ROOM", room)
         with xr.open_dataset(path) as opened:
-            results.append((read.statistics(opened).load(), read.loop_energy(cycles)))
-    for whole, pieces in zip(*results, strict=True):
-        xr.testing.assert_identical(pieces, whole)
+            results.append((statistics(opened), read.loop_energy(cycles)))
+    (whole, of_cycles), (pieces, of_pieces) = results
+    are_identical(pieces, whole)
+    xr.testing.assert_identical(of_pieces, of_cycles)
 
 
 def test_words_and_settings_are_known_whether_swept_or_not_and_a_run_that_is_stationary():

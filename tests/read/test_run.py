@@ -49,7 +49,7 @@ def test_a_statistic_over_time_needs_a_stationary_run_and_has_its_sample(ramp):
     )
     assert late.attrs["over"] == "second half of the run and 6 members"
     of_time = read.distribution(steady.dataset, ["fluctuation_energy"])
-    free = of_time["fluctuation_energy_effective_samples"]
+    free = of_time["fluctuation_energy"].number
     assert_array_equal(late.sel(statistic="number"), free)
     with pytest.raises(sim.BadInput, match="contact_radius: speed or mount changes"):
         sim.Run(ramp).statistic("contact_radius", late=True)

@@ -21,13 +21,15 @@ from helpers.parts import (
     shear,
 )
 from helpers.printed import rows_of
+from helpers.statements import shares, statistics
 from numpy.testing import assert_allclose
 
 import sim
 from sim.ensemble import plan as plans
 from sim.parts.contact.models import Adhesion
-from sim.read.events import peak_of_mean
-from sim.read.statistics import closed_only, of_second_half, settlements
+from sim.read.late import settlements
+from sim.read.observables import closed_only
+from sim.read.peaks import peak_of_mean
 from tests.read.test_invariance import SCENES
 
 ENSEMBLES, LEAST, MOST = 1000, 0.92, 0.98
@@ -52,7 +54,7 @@ def test_settled_series_are_so_in_99_of_100_cases_and_their_intervals_hold_while
     values = series(np.random.default_rng(31), members, times)
     results = [read.over_time(each) for each in values]
     means, lows, highs, errors = (
-        np.array([each[k] for each in results]) for k in ("mean", "low", "high", "sem")
+        np.array([each[k] for each in results]) for k in ("value", "low", "high", "sem")
     )
     free = math.nan if members < 4 else members - 1.0
     settled = np.array(
@@ -129,11 +131,11 @@ def test_a_mean_has_one_error_with_and_without_members_and_in_any_division_into_
     parts, monkeypatch
 ):
     each = run(scene(**parts))
-    expected = of_second_half(each)
+    expected = read.distribution(each)
     # blocks that end within the second half
     monkeypatch.setattr(plans, "_BLOCK_SECONDS", 2e-3)
     monkeypatch.setattr(plans, "_GROUP", 5)
-    pooled = of_second_half(run(scene(**parts, record=Record(per_member=False))))
+    pooled = read.distribution(run(scene(**parts, record=Record(per_member=False))))
     for name in (
         "contact_area",
         "area_ratio",
@@ -141,54 +143,53 @@ def test_a_mean_has_one_error_with_and_without_members_and_in_any_division_into_
         "fraction_detached",
         "bond_fraction",
     ):
-        for kind in ("mean", "sem", "low", "high"):
+        for kind in ("value", "sem", "low", "high"):
             assert_allclose(
-                pooled[f"{name}_{kind}"],
-                expected[f"{name}_{kind}"],
+                getattr(pooled[name], kind),
+                getattr(expected[name], kind),
                 rtol=1e-6,
                 err_msg=name,
             )
-        xr.testing.assert_equal(pooled[f"{name}_reason"], expected[f"{name}_reason"])
+        xr.testing.assert_equal(pooled[name].reason, expected[name].reason)
     # by hand: each member's mean while it is closed
     late = each.isel(t=slice(each.sizes["t"] // 2, None))
     means = late["contact_area"].where(late["in_contact"] > 0).mean("t")
-    assert_allclose(expected["contact_area_mean"], means.mean("member"), rtol=1e-12)
+    assert_allclose(expected["contact_area"].value, means.mean("member"), rtol=1e-12)
     error = means.std("member", ddof=1) / np.sqrt(means.count("member"))
-    assert_allclose(expected["contact_area_sem"], error, rtol=1e-10)
+    assert_allclose(expected["contact_area"].sem, error, rtol=1e-10)
 
 
 def test_contacts_that_come_off_lose_no_area_to_bonds_and_too_few_or_those_that_close_again_have_no_mean():
     dataset = run(scene(**PULLED))
-    result = of_second_half(dataset)
+    result = read.distribution(dataset)
     gone = dataset["in_contact"].to_numpy() == 0
     assert 10 < gone[:, -1].sum() < 35
-    assert result["fraction_detached_reason"].item().startswith("not settled")
-    assert abs(result["lost_to_bonds_mean"] - 1.0 + result["area_ratio_mean"]) < 1e-12
+    assert result["fraction_detached"].reason.item().startswith("not settled")
+    assert abs(result["lost_to_bonds"].value - 1.0 + result["area_ratio"].value) < 1e-12
     # as the bonds are all there on average, closed contacts have nearly JKR's area
     assert (
-        abs(result["area_ratio_mean"] - 1.0) < 0.1
-        and 0.0 < result["area_ratio_sem"] < 0.05
+        abs(result["area_ratio"].value - 1.0) < 0.1
+        and 0.0 < result["area_ratio"].sem < 0.05
     )
-    shares = read.shares(dataset)
     assert_allclose(
-        shares["lost_to_bonds_mean"]
-        + read.statistics(closed_only(dataset))["area_ratio_mean"],
+        shares(dataset)["lost_to_bonds"].value
+        + statistics(closed_only(dataset))["area_ratio"].value,
         1.0,
     )
     lasting = np.flatnonzero(~gone[:, -1])[:2]
     few = dataset.isel(member=[*lasting, *np.flatnonzero(gone[:, -1])])
-    result = of_second_half(few)
+    result = read.distribution(few)
     reason = (
         f"2 of {few.sizes['member']} contacts are closed at the end of the second half"
     )
-    assert result["contact_area_reason"] == reason and math.isnan(
-        result["contact_area_mean"]
+    assert result["contact_area"].reason == reason and math.isnan(
+        result["contact_area"].value
     )
     again = dataset["in_contact"].copy()
     again[0, 200], again[0, 201:] = 0, 1
-    result = of_second_half(dataset.assign(in_contact=again))
+    result = read.distribution(dataset.assign(in_contact=again))
     assert (
-        result["friction_force_reason"]
+        result["friction_force"].reason
         == "1 of 40 contacts close again in the second half"
     )
 
@@ -238,14 +239,14 @@ def test_the_peak_after_a_rest_does_not_grow_with_the_time_of_sliding():
         "adhesion": Adhesion(work=42e-3, bond_share=0.0),
     }
     clocks = (Clock(duration=duration, step=1e-3) for duration in (0.3, 1.0))
-    results = [read.statements(run(scene(**parts, clock=clock))) for clock in clocks]
+    results = [
+        read.Run(run(scene(**parts, clock=clock))).statements() for clock in clocks
+    ]
     for name in ("peak_stress", "peak_friction", "peak_time", "peak_friction_time"):
-        assert_allclose(*(result[f"{name}_mean"] for result in results), rtol=1e-6)
+        assert_allclose(*(result[name].value for result in results), rtol=1e-6)
     # bond by bond, in 400 ensembles of another code: 32.1 kPa
-    low, high, reason = (
-        results[0][f"peak_stress_{end}"] for end in ("low", "high", "reason")
-    )
-    assert low < 32.1e3 < high and reason == ""
+    peak = results[0]["peak_stress"]
+    assert peak.low < 32.1e3 < peak.high and peak.reason == ""
 
 
 @pytest.mark.parametrize("members", [1, 2, 6])
@@ -262,14 +263,14 @@ def test_a_difference_along_a_sweep_has_the_error_of_the_members_differences(mem
         )
     )
     alone, change = (
-        of_second_half(dataset),
+        read.distribution(dataset),
         read.distribution(dataset, minus={"contact.load": 4e-3}),
     )
-    area, late = (of["contact_area_mean"] for of in (change, alone))
+    area, late = (of["contact_area"].value for of in (change, alone))
     assert_allclose(area[1], late[1] - late[0], rtol=1e-9)
-    assert area[0] == 0.0 and change["contact_area_reason"][1] == ""
-    apart = math.hypot(*alone["contact_area_sem"])
-    assert 0.0 < change["contact_area_sem"][1] < 0.3 * apart
+    assert area[0] == 0.0 and change["contact_area"].reason[1] == ""
+    apart = math.hypot(*alone["contact_area"].sem)
+    assert 0.0 < change["contact_area"].sem[1] < 0.3 * apart
     if members > 2:
         each = (
             dataset["contact_area"]
@@ -278,7 +279,7 @@ def test_a_difference_along_a_sweep_has_the_error_of_the_members_differences(mem
             .diff("contact_load")
         )
         error = each.std("member", ddof=1).item() / math.sqrt(members)
-        assert_allclose(change["contact_area_sem"][1], error, rtol=1e-9)
+        assert_allclose(change["contact_area"].sem[1], error, rtol=1e-9)
 
 
 def test_joined_runs_are_described_as_what_they_are(tmp_path):
@@ -305,7 +306,7 @@ def test_joined_runs_are_described_as_what_they_are(tmp_path):
             dataset.attrs["members"] == 12
             and dataset.attrs["joined"] == "12 members joined, 6 of one run"
         )
-        error = of_second_half(dataset)["contact_area_sem"]
+        error = read.distribution(dataset)["contact_area"].sem
         halves = (
             both["contact_area"].isel(t=slice(dataset.sizes["t"] // 2, None)).mean("t")
         )
@@ -322,14 +323,12 @@ def test_two_records_one_of_which_is_the_start_have_no_mean_but_the_value_at_the
     dataset = run(scene(**parts, clock=Clock(0.8, 2e-3)))
     ends = read.distribution(dataset.isel(t=[0, -1]))
     for name in ("contact_area", "friction_force"):
-        assert_allclose(
-            ends[f"{name}_mean"], dataset[name].isel(t=-1).mean(), rtol=1e-12
+        assert_allclose(ends[name].value, dataset[name].isel(t=-1).mean(), rtol=1e-12)
+        assert math.isnan(ends[name].sem) and ends[name].reason.item().startswith(
+            "too few records"
         )
-        assert math.isnan(ends[f"{name}_sem"]) and ends[
-            f"{name}_reason"
-        ].item().startswith("too few records")
-    assert read.distribution(dataset.isel(t=[0, 10, -1]))["contact_area_reason"] == ""
-    pooled = of_second_half(
+    assert read.distribution(dataset.isel(t=[0, 10, -1]))["contact_area"].reason == ""
+    pooled = read.distribution(
         run(
             scene(
                 **parts,
@@ -339,10 +338,10 @@ def test_two_records_one_of_which_is_the_start_have_no_mean_but_the_value_at_the
         )
     )
     assert_allclose(
-        pooled["contact_area_mean"],
+        pooled["contact_area"].value,
         dataset["contact_area"].isel(t=-1).mean(),
         rtol=1e-12,
     )
-    assert pooled["contact_area_reason"].item().startswith(
+    assert pooled["contact_area"].reason.item().startswith(
         "too few records"
-    ) and math.isnan(pooled["contact_area_sem"])
+    ) and math.isnan(pooled["contact_area"].sem)

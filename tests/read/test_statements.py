@@ -42,12 +42,12 @@ def test_a_statement_prints_its_error_its_bounds_or_its_reason():
 def test_table_csv_and_statements_have_the_same_numbers_and_samples():
     speeds = ["1 mm/s", "3 mm/s", "10 mm/s"]
     dataset = run(scene(drive=drive.Steady(speed=1e-3), sweep={"drive.speed": speeds}))
-    stated = read.statements(dataset)
+    stated = read.Run(dataset).statements()
     assert (
-        stated["contact_area_mean"].attrs["over"]
+        stated["contact_area"].value.attrs["over"]
         == "second half of the run and 6 members"
     )
-    assert stated["speed_at_5_percent_lost_mean"].attrs["over"] == "6 members"
+    assert stated["speed_at_5_percent_lost"].value.attrs["over"] == "6 members"
     rows = read.long(read.Run(dataset)).set_index("quantity")
     whole_run = rows[rows["t"].isna()]
     for statement in read.each(stated):
@@ -60,7 +60,7 @@ def test_table_csv_and_statements_have_the_same_numbers_and_samples():
         np.testing.assert_array_equal(at["mean"], statement.value)
         assert set(at["over"]) == {statement.over or "one run"}
     areas = [s.value for s in read.each(stated) if s.name == "area_ratio"]
-    np.testing.assert_array_equal(areas, stated["area_ratio_mean"])
+    np.testing.assert_array_equal(areas, stated["area_ratio"].value)
     (first, *_), frame = rows_of(dataset), read.frame(read.Run(dataset))
     assert first["A/A_JKR (%)"] == concise(
         100.0 * frame["area_ratio"][0], 100.0 * frame["area_ratio_error"][0]
@@ -84,8 +84,9 @@ def test_a_reason_marks_its_cell_and_is_a_note_of_the_table_with_its_point():
     held = {"drive": drive.Steady(speed=1e-3), "shear": shear.Uniform()}
     one = read.Run(run(scene(**held, sweep=loads)))
     late = one.late(column.name for column in read.tables.main_columns(one))
-    reason = ("contact_load", np.array(["", "not settled: 1 → 2"], object))
-    late["area_ratio_reason"] = reason
+    reason = np.array(["", "not settled: 1 → 2"], object)
+    reason = xr.DataArray(reason, dims="contact_load")
+    late["area_ratio"] = late["area_ratio"]._replace(reason=reason)
     (table,) = read.tables_of(one)
     marked = [row["A/A_JKR (%)"].endswith("*") for row in table.rows]
     assert marked == [False, True]
@@ -176,10 +177,9 @@ def test_a_maximum_inside_a_sweep_and_a_systematic_error_are_notes():
     # it falls all the way
     assert not [line for line in lines if "contact area is" in line]
     late = one.late(("contact_area", "friction_force"))
-    late["friction_force_reason"] = (
-        "drive_speed",
-        np.array(["", "not settled", ""], object),
-    )
+    reason = np.array(["", "not settled", ""], object)
+    reason = xr.DataArray(reason, dims="drive_speed")
+    late["friction_force"] = late["friction_force"]._replace(reason=reason)
     lines = read.notes(one, []).further
     assert not [line for line in lines if "friction force is" in line]
     error = SystematicError(

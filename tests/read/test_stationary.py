@@ -26,8 +26,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import special, stats
 
 from sim.parts.contact.models import Solid, Sphere
-from sim.read.events import lifetimes
-from sim.read.statistics import QUANTILES, covariance_of, quantile_ranks
+from sim.read.correlation import covariance_of
+from sim.read.lifetimes import lifetimes
+from sim.read.statistics import QUANTILES, quantile_ranks
 from sim.spectrum.families import Gaussian
 from sim.units.notation import concise
 
@@ -64,15 +65,16 @@ def test_quantiles_and_intervals_of_64_members_hold_what_they_promise(ensembles)
     result, law = ensembles
     # of the k-th of n ordered numbers the exact mean share below is k/(n + 1); the place is between k's
     places = 1.0 + LEVELS * 63.0
-    below = law.cdf(result["x_quantile"]).mean(axis=1)
+    below = law.cdf(result["x"].quantile).mean(axis=1)
     errors = np.sqrt(LEVELS * (1.0 - LEVELS) / 64.0 / ENSEMBLES)
     assert np.all(np.abs(below - places / 65.0) < 5.0 * errors)
-    assert LEAST < share_holding(result["x_low"], result["x_high"], law.mean()) < MOST
+    assert LEAST < share_holding(result["x"].low, result["x"].high, law.mean()) < MOST
     for k, level in enumerate(LEVELS):
         low, high = (
-            result[f"x_quantile_{end}"].isel(quantile=k) for end in ("low", "high")
+            end.isel(quantile=k)
+            for end in (result["x"].quantile_low, result["x"].quantile_high)
         )
-        assert bool((low <= result["x_quantile"].isel(quantile=k)).all()) and bool(
+        assert bool((low <= result["x"].quantile.isel(quantile=k)).all()) and bool(
             (low < high).all()
         )
         assert LEAST < share_holding(low, high, law.ppf(level)) < MOST, level
@@ -95,8 +97,8 @@ def test_few_members_widen_an_interval_and_those_of_shares_hold_what_they_promis
     for members in [2, 3, 5]:
         drawn = np.random.default_rng(12).normal(size=(members, ENSEMBLES))
         result = read.summary(xr.Dataset({"x": (("member", "t"), drawn)}))
-        assert LEAST < share_holding(result["x_low"], result["x_high"], 0.0) < MOST
-        low, high = (result["x_mean"] + z * result["x_sem"] for z in (-1.96, 1.96))
+        assert LEAST < share_holding(result["x"].low, result["x"].high, 0.0) < MOST
+        low, high = (result["x"].value + z * result["x"].sem for z in (-1.96, 1.96))
         assert share_holding(low, high, 0.0) < LEAST
     for detached in [0.02, 0.1, 0.5]:
         opened = (np.random.default_rng(13).random((64, ENSEMBLES)) < detached).astype(
@@ -105,18 +107,18 @@ def test_few_members_widen_an_interval_and_those_of_shares_hold_what_they_promis
         result = read.summary(
             xr.Dataset({"fraction_detached": (("member", "t"), opened)})
         )
-        low, high = result["fraction_detached_low"], result["fraction_detached_high"]
+        low, high = result["fraction_detached"].low, result["fraction_detached"].high
         assert share_holding(low, high, detached) > LEAST and float(low.min()) >= -1e-15
         none = read.summary(
             xr.Dataset({"fraction_detached": (("member",), np.zeros(64))})
         )
         # Wilson's bound of none in 64: z^2/(64 + z^2)
         assert_allclose(
-            none["fraction_detached_high"],
+            none["fraction_detached"].high,
             3.841458820694124 / 67.84145882069413,
             rtol=1e-12,
         )
-        assert none["fraction_detached_low"] == 0.0
+        assert none["fraction_detached"].low == 0.0
 
 
 def covered(law, members, length, ensembles):
@@ -178,11 +180,11 @@ def test_correlation_times_and_free_values_are_those_of_the_law_and_of_white_noi
     # the mean of n records has the variance (1 + k)/(1 - k)/n, its estimate from 64 means the error sqrt(2/63)
     keep = math.exp(-0.2)
     exact = 64 * 2000 * (1.0 - keep) / (1.0 + keep)
-    assert abs(result["effective_samples"] / exact - 1.0) < 5.0 * math.sqrt(2.0 / 63.0)
+    assert abs(result["number"] / exact - 1.0) < 5.0 * math.sqrt(2.0 / 63.0)
     series = ornstein_uhlenbeck(np.random.default_rng(16), (1, 50), math.exp(-0.2))
     assert np.all(np.isnan(read.over_time(series)["quantile_low"]))
     white = np.random.default_rng(18).normal(size=(1, 20_000))
-    assert abs(read.over_time(white)["effective_samples"] / 20_000 - 1.0) < 0.1
+    assert abs(read.over_time(white)["number"] / 20_000 - 1.0) < 0.1
     assert math.isnan(read.integral_time(white, step=1.0).time)
 
 
@@ -201,7 +203,7 @@ def test_statistics_leave_out_missing_values_and_a_distribution_is_over_members_
         values[0, 100:] = math.nan
         result, known = read.over_time(values), values[np.isfinite(values)]
         assert_allclose(result["quantile"], np.quantile(known, LEVELS), rtol=1e-13)
-        assert_allclose(result["mean"], np.nanmean(values, axis=1).mean(), rtol=1e-13)
+        assert_allclose(result["value"], np.nanmean(values, axis=1).mean(), rtol=1e-13)
         assert (members == 1) == math.isnan(result["sem"])
     dataset = run(
         scene(
@@ -212,23 +214,25 @@ def test_statistics_leave_out_missing_values_and_a_distribution_is_over_members_
     )
     result = read.distribution(dataset)
     late = dataset["contact_area"].isel(t=slice(dataset.sizes["t"] // 2, None))
-    assert_allclose(result["contact_area_mean"], late.mean(("member", "t")), rtol=1e-13)
-    assert_allclose(result["contact_area_std"], late.std(("member", "t")), rtol=1e-9)
+    assert_allclose(
+        result["contact_area"].value, late.mean(("member", "t")), rtol=1e-13
+    )
+    assert_allclose(result["contact_area"].std, late.std(("member", "t")), rtol=1e-9)
     means = late.mean("t")
     assert_allclose(
-        result["contact_area_sem"],
+        result["contact_area"].sem,
         means.std("member", ddof=1) / math.sqrt(20),
         rtol=1e-10,
     )
     assert_allclose(
-        result["contact_area_quantile"],
+        result["contact_area"].quantile,
         late.quantile(LEVELS, ("member", "t")).T,
         rtol=1e-13,
     )
-    assert result["contact_area_mean"].dims == ("contact_load",) and bool(
-        result["speed_sem"].isnull().all()
+    assert result["contact_area"].value.dims == ("contact_load",) and bool(
+        result["speed"].sem.isnull().all()
     )
-    assert result["contact_area_quantile_low"].attrs["units"] == "m^2"
+    assert result["contact_area"].unit == "m^2"
 
 
 def squared_ornstein_uhlenbeck(rng, members, records, keep, pairs=5):
@@ -283,11 +287,9 @@ def test_energy_forgets_twice_as_fast_as_its_amplitudes_and_records_too_seldom_a
         clock=Clock(duration=0.4, step=0.001),
         ensemble=Ensemble(members=128),
     )
-    result = read.statistics(run(steady))
-    assert abs(float(result["correlation_time"]) - 0.01) < 5.0 * float(
-        result["correlation_time_sem"]
-    )
-    assert float(result["correlation_time_sem"]) < 1e-3
+    time = read.correlation_time(run(steady))
+    assert abs(float(time.value) - 0.01) < 5.0 * float(time.sem)
+    assert float(time.sem) < 1e-3
     field = shear.Banded(correlation=Time(time=0.02), **FIELD)
     coarse = run(
         scene(
@@ -297,7 +299,7 @@ def test_energy_forgets_twice_as_fast_as_its_amplitudes_and_records_too_seldom_a
             ensemble=Ensemble(members=16),
         )
     )
-    assert float(read.statistics(coarse)["correlation_time_below"]) == 0.04
+    assert float(read.correlation_time(coarse).high) == 0.04
     (cell,) = (
         row["mean"]
         for row in rows_of(coarse, read.spread)
@@ -321,22 +323,22 @@ def test_a_correlation_time_is_one_number_in_table_and_csv_and_a_missing_one_has
         result = read.correlation_time(dataset)
         energy = dataset["fluctuation_energy"].transpose(..., "t").to_numpy()
         exact = read.integral_time(np.atleast_2d(energy), clock.record or clock.step)
-        assert reason in exact.reason and reason in result[f"{NAME}_reason"].item()
+        assert reason in exact.reason and reason in result.reason.item()
         assert bool(exact.reason) is bool(reason) is math.isnan(exact.time)
-        assert_array_equal(result[NAME], exact.time)
+        assert_array_equal(result.value, exact.time)
         frame = read.long(read.Run(dataset)).set_index("quantity")
         assert_array_equal(frame.loc[[NAME], "mean"], exact.time)
         assert not any(NAME in column for column in frame.columns)
     dataset = run(scene(**parts | noise | {"clock": fine}))
     time = read.correlation_time(dataset)
-    expected = concise(1e3 * float(time[NAME]), 1e3 * float(time[f"{NAME}_sem"]))
+    expected = concise(1e3 * float(time.value), 1e3 * float(time.sem))
     assert expected in [
         row["mean"]
         for row in rows_of(dataset, read.spread)
         if row["quantity"] == "t_c (ms)"
     ]
     ramp = read.correlation_time(lens.ramp())
-    assert ramp[f"{NAME}_reason"].item() == "the speed changes"
+    assert ramp.reason.item() == "the speed changes"
 
 
 def test_there_is_no_correlation_time_where_nothing_decays_visibly_or_on_a_ramp():
@@ -353,7 +355,7 @@ def test_there_is_no_correlation_time_where_nothing_decays_visibly_or_on_a_ramp(
         assert all(math.isnan(number) for number in read.integral_time(energy, 0.1)[:2])
     energy = squared_ornstein_uhlenbeck(np.random.default_rng(4), 2, 12, 0.1)
     assert all(math.isnan(number) for number in read.integral_time(energy, 1.0)[:3])
-    assert math.isnan(read.correlation_time(lens.ramp())["correlation_time"])
+    assert math.isnan(read.correlation_time(lens.ramp()).value)
 
 
 def test_a_covariance_is_the_mean_of_products_of_deviations_and_sees_nothing_that_members_share():
@@ -510,10 +512,12 @@ def test_members_that_are_never_in_contact_are_no_survivors():
     assert 20 < closed.sum() < 80
     times = dataset["first_detachment"]
     every, alone = (
-        lifetimes(
-            dataset.isel(member=who), times.isel(member=who), "detached", "detached"
-        )
+        lifetimes(dataset.isel(member=who), times.isel(member=who), "detached")
         for who in (slice(None), closed)
     )
-    xr.testing.assert_identical(every, alone)
-    assert every["half_detached"] > 0.0
+    for of_all, of_closed in zip(every, alone, strict=True):
+        for kind in ("value", "low", "high"):
+            xr.testing.assert_identical(
+                *(getattr(o, kind) for o in (of_all, of_closed))
+            )
+    assert every[0].value > 0.0

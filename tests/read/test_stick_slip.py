@@ -12,6 +12,7 @@ from helpers.driven import force, scenario, spring
 from helpers.parts import Adhesion, Bell, Clock, Force, Record, Spring, read, run
 from helpers.printed import lines_of, rows_of
 from helpers.scenes import SHEARS, scene
+from helpers.statements import statistics, values_of
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
@@ -132,7 +133,7 @@ def test_stick_slip_mean_force_statistics_and_tables_are_those_of_the_closed_cyc
     moved = drop + result["slip_duration"]
     assert_allclose(result["slip_amplitude"] / LENGTH, moved, rtol=1e-6)
     assert_allclose(result["slip_speed"], LENGTH, rtol=1e-14)
-    result = read.stick_slip(cycles())
+    result = values_of(read.stick_slip(cycles()))
     begins = 1.0 + (STICKS + SLIPS) * np.arange(6)
     late = begins[begins >= 2.5]
     assert np.all(result["slip_count"] == late.size)
@@ -145,9 +146,9 @@ def test_stick_slip_mean_force_statistics_and_tables_are_those_of_the_closed_cyc
         atol=2.0 * RECORD / (late.size - 1),
         rtol=0,
     )
-    result = read.statistics(cycles())
-    assert_allclose(result["static_friction_mean"] / FORCE, 1.0, atol=2.0 * RECORD)
-    assert result["static_friction_mean"].attrs["units"] == "N"
+    result = statistics(cycles())
+    assert_allclose(result["static_friction"].value / FORCE, 1.0, atol=2.0 * RECORD)
+    assert result["static_friction"].value.attrs["units"] == "N"
     (row,) = rows_of(cycles(), read.highlights)
     cells = {" ".join(heading.split()): cell for heading, cell in row.items()}
     assert cells["slips"].startswith("3") and cells["kinetic friction (mN)"].startswith(
@@ -179,14 +180,14 @@ def test_stick_slip_mean_force_statistics_and_tables_are_those_of_the_closed_cyc
 def test_the_mean_speed_is_that_of_the_way_and_without_slips_there_is_kinetic_friction_alone():
     result = read.distribution(cycles(10.0))
     for name, exact in (("speed", LENGTH), ("spring_force", MEAN * FORCE)):
-        assert result[f"{name}_reason"] == "" and math.isnan(result[f"{name}_sem"])
+        assert result[name].reason == "" and math.isnan(result[name].sem)
         # whole cycles, of which each end is known to a record
         assert_allclose(
-            result[f"{name}_mean"], exact, rtol=2.0 * RECORD / (6.0 * (STICKS + SLIPS))
+            result[name].value, exact, rtol=2.0 * RECORD / (6.0 * (STICKS + SLIPS))
         )
     few = read.distribution(cycles())  # of 3.6 cycles in the second half
-    assert str(few["speed_reason"].item()).startswith("too short") and math.isnan(
-        few["speed_low"]
+    assert str(few["speed"].reason.item()).startswith("too short") and math.isnan(
+        few["speed"].low
     )
     area = scene(1).contact_area
     drive = Spring(stage=LENGTH, stiffness=1e3, damping=1.0, contact_stiffness="rigid")
@@ -199,7 +200,7 @@ def test_the_mean_speed_is_that_of_the_way_and_without_slips_there_is_kinetic_fr
             bonds=Unbroken(stress=FORCE / area),
         )
     )
-    result = read.stick_slip(dataset)
+    result = values_of(read.stick_slip(dataset))
     assert result["slip_count"].item() == 0.0 and math.isnan(
         result["static_friction"].item()
     )
@@ -314,7 +315,9 @@ def test_a_force_that_falls_while_the_slider_is_hardly_faster_than_the_stage_is_
 def test_the_records_of_a_run_do_not_change_its_slip_events(record):
     clock = PULLED["clock"] | {"record": record}
     seldom = run(sim.Scenario(**PULLED | {"clock": clock}))
-    xr.testing.assert_identical(read.stick_slip(seldom), read.stick_slip(pulled()))
+    xr.testing.assert_identical(
+        values_of(read.stick_slip(seldom)), values_of(read.stick_slip(pulled()))
+    )
 
 
 def machine(duration, **drive):
@@ -335,7 +338,7 @@ def test_the_slow_fall_of_friction_beyond_its_maximum_is_no_slip_event(stage, co
     dataset = run(machine("6 s", stage=stage))
     force = dataset["spring_force"].values
     assert force.max() > 1.02 * force[-1]
-    events = read.events(dataset)
+    events = values_of(read.events(dataset))
     assert dataset["slip_count"].item() == count
     # friction falls from its first maximum in all of them
     assert_allclose(events["static_threshold"], 0.3227, rtol=5e-3)
@@ -345,7 +348,7 @@ def test_the_static_threshold_of_a_ramp_is_the_first_maximum_and_the_onset_lies_
     """The force later rises to half as much again before slip events at higher speeds."""
     stage = {"from": "0.1 mm/s", "to": "2 mm/s", "scale": "log"}
     dataset = run(machine("8.67 s", stage=stage))
-    events = read.events(dataset)
+    events = values_of(read.events(dataset))
     assert_allclose(events["static_threshold"], 0.3129, rtol=1e-3)
     assert dataset["peak_friction"] > 1.2 * events["static_threshold"]
     first, second = dataset["slip_time"].values[:2]
@@ -370,7 +373,7 @@ def test_a_stage_that_gets_faster_and_slower_has_an_onset_and_an_end_of_slips_un
     clock = PULLED["clock"] | {"duration": "2.4 s"}
     scene = {key: PULLED[key] for key in PULLED if key != "sweep"}
     dataset = run(sim.Scenario(**scene | {"drive": drive, "clock": clock}))
-    result = read.stick_slip(dataset)
+    result = values_of(read.stick_slip(dataset))
     time = dataset["slip_time"].values
     before = 1.0 + 2.0 * np.array([2.0 * time[0] - time[1], time[0]])
     onset = [result["onset_steady_speed"], result["onset_slip_speed"]]
@@ -387,7 +390,7 @@ def test_a_stage_that_gets_faster_and_slower_has_an_onset_and_an_end_of_slips_un
 def test_slips_that_begin_at_the_start_of_a_ramp_have_no_onset():
     drive = PULLED["drive"] | {"stage": {"from": "3 mm/s", "to": "5 mm/s"}}
     scene = {key: PULLED[key] for key in PULLED if key != "sweep"}
-    result = read.stick_slip(run(sim.Scenario(**scene | {"drive": drive})))
+    result = values_of(read.stick_slip(run(sim.Scenario(**scene | {"drive": drive}))))
     assert result["slip_count"] > 10 and np.isnan(result["onset_slip_speed"])
 
 
@@ -413,7 +416,7 @@ def test_slip_events_and_peaks_after_a_hold_are_told_apart_from_those_before_wha
     for of in (read.slips_by_phase, read.peaks_after_holds):
         xr.testing.assert_identical(of(seldom), of(dataset))
     # it would be a mean over phases
-    assert "static_friction" not in read.stick_slip(dataset)
+    assert "static_friction" not in values_of(read.stick_slip(dataset))
 
 
 @pytest.mark.parametrize(("length", "settles"), [("0.05 s", False), ("2.4 s", True)])
@@ -424,14 +427,14 @@ def test_the_kinetic_friction_is_that_of_steady_sliding_and_absent_while_the_spr
     scene = {key: PULLED[key] for key in PULLED if key != "sweep"}
     drive = PULLED["drive"] | {"stage": "1 mm/s"}
     dataset = run(sim.Scenario(**scene | {"drive": drive, "clock": clock}))
-    result = read.stick_slip(dataset)
+    friction = read.stick_slip(dataset)["kinetic_friction"]
     if settles:
         force = dataset["spring_force"].values[-1]
-        assert_allclose(result["kinetic_friction"], force, rtol=1e-4)
-        assert result["kinetic_friction_reason"] == ""
+        assert_allclose(friction.value, force, rtol=1e-4)
+        assert friction.reason == ""
     else:
-        assert np.isnan(result["kinetic_friction"])
-        assert result["kinetic_friction_reason"] == "not settled"
+        assert np.isnan(friction.value)
+        assert friction.reason == "not settled"
 
 
 def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused():
@@ -447,7 +450,7 @@ def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused(
     dataset = run(
         scene(2, clock=Clock(duration=12.0, step=0.1), drive=drive, bonds=bonds)
     )
-    result = read.stick_slip(dataset)
+    result = values_of(read.stick_slip(dataset))
     when = dataset["runaway_time"].isel(t=-1).values
     assert np.all(when > 1.0) and np.all(result["ran_away"] == 1.0)
     assert_allclose(result["runaway_after"], when, rtol=1e-14)
@@ -457,7 +460,7 @@ def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused(
     # none after its end
     assert all("–" not in row.values() for row in rows_of(dataset)[-3:])
     held = run(scene(1, clock=Clock(duration=0.5, step=0.1), drive=drive, bonds=bonds))
-    calm = read.stick_slip(held)
+    calm = values_of(read.stick_slip(held))
     assert calm["ran_away"].item() == 0.0 and np.isnan(calm["static_friction"]).all()
     cells = {
         " ".join(heading.split()): cell
@@ -471,7 +474,7 @@ def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused(
     )
     with pytest.raises(ValueError, match="spring"):
         read.slips(dataset)
-    assert not read.stick_slip(dataset.drop_vars("runaway_time"))
+    assert not values_of(read.stick_slip(dataset.drop_vars("runaway_time")))
 
 
 def test_statistics_alone_have_the_means_of_slip_events_over_the_members_that_slip():
@@ -479,29 +482,29 @@ def test_statistics_alone_have_the_means_of_slip_events_over_the_members_that_sl
     field = replace(SHEARS["modal, time, constant"], paid_by_adhesion=0.0)
     noisy = replace(cycled(), shear=field)
     pooled = run(replace(noisy, record=Record(per_member=False)))
-    each = read.stick_slip(run(noisy))
+    each = values_of(read.stick_slip(run(noisy)))
     with pytest.raises(ValueError, match="per_member"):
         read.slips(pooled)
-    result = read.stick_slip(pooled)
+    result = read.Run(pooled).events
     for name in (
         "slip_count",
         "static_friction",
         "recurrence_time_largest",
         "kinetic_friction",
     ):
-        assert_allclose(result[f"{name}_mean"], each[name].mean(), rtol=1e-12)
+        assert_allclose(result[name].value, each[name].mean(), rtol=1e-12)
         assert_allclose(
-            result[f"{name}_sem"],
+            result[name].sem,
             each[name].std(ddof=1) / math.sqrt(2.0),
             rtol=1e-9,
             atol=1e-18,
         )
     values = np.array([[1.0, NAN], [2.0, NAN], [NAN, NAN]])
     groups = [moments(values[:1]), moments(values[1:]), moments(values[2:])]
-    result = pooled_moments(groups)
-    assert_array_equal(result["count"], [2.0, 0.0])
-    assert_array_equal(result["mean"], [1.5, NAN])
-    assert_allclose(result["sem"], [0.5, NAN], rtol=1e-14)
+    mean, _, error, count = pooled_moments(groups)
+    assert_array_equal(count, [2.0, 0.0])
+    assert_array_equal(mean, [1.5, NAN])
+    assert_allclose(error, [0.5, NAN], rtol=1e-14)
 
 
 def test_a_settled_creep_without_noise_has_no_spread():
@@ -519,8 +522,10 @@ def test_a_stage_that_jumps_between_speeds_has_no_onset_of_slips_and_no_end():
         "value": ["3 mm/s", "3 mm/s", "8 mm/s", "8 mm/s"],
     }
     alone = {key: value for key, value in PULLED.items() if key != "sweep"}
-    result = read.stick_slip(
-        run(sim.Scenario(**alone | {"drive": PULLED["drive"] | {"stage": stage}}))
+    result = values_of(
+        read.stick_slip(
+            run(sim.Scenario(**alone | {"drive": PULLED["drive"] | {"stage": stage}}))
+        )
     )
     assert result["slip_count"] > 10 and list(result) == ["slip_count"]
 
@@ -546,11 +551,12 @@ def test_the_time_of_a_loss_of_stability_is_no_mean_over_the_members_that_happen
         }
     )
     members = members.assign(spring_force=0.0)
-    all_of_them = read.stick_slip(members.isel(member=slice(2)))
+    all_of_them = values_of(read.stick_slip(members.isel(member=slice(2))))
     assert all_of_them["runaway_after"].mean() == 2.0
-    some = read.stick_slip(members)
+    found = read.stick_slip(members)
+    some = values_of(found)
     assert some["ran_away"].mean() == 2.0 / 3.0
     assert (
         some["runaway_after"].isnull().all() and some["static_friction"].isnull().all()
     )
-    assert some["runaway_after_reason"] == "not every member loses stability"
+    assert found["runaway_after"].reason == "not every member loses stability"

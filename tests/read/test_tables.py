@@ -24,6 +24,7 @@ from helpers.parts import (
     shear,
 )
 from helpers.printed import rows_of
+from helpers.statements import shares, statistics
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
@@ -56,14 +57,14 @@ def test_a_reduced_dataset_has_the_columns_that_it_can(per_member):
 
 
 def test_tables_have_a_dozen_rows_or_one_for_each_point(ramp):
-    rows, result = rows_of(ramp), read.statistics(ramp)
+    rows, result = rows_of(ramp), statistics(ramp)
     assert len(rows) == 12 and all(set(row) == set(rows[0]) for row in rows)
     assert [rows[0]["t (ms)"], rows[-1]["t (ms)"]] == ["0", "400"]
     for row, at in ((rows[0], 0), (rows[-1], -1)):
         mean = float(re.match(r"[\d.]+", row["a (µm)"])[0])
         # half a unit of the fourth digit, the least that is shown
         np.testing.assert_allclose(
-            mean, 1e6 * float(result["contact_radius_mean"][at]), rtol=5e-4
+            mean, 1e6 * float(result["contact_radius"].value[at]), rtol=5e-4
         )
     assert "open (%)" not in rows[0]
     # Wilson's bound of none in six: z²/(6 + z²) = 0.390
@@ -121,19 +122,20 @@ def of(long, quantity):
 
 
 def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp_path):
-    result, rows = read.statistics(ramp), of(long, "contact_radius")
-    names = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": "std"}
+    result, rows = statistics(ramp), of(long, "contact_radius")
+    names = {"mean": "value", "error": "sem", "low": "low", "high": "high"}
+    names["sd"] = "std"
     assert_array_equal(rows["t [s]"], ramp["t"])
     assert_array_equal(rows["speed [m/s]"], ramp["speed"])
     for column, kind in names.items():
-        assert_array_equal(rows[column], result[f"contact_radius_{kind}"])
+        assert_array_equal(rows[column], getattr(result["contact_radius"], kind))
     assert_array_equal(
-        rows["q95"], result["contact_radius_quantile"].sel(quantile=0.95)
+        rows["q95"], result["contact_radius"].quantile.sel(quantile=0.95)
     )
     assert_array_equal(
-        rows["q50_low"], result["contact_radius_quantile_low"].sel(quantile=0.5)
+        rows["q50_low"], result["contact_radius"].quantile_low.sel(quantile=0.5)
     )
-    lost = read.shares(ramp)["lost_to_fluctuations_first_mean"]
+    lost = shares(ramp)["lost_to_fluctuations_first"].value
     assert_array_equal(of(long, "lost_to_fluctuations_first")["mean"], lost)
     assert (
         set(rows["unit"]) == {"m"}
@@ -142,12 +144,12 @@ def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp
     )
     (masked,) = of(long, "time_masked").to_dict("records")
     assert masked["mean"] == float(
-        read.statistics(ramp)["time_masked_mean"]
+        statistics(ramp)["time_masked"].value
     ) and math.isnan(masked["t [s]"])
     (dissipated,) = of(long, "total_dissipated").to_dict("records")
     assert dissipated["q95"] == 0.0 and dissipated["unit"] == "J"
     (speed,) = of(long, "speed_at_5_percent_lost").to_dict("records")
-    result = read.loss_speeds(ramp)["speed_at_5_percent_lost_low"]
+    result = read.loss_speeds(ramp)["speed_at_5_percent_lost"].low
     assert speed["low"] == float(result) and speed["unit"] == "m/s"
     sweep = {"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 0.5, 1.0]}
     dataset = run(scene(sweep=sweep, shear=shear.Uniform()))
@@ -284,9 +286,9 @@ def test_tables_leave_out_what_tells_nothing_and_say_how_steady_quantities_are_s
         "free values",
     ]
     np.testing.assert_allclose(
-        float(energy["sd"]), 1e3 * float(law["fluctuation_energy_std"]), rtol=5e-3
+        float(energy["sd"]), 1e3 * float(law["fluctuation_energy"].std), rtol=5e-3
     )
-    free_values = float(law["fluctuation_energy_effective_samples"])
+    free_values = float(law["fluctuation_energy"].number)
     np.testing.assert_allclose(float(energy["free values"]), free_values, rtol=5e-3)
     assert "(" in energy["mean"] and "(" in energy["95 %"]
     assert rows_of(lens.ramp(), read.spread) == []
@@ -316,9 +318,7 @@ def test_rows_of_the_whole_run_have_no_time_whether_or_not_a_loop_is_closed(cycl
     }
     dataset = run(scene(contact=course, **quiet))
     rows = read.long(read.Run(dataset))
-    of_run = rows["quantity"].isin(
-        [name.removesuffix("_mean") for name in map(str, read.statements(dataset))]
-    )
+    of_run = rows["quantity"].isin([*read.Run(dataset).statements()])
     assert (
         ("loop_energy" in set(rows["quantity"])) == bool(cycles)
         and of_run.any()
@@ -376,7 +376,7 @@ def test_the_speed_of_a_slider_on_single_bonds_is_its_displacement_over_the_time
     shown = [float(re.match(r"[\d.]+", row["V (µm/s)"])[0]) for row in rows_of(dataset)]
     at = np.rint(np.linspace(0, 200, 12)).astype(int)[1:-1]
     speed = 1e6 * (position[at + 1] - position[at - 1]) / (2.0 * time[1])
-    few = read.distribution(dataset.isel(t=[0, 100, 200]), ["speed"])["speed_mean"]
+    few = read.distribution(dataset.isel(t=[0, 100, 200]), ["speed"])["speed"].value
     np.testing.assert_allclose(
         few, (position[200] - position[100]) / (time[200] - time[100]), rtol=1e-9
     )

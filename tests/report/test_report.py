@@ -15,6 +15,7 @@ from helpers.commands import SCENE, sim
 from helpers.parts import Clock, Ensemble, Equilibrium, Record, load, read, run, shear
 from helpers.pictured import STEADY, mapped, simulated
 from helpers.printed import rows_of
+from helpers.statements import statistics
 
 from sim.plots import kinds
 from sim.read.observables import full_area
@@ -333,7 +334,7 @@ def test_a_page_has_the_numbers_of_the_statistics_its_question_and_error_estimat
             rest,
         )
     # of all records, of which 24 are looked at
-    error = float(read.statistics(ramp)["area_ratio_sem"].max())
+    error = float(statistics(ramp)["area_ratio"].sem.max())
     *_, row = report.known(ramp)
     assert 0.5 * error < 0.01 * float(row["size"].removesuffix(" %")) <= error * 1.005
 

@@ -1,0 +1,482 @@
+"""Peaks of stress and friction: of a start from rest or a ramp of the speed, after a hold, and of noisy members."""
+
+import contextlib
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from scipy import special
+
+from sim.read.correlation import LEVEL, Array
+from sim.read.dataset import (
+    MEMBERS,
+    STATISTIC,
+    ensemble_mean,
+    plain,
+    setting,
+    speed_of,
+    word,
+)
+from sim.read.estimate import Estimate, Estimates
+from sim.read.late import observable_of
+from sim.read.observables import labelled, pure
+from sim.units.notation import engineering
+
+#: Relative changes below it are rounding.
+_ROUNDING = 1e-9
+#: Peaks, each with the quantity that it is of, and the beginning of the names of its time and speed.
+PEAKS = {
+    "peak_stress": ("shear_stress", "peak"),
+    "peak_friction": ("friction_force", "peak_friction"),
+}
+
+
+def differ(variable: xr.DataArray) -> bool:
+    """True for a variable of which the members have different values."""
+    return bool({MEMBERS, STATISTIC} & {*variable.dims})
+
+
+def peaks(dataset: xr.Dataset) -> Estimates:
+    """Return the friction peak after a start from rest, and the friction maximum of a ramp of the speed.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+
+    Returns
+    -------
+    dict of str to Estimate
+        ``peak_stress`` [Pa], the largest magnitude of the shear stress while sliding; ``peak_time`` [s], from
+        where sliding starts; ``peak_speed`` [m/s]; and ``peak_friction`` [N], ``peak_friction_time`` and
+        ``peak_friction_speed``, the same of the friction force. Empty under any other drive, and of members that
+        differ: their largest value is that of the noise
+        (see ``ensemble_peaks``).
+
+    Notes
+    -----
+    Peaks are those of the clock steps, refined between them. nan where there is none: the value at the end of the run,
+    or on a ramp that at its start, is as large. A start may peak at once, when the stress falls from what it was at
+    rest.
+    """
+    dataset = plain(dataset)
+    drive = word(dataset, "drive.model", "")
+    ramp, start = drive == "ramp", drive == "start"
+    if not bool((ramp | start).any()):
+        return {}
+    result, phased = Estimates(), "phase_start" in dataset
+    last = dataset["phase_start"].count("phase") - 1 if phased else xr.DataArray(0)
+    beginning = (
+        dataset["phase_start"].isel(phase=last).where(start, 0.0)
+        if phased
+        else xr.DataArray(0.0)
+    )
+    for name, (source, prefix) in PEAKS.items():
+        if not {name, source} <= {*dataset} or differ(dataset[name]):
+            continue
+        ends = abs(dataset[source].astype(float)).isel(t=[0, -1])
+        read = [dataset[key] for key in (name, f"{prefix}_time", f"{prefix}_speed")]
+        if phased:
+            read = [
+                dataset[f"phase_{whole.name}"].isel(phase=last).where(start, whole)
+                for whole in read
+            ]
+        size, when, speed = read
+        before, after = (
+            size / (1.0 + _ROUNDING) > ends.isel(t=k, drop=True) for k in (0, 1)
+        )
+        known = (ramp | start) & after & (~ramp | before)
+        since = when - beginning
+        bounds: list[xr.DataArray | None] = [None, None]
+        if bool(ramp.any()):
+            late = _late_by_steps(dataset, when, speed)
+            since = since - late.time.where(ramp, 0.0)
+            speed = late.speed.where(ramp, speed)
+            bounds = [late.time_bound, late.speed_bound]
+        about = dataset[source].attrs
+        text = f"largest {about.get('long_name', source)} while sliding"
+        unit = str(about.get("units", "1"))
+        columns = {
+            name: (size, None, unit, text),
+            f"{prefix}_time": (
+                since,
+                bounds[0],
+                "s",
+                f"time from the start of sliding to the {text}",
+            ),
+            f"{prefix}_speed": (
+                speed,
+                bounds[1],
+                "m/s",
+                f"sliding speed at the {text}",
+            ),
+        }
+        for key, (values, bound, *described) in columns.items():
+            values = labelled(values.where(known), *described)
+            one = Estimate(values)
+            if bound is not None:
+                bound = bound.where(known).assign_attrs(source="step")
+                one = one._replace(bound=bound)
+            result[key] = one.map(lambda each: each.drop_vars("phase", errors="ignore"))
+    return result
+
+
+#: Relaxation rate times half a clock step from which on bonds have forgotten the step before.
+_FORGOTTEN = 10.0
+
+
+class Late(NamedTuple):
+    """Time by which a maximum along a ramp is found late, the speed at its true time, and what may be left of both."""
+
+    time: xr.DataArray
+    speed: xr.DataArray
+    time_bound: xr.DataArray
+    speed_bound: xr.DataArray
+
+
+def _late_by_steps(
+    dataset: xr.Dataset, when: xr.DataArray, speed: xr.DataArray
+) -> Late:
+    """Return by how much the clock step makes a maximum late that is found at a time [s] and a speed [m/s] of a ramp.
+
+    Notes
+    -----
+    During a clock step dt bonds have the mean speed of the step, which is that at its
+    middle, but time and speed of a sample are those at its end. Bonds without a memory
+    are therefore found dt/2 late. Bonds that relax exponentially at a rate k have the
+    delay ``dt/2 coth(x)`` with ``x = k dt/2`` in place of 1/k. They are found L(x) dt/2
+    late, with Langevin's function ``L(x) = coth(x) - 1/x``. The rate k is that of
+    rebinding over the share of bonds that is left, as in a rate equation.
+
+    Two errors remain. In other models k may differ by a factor, which changes the delay
+    by about 1/k. The maximum between samples is that of a parabola, whose vertex is off
+    by dt² f'''/(6 f''). Over the logarithm of the speed the third derivative of the stress
+    is at most about three times the second, and a linear ramp adds three. With the
+    relative change h of the speed in a step the vertex is therefore off by at most h dt.
+    Bonds that remember a step (x < 10) are sought by their slopes at the speed of the
+    samples, and their maximum is only known to a step.
+    """
+    step, duration = setting(dataset, "clock.step"), setting(dataset, "clock.duration")
+    is_log = word(dataset, "drive.scale", "") == "log"
+    first, last = (speed_of(dataset).isel(t=k, drop=True) for k in (0, -1))
+    with contextlib.suppress(KeyError):  # tables of a drive that are swept whole
+        first, last = (setting(dataset, f"drive.{end}") for end in ("from", "to"))
+    size = abs(speed)
+    ratio = abs(last / first.where(is_log, 1.0)).where(is_log, 1.0)
+    # the growth of the magnitude of the speed
+    slope = (size * np.log(ratio)).where(is_log, (last - first) * np.sign(speed))
+    slope = slope / duration
+    memory = xr.DataArray(math.inf)
+    with contextlib.suppress(KeyError):
+        memory = setting(dataset, "bonds.rebinding_rate")
+        if "bond_fraction" in dataset and MEMBERS not in dataset["bond_fraction"].dims:
+            at = when.fillna(0.0)
+            left = dataset["bond_fraction"].sel(t=at, method="nearest").drop_vars("t")
+            memory = memory / left
+    half = 0.5 * memory * step
+    with np.errstate(over="ignore", divide="ignore"):
+        exact = 1.0 / np.tanh(half) - 1.0 / half
+        langevin = xr.where(half > 1e-3, exact, half / 3.0)
+    late = 0.5 * step * langevin
+    change = abs(slope) / size.where(size > 0.0)
+    bound = (step * step * change + 1.0 / memory).where(half >= _FORGOTTEN, step)
+    earlier = (size * np.exp(-slope / size * late)).where(is_log, size - slope * late)
+    return Late(late + 0.0 * when, earlier, bound, change * size * bound)
+
+
+def static_threshold(dataset: xr.Dataset) -> Estimates:
+    """Return the static threshold: the first maximum of the friction after a start from rest, and the area at it.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, of a drive that starts from rest at a constant control of the contact.
+
+    Returns
+    -------
+    dict of str to Estimate
+        ``static_threshold`` [N]; ``area_at_threshold`` [1], the contact area there over that at rest; and
+        ``threshold_after`` [s], the time of the threshold. nan if the friction does not fall by 1 % from its first
+        maximum before it exceeds the maximum again. Empty of other drives.
+
+    Notes
+    -----
+    The maximum is that of the clock steps of each member, refined between them. If members differ, each has its own
+    threshold. The first maximum from which noise takes 1 % may then come before the maximum of the mean, and it is
+    lower. If the relative noise of the friction is of the order of 1 %, read the peak of the mean instead
+    (``ensemble_peaks``).
+    """
+    if "static_threshold_area" not in dataset:
+        return {}
+    text = "first maximum of the friction force after a start from rest"
+    force, when, area = (
+        dataset[name].astype(float)
+        for name in (
+            "static_threshold",
+            "static_threshold_time",
+            "static_threshold_area",
+        )
+    )
+    at_rest = ensemble_mean(dataset["contact_area"]).isel(t=0, drop=True)
+    about = f"contact area at the {text} over that at rest"
+    return {
+        "static_threshold": Estimate(labelled(force, "N", text)),
+        "area_at_threshold": Estimate(pure(area / at_rest, about)),
+        "threshold_after": Estimate(labelled(when, "s", f"time of the {text}")),
+    }
+
+
+def peaks_after_holds(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the friction peak after each hold, and the time for which the slider or the stage was held before.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, of a drive with more than one phase.
+
+    Returns
+    -------
+    xarray.Dataset
+        With the dimension ``phase`` last: ``peak_after_hold`` [N], the first maximum of the friction after a rest, if
+        the friction then falls by 1 % before it exceeds the maximum; ``time_held`` [s] before; and the ``start`` [s] of
+        the phase. All are nan in other phases. Empty if nothing rests before another phase.
+    """
+    if "phase_static_threshold" not in dataset:
+        return xr.Dataset()
+    start, rests = dataset["phase_start"], dataset["phase_name"].str.contains("rest")
+    held = (dataset["phase_end"] - start).where(rests).shift(phase=1)
+    peak = dataset["phase_static_threshold"].astype(float)
+    result = xr.Dataset(
+        {
+            "peak_after_hold": labelled(
+                peak.where(held.notnull()),
+                "N",
+                "first maximum of the friction force after a hold",
+            ),
+            "time_held": labelled(held, "s", "time at rest before a phase"),
+            "start": labelled(start, "s", "start of a phase"),
+        }
+    )
+    return result.transpose(..., "phase")
+
+
+# --- peaks of the mean of members with noise, with errors, or the reason for none ---
+
+#: Chance of a peak out of noise; resampled ensembles for the error of its time; share of the records after it.
+_CHANCE, _RESAMPLED, _AFTER = 0.01, 200, 8
+#: Standard errors by which estimates of a peak over different numbers of records may differ.
+_ALIKE = 2.0
+#: Dimensions of a quantity of each member.
+_EACH = [MEMBERS, "t"]
+#: Records that a peak needs: an eighth of them are its end.
+_FEWEST = 8
+
+
+class Peak(NamedTuple):
+    """Peak of the mean of members, its standard error, time, and the ends of both intervals; or why there is none."""
+
+    reason: str
+    value: float = math.nan
+    sem: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
+    time: float = math.nan
+    first: float = math.nan
+    last: float = math.nan
+
+
+def peak_of_mean(values: Array, times: Array, unit: str = "1") -> Peak:
+    """Return the peak of the mean of members with noise, after the first of their records.
+
+    Parameters
+    ----------
+    values : array, shape (members, records)
+        All known.
+    times : array, shape (records,)
+        Since the first record [s], evenly spaced.
+    unit : str
+        Of the values, for the reason.
+
+    Notes
+    -----
+    The mean must rise above the first record and above the mean over the last eighth by more than noise does in one of
+    a hundred runs: by Student's law for the largest of as many values as there are records. A parabola through the
+    records about the largest moving average gives value and time. Its width is doubled as long as the estimates agree
+    within two of the standard errors of their differences (Lepski's rule). The error is that of the members under these
+    weights; that of the time is from ensembles drawn from these members, and at least half a record.
+    """
+    members, records = values.shape
+    mean, free, tail = values.mean(axis=0), members - 1.0, np.zeros(records)
+    tail[-max(1, records // _AFTER) :] = 1.0 / max(1, records // _AFTER)
+    last = records - max(1, records // _AFTER)
+
+    def error(weights: Array) -> float:
+        return (
+            float(np.std(values @ weights, ddof=1)) / math.sqrt(members)
+            if members > 1
+            else math.nan
+        )
+
+    weights, _ = _top(mean, 0, last)
+    place = int(np.argmax(weights))
+    surely = float(special.stdtrit(free, 1.0 - _CHANCE / records))
+    for base in (tail, np.eye(1, records)[0]):
+        if not (weights - base) @ mean > surely * error(weights - base):
+            most, end, when = (
+                engineering(*number)
+                for number in (
+                    (mean[place], unit),
+                    (float(tail @ mean), unit),
+                    (float(times[place]), "s"),
+                )
+            )
+            return Peak(
+                f"no peak above the noise: at most {most} after {when}, {end} at the end"
+            )
+    if place < 3:
+        step = engineering(float(times[place]) / 4.0, "s")
+        return Peak(
+            f"too few records to resolve the peak: record every {step} or more often"
+        )
+    tried, width = [_top(mean, 0, last)], 1
+    # an average about a record before the last eighth has as many after it
+    while 2 * width <= min(place, records - last + 1):
+        weights, at = _top(mean, width, last)
+        if any(
+            abs((weights - other) @ mean) > _ALIKE * error(weights - other)
+            for other, _ in tried
+        ):
+            break
+        tried, width = [*tried, (weights, at)], 2 * width
+    (weights, at), width = tried[-1], width // 2
+    rng = np.random.default_rng(0)  # the same interval each time
+    drawn = (
+        rng.multinomial(members, np.full(members, 1.0 / members), size=_RESAMPLED)
+        / members
+        @ values
+    )
+    ends = np.quantile(
+        [_top(each, width, last)[1] for each in drawn],
+        [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL],
+    )
+    value, sem, records_at = float(weights @ mean), error(weights), np.arange(records)
+    half = float(special.stdtrit(free, 0.5 + 0.5 * LEVEL)) * sem
+    between = max(
+        0.0, 0.125 * float(np.array([-1.0, 2.0, -1.0]) @ mean[place - 1 : place + 2])
+    ) * (width < 2)
+    time, first, stop = np.interp([at, ends[0] - 0.5, ends[1] + 0.5], records_at, times)
+    return Peak(
+        "",
+        value,
+        sem,
+        value - half,
+        value + half + between,
+        float(time),
+        float(first),
+        float(stop),
+    )
+
+
+def _top(mean: Array, width: int, last: int) -> tuple[Array, float]:
+    """Return the weights of the records whose sum is the peak before the record ``last``, and its place.
+
+    It is the largest value, or if the ``width`` is two or more records to both sides the vertex of a parabola.
+    """
+    sums = np.append(0.0, np.cumsum(mean))
+    # of centres width, ..., last - 1
+    averages = sums[2 * width + 1 : last + width] - sums[: last - width - 1]
+    begin = 1 if width == 0 else 0
+    place = width + begin + int(np.argmax(averages[begin:]))
+    weights, at = np.zeros(len(mean)), float(place)
+    if width < 2:
+        weights[place] = 1.0
+        return weights, at
+    chosen = slice(place - width, place + width + 1)
+    fit = np.linalg.pinv(np.vander(np.linspace(-1.0, 1.0, 2 * width + 1), 3))
+    curvature, slope, _ = fit @ mean[chosen]
+    vertex = (
+        float(np.clip(-0.5 * slope / curvature, -1.0, 1.0)) if curvature < 0.0 else 0.0
+    )
+    weights[chosen] = np.array([vertex**2, vertex, 1.0]) @ fit
+    return weights, at + vertex * width
+
+
+def ensemble_peaks(dataset: xr.Dataset) -> Estimates:
+    """Return the peaks of stress and friction of members with noise, while sliding after a rest or along a ramp.
+
+    Returns
+    -------
+    dict of str to Estimate
+        ``peak_stress`` [Pa] and ``peak_friction`` [N], with a reason without a peak, see ``peak_of_mean``; time since
+        sliding starts, ``peak_time`` and ``peak_friction_time`` [s], and speed then, ``peak_speed`` and
+        ``peak_friction_speed`` [m/s], with intervals. Empty under any other drive, and of members that do not differ.
+        Peaks of friction are of the contacts that stay closed.
+    """
+    dataset = plain(dataset)
+    drive, result = word(dataset, "drive.model", ""), Estimates()
+    is_ramp, starts = drive == "ramp", drive == "start"
+    if not bool((is_ramp | starts).any()) or "speed" not in dataset:
+        return result
+    rest = xr.DataArray(0.0)
+    if "phase_start" in dataset:  # the last phase of a start is sliding
+        begins = dataset["phase_start"]
+        sliding = begins.isel(phase=begins.count("phase") - 1)
+        rest = sliding.drop_vars("phase", errors="ignore").where(starts, 0.0)
+    times, sweep = dataset["t"], xr.zeros_like(dataset["contact_modulus"], float)
+    onset = (times >= rest - 1e-6 * times[-1]).argmax("t")
+    speeds = abs(speed_of(dataset)) + sweep
+    for name, (source, prefix) in PEAKS.items():
+        if source not in dataset or not differ(dataset[source]):
+            continue
+        about = dataset[source].attrs
+        unit = str(about.get("units", "1"))
+        values = xr.DataArray(np.empty((0, times.size)), dims=_EACH)
+        if MEMBERS in dataset[source].dims:
+            values = observable_of(dataset, source)
+        how: Any = {
+            "input_core_dims": [_EACH, ["t"], [], ["t"]],
+            "output_core_dims": [[]] * 11,
+            "vectorize": True,
+            "output_dtypes": [object, *"dddddddddd"],
+            "kwargs": {"unit": unit},
+        }
+        reason, value, sem, low, high, *places = xr.apply_ufunc(
+            _peak_since, values, speeds, onset, times, **how
+        )
+        when, at = places[:3], places[3:]
+        if bool(is_ramp.any()):
+            late = _late_by_steps(dataset, when[0], at[0])
+            share = (late.speed / at[0]).where(is_ramp, 1.0)
+            when = [each - late.time.where(is_ramp, 0.0) for each in when]
+            at = [each * share for each in at]
+        text = f"peak of the mean of the {source.replace('_', ' ')}"
+        reason = reason.drop_attrs(deep=False)
+        value = labelled(value, unit, text)
+        result[name] = Estimate(value, sem, low, high, reason=reason)
+        for kind, (middle, first, last), si, words in (
+            ("time", when, "s", f"time of sliding to the {text}"),
+            ("speed", at, "m/s", f"speed at the {text}"),
+        ):
+            middle = labelled(middle, si, words)
+            result[f"{prefix}_{kind}"] = Estimate(middle, low=first, high=last)
+    return result
+
+
+def _peak_since(
+    values: Array, speeds: Array, first: int, times: Array, unit: str
+) -> tuple[Any, ...]:
+    """Return the fields of the ``Peak`` of the members after a record, and the speed at its time and interval."""
+    if not len(values):
+        return *Peak(
+            "the peak of members with noise needs every member: [record] per_member = true"
+        ), *[math.nan] * 3
+    known, since = np.abs(values[:, first:]), times[first:] - times[first]
+    known = known[np.isfinite(known).all(axis=-1)]
+    is_enough = len(known) > 1 and known.shape[1] >= _FEWEST
+    peak = (
+        peak_of_mean(known, since, unit)
+        if is_enough
+        else Peak("too few records or members")
+    )
+    return *peak, *np.interp(peak[-3:], since, speeds[first:])
