@@ -27,8 +27,8 @@ from sim.read.observables import ENDINGS, labelled, pure
 from sim.read.statistics import LEVEL, WIDE, Array, observable_of, summary
 from sim.units.notation import engineering
 
-#: Relative changes below it are rounding.
-_ROUNDING = 1e-9
+#: Relative changes below it are rounding, also of records with six digits (``record.compression = "digits"``).
+_ROUNDING = 1e-6
 #: Path of the stage in a clock step over the advance in a slip event, above which the event is not resolved.
 _COARSE = 0.02
 #: Properties of slip events and the quantities of late ones of which the engine records moments.
