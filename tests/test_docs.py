@@ -97,7 +97,10 @@ def test_links_between_pages_lead_to_files_and_headings():
 
 
 def test_names_of_code_in_the_pages_exist():
-    for page in {*PAGES} - {"CHANGELOG.md"}:  # which has former names, too
+    scenarios = (
+        f"scenarios/{path.name}" for path in (ROOT / "scenarios").glob("*.toml")
+    )
+    for page in {*PAGES, *scenarios} - {"CHANGELOG.md"}:  # which has former names, too
         for name in set(
             re.findall(
                 r"`(sim(?!\.schema\.json)(?:\.\w+)+)(?:\([^`]*\))?`", text_of(page)
