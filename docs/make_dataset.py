@@ -149,7 +149,7 @@ seeds = xarray.open_mfdataset(
 )
 ```
 
-`open_mfdataset` needs dask, which `pip install 'sliding-sim[cluster]'` adds. Without dask, `xarray.concat` joins the
+`open_mfdataset` needs dask, which `pip install '.[cluster]'` adds. Without dask, `xarray.concat` joins the
 runs that `[sim.open(path) for path in paths]` has opened, with the same options.
 
 Attributes are those of the first run. `t` counts seconds and is no date. Therefore `dataset.resample` needs
