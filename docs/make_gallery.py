@@ -931,17 +931,30 @@ def peeling(dataset: xr.Dataset) -> dict[str, Number]:
     "afm_tip",
     "Is the friction of an AFM tip a measure of its contact area?",
     """Yes, in the model friction is proportional to the area: it is {stress:g} GPa times JKR's area. This holds in
-    tension, too, down to the pull-off at {off:.0f} nN, where friction is {friction:.0f} nN. Without load friction
-    is {zero:.0f} nN.""",
+    tension, too: at {tension:.0f} nN friction is {friction:.0f} nN. At the pull-off, at {off:.1f} nN, JKR's area leaves
+    {least:.1f} nN. Without load friction is {zero:.0f} nN.""",
 )
 def afm_tip(dataset: xr.Dataset) -> dict[str, Number]:
     last, load = dataset.isel(t=-1), dataset["contact_load"]
     force = 1e9 * last["friction_force"].where(last["in_contact"] == 1, drop=True)
     zero = 1e9 * last["friction_force"][nearest(load, 0.0)]
+    stress, off, size, modulus = (
+        float(values.max())
+        for values in (
+            last["shear_stress"],
+            dataset["jkr_pull_off_load"],
+            dataset["sphere_radius"],
+            dataset["contact_modulus"],
+        )
+    )
+    # the radius of the JKR contact at its pull-off
+    least = np.pi * (-0.75 * off * size / modulus) ** (2.0 / 3.0)
     return {
-        "stress": 1e-9 * float(last["shear_stress"].max()),
-        "off": 1e9 * float(dataset["jkr_pull_off_load"].max()),
+        "stress": 1e-9 * stress,
+        "off": 1e9 * off,
+        "tension": 1e9 * float(force["contact_load"][0]),
         "friction": float(force[0]),
+        "least": 1e9 * stress * least,
         "zero": float(zero),
     }
 
@@ -1125,8 +1138,8 @@ def own_map(dataset: xr.Dataset) -> dict[str, Number]:
     "own_map",
     "What does a measured pattern look like, and which part of it is in contact?",
     """The pattern has streaks along the sliding direction. Its rms is {rms:.1f} kPa, on a mean of {mean:.0f} kPa
-    that the bonds bear. The circle is the contact, {width:.0f} µm wide. The pattern moves with the slider. Beyond
-    the map there is no stress.""",
+    that the bonds bear. The circle is the contact, {width:.0f} µm wide. The pattern passes under the contact as the
+    slider moves. Beyond the map there is no stress.""",
     kind="map",
 )
 def pattern(dataset: xr.Dataset) -> dict[str, Number]:
