@@ -37,7 +37,8 @@ autosummary_generate = True
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
-copybutton_prompt_text = ">>> "
+copybutton_prompt_text, copybutton_prompt_is_regexp = r">>> |\.\.\. ", True
+smartquotes = False  # two dashes of an option stay two dashes
 
 
 def setup(app: Any) -> None:
