@@ -1,11 +1,13 @@
 """Writes docs/gallery: a page for each question with its figure, its answer and its commands, and an index of all.
 
 ``python docs/make_gallery.py`` runs all scenarios; with names, those alone; with ``--text``, none. The numbers of the
-answers are kept in ``gallery/numbers.json``, from which the pages are made.
+answers are kept in ``gallery/numbers.json``, from which the pages are made. The labels of the pictures are kept in
+``gallery/labels.json``, by which a test finds a picture with labels that the program no longer draws.
 """
 
 import io
 import json
+import re
 import shlex
 import sys
 import textwrap
@@ -16,6 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 import sim
@@ -29,7 +33,12 @@ from sim.study.plan import Plan, figure as planned
 
 ROOT = Path(__file__).parent.parent
 FOLDER = Path(__file__).with_name("gallery")
-NUMBERS = FOLDER / "numbers.json"
+NUMBERS, LABELS = FOLDER / "numbers.json", FOLDER / "labels.json"
+#: Pictures of other pages, each with its scenario.
+BESIDE = {
+    "../first_contact": ROOT / "sim" / "starter.toml",
+    "../pdms_lens": ROOT / "scenarios" / "pdms_lens.toml",
+}
 HEAD = """# Gallery
 
 Each question below leads to a page with its figure, its answer and the commands that give the figure. The shortest
@@ -134,20 +143,24 @@ class Entry(NamedTuple):
             return sim.fit(path, path.with_suffix(".csv"), self.free)
         return sim.run(sim.load(path, dict(self.changes)))
 
-    def draw(self, result: Any) -> None:
-        """Make the picture, of few colours and as many pixels as its size allows."""
-        chosen: Any = {"where": dict(self.where), "units": self.units, **self.choices}
-        if self.kind == "movie":
-            sim.plot(result, self.kind, self.picture, **chosen)
-            return
+    def figure(self, result: Any, to: Path | None = None) -> Figure:
+        """Return the figure of the question, and save it if asked."""
         if self.points:
-            figure = planned(result)
-        else:
-            figure = (
-                fitted(result.problem, result.best)
-                if self.free
-                else sim.plot(result, self.kind, **chosen)
-            )
+            return planned(result)
+        if self.free:
+            return fitted(result.problem, result.best)
+        chosen: Any = {"where": dict(self.where), "units": self.units, **self.choices}
+        return sim.plot(result, self.kind, to, **chosen)
+
+    def draw(self, result: Any) -> list[str]:
+        """Make the picture, of few colours and as many pixels as its size allows.
+
+        Returns its labels, none for a movie, whose frames differ.
+        """
+        if self.kind == "movie":
+            self.figure(result, self.picture)
+            return []
+        figure = self.figure(result)
         for dpi, colours in FINENESS:
             drawn, small = io.BytesIO(), io.BytesIO()
             figure.savefig(drawn, format="png", dpi=dpi)
@@ -161,6 +174,7 @@ class Entry(NamedTuple):
             if small.tell() < MOST_BYTES:
                 break
         self.picture.write_bytes(small.getvalue())
+        return labels(figure)
 
     def text(self, numbers: dict[str, Any]) -> str:
         """Return the page with the question, its figure, its answer and the commands."""
@@ -184,6 +198,16 @@ class Entry(NamedTuple):
             for name, value in shown.items()
         }
         return " ".join(self.answer.format(**shown).split())
+
+
+def labels(figure: Figure) -> list[str]:
+    """Return the words of a figure: legends, titles and names of axes, without the numbers at ticks."""
+    texts = {text.get_text() for text in figure.findobj(Text)}
+    return sorted(
+        text
+        for text in texts
+        if re.search("[A-Za-z]{2}", text) and "mathdefault" not in text
+    )
 
 
 def _toml(value: Any) -> str:
@@ -1191,23 +1215,35 @@ def pages(numbers: dict[str, dict[str, Any]]) -> dict[Path, str]:
     return {FOLDER / "README.md": index} | texts
 
 
-def stored_numbers() -> dict[str, dict[str, Any]]:
-    """Return the numbers of all answers as last computed."""
-    return json.loads(NUMBERS.read_text(encoding="utf-8")) if NUMBERS.exists() else {}
+def stored(path: Path) -> dict[str, Any]:
+    """Return the numbers of all answers, or the labels of all pictures, as last computed."""
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+
+
+def store(path: Path, values: Mapping[str, Any]) -> None:
+    """Write the numbers or the labels in the order of the questions, pictures of other pages first."""
+    names = [*BESIDE, *(entry.name for entry in ENTRIES)]
+    ordered = {name: values[name] for name in names if name in values}
+    text = json.dumps(ordered, indent=1, ensure_ascii=False)
+    path.write_text(f"{text}\n", encoding="utf-8")
 
 
 def main(names: list[str]) -> None:
     """Run, draw and answer questions, all or some, and write the pages."""
-    numbers = stored_numbers()
+    numbers, drawn = stored(NUMBERS), stored(LABELS)
+    for name, scenario in BESIDE.items():
+        if not names or Path(name).name in names:
+            figure = sim.plot(sim.run(scenario), to=FOLDER / f"{name}.png")
+            drawn[name] = labels(figure)
     for entry in ENTRIES:
         if not names or entry.name in names:
             dataset = entry.run()
             numbers[entry.name] = entry.numbers(dataset)
-            entry.draw(dataset)
+            drawn[entry.name] = entry.draw(dataset)
             sys.stdout.write(f"{entry.name}: {entry.filled(numbers[entry.name])}\n")
-    ordered = {entry.name: numbers[entry.name] for entry in ENTRIES}
-    NUMBERS.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
-    for path, text in pages(ordered).items():
+    store(NUMBERS, numbers)
+    store(LABELS, drawn)
+    for path, text in pages(numbers).items():
         path.write_text(text, encoding="utf-8")
 
 
