@@ -220,13 +220,9 @@ def _toml(value: Any) -> str:
         )
     if isinstance(value, list):
         return f"[{', '.join(map(_toml, value))}]"
-    return (
-        f'"{value}"'
-        if isinstance(value, str)
-        else str(value).lower()
-        if isinstance(value, bool)
-        else str(value)
-    )
+    return json.dumps(
+        value, ensure_ascii=False
+    )  # as TOML writes text, booleans and numbers
 
 
 def pair(
