@@ -37,7 +37,8 @@ autosummary_generate = True
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
-copybutton_prompt_text = ">>> "
+copybutton_prompt_text, copybutton_prompt_is_regexp = r">>> |\.\.\. ", True
+smartquotes = False  # two dashes of an option stay two dashes
 
 
 def setup(app: Any) -> None:
@@ -51,3 +52,13 @@ def setup(app: Any) -> None:
         return write, None
 
     app.add_html_math_renderer("mathml", visit(False), visit(True))
+    app.connect("sphinx-click-process-epilog", _add_kinds)
+
+
+def _add_kinds(app: Any, context: Any, lines: list[str]) -> None:
+    """Add what the help of a command lists below its options: the kinds of figures."""
+    formatter = context.make_formatter()
+    context.command.format_epilog(context, formatter)
+    if formatter.getvalue() and not context.command.epilog:
+        below = formatter.getvalue().strip().splitlines()
+        lines += ["::", "", *(f"   {line}" for line in below)]

@@ -39,8 +39,8 @@ SECTIONS = {
 coordinate: `dataset.contact_area.mean("member").plot(x="speed")`. Omit the mean if members do not differ.
 """,
     "Recorded at each time": """A variable that differs between members has the dimension `member`, too.
-With `per_member = false` it is replaced by `<name>_mean`, `<name>_std` and `<name>_sem`.
-These are the mean, the standard deviation and the standard error of the mean over the members.
+With `per_member = false` it has the dimension `statistic` in its place: the mean, the standard deviation and the
+standard error of the mean over the members, as in `dataset["contact_area"].sel(statistic="mean")`.
 Members whose value is nan are omitted.
 
 With `per_member = false` there is also `late_<name>`, for quantities that have a mean over time. Its dimension `late`
@@ -54,7 +54,7 @@ has four values:
 Radius, area, load and friction are averaged over the times at which the contact is closed.
 
 `speed` is the speed at the time of the record. In stick-slip it is mostly far below the speed of the stage, and rarely
-far above it. `sim.read.distribution(dataset, ["speed"])` has its mean over the second half of the run.
+far above it. `sim.Run(dataset).statistic("speed", late=True)` has its mean over the second half of the run.
 
 A member has the same noise at all points of a sweep. The error of a difference between two points is therefore that of
 the members' differences. It is often much smaller than the two errors added in quadrature:
@@ -68,7 +68,7 @@ dataset = sim.run(sim.load("scenarios/pdms_lens.toml", few | loads))
 change = sim.read.distribution(
     dataset, ["contact_area"], minus={"contact.load": "4 mN"}
 )
-change.contact_area_mean, change.contact_area_sem
+change["contact_area"].value, change["contact_area"].sem
 ```
 
 With the drives `spring` and `force`, energies balance. `drive_work` is the sum of three parts: the rise of
@@ -149,7 +149,7 @@ seeds = xarray.open_mfdataset(
 )
 ```
 
-`open_mfdataset` needs dask, which `pip install 'sliding-sim[cluster]'` adds. Without dask, `xarray.concat` joins the
+`open_mfdataset` needs dask, which `pip install '.[cluster]'` adds. Without dask, `xarray.concat` joins the
 runs that `[sim.open(path) for path in paths]` has opened, with the same options.
 
 Attributes are those of the first run. `t` counts seconds and is no date. Therefore `dataset.resample` needs

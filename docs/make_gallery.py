@@ -1,11 +1,14 @@
 """Writes docs/gallery: a page for each question with its figure, its answer and its commands, and an index of all.
 
 ``python docs/make_gallery.py`` runs all scenarios; with names, those alone; with ``--text``, none. The numbers of the
-answers are kept in ``gallery/numbers.json``, from which the pages are made.
+answers are kept in ``gallery/numbers.json``, from which the pages are made. The labels of the pictures are kept in
+``gallery/labels.json``, by which a test finds a picture with labels that the program no longer draws.
 """
 
 import io
 import json
+import math
+import re
 import shlex
 import sys
 import textwrap
@@ -16,11 +19,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 import sim
 from sim import laws, read
-from sim.read import concise, distribution, shares, statistics
+from sim.read import Estimate, concise, distribution, over_members
 from sim.read.events import incipient_law
 from sim.study.fit import Fit, figure as fitted
 from sim.study.likelihood import LEVEL
@@ -29,7 +34,12 @@ from sim.study.plan import Plan, figure as planned
 
 ROOT = Path(__file__).parent.parent
 FOLDER = Path(__file__).with_name("gallery")
-NUMBERS = FOLDER / "numbers.json"
+NUMBERS, LABELS = FOLDER / "numbers.json", FOLDER / "labels.json"
+#: Pictures of other pages, each with its scenario.
+BESIDE = {
+    "../first_contact": ROOT / "sim" / "starter.toml",
+    "../pdms_lens": ROOT / "scenarios" / "pdms_lens.toml",
+}
 HEAD = """# Gallery
 
 Each question below leads to a page with its figure, its answer and the commands that give the figure. The shortest
@@ -134,20 +144,24 @@ class Entry(NamedTuple):
             return sim.fit(path, path.with_suffix(".csv"), self.free)
         return sim.run(sim.load(path, dict(self.changes)))
 
-    def draw(self, result: Any) -> None:
-        """Make the picture, of few colours and as many pixels as its size allows."""
-        chosen: Any = {"where": dict(self.where), "units": self.units, **self.choices}
-        if self.kind == "movie":
-            sim.plot(result, self.kind, self.picture, **chosen)
-            return
+    def figure(self, result: Any, to: Path | None = None) -> Figure:
+        """Return the figure of the question, and save it if asked."""
         if self.points:
-            figure = planned(result)
-        else:
-            figure = (
-                fitted(result.problem, result.best)
-                if self.free
-                else sim.plot(result, self.kind, **chosen)
-            )
+            return planned(result)
+        if self.free:
+            return fitted(result.problem, result.best)
+        chosen: Any = {"where": dict(self.where), "units": self.units, **self.choices}
+        return sim.plot(result, self.kind, to, **chosen)
+
+    def draw(self, result: Any) -> list[str]:
+        """Make the picture, of few colours and as many pixels as its size allows.
+
+        Returns its labels, none for a movie, whose frames differ.
+        """
+        if self.kind == "movie":
+            self.figure(result, self.picture)
+            return []
+        figure = self.figure(result)
         for dpi, colours in FINENESS:
             drawn, small = io.BytesIO(), io.BytesIO()
             figure.savefig(drawn, format="png", dpi=dpi)
@@ -161,6 +175,7 @@ class Entry(NamedTuple):
             if small.tell() < MOST_BYTES:
                 break
         self.picture.write_bytes(small.getvalue())
+        return labels(figure)
 
     def text(self, numbers: dict[str, Any]) -> str:
         """Return the page with the question, its figure, its answer and the commands."""
@@ -186,6 +201,16 @@ class Entry(NamedTuple):
         return " ".join(self.answer.format(**shown).split())
 
 
+def labels(figure: Figure) -> list[str]:
+    """Return the words of a figure: legends, titles and names of axes, without the numbers at ticks."""
+    texts = {text.get_text() for text in figure.findobj(Text)}
+    return sorted(
+        text
+        for text in texts
+        if re.search("[A-Za-z]{2}", text) and "mathdefault" not in text
+    )
+
+
 def _toml(value: Any) -> str:
     """Return a value as an override of the command line."""
     if isinstance(value, dict):
@@ -196,24 +221,17 @@ def _toml(value: Any) -> str:
         )
     if isinstance(value, list):
         return f"[{', '.join(map(_toml, value))}]"
-    return (
-        f'"{value}"'
-        if isinstance(value, str)
-        else str(value).lower()
-        if isinstance(value, bool)
-        else str(value)
-    )
+    return json.dumps(
+        value, ensure_ascii=False
+    )  # as TOML writes text, booleans and numbers
 
 
-def pair(
-    summary: xr.Dataset, variable: str, factor: float = 1.0, **at: float
-) -> Number:
-    """A mean of the statistics with its standard error where it has one, at the records nearest to some values."""
-    index = {name: nearest(summary[name], value) for name, value in at.items()}
-    value, error = (
-        factor * float(summary[f"{variable}_{kind}"].isel(index).squeeze())
-        for kind in ("mean", "sem")
-    )
+def pair(one: Estimate, factor: float = 1.0, **at: float) -> Number:
+    """A mean with its standard error where it has one, at the records nearest to some values."""
+    index = {name: nearest(one.value[name], value) for name, value in at.items()}
+    there = one.isel(index)
+    value = factor * float(there.value.squeeze())
+    error = math.nan if there.sem is None else factor * float(there.sem.squeeze())
     return (value, error) if error > 0.0 else value
 
 
@@ -221,12 +239,18 @@ def mean(
     variable: str, dataset: xr.Dataset, factor: float = 1.0, **at: float
 ) -> Number:
     """Mean over the members with its standard error."""
-    return pair(statistics(dataset), variable, factor, **at)
+    return pair(over_members(dataset, [variable])[variable], factor, **at)
 
 
 def share(variable: str, dataset: xr.Dataset, **at: float) -> Number:
     """Mean share of JKR's area with its standard error [%]."""
-    return pair(shares(dataset), variable, 100.0, **at)
+    return pair(over_members(dataset, [variable])[variable], 100.0, **at)
+
+
+def area_left(dataset: xr.Dataset) -> xr.DataArray:
+    """Mean area at the end of the run over JKR's [%]."""
+    last = over_members(dataset.isel(t=[-1]), ["area_ratio"])["area_ratio"]
+    return 100.0 * last.value.isel(t=0)
 
 
 def modulus_of(dataset: xr.Dataset) -> float:
@@ -305,9 +329,7 @@ def uniform_stress(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def theories(dataset: xr.Dataset) -> dict[str, Number]:
     place = nearest(dataset["bonds_stress"], 50e3)
-    ratio = 100.0 * statistics(dataset)["area_ratio_mean"].isel(
-        t=-1, bonds_stress=place
-    )
+    ratio = area_left(dataset).isel(bonds_stress=place)
     numbers = (
         float(dataset[name])
         for name in ("contact_load", "adhesion_work", "sphere_radius")
@@ -336,7 +358,7 @@ def masking(dataset: xr.Dataset) -> dict[str, Number]:
     unit = laws.halfspace.ripple_energy(
         1.0, 2 * np.pi / wavelength, 0.0, modulus_of(dataset)
     )
-    ratio = 100.0 * statistics(dataset)["area_ratio_mean"].isel(t=-1)
+    ratio = area_left(dataset)
     return {
         "amplitude": 1e-3 * float(np.sqrt(work / unit)),
         "wavelength": 1e6 * wavelength,
@@ -360,7 +382,7 @@ def masking(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def direction(dataset: xr.Dataset) -> dict[str, Number]:
     energy = 1e3 * dataset["fluctuation_energy"].isel(t=-1)
-    ratio = 100.0 * statistics(dataset)["area_ratio_mean"].isel(t=-1)
+    ratio = area_left(dataset)
     return {
         "amplitude": 1e-3 * float(dataset["shear_spectrum_amplitude"]),
         "along": float(energy[0]),
@@ -431,16 +453,14 @@ def decomposition(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def soft_lens(dataset: xr.Dataset) -> dict[str, Number]:
     rms = 30e3
-    late = read.summary(read.settled(read.observables(dataset))).sel(
-        shear_spectrum_rms=rms
-    )
+    late, at = distribution(dataset), {"shear_spectrum_rms": rms}
     work = read.bond_work(dataset).isel(t=-1)
     return {
         "modulus": 1e-6 * modulus_of(dataset),
         "width": 2e3 * float(dataset["radius_at_rest"].max()),
         "rms": 1e-3 * rms,
-        "masked": pair(late, "fraction_masked", 100.0),
-        "energy": pair(late, "fluctuation_energy", 1e3),
+        "masked": pair(late["fraction_masked"], 100.0, **at),
+        "energy": pair(late["fluctuation_energy"], 1e3, **at),
         "work": 1e3 * float(work.max()),
     }
 
@@ -454,10 +474,9 @@ def soft_lens(dataset: xr.Dataset) -> dict[str, Number]:
     waves along a side.""",
 )
 def ten_wavelengths(dataset: xr.Dataset) -> dict[str, Number]:
-    area, ratio = (
-        dataset["contact_area"].isel(t=-1),
-        statistics(dataset)["area_ratio_quantile"].isel(t=-1),
-    )
+    area = dataset["contact_area"].isel(t=-1)
+    ratio = over_members(dataset.isel(t=[-1]), ["area_ratio"])["area_ratio"].quantile
+    ratio = ratio.isel(t=0)
     count = dataset.sizes["member"]
     spread = 100.0 * (area.std("member", ddof=1) / area.mean("member")).to_numpy()
     three, ten, thirty = (
@@ -508,7 +527,7 @@ def stress_map(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def friction_maximum(dataset: xr.Dataset) -> dict[str, Number]:
     top = int(dataset["shear_stress"].argmax("t"))
-    left = float(statistics(dataset)["area_ratio_mean"][top])
+    left = float(read.observables(dataset)["area_ratio"][top])
     return {
         "stress": 1e-3 * float(dataset["peak_stress"]),
         "speed": 1e3 * float(dataset["speed"][top]),
@@ -653,14 +672,9 @@ def creep(dataset: xr.Dataset) -> dict[str, Number]:
     kind="incipient",
 )
 def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
-    pulls, load = (
-        read.events(dataset),
-        1e3 * dataset["contact_load"].to_numpy(),
-    )
-    lost, area = (
-        100.0 * (1.0 - pulls["area_at_threshold"].to_numpy()),
-        dataset["contact_area"].isel(t=0),
-    )
+    share = read.events(dataset)["area_at_threshold"].value.to_numpy()
+    load = 1e3 * dataset["contact_load"].to_numpy()
+    lost, area = 100.0 * (1.0 - share), dataset["contact_area"].isel(t=0)
     curves = zip(
         *(dataset[name].to_numpy() for name in ("spring_force", "contact_area")),
         strict=True,
@@ -681,9 +695,9 @@ def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
     "stick_slip",
     "At which speed does a lens behind a soft spring begin to stick and slip?",
     """Slip events set in between {steady:.1f} and {onset:.1f} mm/s as the stage speed increases. Nothing prescribes
-    the onset. It lies above the speed of the friction maximum, which is {peak:.1f} mm/s in the mean-field theory. From
-    then on the force falls by {drop:.1f} mN in each slip event of {slip:.0f} µm. Slip events begin at {static:.1f} mN,
-    and the mean force is {kinetic:.1f} mN.""",
+    the onset. In steady sliding the friction force is largest at {force:.1f} mm/s and the stress of the bonds at
+    {peak:.1f} mm/s, below the onset. From then on the force falls by {drop:.1f} mN in each slip event of
+    {slip:.0f} µm. Slip events begin at {static:.1f} mN, and the mean force is {kinetic:.1f} mN.""",
     kind="time",
 )
 def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
@@ -697,6 +711,8 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     peak = laws.schallamach.first_moment_peak(
         *(float(dataset[f"bonds_{name}"]) for name in names)
     )
+    speeds = np.geomspace(1e-3, 1e-2, 1001)
+    steady = sim.steady_curves(sim.load(ROOT / "scenarios" / "stick_slip.toml"), speeds)
     mean, times = read.slips(dataset).mean("slip"), dataset["slip_time"]
     # from the first slip event to the last
     stage = dataset.sel(t=slice(float(times[0]), float(times[-1])))
@@ -707,6 +723,7 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     return {
         "steady": 1e3 * float(dataset["onset_steady_speed"]),
         "onset": 1e3 * float(dataset["onset_slip_speed"]),
+        "force": 1e3 * float(speeds[int(steady["friction_force"].argmax("speed"))]),
         "peak": 1e3 * float(peak.speed),
         "drop": 1e3 * float(mean["force_drop"]),
         "slip": 1e6 * float(mean["slip_amplitude"]),
@@ -730,9 +747,10 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
         dataset["drive_stiffness"].to_numpy(),
     )
     up, down = (
-        1e3 * float(events[name][0]) for name in ("onset_slip_speed", "end_slip_speed")
+        1e3 * float(events[name].value[0])
+        for name in ("onset_slip_speed", "end_slip_speed")
     )
-    calm = events["end_slip_speed"].isnull().to_numpy()
+    calm = events["end_slip_speed"].value.isnull().to_numpy()
     return {
         "soft": float(stiffness[0]),
         "up": up,
@@ -752,18 +770,18 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
     late = read.distribution(dataset)
-    slow, fast = (late.sel(drive_stage=speed) for speed in (2e-3, 3e-3))
-    names = {"before": slow, "after": fast}
-    numbers: dict[str, Number] = {
-        name: pair(each, "area_ratio", 100.0) for name, each in names.items()
-    }
-    return numbers | {
+    slow, fast = {"drive_stage": 2e-3}, {"drive_stage": 3e-3}
+    area, bonds = late["area_ratio"], late["lost_to_bonds"]
+    noise = late["lost_to_fluctuations"]
+    return {
+        "before": pair(area, 100.0, **slow),
+        "after": pair(area, 100.0, **fast),
         "slow": 2.0,
         "fast": 3.0,
-        "bonds": pair(fast, "lost_to_bonds", 100.0),
-        "bonded": pair(slow, "lost_to_bonds", 100.0),
-        "noise": pair(fast, "lost_to_fluctuations", 100.0),
-        "calm": pair(slow, "lost_to_fluctuations", 100.0),
+        "bonds": pair(bonds, 100.0, **fast),
+        "bonded": pair(bonds, 100.0, **slow),
+        "noise": pair(noise, 100.0, **fast),
+        "calm": pair(noise, 100.0, **slow),
         "rms": 1e-3 * float(dataset["shear_spectrum_rms"]),
         "length": 1e6 * float(dataset["shear_correlation_length"]),
     }
@@ -820,13 +838,14 @@ def slip_event(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def motor_clutch(dataset: xr.Dataset) -> dict[str, Number]:
     late = read.summary(read.settled(dataset[["friction_force"]]), quantiles=False)
+    friction = late["friction_force"]
     stiffness, best = (
         dataset["drive_contact_stiffness"].to_numpy(),
-        int(np.argmax(late["friction_force_mean"].to_numpy())),
+        int(np.argmax(friction.value.to_numpy())),
     )
     at = {"most": best, "softly": 0, "stiffly": -1}
     numbers = {
-        name: pair(late.isel(drive_contact_stiffness=k), "friction_force", 1e12)
+        name: pair(friction.isel({"drive_contact_stiffness": k}), 1e12)
         for name, k in at.items()
     }
     borne = np.array(numbers["stiffly"])
@@ -869,18 +888,16 @@ def bond_noise(dataset: xr.Dataset) -> dict[str, Number]:
     members detach as the speed increases, half of them within {off:.0f} ms, at which the speed is {at:.1f} mm/s.""",
 )
 def fixed_grips(dataset: xr.Dataset) -> dict[str, Number]:
-    depth, over_members = dataset["contact_indentation"], statistics(dataset)
-    high, deep = (
-        over_members.isel(contact_indentation=0),
-        over_members.isel(contact_indentation=-1, t=-1),
-    )
-    then = float(high["half_detached_mean"])
+    depth, events = dataset["contact_indentation"], read.Run(dataset).events
+    high, deep = {"contact_indentation": 0}, {"contact_indentation": -1}
+    then = float(events["half_detached"].isel(high).value)
+    last = over_members(dataset.isel(t=[-1]), ["area_ratio"])["area_ratio"]
     return {
         "deep": 1e6 * float(depth[-1]),
         "high": 1e6 * float(depth[0]),
-        "kept": pair(deep, "area_ratio", 100.0),
+        "kept": pair(last.isel(deep), 100.0),
         "speed": 1e3 * float(speeds(dataset)[-1]),
-        "open": pair(high, "ever_detached", 100.0),
+        "open": pair(events["ever_detached"].isel(high), 100.0),
         "off": 1e3 * then,
         "at": 1e3 * float(speeds(dataset).sel(t=then, method="nearest")),
     }
@@ -931,17 +948,30 @@ def peeling(dataset: xr.Dataset) -> dict[str, Number]:
     "afm_tip",
     "Is the friction of an AFM tip a measure of its contact area?",
     """Yes, in the model friction is proportional to the area: it is {stress:g} GPa times JKR's area. This holds in
-    tension, too, down to the pull-off at {off:.0f} nN, where friction is {friction:.0f} nN. Without load friction
-    is {zero:.0f} nN.""",
+    tension, too: at {tension:.0f} nN friction is {friction:.0f} nN. At the pull-off, at {off:.1f} nN, JKR's area leaves
+    {least:.1f} nN. Without load friction is {zero:.0f} nN.""",
 )
 def afm_tip(dataset: xr.Dataset) -> dict[str, Number]:
     last, load = dataset.isel(t=-1), dataset["contact_load"]
     force = 1e9 * last["friction_force"].where(last["in_contact"] == 1, drop=True)
     zero = 1e9 * last["friction_force"][nearest(load, 0.0)]
+    stress, off, size, modulus = (
+        float(values.max())
+        for values in (
+            last["shear_stress"],
+            dataset["jkr_pull_off_load"],
+            dataset["sphere_radius"],
+            dataset["contact_modulus"],
+        )
+    )
+    # the radius of the JKR contact at its pull-off
+    least = np.pi * (-0.75 * off * size / modulus) ** (2.0 / 3.0)
     return {
-        "stress": 1e-9 * float(last["shear_stress"].max()),
-        "off": 1e9 * float(dataset["jkr_pull_off_load"].max()),
+        "stress": 1e-9 * stress,
+        "off": 1e9 * off,
+        "tension": 1e9 * float(force["contact_load"][0]),
         "friction": float(force[0]),
+        "least": 1e9 * stress * least,
         "zero": float(zero),
     }
 
@@ -1079,13 +1109,13 @@ def own_psd(dataset: xr.Dataset) -> dict[str, Number]:
         {"shear_spectrum_rms": 1e3 * rms},
         distribution(dataset, ("fluctuation_energy", "area_ratio")),
     )
-    energy = pair(late, "fluctuation_energy", 1e3, **at)
+    energy = pair(late["fluctuation_energy"], 1e3, **at)
     stored = energy[0] if isinstance(energy, tuple) else energy
     return {
         "rms": rms,
         "work": work,
         "energy": energy,
-        "share": pair(late, "area_ratio", 100.0, **at),
+        "share": pair(late["area_ratio"], 100.0, **at),
         "lost": rms * float(np.sqrt(work / stored)),
     }
 
@@ -1125,8 +1155,8 @@ def own_map(dataset: xr.Dataset) -> dict[str, Number]:
     "own_map",
     "What does a measured pattern look like, and which part of it is in contact?",
     """The pattern has streaks along the sliding direction. Its rms is {rms:.1f} kPa, on a mean of {mean:.0f} kPa
-    that the bonds bear. The circle is the contact, {width:.0f} µm wide. The pattern moves with the slider. Beyond
-    the map there is no stress.""",
+    that the bonds bear. The circle is the contact, {width:.0f} µm wide. The pattern passes under the contact as the
+    slider moves. Beyond the map there is no stress.""",
     kind="map",
 )
 def pattern(dataset: xr.Dataset) -> dict[str, Number]:
@@ -1178,23 +1208,35 @@ def pages(numbers: dict[str, dict[str, Any]]) -> dict[Path, str]:
     return {FOLDER / "README.md": index} | texts
 
 
-def stored_numbers() -> dict[str, dict[str, Any]]:
-    """Return the numbers of all answers as last computed."""
-    return json.loads(NUMBERS.read_text(encoding="utf-8")) if NUMBERS.exists() else {}
+def stored(path: Path) -> dict[str, Any]:
+    """Return the numbers of all answers, or the labels of all pictures, as last computed."""
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+
+
+def store(path: Path, values: Mapping[str, Any]) -> None:
+    """Write the numbers or the labels in the order of the questions, pictures of other pages first."""
+    names = [*BESIDE, *(entry.name for entry in ENTRIES)]
+    ordered = {name: values[name] for name in names if name in values}
+    text = json.dumps(ordered, indent=1, ensure_ascii=False)
+    path.write_text(f"{text}\n", encoding="utf-8")
 
 
 def main(names: list[str]) -> None:
     """Run, draw and answer questions, all or some, and write the pages."""
-    numbers = stored_numbers()
+    numbers, drawn = stored(NUMBERS), stored(LABELS)
+    for name, scenario in BESIDE.items():
+        if not names or Path(name).name in names:
+            figure = sim.plot(sim.run(scenario), to=FOLDER / f"{name}.png")
+            drawn[name] = labels(figure)
     for entry in ENTRIES:
         if not names or entry.name in names:
             dataset = entry.run()
             numbers[entry.name] = entry.numbers(dataset)
-            entry.draw(dataset)
+            drawn[entry.name] = entry.draw(dataset)
             sys.stdout.write(f"{entry.name}: {entry.filled(numbers[entry.name])}\n")
-    ordered = {entry.name: numbers[entry.name] for entry in ENTRIES}
-    NUMBERS.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
-    for path, text in pages(ordered).items():
+    store(NUMBERS, numbers)
+    store(LABELS, drawn)
+    for path, text in pages(numbers).items():
         path.write_text(text, encoding="utf-8")
 
 

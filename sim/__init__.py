@@ -12,7 +12,7 @@ Remarks on what is read are warnings of the logger ``"sim"``, as of the standard
 ...     sphere=dict(radius="2 mm"),
 ...     adhesion=dict(work="42 mJ/m^2"),
 ...     contact=dict(load="4 mN"),
-...     drive=dict(model="ramp", start="0 mm/s", stop="10 mm/s"),
+...     drive={"model": "ramp", "from": "0 mm/s", "to": "10 mm/s"},
 ...     bonds=dict(model="steady", critical_speed="10 mm/s", stress="0.3 MPa"),
 ... )
 >>> dataset = sim.run(scene)

@@ -420,7 +420,9 @@ def _cluster(address: str) -> Iterator[_Team]:
         from distributed.comm import CommClosedError, resolve_address
     except ImportError:
         raise BadInput(
-            ["--scheduler needs dask.distributed; install sliding-sim[cluster]"]
+            [
+                "--scheduler needs dask.distributed: pip install '.[cluster]' in the folder of the sources"
+            ]
         ) from None
     try:
         # a client that fails at it is not closed within its patience

@@ -11,6 +11,6 @@ if missing := [
 ]:
     raise BadInput(
         [
-            f"{missing[0]} is missing; install it with: pip install 'sliding-sim[explore]'"
+            f"{missing[0]} is missing; install it with: pip install '.[explore]' in the folder of the sources"
         ]
     )

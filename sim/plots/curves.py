@@ -106,7 +106,7 @@ class Statistics:
             one = over_members(part, [name]).get(name)
         if one is None or self.along == "t":
             return one
-        return one.map(lambda each: each.isel(t=0, drop=True, missing_dims="ignore"))
+        return one.isel({"t": 0})
 
 
 class Scene(NamedTuple):

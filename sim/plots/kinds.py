@@ -79,24 +79,16 @@ class Choices(NamedTuple):
         ValueError
             For a choice that the kind does not take, or that cannot be read.
         """
-        of_all = (
-            "member",
-            "units",
-            "size",
-            "xlim",
-            *(("start", "stop") if kind in _OVER_TIME else ()),
-        )
+        of_all = ["member", "units", "size", "xlim"]
+        of_all += ["start", "stop"] if kind in _OVER_TIME else []
         options = {
             name: value for name, value in self.chosen.items() if name not in of_all
         }
         if refused := [name for name in options if name not in takes]:
-            words = (
-                f"it takes: {', '.join(takes)}"
-                if takes
-                else "it takes only member and units"
-            )
+            names = ", ".join(["where", *of_all, *takes])
+            names = names.replace("start, stop", "start (--from), stop (--to)")
             raise ValueError(
-                f'the figure "{kind}" has no choice of {refused[0]}; {words}'
+                f'the figure "{kind}" has no choice of {refused[0]}; it takes {names}'
             )
         if self.at is not None:
             options["at"] = read_option(self.at, "at", "s")

@@ -1,6 +1,6 @@
 """The statistics of one quantity: its value, and all that stands beside it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import xarray as xr
@@ -59,6 +59,10 @@ class Estimate(NamedTuple):
         """Return it with each known field changed."""
         others = (None if each is None else change(each) for each in self[1:])
         return Estimate(change(self.value), *others)
+
+    def isel(self, at: Mapping[str, Any]) -> "Estimate":
+        """Return it at indices along some dimensions, which not all fields need to have."""
+        return self.map(lambda each: each.isel(at, missing_dims="ignore"))
 
     @property
     def is_missing(self) -> xr.DataArray:

@@ -24,7 +24,7 @@ from sim.read.observables import labelled, pure
 from sim.units.notation import engineering
 
 #: Relative changes below it are rounding.
-_ROUNDING = 1e-9
+_ROUNDING = 1e-6
 #: Peaks, each with the quantity that it is of, and the beginning of the names of its time and speed.
 PEAKS = {
     "peak_stress": ("shear_stress", "peak"),

@@ -312,7 +312,7 @@ def spread(run: Run) -> Table:
     least = _ROUNDING if run.has_noise else _SETTLED
     rows = []
     for column in (column for column in columns if column.name in late):
-        one = late[column.name].map(lambda values: values.isel(at))
+        one = late[column.name].isel(at)
         if one.std is not None and one.std > least * abs(one.value):
             rows.append(_spread_of(one, column.definition))
     if not rows or not run.has_noise or "fluctuation_energy" not in late:
@@ -502,9 +502,7 @@ def _turning(run: Run) -> Iterator[str]:
     others = {name: 0 for name in run.sweep if name != swept[0]}
     late = run.late(names)
     for name in (name for name in names if name in late):
-        curve = late[name].map(
-            lambda values: values.isel(others, missing_dims="ignore")
-        )
+        curve = late[name].isel(others)
         if curve.reason is not None and bool((curve.reason != "").any()):
             continue  # values at an end are no means
         inside = extremes(curve, swept[0])

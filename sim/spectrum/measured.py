@@ -682,8 +682,8 @@ class StressMap:
     noise : float
         rms [Pa] of white noise in a pixel: what energy it seems to store is reported, not subtracted.
     start : float, optional
-        Place along x at which the middle of a disc begins [m], without it the middle of the map. As the pattern moves
-        with the slider, sliding in +x brings lower x under the disc.
+        Place along x at which the middle of a disc begins [m], without it the middle of the map. The pattern passes
+        the contact in +x, so that sliding in +x brings lower x under the disc.
     variable : str
         Name in a netCDF file.
     unit : str

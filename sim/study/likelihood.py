@@ -417,7 +417,7 @@ try:
     import lmfit
 except ModuleNotFoundError:
     raise BadInput(
-        ["fitting needs lmfit, of an extra: pip install 'sliding-sim[fit]'"]
+        ["fitting needs lmfit: pip install '.[fit]' in the folder of the sources"]
     ) from None
 
 

@@ -322,8 +322,8 @@ def test_what_cannot_be_drawn_is_refused_and_given_axes_are_drawn_in(
 ):
     for kind, choices, words in (
         ("time", {"x": "slider_positon"}, "choose t, speed or a recorded variable"),
-        ("stress", {"at": "1 s"}, "at; it takes: data, ax$"),
-        ("theories", {"data": "x.csv"}, "data; it takes only"),
+        ("stress", {"at": "1 s"}, "at; .* size, xlim, start .*, stop .*, data, ax$"),
+        ("theories", {"data": "x.csv"}, "takes where, member, units, size, xlim$"),
         ("curve", {"units": ("mm",)}, '"mm"'),
         ("curve", {"units": ("parsnip",)}, '"parsnip"'),
     ):
@@ -384,7 +384,7 @@ def test_what_cannot_be_drawn_is_refused_and_given_axes_are_drawn_in(
     )
     assert path.read_text(encoding="utf-8").startswith("speed")
     refused = command("plot", "x.nc", "--at", "1 s", "curve", "--force").stderr
-    assert refused.strip().endswith("it takes: x, absolute, data, ax")
+    assert refused.strip().endswith("size, xlim, x, absolute, data, ax")
     listed = " ".join(command("plot", "--help").stdout.split())
     assert "over speed. --x --absolute --data" in listed
     for name, kind in plots.KINDS.items():

@@ -358,6 +358,30 @@ def test_the_friction_maximum_and_the_static_peak_are_those_of_the_clock_steps_w
     assert_allclose(result["peak_friction_time"], result["peak_time"], rtol=1e-12)
 
 
+@pytest.mark.parametrize("rounding", ["compression", "precision"])
+def test_rounded_records_make_no_peak_of_a_stress_that_falls_and_keep_a_true_one(
+    rounding, tmp_path
+):
+    """The stress of a simple population falls along the whole ramp, that of stretched bonds has a maximum."""
+    rounded = {"compression": "digits", "precision": "float32"}[rounding]
+    parts = ALONG_A_RAMP | {"clock": {"duration": "40 s", "step": "0.4 s"}}
+    falls = {"model": "steady", "critical_speed": "1 mm/s", "stress": "0.3 MPa"}
+    ends = {"from": "1 nm/s", "to": "1 um/s", "scale": "log"}
+    for bonds_of, is_peak in ((falls, False), (parts["bonds"], True)):
+        # many first values, of which some are rounded down
+        for first in np.linspace(1.0, 2.0, 6):
+            drive_of = {"model": "ramp"} | ends | {"from": f"{first} nm/s"}
+            scenario = sim.Scenario(**parts | {"bonds": bonds_of, "drive": drive_of})
+            exact = values_of(read.peaks(run(scenario)))
+            path = tmp_path / f"{is_peak}{first}.nc"
+            sim.run(scenario.with_values({f"record.{rounding}": rounded}), path)
+            with sim.open(path) as dataset:
+                assert dataset["shear_stress"][0] != exact.get("peak_stress", 0.0)
+                result = values_of(read.peaks(dataset))
+            assert bool(result["peak_stress"].notnull()) is is_peak
+            xr.testing.assert_allclose(result, exact, rtol=1e-6)
+
+
 @pytest.mark.parametrize("cycles", [2, pytest.param(10, marks=pytest.mark.verify)])
 def test_pull_offs_of_cycles_are_those_of_all_cycles_and_not_the_lowest(cycles):
     """Own Gillespie and JKR, 200 pull-offs: mean of the loads -364 nN."""

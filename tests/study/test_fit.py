@@ -1015,7 +1015,7 @@ def test_the_lines_of_the_documentation_sample_a_posterior_that_agrees_with_the_
     lines = re.search(r"```python\n(import lmfit.*?flatchain)\n", text, re.DOTALL)[1]
     monkeypatch.chdir(root)
     values = {}
-    exec(lines.replace("1000", "300"), values)
+    exec(lines.replace("2000", "300"), values)
     # 2,000 samples that are some 24 steps alike: a quantile is off by 0.2 standard deviations
     for number, samples in zip(
         values["fit"].numbers, values["chain"].to_numpy().T, strict=True

@@ -1,4 +1,4 @@
-"""A measured map of the stress as the field itself, carried with the slider, on the plane or under a disc.
+"""A measured map of the stress as the field itself, which passes the contact, on the plane or under a disc.
 
 On the plane the map is periodic and its energy does not change. On a disc only the stress in the contact counts, and
 the pattern passes under the sphere. A unit of new contact at the edge costs dE/dA of this pattern, of either sign.
@@ -43,8 +43,9 @@ class CarriedProcess(SmoothProcess):
     def maps(self, state: Fluctuation, position: Array, members: int) -> Array:
         """Return stress maps τ1(x, y) of the first ``members``, shape (members, nx, ny) [Pa].
 
-        At ``position`` X [m] the pattern has moved by X. Under a disc the contact is in the middle of the pattern,
-        without stress beyond the pattern. Otherwise the pattern is periodic.
+        At ``position`` X [m] the pattern has moved by X past the contact. Under a disc
+        the contact is in the middle of the pattern, without stress beyond the pattern.
+        Otherwise the pattern is periodic.
         """
         lattice, ahead = (
             self.field.lattice,

@@ -331,8 +331,8 @@ class ModalProcess(Renewing):
     def maps(self, state: Fluctuation, position: Array, members: int) -> Array:
         """Return stress maps τ1(x, y) of the first ``members``, shape (members, points, points) [Pa].
 
-        The pattern is carried with the slider: at ``position`` X [m] a mode e^{iqx} has become
-        e^{iq(x − X)}.
+        The pattern passes the contact: at ``position`` X [m] of the slider a mode e^{iqx} has
+        become e^{iq(x − X)}.
         """
         first = state._replace(values=state.values[:members])
         if len(state.amplitude) > 1:
