@@ -95,6 +95,10 @@ CAN_JUMP_IN = Condition(
     f'{CAN_OPEN.words}, and contact.model other than "rate_dependent"',
     lambda scene: CAN_OPEN.holds(scene) and not scene.contact.lags,
 )
+LAGS_BEHIND_SPEED = Condition(
+    "a speed that changes at a constant mount, and bonds or fluctuations that lag",
+    lambda scene: scene.lags_behind_speed,
+)
 LATE_PULL_OFF = Condition(
     f"fluctuations or an edge that lags, and {CAN_OPEN.words}",
     lambda scene: CAN_OPEN.holds(scene) and (scene.feels_steps or scene.contact.lags),
@@ -896,6 +900,21 @@ OF_SLIPS: tuple[Definition, ...] = (
     ),
 )
 
+#: Shares of JKR's area whose loss has a speed, by the endings of names; None for half of all that can be lost.
+LOST: dict[str, float | None] = {
+    "at_5_percent_lost": 0.05,
+    "at_50_percent_lost": 0.5,
+    "halfway_to_hertz": None,
+}
+
+
+def loss_in_words(share: float | None) -> str:
+    """Return a share of the loss in words."""
+    if share is None:
+        return "half of the JKR area above the Hertz area"
+    return f"{100 * share:g} % of JKR's"
+
+
 #: Numbers of a scene, written for each point of a sweep.
 NUMBERS: tuple[Definition, ...] = (
     Definition("contact_modulus", "Pa", "contact modulus", symbol="E*"),
@@ -924,6 +943,16 @@ NUMBERS: tuple[Definition, ...] = (
         "load at pull-off with the full work of adhesion",
         symbol="P_c",
         exists_when=AT_A_LOAD,
+    ),
+    *(
+        Definition(
+            f"{kind}_speed_{name}",
+            "m/s",
+            f"speed at which steady sliding{words} loses {loss_in_words(share)}",
+            exists_when=LAGS_BEHIND_SPEED,
+        )
+        for name, share in LOST.items()
+        for kind, words in (("steady", ""), ("unstable", ", where it is unstable,"))
     ),
 )
 

@@ -21,6 +21,7 @@ import sim.quantities as registry
 from sim.ensemble.diagnosis import cure, systematic_errors, worst
 from sim.ensemble.execute import pool
 from sim.ensemble.plan import IN_MEMORY, Plan, part_name
+from sim.ensemble.steady_speed import steady_speeds
 from sim.ensemble.store import Blocks
 from sim.ensemble.variables import NUMBERS, Variable
 from sim.numerics.files import HDF5
@@ -414,6 +415,7 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
                 quantity.symbol,
             )
             numbers[variable_name(key)] = value
+        numbers |= steady_speeds(point)
         for name, value in (numbers | errors[-1][1]).items():
             derived.setdefault(name, []).append(float(value))
         point.release()

@@ -9,6 +9,7 @@ from sim.ensemble.diagnosis import slider_body
 from sim.ensemble.steady import steady_course
 from sim.parts.drive import Spring
 from sim.parts.exchange import Array
+from sim.quantities import LOST
 from sim.scenario.scenario import Scenario
 
 #: Speeds of the curve in which crossings are searched, decades beyond those of the
@@ -72,6 +73,26 @@ def speeds_of_areas(scene: Scenario, shares: Array) -> tuple[Array, Array]:
         # nan below the maximum of the friction, where any spring is stiff enough
         stable[known] = ~(needed > cast(Spring, scene.drive).stiffness)
     return speeds, stable
+
+
+def steady_speeds(scene: Scenario) -> dict[str, float]:
+    """Return the numbers of the registry at which steady sliding of a scene loses shares of JKR's area [m/s].
+
+    Empty if nothing lags behind a speed that changes, so that a course has the same speeds.
+    """
+    if not scene.lags_behind_speed:
+        return {}
+    contact = scene.contact.equilibrium_radius
+    works = np.array([0.0, scene.adhesion.work])
+    hertz, full = contact(works, scene.sphere.radius, scene.solid.contact_modulus)
+    half = 0.5 * (1.0 + (hertz / full) ** 2)
+    left = [half if share is None else 1.0 - share for share in LOST.values()]
+    speeds, stable = speeds_of_areas(scene, np.array(left))
+    numbers = {}
+    for name, speed, is_stable in zip(LOST, speeds, stable, strict=True):
+        numbers[f"steady_speed_{name}"] = speed if is_stable else np.nan
+        numbers[f"unstable_speed_{name}"] = np.nan if is_stable else speed
+    return numbers
 
 
 def _energies(scene: Scenario) -> Array | None:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from scipy import special
 
+from sim.quantities import LOST, loss_in_words
 from sim.read.correlation import LEVEL, Array
 from sim.read.dataset import (
     MEMBERS,
@@ -37,8 +38,6 @@ from sim.units.errors import BadInput
 from sim.units.notation import engineering
 from sim.units.quantity import read_option
 
-#: Shares of JKR's area whose loss has a speed.
-_LOSSES = (0.05, 0.5)
 #: Shares of a loss, in both orders of charging.
 _CHARGED = (
     "lost_to_bonds",
@@ -417,14 +416,21 @@ def _course(dataset: xr.Dataset) -> tuple[str, xr.DataArray]:
 
 
 def _if_steady(
-    dataset: xr.Dataset, levels: Sequence[xr.DataArray]
+    dataset: xr.Dataset, levels: Sequence[xr.DataArray], is_chosen: bool
 ) -> list[tuple[xr.DataArray, xr.DataArray]]:
     """Return for each share of JKR's area the speed in steady sliding [m/s], and True where that is stable.
 
-    They are those of the scenario's own models. Speeds are nan at points of a sweep whose
-    scenario is not known: of a measured map, of runs that were joined, of swept models.
+    They are those of the scenario's own models, which the run has recorded for the default
+    shares. Speeds are nan at points of a sweep whose scenario is not known: of a measured
+    map, of runs that were joined, of swept models.
     """
     sweep = dataset["contact_modulus"]
+    if not is_chosen and f"steady_speed_{next(iter(LOST))}" in dataset:
+        pairs = (
+            (dataset[f"{kind}_speed_{name}"] for kind in ("steady", "unstable"))
+            for name in LOST
+        )
+        return [(calm.fillna(other), other.isnull()) for calm, other in pairs]
     result = [(math.nan * sweep, xr.ones_like(sweep, bool)) for _ in levels]
     delays = any(str(name).startswith("bonds_rebinding") for name in dataset.variables)
     with contextlib.suppress(KeyError):
@@ -495,28 +501,19 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
     hertz = (radii["radius_hertz"] / radii["radius_jkr"]) ** 2
     if along in hertz.dims:
         hertz = hertz.min(along)
-    shares = wanted or _LOSSES
+    shares: dict[str, float | None] = LOST
+    if wanted:
+        shares = {f"at_{100 * k:g}_percent_lost": k for k in wanted}
+    half = 0.5 * (1.0 + hertz)
     left = [
-        (
-            f"at_{100 * k:g}_percent_lost",
-            1.0 - k + 0.0 * hertz,
-            f"{100 * k:g} % of JKR's",
-        )
-        for k in shares
+        (name, half if k is None else 1.0 - k + 0.0 * hertz, loss_in_words(k))
+        for name, k in shares.items()
     ]
-    if not wanted:
-        left.append(
-            (
-                "halfway_to_hertz",
-                0.5 * (1.0 + hertz),
-                "half of the JKR area above the Hertz area",
-            )
-        )
     least = _least_area(dataset, hertz)
     means, sizes, alone = _group_means(dataset, along, bool(wanted))
     lasting: Any = [None] * len(left)
     if along == "t":
-        lasting = _if_steady(dataset, [level for _, level, _ in left])
+        lasting = _if_steady(dataset, [level for _, level, _ in left], bool(wanted))
     beside, result = means.to_array("quantity").drop_vars("quantity"), Estimates()
     how: Any = {
         "input_core_dims": [

@@ -556,6 +556,14 @@ class Scenario:
         return self.population.is_random or self.fluctuations.per_member
 
     @property
+    def lags_behind_speed(self) -> bool:
+        """Return True if the speed changes at a constant mount, and bonds or fluctuations lag behind it."""
+        amplitude = getattr(self.fluctuations, "amplitude", None)
+        rates = (key.startswith("bonds.rebinding") for key in quantities(self))
+        lags = any(rates) or bool(getattr(amplitude, "relaxing", False))
+        return lags and not self.contact.changes and bool(np.ptp(self.speeds(_SPEEDS)))
+
+    @property
     def loads_from_rest(self) -> bool:
         """True if a friction force builds up after a rest: of the slider, or of the stage that pulls it."""
         drive, rests = cast(Any, self.drive), self.phases.rests
