@@ -35,7 +35,6 @@ from sim.read.over_speed import crossing, extremes, loss_speeds
 from sim.read.peaks import peaks, peaks_after_holds
 from sim.read.run import Run
 from sim.read.slips import kinetic_friction, slips, slips_by_phase, stick_slip
-from sim.read.statements import Statement, each, relaxation
 from sim.read.statistics import QUANTILES, averaging, over_members, summary
 from sim.read.tables import (
     GROUPS,
@@ -59,7 +58,6 @@ __all__ = [
     "IntegralTime",
     "Lifetime",
     "Run",
-    "Statement",
     "SystematicError",
     "Table",
     "averaging",
@@ -69,7 +67,6 @@ __all__ = [
     "correlation_time",
     "crossing",
     "distribution",
-    "each",
     "engineering",
     "events",
     "extremes",
@@ -93,7 +90,6 @@ __all__ = [
     "phases",
     "pull_offs",
     "reference_radii",
-    "relaxation",
     "remarks",
     "scaled",
     "setting",

@@ -60,7 +60,7 @@ class Estimate(NamedTuple):
         others = (None if each is None else change(each) for each in self[1:])
         return Estimate(change(self.value), *others)
 
-    def isel(self, at: Mapping[str, Any]) -> "Estimate":
+    def isel(self, at: Mapping[Any, Any]) -> "Estimate":
         """Return it at indices along some dimensions, which not all fields need to have."""
         return self.map(lambda each: each.isel(at, missing_dims="ignore"))
 

@@ -17,7 +17,6 @@ from sim.read.observables import restricted, with_slips
 from sim.read.over_speed import extremes
 from sim.read.run import Run
 from sim.read.slips import unresolved_slips
-from sim.read.statements import each
 from sim.read.statistics import QUANTILES, over_members
 from sim.units.notation import bounded, concise, engineering, scaled, share
 
@@ -530,35 +529,48 @@ def key_figures(run: Run) -> list[dict[str, str]]:
         for column in (*MAIN, *LOSSES, *EVENTS, *SLIPS, *_of_losses_of(run))
         if _of_drive(run, column.name)
     }
-    groups = [run.events, run.losses]
+    late = {}
     if run.is_stationary:
-        groups.append(run.late(c.name for c in (*main_columns(run), *LOSSES)))
+        late = run.late(c.name for c in (*main_columns(run), *LOSSES))
     rows = []
-    for statement in (one for group in groups for one in each(group)):
-        column = columns.get(statement.name)
+    for name, one in (run.events | run.losses | late).items():
+        column = columns.get(name)
         if column is None:
             continue
-        # an event that did not happen is no key figure
-        reasons = ("", column.definition.absent)
-        numbers = (statement.value, statement.low, statement.high)
-        if all(map(math.isnan, numbers)) and statement.reason in reasons:
-            continue
-        if abs(statement.value - column.dull) < _ROUNDING:
-            continue
-        meaning = column.definition.meaning
-        over = f"; mean over the {statement.over}" if statement.over else ""
-        places = [
-            f"phase {at}" if name == "phase" else str(at)
-            for name, at in statement.at.items()
-        ]
-        rows.append(
-            {
-                "": ", ".join([column.heading, *places]),
-                "value": str(statement),
-                "definition": meaning[:1].upper() + meaning[1:] + over,
-            }
-        )
+        row, about = column.definition, one.value.attrs
+        over = f"; mean over the {about['over']}" if about.get("over") else ""
+        for place in np.ndindex(one.value.shape):
+            at = dict(zip(one.value.dims, place, strict=True))
+            here = one.isel(at)
+            (reason,) = _reasons_at(here, {}, row)
+            # an event that did not happen is no key figure
+            if here.is_missing and reason in ("", row.absent):
+                continue
+            if abs(here.value - column.dull) < _ROUNDING:
+                continue
+            where = [
+                f"phase {here.value[dim].item()}"
+                if dim == "phase"
+                else str(here.value[dim].item())
+                for dim in at
+                if dim in one.value.coords and dim not in run.sweep
+            ]
+            rows.append(
+                {
+                    "": ", ".join([row.heading, *where]),
+                    "value": figure(here, row),
+                    "definition": row.meaning[:1].upper() + row.meaning[1:] + over,
+                }
+            )
     return rows
+
+
+def figure(one: Estimate, row: Definition) -> str:
+    """Return a number with its errors, its unit, and the reason if it is missing or no mean."""
+    unit, (text,) = _texts_of(one, {}, row)
+    reason = "" if one.reason is None else str(one.reason.item())
+    known = not bool(one.is_missing)
+    return "; ".join(filter(None, [f"{text} {unit}".rstrip() * known, reason]))
 
 
 # --- cells ---
@@ -569,8 +581,8 @@ def _places(places: Places, points: Points) -> Cells:
     cells: Cells = {}
     for name, index in points.items():
         unit = places[name].attrs.get("units", "1")
-        heading, texts = _column_of(name, unit, places[name][index].to_numpy())
-        cells[heading] = texts
+        shown, texts = _column_of(unit, places[name][index].to_numpy())
+        cells[_headed(name, shown)] = texts
     return cells
 
 
@@ -602,12 +614,12 @@ def _table_of(
     reasons = []
     for column in columns:
         row, one = column.definition, means[column.name]
-        heading, texts = _texts_of(one, points, row)
+        shown, texts = _texts_of(one, points, row)
         for number, reason in enumerate(_reasons_at(one, points, row)):
             if reason:
                 texts[number] += "*"
                 reasons.append(Reason(row.heading, reason, words[number]))
-        cells[heading] = texts
+        cells[_headed(row.heading, shown)] = texts
     return Table(_rows(cells), keys, columns=columns, reasons=tuple(reasons))
 
 
@@ -636,38 +648,42 @@ def _reasons_at(one: Estimate, points: Points, row: Definition) -> list[str]:
 
 
 def _texts_of(one: Estimate, points: Points, row: Definition) -> tuple[str, list[str]]:
-    """Return the heading of a column with its unit, and its cells."""
+    """Return the unit in which a column is printed, and its cells."""
     value, error, low, high, bound = (_at(field, points) for field in one[:5])
     unit = one.unit
     if row.form is not Form.PLAIN and unit == "1":
         unit, value = "%", np.where(np.abs(value) < _ROUNDING, 0.0, value)
     errors = (error, low, high, np.nan_to_num(bound))
-    heading, texts = _column_of(row.heading, unit, value, errors, one.source)
+    shown, texts = _column_of(unit, value, errors, one.source)
     if row.form is Form.SHARE:
         texts = [
             share(*ends) or text
             for *ends, text in zip(value, low, high, texts, strict=True)
         ]
-    return heading, texts
+    return shown, texts
 
 
 #: Standard error, ends of the interval and systematic error of a number without any.
 _EXACT = tuple(np.array(number) for number in (0.0, math.nan, math.nan, 0.0))
 
 
+def _headed(heading: str, unit: str) -> str:
+    """Return a heading with a unit."""
+    return f"{heading} ({unit})" if unit else heading
+
+
 def _column_of(
-    heading: str,
     unit: str,
     values: Array,
     errors: Sequence[Array] = _EXACT,
     source: str = "",
 ) -> tuple[str, list[str]]:
-    """Return a heading with the unit that suits the largest value, and the cells of a column.
+    """Return the unit that suits the largest value, and the cells of a column.
 
     ``errors`` are standard errors, both ends of intervals, and systematic errors.
     """
     if values.dtype.kind not in "fi":
-        return heading, [str(value) for value in values]
+        return "", [str(value) for value in values]
     sizes = np.abs(values)
     if not np.any(np.isfinite(sizes)):
         sizes = np.abs(np.append(errors[1], errors[2]))
@@ -690,7 +706,7 @@ def _column_of(
         )
         for value, error, low, high, bound in np.broadcast(values, *errors)
     ]
-    return f"{heading} ({shown})" if shown else heading, texts
+    return shown, texts
 
 
 def _at(variable: xr.DataArray | None, points: Points) -> Array:
@@ -777,9 +793,8 @@ def _spread_of(one: Estimate, row: Definition) -> dict[str, str]:
     factor, shown = scaled(float(np.max(np.abs(levels))), row.unit)
     if row.form is not Form.PLAIN:
         factor, shown = 100.0, "%"
-    heading = f"{row.heading} ({shown})" if shown else row.heading
     cells = {
-        "quantity": heading,
+        "quantity": _headed(row.heading, shown),
         "mean": concise(factor * float(value), factor * float(error)),
         "sd": f"{factor * std:.3g}",
     }

@@ -59,6 +59,35 @@ def values_of(estimates):
     return xr.Dataset({name: one.value for name, one in estimates.items()})
 
 
+class Statement(NamedTuple):
+    """A number at one point of the sweep with its name and place."""
+
+    name: str
+    at: dict
+    value: float
+    low: float
+    high: float
+    bound: float
+    reason: str
+
+
+def each(estimates):
+    """Yield the numbers of quantities, one for each point of the sweep."""
+    for name, one in estimates.items():
+        for place in np.ndindex(one.value.shape):
+            at = dict(zip(one.value.dims, place, strict=True))
+            value, low, high, bound, reason = (
+                math.nan
+                if field is None
+                else field.isel(at, missing_dims="ignore").item()
+                for field in (one.value, one.low, one.high, one.bound, one.reason)
+            )
+            coords = one.value.isel(at).coords
+            known = {dim: coords[dim].item() for dim in at if dim in coords}
+            reason = reason if isinstance(reason, str) else ""
+            yield Statement(name, known, value, low, high, bound, reason)
+
+
 def statements_of(run):
     """Return the numbers behind the tables of a run by name, point of the sweep, and time or record."""
     over = [*read.tables.main_columns(run), *read.tables.LOSSES]

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from helpers.parts import read, run
+from helpers.statements import each
 
 import sim
 
@@ -246,7 +247,7 @@ def by_name(dataset):
                 for value in one.at.values()
             ),
         ): one
-        for one in read.each(read.Run(dataset).statements())
+        for one in each(read.Run(dataset).statements())
     }
 
 
