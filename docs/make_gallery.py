@@ -450,6 +450,7 @@ def decomposition(dataset: xr.Dataset) -> dict[str, Number]:
     """With G = {modulus:g} MPa and a contact {width:.1f} mm wide, an rms of {rms:g} kPa masks the contact {masked}
     % of the time. The fluctuations then store {energy} mJ/m². The bonds at this speed supply a work of adhesion of
     {work:.1f} mJ/m².""",
+    kind="time_masked",
 )
 def soft_lens(dataset: xr.Dataset) -> dict[str, Number]:
     rms = 30e3
@@ -472,6 +473,7 @@ def soft_lens(dataset: xr.Dataset) -> dict[str, Number]:
     {high:.1f} % of JKR's area. With three wavelengths the standard deviation is {three} %, with thirty {thirty} %.
     The energy is a sum over the waves in the contact. Its spread therefore falls about as one over the number of
     waves along a side.""",
+    kind="histogram",
 )
 def ten_wavelengths(dataset: xr.Dataset) -> dict[str, Number]:
     area = dataset["contact_area"].isel(t=-1)

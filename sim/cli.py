@@ -458,7 +458,8 @@ def stats(
 
 #: Kinds of figures with their content and options, here because the help must not import what draws them.
 _KINDS = {
-    "loop": "Load and contact radius over displacement with the energy lost per cycle, and radius over load. --data",
+    "loop": "Load and contact radius over displacement, and radius over load, with the pull-offs and JKR's"
+    " equilibria. --data",
     "theories": "Contact area, simulated and by each theory, over shear stress and tangential force.",
     "stress": "Shear stress with its maximum, and bonds, over speed. After a start from rest: the static peaks. --data",
     "stability": "Force amplitude of the spring over speed and stiffness, at increasing and decreasing speed,"
@@ -470,8 +471,13 @@ _KINDS = {
     " curve. --x --absolute --data",
     "time": "Contact radius, energies, friction, and changing speed, load and displacement, over time. --x"
     " --absolute --data",
-    "incipient": "Contact area over the tangential force before sliding, with the law A0 − αQ². --absolute",
+    "incipient": "Contact area over the tangential force before sliding, and the law A0 − αQ² if the loss grows as a"
+    " square. --absolute",
     "map": "Last stress map of a member, or the map nearest to a time, and the displacement by this stress. --at",
+    "histogram": "Distribution of a quantity (--x) over the members, and over the second half of a stationary"
+    " run. --x",
+    "survival": "Share of contacts not yet masked, or detached (--x first_detachment), over time, with 95 % intervals."
+    " --x",
     "movie": "Movie (GIF, MP4) of one contact: its edge, over the stress if maps are recorded, with area and"
     " force over time. --absolute",
 }
@@ -526,6 +532,12 @@ class _Plot(click.Command):
     help="Range of the x axis in its unit, such as 0.1:10.",
 )
 @click.option(
+    "--ylim",
+    default="",
+    metavar="LOW:HIGH",
+    help="Range of the y axis of the first panel in its unit.",
+)
+@click.option(
     "--from",
     "start",
     metavar="TIME",
@@ -547,9 +559,9 @@ def plot(
 ) -> None:
     """Draw a figure. Without KIND, the first kind that fits the dataset is drawn.
 
-    KIND may also be a statement, such as pull_off_load, which is drawn over the swept key. If OUTPUT is a
-    scenario (.toml), its spectrum is drawn before any run. Every kind takes --where, --member, --units, --size
-    and --xlim, and the options beside its name. Kinds over time also take --from and --to.
+    KIND may also be a statement, such as pull_off_load, which is drawn over the first swept key or --x. If OUTPUT is
+    a scenario (.toml), its spectrum is drawn before any run. Every kind takes --where, --member, --units, --size,
+    --xlim and --ylim, and the options beside its name. Kinds over time also take --from and --to.
     """
     _import_xarray()
     from sim.plots import kinds as plots

@@ -28,6 +28,7 @@ from sim import read
 from sim.cli import _values, cli
 from sim.laws import halfspace, schallamach
 from sim.plots.kinds import KINDS
+from sim.quantities import QUANTITIES
 from sim.scenario.reader import load
 
 ROOT = Path(__file__).parent.parent
@@ -169,7 +170,8 @@ def test_the_commands_that_a_page_shows_exist_with_their_options_kinds_and_keys(
             )
             # words may be left out
             values = command.make_context(name, words, resilient_parsing=True).params
-            assert values.get("kind") in (None, *KINDS), (page, name, *words)
+            kinds = (None, *KINDS, *QUANTITIES)
+            assert values.get("kind") in kinds, (page, name, *words)
             assert all(
                 (ROOT / word).exists()
                 for word in words

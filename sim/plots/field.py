@@ -8,6 +8,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
+from matplotlib.patches import Rectangle
 
 from sim.laws.halfspace import angular_compliance, displacement
 from sim.plots import style
@@ -36,9 +37,8 @@ def needs_maps(dataset: xr.Dataset) -> None:
 def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     """Last stress map of a member, or the map nearest to a time, and the displacement by this stress."""
     point = dataset.isel(dict.fromkeys(sweep_dims(dataset), 0))
-    number = (
-        -1 if at is None else int(np.abs(point["map_time"].to_numpy() - at).argmin())
-    )
+    times = point["map_time"].to_numpy()
+    number = -1 if at is None else int(np.abs(times - at).argmin())
     stress = point["shear_map"].isel(map_time=number, map_member=0).transpose("x", "y")
     sides, measured = sides_of(stress), bool(word(dataset, "shear.field.file", ""))
     solid = (
@@ -51,43 +51,23 @@ def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     figure, axes = style.pairs(0.6 + 2.5 * min(1.0, sides[1] / sides[0]), shared=True)
     length = style.Unit.of(np.array(sides), "m")
     sizes = [length.factor * size for size in (*sides, radius)]
-    draw_field(axes[0], stress.to_numpy(), sizes, measured, STRESS)
-    draw_field(axes[1], moved, sizes, measured, ("m", "displacement $w_1$", "PuOr_r"))
-    arrow = {
-        -1.0: r"$\longleftarrow$ sliding",
-        0.0: "at rest",
-        1.0: r"sliding $\longrightarrow$",
-    }
-    box = {
-        "boxstyle": "round,pad=0.2",
-        "facecolor": "white",
-        "alpha": 0.85,
-        "linewidth": 0,
-    }
-    for panel in axes:
+    about: Any = (*STRESS, None), ("m", "displacement $w_1$", "PuOr_r", None)
+    for panel, values, words in zip(
+        axes, (stress.to_numpy(), moved), about, strict=True
+    ):
+        draw_field(panel, values, sizes, measured, words)
         if measured or 0.0 < sizes[2] < 1.5 * sizes[0]:
             style.contact_circle(panel, sizes[2])
         panel.set_xlabel(length.label("$x$"))
-        panel.text(
-            0.04,
-            0.05,
-            arrow[float(np.sign(speed))],
-            transform=panel.transAxes,
-            fontsize=7,
-            bbox=box,
-        )
     axes[0].set_ylabel(length.label("$y$"))
-    then = f"$t$ = {style.text_of(stress['map_time'], 's')}, $V$ = {style.text_of(speed, 'm/s')}"
+    arrow = (r"$\longleftarrow$ sliding", "at rest", r"sliding $\longrightarrow$")
+    now = [style.swept_value(dataset, name, 0) for name in style.swept(dataset)]
+    now += [f"$t$ = {style.text_of(stress['map_time'], 's')}"]
+    now += [f"$V$ = {style.text_of(speed, 'm/s')}", arrow[int(np.sign(speed)) + 1]]
     with where_recorded():
-        then += rf", mean $\tau_0$ = {style.rounded(_then(point, 'shear_stress', stress), 'Pa')}"
-    axes[0].set_title(
-        ", ".join(
-            [
-                *(style.swept_value(dataset, name, 0) for name in style.swept(dataset)),
-                then,
-            ]
-        )
-    )
+        mean = style.rounded(_then(point, "shear_stress", stress), "Pa")
+        now.append(rf"mean $\tau_0$ = {mean}")
+    style.head(figure, now)
     return figure
 
 
@@ -112,17 +92,13 @@ def around(
             -(points // 2 + 0.5) * side / points
             for points, side in zip(field.shape, sizes, strict=False)
         ]
-        return (
-            field,
-            (firsts[0], firsts[0] + sizes[0], firsts[1], firsts[1] + sizes[1]),
-            0.0,
-        )
+        x, y, (along, across, _) = *firsts, sizes
+        return field, (x, x + along, y, y + across), 0.0
     cell, _, radius = sizes
     # between its samples by its own Fourier series: nothing is smoothed
     points = field.shape[0] * -(-PIXELS // field.shape[0])
-    field = scipy.signal.resample(
-        scipy.signal.resample(field, points, axis=0), points, axis=1
-    )
+    for axis in (0, 1):
+        field = scipy.signal.resample(field, points, axis=axis)
     side = max(cell, 2.3 * radius) if 2.3 * radius < 3.0 * cell else cell
     half = int(np.ceil(0.5 * side / cell * points))
     index = np.arange(-half, half + 1) % points
@@ -131,50 +107,37 @@ def around(
 
 
 def draw_field(
-    panel: Axes,
-    field: np.ndarray,
-    sizes: list[float],
-    measured: bool,
-    about: tuple,
-    among: np.ndarray | None = None,
+    panel: Axes, field: np.ndarray, sizes: list[float], measured: bool, about: tuple
 ) -> tuple[AxesImage, float]:
     """Draw a field (x, y) around the contact with x to the right, and a colour bar; return the image and its factor.
 
-    ``about`` holds the SI unit, words and colour map. The bar has the colours of the field alone, or of all fields
-    ``among`` which it is one. Few pixels beyond its ends do not rule it.
+    ``about`` holds the SI unit, words, colour map, and the fields that share the colours, or
+    None. Few pixels beyond the ends of the bar do not rule it. A dash-dotted square is the
+    cell if the view is wider, in which the cell repeats.
     """
-    si, words, colours = about
+    si, words, colours, among = about
     shown, extent, half = around(field, sizes, measured)
     among = shown if among is None else among
     unit = style.Unit.of(among, si)
-    low, high, most = unit.factor * np.array(
-        [np.min(among), np.max(among), np.quantile(np.abs(among), _SHOWN)]
+    most = unit.factor * np.quantile(np.abs(among), _SHOWN) or 1.0
+    image = panel.imshow(
+        unit.factor * shown.T,
+        extent=extent,
+        origin="lower",
+        cmap=style.part_of(colours, 0.05, 0.95),
+        vmin=-most,
+        vmax=most,
+        interpolation="nearest",
     )
-    most = most or 1.0
-    cut = {
-        (False, False): "neither",
-        (True, False): "min",
-        (False, True): "max",
-        (True, True): "both",
-    }
-    extend = cut[bool(low < -most), bool(high > most)]
-    look: Any = {
-        "cmap": style.part_of(colours, 0.05, 0.95),
-        "vmin": -most,
-        "vmax": most,
-        "interpolation": "nearest",
-    }
-    image = panel.imshow(unit.factor * shown.T, extent=extent, origin="lower", **look)
-    beside: Any = {
-        "cax": panel.inset_axes((1.03, 0.0, 0.045, 1.0)),
-        "label": unit.label(words),
-        "extend": extend,
-    }
-    bar = panel.figure.colorbar(image, extendfrac=0.03, **beside)
-    if high > low:
-        bar.ax.set_ylim(max(low, -most), min(high, most))
+    beside: Any = {"cax": panel.inset_axes((1.03, 0.0, 0.045, 1.0))}
+    panel.figure.colorbar(image, label=unit.label(words), extend="both", **beside)
     if half:
         panel.set(xlim=(-half, half), ylim=(-half, half))
+    if half > 0.5 * sizes[0]:
+        corner = (-0.5 * sizes[0], -0.5 * sizes[0])
+        look: Any = {"fill": False, "linestyle": "-.", "linewidth": 0.8}
+        panel.add_patch(Rectangle(corner, sizes[0], sizes[0], **look))
+        panel.set_title("dash-dotted: the cell, which repeats")
     return image, unit.factor
 
 
@@ -194,10 +157,8 @@ def density_figure(scene: "Scenario") -> Figure:
     ValueError
         If there is none: the stress is uniform, or a single wave.
     """
-    shear, radius = (
-        scene.fluctuations,
-        scene.rest_radius if scene.rest_radius > 0.0 else 0.01 * scene.sphere.radius,
-    )
+    shear, radius = scene.fluctuations, scene.rest_radius
+    radius = radius if radius > 0.0 else 0.01 * scene.sphere.radius
     spectrum = shear.spectrum
     if spectrum.wavevector is not None:
         raise ValueError(
@@ -209,63 +170,43 @@ def density_figure(scene: "Scenario") -> Figure:
     length = style.Unit.of(2 * np.pi / q, "m", logarithmic=True)
     figure, (panel, below) = style.rows([1.9, 1.1])
     shown = q / length.factor
-    split = not np.allclose(along, across, rtol=1e-9, atol=0.0)
-    for density, look, name in (
-        (along, "-", "along the sliding"),
-        (across, "--", "across it"),
-    )[: 1 + split]:
+    densities = {"along the sliding": (along, "-"), "across it": (across, "--")}
+    if np.allclose(along, across, rtol=1e-9, atol=0.0):
+        densities = {"$C(q)$": (along, "-")}
+    for name, (density, look) in densities.items():
         line = np.where(density > 0.0, density, np.nan)
-        panel.loglog(
-            shown,
-            line,
-            look,
-            color=style.FLUCTUATIONS,
-            label=name if split else "$C(q)$",
-        )
+        panel.loglog(shown, line, look, color=style.FLUCTUATIONS, label=name)
     if getattr(spectrum, "file", ""):
         rows = cast(Rowed, spectrum).rows
-        marks: Any = style.HOLLOW | {
-            "markersize": 3.0,
-            "markeredgewidth": 0.6,
-            "color": style.BOTH,
-        }
-        panel.plot(
-            rows.q / length.factor,
-            np.where(rows.density > 0.0, rows.density, np.nan),
-            label="rows",
-            **marks,
-        )
+        known = rows.density > 0.0
+        marks: Any = style.HOLLOW | {"color": style.BOTH, "label": "rows"}
+        panel.plot(rows.q[known] / length.factor, rows.density[known], **marks)
     most = np.max(np.maximum(along, across))
-    panel.set_ylim(
-        max(0.3 * np.min(along[along > 0.0], initial=most), 1e-9 * most), 3.0 * most
-    )
-    wide, cell = (
-        np.pi / radius / length.factor,
-        2 * np.pi / shear.side(scene.setting.cell) / length.factor,
-    )
-    for place, look, name in (
-        (wide, ":", r"$\pi/a$, a wave as wide as the contact"),
-        (cell, "-.", r"$2\pi$/cell"),
+    least = 0.3 * np.min(along[along > 0.0], initial=most)
+    panel.set_ylim(max(least, 1e-9 * most), 3.0 * most)
+    for wave, look, name in (
+        (radius, ":", r"$\pi/a$, a wave as wide as the contact"),
+        (0.5 * shear.side(scene.setting.cell), "-.", r"$2\pi$/cell"),
     ):
+        place = np.pi / wave / length.factor
         if shown[0] < place < shown[-1]:
             panel.axvline(place, linestyle=look, **style.GREY, label=name)
             below.axvline(place, linestyle=look, **style.GREY)
-    words = (
-        r"$C$ for $n\langle f^2\rangle$ = 1 N²/m²"
-        if spectrum.bond_made
-        else r"spectral density $C$ (Pa² m²)"
-    )
+    words = r"spectral density $C$ (Pa² m²)"
+    if spectrum.bond_made:
+        words = r"$C$ for $n\langle f^2\rangle$ = 1 N²/m²"
     panel.set_ylabel(words)
     style.legend(panel)
     mean, lean = cast(Waves, spectrum).harmonics(q)
     level, swing = angular_compliance(scene.solid.effective[1])
-    for weight, look, name in (
-        (q * mean, "-", "variance"),
-        (level * mean - swing * lean, "--", "stored energy"),
-    ):
+    weights = {
+        "variance": (q * mean, "-"),
+        "stored energy": (level * mean - swing * lean, "--"),
+    }
+    for name, (weight, look) in weights.items():
         held = scipy.integrate.cumulative_trapezoid(weight, q, initial=0.0)
         below.plot(shown, held / held[-1], look, color=style.BOTH, label=name)
     below.set_ylabel("share of longer waves")
-    below.legend(loc="lower right")
+    style.legend(below)
     style.across(below, shown, f"wavenumber $q$ (rad/{length.name})", "log")
     return figure

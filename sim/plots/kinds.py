@@ -1,10 +1,9 @@
 """The kinds of figures, the choices for a figure, and its drawing."""
 
 import contextlib
+import functools
 import inspect
-import math
 import re
-import textwrap
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sim.numerics.files import claim as claim_file
-from sim.plots import curves, field, movie, slider, style, theories
+from sim.plots import curves, distributions, field, movie, slider, style, theories
 from sim.plots.measured import Measured
 from sim.plots.style import STYLE, recorded, save, swept_value
 from sim.read import Run, engineering, sweep_dims
@@ -33,7 +32,9 @@ from sim.units.quantity import read_option
 
 #: Kinds of figures over time, of which a part can be drawn.
 _OVER_TIME = ("time", "friction", "creep", "stress", "movie")
-_SIZE = re.compile(r"(?P<width>[\d.]+) *[x×] *(?P<height>[\d.]+) *(?P<unit>in|cm|mm)")
+#: Choices that all kinds take, and those that kinds over time take beside them.
+_OF_ALL, _TIMES = ("member", "units", "size", "xlim", "ylim"), ("start", "stop")
+_SIZE = re.compile(r"([\d.]+) *[x×] *([\d.]+) *(in|cm|mm)")
 _INCHES = {"in": 1.0, "cm": 1.0 / 2.54, "mm": 0.1 / 2.54}
 
 
@@ -44,8 +45,8 @@ class Choices(NamedTuple):
     parameters take ``at``, the time [s] of the drawn record or map. ``x`` is the variable or swept key of the x axis.
     ``absolute`` draws areas instead of shares. ``data`` are measured points in a CSV table, or columns in SI by name
     (``{"speed": [1e-3], "contact_area": [4e-8]}``). ``ax`` are the matplotlib axes of the first panel. ``size`` is the
-    size of the picture, such as ``"3.4x2.6in"``. ``xlim`` is the range of the x axis in its unit, such as ``"0.1:10"``.
-    ``start`` and ``stop`` limit the time of figures over time.
+    size of the picture, such as ``"3.4x2.6in"``. ``xlim`` and ``ylim`` are ranges of the axes of the first panel in
+    their units, such as ``"0.1:10"``. ``start`` and ``stop`` limit the time of figures over time.
     """
 
     member: int | None = None
@@ -57,6 +58,7 @@ class Choices(NamedTuple):
     ax: Axes | None = None
     size: str = ""
     xlim: str = ""
+    ylim: str = ""
     start: float | str | None = None
     stop: float | str | None = None
 
@@ -79,17 +81,17 @@ class Choices(NamedTuple):
         ValueError
             For a choice that the kind does not take, or that cannot be read.
         """
-        of_all = ["member", "units", "size", "xlim"]
-        of_all += ["start", "stop"] if kind in _OVER_TIME else []
+        of_all = [*_OF_ALL, *(_TIMES if kind in _OVER_TIME else ())]
         options = {
-            name: value for name, value in self.chosen.items() if name not in of_all
+            name: self.chosen[name] for name in self.chosen if name not in of_all
         }
-        if refused := [name for name in options if name not in takes]:
-            names = ", ".join(["where", *of_all, *takes])
-            names = names.replace("start, stop", "start (--from), stop (--to)")
-            raise ValueError(
-                f'the figure "{kind}" has no choice of {refused[0]}; it takes {names}'
-            )
+        for name in options:
+            if name not in takes:
+                words = ", ".join(["where", *of_all, *takes])
+                words = words.replace("start, stop", "start (--from), stop (--to)")
+                raise ValueError(
+                    f'the figure "{kind}" has no choice of {name}; it takes: {words}'
+                )
         if self.at is not None:
             options["at"] = read_option(self.at, "at", "s")
         if self.data is not None:
@@ -98,17 +100,13 @@ class Choices(NamedTuple):
 
     def measured(self, dataset: xr.Dataset) -> Measured | None:
         """Return the measured points, if there are any."""
-        return (
-            self.data
-            if self.data is None or isinstance(self.data, Measured)
-            else Measured(self.data, dataset)
-        )
+        if self.data is None or isinstance(self.data, Measured):
+            return self.data
+        return Measured(self.data, dataset)
 
     def between(self, dataset: xr.Dataset) -> xr.Dataset:
         """Return the dataset between the times ``start`` and ``stop``."""
-        start = (
-            -math.inf if self.start is None else read_option(self.start, "--from", "s")
-        )
+        start = None if self.start is None else read_option(self.start, "--from", "s")
         cut = dataset.sel(t=slice(start, read_option(self.stop, "--to", "s")))
         if cut.sizes["t"] < 2:
             last = engineering(float(dataset["t"][-1]), "s")
@@ -118,24 +116,23 @@ class Choices(NamedTuple):
         return cut
 
     def shape(self, figure: Figure) -> None:
-        """Give a figure the chosen size and range of its x axis."""
+        """Give a figure the chosen size, and its first panel the chosen ranges of the axes."""
         if self.size:
             if not (match := _SIZE.fullmatch(self.size)):
                 raise ValueError(
                     f'--size takes width x height with a unit, such as 3.4x2.6in, not "{self.size[:40]}"'
                 )
-            width, height = (
-                float(match[name]) * _INCHES[match["unit"]]
-                for name in ("width", "height")
-            )
+            *sides, unit = match.groups()
+            width, height = (float(side) * _INCHES[unit] for side in sides)
             figure.set_size_inches(width, height)
-        if self.xlim:
-            try:
-                low, high = map(float, self.xlim.split(":"))
-            except ValueError:
-                words = f'--xlim takes two numbers in the unit of the axis, such as 0.1:10, not "{self.xlim[:40]}"'
-                raise ValueError(words) from None
-            figure.axes[0].set_xlim(low, high)
+        for name, text in (("xlim", self.xlim), ("ylim", self.ylim)):
+            if text:
+                try:
+                    low, high = map(float, text.split(":"))
+                except ValueError:
+                    words = f'--{name} takes two numbers in the unit of the axis, such as 0.1:10, not "{text[:40]}"'
+                    raise ValueError(words) from None
+                figure.axes[0].set(**{name: (low, high)})
 
     def of_member(self, dataset: xr.Dataset) -> xr.Dataset:
         """Return the dataset of the chosen member, or of all.
@@ -183,7 +180,13 @@ class Kind(NamedTuple):
     @property
     def takes(self) -> tuple[str, ...]:
         """Choices that the kind takes beside a member and units."""
-        return tuple(inspect.signature(self.draw).parameters)[1:]
+        names = inspect.signature(self.draw).parameters
+        return tuple(name for name in names if name in Choices._fields)
+
+
+def _never(dataset: xr.Dataset) -> bool:
+    """Fit no dataset, because the kind is drawn only if its name is given."""
+    return False
 
 
 _OF_THEORY = ("shear_stress", "contact_area")
@@ -227,9 +230,11 @@ KINDS: dict[str, Kind] = {
         reads=("spring_force", "contact_area"),
     ),
     "map": Kind(field.map_figure, field.needs_maps),
-    "movie": Kind(
-        movie.movie_figure, movie.needs_one_contact, lambda dataset: False, movie.READS
+    "histogram": Kind(
+        distributions.histogram_figure, distributions.needs_members, _never
     ),
+    "survival": Kind(distributions.survival_figure, distributions.needs_event, _never),
+    "movie": Kind(movie.movie_figure, movie.needs_one_contact, _never, movie.READS),
 }
 
 
@@ -301,30 +306,21 @@ def draw(
     """
     choices = choices or Choices()
     dataset = choices.of_member(plain(dataset))
+    swept = style.swept(dataset)
     if not kind:
         data = choices.measured(dataset)
-        choices = choices._replace(data=data)
-        dims = [
-            (dim, dim.rpartition("_")[2], dim.replace("_", ".", 1))
-            for dim in style.swept(dataset)
-        ]
-        over = "sweep" if any(choices.x in words for words in dims) else "time"
-        kind = {"": default(dataset, data), "speed": "curve"}.get(choices.x, over)
-    of_statement = (
-        kind not in KINDS
-        and bool(style.swept(dataset))
-        and kind in Run(dataset).statements()
-    )
-    drawing = (
-        Kind(lambda run: curves.statement_figure(run, str(kind)))
-        if of_statement
-        else KINDS.get(kind)
-    )
+        choices, x = choices._replace(data=data), choices.x.replace(".", "_")
+        is_key = any(name.endswith(x) for name in swept)
+        kinds = {"": default(dataset, data), "speed": "curve"}
+        kind = kinds.get(x, "sweep" if is_key else "time")
+    drawing = KINDS.get(kind)
     if drawing is None:
-        raise ValueError(
-            f'there is no figure "{kind}"; known: {", ".join(KINDS)}, and statements of a sweep'
-        )
-    if not of_statement and (missing := _missing(dataset, kind)):
+        if not swept or kind not in Run(dataset).statements():
+            raise ValueError(
+                f'there is no figure "{kind}"; known: {", ".join(KINDS)}, and statements of a sweep'
+            )
+        drawing = Kind(functools.partial(curves.statement_figure, name=kind))
+    elif missing := _missing(dataset, kind):
         raise ValueError(
             f"{missing}; it can be drawn as: {', '.join(drawable(dataset))}"
         )
@@ -334,37 +330,31 @@ def draw(
     look = contextlib.nullcontext() if choices.ax else mpl.rc_context(STYLE)
     with look, answered(), in_units(choices.units):
         figure = drawing.draw(dataset, **options)
-        fixed = [
-            swept_value(dataset, name, 0)
-            for name in sweep_dims(dataset)
-            if dataset.sizes[name] == 1
-        ]
-        fixed += [] if choices.member is None else [f"member {choices.member}"]
-        if fixed and not choices.ax:
-            figure.suptitle(", ".join(fixed), fontsize=mpl.rcParams["axes.titlesize"])
-        labelled = [
-            dataset[name]
-            for name in style.swept(dataset)
-            if dataset[name].dtype.kind not in "fi"
-        ]
-        key = [
-            str(label.attrs.get("long_name", "")).partition(", ")[2]
-            for label in labelled
-        ]
-        if any(key) and not choices.ax:
-            texts = filter(
-                None,
-                [*"; ".join(filter(None, key)).split("; "), figure.get_supxlabel()],
-            )
-            lines = [textwrap.fill(text, 76, subsequent_indent="   ") for text in texts]
-            figure.supxlabel(
-                "\n".join(lines),
-                x=0.02,
-                ha="left",
-                fontsize=0.75 * mpl.rcParams["font.size"],
-            )
+        if not choices.ax:
+            _describe(figure, dataset, choices.member)
         choices.shape(figure)
         return figure
+
+
+def _describe(figure: Figure, dataset: xr.Dataset, member: int | None) -> None:
+    """Write chosen values above a figure, and below it what the labels of swept courses stand for."""
+    fixed = [
+        swept_value(dataset, name, 0)
+        for name in sweep_dims(dataset)
+        if dataset.sizes[name] == 1
+    ]
+    fixed += [] if member is None else [f"member {member}"]
+    if fixed:
+        style.head(figure, fixed)
+    courses = [
+        str(dataset[name].attrs.get("long_name", "")).partition(", ")[2]
+        for name in style.swept(dataset)
+        if dataset[name].dtype.kind not in "fi"
+    ]
+    if any(courses):
+        texts = [text for course in courses for text in course.split("; ")]
+        text = "\n".join(filter(None, [*texts, figure.get_supxlabel()]))
+        figure.supxlabel(text, x=0.02, ha="left", fontsize=6.0)
 
 
 def drawn(

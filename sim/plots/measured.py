@@ -1,7 +1,6 @@
 """Measured points over the curves of a dataset, from a CSV table, and their residuals."""
 
 import itertools
-import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -29,11 +28,7 @@ _NEAR, _ROUNDING = 5e-3, 1e-9
 _ALIKE = 0.01
 _MARKS = "osD^v"
 #: Reasons why a row is not drawn, and why it has no residual.
-_NO_CURVE, _SEVERAL = (
-    "not of a curve in the figure",
-    ("of several curves", "of curves with other JKR areas"),
-)
-_APART = (_SEVERAL[0], "beyond the curve", "without an error")
+_NO_CURVE, _SEVERAL = "not of a curve in the figure", "of several curves"
 #: Most values of a condition that are named.
 _MOST = 3
 
@@ -106,7 +101,7 @@ class Residuals(NamedTuple):
 
     over: str
     name: str
-    line: Line
+    colour: str
     x: np.ndarray
     values: np.ndarray
 
@@ -116,7 +111,7 @@ class Measured:
 
     Its columns are variables of a dataset with their units and errors, as those of ``sim fit``. A column that is a
     number of the scenario, such as ``contact_load``, assigns a row to a curve of a sweep. For each column of which a
-    panel has points, ``reasons`` says why a row is none of them or has no residual; "" if neither. ``assumed`` tells
+    panel has points, ``reasons`` says why a row is none of them or of no single curve; "" if neither. ``assumed`` tells
     of missing units.
     """
 
@@ -172,24 +167,18 @@ class Measured:
 
     def _rows_of(self, curve: Compared, over: str, at_end: bool) -> np.ndarray:
         """True for the rows whose conditions are those all along a curve, of the last record if it is not over time."""
-        rows, sweep = (
-            np.ones(len(next(iter(self.table.values())).values), bool),
-            {*sweep_dims(self.dataset)},
-        )
-        prescribed = (
-            speed_name(self.dataset)
-            if at_end and "drive_force" not in self.dataset
-            else ""
-        )
-        for column in self.table:
+        rows = np.ones(len(next(iter(self.table.values())).values), bool)
+        is_prescribed = at_end and "drive_force" not in self.dataset
+        prescribed = speed_name(self.dataset) if is_prescribed else ""
+        for column, points in self.table.items():
             for name in () if over in names_of(column) else names_of(column):
                 number = self.dataset.variables.get(name, xr.Variable("t", [np.nan]))
                 number = number.isel(t=-1) if name == prescribed else number
                 values = number.isel(curve.line.point, missing_dims="ignore").to_numpy()
-                if {*number.dims} <= sweep and np.ptp(values) == 0.0:
-                    rows &= np.abs(
-                        self.table[column].values - values.flat[0]
-                    ) <= _NEAR * np.abs(values.flat[0])
+                of_sweep = {*number.dims} <= {*sweep_dims(self.dataset)}
+                if of_sweep and np.ptp(values) == 0.0:
+                    value = values.flat[0]
+                    rows &= np.abs(points.values - value) <= _NEAR * np.abs(value)
                     self.conditions.add(column)
         return rows
 
@@ -197,24 +186,23 @@ class Measured:
         """Return the measured values of a variable, or those that follow from another column, at places on the axis."""
         if (points := self.column(name)) is not None:
             return points
-        if (
-            name == "area_ratio"
-            and (area := self._values("contact_area", curve, x)) is not None
-        ):
-            (branches,) = curve.at(x, curve.full)
-            unique = branches[0] if len(branches) == 1 else np.full(x.shape, np.nan)
-            full = curve.full[0] if np.ptp(curve.full) == 0.0 else unique
-            return Points(
-                area.values / full, None if area.errors is None else area.errors / full
+        if name == "area_ratio":
+            area = self._values("contact_area", curve, x)
+            if area is None:
+                return None
+            branches = curve.at(x, curve.full)[0]
+            full = branches[0] if len(branches) == 1 else np.full(x.shape, np.nan)
+            return scaled(
+                area, 1.0 / (curve.full[0] if np.ptp(curve.full) == 0.0 else full)
             )
         by, power, factor = _BY.get(name, ("", 1.0, 1.0))
         if by not in self.table:
             return None
-        source, errors = self.table[by]
-        values = factor * source**power
-        return Points(
-            values, None if errors is None else power * np.abs(values / source) * errors
-        )
+        values, errors = self.table[by]
+        derived = factor * values**power
+        if errors is not None:
+            errors = power * np.abs(derived / values) * errors
+        return Points(derived, errors)
 
     def draw(
         self,
@@ -232,89 +220,63 @@ class Measured:
         across, (name, factor) = self.column(over[0]), shown
         # the column that the variable has or follows from
         sizes = (*_BY,) if name in ("area_ratio", *_BY) else ()
-        source = next(
-            (each for each in (*names_of(name), *sizes) if each in self.table), ""
-        )
-        if across is None or not source:
+        names = [each for each in (*names_of(name), *sizes) if each in self.table]
+        if across is None or not names:
             return
         self.over.add(over[0])
-        x, wide = (
-            over[1] * across.values,
-            None if across.errors is None else over[1] * across.errors,
-        )
+        x, wide = scaled(across, over[1])
         matches = np.array([self._rows_of(curve, over[0], at_end) for curve in curves])
-        points = [each for curve in curves if (each := self._values(name, curve, x))]
-        places = np.where(
-            matches, factor * np.array([each.values for each in points]), np.nan
-        )
-        first, count = np.argmax(matches, axis=0), matches.sum(axis=0)
-        y = np.take_along_axis(places, first[np.newaxis], 0)[0]
-        differs = np.any(matches & (np.abs(places - y) > 1e-9 * np.abs(y)), axis=0)
-        row_values = [self.table[each].values for each in (source, *self.conditions)]
-        ends = [
-            np.all(np.isnan(curve.at(x, curve.mean)[0]), axis=0) for curve in curves
+        points = [
+            scaled(each, factor)
+            for curve in curves
+            if (each := self._values(name, curve, x)) is not None
         ]
-        errors = self.table[source].errors
+        owner, count = np.argmax(matches, axis=0), matches.sum(axis=0)
+        places = np.where(matches, [each.values for each in points], np.nan)
+        y = np.take_along_axis(places, owner[np.newaxis], 0)[0]
+        differs = np.any(matches & (np.abs(places - y) > 1e-9 * np.abs(y)), axis=0)
+        row_values = [self.table[each].values for each in (names[0], *self.conditions)]
         faults = {
             "with an empty cell": ~np.all(np.isfinite([x, *row_values]), axis=0),
             _NO_CURVE: count == 0,
-            _SEVERAL[1]: differs,
+            "of curves with other JKR areas": differs,
             "at or below 0 on a logarithmic axis": (x <= 0.0) & log,
             "without JKR's area": ~np.isfinite(y),
-            _APART[0]: count > 1,
-            _APART[1]: np.all(ends | ~matches, axis=0),
-            _APART[2]: errors is not None and np.isnan(errors),
+            _SEVERAL: count > 1,
         }
         reasons = np.select([*faults.values()], [*faults], "")
-        self.reasons[source] = np.where(
-            self.reasons.get(source, reasons) == "", "", reasons
-        )
-        for k, curve in enumerate([*curves, curves[0]]):
-            alone, line = (
-                k < len(curves),
-                curve.line if k < len(curves) else curve.line._replace(colour=BOTH),
-            )
-            rows = np.isin(reasons, ("", *_APART)) & (
-                (count == 1) & (first == k) if alone else count > 1
-            )
-            if not np.any(rows):
-                continue
-            errors, label = points[k % len(curves)].errors, "measured"
-            high = None if errors is None else factor * errors[rows]
-            if high is not None and alone:
-                values, branches = _residuals(curve, x[rows], y[rows], high, log)
-                near = np.isfinite(values)
-                if np.any(near):
-                    self.residuals.append(
-                        Residuals(over[0], source, line, x[rows], values)
-                    )
-                    label += rf", $\chi^2$ = {np.sum(values[near] ** 2):.4g} of {np.sum(near)}"
-                    label += " (nearest branch)" * (branches > 1)
-            look: Any = HOLLOW | {"color": line.colour, "elinewidth": 0.7, "zorder": 3}
-            panel.errorbar(
-                x[rows],
-                y[rows],
-                high,
-                None if wide is None else wide[rows],
-                label=label,
-                **look,
-            )
+        former = self.reasons.get(names[0], reasons)
+        self.reasons[names[0]] = np.where(former == "", "", reasons)
+        for k, curve in enumerate(curves):
+            alone = (reasons == "") & (owner == k)
+            together = (reasons == _SEVERAL) & (k == 0)
+            for rows, colour in ((alone, curve.line.colour), (together, BOTH)):
+                if not np.any(rows):
+                    continue
+                errors, label = points[k].errors, "measured"
+                high = None if errors is None else errors[rows]
+                if high is not None and rows is alone:
+                    values, branches = _residuals(curve, x[rows], y[rows], high, log)
+                    known = np.isfinite(values)
+                    if np.any(known):
+                        residuals = (over[0], names[0], colour, x[rows], values)
+                        self.residuals.append(Residuals(*residuals))
+                        total = np.sum(values[known] ** 2)
+                        label += rf", $\chi^2$ = {total:.4g} of {np.sum(known)}"
+                        label += " (nearest branch)" * (branches > 1)
+                far = None if wide is None else wide[rows]
+                look: Any = HOLLOW | {"color": colour, "elinewidth": 0.7, "zorder": 3}
+                panel.errorbar(x[rows], y[rows], high, far, label=label, **look)
 
     def residual_panel(self, panel: Axes, over: str) -> None:
         """Draw the residuals from curves over a variable."""
         residuals = [each for each in self.residuals if each.over == over]
         names = list(dict.fromkeys(each.name for each in residuals))
         for each in residuals:
-            look = HOLLOW | {
-                "marker": _MARKS[names.index(each.name) % len(_MARKS)],
-                "color": each.line.colour,
-            }
-            panel.plot(
-                each.x,
-                each.values,
-                label=each.name.replace("_", " ") if len(names) > 1 else "",
-                **look,
-            )
+            marker = _MARKS[names.index(each.name) % len(_MARKS)]
+            look = HOLLOW | {"marker": marker, "color": each.colour}
+            label = each.name.replace("_", " ") if len(names) > 1 else ""
+            panel.plot(each.x, each.values, label=label, **look)
         panel.axhline(0.0, **GUIDE)
         panel.margins(y=0.15)
         panel.set_ylabel(r"residual ($\sigma$)")
@@ -322,59 +284,45 @@ class Measured:
 
     @property
     def remark(self) -> str:
-        """Return how many points the figure lacks or does not compare, and why; "" if there are none."""
+        """Return how many points the figure lacks, and why; "" if there are none."""
         counts = Counter(
-            sorted(np.concatenate([*self.reasons.values(), np.empty(0, str)]).tolist())
+            reason for reasons in self.reasons.values() for reason in reasons.tolist()
         )
-        total, drawn = (
-            counts.total(),
-            counts.pop("", 0) + sum(counts[reason] for reason in _APART),
-        )
-        apart = ", ".join(
-            f"{counts.pop(reason)} {self._cause(reason)}"
-            for reason in _APART
-            if counts[reason]
-        )
-        left_out = ", ".join(
-            f"{count} {self._cause(reason)}"
-            for reason, count in counts.items()
-            if count
-        )
-        shown = {
-            each
-            for name in (*self.over, *self.reasons, *self.conditions)
-            for each in names_of(name)
-        }
-        idle = ", ".join(name for name in self.table if name not in shown)
-        parts = [
-            (f"{drawn} of {total} points drawn; omitted: ", left_out),
-            ("without a residual: ", apart),
+        total, several = counts.total(), counts.pop(_SEVERAL, 0)
+        drawn = counts.pop("", 0) + several
+        causes = [
+            f"{counts[reason]} {self._cause(reason)}" for reason in sorted(counts)
         ]
-        return "; ".join(
-            words + text for words, text in [*parts, ("no panel of ", idle)] if text
-        )
+        parts = []
+        if causes:
+            parts.append(
+                f"{drawn} of {total} points drawn; omitted: {', '.join(causes)}"
+            )
+        if several:
+            parts.append(f"{several} {self._cause(_SEVERAL)}")
+        known = [*self.over, *self.reasons, *self.conditions]
+        shown = {each for name in known for each in names_of(name)}
+        if idle := [name for name in self.table if name not in shown]:
+            parts.append(f"no panel of {', '.join(idle)}")
+        return "; ".join(parts)
 
     def _cause(self, reason: str) -> str:
-        """Return a reason with the conditions of rows of no curve, or with the columns that rows of several lack."""
-        rows, texts = (
-            np.any([each == reason for each in self.reasons.values()], axis=0),
-            [],
-        )
-        for name in sorted(self.conditions) if reason == _NO_CURVE else ():
-            values = [
-                engineering(each, self.units[name])
-                for each in np.unique(self.table[name].values[rows])
-            ]
-            texts.append(
-                f"{name} {', '.join(values[:_MOST])}" + ", …" * (len(values) > _MOST)
-            )
-        for key in sweep_dims(self.dataset) if reason in _SEVERAL else ():
-            texts += (
-                [f"no column {key}"]
+        """Return a reason with the conditions of rows of no curve, or with the columns that other rows lack."""
+        texts = []
+        if reason == _NO_CURVE:
+            rows = np.any([each == reason for each in self.reasons.values()], axis=0)
+            for name in sorted(self.conditions):
+                numbers = np.unique(self.table[name].values[rows])
+                values = [engineering(each, self.units[name]) for each in numbers]
+                values[_MOST:] = ["…"] * (len(values) > _MOST)
+                texts.append(f"{name} {', '.join(values)}")
+        elif "curves" in reason:
+            texts = [
+                f"no column {key}"
+                for key in sweep_dims(self.dataset)
                 if self.dataset.sizes[key] > 1 and not self.column(key)
-                else []
-            )
-        return reason + (f" ({'; '.join(texts)})" if texts else "")
+            ]
+        return f"{reason} ({'; '.join(texts)})" if texts else reason
 
     def finish(self, figure: Figure, over: str, ax: Axes | None = None) -> None:
         """Write the remark below a figure, in foreign axes above the legend.
@@ -389,18 +337,23 @@ class Measured:
                 f'{self.source}: no column "{over}", the x axis of the figure; add it or choose --x'
             )
         if not any(
-            np.any(np.isin(reasons, ("", *_APART))) for reasons in self.reasons.values()
+            np.isin(each, ("", _SEVERAL)).any() for each in self.reasons.values()
         ):
             lack = "no row fits the figure: the columns are not its variables, or the conditions differ"
             columns = self.remark or f"columns: {', '.join(self.table)}"
             raise ValueError(
                 f"{self.source}: {lack} ({columns}); choose another kind, --x or --where"
             )
-        text = textwrap.fill(self.remark, 64)
-        if text and ax is None:
-            figure.supxlabel(text, fontsize=7.0)
-        elif text and ax is not None and (entries := ax.get_legend()):
-            entries.set_title(text)
+        if self.remark and ax is None:
+            figure.supxlabel(self.remark, fontsize=7.0)
+        elif self.remark and ax is not None and (entries := ax.get_legend()):
+            entries.set_title(self.remark)
+
+
+def scaled(points: Points, factor: float | np.ndarray) -> Points:
+    """Return points times a factor."""
+    values, errors = points
+    return Points(factor * values, None if errors is None else factor * errors)
 
 
 def _residuals(
@@ -414,9 +367,5 @@ def _residuals(
     nearest = np.argmin(np.nan_to_num(np.abs(branches), nan=np.inf), axis=0)
     values = np.take_along_axis(branches, nearest[np.newaxis], 0)[0]
     known = branches[:, np.isfinite(values)]
-    apart = (
-        np.nanmax(known, axis=0) - np.nanmin(known, axis=0)
-        if known.size
-        else np.zeros(1)
-    )
-    return values, len(branches) if np.max(apart) > _ALIKE else 1
+    differ = known.size and np.nanmax(np.ptp(known, axis=0)) > _ALIKE
+    return values, len(branches) if differ else 1

@@ -1,7 +1,7 @@
 """The contact in motion: its edge over the stress or behind a spring, beside area and force over time."""
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -18,14 +18,10 @@ from sim.read.dataset import MEMBERS, only_statistics, word
 from sim.units.terminal import LOG
 
 #: Most frames of a movie by format, and least; frames a second; dots an inch by format.
-_FRAMES, _LEAST, _RATE, _FINENESS = (
-    {"gif": 60, "mp4": 120},
-    5,
-    20,
-    {"gif": 100, "mp4": 150},
-)
+_FRAMES, _LEAST, _RATE = {"gif": 60, "mp4": 120}, 5, 20
+_FINENESS = {"gif": 100, "mp4": 150}
 #: Colours of a GIF, and least frames that a slip event needs.
-_COLOURS, _OF_SLIP = 128, 8
+_COLOURS, _OF_SLIP = 256, 8
 #: Forces over time, the first that is recorded and changes.
 _FORCES = {
     "spring_force": "spring force $F$",
@@ -33,19 +29,16 @@ _FORCES = {
     "normal_load": "normal load $P$",
 }
 READS = "speed", "slider_position", "jkr_radius", "normal_load"
-#: Marks on the half-space, and the largest part of the view by which they may move between two frames.
-_MARKS, _MOST_MOVED = 60, 0.1
 
 
 class Movie(style.Picture):
     """A picture that moves if it is saved as GIF or MP4; in any other format it is its first frame."""
 
-    #: Records at which there are frames, times of all records and of slip events [s], the meaning of dots, and the
-    #: function that shows a frame.
+    #: Records at which there are frames, times of all records and of slip events [s], and
+    #: the function that shows a frame.
     places: np.ndarray
     times: np.ndarray
     slips: np.ndarray
-    legend_text: str
     show_frame: Callable[[int], None]
 
     def savefig(self, fname: Any, **options: Any) -> None:
@@ -64,23 +57,18 @@ class Movie(style.Picture):
             raise ValueError(
                 "an MP4 needs the program ffmpeg, which was not found; install it, or name a .gif file"
             )
-        frames = np.unique(
-            np.rint(np.linspace(0, len(self.places) - 1, _FRAMES[form])).astype(int)
-        )
+        frames = np.linspace(0, len(self.places) - 1, _FRAMES[form])
+        frames = np.unique(np.rint(frames).astype(int))
         first, last = self.times[self.places[frames[[0, -1]]]]
-        pace = f"{style.text_of(last - first, 's')} shown in {(len(frames) - 1) / _RATE:.1f} s"
-        if (
-            np.sum((self.slips >= first) & (self.slips <= last))
-            > len(frames) / _OF_SLIP
-        ):
-            LOG.warning(
-                "%s: too few frames to show the slip events; choose less time by --from and --to",
-                pace,
-            )
+        lasting = (len(frames) - 1) / _RATE
+        pace = f"{style.text_of(last - first, 's')} shown in {lasting:.1f} s"
+        slips = np.sum((self.slips >= first) & (self.slips <= last))
+        if slips > len(frames) / _OF_SLIP:
+            words = "too few frames to show the slip events; choose less time by --from and --to"
+            LOG.warning("%s: %s", pace, words)
         with mpl.rc_context(style.STYLE):
-            self.supxlabel(
-                f"{pace}; {self.legend_text}", fontsize=7.0, x=0.01, ha="left"
-            )
+            words = f"{pace}; dotted: the contact of JKR"
+            self.supxlabel(words, fontsize=7.0, x=0.01, ha="left")
             self.set_dpi(options.get("dpi") or _FINENESS[form])
             self.canvas.draw()
             # the panels stay in their places, which also saves most of the time
@@ -93,27 +81,19 @@ class Movie(style.Picture):
         for frame in frames:
             self.show_frame(frame)
             canvas.draw()
-            pictures.append(np.array(canvas.buffer_rgba())[..., :3])
-        few = Image.fromarray(np.vstack(pictures[:: max(len(pictures) // 6, 1)]))
-        palette = few.quantize(_COLOURS, Image.Quantize.MEDIANCUT)
-        shown = (
-            Image.fromarray(each).quantize(palette=palette, dither=Image.Dither.NONE)
+            pictures.append(Image.fromarray(np.array(canvas.buffer_rgba())[..., :3]))
+        palette = pictures[0].quantize(_COLOURS)
+        first, *others = (
+            each.quantize(palette=palette, dither=Image.Dither.NONE)
             for each in pictures
         )
-        next(shown).save(
-            fname,
-            "gif",
-            save_all=True,
-            append_images=shown,
-            duration=1000 // _RATE,
-            loop=0,
-        )
+        lasting: Any = {"duration": 1000 // _RATE, "loop": 0}
+        first.save(fname, "gif", save_all=True, append_images=others, **lasting)
 
     def _save_mp4(self, fname: Any, frames: np.ndarray) -> None:
         """Write an MP4 that browsers and presentations show."""
-        writer = FFMpegWriter(
-            _RATE, "h264", extra_args=["-pix_fmt", "yuv420p", "-f", "mp4"]
-        )
+        browsers = ["-pix_fmt", "yuv420p", "-f", "mp4"]
+        writer = FFMpegWriter(_RATE, "h264", extra_args=browsers)
         with writer.saving(self, fname, self.dpi):
             for frame in frames:
                 self.show_frame(frame)
@@ -146,48 +126,31 @@ def movie_figure(dataset: xr.Dataset, absolute: bool = False) -> Movie:
 
     With maps, each frame is a map.
     """
-    point = dataset.isel(
-        dict.fromkeys([*sweep_dims(dataset), MEMBERS, "map_member"], 0),
-        missing_dims="ignore",
-    )
+    single = [*sweep_dims(dataset), MEMBERS, "map_member"]
+    point = dataset.isel(dict.fromkeys(single, 0), missing_dims="ignore")
     # until the slider runs away
     point = point.isel(t=np.isfinite(point["slider_position"].to_numpy()))
-    times, movie = (
-        point["t"].to_numpy(),
-        Movie(figsize=(style.WIDE, 2.9), dpi=200, layout="constrained"),
-    )
+    movie = Movie(figsize=(style.WIDE, 2.9), dpi=200, layout=style.Layout())
     FigureCanvasAgg(movie)
     grid = movie.add_gridspec(2, 2, width_ratios=[1.25, 1.0])
-    plan, *curves = (
+    plan, above, below = (
         movie.add_subplot(place) for place in (grid[:, 0], grid[0, 1], grid[1, 1])
     )
     movie.slips = point["slip_time"].to_numpy() if "slip_time" in point else np.empty(0)
-    movie.times, movie.places, time = (
-        times,
-        np.arange(len(times)),
-        style.Unit.of(times, "s"),
-    )
-    if is_mapped := "shear_map" in point:
-        point = point.isel(
-            map_time=(point["map_time"] >= times[0]) & (point["map_time"] <= times[-1])
-        )
-        is_mapped = point.sizes["map_time"] > 1
+    movie.times = times = point["t"].to_numpy()
+    movie.places, time = np.arange(len(times)), style.Unit.of(times, "s")
+    is_mapped = "shear_map" in point
     if is_mapped:
-        movie.places = np.abs(
-            times[:, np.newaxis] - point["map_time"].to_numpy()
-        ).argmin(axis=0)
+        mapped = point["map_time"].to_numpy()
+        within = (mapped >= times[0]) & (mapped <= times[-1])
+        is_mapped = bool(np.sum(within) > 1)
+    if is_mapped:
+        point = point.isel(map_time=within)
+        movie.places = np.abs(times[:, np.newaxis] - mapped[within]).argmin(axis=0)
     if len(movie.places) < _LEAST:
-        cure = "choose more time by --from and --to, or run again with a smaller clock.step and clock.record"
-        if is_mapped and len(times) >= _LEAST:
-            some = times[:: -(-len(times) // _FRAMES["gif"])]
-            ends = f'from = "{some[0]:g} s", to = "{some[-1]:g} s"'
-            cure = f"run again with record.maps = {{ {ends}, count = {len(some)} }}"
+        cure = "choose more time by --from and --to, or record more by record.maps, clock.step and clock.record"
         raise ValueError(f"frames: {len(movie.places)}, too few for a movie; {cure}")
     move = (_over_stress if is_mapped else _sliding)(plan, point)
-    has_marks = any(np.any(cast(Any, item).get_sizes()) for item in plan.collections)
-    movie.legend_text = (
-        "dotted: the contact of JKR" + "; dots: marks on the half-space" * has_marks
-    )
     area, full = (
         np.pi * point[name].to_numpy() ** 2 for name in ("contact_radius", "jkr_radius")
     )
@@ -195,25 +158,22 @@ def movie_figure(dataset: xr.Dataset, absolute: bool = False) -> Movie:
     if not absolute and np.all(full > 0.0):
         shown = (area / full, r"contact area $A/A_\mathrm{JKR}$", "1")
     forces = {name: point[name].to_numpy() for name in _FORCES if name in point}
-    changing = (
+    changing = [
         name
         for name, values in forces.items()
         if np.ptp(values) > 1e-9 * np.max(np.abs(values))
-    )
-    force = next(changing, "normal_load")
-    follow = [
-        _curve(curves[0], times, *shown),
-        _curve(curves[1], times, forces[force], _FORCES[force], "N"),
     ]
-    curves[0].tick_params(labelbottom=False)
-    curves[0].set_xlabel("")
+    force = next(iter(changing), "normal_load")
+    pulling = (forces[force], _FORCES[force], "N")
+    follow = [_curve(above, times, *shown), _curve(below, times, *pulling)]
+    above.tick_params(labelbottom=False)
+    above.set_xlabel("")
 
     def show(frame: int) -> None:
         k = int(movie.places[frame])
         speed = style.rounded(point["speed"][k], "m/s")
-        plan.set_title(
-            f"$t$ = {time.factor * times[k]:.4g} {time.name}, sliding speed {speed}"
-        )
+        now = f"$t$ = {time.factor * times[k]:.4g} {time.name}"
+        plan.set_title(f"{now}, sliding speed {speed}")
         move(frame, k)
         for mark in follow:
             mark(k)
@@ -227,9 +187,8 @@ def _edge(
     panel: Axes, point: xr.Dataset, factor: float
 ) -> Callable[[int, float], None]:
     """Draw the edge of the contact, and dotted that of JKR's; return the function that moves both."""
-    dotted = Circle(
-        (0.0, 0.0), 0.0, fill=False, linestyle=":", linewidth=1.0, color=style.REFERENCE
-    )
+    look: Any = {"fill": False, "linestyle": ":", "color": style.REFERENCE}
+    dotted = Circle((0.0, 0.0), 0.0, **look)
     panel.add_patch(dotted)
     circles = {"contact_radius": style.contact_circle(panel, 0.0), "jkr_radius": dotted}
 
@@ -243,18 +202,14 @@ def _edge(
 
 def _over_stress(panel: Axes, point: xr.Dataset) -> Callable[[int, int], None]:
     """Draw the maps around the contact; return the function that shows one of them."""
-    maps, measured = (
-        point["shear_map"].transpose("map_time", "x", "y"),
-        bool(word(point, "shear.field.file", "")),
-    )
+    maps = point["shear_map"].transpose("map_time", "x", "y")
+    measured = bool(word(point, "shear.field.file", ""))
     stress, sides = maps.to_numpy(), field.sides_of(maps)
     length = style.Unit.of(np.array(sides), "m")
-    sizes = [
-        length.factor * size for size in (*sides, float(point["contact_radius"].max()))
-    ]
-    image, factor = field.draw_field(
-        panel, stress[0], sizes, measured, field.STRESS, stress
-    )
+    sizes = [*sides, float(point["contact_radius"].max())]
+    sizes = [length.factor * size for size in sizes]
+    about = *field.STRESS, stress
+    image, factor = field.draw_field(panel, stress[0], sizes, measured, about)
     panel.set(xlabel=length.label("$x$"), ylabel=length.label("$y$"))
     edge = _edge(panel, point, length.factor)
 
@@ -266,50 +221,30 @@ def _over_stress(panel: Axes, point: xr.Dataset) -> Callable[[int, int], None]:
 
 
 def _sliding(panel: Axes, point: xr.Dataset) -> Callable[[int, int], None]:
-    """Draw the contact on the half-space, and the spring that pulls it; return the function that shows a record.
-
-    Marks on the half-space pass where they move little between two frames.
-    """
+    """Draw the contact, and the spring that pulls it; return the function that shows a record."""
     pulled, place = "stage_position" in point, point["slider_position"].to_numpy()
-    origin = point["stage_position"].to_numpy() if pulled else place
-    behind, radius = place - origin, float(point["contact_radius"].max())
-    ends = np.array(
-        [min(behind.min(), 0.0) - 1.4 * radius, max(behind.max(), 0.0) + 1.4 * radius]
-    )
+    behind = place - (point["stage_position"].to_numpy() if pulled else place)
+    radius = float(point["contact_radius"].max())
+    ends = np.array([min(behind.min(), 0.0), max(behind.max(), 0.0)])
+    ends += 1.4 * radius * np.array([-1.0, 1.0])
     length = style.Unit.of(ends, "m")
+    xlabel = length.label(f"$x$ from the {'stage' if pulled else 'slider'}")
     panel.set(
         xlim=length.factor * ends,
         ylim=1.6 * length.factor * radius * np.array([-1.0, 1.0]),
         aspect="equal",
+        xlabel=xlabel,
+        ylabel=length.label("$y$"),
     )
-    panel.set(
-        xlabel=length.label("$x$ from the stage" if pulled else "$x$ from the slider")
-    )
-    panel.set_ylabel(length.label("$y$"))
-    width, random = np.ptp(ends), np.random.default_rng(0)
-    along, across = (
-        random.uniform(0.0, width, _MARKS),
-        random.uniform(-1.6, 1.6, _MARKS) * radius,
-    )
-    is_slow = 0.0 < np.ptp(origin) < _MOST_MOVED * width * _FRAMES["gif"]
-    marks = panel.scatter(
-        along, across, 3.0 if is_slow else 0.0, color=style.REFERENCE, linewidths=0
-    )
-    coil, edge = (
-        panel.plot([], [], color=style.BONDS, linewidth=0.8)[0],
-        _edge(panel, point, length.factor),
-    )
+    (coil,) = panel.plot([], [], color=style.BONDS, linewidth=0.8)
+    edge = _edge(panel, point, length.factor)
     turns = np.resize([0.0, 1.0, 0.0, -1.0], 33) * 0.12 * radius
 
     def move(frame: int, k: int) -> None:
-        shifted = ends[0] + (along - origin[k]) % width
-        marks.set_offsets(length.factor * np.column_stack([shifted, across]))
         edge(k, behind[k])
         if pulled:  # the stage is at the origin
-            coil.set_data(
-                length.factor * np.linspace(behind[k], 0.0, turns.size),
-                length.factor * turns,
-            )
+            along = np.linspace(behind[k], 0.0, turns.size)
+            coil.set_data(length.factor * along, length.factor * turns)
 
     return move
 
@@ -319,16 +254,12 @@ def _curve(
 ) -> Callable[[int], None]:
     """Draw a curve over time; return the function that sets its cursor."""
     time = style.Unit.of(times, "s")
-    times, values = (
-        time.factor * times,
-        style.in_unit(panel.yaxis, words, values, si) * values,
-    )
+    times = time.factor * times
+    values = style.in_unit(panel.yaxis, words, values, si) * values
     panel.plot(times, values, color=style.BOTH)
     style.across(panel, times, time.label("time $t$"))
-    cursor, spot = (
-        panel.axvline(times[0], **style.GREY),
-        panel.plot([], [], "o", color=style.FLUCTUATIONS, ms=4.0)[0],
-    )
+    cursor = panel.axvline(times[0], **style.GREY)
+    (spot,) = panel.plot([], [], "o", color=style.FLUCTUATIONS, ms=4.0)
 
     def follow(k: int) -> None:
         cursor.set_xdata([times[k]] * 2)

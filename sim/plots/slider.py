@@ -2,16 +2,13 @@
 
 import contextlib
 import re
-from collections.abc import Callable
-from typing import Any, NamedTuple, cast, get_args
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from pydantic import TypeAdapter
 
-from sim.laws import schallamach
 from sim.plots import style
 from sim.plots.curves import (
     Scene,
@@ -26,116 +23,50 @@ from sim.plots.curves import (
 from sim.plots.measured import Line, Measured
 from sim.read import Run, is_steady, setting, sweep_dims
 from sim.read.dataset import MEMBERS, stays_held, word
-from sim.read.estimate import Estimates
-from sim.read.events import incipient_law, jumps
+from sim.read.events import incipient_law
 from sim.read.observables import with_slips
 from sim.read.over_speed import speed_dim
 from sim.units.errors import BadInput
 
-
-class Steady(NamedTuple):
-    """A closed form of steady sliding over speed: shear stress [Pa] and bonds over bonds at rest [1]."""
-
-    words: str
-    style: str
-    stress: np.ndarray
-    fraction: np.ndarray
+#: A file that a scenario names.
+_FILE = re.compile(r'"file": *"[^"]')
 
 
-#: Numbers of bonds that stretch in a dataset, and the beginning of those of a rupture law.
-_BONDS = "bond_stiffness", "rebinding_rate", "site_density"
-_PREFIX = "bonds_rupture_"
+def scenario_at(dataset: xr.Dataset, point: dict[str, int]) -> Any:
+    """Return the scenario of a point of the sweep; None if it cannot be read.
 
+    No file that a dataset names is read.
+    """
+    from sim.ensemble.dataset import scenario_of  # heavy: for closed forms alone
 
-class Population(NamedTuple):
-    """Bonds that stretch: their rupture law, stiffness [N/m], rebinding rate [1/s] and sites per area [1/m^2]."""
-
-    rupture: Any
-    stiffness: float
-    rebinding: float
-    density: float
-
-    @property
-    def pathway(self) -> tuple[float, float, float] | tuple[()]:
-        """Rate [1/s], Bell force [N] and stiffness [N/m] if all rupture is by one pathway that force opens."""
-        law = self.rupture.law(self.stiffness)
-        return (
-            (law.rate, self.stiffness / law.softness, self.stiffness)
-            if law.one_pathway
-            else ()
-        )
-
-    @property
-    def at_rest(self) -> float:
-        """Share of the sites that are bound at rest."""
-        return float(
-            schallamach.rest_share(
-                self.rupture.law(self.stiffness).at_rest, self.rebinding
-            )
-        )
-
-
-def population_of(point: xr.Dataset) -> Population | None:
-    """Return the bonds of a dataset without a sweep; None if they do not stretch or it lacks their numbers."""
-    if not (
-        keys := [str(name) for name in point.variables if str(name).startswith(_PREFIX)]
-    ):
+    if _FILE.search(str(dataset.attrs.get("scenario_resolved"))):
         return None
-    # which takes a while, and few datasets need it
-    from sim.parts.bonds.rupture import Rupture
-
-    with contextlib.suppress(KeyError, ValueError):
-        numbers = {key.removeprefix(_PREFIX): float(point[key]) for key in keys}
-        # any law by its numbers alone
-        rupture = TypeAdapter(get_args(Rupture)[0]).validate_python(numbers)
-        return Population(
-            rupture, *(float(setting(point, f"bonds.{key}")) for key in _BONDS)
-        )
+    with contextlib.suppress(BadInput, KeyError, ValueError, TypeError):
+        scenario = scenario_of(dataset.attrs)
+        chosen = dataset.isel(dict.fromkeys(sweep_dims(dataset), 0) | point)
+        keys = [key for axis in scenario.sweep for key in axis.keys]
+        return scenario.with_values({key: float(setting(chosen, key)) for key in keys})
     return None
 
 
-def steady_laws(point: xr.Dataset, speed: np.ndarray) -> list[Steady]:
-    """Return closed forms of the dataset's bonds in steady sliding.
+def steady_law(
+    dataset: xr.Dataset, point: dict[str, int], speed: np.ndarray
+) -> np.ndarray:
+    """Return shear stress [Pa] and bond fraction [1] of a scenario's bonds in steady sliding at speeds [m/s].
 
-    Parameters
-    ----------
-    point : xarray.Dataset
-        As ``sim run`` writes it, at one point of its sweep.
-    speed : array
-        V [m/s].
-
-    Returns
-    -------
-    list of Steady
-        Exact, and for Bell's rupture the first-moment closure, too. None for bonds without a stretch.
+    They are nan if the scenario cannot be read.
     """
-    bonds = population_of(point)
-    if bonds is None:
-        return []
-    bound, force, _ = bonds.rupture.closed_form(speed, bonds.stiffness, bonds.rebinding)
-    laws = [
-        Steady(
-            "steady sliding, exact", "-", bonds.density * force, bound / bonds.at_rest
-        )
-    ]
-    if bonds.pathway:
-        stress = schallamach.first_moment_stress(
-            speed, *bonds.pathway, bonds.rebinding, bonds.density
-        )
-        fraction = schallamach.first_moment_fraction(
-            speed, *bonds.pathway, bonds.rebinding
-        )
-        laws.append(Steady("mean field", "--", stress, fraction))
-    return laws
+    scenario = scenario_at(dataset, point)
+    if scenario is None:
+        return np.full((2, speed.size), np.nan)
+    steady = scenario.population.steady(speed)
+    return np.stack([steady.strength, steady.fraction])
 
 
 # -- behind a spring, or under a force ----------------------------------------------------------
 
 #: Speeds of a map, and at which its boundary is drawn.
 _CELLS, _FINE = 28, 200
-#: A file that a scenario names.
-_FILE = re.compile(r'"file": *"[^"]')
-_FRAME: Any = {"color": style.BONDS, "linewidth": 1.4}
 
 
 def needs_force(dataset: xr.Dataset) -> None:
@@ -158,14 +89,12 @@ def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     figure, axes = stacked(scene, [(1.8, position), (1.6, speed)])
     for panel in axes[:2]:
         style.upward(panel)
-        for line in scene.lines:
-            place, values = np.transpose(
-                cast(np.ndarray, panel.lines[line.number].get_xydata())
-            )
-            known = np.flatnonzero(np.isfinite(values))
-            if 0 < known.size < values.size:
-                look: Any = {"color": line.colour, "markersize": 4, "label": "runaway"}
-                panel.plot(place[known[-1]], values[known[-1]], "x", **look)
+        for drawn in [*panel.lines]:
+            points = np.asarray(drawn.get_xydata())
+            known = points[np.isfinite(points[:, 1])]
+            if 0 < len(known) < len(points):
+                look: Any = {"color": drawn.get_color(), "markersize": 4}
+                panel.plot(*known[-1], "x", label="runaway", **look)
     style.legend(axes[0], scene.title)
     return figure
 
@@ -204,10 +133,8 @@ def stability_figure(dataset: xr.Dataset) -> Figure:
     }
     legs = {words: leg for words, leg in legs.items() if speed[leg].size > _CELLS}
     edges = np.geomspace(np.min(speed[1:]), np.max(speed), _CELLS + 1)
-    pace, hard = (
-        style.Unit.of(edges, "m/s", True),
-        style.Unit.of(stiffness, "N/m", True),
-    )
+    pace = style.Unit.of(edges, "m/s", logarithmic=True)
+    hard = style.Unit.of(stiffness, "N/m", logarithmic=True)
     steps = np.sqrt(stiffness[1:] * stiffness[:-1])
     rows = np.concatenate(
         [[stiffness[0] ** 2 / steps[0]], steps, [stiffness[-1] ** 2 / steps[-1]]]
@@ -218,28 +145,17 @@ def stability_figure(dataset: xr.Dataset) -> Figure:
     swings = [
         _swings(force.to_numpy()[:, leg], speed[leg], edges) for leg in legs.values()
     ]
-    ends: Any = {"vmin": np.nanmin(swings), "vmax": np.nanmax(swings)}
-    # greys that no page turns over and that show a line
-    grey = style.part_of("Greys", 0.0, 0.65)
+    # pale where sliding is steady, and nowhere as dark as the line of the theory
+    look: Any = {"cmap": style.part_of("YlOrRd", 0.02, 0.75), "rasterized": True}
+    look |= {"vmin": np.nanmin(swings), "vmax": np.nanmax(swings)}
+    line: Any = {"color": style.BONDS, "linewidth": 1.4}
+    line["label"] = "theory: unstable below"
+    x, label = pace.factor * edges, pace.label("speed of the stage $V$")
     for panel, words, swing in zip(axes, legs, swings, strict=True):
-        mesh = panel.pcolormesh(
-            pace.factor * edges,
-            hard.factor * rows,
-            swing,
-            cmap=grey,
-            rasterized=True,
-            **ends,
-        )
-        panel.plot(
-            pace.factor * fine,
-            hard.factor * boundary,
-            label="theory: unstable below",
-            **_FRAME,
-        )
+        mesh = panel.pcolormesh(x, hard.factor * rows, swing, **look)
+        panel.plot(pace.factor * fine, hard.factor * boundary, **line)
         panel.set(yscale="log", ylim=hard.factor * rows[[0, -1]])
-        style.across(
-            panel, pace.factor * edges, pace.label("speed of the stage $V$"), "log"
-        )
+        style.across(panel, x, label, "log")
         style.legend(panel, words)
     axes[0].set_ylabel(hard.label("stiffness of the spring $K$"))
     figure.colorbar(mesh, ax=axes, label="force amplitude (normalised)", pad=0.02)
@@ -258,31 +174,14 @@ def _swings(force: np.ndarray, speed: np.ndarray, edges: np.ndarray) -> np.ndarr
 
 
 def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
-    """Return the stiffness below which steady sliding is unstable [N/m]; nan if the scenario cannot be read.
+    """Return the stiffness below which steady sliding is unstable [N/m]; nan if the scenario cannot be read."""
+    from sim.ensemble.diagnosis import slider_body  # heavy: for this figure alone
 
-    No file that a dataset names is read.
-    """
-    from sim.ensemble.dataset import scenario_of  # heavy: for this figure alone
-    from sim.ensemble.diagnosis import slider_body
-
-    point = dataset.isel(dict.fromkeys(sweep_dims(dataset), 0))
-    with contextlib.suppress(BadInput, KeyError):
-        scene = scenario_of(
-            {}
-            if _FILE.search(str(dataset.attrs.get("scenario_resolved")))
-            else dataset.attrs
-        )
-        scene = scene.with_values(
-            {
-                key: float(setting(point, key))
-                for axis in scene.sweep
-                for key in axis.keys
-            }
-        )
-        return np.asarray(
-            scene.population.onset(speed, slider_body(scene, speed)).stiffness
-        )
-    return np.full(speed.shape, np.nan)
+    scenario = scenario_at(dataset, {})
+    if scenario is None:
+        return np.full(speed.shape, np.nan)
+    onset = scenario.population.onset(speed, slider_body(scenario, speed))
+    return np.asarray(onset.stiffness)
 
 
 def needs_pull(dataset: xr.Dataset) -> None:
@@ -306,48 +205,59 @@ def needs_pull(dataset: xr.Dataset) -> None:
         )
 
 
-def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
-    """Contact area over the tangential force before sliding, with the law A0 − αQ².
+#: Exponents of the loss of area by the tangential force that count as a square.
+_SQUARE = (1.7, 2.3)
 
-    The law is fitted by least squares up to half of the largest force.
+
+def exponent_of(force: np.ndarray, area: np.ndarray, top: int) -> float:
+    """Return the exponent p of a loss of area [m^2] that grows as Q^p, up to half of the force at a record.
+
+    It is the slope of the logarithms of all records with a loss.
+
+    >>> force = np.linspace(0.0, 1.0, 101)
+    >>> round(exponent_of(force, 2.0 - 0.1 * force**1.5, 100), 3)
+    1.5
+    """
+    loss = area[0] - area[:top]
+    small = (force[:top] <= 0.5 * force[top]) & (loss > 0.0) & (force[:top] > 0.0)
+    if np.sum(small) < 2:
+        return np.nan
+    share, lost = np.log(force[:top][small]), np.log(loss[small])
+    return float(np.polyfit(share, lost, 1)[0])
+
+
+def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
+    """Contact area over the tangential force before sliding, and the law A0 − αQ² if the loss grows as a square.
+
+    Law and exponent are fitted by least squares up to half of the largest force.
     """
     scene = scene_along(dataset, "t")
     force, area = np.abs(scene.all("spring_force")), scene.all("contact_area")
-    tops, alphas = np.transpose(
-        [incipient_law(*curve) for curve in zip(force, area, strict=True)]
-    )
-    rises = np.arange(force.shape[1]) <= tops[:, np.newaxis]
     unit = style.Unit.of(force, "N")
-    figure, axes = style.rows([2.0, 1.8], shared=False)
-    axes[0].set_ylabel("contact area $A/A_0$")
-    factor = (
-        style.in_unit(axes[0].yaxis, "contact area $A$", area, "m^2")
-        if absolute
-        else 1.0
-    )
+    figure, (panel,) = style.rows([2.4])
+    panel.set_ylabel("contact area $A/A_0$")
+    factor, known = 1.0, []
+    if absolute:
+        factor = style.in_unit(panel.yaxis, "contact area $A$", area, "m^2")
     for line in scene.lines:
-        up, alpha = rises[line.number], alphas[line.number]
-        pulled, areas = force[line.number, up], area[line.number, up]
-        law = alpha * pulled**2 / areas[0]
-        words = rf"$\alpha$ = {1e6 * alpha:.3g} mm$^2$/N$^2$"
-        name = f"{line.label}: {words}" if not scene.single else words
-        look = style.GREY | ({} if scene.single else {"color": line.colour})
-        full = factor * areas[0] if absolute else 1.0
-        axes[0].plot(
-            unit.factor * pulled, full * areas / areas[0], color=line.colour, label=name
-        )
-        axes[0].plot(unit.factor * pulled, full * (1.0 - law), "--", **look)
-        axes[1].plot(
-            unit.factor * pulled[1:], 1.0 - areas[1:] / areas[0], color=line.colour
-        )
-        axes[1].plot(unit.factor * pulled[1:], law[1:], "--", **look)
-    axes[0].plot([], [], "--", label=r"$A_0 - \alpha Q^2$", **style.GREY)
-    axes[1].set_ylabel("lost area $1 - A/A_0$")
-    style.upward(axes[1])
-    words, known = unit.label("tangential force $Q$"), unit.factor * force[rises]
-    style.across(axes[0], known, words)
-    style.across(axes[1], known[known > 0.01 * known.max()], words, "log")
-    style.legend(axes[0], scene.title)
+        force_of, area_of = force[line.number], area[line.number]
+        top, alpha = incipient_law(force_of, area_of)
+        power = exponent_of(force_of, area_of, top)
+        force_of, area_of = force_of[: top + 1], area_of[: top + 1]
+        known.append(unit.factor * force_of)
+        scale = factor if absolute else 1.0 / area_of[0]
+        words = f"loss as $Q^{{{power:.2f}}}$"
+        if _SQUARE[0] <= power <= _SQUARE[1]:
+            words += rf", $\alpha$ = {1e6 * alpha:.3g} mm$^2$/N$^2$"
+            law = scale * (area_of[0] - alpha * force_of**2)
+            look = {} if scene.single else {"color": line.colour}
+            panel.plot(known[-1], law, "--", **style.GREY | look)
+            panel.plot([], [], "--", label=r"$A_0 - \alpha Q^2$", **style.GREY)
+        label = words if scene.single else f"{line.label}: {words}"
+        panel.plot(known[-1], scale * area_of, color=line.colour, label=label)
+    forces = np.concatenate(known)
+    style.across(panel, forces, unit.label("tangential force $Q$"))
+    style.legend(panel, scene.title)
     return figure
 
 
@@ -356,19 +266,11 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
 #: Speeds at which a closed form is drawn.
 _CURVE = 600
 
-#: A peak is resolved if more clock steps than that lead up to it.
-_STEPS = 3.5
+#: Units of the place of a peak.
+_SI = {"speed": "m/s", "time": "s"}
 
-#: Look of an exact closed form, grey that shows on a black line and beside it, and of an approximate one.
-_LAWS: Any = {
-    "-": {"linestyle": "-", "color": "#BBBBBB", "linewidth": 0.7, "zorder": 3},
-    "--": {
-        "linestyle": "--",
-        "color": style.REFERENCE,
-        "linewidth": 0.7,
-        "zorder": 1.5,
-    },
-}
+#: Look of a closed form: grey that shows on a black line and beside it.
+_LAW: Any = {"color": "#BBBBBB", "linewidth": 0.7, "zorder": 3}
 _RING: Any = style.HOLLOW | {"markersize": 5.0, "mfc": "none", "mew": 0.9, "zorder": 4}
 
 
@@ -401,101 +303,68 @@ def stress_figure(
     if "drive_rest" in dataset:
         if data or ax:
             raise ValueError(
-                "starts from rest need several panels; with data or an ax, draw the kind time"
+                "starts from rest have peaks; with data or an ax, draw the kind time"
             )
         return start_figure(dataset)
     scene = over_speed(dataset)._replace(measured=data)
-
-    def thin_lines(
-        panel: Axes, scene: Scene, values: Callable[[Steady], np.ndarray]
-    ) -> None:
-        for line in scene.lines:
-            speeds = _fine(scene, line)
-            for law in steady_laws(dataset.isel(line.point), speeds):
-                panel.plot(
-                    scene.unit.factor * speeds,
-                    values(law),
-                    label=law.words,
-                    **_LAWS[law.style],
-                )
-
-    def stress_panel(panel: Axes, scene: Scene) -> None:
-        """Draw the shear stress upon closed forms, with the maximum of each curve."""
-        factor = style.in_unit(
-            panel.yaxis, r"shear stress $\tau_0$", scene.all("shear_stress"), "Pa"
-        )
-        contact_curves(
-            panel,
-            scene._replace(lines=_marked(panel, scene, factor)),
-            "shear_stress",
-            factor,
-        )
-        thin_lines(panel, scene, lambda law: factor * law.stress)
-
-    def fraction_panel(panel: Axes, scene: Scene) -> None:
-        thin_lines(panel, scene, lambda law: law.fraction)
-        contact_curves(panel, scene, "bond_fraction", 1.0)
-        panel.set_ylabel("bond fraction $N/N_0$")
-
-    panels = [(2.1, stress_panel), (1.3, fraction_panel)]
-    return stacked(
-        scene, panels if scene.varies("bond_fraction") else panels[:1], ax=ax
-    )[0]
+    panels = [(2.1, _stress_panel), (1.3, _fraction_panel)]
+    shown = panels if scene.varies("bond_fraction") else panels[:1]
+    return stacked(scene, shown, ax)[0]
 
 
-def _fine(scene: Scene, line: Line) -> np.ndarray:
-    """Return the speeds of a closed form beside a curve [m/s]."""
-    speeds = scene.speeds(line)
-    low, high = np.min(speeds), np.max(speeds)
-    if scene.scale == "log":
-        return np.geomspace(low, high, _CURVE)
-    if scene.scale == "symlog":
-        return np.append(
-            0.0, np.geomspace(np.min(speeds[speeds > 0.0]), high, _CURVE - 1)
-        )
-    return np.linspace(low, high, _CURVE)
+def _stress_panel(panel: Axes, scene: Scene) -> None:
+    """Draw the shear stress upon closed forms, with the maximum of each curve."""
+    words, stresses = r"shear stress $\tau_0$", scene.all("shear_stress")
+    factor = style.in_unit(panel.yaxis, words, stresses, "Pa")
+    scene.statistics.stated = Run(scene.statistics.dataset).statements([])
+    lines = [
+        _mark_peak(panel, scene, line, factor, "speed") if line.style == "-" else line
+        for line in scene.lines
+    ]
+    contact_curves(panel, scene._replace(lines=lines), "shear_stress", factor)
+    _laws(panel, scene, 0, factor)
 
 
-def maximum_of(speed: np.ndarray, stress: np.ndarray) -> int | None:
-    """Return the index of the largest size of the stress; None if it is at an end of the speeds.
-
-    >>> maximum_of(np.array([1.0, 2.0, 3.0]), np.array([1.0, 4.0, 2.0]))
-    1
-    >>> maximum_of(np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 4.0])) is None
-    True
-    """
-    if not np.any(np.isfinite(stress)):
-        return None
-    at, size = (
-        int(np.nanargmax(np.abs(stress))),
-        np.where(np.isfinite(stress), np.abs(speed), np.nan),
+def _mark_peak(panel: Axes, scene: Scene, line: Line, factor: float, over: str) -> Line:
+    """Mark the stated peaks of the stress, and return the curve with a single peak in its name."""
+    stated = [scene.statistics.get(f"peak_{name}") for name in (over, "stress")]
+    if any(each is None for each in stated):
+        return line
+    place, peak = (
+        cast(xr.DataArray, each)
+        .isel(line.point, missing_dims="ignore")
+        .to_numpy()
+        .ravel()
+        for each in stated
     )
-    return at if np.nanmin(size) < size[at] < np.nanmax(size) else None
+    sign = np.sign(scene.values("shear_stress", line.whole)[-1])
+    at = scene.unit.factor * place, factor * sign * peak
+    if not np.isfinite(place).any():
+        return line
+    panel.plot(*at, color=line.colour, **_RING)
+    if place.size > 1:
+        return line
+    words = f"{style.rounded(peak[0], 'Pa')} at {style.rounded(place[0], _SI[over])}"
+    return line._replace(label=line.label and f"{line.label}: {words}")
 
 
-def _marked(panel: Axes, scene: Scene, factor: float) -> list[Line]:
-    """Mark the maximum of each curve by a ring and return the curves with the maxima in their names."""
-    labelled = []
+def _fraction_panel(panel: Axes, scene: Scene) -> None:
+    _laws(panel, scene, 1, 1.0)
+    contact_curves(panel, scene, "bond_fraction", 1.0)
+    panel.set_ylabel("bond fraction $N/N_0$")
+
+
+def _laws(panel: Axes, scene: Scene, which: int, factor: float) -> None:
+    """Draw stress (0) or bond fraction (1) in steady sliding beside each curve over the speed."""
     for line in scene.lines:
-        speed, stress = scene.speeds(line), scene.values("shear_stress", line)
-        # their transients have no maximum over the speed
-        steps = scene.broken and jumps(speed, True).size
-        at = None if steps else maximum_of(speed, stress)
-        words = line.label
-        if at is not None:
-            panel.plot(
-                scene.x[line.number][at],
-                factor * stress[at],
-                color=line.colour,
-                **_RING,
-            )
-            most, fast = (
-                style.rounded(stress[at], "Pa"),
-                style.rounded(speed[at], "m/s"),
-            )
-            words = words and f"{words}: {most} at {fast}"
-        labelled.append(line._replace(label=words))
-    return labelled
+        speeds = scene.speeds(line)
+        low, high = np.min(speeds), np.max(speeds)
+        fine = np.linspace(low, high, _CURVE)
+        if scene.scale != "linear":
+            fine = np.geomspace(np.min(speeds[speeds > 0.0]), high, _CURVE)
+        law = factor * steady_law(scene.statistics.dataset, line.point, fine)[which]
+        label = "steady sliding" if np.any(np.isfinite(law)) else ""
+        panel.plot(scene.unit.factor * fine, law, label=label, **_LAW)
 
 
 def start_figure(dataset: xr.Dataset) -> Figure:
@@ -504,95 +373,29 @@ def start_figure(dataset: xr.Dataset) -> Figure:
     longest = dataset.isel(
         {dim: np.flatnonzero(rests == rests.max()) for dim in rests.dims}
     )
-    over = [str(dim) for dim in (*speeds.dims, *rests.dims) if dataset.sizes[dim] > 1]
-    stated = Run(longest).statements([])
-    if not over or "peak_stress" not in stated:
-        figure, axes = style.rows([2.15])
-    else:
-        figure, axes = style.pairs(2.9)
-        _peak_panel(axes[1], dataset, over_key(dataset, over[0]))
-    _time_panel(axes[0], longest, float(rests.max()), stated)
-    return figure
-
-
-def _time_panel(
-    panel: Axes, dataset: xr.Dataset, rest: float, stated: Estimates
-) -> None:
-    """Draw the stress over the time since the start; a dot is a stated peak."""
-    slid = dataset.isel(t=np.flatnonzero(dataset["t"] > rest + 1e-9 * dataset["t"][-1]))
-    scene = scene_along(slid, "t")
+    rest, stated = float(rests.max()), Run(longest).statements([])
+    swept = [str(dim) for dim in (*speeds.dims, *rests.dims) if dataset.sizes[dim] > 1]
+    has_peaks = bool(swept) and "peak_stress" in stated
+    figure, axes = style.pairs(2.9) if has_peaks else style.rows([2.15])
+    slid = longest.isel(t=np.flatnonzero(dataset["t"] > rest * (1.0 + 1e-9)))
+    scene, times = scene_along(slid, "t"), slid["t"].to_numpy() - rest
     scale = "linear" if scene.single else "log"
-    scene = scene.placed(
-        "t", slid["t"].to_numpy() - rest, "time since the start", "s", scale
-    )
-    factor = style.in_unit(
-        panel.yaxis, r"shear stress $\tau_0$", scene.all("shear_stress"), "Pa"
-    )
-    contact_curves(panel, scene, "shear_stress", factor)
-    for line in scene.lines if "peak_stress" in stated else ():
-        when, peak = (
-            style.number_at(stated[f"peak_{name}"].value, line.point)
-            for name in ("time", "stress")
-        )
-        peak = np.copysign(peak, scene.values("shear_stress", line)[-1])
-        panel.plot(
-            scene.unit.factor * when,
-            factor * peak,
-            "o",
-            markersize=3,
-            color=line.colour,
-        )
-    style.across(panel, scene.x, scene.words, scale)
-    style.legend(
-        panel,
-        "; ".join(
-            filter(None, [f"after {style.text_of(rest, 's')} at rest", scene.title])
-        ),
-    )
-
-
-def _peak_panel(panel: Axes, dataset: xr.Dataset, scene: Scene) -> None:
-    """Draw the peak stress; a hollow one comes within few steps of the start.
-
-    Thin lines over the speed are closed forms: the peak of Bell bonds if none rebinds, and steady sliding.
-    """
-    scene.statistics.stated = Run(scene.statistics.dataset).statements([])
-    factor = statement_curves(panel, scene, "peak_stress")
+    scene = scene.placed("t", times, "time since the start", "s", scale)
+    words, stresses = r"shear stress $\tau_0$", scene.all("shear_stress")
+    factor = style.in_unit(axes[0].yaxis, words, stresses, "Pa")
+    contact_curves(axes[0], scene, "shear_stress", factor)
+    scene.statistics.stated = stated
     for line in scene.lines:
-        x, peaks, when = (
-            scene.x[line.number],
-            *(scene.values(f"peak_{name}", line) for name in ("stress", "time")),
-        )
-        few = when <= _STEPS * float(dataset["clock_step"])
-        look: Any = {
-            "markersize": 3,
-            "mfc": "white",
-            "color": line.colour,
-            "label": "not resolved" * bool(few.any()),
-        }
-        panel.plot(x[few], factor * peaks[few], "o", **look)
-    for line in scene.lines if scene.over.endswith("speed") else ():
-        point = dataset.isel(line.point | {scene.over: 0})
-        speeds, bonds = _fine(scene, line), population_of(point)
-        if bonds and bonds.pathway:
-            rested = style.mean_of(point, "bond_fraction").sel(
-                t=float(setting(point, "drive.rest")), method="ffill"
-            )
-            force = schallamach.start_up_peak(speeds, *bonds.pathway).force
-            peak = factor * float(rested) * bonds.density * bonds.at_rest * force
-            panel.plot(
-                scene.unit.factor * speeds,
-                peak,
-                ":",
-                label="without rebinding",
-                **style.GREY,
-            )
-        for law in steady_laws(point, speeds)[:1]:
-            panel.plot(
-                scene.unit.factor * speeds,
-                factor * law.stress,
-                label=law.words,
-                **_LAWS[law.style],
-            )
-    style.across(panel, scene.x, scene.words, scene.scale, 0.05)
-    style.legend(panel, "peak of the stress")
+        _mark_peak(axes[0], scene, line, factor, "time")
+    style.across(axes[0], scene.x, scene.words, scale)
+    after = f"after {style.text_of(rest, 's')} at rest"
+    style.legend(axes[0], scene.headed(after).title)
+    if has_peaks:
+        scene = over_key(dataset, swept[0])
+        scene.statistics.stated = Run(scene.statistics.dataset).statements([])
+        factor = statement_curves(axes[1], scene, "peak_stress")
+        if scene.over.endswith("speed"):
+            _laws(axes[1], scene, 0, factor)
+        style.across(axes[1], scene.x, scene.words, scene.scale, 0.05)
+        style.legend(axes[1], "peak of the stress")
+    return figure

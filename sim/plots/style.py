@@ -8,9 +8,8 @@ import io
 import itertools
 import re
 import string
-import textwrap
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import matplotlib as mpl
 import numpy as np
@@ -19,11 +18,12 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Circle
-from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from sim.numerics.files import output
+from sim.plots.layout import Layout
 from sim.read import engineering, scaled, sweep_dims
 from sim.read.dataset import ensemble_mean
 
@@ -53,6 +53,7 @@ HOLLOW: Any = {"marker": "o", "markersize": 3.5, "mfc": "white", "linestyle": "n
 
 #: Look of all legends.
 LEGEND: Any = {
+    "borderaxespad": 0.2,
     "handletextpad": 0.5,
     "labelspacing": 0.25,
     "alignment": "left",
@@ -88,7 +89,7 @@ class Picture(Figure):
     """A figure that is saved in the style of its drawing; equal pictures give equal bytes."""
 
     def savefig(self, fname: Any, **options: Any) -> None:
-        """Save as PNG (200 dpi), PDF or SVG, by the extension; see ``matplotlib.figure.Figure.savefig``."""
+        """Save as PNG (400 dpi), PDF or SVG, by the extension; see ``matplotlib.figure.Figure.savefig``."""
         undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(
             str(fname).rpartition(".")[2].lower()
         )
@@ -127,7 +128,7 @@ def _panels(
     size: tuple[float, float], count: tuple[int, int], **options: Any
 ) -> tuple[Figure, list[Axes]]:
     """Return a picture of a size [in] with its own canvas, and its panels, with letters if there are more than one."""
-    figure = Picture(figsize=size, dpi=200, layout="constrained")
+    figure = Picture(figsize=size, dpi=400, layout=Layout())
     FigureCanvasAgg(figure)
     axes = list(figure.subplots(*count, squeeze=False, **options).flat)
     for panel in axes:
@@ -146,20 +147,17 @@ def _panels(
 
 
 def swept_value(dataset: xr.Dataset, name: str, at: int) -> str:
-    """Return a swept value with its symbol, ``P = 4 mN``, in the unit of the whole axis unless it is small there."""
+    """Return a swept value with its symbol and in a unit that suits it, ``P = 4 mN``."""
     coordinate = dataset[name]
-    value = coordinate[at].item()
+    value, unit = coordinate[at].item(), coordinate.attrs.get("units", "1")
     if isinstance(value, str):
         return value
-    unit = Unit.of(coordinate.to_numpy(), coordinate.attrs.get("units", "1"))
-    if 0.0 < abs(value) * unit.factor < 0.1:
-        unit = Unit.of(value, coordinate.attrs.get("units", "1"))
-    number = f"{value * unit.factor:.4g} {unit.name}".strip().replace("-", "−")
-    sign, key = symbol(coordinate), (name.partition("_")[2] or name).replace("_", " ")
+    words = symbol(coordinate)
     # the letters of pure numbers are known to few
-    if not sign or coordinate.attrs.get("units") == "1":
-        return f"{key} {sign}".strip() + f" = {number}"
-    return f"{sign} = {number}"
+    if not words or unit == "1":
+        key = name.partition("_")[2] or name
+        words = f"{key.replace('_', ' ')} {words}".strip()
+    return f"{words} = {text_of(value, unit)}"
 
 
 def shades(count: int) -> list[str]:
@@ -191,8 +189,7 @@ def number_at(variable: xr.DataArray, at: dict[str, int]) -> float:
 
 def contact_circle(panel: Axes, radius: float) -> Circle:
     """Draw the edge of the contact on a map and return it."""
-    circle = Circle((0.0, 0.0), radius, fill=False, linewidth=1.0, color=BOTH)
-    circle.set_path_effects([withStroke(linewidth=2.4, foreground="white", alpha=0.8)])
+    circle = Circle((0.0, 0.0), radius, fill=False, linewidth=1.2, color=BOTH)
     panel.add_patch(circle)
     return circle
 
@@ -273,30 +270,44 @@ def axis_scale(values: np.ndarray) -> str:
     return "symlog" if above.max() >= 100.0 * above.min() else "linear"
 
 
-def legend(panel: Axes, title: str = "", columns: int = 0) -> None:
-    """Draw a legend above the panel, each label once."""
+def legend(panel: Axes, title: str = "", whole: bool = False) -> None:
+    """Draw a legend above a panel, each label once.
+
+    That of a ``whole`` figure, or of the first of panels in a column, belongs to the
+    figure, so that a title of the panel has its place below it.
+    """
     entries: dict[str, Any] = {}
     for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
         entries.setdefault(label, handle)
     if not entries and not title:
         return
-    longest = max(
-        (
-            len(re.sub(r"[$^_{}]", "", re.sub(r"\\[A-Za-z]+", "x", text)))
-            for text in entries
-        ),
-        default=0,
-    )
-    panel.legend(
-        entries.values(),
-        entries,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        borderaxespad=0.2,
-        ncols=columns or (3 if longest <= 16 else 2 if longest <= 28 else 1),
-        title="\n".join(textwrap.wrap(title, 62)) or None,
-        **LEGEND,
-    )
+    figure, spec = cast(Figure, panel.figure), panel.get_subplotspec()
+    is_column = spec is not None and spec.get_gridspec().ncols == 1
+    is_first = isinstance(figure, Picture) and panel is figure.axes[0]
+    look = LEGEND | {"title": title or None}
+    if is_first and (is_column or whole):
+        for former in figure.legends:
+            former.remove()
+        look["loc"] = "outside upper left"
+        figure.legend(entries.values(), entries, **look)
+    else:
+        look |= {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
+        panel.legend(entries.values(), entries, **look)
+    # of somebody else's figure, unless that has a layout that places no legends
+    if type(figure.get_layout_engine()) in (type(None), ConstrainedLayoutEngine):
+        figure.set_layout_engine(Layout())
+
+
+def head(figure: Figure, words: list[str]) -> None:
+    """Write words at the top of a figure, into its first legend if it has any."""
+    legends = [*figure.legends, *(panel.get_legend() for panel in figure.axes)]
+    for legend in filter(None, legends):
+        title = legend.get_title().get_text()
+        words = [text for text in words if text not in title]
+        legend.set_title("; ".join(filter(None, [", ".join(words), title])))
+        return
+    words = list(filter(None, [figure.get_suptitle(), *words]))
+    figure.suptitle(", ".join(words), fontsize=mpl.rcParams["axes.titlesize"])
 
 
 def fill(
@@ -327,17 +338,16 @@ def across(
     )
     if scale == "linear":
         panel.locator_params(axis="x", min_n_ticks=3)
-    if scale == "log" and high < 100.0 * low:
-        plain_ticks(panel.xaxis)
+    if scale == "log" and high >= 100.0 * low:
+        # as many ticks at any width, which would else change the width
+        panel.xaxis.set_major_locator(LogLocator(numticks=5))
+    elif scale == "log":
+        subs = (1.0, 3.0) if high >= 10.0 * low else (1.0, 2.0, 3.0, 5.0)
+        panel.xaxis.set_major_locator(LogLocator(subs=subs))
+        panel.xaxis.set_major_formatter("{x:g}")
+        panel.xaxis.set_minor_formatter(NullFormatter())
     if scale != "symlog" and high > low:
         axis, back = (np.log, np.exp) if scale == "log" else (np.array, np.array)
         ends = axis([low, high])
         panel.set_xlim(*back(ends + np.array([-room, room]) * np.ptp(ends)))
-    panel.set_xlabel("\n".join(textwrap.wrap(words, 64)))
-
-
-def plain_ticks(axis: Axis) -> None:
-    """Set numbers such as 0.1, 0.2, 0.5 on a logarithmic axis of few decades."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(NullFormatter())
+    panel.set_xlabel(words)

@@ -39,17 +39,16 @@ Data = Path | str | Mapping[str, Any]
 
 #: Hint of how to read a figure of each kind.
 HINTS = {
-    "loop": "A cross is a pull-off (of each member). A ring is a jump into contact. The loop area is the energy lost.",
+    "loop": "The area of a closed loop is the energy lost in a cycle.",
     "theories": "Measured areas distinguish theories where their curves separate.",
-    "stress": "A mark is the maximum of the stress. Thin lines are closed forms.",
-    "stability": "Dark cells are stick-slip. Below the line, steady sliding is unstable in theory.",
-    "creep": "A line of slope one is sliding at constant speed. A line that bends upward is a runaway.",
+    "stress": "A pale line is steady sliding by the model of the bonds.",
+    "stability": "In red cells the force varies most. Below the line, steady sliding is unstable in theory.",
+    "creep": "A displacement that grows in proportion to time is sliding at constant speed.",
     "friction": "The area of the friction loop is the work of friction.",
-    "curve": "Blue, or above a dash-dotted line: lost to broken bonds. Vermilion, or below it: lost to fluctuations."
-    " On the dotted Hertz line, adhesion is masked.",
+    "curve": "Blue, or above a dash-dotted line: lost to broken bonds. Vermilion, or below it: lost to fluctuations.",
     "sweep": "Each point is a separate run.",
-    "time": "The contact radius lies between the JKR and Hertz radii.",
-    "incipient": "Slip begins where the area deviates from the dashed law.",
+    "time": "Grey lines are the contacts of JKR and of Hertz.",
+    "incipient": "A curve ends at the largest force before the first fall of the force by 2 %.",
     "map": "The circle is the edge of the contact.",
 }
 #: Kinds that are drawn wherever they can be, beside those that fit.

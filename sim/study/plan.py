@@ -608,7 +608,7 @@ def figure(result: Plan) -> Figure:
         panel.plot([], [], "--", color=style.REFERENCE, label="estimate for ranking")
         panel.set(ylim=(-0.03, 1.03), ylabel="P(mechanisms told apart)")
         style.across(panel, x, unit.label(f"{words} of the next point"), scale, 0.05)
-        style.legend(panel, columns=2)
+        style.legend(panel)
     return picture
 
 

@@ -65,7 +65,7 @@ def lines_of(panel):
 
 def legend_of(panel):
     """Entries of a legend, and its title."""
-    legend = panel.get_legend()
+    legend = panel.get_legend() or panel.figure.legends[0]
     return [
         text.get_text() for text in legend.get_texts()
     ], legend.get_title().get_text()

@@ -6,7 +6,6 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from helpers.parts import (
-    Band,
     Bell,
     Clock,
     Ensemble,
@@ -20,7 +19,6 @@ from helpers.parts import (
 from helpers.pictured import (
     STEADY,
     drawn,
-    field,
     legend_of,
     lines_of,
     mapped,
@@ -32,6 +30,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.plots import Choices, kinds as plots, style as pictures
 
+#: Colour of closed forms.
+PALE = "#BBBBBB"
 REVERSING = drive.Table(
     time=(0.0, 0.1, 0.1, 0.3, 0.3, 0.4), speed=(2e-3, 2e-3, -2e-3, -2e-3, 2e-3, 2e-3)
 )
@@ -55,7 +55,7 @@ def swept(**sweep):
     )
 
 
-def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_with_a_colour_bar():
+def test_sweeps_are_shown_against_their_key_and_of_many_curves_ten_are_drawn():
     dataset = simulated(drive=STEADY, sweep={"contact.load": ["1 mN", "4 mN", "16 mN"]})
     figure = plots.draw(dataset)
     found = read.summary(read.settled(read.observables(dataset)))
@@ -80,23 +80,19 @@ def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_wi
     figure = plots.draw(dataset, "sweep")
     for panel in figure.axes:
         for line in panel.lines:
-            x, y = (np.asarray(values) for values in line.get_data())
+            y = np.asarray(line.get_ydata())
             joined = (
                 np.isfinite(y[1:])
                 & np.isfinite(y[:-1])
                 & (line.get_linestyle() != "None")
             )
-            # a line within a category, or the one at zero across them all
-            assert np.all(np.abs(np.diff(x))[joined] < 0.5) or np.all(y == 0.0)
+            # no line joins categories, but the one at zero
+            assert not np.any(joined) or np.all(y == 0.0)
     radii = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
     assert_allclose(
         radii[1].get_ydata(),
         1e6 * dataset["contact_radius"].isel(contact_load=1, t=-1),
         rtol=1e-14,
-    )
-    # side by side
-    assert np.all(radii[0].get_xdata() < [0.0, 1.0]) and np.all(
-        radii[1].get_xdata() > [0.0, 1.0]
     )
     assert [text.get_text() for text in figure.axes[-1].get_xticklabels()] == [
         "none",
@@ -110,10 +106,7 @@ def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_wi
     assert_allclose(drawn(panel, pictures.LINES[1])[1], radius, rtol=1e-14)
     dataset = simulated(sweep={"drive.to": ["10 mm/s", "100 mm/s"]})
     figure = plots.draw(dataset, "sweep")
-    assert (
-        legend_of(figure.axes[0])[1]
-        == "at the end: $t$ = 400 ms, $V$ = 10 mm/s to 100 mm/s"
-    )
+    assert legend_of(figure.axes[0])[1] == "at $t$ = 400 ms"
     panel = plots.draw(dataset).axes[0]
     ends = [drawn(panel, colour)[0][-1] for colour in pictures.LINES[:2]]
     assert_allclose(ends, [10.0, 100.0], rtol=1e-12)
@@ -122,10 +115,8 @@ def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_wi
         shear=shear.Uniform(),
         sweep={"contact.load": list(np.linspace(1e-3, 9e-3, 9))},
     )
-    panel, *_, bar = rendered(plots.draw(dataset, "time")).axes
-    assert bar.get_ylabel() == "normal load $P$ (mN)" and not any(
-        "$P$" in name for name in legend_of(panel)[0]
-    )
+    panel = rendered(plots.draw(dataset, "time")).axes[0]
+    assert sum("$P$" in name for name in legend_of(panel)[0]) == 9
     colours = [line.get_color() for line in panel.lines if line.get_linestyle() == "-"]
     assert len(colours) == 9 and colours == sorted(
         colours, key=lambda c: sum(mpl.colors.to_rgb(c)[:2])
@@ -133,15 +124,15 @@ def test_sweeps_are_shown_against_their_key_and_of_many_curves_some_are_drawn_wi
     dataset = swept(contact_load=41)
     panel = plots.draw(dataset, "time").axes[0]
     ends = [line.get_ydata()[0] for line in panel.lines if line.get_linestyle() == "-"]
-    places = np.rint(np.linspace(0, 40, 20)).astype(int)
+    places = np.rint(np.linspace(0, 40, 10)).astype(int)
     assert_allclose(
         ends, 1e6 * dataset["contact_radius"].isel(contact_load=places, t=0), rtol=1e-14
     )
-    assert "20 of 41 curves drawn (choose others by --where)" in legend_of(panel)[
+    assert "10 of 41 curves drawn (choose others by --where)" in legend_of(panel)[
         1
     ].replace("\n", " ")
     chosen = plots.draw(read.where(dataset, {"contact.load": "1 mN"}), "time")
-    assert chosen.get_suptitle() == "$P$ = 1 mN"
+    assert legend_of(chosen.axes[0])[1] == "$P$ = 1 mN"
     dataset = swept(contact_load=9, sphere_radius=3)
     panel = rendered(plots.draw(dataset, "time")).axes[0]
     ends = [
@@ -233,17 +224,6 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
         quantiles[{"quantile": 0}].min(),
         quantiles[{"quantile": 1}].max(),
     )
-    small = simulated(
-        shear=field(spectrum=Band(rms=10e3, longest=60e-6, shortest=16e-6))
-    )
-    panels = plots.draw(small, "curve").axes
-    assert (
-        panels[2].get_ylabel().startswith(r"fluctuations $\Delta\Gamma$")
-        and len(panels) == 4
-    )
-    _, energy = drawn(panels[2], pictures.BOTH)
-    found = statistics(small)["fluctuation_energy"].value
-    assert_allclose(energy / energy[-1], found / found[-1], rtol=1e-13)
     assert len(plots.draw(ramp, "curve").axes) == 3
     dataset = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())
     closed = dataset["in_contact"].to_numpy() == 1
@@ -267,17 +247,21 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
     )
     panel = plots.draw(dataset, "sweep").axes[0]
     _, hertz = drawn(panel, pictures.REFERENCE, ":")
-    assert np.all(np.isnan(hertz[:2])) and hertz[2] == 0.0 and np.all(hertz[3:] > 0.0)
+    assert np.all(np.isnan(hertz[:2])) and np.all(hertz[3:] > 0.0)
     assert drawn(panel, pictures.REFERENCE, "--")[1][0] > 0.0  # JKR holds it
     dataset = simulated(drive=REVERSING, shear=shear.Uniform())
     speed = dataset["speed"].to_numpy()
     for kind in ("curve", "friction", "stress"):
         for panel in plots.draw(dataset, kind).axes:
             for line in (
-                line for line in panel.lines if np.size(line.get_ydata()) > 10
+                line
+                for line in panel.lines
+                if np.size(line.get_ydata()) > 10 and line.get_color() != PALE
             ):
                 x = np.asarray(line.get_xdata(), float)
-                speeds = np.insert(speed, np.flatnonzero(np.diff(speed)) + 1, np.nan)
+                gaps = np.flatnonzero(np.diff(speed)) + 1
+                # a friction loop is one line
+                speeds = np.insert(speed, gaps if kind != "friction" else (), np.nan)
                 assert len(x) == len(speeds) and np.all(
                     np.isnan(x) == np.isnan(speeds)
                 ), kind
@@ -395,7 +379,11 @@ def test_every_shape_of_dataset_is_drawn_as_what_fits_it_and_a_quantity_not_reco
             )
             for panel in figure.axes:
                 assert (
-                    lines_of(panel) or panel.texts or panel.collections or panel.images
+                    lines_of(panel)
+                    or panel.texts
+                    or panel.collections
+                    or panel.images
+                    or panel.patches
                 ), (changes, kind)
     loads, start = {"contact.load": [1e-3, 4e-3]}, drive.Start(rest=0.1, speed=1e-3)
     moved = {
@@ -462,7 +450,7 @@ def test_equal_figures_give_equal_files_of_one_or_two_columns_and_leave_matplotl
         int.from_bytes((tmp_path / f"{name}.png").read_bytes()[16:20], "big")
         for name in ("first", "map")
     ]
-    assert widths == [680, 1400]  # at 200 dpi
+    assert widths == [1360, 2800]  # at 400 dpi
     assert mpl.rcParams.copy() == before and "matplotlib.pyplot" not in sys.modules
 
 

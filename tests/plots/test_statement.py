@@ -90,3 +90,65 @@ def test_size_range_and_time_of_a_figure_are_chosen(speeds):
             kinds.draw(simulated(), "time", choices)
     with pytest.raises(ValueError, match="no choice of start"):
         kinds.draw(simulated(), "curve", Choices(start=0.1))
+
+
+def test_a_statement_has_the_speed_or_any_swept_key_as_its_axis_and_another_as_its_curves():
+    dataset = simulated(
+        drive=drive.Steady(speed=1e-3),
+        sweep={"contact.load": [4e-3, 1e-3], "drive.speed": [1e-2, 1e-3, 3e-3]},
+    )
+    stated = read.Run(dataset).statements()["contact_area"].value
+    for x, order in (("speed", [1, 2, 0]), ("drive.speed", [1, 2, 0])):
+        panel = kinds.draw(dataset, "contact_area", Choices(x=x)).axes[0]
+        curves = [line.get_data() for line in panel.lines if line.get_marker() == "o"]
+        assert "speed" in panel.get_xlabel() and len(curves) == 2
+        for k, (speed, area) in enumerate(curves):
+            assert_allclose(speed, [1.0, 3.0, 10.0], rtol=1e-12)
+            assert_allclose(area, 1e6 * stated[k, order], rtol=1e-12)
+        assert legend_of(panel)[0] == ["$P$ = 4 mN", "$P$ = 1 mN"]
+    panel = kinds.draw(dataset, "contact_area", Choices(x="load")).axes[0]
+    (load, _), *others = [
+        line.get_data() for line in panel.lines if line.get_marker() == "o"
+    ]
+    assert_allclose(load, [1.0, 4.0], rtol=1e-12)
+    assert len(others) == 2
+    with pytest.raises(ValueError, match='no x axis "t"; choose a swept one: speed'):
+        kinds.draw(dataset, "contact_area", Choices(x="t"))
+
+
+def test_a_histogram_counts_the_members_and_has_an_area_of_one():
+    dataset = simulated(drive=drive.Steady(speed=4e-3))
+    panel = kinds.draw(dataset, "histogram", Choices(x="fluctuation_energy")).axes[0]
+    (steps,) = panel.patches
+    density, edges, _ = steps.get_data()
+    late = dataset["fluctuation_energy"].isel(t=slice(dataset.sizes["t"] // 2, None))
+    exact, _ = np.histogram(1e3 * late, edges)
+    assert exact.sum() == late.size
+    assert_allclose(density * np.diff(edges), exact / late.size, rtol=1e-12)
+    assert legend_of(panel)[1] == "6 members, second half of the run"
+    alone = simulated(drive=drive.Steady(speed=4e-3), shear=shear.Uniform())
+    assert "histogram" not in kinds.drawable(alone)
+    with pytest.raises(ValueError, match="members that differ"):
+        kinds.draw(alone, "histogram")
+
+
+def test_a_survival_falls_at_each_event_and_there_is_none_without_an_event():
+    dataset = simulated(drive=drive.Steady(speed=4e-3)).copy(deep=True)
+    end = float(dataset["t"][-1])
+    dataset["first_masked"][:] = np.array([0.5, 0.25, np.nan, 0.25, np.nan, 0.75]) * end
+    panel = kinds.draw(dataset, "survival").axes[0]
+    time, share = panel.lines[0].get_data()
+    assert_allclose(time, 1e3 * end * np.array([0.0, 0.25, 0.5, 0.75, 1.0]), rtol=1e-12)
+    assert_allclose(share, np.array([6, 4, 3, 2, 2]) / 6, rtol=1e-12)
+    assert panel.get_ylabel() == "contacts not yet masked"
+    dataset["first_masked"][:] = np.nan
+    assert "survival" not in kinds.drawable(dataset)
+    with pytest.raises(ValueError, match="no contact is masked or detached"):
+        kinds.draw(dataset, "survival")
+
+
+def test_the_range_of_the_y_axis_is_chosen(speeds):
+    figure = kinds.draw(speeds, "curve", Choices(ylim="0.2:0.9"))
+    assert_allclose(figure.axes[0].get_ylim(), [0.2, 0.9], rtol=1e-12)
+    with pytest.raises(ValueError, match="--ylim"):
+        kinds.draw(speeds, "curve", Choices(ylim="1"))

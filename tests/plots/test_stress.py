@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from helpers.parts import Clock, Ensemble, bonds, drive, shear
+from helpers.parts import Clock, Ensemble, bonds, drive, read, shear
 from helpers.pictured import data_of, drawn, legend_of, rendered, simulated
 from numpy.testing import assert_allclose
 
 from sim.laws import schallamach
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.plots import kinds as plots, slider, style as pictures
-from sim.plots.slider import maximum_of
 
 #: Bonds whose friction is largest at 19.3 zero_force_rate bell_force/bond_stiffness = 1.93 mm/s.
 BELL = {"zero_force_rate": 1e4, "bell_force": 4e-12}
@@ -75,17 +74,11 @@ def test_stress_and_bonds_are_drawn_over_the_speed_beside_the_law_of_every_ruptu
         "log",
     )
     speed, exact = drawn(stress, PALE)
-    assert_allclose(
-        exact, 1e-3 * schallamach.bell_stress(1e-6 * speed, *LAW, 9e16), rtol=1e-12
-    )
-    speed, field = drawn(stress, pictures.REFERENCE, "--")
-    assert_allclose(
-        field,
-        1e-3 * schallamach.first_moment_stress(1e-6 * speed, *LAW, 9e16),
-        rtol=1e-12,
-    )
+    bell = schallamach.bell_stress(1e-6 * speed, *LAW, 9e16)
+    # the steady law of cohorts is an integral
+    assert_allclose(exact, 1e-3 * bell, rtol=1e-9)
     speed, exact = drawn(fraction, PALE)
-    assert_allclose(exact, schallamach.bell_fraction(1e-6 * speed, *LAW), rtol=1e-12)
+    assert_allclose(exact, schallamach.bell_fraction(1e-6 * speed, *LAW), rtol=1e-9)
     assert_allclose(speed[[0, -1]], [1.0, 1e5], rtol=1e-9)
     speed, short = np.array([1e-5, 1e-3]), Clock(duration=1.0, step=0.1)
     for rupture, exact in (
@@ -102,18 +95,16 @@ def test_stress_and_bonds_are_drawn_over_the_speed_beside_the_law_of_every_ruptu
             9e16 * schallamach.constant_moments(speed, 1e4, 4e-4, 1e5).force,
         ),
     ):
-        dataset = ramped(bonds.FirstMoment(rupture=rupture, **SITES), clock=short)
-        (law,) = slider.steady_laws(dataset, speed)
-        assert_allclose(law.stress, exact, rtol=1e-12)
+        dataset = ramped(bonds.Cohort(rupture=rupture, **SITES), clock=short)
+        stress, _ = slider.steady_law(dataset, {}, speed)
+        assert_allclose(stress, exact, rtol=2e-4)
         plots.draw(dataset, "stress")
     dataset = ramped(sweep={"bonds.rupture.bell_force": [4e-12, 8e-12]}, clock=short)
     for k, force in enumerate((4e-12, 8e-12)):
-        law = slider.steady_laws(dataset.isel(bonds_rupture_bell_force=k), speed)[0]
-        assert_allclose(
-            law.stress,
-            schallamach.bell_stress(speed, 1e4, force, 4e-4, 1e5, 9e16),
-            rtol=1e-12,
-        )
+        stress, _ = slider.steady_law(dataset, {"bonds_rupture_bell_force": k}, speed)
+        exact = schallamach.bell_stress(speed, 1e4, force, 4e-4, 1e5, 9e16)
+        # cohorts hold it to their tolerance
+        assert_allclose(stress, exact, rtol=2e-4)
 
 
 def test_the_maximum_is_marked_and_named_of_each_model_unless_the_stress_only_rises(
@@ -121,18 +112,16 @@ def test_the_maximum_is_marked_and_named_of_each_model_unless_the_stress_only_ri
 ):
     panel = plots.draw(ramp, "stress").axes[0]
     (ring,) = (line for line in panel.lines if line.get_markerfacecolor() == "none")
-    at = int(np.argmax(ramp["shear_stress"].to_numpy()))
-    assert_allclose(
-        np.ravel(ring.get_data()),
-        [1e6 * ramp["speed"][at], 1e-3 * ramp["shear_stress"][at]],
-        rtol=1e-14,
-    )
-    # a record every tenth of a decade and more: the largest record is within half a step of the maximum
+    place, peak = np.ravel(ring.get_data())
+    # it is that of the table, refined between clock steps
+    stated = read.Run(ramp).statements()
+    assert_allclose(place, 1e6 * stated["peak_speed"].value, rtol=1e-12)
+    assert_allclose(peak, 1e-3 * stated["peak_stress"].value, rtol=1e-12)
     speed, stress = schallamach.bell_peak(*LAW, 9e16)
-    assert abs(np.log(1e-6 * ring.get_xdata()[0] / speed)) <= 0.5 * np.log(1e5) / 100
-    name = f"simulated: {pictures.rounded(float(ramp['shear_stress'][at]), 'Pa')} at 2 mm/s"
+    assert abs(np.log(1e-6 * place / speed)) <= 0.5 * np.log(1e5) / 100
+    name = f"simulated: {pictures.rounded(1e3 * peak, 'Pa')} at 1.93 mm/s"
     assert legend_of(panel)[0][0] == name
-    assert_allclose(float(ramp["shear_stress"][at]), stress, rtol=5e-3)
+    assert_allclose(1e3 * peak, stress, rtol=5e-3)
     rupture = {"model": "bell", "zero_force_rate": "1e4 1/s", "bell_force": "4 pN"}
     numbers = {
         "bond_stiffness": "0.4 mN/m",
@@ -146,23 +135,17 @@ def test_the_maximum_is_marked_and_named_of_each_model_unless_the_stress_only_ri
     names = legend_of(plots.draw(dataset, "stress").axes[0])[0]
     most = [
         pictures.rounded(float(value), "Pa")
-        for value in dataset["shear_stress"].max("t")
+        for value in read.Run(dataset).statements()["peak_stress"].value
     ]
-    assert names[:2] == [f"rate: {most[0]} at 2 mm/s", f"cohort: {most[1]} at 2 mm/s"]
-    speed = np.array([1.0, 2.0, 3.0])
-    assert (
-        maximum_of(speed, speed[::-1]) is None
-        and maximum_of(speed, np.full(3, np.nan)) is None
-    )
-    assert maximum_of(-speed, np.array([-1.0, -4.0, -2.0])) == 1
+    for k, model in enumerate(("rate", "cohort")):
+        assert names[k].startswith(f"{model}: {most[k]} at ")
     dataset = ramped(
         drive=drive.Ramp(start=1e-6, stop=1e-4, scale="log"),
         clock=Clock(duration=1.0, step=0.1),
     )
     assert legend_of(plots.draw(dataset, "stress").axes[0])[0] == [
         "simulated",
-        "steady sliding, exact",
-        "mean field",
+        "steady sliding",
     ]
     # transients after a jump of the speed have no maximum over the speed
     jump = drive.Table(
@@ -174,7 +157,7 @@ def test_the_maximum_is_marked_and_named_of_each_model_unless_the_stress_only_ri
     assert not [line for line in panel.lines if line.get_markerfacecolor() == "none"]
 
 
-def test_peaks_after_rests_are_those_of_steps_beside_the_closed_form_and_hollow_if_not_resolved(
+def test_peaks_after_rests_are_those_of_steps_beside_steady_sliding(
     starts,
 ):
     after, peaks = rendered(plots.draw(starts, "stress")).axes
@@ -201,29 +184,10 @@ def test_peaks_after_rests_are_those_of_steps_beside_the_closed_form_and_hollow_
         highest = starts["shear_stress"][k].where(starts["t"] > rest).max("t")
         # between two records it is higher
         assert np.all(starts["peak_stress"][k] >= highest)
-    assert legend_of(peaks)[0][2:] == ["without rebinding", "steady sliding, exact"]
-    dotted = [line.get_data() for line in peaks.lines if line.get_linestyle() == ":"]
-    for rest, (speed, peak) in zip((0.5, 1.0), dotted, strict=True):
-        bound = 0.5 * -np.expm1(-2.0 * rest)  # sites bind and open with 1/s each
-        force = schallamach.start_up_peak(1e-9 * speed, 1.0, 4e-12, 4e-4).force
-        # the number of bonds is exact for a constant rate; the population holds it to its tolerance of 1e-4
-        assert_allclose(peak, 1e-3 * 9e16 * bound * force, rtol=2e-4)
+    assert legend_of(peaks)[0][2:] == ["steady sliding"]
     speed, stress = data_of(peaks, PALE)[0]
     exact = schallamach.bell_stress(1e-9 * speed, 1.0, 4e-12, 4e-4, 1.0, 9e16)
-    assert_allclose(stress, 1e-3 * exact, rtol=1e-12)
-    # At 1 µm/s the peak comes 34 ms after the start, within two steps; at 100 nm/s after 190 ms.
-    coarse = started(
-        clock=Clock(duration=2.0, step=0.02), sweep={"drive.speed": [1e-7, 1e-6]}
-    )
-    panel = plots.draw(coarse, "stress").axes[1]
-    white = [
-        line.get_xdata()
-        for line in panel.lines
-        if line.get_markerfacecolor() == "white"
-    ]
-    (hollow,) = (places for places in white if len(places))
-    assert_allclose(hollow, [1000.0], rtol=1e-12)
-    assert "not resolved" in legend_of(panel)[0]
+    assert_allclose(stress, 1e-3 * exact, rtol=2e-4)
 
 
 def test_sliding_without_a_stress_over_speed_or_time_is_refused_with_the_cure():
