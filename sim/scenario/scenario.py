@@ -558,9 +558,8 @@ class Scenario:
     @property
     def lags_behind_speed(self) -> bool:
         """Return True if the speed changes at a constant mount, and bonds or fluctuations lag behind it."""
-        amplitude = getattr(self.fluctuations, "amplitude", None)
         rates = (key.startswith("bonds.rebinding") for key in quantities(self))
-        lags = any(rates) or bool(getattr(amplitude, "relaxing", False))
+        lags = any(rates) or self.fluctuations.relaxes
         return lags and not self.contact.changes and bool(np.ptp(self.speeds(_SPEEDS)))
 
     @property
