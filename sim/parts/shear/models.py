@@ -98,11 +98,6 @@ class ShearModel:
     passes: ClassVar[bool] = False
     #: True if the energy that the contact reads is the same at all times.
     stays: ClassVar[bool] = False
-
-    @property
-    def relaxes(self) -> bool:
-        """Return True if the amplitude follows the speed with a delay."""
-        return bool(getattr(self, "amplitude", Constant()).relaxing)
     #: True if a drive that solves its motion can draw the energy that the contact reads in its own loop.
     in_blocks: ClassVar[bool] = False
     #: Correlation length of the field [m]; nan if its modes have none in common.
@@ -116,6 +111,11 @@ class ShearModel:
     mode_amplitudes: str = "gaussian"
     #: Relative error of the energy on a disc that needs no remark.
     tolerance: float = 0.01
+
+    @property
+    def relaxes(self) -> bool:
+        """Return True if the amplitude follows the speed with a delay."""
+        return bool(getattr(self, "amplitude", Constant()).relaxing)
 
     @model_validator(mode="after")
     def _one_size(self) -> Self:
