@@ -136,6 +136,10 @@ class Search:
         """Return the minimum of the sum of squares for simulated values, coarsely, from the nearest known place."""
         return self._from(values, [int(np.argmin(self._sums(values)))])
 
+    def sums(self, values: Iterable[Array]) -> Array:
+        """Return the least sums of squares for several simulated values."""
+        return np.array([self.least(item).chi_square for item in values])
+
     def exact(self, values: Array) -> Minimum:
         """Return the minimum to eight digits, from the given starts and the nearest places that differ."""
         starts = list(range(self.given))
