@@ -19,10 +19,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
-import matplotlib as mpl
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 from pydantic import TypeAdapter
 from scipy import special
 
@@ -33,23 +31,11 @@ from sim.numerics import files, hdf5, lazy
 from sim.numerics.stopwatch import stopwatch
 from sim.parts.drive import Driven
 from sim.parts.exchange import Array, Bonding, Gammas, Motion
-from sim.parts.shear.bands import cell_pairs
 from sim.parts.shear.process import Fluctuation
-from sim.plots.style import (
-    BONDS,
-    FLUCTUATIONS,
-    LINES,
-    REFERENCE,
-    STYLE,
-    legend,
-    rows,
-    save,
-)
-from sim.read import engineering
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read, keys, model, tables
 from sim.units.errors import BadInput
-from sim.units.notation import concise
+from sim.units.notation import concise, engineering
 
 #: A table to print, and the text below it.
 Printed = tuple[list[dict[str, str]], str]
@@ -65,6 +51,8 @@ STATISTICS = ("mean", "spread", "skewness", "correlation time")
 Check = Callable[[], None]
 #: A reading of a variable of a run.
 Read = Callable[[Scenario, Trajectory], Array]
+#: Shape of the errors of a setting.
+_SHAPE = len(QUANTITIES), len(STATISTICS)
 _READS = tuple(READ[name] for name in QUANTITIES)
 _ENERGY, _RADIUS = 2, 3
 _SHORT = ("stress", "bonds", "ΔΓ", "radius", "friction")
@@ -97,12 +85,8 @@ _TICK = 1e-9
 #: Errors below this are roundings.
 _ROUNDING = 1e-9
 
-#: Parts by the name in the dataset: words, table of the scenario, colour and marker.
-_PARTS = {
-    "shear": ("shear model", "shear", FLUCTUATIONS, "o"),
-    "bonds": ("bond model", "bonds", BONDS, "s"),
-    "step": ("clock step", "clock", LINES[3], "^"),
-}
+#: Tables of the scenario by the part's name in the dataset.
+_PARTS = {"shear": "shear", "bonds": "bonds", "step": "clock"}
 #: Unit and meaning of the variables of the dataset, by attribute of ``Setting``.
 _DESCRIBED = {
     "part": ("", "part of the scenario that the setting changes"),
@@ -147,19 +131,13 @@ class Setting:
     ratio: float = 1.0
     time: float = math.nan
     members: int = 0
-    error: Array = field(
-        default_factory=lambda: np.full((len(QUANTITIES), len(STATISTICS)), np.nan)
-    )
-    standard_error: Array = field(
-        default_factory=lambda: np.zeros((len(QUANTITIES), len(STATISTICS)))
-    )
+    error: Array = field(default_factory=lambda: np.full(_SHAPE, np.nan))
+    standard_error: Array = field(default_factory=lambda: np.zeros(_SHAPE))
 
     @property
     def pace(self) -> float:
         """Return the estimated time of a run of one member [s]."""
-        return self.time / (
-            self.scenario.ensemble.members if self.scenario.is_random else 1
-        )
+        return self.time / _members(self.scenario)
 
 
 @dataclass
@@ -339,6 +317,11 @@ def converge(
     )
 
 
+def _members(scenario: Scenario) -> int:
+    """Return the members that differ."""
+    return scenario.ensemble.members if scenario.is_random else 1
+
+
 def _table(part: object) -> dict[str, Any]:
     """Return the keys of a part that have a value, as its table in a scenario file."""
     return dict(TypeAdapter(Any).dump_python(part, by_alias=True, exclude_none=True))
@@ -346,34 +329,30 @@ def _table(part: object) -> dict[str, Any]:
 
 def _tried(scenario: Scenario) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the settings of a scene, simple ones first: the part, and the keys of its table that are changed."""
+
+    def tolerances(table: dict[str, Any], usual: tuple[float, ...]) -> list[float]:
+        return sorted({*usual, table.get("tolerance", usual[0])}, reverse=True)
+
     shear, bonds = _table(scenario.shear), _table(scenario.bonds)
     if "correlation" in shear:
         yield "shear", {"model": "mean"}
-        for tolerance in sorted(
-            {*_BANDS, shear.get("tolerance", _BANDS[0])}, reverse=True
-        ):
+        for tolerance in tolerances(shear, _BANDS):
             yield "shear", {"model": "banded", "tolerance": tolerance}
         # the same numbers
         yield "shear", {"model": "mapped" if shear["model"] == "mapped" else "modal"}
     if "rebinding_rate" not in bonds:
         return
-    carried, stretched = bonds.get("area") == "carried", "rupture" in bonds
-    if not (stretched or carried):
+    is_carried, is_stretched = bonds.get("area") == "carried", "rupture" in bonds
+    if not (is_stretched or is_carried):
         yield "bonds", {"model": "steady"}
     yield "bonds", {"model": "rate"}
-    for tolerance in (
-        sorted({*_COHORTS, bonds.get("tolerance", _COHORTS[0])}, reverse=True)
-        if stretched
-        else ()
-    ):
+    for tolerance in tolerances(bonds, _COHORTS) if is_stretched else ():
         yield "bonds", {"model": "cohort", "tolerance": tolerance}
-    sites = (
-        bonds.get("sites")
-        or bonds.get("site_density", math.inf) * math.pi * scenario.rest_radius**2
-    )
-    last, most = ("tracked", 1e5) if stretched else ("counted", 1e9)
+    density = bonds.get("site_density", math.inf)
+    sites = bonds.get("sites") or density * math.pi * scenario.rest_radius**2
+    last, most = ("tracked", 1e5) if is_stretched else ("counted", 1e9)
     # sites cannot be carried with the area
-    if not carried and ("sites" in bonds or 0.0 < sites <= most):
+    if not is_carried and ("sites" in bonds or 0.0 < sites <= most):
         yield "bonds", {"model": last, "sites": round(sites)}
 
 
@@ -384,14 +363,11 @@ def _admitted(
 
     If the time is spent, only the setting of the scene itself is built.
     """
-    table_now, label = (
-        _table(getattr(base, part)),
-        " ".join(f"{value}" for value in changes.values()),
-    )
-    admitted = tables(keys(Scenario)[part].annotation).values()
+    table_now = _table(getattr(base, part))
+    label = " ".join(map(str, changes.values()))
     declared = {
         key
-        for kind in admitted
+        for kind in tables(keys(Scenario)[part].annotation).values()
         if model(kind) == changes["model"]
         for key in keys(kind)
     }
@@ -400,12 +376,8 @@ def _admitted(
         if budget.left() < 0.0 and not is_written:
             budget.needs(2.0 * budget.seconds)
             raise ValueError(_TOO_LONG)
-        changed = base.with_values(
-            {
-                part: {key: table_now[key] for key in table_now.keys() & declared}
-                | changes
-            }
-        )
+        kept = {key: table_now[key] for key in table_now.keys() & declared}
+        changed = base.with_values({part: kept | changes})
         changed.process  # noqa: B018 - some models are refused only when their modes are made
     except ValueError as fault:
         budget.left_out.append(f"{label}: " + str(fault).partition("\n")[0])
@@ -421,28 +393,19 @@ def _at_step(scenario: Scenario, ratio: float) -> Setting:
     changed = scenario.with_values(
         {"clock": {"duration": clock.duration, "step": step, "record": record}}
     )
-    text, label = (
-        f'step = "{step:.12g} s"\nrecord = "{record:.12g} s"',
-        f"step {engineering(step, 's')}",
-    )
+    text = f'step = "{step:.12g} s"\nrecord = "{record:.12g} s"'
+    label = f"step {engineering(step, 's')}"
     return Setting(label, "step", changed, text, int(ratio == 1.0), ratio)
 
 
 def _timed(scenario: Scenario, seconds: float) -> float:
     """Return the CPU time of the scene's run [s], by all but the first of the pieces that are run in some seconds."""
-    members, last = (
-        scenario.ensemble.members if scenario.is_random else 1,
-        scenario.clock.steps,
-    )
+    members, last = _members(scenario), scenario.clock.steps
     full = min(together(scenario), members)
-    batch = (
-        full if seconds_a_step(scenario, full) < 0.25 * seconds else min(full, _FEWEST)
-    )
-    noise, now, state = (
-        MemberNoise.of(scenario.seed, np.arange(batch)),
-        stopwatch(),
-        None,
-    )
+    is_quick = seconds_a_step(scenario, full) < 0.25 * seconds
+    batch = full if is_quick else min(full, _FEWEST)
+    noise, now = MemberNoise.of(scenario.seed, np.arange(batch)), stopwatch()
+    state = None
     times, end, step, length = list[tuple[int, float]](), now() + seconds, 0, 1
     while not times or now() < end:
         steps, before = range(step + 1, min(step + length, last) + 1), now()
@@ -451,8 +414,7 @@ def _timed(scenario: Scenario, seconds: float) -> float:
         step, length = steps[-1] % last, min(2 * length, _PIECE)
     # the first piece has loaded what is computed once
     done, spent = np.sum(times[1:] or times, axis=0).tolist()
-    batches = -(-members // full) * full / batch
-    return batches * last * max(spent, _TICK) / done
+    return -(-members // full) * full / batch * last * max(spent, _TICK) / done
 
 
 def _records(scenario: Scenario) -> range:
@@ -486,26 +448,20 @@ def recorded(
     """
     values, length = list[Array](), max(1, len(steps) // _PIECES)
     for batch in np.array_split(members, -(-len(members) // together(scenario))):
-        noise, state, pieces = (
-            MemberNoise.of(scenario.seed, batch),
-            None,
-            list[list[Array]](),
-        )
+        noise, state = MemberNoise.of(scenario.seed, batch), None
+        pieces = list[list[Array]]()
         for begin in range(0, len(steps), length):
             check()
-            state, course = follow(
-                scenario, noise, state, steps[begin : begin + length]
-            )
-            if (
-                scenario.drive.solves_motion
-                and np.isfinite(cast(Driven, state.drive).unresolved_time).any()
-            ):
-                cure = "set drive.viscosity or a shorter clock.step"
-                step = f"clock.step = {scenario.clock.step:.3g} s"
-                raise Unresolved(
-                    f"with {step} some members could not be resolved; {cure}"
-                )
-            shape = course.time.size, len(batch)
+            piece = steps[begin : begin + length]
+            state, course = follow(scenario, noise, state, piece)
+            if scenario.drive.solves_motion:
+                unresolved = np.isfinite(cast(Driven, state.drive).unresolved_time)
+                if unresolved.any():
+                    raise Unresolved(
+                        f"with clock.step = {scenario.clock.step:.3g} s some members could not be resolved; "
+                        "set drive.viscosity or a shorter clock.step"
+                    )
+            shape = len(piece), len(batch)
             pieces.append(
                 [np.broadcast_to(read(scenario, course), shape).T for read in reads]
             )
@@ -526,9 +482,8 @@ def compared(
     averages, most = list[Array](), _most_at_once(steps)
     for begin in range(0, len(members), most):
         values = recorded(scenario, members[begin : begin + most], steps, check=check)
-        averages.append(
-            np.nan_to_num(values[:, :, len(steps) // 2 :]).mean(axis=2, keepdims=True)
-        )
+        late = np.nan_to_num(values[:, :, len(steps) // 2 :])
+        averages.append(late.mean(axis=2, keepdims=True))
     return np.concatenate(averages, axis=1)
 
 
@@ -542,6 +497,12 @@ def _most_members(scenario: Scenario, steps: range) -> int:
     return _MOST if scenario.drive.solves_motion else _most_at_once(steps)
 
 
+def _over(values: Array, unit: Array) -> Array:
+    """Return values in a unit; 0 if the unit is 0."""
+    zeros = np.zeros(np.broadcast_shapes(values.shape, unit.shape))
+    return np.divide(values, unit, out=zeros, where=unit > 0.0)
+
+
 def _known(terms: Gammas, power: int) -> Array:
     """Return mean, spread, skewness and correlation time of ΔΓ at amplitude 1, in closed form.
 
@@ -550,11 +511,7 @@ def _known(terms: Gammas, power: int) -> Array:
     """
     mean, variance, third = (np.sum(terms.shape * terms.weight**n) for n in (1, 2, 3))
     lives = np.sum(terms.shape * terms.weight**2 * terms.wavenumber ** -float(power))
-    of_spread = (
-        (2.0 * third / variance**1.5, lives / variance)
-        if variance > 0.0
-        else (0.0, 0.0)
-    )
+    of_spread = _over(np.array([2.0 * third, lives]), variance ** np.array([1.5, 1.0]))
     return np.array([mean + terms.constant, math.sqrt(variance), *of_spread])
 
 
@@ -579,33 +536,20 @@ def _errors(values: Array, reference: Array, known: Array | None = None) -> Arra
     difference = changed - exact
     if known is not None:
         of_energy, of_radius = exact[_ENERGY, 0, 1:], exact[_RADIUS, 0, 1:]
-        along, variance = (
-            np.sum(of_radius * of_energy, axis=0),
-            np.sum(of_energy**2, axis=0),
-        )
-        slope = np.divide(
-            along, variance, out=np.zeros(variance.shape), where=variance > 0.0
-        )
+        along = np.sum(of_radius * of_energy, axis=0)
+        slope = _over(along, np.sum(of_energy**2, axis=0))
         slopes = np.stack([slope, np.abs(slope)])[:, np.newaxis]
-        lacking = (
-            known[:2, np.newaxis, np.newaxis] * exact[_ENERGY] - difference[_ENERGY]
-        )
-        difference[_RADIUS] += slopes * lacking
+        wanted = known[:2, np.newaxis, np.newaxis] * exact[_ENERGY]
+        difference[_RADIUS] += slopes * (wanted - difference[_ENERGY])
     size, influence = np.abs(difference[:, :, 0]), difference[:, :, 1:]
     count = influence.shape[2]
     deviation = np.sqrt(np.sum(influence**2, axis=2) / (count * max(count - 1, 1)))
+    largest = (size + students(count) * deviation).argmax(axis=2, keepdims=True)
     unit = np.repeat(np.abs(exact[:, :1, 0]).max(axis=2), 2, axis=1)
     unit[_ENERGY, 1] = exact[_ENERGY, 1, 0].max() or unit[_ENERGY, 1]
-    largest = (size + students(count) * deviation).argmax(axis=2)[
-        np.newaxis, ..., np.newaxis
-    ]
-    at_largest = np.take_along_axis(np.stack([size, deviation]), largest, axis=3)[
-        ..., 0
-    ]
-    result = np.full((2, len(QUANTITIES), len(STATISTICS)), np.nan)
-    result[:, :, :2] = np.divide(
-        at_largest, unit, out=np.zeros(at_largest.shape), where=unit > 0.0
-    )
+    result = np.full((2, *_SHAPE), np.nan)
+    for part, values in zip(result, (size, deviation), strict=True):
+        part[:, :2] = _over(np.take_along_axis(values, largest, 2)[..., 0], unit)
     if known is not None:
         result[:, _ENERGY] = np.abs(known), np.zeros(len(STATISTICS))
     return result
@@ -621,16 +565,9 @@ def _moments(sample: Array) -> Array:
     )
     spread = np.where(spread > 1e-12 * np.abs(mean), spread, 0.0)
     off = np.where(spread > 0.0, sample - mean, 0.0)
-    on_spread = np.divide(
-        off**2 - spread**2, 2.0 * spread, out=np.zeros(off.shape), where=spread > 0.0
-    )
-    return np.stack(
-        [
-            np.concatenate([mean, off], axis=1),
-            np.concatenate([spread, on_spread], axis=1),
-        ],
-        axis=1,
-    )
+    on_spread = _over(off**2 - spread**2, 2.0 * spread)
+    parts = (mean, off), (spread, on_spread)
+    return np.stack([np.concatenate(part, axis=1) for part in parts], axis=1)
 
 
 def _judged(settings: list[Setting], until: float, budget: Budget) -> list[Setting]:
@@ -640,9 +577,8 @@ def _judged(settings: list[Setting], until: float, budget: Budget) -> list[Setti
     run. Without a finer setting, that of the scene has no error, and none is returned but itself.
     """
     (own,) = (row for row in settings if row.own)
-    nearest = min(
-        settings[settings.index(own) + 1 :], key=lambda row: row.time, default=own
-    )
+    finer = settings[settings.index(own) + 1 :]
+    nearest = min(finer, key=lambda row: row.time, default=own)
     order = sorted(
         settings, key=lambda row: (row is not own, row is not nearest, row.time)
     )
@@ -650,99 +586,71 @@ def _judged(settings: list[Setting], until: float, budget: Budget) -> list[Setti
     steps = _records([own, *noisy][-1].scenario)
     most, wanted = _most_members(own.scenario, steps), _affordable(noisy, until, budget)
     first = int(np.clip(max(0.25 * wanted, min(wanted, _FEWEST)), _LEAST, most))
-    samples, reasons = dict[Setting, Array](), dict.fromkeys(settings, _TOO_LONG)
+    samples, reasons = dict[Setting, Array](), dict[Setting, str]()
     expected = taken = 0.0
     for row in order:
-        members, limit = (
-            range(first if row in noisy else 1),
-            budget.end if row is own else until,
-        )
-        if budget.slower * row.pace * len(members) > budget.left(limit):
+        members = range(first if row in noisy else 1)
+        limit, seconds = budget.end if row is own else until, row.pace * len(members)
+        reasons[row] = _TOO_LONG
+        if budget.slower * seconds > budget.left(limit):
             continue
-        before = budget.now()
+        before, check = budget.now(), functools.partial(budget.check, limit)
         try:
-            samples[row] = compared(
-                row.scenario, members, steps, functools.partial(budget.check, limit)
-            )
+            samples[row] = compared(row.scenario, members, steps, check)
         except Unresolved as fault:
             if row is own:
                 raise
             reasons[row] = str(fault)
         except _Spent:
             pass
-        expected, taken = (
-            expected + row.pace * len(members),
-            taken + budget.now() - before,
-        )
+        expected += seconds
+        taken += budget.now() - before
         budget.slower = max(budget.slower, taken / expected)
-    fitting, costly = (
-        [row for row in settings if row in samples],
-        [row for row in noisy if row in samples],
-    )
-    more = range(
-        first, first + int(min(_affordable(costly, until, budget), most - first))
-    )
-    if costly and more:
+    compared_rows = [row for row in settings if row in samples]
+    costly = [row for row in compared_rows if row in noisy]
+    more = min(_affordable(costly, until, budget), most - first)
+    if costly and more >= 1.0:
         check = functools.partial(budget.check, until)
+        members = range(first, first + int(more))
         with contextlib.suppress(_Spent, Unresolved):
-            rest = [compared(row.scenario, more, steps, check) for row in costly]
-            samples |= {
-                row: np.concatenate([samples[row], values], axis=1)
-                for row, values in zip(costly, rest, strict=True)
-            }
-    left_out = {row.label: reasons[row] for row in settings if row not in samples}
-    budget.left_out += map(": ".join, left_out.items())
-    if _TOO_LONG in left_out.values():
-        budget.needs(
-            2.0 * sum(row.pace * (_FEWEST if row in noisy else 1) for row in settings)
-        )
-    if not fitting or (own is fitting[-1] and own is not settings[-1]):
-        return [own]
-    _compare(own.scenario, fitting, samples)
-    return [row for row in settings if row is own or row in samples]
+            rest = [compared(row.scenario, members, steps, check) for row in costly]
+            for row, values in zip(costly, rest, strict=True):
+                samples[row] = np.concatenate([samples[row], values], axis=1)
+    left_out = [row for row in settings if row not in samples]
+    budget.left_out += [f"{row.label}: {reasons[row]}" for row in left_out]
+    if _TOO_LONG in [reasons[row] for row in left_out]:
+        members_of = {row: _FEWEST if row in noisy else 1 for row in settings}
+        budget.needs(2.0 * sum(row.pace * members_of[row] for row in settings))
+    if own in samples and (compared_rows[-1] is not own or not finer):
+        _compare(compared_rows, samples)
+        return compared_rows
+    return [own]
 
 
 def _affordable(rows: list[Setting], until: float, budget: Budget) -> float:
     """Return the members of some settings whose runs are estimated to take half of the time that is left."""
-    return (
-        0.5
-        * budget.left(until)
-        / max(budget.slower * sum(row.pace for row in rows), _TICK)
-    )
+    seconds = budget.slower * sum(row.pace for row in rows)
+    return 0.5 * budget.left(until) / max(seconds, _TICK)
 
 
-def _compare(
-    scene: Scenario, fitting: list[Setting], samples: dict[Setting, Array]
-) -> None:
+def _compare(rows: list[Setting], samples: dict[Setting, Array]) -> None:
     """Write the errors of the settings of one part against the last of them."""
-    part, finest, known = cast(Any, scene.fluctuations), samples[fitting[-1]], None
-    driven = scene.drive.solves_motion
+    finest, known = rows[-1], None
+    part = cast(Any, finest.scenario.fluctuations)
     has_truth = (
-        fitting[0].part == "shear"
+        finest.part == "shear"
         and part.per_member
-        and not (part.law.relaxing or driven)
+        and not (part.law.relaxing or finest.scenario.drive.solves_motion)
     )
-    if has_truth:  # the distribution of ΔΓ by all modes of the cell
-        pairs = cell_pairs(
-            part.spectrum,
-            part.side(scene.setting.cell),
-            part.points,
-            *scene.solid.effective,
-        )
-        truth = _known(
-            Gammas(pairs.weight, pairs.count, pairs.wavenumber), part.correlation.power
-        )
-    for row in fitting:
+    for row in rows:
         if has_truth:
-            approximate = _known(row.scenario.process.gammas, part.correlation.power)
-            known = (
-                np.divide(
-                    approximate, truth, out=np.ones(truth.shape), where=truth != 0.0
-                )
-                - 1.0
+            known, truth = (
+                _known(each.scenario.process.gammas, part.correlation.power)
+                for each in (row, finest)
             )
-        row.error, row.standard_error = _errors(samples[row], finest, known)
-        row.members = max(samples[row].shape[1], finest.shape[1])
+            known = _over(known - truth, truth)
+        row.error, row.standard_error = _errors(samples[row], samples[finest], known)
+        row.members = max(samples[row].shape[1], samples[finest].shape[1])
 
 
 class _Replayed:
@@ -752,11 +660,8 @@ class _Replayed:
     """
 
     def __init__(self, scenario: Scenario, energy: Array) -> None:
-        self.process, self.amplitude, self.energy = (
-            scenario.process,
-            scenario.fluctuations.law,
-            energy,
-        )
+        self.process, self.energy = scenario.process, energy
+        self.amplitude = scenario.fluctuations.law
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.process, name)
@@ -781,9 +686,7 @@ def _replays(scenario: Scenario) -> bool:
 def _unit_energy(scenario: Scenario, course: Trajectory) -> Array:
     """Return ΔΓ at amplitude 1 [J/m²]."""
     size = scenario.fluctuations.law.factor(course.speed, course.strength) ** 2
-    return np.divide(
-        course.energy, size, out=np.zeros(course.energy.shape), where=size > 0.0
-    )
+    return _over(course.energy, size)
 
 
 def _at_steps(
@@ -816,53 +719,26 @@ def _at_steps(
     return result
 
 
-class _Series(NamedTuple):
-    """Runs of a scene at several clock steps, the finest first, their members, and the time that they took [s]."""
+def _most_in_series(exact: Scenario) -> int:
+    """Return the most members that are compared at several clock steps."""
+    if not exact.is_random:
+        return 1
+    if _replays(exact):
+        return max(_LEAST, min(_NUMBERS // exact.clock.steps, together(exact)))
+    return _most_members(exact, _records(exact))
 
-    rows: list[Setting]
-    runs: list[Array]
-    members: int
-    seconds: float
 
-
-def _series(rows: list[Setting], members: int, budget: Budget) -> _Series | None:
+def _tried_steps(
+    rows: list[Setting], members: int, budget: Budget
+) -> list[Array] | None:
     """Return runs at several clock steps; None if the budget is spent before, or if a motion is not resolved."""
-    began = budget.now()
     try:
-        return _Series(
-            rows, _at_steps(rows, members, budget.check), members, budget.now() - began
-        )
+        return _at_steps(rows, members, budget.check)
     except Unresolved as fault:
         budget.left_out.append(str(fault))
     except _Spent:
         pass
     return None
-
-
-def _first_series(
-    setting: Setting, ratios: Sequence[float], budget: Budget
-) -> _Series | None:
-    """Return runs at a few clock steps, with as many members as fit; None if too few do."""
-    scene, pace, left, members = (
-        setting.scenario,
-        budget.slower * setting.pace,
-        budget.left(),
-        1,
-    )
-    cost = pace * sum(1.0 / ratio for ratio in ratios)
-    if scene.is_random:
-        members = max(min(_most_in_series(scene), int(left / (32.0 * pace))), 4)
-        members = max(min(members, int(left / cost)), _LEAST)
-    if members * cost > left:
-        return None
-    return _series([_at_step(scene, ratio) for ratio in ratios], members, budget)
-
-
-def _most_in_series(exact: Scenario) -> int:
-    """Return the most members that are compared at several clock steps."""
-    if _replays(exact):
-        return max(_LEAST, min(_NUMBERS // exact.clock.steps, together(exact)))
-    return _most_members(exact, _records(exact))
 
 
 def _judged_steps(
@@ -874,51 +750,44 @@ def _judged_steps(
     larger part of the bound, the members are multiplied by four instead. At a prescribed speed the bonds are those of
     the finest model, which any model of small error resembles. If that does not fit, they are those of the scene.
     """
-    coarser = written.scenario.clock.stride % 4 == 0
-    ratios = (
-        ((0.25, 1.0, 4.0), (1.0, 4.0), (0.25, 1.0))
-        if coarser
-        else ((0.0625, 0.25, 1.0), (0.25, 1.0))
-    )
-    for scene, some in itertools.product(dict.fromkeys((finest, written)), ratios):
-        if series := _first_series(scene, some, budget):
-            exact, most = scene.scenario, _most_in_series(scene.scenario)
+    ratios = [(0.25, 1.0, 4.0), (1.0, 4.0), (0.25, 1.0)]
+    if written.scenario.clock.stride % 4:
+        ratios = [(0.0625, 0.25, 1.0), (0.25, 1.0)]
+    runs = None
+    for setting, tried in itertools.product(dict.fromkeys((finest, written)), ratios):
+        exact, began = setting.scenario, budget.now()
+        cost = budget.slower * setting.pace * sum(1.0 / ratio for ratio in tried)
+        most = _most_in_series(exact)
+        members = int(np.clip(budget.left() / (6.0 * cost), min(_LEAST, most), most))
+        if members * cost <= budget.left():
+            rows = [_at_step(exact, ratio) for ratio in tried]
+            runs = _tried_steps(rows, members, budget)
+        if runs:
             break
     else:
         budget.needs(_FEWEST * 5.25 * written.pace)
         return [written], ""
-    while True:
-        rows, runs, count, seconds = series
-        changes = np.array(
-            [_errors(longer, shorter) for shorter, longer in itertools.pairwise(runs)]
-        )
+    following, following_runs = rows, cast(list[Array] | None, runs)
+    while following_runs:
+        rows, runs, seconds = following, following_runs, budget.now() - began
+        count, pairs = runs[0].shape[1], itertools.pairwise(runs)
+        changes = np.array([_errors(longer, shorter) for shorter, longer in pairs])
         changes[:, :, :, 2 - exact.drive.solves_motion :] = 0.0
         # a change that is small by chance does not hide those before it, of first order
-        sure, rest = (
-            students(count),
-            np.max(
-                changes / 4.0 ** np.arange(len(changes)).reshape(-1, 1, 1, 1), axis=0
-            ),
-        )
-        small = float(np.max(rest[0] + sure * rest[1])) <= _SMALL * accepted
-        more_members = count < most and sure * float(np.max(rest[1])) > float(
-            np.max(rest[0])
-        )
-        if (
-            small
-            or not (more_members or rows[0].ratio > _FINEST_STEP)
-            or 4.2 * seconds > budget.left()
-        ):
+        falls = 4.0 ** np.arange(len(changes)).reshape(-1, 1, 1, 1)
+        rest = np.max(changes / falls, axis=0)
+        noise = students(count) * rest[1]
+        is_small = np.max(rest[0] + noise) <= _SMALL * accepted
+        if is_small or 4.2 * seconds > budget.left():
             break
-        if more_members:
-            following = _series(rows, min(4 * count, most), budget)
+        began = budget.now()
+        if count < most and noise.max() > rest[0].max():
+            members = min(4 * count, most)
+        elif rows[0].ratio > _FINEST_STEP:
+            following = [_at_step(exact, 0.25 * rows[0].ratio), *rows]
         else:
-            following = _series(
-                [_at_step(exact, 0.25 * rows[0].ratio), *rows], count, budget
-            )
-        if following is None:
             break
-        series = following
+        following_runs = _tried_steps(following, members, budget)
     # the rest of a series that falls by _FALL is its last term here
     for row, run in zip(rows, runs, strict=True):
         row.error, row.standard_error = _errors(run, runs[0]) + rest / (_FALL - 1.0)
@@ -1115,7 +984,7 @@ def recommendation(dataset: xr.Dataset) -> str:
         )
     changed = [dataset.isel(row=row) for row in best.rows if row not in written.rows]
     toml = [
-        f"\n[{_PARTS[str(row['part'].values)][1]}]\n{row['toml'].values}"
+        f"\n[{_PARTS[str(row['part'].values)]}]\n{row['toml'].values}"
         for row in changed
     ]
     return "\n".join([*lines, *["Write:"] * bool(toml), *toml])
@@ -1135,76 +1004,6 @@ def _off(choice: Choice) -> str:
     )
 
 
-def figure(dataset: xr.Dataset) -> Figure:
-    """Draw the largest error of each setting against the CPU time of the run, in the width of a column.
-
-    Bars are the noise, at 95 %. Exact settings are drawn at a tenth of the smallest error. A ring marks the scene, a
-    star the recommended combination, if there is one.
-    """
-    tolerance = float(dataset.attrs["tolerance"])
-    best, _ = chosen(choices(dataset), tolerance)
-    part, is_written, cost, members, *errors = (
-        dataset[name].to_numpy() for name in _COLUMNS
-    )
-    error, deviation = (np.nan_to_num(each).reshape(len(part), -1) for each in errors)
-    at = np.arange(len(part)), error.argmax(axis=1)
-    off, bars = (
-        np.where(members > 0, error[at], np.nan),
-        students(members) * deviation[at],
-    )
-    floor = 0.1 * min([tolerance, *off[off > _ROUNDING]])
-    off = np.maximum(off, floor)
-    with mpl.rc_context(STYLE):
-        picture, (panel,) = rows([3.0])
-        for name, (words, _, color, marker) in _PARTS.items():
-            if np.any(here := (part == name) & (members > 0)):
-                panel.errorbar(
-                    cost[here],
-                    off[here],
-                    bars[here],
-                    c=color,
-                    marker=marker,
-                    ms=3.6,
-                    lw=0.6,
-                    label=words,
-                )
-        panel.plot(
-            cost[is_written == 1],
-            off[is_written == 1],
-            "o",
-            c="none",
-            mec="black",
-            ms=7.5,
-            label="as written",
-        )
-        if math.isfinite(best.bound) and not dataset.attrs.get("not_converging"):
-            panel.plot(
-                best.time,
-                max(best.bound, floor),
-                "*",
-                c="black",
-                ms=7.0,
-                zorder=5,
-                label="recommended",
-            )
-        panel.axhline(
-            tolerance, color=REFERENCE, linestyle="--", linewidth=0.8, label="accepted"
-        )
-        if not np.any(members > 0):  # logarithmic axes need a range
-            panel.set(
-                xlim=(0.5 * cost.min(), 2.0 * cost.max()),
-                ylim=(0.1 * tolerance, 10.0 * tolerance),
-            )
-        panel.set(
-            xscale="log",
-            yscale="log",
-            xlabel="CPU time of the run (s)",
-            ylabel="largest error (bottom: exact)",
-        )
-        legend(panel)
-    return picture
-
-
 def study(
     scenario: Scenario,
     target: Path,
@@ -1212,20 +1011,10 @@ def study(
     seconds: float,
     tolerance: float | None,
 ) -> Printed:
-    """Study a scene and save dataset and figure; return the table to print and the text below it."""
-    picture = target.with_suffix(".png")
-    if picture == target:
-        raise BadInput(
-            [
-                f"{target}: the dataset cannot have the name of its picture; end it in .nc"
-            ]
-        )
+    """Study a scene and save the dataset; return the table to print and the text below it."""
     hdf5.claim(target, replace, files_read(scenario))
-    files.claim(picture, replace, files_read(scenario))
     dataset = converge(scenario, seconds, tolerance)
     with files.output(target) as beside:
         lazy.save(dataset, beside)
-    save(figure(dataset), picture)
-    return table(
-        dataset
-    ), f"{explanation(dataset)}\n\n{recommendation(dataset)}\n\n{target}\n{picture}"
+    text = f"{explanation(dataset)}\n\n{recommendation(dataset)}\n\n{target}"
+    return table(dataset), text

@@ -24,8 +24,8 @@ from sim.units.quantity import Quantity
 DRAWS, _ENOUGH, _HOPELESS = 200, 20, 30.0
 #: Relative precision of a sum of squares of drawn curves, whose ratios are of order 1.
 _FINE = 1e-3
-#: Residual of an open contact, and distances of curves that are alike and that differ, all in standard errors.
-_FAR, _BESIDE, _APART = 1e6, 0.3, 3.0
+#: Distances of curves that are alike and that differ, in standard errors.
+_BESIDE, _APART = 0.3, 3.0
 #: Binary logarithm of the most places at which a search may start, their range without bounds, in large changes, and
 #: how many of them are tried for measured curves.
 _SPREAD, _AROUND, _STARTS = 8, 3.0, 12
@@ -36,17 +36,24 @@ _ALPHA = Free(
     "alpha", Quantity("1", "reversible share", at_least=0, at_most=1), 0.1, 0.0, 1.0
 )
 _LAMBDA = Free("lambda", Quantity("1", "mixity", at_least=0, at_most=1), 0.5, 0.0, 1.0)
-#: Theories by their name in ``sim.laws.theories``: words, and numbers of their own.
-_THEORIES: dict[str, tuple[str, tuple[Free, ...]]] = {
-    "jkr": ("JKR, independent of shear", ()),
-    "uncorrected": ("Menga et al. 2018, uncorrected", ()),
-    "savkoor_briggs": ("Savkoor & Briggs, full stick", ()),
-    "reversible_force": ("reversible, force held", ()),
-    "reversible_stress": ("reversible, stress held", ()),
-    "fraction": ("a fraction alpha reversible", (_ALPHA,)),
-    "scaled_angle": ("mixed mode, scaled angle", (_LAMBDA,)),
-    "shear_share": ("mixed mode, shear share", (_LAMBDA,)),
-    "scaled_tangent": ("mixed mode, scaled tangent", (_LAMBDA,)),
+#: Theories by their name in ``sim.laws.theories``, in words.
+_THEORIES = {
+    "jkr": "JKR, independent of shear",
+    "uncorrected": "Menga et al. 2018, uncorrected",
+    "savkoor_briggs": "Savkoor & Briggs, full stick",
+    "reversible_force": "reversible, force held",
+    "reversible_stress": "reversible, stress held",
+    "fraction": "a fraction alpha reversible",
+    "scaled_angle": "mixed mode, scaled angle",
+    "shear_share": "mixed mode, shear share",
+    "scaled_tangent": "mixed mode, scaled tangent",
+}
+#: Numbers of their own that some theories have.
+_OWN = {
+    "fraction": _ALPHA,
+    "scaled_angle": _LAMBDA,
+    "shear_share": _LAMBDA,
+    "scaled_tangent": _LAMBDA,
 }
 WHOLE = "the scenario as it is"
 #: Parts of it by their names, and what they leave out.
@@ -81,6 +88,10 @@ class Verdict(NamedTuple):
     words: str
 
 
+def _size(result: Minimum) -> float:
+    return result.chi_square
+
+
 class Search:
     """Search for the least sums of squares of one mechanism, for many sets of values under the same conditions.
 
@@ -95,52 +106,49 @@ class Search:
         Places that are known before.
     """
 
-    def __init__(self, problem: Problem, starts: Sequence[Array]) -> None:
-        self.problem, self.given = problem, len(starts)
-        self.places = [*starts, *([] if problem.by_run else _spread(problem))]
-        self.error = np.hypot(problem.sigma, problem.noise)
-        self.curves = np.array([self._curve(place) for place in self.places])
-
-    def _curve(self, place: Array) -> Array:
-        """Return all curves in standard errors, and the common errors in their sizes."""
-        return np.append(
-            self.problem.predicted(place) / self.error, place[len(self.problem.free) :]
-        )
+    def __init__(self, problem: Problem, starts: Iterable[Array]) -> None:
+        self.problem, self.places = problem, [*starts]
+        self.given = len(self.places)
+        if not problem.by_run:
+            self.places += [*_spread(problem)]
+        # residuals of zeros are curves in standard errors
+        self.zeros = replace(problem, values=np.zeros(len(problem.values)))
+        self.curves = np.array([self.zeros.residuals(place) for place in self.places])
 
     def _sums(self, values: Array) -> Array:
         """Return the sums of squares of some values at all known places."""
-        off = self.curves - np.append(
-            values / self.error, np.zeros(len(self.problem.common))
-        )
-        return np.sum(np.nan_to_num(off, nan=_FAR) ** 2, axis=1)
+        scaled = values / np.hypot(self.problem.sigma, self.problem.noise)
+        off = self.curves + np.pad(scaled, (0, len(self.problem.common)))
+        return np.sum(off**2, axis=1)
 
-    def _from(self, values: Array, starts: Sequence[int], precision: float) -> Minimum:
-        """Return the least of the minima from some known places, and remember it if its curves are new."""
+    def _from(self, values: Array, starts: Sequence[int]) -> Minimum:
+        """Return the least of the minima from some known places, coarsely, and remember it if its curves are new."""
         problem = replace(self.problem, values=values)
         minima = [minimum(problem, self.places[k], precision=_FINE) for k in starts]
-        result = min(minima, key=lambda item: item.chi_square)
-        if precision < _FINE:
-            result = minimum(problem, result.x, precision=precision)
-        curve = self._curve(result.x)
-        if not np.sum((curve - self.curves[starts[0]]) ** 2) < _BESIDE**2:
+        result = min(minima, key=_size)
+        curve = self.zeros.residuals(result.x)
+        if np.sum((curve - self.curves[starts[0]]) ** 2) >= _BESIDE**2:
             self.places.append(result.x)
             self.curves = np.append(self.curves, [curve], axis=0)
         return result
 
     def least(self, values: Array) -> Minimum:
         """Return the minimum of the sum of squares for simulated values, coarsely, from the nearest known place."""
-        return self._from(values, [int(np.argmin(self._sums(values)))], _FINE)
+        return self._from(values, [int(np.argmin(self._sums(values)))])
+
+    def sums(self, values: Iterable[Array]) -> Array:
+        """Return the least sums of squares for several simulated values."""
+        return np.array([self.least(item).chi_square for item in values])
 
     def exact(self, values: Array) -> Minimum:
         """Return the minimum to eight digits, from the given starts and the nearest places that differ."""
         starts = list(range(self.given))
         for k in np.argsort(self._sums(values), kind="stable").tolist():
-            off = np.nan_to_num(self.curves[starts] - self.curves[k], nan=_FAR)
-            if len(starts) < self.given + _STARTS and np.all(
-                np.sum(off**2, axis=1) > _APART**2
-            ):
+            apart = np.sum((self.curves[starts] - self.curves[k]) ** 2, axis=1)
+            if len(starts) < self.given + _STARTS and np.all(apart > _APART**2):
                 starts.append(k)
-        return self._from(values, starts, 1e-8)
+        problem = replace(self.problem, values=values)
+        return minimum(problem, self._from(values, starts).x, precision=1e-8)
 
     def reaches(self, values: Array, level: float) -> bool:
         """Return True if the least sum of squares for simulated values is at most a level."""
@@ -152,38 +160,27 @@ class Search:
 
 def _spread(problem: Problem) -> Array:
     """Return places between the bounds of a problem, or as far from its start as a number may change much."""
-    count = len(problem.bounds)
-    if not count:
+    if not problem.bounds:
         return np.empty((0, 0))
-    widths = [_AROUND * item.width for item in problem.free] + [_AROUND] * len(
-        problem.common
-    )
-    bounds = zip(problem.bounds, problem.start, widths, strict=True)
-    ends = [
-        (max(low, x - width), min(high, x + width))
-        if math.isinf(high - low)
-        else (low, high)
-        for (low, high), x, width in bounds
-    ]
+    widths = [item.width for item in problem.free] + [1.0] * len(problem.common)
+    low, high = np.transpose(problem.bounds)
+    away = np.where(np.isfinite(high - low), np.inf, _AROUND * np.array(widths))
     # scipy has the name rng since 1.15 only
-    shares = qmc.Sobol(count, seed=np.random.default_rng(0)).random_base2(
-        min(4 + 2 * count, _SPREAD)
-    )
-    return qmc.scale(shares, *np.transpose(ends))
+    sampler = qmc.Sobol(len(widths), seed=np.random.default_rng(0))
+    shares = sampler.random_base2(min(4 + 2 * len(widths), _SPREAD))
+    ends = np.maximum(low, problem.start - away), np.minimum(high, problem.start + away)
+    return qmc.scale(shares, *ends)
 
 
 def draws_of(
     problem: Problem, expected: Array, rng: np.random.Generator
 ) -> Iterator[Array]:
     """Yield curves with random errors, those that all points of a variable share included."""
+    errors = np.hypot(problem.sigma, problem.noise)
     while True:
-        values = expected + np.hypot(
-            problem.sigma, problem.noise
-        ) * rng.standard_normal(len(expected))
+        values = expected + errors * rng.standard_normal(len(expected))
         for name, size in problem.common.items():
-            values = np.where(
-                problem.of(name), values * (1.0 + size * rng.standard_normal()), values
-            )
+            values[problem.of(name)] *= 1.0 + size * rng.standard_normal()
         yield values
 
 
@@ -199,51 +196,33 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
     draws : int
         Curves drawn for each mechanism.
     """
-    whole = Search(problem, [best.x])
-    fits = [
-        (
-            WHOLE,
-            whole,
-            min(best, whole.exact(problem.values), key=lambda item: item.chi_square),
-        )
-    ]
+    searches = {WHOLE: Search(problem, [best.x])}
     for name, other in others(problem):
-        search = Search(other, _starts(other))
-        fits.append((name, search, search.exact(problem.values)))
-    best, criteria = (
-        fits[0][2],
-        [item.problem.criterion(least.chi_square) for _, item, least in fits],
-    )
-    worst = min(criteria) + _HOPELESS
-    judged = []
-    for place, ((name, item, least), aicc) in enumerate(
-        zip(fits, criteria, strict=True)
-    ):
-        p_value, rejected = math.nan, place > 0
-        if place and aicc < worst:
+        searches[name] = Search(other, _starts(other))
+    minima = [search.exact(problem.values) for search in searches.values()]
+    minima[0] = best = min(best, minima[0], key=_size)
+    fits = list(zip(searches.items(), minima, strict=True))
+    criteria = [
+        search.problem.criterion(least.chi_square) for (_, search), least in fits
+    ]
+    judged = list[Judged]()
+    for place, ((name, search), least) in enumerate(fits):
+        p_value, is_rejected = math.nan, place > 0
+        if place and criteria[place] < min(criteria) + _HOPELESS:
             rng = np.random.default_rng([seed, place])
-            p_value = _p_value(item, least, whole, best, rng, draws)
-            rejected = (
-                p_value <= RARE
-                and aicc - (criteria[0] if name in PARTS else min(criteria)) >= WORSE
-            )
-        judged.append(
-            Judged(
-                name,
-                item.problem.numbers(least.x),
-                least.chi_square,
-                aicc,
-                p_value,
-                rejected,
-            )
-        )
-    sufficient, words = _verdict(judged)
-    return Verdict(tuple(sorted(judged, key=lambda item: item.aicc)), sufficient, words)
+            p_value = _p_value(search, least, searches[WHOLE], best, rng, draws)
+            reference = criteria[0] if name in PARTS else min(criteria)
+            is_rejected = p_value <= RARE and criteria[place] - reference >= WORSE
+        numbers = search.problem.numbers(least.x), least.chi_square, criteria[place]
+        judged.append(Judged(name, *numbers, p_value, is_rejected))
+    judged_by_aicc = tuple(sorted(judged, key=lambda item: item.aicc))
+    return Verdict(judged_by_aicc, *_verdict(judged))
 
 
 def _verdict(judged: list[Judged]) -> tuple[str, str]:
     """Return the mechanism that is sufficient, "" if the data cannot tell, and that in words."""
     whole, *others = judged
+    left = [item for item in others if not item.rejected]
     if not others:
         return (
             "",
@@ -254,15 +233,12 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
             "",
             f"the data cannot tell: AICc of {WHOLE} needs two more points than free keys; measure more",
         )
-    left = [item for item in others if not item.rejected]
     if not left:
         return WHOLE, f"the data prefer {WHOLE}: every other mechanism is rejected"
     first, ahead = left[0], whole.aicc - left[0].aicc
     if len(left) > 1 or (first.name not in PARTS and ahead < WORSE):
-        return (
-            "",
-            f"the data cannot tell: not rejected are {WHOLE}, {', '.join(item.name for item in left)}",
-        )
+        names = ", ".join(item.name for item in left)
+        return "", f"the data cannot tell: not rejected are {WHOLE}, {names}"
     evidence = f"(p = {first.p_value:.2g}, AICc {-ahead:+.2g} from {WHOLE})"
     words = f"the data prefer {first.name} {evidence} and reject the others"
     if first.name in PARTS:
@@ -271,49 +247,38 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
 
 
 def others(problem: Problem) -> Iterator[tuple[str, Problem]]:
-    """Mechanisms beside the scenario as it is, each with the keys that it has."""
-    scene, known = (
-        problem.groups[0][0].scenario,
-        quantities(problem.groups[0][0].scenario),
-    )
-    still = {"shear.paid_by_adhesion": 0.0} if "shear.paid_by_adhesion" in known else {}
+    """Yield the mechanisms beside the scenario as it is, each with the keys that it has."""
+    scene = problem.groups[0][0].scenario
+    still = dict.fromkeys({"shear.paid_by_adhesion"} & {*quantities(scene)}, 0.0)
     share = {"adhesion.bond_share": 0.0}
-    is_bonded = scene.adhesion.bond_share > 0.0 and scene.population.carries_stress
-    if (
-        is_bonded
-        and "shear.paid_by_adhesion" in known
-        and scene.fluctuations.paid_by_adhesion > 0.0
-    ):
+    shares = scene.adhesion.bond_share, scene.fluctuations.paid_by_adhesion
+    is_stressed = scene.population.carries_stress
+    if is_stressed and still and min(shares) > 0.0:
         yield "bonds only", _less(problem, still, "shear.")
         yield "fluctuations only", _less(problem, share, "adhesion.bond_share")
-    if (
-        scene.contact.kind == "displacement"
-        or not scene.population.carries_stress
-        or problem.by_run
-    ):
-        # theories are of a load or an indentation, of a stress, and of equilibrium
-        return
-    for theory, (words, more) in _THEORIES.items():
+    # theories are of a load or an indentation, of a stress, and of equilibrium
+    if is_stressed and scene.contact.kind != "displacement" and not problem.by_run:
         other = _less(problem, still | share, "shear.", "adhesion.bond_share")
-        yield words, replace(other, free=(*other.free, *more), theory=theory)
+        for theory, words in _THEORIES.items():
+            free = [*other.free, *filter(None, [_OWN.get(theory)])]
+            yield words, replace(other, free=free, theory=theory)
 
 
 def _less(problem: Problem, fixed: dict[str, float], *without: str) -> Problem:
-    """A problem with some numbers fixed, and without the keys that these leave without effect."""
-    free = tuple(item for item in problem.free if not item.key.startswith(without))
+    """Return a problem with some numbers fixed, and without the keys that these leave without effect."""
+    free = [item for item in problem.free if not item.key.startswith(without)]
     result = replace(problem, free=free, fixed=fixed)
     left_out = idle(result)
-    return replace(
-        result, free=tuple(item for item in free if item.key not in left_out)
-    )
+    return replace(result, free=[item for item in free if item.key not in left_out])
 
 
-def _starts(problem: Problem) -> list[Array]:
+def _starts(problem: Problem) -> Array:
     """Return starts of the search: a theory's own number at several sizes, as most contacts bear only some."""
-    if not problem.free or problem.free[-1] not in (_ALPHA, _LAMBDA):
-        return [problem.start]
-    last = np.arange(len(problem.start)) == len(problem.free) - 1
-    return [np.where(last, size, problem.start) for size in (0.01, 0.1, 0.5)]
+    if problem.theory not in _OWN:
+        return problem.start[np.newaxis]
+    starts = np.tile(problem.start, (3, 1))
+    starts[:, len(problem.free) - 1] = 0.01, 0.1, 0.5
+    return starts
 
 
 def _p_value(

@@ -13,7 +13,7 @@ are left out. The likelihood ratio of a mechanism has the distribution of the da
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,15 +30,7 @@ from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read
 from sim.study import fit as fits, likelihood
 from sim.study.converge import Printed
-from sim.study.likelihood import (
-    LEVEL,
-    Curve,
-    Free,
-    Interval,
-    Measured,
-    Minimum,
-    Problem,
-)
+from sim.study.likelihood import LEVEL, Free, Interval, Measured, Minimum, Problem
 from sim.study.mechanisms import PARTS, RARE, WHOLE, WORSE, Search, draws_of, others
 from sim.units.errors import BadInput
 from sim.units.notation import concise, engineering, in_units, scaled
@@ -132,11 +124,8 @@ class Plan(NamedTuple):
     def best(self) -> list[Point]:
         """Return the best further point, and those that are not worse by two standard errors of their difference."""
         points = self.simulated
-        return [
-            item
-            for item in points
-            if not _is_more(points[0].probabilities, item.probabilities)
-        ]
+        best = points[0].probabilities if points else {}
+        return [item for item in points if not _is_more(best, item.probabilities)]
 
     @property
     def advice(self) -> str:
@@ -154,10 +143,10 @@ class Plan(NamedTuple):
     @property
     def rows(self) -> tuple[list[dict[str, str]], list[dict[str, str]]]:
         """Return a row for each free key and for each truth."""
-        keys, truths = [], []
+        keys, truths = list[dict[str, str]](), list[dict[str, str]]()
         for item in self.numbers:
-            value, (low, high, *is_open) = item.free.start, item.interval
-            factor, unit = scaled(value, item.free.quantity.unit)
+            quantity, (low, high, *is_open) = item.free.quantity, item.interval
+            factor, unit = scaled(item.free.start, quantity.unit)
             ends = [
                 f"{factor * end:.4g}" + " (open)" * mark
                 for end, mark in zip((low, high), is_open, strict=True)
@@ -165,28 +154,27 @@ class Plan(NamedTuple):
             keys.append(
                 {
                     "key": item.free.key,
-                    "value": engineering(value, item.free.quantity.unit),
+                    "value": engineering(item.free.start, quantity.unit),
                     f"{LEVEL:.0%} interval to expect": f"{' to '.join(ends)} {unit}".rstrip(),
                     "P(lower end open)": str(item.low_open),
                     "P(upper end open)": str(item.high_open),
                 }
             )
         for truth, chance in self.probabilities.items():
-            further = {
-                f"with {point.words}": str(point.probabilities[truth])
-                for point in self.simulated
-            }
-            truths.append({"truth": truth, "P(told apart)": str(chance)} | further)
+            row = {"truth": truth, "P(told apart)": str(chance)}
+            for point in self.simulated:
+                row[f"with {point.words}"] = str(point.probabilities[truth])
+            truths.append(row)
         return keys, truths
 
 
 def _is_more(probabilities: dict[str, Chance], others: dict[str, Chance]) -> bool:
     """Return True if the sum of some probabilities exceeds that of others by two standard errors of the difference."""
-    chances, other_chances = (
-        np.array([*item.values()]) for item in (probabilities, others)
+    (first, first_errors), (last, last_errors) = (
+        np.transpose([*item.values()]) for item in (probabilities, others)
     )
-    more, _ = np.sum(chances, axis=0) - np.sum(other_chances, axis=0)
-    return bool(more > 2.0 * np.linalg.norm([chances[:, 1], other_chances[:, 1]]))
+    error = np.linalg.norm([first_errors, last_errors])
+    return bool(np.sum(first - last) > 2.0 * error)
 
 
 class _Simulated(NamedTuple):
@@ -216,65 +204,42 @@ class _Design:
         for name, search in self.parts.items():
             self.expected[name] = search.problem.predicted(search.exact(curves).x)
 
-    @property
-    def fits(self) -> int:
-        """Return the fits of each simulated data set, for all truths together."""
-        return 1 + len(self.parts) * (3 + len(self.parts))
-
     def level(self, part: str, rare: dict[str, float]) -> float:
         """Return the rise of the sum of squares from the whole scenario that rejects a mechanism."""
         penalty = self.parts[part].problem.criterion(0.0) - self.problem.criterion(0.0)
         return max(rare[part], WORSE - penalty)
 
-    def simulated(
-        self, sims: int, seed: int, advance: Callable[[int], None]
-    ) -> "_Simulated":
+    def simulated(self, sims: int, seed: int) -> "_Simulated":
         """Return the results of a number of simulated data sets for each truth."""
         values, sums, rare = dict[str, Array](), dict[str, Array](), dict[str, float]()
         for number, (truth, expected) in enumerate(self.expected.items()):
-            drawn = draws_of(
-                self.problem, expected, np.random.default_rng([seed, number])
-            )
-            values[truth] = np.array([*itertools.islice(drawn, sims)])
-            sums[truth] = np.array(
-                [self.whole.least(item).chi_square for item in values[truth]]
-            )
-            advance(sims)
+            rng = np.random.default_rng([seed, number])
+            drawn = itertools.islice(draws_of(self.problem, expected, rng), sims)
+            values[truth] = np.array([*drawn])
+            sums[truth] = self.whole.sums(values[truth])
             if truth in self.parts:
-                least = [
-                    self.parts[truth].least(item).chi_square for item in values[truth]
-                ]
-                rare[truth] = float(
-                    np.sort(least - sums[truth])[-math.floor(RARE * (sims + 1))]
-                )
-                advance(sims)
+                ratios = np.sort(self.parts[truth].sums(values[truth]) - sums[truth])
+                rare[truth] = float(ratios[-math.floor(RARE * (sims + 1))])
         probabilities = dict[str, Chance]()
         for truth in self.expected:
             is_truth = np.ones(sims, bool)
             for part, search in self.parts.items():
                 levels = sums[truth] + self.level(part, rare)
-                rejected = [
-                    not search.reaches(*item)
-                    for item in zip(values[truth], levels, strict=True)
-                ]
-                is_truth &= np.array(rejected) == (part != truth)
-                advance(sims)
+                reached = list(map(search.reaches, values[truth], levels))
+                is_truth &= np.array(reached) == (part == truth)
             probabilities[truth] = Chance.of(is_truth)
         return _Simulated(probabilities, rare, values[WHOLE], sums[WHOLE])
 
     def estimate(self, rare: dict[str, float]) -> dict[str, float]:
         """Return the probability by a non-central chi-square distribution if these ratios are rare, by truth."""
-        result = {}
+        result = dict[str, float]()
         for truth, curves in self.expected.items():
-            least, chances = self.whole.exact(curves).chi_square, []
+            least, chances = self.whole.exact(curves).chi_square, list[float]()
             for part in self.parts.keys() - {truth}:
-                away = max(self.parts[part].exact(curves).chi_square - least, _LEAST)
-                freedom = max(
-                    len(self.problem.free) - len(self.parts[part].problem.free), 1
-                )
-                chances.append(
-                    float(stats.ncx2.sf(self.level(part, rare), freedom, away))
-                )
+                search, level = self.parts[part], self.level(part, rare)
+                away = max(search.exact(curves).chi_square - least, _LEAST)
+                fewer = len(self.problem.free) - len(search.problem.free)
+                chances.append(float(stats.ncx2.sf(level, max(fewer, 1), away)))
             result[truth] = min(chances)
         return result
 
@@ -314,10 +279,8 @@ def plan(
     BadInput
         If a key has no effect, the table cannot be read or has no errors, or the drive needs runs.
     """
-    base, seed = (
-        scenario.with_values({"record": {}}),
-        scenario.seed if seed is None else seed,
-    )
+    base, common = scenario.with_values({"record": {}}), common or {}
+    seed = scenario.seed if seed is None else seed
     if sims < LEAST_SIMS:
         raise BadInput(
             [
@@ -332,84 +295,68 @@ def plan(
         )
     noise = "the models of the scenario have noise; curves are those of steady sliding with its means"
     remarks = [noise if base.is_random else "curves are those of steady sliding"]
-    numbers, table = (
-        [fits.free_number(base, text) for text in free],
-        _read(points, base),
-    )
+    numbers = [fits.free_number(base, text) for text in free]
+    table = _read(points, base)
     if not all(np.isnan(item.values).all() for item in table.curves):
         remarks.append(f"{points}: measured values are not used; a plan predicts them")
     if faults := [*fits.conflicts(base, numbers, [], [table])]:
         raise BadInput(faults)
-    problem = _predicted(base, [table], numbers, common or {})
+    problem = _predicted(base, [table], numbers, common)
     likelihood.refuse_undetermined(problem)
-    further = (
-        _speeds(table) if candidates is None else _read(candidates, base, table.names)
-    )
-    if further is None:
+    further = _speeds(table)
+    if candidates is not None:
+        further = _rows(_read(candidates, base, table.names))
+    if not further:
         remarks.append(
             f"{points}: no column has the speed, so no further point is proposed; give --candidates"
         )
     design = _Design(problem)
     if not design.parts:
-        further, cause = (
-            None,
-            "bonds or fluctuations do not act in the scenario as it is",
-        )
+        further, cause = [], "bonds or fluctuations do not act in the scenario as it is"
         remarks.append(f"no mechanisms are told apart, because {cause}")
-    candidate_rows = (
-        [_rows(further, [row]) for row in range(further.rows)] if further else []
-    )
-    total = sims * (
-        design.fits * (1 + min(len(candidate_rows), _BEST)) + 2 * len(numbers)
-    )
-    with progress_bar(total, "fits of simulated data") as shown:
-        first, ranked = (
-            design.simulated(sims, seed, shown.advance),
-            list[tuple[Point, _Design]](),
-        )
-        expected = [
-            _interval(problem, k, first.values, first.sums, shown.advance)
-            for k in range(len(numbers))
-        ]
-        for row in candidate_rows:
-            beside = _Design(
-                _predicted(base, _joined(table, row, problem), numbers, common or {})
-            )
-            conditions = {
-                key: float(values[0]) for key, values in row.conditions.items()
-            }
+    count = 1 + len(numbers) + len(further) + min(len(further), _BEST)
+    with progress_bar(count, "steps of the plan") as shown:
+        first = design.simulated(sims, seed)
+        shown.advance(1)
+        expected = list[Expected]()
+        for k in range(len(numbers)):
+            expected.append(_interval(problem, k, first.values, first.sums))
+            shown.advance(1)
+        ranked = list[tuple[Point, _Design]]()
+        for row in further:
+            tables = [table, _with_errors(row, problem)]
+            beside = _Design(_predicted(base, tables, numbers, common))
             point = Point(
-                conditions,
-                _words(base, conditions, table, row),
+                {key: float(value) for key, (value,) in row.conditions.items()},
+                _words(base, table, row),
                 beside.estimate(first.rare),
                 {},
             )
             ranked.append((point, beside))
+            shown.advance(1)
         ranked.sort(key=lambda item: -sum(item[0].estimate.values()))
         proposed = [point for point, _ in ranked]
         for k, (point, beside) in enumerate(ranked[:_BEST]):
-            simulated = beside.simulated(sims, seed + 1 + k, shown.advance)
-            proposed[k] = point._replace(probabilities=simulated.probabilities)
+            chances = beside.simulated(sims, seed + 1 + k).probabilities
+            proposed[k] = point._replace(probabilities=chances)
+            shown.advance(1)
     proposed.sort(
         key=lambda item: (
             -sum(chance.probability for chance in item.probabilities.values())
         )
     )
     probabilities = first.probabilities if design.parts else {}
-    result = Plan(
-        problem, tuple(expected), probabilities, tuple(proposed), tuple(remarks)
-    )
-    tried = (
-        [point.conditions["speed"] for point in proposed] if candidates is None else []
-    )
-    if any(
-        point.conditions["speed"] in (min(tried), max(tried))
-        for point in result.best
-        if tried
-    ):
-        end = "a best speed is the first or last candidate; speeds beyond may be better: give them by --candidates"
-        result = result._replace(remarks=(*result.remarks, end))
-    return result
+    result = Plan(problem, tuple(expected), probabilities, tuple(proposed), ())
+    certain = dict.fromkeys(probabilities, Chance(1.0, 0.0))
+    if result.best and candidates is None:
+        speeds = [point.conditions["speed"] for point in proposed]
+        best = {point.conditions["speed"] for point in result.best}
+        can_rise = _is_more(certain, result.best[0].probabilities)
+        if can_rise and best & {min(speeds), max(speeds)}:
+            remarks.append(
+                "a best speed is the first or last candidate; speeds beyond may be better: give them by --candidates"
+            )
+    return result._replace(remarks=tuple(remarks))
 
 
 def _read(path: Path, scenario: Scenario, template: Sequence[str] = ()) -> Measured:
@@ -430,94 +377,72 @@ def _predicted(
 ) -> Problem:
     """Return the problem of some tables, with the values that the scenario predicts and their errors."""
     problem = likelihood.problem_of(scenario, tables, free, common)
-    values = problem.predicted(problem.start)
-    sigma = np.where(
-        problem.sigma < 0.0, -problem.sigma * np.abs(values), problem.sigma
-    )
-    for number in np.flatnonzero(~(sigma > 0.0)):
-        place, cure = (
-            problem.place(int(number)),
-            "omit the row, or give an error in units",
-        )
+    values, sigma = problem.predicted(problem.start), problem.sigma
+    sigma = np.where(sigma < 0.0, -sigma * np.abs(values), sigma)
+    for number in np.flatnonzero(~(sigma > 0.0)).tolist():
         cause = (
             "is predicted as 0 or without a contact, so a relative error is undefined"
         )
-        raise BadInput([f"{tables[0].path}: {place} {cause}; {cure}"])
+        cure = "omit the row, or give an error in units"
+        raise BadInput([f"{tables[0].path}: {problem.place(number)} {cause}; {cure}"])
     return replace(problem, values=values, sigma=sigma)
 
 
-def _rows(table: Measured, rows: Sequence[int]) -> Measured:
-    """Return some rows of a table."""
-    conditions = {key: values[rows] for key, values in table.conditions.items()}
-    curves = [
-        (name, values[rows], None if errors is None else errors[rows])
-        for name, values, errors in table.curves
-    ]
-    return table._replace(
-        conditions=conditions, curves=tuple(Curve(*curve) for curve in curves)
-    )
+def _rows(table: Measured) -> list[Measured]:
+    """Return the rows of a table, each as a table."""
+    result = list[Measured]()
+    for row in np.arange(table.rows)[:, np.newaxis]:
+        conditions = {key: values[row] for key, values in table.conditions.items()}
+        curves = [
+            item._replace(
+                values=item.values[row],
+                errors=None if item.errors is None else item.errors[row],
+            )
+            for item in table.curves
+        ]
+        result.append(table._replace(conditions=conditions, curves=tuple(curves)))
+    return result
 
 
-def _speeds(table: Measured) -> Measured | None:
+def _speeds(table: Measured) -> list[Measured]:
     """Return points at speeds beyond those of a table, with each set of its other conditions and without errors."""
-    if not np.any(speeds := np.abs(table.conditions.get("speed", np.zeros(1)))):
-        return None
-    held = [values for key, values in table.conditions.items() if key != "speed"]
-    places = np.unique([np.zeros(table.rows), *held], axis=1, return_index=True)[1]
-    result = _rows(table, np.repeat(places, _SPEEDS).tolist())
-    beyond = np.geomspace(
-        0.1 * speeds[speeds > 0.0].min(), 10.0 * speeds.max(), _SPEEDS
-    )
-    conditions = result.conditions | {"speed": np.tile(beyond, len(places))}
-    return result._replace(
-        conditions=conditions,
-        curves=tuple(item._replace(errors=None) for item in result.curves),
-    )
+    speeds = np.abs(table.conditions.get("speed", np.zeros(1)))
+    if not speeds.any():
+        return []
+    ends = 0.1 * speeds[speeds > 0.0].min(), 10.0 * speeds.max()
+    curves = [item._replace(errors=None) for item in table.curves]
+    held = dict[Any, Measured]()
+    for row in _rows(table._replace(curves=tuple(curves))):
+        others = row.conditions | {"speed": np.zeros(1)}
+        held[tuple(value.item() for value in others.values())] = row
+    return [
+        row._replace(conditions=row.conditions | {"speed": np.array([speed])})
+        for row in held.values()
+        for speed in np.geomspace(*ends, _SPEEDS)
+    ]
 
 
-def _joined(table: Measured, row: Measured, problem: Problem) -> list[Measured]:
-    """Return the tables of a plan with a further point; without errors it has the median relative errors of the plan.
-
-    It is a row of the same table if its columns are the same, because a table is computed at once.
-    """
+def _with_errors(row: Measured, problem: Problem) -> Measured:
+    """Return a further point; without errors it has the median relative errors of the plan."""
     shares = problem.sigma / np.abs(problem.values)
-    medians = {
-        name: -np.median(shares[problem.of(name)], keepdims=True)
-        for name in problem.names
-    }
     curves = [
-        item if item.errors is not None else item._replace(errors=medians[item.name])
+        item._replace(errors=-np.median(shares[problem.of(item.name)], keepdims=True))
+        if item.errors is None
+        else item
         for item in row.curves
     ]
-    row = row._replace(curves=tuple(curves))
-    if row.names != table.names or row.conditions.keys() != table.conditions.keys():
-        return [table, row]
-    conditions = {
-        key: np.append(values, row.conditions[key])
-        for key, values in table.conditions.items()
-    }
-    pairs: Any = zip(table.curves, curves, strict=True)
-    curves = [
-        Curve(name, *map(np.append, planned, further))
-        for (name, *planned), (_, *further) in pairs
-    ]
-    return [table._replace(conditions=conditions, curves=tuple(curves))]
+    return row._replace(curves=tuple(curves))
 
 
-def _words(
-    scenario: Scenario, conditions: dict[str, float], table: Measured, row: Measured
-) -> str:
+def _words(scenario: Scenario, table: Measured, row: Measured) -> str:
     """Return conditions and variables of a further point that are not the same in the whole table, for people."""
     declared = dict(likelihood.conditions_of(scenario).values())
-    texts = [
-        f"{declared[key].symbol or key} = {engineering(value, declared[key].unit)}"
-        for key, value in sorted(
-            conditions.items(), key=lambda item: item[0] != "speed"
-        )
-        if key == "speed"
-        or key not in table.conditions
-        or np.ptp(table.conditions[key]) > 0.0
-    ]
+    texts = list[str]()
+    for key in sorted(row.conditions, key=lambda key: key != "speed"):
+        values = table.conditions.get(key, np.array([0.0, 1.0]))
+        if key == "speed" or np.ptp(values) > 0.0:
+            number = engineering(float(row.conditions[key][0]), declared[key].unit)
+            texts.append(f"{declared[key].symbol or key} = {number}")
     variables = "" if row.names == table.names else f" ({', '.join(row.names)})"
     return (", ".join(texts) or "the same conditions") + variables
 
@@ -525,36 +450,22 @@ def _words(
 def covariance_at(problem: Problem, x: Array) -> Array:
     """Return the covariance of what is free at a place, finite for numbers without information, too."""
     slopes = likelihood.derivatives(problem, x, range(len(x)))
-    widths = np.array(
-        [item.width for item in problem.free] + [1.0] * len(problem.common)
-    )
-    return np.asarray(
-        np.linalg.inv(slopes.T @ slopes + np.diag((_UNKNOWN * widths) ** -2.0)), float
-    )
+    widths = [item.width for item in problem.free] + [1.0] * len(problem.common)
+    unknown = np.diag((_UNKNOWN * np.array(widths)) ** -2.0)
+    return np.asarray(np.linalg.inv(slopes.T @ slopes + unknown), float)
 
 
-def _interval(
-    problem: Problem, k: int, values: Array, sums: Array, advance: Callable[[int], None]
-) -> Expected:
+def _interval(problem: Problem, k: int, values: Array, sums: Array) -> Expected:
     """Return the interval to expect for a free number, by simulated values and their least sums of squares."""
     item, covariance = problem.free[k], covariance_at(problem, problem.start)
-    interval = likelihood.interval(
-        problem, Minimum(problem.start, 0.0, covariance, True), k
-    )
-    rise, rest, chances = (
-        float(stats.chi2.ppf(LEVEL, 1)),
-        [*problem.free[:k], *problem.free[k + 1 :]],
-        [],
-    )
+    exact = Minimum(problem.start, 0.0, covariance, True)
+    levels = sums + float(stats.chi2.ppf(LEVEL, 1))
+    rest, chances = [*problem.free[:k], *problem.free[k + 1 :]], list[Chance]()
     for end in (item.low, item.high):
         held = replace(problem, free=rest, fixed={**problem.fixed, item.key: end})
         search = Search(held, [held.start])
-        is_open = [
-            search.reaches(*item) for item in zip(values, sums + rise, strict=True)
-        ]
-        chances.append(Chance.of(np.array(is_open)))
-        advance(len(values))
-    return Expected(item, interval, *chances)
+        chances.append(Chance.of(np.array([*map(search.reaches, values, levels)])))
+    return Expected(item, likelihood.interval(problem, exact, k), *chances)
 
 
 def figure(result: Plan) -> Figure:
@@ -563,47 +474,26 @@ def figure(result: Plan) -> Figure:
     Lines are the estimates, points with errors are simulated, and dots are the probabilities without a further point.
     Points have the other conditions of the best one.
     """
-    held = {
-        key: value
-        for key, value in result.points[0].conditions.items()
-        if key != "speed"
-    }
-    drawn = [
-        item for item in result.points if {**item.conditions, **held} == item.conditions
-    ]
+    held = dict(result.points[0].conditions)
+    is_speed = held.pop("speed", None) is not None
+    drawn = [item for item in result.points if held.items() <= item.conditions.items()]
     drawn.sort(key=lambda item: item.conditions.get("speed", 0.0))
-    words, si = (
-        ("sliding speed $V$", "m/s")
-        if "speed" in drawn[0].conditions
-        else ("number", "1")
-    )
+    simulated = [k for k, item in enumerate(drawn) if item.probabilities]
+    words, si = ("sliding speed $V$", "m/s") if is_speed else ("number", "1")
     speeds = np.array([item.conditions.get("speed", k) for k, item in enumerate(drawn)])
-    scale, simulated = (
-        style.axis_scale(speeds),
-        [k for k, item in enumerate(drawn) if item.probabilities],
-    )
+    scale = style.axis_scale(speeds)
     unit = style.Unit.of(speeds, si, scale == "log")
     x = unit.factor * speeds
     with mpl.rc_context(style.STYLE):
         picture, (panel,) = style.rows([2.1])
         for truth, chance in result.probabilities.items():
-            look: Any = {"color": _LOOKS[truth]}
-            panel.axhline(chance.probability, linestyle=":", linewidth=0.9, **look)
-            panel.plot(
-                x, [item.estimate[truth] for item in drawn], "--", linewidth=0.7, **look
-            )
-            points, errors = np.transpose(
-                [drawn[k].probabilities[truth] for k in simulated]
-            )
-            panel.errorbar(
-                x[simulated],
-                points,
-                errors,
-                label=truth,
-                elinewidth=0.7,
-                **style.HOLLOW,
-                **look,
-            )
+            look: Any = {"color": _LOOKS[truth], "linewidth": 0.7}
+            estimates = [item.estimate[truth] for item in drawn]
+            chances = [drawn[k].probabilities[truth] for k in simulated]
+            panel.axhline(chance.probability, linestyle=":", **look)
+            panel.plot(x, estimates, "--", **look)
+            look |= style.HOLLOW | {"label": truth, "elinewidth": 0.7}
+            panel.errorbar(x[simulated], *np.transpose(chances), **look)
         panel.plot([], [], ":", color=style.REFERENCE, label="without it")
         panel.plot([], [], "--", color=style.REFERENCE, label="estimate for ranking")
         panel.set(ylim=(-0.03, 1.03), ylabel="P(mechanisms told apart)")
@@ -615,38 +505,34 @@ def figure(result: Plan) -> Figure:
 def carried_out(
     scenario: Scenario,
     points: Path,
-    free: Sequence[str],
-    common: Sequence[str],
     stem: Path,
     replaced: bool,
     units: Sequence[str] = (),
-    candidates: Path | None = None,
-    sims: int = SIMS,
-    seed: int | None = None,
+    **options: Any,
 ) -> list[Printed]:
-    """Plan, write ``<stem>_plan.json`` and ``.png``, and return the tables to print."""
-    outputs = [
+    """Plan with options of ``plan``, write ``<stem>_plan.json`` and ``.png``, and return the tables to print."""
+    numbers, drawn = (
         stem.with_name(f"{stem.name}_plan.{ending}") for ending in ("json", "png")
-    ]
-    for path in outputs:
-        files.claim(
-            path, replaced, [*files_read(scenario), points, *filter(None, [candidates])]
-        )
-    result = plan(
-        scenario, points, free, candidates, fits.common_errors(common), sims, seed
     )
+    sources = [*files_read(scenario), points]
+    sources += filter(None, [options.get("candidates")])
+    for path in (numbers, drawn):
+        files.claim(path, replaced, sources)
+    options["common"] = fits.common_errors(options["common"])
+    result = plan(scenario, points, **options)
     with in_units(units):
         shown, truths = result.rows
         picture = figure(result) if result.points else None
-    with files.output(outputs[0]) as beside:
+    with files.output(numbers) as beside:
         beside.write_bytes((json.dumps(document(result), indent=2) + "\n").encode())
+    outputs = [str(numbers)]
     if picture:
-        style.save(picture, outputs[1])
+        style.save(picture, drawn)
+        outputs.append(str(drawn))
     else:
-        outputs.pop().unlink(missing_ok=True)  # of an older plan, which may be replaced
-    below = "\n".join(
-        ["", *filter(None, [result.advice]), *result.remarks, "", *map(str, outputs)]
-    )
+        drawn.unlink(missing_ok=True)  # of an older plan, which may be replaced
+    advice = [result.advice] if result.advice else []
+    below = "\n".join(["", *advice, *result.remarks, "", *outputs])
     return [(shown, ""), (truths, below)] if truths else [(shown, below)]
 
 
@@ -656,22 +542,24 @@ def document(result: Plan) -> dict[str, Any]:
     def chances(probabilities: dict[str, Chance]) -> dict[str, Any]:
         return {truth: chance._asdict() for truth, chance in probabilities.items()}
 
+    numbers = {
+        item.free.key: {
+            "value": item.free.start,
+            "unit": item.free.quantity.unit,
+            **item.interval._asdict(),
+            "probability_low_open": item.low_open._asdict(),
+            "probability_high_open": item.high_open._asdict(),
+        }
+        for item in result.numbers
+    }
+    points = [
+        item._asdict() | {"probabilities": chances(item.probabilities)}
+        for item in result.points
+    ]
     return {
-        "numbers": {
-            item.free.key: {
-                "value": item.free.start,
-                "unit": item.free.quantity.unit,
-                **item.interval._asdict(),
-                "probability_low_open": item.low_open._asdict(),
-                "probability_high_open": item.high_open._asdict(),
-            }
-            for item in result.numbers
-        },
+        "numbers": numbers,
         "probabilities": chances(result.probabilities),
-        "points": [
-            item._asdict() | {"probabilities": chances(item.probabilities)}
-            for item in result.points
-        ],
+        "points": points,
         "advice": result.advice,
         "remarks": result.remarks,
     }

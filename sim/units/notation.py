@@ -12,18 +12,8 @@ from sim.units.quantity import Quantity
 #: Most digits of a mean with its error.
 _MOST_DIGITS = 6
 
-_PREFIXES = {
-    -15: "f",
-    -12: "p",
-    -9: "n",
-    -6: "µ",
-    -3: "m",
-    0: "",
-    3: "k",
-    6: "M",
-    9: "G",
-    12: "T",
-}
+#: Prefixes of powers of a thousand, from the fifth below one.
+_PREFIXES = ("f", "p", "n", "µ", "m", "", "k", "M", "G", "T")
 _PREFIXABLE = re.compile(r"(?P<base>m|s|N|Pa|J)(?:\^(?P<power>\d))?(?P<rest>|[/ ].*)")
 
 
@@ -90,11 +80,9 @@ def scaled(magnitude: float, unit: str) -> tuple[float, str]:
         return 1.0, "" if unit == "1" else shown
     power = int(match["power"] or 1)
     # squares step by a million: 0.05 mm² reads better than 50 000 µm²
-    exponent = 3 * math.floor(
-        (math.log10(size) + 2.0 * (power - 1) + 1e-12) / (3 * power)
-    )
-    exponent = min(max(exponent, -15), 12)
-    return 10.0 ** (-exponent * power), _PREFIXES[exponent] + shown
+    thousands = (math.log10(size) + 2.0 * (power - 1) + 1e-12) / (3 * power)
+    place = min(max(math.floor(thousands), -5), 4)
+    return 10.0 ** (-3 * place * power), _PREFIXES[place + 5] + shown
 
 
 def _typeset(unit: str) -> str:
@@ -179,25 +167,21 @@ def bounded(
     >>> print(bounded(116.587, math.nan, bound=0.4, source="step"))
     116.59 ± 0.40 (step)
     """
-    ends = [
-        f"{sign} {end:.4g}"
-        for sign, end in ((">", low), ("<", high))
-        if math.isfinite(end)
-    ]
+    ends = [f"> {low:.4g}"] if math.isfinite(low) else []
+    ends += [f"< {high:.4g}"] if math.isfinite(high) else []
+    if math.isnan(value) and len(ends) == 2:
+        return f"{low:.4g} to {high:.4g}"
     if math.isnan(value):
-        if len(ends) == 2:
-            return f"{low:.4g} to {high:.4g}"
         return ends[0] if ends else "–"
     if len(ends) == 1:
         return f"{value:.4g} ({ends[0]})"
     text = concise(value, sem)
-    if not 10.0 ** (1 - _MOST_DIGITS) * abs(value) < bound < math.inf:
+    is_shown = 10.0 ** (1 - _MOST_DIGITS) * abs(value) < bound < math.inf
+    if not is_shown or ("(" in text and bound < 0.1 * sem):
         return text
     places = max(_places_of(bound), 0)
     if "(" not in text:
         text = f"{value:.{places}f}"
-    elif bound < 0.1 * sem:
-        return text
     return f"{text} ± {bound:.{places}f} ({source})"
 
 

@@ -242,18 +242,14 @@ class Quantity:
 
     def _number(self, value: Any) -> float:
         """Return a number that is none of text."""
-        whole = hasattr(value, "__index__") or (
+        is_whole = hasattr(value, "__index__") or (
             isinstance(value, float) and value.is_integer()
         )
         is_scalar = not isinstance(value, bool) and getattr(value, "shape", ()) == ()
-        if not is_scalar or not (whole if self.whole else hasattr(value, "__float__")):
-            kind = (
-                "whole number"
-                if self.whole
-                else "number"
-                if self.unit == "1"
-                else "number or text with a unit"
-            )
+        is_number = is_whole if self.whole else hasattr(value, "__float__")
+        if not (is_scalar and is_number):
+            kind = "number" if self.unit == "1" else "number or text with a unit"
+            kind = "whole number" if self.whole else kind
             raise _fault(f"must be a {kind} such as {self.example}")
         try:
             return int(value) if self.whole else float(value)
@@ -305,22 +301,23 @@ class Quantity:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict:
-        described: dict[str, Any] = {
-            "type": ["number", "string"],
-            "description": f"{self.meaning} [{self.unit}]",
-        }
         if self.whole:
-            described = {"type": "integer", "description": self.meaning}
-        bounds = {word: getattr(self, name) for name, (word, _) in _BOUNDS.items()}
-        described |= {
-            word: bound for word, bound in bounds.items() if math.isfinite(bound)
-        }
-        example: Any = self.example.strip('"')
-        return described | {
-            "examples": [
-                64 if self.whole else float(example) if self.unit == "1" else example
-            ]
-        }
+            described: dict[str, Any] = {
+                "type": "integer",
+                "description": self.meaning,
+                "examples": [64],
+            }
+        else:
+            example = self.example.strip('"')
+            described = {
+                "type": ["number", "string"],
+                "description": f"{self.meaning} [{self.unit}]",
+                "examples": [float(example) if self.unit == "1" else example],
+            }
+        for name, (word, _) in _BOUNDS.items():
+            if math.isfinite(bound := getattr(self, name)):
+                described[word] = bound
+        return described
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(Field,))

@@ -543,22 +543,8 @@ class Number(NamedTuple):
 
     def pieces(self, ends: Array, duration: float) -> Pieces:
         """Return the pieces of the intervals between some times [s], cut where the value turns or jumps."""
-        span = ends[1:] - ends[:-1]
-        value, unsteady, integral = (
-            np.full(len(span), self.value),
-            np.zeros(len(span)),
-            self.value * span,
-        )
-        return Pieces(
-            np.arange(len(span)),
-            ends[:-1],
-            ends[1:],
-            value,
-            value,
-            integral,
-            np.abs(integral),
-            unsteady,
-        )
+        value = np.full(len(ends) - 1, self.value)
+        return linear_pieces(np.arange(len(value)), ends[:-1], ends[1:], value, value)
 
 
 @keyed(kw_only=True)

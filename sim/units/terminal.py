@@ -51,10 +51,8 @@ _SIGNS = {
     "∞": "inf",
     "⟨": "<",
     "⟩": ">",
-    "ℓ": "l",
     "µ": "u",
     "μ": "u",
-    "…": "...",
     "“": '"',
     "”": '"',
     "’": "'",
@@ -86,34 +84,23 @@ def in_ascii(text: str) -> str:
     """
     result = ""
     for place, letter in enumerate(text):
-        if letter.isascii():
-            result += letter
-            continue
-        name, kind = (
-            unicodedata.name(letter, "").split(),
-            unicodedata.decomposition(letter),
-        )
-        if letter in _SIGNS:
-            result += _SIGNS[letter]
+        name = unicodedata.name(letter, "").split()
+        if letter.isascii() or letter in _SIGNS:
+            result += _SIGNS.get(letter, letter)
         elif name[:1] == ["GREEK"] and name[2:3] == ["LETTER"]:
-            result += name[3].capitalize() if name[1] == "CAPITAL" else name[3].lower()
-        elif unicodedata.combining(letter):
-            continue
-        else:
+            word = name[3].lower()
+            result += word.capitalize() if name[1] == "CAPITAL" else word
+        elif not unicodedata.combining(letter):
+            before = text[place - 1 : place]
+            result += "^" * (_is_raised(letter) and not _is_raised(before))
             parts = unicodedata.normalize("NFKD", letter).replace("−", "-")
-            raised = (
-                "^"
-                if kind.startswith("<super>")
-                and not _is_raised(text[place - 1 : place])
-                else ""
-            )
-            result += raised + ("".join(c for c in parts if c.isascii()) or "?")
+            result += "".join(filter(str.isascii, parts)) or "?"
     return result
 
 
-def _is_raised(letter: str) -> bool:
+def _is_raised(letters: str) -> bool:
     """Return True for a superscript."""
-    return letter != "" and unicodedata.decomposition(letter).startswith("<super>")
+    return unicodedata.decomposition(letters or " ").startswith("<super>")
 
 
 def _replaced(fault: UnicodeError) -> tuple[str, int]:
@@ -172,72 +159,38 @@ def print_rows(rows: list[dict[str, str]], keys: int = 0) -> None:
     """
     if not rows:
         return
-    columns = {
-        heading: [_written(one_line(row[heading])) for row in rows]
-        for heading in rows[0]
-    }
-    wrapped = {
-        heading: _wrapped(_written(plain(heading)), cells)
-        for heading, cells in columns.items()
-    }
-    sizes = {
-        heading: max(map(_cell_width, [*lines, *columns[heading]]))
-        for heading, lines in wrapped.items()
-    }
-    first, *rest = _parts(sizes, keys, width())
-    for number, part in enumerate((first, *rest)):
-        if number:
-            say()
-        _print_part(part, wrapped, columns)
-
-
-def _parts(sizes: dict[str, int], keys: int, room: int) -> list[list[str]]:
-    """Return the headings of each part of a table whose columns have these widths."""
-    headings = list(sizes)
-    repeated = headings[:keys]
-    start = sum(sizes[heading] + _GAP for heading in repeated)
-    parts, used = [list(repeated)], start
-    for heading in headings[keys:]:
-        needed = sizes[heading] + _GAP
-        if used + needed - _GAP > room and len(parts[-1]) > len(repeated):
-            parts.append(list(repeated))
-            used = start
-        parts[-1].append(heading)
-        used += needed
-    return parts
-
-
-def _print_part(
-    part: list[str], wrapped: dict[str, list[str]], columns: dict[str, list[str]]
-) -> None:
+    from rich.cells import cell_len
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
-    for heading in part:
-        table.add_column(
-            Text("\n".join(wrapped[heading])),
-            justify="right",
-            no_wrap=True,
-            vertical="bottom",
-        )
-    for cells in zip(*(columns[heading] for heading in part), strict=True):
-        table.add_row(*map(Text, cells))
-    Console(file=sys.stdout, width=_WIDE).print(table)
-
-
-def _wrapped(heading: str, cells: list[str]) -> list[str]:
-    """Return a heading in lines about as long as the cells below it."""
-    longest = max(map(_cell_width, cells))
-    lines = textwrap.wrap(heading, max(longest, _SHORTEST), break_long_words=False)
-    return lines or [""]
-
-
-def _cell_width(text: str) -> int:
-    from rich.cells import cell_len
-
-    return cell_len(text)
+    columns, lines = dict[str, list[str]](), dict[str, list[str]]()
+    sizes = dict[str, int]()
+    for heading in rows[0]:
+        cells = [_written(one_line(row[heading])) for row in rows]
+        longest = max(_SHORTEST, *map(cell_len, cells))
+        text = _written(plain(heading))
+        wrapped = textwrap.wrap(text, longest, break_long_words=False)
+        columns[heading], lines[heading] = cells, wrapped
+        sizes[heading] = max(map(cell_len, [*wrapped, *cells])) + _GAP
+    repeated, parts, room = [*sizes][:keys], list[list[str]](), 0
+    for heading in [*sizes][keys:]:
+        room -= sizes[heading]
+        if room < 0 or not parts:
+            parts.append([*repeated])
+            room = width() + _GAP - sum(sizes[name] for name in repeated)
+            room -= sizes[heading]
+        parts[-1].append(heading)
+    for number, part in enumerate(parts or [repeated]):
+        table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
+        for heading in part:
+            title = Text("\n".join(lines[heading]))
+            table.add_column(title, justify="right", no_wrap=True, vertical="bottom")
+        for line in zip(*(columns[heading] for heading in part), strict=True):
+            table.add_row(*map(Text, line))
+        if number:
+            say()
+        Console(file=sys.stdout, width=_WIDE).print(table)
 
 
 def _written(text: str) -> str:

@@ -195,6 +195,18 @@ def test_points_that_two_standard_errors_do_not_tell_from_the_best_are_proposed_
     assert planning.Plan(None, (), near, (), ()).advice == ""
 
 
+def test_speeds_beyond_the_candidates_are_proposed_only_if_a_probability_can_still_rise(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(planning, "_SPEEDS", 2)
+    for error, can_rise in ((1.0, False), (20.0, True)):
+        path = points(tmp_path / "points.csv", ACROSS[::3], error)
+        result = sim.plan(load(SPRUNG), path, ["bonds.critical_speed"], sims=50)
+        chances = result.best[0].probabilities.values()
+        assert all(chance.probability == 1.0 for chance in chances) != can_rise
+        assert any("speeds beyond" in text for text in result.remarks) == can_rise
+
+
 def test_the_command_proposes_a_point_above_the_onset_and_draws_what_it_prints(
     tmp_path, monkeypatch
 ):
@@ -219,7 +231,7 @@ def test_the_command_proposes_a_point_above_the_onset_and_draws_what_it_prints(
     monkeypatch.setattr(
         planning,
         "plan",
-        lambda *arguments: results.append(original(*arguments)) or results[0],
+        lambda *given, **named: results.append(original(*given, **named)) or results[0],
     )
     done = CliRunner().invoke(cli, list(map(str, words)))
     assert done.exit_code == 0, done.output
@@ -282,7 +294,7 @@ def test_probabilities_are_those_of_the_verdict_over_200_data_sets(
         scene, points(tmp_path / "points.csv", ACROSS, error), AREA_KEYS
     )
     design = planning._Design(problem)
-    predicted = design.simulated(400, 1, lambda done: None).probabilities[truth]
+    predicted = design.simulated(400, 1).probabilities[truth]
     hits = 0
     for seed, values in enumerate(drawn(problem, design.expected[truth], count, 0)):
         data = replace(problem, values=values)
@@ -360,13 +372,10 @@ def test_the_proposed_point_is_among_the_best_three_of_twenty_by_simulation(tmp_
     )
     problem = planning._predicted(scene, [table], free, {})
     means = {}
-    further = planning._speeds(table)
-    for place in range(further.rows):
-        row = planning._rows(further, [place])
-        design = planning._Design(
-            planning._predicted(scene, planning._joined(table, row, problem), free, {})
-        )
-        probabilities = design.simulated(200, 9, lambda done: None).probabilities
+    for row in planning._speeds(table):
+        tables = [table, planning._with_errors(row, problem)]
+        design = planning._Design(planning._predicted(scene, tables, free, {}))
+        probabilities = design.simulated(200, 9).probabilities
         means[float(row.conditions["speed"][0])] = sum(
             chance.probability for chance in probabilities.values()
         )
