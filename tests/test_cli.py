@@ -438,6 +438,10 @@ def test_what_a_command_reads_is_never_replaced_and_an_older_file_only_if_asked_
         (["stats", "x.nc", "--csv", "other.nc"], "other.nc is a dataset"),
         (["stats", "x.nc", "--csv", "new.toml"], "new.toml has a scenario name"),
         (["plot", "x.nc", "-o", "copy"], "copy is the scenario of this dataset"),
+        (
+            ["converge", "scene.toml", "-o", "new.png"],
+            "new.png: the dataset cannot have the name of its picture",
+        ),
     ):
         before = content(made)
         done = sim(*arguments, "--force")
@@ -448,6 +452,7 @@ def test_what_a_command_reads_is_never_replaced_and_an_older_file_only_if_asked_
         (["stats", "x.nc", "--csv", "x.csv"], "x.csv"),
         (["plot", "x.nc"], "x.png"),
         (["converge", "scene.toml", "-o", "new.nc"], "new.nc"),
+        (["converge", "scene.toml", "-o", "new"], "new.png"),
     ):
         before = content(made)
         done = sim(*arguments)
@@ -581,7 +586,10 @@ def test_new_converge_and_a_reduced_file_work_and_name_what_a_figure_misses(
     )
     done = sim("converge", "scene.toml", "--budget", "0.5 s", "--tolerance", "2 %")
     assert done.exit_code == 0 and "banded" in done.output and "2 %" in done.output
-    assert Path("outputs/scene-converge.nc").exists()
+    assert (
+        Path("outputs/scene-converge.nc").exists()
+        and Path("outputs/scene-converge.png").exists()
+    )
     refused = sim("converge", "scene.toml", "--budget", "2 kg")
     assert refused.exit_code == 2 and "budget" in refused.stderr
     done = sim(

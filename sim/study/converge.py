@@ -19,8 +19,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
+import matplotlib as mpl
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 from pydantic import TypeAdapter
 from scipy import special
 
@@ -32,10 +34,21 @@ from sim.numerics.stopwatch import stopwatch
 from sim.parts.drive import Driven
 from sim.parts.exchange import Array, Bonding, Gammas, Motion
 from sim.parts.shear.process import Fluctuation
+from sim.plots.style import (
+    BONDS,
+    FLUCTUATIONS,
+    LINES,
+    REFERENCE,
+    STYLE,
+    legend,
+    rows,
+    save,
+)
+from sim.read import engineering
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read, keys, model, tables
 from sim.units.errors import BadInput
-from sim.units.notation import concise, engineering
+from sim.units.notation import concise
 
 #: A table to print, and the text below it.
 Printed = tuple[list[dict[str, str]], str]
@@ -85,8 +98,12 @@ _TICK = 1e-9
 #: Errors below this are roundings.
 _ROUNDING = 1e-9
 
-#: Tables of the scenario by the part's name in the dataset.
-_PARTS = {"shear": "shear", "bonds": "bonds", "step": "clock"}
+#: Parts by the name in the dataset: words, table of the scenario, colour and marker.
+_PARTS = {
+    "shear": ("shear model", "shear", FLUCTUATIONS, "o"),
+    "bonds": ("bond model", "bonds", BONDS, "s"),
+    "step": ("clock step", "clock", LINES[3], "^"),
+}
 #: Unit and meaning of the variables of the dataset, by attribute of ``Setting``.
 _DESCRIBED = {
     "part": ("", "part of the scenario that the setting changes"),
@@ -984,7 +1001,7 @@ def recommendation(dataset: xr.Dataset) -> str:
         )
     changed = [dataset.isel(row=row) for row in best.rows if row not in written.rows]
     toml = [
-        f"\n[{_PARTS[str(row['part'].values)]}]\n{row['toml'].values}"
+        f"\n[{_PARTS[str(row['part'].values)][1]}]\n{row['toml'].values}"
         for row in changed
     ]
     return "\n".join([*lines, *["Write:"] * bool(toml), *toml])
@@ -1004,6 +1021,47 @@ def _off(choice: Choice) -> str:
     )
 
 
+def figure(dataset: xr.Dataset) -> Figure:
+    """Draw the largest error of each setting against the CPU time of the run, in the width of a column.
+
+    Bars are the noise, at 95 %. Exact settings are drawn at a tenth of the smallest error. A ring marks the scene, a
+    star the recommended combination, if there is one.
+    """
+    tolerance = float(dataset.attrs["tolerance"])
+    best, _ = chosen(choices(dataset), tolerance)
+    part, is_written, cost, members, *errors = (
+        dataset[name].to_numpy() for name in _COLUMNS
+    )
+    error, deviation = (np.nan_to_num(each).reshape(len(part), -1) for each in errors)
+    at = np.arange(len(part)), error.argmax(axis=1)
+    off, bars = (
+        np.where(members > 0, error[at], np.nan),
+        students(members) * deviation[at],
+    )
+    floor = 0.1 * min([tolerance, *off[off > _ROUNDING]])
+    off = np.maximum(off, floor)
+    with mpl.rc_context(STYLE):
+        picture, (panel,) = rows([3.0])
+        for name, (words, _, color, marker) in _PARTS.items():
+            here = (part == name) & (members > 0)
+            if here.any():
+                look: Any = {"c": color, "marker": marker, "ms": 3.6, "lw": 0.6}
+                panel.errorbar(cost[here], off[here], bars[here], label=words, **look)
+        own = is_written == 1
+        ring: Any = {"c": "none", "mec": "black", "ms": 7.5, "label": "as written"}
+        panel.plot(cost[own], off[own], "o", **ring)
+        if math.isfinite(best.bound) and not dataset.attrs.get("not_converging"):
+            star: Any = {"c": "black", "ms": 7.0, "zorder": 5, "label": "recommended"}
+            panel.plot(best.time, max(best.bound, floor), "*", **star)
+        panel.axhline(tolerance, c=REFERENCE, ls="--", lw=0.8, label="accepted")
+        if not np.any(members > 0):  # logarithmic axes need a range
+            panel.set_xlim(0.5 * cost.min(), 2.0 * cost.max())
+        panel.set(xscale="log", xlabel="CPU time of the run (s)")
+        panel.set(yscale="log", ylabel="largest error (bottom: exact)")
+        legend(panel)
+    return picture
+
+
 def study(
     scenario: Scenario,
     target: Path,
@@ -1011,10 +1069,20 @@ def study(
     seconds: float,
     tolerance: float | None,
 ) -> Printed:
-    """Study a scene and save the dataset; return the table to print and the text below it."""
+    """Study a scene and save dataset and figure; return the table to print and the text below it."""
+    picture = target.with_suffix(".png")
+    if picture == target:
+        raise BadInput(
+            [
+                f"{target}: the dataset cannot have the name of its picture; end it in .nc"
+            ]
+        )
     hdf5.claim(target, replace, files_read(scenario))
+    files.claim(picture, replace, files_read(scenario))
     dataset = converge(scenario, seconds, tolerance)
     with files.output(target) as beside:
         lazy.save(dataset, beside)
-    text = f"{explanation(dataset)}\n\n{recommendation(dataset)}\n\n{target}"
-    return table(dataset), text
+    save(figure(dataset), picture)
+    return table(
+        dataset
+    ), f"{explanation(dataset)}\n\n{recommendation(dataset)}\n\n{target}\n{picture}"

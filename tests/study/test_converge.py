@@ -206,6 +206,7 @@ def test_errors_of_rates_and_of_missing_sites_are_their_closed_forms_and_the_che
     assert float(
         dataset["error"].max()
     ) < 1e-12 and "scenario as written is exact" in recommendation(dataset)
+    study.figure(dataset)
 
 
 def run_of(scenario, members=1):
@@ -359,7 +360,7 @@ def missing(dataset):
 
 
 def test_a_scene_that_does_not_fit_into_its_budget_has_its_cost_no_error_and_no_recommendation(
-    quick,
+    tmp_path, quick
 ):
     dataset = converge(LONG, 0.5)
     assert quick.seconds < 0.65
@@ -374,6 +375,9 @@ def test_a_scene_that_does_not_fit_into_its_budget_has_its_cost_no_error_and_no_
         and "[" not in text
     )
     assert study.engineering(dataset.attrs["budget"], "s") in text
+    picture = study.figure(dataset.isel(row=dataset["members"].to_numpy() == 0))
+    study.save(picture, tmp_path / "empty.png")
+    assert "recommended" not in picture.axes[0].get_legend_handles_labels()[1]
     assert {
         line["stress\n(%)"] for line in table(dataset) if "*" in line["setting"]
     } == {"–"}
@@ -518,7 +522,7 @@ def test_what_the_scene_admits_is_tried_once_choices_and_sweeps_are_settled(quic
     assert "contact.load" in explanation(dataset)
 
 
-def test_errors_of_bands_are_those_known_before_the_run_in_dataset_and_table(
+def test_errors_of_bands_are_those_known_before_the_run_in_dataset_table_and_figure(
     steady, tmp_path
 ):
     known = scene(**STEADY).process.bands.errors
@@ -553,6 +557,11 @@ def test_errors_of_bands_are_those_known_before_the_run_in_dataset_and_table(
         lines["banded 0.01 *"]["members"]
         == f"{int(steady['members'].sel(row='banded 0.01')):,}"
     )
+    (panel,) = study.figure(steady).axes
+    shown = np.concatenate(
+        [container.lines[0].get_xdata() for container in panel.containers]
+    )
+    assert_allclose(np.sort(shown), np.sort(steady["time"]))
 
 
 def dataset_of(error, cost, part=None, own=None, noise=0.0):
@@ -767,6 +776,10 @@ def test_a_carried_area_that_fluctuates_is_not_shown_to_converge_and_nothing_is_
     changes = [float(number) for number in re.findall(r"[\d.]+(?=, then| %)", text)]
     # as step^(-1/2)
     assert "No setting is recommended" in text and changes[1] > 1.5 * changes[0]
+    assert (
+        "recommended"
+        not in study.figure(dataset).axes[0].get_legend_handles_labels()[1]
+    )
 
 
 def random_scene(seed):

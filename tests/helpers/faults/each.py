@@ -184,7 +184,7 @@ def main(state, calls, all_of_them, words, again, large):
 
 
 def study(state, all_of_them, words):
-    """Let calls of a study fail that replaces a dataset, which is the old one or the new one."""
+    """Let calls of a study fail that replaces a dataset and a picture; each of them is the old one or the new one."""
     from sim.study import converge
 
     folder, faults, made, failed = (
@@ -193,7 +193,7 @@ def study(state, all_of_them, words):
         0,
         0,
     )
-    older = {"out.nc": b"older dataset"}
+    older = {"out.nc": b"older dataset", "out.png": b"older picture"}
 
     def content():
         return {path.name: path.read_bytes() for path in folder.iterdir()}
