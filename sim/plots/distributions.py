@@ -1,5 +1,6 @@
 """Figures of what differs between members: a histogram, and the survival of an event."""
 
+import contextlib
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,16 @@ from sim.read.dataset import MEMBERS
 from sim.read.observables import closed_observables, restricted
 
 #: Quantities of a histogram, the first that differs between members.
-_RANDOM = ("area_ratio", "contact_area", "bond_fraction", "friction_force")
+_RANDOM = (
+    "area_ratio",
+    "contact_area",
+    "bond_fraction",
+    "friction_force",
+    "fluctuation_energy",
+)
+
+#: Differences below this share of a value are rounding.
+_ROUNDING = 1e-9
 
 #: Most bars of a histogram.
 _BARS = 60
@@ -33,22 +43,39 @@ def values_of(dataset: xr.Dataset, name: str) -> xr.DataArray:
     values = closed_observables(restricted(late, [name]), [name])
     if name not in values or MEMBERS not in values[name].dims:
         raise ValueError(f"{name[:40]} does not differ between recorded members")
-    return values[name].astype(float)
+    result = values[name].astype(float)
+    spread = (result.max() - result.min()).item()
+    if not spread > _ROUNDING * float(abs(result).max()):
+        raise ValueError(f"{name} is equal in all members at the end of the run")
+    return result
 
 
 def needs_members(dataset: xr.Dataset) -> None:
     """Refuse a dataset without recorded members that differ."""
     if dataset.sizes.get(MEMBERS, 1) < 2:
-        raise ValueError(
-            "a distribution needs members that differ: set ensemble.members = 64 and record.per_member = true"
-        )
+        cure = "set ensemble.members = 64 and record.per_member = true"
+        raise ValueError(f"a distribution needs members that differ: {cure}")
+
+
+def differing(dataset: xr.Dataset) -> xr.DataArray:
+    """Return the first quantity that differs between members.
+
+    Raises
+    ------
+    ValueError
+        If none does, or members were not recorded.
+    """
+    needs_members(dataset)
+    for name in _RANDOM:
+        with contextlib.suppress(ValueError):
+            return values_of(dataset, name)
+    raise ValueError("the members are equal at the end of the run")
 
 
 def histogram_figure(dataset: xr.Dataset, x: str = "") -> Figure:
     """Distribution of a quantity (--x) over the members, and over the second half of a stationary run."""
     scene = scene_along(dataset, "t")
-    known = [name for name in _RANDOM if scene.statistics.get(name) is not None]
-    values = values_of(dataset, x or known[0])
+    values = values_of(dataset, x) if x else differing(dataset)
     figure, (panel,) = style.rows([2.2])
     factor = style.in_unit(
         panel.xaxis, style.named(values), values.to_numpy(), values.attrs["units"]

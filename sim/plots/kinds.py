@@ -230,9 +230,7 @@ KINDS: dict[str, Kind] = {
         reads=("spring_force", "contact_area"),
     ),
     "map": Kind(field.map_figure, field.needs_maps),
-    "histogram": Kind(
-        distributions.histogram_figure, distributions.needs_members, _never
-    ),
+    "histogram": Kind(distributions.histogram_figure, distributions.differing, _never),
     "survival": Kind(distributions.survival_figure, distributions.needs_event, _never),
     "movie": Kind(movie.movie_figure, movie.needs_one_contact, _never, movie.READS),
 }

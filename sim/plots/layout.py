@@ -10,9 +10,13 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
 from matplotlib.text import Text
+from matplotlib.ticker import MaxNLocator
 
 #: A word, or mathematics with the letters beside it: no line breaks within.
 _WORD = re.compile(r"(?:\$[^$]*\$|[^\s$])+")
+
+#: Height of a panel that has room for no more than two numbers of its axis [in].
+_LOW = 0.4
 
 #: The letter of a panel, which is left out of a figure with less than 0.6 in for each.
 _LETTER = re.compile(r"\([a-z]\)")
@@ -47,6 +51,10 @@ class Layout(ConstrainedLayoutEngine):
         is_high = frame.height > 0.6 * figure.dpi * len(panels)
         for panel in panels:
             box = panel.get_window_extent()
+            locator = panel.yaxis.get_major_locator()
+            if isinstance(locator, MaxNLocator):
+                is_low = box.height < _LOW * figure.dpi
+                locator.set_params(min_n_ticks=2 if is_low else 3)
             self._wrap(panel.title, box.width)
             for text in panel.texts:
                 if _LETTER.fullmatch(text.get_text()):

@@ -132,6 +132,16 @@ def test_a_histogram_counts_the_members_and_has_an_area_of_one():
         kinds.draw(alone, "histogram")
 
 
+def test_equal_members_have_no_histogram_and_the_first_quantity_that_differs_is_drawn():
+    ends_masked = simulated()  # at the end of the ramp all contacts are Hertz's
+    area = ends_masked["contact_area"].isel(t=-1)
+    assert float(area.max() - area.min()) < 1e-12 * float(area.max())
+    panel = kinds.draw(ends_masked, "histogram").axes[0]
+    assert panel.get_xlabel().startswith("elastic energy")
+    with pytest.raises(ValueError, match="contact_area is equal in all members"):
+        kinds.draw(ends_masked, "histogram", Choices(x="contact_area"))
+
+
 def test_a_survival_falls_at_each_event_and_there_is_none_without_an_event():
     dataset = simulated(drive=drive.Steady(speed=4e-3)).copy(deep=True)
     end = float(dataset["t"][-1])
