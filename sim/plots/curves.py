@@ -404,12 +404,24 @@ _FINE = 3
 _APART = 0.005
 
 
-def series(name: str, words: str, si: str) -> Panel:
-    """Return a panel of one quantity."""
+#: Quantiles that an axis shows, of records whose whole range is larger by more than a factor.
+_USUAL, _FAR = (0.005, 0.995), 3.0
+
+
+def series(name: str, words: str, si: str, usual: bool = False) -> Panel:
+    """Return a panel of one quantity; if ``usual``, few records far from the others are stated and do not rule it."""
 
     def panel_of(panel: Axes, scene: Scene) -> None:
-        factor = style.in_unit(panel.yaxis, words, scene.all(name), si)
+        values = scene.all(name)
+        factor = style.in_unit(panel.yaxis, words, values, si)
         contact_curves(panel, scene, name, factor)
+        low, high = np.nanquantile(values, _USUAL) if usual else (0.0, 0.0)
+        if high > low and np.nanmax(values) - np.nanmin(values) > _FAR * (high - low):
+            ends = 1.3 * low - 0.3 * high, 1.3 * high - 0.3 * low
+            panel.set_ylim(factor * ends[0], factor * ends[1])
+            text = f"largest record {style.rounded(np.nanmax(values), si)}"
+            place: Any = {"transform": panel.transAxes, "va": "top", "fontsize": 7}
+            panel.text(0.02, 0.86, text, **place)
 
     return panel_of
 
@@ -628,7 +640,7 @@ def time_figure(
     scene = scene._replace(heading=scene.headed(coarse_slips(dataset)).heading)
     is_held = bool(stays_held(dataset).all())
     driven = [
-        (0.8, series(name, *_DRIVEN[name]))
+        (0.8, series(name, *_DRIVEN[name], usual=True))
         for name in _DRIVEN
         if name != scene.over
         and not (name == "displacement" and is_held)

@@ -87,6 +87,18 @@ def test_a_size_of_the_contact_that_stays_is_left_out_beside_panels_that_change(
     )
 
 
+def test_few_fast_records_do_not_rule_the_axis_of_the_speed_and_are_stated():
+    dataset = driven("pull").copy(deep=True)
+    dataset["speed"][:] = 1e-3 * np.linspace(1.0, 2.0, dataset.sizes["t"])
+    dataset["speed"][..., 7] = 0.5
+    panel = draw(dataset, "time").axes[-1]
+    assert panel.get_ylim()[0] < 1.0 and 2.0 < panel.get_ylim()[1] < 3.0
+    stated = [text.get_text() for text in panel.texts]
+    assert "largest record 500 mm/s" in stated
+    usual = draw(driven("pull"), "time").axes[-1].texts
+    assert not any("largest" in text.get_text() for text in usual)
+
+
 def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_its_bonds():
     dataset = driven("map")
     figure = rendered(draw(dataset))
