@@ -56,7 +56,6 @@ _RECORDED = {
     *(f"{name}_count" for name in RECORDED),
     "t",
     MEMBERS,
-    STATISTIC,
     "slip",
     "phase",
     "phase_start",

@@ -170,6 +170,26 @@ def test_maps_of_netcdf_in_its_formats_are_read_and_other_files_are_refused(
     assert "map.nc: is not a netCDF file" in sim("check", "mapped.toml").stderr
 
 
+def test_statistics_without_members_are_read_from_a_file_and_those_of_version_1_are_refused(
+    folder,
+):
+    alone = {"record.per_member": False, "ensemble.members": 3}
+    path = package.run(package.load("scene.toml", alone), "alone.nc")
+    with package.open("alone.nc") as dataset:
+        assert dataset["contact_area"].sizes["statistic"] == 3
+        old = dataset.load().drop_dims("statistic")
+        for kind, values in zip(
+            ("mean", "std", "sem"), dataset["contact_area"], strict=True
+        ):
+            old[f"contact_area_{kind}"] = values.drop_vars("statistic")
+        old.to_netcdf("old.nc")
+    for command in (["stats"], ["report", "--force"], ["plot", "time", "--force"]):
+        done = sim(command[0], "alone.nc", *command[1:])
+        assert done.exit_code == 0, done.stderr
+    done = sim("stats", "old.nc")
+    assert done.exit_code == 2 and "form of version 1; run the scenario" in done.stderr
+
+
 def test_a_dataset_of_an_older_version_says_what_it_lacks(folder):
     with package.open("out.nc") as dataset:
         dataset.load().drop_vars(["peak_friction", "bonds_radius"]).to_netcdf("old.nc")
