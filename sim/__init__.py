@@ -261,6 +261,7 @@ def fit(
     common: dict[str, float] | None = None,
     steady: bool = False,
     per_table: "Iterable[str]" = (),
+    errors: "str | Sequence[str]" = (),
 ) -> "Fit":
     """Calibrate keys of a scenario to measured curves.
 
@@ -279,12 +280,15 @@ def fit(
         Whether steady sliding is enough; else the scenario's own models have the last word.
     per_table : iterable of str
         Keys with a value in each table, as those of ``free``. The files name the tables.
+    errors : str, or several
+        Standard errors of curves that come without: ``"2 %"`` of each value, ``"0.1 mN"``, or of one variable,
+        ``"contact_area=2 %"``. Without them equal errors along a curve are assumed, of the size of the scatter.
 
     Returns
     -------
     Fit
-        ``scenario`` with the ``values`` found, ``numbers`` with errors and intervals, ``correlations``, ``remarks``;
-        of values per table also ``differences``, ``no_difference`` and the ``scenarios``.
+        ``scenario`` with the ``values`` found, their standard ``errors`` and 95 % ``intervals``, ``correlations`` and
+        ``remarks``; of values per table also ``differences``, ``no_difference`` and the ``scenarios``.
     """
     from sim.study.fit import fit as study
 
@@ -296,6 +300,7 @@ def fit(
         common,
         steady,
         per_table,
+        [errors] if isinstance(errors, str) else errors,
     )
 
 

@@ -699,6 +699,12 @@ def converge(
     help="Error shared by all points, such as 2 %.",
 )
 @click.option(
+    "--errors",
+    multiple=True,
+    metavar="[COLUMN=]SIZE",
+    help="Errors of curves without them, as 2 % or 0.1 mN.",
+)
+@click.option(
     "--steady",
     is_flag=True,
     help="Fit steady sliding only, without corrections by runs.",
@@ -766,12 +772,10 @@ def fit(
             or options["judged"]
             or options["steady"]
             or options["per_table"]
+            or options["errors"]
         ):
-            raise BadInput(
-                [
-                    "--plan: takes one table, without --compare, --steady and --per-table; omit these"
-                ]
-            )
+            others = "--compare, --errors, --steady and --per-table"
+            raise BadInput([f"--plan: takes one table, without {others}; omit these"])
         chosen = {name: options[name] for name in ("free", "common", "units")}
         shown = plan.carried_out(
             scene, options["data"][0], stem=stem, replaced=force, **chosen, **planned

@@ -8,11 +8,12 @@ the motion of the slider.
 """
 
 import difflib
+import html
 import itertools
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -24,13 +25,14 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy import stats
-from scipy.special import chdtrc
+from scipy.special import betaln
 
 from sim.ensemble.dataset import variable_name
 from sim.numerics import files
 from sim.parts.exchange import Array
 from sim.plots import style
 from sim.plots.style import BOTH, HOLLOW, Unit
+from sim.quantities import QUANTITIES
 from sim.scenario.files import parse, written
 from sim.scenario.reader import override
 from sim.scenario.scenario import Scenario
@@ -40,7 +42,6 @@ from sim.study.converge import Printed
 from sim.study.likelihood import (
     LEVEL,
     MOUNT,
-    Curve,
     Free,
     Interval,
     Measured,
@@ -49,18 +50,10 @@ from sim.study.likelihood import (
     idle,
     with_errors,
 )
-from sim.study.mechanisms import (
-    DRAWS,
-    WHOLE,
-    Search,
-    Verdict,
-    compare,
-    draws_of,
-    share_of_larger,
-)
+from sim.study.mechanisms import WHOLE, Verdict, compare
 from sim.units.errors import BadInput
 from sim.units.notation import concise, engineering, in_units, scaled
-from sim.units.quantity import read_option
+from sim.units.quantity import Quantity, read_option
 
 #: Factor by which a number that is fitted in its logarithm may change at most, where no bounds are given.
 _WIDE = 1e4
@@ -68,14 +61,14 @@ _WIDE = 1e4
 _RUNS, _STAYS = 3, 0.1
 #: Correlation beyond which the data hardly separate two keys.
 _ALIKE = 0.95
-#: Start of another search, over an e-fold or the range of a number; and most rows that are named.
-_BESIDE, _MOST_ROWS = 0.5, 3
-#: Probability of a chi^2 as large below which a fit is doubted.
+#: Most rows of a kind that are named.
+_MOST_ROWS = 3
+#: Probability of a chi^2 as large, or of as few runs of one sign, below which errors are doubted.
 POOR = 0.05
 #: Ratio of measured and fitted values beyond which a unit is asked for.
 _OTHER_UNIT = 100.0
-#: Relative precision of a sum of squares of curves that are drawn without a difference.
-_FINE = 1e-4
+#: Residual beyond which the best curve does not reach a point.
+_FAR = 3.0
 #: Tables of keys that are not physical.
 _OTHER = ("clock", "record", "ensemble", "seed")
 
@@ -102,22 +95,23 @@ class Estimate(NamedTuple):
     steady: float
 
     @property
-    def texts(self) -> tuple[str, str, str, str]:
-        """Return the value, both ends of the interval and their unit as text."""
-        ends, value, error = self.interval, self.value, self.error
-        is_limit = ends.low_open and not ends.high_open and error > abs(value)
-        factor, unit = scaled(ends.high if is_limit else value, self.free.quantity.unit)
-        text = (
-            f"below {factor * ends.high:.3g}"
-            if is_limit
-            else concise(factor * value, factor * error)
+    def texts(self) -> tuple[str, str, str]:
+        """Return the value with its standard error, the interval, and their unit as text.
+
+        A value has no standard error if the data do not set its interval on both sides.
+        """
+        low, high, low_open, high_open = self.interval
+        factor, unit = scaled(
+            high if low_open and not high_open else self.value, self.free.quantity.unit
         )
-        marks = (" (bound)" if is_open else "" for is_open in ends[2:])
-        low, high = (
-            f"{factor * end:.4g}{mark}"
-            for end, mark in zip(ends[:2], marks, strict=True)
-        )
-        return text, low, high, unit
+        is_open = low_open or high_open
+        value = concise(factor * self.value, 0.0 if is_open else factor * self.error)
+        ends = f"{factor * low:.4g}", f"{factor * high:.4g}"
+        if low_open and high_open:
+            return value, "not set", unit
+        if is_open:
+            return value, f"below {ends[1]}" if low_open else f"above {ends[0]}", unit
+        return value, " to ".join(ends), unit
 
 
 class NoDifference(NamedTuple):
@@ -126,29 +120,32 @@ class NoDifference(NamedTuple):
     Attributes
     ----------
     p_value : float
-        Probability of a likelihood ratio as large or larger if the tables had one value; nan if it is not computed.
+        Probability of a likelihood ratio as large or larger if the tables had one value.
     chi_square : float
         Rise of the chi^2 by the single value.
     freedom : int
         Degrees of freedom: tables without the first.
-    draws : int
-        Curves that were drawn for the probability; 0 if the likelihood ratio has a known distribution.
+    is_limit : bool
+        True if a bound sets the end of any interval. The probability is then an upper limit, because values at a bound
+        differ less by chance.
     """
 
     p_value: float
     chi_square: float
     freedom: int
-    draws: int
+    is_limit: bool
 
     def __str__(self) -> str:
-        return f"{self.p_value:.2g}" + " (simulated)" * (self.draws > 0)
+        return "at most " * self.is_limit + f"{self.p_value:.2g}"
 
 
 class Fit(NamedTuple):
-    """A calibrated scenario. Its text is a line for each number, and the chi^2.
+    """A calibrated scenario. Its text and its table in a notebook have all numbers with their intervals.
 
     Attributes
     ----------
+    values, errors, intervals : dict
+        Value, standard error, and both ends of the 95 % interval of each free key [SI].
     scenario : Scenario
         The scenario with the numbers found, and with those of the first table if tables have their own.
     problem : Problem
@@ -183,18 +180,26 @@ class Fit(NamedTuple):
     no_difference: Mapping[str, NoDifference] = MappingProxyType({})
 
     def __repr__(self) -> str:
-        texts = (
-            (item.free.key, *item.texts) for item in (*self.numbers, *self.differences)
+        lines = [f"key = value(standard error), {LEVEL:.0%} interval"]
+        for item in (*self.numbers, *self.differences):
+            value, interval, unit = item.texts
+            lines.append(f"{item.free.key} = {value}, {interval} {unit}".rstrip())
+        for key, test in self.no_difference.items():
+            lines.append(f"{key}: p of no difference {test}")
+        attributes = "in SI: .values, .errors, .intervals"
+        return "\n".join([*lines, _quality(self), attributes])
+
+    def _repr_html_(self) -> str:
+        from pandas import DataFrame
+
+        tables = [rows for rows in (_table(self), _differences(self)) if rows]
+        texts = map(html.escape, (_quality(self), *self.remarks))
+        return "".join(
+            [
+                *(DataFrame(rows).to_html(index=False) for rows in tables),
+                *(f"<p>{text}</p>" for text in texts),
+            ]
         )
-        lines = [
-            f"{key} = {value} [{low}, {high}] {unit}".rstrip()
-            for key, value, low, high, unit in texts
-        ]
-        tests = [
-            f"{key}: p of no difference {test}"
-            for key, test in self.no_difference.items()
-        ]
-        return "\n".join([*lines, *tests, _quality(self)])
 
     @property
     def aicc(self) -> float:
@@ -204,17 +209,25 @@ class Fit(NamedTuple):
     @property
     def p_value(self) -> float:
         """Probability of a chi^2 as large or larger; nan if the errors were not measured."""
-        known = self.problem.freedom > 0 and not self.problem.estimated.any()
-        return (
-            float(chdtrc(self.problem.freedom, self.best.chi_square))
-            if known
-            else math.nan
-        )
+        problem = self.problem
+        if problem.freedom <= 0 or problem.estimated.any():
+            return math.nan
+        return float(stats.chi2.sf(self.best.chi_square, problem.freedom))
 
     @property
     def values(self) -> dict[str, float]:
         """Values of the free keys [SI]; a key with a value per table has the name of the table behind it."""
         return {item.free.key: item.value for item in self.numbers}
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Standard errors of the free keys [SI]."""
+        return {item.free.key: item.error for item in self.numbers}
+
+    @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """Ends of the 95 % intervals of the free keys [SI]; ``numbers`` tell if a bound sets an end."""
+        return {item.free.key: item.interval[:2] for item in self.numbers}
 
     def of_table(self, place: int) -> dict[str, float]:
         """Return the values of the keys in a table [SI], and its conditions but the speed that all rows share."""
@@ -253,6 +266,7 @@ def fit(
     common: dict[str, float] | None = None,
     steady: bool = False,
     per_table: Iterable[str] = (),
+    errors: Sequence[str] = (),
 ) -> Fit:
     """Find numbers of a scenario from measured curves.
 
@@ -270,6 +284,9 @@ def fit(
         True if steady sliding is enough, so that the scenario's own models are not run.
     per_table : iterable of str
         Keys that have a value in each table, as those of ``free``.
+    errors : sequence of str
+        Standard errors of curves that come without, as ``"2 %"`` of each value, as ``"0.1 mN"``, or of one variable,
+        ``"contact_area=2 %"``.
 
     Raises
     ------
@@ -282,6 +299,7 @@ def fit(
     tables = [
         likelihood.read(path, base) if isinstance(path, Path) else path for path in data
     ]
+    tables = likelihood.with_stated_errors(tables, errors)
     if faults := [*conflicts(base, shared, split, tables)]:
         raise BadInput(faults)
     places = itertools.product(split, enumerate(tables))
@@ -297,15 +315,13 @@ def fit(
     if base.drive.solves_motion or (not steady and idle(problem)):
         problem = replace(problem, by_run=True).compared(problem.start)
     likelihood.refuse_undetermined(problem)
-    problem, best = _searched(problem)
+    problem, best = with_errors(problem)
     alone, steady = best, steady or problem.by_run
     converged = steady and best.converged
     for _ in range(0 if steady else _RUNS):
         before = best.x
         problem, best = with_errors(problem.compared(best.x), best.x)
-        if best.covariance is None or np.all(
-            np.abs(best.x - before) < _STAYS * np.sqrt(np.diag(best.covariance))
-        ):
+        if np.all(np.abs(best.x - before) < _STAYS * np.sqrt(np.diag(best.covariance))):
             converged = alone.converged and best.converged
             break
     return _assembled(scenario, problem, best, alone, converged)
@@ -336,170 +352,100 @@ def conflicts(
             yield f"{table.path}: has values of {key}, which is free; omit them, or do not free this key"
 
 
-def _searched(problem: Problem) -> tuple[Problem, Minimum]:
-    """The minimum near the scenario's own values; a poor one is sought from both sides of it, by each free number, too.
-
-    A contact that is open has no slope that would lead out of there.
-    """
-    minima = [with_errors(problem, problem.start)]
-    (scattered, best), freedom = minima[0], problem.freedom
-    is_poor = freedom > 0 and best.chi_square > freedom + 4.0 * math.sqrt(2.0 * freedom)
-    if not problem.by_run and (is_poor or _open(scattered, best).size):
-        for (k, item), sign in itertools.product(enumerate(problem.free), (-1.0, 1.0)):
-            beside = best.x.copy()
-            beside[k] += sign * _BESIDE * item.width
-            minima.append(with_errors(problem, beside))
-    return min(minima, key=lambda item: item[0].criterion(item[1].chi_square))
-
-
-def _open(problem: Problem, best: Minimum) -> NDArray[np.int64]:
-    """Return the measured numbers of a closed contact at which the contact is open by the fit."""
-    return np.flatnonzero(
-        (problem.predicted(best.x) == 0.0)
-        & (np.abs(problem.values) > 3.0 * problem.sigma)
-    )
-
-
 def _assembled(
     scenario: Scenario, problem: Problem, best: Minimum, alone: Minimum, converged: bool
 ) -> Fit:
     """Return the fit with its intervals and remarks."""
-    count, size, known = len(problem.free), len(best.x), best.covariance is not None
-    covariance = (
-        np.full((size, size), np.nan) if best.covariance is None else best.covariance
-    )
-    spread, estimates = (
-        np.sqrt(np.diag(covariance)),
-        [_estimate(problem, best, alone, k) for k in range(count)],
-    )
-    alike = (covariance / np.outer(spread, spread))[:count, :count]
-    result = Fit(
-        scenario, problem, best, tuple(estimates), alike, known and converged, ()
-    )
-    if not known:
-        return result._replace(
-            remarks=(
-                "the errors could not be computed: the data do not determine all keys",
-            )
-        )
-    split = [item.name for item in problem.free if item.table >= 0]
-    places = {
-        key: [k for k, item in enumerate(problem.free) if item.name == key]
-        for key in split
-    }
+    count = len(problem.free)
+    estimates = [
+        _estimate(problem, best, alone, item, lambda x, k=k: float(x[k]))  # type: ignore[misc]
+        for k, item in enumerate(problem.free)
+    ]
+    spread = np.sqrt(np.diag(best.covariance))
+    alike = (best.covariance / np.outer(spread, spread))[:count, :count]
+    result = Fit(scenario, problem, best, tuple(estimates), alike, converged, ())
+    split = dict.fromkeys(item.name for item in problem.free if item.table >= 0)
     result = result._replace(
         scenario=scenario.with_values(result.of_table(0) if split else result.values),
         lag=likelihood.lag(problem, best.x),
-        differences=tuple(_between_tables(result, alone, [*places.values()])),
-        no_difference={
-            key: _no_difference(result, numbers) for key, numbers in places.items()
-        },
+        differences=tuple(
+            estimate
+            for key in split
+            for estimate in _between_tables(result, alone, key)
+        ),
+        no_difference={key: _no_difference(result, key) for key in split},
     )
     return result._replace(remarks=tuple(_remarks(result)))
 
 
-def _between_tables(
-    result: Fit, alone: Minimum, places: list[list[int]]
-) -> Iterator[Estimate]:
+def _estimate(
+    problem: Problem,
+    best: Minimum,
+    alone: Minimum,
+    item: Free,
+    quantity: Callable[[Array], float],
+) -> Estimate:
+    """Return the estimate of a quantity with bounds, as it is fitted, from all free numbers."""
+    slope = likelihood.slope_of(problem, best.x, quantity)
+    error = math.sqrt(slope @ best.covariance @ slope)
+    value, unshifted = (item.outer(quantity(least.x)) for least in (best, alone))
+    if item.logarithmic:
+        error *= value
+    interval = likelihood.profile(problem, best, item, quantity)
+    return Estimate(item, value, error, interval, unshifted)
+
+
+def _between_tables(result: Fit, alone: Minimum, key: str) -> Iterator[Estimate]:
     """Yield ratios and differences to the first table; a number that is not fitted in its logarithm has no ratio.
 
     A bound that sets an end of either value's interval sets that of the ratio and of the difference.
     """
-    for (first, *rest), is_ratio in itertools.product(places, (True, False)):
-        base = result.numbers[first]
-        for k in rest if base.free.logarithmic or not is_ratio else ():
-            problem, best = likelihood.with_difference(
-                result.problem, result.best, k, first, is_ratio
-            )
-            _, before = likelihood.with_difference(
-                result.problem, alone, k, first, is_ratio
-            )
-            estimate, ends, others = (
-                _estimate(problem, best, before, k),
-                result.numbers[k].interval,
-                base.interval,
-            )
+    problem = result.problem
+    first, *rest = (k for k, item in enumerate(problem.free) if item.name == key)
+    base = problem.free[first]
+    span = base.high - base.low
+    stems = [table.path.stem for table in problem.tables]
+    for is_ratio in (True, False) if base.logarithmic else (False,):
+        for k in rest:
+
+            def quantity(x: Array, k: int = k, is_ratio: bool = is_ratio) -> float:
+                if is_ratio:
+                    return float(x[k] - x[first])
+                return base.outer(float(x[k])) - base.outer(float(x[first]))
+
+            sign = "/" if is_ratio else "-"
+            name = f"{key} ({stems[problem.free[k].table]} {sign} {stems[base.table]})"
+            item = Free(name, base.quantity, 0.0, -span, span)
+            if is_ratio:
+                most = base.high / base.low
+                item = Free(name, Quantity("1", "ratio"), 1.0, 1.0 / most, most)
+            estimate = _estimate(problem, result.best, alone, item, quantity)
             low, high, *is_open = estimate.interval
-            is_open = [
-                any(marks)
-                for marks in zip(is_open, ends[2:], reversed(others[2:]), strict=True)
-            ]
+            marks = result.numbers[k].interval[2:]
+            others = reversed(result.numbers[first].interval[2:])
+            is_open = [any(ends) for ends in zip(is_open, marks, others, strict=True)]
             yield estimate._replace(interval=Interval(low, high, *is_open))
 
 
-def _estimate(problem: Problem, best: Minimum, alone: Minimum, k: int) -> Estimate:
-    """Return one free number with its interval, if the errors are known."""
-    item, ends, spread = (
-        problem.free[k],
-        Interval(math.nan, math.nan, True, True),
-        math.nan,
-    )
-    value, unshifted = (item.outer(float(least.x[k])) for least in (best, alone))
-    if best.covariance is not None:
-        ends, spread = (
-            likelihood.interval(problem, best, k),
-            math.sqrt(best.covariance[k, k]),
-        )
-    return Estimate(
-        item, value, spread * (value if item.logarithmic else 1.0), ends, unshifted
-    )
+def _no_difference(result: Fit, key: str) -> NoDifference:
+    """Test that the values of a key in all tables are a single one.
 
-
-def _no_difference(result: Fit, places: list[int]) -> NoDifference:
-    """Test that numbers of the tables are a single one.
-
-    The likelihood ratio has a chi-square distribution, and an F distribution if errors are estimated. If the interval
-    of any number reaches a bound, its distribution is simulated instead: both are fitted to curves of the single value.
+    The likelihood ratio has a chi-square distribution, and an F distribution if errors are estimated.
     """
-    problem, best, freedom = result.problem, result.best, len(places) - 1
-    merged, starts = likelihood.with_one_value(problem, best, places)
-    single = min(
-        (likelihood.minimum(merged, start) for start in starts),
-        key=lambda item: item.chi_square,
-    )
-    rise, is_estimated = (
-        max(single.chi_square - best.chi_square, 0.0),
-        problem.estimated.any(),
-    )
-    measured = rise / best.chi_square if is_estimated else rise
-    if not any(
-        item.interval.low_open or item.interval.high_open for item in result.numbers
-    ):
-        tail = (
-            stats.f.sf(rise / freedom, freedom, problem.freedom)
-            if is_estimated
-            else stats.chi2.sf(rise, freedom)
-        )
-        return NoDifference(float(tail), rise, freedom, 0)
-    # as precisely as drawn curves are fitted
-    if problem.by_run or rise <= _FINE * best.chi_square:
-        return NoDifference(math.nan if problem.by_run else 1.0, rise, freedom, 0)
-    times = [len(places) if k == places[0] else 1 for k in range(len(single.x))]
-    joint, separate = Search(merged, [single.x]), Search(problem, [best.x])
-
-    def ratio(values: Array) -> float:
-        shared, drawn_problem = (
-            replace(merged, values=values),
-            replace(problem, values=values),
-        )
-        one_value = likelihood.minimum(shared, joint.least(values).x, precision=_FINE)
-        # no worse than one value
-        starts = [np.repeat(one_value.x, times), separate.least(values).x]
-        least = min(
-            likelihood.minimum(drawn_problem, start, precision=_FINE).chi_square
-            for start in starts
-        )
-        return (one_value.chi_square - least) / (least if is_estimated else 1.0)
-
-    drawn = draws_of(
-        problem,
-        merged.predicted(single.x),
-        np.random.default_rng([result.scenario.seed, places[0]]),
-    )
-    p_value, draws = share_of_larger(
-        (ratio(values) >= measured for values in drawn), DRAWS
-    )
-    return NoDifference(p_value, rise, freedom, draws)
+    problem, best = result.problem, result.best
+    free = {
+        shared.key: shared
+        for item in problem.free
+        for shared in [item._replace(key=key, table=-1) if item.name == key else item]
+    }
+    single = likelihood.lowest(replace(problem, free=[*free.values()]))
+    rise = max(single.chi_square - best.chi_square, 0.0)
+    freedom = len(problem.free) - len(free)
+    law = stats.chi2(freedom)
+    if problem.estimated.any():
+        law = stats.f(freedom, problem.freedom, scale=freedom)
+    is_limit = any(any(item.interval[2:]) for item in result.numbers)
+    return NoDifference(float(law.sf(rise)), rise, freedom, is_limit)
 
 
 def _remarks(result: Fit) -> Iterator[str]:
@@ -519,7 +465,8 @@ def _remarks(result: Fit) -> Iterator[str]:
             if math.isnan(end):
                 yield f"{item.free.key}: the {word} end of its interval could not be computed"
             elif is_open:
-                yield f"{item.free.key}: the data do not set the {word} end of its interval; its bound is shown"
+                bound = engineering(end, item.free.quantity.unit)
+                yield f"{item.free.key}: the data do not set the {word} end of its interval; its bound is {bound}"
     causes = (
         "the model is incomplete, a fixed key is wrong, or the errors are too small"
     )
@@ -527,8 +474,10 @@ def _remarks(result: Fit) -> Iterator[str]:
         yield f"{result.lag}; if steady speeds were measured, choose --steady or a slower ramp"
         causes = "such a lag can explain it"
     if result.p_value <= POOR:
-        far = f"the residuals exceed the errors (p = {result.p_value:.2g}), so the intervals do not hold"
-        yield f"{far}: {causes}"
+        far = f"the best of several searches misses the data by more than their errors (p = {result.p_value:.2g})"
+        yield f"{far}, so the intervals do not hold: {causes}"
+    yield from _unreached(problem, result.best)
+    yield from _one_sided(problem, result.best)
     for number, name in enumerate(problem.names):
         here = problem.curve == number
         size, least = (
@@ -540,19 +489,81 @@ def _remarks(result: Fit) -> Iterator[str]:
             and not 1.0 / _OTHER_UNIT < size / least < _OTHER_UNIT
         ):
             yield f"{name} is {size / least:.2g} times what is fitted: check its unit, and those of the scenario"
-    if (open_rows := _open(problem, result.best)).size:
-        places = ", ".join(map(problem.place, open_rows[:_MOST_ROWS]))
-        yield f"the fit has an open contact at measured points: {places}"
     if problem.estimated.any():
-        effect = (
-            ", so p of no difference follows from an F distribution"
-            if result.no_difference
-            else ""
+        numbers = np.unique(problem.curve[problem.estimated])
+        sizes = [
+            f"{problem.names[number]} {engineering(size, unit)}"
+            for number in numbers
+            for size in problem.sigma[problem.curve == number][:1]
+            for unit in [QUANTITIES[problem.names[number]].unit]
+        ]
+        yield (
+            "curves without errors: equal absolute errors along each curve are assumed, of the size of the scatter "
+            f"around the fit ({', '.join(sizes)}); for proportional ones, give --errors '2 %'"
         )
-        yield f"curves without errors: the scatter around the fit is used instead{effect}"
-    for key, test in result.no_difference.items():
-        if math.isnan(test.p_value):
-            yield f"{key}: p of no difference is not computed, because a bound sets an interval; give wider bounds"
+        if result.no_difference:
+            yield "p of no difference follows from an F distribution, because errors are estimated"
+
+
+def _unreached(problem: Problem, best: Minimum) -> Iterator[str]:
+    """Yield the points that the best curve does not reach because the contact is open or masked there."""
+    off = problem.residuals(best.x)[: len(problem.values)]
+    is_far = np.abs(off) > _FAR
+    is_open = problem.predicted(best.x) == 0.0
+    masked = problem.masked(best.x) & ~is_open
+    states = {"open": is_open, "masked, so that adhesion holds no area": masked}
+    for words, state in states.items():
+        if (rows := np.flatnonzero(state & is_far)).size:
+            places = ", ".join(map(problem.place, rows[:_MOST_ROWS]))
+            more = ", ..." * (rows.size > _MOST_ROWS)
+            yield f"the best curve does not reach {rows.size} points, where its contact is {words}: {places}{more}"
+
+
+def _one_sided(problem: Problem, best: Minimum) -> Iterator[str]:
+    """Yield a remark if residuals of one sign follow each other more often than by chance (Wald and Wolfowitz 1940).
+
+    Points of a curve follow each other along the condition that varies most, under the same other conditions.
+    """
+    off = problem.residuals(best.x)
+    conditions, _ = _alike(problem)
+    count, expected, probabilities = 0, 0.0, np.ones(1)
+    for number, (table, _) in enumerate(problem.curves):
+        order = np.lexsort((_along(problem.tables[table]).values, conditions[table]))
+        signs = off[np.flatnonzero(problem.curve == number)[order]] > 0.0
+        law = runs_of(int(np.sum(signs)), int(np.sum(~signs)))
+        count += 1 + int(np.sum(signs[1:] != signs[:-1]))
+        expected += float(law @ np.arange(len(law)))
+        probabilities = np.convolve(probabilities, law)
+    p_value = float(np.sum(probabilities[: count + 1]))
+    if p_value <= POOR:
+        runs = f"residuals of one sign form {count} runs, by chance {expected:.3g} (p = {p_value:.2g})"
+        yield (
+            f"{runs}: errors of neighbouring points are correlated, or the curves have another form, so the intervals "
+            "are too narrow"
+        )
+
+
+def runs_of(above: int, below: int) -> Array:
+    """Return the exact probabilities of 0, 1, 2, … runs of one sign in a random order of residuals of two signs.
+
+    >>> runs_of(2, 2).round(3).tolist()
+    [0.0, 0.0, 0.333, 0.333, 0.333]
+    """
+    if not above or not below:
+        return np.array([0.0, 1.0])
+    runs = np.arange(above + below + 1)
+    more, less = (runs + 1) // 2, runs // 2
+    ways = [
+        _log_choose(above - 1, first - 1) + _log_choose(below - 1, second - 1)
+        for first, second in ((more, less), (less, more))
+    ]
+    total = _log_choose(above + below, np.array(above))
+    return np.asarray(np.sum(np.exp(np.array(ways) - total), axis=0), float)
+
+
+def _log_choose(count: int, chosen: NDArray[np.int64]) -> Array:
+    """Return the logarithm of a binomial coefficient, minus infinity for one that is 0."""
+    return np.asarray(-np.log(count + 1.0) - betaln(count - chosen + 1.0, chosen + 1.0))
 
 
 def free_number(scenario: Scenario, text: str, option: str = "--free") -> Free:
@@ -626,87 +637,61 @@ def figure(problem: Problem, best: Minimum) -> Figure:
     """Draw each variable over the condition that varies most, with error bars and fit, above its residuals.
 
     Residuals are in standard errors. Rows of any table with the same other conditions have one colour and one curve.
-    If tables have values of their own, each has its own colours.
-    Over the speed the curve has many speeds; otherwise it joins the rows. If the scenario's own models add to steady
-    sliding, that alone is dashed.
+    If tables have values of their own, each has its own colours. Over the speed the curve has many speeds; otherwise it
+    joins the rows.
     """
     fitted, alone = problem.predicted(best.x), problem.steady(best.x)
     off = (problem.values - fitted) / np.hypot(problem.sigma, problem.noise)
-    is_shifted = np.any(np.abs(problem.shift) > _STAYS * problem.sigma)
-    lines = [(fitted, "fit", "-"), (alone, "in steady sliding", "--")][
-        : 2 if is_shifted else 1
-    ]
-    along, (conditions, labels) = (
-        [_along(table) for table in problem.tables],
-        _alike(problem),
-    )
-    colours, panels = (
-        style.shades(len(labels)),
-        dict[tuple[str, str], list[tuple[int, int]]](),
-    )
-    for number, (place, name) in enumerate(
-        (k, name) for k, table in enumerate(problem.tables) for name in table.names
-    ):
-        panels.setdefault((name, along[place].key), []).append((number, place))
+    along = [_along(table) for table in problem.tables]
+    conditions, labels = _alike(problem)
+    colours = style.shades(len(labels))
+    panels = dict[tuple[str, str], list[int]]()
+    for number, (table, name) in enumerate(problem.curves):
+        panels.setdefault((name, along[table].key), []).append(number)
     with mpl.rc_context(style.STYLE):
         picture, axes = style.rows([_CURVES, _RESIDUALS] * len(panels), shared=False)
-        for (name, key), upper, lower in zip(
-            panels, axes[::2], axes[1::2], strict=True
+        for ((name, key), numbers), upper, lower in zip(
+            panels.items(), axes[::2], axes[1::2], strict=True
         ):
-            drawn, every = (
-                panels[name, key],
-                np.concatenate([along[place].values for _, place in panels[name, key]]),
-            )
-            scale, (_, words, si, _) = style.axis_scale(every), along[drawn[0][1]]
-            definition = Curve(name, every, None).definition
-            x, y = (
-                Unit.of(every, si, scale == "log"),
-                Unit.of(problem.values[problem.of(name)], definition.unit),
-            )
-            for (number, place), condition in itertools.product(
-                drawn, range(len(labels))
+            tables = [problem.curves[number][0] for number in numbers]
+            every = np.concatenate([along[table].values for table in tables])
+            scale, axis = style.axis_scale(every), along[tables[0]]
+            definition = QUANTITIES[name]
+            x = Unit.of(every, axis.unit, scale == "log")
+            y = Unit.of(problem.values[problem.of(name)], definition.unit)
+            for number, table, condition in (
+                (number, k, condition)
+                for number, k in zip(numbers, tables, strict=True)
+                for condition in np.unique(conditions[k])
             ):
-                alike = np.flatnonzero(conditions[place] == condition)
-                if not alike.size:
-                    continue
-                alike, colour = (
-                    alike[np.argsort(along[place].values[alike], kind="stable")],
-                    colours[condition],
-                )
-                at, over = (
-                    np.flatnonzero(problem.curve == number)[alike],
-                    along[place].values[alike],
-                )
-                bars: Any = HOLLOW | {"color": colour, "elinewidth": 0.7, "zorder": 3}
+                values = along[table].values
+                rows = np.flatnonzero(conditions[table] == condition)
+                rows = rows[np.argsort(values[rows], kind="stable")]
+                at, over = np.flatnonzero(problem.curve == number)[rows], values[rows]
+                look: Any = {"color": colours[condition]}
                 upper.errorbar(
                     x.factor * over,
                     y.factor * problem.values[at],
                     y.factor * problem.sigma[at],
-                    **bars,
+                    elinewidth=0.7,
+                    zorder=3,
+                    **HOLLOW,
+                    **look,
                 )
-                lower.plot(x.factor * over, off[at], color=colour, **HOLLOW)
+                lower.plot(x.factor * over, off[at], **HOLLOW, **look)
                 fine, smooth = over, alone[at]
                 if (
                     key == "speed"
                     and np.ptp(over)
-                    and (between := problem.between(best.x, place, name, alike))
+                    and not problem.by_run
+                    and over[0] > 0.0
                 ):
-                    fine, smooth = between
+                    fine, smooth = problem.between(best.x, table, name, rows)
                 # what is added to steady sliding is known at the rows
-                for values, _, dashes in lines:
-                    line = y.factor * (
-                        smooth + np.interp(fine, over, values[at] - alone[at])
-                    )
-                    mark = "" if np.ptp(over) else "x"
-                    upper.plot(
-                        x.factor * fine,
-                        line,
-                        dashes,
-                        color=colour,
-                        marker=mark,
-                        linewidth=0.9,
-                        zorder=2,
-                    )
+                line = smooth + np.interp(fine, over, fitted[at] - alone[at])
+                marker = "" if np.ptp(over) else "x"
+                look |= {"marker": marker, "linewidth": 0.9, "zorder": 2}
+                upper.plot(x.factor * fine, y.factor * line, **look)
             upper.set_ylabel(
                 y.label(f"{definition.meaning.partition(',')[0]} ${definition.symbol}$")
             )
@@ -715,15 +700,11 @@ def figure(problem: Problem, best: Minimum) -> Figure:
             lower.margins(y=0.15)
             lower.set_ylabel("residual ($\\sigma$)")
             style.across(upper, x.factor * every, "", scale, 0.05)
-            style.across(lower, x.factor * every, x.label(words), scale, 0.05)
+            style.across(lower, x.factor * every, x.label(axis.words), scale, 0.05)
         axes[0].plot([], [], label="measured", color=BOTH, **HOLLOW)
-        for _, label, dashes in lines:
-            axes[0].plot([], [], dashes, color=BOTH, label=label, linewidth=0.9)
-        for k in (
-            np.unique(np.linspace(0, len(labels) - 1, _NAMED).astype(int))
-            if len(labels) > 1
-            else ()
-        ):
+        axes[0].plot([], [], label="fit", color=BOTH, linewidth=0.9)
+        named = np.linspace(0, len(labels) - 1, _NAMED).astype(int)
+        for k in np.unique(named) if len(labels) > 1 else ():
             axes[0].plot([], [], color=colours[k], label=labels[k])
         style.legend(axes[0])
     return picture
@@ -749,39 +730,30 @@ def _along(table: Measured) -> Along:
 
 
 def _levels(values: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Return the different values in order, nan as the last, and the place of each value among them."""
-    least = list[float]()
-    for value in np.unique(values).tolist():
-        if not least or not value - least[-1] <= _NEAR * abs(least[-1]):
-            least.append(value)
-    level = np.searchsorted(least, values, "right") - 1
+    """Return the levels of values in order, and the number of the level of each; those nearly the same are one."""
+    order = np.argsort(values)
+    before, after = values[order[:-1]], values[order[1:]]
+    level = np.zeros(len(values), int)
+    level[order[1:]] = np.cumsum(after > before + _NEAR * np.abs(before))
     return np.bincount(level, values) / np.bincount(level), level
 
 
 def _alike(problem: Problem) -> tuple[list[NDArray[np.int64]], list[str]]:
     """Return for each table the numbers of the conditions of its rows beside that along the axis, and their labels."""
-    along, places = (
-        [_along(table) for table in problem.tables],
-        np.cumsum([table.rows for table in problem.tables]),
-    )
-    numbers, texts = [np.zeros(places[-1], int)], [[""]]
+    along = [_along(table) for table in problem.tables]
+    counts = [table.rows for table in problem.tables]
+    numbers, texts = [np.zeros(sum(counts), int)], [[""]]
     if any(item.table >= 0 for item in problem.free):
-        numbers = [
-            np.repeat(
-                np.arange(len(problem.tables)), [table.rows for table in problem.tables]
-            )
-        ]
+        numbers = [np.repeat(np.arange(len(counts)), counts)]
         texts = [[table.path.stem for table in problem.tables]]
-    for key, (quantity, columns) in problem.conditions().items():
-        others = [
-            np.where(axis.key == key, np.nan, values)
-            for axis, values in zip(along, columns, strict=True)
+    for key, quantity in problem.conditions.items():
+        columns = [
+            np.where(axis.key == key, np.inf, problem.condition(key, k))
+            for k, axis in enumerate(along)
         ]
-        means, level = _levels(np.concatenate(others))
-        name, described = (
-            variable_name(key),
-            {"units": quantity.unit, "symbol": quantity.symbol},
-        )
+        means, level = _levels(np.concatenate(columns))
+        name = variable_name(key)
+        described = {"units": quantity.unit, "symbol": quantity.symbol}
         words = xr.Dataset(coords={name: (name, means[np.isfinite(means)], described)})
         if words.sizes[name] > 1:
             numbers.append(level)
@@ -794,7 +766,7 @@ def _alike(problem: Problem) -> tuple[list[NDArray[np.int64]], list[str]]:
         ", ".join(filter(None, map(list.__getitem__, texts, column)))
         for column in kinds.T
     ]
-    return np.split(number.ravel(), places[:-1]), labels
+    return np.split(number.ravel(), np.cumsum(counts)[:-1]), labels
 
 
 def common_errors(texts: Sequence[str]) -> dict[str, float]:
@@ -813,32 +785,27 @@ _MADE = "# Made by sim fit"
 def carried_out(
     scenario: Scenario,
     data: Sequence[Path],
-    free: Sequence[str],
-    common: Sequence[str],
     stem: Path,
     replace: bool,
-    steady: bool,
     judged: bool,
     units: Sequence[str] = (),
-    per_table: Sequence[str] = (),
+    **arguments: Any,
 ) -> tuple[Fit, list[Printed]]:
     """Fit, compare mechanisms if wanted, write the files, and return the tables to print.
 
-    Arguments are those of ``sim.study.fit.fit``, with ``common`` as texts ``"COLUMN=2 %"``, and the ``units`` of the
-    figure. The files are ``<stem>_fit.toml``, ``.json`` and ``.png``. With keys ``per_table`` each table has a scenario
-    ``<stem>_fit_<table>.toml``. Older ones are refused unless ``replace`` is True; a scenario is replaced only if a fit
-    has written it.
+    The ``units`` are those of the figure. Further arguments are those of ``fit``, with ``common`` as texts
+    ``"COLUMN=2 %"``. The files are ``<stem>_fit.toml``, ``.json`` and ``.png``. With keys
+    ``per_table`` each table has a scenario ``<stem>_fit_<table>.toml``. Older ones are refused unless ``replace`` is
+    True; a scenario is replaced only if a fit has written it.
     """
-    sizes = common_errors(common)
-    endings = [
-        *([f"_{path.stem}.toml" for path in data] if per_table else [".toml"]),
-        ".json",
-        ".png",
+    arguments["common"] = common_errors(arguments["common"])
+    split = arguments["per_table"]
+    endings = [f"_{path.stem}.toml" for path in data if split] or [".toml"]
+    outputs = [
+        stem.with_name(f"{stem.name}_fit{ending}")
+        for ending in (*endings, ".json", ".png")
     ]
-    outputs, inputs = (
-        [stem.with_name(f"{stem.name}_fit{ending}") for ending in endings],
-        [*files_read(scenario), *data],
-    )
+    inputs = [*files_read(scenario), *data]
     for path in outputs:
         is_scenario = (
             replace
@@ -853,52 +820,42 @@ def carried_out(
         for table in tables:
             for unit in (
                 _along(table).unit,
-                *(curve.definition.unit for curve in table.curves),
+                *(QUANTITIES[name].unit for name in table.names),
             ):
                 scaled(1.0, unit)
-    result = fit(scenario, tables, free, sizes, steady, per_table)
-    verdict = (
-        compare(result.problem, result.best, result.scenario.seed) if judged else None
-    )
+    result = fit(scenario, tables, **arguments)
+    verdict = None
+    if judged:
+        verdict = compare(result.problem, result.best, result.scenario.seed)
     with in_units(units):
         picture = figure(result.problem, result.best)
-    numbers = (
-        json.dumps(document(result, data, verdict), indent=2, allow_nan=False) + "\n"
-    )
+    numbers = json.dumps(document(result, data, verdict), indent=2, allow_nan=False)
     scenarios = [
-        scenario_text(scenario, result, stem.parent, k) for k in range(len(outputs) - 2)
+        scenario_text(scenario, result, stem.parent, k) for k in range(len(endings))
     ]
-    for path, text in zip(outputs[:-1], [*scenarios, numbers], strict=True):
+    for path, text in zip(outputs[:-1], [*scenarios, f"{numbers}\n"], strict=True):
         with files.output(path) as beside:
             beside.write_bytes(text.encode())
     style.save(picture, outputs[-1])
     sources = [f"{table.path}: {table.rows} rows, {table.ranges}" for table in tables]
-    shown: list[Printed] = [
-        (
-            _table(result),
-            "\n".join(["", _quality(result), *result.remarks, *sources, ""]),
-        )
-    ]
+    below = "\n".join(["", _quality(result), *result.remarks, *sources, ""])
+    shown: list[Printed] = [(_table(result), below)]
     if result.differences:
         shown.append((_differences(result), ""))
     if verdict is not None:
         doubt = "; but even the unchanged scenario misses the data, so perhaps none of these is true"
-        shown.append(
-            (
-                _comparison(verdict),
-                f"\n{verdict.words}{doubt if result.p_value <= POOR else ''}\n",
-            )
-        )
+        words = verdict.words + doubt * (result.p_value <= POOR)
+        shown.append((_comparison(verdict), f"\n{words}\n"))
     return result, [*shown, ([], "\n".join(map(str, outputs)))]
 
 
 def _row(heading: str, item: Estimate) -> dict[str, str]:
     """Return the key, the value and the interval of an estimate, in units that suit it."""
-    value, low, high, unit = item.texts
+    value, interval, unit = item.texts
     return {
         heading: item.free.key,
-        "value": f"{value} {unit}".rstrip(),
-        f"{LEVEL:.0%} interval": f"{low} to {high}",
+        "value (standard error)": f"{value} {unit}".rstrip(),
+        f"{LEVEL:.0%} interval": f"{interval} {unit}".rstrip(),
     }
 
 
@@ -910,9 +867,7 @@ def _table(fit: Fit) -> list[dict[str, str]]:
             engineering(value, item.free.quantity.unit)
             for value in (item.free.start, item.steady)
         )
-        shift = (
-            (item.steady - item.value) / item.error if item.error > 0.0 else math.nan
-        )
+        shift = (item.steady - item.value) / item.error
         alone += f" ({shift:+.1f} errors)" if abs(shift) > 0.05 else ""
         rows.append(_row("key", item) | {"start": start, "steady sliding alone": alone})
     return rows
@@ -921,10 +876,11 @@ def _table(fit: Fit) -> list[dict[str, str]]:
 def _differences(fit: Fit) -> list[dict[str, str]]:
     """Return one row for each ratio or difference of values per table; the first of a key has the p of none."""
     tests = {name: str(test) for name, test in fit.no_difference.items()}
-    rows = [
-        (item.free.name, _row("ratio or difference", item)) for item in fit.differences
+    return [
+        _row("ratio or difference", item)
+        | {"p of no difference": tests.pop(item.free.name, "")}
+        for item in fit.differences
     ]
-    return [row | {"p of no difference": tests.pop(name, "")} for name, row in rows]
 
 
 def _quality(fit: Fit) -> str:

@@ -9,16 +9,18 @@ A number above zero without an upper bound is fitted in its logarithm. The sum o
 error that curves share is one more number, known to be 0 within its size.
 """
 
+import contextlib
 import functools
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, stats
+from scipy.stats import qmc
 
 from sim.ensemble.dataset import variable_name
 from sim.ensemble.steady import Values, changed, steady_course
@@ -133,6 +135,42 @@ def read(path: Path, scenario: Scenario, planned: Sequence[str] = ()) -> Measure
         for name, (x, _) in result.items()
     ]
     return Measured(path, scenario.contact.kind, conditions, curves, ", ".join(ranges))
+
+
+def with_stated_errors(
+    tables: Sequence[Measured], texts: Sequence[str]
+) -> list[Measured]:
+    """Return tables whose curves without errors have those of texts ``"2 %"``, ``"1 mN"``, ``"contact_area=2 %"``."""
+    unused = dict.fromkeys(texts)
+
+    def stated(curve: Curve) -> Curve:
+        for text in texts if curve.errors is None else ():
+            name, _, size = text.rpartition("=")
+            if name.strip() not in ("", curve.name):
+                continue
+            sizes: dict[str, Array | float] = {"1": np.abs(curve.values)}
+            sizes.setdefault(curve.definition.unit, 1.0)
+            for unit, scale in sizes.items():
+                with contextlib.suppress(ValueError):
+                    error = Quantity(unit, "error", above=0).read(size)
+                    unused.pop(text, None)
+                    return curve._replace(errors=error * scale + 0.0 * curve.values)
+        return curve
+
+    result = [
+        table._replace(curves=tuple(map(stated, table.curves))) for table in tables
+    ]
+    for text in unused:
+        cure = 'write "2 %", a size with the unit of a curve without errors, or one of both as COLUMN=SIZE'
+        raise BadInput([f"--errors {text}: no curve can have such errors; {cure}"])
+    for table in result:
+        for curve in table.curves:
+            if curve.errors is not None and not np.all(curve.errors > 0.0):
+                cause = (
+                    f"{curve.name} has a value of 0, so a relative error is undefined"
+                )
+                raise BadInput([f"{table.path}: {cause}; give it in units"])
+    return result
 
 
 def faults_of(
@@ -413,14 +451,6 @@ def _records(point: Scenario, names: list[str]) -> tuple[Array, Array, Array]:
     return times, speeds[0], np.array(values)
 
 
-try:
-    import lmfit
-except ModuleNotFoundError:
-    raise BadInput(
-        ["fitting needs lmfit: pip install '.[fit]' in the folder of the sources"]
-    ) from None
-
-
 #: Probability of an interval.
 LEVEL = 0.95
 #: Residual of a row at which the contact is open, in standard errors.
@@ -435,19 +465,32 @@ _NO_EFFECT = 1e-6
 _DRAWN = 200
 #: Precision of the ends of an interval, over its half width, that of the sums of squares there, and most steps to one.
 _END, _END_SQUARES, _MOST = 1e-3, 1e-5, 30
+#: Residual of the spring, by which an end is found, at a distance of a standard error; the share of the way to its aim
+#: that may be left, and the factor by which it is made stiffer if more is left.
+_STIFFNESS, _NEAR_AIM, _STIFFER = 10.0, 0.1, 3.0
 #: Rounds in which errors that nobody gave are found.
 _ROUNDS = 4
-#: Distance of a start from the middle between its bounds, over that of a start from a bound.
-_BESIDE = 1e-3
 #: Most evaluations of a minimum, for each number and one more.
 _EVALUATIONS = 100
+#: Spread of a number without information, in large changes of it.
+_UNKNOWN = 1e3
+#: Places at which the sum of squares is tried before a search: binary logarithm of their number, the range of each set
+#: of them over that of the bounds, and the number of the lowest from which a search starts.
+_PLACES, _RANGES, _STARTS = 8, (1.0, 0.25), 16
+#: The same if each prediction is a run.
+_RUN_PLACES, _RUN_RANGES, _RUN_STARTS = 3, (0.1,), 1
+#: Distance from the start within which a number without bounds is tried, in large changes.
+_AROUND = 3.0
+#: Relative precision of places, if that of the sum of squares is not finer.
+_FINEST = 1e-6
+#: Cosine of the least angle at which a search starts.
+_INSIDE = 0.998
 
 
 class Free(NamedTuple):
     """A number of the scenario that is to be found between two bounds; ``start`` is the scenario's own.
 
-    A number of one ``table`` has its name behind the key, as in ``"bonds.stress (wet)"``. A number may also be the
-    ratio of a table's value to that of the number at the place ``base``, or the difference if it is not logarithmic.
+    A number of one ``table`` has its name behind the key, as in ``"bonds.stress (wet)"``.
     """
 
     key: str
@@ -456,7 +499,6 @@ class Free(NamedTuple):
     low: float
     high: float
     table: int = -1
-    base: int = -1
 
     @property
     def name(self) -> str:
@@ -486,16 +528,6 @@ class Free(NamedTuple):
     def outer(self, x: float) -> float:
         return min(max(math.exp(x), self.low), self.high) if self.logarithmic else x
 
-    def related(self, base: float, x: float) -> float:
-        """Return the value that has this ratio or difference to a base."""
-        return base * math.exp(x) if self.logarithmic else base + x
-
-    def room(self, base: "Free", x: float) -> tuple[float, float]:
-        """Return the bounds of a base, as it is fitted, if this ratio or difference is x and both are within theirs."""
-        ends = (self.related(end, -x) for end in (base.low, base.high))
-        low, high = (min(max(end, base.low), base.high) for end in ends)
-        return base.inner(low), base.inner(high)
-
 
 @dataclass(frozen=True)
 class Problem:
@@ -505,7 +537,8 @@ class Problem:
     standard errors, ``estimated`` where nobody gave them. ``shift`` is what the scenario's own models add to
     steady sliding at each of them, and ``noise`` its standard error. ``common`` are relative errors that all points
     of a variable share. ``fixed`` and ``theory`` make another mechanism of the scenario. With ``by_run`` each
-    prediction is a run of the scenario's own models, as steady sliding does not depend on all that is free.
+    prediction is a run of the scenario's own models, as steady sliding does not depend on all that is free. A
+    ``spring`` is one more residual, which draws a quantity to a value.
     """
 
     tables: Sequence[Measured]
@@ -521,6 +554,7 @@ class Problem:
     fixed: Values
     theory: str = ""
     by_run: bool = False
+    spring: Callable[[Array], float] | None = None
 
     @property
     def start(self) -> Array:
@@ -533,6 +567,19 @@ class Problem:
         ends = [(item.inner(item.low), item.inner(item.high)) for item in self.free]
         return ends + [(-math.inf, math.inf)] * len(self.common)
 
+    def limits(self, changes: float) -> tuple[Array, Array]:
+        """Return the bounds, those of numbers without bounds by a number of large changes from the start."""
+        low, high = np.transpose(self.bounds)
+        around = changes * self.widths
+        return np.maximum(low, self.start - around), np.minimum(
+            high, self.start + around
+        )
+
+    @property
+    def widths(self) -> Array:
+        """Return the change of each number that is a large one."""
+        return np.array([item.width for item in self.free] + [1.0] * len(self.common))
+
     def numbers(self, x: Array) -> dict[str, float]:
         """Return the values of the free keys and of those that make the mechanism."""
         return {
@@ -542,19 +589,11 @@ class Problem:
 
     def of_table(self, x: Array, table: int) -> dict[str, float]:
         """Return the values of the keys in a table, and of those that make the mechanism."""
-        numbers = [
-            item.outer(float(value)) for item, value in zip(self.free, x, strict=False)
-        ]
-        for k, item in enumerate(self.free):
-            if item.base >= 0:
-                base = self.free[item.base]
-                numbers[k] = min(
-                    max(item.related(numbers[item.base], float(x[k])), base.low),
-                    base.high,
-                )
-        applied = zip(self.free, numbers, strict=True)
+        applied = zip(self.free, x, strict=False)
         return {
-            item.name: value for item, value in applied if item.table in (-1, table)
+            item.name: item.outer(float(value))
+            for item, value in applied
+            if item.table in (-1, table)
         } | {**self.fixed}
 
     def steady(self, x: Array) -> Array:
@@ -598,15 +637,10 @@ class Problem:
 
     def between(
         self, x: Array, table: int, name: str, rows: NDArray[np.int64]
-    ) -> tuple[Array, Array] | None:
-        """Return speeds between those of rows that differ in nothing else, and their curve in steady sliding.
-
-        There is no curve by runs, or if a row is at rest.
-        """
+    ) -> tuple[Array, Array]:
+        """Return speeds between those of rows that differ in nothing else, and their curve in steady sliding."""
         group, k = self.group(table, rows[0])
         speeds = self.tables[table].conditions["speed"][rows]
-        if self.by_run or not np.min(speeds) > 0.0:
-            return None
         fine = np.geomspace(np.min(speeds), np.max(speeds), _DRAWN)[:, np.newaxis]
         course = group._replace(
             rows=np.arange(_DRAWN), time=group.time[k] + 0.0 * fine, speed=fine
@@ -615,45 +649,37 @@ class Problem:
             course, self.of_table(x, table), [name], self.theory
         )[name]
 
-    def conditions(self) -> dict[str, tuple[Quantity, list[Array]]]:
-        """Return the conditions but time that some table names, by key, with the values at the rows of each table.
+    @property
+    def conditions(self) -> dict[str, Quantity]:
+        """Return the declarations of the conditions but time that some table names, by key."""
+        declared = dict(conditions_of(self.groups[0][0].scenario).values())
+        keys = [key for table in self.tables for key in table.conditions]
+        return {key: declared[key] for key in keys if key != "t"}
 
-        They are nan along a run over time, and those of the scenario if a table does not name the condition.
-        """
-        declared, result = (
-            dict(conditions_of(self.groups[0][0].scenario).values()),
-            dict[str, Any](),
-        )
-        for key in (
-            key for table in self.tables for key in table.conditions if key != "t"
-        ):
-            result[key] = (
-                declared[key],
-                [np.full(table.rows, np.nan) for table in self.tables],
-            )
-            for values, table, groups in zip(
-                result[key][1], self.tables, self.groups, strict=True
-            ):
-                for group in () if "t" in table.conditions else groups:
-                    course, duration = (
-                        group.scenario.contact.course,
-                        group.scenario.clock.duration,
-                    )
-                    of_course = {
-                        "speed": group.speed[:, 0],
-                        "mount": course.at(group.time[:, 0], duration),
-                    }
-                    values[group.rows] = (
-                        of_course[key]
-                        if key in of_course
-                        else quantities(group.scenario)[key][1]
-                    )
-        return result
+    def condition(self, key: str, table: int) -> Array:
+        """Return a condition at the rows of a table, measured or of the scenario; infinity along a run over time."""
+        measured = self.tables[table].conditions
+        if key in measured:
+            return measured[key]
+        (scenario, _, time, speed), *_ = self.groups[table]
+        value = math.inf
+        if "t" not in measured:
+            course, duration = scenario.contact.course, scenario.clock.duration
+            own = {"speed": speed[0, 0], "mount": course.at(time[0], duration)[0]}
+            value = own[key] if key in own else quantities(scenario)[key][1]
+        return np.full(self.tables[table].rows, value)
+
+    @property
+    def curves(self) -> list[tuple[int, str]]:
+        """Return the table and the variable of each curve."""
+        return [
+            (k, name) for k, table in enumerate(self.tables) for name in table.names
+        ]
 
     @property
     def names(self) -> list[str]:
         """Return the names of all curves."""
-        return [name for table in self.tables for name in table.names]
+        return [name for _, name in self.curves]
 
     def of(self, name: str) -> NDArray[np.bool_]:
         """Return True at the numbers of a variable."""
@@ -662,31 +688,39 @@ class Problem:
     def at(self, number: int) -> tuple[int, str, int]:
         """Return the table, the variable and the row of one of all numbers."""
         curve = self.curve[number]
-        table = int(
-            np.repeat(
-                np.arange(len(self.tables)),
-                [len(table.curves) for table in self.tables],
-            )[curve]
-        )
-        return table, self.names[curve], number - int(np.argmax(self.curve == curve))
+        return *self.curves[curve], number - int(np.argmax(self.curve == curve))
 
     def place(self, number: int) -> str:
-        """Return the variable and the row of one of all numbers, for people."""
-        _, name, row = self.at(number)
-        return f"{name}: row {row + 1}"
+        """Return the variable and the row of one of all numbers, and its table if there are several, for people."""
+        table, name, row = self.at(number)
+        stem = f"{self.tables[table].path.stem}, " * (len(self.tables) > 1)
+        return f"{stem}{name}: row {row + 1}"
 
     def group(self, table: int, row: int) -> tuple[Group, int]:
         """Return the group of a row of a table, and the place of the row in the group."""
         group = next(item for item in self.groups[table] if row in item.rows)
         return group, int(np.flatnonzero(group.rows == row)[0])
 
+    def masked(self, x: Array) -> NDArray[np.bool_]:
+        """Return True at the numbers of a contact that is masked in steady sliding; at none if a run predicts them."""
+        name = "work_of_adhesion"
+        result = list[NDArray[np.bool_]]()
+        for k, (table, table_groups) in enumerate(
+            zip(self.tables, self.groups, strict=True)
+        ):
+            works = np.ones(table.rows)
+            for group in () if self.by_run else table_groups:
+                values = by_steady_sliding(group, self.of_table(x, k), [name])
+                works[group.rows] = values[name]
+            result += [works <= 0.0] * len(table.names)
+        return np.concatenate(result)
+
     def residuals(self, x: Array) -> Array:
         """Deviations over errors, and the common errors over their sizes."""
         off = (self.values - self.predicted(x)) / np.hypot(self.sigma, self.noise)
-        return np.append(
-            np.nan_to_num(off, nan=_OPEN, posinf=_OPEN, neginf=-_OPEN),
-            x[len(self.free) :],
-        )
+        off = np.nan_to_num(off, nan=_OPEN, posinf=_OPEN, neginf=-_OPEN)
+        drawn = [] if self.spring is None else [self.spring(x)]
+        return np.concatenate([off, x[len(self.free) :], drawn])
 
     @property
     def freedom(self) -> int:
@@ -757,73 +791,90 @@ def lag(problem: Problem, x: Array) -> str:
 
 
 class Minimum(NamedTuple):
-    """A minimum of the sum of squares, with the covariance of what is free (None where it was not asked for)."""
+    """A minimum of the sum of squares, with the covariance of what is free; ``converged`` if the search ended there."""
 
     x: Array
     chi_square: float
-    covariance: Array | None
+    covariance: Array
     converged: bool
 
 
-def minimum(
-    problem: Problem,
-    start: Array,
-    fixed: dict[int, float] | None = None,
-    errors: bool = False,
-    precision: float = 1e-8,
-) -> Minimum:
-    """The least sum of squares near a start, with some numbers fixed, to a relative precision."""
-    fixed, bounds = dict(fixed or {}), problem.bounds
-    for k, item in enumerate(problem.free):
-        if k in fixed and (base := item.base) >= 0:
-            bounds[base] = low, high = item.room(problem.free[base], fixed[k])
-            if not low < high:
-                fixed[base] = low
-    parameters = lmfit.Parameters()
-    for k, (low, high) in enumerate(bounds):
+def minimum(problem: Problem, start: Array, precision: float = 1e-8) -> Minimum:
+    """Return the least sum of squares near a start, to a relative precision.
+
+    The search is that of Levenberg and Marquardt (MINPACK) for angles, whose cosines are the places between the bounds.
+    An angle of 0 in the middle would make the first steps zero, because they are relative to the angles.
+    """
+    if not len(start):
+        chi_square = float(np.sum(problem.residuals(start) ** 2))
+        return Minimum(start, chi_square, np.empty((0, 0)), True)
+    precision = max(precision, _RUN_PRECISION) if problem.by_run else precision
+    low, high = problem.limits(_UNKNOWN)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+
+    def place(angles: Array) -> Array:
+        return middle - half * np.cos(angles)
+
+    result = optimize.least_squares(
+        lambda angles: problem.residuals(place(angles)),
         # at a bound no step has an effect
-        room = 1e-3 * (high - low) if math.isfinite(high - low) else 0.0
-        if k in fixed:
-            parameters.add(f"p{k}", value=fixed[k], vary=False)
-            continue
-        value = min(max(start[k], low + room), high - room)
-        # in the middle its steps are none
-        if abs(value - 0.5 * (low + high)) < _BESIDE * room:
-            value = 0.5 * (low + high) + _BESIDE * room
-        parameters.add(f"p{k}", value=value, min=low, max=high)
-
-    def numbers(current: Any) -> Array:
-        return np.array([*current.valuesdict().values()])
-
-    if len(fixed) == len(parameters):
-        x = numbers(parameters)
-        return Minimum(x, float(np.sum(problem.residuals(x) ** 2)), None, True)
-    options: dict[str, Any] = {
-        "calc_covar": errors,
-        "scale_covar": False,
-        "max_nfev": _EVALUATIONS * (len(start) + 1),
-    }
-    # steps of the minimizer's own would be lost in the rounding of a run
-    if problem.by_run:
-        varied, precision = (
-            [k for k in range(len(parameters)) if k not in fixed],
-            _RUN_PRECISION,
-        )
-        options["Dfun"] = lambda current: derivatives(problem, numbers(current), varied)
-    minimizer = lmfit.Minimizer(
-        lambda current: problem.residuals(numbers(current)), parameters, **options
+        np.arccos(np.clip((middle - start) / half, -_INSIDE, _INSIDE)),
+        lambda angles: derivatives(problem, place(angles)) * half * np.sin(angles),
+        method="lm",
+        x_scale="jac",
+        ftol=precision,
+        xtol=min(precision, _FINEST),
+        max_nfev=_EVALUATIONS * (len(start) + 1),
     )
-    result = minimizer.leastsq(ftol=precision, xtol=precision)
-    covariance = getattr(result, "covar", None) if errors else None
-    return Minimum(
-        numbers(result.params), float(result.chisqr), covariance, bool(result.success)
-    )
+    x = place(result.x)
+    slopes = derivatives(problem, x)
+    free = np.diag((_UNKNOWN * problem.widths) ** -2.0)
+    covariance = np.asarray(np.linalg.inv(slopes.T @ slopes + free), float)
+    return Minimum(x, 2.0 * result.cost, covariance, result.status > 0)
 
 
-def with_errors(problem: Problem, start: Array) -> tuple[Problem, Minimum]:
-    """The minimum, and the problem with errors of the curves that came without: the scatter around it."""
+def lowest(problem: Problem) -> Minimum:
+    """Return the lowest of the minima near the scenario's own values and near the lowest of many other places.
+
+    The places fill the bounds evenly, and again a part of them around the scenario's own values. The curves have kinks
+    where a contact is masked or opens, so a single search may end beside the minimum.
+    """
+    places = spread(problem)
+    sums = []
+    for place in places:
+        # a run may refuse values that lie far from those of the scenario
+        with contextlib.suppress(BadInput):
+            sums.append((float(np.sum(problem.residuals(place) ** 2)), place))
+    sums.sort(key=lambda item: item[0])
+    minima = [minimum(problem, problem.start)]
+    for _, place in sums[: _RUN_STARTS if problem.by_run else _STARTS]:
+        with contextlib.suppress(BadInput):
+            minima.append(minimum(problem, place))
+    return min(minima, key=lambda item: item.chi_square)
+
+
+def spread(problem: Problem) -> Array:
+    """Return places that fill the bounds of a problem evenly, and a part of the bounds around the start."""
+    if not len(problem.start):
+        return np.empty((0, 0))
+    low, high = problem.limits(_AROUND)
+    count = _RUN_PLACES if problem.by_run else _PLACES
+    ranges = _RUN_RANGES if problem.by_run else _RANGES
+    # scipy has the name rng since 1.15 only
+    sobol = qmc.Sobol(len(low), seed=np.random.default_rng(0))
+    off = qmc.scale(sobol.random_base2(count), low, high) - problem.start
+    return np.concatenate([problem.start + part * off for part in ranges])
+
+
+def with_errors(
+    problem: Problem, start: Array | None = None
+) -> tuple[Problem, Minimum]:
+    """Return the minimum near a start, or the lowest, and the problem with errors of the curves that came without.
+
+    Such an error is the scatter around the fit.
+    """
     for _ in range(_ROUNDS):
-        best = minimum(problem, start, errors=True)
+        best = lowest(problem) if start is None else minimum(problem, start)
         start, off = best.x, problem.values - problem.predicted(best.x)
         if not problem.estimated.any():
             break
@@ -841,9 +892,7 @@ def idle(problem: Problem) -> list[str]:
     if not problem.free:  # as of a mechanism that has none of the keys
         return []
     sizes = np.sqrt(
-        np.sum(
-            derivatives(problem, problem.start, range(len(problem.free))) ** 2, axis=0
-        )
+        np.sum(derivatives(problem, problem.start)[:, : len(problem.free)] ** 2, axis=0)
     )
     least = _NO_EFFECT * math.sqrt(len(problem.values))
     return [
@@ -860,7 +909,7 @@ def entangled(problem: Problem) -> list[list[str]]:
             x + share * (0.5 * (low + high) - x) if math.isfinite(high - low) else x
             for x, (low, high) in zip(problem.start, problem.bounds, strict=True)
         ]
-        columns = derivatives(problem, np.array(inside), range(count))
+        columns = derivatives(problem, np.array(inside))[:, :count]
         _, sizes, rows = np.linalg.svd(
             columns / np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300)
         )
@@ -895,12 +944,11 @@ def refuse_undetermined(problem: Problem) -> None:
         raise BadInput(faults)
 
 
-def derivatives(problem: Problem, x: Array, places: Iterable[int]) -> Array:
-    """Derivatives of the residuals over what is free, a column for each place in it."""
-    columns, share = [], _RUN_STEP if problem.by_run else _STEP
-    for k in places:
-        low, high = problem.bounds[k]
-        step = share * (1.0 if k >= len(problem.free) else problem.free[k].width)
+def derivatives(problem: Problem, x: Array) -> Array:
+    """Return the derivatives of the residuals over what is free, a column for each."""
+    columns = []
+    steps = (_RUN_STEP if problem.by_run else _STEP) * problem.widths
+    for k, ((low, high), step) in enumerate(zip(problem.bounds, steps, strict=True)):
         up, down = x.copy(), x.copy()
         up[k], down[k] = min(x[k] + step, high), max(x[k] - step, low)
         columns.append(
@@ -919,136 +967,102 @@ class Interval(NamedTuple):
 
 
 def interval(problem: Problem, best: Minimum, k: int) -> Interval:
+    """Return the 95 % interval of a free number."""
+    return profile(problem, best, problem.free[k], lambda x: float(x[k]))
+
+
+def slope_of(problem: Problem, x: Array, quantity: Callable[[Array], float]) -> Array:
+    """Return the derivatives of a quantity over what is free."""
+    steps = np.diag(_STEP * problem.widths)
+    rises = [quantity(x + step) - quantity(x - step) for step in steps]
+    return np.array(rises) / (2.0 * np.diag(steps))
+
+
+def profile(
+    problem: Problem, best: Minimum, item: Free, quantity: Callable[[Array], float]
+) -> Interval:
     """Return the interval in which the sum of squares, least over all else, stays below its bound (profile likelihood).
 
-    The ends are computed here because ``lmfit.conf_interval`` has two limits. It returns no interval if a bound ends
-    it, and it widens all intervals by an estimated variance even if the errors are known.
+    Parameters
+    ----------
+    problem, best : Problem, Minimum
+        The fit.
+    item : Free
+        Bounds of the quantity, and its form as it is fitted.
+    quantity : callable
+        The quantity as it is fitted, from what is free.
     """
-    estimated = problem.estimated.any()
     rise = math.sqrt(
         stats.f.ppf(LEVEL, 1, problem.freedom)
-        if estimated
+        if problem.estimated.any()
         else stats.chi2.ppf(LEVEL, 1)
     )
     (low, low_open), (high, high_open) = (
-        _end(problem, best, k, sign, rise) for sign in (-1.0, 1.0)
+        _end(problem, best, quantity, item.inner(bound), rise)
+        for bound in (item.low, item.high)
     )
-    return Interval(
-        problem.free[k].outer(low), problem.free[k].outer(high), low_open, high_open
-    )
+    return Interval(item.outer(low), item.outer(high), low_open, high_open)
 
 
 def _end(
-    problem: Problem, best: Minimum, k: int, sign: float, rise: float
+    problem: Problem,
+    best: Minimum,
+    quantity: Callable[[Array], float],
+    bound: float,
+    rise: float,
 ) -> tuple[float, bool]:
-    """Return one end of an interval, and True if it is only the bound of the number."""
-    assert best.covariance is not None
-    lowest, highest = np.transpose(problem.bounds)
-    bound, spread = (
-        (lowest if sign < 0.0 else highest)[k],
-        math.sqrt(best.covariance[k, k]),
-    )
-    along = best.covariance[:, k] / spread  # where the rest goes with this number
-    base = problem.free[item.base] if (item := problem.free[k]).base >= 0 else None
-    room, near, far, start = abs(bound - best.x[k]), 0.0, rise * spread, best.x
+    """Return the end of an interval on the side of a bound, and True if the bound itself is the end.
+
+    A spring draws the quantity to an aim while all else is fitted. The sum of squares without the spring is then the
+    least one for the value that the quantity has there, so that the stiffness of the spring does not matter.
+    """
+    value = quantity(best.x)
+    room = abs(bound - value)
+    if room == 0.0:
+        return bound, True
+    slope = slope_of(problem, best.x, quantity)
+    variance = float(slope @ best.covariance @ slope)
+    spread = min(math.sqrt(variance), room)
+    along = best.covariance @ slope / variance
+    side, start = math.copysign(1.0, bound - value), best.x
+    stiffness = _STIFFNESS / spread
 
     @functools.cache
     def above(distance: float) -> float:
         """Return the root of the rise of the sum of squares beyond that of the end; 0 where it is near enough."""
-        nonlocal start
-        if distance == 0.0:
-            return -rise
-        number = bound if distance == room else best.x[k] + sign * distance
-        starts = np.array(
-            [start, best.x + along * (number - best.x[k]) / spread, best.x, best.x]
-        )
-        starts[:, k] = number
-        if base:  # in the last start the other value is kept instead of the base
-            other = item.related(base.outer(best.x[item.base]), best.x[k])
-            starts[-1, item.base] = base.inner(
-                min(max(item.related(other, -number), base.low), base.high)
+        nonlocal start, stiffness
+        root, step = 0.0, side * distance
+        guess = np.clip(best.x + along * step, *problem.limits(_UNKNOWN))
+        for _ in range(_MOST if distance else 0):
+
+            def spring(x: Array, stiffness: float = stiffness) -> float:
+                return stiffness * (quantity(x) - value - step)
+
+            drawn = replace(problem, spring=spring)
+            sums = [float(np.sum(drawn.residuals(x) ** 2)) for x in (start, guess)]
+            result = minimum(
+                drawn, start if sums[0] < sums[1] else guess, precision=_END_SQUARES
             )
-        # if the data do not bound a number, the straight way to it leads out of the bounds
-        guesses = [*np.clip(starts, lowest, highest)]
-        if not base:
-            guesses = [
-                min(guesses[:2], key=lambda x: float(np.sum(problem.residuals(x) ** 2)))
-            ]
-        minima = [
-            minimum(problem, guess, {k: number}, precision=_END_SQUARES)
-            for guess in guesses
-        ]
-        result = min(minima, key=lambda item: item.chi_square)
-        root, start = math.sqrt(max(result.chi_square - best.chi_square, 0.0)), result.x
+            start = result.x
+            off = spring(start)
+            root = math.sqrt(max(result.chi_square - off**2 - best.chi_square, 0.0))
+            if root >= rise or abs(off) < _NEAR_AIM * stiffness * distance:
+                break
+            stiffness *= _STIFFER
         return 0.0 if abs(root / rise - 1.0) < _END else root - rise
 
+    far, near = rise * spread, 0.0
     for _ in range(_MOST):
         far = min(far, room)
-        if above(far) >= 0.0:
-            near = optimize.brentq(
-                above, near, far, rtol=_END, maxiter=_MOST, disp=False
-            )
-            return best.x[k] + sign * near, False
+        if (excess := above(far)) >= 0.0:
+            if excess > 0.0:
+                optimize.brentq(above, near, far, rtol=_END, maxiter=_MOST, disp=False)
+            return quantity(start), False
         if far == room:
             return bound, True
         # the root of a parabola is a line
-        near, far = far, far * min(1.1 * rise / max(rise + above(far), 1e-300), 3.0)
+        near, far = far, far * min(1.1 * rise / max(rise + excess, 1e-300), 3.0)
     return math.nan, True
-
-
-def with_one_value(
-    problem: Problem, best: Minimum, places: Sequence[int]
-) -> tuple[Problem, list[Array]]:
-    """Return the problem in which neighbouring numbers, one of each table, are a single one, and starts for it."""
-    first, merged, x = places[0], [*problem.free], best.x
-    merged[first : places[-1] + 1] = [
-        merged[first]._replace(key=merged[first].name, table=-1)
-    ]
-    values = [float(np.mean(x[list(places)])), *x[list(places)]]
-    starts = [
-        np.where(np.isin(np.arange(len(x)), places), value, x) for value in values
-    ]
-    return replace(problem, free=merged), [
-        np.delete(start, places[1:]) for start in starts
-    ]
-
-
-def with_difference(
-    problem: Problem, best: Minimum, k: int, base: int, is_ratio: bool
-) -> tuple[Problem, Minimum]:
-    """Return the problem and its minimum if a number k of a table is fitted by its ratio or difference to another."""
-    item, free, x, slopes = (
-        problem.free[k],
-        [*problem.free],
-        best.x.copy(),
-        np.eye(len(best.x)),
-    )
-    value, reference = item.outer(float(x[k])), item.outer(float(x[base]))
-    table, other = (problem.tables[problem.free[j].table].path.stem for j in (k, base))
-    quantity, start, low, high = (
-        item.quantity,
-        0.0,
-        item.low - item.high,
-        item.high - item.low,
-    )
-    x[k], slopes[k, [k, base]] = (
-        value - reference,
-        (value, -reference) if item.logarithmic else (1.0, -1.0),
-    )
-    if is_ratio:
-        quantity, start, low, high = (
-            Quantity("1", "ratio"),
-            1.0,
-            item.low / item.high,
-            item.high / item.low,
-        )
-        x[k], slopes[k, [k, base]] = math.log(value / reference), (1.0, -1.0)
-    name = f"{item.name} ({table} {'/' if is_ratio else '-'} {other})"
-    free[k] = Free(name, quantity, start, low, high, item.table, base)
-    covariance = (
-        None if best.covariance is None else slopes @ best.covariance @ slopes.T
-    )
-    return replace(problem, free=free), best._replace(x=x, covariance=covariance)
 
 
 def problem_of(

@@ -449,7 +449,7 @@ def _words(scenario: Scenario, table: Measured, row: Measured) -> str:
 
 def covariance_at(problem: Problem, x: Array) -> Array:
     """Return the covariance of what is free at a place, finite for numbers without information, too."""
-    slopes = likelihood.derivatives(problem, x, range(len(x)))
+    slopes = likelihood.derivatives(problem, x)
     widths = [item.width for item in problem.free] + [1.0] * len(problem.common)
     unknown = np.diag((_UNKNOWN * np.array(widths)) ** -2.0)
     return np.asarray(np.linalg.inv(slopes.T @ slopes + unknown), float)

@@ -275,7 +275,7 @@ def test_the_search_of_a_verdict_leaves_the_minimum_of_the_fit_for_a_lower_one(
     expected = planning._Design(problem).expected["fluctuations only"]
     (values,) = itertools.islice(drawn(problem, expected, 103, 0), 102, None)
     data = replace(problem, values=values)
-    best = likelihood.minimum(data, data.start, errors=True)
+    best = likelihood.minimum(data, data.start)
     assert (
         mechanisms.Search(data, [best.x]).exact(values).chi_square
         < best.chi_square - 3.0
@@ -298,7 +298,7 @@ def test_probabilities_are_those_of_the_verdict_over_200_data_sets(
     hits = 0
     for seed, values in enumerate(drawn(problem, design.expected[truth], count, 0)):
         data = replace(problem, values=values)
-        best = likelihood.minimum(data, data.start, errors=True)
+        best = likelihood.minimum(data, data.start)
         hits += mechanisms.compare(data, best, seed).sufficient == truth
     observed = planning.Chance.of(np.arange(count) < hits)
     assert 0.1 < observed.probability < 0.95  # else nothing is tested
@@ -342,9 +342,7 @@ def test_intervals_to_expect_are_those_of_200_fits(
     problem, rows = result.problem, []
     for values in drawn(problem, problem.values, 200, 1):
         data = replace(problem, values=values)
-        data, best = fits._searched(data)
-        if best.covariance is None:
-            best = best._replace(covariance=planning.covariance_at(data, best.x))
+        best = likelihood.lowest(data)
         rows.append([likelihood.interval(data, best, k) for k in range(len(keys))])
     for item, ends in zip(result.numbers, zip(*rows, strict=True), strict=True):
         low, high, *is_open = np.transpose(ends)
