@@ -13,7 +13,7 @@ import itertools
 import json
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -21,13 +21,11 @@ from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
-import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import betaln
 
-from sim.ensemble.dataset import variable_name
 from sim.numerics import files
 from sim.parts.exchange import Array
 from sim.plots import style
@@ -84,15 +82,12 @@ class Estimate(NamedTuple):
         Value and standard error.
     interval : Interval
         Ends ``low`` and ``high`` of the 95 % interval; ``low_open``, ``high_open`` are True if a bound set the end.
-    steady : float
-        Value if steady sliding alone were fitted.
     """
 
     free: Free
     value: float
     error: float
     interval: Interval
-    steady: float
 
     @property
     def texts(self) -> tuple[str, str, str]:
@@ -160,10 +155,8 @@ class Fit(NamedTuple):
         True if the search has ended at a minimum.
     remarks : tuple of str
         Conditions on the numbers, a sentence each.
-    lag : str
-        Lag of the scenario's own run behind steady speeds, "" if it is within the errors.
     differences : tuple of Estimate
-        Ratios and differences of the values per table to those of the first.
+        Ratios of the values per table to those of the first, or differences if a number is not above zero.
     no_difference : dict of str to NoDifference
         For each key with a value per table the test that all tables have one value.
     """
@@ -175,7 +168,6 @@ class Fit(NamedTuple):
     correlations: Array
     converged: bool
     remarks: tuple[str, ...]
-    lag: str = ""
     differences: tuple[Estimate, ...] = ()
     no_difference: Mapping[str, NoDifference] = MappingProxyType({})
 
@@ -316,15 +308,15 @@ def fit(
         problem = replace(problem, by_run=True).compared(problem.start)
     likelihood.refuse_undetermined(problem)
     problem, best = with_errors(problem)
-    alone, steady = best, steady or problem.by_run
+    steady, first = steady or problem.by_run, best
     converged = steady and best.converged
     for _ in range(0 if steady else _RUNS):
         before = best.x
         problem, best = with_errors(problem.compared(best.x), best.x)
         if np.all(np.abs(best.x - before) < _STAYS * np.sqrt(np.diag(best.covariance))):
-            converged = alone.converged and best.converged
+            converged = first.converged and best.converged
             break
-    return _assembled(scenario, problem, best, alone, converged)
+    return _assembled(scenario, problem, best, converged)
 
 
 def conflicts(
@@ -353,13 +345,12 @@ def conflicts(
 
 
 def _assembled(
-    scenario: Scenario, problem: Problem, best: Minimum, alone: Minimum, converged: bool
+    scenario: Scenario, problem: Problem, best: Minimum, converged: bool
 ) -> Fit:
     """Return the fit with its intervals and remarks."""
-    count = len(problem.free)
+    count, places = len(problem.free), np.eye(len(best.x))
     estimates = [
-        _estimate(problem, best, alone, item, lambda x, k=k: float(x[k]))  # type: ignore[misc]
-        for k, item in enumerate(problem.free)
+        _estimate(problem, best, item, places[k]) for k, item in enumerate(problem.free)
     ]
     spread = np.sqrt(np.diag(best.covariance))
     alike = (best.covariance / np.outer(spread, spread))[:count, :count]
@@ -367,64 +358,51 @@ def _assembled(
     split = dict.fromkeys(item.name for item in problem.free if item.table >= 0)
     result = result._replace(
         scenario=scenario.with_values(result.of_table(0) if split else result.values),
-        lag=likelihood.lag(problem, best.x),
         differences=tuple(
-            estimate
-            for key in split
-            for estimate in _between_tables(result, alone, key)
+            estimate for key in split for estimate in _between_tables(result, key)
         ),
         no_difference={key: _no_difference(result, key) for key in split},
     )
     return result._replace(remarks=tuple(_remarks(result)))
 
 
-def _estimate(
-    problem: Problem,
-    best: Minimum,
-    alone: Minimum,
-    item: Free,
-    quantity: Callable[[Array], float],
-) -> Estimate:
-    """Return the estimate of a quantity with bounds, as it is fitted, from all free numbers."""
-    slope = likelihood.slope_of(problem, best.x, quantity)
-    error = math.sqrt(slope @ best.covariance @ slope)
-    value, unshifted = (item.outer(quantity(least.x)) for least in (best, alone))
-    if item.logarithmic:
-        error *= value
-    interval = likelihood.profile(problem, best, item, quantity)
-    return Estimate(item, value, error, interval, unshifted)
+def _estimate(problem: Problem, best: Minimum, item: Free, weights: Array) -> Estimate:
+    """Return the estimate of a quantity that has some weights in all that is free."""
+    value = item.outer(float(weights @ best.x))
+    error = math.sqrt(weights @ best.covariance @ weights)
+    interval = likelihood.profile(problem, best, item, weights)
+    return Estimate(item, value, error * (value if item.logarithmic else 1.0), interval)
 
 
-def _between_tables(result: Fit, alone: Minimum, key: str) -> Iterator[Estimate]:
-    """Yield ratios and differences to the first table; a number that is not fitted in its logarithm has no ratio.
+def _between_tables(result: Fit, key: str) -> Iterator[Estimate]:
+    """Yield the ratios to the first table, or the differences of a number that is not fitted in its logarithm.
 
-    A bound that sets an end of either value's interval sets that of the ratio and of the difference.
+    A bound that sets an end of either value's interval sets that of the ratio or difference.
     """
-    problem = result.problem
+    problem, places = result.problem, np.eye(len(result.best.x))
     first, *rest = (k for k, item in enumerate(problem.free) if item.name == key)
     base = problem.free[first]
-    span = base.high - base.low
+    quantity, start, low, high = (
+        base.quantity,
+        0.0,
+        base.low - base.high,
+        base.high - base.low,
+    )
+    if base.logarithmic:
+        quantity, start = Quantity("1", "ratio"), 1.0
+        low, high = base.low / base.high, base.high / base.low
+    sign = "/" if base.logarithmic else "-"
     stems = [table.path.stem for table in problem.tables]
-    for is_ratio in (True, False) if base.logarithmic else (False,):
-        for k in rest:
-
-            def quantity(x: Array, k: int = k, is_ratio: bool = is_ratio) -> float:
-                if is_ratio:
-                    return float(x[k] - x[first])
-                return base.outer(float(x[k])) - base.outer(float(x[first]))
-
-            sign = "/" if is_ratio else "-"
-            name = f"{key} ({stems[problem.free[k].table]} {sign} {stems[base.table]})"
-            item = Free(name, base.quantity, 0.0, -span, span)
-            if is_ratio:
-                most = base.high / base.low
-                item = Free(name, Quantity("1", "ratio"), 1.0, 1.0 / most, most)
-            estimate = _estimate(problem, result.best, alone, item, quantity)
-            low, high, *is_open = estimate.interval
-            marks = result.numbers[k].interval[2:]
-            others = reversed(result.numbers[first].interval[2:])
-            is_open = [any(ends) for ends in zip(is_open, marks, others, strict=True)]
-            yield estimate._replace(interval=Interval(low, high, *is_open))
+    for k in rest:
+        name = f"{key} ({stems[problem.free[k].table]} {sign} {stems[base.table]})"
+        item = Free(name, quantity, start, low, high)
+        estimate = _estimate(problem, result.best, item, places[k] - places[first])
+        marks = result.numbers[k].interval[2:]
+        others = reversed(result.numbers[first].interval[2:])
+        ends = zip(estimate.interval[2:], marks, others, strict=True)
+        is_open = map(any, ends)
+        interval = Interval(*estimate.interval[:2], *is_open)
+        yield estimate._replace(interval=interval)
 
 
 def _no_difference(result: Fit, key: str) -> NoDifference:
@@ -470,9 +448,6 @@ def _remarks(result: Fit) -> Iterator[str]:
     causes = (
         "the model is incomplete, a fixed key is wrong, or the errors are too small"
     )
-    if result.lag:
-        yield f"{result.lag}; if steady speeds were measured, choose --steady or a slower ramp"
-        causes = "such a lag can explain it"
     if result.p_value <= POOR:
         far = f"the best of several searches misses the data by more than their errors (p = {result.p_value:.2g})"
         yield f"{far}, so the intervals do not hold: {causes}"
@@ -510,7 +485,9 @@ def _unreached(problem: Problem, best: Minimum) -> Iterator[str]:
     off = problem.residuals(best.x)[: len(problem.values)]
     is_far = np.abs(off) > _FAR
     is_open = problem.predicted(best.x) == 0.0
-    masked = problem.masked(best.x) & ~is_open
+    masked = np.zeros_like(is_open)
+    if not problem.by_run:
+        masked = (problem.steady(best.x, "work_of_adhesion") <= 0.0) & ~is_open
     states = {"open": is_open, "masked, so that adhesion holds no area": masked}
     for words, state in states.items():
         if (rows := np.flatnonzero(state & is_far)).size:
@@ -641,7 +618,7 @@ def figure(problem: Problem, best: Minimum) -> Figure:
     joins the rows.
     """
     fitted, alone = problem.predicted(best.x), problem.steady(best.x)
-    off = (problem.values - fitted) / np.hypot(problem.sigma, problem.noise)
+    off = problem.residuals(best.x)
     along = [_along(table) for table in problem.tables]
     conditions, labels = _alike(problem)
     colours = style.shades(len(labels))
@@ -650,51 +627,46 @@ def figure(problem: Problem, best: Minimum) -> Figure:
         panels.setdefault((name, along[table].key), []).append(number)
     with mpl.rc_context(style.STYLE):
         picture, axes = style.rows([_CURVES, _RESIDUALS] * len(panels), shared=False)
-        for ((name, key), numbers), upper, lower in zip(
-            panels.items(), axes[::2], axes[1::2], strict=True
-        ):
+        for k, ((name, key), numbers) in enumerate(panels.items()):
+            upper, lower = axes[2 * k : 2 * k + 2]
             tables = [problem.curves[number][0] for number in numbers]
             every = np.concatenate([along[table].values for table in tables])
             scale, axis = style.axis_scale(every), along[tables[0]]
-            definition = QUANTITIES[name]
             x = Unit.of(every, axis.unit, scale == "log")
+            definition = QUANTITIES[name]
             y = Unit.of(problem.values[problem.of(name)], definition.unit)
-            for number, table, condition in (
-                (number, k, condition)
-                for number, k in zip(numbers, tables, strict=True)
-                for condition in np.unique(conditions[k])
-            ):
+            for number, table in zip(numbers, tables, strict=True):
+                first = np.argmax(problem.curve == number)
                 values = along[table].values
-                rows = np.flatnonzero(conditions[table] == condition)
-                rows = rows[np.argsort(values[rows], kind="stable")]
-                at, over = np.flatnonzero(problem.curve == number)[rows], values[rows]
-                look: Any = {"color": colours[condition]}
-                upper.errorbar(
-                    x.factor * over,
-                    y.factor * problem.values[at],
-                    y.factor * problem.sigma[at],
-                    elinewidth=0.7,
-                    zorder=3,
-                    **HOLLOW,
-                    **look,
-                )
-                lower.plot(x.factor * over, off[at], **HOLLOW, **look)
-                fine, smooth = over, alone[at]
-                if (
-                    key == "speed"
-                    and np.ptp(over)
-                    and not problem.by_run
-                    and over[0] > 0.0
-                ):
-                    fine, smooth = problem.between(best.x, table, name, rows)
-                # what is added to steady sliding is known at the rows
-                line = smooth + np.interp(fine, over, fitted[at] - alone[at])
-                marker = "" if np.ptp(over) else "x"
-                look |= {"marker": marker, "linewidth": 0.9, "zorder": 2}
-                upper.plot(x.factor * fine, y.factor * line, **look)
-            upper.set_ylabel(
-                y.label(f"{definition.meaning.partition(',')[0]} ${definition.symbol}$")
-            )
+                order = np.argsort(values, kind="stable")
+                for condition in np.unique(conditions[table]):
+                    rows = order[conditions[table][order] == condition]
+                    at, over = first + rows, x.factor * values[rows]
+                    measured, errors = (
+                        y.factor * problem.values[at],
+                        y.factor * problem.sigma[at],
+                    )
+                    look: Any = {"color": colours[condition]}
+                    bars = HOLLOW | look | {"elinewidth": 0.7, "zorder": 3}
+                    upper.errorbar(over, measured, errors, **bars)
+                    lower.plot(over, off[at], **HOLLOW, **look)
+                    fine, smooth = values[rows], alone[at]
+                    if (
+                        key == "speed"
+                        and 0.0 < fine[0] < fine[-1]
+                        and not problem.by_run
+                    ):
+                        fine, smooth = problem.between(best.x, table, name, rows)
+                    # what is added to steady sliding is known at the rows
+                    added = np.interp(fine, values[rows], fitted[at] - alone[at])
+                    look |= {
+                        "linewidth": 0.9,
+                        "zorder": 2,
+                        "marker": "" if np.ptp(over) else "x",
+                    }
+                    upper.plot(x.factor * fine, y.factor * (smooth + added), **look)
+            meaning = definition.meaning.partition(",")[0]
+            upper.set_ylabel(y.label(f"{meaning} ${definition.symbol}$"))
             upper.tick_params(labelbottom=False)
             lower.axhline(0.0, **style.GUIDE)
             lower.margins(y=0.15)
@@ -712,14 +684,10 @@ def figure(problem: Problem, best: Minimum) -> Figure:
 
 def _along(table: Measured) -> Along:
     """Return the condition that varies most from row to row; if two do, the speed."""
-    varied = {
-        name: values
-        for name, values in table.conditions.items()
-        if np.ptp(values) > 0.0
-    }
+    varied = {key: x for key, x in table.conditions.items() if np.ptp(x) > 0.0}
     if not varied:
         return Along("", "row", "1", np.arange(1.0, table.rows + 1.0))
-    key = max(varied, key=lambda name: (len(_levels(varied[name])[0]), name == "speed"))
+    key = max(varied, key=lambda key: (len({*_levels(varied[key])}), key == "speed"))
     column, unit, _ = MOUNT[table.mount]
     known = {
         "mount": (column.replace("_", " "), unit),
@@ -729,44 +697,43 @@ def _along(table: Measured) -> Along:
     return Along(key, *known.get(key, (key, "1")), varied[key])
 
 
-def _levels(values: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Return the levels of values in order, and the number of the level of each; those nearly the same are one."""
+def _levels(values: Array) -> Array:
+    """Return values of which those that are nearly the same are replaced by their mean."""
     order = np.argsort(values)
     before, after = values[order[:-1]], values[order[1:]]
     level = np.zeros(len(values), int)
     level[order[1:]] = np.cumsum(after > before + _NEAR * np.abs(before))
-    return np.bincount(level, values) / np.bincount(level), level
+    return (np.bincount(level, values) / np.bincount(level))[level]
 
 
 def _alike(problem: Problem) -> tuple[list[NDArray[np.int64]], list[str]]:
     """Return for each table the numbers of the conditions of its rows beside that along the axis, and their labels."""
-    along = [_along(table) for table in problem.tables]
-    counts = [table.rows for table in problem.tables]
-    numbers, texts = [np.zeros(sum(counts), int)], [[""]]
-    if any(item.table >= 0 for item in problem.free):
-        numbers = [np.repeat(np.arange(len(counts)), counts)]
-        texts = [[table.path.stem for table in problem.tables]]
-    for key, quantity in problem.conditions.items():
-        columns = [
-            np.where(axis.key == key, np.inf, problem.condition(key, k))
-            for k, axis in enumerate(along)
+    places = np.repeat(
+        np.arange(len(problem.tables)), [table.rows for table in problem.tables]
+    )
+    split = any(item.table >= 0 for item in problem.free)
+    columns: dict[str, Any] = {"": places if split else 0.0 * places}
+    declared = problem.conditions
+    for key in declared:
+        values = [
+            np.full(table.rows, np.inf)
+            if _along(table).key == key
+            else problem.condition(key, k)
+            for k, table in enumerate(problem.tables)
         ]
-        means, level = _levels(np.concatenate(columns))
-        name = variable_name(key)
-        described = {"units": quantity.unit, "symbol": quantity.symbol}
-        words = xr.Dataset(coords={name: (name, means[np.isfinite(means)], described)})
-        if words.sizes[name] > 1:
-            numbers.append(level)
-            texts.append(
-                [style.swept_value(words, name, k) for k in range(words.sizes[name])]
-                + [""]
-            )
-    kinds, number = np.unique(numbers, axis=1, return_inverse=True)
-    labels = [
-        ", ".join(filter(None, map(list.__getitem__, texts, column)))
-        for column in kinds.T
-    ]
-    return np.split(number.ravel(), np.cumsum(counts)[:-1]), labels
+        columns[key] = _levels(np.concatenate(values))
+    kinds, number = np.unique([*columns.values()], axis=1, return_inverse=True)
+    labels = []
+    for kind in kinds.T:
+        words = [problem.tables[int(kind[0])].path.stem] * split
+        for (key, quantity), value, all_of_key in zip(
+            declared.items(), kind[1:], kinds[1:], strict=True
+        ):
+            if np.isfinite(value) and np.ptp(all_of_key[np.isfinite(all_of_key)]):
+                sign = f"${quantity.symbol}$" if quantity.unit != "1" else key
+                words.append(f"{sign} = {engineering(value, quantity.unit)}")
+        labels.append(", ".join(words))
+    return [number.ravel()[places == k] for k in range(len(problem.tables))], labels
 
 
 def common_errors(texts: Sequence[str]) -> dict[str, float]:
@@ -861,16 +828,11 @@ def _row(heading: str, item: Estimate) -> dict[str, str]:
 
 def _table(fit: Fit) -> list[dict[str, str]]:
     """Return one row for each estimate."""
-    rows = []
-    for item in fit.numbers:
-        start, alone = (
-            engineering(value, item.free.quantity.unit)
-            for value in (item.free.start, item.steady)
-        )
-        shift = (item.steady - item.value) / item.error
-        alone += f" ({shift:+.1f} errors)" if abs(shift) > 0.05 else ""
-        rows.append(_row("key", item) | {"start": start, "steady sliding alone": alone})
-    return rows
+    return [
+        _row("key", item)
+        | {"start": engineering(item.free.start, item.free.quantity.unit)}
+        for item in fit.numbers
+    ]
 
 
 def _differences(fit: Fit) -> list[dict[str, str]]:
@@ -887,13 +849,10 @@ def _quality(fit: Fit) -> str:
     """Return the chi^2 of the fit and, if it has not converged, the cure."""
     likely = f", p = {fit.p_value:.2g}" if math.isfinite(fit.p_value) else ""
     chi_square = f"chi^2 {fit.best.chi_square:.4g} at {fit.problem.freedom} degrees of freedom{likely}"
-    cure = (
-        "choose --steady or a slower ramp"
-        if fit.lag
-        else "start nearer, give bounds, or free fewer keys"
+    ending = (
+        "\nthe fit has not converged: start nearer, give bounds, or free fewer keys"
     )
-    ending = "" if fit.converged else f"\nthe fit has not converged: {cure}"
-    return f"{chi_square}, AICc {fit.aicc:.4g}{ending}"
+    return f"{chi_square}, AICc {fit.aicc:.4g}" + ending * (not fit.converged)
 
 
 def _comparison(verdict: Verdict) -> list[dict[str, str]]:
@@ -926,7 +885,6 @@ def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[st
                 "standard_error": item.error,
                 **item.interval._asdict(),
                 "start": item.free.start,
-                "steady_sliding_alone": item.steady,
             }
             for item in items
         }

@@ -31,7 +31,6 @@ from sim.quantities import QUANTITIES, Definition
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
 from sim.units.errors import BadInput
-from sim.units.notation import engineering
 from sim.units.quantity import Quantity
 from sim.units.tables import names_of, read_measured
 
@@ -344,46 +343,31 @@ def by_runs(
 ) -> Array:
     """Return means and standard errors by the scenario's own models, with the noise of its seed: (2, names, rows).
 
-    Rows with times are read along the scenario's run, and so are rows with speeds alone if the drive passes through
-    these. Otherwise each row is a run at a steady speed, or of the steady stage, whose second half counts.
-
-    Raises
-    ------
-    BadInput
-        If the run does not reach the speed of a row, or passes it twice.
+    Rows with times are read along the scenario's run. Otherwise each row is a run at its steady speed, or of the steady
+    stage, whose second half counts.
     """
     result = np.empty((2, len(names), sum(len(group.rows) for group in groups)))
     for group in groups:
-        scenario, is_along = (
-            group.scenario.with_values(dict(values) | {"record": {}}),
-            by_time or _by_speed(group),
-        )
-        still = () if is_along else enumerate(group.rows)
-        runs = [(group.rows[[k]], _still(scenario, group, k)) for k, _ in still] or [
-            (group.rows, scenario)
-        ]
+        scenario = group.scenario.with_values(dict(values) | {"record": {}})
+        runs = [(group.rows, scenario)]
+        if not by_time:
+            stills = (_still(scenario, group, k) for k in range(len(group.rows)))
+            runs = list(zip(group.rows[:, np.newaxis], stills, strict=True))
         for rows, point in runs:
-            time, speed, records = _records(point, names)
-            members = records[..., np.newaxis, :, len(time) // 2 :].mean(axis=-1)
-            if is_along:
-                members = _at_rows(group, by_time, time, speed, records)
-            error = members.std(
-                axis=-1, ddof=min(members.shape[-1] - 1, 1)
-            ) / math.sqrt(members.shape[-1])
-            result[..., rows] = members.mean(axis=-1), error
+            time, records = _records(point, names)
+            members = records[..., len(time) // 2 :].mean(axis=-1, keepdims=True)
+            if by_time:
+                at = group.time[:, 0]
+                members = np.array(
+                    [[np.interp(at, time, row) for row in rows] for rows in records]
+                )
+            count = members.shape[1]
+            spread = members.std(axis=1, ddof=min(count - 1, 1))
+            result[..., rows] = members.mean(axis=1), spread / math.sqrt(count)
         if not group.scenario.drive.solves_motion:
-            result[0][:, group.rows] += [
-                *by_steady_sliding(group, values, names).values()
-            ]
+            alone = by_steady_sliding(group, values, names)
+            result[0][:, group.rows] += [*alone.values()]
     return result
-
-
-def _by_speed(group: Group) -> bool:
-    """Return True if a run passes through the speeds of the rows of a group, unless these have times."""
-    drive = group.scenario.drive
-    return not (
-        drive.solves_motion or drive.model == "steady" or group.scenario.contact.changes
-    )
 
 
 def _still(scenario: Scenario, group: Group, row: int) -> Scenario:
@@ -396,38 +380,8 @@ def _still(scenario: Scenario, group: Group, row: int) -> Scenario:
     )
 
 
-def _at_rows(
-    group: Group, by_time: bool, time: Array, speed: Array, records: Array
-) -> Array:
-    """Return values between two records, by the time of a row or by the logarithm of its speed."""
-    along, at = time, group.time[:, 0]
-    if not by_time:
-        with np.errstate(divide="ignore"):
-            along, at = np.log(np.abs(speed)), np.log(np.abs(group.speed[:, 0]))
-    if along[0] > along[-1]:
-        along, at = -along, -at
-    near = 1e-9 * max(1.0, float(np.ptp(along)))
-    if (
-        not np.all(np.diff(along) > 0.0)
-        or at.min() < along[0] - near
-        or at.max() > along[-1] + near
-    ):
-        ends = (np.abs(speed), np.abs(group.speed))
-        run, data = (f"{values.min():.3g} to {values.max():.3g} m/s" for values in ends)
-        cure = 'must pass each speed of the data once; widen it, or fit with [drive] model = "steady"'
-        raise BadInput(
-            [f"drive.speed: the run goes from {run}, the data from {data}; it {cure}"]
-        )
-    return np.array(
-        [
-            np.transpose([np.interp(at, along, member) for member in members])
-            for members in records
-        ]
-    )
-
-
-def _records(point: Scenario, names: list[str]) -> tuple[Array, Array, Array]:
-    """Return times and speeds of the records of a run, and variables, shape (names, members, records).
+def _records(point: Scenario, names: list[str]) -> tuple[Array, Array]:
+    """Return times of the records of a run, and variables, shape (names, members, records).
 
     There is one member if none differ.
 
@@ -448,7 +402,7 @@ def _records(point: Scenario, names: list[str]) -> tuple[Array, Array, Array]:
             members - READ[name](point, alone)[:, 0]
             for name, members in zip(names, values, strict=True)
         ]
-    return times, speeds[0], np.array(values)
+    return times, np.array(values)
 
 
 #: Probability of an interval.
@@ -596,24 +550,17 @@ class Problem:
             if item.table in (-1, table)
         } | {**self.fixed}
 
-    def steady(self, x: Array) -> Array:
-        """Return all curves in steady sliding, or by runs."""
+    def steady(self, x: Array, only: str = "") -> Array:
+        """Return all curves in steady sliding, or by runs; or one variable at the rows of all curves."""
         if self.by_run:
             return self.sampled(x)[0]
         result = []
-        for k, (table, table_groups) in enumerate(
-            zip(self.tables, self.groups, strict=True)
-        ):
-            numbers, columns = (
-                self.of_table(x, k),
-                np.empty((len(table.curves), table.rows)),
-            )
-            for group in table_groups:
-                columns[:, group.rows] = [
-                    *by_steady_sliding(
-                        group, numbers, table.names, self.theory
-                    ).values()
-                ]
+        for k, (table, groups) in enumerate(zip(self.tables, self.groups, strict=True)):
+            names = [only] * len(table.curves) if only else table.names
+            numbers, columns = self.of_table(x, k), np.empty((len(names), table.rows))
+            for group in groups:
+                values = by_steady_sliding(group, numbers, names, self.theory)
+                columns[:, group.rows] = [values[name] for name in names]
             result.append(columns.ravel())
         return np.concatenate(result)
 
@@ -701,20 +648,6 @@ class Problem:
         group = next(item for item in self.groups[table] if row in item.rows)
         return group, int(np.flatnonzero(group.rows == row)[0])
 
-    def masked(self, x: Array) -> NDArray[np.bool_]:
-        """Return True at the numbers of a contact that is masked in steady sliding; at none if a run predicts them."""
-        name = "work_of_adhesion"
-        result = list[NDArray[np.bool_]]()
-        for k, (table, table_groups) in enumerate(
-            zip(self.tables, self.groups, strict=True)
-        ):
-            works = np.ones(table.rows)
-            for group in () if self.by_run else table_groups:
-                values = by_steady_sliding(group, self.of_table(x, k), [name])
-                works[group.rows] = values[name]
-            result += [works <= 0.0] * len(table.names)
-        return np.concatenate(result)
-
     def residuals(self, x: Array) -> Array:
         """Deviations over errors, and the common errors over their sizes."""
         off = (self.values - self.predicted(x)) / np.hypot(self.sigma, self.noise)
@@ -748,46 +681,6 @@ class Problem:
                 ]
             )
         return replace(self, shift=mean - self.steady(x), noise=noise)
-
-
-def lag(problem: Problem, x: Array) -> str:
-    """Return the lag of a run that passes the speeds of rows, in words, "" if it is within the errors.
-
-    It is that where the run adds most to steady sliding, from a run at this speed: fluctuations add to it as well.
-    """
-    passing = [
-        number
-        for number, (table, _, row) in enumerate(
-            map(problem.at, range(len(problem.values)))
-        )
-        if "t" not in problem.tables[table].conditions
-        and _by_speed(problem.group(table, row)[0])
-    ]
-    if not passing:
-        return ""
-    ramp = problem.steady(x) + problem.shift
-    added = np.abs(ramp - replace(problem, by_run=False).steady(x)) / np.hypot(
-        problem.sigma, problem.noise
-    )
-    number = max(passing, key=added.__getitem__)
-    if added[number] <= 1.0:
-        return ""
-    table, name, row = problem.at(number)
-    group, k = problem.group(table, row)
-    alone = Group(
-        _still(group.scenario, group, k),
-        np.zeros(1, int),
-        group.time[[k]],
-        group.speed[[k]],
-    )
-    mean, noise = by_runs([alone], problem.of_table(x, table), [name], False)[:, 0, 0]
-    off = ramp[number] - mean
-    error = math.hypot(problem.sigma[number], 2.0 * noise, 2.0 * problem.noise[number])
-    if mean == 0.0 or not abs(off) > error:
-        return ""
-    side = f"{abs(100.0 * off / mean):.2g} % {'above' if off / mean > 0.0 else 'below'} that of a steady speed"
-    at_speed = f"at {engineering(float(group.speed[k, 0]), 'm/s')} its {name} is {side}"
-    return f"the run lags: {at_speed}, {abs(off) / problem.sigma[number]:.2g} errors of the point"
 
 
 class Minimum(NamedTuple):
@@ -901,27 +794,23 @@ def idle(problem: Problem) -> list[str]:
 
 
 def entangled(problem: Problem) -> list[list[str]]:
-    """Sets of free keys that the curves depend on only together, as on their product."""
-    count, spaces = len(problem.free), []
-    # off the bounds, and what holds at two places is no accident of one
-    for share in (0.05, 0.16):
-        inside = [
-            x + share * (0.5 * (low + high) - x) if math.isfinite(high - low) else x
-            for x, (low, high) in zip(problem.start, problem.bounds, strict=True)
-        ]
-        columns = derivatives(problem, np.array(inside))[:, :count]
-        _, sizes, rows = np.linalg.svd(
-            columns / np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300)
-        )
+    """Return sets of free keys that the curves depend on only together, as on their product."""
+    start, count = problem.start, len(problem.free)
+    middle = np.mean(problem.limits(_AROUND), axis=0)
+    for share in (0.05, 0.16):  # what holds at two places is no accident of one
+        columns = derivatives(problem, start + share * (middle - start))[:, :count]
+        norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        _, sizes, rows = np.linalg.svd(columns / norms)
         nothing = (_RUN_NOTHING if problem.by_run else _NOTHING) * sizes[0]
-        spaces.append(
-            [rows[k] for k in range(count) if k >= len(sizes) or sizes[k] < nothing]
-        )
-    if not all(spaces):
-        return []
+        if not np.any(sizes < nothing):
+            return []
     return [
-        [problem.free[k].key for k in range(count) if abs(row[k]) > 0.1]
-        for row in spaces[0]
+        [
+            item.key
+            for item, part in zip(problem.free, row, strict=True)
+            if abs(part) > 0.1
+        ]
+        for row in rows[sizes < nothing]
     ]
 
 
@@ -968,19 +857,10 @@ class Interval(NamedTuple):
 
 def interval(problem: Problem, best: Minimum, k: int) -> Interval:
     """Return the 95 % interval of a free number."""
-    return profile(problem, best, problem.free[k], lambda x: float(x[k]))
+    return profile(problem, best, problem.free[k], np.eye(len(best.x))[k])
 
 
-def slope_of(problem: Problem, x: Array, quantity: Callable[[Array], float]) -> Array:
-    """Return the derivatives of a quantity over what is free."""
-    steps = np.diag(_STEP * problem.widths)
-    rises = [quantity(x + step) - quantity(x - step) for step in steps]
-    return np.array(rises) / (2.0 * np.diag(steps))
-
-
-def profile(
-    problem: Problem, best: Minimum, item: Free, quantity: Callable[[Array], float]
-) -> Interval:
+def profile(problem: Problem, best: Minimum, item: Free, weights: Array) -> Interval:
     """Return the interval in which the sum of squares, least over all else, stays below its bound (profile likelihood).
 
     Parameters
@@ -988,9 +868,9 @@ def profile(
     problem, best : Problem, Minimum
         The fit.
     item : Free
-        Bounds of the quantity, and its form as it is fitted.
-    quantity : callable
-        The quantity as it is fitted, from what is free.
+        The quantity, with its bounds.
+    weights : array
+        Weights of all that is free, as it is fitted, in the quantity, as it is fitted.
     """
     rise = math.sqrt(
         stats.f.ppf(LEVEL, 1, problem.freedom)
@@ -998,7 +878,7 @@ def profile(
         else stats.chi2.ppf(LEVEL, 1)
     )
     (low, low_open), (high, high_open) = (
-        _end(problem, best, quantity, item.inner(bound), rise)
+        _end(problem, best, weights, item.inner(bound), rise)
         for bound in (item.low, item.high)
     )
     return Interval(item.outer(low), item.outer(high), low_open, high_open)
@@ -1007,7 +887,7 @@ def profile(
 def _end(
     problem: Problem,
     best: Minimum,
-    quantity: Callable[[Array], float],
+    weights: Array,
     bound: float,
     rise: float,
 ) -> tuple[float, bool]:
@@ -1016,14 +896,13 @@ def _end(
     A spring draws the quantity to an aim while all else is fitted. The sum of squares without the spring is then the
     least one for the value that the quantity has there, so that the stiffness of the spring does not matter.
     """
-    value = quantity(best.x)
+    value = float(weights @ best.x)
     room = abs(bound - value)
     if room == 0.0:
         return bound, True
-    slope = slope_of(problem, best.x, quantity)
-    variance = float(slope @ best.covariance @ slope)
+    variance = float(weights @ best.covariance @ weights)
     spread = min(math.sqrt(variance), room)
-    along = best.covariance @ slope / variance
+    along = best.covariance @ weights / variance
     side, start = math.copysign(1.0, bound - value), best.x
     stiffness = _STIFFNESS / spread
 
@@ -1036,7 +915,7 @@ def _end(
         for _ in range(_MOST if distance else 0):
 
             def spring(x: Array, stiffness: float = stiffness) -> float:
-                return stiffness * (quantity(x) - value - step)
+                return stiffness * (float(weights @ x) - value - step)
 
             drawn = replace(problem, spring=spring)
             sums = [float(np.sum(drawn.residuals(x) ** 2)) for x in (start, guess)]
@@ -1057,7 +936,7 @@ def _end(
         if (excess := above(far)) >= 0.0:
             if excess > 0.0:
                 optimize.brentq(above, near, far, rtol=_END, maxiter=_MOST, disp=False)
-            return quantity(start), False
+            return float(weights @ start), False
         if far == room:
             return bound, True
         # the root of a parabola is a line

@@ -400,17 +400,6 @@ def test_jkrs_loads_fit_the_work_and_times_are_read_along_a_run_whose_edge_may_l
             0.01,
             rtol=1e-6,
         )
-    far = table(
-        tmp_path / "far.csv",
-        {"speed [m/s]": [1e-4, 1.0]},
-        {"contact_area": np.full(2, 4e-8)},
-        0.001,
-    )
-    with pytest.raises(
-        BadInput,
-        match=r"drive.speed: the run goes from 1e-05 to 0.05 m/s, the data from 0.0001 to 1",
-    ):
-        fit(start, [far], ["bonds.critical_speed"])
     scene = load(
         LENS
         | {
@@ -443,7 +432,7 @@ def test_jkrs_loads_fit_the_work_and_times_are_read_along_a_run_whose_edge_may_l
     assert_allclose([*found.values.values()], [42e-3, 1e-5], rtol=1e-4)
 
 
-def test_a_ramp_that_lags_behind_points_of_steady_speeds_is_named_with_its_size_and_the_cure(
+def test_points_of_steady_speeds_are_compared_with_steady_sliding_even_if_the_scenario_is_a_ramp_that_lags(
     tmp_path,
 ):
     rate = {
@@ -452,59 +441,35 @@ def test_a_ramp_that_lags_behind_points_of_steady_speeds_is_named_with_its_size_
         "rebinding_rate": 15.0,
         "stress": 2e5,
     }
-    ramp = {"model": "ramp", "from": 1e-5, "to": 2e-2}
-    fast = load(
+    ramp = load(
         LENS
         | {
             "clock": {"duration": "1 s", "step": "1 ms"},
-            "drive": ramp,
+            "drive": {"model": "ramp", "from": 1e-5, "to": 2e-2},
             "bonds": rate,
             "shear": {"model": "uniform"},
         }
     )
-    slow = fast.with_values({"clock.duration": 2000.0, "clock.step": 1.0})
     speeds = np.array([1e-3, 3e-3, 1e-2])
-    force = [
-        float(sim.run(fast.with_values({"drive": {"speed": v}})).friction_force[-1])
-        for v in speeds
-    ]
+    runs = [sim.run(ramp.with_values({"drive": {"speed": v}})) for v in speeds]
+    force = np.array([float(run.friction_force[-1]) for run in runs])
+    # on the ramp itself the bonds lag by more than the errors
+    passing = sim.run(ramp)
+    lag = np.interp(speeds, passing.speed, passing.friction_force) / force - 1.0
+    assert np.max(np.abs(lag)) > 0.03
+    curve = {"friction_force": force}
+    path = table(tmp_path / "steady.csv", {"speed [m/s]": speeds}, curve, 0.01)
+    start = ramp.with_values({"bonds.critical_speed": 4e-3})
+    result = fit(start, [path], ["bonds.critical_speed"])
+    assert_allclose(result.values["bonds.critical_speed"], 5e-3, rtol=1e-5)
     path = table(
-        tmp_path / "steady.csv",
-        {"speed [m/s]": speeds},
-        {"friction_force": np.array(force)},
+        tmp_path / "ramp.csv",
+        {"t [s]": passing.t[100::300].values},
+        {"friction_force": passing.friction_force[100::300].values},
         0.01,
     )
-    result = fit(fast, [path], ["bonds.critical_speed"])
-    values = {
-        "bonds.critical_speed": result.values["bonds.critical_speed"],
-        "clock.step": 1e-4,
-    }
-    passing = sim.run(fast.with_values(values))
-    (remark,) = (
-        text for text in result.remarks if result.lag and text.startswith(result.lag)
-    )
-    speed, share, errors = map(
-        float,
-        re.search(
-            r"at (\d+) mm/s .* is (\S+) % above .*, (\S+) errors", remark
-        ).groups(),
-    )
-    still = sim.run(
-        fast.with_values(values | {"drive": {"speed": 1e-3 * speed}})
-    ).friction_force[-1]
-    ratio = np.interp(1e-3 * speed, passing.speed, passing.friction_force) / float(
-        still
-    )
-    # two digits; the clock step of 1 ms is 1.5 % of the bonds' memory
-    assert_allclose(
-        [share, errors], [100.0 * (ratio - 1.0), (ratio - 1.0) / 0.01], rtol=0.1
-    )
-    assert 1e-3 * speed in speeds and share > 3.0 and "--steady" in remark
-    for cure in (repr(result._replace(converged=False)), *result.remarks):
-        assert "fewer keys" not in cure and "the model is incomplete" not in cure
-    for scene, steady in ((fast, True), (slow, False)):
-        result = fit(scene, [path], ["bonds.critical_speed"], steady=steady)
-        assert not result.lag and "fewer keys" in repr(result._replace(converged=False))
+    result = fit(start, [path], ["bonds.critical_speed"])
+    assert_allclose(result.values["bonds.critical_speed"], 5e-3, rtol=1e-3)
 
 
 #: A body behind a spring on bonds whose stress is constant, and a stage that is suddenly faster.
@@ -612,10 +577,11 @@ def test_a_driven_slider_is_fitted_to_force_and_stage_and_members_shift_the_fit_
         tmp_path / "lens.csv", {"speed [m/s]": SPEEDS}, noisy(truth, 0.002, 6), 0.002
     )
     found = fit(scene, [path], ["shear.spectrum.rms", "bonds.stress"])
+    alone = fit(scene, [path], ["shear.spectrum.rms", "bonds.stress"], steady=True)
     (rms, _), noise = found.numbers, found.problem.noise
     assert (
         found.converged
-        and abs(rms.value - rms.steady) > rms.error
+        and abs(rms.value - alone.values[rms.free.key]) > rms.error
         and np.all(noise[6:9] > 0.0)
     )
     mean, error = likelihood.by_runs(
@@ -1177,13 +1143,9 @@ def test_tables_without_noise_give_their_exact_ratios_and_keys_all_per_table_giv
     )
     tables = condition_tables(scene, THREE, 0.01, 1, 0.0)
     result = fit(start, tables, ["bonds.stress"], steady=True, per_table=[SPEED])
-    wet, oil, by_wet, by_oil = result.differences
-    assert [item.free.key for item in (wet, by_oil)] == [
-        f"{SPEED} (wet / dry)",
-        f"{SPEED} (oil - dry)",
-    ]
-    assert_allclose([wet.value, oil.value, by_wet.value], [1.5, 1.0, 5e-3], rtol=1e-5)
-    assert abs(by_oil.value) < 1e-5 * by_oil.error
+    wet, oil = result.differences
+    assert wet.free.key == f"{SPEED} (wet / dry)"
+    assert_allclose([wet.value, oil.value], [1.5, 1.0], rtol=1e-5)
     assert (
         result.no_difference[SPEED].freedom == 2
         and result.no_difference[SPEED].p_value < 1e-9
@@ -1243,37 +1205,25 @@ def test_intervals_and_p_of_a_force_proportional_to_a_stress_per_table_follow_fr
         bound = wet + 0.5 * of_wet
     law = stats.f(1, 2 * len(SPEEDS) - 2) if is_bare else stats.chi2(1)
 
-    def above(slope, offset):  # the value of wet is slope times that of dry plus offset
+    def above(slope):  # the value of wet is slope times that of dry
         weights = np.array([1.0 / of_dry**2, slope**2 / of_wet**2])
-        value = min(
-            np.average([dry, (wet - offset) / slope], weights=weights),
-            bound,
-            (bound - offset) / slope,
-        )
-        return (
-            ((value - dry) / of_dry) ** 2
-            + ((slope * value + offset - wet) / of_wet) ** 2
-            - law.ppf(0.95)
-        )
+        value = np.average([dry, wet / slope], weights=weights)
+        value = min(value, bound, bound / slope)
+        off = (value - dry) / of_dry, (slope * value - wet) / of_wet
+        return np.sum(np.square(off)) - law.ppf(0.95)
 
     text = f"bonds.stress=1 kPa:{bound:.17g}" if case == "bound" else "bonds.stress"
     result = fit(scene, tables, [], steady=True, per_table=[text])
     both = math.hypot(of_dry, of_wet)
-    for item, best, of in zip(
-        result.differences, (wet / dry, wet - dry), (both / dry, both), strict=True
-    ):
-        assert_allclose(item.value, best, rtol=0, atol=1e-4 * of)
-        root = (
-            (lambda x: above(x, 0.0))
-            if item.free.quantity.unit == "1"
-            else (lambda x: above(1.0, x))
-        )
-        ends = [
-            optimize.brentq(root, best, best + sign * 9.0 * of) for sign in (-1.0, 1.0)
-        ]
-        # a thousandth of the half width is promised
-        assert_allclose(item.interval[:2], ends, rtol=0, atol=3e-3 * of)
-        assert item.interval[2:] == (False, case == "bound")
+    (item,) = result.differences
+    best, of = wet / dry, both / dry
+    assert_allclose(item.value, best, rtol=0, atol=1e-4 * of)
+    ends = [
+        optimize.brentq(above, best, best + sign * 9.0 * of) for sign in (-1.0, 1.0)
+    ]
+    # a thousandth of the half width is promised
+    assert_allclose(item.interval[:2], ends, rtol=0, atol=3e-3 * of)
+    assert item.interval[2:] == (False, case == "bound")
     test = result.no_difference["bonds.stress"]
     assert_allclose(test.chi_square, (wet - dry) ** 2 / both**2, rtol=1e-4)
     assert_allclose(test.p_value, law.sf(test.chi_square), rtol=1e-12)
@@ -1299,20 +1249,17 @@ def test_differences_of_values_at_a_bound_agree_with_their_chi_square_and_mark_t
     tables = condition_tables(load(LENS), changes, 0.02, seed)
     for order in (tables, tables[::-1]):
         result = fit(load(LENS), order, [SPEED], steady=True, per_table=[key])
-        (of_ratio, of_difference), test = (
-            (item.interval for item in result.differences),
-            result.no_difference[key],
-        )
+        (ratio,), test = result.differences, result.no_difference[key]
+        of_ratio = ratio.interval
         assert (test.chi_square > stats.chi2.ppf(0.95, 1)) == is_excluded
         assert test.is_limit
         assert (of_ratio.low < 1.0 < of_ratio.high) != is_excluded
-        assert (of_difference.low < 0.0 < of_difference.high) != is_excluded
         base, other = (item.interval for item in result.numbers[1:])
         assert [base.low_open, other.low_open] == [
             not (is_excluded and order is tables),
             not (is_excluded and order is not tables),
         ]
-        assert of_ratio[2:] == of_difference[2:] == (other.low_open, base.low_open)
+        assert of_ratio[2:] == (other.low_open, base.low_open)
         # a value at its bound has no effect, so the other one is free within its own interval, but for a correlation
         assert not base.low_open or of_ratio.high > 0.5 * other.high / base.low
         assert not other.low_open or of_ratio.low < 2.0 * other.low / base.high
