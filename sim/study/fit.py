@@ -24,7 +24,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy import stats
-from scipy.special import betaln
 
 from sim.numerics import files
 from sim.parts.exchange import Array
@@ -497,50 +496,24 @@ def _unreached(problem: Problem, best: Minimum) -> Iterator[str]:
 
 
 def _one_sided(problem: Problem, best: Minimum) -> Iterator[str]:
-    """Yield a remark if residuals of one sign follow each other more often than by chance (Wald and Wolfowitz 1940).
+    """Yield a remark if neighbouring residuals have one sign more often than by chance (an exact test of runs).
 
-    Points of a curve follow each other along the condition that varies most, under the same other conditions.
+    Points of a curve are neighbours along the condition that varies most, under the same other conditions. Independent
+    errors change their sign from point to point with a probability of one half, and after a fit more often.
     """
-    off = problem.residuals(best.x)
+    is_above = problem.residuals(best.x)[: len(problem.values)] > 0.0
     conditions, _ = _alike(problem)
-    count, expected, probabilities = 0, 0.0, np.ones(1)
+    changes = []
     for number, (table, _) in enumerate(problem.curves):
         order = np.lexsort((_along(problem.tables[table]).values, conditions[table]))
-        signs = off[np.flatnonzero(problem.curve == number)[order]] > 0.0
-        law = runs_of(int(np.sum(signs)), int(np.sum(~signs)))
-        count += 1 + int(np.sum(signs[1:] != signs[:-1]))
-        expected += float(law @ np.arange(len(law)))
-        probabilities = np.convolve(probabilities, law)
-    p_value = float(np.sum(probabilities[: count + 1]))
+        signs = is_above[problem.curve == number][order]
+        changes += [*(signs[1:] != signs[:-1])]
+    p_value = stats.binom.cdf(sum(changes), len(changes), 0.5)
     if p_value <= POOR:
-        runs = f"residuals of one sign form {count} runs, by chance {expected:.3g} (p = {p_value:.2g})"
-        yield (
-            f"{runs}: errors of neighbouring points are correlated, or the curves have another form, so the intervals "
-            "are too narrow"
-        )
-
-
-def runs_of(above: int, below: int) -> Array:
-    """Return the exact probabilities of 0, 1, 2, … runs of one sign in a random order of residuals of two signs.
-
-    >>> runs_of(2, 2).round(3).tolist()
-    [0.0, 0.0, 0.333, 0.333, 0.333]
-    """
-    if not above or not below:
-        return np.array([0.0, 1.0])
-    runs = np.arange(above + below + 1)
-    more, less = (runs + 1) // 2, runs // 2
-    ways = [
-        _log_choose(above - 1, first - 1) + _log_choose(below - 1, second - 1)
-        for first, second in ((more, less), (less, more))
-    ]
-    total = _log_choose(above + below, np.array(above))
-    return np.asarray(np.sum(np.exp(np.array(ways) - total), axis=0), float)
-
-
-def _log_choose(count: int, chosen: NDArray[np.int64]) -> Array:
-    """Return the logarithm of a binomial coefficient, minus infinity for one that is 0."""
-    return np.asarray(-np.log(count + 1.0) - betaln(count - chosen + 1.0, chosen + 1.0))
+        kept = f"{len(changes) - sum(changes)} of {len(changes)}"
+        words = f"residuals keep their sign from point to point {kept} times (p = {p_value:.2g})"
+        cause = "errors of neighbouring points are correlated, or the curves have another form"
+        yield f"{words}: {cause}, so the intervals are too narrow"
 
 
 def free_number(scenario: Scenario, text: str, option: str = "--free") -> Free:

@@ -261,6 +261,241 @@ def test_intervals_hold_the_truth_in_95_of_100_fits(
     assert np.all((held >= least) & (held <= most)), held
 
 
+#: A lens whose contacts are masked at high speeds, its first guess, and what made the curves.
+LENS_AT_REST = {
+    "clock": {"duration": "1 s", "step": "10 ms"},
+    "solid": {"shear_modulus": "1.6 MPa"},
+    "sphere": {"radius": "2 mm"},
+    "adhesion": {"work": "42 mJ/m^2"},
+    "contact": {"load": "4 mN"},
+    "drive": {"model": "steady", "speed": "1 mm/s"},
+    "bonds": {"model": "steady", "critical_speed": "3 mm/s", "stress": "0.1 MPa"},
+    "shear": {
+        "model": "mean",
+        "spectrum": {"model": "gaussian", "rms": "50 kPa", "length": "10 um"},
+    },
+}
+MADE_BY = {"bonds.critical_speed": 5e-3, "bonds.stress": 0.25e6}
+MASKED_BY = MADE_BY | {"shear.spectrum.rms": 80e3}
+DOCUMENTED = Path(__file__).parents[2] / "scenarios"
+
+
+def problem_with(scene, tables, truth, per_table=(), common=None):
+    """Return the problem of free keys with the values that the truth predicts, and the place of the truth."""
+    scene = load(scene).with_values({"record": {}})
+    read = [
+        table if isinstance(table, Measured) else likelihood.read(table, scene)
+        for table in tables
+    ]
+    free, place = [], []
+    for key, value in truth.items():
+        item = calibration.free_number(scene, key)
+        if key in per_table:
+            for k, table in enumerate(read):
+                name = f"{key} ({table.path.stem})"
+                free.append(item._replace(key=name, table=k))
+                place.append(math.log(value[k]))
+        else:
+            free.append(item)
+            place.append(math.log(value))
+    problem = problem_of(scene, read, free, common or {})
+    place = np.append(place, np.zeros(len(problem.common)))
+    return replace(problem, values=problem.predicted(place)), place
+
+
+def of_the_lens():
+    """Areas with errors of 1 % and forces with errors of 2 % at speeds up to that of masking."""
+    scene = load(LENS_AT_REST)
+    speeds = np.geomspace(5e-5, 1e-2, 12)
+    exact = {
+        curve.name: curve.values
+        for curve in drawn_of(scene.with_values(MASKED_BY), 0.0, 0, speeds).curves
+    }
+    sizes = {"contact_area": 0.01, "friction_force": 0.02}
+    curves = [Curve(n, v, sizes[n] * v) for n, v in exact.items()]
+    return Measured(Path("lens.csv"), "load", {"speed": speeds}, tuple(curves))
+
+
+def documented(kind):
+    """Return a problem of the kinds of the documentation, and the place that makes its values."""
+    lens = DOCUMENTED / "measured_lens.toml"
+    dry, wet = (DOCUMENTED / f"measured_lens{end}.csv" for end in ("", "_wet"))
+    made_by = {"bonds.critical_speed": 7e-3, "bonds.stress": 0.25e6}
+    both = made_by | {"bonds.critical_speed": (7e-3, 10.5e-3)}
+    return {
+        "masked": lambda: problem_with(LENS_AT_REST, [of_the_lens()], MASKED_BY),
+        "common": lambda: problem_with(
+            LENS_AT_REST, [of_the_lens()], MASKED_BY, common={"contact_area": 0.02}
+        ),
+        "two keys": lambda: problem_with(lens, [dry], made_by),
+        "three keys": lambda: problem_with(
+            lens, [dry], {"adhesion.work": 42e-3} | made_by
+        ),
+        "per table": lambda: problem_with(
+            lens, [dry, wet], both, ["bonds.critical_speed"]
+        ),
+        "jkr": lambda: problem_with(
+            DOCUMENTED / "jkr_fit.toml",
+            [DOCUMENTED / "jkr_fit.csv"],
+            {"adhesion.work": 45e-3, "solid.youngs_modulus": 1.5e6},
+        ),
+    }[kind]()
+
+
+def drawn_from(problem, count, seed):
+    """Yield a problem with random errors, for each of some data sets."""
+    draws = mechanisms.draws_of(problem, problem.values, np.random.default_rng(seed))
+    for values in itertools.islice(draws, count):
+        yield replace(problem, values=values)
+
+
+@pytest.mark.parametrize(
+    ("kind", "count"),
+    [
+        ("common", 3),
+        *(
+            pytest.param(kind, count, marks=pytest.mark.verify)
+            for kind, count in {
+                "masked": 250,
+                "common": 250,
+                "two keys": 125,
+                "three keys": 125,
+                "per table": 125,
+                "jkr": 125,
+            }.items()
+        ),
+    ],
+)
+def test_no_fit_ends_above_the_lowest_of_many_starts_and_one_at_the_truth(kind, count):
+    problem, truth = documented(kind)
+    starts = 200 if count > 10 else 20
+    low, high = problem.limits(3.0)
+    rng, single = np.random.default_rng(2), 0
+    for data in drawn_from(problem, count, 1):
+        best = likelihood.lowest(data).chi_square
+        assert best <= minimum(data, truth).chi_square + 0.1
+        single += minimum(data, data.start).chi_square > best + 0.1
+        for start in rng.uniform(low, high, (starts, len(low))):
+            # a search of one in a thousand is enough to be 0.1 below
+            assert best <= minimum(data, start, precision=1e-3).chi_square + 0.1
+    # the search from the first guess alone does not do
+    assert single > 0 or kind not in ("common", "masked")
+
+
+def test_stated_errors_are_those_of_an_error_column_and_only_of_curves_without_one(
+    tmp_path, truth
+):
+    scene, free, drawn = load(LENS), ["bonds.stress"], noisy(truth, 0.02, 3)
+    speeds = {"speed [m/s]": SPEEDS}
+    bare = table(tmp_path / "bare.csv", speeds, drawn)
+    known = table(tmp_path / "known.csv", speeds, drawn, 0.02)
+
+    def errors_of(path, *texts):
+        problem = fit(scene, [path], free, steady=True, errors=texts).problem
+        return problem.sigma, problem.estimated
+
+    sigma, estimated = errors_of(known)
+    stated, is_scatter = errors_of(bare, "2 %")
+    assert_allclose(stated, sigma, rtol=1e-12)
+    assert not np.any(is_scatter) and not np.any(estimated)
+    sigma, estimated = errors_of(bare, "0.3 mN")
+    assert_allclose(sigma[len(SPEEDS) :], 0.3e-3, rtol=1e-12)
+    # the area has no error in newtons
+    assert np.all(estimated[: len(SPEEDS)]) and not np.any(estimated[len(SPEEDS) :])
+    sigma, _ = errors_of(bare, "friction_force=0.3 mN", "1 %")
+    assert_allclose(sigma[: len(SPEEDS)], 0.01 * drawn["contact_area"], rtol=1e-10)
+    for text, cure in (
+        ("2 kPa", "no curve can have such errors"),
+        ("-2 %", "no curve can have such errors"),
+        ("contact_radius=2 %", "no curve can have such errors"),
+    ):
+        with pytest.raises(BadInput, match=cure):
+            errors_of(bare, text)
+    with pytest.raises(BadInput, match="no curve can have such errors"):
+        errors_of(known, "2 %")
+    drawn["friction_force"][0] = 0.0
+    with pytest.raises(BadInput, match="value of 0"):
+        errors_of(table(tmp_path / "zero.csv", speeds, drawn), "2 %")
+    result = sim.fit(LENS, bare, free, steady=True)
+    (remark,) = (text for text in result.remarks if "equal absolute errors" in text)
+    assert "--errors" in remark and "µm²" in remark and "µN" in remark
+    assert not sim.fit(LENS, bare, free, steady=True, errors="2 %").remarks
+
+
+def test_correlated_errors_are_named_and_independent_ones_are_not():
+    problem, truth = documented("masked")
+    best = likelihood.Minimum(truth, 0.0, np.eye(len(truth)), True)
+    rng, count, size = np.random.default_rng(8), 400, len(problem.values)
+    named = {0.0: 0, 0.9: 0}
+    for memory in named:
+        for _ in range(count):
+            noise = rng.standard_normal(size)
+            for k in range(1, size):  # each curve begins anew
+                if problem.curve[k] == problem.curve[k - 1]:
+                    fresh = math.sqrt(1.0 - memory**2) * noise[k]
+                    noise[k] = memory * noise[k - 1] + fresh
+            data = replace(problem, values=problem.values + problem.sigma * noise)
+            named[memory] += len([*calibration._one_sided(data, best)])
+    # discrete numbers are at most as often rare as the level says
+    assert named[0.0] <= stats.binom.ppf(0.9995, count, calibration.POOR)
+    # signs change with a probability of arccos(0.9) / pi, 3.2 times in 22, so by Markov's inequality 7 times, which are
+    # not rare, in less than half of the sets
+    assert named[0.9] > 0.5 * count
+
+
+def test_points_that_the_best_curve_does_not_reach_are_counted_and_named(tmp_path):
+    loads = np.array([-3e-4, -2e-4, 0.0, 1e-3, 2e-3])
+    radii = sim.laws.jkr.radius_at_load(loads, 60e-3, 2e-3, 6.4e6)
+    conditions, curve = {"normal_load [N]": loads}, {"contact_radius": radii}
+    path = table(tmp_path / "pulled.csv", conditions, curve, 0.01)
+    # JKR's pull-off load is 3/2 pi w R
+    for most, count in ((20e-3, 2), (26e-3, 1), (70e-3, 0)):
+        key = f"adhesion.work=1 mJ/m^2:{most} J/m^2"
+        scene = still().with_values({"adhesion.work": 15e-3})
+        remarks = fit(scene, [path], [key], steady=True).remarks
+        named = [text for text in remarks if "does not reach" in text]
+        assert len(named) == min(count, 1)
+        if named:
+            assert f"reach {count} points" in named[0] and "row 1" in named[0]
+            assert "open" in named[0] and ("row 2" in named[0]) == (count > 1)
+    problem, truth = documented("masked")
+    at = problem.tables[0].conditions["speed"]
+    best = likelihood.Minimum(truth, 0.0, np.eye(len(truth)), True)
+    assert not [*calibration._unreached(problem, best)]
+    slower = truth + np.array([-1.5, 0.0, 0.0])  # bonds break at lower speeds
+    (remark,) = calibration._unreached(problem, best._replace(x=slower))
+    masked = problem.steady(slower, "work_of_adhesion") <= 0.0
+    far = masked & (np.abs(problem.residuals(slower)) > 3.0)
+    assert 0 < np.sum(far) < len(far) and at[far[: len(at)]].min() > at[0]
+    assert f"reach {np.sum(far)} points" in remark and "masked" in remark
+
+
+def test_a_fit_shows_its_intervals_as_text_in_a_notebook_and_by_the_names_of_its_keys(
+    curves,
+):
+    result = sim.fit(LENS, curves, ["bonds.stress", "bonds.critical_speed"])
+    (item, _), key = result.numbers, "bonds.stress"
+    assert result.intervals[key] == item.interval[:2]
+    assert (result.values[key], result.errors[key]) == (item.value, item.error)
+    value, interval, unit = item.texts
+    page = result._repr_html_()
+    assert re.search(r"<th>value \(standard error\)</th>\s*<th>95% interval</th>", page)
+    for text in (value, interval):
+        assert f">{text} {unit}<" in page
+    assert f"{key} = {value}, {interval} {unit}\n" in repr(result)
+    assert "intervals" in repr(result) and "chi^2" in page
+    # a bracket is a standard error, and none is given if a bound ends the interval
+    opened = item._replace(interval=item.interval._replace(low_open=True))
+    value, interval, _ = opened.texts
+    assert "(" not in value and interval.startswith("below ")
+    for low_open, high_open, words in (
+        (False, True, "above "),
+        (True, True, "not set"),
+    ):
+        ends = item.interval._replace(low_open=low_open, high_open=high_open)
+        assert item._replace(interval=ends).texts[1].startswith(words)
+
+
 def test_the_critical_speed_and_stress_of_bells_bonds_are_fitted_as_they_are_given(
     tmp_path,
 ):
@@ -1067,6 +1302,8 @@ def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unaske
         tmp_path / f"lens_fit.{ending}" for ending in ("toml", "json", "png")
     ]
     assert result.output.rstrip().endswith("\n".join(map(str, outputs)))
+    headings = " ".join(result.output.split("---")[0].split())
+    assert all(word in headings for word in ("value (standard", "error)", "95%"))
     numbers, fitted = (
         json.loads(document.read_text(encoding="utf-8")),
         quantities(load(toml)),
