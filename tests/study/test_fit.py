@@ -382,6 +382,62 @@ def test_no_fit_ends_above_the_lowest_of_many_starts_and_one_at_the_truth(kind, 
     assert single > 0 or kind not in ("common", "masked")
 
 
+#: Faults of a fit: what made the curves but is fixed at another value in the fit, and errors that are too small.
+FAULTS = {
+    "another work": ({"adhesion.work": 40e-3}, 1.0),
+    "another waviness": ({"shear.spectrum.length": 13e-6}, 1.0),
+    "too small errors": ({}, 1.25),
+}
+
+
+@pytest.mark.parametrize(
+    ("fault", "count"),
+    [
+        ("another work", 3),
+        *(pytest.param(fault, 100, marks=pytest.mark.verify) for fault in FAULTS),
+    ],
+)
+def test_a_model_is_blamed_if_and_only_if_no_start_reaches_the_errors(fault, count):
+    changes, noise = FAULTS[fault]
+    scene, table = load(LENS_AT_REST), of_the_lens()
+    speeds = table.conditions["speed"]
+    exact = drawn_of(scene.with_values(MASKED_BY | changes), 0.0, 0, speeds).curves
+    problem, truth = documented("masked")
+    rng, blamed = np.random.default_rng(4), 0
+    low, high = problem.limits(3.0)
+    for _ in range(count):
+        curves = tuple(
+            Curve(name, values + noise * error * rng.standard_normal(12), error)
+            for (name, values, _), (*_, error) in zip(exact, table.curves, strict=True)
+        )
+        result = fit(scene, [table._replace(curves=curves)], MASKED_BY, steady=True)
+        data = replace(problem, values=result.problem.values)
+        starts = [truth, *rng.uniform(low, high, (30, len(low)))]
+        least = min(minimum(data, start).chi_square for start in starts)
+        assert result.best.chi_square <= least + 0.1
+        least = min(least, result.best.chi_square)
+        is_poor = stats.chi2.sf(least, problem.freedom) <= calibration.POOR
+        is_blamed = any("misses the data" in text for text in result.remarks)
+        assert is_blamed == is_poor
+        blamed += is_blamed
+    assert count < 10 or blamed > 0
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("kind", ["masked", "two keys", "jkr"])
+def test_intervals_of_documented_fits_hold_the_truth_in_93_to_97_of_100(kind):
+    problem, truth = documented(kind)
+    rows = []
+    for data in drawn_from(problem, 1000, 5000):
+        best = likelihood.minimum(data, truth)
+        ends = [likelihood.interval(data, best, k) for k in range(len(problem.free))]
+        values = [item.outer(x) for item, x in zip(problem.free, truth, strict=True)]
+        pairs = zip(ends, values, strict=True)
+        rows.append([end.low <= value <= end.high for end, value in pairs])
+    held = np.mean(rows, axis=0)
+    assert np.all((held >= 0.93) & (held <= 0.97)), held
+
+
 def test_stated_errors_are_those_of_an_error_column_and_only_of_curves_without_one(
     tmp_path, truth
 ):
