@@ -54,6 +54,8 @@ from sim.units.quantity import Quantity, read_option
 
 #: Factor by which a number that is fitted in its logarithm may change at most, where no bounds are given.
 _WIDE = 1e4
+#: Change of another number without bounds at most, over its size.
+_AROUND = 10.0
 #: Most runs of the scenario's own models, and the change of every number, over its error, that ends them.
 _RUNS, _STAYS = 3, 0.1
 #: Correlation beyond which the data hardly separate two keys.
@@ -242,8 +244,7 @@ class Fit(NamedTuple):
     def scenarios(self) -> dict[str, Scenario]:
         """The scenario of each table by its name, with its values and with the conditions of all its rows."""
         values = {
-            table.path.stem: self.of_table(k)
-            for k, table in enumerate(self.problem.tables)
+            table.stem: self.of_table(k) for k, table in enumerate(self.problem.tables)
         }
         return {
             name: self.scenario.with_values(numbers) for name, numbers in values.items()
@@ -295,7 +296,7 @@ def fit(
         raise BadInput(faults)
     places = itertools.product(split, enumerate(tables))
     split = [
-        item._replace(key=f"{item.key} ({table.path.stem})", table=k)
+        item._replace(key=f"{item.key} ({table.stem})", table=k)
         for item, (k, table) in places
     ]
     problem = likelihood.problem_of(base, tables, shared + split, common or {})
@@ -327,7 +328,7 @@ def conflicts(
     """Yield the faults of free keys and tables that do not go together."""
     keys, names = (
         [item.key for item in (*shared, *split)],
-        [table.path.stem.lower() for table in tables],
+        [table.stem.lower() for table in tables],
     )
     for key in {key: None for key in keys if keys.count(key) > 1}:
         yield f"--free{' or --per-table' * bool(split)}: {key} is there twice; give each key once"
@@ -391,7 +392,7 @@ def _between_tables(result: Fit, key: str) -> Iterator[Estimate]:
         quantity, start = Quantity("1", "ratio"), 1.0
         low, high = base.low / base.high, base.high / base.low
     sign = "/" if base.logarithmic else "-"
-    stems = [table.path.stem for table in problem.tables]
+    stems = [table.stem for table in problem.tables]
     for k in rest:
         name = f"{key} ({stems[problem.free[k].table]} {sign} {stems[base.table]})"
         item = Free(name, quantity, start, low, high)
@@ -427,49 +428,30 @@ def _no_difference(result: Fit, key: str) -> NoDifference:
 
 def _remarks(result: Fit) -> Iterator[str]:
     """Yield remarks on what the data do not determine and where the fit is poor."""
-    problem, fitted = result.problem, np.abs(result.problem.predicted(result.best.x))
-    for i, item in enumerate(result.numbers):
-        for other, correlation in zip(
-            result.numbers[:i], result.correlations[i], strict=False
-        ):
-            if abs(correlation) > _ALIKE:
-                pair = f"{other.free.key} and {item.free.key}"
-                yield f"the data hardly separate {pair} (correlation {correlation:.3f})"
-        low, high, *open_ends = item.interval
-        for word, end, is_open in zip(
-            ("lower", "upper"), (low, high), open_ends, strict=True
-        ):
-            if math.isnan(end):
-                yield f"{item.free.key}: the {word} end of its interval could not be computed"
-            elif is_open:
-                bound = engineering(end, item.free.quantity.unit)
-                yield f"{item.free.key}: the data do not set the {word} end of its interval; its bound is {bound}"
-    causes = (
-        "the model is incomplete, a fixed key is wrong, or the errors are too small"
-    )
+    problem, fitted = result.problem, result.problem.predicted(result.best.x)
+    numbers = enumerate(result.numbers)
+    for (i, item), (k, other) in itertools.combinations(numbers, 2):
+        if abs(correlation := result.correlations[i, k]) > _ALIKE:
+            pair = f"{item.free.key} and {other.free.key}"
+            yield f"the data hardly separate {pair} (correlation {correlation:.3f})"
     if result.p_value <= POOR:
         far = f"the best of several searches misses the data by more than their errors (p = {result.p_value:.2g})"
+        causes = (
+            "the model is incomplete, a fixed key is wrong, or the errors are too small"
+        )
         yield f"{far}, so the intervals do not hold: {causes}"
     yield from _unreached(problem, result.best)
     yield from _one_sided(problem, result.best)
     for number, name in enumerate(problem.names):
         here = problem.curve == number
-        size, least = (
-            float(np.median(np.abs(problem.values[here]))),
-            float(np.median(fitted[here])),
-        )
-        if (
-            min(size, least) > 0.0
-            and not 1.0 / _OTHER_UNIT < size / least < _OTHER_UNIT
-        ):
+        size, least = np.median(np.abs([problem.values[here], fitted[here]]), axis=1)
+        if size and least and abs(math.log(size / least)) > math.log(_OTHER_UNIT):
             yield f"{name} is {size / least:.2g} times what is fitted: check its unit, and those of the scenario"
     if problem.estimated.any():
-        numbers = np.unique(problem.curve[problem.estimated])
         sizes = [
-            f"{problem.names[number]} {engineering(size, unit)}"
-            for number in numbers
-            for size in problem.sigma[problem.curve == number][:1]
-            for unit in [QUANTITIES[problem.names[number]].unit]
+            f"{name} {engineering(problem.sigma[here][0], QUANTITIES[name].unit)}"
+            for number, name in enumerate(problem.names)
+            if np.all(problem.estimated[here := problem.curve == number])
         ]
         yield (
             "curves without errors: equal absolute errors along each curve are assumed, of the size of the scatter "
@@ -553,6 +535,8 @@ def free_number(scenario: Scenario, text: str, option: str = "--free") -> Free:
         )
     elif low >= 0.0 and math.isinf(high):
         low, high = start / _WIDE, start * _WIDE
+    elif math.isinf(high - low):
+        low, high = start - _AROUND * abs(start), start + _AROUND * abs(start)
     elif low == quantity.above and low == 0.0:
         low = high / _WIDE**2
     if not low <= start <= high or low == high:
@@ -686,22 +670,24 @@ def _alike(problem: Problem) -> tuple[list[NDArray[np.int64]], list[str]]:
     )
     split = any(item.table >= 0 for item in problem.free)
     columns: dict[str, Any] = {"": places if split else 0.0 * places}
-    declared = problem.conditions
-    for key in declared:
+    declared = dict(likelihood.conditions_of(problem.groups[0][0].scenario).values())
+    others = {key for table in problem.tables for key in table.conditions} - {"t"}
+    for key in sorted(others):
         values = [
             np.full(table.rows, np.inf)
             if _along(table).key == key
-            else problem.condition(key, k)
-            for k, table in enumerate(problem.tables)
+            else table.conditions.get(key, np.full(table.rows, np.inf))
+            for table in problem.tables
         ]
         columns[key] = _levels(np.concatenate(values))
     kinds, number = np.unique([*columns.values()], axis=1, return_inverse=True)
     labels = []
     for kind in kinds.T:
-        words = [problem.tables[int(kind[0])].path.stem] * split
-        for (key, quantity), value, all_of_key in zip(
-            declared.items(), kind[1:], kinds[1:], strict=True
+        words = [problem.tables[int(kind[0])].stem] * split
+        for key, value, all_of_key in zip(
+            sorted(others), kind[1:], kinds[1:], strict=True
         ):
+            quantity = declared[key]
             if np.isfinite(value) and np.ptp(all_of_key[np.isfinite(all_of_key)]):
                 sign = f"${quantity.symbol}$" if quantity.unit != "1" else key
                 words.append(f"{sign} = {engineering(value, quantity.unit)}")
@@ -777,8 +763,7 @@ def carried_out(
         with files.output(path) as beside:
             beside.write_bytes(text.encode())
     style.save(picture, outputs[-1])
-    sources = [f"{table.path}: {table.rows} rows, {table.ranges}" for table in tables]
-    below = "\n".join(["", _quality(result), *result.remarks, *sources, ""])
+    below = "\n".join(["", _quality(result), *result.remarks, ""])
     shown: list[Printed] = [(_table(result), below)]
     if result.differences:
         shown.append((_differences(result), ""))

@@ -13,7 +13,7 @@ import contextlib
 import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,7 +27,7 @@ from sim.ensemble.steady import Values, changed, steady_course
 from sim.ensemble.variables import READ, VARIABLES
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.parts.exchange import Array
-from sim.quantities import QUANTITIES, Definition
+from sim.quantities import QUANTITIES
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
 from sim.units.errors import BadInput
@@ -60,25 +60,24 @@ class Curve(NamedTuple):
     values: Array
     errors: Array | None
 
-    @property
-    def definition(self) -> Definition:
-        """The row of the variable in the registry of quantities."""
-        return QUANTITIES[self.name]
-
 
 class Measured(NamedTuple):
     """One table: under which conditions which curves were measured.
 
     ``conditions`` holds the columns ``"t"``, ``"speed"``, ``"mount"`` (load, indentation or displacement) and those of
     other keys of the scenario. Rows have the same numbers in all columns. ``mount`` is the key of the contact that
-    holds the sphere. ``ranges`` names the range of each column, for people.
+    holds the sphere.
     """
 
     path: Path
     mount: str
     conditions: dict[str, Array]
     curves: tuple[Curve, ...]
-    ranges: str = ""
+
+    @property
+    def stem(self) -> str:
+        """Return the name of the table, which is that of its file."""
+        return self.path.stem
 
     @property
     def rows(self) -> int:
@@ -129,46 +128,36 @@ def read(path: Path, scenario: Scenario, planned: Sequence[str] = ()) -> Measure
     curves = curves or tuple(Curve(name, unknown, None) for name in planned)
     for fault in faults_of(scenario, conditions, curves):
         raise BadInput([f"{path}: {fault}"])
-    ranges = [
-        f"{name} {np.min(x):.4g} to {np.max(x):.4g} {known[name].unit}"
-        for name, (x, _) in result.items()
-    ]
-    return Measured(path, scenario.contact.kind, conditions, curves, ", ".join(ranges))
+    return Measured(path, scenario.contact.kind, conditions, curves)
 
 
 def with_stated_errors(
     tables: Sequence[Measured], texts: Sequence[str]
 ) -> list[Measured]:
     """Return tables whose curves without errors have those of texts ``"2 %"``, ``"1 mN"``, ``"contact_area=2 %"``."""
-    unused = dict.fromkeys(texts)
-
-    def stated(curve: Curve) -> Curve:
-        for text in texts if curve.errors is None else ():
-            name, _, size = text.rpartition("=")
-            if name.strip() not in ("", curve.name):
-                continue
-            sizes: dict[str, Array | float] = {"1": np.abs(curve.values)}
-            sizes.setdefault(curve.definition.unit, 1.0)
-            for unit, scale in sizes.items():
+    unused, result = dict.fromkeys(texts), []
+    for table in tables:
+        curves = []
+        for curve in table.curves:
+            for text in texts if curve.errors is None else ():
+                name, _, size = text.rpartition("=")
+                is_share = size.endswith("%")
+                unit = "1" if is_share else QUANTITIES[curve.name].unit
+                if name not in ("", curve.name):
+                    continue
                 with contextlib.suppress(ValueError):
                     error = Quantity(unit, "error", above=0).read(size)
+                    scale = np.abs(curve.values) if is_share else np.ones(table.rows)
+                    curve = curve._replace(errors=error * scale)
                     unused.pop(text, None)
-                    return curve._replace(errors=error * scale + 0.0 * curve.values)
-        return curve
-
-    result = [
-        table._replace(curves=tuple(map(stated, table.curves))) for table in tables
-    ]
+            if curve.errors is not None and not np.all(curve.errors):
+                cause = f"{table.path}: {curve.name} has a value of 0"
+                raise BadInput([f"{cause}; give --errors in its unit"])
+            curves.append(curve)
+        result.append(table._replace(curves=tuple(curves)))
     for text in unused:
         cure = 'write "2 %", a size with the unit of a curve without errors, or one of both as COLUMN=SIZE'
         raise BadInput([f"--errors {text}: no curve can have such errors; {cure}"])
-    for table in result:
-        for curve in table.curves:
-            if curve.errors is not None and not np.all(curve.errors > 0.0):
-                cause = (
-                    f"{curve.name} has a value of 0, so a relative error is undefined"
-                )
-                raise BadInput([f"{table.path}: {cause}; give it in units"])
     return result
 
 
@@ -263,10 +252,10 @@ def groups(scenario: Scenario, table: Measured) -> list[Group]:
         for key, values in table.conditions.items()
         if key not in ("t", "speed", "mount")
     }
-    columns = np.array([*keyed.values()]).reshape(len(keyed), table.rows)
+    columns = np.array([np.zeros(table.rows), *keyed.values()])
     result = []
-    for place in np.unique(columns, axis=1, return_index=True)[1] if keyed else [0]:
-        rows = np.flatnonzero(np.all(columns == columns[:, place : place + 1], axis=0))
+    for place in np.unique(columns, axis=1, return_index=True)[1]:
+        rows = np.flatnonzero(np.all(columns == columns[:, [place]], axis=0))
         try:
             item = scenario.with_values(
                 {key: float(values[place]) for key, values in keyed.items()},
@@ -430,11 +419,15 @@ _EVALUATIONS = 100
 _UNKNOWN = 1e3
 #: Places at which the sum of squares is tried before a search: binary logarithm of their number, the range of each set
 #: of them over that of the bounds, and the number of the lowest from which a search starts.
-_PLACES, _RANGES, _STARTS = 8, (1.0, 0.25), 16
+_PLACES, _RANGES, _STARTS = 8, (1.0, 0.25), 8
 #: The same if each prediction is a run.
 _RUN_PLACES, _RUN_RANGES, _RUN_STARTS = 3, (0.1,), 1
-#: Distance from the start within which a number without bounds is tried, in large changes.
-_AROUND = 3.0
+#: Bound of an error that all points share, over its size.
+_MOST_COMMON = 5.0
+#: Places that are tried around a minimum, their distances from it in standard errors, and searches from the lowest.
+_AROUND, _DISTANCES, _BEHIND = 128, (1.0, 4.0), 4
+#: Relative precision of the sums of squares among which the lowest is chosen.
+_COARSE = 1e-3
 #: Relative precision of places, if that of the sum of squares is not finer.
 _FINEST = 1e-6
 #: Cosine of the least angle at which a search starts.
@@ -465,15 +458,8 @@ class Free(NamedTuple):
 
     @property
     def width(self) -> float:
-        """Change of the number as it is fitted that is a large one: an e-fold, its range, or its size without one."""
-        if self.logarithmic:
-            return 1.0
-        return max(
-            self.high - self.low
-            if math.isfinite(self.high - self.low)
-            else abs(self.start),
-            1e-300,
-        )
+        """Change of the number as it is fitted that is a large one: an e-fold, or its range."""
+        return 1.0 if self.logarithmic else self.high - self.low
 
     def inner(self, value: float) -> float:
         """The number as it is fitted."""
@@ -505,7 +491,7 @@ class Problem:
     estimated: NDArray[np.bool_]
     shift: Array
     noise: Array
-    fixed: Values
+    fixed: Values = field(default_factory=dict)
     theory: str = ""
     by_run: bool = False
     spring: Callable[[Array], float] | None = None
@@ -519,15 +505,7 @@ class Problem:
     @property
     def bounds(self) -> list[tuple[float, float]]:
         ends = [(item.inner(item.low), item.inner(item.high)) for item in self.free]
-        return ends + [(-math.inf, math.inf)] * len(self.common)
-
-    def limits(self, changes: float) -> tuple[Array, Array]:
-        """Return the bounds, those of numbers without bounds by a number of large changes from the start."""
-        low, high = np.transpose(self.bounds)
-        around = changes * self.widths
-        return np.maximum(low, self.start - around), np.minimum(
-            high, self.start + around
-        )
+        return ends + [(-_MOST_COMMON, _MOST_COMMON)] * len(self.common)
 
     @property
     def widths(self) -> Array:
@@ -586,35 +564,13 @@ class Problem:
         self, x: Array, table: int, name: str, rows: NDArray[np.int64]
     ) -> tuple[Array, Array]:
         """Return speeds between those of rows that differ in nothing else, and their curve in steady sliding."""
-        group, k = self.group(table, rows[0])
+        group = next(item for item in self.groups[table] if rows[0] in item.rows)
         speeds = self.tables[table].conditions["speed"][rows]
         fine = np.geomspace(np.min(speeds), np.max(speeds), _DRAWN)[:, np.newaxis]
-        course = group._replace(
-            rows=np.arange(_DRAWN), time=group.time[k] + 0.0 * fine, speed=fine
-        )
-        return fine[:, 0], by_steady_sliding(
-            course, self.of_table(x, table), [name], self.theory
-        )[name]
-
-    @property
-    def conditions(self) -> dict[str, Quantity]:
-        """Return the declarations of the conditions but time that some table names, by key."""
-        declared = dict(conditions_of(self.groups[0][0].scenario).values())
-        keys = [key for table in self.tables for key in table.conditions]
-        return {key: declared[key] for key in keys if key != "t"}
-
-    def condition(self, key: str, table: int) -> Array:
-        """Return a condition at the rows of a table, measured or of the scenario; infinity along a run over time."""
-        measured = self.tables[table].conditions
-        if key in measured:
-            return measured[key]
-        (scenario, _, time, speed), *_ = self.groups[table]
-        value = math.inf
-        if "t" not in measured:
-            course, duration = scenario.contact.course, scenario.clock.duration
-            own = {"speed": speed[0, 0], "mount": course.at(time[0], duration)[0]}
-            value = own[key] if key in own else quantities(scenario)[key][1]
-        return np.full(self.tables[table].rows, value)
+        time = group.time[group.rows == rows[0]] + 0.0 * fine
+        course = group._replace(time=time, speed=fine)
+        values = self.of_table(x, table)
+        return fine[:, 0], by_steady_sliding(course, values, [name], self.theory)[name]
 
     @property
     def curves(self) -> list[tuple[int, str]]:
@@ -632,21 +588,12 @@ class Problem:
         """Return True at the numbers of a variable."""
         return np.array(self.names)[self.curve] == name
 
-    def at(self, number: int) -> tuple[int, str, int]:
-        """Return the table, the variable and the row of one of all numbers."""
-        curve = self.curve[number]
-        return *self.curves[curve], number - int(np.argmax(self.curve == curve))
-
     def place(self, number: int) -> str:
         """Return the variable and the row of one of all numbers, and its table if there are several, for people."""
-        table, name, row = self.at(number)
-        stem = f"{self.tables[table].path.stem}, " * (len(self.tables) > 1)
-        return f"{stem}{name}: row {row + 1}"
-
-    def group(self, table: int, row: int) -> tuple[Group, int]:
-        """Return the group of a row of a table, and the place of the row in the group."""
-        group = next(item for item in self.groups[table] if row in item.rows)
-        return group, int(np.flatnonzero(group.rows == row)[0])
+        table, name = self.curves[self.curve[number]]
+        row = number - int(np.argmax(self.curve == self.curve[number])) + 1
+        stem = f"{self.tables[table].stem}, " * (len(self.tables) > 1)
+        return f"{stem}{name}: row {row}"
 
     def residuals(self, x: Array) -> Array:
         """Deviations over errors, and the common errors over their sizes."""
@@ -663,13 +610,11 @@ class Problem:
     def criterion(self, chi_square: float) -> float:
         """Akaike's criterion for few points, AICc."""
         count = len(self.free) + len({*self.curve[self.estimated].tolist()})
-        size = (
-            chi_square
-            + 2.0 * float(np.sum(np.log(self.sigma[self.estimated])))
-            + 2.0 * count
-        )
         left = len(self.values) - count - 1
-        return size + 2.0 * count * (count + 1) / left if left > 0 else math.inf
+        if left <= 0:
+            return math.inf
+        size = chi_square + 2.0 * float(np.sum(np.log(self.sigma[self.estimated])))
+        return size + 2.0 * count * (1.0 + (count + 1) / left)
 
     def compared(self, x: Array) -> "Problem":
         """Return this problem with the shift from steady sliding at x to the scenario's own models there."""
@@ -702,7 +647,7 @@ def minimum(problem: Problem, start: Array, precision: float = 1e-8) -> Minimum:
         chi_square = float(np.sum(problem.residuals(start) ** 2))
         return Minimum(start, chi_square, np.empty((0, 0)), True)
     precision = max(precision, _RUN_PRECISION) if problem.by_run else precision
-    low, high = problem.limits(_UNKNOWN)
+    low, high = np.transpose(problem.bounds)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
 
     def place(angles: Array) -> Array:
@@ -712,9 +657,10 @@ def minimum(problem: Problem, start: Array, precision: float = 1e-8) -> Minimum:
         lambda angles: problem.residuals(place(angles)),
         # at a bound no step has an effect
         np.arccos(np.clip((middle - start) / half, -_INSIDE, _INSIDE)),
-        lambda angles: derivatives(problem, place(angles)) * half * np.sin(angles),
         method="lm",
         x_scale="jac",
+        # a run is known to the tolerance of its steps alone
+        diff_step=_RUN_STEP if problem.by_run else None,
         ftol=precision,
         xtol=min(precision, _FINEST),
         max_nfev=_EVALUATIONS * (len(start) + 1),
@@ -732,25 +678,50 @@ def lowest(problem: Problem) -> Minimum:
     The places fill the bounds evenly, and again a part of them around the scenario's own values. The curves have kinks
     where a contact is masked or opens, so a single search may end beside the minimum.
     """
-    places = spread(problem)
-    sums = []
-    for place in places:
-        # a run may refuse values that lie far from those of the scenario
+    count = _RUN_STARTS if problem.by_run else _STARTS
+    places = sorted(spread(problem), key=lambda place: _sum(problem, place))
+    minima = [minimum(problem, problem.start, _COARSE)]
+    for place in places[:count]:
         with contextlib.suppress(BadInput):
-            sums.append((float(np.sum(problem.residuals(place) ** 2)), place))
-    sums.sort(key=lambda item: item[0])
-    minima = [minimum(problem, problem.start)]
-    for _, place in sums[: _RUN_STARTS if problem.by_run else _STARTS]:
-        with contextlib.suppress(BadInput):
-            minima.append(minimum(problem, place))
-    return min(minima, key=lambda item: item.chi_square)
+            minima.append(minimum(problem, place, _COARSE))
+    best = minimum(problem, min(minima, key=lambda item: item.chi_square).x)
+    if problem.by_run or not len(best.x):
+        return best
+    for _ in range(_ROUNDS):
+        minima = [minimum(problem, place, _COARSE) for place in _beside(problem, best)]
+        beside = minimum(problem, min(minima, key=lambda item: item.chi_square).x)
+        if not beside.chi_square < best.chi_square:
+            break
+        best = beside
+    return best
+
+
+def _beside(problem: Problem, best: Minimum) -> Array:
+    """Return places around a minimum at which the sum of squares is lowest compared with a parabola.
+
+    They lie behind kinks, where another number of contacts is masked or open.
+    """
+    steps = np.random.default_rng(0).standard_normal((_AROUND, len(best.x)))
+    distances = np.linspace(*_DISTANCES, _AROUND)
+    steps *= (distances / np.linalg.norm(steps, axis=1))[:, np.newaxis]
+    places = best.x + steps @ np.linalg.cholesky(best.covariance).T
+    places = np.clip(places, *np.transpose(problem.bounds))
+    sums = np.array([_sum(problem, place) for place in places])
+    return places[np.argsort(sums - distances**2)[:_BEHIND]]
+
+
+def _sum(problem: Problem, place: Array) -> float:
+    """Return the sum of squares at a place; infinity if a run refuses its values, far from those of the scenario."""
+    with contextlib.suppress(BadInput):
+        return float(np.sum(problem.residuals(place) ** 2))
+    return math.inf
 
 
 def spread(problem: Problem) -> Array:
     """Return places that fill the bounds of a problem evenly, and a part of the bounds around the start."""
     if not len(problem.start):
         return np.empty((0, 0))
-    low, high = problem.limits(_AROUND)
+    low, high = np.transpose(problem.bounds)
     count = _RUN_PLACES if problem.by_run else _PLACES
     ranges = _RUN_RANGES if problem.by_run else _RANGES
     # scipy has the name rng since 1.15 only
@@ -796,7 +767,7 @@ def idle(problem: Problem) -> list[str]:
 def entangled(problem: Problem) -> list[list[str]]:
     """Return sets of free keys that the curves depend on only together, as on their product."""
     start, count = problem.start, len(problem.free)
-    middle = np.mean(problem.limits(_AROUND), axis=0)
+    middle = np.mean(problem.bounds, axis=1)
     for share in (0.05, 0.16):  # what holds at two places is no accident of one
         columns = derivatives(problem, start + share * (middle - start))[:, :count]
         norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
@@ -902,7 +873,6 @@ def _end(
         return bound, True
     variance = float(weights @ best.covariance @ weights)
     spread = min(math.sqrt(variance), room)
-    along = best.covariance @ weights / variance
     side, start = math.copysign(1.0, bound - value), best.x
     stiffness = _STIFFNESS / spread
 
@@ -911,17 +881,13 @@ def _end(
         """Return the root of the rise of the sum of squares beyond that of the end; 0 where it is near enough."""
         nonlocal start, stiffness
         root, step = 0.0, side * distance
-        guess = np.clip(best.x + along * step, *problem.limits(_UNKNOWN))
         for _ in range(_MOST if distance else 0):
 
             def spring(x: Array, stiffness: float = stiffness) -> float:
                 return stiffness * (float(weights @ x) - value - step)
 
             drawn = replace(problem, spring=spring)
-            sums = [float(np.sum(drawn.residuals(x) ** 2)) for x in (start, guess)]
-            result = minimum(
-                drawn, start if sums[0] < sums[1] else guess, precision=_END_SQUARES
-            )
+            result = minimum(drawn, start, precision=_END_SQUARES)
             start = result.x
             off = spring(start)
             root = math.sqrt(max(result.chi_square - off**2 - best.chi_square, 0.0))
@@ -941,7 +907,7 @@ def _end(
             return bound, True
         # the root of a parabola is a line
         near, far = far, far * min(1.1 * rise / max(rise + excess, 1e-300), 3.0)
-    return math.nan, True
+    return bound, True
 
 
 def problem_of(
@@ -972,21 +938,15 @@ def problem_of(
         else c.errors
         for c in curves
     ]
-    estimated, zero = (
-        np.array([curve.errors is None for curve in curves])[number],
-        np.zeros(len(values)),
-    )
-    rows = [groups(scenario, table) for table in tables]
     return Problem(
-        tables,
-        rows,
-        free,
-        common,
-        values,
-        np.concatenate(sigma),
-        number,
-        estimated,
-        zero,
-        zero,
-        {},
+        tables=tables,
+        groups=[groups(scenario, table) for table in tables],
+        free=free,
+        common=common,
+        values=values,
+        sigma=np.concatenate(sigma),
+        curve=number,
+        estimated=np.array([curve.errors is None for curve in curves])[number],
+        shift=np.zeros(len(values)),
+        noise=np.zeros(len(values)),
     )

@@ -369,7 +369,7 @@ def drawn_from(problem, count, seed):
 def test_no_fit_ends_above_the_lowest_of_many_starts_and_one_at_the_truth(kind, count):
     problem, truth = documented(kind)
     starts = 200 if count > 10 else 20
-    low, high = problem.limits(3.0)
+    low, high = np.transpose(problem.bounds)
     rng, single = np.random.default_rng(2), 0
     for data in drawn_from(problem, count, 1):
         best = likelihood.lowest(data).chi_square
@@ -404,7 +404,7 @@ def test_a_model_is_blamed_if_and_only_if_no_start_reaches_the_errors(fault, cou
     exact = drawn_of(scene.with_values(MASKED_BY | changes), 0.0, 0, speeds).curves
     problem, truth = documented("masked")
     rng, blamed = np.random.default_rng(4), 0
-    low, high = problem.limits(3.0)
+    low, high = np.transpose(problem.bounds)
     for _ in range(count):
         curves = tuple(
             Curve(name, values + noise * error * rng.standard_normal(12), error)
