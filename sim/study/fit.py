@@ -243,11 +243,9 @@ class Fit(NamedTuple):
     @property
     def scenarios(self) -> dict[str, Scenario]:
         """The scenario of each table by its name, with its values and with the conditions of all its rows."""
-        values = {
-            table.stem: self.of_table(k) for k, table in enumerate(self.problem.tables)
-        }
         return {
-            name: self.scenario.with_values(numbers) for name, numbers in values.items()
+            table.stem: self.scenario.with_values(self.of_table(k))
+            for k, table in enumerate(self.problem.tables)
         }
 
 
@@ -326,10 +324,8 @@ def conflicts(
     tables: Sequence[Measured],
 ) -> Iterator[str]:
     """Yield the faults of free keys and tables that do not go together."""
-    keys, names = (
-        [item.key for item in (*shared, *split)],
-        [table.stem.lower() for table in tables],
-    )
+    keys = [item.key for item in (*shared, *split)]
+    names = [table.stem.lower() for table in tables]
     for key in {key: None for key in keys if keys.count(key) > 1}:
         yield f"--free{' or --per-table' * bool(split)}: {key} is there twice; give each key once"
     if not keys:
@@ -464,14 +460,13 @@ def _remarks(result: Fit) -> Iterator[str]:
 def _unreached(problem: Problem, best: Minimum) -> Iterator[str]:
     """Yield the points that the best curve does not reach because the contact is open or masked there."""
     off = problem.residuals(best.x)[: len(problem.values)]
-    is_far = np.abs(off) > _FAR
     is_open = problem.predicted(best.x) == 0.0
-    masked = np.zeros_like(is_open)
+    states = {"open": is_open}
     if not problem.by_run:
         masked = (problem.steady(best.x, "work_of_adhesion") <= 0.0) & ~is_open
-    states = {"open": is_open, "masked, so that adhesion holds no area": masked}
+        states["masked, so that adhesion holds no area"] = masked
     for words, state in states.items():
-        if (rows := np.flatnonzero(state & is_far)).size:
+        if (rows := np.flatnonzero(state & (np.abs(off) > _FAR))).size:
             places = ", ".join(map(problem.place, rows[:_MOST_ROWS]))
             more = ", ..." * (rows.size > _MOST_ROWS)
             yield f"the best curve does not reach {rows.size} points, where its contact is {words}: {places}{more}"
@@ -501,20 +496,13 @@ def _one_sided(problem: Problem, best: Minimum) -> Iterator[str]:
 def free_number(scenario: Scenario, text: str, option: str = "--free") -> Free:
     """Return the free number of a text ``KEY`` or ``KEY=LOW:HIGH``."""
     key, sign, span = text.partition("=")
-    physical = (
-        item
-        for item in quantities(scenario).items()
-        if item[0].partition(".")[0] not in _OTHER
-    )
-    key, known = (
-        key.strip(),
-        {name: number for name, number in physical if not number[0].whole},
-    )
+    key, known = key.strip(), dict[str, tuple[Quantity, float]]()
+    for name, number in quantities(scenario).items():
+        if name.partition(".")[0] not in _OTHER and not number[0].whole:
+            known[name] = number
     if key not in known:
-        near = "".join(
-            f'; did you mean "{name}"?'
-            for name in difflib.get_close_matches(key, known, 1, 0.5)
-        )
+        close = difflib.get_close_matches(key, known, 1, 0.5)
+        near = "".join(f'; did you mean "{name}"?' for name in close)
         raise BadInput(
             [f"{option} {key[:80]}: is not a physical key of the scenario{near}"]
         )
@@ -744,11 +732,9 @@ def carried_out(
     tables = [likelihood.read(path, scenario) for path in data]
     with in_units(units):  # before anything is fitted
         for table in tables:
-            for unit in (
-                _along(table).unit,
-                *(QUANTITIES[name].unit for name in table.names),
-            ):
+            for unit in [QUANTITIES[name].unit for name in table.names]:
                 scaled(1.0, unit)
+            scaled(1.0, _along(table).unit)
     result = fit(scenario, tables, **arguments)
     verdict = None
     if judged:
@@ -834,7 +820,8 @@ def _comparison(verdict: Verdict) -> list[dict[str, str]]:
 
 def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[str, Any]:
     """Return all numbers of a fit [SI]; those that are not known are None."""
-    shares = fit.best.x[len(fit.numbers) :]
+    common = fit.problem.common
+    shares = zip(common.items(), fit.best.x[len(fit.numbers) :], strict=True)
     numbers, differences = (
         {
             item.free.key: {
@@ -858,13 +845,10 @@ def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[st
             key: test._asdict() for key, test in fit.no_difference.items()
         },
         "correlations": {
-            "keys": [item.free.key for item in fit.numbers],
+            "keys": [*fit.values],
             "matrix": fit.correlations.tolist(),
         },
-        "common_errors": {
-            name: size * x
-            for (name, size), x in zip(fit.problem.common.items(), shares, strict=True)
-        },
+        "common_errors": {name: size * x for (name, size), x in shares},
         "chi_square": fit.best.chi_square,
         "degrees_of_freedom": fit.problem.freedom,
         "p_value": fit.p_value,
@@ -874,11 +858,7 @@ def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[st
     }
     if verdict is not None:
         judged = [item._asdict() for item in verdict.judged]
-        result["mechanisms"] = {
-            "sufficient": verdict.sufficient,
-            "words": verdict.words,
-            "judged": judged,
-        }
+        result["mechanisms"] = verdict._asdict() | {"judged": judged}
     known: dict[str, Any] = json.loads(
         json.dumps(result), parse_constant=lambda _: None
     )
@@ -890,10 +870,8 @@ def scenario_text(scenario: Scenario, fit: Fit, folder: Path, table: int = 0) ->
 
     If tables have values of their own, the file has the conditions of all rows of its table, too.
     """
-    source, values = (
-        scenario.origin,
-        fit.of_table(table) if fit.differences else fit.values,
-    )
+    source = scenario.origin
+    values = fit.of_table(table) if fit.differences else fit.values
     units = {key: quantity.unit for key, (quantity, _) in quantities(scenario).items()}
     units |= {f"contact.{scenario.contact.kind}": MOUNT[scenario.contact.kind][1]}
     tables = parse(source.text, source.path)

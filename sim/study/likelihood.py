@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -257,27 +257,19 @@ def groups(scenario: Scenario, table: Measured) -> list[Group]:
     for place in np.unique(columns, axis=1, return_index=True)[1]:
         rows = np.flatnonzero(np.all(columns == columns[:, [place]], axis=0))
         try:
-            item = scenario.with_values(
-                {key: float(values[place]) for key, values in keyed.items()},
-                built=False,
-            )
+            numbers = {key: float(values[place]) for key, values in keyed.items()}
+            item = scenario.with_values(numbers, built=False)
         except BadInput as fault:
-            raise BadInput(
-                [
-                    f"{table.path}: row {place + 1}: {message}"
-                    for message in fault.problems
-                ]
-            ) from None
+            row = f"{table.path}: row {place + 1}"
+            raise BadInput([f"{row}: {text}" for text in fault.problems]) from None
         conditions = {name: values[rows] for name, values in table.conditions.items()}
         duration, count = item.clock.duration, len(rows)
         # a course of the rows, as long as the run
         time = conditions.get("t", np.linspace(0.0, duration, count))
         if (mount := conditions.get("mount")) is not None:
-            course = (
-                float(mount[0])
-                if np.all(mount == mount[0])
-                else {"time": time, "value": mount}
-            )
+            course: Any = {"time": time, "value": mount}
+            if np.all(mount == mount[0]):
+                course = float(mount[0])
             item = item.with_values({f"contact.{table.mount}": course}, built=False)
         instants = np.repeat(conditions.get("t", np.zeros(count)), 2)
         speed = conditions.get(
@@ -544,10 +536,11 @@ class Problem:
 
     def sampled(self, x: Array) -> Array:
         """Return all curves by the scenario's own models and their standard errors, shape (2, numbers)."""
-        tables = zip(range(len(self.tables)), self.tables, self.groups, strict=True)
         runs = [
-            by_runs(rows, self.of_table(x, k), table.names, "t" in table.conditions)
-            for k, table, rows in tables
+            by_runs(groups, self.of_table(x, k), table.names, "t" in table.conditions)
+            for k, (table, groups) in enumerate(
+                zip(self.tables, self.groups, strict=True)
+            )
         ]
         return np.concatenate([rows.reshape(2, -1) for rows in runs], axis=1)
 
@@ -666,10 +659,15 @@ def minimum(problem: Problem, start: Array, precision: float = 1e-8) -> Minimum:
         max_nfev=_EVALUATIONS * (len(start) + 1),
     )
     x = place(result.x)
-    slopes = derivatives(problem, x)
-    free = np.diag((_UNKNOWN * problem.widths) ** -2.0)
-    covariance = np.asarray(np.linalg.inv(slopes.T @ slopes + free), float)
+    covariance = covariance_at(problem, x)
     return Minimum(x, 2.0 * result.cost, covariance, result.status > 0)
+
+
+def covariance_at(problem: Problem, x: Array) -> Array:
+    """Return the covariance of what is free at a place, finite for numbers without information, too."""
+    slopes = derivatives(problem, x)
+    unknown = np.diag((_UNKNOWN * problem.widths) ** -2.0)
+    return np.asarray(np.linalg.inv(slopes.T @ slopes + unknown), float)
 
 
 def lowest(problem: Problem) -> Minimum:

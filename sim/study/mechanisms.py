@@ -12,11 +12,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import qmc
 
 from sim.parts.exchange import Array
 from sim.scenario.schema import quantities
-from sim.study.likelihood import Free, Minimum, Problem, idle, minimum
+from sim.study.likelihood import Free, Minimum, Problem, idle, minimum, spread
 from sim.units.quantity import Quantity
 
 #: Most draws of a likelihood ratio; ratios as large as the measured one that are enough (Besag & Clifford 1991);
@@ -26,9 +25,8 @@ DRAWS, _ENOUGH, _HOPELESS = 200, 20, 30.0
 _FINE = 1e-3
 #: Distances of curves that are alike and that differ, in standard errors.
 _BESIDE, _APART = 0.3, 3.0
-#: Binary logarithm of the most places at which a search may start, their range without bounds, in large changes, and
-#: how many of them are tried for measured curves.
-_SPREAD, _AROUND, _STARTS = 8, 3.0, 12
+#: Places between the bounds at which a search may start, and how many of them are tried for measured curves.
+_SPREAD, _STARTS = 256, 12
 #: What rejects a mechanism: probability of a ratio at least as large, and difference of AICc.
 RARE, WORSE = 0.05, 4.0
 
@@ -110,7 +108,7 @@ class Search:
         self.problem, self.places = problem, [*starts]
         self.given = len(self.places)
         if not problem.by_run:
-            self.places += [*_spread(problem)]
+            self.places += [*spread(problem)[:_SPREAD]]
         # residuals of zeros are curves in standard errors
         self.zeros = replace(problem, values=np.zeros(len(problem.values)))
         self.curves = np.array([self.zeros.residuals(place) for place in self.places])
@@ -156,20 +154,6 @@ class Search:
             np.min(self._sums(values)) <= level
             or self.least(values).chi_square <= level
         )
-
-
-def _spread(problem: Problem) -> Array:
-    """Return places between the bounds of a problem, or as far from its start as a number may change much."""
-    if not problem.bounds:
-        return np.empty((0, 0))
-    widths = [item.width for item in problem.free] + [1.0] * len(problem.common)
-    low, high = np.transpose(problem.bounds)
-    away = np.where(np.isfinite(high - low), np.inf, _AROUND * np.array(widths))
-    # scipy has the name rng since 1.15 only
-    sampler = qmc.Sobol(len(widths), seed=np.random.default_rng(0))
-    shares = sampler.random_base2(min(4 + 2 * len(widths), _SPREAD))
-    ends = np.maximum(low, problem.start - away), np.minimum(high, problem.start + away)
-    return qmc.scale(shares, *ends)
 
 
 def draws_of(

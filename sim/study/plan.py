@@ -39,8 +39,8 @@ from sim.units.terminal import progress_bar
 
 #: Simulated data sets of each truth, and fewest; speeds of further points by default; points that are simulated.
 SIMS, LEAST_SIMS, _SPEEDS, _BEST = 400, 50, 20, 3
-#: Least noncentrality that scipy knows, and spread of a number without information, in large changes.
-_LEAST, _UNKNOWN = 1e-9, 1e3
+#: Least noncentrality that scipy knows.
+_LEAST = 1e-9
 _LOOKS = {
     WHOLE: style.BOTH,
     "bonds only": style.BONDS,
@@ -447,17 +447,9 @@ def _words(scenario: Scenario, table: Measured, row: Measured) -> str:
     return (", ".join(texts) or "the same conditions") + variables
 
 
-def covariance_at(problem: Problem, x: Array) -> Array:
-    """Return the covariance of what is free at a place, finite for numbers without information, too."""
-    slopes = likelihood.derivatives(problem, x)
-    widths = [item.width for item in problem.free] + [1.0] * len(problem.common)
-    unknown = np.diag((_UNKNOWN * np.array(widths)) ** -2.0)
-    return np.asarray(np.linalg.inv(slopes.T @ slopes + unknown), float)
-
-
 def _interval(problem: Problem, k: int, values: Array, sums: Array) -> Expected:
     """Return the interval to expect for a free number, by simulated values and their least sums of squares."""
-    item, covariance = problem.free[k], covariance_at(problem, problem.start)
+    item, covariance = problem.free[k], likelihood.covariance_at(problem, problem.start)
     exact = Minimum(problem.start, 0.0, covariance, True)
     levels = sums + float(stats.chi2.ppf(LEVEL, 1))
     rest, chances = [*problem.free[:k], *problem.free[k + 1 :]], list[Chance]()

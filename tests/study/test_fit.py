@@ -235,7 +235,7 @@ def test_steady_sliding_is_what_a_run_ends_in_also_for_rows_of_loads_and_solids_
 
 @pytest.mark.parametrize(
     ("fits", "least", "most"),
-    [(20, 0.8, 1.0), pytest.param(500, 0.92, 0.98, marks=pytest.mark.verify)],
+    [(8, 0.6, 1.0), pytest.param(500, 0.92, 0.98, marks=pytest.mark.verify)],
 )
 def test_intervals_hold_the_truth_in_95_of_100_fits(
     truth, monkeypatch, fits, least, most
@@ -257,7 +257,7 @@ def test_intervals_hold_the_truth_in_95_of_100_fits(
             ]
         )
     held = np.mean(rows, axis=0)
-    # of 20 fits more than 4 fail with a probability of 0.3 %; of 500 the binomial standard error is 1 %, three of them
+    # of 8 fits more than 3 fail with a probability of 0.04 %; of 500 the binomial standard error is 1 %, three of them
     assert np.all((held >= least) & (held <= most)), held
 
 
@@ -935,7 +935,7 @@ def test_the_figure_has_one_curve_and_colour_for_each_load_in_one_table_or_in_se
     assert (
         len(points) == len(forces) and points.keys() == fits.keys() == residuals.keys()
     )
-    labels = [text.get_text() for text in upper.get_legend().get_texts()][2:]
+    labels = [text.get_text() for text in upper.figure.legends[0].get_texts()][2:]
     assert [label.partition("= ")[2] for label in labels] == [
         f"{1e3 * each:g} mN" for each in forces if each
     ]
@@ -1655,7 +1655,8 @@ def test_the_command_writes_a_scenario_for_each_table_with_its_load_and_draws_a_
     upper, *_ = figure(result.problem, result.best).axes
     points, fits = drawn_by_colour(upper)
     labels = [
-        text.get_text().partition(",")[0] for text in upper.get_legend().get_texts()
+        text.get_text().partition(",")[0]
+        for text in upper.figure.legends[0].get_texts()
     ]
     assert (
         len(points) == 2
