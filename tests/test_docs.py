@@ -317,7 +317,7 @@ STATED = {
     "README.md": "3.11 133.2(10) 1.0 116.59 0.40",
     "docs/choosing.md": "24 55 64 1000 50,000 95 97.5",
     "docs/explore.md": "50 95",
-    "docs/fit.md": "250 1.5 10,000 30",
+    "docs/fit.md": "250 1.5 10,000 30 45 512 1,000 94.8 95.5",
     "docs/large_files.md": "0.02",
     "docs/limits.md": "1000",
     "docs/means.md": "133.2(10) 1.0 101 105",
