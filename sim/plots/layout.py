@@ -116,7 +116,7 @@ def _arrange(legend: Legend, columns: int) -> None:
 
 
 def broken(text: str, length: int) -> str:
-    """Return a text in lines of at most a length, broken between words.
+    r"""Return a text in lines of at most a length, broken between words.
 
     >>> broken(r"the law $A_0 - \alpha Q^2$ of incipient shear", 24)
     'the law $A_0 - \\alpha Q^2$\nof incipient shear'
