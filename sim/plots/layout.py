@@ -118,7 +118,7 @@ def _arrange(legend: Legend, columns: int) -> None:
 def broken(text: str, length: int) -> str:
     r"""Return a text in lines of at most a length, broken between words.
 
-    >>> broken(r"the law $A_0 - \alpha Q^2$ of incipient shear", 24)
+    >>> broken(r"the law $A_0 - \alpha Q^2$ of incipient shear", 27)
     'the law $A_0 - \\alpha Q^2$\nof incipient shear'
     """
     lines = []
