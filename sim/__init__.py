@@ -51,7 +51,7 @@ _FROM = {
     "Scenario": "sim.scenario.scenario",
     "load": "sim.scenario.reader",
 }
-_FOLDERS = ("laws", "plots", "read", "report", "spectrum")
+_FOLDERS = ("laws", "plots", "read", "reports", "spectrum")
 _FUNCTIONS = (
     "check",
     "converge",

@@ -595,7 +595,7 @@ def report(
 ) -> None:
     """Write an HTML page on a run: question, key figures, remarks, figures, errors and commands."""
     _import_xarray()
-    from sim.report import written
+    from sim.reports import written
     from sim.units.notation import in_units
 
     with _opened(output, chosen) as dataset, in_units(units):

@@ -25,7 +25,7 @@ from sim.cli import _KINDS
 from sim.plots import Choices, kinds as plots, style as pictures
 from sim.plots.field import PIXELS
 from sim.plots.measured import Compared, Line
-from sim.report.report import drawings
+from sim.reports.report import drawings
 from sim.units.errors import BadInput
 
 LOADS = {"contact.load": [1e-3, 4e-3]}

@@ -19,7 +19,7 @@ from helpers.statements import statistics
 
 from sim.plots import kinds
 from sim.read.observables import full_area
-from sim.report import html, report
+from sim.reports import html, report
 
 VOID = {"meta", "link", "img", "br", "hr", "input"}
 TAGS = {
