@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from sim.explorer.server import Server
+    from sim.reports import Methods, Page
     from sim.scenario.scenario import Scenario
     from sim.study.fit import Fit
     from sim.study.plan import Plan
@@ -57,9 +58,11 @@ _FUNCTIONS = (
     "converge",
     "explore",
     "fit",
+    "methods",
     "open",
     "plan",
     "plot",
+    "report",
     "run",
     "stats",
     "steady_curves",
@@ -75,7 +78,7 @@ def run(
     resume: bool = False,
     jobs: int = 1,
     progress: bool | Callable[[int], None] = False,
-) -> Any:
+) -> "xarray.Dataset":
     """Run a scenario with its ensemble and its sweep.
 
     Parameters
@@ -96,8 +99,8 @@ def run(
 
     Returns
     -------
-    xarray.Dataset or pathlib.Path
-        The dataset, or the path of the file.
+    xarray.Dataset
+        The dataset; with ``to`` as ``open`` opens it, whose ``close()`` releases the file.
 
     Raises
     ------
@@ -128,7 +131,7 @@ def run(
             if progress is True
             else contextlib.nullcontext(lines) as bar
         ):
-            return simulate(
+            result = simulate(
                 scene,
                 to,
                 replace=replace,
@@ -147,6 +150,7 @@ def run(
         if message != str(fault):
             fault.args = (message,)
         raise
+    return result if to is None else open(result)
 
 
 def check(scenario: "Scenario | Path | dict[str, Any]") -> "Text":
@@ -242,6 +246,70 @@ def plot(
     if to is not None:
         save(figure, pathlib.Path(to))
     return figure if ax is None else ax
+
+
+def report(
+    dataset: "xarray.Dataset | Path",
+    to: Path | None = None,
+    where: dict[str, Any] | None = None,
+    *,
+    data: "Path | dict[str, Any] | None" = None,
+    lost: "Sequence[float | str]" = (),
+) -> "Page":
+    """Return the page of a run, which a notebook shows. Save it if ``to`` is a file.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset or path
+        As ``run`` makes it.
+    to : path, optional
+        The HTML file; an older one is replaced.
+    where : dict, optional
+        Values of swept keys, ``{"contact.load": "4 mN"}``.
+    data : path or dict, optional
+        Measured points, as ``plot`` takes them.
+    lost : sequence of float or str
+        Shares of the JKR area whose loss has a speed, ``["10 %"]``.
+
+    Returns
+    -------
+    Page
+        The text of the page.
+    """
+    from sim.reports import html, written
+
+    is_file = isinstance(dataset, str | os.PathLike)
+    source = pathlib.Path(dataset if is_file else "OUT.nc")
+    points = pathlib.Path(data) if isinstance(data, str | os.PathLike) else data
+
+    def page(run: "xarray.Dataset") -> "Page":
+        if to is None:
+            return html(run, source, points, lost)
+        return written(run, source, pathlib.Path(to), True, points, lost)
+
+    return _plainly(page, dataset, where)
+
+
+def methods(
+    dataset: "xarray.Dataset | Path", where: dict[str, Any] | None = None
+) -> "Methods":
+    """Return a paragraph of methods on a run, with references in BibTeX.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset or path
+        As ``run`` makes it.
+    where : dict, optional
+        Values of swept keys, ``{"contact.load": "4 mN"}``.
+
+    Returns
+    -------
+    Methods
+        ``text`` and ``bibtex``; printed, it is both.
+    """
+    from sim.reports import methods as described
+
+    return _plainly(described, dataset, where)
 
 
 def converge(

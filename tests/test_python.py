@@ -35,7 +35,8 @@ def dataset():
 @pytest.fixture
 def file(dataset, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    return sim.run(SCENE, to="out.nc")
+    sim.run(SCENE, to="out.nc").close()
+    return tmp_path / "out.nc"
 
 
 def test_importing_the_package_imports_nothing_heavy_and_dir_lists_what_is_public():
@@ -67,7 +68,8 @@ def test_a_run_into_a_file_is_replaced_only_if_asked(file, dataset, monkeypatch)
         np.testing.assert_array_equal(opened.contact_radius, dataset.contact_radius)
     with pytest.raises(sim.BadInput, match=r"out\.nc exists; .* replace=True"):
         sim.run(SCENE, to="out.nc")
-    assert sim.run(SCENE, to="out.nc", replace=True) == file
+    with sim.run(SCENE, to="out.nc", replace=True) as again:
+        assert not again.contact_radius._in_memory and again.equals(dataset)
     trouble = StoreTrouble("out.nc: no space; repeat the command with --resume")
     monkeypatch.setattr("sim.ensemble.simulate.run", Mock(side_effect=trouble))
     with pytest.raises(StoreTrouble, match=r"^out\.nc: no space; .* resume=True"):
