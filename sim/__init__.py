@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
+    from sim.ensemble.preview import Preview
     from sim.explorer.server import Server
     from sim.reports import Methods, Page
     from sim.scenario.scenario import Scenario
@@ -114,23 +115,25 @@ def run(
     from sim.ensemble.plan import Plan, work
     from sim.ensemble.simulate import run as simulate
     from sim.numerics.files import OutputExists
+    from sim.units import notebook
     from sim.units.terminal import LOG, Shown, progress_bar, progress_lines
 
     scene = _scene(scenario)
     plan = Plan.of(scene)
     for remark in remarks(plan) if LOG.isEnabledFor(logging.INFO) else ():
         LOG.info(remark)
-    lines = (
-        Shown(progress)
-        if callable(progress)
-        else progress_lines(work(plan), "member-steps", LOG.info)
-    )
+    task = work(plan), "member-steps"
+    display: contextlib.AbstractContextManager[Shown]
+    if callable(progress):
+        display = contextlib.nullcontext(Shown(progress))
+    elif not progress:
+        display = contextlib.nullcontext(progress_lines(*task, LOG.info))
+    elif notebook.is_notebook():
+        display = contextlib.nullcontext(notebook.bar(*task))
+    else:
+        display = progress_bar(*task)
     try:
-        with (
-            progress_bar(work(plan))
-            if progress is True
-            else contextlib.nullcontext(lines) as bar
-        ):
+        with display as bar:
             result = simulate(
                 scene,
                 to,
@@ -153,11 +156,11 @@ def run(
     return result if to is None else open(result)
 
 
-def check(scenario: "Scenario | Path | dict[str, Any]") -> "Text":
+def check(scenario: "Scenario | Path | dict[str, Any]") -> "Preview":
     """Describe a run: models, quantities in SI, error estimates, and its time, memory and file size."""
     from sim.ensemble.preview import preview
 
-    return Text(preview(_scene(scenario)))
+    return preview(_scene(scenario))
 
 
 def open(path: Path) -> "xarray.Dataset":
@@ -497,14 +500,6 @@ def explore(
     )
     server.begin()
     return server
-
-
-class Text(str):
-    """A text that a prompt shows without quotes."""
-
-    __slots__ = ()
-
-    __repr__ = str.__str__
 
 
 def _scene(scenario: "Scenario | Path | dict[str, Any]") -> "Scenario":
