@@ -1,5 +1,6 @@
 """The package as it is used from Python: scenes, runs, statistics and figures; every fault as ``BadInput``."""
 
+import html
 import subprocess
 import sys
 import tomllib
@@ -169,6 +170,20 @@ def test_stats_are_a_data_frame_in_si_and_plot_draws_and_saves(file, dataset, tm
     assert (tmp_path / "time.png").stat().st_size > 1000
     with pytest.raises(sim.BadInput, match=r"known: .*curve"):
         sim.plot(dataset, "nothing")
+
+
+def test_a_report_is_a_page_that_is_saved_if_a_file_is_named(file, dataset, tmp_path):
+    page = sim.report(dataset, to=tmp_path / "first.html")
+    assert (tmp_path / "first.html").read_text(encoding="utf-8") == page
+    assert "<h1>a &lt;scene&gt;</h1>" in page and len(repr(page)) < 100
+    shown = html.unescape(page._repr_html_().partition('srcdoc="')[2])
+    assert shown.removesuffix('"></iframe>') == page
+    for source in (file, str(file)):
+        assert 'to="out.nc"' in html.unescape(sim.report(source))
+    with pytest.raises(sim.BadInput, match="reads this file"):
+        sim.report(file, to=file)
+    with pytest.raises(sim.BadInput, match="not swept"):
+        sim.report(file, where={"load": "1 mN"})
 
 
 def test_converge_takes_a_budget_as_text(monkeypatch):

@@ -57,6 +57,7 @@ class Methods(NamedTuple):
 def methods(dataset: xr.Dataset) -> Methods:
     """Return a paragraph on version, models, numbers, seed, members, clock and errors of a run, with its references."""
     models = (word(dataset, f"{part}.model", "").astype(str) for part in _PARTS)
+    swept = {name: dataset.sizes[name] for name in sweep_dims(dataset)}
     numbers = {
         dataset[name].attrs["long_name"]: _size(dataset[name])
         for name in _NUMBERS
@@ -69,7 +70,7 @@ def methods(dataset: xr.Dataset) -> Methods:
             part: np.unique(names) for part, names in zip(_PARTS, models, strict=True)
         },
         numbers=numbers,
-        swept={name: dataset.sizes[name] for name in sweep_dims(dataset)},
+        swept={name: count for name, count in swept.items() if count > 1},
         step=_size(dataset["clock_step"]),
         duration=_size(dataset["clock_duration"]),
         is_random=bool(has_noise(dataset).any()),
