@@ -174,7 +174,7 @@ def test_statistics_without_members_are_read_from_a_file_and_those_of_version_1_
     folder,
 ):
     alone = {"record.per_member": False, "ensemble.members": 3}
-    package.run(package.load("scene.toml", alone), "alone.nc")
+    package.run(package.load("scene.toml", alone), "alone.nc").close()
     with package.open("alone.nc") as dataset:
         assert dataset["contact_area"].sizes["statistic"] == 3
         old = dataset.load().drop_dims("statistic")
