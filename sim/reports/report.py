@@ -88,18 +88,17 @@ def drawings(run: Run, data: Data | None = None) -> list[Drawing]:
         fits = kind in _ALSO or kinds.KINDS[kind].fits(dataset)
         if fits and kind not in repeated:
             shown.append(kind)
-    first, *others = dict.fromkeys(shown)
-    result = [Drawing(kind, kinds.KINDS[kind].shows) for kind in others]
-    for place, drawing in enumerate(result, 1):
-        # the fault may be a library's, whose words are not for this page
-        with contextlib.suppress(ValueError):
-            svg = svg_of(
-                kinds.draw(dataset, drawing.kind), f"f{place}-", drawing.caption
-            )
-            result[place - 1] = drawing._replace(svg=svg)
-    caption = kinds.KINDS[first].shows
-    picture = kinds.draw(dataset, first, Choices(data=measured))
-    return [Drawing(first, caption, svg_of(picture, "f0-", caption), measured), *result]
+    result = []
+    for place, kind in enumerate(dict.fromkeys(shown)):
+        drawing = Drawing(kind, kinds.KINDS[kind].shows)
+        choices = None if place else Choices(data=measured)
+        # the fault of a further figure may be a library's, whose words are not for this page
+        with contextlib.suppress(ValueError) if place else contextlib.nullcontext():
+            picture = kinds.draw(dataset, kind, choices)
+            svg = svg_of(picture, f"f{place}-", drawing.caption)
+            drawing = Drawing(*drawing[:2], svg, choices and measured)
+        result.append(drawing)
+    return result
 
 
 def svg_of(figure: Figure, prefix: str, name: str) -> str:
