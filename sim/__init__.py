@@ -40,7 +40,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
+    from sim.ensemble.preview import Preview
     from sim.explorer.server import Server
+    from sim.reports import Methods, Page
     from sim.scenario.scenario import Scenario
     from sim.study.fit import Fit
     from sim.study.plan import Plan
@@ -51,15 +53,17 @@ _FROM = {
     "Scenario": "sim.scenario.scenario",
     "load": "sim.scenario.reader",
 }
-_FOLDERS = ("laws", "plots", "read", "report", "spectrum")
+_FOLDERS = ("laws", "plots", "read", "reports", "spectrum")
 _FUNCTIONS = (
     "check",
     "converge",
     "explore",
     "fit",
+    "methods",
     "open",
     "plan",
     "plot",
+    "report",
     "run",
     "stats",
     "steady_curves",
@@ -75,7 +79,7 @@ def run(
     resume: bool = False,
     jobs: int = 1,
     progress: bool | Callable[[int], None] = False,
-) -> Any:
+) -> "xarray.Dataset":
     """Run a scenario with its ensemble and its sweep.
 
     Parameters
@@ -96,8 +100,8 @@ def run(
 
     Returns
     -------
-    xarray.Dataset or pathlib.Path
-        The dataset, or the path of the file.
+    xarray.Dataset
+        The dataset; with ``to`` as ``open`` opens it, whose ``close()`` releases the file.
 
     Raises
     ------
@@ -111,24 +115,26 @@ def run(
     from sim.ensemble.plan import Plan, work
     from sim.ensemble.simulate import run as simulate
     from sim.numerics.files import OutputExists
+    from sim.units import notebook
     from sim.units.terminal import LOG, Shown, progress_bar, progress_lines
 
     scene = _scene(scenario)
     plan = Plan.of(scene)
     for remark in remarks(plan) if LOG.isEnabledFor(logging.INFO) else ():
         LOG.info(remark)
-    lines = (
-        Shown(progress)
-        if callable(progress)
-        else progress_lines(work(plan), "member-steps", LOG.info)
-    )
+    task = work(plan), "member-steps"
+    display: contextlib.AbstractContextManager[Shown]
+    if callable(progress):
+        display = contextlib.nullcontext(Shown(progress))
+    elif not progress:
+        display = contextlib.nullcontext(progress_lines(*task, LOG.info))
+    elif notebook.is_notebook():
+        display = contextlib.nullcontext(notebook.bar(*task))
+    else:
+        display = progress_bar(*task)
     try:
-        with (
-            progress_bar(work(plan))
-            if progress is True
-            else contextlib.nullcontext(lines) as bar
-        ):
-            return simulate(
+        with display as bar:
+            result = simulate(
                 scene,
                 to,
                 replace=replace,
@@ -147,13 +153,14 @@ def run(
         if message != str(fault):
             fault.args = (message,)
         raise
+    return result if to is None else open(result)
 
 
-def check(scenario: "Scenario | Path | dict[str, Any]") -> "Text":
+def check(scenario: "Scenario | Path | dict[str, Any]") -> "Preview":
     """Describe a run: models, quantities in SI, error estimates, and its time, memory and file size."""
     from sim.ensemble.preview import preview
 
-    return Text(preview(_scene(scenario)))
+    return preview(_scene(scenario))
 
 
 def open(path: Path) -> "xarray.Dataset":
@@ -242,6 +249,70 @@ def plot(
     if to is not None:
         save(figure, pathlib.Path(to))
     return figure if ax is None else ax
+
+
+def report(
+    dataset: "xarray.Dataset | Path",
+    to: Path | None = None,
+    where: dict[str, Any] | None = None,
+    *,
+    data: "Path | dict[str, Any] | None" = None,
+    lost: "Sequence[float | str]" = (),
+) -> "Page":
+    """Return the page of a run, which a notebook shows. Save it if ``to`` is a file.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset or path
+        As ``run`` makes it.
+    to : path, optional
+        The HTML file; an older one is replaced.
+    where : dict, optional
+        Values of swept keys, ``{"contact.load": "4 mN"}``.
+    data : path or dict, optional
+        Measured points, as ``plot`` takes them.
+    lost : sequence of float or str
+        Shares of the JKR area whose loss has a speed, ``["10 %"]``.
+
+    Returns
+    -------
+    Page
+        The text of the page.
+    """
+    from sim.reports import html, written
+
+    is_file = isinstance(dataset, str | os.PathLike)
+    source = pathlib.Path(dataset if is_file else "OUT.nc")
+    points = pathlib.Path(data) if isinstance(data, str | os.PathLike) else data
+
+    def page(run: "xarray.Dataset") -> "Page":
+        if to is None:
+            return html(run, source, points, lost)
+        return written(run, source, pathlib.Path(to), True, points, lost)
+
+    return _plainly(page, dataset, where)
+
+
+def methods(
+    dataset: "xarray.Dataset | Path", where: dict[str, Any] | None = None
+) -> "Methods":
+    """Return a paragraph of methods on a run, with references in BibTeX.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset or path
+        As ``run`` makes it.
+    where : dict, optional
+        Values of swept keys, ``{"contact.load": "4 mN"}``.
+
+    Returns
+    -------
+    Methods
+        ``text`` and ``bibtex``; printed, it is both.
+    """
+    from sim.reports import methods as described
+
+    return _plainly(described, dataset, where)
 
 
 def converge(
@@ -429,14 +500,6 @@ def explore(
     )
     server.begin()
     return server
-
-
-class Text(str):
-    """A text that a prompt shows without quotes."""
-
-    __slots__ = ()
-
-    __repr__ = str.__str__
 
 
 def _scene(scenario: "Scenario | Path | dict[str, Any]") -> "Scenario":

@@ -593,13 +593,15 @@ def report(
     force: bool,
     **beside: Any,
 ) -> None:
-    """Write an HTML page on a run: question, key figures, remarks, figures, errors and commands."""
+    """Write an HTML page on a run: question, answer, figure, table, limits, methods and commands."""
     _import_xarray()
-    from sim.report import written
+    from sim.reports import written
     from sim.units.notation import in_units
 
     with _opened(output, chosen) as dataset, in_units(units):
-        say(str(written(dataset, output, page, force, **beside)))
+        target = page or output.with_suffix(".html")
+        written(dataset, output, target, force, **beside)
+        say(str(target))
 
 
 def _import_xarray() -> None:

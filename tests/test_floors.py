@@ -31,13 +31,13 @@ FLOORS = (
     "engine",
     "ensemble",
 )
-FLOORS += ("read", "plots", "report", "study", "explorer", "cli", "__main__")
+FLOORS += ("read", "plots", "reports", "study", "explorer", "cli", "__main__")
 #: Floors that a floor must not import although they are below it.
 FORBIDDEN = {
     "read": {"parts", "scenario", "engine", "ensemble"},
     "plots": {"engine", "ensemble"},
 }
-FORBIDDEN |= {"report": {"ensemble"}}
+FORBIDDEN |= {"reports": {"ensemble"}}
 #: Speeds in steady sliding beside those of a course are of the models of a stored scenario.
 ALLOWED = {
     ("read.over_speed", f"ensemble.{name}") for name in ("dataset", "steady_speed")

@@ -1,5 +1,6 @@
 """The package as it is used from Python: scenes, runs, statistics and figures; every fault as ``BadInput``."""
 
+import html
 import subprocess
 import sys
 import tomllib
@@ -35,7 +36,8 @@ def dataset():
 @pytest.fixture
 def file(dataset, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    return sim.run(SCENE, to="out.nc")
+    sim.run(SCENE, to="out.nc").close()
+    return tmp_path / "out.nc"
 
 
 def test_importing_the_package_imports_nothing_heavy_and_dir_lists_what_is_public():
@@ -67,7 +69,8 @@ def test_a_run_into_a_file_is_replaced_only_if_asked(file, dataset, monkeypatch)
         np.testing.assert_array_equal(opened.contact_radius, dataset.contact_radius)
     with pytest.raises(sim.BadInput, match=r"out\.nc exists; .* replace=True"):
         sim.run(SCENE, to="out.nc")
-    assert sim.run(SCENE, to="out.nc", replace=True) == file
+    with sim.run(SCENE, to="out.nc", replace=True) as again:
+        assert not again.contact_radius._in_memory and again.equals(dataset)
     trouble = StoreTrouble("out.nc: no space; repeat the command with --resume")
     monkeypatch.setattr("sim.ensemble.simulate.run", Mock(side_effect=trouble))
     with pytest.raises(StoreTrouble, match=r"^out\.nc: no space; .* resume=True"):
@@ -167,6 +170,20 @@ def test_stats_are_a_data_frame_in_si_and_plot_draws_and_saves(file, dataset, tm
     assert (tmp_path / "time.png").stat().st_size > 1000
     with pytest.raises(sim.BadInput, match=r"known: .*curve"):
         sim.plot(dataset, "nothing")
+
+
+def test_a_report_is_a_page_that_is_saved_if_a_file_is_named(file, dataset, tmp_path):
+    page = sim.report(dataset, to=tmp_path / "first.html")
+    assert (tmp_path / "first.html").read_text(encoding="utf-8") == page
+    assert "<h1>a &lt;scene&gt;</h1>" in page and len(repr(page)) < 100
+    shown = html.unescape(page._repr_html_().partition('srcdoc="')[2])
+    assert shown.removesuffix('"></iframe>') == page
+    for source in (file, str(file)):
+        assert 'to="out.nc"' in html.unescape(sim.report(source))
+    with pytest.raises(sim.BadInput, match="reads this file"):
+        sim.report(file, to=file)
+    with pytest.raises(sim.BadInput, match="not swept"):
+        sim.report(file, where={"load": "1 mN"})
 
 
 def test_converge_takes_a_budget_as_text(monkeypatch):

@@ -1,5 +1,6 @@
 """Statements about a run before it starts: models, quantities, error estimates, time, memory and file."""
 
+import html
 import itertools
 import math
 import os
@@ -30,6 +31,7 @@ from sim.scenario.checks import DISTANCES, LARGEST_STRAIN
 from sim.scenario.scenario import Record, Scenario
 from sim.scenario.schema import Entry, distinct, entries
 from sim.units.notation import engineering
+from sim.units.notebook import table
 from sim.units.quantity import read_option
 from sim.units.terminal import duration
 
@@ -234,7 +236,25 @@ def _times(needs: Forecast, jobs: int) -> str:
     return f"about {duration(needs.cpu)} of CPU time{clock}"
 
 
-def preview(scenario: Scenario) -> str:
+class Preview(str):
+    """Description of a run as text, which a notebook shows as tables."""
+
+    blocks: dict[str, Rows]
+
+    __repr__ = str.__str__
+
+    def _repr_html_(self) -> str:
+        name, *_ = self.splitlines()
+        texts = [f"<b>{html.escape(name)}</b>"]
+        for title, rows in self.blocks.items():
+            cells = [
+                {str(place): cell for place, cell in enumerate(row)} for row in rows
+            ]
+            texts.append(f"<p>{title}</p>{table(cells, headed=False)}")
+        return "".join(texts)
+
+
+def preview(scenario: Scenario) -> Preview:
     """Describe a run: models, quantities in SI, error estimates, and the time, memory and file that it takes.
 
     Parameters
@@ -244,7 +264,7 @@ def preview(scenario: Scenario) -> str:
 
     Returns
     -------
-    str
+    Preview
         Several lines for a terminal.
     """
     plan = Plan.of(scenario)
@@ -261,12 +281,11 @@ def preview(scenario: Scenario) -> str:
         "notes": [(text,) for text in remarks(plan, most)],
         "the run": _run(plan),
     }
-    return "\n\n".join(
-        [
-            scenario.name,
-            *(f"{title}\n{_aligned(rows)}" for title, rows in blocks.items() if rows),
-        ]
-    )
+    blocks = {title: rows for title, rows in blocks.items() if rows}
+    texts = (f"{title}\n{_aligned(rows)}" for title, rows in blocks.items())
+    result = Preview("\n\n".join([scenario.name, *texts]))
+    result.blocks = blocks
+    return result
 
 
 def _aligned(rows: Rows) -> str:

@@ -106,8 +106,9 @@ def remarks(dataset: xr.Dataset) -> list[str]:
 
     try:
         run = plan.Plan.of(scenario_of(dataset.attrs))
-    except BadInput as fault:
+    except BadInput:
         return [
-            f"not in the dataset, but printed by `sim check` of its scenario ({fault.problems[0]})"
+            "the dataset does not hold the whole scenario, such as a measured map;"
+            " `sim check` of the scenario prints its remarks"
         ]
     return [*diagnosis.remarks(run), *diagnosis.diagnosis(run)]

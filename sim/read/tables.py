@@ -18,6 +18,7 @@ from sim.read.over_speed import extremes
 from sim.read.run import Run
 from sim.read.slips import unresolved_slips
 from sim.read.statistics import QUANTILES, over_members
+from sim.units import notebook
 from sim.units.notation import bounded, concise, engineering, scaled, share
 
 #: Cells of columns by heading.
@@ -96,6 +97,9 @@ class Table(NamedTuple):
     columns: tuple[Column, ...] = ()
     left_out: tuple[Column, ...] = ()
     reasons: tuple[Reason, ...] = ()
+
+    def _repr_html_(self) -> str:
+        return notebook.table(self.rows)
 
 
 def _columns(*names: str, dull: float = 0.0) -> tuple[Column, ...]:

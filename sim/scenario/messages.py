@@ -5,11 +5,12 @@ import difflib
 import functools
 import re
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, get_args
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
+from pydantic_core.core_schema import ErrorType
 
 from sim.scenario.schema import (
     all_tables,
@@ -33,6 +34,17 @@ _NO_TABLE = (
     "model_attributes_type",
     "dict_type",
     "union_tag_not_found",
+)
+#: Faults by their names in pydantic, in our words; any other of pydantic's is one.
+_IN_OUR_WORDS = {
+    "string_type": "must be text in quotes",
+    "string_too_long": "must have at most {max_length} letters",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "tuple_type": "must be a list in square brackets",
+}
+_UNUSABLE = dict.fromkeys(
+    get_args(ErrorType), "has a value of a kind that it cannot have"
 )
 #: Faults that are reported at once.
 _MOST = 100
@@ -184,7 +196,9 @@ def _fault(root: type, error: ErrorDetails) -> Fault:
         )
     last = place.path[-1] if place.path else ""
     value = f"value {last + 1}: " if isinstance(last, int) else ""
-    return Fault(place.path, value + error["msg"])
+    words = (_UNUSABLE | _IN_OUR_WORDS).get(kind)
+    text = words.format(**error.get("ctx", {})) if words else error["msg"]
+    return Fault(place.path, value + text)
 
 
 def _unknown(root: type, table: _Place, key: str) -> Fault:

@@ -33,9 +33,11 @@ from sim.quantities import RECORDED
 from sim.scenario.checks import Limits, faults_across, limits, pulled, remarks_between
 from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
-from sim.scenario.schema import quantities, with_models
+from sim.scenario.schema import entries, quantities, with_models
 from sim.scenario.sweep import read_sweep, rows, set_key, spaced
+from sim.units import notebook
 from sim.units.errors import BadInput
+from sim.units.notation import engineering
 from sim.units.quantity import Quantity
 from sim.units.tables import Pieces
 
@@ -336,6 +338,26 @@ class Scenario:
         )
         points = math.prod(len(axis.values) for axis in self.sweep)
         return f'<Scenario "{self.name}": {models}; members {self.ensemble.members}, points {points}>'
+
+    def _repr_html_(self) -> str:
+        axes = {key: axis for axis in self.sweep for key in axis.keys}
+        rows = []
+        for key, value, quantity in entries(self):
+            if value in (None, "", ()) or key == "sweep":
+                continue
+            text = str(value)
+            if key in axes or isinstance(value, tuple):
+                text = f"{len(axes[key].values if key in axes else value)} values"
+            elif isinstance(value, float) and quantity is not None:
+                text = engineering(value, quantity.unit)
+            meaning = "" if quantity is None else quantity.meaning
+            rows.append({"key": key, "value": text, "meaning": meaning})
+        return notebook.table(rows)
+
+    def __hash__(self) -> int:
+        # a sweep and a source may hold dictionaries; scenarios that differ in them alone share a hash
+        names = (name for name in _FIELDS if name not in ("sweep", "source"))
+        return hash(tuple(getattr(self, name) for name in names))
 
     @model_validator(mode="after")
     def _across_parts(self, info: ValidationInfo) -> "Scenario":

@@ -883,16 +883,25 @@ def scenario_text(scenario: Scenario, fit: Fit, folder: Path, table: int = 0) ->
     above = Path(source.path).parent
     if above.resolve() != folder.resolve():
         _move(tables, above.absolute(), folder.absolute())
+    # the paragraphs after the question are on the values before the fit
     comment = itertools.takewhile(
-        lambda line: line.startswith("#"), source.text.splitlines()
+        lambda line: line.startswith("#") and line != "#", source.text.splitlines()
     )
-    question = "".join(
-        f"{line}\n" for line in comment if not line.startswith(_MADE)
-    ).removesuffix("#\n")
-    opening = f"{question}#\n" if question else ""
-    keys = {item.free.name: None for item in fit.numbers}
+    question = [line for line in comment if not line.startswith(_MADE)]
+    keys = dict.fromkeys(item.free.name for item in fit.numbers)
     of = f" of {fit.problem.tables[table].path.name}" if fit.differences else ""
-    return f"{opening}{_MADE}: {', '.join(keys)} are calibrated to measured curves{of}.\n{written(tables)}"
+    result = [f": {', '.join(keys)} are calibrated to measured curves{of}."]
+    for item in fit.numbers:
+        if item.free.table in (-1, table):
+            value, interval, unit = item.texts
+            ends = f"{LEVEL:.0%} interval {interval} {unit}".rstrip()
+            result.append(
+                f"\n# {item.free.name} = {value} {unit}".rstrip() + f", {ends}"
+            )
+    texts = *_quality(fit).splitlines(), *fit.remarks
+    made = "".join([_MADE, *result, *(f"\n# {text}" for text in texts)])
+    opening = "\n".join([*question, "#", ""] if question else [])
+    return f"{opening}{made}\n{written(tables)}"
 
 
 def _move(table: dict[str, Any], above: Path, folder: Path) -> None:

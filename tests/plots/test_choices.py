@@ -25,7 +25,7 @@ from sim.cli import _KINDS
 from sim.plots import Choices, kinds as plots, style as pictures
 from sim.plots.field import PIXELS
 from sim.plots.measured import Compared, Line
-from sim.report.report import drawings
+from sim.reports.report import drawings
 from sim.units.errors import BadInput
 
 LOADS = {"contact.load": [1e-3, 4e-3]}
@@ -287,7 +287,7 @@ def test_each_row_of_a_table_is_drawn_once_or_counted_as_left_out(
         "at": 1,
     }
     assert "2 mN, 9 mN" in remark
-    (drawing,) = (each for each in drawings(loads, path) if each.measured)
+    (drawing,) = (each for each in drawings(sim.Run(loads), path) if each.measured)
     assert drawing.kind == plots.default(loads) and drawing.measured.remark == remark
 
 
@@ -318,7 +318,10 @@ def test_rows_without_a_load_are_of_no_one_curve_and_a_table_without_speeds_is_r
     ):
         draw(loads, "curve", data=path)  # the area of JKR's contact is not known
     path = table("contact_load [mN], contact_area [mm^2]\n1, 0.04\n4, 0.05\n")
-    for show in (lambda: draw(loads, data=path), lambda: drawings(loads, path)):
+    for show in (
+        lambda: draw(loads, data=path),
+        lambda: drawings(sim.Run(loads), path),
+    ):
         with pytest.raises(ValueError, match='no column "speed"'):
             show()
 

@@ -135,9 +135,9 @@ def datasets(tmp_path_factory):
         patched.chdir(tmp_path_factory.mktemp("datasets"))
         result = {}
         for scene, text in SCENES.items():
-            path = package.run(tomllib.loads(text), f"{scene}.nc")
+            package.run(tomllib.loads(text), f"{scene}.nc").close()
             with xr.open_dataset(
-                path, decode_times=False, decode_coords=False
+                f"{scene}.nc", decode_times=False, decode_coords=False
             ) as dataset:
                 result[scene] = dataset.load()
         yield result

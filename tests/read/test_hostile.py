@@ -28,7 +28,7 @@ spectrum = { model = "measured", file = "map.nc", spacing = "5 um" }
 def sound(tmp_path_factory):
     """A dataset as a run writes it."""
     path = tmp_path_factory.mktemp("sound") / "out.nc"
-    package.run(tomllib.loads(SCENE), path)
+    package.run(tomllib.loads(SCENE), path).close()
     return path
 
 
@@ -113,7 +113,7 @@ def test_a_changed_byte_of_a_recorded_variable_or_a_checksummed_map_is_named_and
 ):
     for compression in ("none", "zlib"):
         written = tomllib.loads(SCENE) | {"record": {"compression": compression}}
-        with package.open(package.run(written, f"{compression}.nc")) as dataset:
+        with package.run(written, f"{compression}.nc") as dataset:
             dataset.load()
         for path in flipped(f"{compression}.nc", "contact_area"):
             with package.open(path) as damaged:
@@ -174,7 +174,7 @@ def test_statistics_without_members_are_read_from_a_file_and_those_of_version_1_
     folder,
 ):
     alone = {"record.per_member": False, "ensemble.members": 3}
-    package.run(package.load("scene.toml", alone), "alone.nc")
+    package.run(package.load("scene.toml", alone), "alone.nc").close()
     with package.open("alone.nc") as dataset:
         assert dataset["contact_area"].sizes["statistic"] == 3
         old = dataset.load().drop_dims("statistic")

@@ -235,8 +235,8 @@ def test_events_of_a_version_with_other_definitions_are_left_out_with_one_senten
 ):
     pulled = Equilibrium(load={"from": 4e-3, "to": -1e-3})
     still = {"drive": drive.Steady(speed=0.0), "shear": shear.Uniform()}
-    path = sim.run(scene(contact=pulled, **still), tmp_path / "new.nc")
-    old = tmp_path / "old.nc"
+    path, old = tmp_path / "new.nc", tmp_path / "old.nc"
+    sim.run(scene(contact=pulled, **still), path).close()
     shutil.copy(path, old)
     with netCDF4.Dataset(old, "a") as file:
         file.sim_version = "1.3.1"

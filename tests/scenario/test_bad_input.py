@@ -158,7 +158,14 @@ VALUES = [
         '"mJ"...J/m^2...for example "42 mJ/m^2"',
     ),
     ("seed = 7", "seed = 18446744073709551616", "seed", "at most 18446744073709551615"),
-    ('name = "lens"', "name = 5", "name", "string"),
+    ('name = "lens"', "name = 5", "name", "text in quotes"),
+    ('name = "lens"', f"name = '{'x' * 201}'", "name", "at most 200 letters"),
+    (
+        "members = 4",
+        "members = 4\n[record]\nper_member = 'maybe'",
+        "record.per_member",
+        "true or false",
+    ),
     ('from = "10 um/s"', "from = 1e-200", "drive.from", "too small"),
     (
         'rebinding_rate = "500 1/s"',
@@ -167,7 +174,7 @@ VALUES = [
         "too small",
     ),
     ("rebinding_rate", "stress = 1e-300\nrebinding_rate", "bonds.stress", "too small"),
-    ("members = 4", 'members = 4\n[record]\nmaps = "1 s"', "record.maps", "tuple"),
+    ("members = 4", 'members = 4\n[record]\nmaps = "1 s"', "record.maps", "list"),
     (
         "members = 4",
         'members = 4\n[record]\nmaps = ["1 s", "2 kg"]',

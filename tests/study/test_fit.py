@@ -1372,9 +1372,17 @@ def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unaske
         **quantities(load(scenario)),
         **dict.fromkeys(KEYS),
     }
-    assert toml.read_text(encoding="utf-8").startswith(
-        "# How fast are its bonds?\n#\n# Made up.\n"
-    )
+    # the paragraph "Made up." is on the values before the fit
+    question, _, made, *lines = toml.read_text(encoding="utf-8").splitlines()
+    assert question == "# How fast are its bonds?"
+    assert made.startswith("# Made by sim fit: bonds.critical_speed, ")
+    for line, (key, estimate) in zip(lines, numbers["numbers"].items(), strict=False):
+        ends = re.fullmatch(r"# (.+) = .+, 95% interval (\S+) to (\S+) \S+", line)
+        assert ends and ends[1] == key
+        ratio = float(ends[3]) / float(ends[2])
+        assert_allclose(ratio, estimate["high"] / estimate["low"], rtol=1e-3)
+    likely = f"p = {numbers['p_value']:.2g}"
+    assert likely in lines[len(numbers["numbers"])]
     assert png.read_bytes().startswith(b"\x89PNG")
     assert numbers["converged"] and "contact_area" in numbers["common_errors"]
     before = [path.read_bytes() for path in outputs]

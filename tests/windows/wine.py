@@ -68,7 +68,7 @@ SIGNED = {
     "ucrtbase.dll": "Microsoft Corporation",
 }
 #: Folders whose tests are run, unless files are named.
-TESTED = ("parts", "scenario", "units", "report", "ensemble", "study")
+TESTED = ("parts", "scenario", "units", "reports", "ensemble", "study")
 #: Variables of a shell that would change the Python on the other side, or where pip looks.
 FOREIGN = ("PYTHON", "PIP_", "OPENBLAS_", "DISPLAY", "VIRTUAL_ENV", "SIM_")
 PORT = 8793

@@ -1,6 +1,7 @@
 """The page of a run is complete and harmless, and its numbers are those of the statistics."""
 
 import contextlib
+import html as markup
 import json
 import re
 import shutil
@@ -19,7 +20,7 @@ from helpers.statements import statistics
 
 from sim.plots import kinds
 from sim.read.observables import full_area
-from sim.report import html, report
+from sim.reports import html, report
 
 VOID = {"meta", "link", "img", "br", "hr", "input"}
 TAGS = {
@@ -54,6 +55,10 @@ TAGS = {
     "clippath",
     "rect",
     "image",
+    "ul",
+    "li",
+    "details",
+    "summary",
 }
 
 
@@ -146,7 +151,7 @@ def bare(monkeypatch):
 @pytest.fixture
 def unwritten(monkeypatch):
     """Figures that are drawn but not written as SVG, which takes most of their time."""
-    monkeypatch.setattr(report, "svg_of", lambda figure, prefix: "<svg></svg>")
+    monkeypatch.setattr(report, "svg_of", lambda figure, prefix, name: "<svg></svg>")
 
 
 def shipped(name, **changes):
@@ -171,24 +176,14 @@ def test_every_shape_of_dataset_has_its_page():
             sweep={"adhesion.bond_share": [0.0, 1.0], "contact.load": [1e-3, 4e-3]}
         )
     )
-    heads = re.findall(
-        "<thead>(.*?)</thead>", text.partition("<h2>Figures")[0], re.DOTALL
-    )
+    heads = re.findall("<thead>(.*?)</thead>", text, re.DOTALL)
     assert len(heads) > 1 and all(
         "bond_share" in head and "load (mN)" in head for head in heads
     )
 
 
 @pytest.mark.usefixtures("unwritten")
-def test_the_figures_of_a_page_are_those_that_show_more_of_a_run_and_others_have_a_reason(
-    monkeypatch, smooth
-):
-    course = {"time": [0.0, 0.02, 0.02, 0.06], "value": [2e-4, 2e-4, 2e-3, 2e-3]}
-    stepped = shipped(
-        "velocity_step",
-        **{"drive.stage": course},
-        clock={"duration": "60 ms", "step": "1 ms"},
-    )
+def test_the_first_figure_fits_a_run_best_and_others_show_more_of_it():
     crept = shipped(
         "creep",
         clock={"duration": "0.1 s", "step": "2 ms"},
@@ -212,24 +207,35 @@ def test_the_figures_of_a_page_are_those_that_show_more_of_a_run_and_others_have
         sweep={},
         clock={"duration": 0.02, "step": 1e-3},
     )
-    for dataset, best, shown, left_out in (
-        (both_ways, "friction", {"curve"}, set()),  # a branch for each sense
-        # transients are no curve of stress over speed
-        (stepped, "curve", set(), {"stress"}),
-        (crept, "creep", {"sweep"}, {"stress", "time", "curve"}),
-        (steady, "sweep", set(), {"time"}),  # nothing changes in time
+    for dataset, shown, left_out in (
+        (both_ways, ["friction"], {"sweep"}),
+        (crept, ["creep"], {"sweep", "time", "curve"}),
+        (steady, ["sweep"], {"time"}),  # nothing changes in time
     ):
-        drawings = [drawing.kind for drawing in report.drawings(dataset)]
-        assert (
-            drawings[0] == best and shown <= {*drawings} and not left_out & {*drawings}
-        )
-    draw = report.kinds.draw
-    monkeypatch.setattr(
-        report.kinds, "draw", lambda dataset, kind: draw(dataset, "map")
-    )
-    assert [
-        "no stress maps" in drawing.lacks for drawing in report.drawings(smooth)
-    ] == [True]
+        kinds_shown = [each.kind for each in report.drawings(read.Run(dataset))]
+        assert kinds_shown[: len(shown)] == shown
+        assert not left_out & {*kinds_shown}
+
+
+@pytest.mark.usefixtures("unwritten")
+def test_no_words_of_a_library_reach_a_page(monkeypatch, smooth):
+    def refuse(dataset, kind, *choices):
+        if kind == best:
+            return
+        raise ValueError("operands could not be broadcast together")
+
+    best = kinds.default(smooth)
+    monkeypatch.setattr(kinds, "draw", refuse)
+    monkeypatch.setattr(kinds, "drawable", lambda dataset: [best, "map"])
+    text = html(smooth, "x.nc")
+    assert "broadcast" not in text
+    assert "<code>sim plot x.nc map</code> prints the reason" in text
+    # a map of which the dataset has the digest alone
+    document = json.loads(smooth.attrs["scenario_resolved"])
+    document["shear"] = {"model": "mapped", "field": {"values": 3}}
+    lacking = smooth.assign_attrs(scenario_resolved=json.dumps(document))
+    (remark,) = report.remarks(lacking)
+    assert "does not hold the whole scenario" in remark and "nput" not in remark
 
 
 def test_figures_are_in_the_pages_colours(ramp):
@@ -240,14 +246,16 @@ def test_figures_are_in_the_pages_colours(ramp):
     ):
         images = [
             given
-            for tag, given in harmless(Page(report.svg_of(figure, "x-"))).elements
+            for tag, given in harmless(
+                Page(report.svg_of(figure, "x-", "a <name>"))
+            ).elements
             if tag == "image"
         ]
         # bars are images, too
         assert (
             sum(image["href"].startswith("data:image/png") for image in images) >= count
         )
-    text = report.svg_of(kinds.draw(ramp, "curve"), "x-")
+    text = report.svg_of(kinds.draw(ramp, "curve"), "x-", "")
     assert (
         "currentColor" in text
         and "#0072b2" in text
@@ -273,15 +281,15 @@ def test_measured_points_are_in_the_figure_that_has_their_axis_with_their_distan
     smooth, ramp
 ):
     distances = (0.5, -4.0, 1.5, 0.2)
-    (drawing,) = report.drawings(smooth, measured_about(smooth, *distances))
+    drawing, *_ = report.drawings(read.Run(smooth), measured_about(smooth, *distances))
     np.testing.assert_allclose(
         drawing.measured.residuals[0].values, distances, rtol=1e-6
     )
     time = {"t": ramp["t"].to_numpy()[[5, 9]], "friction_force": [1e-3, 1e-3]}
-    first, second = report.drawings(ramp, time)
+    first, second, *_ = report.drawings(read.Run(ramp), time)
     assert (first.kind, second.kind, second.measured) == ("time", "curve", None)
     with pytest.raises(ValueError, match="no column"):
-        report.drawings(ramp, {"bond_fraction": [0.5]})
+        report.drawings(read.Run(ramp), {"bond_fraction": [0.5]})
 
 
 @pytest.mark.usefixtures("unwritten")
@@ -303,11 +311,38 @@ def test_hostile_headings_are_refused_in_one_line(here):
     assert not Path("x.html").exists()
 
 
-def test_a_page_has_the_numbers_of_the_statistics_its_question_and_error_estimates(
+def order_of(text, *parts):
+    """The places of parts of a page, each of which is there once."""
+    assert [text.count(part) for part in parts] == [1] * len(parts)
+    return [text.index(part) for part in parts]
+
+
+def test_a_page_has_question_answer_figure_table_and_limits_in_this_order_and_folds_the_rest(
     ramp,
 ):
+    asked = "#:schema ./sim.schema.json\n# Does it\n# shrink?\n#\n# A first guess.\n"
+    ramp = ramp.assign_attrs(scenario_toml=f"{asked}name = 'x'\n", title="x")
+    text = html(ramp)
+    page = harmless(Page(text))
+    assert page.words("h1") == ["Does it shrink?"]
+    opening = markup.unescape(text[text.index("<body>") :])
+    folded = opening.index("<details>")
+    sentences = report.answer(read.Run(ramp))
+    assert 1 <= len(sentences) <= 3
+    parts = ["<h1>", sentences[0], "<h2>Numbers", "<h2>Limits"]
+    places = order_of(opening, *parts)
+    figure = opening.index("<svg ")
+    assert [*places[:2], figure, *places[2:], folded] == sorted(
+        [*places, figure, folded]
+    )
+    assert "A first guess" not in opening[:folded] and "A first guess" in opening
+    assert "<details open" not in text
+    titles = page.words("summary")
+    assert titles[0] == "All tables" and titles[-1].startswith("Provenance")
+
+
+def test_a_page_has_the_numbers_of_the_statistics_and_error_estimates(ramp):
     page = harmless(Page(html(ramp)))
-    assert [tag for tag, _ in page.elements].count("svg") == len(page.words("b")) == 1
     figures = read.tables.key_figures(read.Run(ramp))
     assert len(figures) > 3 and {"5 % lost at V", "half masked"} <= {
         row[""] for row in figures
@@ -316,27 +351,82 @@ def test_a_page_has_the_numbers_of_the_statistics_its_question_and_error_estimat
         assert set(row.values()) <= set(page.words("td"))
     document = json.loads(ramp.attrs["scenario_resolved"]) | {"<b>small</b>": 1}
     remarked = ramp.assign_attrs(scenario_resolved=json.dumps(document))
-    assert any(
-        "<b>small</b>" in words for words in harmless(Page(html(remarked))).words("p")
-    )
+    assert "<b>small" not in html(remarked)
     assert set(report.remarks(ramp)) < set(page.words("p"))
     assert html(ramp) == html(ramp)
-    text = (
-        "# Why\n# so?\n#\n# Because\n# of that.\n#\n# Really.\nname = 'x'\n# no more\n"
-    )
-    for toml, question, rest in (
-        (text, "Why so?", ["Because of that.", "Really."]),
-        ("", "x", []),
-    ):
-        assert report.question(ramp.assign_attrs(scenario_toml=toml, title="x")) == (
-            "x",
-            question,
-            rest,
-        )
     # of all records, of which 24 are looked at
     error = float(statistics(ramp)["area_ratio"].sem.max())
-    *_, row = report.known(ramp)
-    assert 0.5 * error < 0.01 * float(row["size"].removesuffix(" %")) <= error * 1.005
+    *_, words = report.errors(ramp)
+    size = 0.01 * float(words.removesuffix(" %").rpartition(" ")[2])
+    assert 0.5 * error < size <= error * 1.005 and words in page.words("li")
+
+
+def test_figures_have_names_and_all_that_scrolls_is_reached_by_keyboard(ramp):
+    page = Page(html(ramp))
+    pictures = [given for tag, given in page.elements if tag == "svg"]
+    assert len(page.words("title")) == 1 + len(pictures) > 1
+    assert all(given["role"] == "img" and given["aria-label"] for given in pictures)
+    scrolled = [
+        given for _, given in page.elements if "wide" in given.get("class", "").split()
+    ]
+    assert len(scrolled) > 3
+    for given in scrolled:
+        assert (given["tabindex"], given["role"]) == ("0", "region")
+        assert given["aria-label"]
+    assert len(page.words("summary")) > 3
+
+
+PULLED = {
+    "shear": shear.Uniform(),
+    "ensemble": Ensemble(members=1),
+    "drive": STEADY,
+    "clock": Clock(duration=1.0, step=0.01),
+}
+
+
+@pytest.mark.parametrize("lowest", [-0.5e-3, -0.1e-3])
+def test_an_answer_names_a_pull_off_only_if_the_contact_opened(lowest):
+    course = {"time": [0.0, 1.0], "value": [4e-3, lowest]}
+    dataset = simulated(contact=Equilibrium(load=course), **PULLED)
+    sentences = report.answer(read.Run(dataset))
+    (load,) = (words for words in sentences if "pull-off" in words)
+    work = float(dataset["work_of_adhesion"].isel(t=0))  # bonds break at this speed
+    by_jkr = 1.5 * np.pi * work * float(dataset["sphere_radius"])
+    if lowest < -by_jkr:
+        assert (
+            load == f"The normal load at the first pull-off is {-1e6 * by_jkr:.4g} µN."
+        )
+    else:
+        assert load.startswith("There is no ") and "does not open" in load
+
+
+def test_an_answer_names_the_ends_of_a_sweep_and_is_silent_about_zeros():
+    dataset = simulated(
+        drive=STEADY,
+        shear=shear.Uniform(),
+        ensemble=Ensemble(members=1),
+        clock=Clock(duration=0.04, step=0.02),
+        sweep={"contact.load": [1e-3, 2e-3, 4e-3]},
+    )
+    late = read.Run(dataset).late(["area_ratio"])["area_ratio"].value.to_numpy()
+    area, *others = report.answer(read.Run(dataset))
+    assert f"{100 * late[0]:.4g} % at contact_load = 1 mN" in area
+    assert f"{100 * late[-1]:.4g} % at contact_load = 4 mN" in area
+    assert not [words for words in others if "masked" in words or "without" in words]
+
+
+def test_a_page_after_a_fit_has_its_lines_and_another_page_has_none(smooth):
+    lines = ["Made by sim fit: bonds.stress is calibrated.", "chi^2 12.1, p = 0.43"]
+    asked = "# Does it shrink?\n"
+    fitted = asked + "".join(f"# {line}\n" for line in lines) + "name = 'x'\n"
+    for text, expected in ((fitted, lines), (asked, [])):
+        dataset = smooth.assign_attrs(scenario_toml=text)
+        _, question, fit = report.headed(dataset)
+        assert (question, fit) == ("Does it shrink?", expected)
+        page = Page(html(dataset))
+        assert ("The fit" in page.words("h2")) is bool(expected)
+        assert set(expected) <= set(page.words("li"))
+    assert report.headed(smooth.assign_attrs(scenario_toml="", title="x"))[1] == "x"
 
 
 def test_tables_key_figures_and_figures_of_a_page_have_the_chosen_units(here):
@@ -381,7 +471,7 @@ def test_markup_in_a_file_and_in_measured_data_is_shown_and_does_nothing(here):
     assert "\x1b" not in text and "\u202e" not in text
     assert [attributes for tag, attributes in page.elements if tag == "style"] == [{}]
     assert any(r"d\u202e{{ 7 + 42 }}" in paragraph for paragraph in page.words("p"))
-    assert MARKUP in page.words("p") and "49" not in page.words("p")
+    assert "49" not in page.words("p")
 
 
 @pytest.mark.usefixtures("bare")
@@ -398,13 +488,15 @@ def test_the_page_of_a_file_is_replaced_only_if_asked_and_has_the_commands_that_
     result = sim("report", "y.nc")
     assert (result.exit_code, result.stdout) == (0, "y.html\n")
     page = harmless(Page(Path("y.html").read_text(encoding="utf-8")))
-    assert page.words("h1") == ["Does it stick?"] and "Nobody knows." in page.words("p")
-    assert page.words("pre")[0] == Path("scene.toml").read_text(encoding="utf-8")
+    assert page.words("h1") == ["Does it stick?"]
+    *_, changed, text, _ = page.words("pre")
+    assert text == Path("scene.toml").read_text(encoding="utf-8")
+    assert changed.split("\n")[:2] == ['contact.load = "2 mN"', "seed = 7"]
     command = page.words("pre")[-1].splitlines()[0]
     assert (
         command == "sim run y.toml -o y.nc --set 'contact.load=\"2 mN\"' --set seed=7"
     )
-    Path("y.toml").write_text(page.words("pre")[0], encoding="utf-8")
+    Path("y.toml").write_text(text, encoding="utf-8")
     arguments = [
         "-o",
         "z.nc",

@@ -1,5 +1,0 @@
-"""One page of a whole run: figures, tables, errors, the scenario and how to repeat it."""
-
-from sim.report.report import html, written
-
-__all__ = ["html", "written"]
