@@ -332,7 +332,7 @@ def peak_of_mean(values: Array, times: Array, unit: str = "1") -> Peak:
                 )
             )
             return Peak(
-                f"no peak above the noise: at most {most} after {when}, {end} at the end"
+                f"no peak above the noise: at most {most} after {when}, {end} over the last eighth"
             )
     if place < 3:
         step = engineering(float(times[place]) / 4.0, "s")
