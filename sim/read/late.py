@@ -459,9 +459,14 @@ def _cycles(course: Array) -> Array:
 
 def _openings(counts: Array, members: int, again: str, span: str) -> str:
     """Return why contacts give no mean of what only a closed one has, by their count at each record; "" if they do."""
-    if again or np.any(np.diff(counts) > 0):
+    left, closes = int(counts[-1]), bool(again) or bool(np.any(np.diff(counts) > 0))
+    if members == 1 and closes:
+        return f"the contact closes again in {span}"
+    if members == 1 and not left:
+        return f"the contact is open at the end of {span}"
+    if closes:
         return f"{again or 'some'} of {members} contacts close again in {span}"
-    if (left := int(counts[-1])) <= FEW_LEFT and left < members:
+    if left <= FEW_LEFT and left < members:
         return f"{left or 'none'} of {members} contacts {'are' if left == 2 else 'is'} closed at the end of {span}"
     return ""
 

@@ -180,7 +180,7 @@ def crossing(
     bracket = none._replace(
         low=math.exp(low),
         high=math.exp(high),
-        reason=f"too few of {count} speeds are near",
+        reason=f"known only between two of {count} speeds",
     )
     if math.isnan(low) and math.isnan(high):
         bracket = bracket._replace(reason="hidden by the noise; add members")
