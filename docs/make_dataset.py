@@ -92,12 +92,7 @@ A *phase* of a run is an interval in which no prescribed course turns, stops, st
 prescribed speed changes its sign. Examples are rest and sliding of a `start`, approach and retraction of each cycle.
 If a run has several phases (at most 1,000), the events of each phase are recorded, too.
 
-A *slip event* is a fall of the spring force from a maximum to the next minimum, under these conditions:
-
-- The fall exceeds 0.3 of the largest force so far.
-- The interface slips at least half of the slider's advance.
-- The minimum is known once the force has risen again by 0.1 of the largest force.
-- If the stage stops or turns back, the fall ends without an event.
+[Events](events.md) has the definition of a slip event and of each other event.
 
 If members are kept, the first 1,000 slip events of each member are recorded one by one. Moments include all events.
 With `per_member = false` an event has a `<name>_count`, too. It is the number of members with that event, over which
@@ -186,6 +181,13 @@ COORDINATES = (
         "slip",
         "number of the slip event of a member",
         'drive.model = "spring", and each member is kept',
+    ),
+    (
+        "statistic",
+        "",
+        "statistic",
+        "mean, standard deviation and standard error over the members",
+        "members are not kept",
     ),
     (
         "late",

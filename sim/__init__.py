@@ -199,7 +199,12 @@ def stats(
     """
     from sim.read import Run, frame
 
-    return _plainly(lambda data: frame(Run(data), show), dataset, where)
+    # of files that were opened together numbers are read on use, in pieces
+    return _plainly(
+        lambda data: frame(Run(data.compute() if data.chunks else data), show),
+        dataset,
+        where,
+    )
 
 
 def plot(

@@ -803,7 +803,10 @@ OF_SLIPS: tuple[Definition, ...] = (
     Definition(
         "slip_count",
         "1",
-        "number of slip events",
+        (
+            "number of slip events; in tables of a stage at one speed that of those "
+            "which begin in the second half of the run"
+        ),
         exists_when=BEHIND_A_SPRING,
         heading="slips",
     ),

@@ -368,6 +368,11 @@ def over(dataset: xr.Dataset, name: str) -> Scene:
     ]
     name = _PLAIN.get(name, name)
     if name == "speed":
+        if is_steady(dataset) and speed_dim(dataset) is None:
+            cure = (
+                f"choose --x {swept[0].replace('_', '.', 1)}" if swept else "sweep it"
+            )
+            raise ValueError(f"the speed is the same at all points; {cure}")
         return over_speed(dataset)
     if len(keys) == 1:
         return over_key(dataset, keys[0])

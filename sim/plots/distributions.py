@@ -53,7 +53,9 @@ def values_of(dataset: xr.Dataset, name: str) -> xr.DataArray:
 def needs_members(dataset: xr.Dataset) -> None:
     """Refuse a dataset without recorded members that differ."""
     if dataset.sizes.get(MEMBERS, 1) < 2:
-        cure = "set ensemble.members = 64 and record.per_member = true"
+        alone = int(dataset.attrs["members"]) < 2
+        cure = "record.per_member = true"
+        cure = f"set ensemble.members = 64 and {cure}" if alone else f"set {cure}"
         raise ValueError(f"a distribution needs members that differ: {cure}")
 
 

@@ -132,6 +132,9 @@ class Choices(NamedTuple):
                 except ValueError:
                     words = f'--{name} takes two numbers in the unit of the axis, such as 0.1:10, not "{text[:40]}"'
                     raise ValueError(words) from None
+                if not low < high:
+                    words = f'--{name} takes the lower end first, not "{text[:40]}"'
+                    raise ValueError(words)
                 figure.axes[0].set(**{name: (low, high)})
 
     def of_member(self, dataset: xr.Dataset) -> xr.Dataset:

@@ -106,9 +106,10 @@ def remarks(dataset: xr.Dataset) -> list[str]:
 
     try:
         run = plan.Plan.of(scenario_of(dataset.attrs))
-    except BadInput:
+    except BadInput as fault:
+        key = fault.problems[0].partition(":")[0]
         return [
-            "the dataset does not hold the whole scenario, such as a measured map;"
+            f"the dataset does not hold the whole scenario: the file of {key} is not in it;"
             " `sim check` of the scenario prints its remarks"
         ]
     return [*diagnosis.remarks(run), *diagnosis.diagnosis(run)]

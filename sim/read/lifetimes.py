@@ -118,6 +118,10 @@ def _kaplan_meier(watched: Array, happened: Array, begins: Array) -> list[Array]
     return [times, survival, *ends]
 
 
+#: Times of events that have a survival.
+EVENTS = ("first_masked", "first_detachment")
+
+
 def survival(dataset: xr.Dataset, event: str) -> xr.Dataset:
     """Return the share of the members that an event has not reached yet, over time.
 
@@ -135,8 +139,18 @@ def survival(dataset: xr.Dataset, event: str) -> xr.Dataset:
         the start of the run: the times of the event in all members and points of the sweep, and the end of the run.
         The estimate is that of Kaplan and Meier with log-log intervals, because the run ends before the event has
         reached all members (censoring). Members count from the time at which their contact closes. The numbers are nan
-        after the last member is gone.
+        after the last member is gone, and the interval where the share is 1 or 0.
+
+    Raises
+    ------
+    ValueError
+        If there is no such event, or members were not recorded.
     """
+    if event not in EVENTS:
+        raise ValueError(f"{event[:40]} is no event; choose {' or '.join(EVENTS)}")
+    if event not in dataset or MEMBERS not in dataset[event].dims:
+        cure = "record each of several members: [record] per_member = true"
+        raise ValueError(f"the survival of {event} is not known; {cure}")
     times = dataset[event].astype(float)
     begins, end = _at_risk_from(dataset, times), float(dataset["t"][-1])
     grid = np.unique(np.append(times.to_numpy()[np.isfinite(times.to_numpy())], end))

@@ -546,7 +546,10 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
             text = f"{means[key].attrs.get('long_name', '')}, at the speed at which {loss} is lost"
             if key == "area_ratio":
                 stem, unit = "speed", "m/s"
-                text = f"sliding speed at which the mean contact area has lost {loss}"
+                of = "stage" if speed_name(dataset) == "stage_speed" else "slider"
+                text = (
+                    f"speed of the {of} at which the mean contact area has lost {loss}"
+                )
             value, *intervals, bound = numbers
             low, high, error = (
                 each.where(~never & ~(is_known & alone)) for each in intervals

@@ -190,10 +190,14 @@ def _of_late_slips(dataset: xr.Dataset, means: Estimates) -> dict[str, xr.DataAr
     """Return bounds of the errors of means over slip events by the clock steps at which these begin and end.
 
     Within a step the stage extends the spring by its displacement. A slip event and a stick phase begin and end
-    at clock steps, and so does the span over which the stage does work against friction.
+    at clock steps, in which the slider moves on at about its mean speed in the event. So does the span over which the
+    stage does work against friction.
     """
     step = setting(dataset, "clock.step")
     path = abs(speed_of(dataset)).max("t") * step
+    amplitude, duration = (means[n].value for n in ("slip_amplitude", "slip_duration"))
+    # the slider moves on in the steps at both ends of an event
+    moved = path + 2.0 * step * amplitude / duration
     rise = setting(dataset, "drive.stiffness") * path
     of_each = step + 0.0 * means["recurrence_time"].value
     intervals = (dataset["slip_count_late"] - 1.0).where(
@@ -203,7 +207,8 @@ def _of_late_slips(dataset: xr.Dataset, means: Estimates) -> dict[str, xr.DataAr
     return {
         "static_friction": rise + 0.0 * means["static_friction"].value,
         "force_drop": 2.0 * rise + 0.0 * means["force_drop"].value,
-        "slip_amplitude": path + 0.0 * means["slip_amplitude"].value,
+        "slip_amplitude": moved,
+        "slip_spread": moved / amplitude,
         "slip_duration": of_each,
         "stick_duration": of_each,
         "recurrence_time": step / intervals,
@@ -217,7 +222,7 @@ def unresolved_slips(dataset: xr.Dataset) -> list[str]:
     falls = ensemble_mean(dataset.get("slow_fall_count", xr.DataArray(0.0)))
     if bool((falls > 0.0).any()):
         remarks.append(
-            "the spring force falls by 0.3 or more while the slider is less than ten "
+            "the spring force falls by 0.3 of its largest value or more while the slider is less than ten "
             "times as fast as the stage, which is no slip event: it oscillates, or a "
             "smaller clock.step shows that it is faster"
         )

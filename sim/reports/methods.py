@@ -72,10 +72,16 @@ def methods(dataset: xr.Dataset) -> Methods:
         duration=_size(dataset["clock_duration"]),
         is_random=bool(has_noise(dataset).any()),
         errors=errors(dataset),
+        estimated=is_estimated(dataset),
     )
     references = (_FOLDER / "cite.bib").read_text(encoding="utf-8")
     version = dataset.attrs["sim_version"]
     return Methods(" ".join(text.split()), references.replace("VERSION", version))
+
+
+def is_estimated(dataset: xr.Dataset) -> bool:
+    """Return True if errors of the area were estimated before the run."""
+    return any(str(name).endswith("_error_area") for name in dataset.variables)
 
 
 def errors(dataset: xr.Dataset) -> list[str]:

@@ -29,7 +29,7 @@ from sim.read.errors import remarks
 from sim.read.estimate import Estimate
 from sim.read.run import Run
 from sim.read.tables import figure, key_figures, notes, tables_of
-from sim.reports.methods import errors, methods, rendered
+from sim.reports.methods import errors, is_estimated, methods, rendered
 from sim.scenario.files import toml
 from sim.units.errors import naming
 from sim.units.notation import engineering
@@ -239,6 +239,7 @@ def html(
         remarks=remarks(dataset),
         notes=notes(run, shown),
         errors=errors(dataset),
+        estimated=is_estimated(dataset),
         methods=methods(dataset),
         scenario=attrs.get("scenario_toml") or json.dumps(resolved, indent=2),
         changes={key: toml(value) for key, value in overrides.items()},
@@ -256,6 +257,7 @@ def answer(run: Run, most: int = 3) -> list[str]:
     losses = [name for name in run.losses if name.startswith("speed_")]
     late = run.late(_MEANS) if run.lasts else {}
     known, missing = list[str](), list[str]()
+    held = "phase_peak_after_hold" in run.events
     for group, names in ((run.events, _EVENTS), (run.losses, losses), (late, _MEANS)):
         for name in (name for name in names if name in group):
             one = group[name]
@@ -264,7 +266,8 @@ def answer(run: Run, most: int = 3) -> list[str]:
             is_dull = group is late and not bool(one.value.fillna(0.0).any())
             if not bool(one.is_missing.all()):
                 known += [] if is_dull else [_sentence(one, row)]
-            elif reason and reason == row.absent:
+            # after a hold the peak is that of a phase
+            elif reason == row.absent and not (held and name == "static_threshold"):
                 missing.append(f"There is no {one.value.long_name} ({reason}).")
     return [*known, *missing][:most]
 

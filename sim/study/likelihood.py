@@ -155,6 +155,10 @@ def with_stated_errors(
                 raise BadInput([f"{cause}; give --errors in its unit"])
             curves.append(curve)
         result.append(table._replace(curves=tuple(curves)))
+    if unused and all(c.errors is not None for t in tables for c in t.curves):
+        raise BadInput(
+            ["--errors: all curves have errors in their tables; leave it out"]
+        )
     for text in unused:
         cure = 'write "2 %", a size with the unit of a curve without errors, or one of both as COLUMN=SIZE'
         raise BadInput([f"--errors {text}: no curve can have such errors; {cure}"])
