@@ -16,6 +16,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -386,7 +387,7 @@ class Unfinished:
             self.folder.iterdir(), key=lambda path: path.name != _MANIFEST
         ):
             if _OURS.fullmatch(path.name) and path.stem != "output":
-                _unlink(path)
+                _patiently(path.unlink)
 
     @contextlib.contextmanager
     def _output_locked(self, patience: float | None) -> Iterator[None]:
@@ -396,7 +397,7 @@ class Unfinished:
             with explained(self.folder.parent):
                 self.folder.parent.mkdir(parents=True, exist_ok=True)
                 try:
-                    self.folder.mkdir()
+                    _patiently(self.folder.mkdir)
                 except FileExistsError:
                     # or it did: another process may have removed the folder since
                     if self.folder.is_file():
@@ -446,7 +447,7 @@ def _lock(path: Path, wait: float = 0.0) -> Any:
         warnings.simplefilter("ignore", UserWarning)
         for lock in (FileLock(path), SoftFileLock(path.with_suffix(".held"))):
             try:
-                lock.acquire(timeout=wait, poll_interval=0.05)
+                _patiently(partial(lock.acquire, wait, poll_interval=0.05))
                 return lock
             except Timeout:
                 return None
@@ -458,12 +459,15 @@ def _lock(path: Path, wait: float = 0.0) -> Any:
     raise StoreTrouble(f"{path}: the file system has no locks")
 
 
-def _unlink(path: Path) -> None:
-    """Remove a file. Windows refuses it while another process reads the file, as one that waits for the output does."""
+def _patiently(act: Callable[[], Any]) -> Any:
+    """Act, and again for a second if it is not permitted.
+
+    Windows does not permit to remove a file that another process reads, nor to make or open one that is being removed.
+    """
     end = time.monotonic() + _READING
     while True:
         try:
-            return path.unlink()
+            return act()
         except PermissionError:
             if time.monotonic() > end:
                 raise

@@ -473,6 +473,23 @@ def test_a_folder_that_goes_just_as_a_waiter_finds_it_is_made_anew(
     assert len(makes) > 1 and not names(tmp_path)
 
 
+def test_a_folder_that_windows_is_still_removing_is_made_when_it_is_gone(
+    tmp_path, monkeypatch
+):
+    path, refusals, make = tmp_path / "out.nc", [5, 5], os.mkdir
+
+    def mkdir(name, mode=0o777):
+        if refusals and Path(name) != tmp_path:
+            refusals.pop()
+            raise PermissionError(errno.EACCES, "Access is denied", name)
+        make(name, mode)
+
+    monkeypatch.setattr(os, "mkdir", mkdir)
+    folder = Unfinished(path, {"scenario": {}}, [], lambda path: {})
+    assert folder.publish([], 1, Path.touch) is None
+    assert not refusals and not names(tmp_path)
+
+
 def test_a_manifest_that_another_process_reads_is_removed_when_it_has_been_read(
     tmp_path, monkeypatch
 ):
