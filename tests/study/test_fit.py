@@ -467,7 +467,7 @@ def test_stated_errors_are_those_of_an_error_column_and_only_of_curves_without_o
     ):
         with pytest.raises(BadInput, match=cure):
             errors_of(bare, text)
-    with pytest.raises(BadInput, match="no curve can have such errors"):
+    with pytest.raises(BadInput, match="all curves have errors"):
         errors_of(known, "2 %")
     drawn["friction_force"][0] = 0.0
     with pytest.raises(BadInput, match="value of 0"):
