@@ -34,7 +34,7 @@ _OF_CONTACT = ("contact_radius", "contact_area", "area_ratio", "friction_force")
 _MARKS = {"-": "o", "--": "s", "-.": "^", ":": "v"}
 
 #: Marks of a pull-off and of a jump-in.
-_SIGNS: Any = {
+SIGNS: Any = {
     "pull-off": {"marker": "x", "markersize": 4, "linestyle": "none", "zorder": 3},
     "jump-in": style.HOLLOW | {"mew": 0.8, "zorder": 3},
 }
@@ -286,7 +286,7 @@ def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float) 
     x, mean = scene.x[line.number], factor * scene.values(name, line)
     known, (off, on) = np.flatnonzero(np.isfinite(mean)), scene.openings(line)
     places = np.searchsorted(known, off, "right") - 1, np.searchsorted(known, on)
-    for (words, sign), place in zip(_SIGNS.items(), places, strict=True):
+    for (words, sign), place in zip(SIGNS.items(), places, strict=True):
         if place.size and known.size:
             at = known.take(place, mode="clip")
             panel.plot(x[at], mean[at], color=line.colour, label=words, **sign)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from sim.laws import jkr
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.plots import style
-from sim.plots.curves import Scene, beside, mark_jumps, scene_along
+from sim.plots.curves import SIGNS, Scene, beside, scene_along
 from sim.plots.measured import Line, Measured
 from sim.read import control, is_steady, pull_offs, setting, settled
 from sim.read.dataset import ensemble_mean, plain, stays_held
@@ -264,20 +264,14 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
             x = placed.x[line.number]
             y = factor * np.where(placed.opened(line), 0.0, placed.values(name, line))
             panel.plot(x, y, color=line.colour, label=line.label)
-            if name != load:
-                mark_jumps(panel, placed, name, line, factor)
-            elif (off := _pull_offs(dataset, line)) is not None and np.isfinite(
-                off
-            ).any():
-                marks: Any = {
-                    "color": line.colour,
-                    "markersize": 2.5,
-                    "linestyle": "none",
-                }
-                marks |= {"marker": "x", "label": "pull-off"}
-                panel.plot(scene.unit.factor * off[0], factor * off[1], **marks)
         beside(panel, placed, name, factor)
         style.across(panel, placed.reach, placed.words, room=0.03)
+    events = [
+        point for line in scene.lines for point in _events(loads, scene, line, force)
+    ]
+    for panel in (loads, radii):
+        reach = np.append(scene.reach, events)
+        style.across(panel, reach, scene.words, room=0.03)
     _equilibria((loads, radii, loaded), scene, (force, length), stiffness)
     if data:
         along = scene if data.column(over) else of_load
@@ -293,13 +287,31 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     return figure
 
 
-def _pull_offs(dataset: xr.Dataset, line: Line) -> np.ndarray | None:
-    """Return displacements [m] and loads [N] of the recorded pull-offs, or their means over members."""
-    if "pull_off_load" not in dataset:
-        return None
-    off = pull_offs(dataset).isel(line.point, missing_dims="ignore")
-    names = ("pull_off_displacement", "pull_off_load")
-    return np.stack([ensemble_mean(off[name]).to_numpy().ravel() for name in names])
+def _events(panel: Axes, scene: Scene, line: Line, force: float) -> np.ndarray:
+    """Draw a cross at each recorded pull-off and a ring at the first jump-in of each member, or at their means.
+
+    Return their places on the axis.
+    """
+    dataset, reached = scene.statistics.dataset, []
+    events = ("pull_off", "jump_in")
+    for event, (words, sign) in zip(events, SIGNS.items(), strict=True):
+        if f"{event}_load" not in dataset:
+            continue
+        of_event = pull_offs(dataset) if event == "pull_off" else dataset
+        names = (f"{event}_displacement", f"{event}_load")
+        place, load = (
+            ensemble_mean(of_event[name].isel(line.point, missing_dims="ignore"))
+            .to_numpy()
+            .ravel()
+            for name in names
+        )
+        known = np.isfinite(load)
+        if known.any():
+            x = scene.unit.factor * place[known]
+            look = sign | {"color": line.colour, "label": words}
+            panel.plot(x, force * load[known], **look)
+            reached.append(x)
+    return np.concatenate(reached) if reached else np.empty(0)
 
 
 def _equilibria(

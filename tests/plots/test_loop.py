@@ -96,16 +96,31 @@ def test_behind_a_machine_an_open_contact_has_no_load_and_a_cross_at_each_pull_o
     exact = np.where(closed, 1e6 * machine["contact_radius"], 0.0)
     assert_allclose(course_of(radii)[1], exact, rtol=1e-14)
     ((place, pull),) = marks(loads, "x")
-    each = read.pull_offs(machine)
+    each = read.pull_offs(machine).dropna("phase")
     assert_allclose(place, 1e6 * each["pull_off_displacement"], rtol=1e-14)
     assert_allclose(pull, 1e6 * each["pull_off_load"], rtol=1e-14)
     # the sphere comes off at the fold, within a record
     fold = 1e6 * float(jkr.pull_off_displacement(340.0, *JKR))
     known = place[np.isfinite(place)]
     assert len(known) == 2 and np.all(np.abs(known - fold) <= 1e6 * RECORD)
-    ((place, _),) = marks(radii, "o")
-    opened = np.flatnonzero(np.diff(closed.astype(int)) == 1) + 1
-    assert_allclose(place, 1e6 * machine["displacement"][opened], rtol=1e-14)
+    ((place, pull),) = marks(loads, "o")
+    assert_allclose(place, 1e6 * machine["jump_in_displacement"], rtol=1e-14)
+    assert_allclose(pull, 1e6 * machine["jump_in_load"], rtol=1e-14)
+    # where the radius at an event is not recorded there is no mark of it
+    assert not marks(radii, "x") and not marks(radii, "o")
+
+
+def test_the_marks_of_a_loop_under_a_load_are_inside_the_figure():
+    course = {"from": 1e-3, "to": -1e-3, "cycles": 1}
+    dataset = moved(Equilibrium(load=course, after_pull_off="reattach"), clock=COARSE)
+    loads = rendered(plots.draw(dataset, "loop")).axes[0]
+    left, right = loads.get_xlim()
+    ((place, pull),) = marks(loads, "x")
+    assert loads.get_ylabel() == "normal load $P$ (mN)"
+    assert_allclose(pull, -1.5e3 * np.pi * 42e-3 * 2e-3, rtol=1e-9)
+    assert left < place.item() < right
+    ((place, _),) = marks(loads, "o")
+    assert left < place.item() < right
 
 
 def test_members_that_differ_have_their_own_pull_offs_or_the_means_of_these():
