@@ -16,7 +16,7 @@ import xarray as xr
 
 from sim.numerics import files, hdf5
 from sim.numerics.lazy import Refused, open_lazily
-from sim.quantities import OF_EACH_SLIP, RECORDED
+from sim.quantities import NUMBERS, OF_EACH_SLIP, RECORDED
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
 from sim.units.quantity import read_option
@@ -50,6 +50,8 @@ _DERIVED = (
     "radius_at_rest",
     "radius_without_adhesion",
 )
+#: All numbers of each point of a sweep.
+_NUMBERS = {row.name for row in NUMBERS}
 #: Other numbers of a run, and the dimensions that a run has beside those of its sweep.
 _RECORDED = {
     *RECORDED,
@@ -65,7 +67,6 @@ _RECORDED = {
     "map_time",
     "x",
     "y",
-    "jkr_pull_off_load",
     "error_speed",
     "member_spread_area",
 }
@@ -208,18 +209,14 @@ def _fault(dataset: xr.Dataset) -> str:
     for name, variable in (
         (str(name), variable) for name, variable in dataset.variables.items()
     ):
-        over_sweep = name in keys or name in _DERIVED
+        over_sweep = name in keys or name in _NUMBERS
         is_recorded = name in _RECORDED or name.removeprefix("late_") in _RECORDED
         if not (over_sweep or is_recorded or _ERRORS.match(name)):
             continue
-        is_label = (
-            name in keys
-            and variable.dims
-            and variable.dims[0] in dataset["contact_modulus"].dims
-        )
-        if variable.dtype.kind not in (
-            "OUSTfiu" if is_label else "f" if over_sweep or name == "t" else "fiu"
-        ):
+        allowed = "f" if over_sweep or name == "t" else "fiu"
+        if name in keys and {*variable.dims[:1]} & {*dataset["contact_modulus"].dims}:
+            allowed = "OUSTfiu"  # a label
+        if variable.dtype.kind not in allowed:
             return f"the variable {name} has the type {variable.dtype}, which a run does not give it"
         if unknown := set(variable.dims) - {
             *sweep_dims(dataset),

@@ -51,6 +51,8 @@ _CHARGED = (
 _GROUPS, _MOST_MEANS = 64, 2**22
 #: Within how many standard errors of a level speeds are near it.
 _NEAR = 4.0
+#: Standard errors beyond which a difference of two interpolations is not noise.
+_SEEN = 2.0
 #: Speeds to each side of a level that its interpolation needs.
 _REACH = 6
 #: Reasons for a bound: below the speeds, above them, and above those at which all groups are in contact.
@@ -152,7 +154,7 @@ def crossing(
         """Return half of the interval, the standard error, and the bound of the interpolation."""
         off = (each - rows for each in coarser)
         bound = math.hypot(
-            *(math.sqrt(max(0.0, d[0] ** 2 - error(d) ** 2)) for d in off)
+            *(math.sqrt(max(0.0, d[0] ** 2 - (_SEEN * error(d)) ** 2)) for d in off)
         )
         scatter = float(error(rows))
         return math.hypot(student * scatter, bound), scatter, bound
@@ -425,11 +427,11 @@ def _if_steady(
     map, of runs that were joined, of swept models.
     """
     sweep = dataset["contact_modulus"]
-    if not is_chosen and f"steady_speed_{next(iter(LOST))}" in dataset:
-        pairs = (
-            (dataset[f"{kind}_speed_{name}"] for kind in ("steady", "unstable"))
-            for name in LOST
-        )
+    names = [
+        [f"{kind}_speed_{name}" for kind in ("steady", "unstable")] for name in LOST
+    ]
+    if not is_chosen and {*itertools.chain(*names)} <= dataset.keys():
+        pairs = ((dataset[calm], dataset[other]) for calm, other in names)
         return [(calm.fillna(other), other.isnull()) for calm, other in pairs]
     result = [(math.nan * sweep, xr.ones_like(sweep, bool)) for _ in levels]
     delays = any(str(name).startswith("bonds_rebinding") for name in dataset.variables)

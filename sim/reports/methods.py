@@ -56,7 +56,7 @@ def methods(dataset: xr.Dataset) -> Methods:
     models = (word(dataset, f"{part}.model", "").astype(str) for part in _PARTS)
     swept = {name: dataset.sizes[name] for name in sweep_dims(dataset)}
     numbers = {
-        dataset[name].attrs["long_name"]: _size(dataset[name])
+        dataset[name].attrs.get("long_name", name): _size(dataset[name])
         for name in _NUMBERS
         if name in dataset and bool(dataset[name].notnull().any())
     }

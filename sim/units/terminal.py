@@ -66,9 +66,13 @@ def one_line(text: str) -> str:
     >>> print(one_line(f"{chr(27)}[31m{chr(0x202E)}3 mN"))
     \x1b[31m\u202e3 mN
     """
-    return "".join(
-        c if c.isprintable() else "?" if c.isspace() else repr(c)[1:-1] for c in text
-    )
+
+    def shown(letter: str) -> str:
+        if letter.isprintable():
+            return letter
+        return "?" if letter.isspace() else repr(letter)[1:-1]
+
+    return "".join(map(shown, text))
 
 
 def plain(text: str) -> str:
