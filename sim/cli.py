@@ -461,11 +461,11 @@ _KINDS = {
     "loop": "Load and contact radius over displacement, and radius over load, with the pull-offs and JKR's"
     " equilibria. --data",
     "theories": "Contact area, simulated and by each theory, over shear stress and tangential force.",
-    "stress": "Shear stress with its maximum, and bonds, over speed. After a start from rest: the static peaks. --data",
+    "stress": "Shear stress with its maximum, and bonds, over speed; of a start, over time. --data",
     "stability": "Force amplitude of the spring over speed and stiffness, at increasing and decreasing speed,"
     " with theory.",
     "creep": "Displacement and speed of the slider over time under a prescribed force. A cross marks a runaway. --data",
-    "friction": "Friction force over time and over the slider's position: the friction loop. --data",
+    "friction": "Friction force over time and over the slider's position. --data",
     "curve": "Contact area with the loss by each mechanism, energies and friction, over speed. --x --absolute --data",
     "sweep": "Contact radius, energies and friction over the first swept key. Each value of a further key is a"
     " curve. --x --absolute --data",

@@ -296,7 +296,7 @@ def _smallest_area(plan: Plan, courses: Courses) -> Iterator[str]:
     varies = np.nanmax(every) > np.nanmin(every)
     smallest = ", smallest" if varies else ""
     at = in_words(plan, plan.points[place], float(course.speed[row]))
-    text = f"mean A/A_JKR {_percents(every)}{smallest} at {at}: points taken by"
+    text = f"in steady sliding mean A/A_JKR {_percents(every)}{smallest} at {at}: points taken by"
     text += ",".join(f" {name} {points:.2g}" for name, (points, _) in taken.items())
     if taken.keys() >= {"bonds", "fluctuations"}:
         bonds, waves = taken["bonds"][1], taken["fluctuations"][1]

@@ -695,7 +695,7 @@ def needs_friction(dataset: xr.Dataset) -> None:
 
 
 def friction_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
-    """Friction force over time and over the slider's position: the friction loop."""
+    """Friction force over time and over the slider's position."""
     scene = over(dataset, "t")._replace(measured=data)
     position, words = scene.all("slider_position"), "slider position $x$"
     moved = scene.placed("slider_position", position, words, "m")

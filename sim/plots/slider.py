@@ -299,7 +299,7 @@ def needs_stress(dataset: xr.Dataset) -> None:
 def stress_figure(
     dataset: xr.Dataset, data: Measured | None = None, ax: Axes | None = None
 ) -> Figure:
-    """Shear stress with its maximum, and bonds, over speed. After a start from rest: the static peaks."""
+    """Shear stress with its maximum, and bonds, over speed; of a start, over time."""
     if "drive_rest" in dataset:
         if data or ax:
             raise ValueError(

@@ -453,6 +453,11 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
         times = run.dataset["runaway_time"].isel(t=-1)
         if count := int(times.notnull().sum()):
             yield f"{count} of {times.size} trajectories end because the slider lost stability"
+    if only_statistics(run.dataset) and run.losses:
+        yield (
+            "members were not recorded: errors of losses take those at neighbouring "
+            "speeds for independent, and the time of half of the members is not known"
+        )
     if sentence := unresolved(run.dataset):
         yield sentence
 

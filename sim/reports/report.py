@@ -28,6 +28,7 @@ from sim.read.dataset import claim
 from sim.read.errors import remarks
 from sim.read.estimate import Estimate
 from sim.read.run import Run
+from sim.read.statistics import over_members
 from sim.read.tables import figure, key_figures, notes, tables_of
 from sim.reports.methods import errors, is_estimated, methods, rendered
 from sim.scenario.files import toml
@@ -150,6 +151,12 @@ _EVENTS = (
     "peak_friction",
     "peak_stress",
 )
+#: What takes the area of a contact whose speed changes, in words, and a share of it that is nothing.
+_SHARES = {
+    "lost_to_bonds": "broken bonds",
+    "lost_to_fluctuations": "fluctuations, which are subtracted after the bonds",
+}
+_LEAST = 1e-6
 _MEANS = ("area_ratio", "friction_force", "fraction_masked")
 
 
@@ -256,7 +263,7 @@ def answer(run: Run, most: int = 3) -> list[str]:
     """Return at most so many sentences on what the run tells: events, losses of area, means, and absent events."""
     losses = [name for name in run.losses if name.startswith("speed_")]
     late = run.late(_MEANS) if run.lasts else {}
-    known, missing = list[str](), list[str]()
+    known, missing = _shares(run), list[str]()
     held = "phase_peak_after_hold" in run.events
     for group, names in ((run.events, _EVENTS), (run.losses, losses), (late, _MEANS)):
         for name in (name for name in names if name in group):
@@ -270,6 +277,28 @@ def answer(run: Run, most: int = 3) -> list[str]:
             elif reason == row.absent and not (held and name == "static_threshold"):
                 missing.append(f"There is no {one.value.long_name} ({reason}).")
     return [*known, *missing][:most]
+
+
+def _shares(run: Run) -> list[str]:
+    """Return a sentence on what each mechanism takes at the end of a course of the speed, if both are known."""
+    # in stick-slip the end of a run is any place of a cycle
+    if run.sweep or not run.losses or run.speed_name != "speed":
+        return []
+    last = run.dataset.isel(t=[run.last])
+    found = over_members(last, _SHARES, quantiles=False)
+    if found.keys() != {*_SHARES}:
+        return []
+    at_end = {name: one.isel({"t": 0}) for name, one in found.items()}
+    taken = [
+        f"{figure(one, QUANTITIES[name])} to {_SHARES[name]}"
+        for name, one in at_end.items()
+        if float(one.value) > _LEAST
+    ]
+    if not taken:
+        return []
+    return [
+        f"At the end of the run the contact has lost, of JKR's area, {' and '.join(taken)}."
+    ]
 
 
 def _sentence(one: Estimate, row: Definition) -> str:

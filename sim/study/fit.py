@@ -49,7 +49,7 @@ from sim.study.likelihood import (
 )
 from sim.study.mechanisms import WHOLE, Verdict, compare
 from sim.units.errors import BadInput
-from sim.units.notation import concise, engineering, in_units, scaled
+from sim.units.notation import chance, concise, engineering, in_units, scaled
 from sim.units.quantity import Quantity, read_option
 
 #: Factor by which a number that is fitted in its logarithm may change at most, where no bounds are given.
@@ -791,7 +791,7 @@ def _differences(fit: Fit) -> list[dict[str, str]]:
 
 def _quality(fit: Fit) -> str:
     """Return the chi^2 of the fit and, if it has not converged, the cure."""
-    likely = f", p = {fit.p_value:.2g}" if math.isfinite(fit.p_value) else ""
+    likely = f", {chance(fit.p_value)}" if math.isfinite(fit.p_value) else ""
     chi_square = f"chi^2 {fit.best.chi_square:.4g} at {fit.problem.freedom} degrees of freedom{likely}"
     ending = (
         "\nthe fit has not converged: start nearer, give bounds, or free fewer keys"

@@ -16,6 +16,7 @@ import numpy as np
 from sim.parts.exchange import Array
 from sim.scenario.schema import quantities
 from sim.study.likelihood import Free, Minimum, Problem, idle, minimum, spread
+from sim.units.notation import chance
 from sim.units.quantity import Quantity
 
 #: Most draws of a likelihood ratio; ratios as large as the measured one that are enough (Besag & Clifford 1991);
@@ -223,7 +224,7 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
     if len(left) > 1 or (first.name not in PARTS and ahead < WORSE):
         names = ", ".join(item.name for item in left)
         return "", f"the data cannot tell: not rejected are {WHOLE}, {names}"
-    evidence = f"(p = {first.p_value:.2g}, AICc {-ahead:+.2g} from {WHOLE})"
+    evidence = f"({chance(first.p_value)}, AICc {-ahead:+.2g} from {WHOLE})"
     words = f"the data prefer {first.name} {evidence} and reject the others"
     if first.name in PARTS:
         words = f"{first.name} is sufficient; the data cannot tell whether {PARTS[first.name]} as well {evidence}"

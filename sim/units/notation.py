@@ -185,6 +185,15 @@ def bounded(
     return f"{text} ± {bound:.{places}f} ({source})"
 
 
+def chance(p_value: float) -> str:
+    """Return a p value in words; one that would be rounded to 1 is above 0.99.
+
+    >>> print(chance(0.0312), chance(0.998), sep="; ")
+    p = 0.031; p > 0.99
+    """
+    return f"p = {p_value:.2g}" if p_value < 0.995 else "p > 0.99"
+
+
 def share(value: float, low: float, high: float) -> str:
     """Return a share in percent with an end of its 95 % interval if a standard error would leave 0 to 100 %; "" else.
 

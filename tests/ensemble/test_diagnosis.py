@@ -350,9 +350,9 @@ def test_the_diagnosis_has_the_numbers_of_closed_forms_and_goes_with_the_dataset
         1e3 * energies.mean(),
         atol=4e3 * energies.std() / math.sqrt(energies.size),
     )
-    (mean,) = said(texts, "mean A/A_JKR")
+    (mean,) = said(texts, "in steady sliding mean A/A_JKR")
     smallest, at, taken = re.fullmatch(
-        r"mean A/A_JKR ([0-9.]+) to [0-9.]+ %, smallest at ([^:]*): points taken by"
+        r"in steady sliding mean A/A_JKR ([0-9.]+) to [0-9.]+ %, smallest at ([^:]*): points taken by"
         r" (.*) if fluctuations are subtracted first\)",
         mean,
     ).groups()
