@@ -106,10 +106,13 @@ SERVE = """
 import json, os, subprocess, sys, time
 import numpy as np
 import sim
-from sim import engine
 from sim.laws import jkr
 scenes, programs = json.loads(sys.stdin.readline())
-noise, loaded = getattr(engine, "MemberNoise", None) or engine.Dice, {}
+try:
+    from sim.step.state import MemberNoise
+except ImportError:  # before version 2
+    from sim.engine import MemberNoise, follow
+loaded = {}
 random = np.random.default_rng(1)
 load, work = random.uniform(0, 4e-3, 10**5), random.uniform(0, 0.04, 10**5)
 depth = random.uniform(-4e-7, 2e-6, 10**5)
@@ -121,7 +124,8 @@ def step(name):
     if name not in loaded:
         loaded[name] = sim.load(scenes[name])
     members, steps = np.arange(loaded[name].ensemble.members), range(loaded[name].clock.steps + 1)
-    engine.follow(loaded[name], noise.of(1, members), None, steps)
+    scene, noise = loaded[name], MemberNoise.of(1, members)
+    scene.stepper.follow(noise, None, steps) if hasattr(scene, "stepper") else follow(scene, noise, None, steps)
 for line in sys.stdin:
     name, repeats = json.loads(line)
     began = spent()

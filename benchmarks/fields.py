@@ -11,8 +11,8 @@ import sim
 from benchmarks import plain
 from benchmarks.scenes import RAMP, RATE, field, followed, lens
 from benchmarks.timing import Bench, Beside, Row
-from sim.engine import MemberNoise, follow, start
 from sim.spectrum.families import SelfAffine
+from sim.step.state import MemberNoise
 
 CELL, SHEAR_MODULUS, EXPONENT = 0.24e-3, 1.6e6, 0.1
 TEXTBOOK, HALF = "numpy, noise by rfft2", "numpy, only pairs with power drawn"
@@ -126,13 +126,13 @@ def mapped(bench: Bench) -> list[Row]:
             lens(1, 1000, drive=RAMP, bonds=RATE, shear=field("mapped", size))
         )
         noise = MemberNoise.of(1, np.arange(1))
-        states = [start(scene, noise)]
+        states = [scene.stepper.start(noise)]
 
         def step(scene=scene, noise=noise, states=states) -> None:
-            before = states[0] if states[0].step < 1000 else start(scene, noise)
-            states[0], _ = follow(
-                scene, noise, before, range(before.step + 1, before.step + 2)
-            )
+            is_done = states[0].step == 1000
+            before = scene.stepper.start(noise) if is_done else states[0]
+            steps = range(before.step + 1, before.step + 2)
+            states[0], _ = scene.stepper.advance(before, noise, steps)
             scene.process.maps(states[0].shear, states[0].drive.position, 1)
 
         textbook = plain.TextbookModes(*known(size), SHEAR_MODULUS, 1)

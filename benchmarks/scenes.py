@@ -78,14 +78,12 @@ def followed(scene: Tables) -> Callable[[], object]:
     import numpy as np
 
     import sim
-    from sim import engine
+    from sim.step.state import MemberNoise
 
-    # as an older tree calls it
-    of, noise = sim.load(scene), getattr(engine, "MemberNoise", None) or engine.Dice
-    members, end = np.arange(of.ensemble.members), of.clock.steps
-    return lambda: engine.follow(
-        of, noise.of(of.seed, members), None, range(0, end + 1, of.clock.stride)
-    )
+    of = sim.load(scene)
+    noise = MemberNoise.of(of.seed, np.arange(of.ensemble.members))
+    steps = range(0, of.clock.steps + 1, of.clock.stride)
+    return lambda: of.stepper.follow(noise, None, steps)
 
 
 def steady(speed: float, step: float, steps: int) -> tuple[Any, Any]:

@@ -11,12 +11,12 @@ import sim
 from benchmarks import bonds_plain
 from benchmarks.bonds import BELL
 from benchmarks.timing import Bench, Beside, Row, absolute, spent
-from sim.engine import MemberNoise, State, Trajectory, follow
 from sim.parts.bonds.models import FirstMoment, Tracked
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import READINGS, Spring
 from sim.scenario.scenario import Clock, Scenario
+from sim.step.state import MemberNoise, State, Trajectory
 
 #: Speed of the stage in Bell's stretches a life at rest, and spring over that of all sites: half of the onset's.
 SPEED, SOFT = 10.0, 0.02
@@ -56,12 +56,8 @@ def scene(
 
 def ended(of: Scenario, members: int = 1) -> tuple[State, Trajectory]:
     """Return the state of a slider at the end, and its trajectory at each clock step."""
-    return follow(
-        of,
-        MemberNoise.of(of.seed, np.arange(members)),
-        None,
-        range(1, of.clock.steps + 1),
-    )
+    noise = MemberNoise.of(of.seed, np.arange(members))
+    return of.stepper.follow(noise, None, range(1, of.clock.steps + 1))
 
 
 def followed(of: Scenario, members: int = 1) -> Trajectory:

@@ -27,15 +27,15 @@ FLOORS = (
     "laws",
     "spectrum",
     "parts",
+    "step",
     "scenario",
-    "engine",
     "ensemble",
 )
 FLOORS += ("read", "plots", "reports", "study", "explorer", "cli", "__main__")
 #: Floors that a floor must not import although they are below it.
 FORBIDDEN = {
-    "read": {"parts", "scenario", "engine", "ensemble"},
-    "plots": {"engine", "ensemble"},
+    "read": {"parts", "step", "scenario", "ensemble"},
+    "plots": {"step", "ensemble"},
 }
 FORBIDDEN |= {"reports": {"ensemble"}}
 #: Speeds in steady sliding beside those of a course are of the models of a stored scenario.

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers.corner_scenes import corner_scene
 from helpers.random_scenes import random_scene
+from helpers.scenes import follow
 from helpers.slider_rules import (
     check_dissipated,
     check_ends,
@@ -21,9 +22,9 @@ from helpers.slider_rules import (
 )
 
 import sim
-from sim.engine import MemberNoise, follow, pack, unpack
 from sim.ensemble.variables import LARGEST
 from sim.parts.drive import READINGS
+from sim.step.state import MemberNoise, pack, unpack
 
 #: Seeds of the scenes: six, and scenes whose energies, sub-steps or messages have been wrong.
 SEEDS = [
@@ -176,7 +177,10 @@ def check_cuts(scenario, course, end, cut=None):
     members = range(scenario.ensemble.members)
     middle, _ = run(scenario, members, range(cut + 1))
     resumed, _ = run(
-        scenario, members, range(cut + 1, last + 1), unpack(scenario, pack(middle))
+        scenario,
+        members,
+        range(cut + 1, last + 1),
+        unpack(scenario.parts, pack(middle)),
     )
     seldom, sparse = run(scenario, members, range(last % 5, last + 1, 5))
     for name, values in pack(end).items():

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from helpers import scenes
 
-from sim.engine import pack
+from sim.step.state import pack
 
 USUAL = {
     "drive": "log ramp",

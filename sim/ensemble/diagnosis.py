@@ -7,7 +7,6 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from sim.engine import MemberNoise, follow
 from sim.ensemble.expected import (
     TIMES,
     Expected,
@@ -33,6 +32,7 @@ from sim.scenario.scenario import Scenario
 from sim.spectrum.families import Band
 from sim.spectrum.family import Family
 from sim.spectrum.radial import share_of_long_waves
+from sim.step.state import MemberNoise
 from sim.units.notation import engineering
 
 #: Points of a sweep whose steady sliding is computed, and points that are searched for remarks.
@@ -403,9 +403,8 @@ def _along_course(point: Scenario, slower: float) -> Array:
     scene = changed(
         point, values | {"clock.duration": duration, "clock.step": duration / _STEPS}
     )
-    course = follow(
-        scene, MemberNoise.of(0, np.zeros(1, int)), None, range(_STEPS + 1)
-    )[1]
+    noise = MemberNoise.of(0, np.zeros(1, int))
+    course = scene.stepper.follow(noise, None, range(_STEPS + 1))[1]
     area = course.radius**2 / jkr_radius(scene, course.time) ** 2
     return np.stack([area, area * course.strength, course.speed])[..., 0]
 
@@ -440,7 +439,9 @@ def _lagging(plan: Plan, point: Scenario) -> Iterator[str]:
     with feedback, which is slow. Nothing is said of a table with a jump or beside a changing load.
     """
     left_out = (
-        point.population.per_member or point.fluctuations.law.relaxing or point.by_steps
+        point.population.per_member
+        or point.fluctuations.law.relaxing
+        or point.stepper.longest == 1
     )
     rows = point.drive.time if point.drive.model == "table" else ()
     jumps = bool(rows) and (point.contact.changes or 0.0 in np.diff(rows))

@@ -23,12 +23,12 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
-from sim.engine import State, pack, unpack
 from sim.ensemble.plan import Task
 from sim.ensemble.store import Arrays, Blocks
 from sim.numerics import jit
 from sim.numerics.disk_cache import digest
 from sim.numerics.files import StoreTrouble
+from sim.step.state import State, pack, unpack
 from sim.units.errors import BadInput
 from sim.units.terminal import progress_bar, signals
 
@@ -310,7 +310,7 @@ def _block(
     names, points = group.task.names, group.task.points
     if group.number != number - 1:
         before = state if store is None else store.state(names[number - 1])
-        group.state = unpack(points[0], before or {})
+        group.state = unpack(points[0].parts, before or {})
     group.state, arrays = advance(group.task, number, group.state)
     group.number, is_last = number, number == len(names) - 1
     packed = {} if is_last else pack(group.state)

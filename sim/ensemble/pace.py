@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from sim.engine import MemberNoise, State, follow, pack, start, unpack
 from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots
 from sim.ensemble.swept import spread
 from sim.numerics.stopwatch import stopwatch
 from sim.scenario.scenario import Scenario
+from sim.step.state import MemberNoise, State, pack, unpack
 from sim.units.errors import BadInput
 
 # Rough costs of one core [s]: a record of a batch, of a member, a byte of a map that is drawn.
@@ -96,16 +96,18 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
     ):
         division *= _LONGER
     scene = _divided(point, division)
-    first = follow(scene, noise, None, range(1, 2))[0]  # loads kernels
+    first = scene.stepper.follow(noise, None, range(1, 2))[0]  # loads kernels
     sliding = _sliding(point, noise)
     # its first step is made as such, because at any other the bonds of a contact that was open begin without a stretch
     others = pack(
-        first if sliding is None else follow(scene, noise, sliding, range(1, 2))[0]
+        first
+        if sliding is None
+        else scene.stepper.follow(noise, sliding, range(1, 2))[0]
     )
     states = [
         first,
         *(
-            unpack(point, {name: array.copy() for name, array in others.items()})
+            unpack(point.parts, {name: array.copy() for name, array in others.items()})
             for _ in _PLACES[1:]
         ),
     ]
@@ -116,9 +118,8 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
         for number, place in enumerate(_PLACES):
             last = min(int(place * clock.steps * division) + count, scene.clock.steps)
             steps, before = range(last - count + 1, last + 1), now()
-            states[number] = follow(
-                scene, noise, states[number]._replace(step=last - count), steps
-            )[0]
+            before_piece = states[number]._replace(step=last - count)
+            states[number] = scene.stepper.advance(before_piece, noise, steps)[0]
             longer.append(max(now() - before, 1e-9) * division / count)
             if now() > end:
                 break
@@ -169,6 +170,6 @@ def _sliding(point: Scenario, noise: MemberNoise) -> State | None:
         "bonds.start": "steady",
     }
     try:
-        return start(point.with_values(changes, built=False), noise)
+        return point.with_values(changes, built=False).stepper.start(noise)
     except BadInput:
         return None

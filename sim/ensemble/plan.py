@@ -412,7 +412,7 @@ def seconds_a_step(point: Scenario, members: int) -> float:
     """Return the rough time of one core for a step of a batch, averaged over the run [s], the same on any machine."""
     bonds, batch = (
         point.population,
-        _STEP + _ALONE * point.by_steps + point.population.step_seconds,
+        _STEP + _ALONE * (point.stepper.longest == 1) + point.population.step_seconds,
     )
     member = (
         _OF_MEMBER

@@ -11,7 +11,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from sim.engine import MemberNoise, State, Trajectory, follow
 from sim.ensemble.dataset import (
     attributes,
     attributes_of,
@@ -45,6 +44,7 @@ from sim.parts.shear.process import Fluctuation
 from sim.quantities import MAP, OF_CONTACT, Mean
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read
+from sim.step.state import MemberNoise, State, Trajectory
 from sim.units.notation import second_half
 
 Progress = Callable[[int], None]
@@ -285,7 +285,7 @@ def _record(
     drawn, drawn_at = int(np.sum(members < point.record.map_members)), snapshots(point)
     most = max(_STEPS, _MEMBER_STEPS // len(members))
     for steps in block.pieces(max(1, most // clock.stride), drawn_at):
-        state, course = follow(point, noise, state, steps)
+        state, course = point.stepper.follow(noise, state, steps)
         if steps[-1] % clock.stride == 0:
             first, last = (
                 steps[0] // clock.stride - records[0],

@@ -8,12 +8,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from sim.engine import Trajectory, balance
 from sim.parts.bonds.models import Model
 from sim.parts.exchange import Array, Bonding, Motion
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
 from sim.spectrum.family import Family
+from sim.step.state import Trajectory
 
 #: Values of keys, by their dotted names.
 Values = Mapping[str, float]
@@ -67,7 +67,7 @@ def steady_course(
         if stored is None
         else stored
     )
-    terms = balance(scenario, bonding.fraction, bonding.strength, energy + still, still)
+    terms = scenario.work.balance(bonding, energy + still, still)
     touch = scenario.contact.start(motion, scenario.clock.duration, terms)
     moving = (
         time,

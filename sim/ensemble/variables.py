@@ -6,7 +6,6 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from sim.engine import State, Trajectory, balance
 from sim.laws import jkr
 from sim.parts.contact.balance import (
     BONDS_ONLY,
@@ -32,6 +31,7 @@ from sim.quantities import (
 )
 from sim.scenario.checks import pull_off_error, renewed
 from sim.scenario.scenario import Scenario
+from sim.step.state import State, Trajectory
 
 
 class Variable(NamedTuple):
@@ -96,9 +96,7 @@ def _applied_load(scene: Scenario, course: Trajectory) -> np.ndarray:
 
 
 def _terms(scene: Scenario, course: Trajectory) -> Balance:
-    return balance(
-        scene, course.fraction, course.strength, course.energy, course.position
-    )
+    return scene.work.balance(course, course.energy, course.position)
 
 
 def _stored(scene: Scenario, course: Trajectory) -> np.ndarray:

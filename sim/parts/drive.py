@@ -86,6 +86,9 @@ class _Sliding(Part):
     def readings(self, state: Slider) -> Array:
         return np.empty((1, 0))
 
+    def stage_of(self, state: Slider) -> Array:
+        return np.empty(0)
+
     def pieces(self, ends: Array, duration: float) -> tables.Pieces:
         """Return the speed in the intervals between some times [s], in pieces."""
         raise NotImplementedError
@@ -382,6 +385,9 @@ class Force(_Driven):
     def pieces(self, ends: Array, duration: float) -> tables.Pieces:
         return tables.Number(0.0).pieces(ends, duration)
 
+    def stage_of(self, state: Driven) -> Array:
+        return np.empty(0)
+
 
 @keyed(kw_only=True)
 class Spring(_Driven):
@@ -421,6 +427,9 @@ class Spring(_Driven):
         """Return the speed of the stage at some times after it has started, in a run of a duration [s]."""
         after = self.start_after
         return self.course.at(np.maximum(time - after, 0.0), duration - after)
+
+    def stage_of(self, state: Driven) -> Array:
+        return state.stage_position
 
     def _first_speed(self, duration: float) -> float:
         return self.first(duration) if self.start == "steady" else 0.0

@@ -451,6 +451,9 @@ class Drive(Part, Protocol[State]):
     def readings(self, state: State) -> Array:
         """Recorded quantities of a drive that feels the friction, shape (members, quantities), else (1, 0)."""
 
+    def stage_of(self, state: State) -> Array:
+        """Position of the stage that pulls the slider through a spring [m], empty without one."""
+
 
 class Bonds(Part, Protocol[State]):
     """A population of bonds between slider and half-space."""
@@ -490,6 +493,10 @@ class Shear(Protocol[State]):
     @property
     def state_class(self) -> type[State]:
         """Class of the state, a ``NamedTuple`` with ``energy``."""
+
+    @property
+    def pairs(self) -> int:
+        """Count of mode pairs that are drawn."""
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> State:
         """Stationary fluctuations at t = 0."""

@@ -5,7 +5,7 @@ import math
 from dataclasses import fields, replace
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, cast
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 from pydantic import (
@@ -23,7 +23,7 @@ from sim.numerics.grid import Lattice
 from sim.parts.bonds.models import Bonds, Model as BondModel, Unbroken
 from sim.parts.contact import Contact
 from sim.parts.contact.balance import Bodies, Shares
-from sim.parts.contact.models import Adhesion, Solid, Sphere
+from sim.parts.contact.models import Adhesion, EffectiveWork, Solid, Sphere
 from sim.parts.drive import Drive, Steady as SteadyDrive
 from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
@@ -35,11 +35,14 @@ from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
 from sim.scenario.schema import entries, quantities, with_models
 from sim.scenario.sweep import read_sweep, rows, set_key, spaced
+from sim.step.driven import Driven
+from sim.step.phases import Phases, phases
+from sim.step.prescribed import Prescribed
+from sim.step.stepper import Models, Scene, Stepper
 from sim.units import notebook
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
-from sim.units.tables import Pieces
 
 _Title = Annotated[
     str,
@@ -201,95 +204,6 @@ class Record:
             "unresolved_time",
             *self.quantities,
         )
-
-
-#: Phases of a run that are told apart at most.
-_MOST_PHASES = 1000
-#: Times nearer than this share of the run, and values nearer than this share of the largest, are the same.
-_SAME = 1e-9
-
-
-class Phases(NamedTuple):
-    """Phases of a run: their starts [s], names, and the first clock step of each."""
-
-    starts: tuple[float, ...]
-    names: tuple[str, ...]
-    steps: tuple[int, ...]
-
-    @property
-    def rests(self) -> tuple[bool, ...]:
-        """True for each phase in which the slider or the stage rests."""
-        return tuple("rest" in name.split(", ") for name in self.names)
-
-
-def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
-    """Return the phases of a run: maximal intervals in which no prescribed course turns, stops, starts or jumps.
-
-    The speed of a drive keeps its sign, too. A phase that is shorter than a clock step is none.
-    """
-    whole = np.array([0.0, times.duration])
-    slider, kind = cast(Any, drive), contact.kind
-    forced = slider.solves_motion and not slider.spring
-    course = slider.driven if slider.solves_motion else slider.pieces
-    moved = _turns(course(whole, times.duration), signed=True)
-    pressed = _turns(contact.course.pieces(whole, times.duration), signed=False)
-    steady, words = ("constant force", "force") if forced else ("sliding", "speed")
-    of_drive = {0.0: steady, 1.0: f"increasing {words}", -1.0: f"decreasing {words}"}
-    of_contact = {0.0: f"constant {kind}", 1.0: "approach", -1.0: "retraction"}
-    starts = sorted({*moved, *pressed})
-    result: dict[int, tuple[float, str]] = {}
-    for start in starts:
-        place = [max(at for at in course if at <= start) for course in (moved, pressed)]
-        sense, trend = moved[place[0]]
-        names = [
-            "rest" if sense == 0.0 else of_drive[trend],
-            of_contact[pressed[place[1]][1]],
-        ]
-        shown = [
-            name
-            for name, course in zip(names, (moved, pressed), strict=True)
-            if len(course) > 1
-        ]
-        # the first whose middle is later
-        step = math.floor(start / times.step + 0.5) + 1
-        if step <= times.steps:
-            result[step] = start, ", ".join(shown or names[:1])
-    columns: Any = zip(
-        *((*result[step], step) for step in sorted(result)[:_MOST_PHASES]), strict=True
-    )
-    return Phases(*columns)
-
-
-def _turns(pieces: Pieces, signed: bool) -> dict[float, tuple[float, float]]:
-    """Return the starts of intervals [s] in which a course keeps its sense and its trend, with both.
-
-    The sense of a course that is not ``signed`` is 1; the trend of one that is that of its magnitude.
-    """
-    largest = max(np.abs(pieces.first).max(), np.abs(pieces.last).max())
-    result: dict[float, tuple[float, float]] = {}
-    before, value = (math.nan, math.nan), math.nan
-    for start, stop, first, last in zip(*pieces[1:5], strict=True):
-        crossing = (
-            start + (stop - start) * first / (first - last)
-            if signed and first * last < 0.0
-            else stop
-        )
-        parts = (
-            ((start, first, 0.0), (crossing, 0.0, last))
-            if crossing < stop
-            else ((start, first, last),)
-        )
-        for at, low, high in parts:
-            sense = float(np.sign(low + high)) if signed else 1.0
-            change = (high - low) * sense
-            now = (
-                sense,
-                float(np.sign(change)) if abs(change) > _SAME * largest else 0.0,
-            )
-            if now != before or abs(low - value) > _SAME * largest:
-                result[float(at)] = now
-            before, value = now, high
-    return result
 
 
 @plain_spoken
@@ -547,10 +461,34 @@ class Scenario:
             *cast(Parts, (self.drive, self.population, self.process, self.contact))
         )
 
+    @cached_property
+    def work(self) -> EffectiveWork:
+        """Return the work of adhesion, and what reduces it."""
+        paid = self.fluctuations.paid_by_adhesion
+        return EffectiveWork(self.adhesion, paid, self.margin, self.bodies)
+
+    @cached_property
+    def stepper(self) -> Stepper:
+        """Return the stepper of this scene."""
+        models = Models(self.fluctuations, self.population, self.contact)
+        scene = Scene(
+            self.parts,
+            models,
+            self.times,
+            self.phases,
+            self.work,
+            self.loads_from_rest,
+            self.feels_steps,
+            self.varies["bonds"] == self.varies["contact"],
+            self.solid.effective[0],
+            self.contact_area,
+        )
+        return Driven(scene) if self.drive.solves_motion else Prescribed(scene)
+
     def release(self) -> None:
         """Drop the process, whose arrays may be large; it is made again when needed."""
-        self.__dict__.pop("process", None)
-        self.__dict__.pop("parts", None)
+        for name in ("process", "parts", "stepper"):
+            self.__dict__.pop(name, None)
 
     @cached_property
     def varies(self) -> dict[str, bool]:
@@ -605,43 +543,6 @@ class Scenario:
             self.fluctuations.per_member and self.fluctuations.spectrum.variance > 0.0
         )
         return varies and (self.contact.lags or pulled(self))
-
-    @cached_property
-    def by_steps(self) -> bool:
-        """Return True if a run goes step by step and not by blocks of steps.
-
-        It does so if a part feeds back. With a drive that solves the motion, bonds and an equilibrium contact are
-        solved within its sub-steps. A block of such steps needs fluctuations that do not affect the contact, or that
-        the loop over the steps can draw. Bonds that are advanced in place need a contact that stays, as it would end a
-        block early. Bonds drawn at the end of a step need single steps.
-        """
-        _, bonds, shear, contact = self.chosen
-        in_blocks = bonds.in_blocks or (
-            bonds.in_place and self.fluctuations_leave_contact and self.holds_contact
-        )
-        alone = (
-            contact.lags
-            or not (self.fluctuations_leave_contact or shear.in_blocks)
-            or not in_blocks
-        )
-        return any(part.feeds_back for part in self.chosen[1:]) or (
-            self.drive.solves_motion and alone
-        )
-
-    @cached_property
-    def draws_within(self) -> bool:
-        """Return True if the loop of a drive that solves the motion draws the fluctuations that the contact feels."""
-        return self.drive.solves_motion and not (
-            self.by_steps or self.fluctuations_leave_contact
-        )
-
-    @cached_property
-    def holds_contact(self) -> bool:
-        """Return True if neither bonds nor the mount change the contact within the sub-steps of a slider."""
-        contact, work = self.contact, self.adhesion.work_of_bonds
-        return contact.lags or not (
-            contact.changes or contact.reversible or work(1.0) != work(0.0)
-        )
 
     @property
     def fluctuations_move_contact(self) -> bool:

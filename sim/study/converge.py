@@ -26,7 +26,6 @@ from matplotlib.figure import Figure
 from pydantic import TypeAdapter
 from scipy import special
 
-from sim.engine import MemberNoise, Trajectory, follow
 from sim.ensemble.plan import seconds_a_step, together
 from sim.ensemble.variables import READ
 from sim.numerics import files, hdf5, lazy
@@ -47,6 +46,7 @@ from sim.plots.style import (
 from sim.read import engineering
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read, keys, model, tables
+from sim.step.state import MemberNoise, State, Trajectory
 from sim.units.errors import BadInput
 from sim.units.notation import concise
 
@@ -432,6 +432,13 @@ def _timed(scenario: Scenario, seconds: float) -> float:
     # the first piece has loaded what is computed once
     done, spent = np.sum(times[1:] or times, axis=0).tolist()
     return -(-members // full) * full / batch * last * max(spent, _TICK) / done
+
+
+def follow(
+    scenario: Scenario, noise: MemberNoise, state: State | None, steps: range
+) -> tuple[State, Trajectory]:
+    """Return ``Stepper.follow`` of a scenario, by a name at which a test can count the time."""
+    return scenario.stepper.follow(noise, state, steps)
 
 
 def _records(scenario: Scenario) -> range:

@@ -22,7 +22,6 @@ from numpy.testing import assert_allclose
 from pydantic import TypeAdapter
 
 import sim
-from sim.engine import trajectory_of
 from sim.ensemble import dataset as datasets, plan as plans, simulate as ensemble
 from sim.ensemble.dataset import scenario_json, variable_name
 from sim.ensemble.plan import Plan
@@ -59,7 +58,9 @@ def test_the_dataset_is_what_the_engine_marched_with_members_only_if_they_differ
     for record, state in enumerate(march(scenario, np.arange(5))):
         for variable in Plan.of(scenario).variables:
             recorded = np.atleast_1d(dataset[variable.name].isel(t=record).values)
-            marched = np.ravel(variable.read(scenario, trajectory_of(scenario, state)))
+            marched = np.ravel(
+                variable.read(scenario, scenario.stepper.trajectory_of(state))
+            )
             np.testing.assert_array_equal(recorded, marched, err_msg=variable.name)
     pooled = ensemble.run(sample(record=Record(per_member=False)))
     assert "member" not in pooled.dims and pooled["bond_fraction"].dims == ("t",)

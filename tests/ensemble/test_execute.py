@@ -24,6 +24,7 @@ from sim.ensemble.execute import WorkerDied, compute
 from sim.ensemble.plan import Plan
 from sim.ensemble.store import BlockFiles, MemoryBlocks, Stopped
 from sim.numerics import jit
+from sim.step.stepper import Stepper
 from sim.units.errors import BadInput
 from tests.ensemble.test_store import same
 
@@ -272,9 +273,11 @@ def test_a_run_that_is_stopped_again_and_again_goes_on_in_processes_and_on_a_clu
 def test_what_a_block_raises_on_a_cluster_is_raised_and_what_is_computed_stays(
     tmp_path, many_parts, threads, monkeypatch
 ):
-    path, follow, count = tmp_path / "out.nc", ensemble.follow, itertools.count()
+    path, advance, count = tmp_path / "out.nc", Stepper.advance, itertools.count()
     monkeypatch.setattr(
-        ensemble, "follow", lambda *given: 1 / 0 if next(count) == 5 else follow(*given)
+        Stepper,
+        "advance",
+        lambda *given: 1 / 0 if next(count) == 5 else advance(*given),
     )
     with pytest.raises(ZeroDivisionError):
         ensemble.run(sample(), path, scheduler=threads.scheduler_address)

@@ -19,12 +19,13 @@ from numpy.testing import assert_allclose
 
 import sim
 from benchmarks.timing import child
-from sim.engine import MemberNoise, follow
 from sim.ensemble import pace, plan as plans, preview
 from sim.ensemble.dataset import identity
 from sim.ensemble.pace import counted
 from sim.ensemble.plan import Plan
 from sim.ensemble.preview import fitting, forecast, memory, remarks, size
+from sim.step.state import MemberNoise
+from sim.step.stepper import Stepper
 
 
 def test_members_are_pooled_with_a_remark_if_their_file_would_be_too_large(monkeypatch):
@@ -277,15 +278,18 @@ def long_run(name):
     return Plan.of(sim.load({"contact": {"load": 1.5e-4}} | lens | LONG[name]))
 
 
+_ADVANCE = Stepper.advance
+
+
 class SubstepClock:
     """A clock that each sub-step moves by 3 µs, so that measured times are the same on any machine under any load."""
 
     def __init__(self):
         self.time = 0.0
 
-    def follow(self, scenario, noise, state, steps):
-        before = 0.0 if state is None else state.drive.substeps.sum()
-        reached = follow(scenario, noise, state, steps)
+    def advance(self, stepper, state, noise, steps):
+        before = state.drive.substeps.sum()
+        reached = _ADVANCE(stepper, state, noise, steps)
         self.time += 3e-6 * (reached[0].drive.substeps.sum() - before)
         return reached
 
@@ -295,7 +299,9 @@ def test_the_substeps_of_a_run_are_foretold_within_a_factor_of_two_so_that_its_t
     name, monkeypatch
 ):
     plan, clock = long_run(name), SubstepClock()
-    monkeypatch.setattr(pace, "follow", clock.follow)
+    monkeypatch.setattr(
+        Stepper, "advance", lambda stepper, *rest: clock.advance(stepper, *rest)
+    )
     monkeypatch.setattr(pace, "stopwatch", lambda: lambda: clock.time)
     foretold = pace.pace(plan) * counted(plan)
     assert 0.0 < clock.time < 1.0
@@ -304,5 +310,5 @@ def test_the_substeps_of_a_run_are_foretold_within_a_factor_of_two_so_that_its_t
         MemberNoise.of(3, np.arange(plan.members)),
         range(plan.points[0].clock.steps + 1),
     )
-    clock.follow(plan.points[0], noise, None, steps)
+    plan.points[0].stepper.follow(noise, None, steps)
     assert clock.time / 2.0 < foretold < 2.0 * clock.time

@@ -4,10 +4,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from helpers.scenes import march
+from helpers.scenes import follow as follow, march
 from numpy.testing import assert_allclose
 
-from sim.engine import MemberNoise as MemberNoise, follow as follow
 from sim.laws import jkr
 from sim.parts.bonds.models import FirstMoment
 from sim.parts.bonds.rupture import Bell
@@ -15,6 +14,7 @@ from sim.parts.contact import Equilibrium
 from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import READINGS, Force, Spring
 from sim.scenario.scenario import Clock, Ensemble, Scenario
+from sim.step.state import MemberNoise as MemberNoise
 
 #: Bonds whose unit of stretch is 10 nm and of time 1 s.
 STRETCH, DENSITY, KAPPA = 1e-8, 1e15, 4e-4

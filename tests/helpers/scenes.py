@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.engine import MemberNoise, advance, start, trajectory_of
 from sim.ensemble.variables import VARIABLES
 from sim.parts import drive
 from sim.parts.bonds import models as bonds
@@ -28,6 +27,7 @@ from sim.parts.shear.process import (
 from sim.scenario.scenario import Clock, Ensemble, Scenario
 from sim.scenario.sweep import read_sweep
 from sim.spectrum.families import Band, Gaussian, Ripple, SelfAffine
+from sim.step.state import MemberNoise
 
 SPECTRUM = Band(rms=120e3, longest=120e-6, shortest=60e-6)
 CELL = 0.24e-3
@@ -221,24 +221,28 @@ def scene(members=3, steps=8, **parts):
 READ = {variable.name: variable.read for variable in VARIABLES}
 
 
+def follow(scenario, noise, state, steps):
+    """State at the last of some steps and the trajectory at each, from a state or the start."""
+    return scenario.stepper.follow(noise, state, steps)
+
+
 def march(scenario, members, state=None, keep=True):
     """States of members after every step; without ``keep`` the next step may change a state."""
     noise = MemberNoise.of(scenario.seed, members)
     if state is None:
-        state = start(scenario, noise)
+        state = scenario.stepper.start(noise)
         yield state
     while state.step < scenario.times.steps:
         before = state._replace(bonds=deepcopy(state.bonds)) if keep else state
-        state, _ = advance(
-            scenario, before, noise, range(state.step + 1, state.step + 2)
-        )
+        steps = range(state.step + 1, state.step + 2)
+        state, _ = scenario.stepper.advance(before, noise, steps)
         yield state
 
 
 def records(scenario, *names):
     """Recorded quantities of all members at every step, each of shape (steps + 1, members or 1)."""
     states = [
-        trajectory_of(scenario, state)
+        scenario.stepper.trajectory_of(state)
         for state in march(scenario, np.arange(scenario.ensemble.members))
     ]
     return [

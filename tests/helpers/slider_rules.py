@@ -4,10 +4,11 @@ import math
 from collections import Counter
 
 import numpy as np
+from helpers.scenes import follow
 from scipy.linalg import expm
 
-from sim.engine import MemberNoise, follow
 from sim.parts.drive import READINGS
+from sim.step.state import MemberNoise
 
 #: Turns of the speed of a body that rings, and events in a clock step of many events.
 TURNS, EVENTS = 6, 10**6

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.scenes import follow
 from numpy.testing import assert_allclose
 
 import sim
-from sim.engine import MemberNoise, follow
 from sim.scenario.checks import pull_off_error
+from sim.step.state import MemberNoise
 
 LENS = Path(__file__).parents[2] / "scenarios" / "pdms_lens_spring.toml"
 SPECTRUM = {

@@ -7,7 +7,7 @@ table. ``sim.parts.contact.balance`` has the contact under each.
 
 import math
 from functools import cached_property
-from typing import Annotated, ClassVar, Literal, cast
+from typing import Annotated, ClassVar, Literal, NamedTuple, Protocol, cast
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -24,6 +24,7 @@ from sim.parts.contact.balance import (
     Control,
     DisplacementControl,
     LoadControl,
+    Shares,
     widest_crossings,
 )
 from sim.parts.contact.front import Kinetics, follow as follow_front
@@ -175,6 +176,50 @@ class Adhesion:
     def work_of_bonds(self, fraction):
         """Return Delta gamma [J/m^2] at a bond fraction phi [1], a float or an array."""
         return self.work * (1.0 - self.bond_share + self.bond_share * fraction)
+
+
+class _BondState(Protocol):
+    """Bonds as the work of adhesion reads them."""
+
+    @property
+    def fraction(self) -> Array:
+        """Bonds over bonds at rest [1]."""
+
+    @property
+    def strength(self) -> Array:
+        """Magnitude of the mean shear stress [Pa]."""
+
+
+class EffectiveWork(NamedTuple):
+    """Work of adhesion of a scene, and what reduces it: w = Δγ(bond fraction) − χ ΔΓ − α 6τ0²a/(πE*).
+
+    Attributes
+    ----------
+    adhesion : Adhesion
+        Work of adhesion, and the share of it that bonds carry.
+    paid : float
+        χ, share of ΔΓ that adhesion pays [1].
+    margin : Shares, optional
+        Share of that at the edge of a finite contact.
+    bodies : Bodies
+        Sphere and half-space.
+    """
+
+    adhesion: Adhesion
+    paid: float
+    margin: Shares | None
+    bodies: Bodies
+
+    def balance(self, bonds: _BondState, energy: Array, position: Array) -> Balance:
+        """Return its terms with some bonds, fluctuations of an energy ΔΓ [J/m²], and a slider at a position [m]."""
+        return Balance(
+            self.adhesion.work_of_bonds(bonds.fraction),
+            self.paid * energy,
+            bonds.strength,
+            None if self.margin is None else self.margin.at(position),
+            self.bodies,
+            self.adhesion.work,
+        )
 
 
 _KINDS = ("load", "indentation", "displacement")

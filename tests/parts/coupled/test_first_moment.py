@@ -21,12 +21,12 @@ from helpers.driven import (
     stuck,
 )
 from helpers.printed import lines_of
+from helpers.scenes import follow
 from numpy.testing import assert_allclose
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import sim
-from sim.engine import MemberNoise, follow
 from sim.ensemble.diagnosis import slider_body
 from sim.laws.schallamach import Body, first_moment_onset
 from sim.parts.bonds.models import FirstMoment, Steady, Unbroken
@@ -34,6 +34,7 @@ from sim.parts.bonds.rupture import Constant, CutOff
 from sim.parts.contact.models import Adhesion
 from sim.parts.drive import Force
 from sim.scenario.scenario import Scenario
+from sim.step.state import MemberNoise
 from sim.units.errors import BadInput
 
 #: X, N, F at 1, 1.5, 2, 2.5 and 4 of a massless slider, by two integrators that agree to 2e-12.

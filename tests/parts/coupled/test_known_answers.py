@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from helpers.scenes import follow
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 import sim
-from sim.engine import MemberNoise, follow
+from sim.step.state import MemberNoise
 
 LENS = {
     "solid": {"shear_modulus": 1e6},

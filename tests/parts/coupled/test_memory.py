@@ -15,7 +15,6 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 import sim
-from sim.engine import _step_contact
 from sim.laws import jkr
 from sim.parts.bonds.models import Cohort, FirstMoment, Tracked
 from sim.parts.coupled import coupled
@@ -98,7 +97,7 @@ def at_once(lens, state, expected, drawn):
     shear = state.shear._replace(
         energy=drawn, expected=expected, past=state.shear.past._replace(energy=drawn)
     )
-    around = _step_contact(lens, state.contact, shear, range(1, 2))
+    around = lens.stepper._around(state.contact.radius, shear, range(1, 2))
     noise, bonds = MemberNoise.of(1, np.arange(1)).bonds, deepcopy(state.bonds)
     motions = coupled.advance(
         lens.parts,

@@ -1,4 +1,4 @@
-"""The engine: restart, batch and recording leave every bit as it was; parts know nothing of each other."""
+"""Steppers: restart, batch and recording leave every bit as it was; parts know nothing of each other."""
 
 import functools
 import itertools
@@ -15,17 +15,18 @@ from helpers.scenes import (
     IN_TIME,
     SHEARS,
     SPECTRUM,
+    follow,
     go_together,
     march,
     scene,
 )
 from numpy.testing import assert_allclose
 
-from sim import engine
-from sim.engine import MemberNoise, follow, pack, trajectory_of, unpack
 from sim.parts import shear
 from sim.parts.contact.models import Adhesion
 from sim.parts.shear.process import SlipRate
+from sim.step.driven import Driven
+from sim.step.state import MemberNoise, pack, unpack
 
 DEPTHS = {"drive": DRIVES, "bonds": BONDS, "shear": SHEARS, "contact": CONTACTS}
 
@@ -97,7 +98,7 @@ def check_case(case, members=3, steps=6, **parts):
     straight = list(march(scenario, np.arange(members)))
     assert len(straight) == steps + 1
     restarted = list(
-        march(scenario, np.arange(members), unpack(scenario, pack(straight[2])))
+        march(scenario, np.arange(members), unpack(scenario.parts, pack(straight[2])))
     )
     assert all(same(one, two) for one, two in zip(straight[3:], restarted, strict=True))
     alone = list(march(scenario, np.array([1])))
@@ -124,14 +125,14 @@ def check_blocks(scenario, states, members):
     """
     noise = MemberNoise.of(scenario.seed, np.arange(members))
     answers = scenario.drive.solves_motion and scenario.bonds.model == "counted"
-    singly = [trajectory_of(scenario, states[0])]
+    singly = [scenario.stepper.trajectory_of(states[0])]
     for state in states[:-1] if answers else ():
         step = state.step + 1
         singly.append(follow(scenario, noise, state, range(step, step + 1))[1])
     for stride in (1, 2):
         some = range(0, len(states), stride)
         end, passed = follow(scenario, noise, None, some)
-        marched = [trajectory_of(scenario, states[step]) for step in some]
+        marched = [scenario.stepper.trajectory_of(states[step]) for step in some]
         if answers:
             marched = [
                 record._replace(speed=singly[step].speed)
@@ -207,10 +208,9 @@ def test_bonds_followed_one_by_one_go_through_blocks_of_steps_in_a_contact_that_
     drive,
 ):
     rigid = Adhesion(work=42e-3, bond_share=0.0)
-    assert scene(drive=DRIVES[drive], bonds=BONDS["tracked"]).by_steps
-    assert not scene(
-        drive=DRIVES[drive], bonds=BONDS["tracked"], adhesion=rigid
-    ).by_steps
+    assert scene(drive=DRIVES[drive], bonds=BONDS["tracked"]).stepper.longest == 1
+    stays = scene(drive=DRIVES[drive], bonds=BONDS["tracked"], adhesion=rigid)
+    assert stays.stepper.longest > 1
     check_case({"drive": drive, "bonds": "tracked"}, adhesion=rigid)
 
 
@@ -275,11 +275,11 @@ def test_the_loop_of_a_drive_draws_the_fluctuations_as_their_process_does(
         shear=DRAWN[name],
         contact=CONTACTS[contact],
     )
-    states, asked, steps = list(march(of, np.arange(3))), [], engine.advance
+    states, asked, steps = list(march(of, np.arange(3))), [], Driven._block
     is_open = np.isnan([state.contact.radius for state in states])
     check_blocks(of, states, 3)
     monkeypatch.setattr(
-        engine, "advance", lambda *given: asked.append(given[-1]) or steps(*given)
+        Driven, "_block", lambda *given: asked.append(given[-1]) or steps(*given)
     )
     follow(of, MemberNoise.of(of.seed, np.arange(3)), None, range(41))
     changes = np.count_nonzero(np.any(is_open[1:] != is_open[:-1], axis=1))
