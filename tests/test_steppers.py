@@ -23,9 +23,8 @@ from helpers.scenes import (
 from numpy.testing import assert_allclose
 
 from sim.parts import shear
-from sim.parts.contact.models import Adhesion
+from sim.parts.contact.models import Adhesion, Equilibrium
 from sim.parts.shear.process import SlipRate
-from sim.step.driven import Driven
 from sim.step.state import MemberNoise, pack, unpack
 
 DEPTHS = {"drive": DRIVES, "bonds": BONDS, "shear": SHEARS, "contact": CONTACTS}
@@ -208,7 +207,6 @@ def test_bonds_followed_one_by_one_go_through_blocks_of_steps_in_a_contact_that_
     drive,
 ):
     rigid = Adhesion(work=42e-3, bond_share=0.0)
-    assert scene(drive=DRIVES[drive], bonds=BONDS["tracked"]).stepper.longest == 1
     stays = scene(drive=DRIVES[drive], bonds=BONDS["tracked"], adhesion=rigid)
     assert stays.stepper.longest > 1
     check_case({"drive": drive, "bonds": "tracked"}, adhesion=rigid)
@@ -266,7 +264,7 @@ DRAWN = {
 def test_the_loop_of_a_drive_draws_the_fluctuations_as_their_process_does(
     name, drive, bonds, contact, monkeypatch
 ):
-    """In blocks of steps, or by single steps: a block ends early only where the contact opens or closes."""
+    """In blocks, or by single steps; the loop opens and closes the contact as the model of the contact does."""
     of = scene(
         3,
         40,
@@ -275,17 +273,25 @@ def test_the_loop_of_a_drive_draws_the_fluctuations_as_their_process_does(
         shear=DRAWN[name],
         contact=CONTACTS[contact],
     )
-    states, asked, steps = list(march(of, np.arange(3))), [], Driven._block
+    states, blocks, reached = list(march(of, np.arange(3))), [], Equilibrium.reached
     is_open = np.isnan([state.contact.radius for state in states])
     check_blocks(of, states, 3)
-    monkeypatch.setattr(
-        Driven, "_block", lambda *given: asked.append(given[-1]) or steps(*given)
-    )
-    follow(of, MemberNoise.of(of.seed, np.arange(3)), None, range(41))
     changes = np.count_nonzero(np.any(is_open[1:] != is_open[:-1], axis=1))
     assert changes > 1 if contact == "load there and back" else changes == 0
-    # with another draw than that of the process, each of the 40 steps ends a block
-    assert len(asked) < 20
+
+    def by_model(model, *inputs):
+        blocks.append(inputs[-1])
+        with monkeypatch.context() as plain:
+            plain.setattr(Equilibrium, "reached", reached)
+            touch = model.advance(*inputs[:-1])
+        assert_allclose(blocks[-1], touch.radius, rtol=1e-12)
+        return touch
+
+    monkeypatch.setattr(Equilibrium, "reached", by_model)
+    follow(of, MemberNoise.of(of.seed, np.arange(3)), None, range(41))
+    # a block ends at the end of a phase alone
+    assert len(blocks) == len(of.phases.starts)
+    assert sum(map(len, blocks)) == 40
 
 
 def test_counted_bonds_of_a_slider_are_drawn_at_each_step_in_a_contact_that_stays():

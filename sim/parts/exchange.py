@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.numerics.noise import Noise
-from sim.spectrum.radial import PLANE, Terms as Share
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -163,10 +162,6 @@ class Draws(NamedTuple):
         True if the interface slips at once in answer to what was drawn.
     address : tuple
         Seed, part, members and number of the first step, as of ``Noise.at``.
-    paid : float
-        Share of ΔΓ that adhesion pays, waves being short beside the contact [1].
-    share : tuple
-        Share of that at the edge of a disc: inputs of ``sim.spectrum.radial.share_of``, without cubics on the plane.
     """
 
     values: Array
@@ -180,8 +175,6 @@ class Draws(NamedTuple):
     relaxing: bool
     answers: bool
     address: tuple[np.uint64, np.uint64, NDArray[np.uint64], int]
-    paid: float = 0.0
-    share: Share = PLANE
 
 
 _NO_ADDRESS = np.uint64(0), np.uint64(0), np.empty(0, np.uint64), 0

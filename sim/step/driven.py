@@ -1,10 +1,14 @@
 """Stepper of a driven slider, whose motion is solved together with bonds and contact in sub-steps."""
 
+from typing import cast
+
 import numpy as np
 
+from sim.parts.contact.models import Equilibrium
 from sim.parts.coupled import coupled
 from sim.parts.coupled.coupled import StepContact
-from sim.parts.exchange import NO_DRAWS, Array, Draws, Storing
+from sim.parts.coupled.step_end import StepEnds
+from sim.parts.exchange import NO_DRAWS, Array, ContactState, Storing
 from sim.spectrum.radial import PLANE
 from sim.step.state import MemberNoise, State, Trajectory
 from sim.step.stepper import BLOCK_NUMBERS, Scene, Stepper
@@ -20,12 +24,13 @@ class Driven(Stepper):
 
     Attributes
     ----------
-    is_undisturbed : bool
-        True if fluctuations never change the contact.
+    follows_contact : bool
+        True if the loop over the clock steps finds the contact at the end of each, with the
+        fluctuations there.
     holds_contact : bool
         True if neither bonds nor the mount change the contact within a clock step.
-    draws_within : bool
-        True if the loop over the clock steps draws the fluctuations.
+    is_undisturbed : bool
+        True if fluctuations never change the contact.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -35,14 +40,13 @@ class Driven(Stepper):
         self.holds_contact = contact.lags or not (
             contact.changes or contact.reversible or work(1.0) != work(0.0)
         )
-        # bonds that are advanced in place need a contact that stays, because a block may end early
-        in_blocks = bonds.in_blocks or (
-            bonds.in_place and self.is_undisturbed and self.holds_contact
+        self.follows_contact = (
+            bonds.in_blocks
+            and not contact.lags
+            and (self.is_undisturbed or fluctuations.in_blocks)
         )
-        in_blocks = in_blocks and (self.is_undisturbed or fluctuations.in_blocks)
-        alone = contact.lags or bonds.feeds_back or fluctuations.feeds_back
-        super().__init__(scene, BLOCK_NUMBERS if in_blocks and not alone else 1)
-        self.draws_within = self.longest > 1 and not self.is_undisturbed
+        alone = bonds.feeds_back or fluctuations.feeds_back or not self.follows_contact
+        super().__init__(scene, 1 if alone else BLOCK_NUMBERS)
 
     def start(self, noise: MemberNoise) -> State:
         scene = self.scene
@@ -55,7 +59,7 @@ class Driven(Stepper):
         shear = process.start(motion, bonding, noise.shear)
         balance = scene.work.balance(bonding, shear.energy, slider.position)
         touch = contact.start(motion, scene.times.duration, balance)
-        around = self._around(touch.radius, shear, range(1, 2))
+        around = self._around(touch, shear, range(1, 2))
         slider = coupled.load(parts, slider, bonding, around, scene.times.duration)
         history = self._first_events(bonding, touch, drive.stage_of(slider))
         return State(0, slider, bonds, bonding, shear, touch, history)
@@ -65,11 +69,9 @@ class Driven(Stepper):
     ) -> tuple[State, Trajectory]:
         scene = self.scene
         drive, _, process, contact = parts = scene.parts
-        radius = state.contact.radius
-        if not scene.models.contact.lags:
-            radius = coupled.of_loop(state.drive, radius)
-        around = self._around(radius, state.shear, steps)
-        sliders, motions, bonds, bonding = coupled.advance(
+        around = self._around(state.contact, state.shear, steps)
+        ends = self._ends(state, noise, steps)
+        reached = coupled.advance(
             parts,
             state.drive,
             state.bonds,
@@ -77,17 +79,20 @@ class Driven(Stepper):
             scene.times,
             steps,
             noise.bonds,
-            self._draws(state.shear, noise, steps),
+            ends,
         )
+        motions, bonding = reached.motions, reached.bonding
         shear, energy = process.advance(state.shear, motions, bonding, noise.shear)
         balance = scene.work.balance(bonding, energy, motions.position)
-        touch = contact.advance(state.contact, motions, scene.times.duration, balance)
-        valid = coupled.steps_until_contact_changes(sliders, touch.radius)
-        if valid < len(steps):
-            return self._block(state, noise, steps[:valid])
-        sliders, bonding = coupled.with_contact(
-            parts, sliders, bonding, around, touch.radius
-        )
+        if self.follows_contact:
+            touch = cast(Equilibrium, scene.models.contact).reached(
+                state.contact, motions, scene.times.duration, balance, ends.radius
+            )
+        else:
+            touch = contact.advance(
+                state.contact, motions, scene.times.duration, balance
+            )
+        sliders, bonding = coupled.with_contact(parts, reached, around, touch.radius)
         history = self._events(state, steps, motions, bonding, touch)
         stage = drive.stage_of(sliders)
         if stage.size:
@@ -107,7 +112,7 @@ class Driven(Stepper):
         end = State(
             steps[-1],
             sliders.at(-1),
-            bonds,
+            reached.population,
             bonding.at(-1),
             shear,
             touch.at(-1),
@@ -118,26 +123,44 @@ class Driven(Stepper):
             motions.time, motions, bonding, energy, readings, touch
         )
 
-    def _draws(self, shear: Storing, noise: MemberNoise, steps: range) -> Draws:
-        """Return the fluctuations that the loop over some clock steps draws."""
-        if not self.draws_within:
-            return NO_DRAWS
-        work = self.scene.work
-        share = PLANE if work.margin is None else work.margin.each[0]
-        draws = self.scene.parts.shear.draws(shear, steps, noise.shear)
-        return draws._replace(paid=work.paid, share=share)
+    def _ends(self, state: State, noise: MemberNoise, steps: range) -> StepEnds:
+        """Return what acts at the ends of some clock steps."""
+        scene, contact, work = self.scene, self.scene.models.contact, self.scene.work
+        members = len(noise.bonds.members)
+        ends = scene.times.at(np.arange(steps.start, steps.stop, dtype=float))
+        control = contact.control(ends[:, np.newaxis], scene.times.duration)
+        mounts, touches = np.empty((len(steps), 2)), np.empty(len(steps), bool)
+        load, base, _ = control.mount
+        mounts[:, 0], mounts[:, 1] = np.ravel(load), np.ravel(base)
+        touches[:] = np.ravel(control.closes)
+        draws = NO_DRAWS
+        if self.follows_contact and not self.is_undisturbed:
+            draws = scene.parts.shear.draws(state.shear, steps, noise.shear)
+        return StepEnds(
+            draws,
+            self.follows_contact,
+            not contact.changes,
+            contact.after_pull_off == "reattach",
+            mounts,
+            touches,
+            state.shear.energy + np.zeros(members),
+            work.paid,
+            PLANE if work.margin is None else work.margin.each[0],
+            np.empty((len(steps), members)),
+        )
 
-    def _around(self, radius: Array, shear: Storing, steps: range) -> StepContact:
-        """Return contact and half-space at the start of some clock steps, at which the contact has a radius [m]."""
+    def _around(self, touch: ContactState, shear: Storing, steps: range) -> StepContact:
+        """Return contact and half-space at the start of some clock steps."""
         scene, work, contact = self.scene, self.scene.work, self.scene.models.contact
         ends = scene.times.at(np.arange(steps.start - 1.0, steps.stop))
         first, last = contact.mount_between(ends, scene.times.duration)
         share: Array | float = 1.0
         if work.margin is not None:
-            share = work.margin(np.nan_to_num(radius, nan=0.0))
+            share = work.margin(np.nan_to_num(touch.radius, nan=0.0))
         bare = work.adhesion.work_of_bonds(0.0)
         return StepContact(
-            radius,
+            touch.radius,
+            ~np.isnan(touch.detached),
             bare,
             work.paid * share,
             shear,

@@ -25,7 +25,7 @@ from sim.parts.bonds.rupture import (
     hazard_time,
     rate_at,
 )
-from sim.parts.exchange import Array, Flags
+from sim.parts.exchange import Array
 
 
 @device
@@ -633,12 +633,13 @@ class Cohorts(NamedTuple):
     lattice: Array
 
 
-def relax(cohorts: Cohorts, rows: Flags) -> None:
-    """Take the stretch from all bonds of some ``rows``, in place: they become one cohort."""
-    bound = cohorts.weight[rows].sum(axis=1)
-    cohorts.weight[rows] = cohorts.stretch[rows] = cohorts.width[rows] = 0.0
-    cohorts.weight[rows, 0] = bound
-    cohorts.lattice[rows, 1] = 1.0
+@device
+def relax(row):
+    """Take the stretch from all bonds of a ``row`` of ``Cohorts``, in place: they become one cohort."""
+    weight, stretch, width, lattice = row
+    bound = weight.sum()
+    weight[:], stretch[:], width[:] = 0.0, 0.0, 0.0
+    weight[0], lattice[1] = bound, 1.0
 
 
 def unstretched(rupture: RuptureRate, tolerance: float, share: float) -> Cohorts:

@@ -79,8 +79,6 @@ class _BondModel(Part):
     is_random: ClassVar[bool] = False
     #: True if the population is solved through blocks of clock steps.
     in_blocks: ClassVar[bool] = False
-    #: True if the population is advanced in place, so that a block of clock steps must not end early.
-    in_place: ClassVar[bool] = False
     #: Rough time of a single step of a batch, for estimates [s].
     step_seconds: ClassVar[float] = 0.0
     #: Count of numbers in the state of a member.
@@ -764,7 +762,7 @@ class Tracked(_Separable):
     state_class: ClassVar[type[Tracks]] = Tracks
     per_member: ClassVar[bool] = True
     is_random: ClassVar[bool] = True
-    in_place: ClassVar[bool] = True
+    in_blocks: ClassVar[bool] = True
 
     @property
     def numbers(self) -> int:  # type: ignore[override]

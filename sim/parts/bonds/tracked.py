@@ -541,23 +541,20 @@ def live(tracks, slip, duration, law, seed, members, first, frames):
     return end
 
 
-@kernel(f"void({TRACKS}, boolean[:], UniTuple(float64, 3))")
-def relax(tracks, rows, law):
-    """Take the stretch from all bonds of some ``rows``, in place.
+@device
+def relax(tracks, law):
+    """Take the stretch from all bonds of a row of ``Tracks``, in place.
 
     The rest of the threshold of a bond is exponential whatever its life was, so no number is drawn.
     """
-    (birth, due, life, soonest, _, frame), (rate, softness, limit) = tracks, law
+    (birth, due, life), soonest, frame = tracks
+    rate, softness, limit, _ = law
     of_rates = rate, softness, limit, 0.0
-    for m in range(len(due)):
-        if not rows[m]:
-            continue
-        bonds, row = (birth[m], due[m], life[m]), frame[m]
-        _set(bonds, soonest[m], row, of_rates, True, False)
-        for i in range(due.shape[1]):
-            if math.copysign(1.0, due[m, i]) > 0.0:
-                birth[m, i] = 0.0
-        _set(bonds, soonest[m], row, of_rates, False, False)
+    _set((birth, due, life), soonest, frame, of_rates, True, False)
+    for i in range(len(due)):
+        if math.copysign(1.0, due[i]) > 0.0:
+            birth[i] = 0.0
+    _set((birth, due, life), soonest, frame, of_rates, False, False)
 
 
 @kernel(

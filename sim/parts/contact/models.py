@@ -495,11 +495,6 @@ class Equilibrium(_Controlled):
     ) -> ContactState:
         control = self.control(motions.time, duration)
         radius = self.equilibrium(control, balance)
-        detached, dissipated = (
-            during(state.detached, len(radius)),
-            during(state.dissipated, len(radius)),
-        )
-        turn = np.full((*radius.shape, len(TURN.names or ())), np.nan)
         if np.isnan(radius).any() or np.isnan(state.radius).any():
             phase = np.where(
                 np.isnan(state.radius),
@@ -510,6 +505,24 @@ class Equilibrium(_Controlled):
                 phase[:, np.newaxis], control, np.isnan(radius)[:, :, np.newaxis]
             )
             radius = np.where(followed[:, :, 0] == CLOSED, radius, np.nan)
+        return self.reached(state, motions, duration, balance, radius)
+
+    def reached(
+        self,
+        state: ContactState,
+        motions: Motion,
+        duration: float,
+        balance: Balance,
+        radius: Array,
+    ) -> ContactState:
+        """Return the contact at the end of each step of a block from its radius there [m], nan where it is open."""
+        control = self.control(motions.time, duration)
+        detached, dissipated = (
+            during(state.detached, len(radius)),
+            during(state.dissipated, len(radius)),
+        )
+        turn = np.full((*radius.shape, len(TURN.names or ())), np.nan)
+        if np.isnan(radius).any() or np.isnan(state.radius).any():
             before = np.concatenate([state.radius[np.newaxis], radius[:-1]])
             is_open, was_open, lost = (
                 np.isnan(radius),

@@ -20,6 +20,7 @@ from sim.parts.bonds.cohorts import (
     carry,
     inside,
     read_row,
+    relax,
     settle,
     steepen,
     sum_row,
@@ -28,7 +29,7 @@ from sim.parts.bonds.cohorts import (
 )
 from sim.parts.bonds.rupture import hazard_integral, hazard_time, rate_at
 from sim.parts.coupled import mechanics
-from sim.parts.coupled.redraw import DRAWS, redraw
+from sim.parts.coupled.step_end import ENDS, end_step
 from sim.parts.drive import ENERGY
 from sim.parts.exchange import record
 
@@ -834,6 +835,7 @@ def _through(line, books, pieces, slider, contact, unit, share, rules, bonds, ro
             break
     if going:
         sums_at(pool, count, unit, rules, nodes[0])
+        row.lost = stays - contact.stays
         contact = mechanics.later(mechanics.settled(contact, row, slider), 0.0, stays)
         energy.stored = stored_energy(row, nodes[0].square, time, slider, contact)
     write_row(pool, count, travelled, settled, row.slip, rules, bonds)
@@ -841,11 +843,11 @@ def _through(line, books, pieces, slider, contact, unit, share, rules, bonds, ro
 
 
 @kernel(
-    f"void({mechanics.ARGUMENTS}, {DRAWS}, float64[::1], {RULES},"
+    f"void({mechanics.ARGUMENTS}, {ENDS}, float64[::1], {RULES},"
     " float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1])"
 )
 def advance_cohorts(
-    inputs, numbers, outputs, draws, share, rules, weight, stretch, width, lattice, sums
+    inputs, numbers, outputs, ends, share, rules, weight, stretch, width, lattice, sums
 ):
     """Advance all rows, their energies and cohorts through some clock steps, each row by itself.
 
@@ -870,17 +872,18 @@ def advance_cohorts(
         both[1][: mechanics.ENERGIES],
         line[0],
     )
-    room, of_draws = (
+    room, at_end = (
         (np.empty((9, most)), np.empty((3, most)), nodes),
-        np.empty((2, draws[4].size)),
+        np.empty((2, ends[0][4].size)),
     )
-    has_draws = len(draws[0]) > 0
     for m in range(len(rows)):
         stop, left = 0, share[m % share.size]
         bonds = weight[m], stretch[m], width[m], lattice[m]
         for k in range(len(clock)):
             start, stop = stop, mechanics.pieces_to(k, stop, pieces)
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
+            if row.closed > 0.0:
+                relax(bonds)
             now = mechanics.contact_at(contact, clock[k], row)
             if not mechanics.has_ended(row):
                 time, going = _through(
@@ -909,6 +912,5 @@ def advance_cohorts(
                 slider.stiffness,
             )
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
-            if has_draws:
-                redraw(row, rows[m], m, k, clock, now, draws, of_draws, reached)
+            end_step(row, rows[m], m, k, clock[k, 5], now, ends, at_end)
             sum_row(weight[m], stretch[m], width[m], rules, room[0][4], sums[:, k, m])

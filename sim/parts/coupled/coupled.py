@@ -14,20 +14,19 @@ import numpy as np
 
 from sim.laws.reversible import mean_stress_energy
 from sim.numerics.noise import Noise
-from sim.parts.bonds import models, tracked
-from sim.parts.bonds.cohorts import Cohorts, numbers_of, relax
+from sim.parts.bonds import models
+from sim.parts.bonds.cohorts import Cohorts, numbers_of
 from sim.parts.bonds.tracked import AGAIN, Tracks
 from sim.parts.contact.balance import Bodies
 from sim.parts.coupled.cohorts import advance_cohorts
 from sim.parts.coupled.mean_field import advance_rows
 from sim.parts.coupled.mechanics import COLUMNS, ROW, Inputs, Law, Slider
+from sim.parts.coupled.step_end import StepEnds
 from sim.parts.coupled.tracked import advance_tracks
 from sim.parts.drive import ENERGY, Driven, Force, Spring
 from sim.parts.exchange import (
-    NO_DRAWS,
     Array,
     Bonding,
-    Draws,
     Flags,
     Memory,
     Motion,
@@ -57,8 +56,6 @@ _STRETCHED = [
     "mean",
     "recalled",
 ]
-#: Relative difference up to which two radii are the same equilibrium, found by two methods.
-_SAME = 1e-9
 #: Numbers of slider, bonds, contact and fluctuations.
 _Numbers = tuple[tuple[float, ...], ...]
 
@@ -70,6 +67,8 @@ class StepContact(NamedTuple):
     ----------
     radius : array
         Contact radius at their start [m], nan where it is open.
+    has_parted : array
+        True if it has pulled off before.
     bare : float
         Work of adhesion without bonds and fluctuations [J/m²].
     paid : float or array
@@ -95,6 +94,7 @@ class StepContact(NamedTuple):
     """
 
     radius: Array
+    has_parted: Flags
     bare: float
     paid: float | Array
     shear: Storing
@@ -106,6 +106,30 @@ class StepContact(NamedTuple):
     bodies: Bodies
     shear_modulus: float
     area: float
+
+
+class Reached(NamedTuple):
+    """What slider and bonds have reached after some clock steps.
+
+    Attributes
+    ----------
+    slider : Driven
+        The slider at the end of each step.
+    motions : Motion
+        Its motion.
+    population : tuple
+        The bonds at the end of the last step.
+    bonding : Bonding
+        What others read of the bonds at the end of each step.
+    lost : array, shape (steps, members)
+        True if a contact that follows the bonds alone lost its equilibrium within a step.
+    """
+
+    slider: Driven
+    motions: Motion
+    population: tuple[object, ...]
+    bonding: Bonding
+    lost: Flags
 
 
 #: Bonds that are solved together with a slider; of them those with a stretch first.
@@ -218,13 +242,13 @@ def advance(
     times: Times,
     steps: range,
     noise: Noise,
-    draws: Draws = NO_DRAWS,
-) -> tuple[Driven, Motion, tuple[object, ...], Bonding]:
-    """Return the slider at the end of each of some clock steps, its motion, the bonds at the end and their readings.
+    step_ends: StepEnds,
+) -> Reached:
+    """Return what slider and bonds have reached after some clock steps.
 
-    The contact is that at the start, except for its equilibrium with the bonds, and with the fluctuations that the loop
-    over the steps ``draws``; ``steps_until_contact_changes`` counts the valid steps. ``counted`` bonds stay as well:
-    they are drawn at the end of a step, with the slip in it.
+    The contact is in equilibrium with the bonds within the steps, and at their ends with the fluctuations there, if
+    ``step_ends`` follow it; else it is that at the start. ``counted`` bonds stay as they were at the start of a step:
+    they are drawn at its end, with the slip in it.
     """
     drive, bonds, slider = (
         cast(Force | Spring, parts.drive),
@@ -242,7 +266,8 @@ def advance(
         rows[name] = getattr(slider, name)
     if steps.start == 1 and not drive.spring:  # a force acts at once
         rows["spring_force"] = 0.0
-    rows["radius"] = contact.radius
+    rows["radius"], rows["parted"] = contact.radius, contact.has_parted
+    rows["closed"] = (slider.radius == 0.0) & (contact.radius > 0.0) & (steps.start > 1)
     pieces, duration = drive.driven(ends, times.duration), ends[1:] - ends[:-1]
     scale = 1.0 / (stretch if drive.spring else force)
     course = np.stack(
@@ -262,6 +287,8 @@ def advance(
         for name, values in shear.past._asdict().items():
             rows[name] = values if values.size else law.energy
         law = law._replace(length=law.length / stretch, by_slip=law.by_slip * stretch)
+    draws = step_ends.draws
+    draws = draws._replace(answers=draws.answers and bool(answers))
     state = rows.view(float).reshape(members, COLUMNS)
     clock, work = _clock(contact, ends), stretch * force
     inputs = Inputs(
@@ -277,15 +304,10 @@ def advance(
         tuple(inputs),
         numbers,
         (columns, energies),
-        tuple(draws._replace(answers=draws.answers and bool(answers))),
-    )
-    closes = (
-        (slider.radius == 0.0)
-        & (contact.radius > 0.0)
-        & np.full(members, steps.start > 1)
+        (tuple(draws), *step_ends[1:]),
     )
     end, bonding = _advanced(
-        bonds, population, contact.radius, closes, inputs, loop, reached, noise
+        bonds, population, contact.radius, inputs, loop, reached, noise
     )
     stage, stage_speed = np.zeros((2, len(steps), members))
     if drive.spring:
@@ -315,6 +337,7 @@ def advance(
         memory=memory,
         draws=draws,
     )
+    lost = (reached["lost"] > 0.0) & contact.undisturbed
     if not isinstance(bonds, _WITH_STRETCH):
         plain = cast(models.Population, population)
         start = (
@@ -322,7 +345,8 @@ def advance(
             * bonds.diluted(plain.area_radius, contact.radius)[0]
         )
         fractions = _from_start(start, bonding.fraction)
-        radii = np.fmax(_from_start(contact.radius, after.radius), 0.0)
+        at_ends = step_ends.radius if step_ends.follows else after.radius
+        radii = np.fmax(_from_start(contact.radius, at_ends), 0.0)
         motions = motions._replace(
             stick_ends=_stick_ends(
                 drive, bonds, (slider, after), motions, fractions, radii
@@ -341,8 +365,9 @@ def advance(
         bonding = with_contact_stress(
             parts, Bonding(drawn.fraction, stress, strength), after.speed
         )
-        return after, motions, end, bonding._replace(strength=strength)
-    return after, motions, end, with_contact_stress(parts, bonding, after.speed)
+        return Reached(after, motions, end, bonding._replace(strength=strength), lost)
+    bonding = with_contact_stress(parts, bonding, after.speed)
+    return Reached(after, motions, end, bonding, lost)
 
 
 def _from_start(start: Array, ends: Array) -> Array:
@@ -398,7 +423,7 @@ def _stick_ends(
 
 
 def with_contact(
-    parts: Parts, sliders: Driven, bonding: Bonding, contact: StepContact, radius: Array
+    parts: Parts, reached: Reached, contact: StepContact, radius: Array
 ) -> tuple[Driven, Bonding]:
     """Return slider and bonds at the end of each clock step in the contact of a ``radius`` [m] that is found there.
 
@@ -414,14 +439,8 @@ def with_contact(
       speed is that of the new balance.
     """
     drive, area = cast(Force | Spring, parts.drive), np.pi * np.fmax(radius, 0.0) ** 2
-    closes = (area > 0.0) & (sliders.radius == 0.0)
-    # where neither bonds nor fluctuations are drawn at the end of a step, the loop follows the contact
-    if (
-        contact.undisturbed
-        and not contact.stays
-        and not isinstance(parts.bonds, models.Counted)
-    ):
-        closes = closes | ((area > 0.0) & ~_agree(sliders.radius, radius))
+    sliders, bonding = reached.slider, reached.bonding
+    closes = (area > 0.0) & ((sliders.radius == 0.0) | reached.lost)
     if closes.any():
         yields, slope = drive.yields(
             contact.shear_modulus, contact.bodies.poisson_ratio
@@ -467,7 +486,6 @@ def _advanced(
     bonds: _SolvedBonds,
     population: tuple[object, ...],
     radius: Array,
-    closes: Flags,
     inputs: Inputs,
     loop: tuple[tuple, ...],
     reached: dict[str, Array],
@@ -475,7 +493,7 @@ def _advanced(
 ) -> tuple[tuple[object, ...], Bonding]:
     """Return the bonds after some clock steps and their readings at each.
 
-    ``radius`` of the contact at the start [m]; its bonds are unstretched if it ``closes`` there. ``loop``: arguments of
+    ``radius`` of the contact at the start [m]. ``loop``: arguments of
     ``advance_rows``, of which the outputs receive the rows and energies at the end of each step. ``reached`` has their
     columns by name. Bonds without a stretch have the sense of the sliding in its place.
     """
@@ -487,21 +505,19 @@ def _advanced(
             Cohorts(*(array.copy() for array in ages.cohorts)),
             np.empty((5, *shape)),
         )
-        relax(cohorts, closes)
         rules = numbers_of(bonds.law, bonds.rebinding_rate, bonds.tolerance)
         advance_cohorts(*loop, share, rules, *cohorts, sums)
         return models.Ages(cohorts, area_radius), bonds.read(sums)
     if isinstance(bonds, models.Tracked):
         tracks = cast(Tracks, population)
         tracks = tracks._replace(frame=tracks.frame.copy())
-        tracked.relax(tuple(tracks), closes, tuple(bonds.law[:3]))
         frames = np.empty((*shape, tracks.frame.shape[1]))
         lives = (
             (*bonds.law[:3], bonds.rebinding_rate),
             noise.seed,
             np.asarray(noise.members, dtype=np.uint64),
         )
-        if advance_tracks(*loop[:3], tuple(tracks), *lives, frames):
+        if advance_tracks(*loop, tuple(tracks), *lives, frames):
             raise RuntimeError(AGAIN)
         return tracks, bonds.read(frames)
     if isinstance(bonds, models.FirstMoment):
@@ -509,7 +525,7 @@ def _advanced(
         share, area_radius = bonds.diluted(stretches.area_radius, radius)
         rows["bound"], rows["moment"] = (
             stretches.bound * share,
-            np.where(closes, 0.0, stretches.stretch * share),
+            stretches.stretch * share,
         )
     else:
         before = cast(models.Population, population)
@@ -525,27 +541,6 @@ def _advanced(
     return models.Population(
         bound[-1].copy(), np.sign(stress[-1]), area_radius
     ), Bonding(bound, stress, stress)
-
-
-def steps_until_contact_changes(slider: Driven, radius: Array) -> int:
-    """Return the number of clock steps up to the first that ends with another contact radius [m] than its sub-steps."""
-    if len(radius) == 1:
-        return 1
-    same = _agree(slider.radius, radius)
-    return len(same) if same[:-1].all() else int(np.argmin(same.all(axis=1))) + 1
-
-
-def of_loop(slider: Sliding, radius: Array) -> Array:
-    """Return the radius [m] with which an equilibrium contact goes on: that of the loop if both are the same."""
-    reached = cast(Driven, slider).radius
-    return np.where(_agree(reached, radius) & (radius > 0.0), reached, radius)
-
-
-def _agree(slider_radius: Array, radius: Array) -> Flags:
-    """True where two radii of a contact differ by rounding alone, or both are those of an open one."""
-    size = np.fmax(radius, 0.0)
-    same: Flags = np.abs(slider_radius - size) <= _SAME * size
-    return same
 
 
 def _numbers(

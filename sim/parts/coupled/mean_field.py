@@ -10,7 +10,7 @@ from sim.parts.coupled import mechanics, radau
 
 # by name: numba inlines no attribute of a module
 from sim.parts.coupled.radau import accept, try_sub_step
-from sim.parts.coupled.redraw import DRAWS, redraw
+from sim.parts.coupled.step_end import ENDS, end_step
 from sim.parts.drive import ENERGY
 
 #: Slip over the cut-off stretch on which bonds are tried, and that within which they may slip at once.
@@ -535,18 +535,19 @@ def _clock_step(line, slider, law, contact, pieces, nodes, books):
         time += reached
         if not (going and reached == slider.length):
             return time, False
+    row.lost = stays - contact.stays
     contact = mechanics.later(mechanics.settled(contact, row, slider), 0.0, stays)
     energy.stored = stored_in(row, time, slider, law, contact)
     return time, True
 
 
-@kernel(f"void({mechanics.ARGUMENTS}, {DRAWS})")
-def advance_rows(inputs, numbers, outputs, draws):
+@kernel(f"void({mechanics.ARGUMENTS}, {ENDS})")
+def advance_rows(inputs, numbers, outputs, ends):
     """Advance all rows and their energies through some clock steps, each row by itself.
 
     ``numbers``: those of ``Slider``, ``Law``, ``Contact`` and ``FieldLaw``. ``outputs``: columns and
-    energies at the end of each step, shape (columns, steps, rows) and (steps, rows, energies). ``draws``: ``Draws``,
-    none if their ``values`` have no rows. Values of a row are missing once its motion has ended (``mechanics.end``).
+    energies at the end of each step, shape (columns, steps, rows) and (steps, rows, energies). ``ends``: ``StepEnds``.
+    Values of a row are missing once its motion has ended (``mechanics.end``).
     """
     rows, energies, pieces, clock, units, work = inputs
     slider, law, contact = (
@@ -566,7 +567,7 @@ def advance_rows(inputs, numbers, outputs, draws):
         both[1][: mechanics.ENERGIES],
         line[0],
     )
-    room, has_draws = np.empty((2, draws[4].size)), len(draws[0]) > 0
+    room = np.empty((2, ends[0][4].size))
     for m in range(len(rows)):
         stop = 0
         for k in range(len(clock)):
@@ -576,6 +577,8 @@ def advance_rows(inputs, numbers, outputs, draws):
                 row.moment = (
                     math.copysign(row.bound, row.speed) if row.speed != 0.0 else 0.0
                 )
+            if row.closed > 0.0 and law.sense == 0.0:
+                row.moment = 0.0
             now = mechanics.contact_at(contact, clock[k], row)
             if not mechanics.has_ended(row):
                 time, going = _clock_step(
@@ -594,5 +597,4 @@ def advance_rows(inputs, numbers, outputs, draws):
                 slider.stiffness,
             )
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
-            if has_draws:
-                redraw(row, rows[m], m, k, clock, now, draws, room, reached)
+            end_step(row, rows[m], m, k, clock[k, 5], now, ends, room)

@@ -12,12 +12,14 @@ from sim.parts.shear.process import remembered, unsteadiness
 #: body, slip and path of the clock step, contact radius, next sub-step, number of sub-steps, times at which stability
 #: was lost and from which on the motion is not resolved, acceleration of the interface. Then ``Memory``, and the path
 #: of the clock step up to which it reaches; the share of ΔΓ that adhesion pays, the energy it pays in the sub-steps,
-#: and that after the draw at the start of the clock step. Last the work since the start of the run, the energy that
-#: is missing, and the time: at the start of the clock step.
+#: and that after the draw at the start of the clock step. Then the work since the start of the run, the energy that
+#: is missing, and the time: at the start of the clock step. Last 1 if the contact has pulled off before, if it has
+#: closed at the end of the step before, and if it was lost within the clock step, else 0.
 ROW = record(
     "spring_force body_speed sheared bound moment speed position slip path radius "
     "next_step substeps runaway_time unresolved_time acceleration "
-    "weight mean spread renewed energy recalled paid felt drawn worked missed elapsed"
+    "weight mean spread renewed energy recalled paid felt drawn worked missed elapsed "
+    "parted closed lost"
 )
 COLUMNS = len(ROW.names or ())
 SLIP, RADIUS = (ROW.names or ()).index("slip"), (ROW.names or ()).index("radius")
@@ -128,6 +130,15 @@ def _missing(a, load, base, contact):
         + 4.0 * modulus * hertz
         - 2.0 * modulus * missing
     ) / series
+
+
+@device
+def is_beyond(radius, work, tilt, contact):
+    """True if a radius is beyond all equilibrium radii with a work of adhesion of ``work`` - ``tilt`` x radius."""
+    missing, _ = _missing(radius, contact.load, contact.base, contact)
+    left = work - tilt * radius
+    released = 0.5 / math.pi * contact.modulus * missing * missing / radius
+    return not radius < math.inf or (missing >= 0.0 and released >= left)
 
 
 @device
@@ -282,7 +293,7 @@ def contact_of(numbers):
 @device
 def contact_at(contact, clock, row):
     """Return the numbers of the contact from the beginning of a clock step on; an open one stays open during it."""
-    row.elapsed = clock[0]
+    row.elapsed, row.lost = clock[0], 0.0
     is_open = not row.radius > 0.0
     if is_open:
         row.radius = 0.0

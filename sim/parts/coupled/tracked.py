@@ -24,6 +24,7 @@ from sim.parts.coupled.cohorts import (
     bend_of,
     stored_energy,
 )
+from sim.parts.coupled.step_end import ENDS, end_step
 from sim.parts.drive import ENERGY
 from sim.parts.exchange import Array
 
@@ -585,15 +586,17 @@ def _through(line, books, pieces, slider, contact, tracks, ground, nodes):
             return time, False
     _sums(tracks, ground, first)
     row.bound, row.moment = first.bound, first.moment
+    row.lost = stays - contact.stays
     contact = mechanics.later(mechanics.settled(contact, row, slider), 0.0, stays)
     energy.stored = stored_energy(row, first.square, time, slider, contact)
     return time, True
 
 
 @kernel(
-    f"int64({mechanics.ARGUMENTS}, {tracked.TRACKS}, UniTuple(float64, 4), uint64, uint64[:], float64[:, :, ::1])"
+    f"int64({mechanics.ARGUMENTS}, {ENDS}, {tracked.TRACKS}, UniTuple(float64, 4), uint64, uint64[:],"
+    " float64[:, :, ::1])"
 )
-def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames):
+def advance_tracks(inputs, numbers, outputs, ends, tracks, law, seed, members, frames):
     """Advance all rows, their energies and their bonds, in place, through some clock steps, each row by itself.
 
     ``law``: rate, softness, limit and k_on; ``seed`` and ``members`` of the lives' draws; ``frames``, of shape (steps,
@@ -618,6 +621,7 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
         np.empty((tracked.COLUMNS, 1)),
     )
     width = 2 << np.int64(math.ceil(math.log2(soonest.shape[2])))
+    at_end = np.empty((2, ends[0][4].size))
     rooms = (
         np.empty(3 * mechanics.COLUMNS),
         np.empty(2 * mechanics.ENERGIES),
@@ -645,8 +649,10 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
         for k in range(len(clock)):
             start, stop = stop, mechanics.pieces_to(k, stop, pieces)
             mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
+            if line[0].closed > 0.0:
+                tracked.relax(bonds, law)
+            now = mechanics.contact_at(contact, clock[k], line[0])
             if not mechanics.has_ended(line[0]):
-                now = mechanics.contact_at(contact, clock[k], line[0])
                 time, going = _through(
                     line, books, pieces[start:stop], slider, now, bonds, ground, nodes
                 )
@@ -663,5 +669,6 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
                 slider.stiffness,
             )
             reached[:, k, m], spent[k, m], frames[k, m] = rows[m], energies[m], frame[m]
+            end_step(line[0], rows[m], m, k, clock[k, 5], now, ends, at_end)
         stamp[m] = np.int64(frame[m, tracked.STEPS])
     return 0

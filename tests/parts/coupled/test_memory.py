@@ -97,17 +97,19 @@ def at_once(lens, state, expected, drawn):
     shear = state.shear._replace(
         energy=drawn, expected=expected, past=state.shear.past._replace(energy=drawn)
     )
-    around = lens.stepper._around(state.contact.radius, shear, range(1, 2))
-    noise, bonds = MemberNoise.of(1, np.arange(1)).bonds, deepcopy(state.bonds)
+    stepper, noise = lens.stepper, MemberNoise.of(1, np.arange(1))
+    around = stepper._around(state.contact, shear, range(1, 2))
+    ends = stepper._ends(state, noise, range(1, 2))._replace(follows=False)
     motions = coupled.advance(
         lens.parts,
         state.drive,
-        bonds,
+        deepcopy(state.bonds),
         around,
         Times(1e-15, 1, 1e-15),
         range(1, 2),
-        noise,
-    )[1]
+        noise.bonds,
+        ends,
+    ).motions
     return motions.slip[0, 0], motions.path[0, 0]
 
 

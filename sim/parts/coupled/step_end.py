@@ -1,0 +1,173 @@
+"""Ends of clock steps in the loops over them: fluctuations are drawn there, and the contact opens or closes."""
+
+import math
+from typing import NamedTuple
+
+from sim.numerics.jit import device
+from sim.numerics.noise import stream
+from sim.parts.contact.balance import SHARE, widest
+from sim.parts.coupled import mechanics
+from sim.parts.exchange import Array, Draws, Flags
+from sim.parts.shear.bands import renew_band
+from sim.parts.shear.process import shares, unsteadiness
+from sim.spectrum.radial import Terms, share_of
+
+#: Types of ``Draws`` and of ``StepEnds``.
+DRAWS = (
+    "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1], boolean, float64, float64, "
+    "boolean, boolean, Tuple((uint64, uint64, uint64[::1], int64))))"
+)
+ENDS = (
+    f"Tuple(({DRAWS}, boolean, boolean, boolean, float64[:, ::1], boolean[::1], float64[::1], float64, {SHARE}, "
+    "float64[:, ::1]))"
+)
+
+
+class StepEnds(NamedTuple):
+    """What acts at the ends of some clock steps.
+
+    Attributes
+    ----------
+    draws : Draws
+        Fluctuations that are drawn there, without rows if none are.
+    follows : bool
+        True if the contact is found there.
+    is_held : bool
+        True if the mount rests.
+    again : bool
+        True if a contact that has pulled off closes again as the free sphere touches.
+    mounts : array, shape (steps, 2)
+        Load [N] and displacement of the base [m] at the end of each step, after a jump there.
+    touches : array, shape (steps,)
+        True if the free sphere touches then.
+    energy : array, shape (members,)
+        ΔΓ of fluctuations that are not drawn [J/m²].
+    paid : float
+        Share of ΔΓ that adhesion pays, waves being short beside the contact [1].
+    share : tuple
+        Share of that at the edge of a disc: inputs of ``sim.spectrum.radial.share_of``, without cubics on the plane.
+    radius : array, shape (steps, members)
+        Contact radius at the end of each step [m], nan where it is open: written in place.
+    """
+
+    draws: Draws
+    follows: bool
+    is_held: bool
+    again: bool
+    mounts: Array
+    touches: Flags
+    energy: Array
+    paid: float
+    share: Terms
+    radius: Array
+
+
+@device
+def _equilibrium(row, load, base, energy, contact, share):
+    """Return the largest stable radius in equilibrium with the ``energy`` that fluctuations take, nan without one.
+
+    The energy is that for many waves in the contact; on a disc the radius is found as ``balance.widest_crossings`` has
+    it. Newton's method begins at a radius beyond all crossings.
+    """
+    mount, body = (load, 0.0, base, 0.0, 0.0), contact[8:12]
+    on_disc = len(share[2]) > 0
+    fluctuating = 0.0 if on_disc else energy
+    bound, tilt = contact.bonded, contact.mean_stress
+    free = mechanics.Contact(
+        contact.bare, *mount, bound, tilt, *body, fluctuating, 0.0, contact.field
+    )
+    bonded, reversible = contact.bare + bound * row.bound, tilt * row.moment**2
+    start = max(row.radius, math.sqrt(contact.area / math.pi))
+    while not mechanics.is_beyond(start, bonded - fluctuating, reversible, free):
+        start *= 2.0
+    wide, _, _, _ = mechanics.contact_area(row.bound, row.moment, 0.0, start, free)
+    if not on_disc:
+        return wide
+    none = mechanics.Contact(0.0, *mount, 0.0, 0.0, *body, 0.0, 0.0, contact.field)
+    hertz, _, _, _ = mechanics.contact_area(0.0, 0.0, 0.0, start, none)
+    terms = load, base, bonded, energy, reversible
+    sphere = contact.curvature, contact.modulus, contact.stiffness
+    return widest(wide, hertz, (terms, sphere, share))
+
+
+@device
+def _draw(state, m, k, duration, field, draws, room):
+    """Draw ΔΓ at the end of a clock step, as its process does; return it and its mean before the draw [J/m²]."""
+    (
+        values,
+        energies,
+        shapes,
+        half_weight,
+        factors,
+        by_slip,
+        span,
+        mean,
+        relaxing,
+        _,
+        address,
+    ) = draws
+    size, energy, expected = 1.0, mean, energies[k, m]
+    if field.length < math.inf and not relaxing:
+        size = math.sqrt(
+            field.floor
+            + (1.0 - field.floor) * unsteadiness(state.weight, state.mean, state.spread)
+        )
+    if shapes.size > 0:
+        keep, renew = room[0], room[1]
+        passed = (state.path if by_slip else duration) / span
+        for i in range(factors.size):
+            keep[i], renew[i] = shares(factors[i] * passed)
+        if relaxing:
+            renew[0] = math.sqrt(state.renewed)
+        seed, part, members, first = address
+        numbers = stream(seed, part, members[m], first + k, 0)
+        energy = 0.0
+        for j in range(shapes.size):
+            i = j if factors.size > 1 else 0
+            x, numbers = renew_band(
+                values[m, j], keep[i], renew[i], 1.0, shapes[j], numbers
+            )
+            values[m, j] = x
+            energy += half_weight[j] * x
+        if factors.size == 1:
+            expected = keep[0] * keep[0] * expected + renew[0] * renew[0] * mean
+    energies[k + 1, m], state.energy = energy, energy
+    return size * size * energy, size * size * expected
+
+
+@device
+def end_step(row, columns, m, k, duration, contact, ends, room):
+    """Draw ΔΓ at the end of a clock step, and find the contact there, with which the next step begins.
+
+    ``row`` is that of member ``m`` in the units of the equations at the end of the sub-steps. ``columns`` are the same
+    [SI], with which the next step begins. ``contact`` is as at the start of the step, ``room`` for the shares of all
+    factors, shape (2, factors).
+    """
+    draws, follows, is_held, again, mounts, touches, energies, paid, share, radii = ends
+    if not follows:
+        return
+    state, has_draws = columns.view(mechanics.ROW)[0], len(draws[0]) > 0
+    drawn = expected = energies[m]
+    if has_draws:
+        drawn, expected = _draw(state, m, k, duration, contact.field, draws, room)
+    is_open, radius = not row.radius > 0.0, math.nan
+    is_reached = row.lost == 0.0 and not mechanics.has_ended(row)
+    if not is_open and is_held and not has_draws and is_reached:
+        radius = row.radius
+    elif not is_open or (touches[k] and (again or row.parted == 0.0)):
+        radius = _equilibrium(
+            row, mounts[k, 0], mounts[k, 1], paid * drawn, contact, share
+        )
+        # a sphere that touches without adhesion and without load has a contact of no size
+        radius = 0.0 if touches[k] and math.isnan(radius) else radius
+    if not is_open and math.isnan(radius):
+        state.parted = 1.0
+    radii[k, m], state.radius = radius, radius
+    state.closed = 1.0 if is_open and radius > 0.0 else 0.0
+    state.paid = paid
+    if len(share[2]) > 0:
+        state.paid = paid * (
+            share_of(radius, share[0], share[1], share[2]) if radius > 0.0 else 0.0
+        )
+    state.drawn = state.paid * drawn
+    state.felt = state.paid * (expected if draws[9] else drawn)
