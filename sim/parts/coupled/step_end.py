@@ -77,9 +77,11 @@ def _equilibrium(row, load, base, energy, contact, share):
         contact.bare, *mount, bound, tilt, *body, fluctuating, 0.0, contact.field
     )
     bonded, reversible = contact.bare + bound * row.bound, tilt * row.moment**2
-    start = max(row.radius, math.sqrt(contact.area / math.pi))
+    start = row.radius if row.radius > 0.0 else math.sqrt(contact.area / math.pi)
+    growth = 0.01
     while not mechanics.is_beyond(start, bonded - fluctuating, reversible, free):
-        start *= 2.0
+        start *= 1.0 + growth
+        growth *= 2.0
     wide, _, _, _ = mechanics.contact_area(row.bound, row.moment, 0.0, start, free)
     if not on_disc:
         return wide
