@@ -194,6 +194,25 @@ NO_DRAWS = Draws(
 )
 
 
+class FieldCourse(NamedTuple):
+    """Fluctuations as the loop of a driven slider has followed them during some clock steps.
+
+    Attributes
+    ----------
+    memory : Memory
+        Memory of earlier sliding at the end of each step, empty if it was not followed.
+    draws : Draws
+        Fluctuations drawn in these steps, without rows if none were.
+    """
+
+    memory: Memory = Memory()
+    draws: Draws = NO_DRAWS
+
+
+#: Course of a prescribed motion, in which no loop follows the fluctuations.
+NOT_FOLLOWED = FieldCourse()
+
+
 class StickEnds(NamedTuple):
     """End of the first stick phase in each step of a slider that starts it at rest, on bonds without a stretch.
 
@@ -238,10 +257,6 @@ class Motion(NamedTuple):
         Integral over the step of the square of what the absolute speed differs from its mean there [m²/s].
     position : array
         Displacement of the slider since the start, at the end of each step [m].
-    memory : Memory
-        Memory of the fluctuations at the end of each step, if the drive solves its motion.
-    draws : Draws
-        Fluctuations that the loop of the drive has drawn in these steps, without rows if it draws none.
     stick_ends : StickEnds
         Ends of stick phases, if the drive solves its motion.
     """
@@ -255,8 +270,6 @@ class Motion(NamedTuple):
     speed: Array
     unsteady: Array = _NONE[np.newaxis]
     position: Array = _NONE[np.newaxis]
-    memory: Memory = Memory()
-    draws: Draws = NO_DRAWS
     stick_ends: StickEnds = StickEnds()
 
 
@@ -495,9 +508,17 @@ class Shear(Protocol[State]):
         """Stationary fluctuations at t = 0."""
 
     def advance(
-        self, state: State, motions: Motion, bonding: Bonding, noise: Noise
+        self,
+        state: State,
+        motions: Motion,
+        bonding: Bonding,
+        noise: Noise,
+        course: FieldCourse = NOT_FOLLOWED,
     ) -> tuple[State, Array]:
-        """Fluctuations after a block of steps, at the ends of which the bonds are ``bonding``; ΔΓ at each [J/m²]."""
+        """Fluctuations after a block of steps, at the ends of which the bonds are ``bonding``; ΔΓ at each [J/m²].
+
+        What the loop of a driven slider has followed or drawn already is in ``course``.
+        """
 
     @property
     def field_law(self) -> FieldLaw:

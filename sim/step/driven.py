@@ -82,7 +82,9 @@ class Driven(Stepper):
             ends,
         )
         motions, bonding = reached.motions, reached.bonding
-        shear, energy = process.advance(state.shear, motions, bonding, noise.shear)
+        shear, energy = process.advance(
+            state.shear, motions, bonding, noise.shear, reached.field
+        )
         balance = scene.work.balance(bonding, energy, motions.position)
         if self.follows_contact:
             touch = cast(Equilibrium, scene.models.contact).reached(

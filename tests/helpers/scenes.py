@@ -275,4 +275,4 @@ def one_step(step, *given):
 
 def advanced(process, state, motion, bonding, noise):
     """The state of a shear process after one step."""
-    return process.advance(state, one_step(*motion[:-2]), bonding, noise)[0]
+    return process.advance(state, one_step(*motion[:-1]), bonding, noise)[0]

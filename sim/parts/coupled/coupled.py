@@ -27,6 +27,7 @@ from sim.parts.drive import ENERGY, Driven, Force, Spring
 from sim.parts.exchange import (
     Array,
     Bonding,
+    FieldCourse,
     Flags,
     Memory,
     Motion,
@@ -121,6 +122,8 @@ class Reached(NamedTuple):
         The bonds at the end of the last step.
     bonding : Bonding
         What others read of the bonds at the end of each step.
+    field : FieldCourse
+        Fluctuations as the loop has followed them.
     lost : array, shape (steps, members)
         True if a contact that follows the bonds alone lost its equilibrium within a step.
     """
@@ -129,6 +132,7 @@ class Reached(NamedTuple):
     motions: Motion
     population: tuple[object, ...]
     bonding: Bonding
+    field: FieldCourse
     lost: Flags
 
 
@@ -324,18 +328,14 @@ def advance(
     )
     first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
     way = duration[:, np.newaxis], reached["slip"], reached["path"], first, after.speed
-    memory = (
-        Memory(*(reached[name] for name in Memory._fields))
-        if law.length < math.inf
-        else Memory()
-    )
+    field = FieldCourse(draws=draws)
+    if law.length < math.inf:
+        field = FieldCourse(Memory(*(reached[name] for name in Memory._fields)), draws)
     motions = Motion(
         steps.start,
         ends[1:, np.newaxis],
         *way,
         position=after.position,
-        memory=memory,
-        draws=draws,
     )
     lost = (reached["lost"] > 0.0) & contact.undisturbed
     if not isinstance(bonds, _WITH_STRETCH):
@@ -365,9 +365,10 @@ def advance(
         bonding = with_contact_stress(
             parts, Bonding(drawn.fraction, stress, strength), after.speed
         )
-        return Reached(after, motions, end, bonding._replace(strength=strength), lost)
+        bonding = bonding._replace(strength=strength)
+        return Reached(after, motions, end, bonding, field, lost)
     bonding = with_contact_stress(parts, bonding, after.speed)
-    return Reached(after, motions, end, bonding, lost)
+    return Reached(after, motions, end, bonding, field, lost)
 
 
 def _from_start(start: Array, ends: Array) -> Array:

@@ -25,7 +25,16 @@ from sim.laws.halfspace import compliance
 from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise, normal, stream
-from sim.parts.exchange import Array, Bonding, FieldLaw, Gammas, Indices, Motion
+from sim.parts.exchange import (
+    NOT_FOLLOWED,
+    Array,
+    Bonding,
+    FieldCourse,
+    FieldLaw,
+    Gammas,
+    Indices,
+    Motion,
+)
 from sim.parts.shear.process import (
     Amplitude,
     Correlation,
@@ -389,9 +398,16 @@ class FixedProcess(ModalProcess):
         return Fluctuation(self._energy(amplitude), amplitude, phases, past)
 
     def advance(
-        self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise
+        self,
+        state: Fluctuation,
+        motions: Motion,
+        bonding: Bonding,
+        noise: Noise,
+        course: FieldCourse = NOT_FOLLOWED,
     ) -> tuple[Fluctuation, Array]:
-        past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
+        past, amplitude = self.amplitude.followed(
+            state.past, motions, bonding.strength, course.memory
+        )
         phases = state.values.copy()
         turn_phases(
             phases,
@@ -514,7 +530,12 @@ class SiteModes(ModalProcess):
         return Fluctuation(energy[0], sizes[:, 0].T, parts, expected=energy[0])
 
     def advance(
-        self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise
+        self,
+        state: Fluctuation,
+        motions: Motion,
+        bonding: Bonding,
+        noise: Noise,
+        course: FieldCourse = NOT_FOLLOWED,
     ) -> tuple[Fluctuation, Array]:
         parts, sizes = state.values.copy(), _sizes(bonding)
         energy = np.empty((len(motions.time), len(parts)))

@@ -15,7 +15,17 @@ from pydantic import Field
 
 from sim.numerics.jit import device, kernel, law
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Array, Bonding, Draws, FieldLaw, Gammas, Memory, Motion
+from sim.parts.exchange import (
+    NOT_FOLLOWED,
+    Array,
+    Bonding,
+    Draws,
+    FieldCourse,
+    FieldLaw,
+    Gammas,
+    Memory,
+    Motion,
+)
 from sim.units.quantity import Quantity, keyed
 
 _Memory = Annotated[
@@ -58,9 +68,12 @@ class _OfTheMoment:
         return NO_PAST, self.factor(motion.speed, stress)
 
     def followed(
-        self, past: Memory, motions: Motion, stress: Array
+        self, past: Memory, motions: Motion, stress: Array, memory: Memory = NO_PAST
     ) -> tuple[Memory, Array]:
-        """Return the memory of the past after a block of steps, and g [1] at the end of each."""
+        """Return the memory of the past after a block of steps, and g [1] at the end of each.
+
+        ``memory`` is that at the end of each step, if a loop has followed it.
+        """
         return past, self.factor(motions.speed, stress)
 
     def field_law(
@@ -183,13 +196,11 @@ class SlipRate(_OfTheMoment):
         return Memory(none, none, none, none), self.factor(motion.speed, stress)
 
     def followed(
-        self, past: Memory, motions: Motion, stress: Array
+        self, past: Memory, motions: Motion, stress: Array, memory: Memory = NO_PAST
     ) -> tuple[Memory, Array]:
-        if motions.memory.weight.size:
-            past, (weight, mean, spread, *_) = (
-                Memory(*(values[-1] for values in motions.memory)),
-                motions.memory,
-            )
+        if memory.weight.size:
+            past = Memory(*(values[-1] for values in memory))
+            weight, mean, spread, *_ = memory
             unsteady = np.where(spread > 0.0, spread, 0.0) / np.where(
                 spread > 0.0, spread + weight * mean * mean, 1.0
             )
@@ -390,9 +401,16 @@ class SmoothProcess:
         )
 
     def advance(
-        self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise
+        self,
+        state: Fluctuation,
+        motions: Motion,
+        bonding: Bonding,
+        noise: Noise,
+        course: FieldCourse = NOT_FOLLOWED,
     ) -> tuple[Fluctuation, Array]:
-        past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
+        past, amplitude = self.amplitude.followed(
+            state.past, motions, bonding.strength, course.memory
+        )
         energy = self._level(amplitude, bonding)
         return Fluctuation(energy[-1], amplitude[-1], np.empty(0), past), energy
 
@@ -512,9 +530,16 @@ class Renewing:
         )
 
     def advance(
-        self, state: Fluctuation, motions: Motion, bonding: Bonding, noise: Noise
+        self,
+        state: Fluctuation,
+        motions: Motion,
+        bonding: Bonding,
+        noise: Noise,
+        course: FieldCourse = NOT_FOLLOWED,
     ) -> tuple[Fluctuation, Array]:
-        past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
+        past, amplitude = self.amplitude.followed(
+            state.past, motions, bonding.strength, course.memory
+        )
         size, (keep, renew) = (
             renewed_size(self.amplitude, state, motions, amplitude),
             self._shares(motions),
@@ -522,14 +547,14 @@ class Renewing:
         if (
             self.amplitude.relaxing
             and self.field_law.follows
-            and motions.memory.renewed.size
+            and course.memory.renewed.size
         ):
             renew, size = (
-                np.sqrt(motions.memory.renewed)[..., np.newaxis],
+                np.sqrt(course.memory.renewed)[..., np.newaxis],
                 np.ones((1, 1)),
             )
             keep, size = keep + np.zeros(renew.shape), size + np.zeros((len(renew), 1))
-        draws = motions.draws  # without rows if the loop of the drive draws nothing
+        draws = course.draws  # without rows if the loop of the drive draws nothing
         values = draws.values if len(draws.values) else state.values.copy()
         drawn = (
             draws.energy[1:]

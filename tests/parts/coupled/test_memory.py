@@ -178,10 +178,11 @@ def test_the_loop_of_the_drive_draws_the_numbers_of_the_process_bit_for_bit(
 ):
     drawn, advance = [], BandedProcess.advance
 
-    def by_both(process, state, motions, *others):
-        drawn.extend(motions.draws.values)
-        by_process = advance(process, state, motions._replace(draws=NO_DRAWS), *others)
-        by_loop = advance(process, state, motions, *others)
+    def by_both(process, *inputs):
+        *others, course = inputs
+        drawn.extend(course.draws.values)
+        by_process = advance(process, *others, course._replace(draws=NO_DRAWS))
+        by_loop = advance(process, *inputs)
         np.testing.assert_equal(by_loop, by_process)
         return by_loop
 
