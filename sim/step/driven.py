@@ -135,15 +135,16 @@ class Driven(Stepper):
         load, base, _ = control.mount
         mounts[:, 0], mounts[:, 1] = np.ravel(load), np.ravel(base)
         touches[:] = np.ravel(control.closes)
+        jumps = contact.course.jumps(ends, scene.times.duration)
         draws = NO_DRAWS
         if self.follows_contact and not self.is_undisturbed:
             draws = scene.parts.shear.draws(state.shear, steps, noise.shear)
         return StepEnds(
             draws,
             self.follows_contact,
-            not contact.changes,
             contact.after_pull_off == "reattach",
             mounts,
+            jumps,
             touches,
             state.shear.energy + np.zeros(members),
             work.paid,

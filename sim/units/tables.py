@@ -29,6 +29,7 @@ from sim.units.quantity import SMALLEST, Quantity, keyed
 from sim.units.terminal import LOG
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 #: A name and its unit: "speed [mm/s]", "speed (mm/s)" or "speed in mm/s".
 _HEADING = re.compile(
@@ -541,6 +542,10 @@ class Number(NamedTuple):
         """Return the value at times [s] of a run of ``duration`` [s]; at a jump that after the jump."""
         return np.full(time.shape, self.value)
 
+    def jumps(self, time: Array, duration: float) -> Flags:
+        """True for those of some times [s] at which the value jumps."""
+        return np.zeros(time.shape, bool)
+
     def pieces(self, ends: Array, duration: float) -> Pieces:
         """Return the pieces of the intervals between some times [s], cut where the value turns or jumps."""
         value = np.full(len(ends) - 1, self.value)
@@ -593,6 +598,9 @@ class Course:
         return np.where(
             np.abs(value) > 1e-13 * max(abs(self.start), abs(self.stop)), value, 0.0
         )
+
+    def jumps(self, time: Array, duration: float) -> Flags:
+        return np.zeros(time.shape, bool)
 
     def pieces(self, ends: Array, duration: float) -> Pieces:
         values, interval = self.at(ends, duration), np.arange(len(ends) - 1)
@@ -723,6 +731,11 @@ class Table:
         return _interpolated(
             times, values, np.searchsorted(times, time, "right") - 1, time
         )
+
+    def jumps(self, time: Array, duration: float) -> Flags:
+        times, values = self._rows
+        is_jump = (np.diff(times) == 0.0) & (np.diff(values) != 0.0)
+        return np.isin(_snapped(times, time, duration), times[1:][is_jump])
 
     def pieces(self, ends: Array, duration: float) -> Pieces:
         return table_pieces(*self._rows, ends, duration)

@@ -537,6 +537,12 @@ def _clock_step(line, slider, law, contact, pieces, nodes, books):
             return time, False
     row.lost = stays - contact.stays
     contact = mechanics.later(mechanics.settled(contact, row, slider), 0.0, stays)
+    if law.sense != 0.0:
+        # such bonds find the contact anew at each time, so that it is lost only if it is at the end
+        _, area, _, _ = mechanics.contact_area(
+            row.bound, row.moment, time, row.radius, contact
+        )
+        row.lost = 1.0 if math.isnan(area) else 0.0
     energy.stored = stored_in(row, time, slider, law, contact)
     return time, True
 

@@ -18,8 +18,8 @@ DRAWS = (
     "boolean, boolean, Tuple((uint64, uint64, uint64[::1], int64))))"
 )
 ENDS = (
-    f"Tuple(({DRAWS}, boolean, boolean, boolean, float64[:, ::1], boolean[::1], float64[::1], float64, {SHARE}, "
-    "float64[:, ::1]))"
+    f"Tuple(({DRAWS}, boolean, boolean, float64[:, ::1], boolean[::1], boolean[::1], float64[::1], float64, "
+    f"{SHARE}, float64[:, ::1]))"
 )
 
 
@@ -32,8 +32,8 @@ class StepEnds(NamedTuple):
         Fluctuations that are drawn there, without rows if none are.
     follows : bool
         True if the contact is found there.
-    is_held : bool
-        True if the mount rests.
+    jumps : array, shape (steps,)
+        True if load or displacement of the base jump there.
     again : bool
         True if a contact that has pulled off closes again as the free sphere touches.
     mounts : array, shape (steps, 2)
@@ -52,9 +52,9 @@ class StepEnds(NamedTuple):
 
     draws: Draws
     follows: bool
-    is_held: bool
     again: bool
     mounts: Array
+    jumps: Flags
     touches: Flags
     energy: Array
     paid: float
@@ -145,7 +145,7 @@ def end_step(row, columns, m, k, duration, contact, ends, room):
     [SI], with which the next step begins. ``contact`` is as at the start of the step, ``room`` for the shares of all
     factors, shape (2, factors).
     """
-    draws, follows, is_held, again, mounts, touches, energies, paid, share, radii = ends
+    draws, follows, again, mounts, jumps, touches, energies, paid, share, radii = ends
     if not follows:
         return
     state, has_draws = columns.view(mechanics.ROW)[0], len(draws[0]) > 0
@@ -154,7 +154,8 @@ def end_step(row, columns, m, k, duration, contact, ends, room):
         drawn, expected = _draw(state, m, k, duration, contact.field, draws, room)
     is_open, radius = not row.radius > 0.0, math.nan
     is_reached = row.lost == 0.0 and not mechanics.has_ended(row)
-    if not is_open and is_held and not has_draws and is_reached:
+    # the radius that the sub-steps have reached, to its last bit: a rounding would be a slip at once
+    if not (is_open or jumps[k] or has_draws) and is_reached:
         radius = row.radius
     elif not is_open or (touches[k] and (again or row.parted == 0.0)):
         radius = _equilibrium(
