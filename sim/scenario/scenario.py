@@ -35,7 +35,7 @@ from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
 from sim.scenario.schema import entries, quantities, with_models
 from sim.scenario.sweep import read_sweep, rows, set_key, spaced
-from sim.step.driven import Driven
+from sim.step.driven import driven
 from sim.step.phases import Phases, phases
 from sim.step.prescribed import Prescribed
 from sim.step.stepper import Models, Scene, Stepper
@@ -483,7 +483,7 @@ class Scenario:
             self.solid.effective[0],
             self.contact_area,
         )
-        return Driven(scene) if self.drive.solves_motion else Prescribed(scene)
+        return driven(scene) if self.drive.solves_motion else Prescribed(scene)
 
     def release(self) -> None:
         """Drop the process, whose arrays may be large; it is made again when needed."""

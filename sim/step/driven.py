@@ -1,14 +1,18 @@
 """Stepper of a driven slider, whose motion is solved together with bonds and contact in sub-steps."""
 
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 
+from sim.parts.contact.balance import Balance
 from sim.parts.contact.models import Equilibrium
 from sim.parts.coupled import coupled
 from sim.parts.coupled.coupled import StepContact
 from sim.parts.coupled.step_end import StepEnds
-from sim.parts.exchange import NO_DRAWS, Array, ContactState, Storing
+from sim.parts.drive import Driven as Slider
+from sim.parts.events import Events
+from sim.parts.exchange import NO_DRAWS, Array, Bonding, ContactState, Motion, Storing
+from sim.parts.shear.models import Model as FluctuationModel
 from sim.spectrum.radial import PLANE
 from sim.step.state import MemberNoise, State, Trajectory
 from sim.step.stepper import BLOCK_NUMBERS, Scene, Stepper
@@ -17,36 +21,28 @@ from sim.step.stepper import BLOCK_NUMBERS, Scene, Stepper
 class Driven(Stepper):
     """Stepper of a slider that a spring or a force moves against its friction.
 
-    Bonds, slider and an equilibrium contact are solved together within each clock step.
-    Clock steps are advanced one by one if something is only known at their ends that acts
-    on the next one: an edge that lags, fluctuations that the loop over the steps cannot
-    draw, bonds that are drawn there.
+    Bonds, slider and an equilibrium contact are solved together within each clock step. The
+    loop over the clock steps finds the contact at the end of each, with the fluctuations
+    there, so that a block has as many steps as are asked for.
 
     Attributes
     ----------
-    follows_contact : bool
-        True if the loop over the clock steps finds the contact at the end of each, with the
-        fluctuations there.
     holds_contact : bool
         True if neither bonds nor the mount change the contact within a clock step.
     is_undisturbed : bool
         True if fluctuations never change the contact.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        fluctuations, bonds, contact = scene.models
-        work = scene.work.adhesion.work_of_bonds
-        self.is_undisturbed = fluctuations.paid_by_adhesion == 0.0 or fluctuations.stays
+    #: True if the loop over the clock steps finds the contact.
+    follows: ClassVar[bool] = True
+
+    def __init__(self, scene: Scene, longest: int = BLOCK_NUMBERS) -> None:
+        super().__init__(scene, longest)
+        contact, work = scene.models.contact, scene.work.adhesion.work_of_bonds
+        self.is_undisturbed = is_undisturbed(scene.models.fluctuations)
         self.holds_contact = contact.lags or not (
             contact.changes or contact.reversible or work(1.0) != work(0.0)
         )
-        self.follows_contact = (
-            bonds.in_blocks
-            and not contact.lags
-            and (self.is_undisturbed or fluctuations.in_blocks)
-        )
-        alone = bonds.feeds_back or fluctuations.feeds_back or not self.follows_contact
-        super().__init__(scene, 1 if alone else BLOCK_NUMBERS)
 
     def start(self, noise: MemberNoise) -> State:
         scene = self.scene
@@ -68,7 +64,7 @@ class Driven(Stepper):
         self, state: State, noise: MemberNoise, steps: range
     ) -> tuple[State, Trajectory]:
         scene = self.scene
-        drive, _, process, contact = parts = scene.parts
+        drive, _, process, _ = parts = scene.parts
         around = self._around(state.contact, state.shear, steps)
         ends = self._ends(state, noise, steps)
         reached = coupled.advance(
@@ -86,31 +82,10 @@ class Driven(Stepper):
             state.shear, motions, bonding, noise.shear, reached.field
         )
         balance = scene.work.balance(bonding, energy, motions.position)
-        if self.follows_contact:
-            touch = cast(Equilibrium, scene.models.contact).reached(
-                state.contact, motions, scene.times.duration, balance, ends.radius
-            )
-        else:
-            touch = contact.advance(
-                state.contact, motions, scene.times.duration, balance
-            )
+        touch = self._touch(state.contact, motions, balance, ends)
         sliders, bonding = coupled.with_contact(parts, reached, around, touch.radius)
         history = self._events(state, steps, motions, bonding, touch)
-        stage = drive.stage_of(sliders)
-        if stage.size:
-            samples = np.stack(
-                [
-                    stage,
-                    sliders.stage_speed,
-                    sliders.spring_force,
-                    sliders.position,
-                    bonding.stress,
-                    sliders.work,
-                ]
-            )
-            late = 0.5 * scene.times.duration
-            slips = history.slips.after(motions.time[:, 0], samples, late)
-            history = history._replace(slips=slips)
+        history = self._with_slips(history, motions, sliders, bonding)
         end = State(
             steps[-1],
             sliders.at(-1),
@@ -125,6 +100,27 @@ class Driven(Stepper):
             motions.time, motions, bonding, energy, readings, touch
         )
 
+    def _touch(
+        self, before: ContactState, motions: Motion, balance: Balance, ends: StepEnds
+    ) -> ContactState:
+        """Return the contact at the end of each clock step, as the loop has found it."""
+        contact = cast(Equilibrium, self.scene.models.contact)
+        duration = self.scene.times.duration
+        return contact.reached(before, motions, duration, balance, ends.radius)
+
+    def _with_slips(
+        self, history: Events, motions: Motion, sliders: Slider, bonding: Bonding
+    ) -> Events:
+        """Return the events with the slip events of a slider that a stage pulls."""
+        stage = self.scene.parts.drive.stage_of(sliders)
+        if not stage.size:
+            return history
+        of_stage = stage, sliders.stage_speed, sliders.spring_force
+        samples = np.stack([*of_stage, sliders.position, bonding.stress, sliders.work])
+        late = 0.5 * self.scene.times.duration
+        slips = history.slips.after(motions.time[:, 0], samples, late)
+        return history._replace(slips=slips)
+
     def _ends(self, state: State, noise: MemberNoise, steps: range) -> StepEnds:
         """Return what acts at the ends of some clock steps."""
         scene, contact, work = self.scene, self.scene.models.contact, self.scene.work
@@ -137,11 +133,11 @@ class Driven(Stepper):
         touches[:] = np.ravel(control.closes)
         jumps = contact.course.jumps(ends, scene.times.duration)
         draws = NO_DRAWS
-        if self.follows_contact and not self.is_undisturbed:
+        if self.follows and not self.is_undisturbed:
             draws = scene.parts.shear.draws(state.shear, steps, noise.shear)
         return StepEnds(
             draws,
-            self.follows_contact,
+            self.follows,
             contact.after_pull_off == "reattach",
             mounts,
             jumps,
@@ -176,3 +172,38 @@ class Driven(Stepper):
             scene.shear_modulus,
             scene.contact_area,
         )
+
+
+class SingleSteps(Driven):
+    """Stepper of a driven slider whose contact is found after each clock step.
+
+    The edge lags, or something is known at the end of a clock step only that acts on the next
+    one: fluctuations that the loop cannot draw, or bonds that are counted there.
+    """
+
+    follows: ClassVar[bool] = False
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene, longest=1)
+
+    def _touch(
+        self, before: ContactState, motions: Motion, balance: Balance, ends: StepEnds
+    ) -> ContactState:
+        """Return the contact at the end of the clock step, by its model."""
+        duration = self.scene.times.duration
+        return self.scene.models.contact.advance(before, motions, duration, balance)
+
+
+def is_undisturbed(fluctuations: FluctuationModel) -> bool:
+    """Return True if fluctuations never change the contact."""
+    return fluctuations.paid_by_adhesion == 0.0 or fluctuations.stays
+
+
+def driven(scene: Scene) -> Driven:
+    """Return the stepper of a driven slider: the loop over the clock steps, or single steps."""
+    fluctuations, bonds, contact = scene.models
+    draws = is_undisturbed(fluctuations) or fluctuations.in_blocks
+    if contact.lags or not (bonds.in_blocks and draws):
+        return SingleSteps(scene)
+    alone = bonds.feeds_back or fluctuations.feeds_back
+    return Driven(scene, longest=1 if alone else BLOCK_NUMBERS)

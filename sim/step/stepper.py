@@ -72,14 +72,14 @@ class Scene(NamedTuple):
 
 
 class Stepper:
-    """What both steppers share: blocks of clock steps, the events in them, and the trajectory.
+    """Base of both steppers: blocks of clock steps, the events in them, and the trajectory.
 
     Examples
     --------
     A run of one's own, with the states in one's hands:
 
     >>> import numpy as np, sim
-    >>> stepper = sim.load("pdms_lens").stepper
+    >>> stepper = sim.load("scenarios/pdms_lens.toml").stepper
     >>> noise = MemberNoise.of(seed=0, members=np.arange(4))
     >>> state = stepper.start(noise)
     >>> state, course = stepper.advance(state, noise, range(10, 101, 10))

@@ -102,7 +102,7 @@ class StepContact(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """What slider and bonds have reached after some clock steps.
+    """Slider, bonds and field after some clock steps.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ ENDS = (
 
 
 class StepEnds(NamedTuple):
-    """What acts at the ends of some clock steps.
+    """Fluctuations and mount that act at the ends of some clock steps.
 
     Attributes
     ----------
