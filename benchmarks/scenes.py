@@ -1,5 +1,6 @@
 """Scenes of the benchmarks: tables of a lens as a scenario names them, and programs that run them."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,63 @@ ROUGH = {
 FIELD = {"spectrum": ROUGH, "cell": 0.24e-3, "correlation": SLIP, "amplitude": ONSET}
 BANDED = FIELD | {"model": "banded", "tolerance": 0.01}
 
+BAND = {"model": "band", "rms": 120e3, "longest": 120e-6, "shortest": 60e-6}
+GAUSSIAN = {"model": "gaussian", "rms": 1e5, "length": 5e-6}
+TABULATED = {
+    "model": "tabulated",
+    "wavenumbers": [1e5, 3e5, 1e6],
+    "densities": [3e-2, 1e-2, 1e-4],
+}
+SPECTRA = [
+    {"model": "ripple", "amplitude": 1e5, "wavelength": 24e-6},
+    BAND,
+    ROUGH | {"longest": 120e-6, "rolloff": 60e-6, "shortest": 30e-6},
+    GAUSSIAN,
+    {
+        "model": "anisotropic_gaussian",
+        "rms": 1e5,
+        "length_x": 5e-6,
+        "length_y": 9e-6,
+        "angle": 0.3,
+    },
+    {"model": "von_karman", "rms": 1e5, "hurst": 0.5, "length": 5e-6},
+    TABULATED,
+]
+CELL = {"cell": 0.24e-3, "points": 80, "correlation": SLIP}
+JUMPING_SPEED = {
+    "model": "table",
+    "time": [0, 3e-3, 3e-3, 20e-3],
+    "speed": [1e-3, 1e-3, 2e-2, 0],
+}
+COUNTER_BODY = {"youngs_modulus": "1 GPa", "poisson_ratio": 0.3}
+FIELDS = [
+    {"model": "mean", "amplitude": {"model": "stress", "reference": 2e5}},
+    CELL | {"model": "modal"},
+    CELL | {"model": "banded"},
+    CELL | {"model": "mapped"},
+]
+#: Changes of the lens with models that neither the scenarios nor the random scenes of the tests hold.
+RARE: dict[str, Tables] = {
+    "spectra": {
+        "drive": JUMPING_SPEED,
+        "bonds": RATE,
+        "sweep": {
+            "shear": [
+                field | {"spectrum": spectrum}
+                for field in FIELDS
+                for spectrum in SPECTRA
+            ]
+        },
+    },
+    "auto, two bodies": {
+        "solid": {"counter_body": COUNTER_BODY},
+        "drive": RAMP,
+        "bonds": STRETCHED | {"model": "auto", "rupture": BELL},
+        "shear": CELL | {"model": "auto", "spectrum": BAND},
+        "sweep": {"bonds.sites": [20, 10**6], "contact.load": [1e-3, 4e-3]},
+    },
+}
+
 
 def tables(name: str, changes: Tables) -> Tables:
     """Return the tables of a lens with changes in some of them."""
@@ -52,6 +110,20 @@ def tables(name: str, changes: Tables) -> Tables:
             key: value for key, value in scene["contact"].items() if key != "load"
         }
     return scene
+
+
+def gathered(root: Path, count: int) -> dict[str, Any]:
+    """Return the paths of all scenarios of a tree, tables of rare models, and ``count`` random scenes."""
+    sys.path.append(str(root / "tests"))
+    from helpers.corner_scenes import corner_scene
+    from helpers.random_scenes import random_scene
+
+    paths = [*sorted(root.glob("scenarios/*.toml")), root / "sim" / "starter.toml"]
+    result: dict[str, Any] = {path.stem: str(path) for path in paths}
+    result |= {name: tables(name, changes) for name, changes in RARE.items()}
+    result |= {f"random {seed}": random_scene(seed) for seed in range(count // 2)}
+    corners = range(count - count // 2)
+    return result | {f"corner {seed}": corner_scene(seed) for seed in corners}
 
 
 def lens(members: int, steps: int, every: int = 1, **parts: Tables) -> Tables:
