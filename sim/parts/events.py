@@ -559,7 +559,6 @@ def after(
         values + np.zeros((count, 1, 1))
         for values, count in zip(so_far[:5], counts, strict=True)
     ]
-    here = (values[:, -1] for values in now)
     ends = (
         motions.first,
         motions.speed,
@@ -568,19 +567,12 @@ def after(
         motions.duration[:, 0],
     )
     bent = np.isnan(bonding.frozen).all()  # bonds without a stretch
-    traits = 1.0 * with_area, 1.0 * bent
     _follow(
-        stress,
-        stiffness,
-        relaxation,
-        radii,
-        pull,
-        contact.work,
-        contact.detached,
-        contact.turn,
-        *ends,
-        *traits,
-        *here,
+        (stress, stiffness, relaxation),
+        (radii, pull, contact.work, contact.detached, contact.turn),
+        ends,
+        (1.0 * with_area, 1.0 * bent),
+        tuple(values[:, -1] for values in now),
     )
     path = (
         np.maximum(so_far.path, motions.path.max(axis=0)) if with_path else so_far.path
@@ -614,33 +606,20 @@ def _load(k, i, stress, stiffness, relaxation, speed, radius):
 
 
 @kernel(
-    f"void({7 * _READ}{_READ_ROWS}{4 * _READ}{2 * 'float64[:], '}float64, float64,"
-    f" {', '.join(5 * ['float64[:, :]'])})"
+    f"void(Tuple(({3 * _READ})), Tuple(({4 * _READ}{_READ_ROWS})), Tuple(({4 * _READ}{2 * 'float64[:], '})),"
+    f" UniTuple(float64, 2), UniTuple(float64[:, :], 5))"
 )
-def _follow(
-    stresses,
-    stiffness,
-    relaxation,
-    radii,
-    pulls,
-    works,
-    detached,
-    turns,
-    first,
-    speed,
-    strengths,
-    since,
-    times,
-    steps,
-    share,
-    bent,
-    stress,
-    friction,
-    pull,
-    contact,
-    rises,
-):
-    bonds, none = (stresses, stiffness, relaxation), (0.0, math.nan, 0.0)
+def _follow(bonds, contacts, motion, traits, events):
+    """Follow the events through a block of clock steps, in place.
+
+    ``bonds``: stress, its stiffness and its relaxation; with the radii and ``motion`` as ``after`` has them.
+    ``contacts``: radii, pulls, works of adhesion, times of detachment, turns. ``traits``: 1 if the area at the largest
+    stress is followed, 1 if bonds have no stretch. ``events``: the present rows of the first five of ``Events``.
+    """
+    radii, pulls, works, detached, turns = contacts
+    first, speed, strengths, since, times, steps = motion
+    stress, friction, pull, contact, rises = events
+    (share, bent), none = traits, (0.0, math.nan, 0.0)
     for k in range(len(times)):
         time, step = times[k], steps[k]
         for i in range(len(friction)):
