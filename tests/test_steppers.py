@@ -3,6 +3,8 @@
 import functools
 import itertools
 import math
+from copy import deepcopy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -334,3 +336,24 @@ def test_long_marches_do_not_drift(steps):
     assert_allclose(
         last.drive.position, 2e-3 * scenario.clock.duration, rtol=1e-16 * steps + 1e-14
     )
+
+
+@pytest.mark.parametrize("drive", ["steady", "spring"])
+def test_a_state_goes_on_in_another_scene_with_the_same_parts_and_in_the_same_one_to_the_last_bit(
+    drive,
+):
+    parts = {
+        "drive": DRIVES[drive],
+        "bonds": BONDS["rate, bell"],
+        "shear": SHEARS["banded, slip, onset"],
+    }
+    of, again = (scene(3, 40, **parts, contact=CONTACTS["load"]) for _ in range(2))
+    pressed = replace(of, contact=Equilibrium(load=1.5 * of.contact.load))
+    noise = MemberNoise.of(of.seed, np.arange(3))
+    middle, _ = follow(of, noise, None, range(21))
+    ends = [
+        stepper.stepper.advance(deepcopy(middle), noise, range(21, 41))
+        for stepper in (of, again, pressed)
+    ]
+    assert same(ends[0][0], ends[1][0])
+    assert np.all(ends[2][1].radius > ends[0][1].radius)
