@@ -598,11 +598,9 @@ def _load(k, i, stress, stiffness, relaxation, speed, radius):
     """Magnitude of the stress, its slope over time at a speed, and the area."""
     value, area = _of(stress, k, i), math.pi * _of(radius, k, i) ** 2
     slope = _of(stiffness, k, i) * speed + _of(relaxation, k, i)
-    return (
-        math.fabs(value),
-        (slope if value > 0.0 else -slope if value < 0.0 else math.fabs(slope)),
-        area,
-    )
+    if not math.fabs(value) > 0.0:
+        return math.fabs(value), math.fabs(slope), area
+    return math.fabs(value), (slope if value > 0.0 else -slope), area
 
 
 @kernel(
@@ -752,7 +750,7 @@ def _keep(now, rise, slope, around, kink, maxima, i):
     if peak > largest:
         largest, place = peak, back
     maxima[i, 0], maxima[i, 1] = last, now
-    maxima[i, 2] = -1.0 if bent > 0.0 else 1.0 if rise < 0.0 and slope < 0.0 else 0.0
+    maxima[i, 2] = -1.0 if bent > 0.0 else 1.0 * (rise < 0.0 and slope < 0.0)
     if place >= 0.0:
         maxima[i, 3], maxima[i, 4] = largest, time - place * step
         maxima[i, 5], maxima[i, 6] = (

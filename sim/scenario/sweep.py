@@ -50,14 +50,11 @@ def read_sweep(sweep: Any) -> tuple[Axis, ...]:
     """
     if isinstance(sweep, tuple) and all(isinstance(axis, Axis) for axis in sweep):
         return sweep
-    axes = (
-        [_zipped(sweep)]
-        if isinstance(sweep, list)
-        else list(_columns(sweep))
-        if isinstance(sweep, dict)
-        else None
-    )
-    if axes is None:
+    if isinstance(sweep, list):
+        axes = [_zipped(sweep)]
+    elif isinstance(sweep, dict):
+        axes = list(_columns(sweep))
+    else:
         raise _fault(
             'must be a table of lists, such as "contact.load" = ["1 mN", "4 mN"]'
         )

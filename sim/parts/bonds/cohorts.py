@@ -390,11 +390,7 @@ def _step_row(pool, count, travelled, settled, slip, duration, rules):
         step = min(step, longest)
         remaining = duration - done
         going = step < 0.999 * remaining
-        step = (
-            (step if step < 0.5 * remaining else 0.5 * remaining)
-            if going
-            else remaining
-        )
+        step = min(step, 0.5 * remaining) if going else remaining
         bound = 0.0
         for i in range(count):
             bound += pool[0, i]

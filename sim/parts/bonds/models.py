@@ -240,13 +240,8 @@ def _last_signs(speed, slip, first, sense):
     for m in range(sense.shape[1]):
         last = first[m]
         for k in range(len(sense)):
-            last = (
-                speed[k, m]
-                if speed[k, m] != 0.0
-                else slip[k, m]
-                if slip[k, m] != 0.0
-                else last
-            )
+            moved = speed[k, m] if speed[k, m] != 0.0 else slip[k, m]
+            last = moved if moved != 0.0 else last
             sense[k, m] = last = np.sign(last)
 
 

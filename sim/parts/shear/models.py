@@ -523,9 +523,8 @@ class Auto(_Fluctuating):
                 "maps_need_memory", "maps change in time: give shear.correlation"
             )
         fitting = Modal if self.spectrum.bond_made else Banded
-        kind: type[Mean | Banded | Modal] = (
-            Mean if self.correlation is None else Mapped if maps else fitting
-        )
+        kind: type[Mean | Banded | Modal] = Mapped if maps else fitting
+        kind = Mean if self.correlation is None else kind
         return kind(
             **{
                 key.name: getattr(self, key.name)
