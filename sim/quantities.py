@@ -1018,6 +1018,10 @@ OF_MEMBERS: tuple[Definition, ...] = (
         "energy dissipated by opening and closing to the end of the run",
         symbol="W",
         heading="dissipated, in all",
+        absent=(
+            "a contact has opened under a load, which moves the free sphere away, so "
+            "that the energy lost then is not defined"
+        ),
     ),
     Definition("pull_offs", "1", "number of phases with a pull-off"),
     Definition(

@@ -14,14 +14,12 @@ from sim.read.dataset import (
     ensemble_mean,
     only_statistics,
     plain,
-    setting,
     where_recorded,
-    word,
 )
 from sim.read.estimate import Estimate, Estimates, explained, of_every_member
 from sim.read.lifetimes import half_lives
-from sim.read.loops import cycles_of, mean_loops
-from sim.read.observables import labelled, pure
+from sim.read.loops import mean_loops
+from sim.read.observables import defined, labelled, pure
 from sim.read.peaks import ensemble_peaks, peaks, peaks_after_holds, static_threshold
 from sim.read.slips import slips_by_phase, stick_slip
 from sim.read.statistics import summary
@@ -63,7 +61,8 @@ def events(dataset: xr.Dataset) -> Estimates:
         - ``jump_in_load``, ``jump_in_displacement`` and ``jump_in_time``: the same of the first jump into contact.
         - ``lowest_load`` [N], ``lowest_load_displacement`` and ``lowest_load_time``: of a load that changes, nan
           without tension.
-        - ``total_dissipated`` [J]: by opening and closing, to the end of the run.
+        - ``total_dissipated`` [J]: by opening and closing, to the end of the run; nan once a contact has opened under a
+          load.
         - ``loop_energy``, ``loop_dissipation`` [J]: means over the cycles there and back; see ``loop_energy``.
         - ``peak_stress`` [Pa], ``peak_time`` [s], ``peak_speed`` [m/s], and ``peak_friction`` [N] with
           ``peak_friction_time``, ``peak_friction_speed``: of a start or a ramp; see ``peaks``.
@@ -96,18 +95,11 @@ def events(dataset: xr.Dataset) -> Estimates:
         with where_recorded():
             found |= part(dataset)
     if "dissipated_energy" in dataset:
-        lost = dataset["dissipated_energy"].isel(t=-1, drop=True).astype(float)
-        text = "total energy dissipated by opening and closing"
-        found["total_dissipated"] = Estimate(labelled(lost, "J", text, "W"))
+        found["total_dissipated"] = _dissipated(dataset)
     with contextlib.suppress(ValueError), answered():
         found |= mean_loops(dataset)
-    with contextlib.suppress(KeyError):
-        _add_late_jumps(found, dataset)
     if {"pull_off_error", "pull_off_load"} <= {*dataset}:
-        error = abs(ensemble_mean(dataset["pull_off_error"])).assign_attrs(
-            source="step"
-        )
-        found["pull_off_load"] = found["pull_off_load"]._replace(bound=error)
+        _add_step_errors(found, dataset)
     return found
 
 
@@ -138,34 +130,30 @@ def of_events(dataset: xr.Dataset, over: str = "") -> Estimates:
     return explained(result | half_lives(dataset) | ensemble_peaks(dataset), over)
 
 
-def _add_late_jumps(found: Estimates, dataset: xr.Dataset) -> None:
-    """Add the bound of the energy that jumps of the contact dissipate [J], if it is known.
+def _dissipated(dataset: xr.Dataset) -> Estimate:
+    """Return the energy dissipated to the end of the run [J]; nan once a contact has opened under a load."""
+    lost = dataset["dissipated_energy"].isel(t=-1, drop=True).astype(float)
+    with contextlib.suppress(KeyError):
+        if control(dataset).kind == "load":
+            lost = lost.where(ensemble_mean(dataset["detachments"]) == 0.0)
+    row = QUANTITIES["total_dissipated"]
+    return of_every_member(defined(row.name, lost), row.absent)
 
-    The stepper opens and closes a contact at the end of a clock step, after the mount has moved on by up to its
-    displacement in a step. It does at most the work of the lowest load over that displacement. A contact closes
-    at most once more than it opens. Under a load a contact that opens dissipates nothing.
+
+def _add_step_errors(found: Estimates, dataset: xr.Dataset) -> None:
+    """Add the bounds of the errors that the clock step makes at pull-offs, if the stepper has recorded one.
+
+    The energy lost at a pull-off grows at most with the square of its load, as behind a soft spring. The relative
+    error of an energy is therefore at most twice that of the load.
     """
-    needed = {"dissipated_energy", "detachments", "lowest_load"}
-    needed |= {"displacement", "in_contact", "first_closing"}
-    is_equilibrium = word(dataset, "contact.model", "equilibrium") == "equilibrium"
-    if not needed <= dataset.keys() or not bool(is_equilibrium.all()):
-        return
-    is_coarse = dataset.sizes["t"] < 2 or control(dataset).kind == "load"
-    if is_coarse or only_statistics(dataset):
-        return
-    records = float(dataset["t"][1] - dataset["t"][0]) / setting(dataset, "clock.step")
-    moved = abs(dataset["displacement"].astype(float).diff("t")).max("t") / records
-    closes = dataset["first_closing"].notnull()
-    starts_open = dataset["in_contact"].isel(t=0, drop=True) == 0.0
-    closings = (dataset["detachments"] + starts_open).where(closes, 0.0)
-    jumps = dataset["detachments"] + closings
-    bound = jumps * abs(dataset["lowest_load"]).fillna(0.0) * moved
-    total = found["total_dissipated"]
-    found["total_dissipated"] = total._replace(bound=bound.assign_attrs(source="step"))
-    loop = found.get("loop_dissipation")
-    if loop is not None and loop.bound is not None:
-        both = (loop.bound + bound / cycles_of(dataset)).assign_attrs(source="step")
-        found["loop_dissipation"] = loop._replace(bound=both)
+    error = abs(ensemble_mean(dataset["pull_off_error"])).assign_attrs(source="step")
+    load = found["pull_off_load"]
+    found["pull_off_load"] = load._replace(bound=error)
+    for name in {"total_dissipated", "loop_dissipation"} & found.keys():
+        one = found[name]
+        bound = 2.0 * abs(error / load.value * one.value).fillna(0.0)
+        bound = bound if one.bound is None else bound + one.bound
+        found[name] = one._replace(bound=bound.assign_attrs(source="step"))
 
 
 def pull_offs(dataset: xr.Dataset) -> xr.Dataset:

@@ -530,15 +530,6 @@ class Equilibrium(_Controlled):
                 np.zeros(radius.shape),
             )
             opens, closes = is_open & ~was_open, was_open & ~is_open
-            for happens, size, sign in ((opens, before, 1.0), (closes, radius, -1.0)):
-                if happens.any():
-                    energy = control.energy(
-                        size, balance.gained(size, self.reversible), balance.bodies
-                    )
-                    lost += np.where(happens, np.maximum(sign * energy, 0.0), 0.0)
-            dissipated = np.add.accumulate(np.concatenate([dissipated[:1], lost]))[1:]
-            opened = np.where(opens, motions.time, np.nan)
-            detached = np.fmax.accumulate(np.concatenate([detached[:1], opened]))[1:]
             left = np.concatenate(
                 [
                     np.broadcast_to(state.work, radius[:1].shape),
@@ -548,9 +539,12 @@ class Equilibrium(_Controlled):
             for happens in (opens, closes):
                 if happens.any():
                     start = left[happens], before[happens]
-                    turn[happens] = self._turns(
+                    turn[happens], lost[happens] = self._turns(
                         happens, start, motions, duration, balance
                     )
+            dissipated = np.add.accumulate(np.concatenate([dissipated[:1], lost]))[1:]
+            opened = np.where(opens, motions.time, np.nan)
+            detached = np.fmax.accumulate(np.concatenate([detached[:1], opened]))[1:]
         work, phases = (
             self._left(radius, balance),
             self._phases(state, control, balance),
@@ -564,8 +558,8 @@ class Equilibrium(_Controlled):
         motions: Motion,
         duration: float,
         balance: Balance,
-    ) -> Array:
-        """Return the rows ``TURN`` of contacts that open, or of contacts that close, within some steps.
+    ) -> tuple[Array, Array]:
+        """Return the rows ``TURN`` of contacts that open or that close within some steps, and the energies lost then.
 
         Parameters
         ----------
@@ -578,9 +572,11 @@ class Equilibrium(_Controlled):
 
         Returns
         -------
-        array, shape (contacts, 3)
+        turns : array, shape (contacts, 3)
             Those of the last equilibrium of a contact that opens, and of the first one of a contact that closes;
             nan if it closes without work of adhesion, because a Hertz contact does not jump.
+        lost : array, shape (contacts,)
+            Energy that the jump at that moment dissipates [J].
 
         Notes
         -----
@@ -633,7 +629,10 @@ class Equilibrium(_Controlled):
             ],
             axis=1,
         )
-        return np.where(opens | has_adhesion, turn, np.nan)
+        gained = there.gained(radius, self.reversible)
+        energy = control.energy(radius, gained, there.bodies)[:, 0]
+        lost = np.maximum(np.where(opens[:, 0], energy, -energy), 0.0)
+        return np.where(opens | has_adhesion, turn, np.nan), lost
 
 
 @keyed(kw_only=True)

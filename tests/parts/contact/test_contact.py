@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from helpers.parts import run
 from helpers.scenes import (
     Adhesion,
     Clock,
@@ -197,9 +198,9 @@ def released(a, stiffness):
 @pytest.mark.parametrize("stiffness", [0.3, 5.0, math.inf])
 @pytest.mark.parametrize("steps", [400, pytest.param(4000, marks=pytest.mark.verify)])
 def test_the_loop_of_load_and_displacement_holds_what_is_dissipated(steps, stiffness):
-    """To first order in the step: each of the two jumps comes within a step of its place, where at most the
-    pull-off load of 1.5 acts; the trapezoidal rule takes half of either jump, and is of second order elsewhere
-    but at the fold, where the load has a square root: of order 3/2."""
+    """Each jump is taken at its own place in the step, up to the root of a rounding at the fold. The trapezoidal rule
+    takes half of either jump, at which at most the pull-off load of 1.5 acts, and is of second order elsewhere but at
+    the fold, where the load has a square root: of order 3/2."""
     last = fold(stiffness)
     exact = released(last, stiffness) - released(touching(stiffness), stiffness)
     reach = (
@@ -220,7 +221,7 @@ def test_the_loop_of_load_and_displacement_holds_what_is_dissipated(steps, stiff
     loop = float(np.sum(0.5 * (load[1:] + load[:-1]) * np.diff(displacement)))
     width = 2.0 * reach / steps
     assert lost[-1] > 0.5
-    assert_allclose(lost[-1], exact, rtol=0.0, atol=3.0 * width)
+    assert_allclose(lost[-1], exact, rtol=1e-7)
     assert_allclose(loop, lost[-1], rtol=0.0, atol=6.0 * width)
 
 
@@ -527,16 +528,15 @@ def test_a_disc_is_where_its_release_rate_is_the_work_that_its_amplitude_leaves_
     scenario = maugis(
         Equilibrium(indentation={"from": 0.0, "to": -2.0}), 400, shear=part
     )
-    radius, lost, depth = course(
-        scenario, "contact_radius", "dissipated_energy", "indentation"
-    )
-    first = int(np.argmax(radius == 0.0))
-    a = radius[first - 1]
-    held = elastic_energy(a, depth[first], scenario.bodies)
+    last = run(scenario).isel(t=-1)
+    depth, load = float(last["pull_off_displacement"]), float(last["pull_off_load"])
+    # Maugis: P = 3a(δ - a²/3)/2, which falls with a where δ < 0
+    a = brentq(lambda a: 1.5 * a * (depth - a**2 / 3.0) - load, 0.0, 3.0, xtol=1e-14)
     assert plane > 1e-3
     assert_allclose(
-        lost[-1],
-        held - math.pi * a**2 * (WORK - disc_energy(spectrum, a, 0.1875)),
+        last["dissipated_energy"],
+        elastic_energy(a, depth, scenario.bodies)
+        - math.pi * a**2 * (WORK - disc_energy(spectrum, a, 0.1875)),
         rtol=1e-7,
     )
 
