@@ -51,6 +51,9 @@ _SLOWER, _FASTER, _AROUND = 0.01, 100.0, 5
 #: Values of K_c/K − 1 from which on no slope is used, and at which a limit is found; width of ln V at which it is, too.
 _STEEP, _ZERO, _NARROW = 10.0, 1e-4, 1e-4
 
+#: What a larger cell and the mean do beside the change that is announced.
+_LESS_SPREAD = " (the spread of ΔΓ between members falls, too, which changes the mean area further)"
+
 #: A point of a sweep, and its systematic errors.
 Worst = tuple[Scenario, dict[str, float]]
 
@@ -120,7 +123,8 @@ def worst_of_sweep(points: Sequence[Scenario]) -> Worst | None:
 def cure(point: Scenario, errors: dict[str, float]) -> str:
     """Return the keys that reduce the error of the cell to about a tenth; "" if A/A_JKR is off by less than 1 point.
 
-    The error falls with the side of the cell, unless the grid has too few points for the short waves.
+    The error falls with the side of the cell, unless the grid has too few points for the short waves. It is that of the
+    mean energy at the same spread, so that a remark follows the keys if these also reduce the spread.
     """
     if not abs(errors["cell_error_area"]) > _ERROR:
         return ""
@@ -147,7 +151,8 @@ def cure(point: Scenario, errors: dict[str, float]) -> str:
     )
     changes += [f"shear.points = {points}"] if points != shear.points else []
     many = changed(shear, {"cell": wide, "points": points}).too_many_modes(wide)
-    return 'shear.model = "mean"' if many else " and ".join(changes)
+    keys = 'shear.model = "mean"' if many else " and ".join(changes)
+    return keys + _LESS_SPREAD * (bool(many) or wide > side)
 
 
 def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
@@ -168,7 +173,9 @@ def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
         size = (
             f"{abs(area):.2g} points and the friction {abs(friction):.2g} % too {too}"
         )
-        texts.append(f"the cell makes A/A_JKR up to {size} (at {at}): {keys}")
+        texts.append(
+            f"the mean ΔΓ of the cell makes A/A_JKR up to {size} (at {at}): {keys}"
+        )
     if plan.scenario.record.per_member is None and not plan.per_member:
         texts.append(
             "a file with every member would exceed 20 GB: only mean, spread and standard error are recorded"
@@ -521,7 +528,7 @@ class Stability(NamedTuple):
 def stability(point: Scenario) -> Stability:
     """Return the stability of steady sliding of a scene with a spring, at the speeds of its stage and around them."""
     spring = cast(Spring, point.drive).spring
-    of_run = _distinct_speeds(point)
+    of_run = distinct_speeds(point)
     if not of_run.size:
         return Stability(0.0, 0.0, math.nan, [])
     below = of_run[0] * np.geomspace(_SLOWER, 1.0, _AROUND)[:-1]
@@ -545,7 +552,7 @@ def stability(point: Scenario) -> Stability:
     )
 
 
-def _distinct_speeds(point: Scenario) -> Array:
+def distinct_speeds(point: Scenario) -> Array:
     """Return the distinct speeds of a run above zero [m/s], in increasing order."""
     speeds = np.unique(np.abs(point.speeds(TIMES)))
     return np.asarray(speeds[speeds > 0.0])

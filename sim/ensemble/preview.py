@@ -14,6 +14,7 @@ from sim.ensemble.diagnosis import (
     SEARCHED,
     Worst,
     diagnosis,
+    distinct_speeds,
     remarks,
     stability,
     worst_of_sweep,
@@ -564,8 +565,13 @@ def _slider(plan: Plan) -> Rows:
     known = [*sprung.values()]
     most = max(known, key=lambda each: each.stiffness)
     text = f"{_span([each.stiffness for each in known])} N/m of the spring"
+    speeds_of_run = [
+        speed for point in driven for speed in distinct_speeds(point).tolist()
+    ]
     if most.stiffness > 0.0:
         text += f" (inf: with any spring), at {engineering(most.speed, 'm/s')} with {most.frequency:.4g} Hz"
+    elif speeds_of_run:
+        text += f": with no spring, at {_span(speeds_of_run, 'm/s')}"
     rows.append(("oscillates below", text))
 
     def speeds(point: Scenario) -> list[str]:

@@ -16,7 +16,7 @@ _UNITS = {
 }
 #: Sources of an error by the first word of its name.
 _SOURCES = {
-    "cell": "the cell",
+    "cell": "the mean ΔΓ of the cell",
     "banded": "banding",
     "step": "the clock step",
     "pull": "the clock step",

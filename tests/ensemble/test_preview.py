@@ -191,7 +191,7 @@ def test_limits_of_the_theory_and_of_the_cell_are_noted_once():
         (
             "soft_lens",
             {"shear.spectrum": WIDE, "shear.points": 32, "sweep": {}},
-            "the cell makes A/A_JKR up to",
+            "the mean ΔΓ of the cell makes A/A_JKR up to",
         ),
         (
             "masking",

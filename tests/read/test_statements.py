@@ -126,5 +126,5 @@ def test_a_maximum_inside_a_sweep_and_a_systematic_error_are_notes():
         "contact_load = 1 mN",
         'shear.cell = "4 mm"',
     )
-    words = 'the cell adds +5.1 points of A/A_JKR at contact_load = 1 mN; cure: shear.cell = "4 mm"'
+    words = 'the mean ΔΓ of the cell adds +5.1 points of A/A_JKR at contact_load = 1 mN; cure: shear.cell = "4 mm"'
     assert str(error) == words and error.matters
