@@ -118,13 +118,11 @@ def survival_figure(dataset: xr.Dataset, x: str = "") -> Figure:
         )
     scene, shares = scene_along(dataset, "t"), survival(dataset, event)
     figure, (panel,) = style.rows([2.2])
-    times = np.append(0.0, shares["time"].to_numpy())
+    times = shares["time"].to_numpy()
     unit = style.Unit.of(times, "s")
     for line in scene.lines:
         share, low, high = (
-            np.append(
-                1.0, shares[name].isel(line.point, missing_dims="ignore").to_numpy()
-            )
+            shares[name].isel(line.point, missing_dims="ignore").to_numpy()
             for name in ("survival", "low", "high")
         )
         look: Any = {

@@ -136,10 +136,11 @@ def survival(dataset: xr.Dataset, event: str) -> xr.Dataset:
     -------
     xarray.Dataset
         ``survival`` with the ends ``low`` and ``high`` of its 95 % interval [1], over the dimension ``time`` [s] since
-        the start of the run: the times of the event in all members and points of the sweep, and the end of the run.
+        the start of the run: 0, the times of the event in all members and points of the sweep, and the end of the run.
         The estimate is that of Kaplan and Meier with log-log intervals, because the run ends before the event has
-        reached all members (censoring). Members count from the time at which their contact closes. The numbers are nan
-        after the last member is gone, and the interval where the share is 1 or 0.
+        reached all members (censoring). A share of 1 or 0, or one event alone, has no log-log interval: there the
+        interval is Clopper and Pearson's, a quantile of the Beta distribution. Members count from the time at which
+        their contact closes. The numbers are nan from a time on at which no member was watched.
 
     Raises
     ------
@@ -153,7 +154,8 @@ def survival(dataset: xr.Dataset, event: str) -> xr.Dataset:
         raise ValueError(f"the survival of {event} is not known; {cure}")
     times = dataset[event].astype(float)
     begins, end = _at_risk_from(dataset, times), float(dataset["t"][-1])
-    grid = np.unique(np.append(times.to_numpy()[np.isfinite(times.to_numpy())], end))
+    events = times.to_numpy()[np.isfinite(times.to_numpy())]
+    grid = np.unique([0.0, *events, end])
 
     def curves(times: Array, begins: Array) -> Array:
         watched = np.where(np.isfinite(times), times, end)
@@ -166,7 +168,11 @@ def survival(dataset: xr.Dataset, event: str) -> xr.Dataset:
         )
         before = np.searchsorted(places, grid, side="right") - 1
         start = np.array([1.0, np.nan, np.nan])[:, np.newaxis]
-        return np.where(before < 0, start, np.array(values)[:, before])
+        share, *ends = np.where(before < 0, start, np.array(values)[:, before])
+        since = begins[counts][:, np.newaxis]
+        exact = _exact(share, np.sum((since < grid) | (since == 0.0), axis=0))
+        known = zip(ends, exact, strict=True)
+        return np.stack([share, *(np.where(np.isnan(a), b, a) for a, b in known)])
 
     how: Any = {
         "input_core_dims": [[MEMBERS]] * 2,
@@ -187,6 +193,14 @@ def survival(dataset: xr.Dataset, event: str) -> xr.Dataset:
         },
         {"time": ("time", grid, {"units": "s", "long_name": "time since the start"})},
     )
+
+
+def _exact(share: Array, members: Array) -> tuple[Array, Array]:
+    """Return the ends of Clopper and Pearson's 95 % interval of a share of some members; nan if it is nan."""
+    count, tail = share * members, 0.5 - 0.5 * LEVEL
+    low = special.betaincinv(count, members - count + 1.0, tail)
+    high = special.betaincinv(count + 1.0, members - count, 1.0 - tail)
+    return np.where(count == 0.0, 0.0, low), np.where(count == members, 1.0, high)
 
 
 def _at_risk_from(dataset: xr.Dataset, times: xr.DataArray) -> xr.DataArray:

@@ -427,7 +427,7 @@ def test_the_share_that_is_left_has_the_survival_and_the_interval_of_scipy():
     curve = stats.ecdf(sample).sf
     with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
         interval = curve.confidence_interval(0.95, method="log-log")
-    inner = result["time"].values < 1.0
+    inner = (result["time"].values > 0.0) & (result["time"].values < 1.0)
     at = result["time"].values[inner]
     assert len(at) > 2
     assert_allclose(result["survival"][inner], curve.evaluate(at), rtol=1e-12)
@@ -436,6 +436,25 @@ def test_the_share_that_is_left_has_the_survival_and_the_interval_of_scipy():
     assert_allclose(result["survival"][-1], np.mean(~happened), rtol=1e-12)
     none = read.survival(dataset, "first_masked")
     assert_array_equal(none["survival"], 1.0)
+    for each in (none.isel(time=-1), result.isel(time=0)):
+        assert_allclose([each["low"], each["high"]], binomial(0, len(times)))
+
+
+@pytest.mark.parametrize("happened", [[0.2, 0.4, 0.7], [0.5, *3 * [math.nan]]])
+def test_a_share_of_1_or_0_or_after_one_event_has_a_binomial_interval(happened):
+    contact, tables, _ = PAIRS["a held load and fluctuations"]
+    few = ran(LENS, contact, **tables).isel(member=slice(0, len(happened)))
+    few = few.assign(first_detachment=("member", happened))
+    last = read.survival(few, "first_detachment").isel(time=-1)
+    gone = int(np.isfinite(happened).sum())
+    assert_allclose(last["survival"], 1.0 - gone / len(happened), rtol=1e-12)
+    assert_allclose([last["low"], last["high"]], binomial(gone, len(happened)))
+
+
+def binomial(gone, members):
+    """The 95 % interval of the share that is left, by scipy."""
+    result = stats.binomtest(members - gone, members)
+    return list(result.proportion_ci(0.95, "exact"))
 
 
 def test_a_median_beyond_the_run_is_bounded_by_its_end_and_no_mean_of_the_masked_is_given():
