@@ -520,7 +520,7 @@ def _plainly(
     where: dict[str, Any] | None,
 ) -> Any:
     """Return the result of a function of a dataset, or of a file with one; its faults become ``BadInput``."""
-    from sim.read import where as chosen
+    from sim.read.dataset import checked, where as chosen
 
     with (
         naming(),
@@ -528,7 +528,7 @@ def _plainly(
         if isinstance(dataset, str | os.PathLike)
         else contextlib.nullcontext(dataset) as data,
     ):
-        return function(chosen(data, where or {}))
+        return function(chosen(checked(data), where or {}))
 
 
 def __getattr__(name: str) -> Any:

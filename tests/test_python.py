@@ -195,6 +195,37 @@ def test_converge_takes_a_budget_as_text(monkeypatch):
         sim.converge(SCENE, "2 kg")
 
 
+TAKES_A_SCENE = {
+    "load": sim.load,
+    "run": sim.run,
+    "check": sim.check,
+    "converge": sim.converge,
+    "fit": lambda scene: sim.fit(scene, "measured.csv", ["contact.load"]),
+    "plan": lambda scene: sim.plan(scene, "points.csv", ["contact.load"]),
+    "steady_curves": lambda scene: sim.steady_curves(scene, [1e-3]),
+    "explore": sim.explore,
+}
+TAKES_A_DATASET = (sim.Run, sim.stats, sim.plot, sim.report, sim.methods)
+
+
+def test_what_is_no_scenario_and_no_dataset_is_refused_with_its_type():
+    for takes in TAKES_A_SCENE.values():
+        with pytest.raises(sim.BadInput, match=r"^a scenario is a file .* type int$"):
+            takes(3)
+    for takes in TAKES_A_DATASET:
+        for wrong, words in (
+            (3, "of type int;"),
+            (None, "of type NoneType;"),
+            (xr.Dataset(), "a Dataset that no run has made;"),
+        ):
+            with pytest.raises(sim.BadInput, match=f"^is {words}.*sim.open returns$"):
+                takes(wrong)
+    with pytest.raises(sim.BadInput, match=r"^is of type str;.*sim.open returns$"):
+        sim.Run("out.nc")
+    with pytest.raises(sim.BadInput, match=r"^1: there is no such file"):
+        sim.open(1)
+
+
 def test_a_fault_of_a_scene_is_bad_input_with_its_key_and_cure():
     for use, key, cure in (
         (

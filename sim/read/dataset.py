@@ -110,7 +110,8 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
     sim.numerics.hdf5.Damaged
         Now or later, if a variable that is read is damaged.
     """
-    if not os.path.exists(path) or os.path.isdir(path):
+    is_name = isinstance(path, str | os.PathLike)  # a number is that of an open file
+    if not is_name or not os.path.exists(path) or os.path.isdir(path):
         reason = "is a folder" if os.path.isdir(path) else "there is no such file"
         unfinished = os.path.isdir(f"{path}.parts")
         cure = (
@@ -338,6 +339,22 @@ def _chunk(variable: xr.Variable, dim: str) -> int:
     chunks = variable.encoding.get("chunksizes") or ()
     # joined runs have other sizes
     return int(chunks[variable.dims.index(dim)]) if len(chunks) == variable.ndim else 1
+
+
+def checked(dataset: object) -> xr.Dataset:
+    """Return the dataset of a run, and refuse anything else.
+
+    Raises
+    ------
+    BadInput
+        With the type of what was given.
+    """
+    if isinstance(dataset, xr.Dataset) and "contact_modulus" in dataset.variables:
+        return dataset
+    kind = f"of type {type(dataset).__name__}"
+    if isinstance(dataset, xr.Dataset):
+        kind = "a Dataset that no run has made"
+    raise BadInput([f"is {kind}; give the dataset that sim.run or sim.open returns"])
 
 
 def plain(dataset: xr.Dataset) -> xr.Dataset:

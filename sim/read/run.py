@@ -58,7 +58,7 @@ class Run:
     """
 
     def __init__(self, dataset: xr.Dataset, lost: Sequence[str | float] = ()) -> None:
-        self.dataset = datasets.plain(dataset)
+        self.dataset = datasets.plain(datasets.checked(dataset))
         self.lost = lost
         self._late, self._known, self._is_whole = Estimates(), set[str](), False
         if MEMBERS in self.dataset["contact_modulus"].dims:

@@ -51,6 +51,11 @@ def load(
     overrides = dict(overrides or {})
     if isinstance(scenario, dict):
         file, text, folder, document = "", "", Path(), copy.deepcopy(scenario)
+    elif not isinstance(scenario, str | os.PathLike):
+        kind = type(scenario).__name__
+        raise BadInput(
+            [f"a scenario is a file or a dictionary of tables, but is of type {kind}"]
+        )
     else:
         file, text, folder = (
             str(scenario),
