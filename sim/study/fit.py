@@ -542,6 +542,11 @@ def free_number(scenario: Scenario, text: str, option: str = "--free") -> Free:
 
 #: Height of a panel of curves and of that of its residuals [in].
 _CURVES, _RESIDUALS = 1.7, 0.8
+#: Name and look of a fit, of one whose points are joined and of others.
+_FITS: dict[bool, tuple[str, dict[str, Any]]] = {
+    False: ("fit", {"linewidth": 0.9}),
+    True: ("fit at the points, joined", {"linewidth": 0.5, "linestyle": ":"}),
+}
 #: Relative difference below which conditions are the same, and most of them that the legend names.
 _NEAR, _NAMED = 0.02, 10
 
@@ -559,8 +564,8 @@ def figure(problem: Problem, best: Minimum) -> Figure:
     """Draw each variable over the condition that varies most, with error bars and fit, above its residuals.
 
     Residuals are in standard errors. Rows of any table with the same other conditions have one colour and one curve.
-    If tables have values of their own, each has its own colours. Over the speed the curve has many speeds; otherwise it
-    joins the rows.
+    If tables have values of their own, each has its own colours. Over time, speed and mount the curve is steady sliding
+    at many places. Runs, and scenarios that differ in another key, are too expensive for that: a thin line joins them.
     """
     fitted, alone = problem.predicted(best.x), problem.steady(best.x)
     off = problem.residuals(best.x)
@@ -570,6 +575,9 @@ def figure(problem: Problem, best: Minimum) -> Figure:
     panels = dict[tuple[str, str], list[int]]()
     for number, (table, name) in enumerate(problem.curves):
         panels.setdefault((name, along[table].key), []).append(number)
+    is_joined = {
+        key: problem.by_run or key not in likelihood.COURSES for _, key in panels
+    }
     with mpl.rc_context(style.STYLE):
         picture, axes = style.rows([_CURVES, _RESIDUALS] * len(panels), shared=False)
         for k, ((name, key), numbers) in enumerate(panels.items()):
@@ -596,19 +604,13 @@ def figure(problem: Problem, best: Minimum) -> Figure:
                     upper.errorbar(over, measured, errors, **bars)
                     lower.plot(over, off[at], **HOLLOW, **look)
                     fine, smooth = values[rows], alone[at]
-                    if (
-                        key == "speed"
-                        and 0.0 < fine[0] < fine[-1]
-                        and not problem.by_run
-                    ):
-                        fine, smooth = problem.between(best.x, table, name, rows)
+                    if not is_joined[key] and fine[0] < fine[-1]:
+                        along_rows = key, rows
+                        fine, smooth = problem.between(best.x, table, name, along_rows)
                     # what is added to steady sliding is known at the rows
                     added = np.interp(fine, values[rows], fitted[at] - alone[at])
-                    look |= {
-                        "linewidth": 0.9,
-                        "zorder": 2,
-                        "marker": "" if np.ptp(over) else "x",
-                    }
+                    look |= _FITS[is_joined[key]][1] | {"zorder": 2}
+                    look["marker"] = "" if np.ptp(over) else "x"
                     upper.plot(x.factor * fine, y.factor * (smooth + added), **look)
             meaning = definition.meaning.partition(",")[0]
             upper.set_ylabel(y.label(f"{meaning} ${definition.symbol}$"))
@@ -619,7 +621,9 @@ def figure(problem: Problem, best: Minimum) -> Figure:
             style.across(upper, x.factor * every, "", scale, 0.05)
             style.across(lower, x.factor * every, x.label(axis.words), scale, 0.05)
         axes[0].plot([], [], label="measured", color=BOTH, **HOLLOW)
-        axes[0].plot([], [], label="fit", color=BOTH, linewidth=0.9)
+        for joined, (words, look) in _FITS.items():
+            if joined in is_joined.values():
+                axes[0].plot([], [], label=words, color=BOTH, **look)
         named = np.linspace(0, len(labels) - 1, _NAMED).astype(int)
         for k in np.unique(named) if len(labels) > 1 else ():
             axes[0].plot([], [], color=colours[k], label=labels[k])

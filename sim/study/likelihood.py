@@ -61,6 +61,10 @@ class Curve(NamedTuple):
     errors: Array | None
 
 
+#: Conditions that may change along the course of a contact; each value of another one is a scenario.
+COURSES = ("t", "speed", "mount")
+
+
 class Measured(NamedTuple):
     """One table: under which conditions which curves were measured.
 
@@ -252,9 +256,7 @@ class Group(NamedTuple):
 def groups(scenario: Scenario, table: Measured) -> list[Group]:
     """The groups of a table's rows; ``BadInput`` where a row has values that do not go together."""
     keyed = {
-        key: values
-        for key, values in table.conditions.items()
-        if key not in ("t", "speed", "mount")
+        key: values for key, values in table.conditions.items() if key not in COURSES
     }
     columns = np.array([np.zeros(table.rows), *keyed.values()])
     result = []
@@ -558,16 +560,28 @@ class Problem:
         return result
 
     def between(
-        self, x: Array, table: int, name: str, rows: NDArray[np.int64]
+        self, x: Array, table: int, name: str, along: tuple[str, NDArray[np.int64]]
     ) -> tuple[Array, Array]:
-        """Return speeds between those of rows that differ in nothing else, and their curve in steady sliding."""
+        """Return places between sorted rows that differ in one condition alone, and their curve in steady sliding.
+
+        ``along`` are the condition, a time, speed or mount, and the rows.
+        """
+        (key, rows), measured = along, self.tables[table]
         group = next(item for item in self.groups[table] if rows[0] in item.rows)
-        speeds = self.tables[table].conditions["speed"][rows]
-        fine = np.geomspace(np.min(speeds), np.max(speeds), _DRAWN)[:, np.newaxis]
-        time = group.time[group.rows == rows[0]] + 0.0 * fine
-        course = group._replace(time=time, speed=fine)
+        known = {
+            each: measured.conditions[each][rows]
+            for each in COURSES
+            if each in measured.conditions
+        }
+        first, last = known[key][[0, -1]]
+        spaced = np.geomspace if first > 0.0 else np.linspace
+        fine = spaced(first, last, _DRAWN)
+        between = {each: np.interp(fine, known[key], known[each]) for each in known}
+        curve = measured.curves[0]._replace(values=fine)
+        points = measured._replace(conditions=between, curves=(curve,))
+        (course,) = groups(group.scenario, points)
         values = self.of_table(x, table)
-        return fine[:, 0], by_steady_sliding(course, values, [name], self.theory)[name]
+        return fine, by_steady_sliding(course, values, [name], self.theory)[name]
 
     @property
     def curves(self) -> list[tuple[int, str]]:

@@ -953,6 +953,41 @@ def test_the_figure_has_one_curve_and_colour_for_each_load_in_one_table_or_in_se
         )
 
 
+def test_a_fit_over_a_load_is_the_curve_of_the_model_and_over_other_keys_a_named_thin_line(
+    tmp_path,
+):
+    # neither bonds nor fluctuations take from the work of adhesion
+    tables = {key: value for key, value in LENS.items() if key != "shear"}
+    scene = load(tables, {"adhesion.bond_share": 0.0})
+    loads = np.array([-0.2e-3, 1e-3, 4e-3])
+    radii = jkr.radius_at_load(loads, 42e-3, 2e-3, 6.4e6)
+    paths = {
+        "load [N]": table(
+            tmp_path / "loads.csv", {"load [N]": loads}, {"contact_radius": radii}, 0.01
+        ),
+        "adhesion_work [J/m^2]": table(
+            tmp_path / "works.csv",
+            {"adhesion_work [J/m^2]": np.array([0.03, 0.042, 0.05])},
+            {"contact_radius": radii},
+            0.01,
+        ),
+    }
+    for column, path in paths.items():
+        problem = problem_of(scene, [likelihood.read(path, scene)], [], {})
+        upper, _ = figure(
+            problem, likelihood.Minimum(problem.start, 0.0, None, True)
+        ).axes
+        names = [text.get_text() for text in upper.figure.legends[0].get_texts()]
+        ((line,),) = drawn_by_colour(upper)[1].values()
+        if column == "load [N]":
+            assert names == ["measured", "fit"] and line.shape == (2, 200)
+            known = jkr.radius_at_load(1e-3 * line[0], 42e-3, 2e-3, 6.4e6)
+            assert_allclose(line[1], 1e6 * known, rtol=1e-9)
+        else:
+            assert names == ["measured", "fit at the points, joined"]
+            assert line.shape == (2, 3)
+
+
 def test_keys_that_data_cannot_tell_apart_are_remarked_or_refused(
     curves, tmp_path, truth
 ):
