@@ -135,7 +135,8 @@ class Scene(NamedTuple):
         if not self.joined:
             return {"linestyle": "none", "marker": _MARKS[dashes], "markersize": 3.5}
         few = (self.broken or not self.over_time) and self.x.shape[1] <= _MARKED
-        marked = {"marker": "o", "markersize": 2.6} if few else {}
+        # a marker hides the dashes in the key
+        marked = {"marker": _MARKS[dashes], "markersize": 2.6} if few else {}
         return {"linestyle": dashes} | marked
 
     def opened(self, line: Line) -> Array:

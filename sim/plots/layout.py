@@ -1,6 +1,5 @@
 """Places of panels, legends and labels: nothing leaves a figure, and no legend hides a curve."""
 
-import copy
 import re
 from typing import Any
 
@@ -9,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
+from matplotlib.offsetbox import VPacker
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
@@ -64,9 +64,8 @@ class Layout(ConstrainedLayoutEngine):
             if legend := panel.get_legend():
                 is_last = box.x1 > 0.6 * frame.x1
                 rooms[legend] = (frame.x1 if is_last else box.x1) - box.x0
-        for name in ("_suptitle", "_supxlabel"):
-            if text := getattr(figure, name):
-                self._wrap(text, 0.95 * frame.width)
+        for text in figure.texts:
+            self._wrap(text, 0.95 * frame.width)
         for letters in _LETTERS:
             heights = [
                 room / frame.width * self._legend(legend, letters, 0.97 * room)
@@ -105,14 +104,25 @@ class Layout(ConstrainedLayoutEngine):
 
 def _arrange(legend: Legend, columns: int) -> None:
     """Distribute the entries of a legend over columns; matplotlib does so only once."""
-    packed: Any = vars(legend)["_legend_handle_box"]
-    stacks = packed.get_children()
+    whole: Any = legend.get_children()[0]
+    stacks = whole.get_children()[1].get_children()
+    if not stacks:  # a title alone
+        return
+    first = stacks[0]
     entries = [entry for stack in stacks for entry in stack.get_children()]
-    packed._children = []
-    for places in filter(len, np.array_split(np.arange(len(entries)), columns)):
-        stack = copy.copy(stacks[0])
-        stack._children = [entries[place] for place in places]
-        packed._children.append(stack)
+    places = np.array_split(np.arange(len(entries)), columns)
+    stacks[:] = [
+        VPacker(
+            first.pad,
+            first.sep,
+            align=first.align,
+            mode=first.mode,
+            children=[entries[place] for place in some],
+        )
+        for some in filter(len, places)
+    ]
+    for stack in stacks:
+        stack.set_figure(legend.get_figure())
 
 
 def broken(text: str, length: int) -> str:

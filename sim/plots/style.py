@@ -261,13 +261,21 @@ def in_unit(axis: Axis, words: str, values: Any, si: str) -> float:
 
 
 def axis_scale(values: np.ndarray) -> str:
-    """Return ``log`` if positive values span a decade or more, ``symlog`` if zero is among them, else ``linear``."""
-    above = values[values > 0.0]
-    if np.any(values < 0.0) or above.size < 2 or above.max() < 10.0 * above.min():
+    """Return ``log`` if positive values span a decade or more, ``symlog`` if zero is among them, else ``linear``.
+
+    An axis with zero is linear if most values lie far from it, as those of a ramp from rest.
+
+    >>> axis_scale(np.linspace(0.0, 1.0, 500)), axis_scale(np.array([0.0, 0.01, 0.1, 1.0]))
+    ('linear', 'symlog')
+    """
+    above = np.sort(values[values > 0.0])
+    if np.any(values < 0.0) or above.size < 2 or above[-1] < 10.0 * above[0]:
         return "linear"
     if above.size == values.size:
         return "log"
-    return "symlog" if above.max() >= 100.0 * above.min() else "linear"
+    middle = above[(above.size - 1) // 2]
+    is_near_zero = above[-1] >= max(100.0 * above[0], 4.0 * middle)
+    return "symlog" if is_near_zero else "linear"
 
 
 def legend(panel: Axes, title: str = "", whole: bool = False) -> None:

@@ -55,6 +55,25 @@ def swept(**sweep):
     )
 
 
+def test_the_key_of_a_sweep_with_markers_tells_its_energies_apart():
+    keys = {"drive.speed": [1e-3, 2e-3, 4e-3], "sphere.radius": ["1 mm", "2 mm"]}
+    figure = plots.draw(simulated(drive=STEADY, sweep=keys), "sweep")
+    legend = figure.axes[1].get_legend()
+    looks = {line.get_marker() for line in legend.get_lines()}
+    assert len(legend.get_lines()) == len(looks) == 2 and "None" not in looks
+
+
+@pytest.mark.parametrize(
+    ("scale", "start", "axis"), [("linear", 0.0, "linear"), ("log", 1e-5, "log")]
+)
+def test_a_ramp_from_rest_has_a_linear_axis_of_the_speed(scale, start, axis):
+    ramp = drive.Ramp(start=start, stop=1e-2, scale=scale)
+    clock = Clock(duration=0.4, step=2e-3)
+    dataset = simulated(drive=ramp, shear=shear.Uniform(), clock=clock)
+    panel = plots.draw(dataset, "curve").axes[-1]
+    assert panel.get_xscale() == axis
+
+
 def test_sweeps_are_shown_against_their_key_and_of_many_curves_ten_are_drawn():
     dataset = simulated(drive=STEADY, sweep={"contact.load": ["1 mN", "4 mN", "16 mN"]})
     figure = plots.draw(dataset)
