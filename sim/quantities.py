@@ -1053,13 +1053,6 @@ OF_MEMBERS: tuple[Definition, ...] = (
         absent=NO_SLIP,
     ),
     Definition(
-        "stress_drop",
-        "Pa",
-        "drop of the shear stress in a slip event",
-        heading="drop of stress",
-        absent=NO_SLIP,
-    ),
-    Definition(
         "slip_spread",
         "1",
         "standard deviation of the slips over their mean",

@@ -159,25 +159,21 @@ def stick_slip(dataset: xr.Dataset) -> Estimates:
     spread = dataset["late_amplitude_std"] / dataset["late_amplitude_mean"]
     found |= kinetic_friction(dataset) | {"slip_spread": Estimate(pure(spread, text))}
     late_half = dataset["slip_time"] >= 0.5 * float(dataset["t"][-1])
-    each = slips(dataset).where(late_half)[
-        ["slip_duration", "stick_duration", "stress_drop"]
-    ]
+    each = slips(dataset).where(late_half)[["slip_duration", "stick_duration"]]
     means = each.mean("slip", keep_attrs=True)
     found |= {str(key): Estimate(values) for key, values in means.items()}
     bounds, source = _of_late_slips(dataset, found), "step"
-    # of one random member there is no other error than the scatter between slip events,
-    # and of the stress the bound of a clock step is not known
-    if dataset.sizes.get(MEMBERS, 1) == 1:
-        is_random = MEMBERS in dataset.sizes
-        source = "slip events and step" if is_random else "step"
+    # of one random member there is no other error than the scatter between slip events
+    if MEMBERS in dataset.sizes and dataset.sizes[MEMBERS] == 1:
+        source = "slip events and step"
         others = each.count("slip") - 1
         squares = ((each - each.mean("slip")) ** 2).mean("slip")
         off = (squares / others.where(others > 0)) ** 0.5
         errors = {str(key): values for key, values in off.items()}
         number = dataset["slip_count_late"]
-        for name, of in _LATE.items() if is_random else ():
+        for name, of in _LATE.items():
             errors[name] = dataset[f"late_{of}_std"] / number**0.5
-        for name in errors if is_random else ("stress_drop",):
+        for name in errors:
             bounds[name] = WIDE * errors[name] + bounds.get(name, 0.0)
     for name, bound in bounds.items():
         if name in found:

@@ -171,9 +171,7 @@ EVENTS = (
     ),
 )
 #: Further columns of slip events.
-SLIPS = _columns(
-    "stress_drop", "slip_spread", "slip_duration", "stick_duration", dull=math.nan
-)
+SLIPS = _columns("slip_spread", "slip_duration", "stick_duration", dull=math.nan)
 #: Columns of each phase.
 PHASES = (
     *_columns("phase_start", "phase_time_held"),
