@@ -106,9 +106,10 @@ LATE_PULL_OFF = Condition(
 
 
 #: Reasons for missing values that several quantities have.
-OPEN = "the contact is open, or the trajectory has ended"
+ENDED = "the trajectory has ended"
+OPEN = f"the contact is open, or {ENDED}"
 NO_SLIP = "there is no slip event"
-NO_RATIO = "the contact or that of JKR is open, or the trajectory has ended"
+NO_RATIO = f"the contact or that of JKR is open, or {ENDED}"
 NO_SLIPS = "there are no two slip events"
 NO_ONSET = "slip events do not set in as the stage gets faster, or there are no two"
 NO_END = "slip events do not end as the stage gets slower, or there are no two"
@@ -507,6 +508,7 @@ DERIVED: tuple[Definition, ...] = (
         "share of open contacts",
         heading="open",
         form=Form.SHARE,
+        absent=ENDED,
     ),
     Definition(
         "fraction_masked",
@@ -514,7 +516,7 @@ DERIVED: tuple[Definition, ...] = (
         "share of closed contacts without effective work of adhesion",
         heading="masked",
         form=Form.SHARE,
-        absent="no contact is closed",
+        absent=f"no contact is closed, or {ENDED}",
     ),
     Definition(
         "correlation_time",

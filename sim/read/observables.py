@@ -41,8 +41,8 @@ FEW_LEFT = 2
 _SOURCES = {
     "normal_load": ("normal_load", "applied_load"),
     "area_ratio": ("contact_area",),
-    "fraction_detached": ("in_contact",),
-    "fraction_masked": ("masked", "in_contact"),
+    "fraction_detached": ("in_contact", "slider_position"),
+    "fraction_masked": ("masked", "in_contact", "slider_position"),
 }
 #: What else only a closed contact has.
 _OF_AREA = ("area_ratio", "lost_to", "order_of", "indentation")
@@ -291,7 +291,8 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
 
     ``area_ratio`` is A/A_JKR, with the JKR area for the same mount at that time. ``fraction_detached`` is 1 if the
     contact is open. ``fraction_masked`` is 1 if it is closed without effective work of adhesion (a Hertz contact).
-    Their ensemble means are the fractions.
+    Their ensemble means are the fractions. Both are nan once the motion of the slider has ended in contact, although
+    the recorded flags stay.
     """
     dataset = plain(dataset)
     result = dataset.drop_vars(
@@ -300,15 +301,17 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     if "contact_area" in result and {*_REFERENCES} <= {*result}:
         area = result["contact_area"].astype(float, copy=False)
         result["area_ratio"] = defined("area_ratio", area / full_area(dataset))
+    moves = ensemble_mean(dataset.get("slider_position", xr.DataArray(0.0))).notnull()
     if "in_contact" in result:
         closed = result["in_contact"].astype(float, copy=False)
         opened = with_mean(closed, 1.0 - ensemble_mean(closed))
+        opened = opened.where(moves | (ensemble_mean(closed) == 0.0))
         result["fraction_detached"] = defined("fraction_detached", opened)
     with where_recorded():
         masked = dataset["masked"].astype(float, copy=False)
         if STATISTIC in masked.dims:  # only of closed contacts it is known
             masked = masked.where(ensemble_mean(dataset["in_contact"]) == 1.0)
-        result["fraction_masked"] = defined("fraction_masked", masked)
+        result["fraction_masked"] = defined("fraction_masked", masked.where(moves))
     return result.drop_vars(["in_contact", "masked"], errors="ignore")
 
 

@@ -459,6 +459,11 @@ def test_a_runaway_has_its_time_and_force_and_slips_of_other_drives_are_refused(
     )
     # none after its end
     assert all("–" not in row.values() for row in rows_of(dataset)[-3:])
+    ended = dataset["t"] > when.max()
+    for name in ("fraction_detached", "fraction_masked"):
+        shares = read.Run(dataset).statistic(name)
+        missing = shares.sel(statistic="mean").isnull()
+        assert bool(ended.any()) and bool((missing == ended).all())
     held = run(scene(1, clock=Clock(duration=0.5, step=0.1), drive=drive, bonds=bonds))
     calm = values_of(read.stick_slip(held))
     assert calm["ran_away"].item() == 0.0 and np.isnan(calm["static_friction"]).all()
