@@ -351,10 +351,9 @@ def checked(dataset: object) -> xr.Dataset:
     """
     if isinstance(dataset, xr.Dataset) and "contact_modulus" in dataset.variables:
         return dataset
-    kind = f"of type {type(dataset).__name__}"
-    if isinstance(dataset, xr.Dataset):
-        kind = "a Dataset that no run has made"
-    raise BadInput([f"is {kind}; give the dataset that sim.run or sim.open returns"])
+    kind = type(dataset).__name__
+    cure = "give the dataset that sim.run or sim.open returns"
+    raise BadInput([f"is of type {kind}, which no run has made; {cure}"])
 
 
 def plain(dataset: xr.Dataset) -> xr.Dataset:

@@ -19,7 +19,7 @@ from sim.read.dataset import (
 from sim.read.estimate import Estimate, Estimates, explained, of_every_member
 from sim.read.lifetimes import half_lives
 from sim.read.loops import mean_loops
-from sim.read.observables import defined, labelled, pure
+from sim.read.observables import defined
 from sim.read.peaks import ensemble_peaks, peaks, peaks_after_holds, static_threshold
 from sim.read.slips import slips_by_phase, stick_slip
 from sim.read.statistics import summary
@@ -32,10 +32,7 @@ _TURNS = (
     *(f"lowest_load{name}" for name in ("", "_time", "_displacement")),
     *(f"jump_in_{name}" for name in ("load", "time", "displacement")),
 )
-_EVER = {
-    "ever_detached": ("first_detachment", "contacts that detached"),
-    "ever_masked": ("first_masked", "contacts that were masked at some time"),
-}
+_EVER = {"ever_detached": "first_detachment", "ever_masked": "first_masked"}
 
 
 def events(dataset: xr.Dataset) -> Estimates:
@@ -76,13 +73,13 @@ def events(dataset: xr.Dataset) -> Estimates:
     found = {
         name: Estimate(_alone(dataset[name])) for name in _TURNS if name in dataset
     }
-    for name, (first, words) in _EVER.items():
+    for name, first in _EVER.items():
         if f"{first}_count" in dataset:
             share = dataset[f"{first}_count"] / dataset.attrs["members"]
-            found[name] = Estimate(pure(share, words))
+            found[name] = Estimate(defined(name, share))
         elif first in dataset:
             has_had = dataset[first].notnull().astype(float)
-            found[name] = Estimate(_alone(pure(has_had, words)))
+            found[name] = Estimate(_alone(defined(name, has_had)))
     for name in ("pull_off_time", "jump_in_time"):
         if f"{name}_count" in dataset:
             is_of_all = dataset[f"{name}_count"] == dataset.attrs["members"]
@@ -184,15 +181,15 @@ def _over_pull_offs(dataset: xr.Dataset) -> Estimates:
     count = load.count("phase")
     if bool((count <= 1).all()):
         return {}
-    text = "of the loads over the pull-offs of a member"
     columns = {
-        "pull_off_load": labelled(load.mean("phase"), "N", f"mean {text}"),
-        "pull_off_displacement": place.mean("phase", keep_attrs=True),
-        "pull_offs": pure(count.astype(float), "number of phases with a pull-off"),
-        "pull_off_load_least": labelled(load.min("phase"), "N", f"least {text}"),
-        "pull_off_load_largest": labelled(load.max("phase"), "N", f"largest {text}"),
+        "pull_off_load": load.mean("phase"),
+        "pull_off_displacement": place.mean("phase"),
+        "pull_offs": count.astype(float),
     }
-    return {name: Estimate(_alone(values)) for name, values in columns.items()}
+    return {
+        name: Estimate(_alone(defined(name, values)))
+        for name, values in columns.items()
+    }
 
 
 # --- readings of records, for figures ---

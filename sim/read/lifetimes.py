@@ -9,7 +9,7 @@ from scipy import special
 from sim.read.correlation import LEVEL, WIDE, Array
 from sim.read.dataset import MEMBERS, is_stationary
 from sim.read.estimate import Estimate, Estimates
-from sim.read.observables import labelled, pure
+from sim.read.observables import defined, pure
 
 
 class Lifetime(NamedTuple):
@@ -229,16 +229,13 @@ def half_lives(dataset: xr.Dataset) -> Estimates:
         that no member has, nor of one that comes at a time of its own in a scene that changes.
     """
     result = Estimates()
-    happened = {
-        "first_detachment": ("detached", "detached"),
-        "first_masked": ("masked", "had their adhesion masked"),
-    }
+    happened = {"first_detachment": "detached", "first_masked": "masked"}
     is_at_rest = is_stationary(dataset)
-    for event, (name, words) in happened.items():
+    for event, name in happened.items():
         if event not in dataset or MEMBERS not in dataset[event].dims:
             continue
         times = dataset[event].astype(float)
-        half, rate = lifetimes(dataset, times, words)
+        half, rate = lifetimes(dataset, times, name)
         if bool(times.notnull().any()):
             result[f"half_{name}"] = half
         if is_at_rest:
@@ -247,11 +244,11 @@ def half_lives(dataset: xr.Dataset) -> Estimates:
 
 
 def lifetimes(
-    dataset: xr.Dataset, times: xr.DataArray, words: str
+    dataset: xr.Dataset, times: xr.DataArray, name: str
 ) -> tuple[Estimate, Estimate]:
     """Return the median time [s] and the rate [1/s] of an event, from its first ``times`` in the members [s].
 
-    ``words`` are what has happened: ``"detached"``. See ``lifetime``.
+    ``name`` is that of the event, ``"detached"`` or ``"masked"``. See ``lifetime``.
     """
     start, end = (float(dataset["t"][record]) for record in (0, -1))
     begins = _at_risk_from(dataset, times)
@@ -264,14 +261,11 @@ def lifetimes(
     numbers = xr.apply_ufunc(
         lifetime, times - start, watched, begins.broadcast_like(times), **how
     )
-    texts = (
-        ("s", f"time at which half of the members have {words}"),
-        ("1/s", f"rate at which members have {words}"),
-    )
     half, rate = (
-        Estimate(labelled(value, *about), low=low, high=high)
-        for (value, low, high), about in zip(
-            (numbers[:3], numbers[3:]), texts, strict=True
+        Estimate(defined(quantity, value), low=low, high=high)
+        for quantity, (value, low, high) in (
+            (f"half_{name}", numbers[:3]),
+            (f"{name}_rate", numbers[3:]),
         )
     )
     return half, rate

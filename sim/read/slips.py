@@ -16,7 +16,7 @@ from sim.read.dataset import (
     word,
 )
 from sim.read.estimate import Estimate, Estimates, of_every_member
-from sim.read.observables import labelled, pure
+from sim.read.observables import defined, labelled
 from sim.read.statistics import summary
 
 #: Path of the stage in a clock step over the advance in a slip event, above which the event is not resolved.
@@ -48,7 +48,7 @@ def slips(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         With the dimension ``slip`` last, nan beyond a member's last: ``slip_time``, ``slip_duration``,
         ``stick_duration`` until the next one, ``recurrence_time`` [s], ``slip_amplitude`` [m], ``slip_speed`` of
-        the stage [m/s], ``static_friction`` and ``force_drop`` [N], ``stress_drop`` [Pa].
+        the stage [m/s], ``static_friction`` and ``force_drop`` [N].
 
     Raises
     ------
@@ -72,38 +72,17 @@ def slips(dataset: xr.Dataset) -> xr.Dataset:
         )
     event = {name: dataset[f"slip_{name}"].astype(float) for name in SLIP_EVENT}
     begins, ends, following = event["time"], event["end"], event["time"].shift(slip=-1)
-    drop, fall = (
-        event["force_before"] - event["force_after"],
-        event["stress_before"] - event["stress_after"],
-    )
     columns = {
-        "slip_time": (begins, "s", "time at which a slip event begins"),
-        "slip_duration": (ends - begins, "s", "duration of a slip event"),
-        "stick_duration": (following - ends, "s", "duration of a stick phase"),
-        "recurrence_time": (
-            following - begins,
-            "s",
-            "time between the starts of two slip events",
-        ),
-        "slip_amplitude": (
-            event["amplitude"],
-            "m",
-            "displacement of the slider in a slip event",
-        ),
-        "slip_speed": (
-            event["speed"],
-            "m/s",
-            "stage speed at the start of a slip event",
-        ),
-        "static_friction": (
-            event["force_before"],
-            "N",
-            "largest spring force in the stick phase before a slip event",
-        ),
-        "force_drop": (drop, "N", "drop of the spring force by a slip event"),
-        "stress_drop": (fall, "Pa", "drop of the shear stress in a slip event"),
+        "slip_time": begins,
+        "slip_duration": ends - begins,
+        "stick_duration": following - ends,
+        "recurrence_time": following - begins,
+        "slip_amplitude": event["amplitude"],
+        "slip_speed": event["speed"],
+        "static_friction": event["force_before"],
+        "force_drop": event["force_before"] - event["force_after"],
     }
-    result = xr.Dataset({name: labelled(*column) for name, column in columns.items()})
+    result = xr.Dataset({name: defined(name, each) for name, each in columns.items()})
     return result.transpose(..., "slip")
 
 
@@ -152,12 +131,12 @@ def stick_slip(dataset: xr.Dataset) -> Estimates:
     if not has_single or not found:
         return found | kinetic_friction(dataset)
     if not is_stationary(dataset):
-        count = pure(dataset["slip_count"].astype(float), "number of slip events")
+        count = defined("slip_count", dataset["slip_count"].astype(float))
         onsets = {name: found[name] for name in _ONSET if name in found}
         return onsets | {"slip_count": Estimate(count)}
-    text = "standard deviation of slip displacements over their mean"
     spread = dataset["late_amplitude_std"] / dataset["late_amplitude_mean"]
-    found |= kinetic_friction(dataset) | {"slip_spread": Estimate(pure(spread, text))}
+    found |= kinetic_friction(dataset)
+    found["slip_spread"] = Estimate(defined("slip_spread", spread))
     late_half = dataset["slip_time"] >= 0.5 * float(dataset["t"][-1])
     each = slips(dataset).where(late_half)[["slip_duration", "stick_duration"]]
     means = each.mean("slip", keep_attrs=True)
@@ -291,9 +270,7 @@ def slips_by_phase(dataset: xr.Dataset) -> xr.Dataset:
         each["slip_time"] + each["recurrence_time"] < end
     )
     result = each[list(_LATE)].where(inside).mean("slip", keep_attrs=True)
-    result["slip_count"] = pure(
-        inside.sum("slip").astype(float), "number of slip events in a phase"
-    )
+    result["slip_count"] = defined("phase_slip_count", inside.sum("slip").astype(float))
     result["start"] = labelled(start, "s", "start of a phase")
     return result.drop_vars("slip", errors="ignore").transpose(..., "phase")
 
@@ -315,13 +292,11 @@ def runaways(dataset: xr.Dataset) -> Estimates:
     """
     when = dataset["runaway_time"].isel(t=-1, drop=True).astype(float)
     has_gone = when.notnull()
-    after = labelled(when, "s", "time of the loss of stability")
-    text = "force at which the slider lost stability"
-    force = labelled(dataset["runaway_force"].astype(float), "N", text)
-    gone = pure(has_gone.astype(float), "members that lost stability")
+    after = defined("runaway_after", when)
+    force = defined("static_friction", dataset["runaway_force"].astype(float))
     reason = "not every member loses stability"
     return {
-        "ran_away": Estimate(gone),
+        "ran_away": Estimate(defined("ran_away", has_gone.astype(float))),
         "runaway_after": of_every_member(after, reason),
         "static_friction": of_every_member(force, reason),
     }

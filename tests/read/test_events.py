@@ -401,8 +401,6 @@ def test_pull_offs_of_cycles_are_those_of_all_cycles_and_not_the_lowest(cycles):
     result = values_of(read.events(dataset))
     assert_allclose(result["pull_off_load"].mean(), 1e-9 * every.mean(), rtol=1e-12)
     assert_array_equal(result["pull_offs"], cycles)
-    assert_allclose(result["pull_off_load_least"], loads.min("phase"), rtol=1e-14)
-    assert_allclose(result["pull_off_load_largest"], loads.max("phase"), rtol=1e-14)
 
 
 def test_peaks_are_maxima_inside_a_ramp_or_at_once_after_a_start_and_none_is_of_noise(
