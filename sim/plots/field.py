@@ -203,7 +203,7 @@ def density_figure(scene: "Scenario") -> Figure:
     weights = {
         "variance": (q * mean, "-"),
         "stored energy": (
-            q * (wave_along * (mean - lean) + wave_across * (mean + lean)),
+            q * (wave_along * (mean + lean) + wave_across * (mean - lean)),
             "--",
         ),
     }
