@@ -276,10 +276,7 @@ class Margin:
     least = 0.0
 
     def __init__(
-        self,
-        spectrum: Family,
-        softness: Softness,
-        sphere_radius: float,
+        self, spectrum: Family, softness: Softness, sphere_radius: float
     ) -> None:
         self.spectrum, self.softness = spectrum, softness
         self._ends = sphere_radius * 10.0**-_DECADES, sphere_radius
@@ -310,19 +307,13 @@ class Margin:
     @cached_property
     def each(self) -> list[Terms]:
         """Inputs of ``share_of``, once for all steps: the wave of a ripple, or places and cubics of a spline."""
-        (low, high), wave = self._ends, self.spectrum.wavevector
-        if wave is not None and self._plane > 0.0:
-            level, swing = float(self.softness.level), float(self.softness.swing)
-            square = wave[0] ** 2 + wave[1] ** 2
-            lean = swing * (wave[0] ** 2 - wave[1] ** 2) / square
-            whole = 0.5 * math.pi * (level + lean)
-            return [
-                (
-                    (2.0 * math.sqrt(square), level / whole, -lean / whole),
-                    _NONE,
-                    np.zeros((1, 4)),
-                )
-            ]
+        (low, high), whole = self._ends, math.pi * self._plane
+        if self.spectrum.wavevector is not None and whole > 0.0:
+            mean, lean = self.spectrum.over_wavenumber
+            level = float(self.softness.level * mean / whole)
+            swing = float(-self.softness.swing * lean / whole)
+            wave = 2.0 * self.spectrum.support[0], level, swing
+            return [(wave, _NONE, np.zeros((1, 4)))]
         count, spline = _POINTS - 1, self._spline(marginal_energy)
         step = math.log(high / low) / count
         cubics = np.ascontiguousarray(spline.c.T * step ** np.arange(3, -1, -1))
@@ -335,11 +326,7 @@ class Margin:
     def _spline(self, law: Callable[..., Array]) -> "scipy.interpolate.CubicSpline":
         if law not in self._splines:
             radii = np.geomspace(*self._ends, _POINTS)
-            energies = (
-                law(self.spectrum, radii, self.softness)
-                if self._plane > 0.0
-                else np.zeros(_POINTS)
-            )
+            energies = law(self.spectrum, radii, self.softness)
             self._splines[law] = scipy.interpolate.CubicSpline(
                 np.log(radii), energies / (self._plane or 1.0)
             )
