@@ -27,6 +27,7 @@ import sim
 from sim import laws, read
 from sim.read import Estimate, concise, distribution, over_members
 from sim.read.events import incipient_law
+from sim.solid import HalfSpace
 from sim.study.fit import Fit, figure as fitted
 from sim.study.likelihood import LEVEL
 from sim.study.mechanisms import WHOLE
@@ -1148,8 +1149,8 @@ def own_map(dataset: xr.Dataset) -> dict[str, Number]:
     }
     modulus = modulus_of(dataset)
     return {name: float(value) for name, value in ends.items()} | {
-        "whole": 1e3 * field.surface_energy(modulus),
-        "radial": 1e3 * float(field.spectrum.surface_energy(modulus)),
+        "whole": 1e3 * HalfSpace(modulus).stored_energy(field),
+        "radial": 1e3 * float(HalfSpace(modulus).stored_energy(field.spectrum)),
     }
 
 

@@ -53,7 +53,7 @@ _FROM = {
     "Scenario": "sim.scenario.scenario",
     "load": "sim.scenario.reader",
 }
-_FOLDERS = ("laws", "plots", "read", "reports", "spectrum")
+_FOLDERS = ("laws", "plots", "read", "reports", "solid", "spectrum")
 _FUNCTIONS = (
     "check",
     "converge",

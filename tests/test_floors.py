@@ -19,13 +19,14 @@ BESIDE |= {
     for path in sorted((ROOT.parent / "tests" / "helpers").glob("*.py"))
 }
 
-#: The folders and the two modules beside them, lowest first.
+#: The folders and the modules beside them, lowest first.
 FLOORS = (
     "units",
     "numerics",
     "quantities",
     "laws",
     "spectrum",
+    "solid",
     "parts",
     "step",
     "scenario",

@@ -19,7 +19,7 @@ from sim.ensemble.expected import (
     largest_losses,
 )
 from sim.ensemble.plan import Plan
-from sim.ensemble.steady import changed, plane_energy, sensitivities
+from sim.ensemble.steady import changed, sensitivities
 from sim.ensemble.swept import grouped, in_words, places, points_in_words, spread
 from sim.laws.schallamach import Body, Onset
 from sim.parts.bonds.models import Cohort, FirstMoment, Rate
@@ -31,7 +31,6 @@ from sim.scenario.checks import renewed
 from sim.scenario.scenario import Scenario
 from sim.spectrum.families import Band
 from sim.spectrum.family import Family
-from sim.spectrum.radial import share_of_long_waves
 from sim.step.state import MemberNoise
 from sim.units.notation import engineering
 
@@ -69,7 +68,7 @@ def systematic_errors(point: Scenario) -> dict[str, float]:
     """
     shear, plane = (
         point.fluctuations,
-        plane_energy(point.fluctuations.spectrum, *point.solid.effective),
+        point.solid.elastic.stored_energy(point.fluctuations.spectrum),
     )
     if (
         "cell_error_energy" not in (known := point.process.known_errors())
@@ -128,7 +127,7 @@ def cure(point: Scenario, errors: dict[str, float]) -> str:
     """
     if not abs(errors["cell_error_area"]) > _ERROR:
         return ""
-    shear, solid = cast(Any, point.fluctuations), point.solid.effective
+    shear, solid = cast(Any, point.fluctuations), point.solid.elastic
     side, points, error = (
         shear.side(point.setting.cell),
         shear.points,
@@ -137,8 +136,8 @@ def cure(point: Scenario, errors: dict[str, float]) -> str:
     decade = 10.0 ** math.floor(math.log10(10.0 * side))
 
     def lacks(cell: float, share: float) -> bool:
-        return points and 1.0 - share_of_long_waves(
-            shear.spectrum, 2.0 * cell / points, solid[1]
+        return points and 1.0 - solid.share_of_long_waves(
+            shear.spectrum, 2.0 * cell / points
         ) > share * abs(error)
 
     wide = side if lacks(side, 0.5) else math.ceil(10.0 * side / decade - 0.05) * decade
@@ -346,8 +345,8 @@ def _waves(point: Scenario) -> Iterator[str]:
     spectrum = point.fluctuations.spectrum
     if not (spectrum.variance and point.rest_radius > 0.0):
         return
-    long_waves = share_of_long_waves(
-        spectrum, 2.0 * point.rest_radius, point.solid.effective[1]
+    long_waves = point.solid.elastic.share_of_long_waves(
+        spectrum, 2.0 * point.rest_radius
     )
     if long_waves > _LAG:
         yield f"waves longer than the contact store {100.0 * long_waves:.2g} % of the energy"
@@ -386,7 +385,7 @@ def over_band(spectrum: Family) -> float | None:
         return None
     short, long = (factor * cast(Any, spectrum).length for factor in _BAND)
     band = Band(rms=cast(Any, spectrum).rms, shortest=short, longest=long)
-    return plane_energy(spectrum, 1.0, 0.5) / plane_energy(band, 1.0, 0.5)
+    return spectrum.over_wavenumber[0] / band.over_wavenumber[0]
 
 
 def _along_course(point: Scenario, slower: float) -> Array:
@@ -478,7 +477,7 @@ def slider_body(point: Scenario, speeds: Array) -> Body:
     drive, steady = cast(Spring, point.drive), point.population.steady(speeds)
     control, (yields, slope) = (
         point.contact.control(0.0, 0.0),
-        drive.yields(*point.solid.effective),
+        drive.yields(point.solid.elastic),
     )
 
     def area(share: float = 1.0, stress: float = 1.0) -> Array:

@@ -456,15 +456,14 @@ def _limits(points: Sequence[Scenario]) -> Rows:
 def _fluctuations(points: Sequence[Scenario]) -> Rows:
     """Return the size of the fluctuations on the infinite plane, and the errors of the cell."""
     fields = [
-        (_power(point), point.fluctuations.spectrum, point.solid.effective)
+        (_power(point), point.fluctuations.spectrum, point.solid.elastic)
         for point in points
     ]
     if not any(spectrum.variance > 0.0 for _, spectrum, _ in fields):
         return []
     rms = [math.sqrt(power * spectrum.variance) for power, spectrum, _ in fields]
     energies = [
-        power * float(spectrum.surface_energy(*solid))
-        for power, spectrum, solid in fields
+        power * solid.stored_energy(spectrum) for power, spectrum, solid in fields
     ]
     settled = any(spectrum.bond_made for _, spectrum, _ in fields)
     when = "in steady sliding at the last speed" if settled else "at amplitude 1"
@@ -540,7 +539,7 @@ def _slider(plan: Plan) -> Rows:
     driven = [point for point in points if point.drive.solves_motion]
     compliances = []
     for point in driven:
-        yields, slope = cast(Spring, point.drive).yields(*point.solid.effective)
+        yields, slope = cast(Spring, point.drive).yields(point.solid.elastic)
         compliances.append(yields + slope / math.sqrt(point.contact_area / math.pi))
     rows: Rows = []
     if compliances:

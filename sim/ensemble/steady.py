@@ -12,7 +12,6 @@ from sim.parts.bonds.models import Model
 from sim.parts.exchange import Array, Bonding, Motion
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
-from sim.spectrum.family import Family
 from sim.step.state import Trajectory
 
 #: Values of keys, by their dotted names.
@@ -63,7 +62,7 @@ def steady_course(
     size = shear.amplitude.factor(speed, bonding.strength) ** 2
     size = bonding.frozen + bonding.varying if shear.spectrum.bond_made else size
     energy = size * (
-        plane_energy(shear.spectrum, *scenario.solid.effective)
+        scenario.solid.elastic.stored_energy(shear.spectrum)
         if stored is None
         else stored
     )
@@ -92,13 +91,6 @@ def bonds_at(population: Model, speeds: tuple[float, ...]) -> Bonding:
             for values in population.steady(distinct)
         )
     )
-
-
-# most numbers that are changed are none of the spectrum's
-@functools.lru_cache(maxsize=256)
-def plane_energy(spectrum: Family, shear_modulus: float, poisson_ratio: float) -> float:
-    """Return the mean ΔΓ of a spectrum on the infinite plane [J/m²]."""
-    return float(spectrum.surface_energy(shear_modulus, poisson_ratio))
 
 
 def sensitivities(

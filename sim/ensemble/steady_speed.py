@@ -82,9 +82,8 @@ def steady_speeds(scene: Scenario) -> dict[str, float]:
     """
     if not scene.lags_behind_speed:
         return {}
-    contact = scene.contact.equilibrium_radius
     works = np.array([0.0, scene.adhesion.work])
-    hertz, full = contact(works, scene.sphere.radius, scene.solid.contact_modulus)
+    hertz, full = scene.contact.equilibrium_radius(works, scene.bodies)
     half = 0.5 * (1.0 + (hertz / full) ** 2)
     left = [half if share is None else 1.0 - share for share in LOST.values()]
     speeds, stable = speeds_of_areas(scene, np.array(left))

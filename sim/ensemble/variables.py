@@ -515,16 +515,18 @@ READ = {variable.name: variable.read for variable in VARIABLES}
 #: Numbers of a scene, written for each point of the sweep.
 NUMBERS = (
     Variable("contact_modulus", "", lambda scene: scene.solid.contact_modulus),
-    Variable("effective_shear_modulus", "", lambda scene: scene.solid.effective[0]),
-    Variable("effective_poisson_ratio", "", lambda scene: scene.solid.effective[1]),
+    Variable(
+        "effective_shear_modulus", "", lambda scene: scene.solid.elastic.shear_modulus
+    ),
+    Variable(
+        "effective_poisson_ratio", "", lambda scene: scene.solid.elastic.poisson_ratio
+    ),
     Variable("has_noise", "", lambda scene: float(scene.is_random)),
     Variable("radius_at_rest", "", lambda scene: scene.rest_radius),
     Variable(
         "radius_without_adhesion",
         "",
-        lambda scene: scene.contact.equilibrium_radius(
-            np.zeros(1), scene.sphere.radius, scene.solid.contact_modulus
-        )[0],
+        lambda scene: scene.contact.equilibrium_radius(np.zeros(1), scene.bodies)[0],
     ),
     Variable(
         "jkr_pull_off_load",

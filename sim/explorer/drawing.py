@@ -5,7 +5,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from sim.ensemble.steady import plane_energy
 from sim.laws.halfspace import gap, normal_displacement
 from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
@@ -77,7 +76,7 @@ def _stress(
     """
     shear, full = (
         scenario.fluctuations,
-        plane_energy(scenario.fluctuations.spectrum, *scenario.solid.effective),
+        scenario.solid.elastic.stored_energy(scenario.fluctuations.spectrum),
     )
     if shear.passes or not full > 0.0 or not at_speed["fluctuation_energy"] > 0.0:
         return None

@@ -568,8 +568,6 @@ def surface_energy(field, cell, shear_modulus, poisson_ratio=0.5):
 # Elastic energy of a fluctuating shear stress on one finite disc of contact: of a wave, of a map.
 
 
-#: A disc smaller than this many pixels stores nothing that a number could hold.
-_LEAST_RADIUS = 1e-12
 #: Width of a soft edge, and how far it reaches [pixels].
 _BLUR, _EDGE = 0.75, 4.5
 # Below this argument the closed forms cancel, above it their power series do; 16 terms are exact there.
@@ -664,47 +662,6 @@ def marginal_factors(x):
     )
 
 
-def _quarter(x, y):
-    """Area of the unit disc to the left of x and below y."""
-
-    def segment(u):
-        return 0.5 * (u * np.sqrt(1.0 - u * u) + np.arcsin(u))
-
-    x, y = np.clip(x, -1.0, 1.0), np.clip(y, -1.0, 1.0)
-    half = np.sqrt(1.0 - y * y)
-    inner = np.clip(x, -half, half)
-    band = segment(inner) + segment(half)
-    below = band + y * (inner + half)
-    ends = segment(np.minimum(x, -half)) + segment(np.maximum(x, half)) - segment(half)
-    above = segment(x) + 0.5 * math.pi + ends + y * (inner + half)
-    return np.where(y < 0.0, below, above)
-
-
-@functools.lru_cache(maxsize=16)
-def _coverage(points, radius):
-    """Samples around a centred disc, their positions and the weight of each: the share of its pixel that is covered.
-
-    Lengths in pixels; rows and columns are the same set, and may step over the border of the cell by two pixels.
-    The shares are the disc smoothed over a pixel. Taking 1/24 of their second differences away undoes that smoothing
-    to second order, so that the weights integrate smooth functions up to the edge.
-    """
-    middle = 0.5 * points
-    index = np.arange(
-        math.ceil(middle - radius - 0.5) - 1, math.floor(middle + radius + 0.5) + 2
-    )
-    corner = (np.append(index, index[-1] + 1) - 0.5 - middle) / radius
-    area = radius**2 * _quarter(corner[:, None], corner)
-    weight = np.clip(np.diff(np.diff(area, axis=0), axis=1), 0.0, 1.0)
-    for axis in (0, 1):
-        weight = (
-            weight
-            - scipy.ndimage.correlate1d(weight, [1.0, -2.0, 1.0], axis, mode="constant")
-            / 24.0
-        )
-    weight.flags.writeable = False
-    return index % points, index - middle, weight
-
-
 @functools.lru_cache(maxsize=8)
 def _free_kernel(points, poisson_ratio):
     """Grid of ``points`` unit pixels and the transform of the kernel cut at half of it, at unit modulus.
@@ -745,69 +702,6 @@ def _padded_size(radius):
     )
 
 
-def _each(energy, field, cell, radius, poisson_ratio):
-    """An energy of each map on the disc of its radius, at unit modulus; 0 without contact."""
-    field, radius = np.asarray(field, dtype=float), np.asarray(radius, dtype=float)
-    if np.any(2.0 * radius > cell):
-        message = f"a disc of radius {np.max(radius):g} m does not fit in a cell of {cell:g} m"
-        raise ValueError(f"{message}; make the cell at least twice the radius")
-    pixel, nu = cell / field.shape[-1], float(poisson_ratio)
-
-    def of_one(map_, a):
-        return energy(map_, pixel, a, nu) if a > _LEAST_RADIUS * pixel else 0.0 * a
-
-    return np.vectorize(of_one, otypes=[float], signature="(x,y),()->()")(
-        field, radius
-    )[()]
-
-
-def disc_energy_of_map(field, cell, radius, shear_modulus, poisson_ratio=0.5):
-    """Return the elastic energy per area of one shear-stress map on a disc at the middle of its cell.
-
-    Parameters
-    ----------
-    field : array, shape (..., points, points)
-        tau1 along x [Pa]; axis -2 is x, axis -1 is y. Used as it is: no mean is removed over the disc.
-    cell : float
-        Side of the periodic cell [m]; sample i stands at i cell/points, the disc at cell/2.
-    radius : float or array, shape (...)
-        a [m], at most cell/2; 0 is no contact and gives 0.
-    shear_modulus : float or array, shape (...)
-        G [Pa].
-    poisson_ratio : float
-        nu [1].
-
-    Returns
-    -------
-    float or array, shape (...)
-        ``1/(2 pi a^2) integral of tau1 w1`` [J/m^2], w1 the displacement by the stress on the disc alone, without
-        periodic images.
-
-    Raises
-    ------
-    ValueError
-        If a disc does not fit in the cell.
-
-    Notes
-    -----
-    A pixel at the edge counts with the share of it that the disc covers. The sum over the padded grid uses the
-    kernel of free space cut at a length beyond the diameter (Vico, Greengard & Ferrando, J. Comput. Phys. 323,
-    2016, 191), exact for every wave that the grid carries. What remains is the edge: for a uniform stress the
-    energy is low by 0.07 (pixel/a)^2, for k waves on the diameter by 0.2 k (pixel/a)^2, relative. A disc of less than
-    about five pixels is not resolved. Each map is summed alone, so its result does not depend on the batch.
-
-    Examples
-    --------
-    A uniform stress on a disc stores (2/3)(2 - nu) tau^2 a^3/G, here 1/pi per area:
-
-    >>> print(f"{disc_energy_of_map(np.ones((64, 64)), 2.0, 1.0, 1.0) * math.pi:.3f}")
-    1.000
-    """
-    return _each(_energy, field, cell, radius, poisson_ratio) / np.asarray(
-        shear_modulus, dtype=float
-    )
-
-
 def disc_energies_of_map(
     field, pixel, radii, shear_modulus, poisson_ratio=0.5, discs=None
 ):
@@ -829,8 +723,11 @@ def disc_energies_of_map(
     Returns
     -------
     array, shape (discs,)
-        [J/m^2], as of ``disc_energy_of_map``. The soft edge changes them by 0.16 (pixel/a)^2 for a uniform stress and
-        by 0.65 k (pixel/a)^2 for k waves on the diameter, relative, and their derivatives no more.
+        ``1/(2 pi a^2) integral of tau1 w1`` [J/m^2], w1 the displacement by the stress on the disc alone, without
+        periodic images: the kernel of free space is cut at a length beyond the diameter (Vico, Greengard & Ferrando,
+        J. Comput. Phys. 323, 2016, 191), exact for every wave that the grid carries. The soft edge changes
+        them by 0.16 (pixel/a)^2 for a uniform stress and by 0.65 k (pixel/a)^2 for k waves on the diameter, relative,
+        and their derivatives no more.
 
     Examples
     --------
@@ -864,13 +761,6 @@ def soft_disc(radius):
     out = np.hypot(place[:, None], place) - radius
     bell = np.exp(-0.5 * (out / _BLUR) ** 2) / (_BLUR * math.sqrt(2.0 * math.pi))
     return 0.5 * (scipy.special.erfc(out / (_BLUR * math.sqrt(2.0))) - out * bell)
-
-
-def _energy(field, pixel, radius, poisson_ratio):
-    index, _, share = _coverage(field.shape[-1], radius / pixel)
-    grid, kernel = _free_kernel(_padded_size(radius / pixel), poisson_ratio)
-    power = grid.weighted_power(field[index[:, None], index] * share, kernel)
-    return 0.5 * pixel**3 * power / (grid.points**2 * math.pi * radius**2)
 
 
 def free_energy_of_map(field, pixel, shear_modulus, poisson_ratio=0.5):

@@ -16,6 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from sim.parts.exchange import Array, Motion, Part, Setting, Times, record
+from sim.solid import ElasticSolid
 from sim.units import tables
 from sim.units.quantity import Quantity, keyed
 
@@ -334,13 +335,10 @@ class _Driven(Part):
         """Speed of the slider at the start [m/s]."""
         return 0.0
 
-    def yields(self, shear_modulus: float, poisson_ratio: float) -> tuple[float, float]:
-        """1/k_t of a contact of radius a as (constant [m/N], slope over 1/a [m²/N]).
-
-        ``k_t = 3 π² G a/(4 (2 − ν))``: a disc of uniform stress on the half-space, and its mean displacement.
-        """
+    def yields(self, solid: ElasticSolid) -> tuple[float, float]:
+        """1/k_t of a contact of radius a as (constant [m/N], slope over 1/a [m²/N])."""
         if self.contact_stiffness == "half_space":
-            return 0.0, 4.0 * (2.0 - poisson_ratio) / (3.0 * math.pi**2 * shear_modulus)
+            return 0.0, solid.tangential_compliance(1.0)
         return (
             (0.0, 0.0)
             if self.contact_stiffness == "rigid"

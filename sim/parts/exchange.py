@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.numerics.noise import Noise
+from sim.solid import ElasticSolid
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -44,14 +45,8 @@ class Setting(NamedTuple):
 
     Attributes
     ----------
-    shear_modulus, poisson_ratio : float
-        G [Pa] and ν [1] of the effective half-space.
-    modulus : float
-        Contact modulus E* [Pa].
-    sphere_radius : float
-        R [m].
-    work : float
-        Work of adhesion with all the bonds of rest [J/m²].
+    solid : ElasticSolid
+        The solid under the sphere, with the counter-body if there is one.
     strength : float
         Shear stress that the bonds of rest can bear [Pa]; 0 for bonds with a stretch.
     rest_radius : float
@@ -62,11 +57,7 @@ class Setting(NamedTuple):
         Clock of the run.
     """
 
-    shear_modulus: float
-    poisson_ratio: float
-    modulus: float
-    sphere_radius: float
-    work: float
+    solid: ElasticSolid
     strength: float
     rest_radius: float
     cell: float

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Rectangle
 
-from sim.laws.halfspace import angular_compliance, displacement
+from sim.laws.halfspace import displacement
 from sim.plots import style
 from sim.read.dataset import sweep_dims, where_recorded, word
 from sim.spectrum.radial import Rowed, Waves
@@ -198,10 +198,14 @@ def density_figure(scene: "Scenario") -> Figure:
     panel.set_ylabel(words)
     style.legend(panel)
     mean, lean = cast(Waves, spectrum).harmonics(q)
-    level, swing = angular_compliance(scene.solid.effective[1])
+    wave_along = scene.solid.elastic.compliance(q, 0.0)
+    wave_across = scene.solid.elastic.compliance(0.0, q)
     weights = {
         "variance": (q * mean, "-"),
-        "stored energy": (level * mean - swing * lean, "--"),
+        "stored energy": (
+            q * (wave_along * (mean + lean) + wave_across * (mean - lean)),
+            "--",
+        ),
     }
     for name, (weight, look) in weights.items():
         held = scipy.integrate.cumulative_trapezoid(weight, q, initial=0.0)

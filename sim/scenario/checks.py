@@ -12,7 +12,7 @@ from sim.laws import jkr
 from sim.laws.limits import JKR_FROM, elastocapillary_length, tabor_number
 from sim.parts.bonds.models import Cohort, Tracked
 from sim.parts.exchange import Array
-from sim.spectrum.families import BondMade, Measured
+from sim.spectrum.families import Measured
 from sim.units.notation import engineering
 
 _STEPS_A_CYCLE = 2
@@ -112,7 +112,8 @@ def _lacks_bonds(scene: Scene) -> Faults:
         fault = 'the spectrum of the bonds needs the force of each bond; use bonds.model = "cohort" or "tracked"'
         yield ("shear", "spectrum"), fault
     else:
-        stiffest = cast(BondMade, shear.spectrum).stiffest(*scene.solid.effective)
+        # a bond's own stiffness is in series with that of the solid, which stores ½ f²/k under a force f
+        stiffest = 0.5 / scene.solid.elastic.stored_energy(shear.spectrum)
         if cast(Cohort | Tracked, bonds).bond_stiffness > stiffest * (1.0 + 1e-9):
             fault = f"the half-space under a bond of this footprint has a stiffness of {stiffest:.3g} N/m in series"
             yield (
@@ -190,7 +191,7 @@ def _shear_faults(scene: Scene, built: bool) -> Faults:
             f'{fault}; move the sphere closer, or give shear.cell such as "0.2 mm"',
         )
     elif built:
-        listed = shear.faults(*scene.solid.effective, radius)
+        listed = shear.faults(scene.solid.elastic, radius)
         yield from (
             (("shear", key) if key else ("shear",), fault) for key, fault in listed
         )
@@ -249,19 +250,17 @@ class Limits(NamedTuple):
 
 def limits(scene: Scene) -> Limits:
     """Return the numbers that tell if a scene lies within the theory."""
-    work, size, modulus = (
-        scene.adhesion.work,
-        scene.sphere.radius,
-        scene.solid.contact_modulus,
-    )
+    work, size, solid = scene.adhesion.work, scene.sphere.radius, scene.solid.elastic
     strength = scene.strengths[1]
     low, high = sorted((0.5 * work, WATER))
-    lengths = elastocapillary_length(np.array([low, high]), *scene.solid.effective)
-    tabor = tabor_number(work, size, modulus, np.array(DISTANCES))
+    lengths = elastocapillary_length(
+        np.array([low, high]), solid.shear_modulus, solid.poisson_ratio
+    )
+    tabor = tabor_number(work, size, solid.contact_modulus, np.array(DISTANCES))
     return Limits(
         (float(tabor[0]), float(tabor[1])),
         scene.widest / size,
-        float(np.max(strength)) / scene.setting.shear_modulus,
+        float(np.max(strength)) / solid.shear_modulus,
         (low, high),
         (float(lengths[0]), float(lengths[1])),
     )

@@ -308,11 +308,7 @@ class Scenario:
     def rest_radius(self) -> float:
         """Return the contact radius at rest, with all bonds and no fluctuation [m]; nan without equilibrium."""
         work = np.array([self.adhesion.work])
-        return float(
-            self.contact.equilibrium_radius(
-                work, self.sphere.radius, self.solid.contact_modulus
-            )[0]
-        )
+        return float(self.contact.equilibrium_radius(work, self.bodies)[0])
 
     @cached_property
     def population(self) -> BondModel:
@@ -362,7 +358,7 @@ class Scenario:
     def process(self) -> Process:
         """Return the shear part on this solid and cell; raise ``BadInput`` if it cannot be built."""
         try:
-            return self.fluctuations.process(*self.solid.effective, self._square)
+            return self.fluctuations.process(self.solid.elastic, self._square)
         except PydanticCustomError as fault:
             # of a point inside a long sweep, which was not tried before
             raise BadInput([f"shear: {fault.message()}"]) from None
@@ -391,17 +387,13 @@ class Scenario:
 
     @cached_property
     def bodies(self) -> Bodies:
-        """Return the sphere and the half-space as the contact sees them."""
-        return Bodies(
-            self.sphere.radius, self.solid.contact_modulus, self.solid.effective[1]
-        )
+        """Return the sphere and the solid as the contact sees them."""
+        return Bodies(self.sphere.radius, self.solid.elastic)
 
     @property
     def widest(self) -> float:
         """Return the radius that the contact can reach [m]."""
-        return self.contact.largest_radius(
-            self.adhesion.work, self.sphere.radius, self.solid.contact_modulus
-        )
+        return self.contact.largest_radius(self.adhesion.work, self.bodies)
 
     @cached_property
     def margin(self) -> Shares | None:
@@ -409,7 +401,7 @@ class Scenario:
         if self.fluctuations.contact == "plane":
             return None
         return self.fluctuations.margin(
-            self.solid.effective, self.sphere.radius, self.widest
+            self.solid.elastic, self.sphere.radius, self.widest
         )
 
     @cached_property
@@ -421,14 +413,8 @@ class Scenario:
     def setting(self) -> Setting:
         """Return the constants from which parts make their remarks."""
         strength = float(self.population.steady(np.zeros(1)).strength[0])
-        bodies = *self.solid.effective, self.solid.contact_modulus, self.sphere.radius
         return Setting(
-            *bodies,
-            self.adhesion.work,
-            strength,
-            self.rest_radius,
-            self._square,
-            self.times,
+            self.solid.elastic, strength, self.rest_radius, self._square, self.times
         )
 
     @cached_property
@@ -480,7 +466,6 @@ class Scenario:
             self.loads_from_rest,
             self.feels_steps,
             self.varies["bonds"] == self.varies["contact"],
-            self.solid.effective[0],
             self.contact_area,
         )
         return driven(scene) if self.drive.solves_motion else Prescribed(scene)

@@ -2,11 +2,8 @@
 
 One convention throughout: ``C(q) = ∫ d²x <τ1(x) τ1(0)> e^{-iq·x}`` in Pa² m², so that
 ``<τ1²> = (1/4π²) ∫ d²q C = (1/2π) ∫ q C dq``. The density in Persson's papers is C / 4π². Every ``variance`` and
-``surface_energy`` is a closed form on the infinite plane and any Poisson ratio ν,
-
-``ΔΓ = (1/8π²) ∫ d²q C (1 - ν qx²/q²) / (G q)``  (Menga, Carbone & Dini at ν = 1/2),
-
-with x the direction of sliding and the coupling to normal displacement at ν ≠ 1/2 neglected.
+``over_wavenumber`` is a closed form on the infinite plane. The latter are the two integrals of which
+``sim.solid.HalfSpace.stored_energy`` makes the energy ΔΓ that the stress stores.
 """
 
 import functools
@@ -20,13 +17,15 @@ from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from sim.laws.halfspace import angular_compliance, energy_factors, ripple_energy
-from sim.spectrum.family import Array, Factors, Family, gaussian_boxes
+from sim.laws.halfspace import energy_factors
+from sim.spectrum.family import Array, Factors, Family, Weight, gaussian_boxes
 from sim.spectrum.measured import Measured, Tabulated
 from sim.spectrum.radial import Isotropic, PowerLaws, Rowed, Rows, Waves
 from sim.units.quantity import Quantity, keyed
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(80)
+#: Oscillations of the density of bonds that are integrated one by one.
+_TURNS = 800
 _PHASE, _WEIGHTS = 0.25 * math.pi * (1 + _NODES), 0.25 * math.pi * _WEIGHTS
 
 
@@ -42,15 +41,16 @@ class BondMade(Isotropic):
     Notes
     -----
     With n sites per area and a mean square force E[f²] per site ``C = n E[f²] (2 J1(qb)/(qb))²``: here for
-    n E[f²] = 1 N²/m², so that the variance is 1/(πb²) and ``ΔΓ = (2 − ν) n E[f²]/(1.5 π² G b)``, which is
-    n E[f²]/(π² G b) for an incompressible half-space. That is the energy stored under the bonds themselves: a
+    n E[f²] = 1 N²/m², so that the variance is 1/(πb²), and on a half-space ``ΔΓ = (2 − ν) n E[f²]/(1.5 π² G b)``,
+    which is n E[f²]/(π² G b) for an incompressible one. That is the energy stored under the bonds themselves: a
     force f moves its disc by 2f/(π²Gb).
 
     Examples
     --------
     Bonds of 10 pN that make 1 MPa (1e17 per m²) on discs of 1 nm:
 
-    >>> print(f"{1e17 * 1e-22 * 1e3 * BondMade(footprint=1e-9).surface_energy(1.6e6):.2f} mJ/m^2")
+    >>> from sim.solid import HalfSpace
+    >>> print(f"{1e17 * 1e-22 * 1e3 * HalfSpace(1.6e6).stored_energy(BondMade(footprint=1e-9)):.2f} mJ/m^2")
     0.63 mJ/m^2
     """
 
@@ -64,14 +64,14 @@ class BondMade(Isotropic):
 
     bond_made: ClassVar[bool] = True
 
-    def stiffest(self, shear_modulus: float, poisson_ratio: float = 0.5) -> float:
-        """Return the stiffness of the half-space under one bond [N/m], π²Gb/2 for an incompressible one.
+    @property
+    def turns(self) -> Array:  # type: ignore[override]
+        """Wavenumbers [rad/m] between which the density oscillates once; beyond the last lies 1e-7 of the energy."""
+        return np.arange(1.0, _TURNS) * (math.pi / self.footprint)
 
-        A bond's own stiffness is in series with it, so the two together cannot be stiffer.
-        """
-        return (
-            0.75 * math.pi**2 * shear_modulus * self.footprint / (2.0 - poisson_ratio)
-        )
+    def reach(self, radius: float) -> tuple[float, float]:
+        """Return the wavenumbers [rad/m] between which the density varies."""
+        return 0.25 / self.footprint, 1e6 / self.footprint
 
     @property
     def variance(self) -> float:
@@ -150,7 +150,8 @@ class Ripple(Family):
     --------
     The ripple that cancels 42 mJ/m² of adhesion at G = 1.6 MPa, ten wavelengths per 0.24 mm:
 
-    >>> print(f"{Ripple(375.158e3, 24e-6).surface_energy(1.6e6):.6f}")
+    >>> from sim.solid import HalfSpace
+    >>> print(f"{HalfSpace(1.6e6).stored_energy(Ripple(375.158e3, 24e-6)):.6f}")
     0.042000
     """
 
@@ -190,13 +191,16 @@ class Ripple(Family):
         """Raise ValueError: a ripple has no density."""
         return self.density(step, reach)
 
-    def surface_energy(
-        self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
-    ) -> Array:
-        """Return the mean energy per area [J/m²]: ``τ1² (1 - ν cos²θ) / (4 G q)``."""
-        return ripple_energy(
-            self.amplitude, self.support[0], self.angle, shear_modulus, poisson_ratio
-        )
+    @property
+    def over_wavenumber(self) -> tuple[float, float]:
+        """Return the integrals of C/\\|q\\| and of C cos 2θ/\\|q\\| over d²q/4π² [Pa² m]."""
+        level = self.variance / self.support[0]
+        return level, level * math.cos(2 * self.angle)
+
+    def total(self, weight: Weight, end: float = math.inf) -> float:
+        """Return the variance times the weight of the one wave, 0 if it lies beyond ``end``."""
+        inside = self.support[0] < end
+        return self.variance * float(weight(*self.wavevector)) if inside else 0.0
 
     def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
         """Return the integrals over discs of the density's two peaks, see ``Family``."""
@@ -244,13 +248,14 @@ class Band(Rowed):
 
     Notes
     -----
-    ``C = 4π σ² / (q2² - q1²)``; at ν = 1/2 ``ΔΓ = 3 σ² / (4 G (q1 + q2))``.
+    ``C = 4π σ² / (q2² - q1²)``; on a half-space of ν = 1/2 ``ΔΓ = 3 σ² / (4 G (q1 + q2))``.
 
     Examples
     --------
+    >>> from sim.solid import HalfSpace
     >>> band = Band(rms=1e5, longest=60e-6, shortest=20e-6)
     >>> q1, q2 = band.support
-    >>> print(round(band.surface_energy(1.6e6) / (3e10 / (4 * 1.6e6 * (q1 + q2))), 12))
+    >>> print(round(HalfSpace(1.6e6).stored_energy(band) / (3e10 / (4 * 1.6e6 * (q1 + q2))), 12))
     1.0
     """
 
@@ -288,7 +293,7 @@ class SelfAffine(Rowed):
 
     Notes
     -----
-    With λ = rolloff/longest, ζ = rolloff/shortest and q_r = 2π/rolloff, at ν = 1/2
+    With λ = rolloff/longest, ζ = rolloff/shortest and q_r = 2π/rolloff, on a half-space of ν = 1/2
     ``ΔΓ = (3 σ² / 4 G q_r) N / D``, ``N = 1 - λ + (1 - ζ^(-1-2H)) / (1 + 2H)``,
     ``D = 1 - λ² + (1 - ζ^(-2H)) / H``, with 2 ln ζ for the last term at H = 0.
 
@@ -296,8 +301,10 @@ class SelfAffine(Rowed):
     --------
     Rough at small scales (H small) stores less energy than the same stress in long waves:
 
-    >>> rough, smooth = (SelfAffine(1e5, hurst, 60e-6, 24e-6, 1e-6) for hurst in (0.2, 0.8))
-    >>> print(f"{rough.surface_energy(1e6) / smooth.surface_energy(1e6):.2f}")
+    >>> from sim.solid import HalfSpace
+    >>> spectra = (SelfAffine(1e5, hurst, 60e-6, 24e-6, 1e-6) for hurst in (0.2, 0.8))
+    >>> rough, smooth = map(HalfSpace(1e6).stored_energy, spectra)
+    >>> print(f"{rough / smooth:.2f}")
     0.62
     """
 
@@ -341,11 +348,12 @@ class Gaussian(_OfRms, Isotropic):
 
     Notes
     -----
-    ``C = π ξ² σ² exp(-q²ξ²/4)``; at ν = 1/2 ``ΔΓ = (3√π/16) σ² ξ / G``.
+    ``C = π ξ² σ² exp(-q²ξ²/4)``; on a half-space of ν = 1/2 ``ΔΓ = (3√π/16) σ² ξ / G``.
 
     Examples
     --------
-    >>> print(f"{Gaussian(rms=1.0, length=1.0).surface_energy(1.0):.7f}")
+    >>> from sim.solid import HalfSpace
+    >>> print(f"{HalfSpace(1.0).stored_energy(Gaussian(rms=1.0, length=1.0)):.7f}")
     0.3323351
     """
 
@@ -393,11 +401,12 @@ class VonKarman(_OfRms, Isotropic):
 
     Notes
     -----
-    ``C = 4π H ξ² σ² (1 + q²ξ²)^(-1-H)``; at ν = 1/2 ``ΔΓ = (3√π/8) Γ(H+½)/Γ(H) σ² ξ / G``.
+    ``C = 4π H ξ² σ² (1 + q²ξ²)^(-1-H)``; on a half-space of ν = 1/2 ``ΔΓ = (3√π/8) Γ(H+½)/Γ(H) σ² ξ / G``.
 
     Examples
     --------
-    >>> print(f"{VonKarman(rms=1.0, length=1.0, hurst=0.5).surface_energy(1.0):.7f}")
+    >>> from sim.solid import HalfSpace
+    >>> print(f"{HalfSpace(1.0).stored_energy(VonKarman(rms=1.0, length=1.0, hurst=0.5)):.7f}")
     0.3750000
     """
 
@@ -449,14 +458,16 @@ class AnisotropicGaussian(_OfRms, Waves):
     Notes
     -----
     ``C = π a b σ² exp(-(a²qx² + b²qy²)/4)`` along its own axes. With Carlson's R_D the means of
-    cos²/q and sin²/q are ``A = (σ² a b³ / 3√π) R_D(0, a², b²)`` and
-    ``B = (σ² b a³ / 3√π) R_D(0, b², a²)``, and ``ΔΓ = (A + B - ν (A cos²θ + B sin²θ)) / 2G``.
+    cos²/q and sin²/q are ``A = (σ² a b³ / 3√π) R_D(0, a², b²)`` and ``B = (σ² b a³ / 3√π) R_D(0, b², a²)``. On a
+    half-space ``ΔΓ = (A + B - ν (A cos²θ + B sin²θ)) / 2G``.
 
     Examples
     --------
     Streaks across the sliding direction are stiffer than streaks along it:
 
-    >>> across, along = (AnisotropicGaussian(1.0, a, b).surface_energy(1.0) for a, b in [(1, 3), (3, 1)])
+    >>> from sim.solid import HalfSpace
+    >>> streaks = (AnisotropicGaussian(1.0, a, b) for a, b in [(1, 3), (3, 1)])
+    >>> across, along = map(HalfSpace(1.0).stored_energy, streaks)
     >>> print(f"{across:.7f} {along:.7f}")
     0.4888006 0.5811675
     """
@@ -473,19 +484,14 @@ class AnisotropicGaussian(_OfRms, Waves):
         (xx, xy, yy), x, y = self._form, np.asarray(qx, float), np.asarray(qy, float)
         return level * np.exp(-(xx * x**2 + 2 * xy * x * y + yy * y**2))
 
-    def surface_energy(
-        self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
-    ) -> Array:
-        """Return the mean energy per area [J/m²] stored in an infinite half-space (see Notes)."""
-        a, b, cosine = self.length_x, self.length_y, math.cos(self.angle)
+    @property
+    def over_wavenumber(self) -> tuple[float, float]:
+        """Return the integrals of C/\\|q\\| and of C cos 2θ/\\|q\\| over d²q/4π² [Pa² m] (see Notes)."""
+        a, b = self.length_x, self.length_y
         scale = self.variance * a * b / (3 * math.sqrt(math.pi))
         along = scale * b**2 * scipy.special.elliprd(0.0, a**2, b**2)
         across = scale * a**2 * scipy.special.elliprd(0.0, b**2, a**2)
-        level, swing = angular_compliance(np.asarray(poisson_ratio, float))
-        turned = swing * (along - across) * (2 * cosine**2 - 1)
-        return (level * (along + across) + turned) / (
-            2 * np.asarray(shear_modulus, float)
-        )
+        return along + across, (along - across) * math.cos(2 * self.angle)
 
     @functools.cached_property
     def _form(self) -> tuple[float, float, float]:

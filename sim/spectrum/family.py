@@ -17,9 +17,29 @@ from sim.numerics.special import erf_between
 Array = NDArray[np.float64]
 #: Shares of a wave's energy that a disc holds as a function of x = 2qa, see ``sim.laws.halfspace``.
 Factors = Callable[[Array], tuple[Array, Array]]
+#: Weight of a wave as a function of its wavevector (qx, qy) [rad/m], such as the compliance of a solid.
+Weight = Callable[[ArrayLike, ArrayLike], Array]
 
 
-class Family(Protocol):
+class Stress(Protocol):
+    """A fluctuating shear stress on the infinite plane, as an elastic solid under it needs it."""
+
+    @property
+    def over_wavenumber(self) -> tuple[float, float]:
+        """Integrals of C/\\|q\\| and of C cos 2θ/\\|q\\| over d²q/4π² [Pa² m], θ from the sliding direction.
+
+        They are all that a half-space of any stiffness needs of the spectrum.
+        """
+
+    def total(self, weight: Weight) -> float:
+        """Return the integral of C times an even weight over d²q/4π².
+
+        The weight is that of an isotropic solid: at any wavenumber it has a mean over the directions, and a part that
+        goes with cos 2θ.
+        """
+
+
+class Family(Stress, Protocol):
     """Power spectral density C of the fluctuating shear stress [Pa² m²] over wavevectors q [rad/m]; frozen."""
 
     def __hash__(self) -> int:
@@ -43,10 +63,8 @@ class Family(Protocol):
     def density(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """Return the power spectral density C at wavevector (qx, qy) [Pa² m²]; raises ValueError for a single wave."""
 
-    def surface_energy(
-        self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
-    ) -> Array:
-        """Return the mean elastic energy per area of an infinite half-space [J/m²] under this stress."""
+    def total(self, weight: Weight, end: float = math.inf) -> float:
+        """Return the integral of C times a weight, see ``Stress``, over the waves with a wavenumber below ``end``."""
 
     def pixels(self, step: float, reach: int) -> Array:
         """Variance in each pixel around the points of a square wavevector lattice [Pa²], its side ``step`` in rad/m.

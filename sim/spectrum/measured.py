@@ -23,10 +23,10 @@ from pydantic import (
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError
 
-from sim.laws.halfspace import free_energy_of_map, noise_energy, surface_energy
+from sim.laws.halfspace import compliance, free_energy_of_map
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice, lattice_of
-from sim.spectrum.family import Array
+from sim.spectrum.family import Array, Weight
 from sim.spectrum.radial import PowerLaws, Rowed, Rows
 from sim.units.quantity import Quantity, keyed
 from sim.units.tables import LISTED, blamed, file_columns, file_path, file_text, matrix
@@ -695,9 +695,10 @@ class StressMap:
     --------
     A ripple along x stores τ²/(8Gq), whatever its mean:
 
+    >>> from sim.solid import HalfSpace
     >>> ripple = 5.0 + np.cos(2 * np.pi * np.arange(16) / 16)[:, None] * np.ones(8)
     >>> stress = StressMap(file="", pixel=1 / 16, values=ripple.tobytes(), shape=(16, 8))
-    >>> print(f"{stress.mean:.1f} {stress.surface_energy(1.0) * 16 * np.pi:.3f}")
+    >>> print(f"{stress.mean:.1f} {HalfSpace(1.0).stored_energy(stress) * 16 * np.pi:.3f}")
     5.0 1.000
     """
 
@@ -823,27 +824,28 @@ class StressMap:
             self.file, wavenumbers=tuple(q), densities=tuple(density / self.inside)
         )
 
-    def surface_energy(self, shear_modulus: float, poisson_ratio: float = 0.5) -> float:
-        """Elastic energy of this very map per area [J/m²].
+    @functools.cached_property
+    def over_wavenumber(self) -> tuple[float, float]:
+        """Integrals of C/\\|q\\| and of C cos 2θ/\\|q\\| over d²q/4π² [Pa² m], per area of the contact.
 
-        Without a mask that of the periodic map, else that of the stress in a free half-space, per area of the contact.
+        Without a mask those of the periodic map, else those of a map without any stress around it.
         """
-        if self.mask:
-            each = free_energy_of_map(
-                self.field, self.pixels[0], shear_modulus, poisson_ratio
-            )
-            return float(each) / self.inside
-        return float(
-            surface_energy(self.field, self.lattice.sides, shear_modulus, poisson_ratio)
-        )
 
-    def noise_energy(self, shear_modulus: float, poisson_ratio: float = 0.5) -> float:
-        """Share of the energy that the measurement's noise makes [J/m²]."""
-        return float(
-            noise_energy(
-                self.noise, math.sqrt(self.lattice.pixel), shear_modulus, poisson_ratio
-            )
-        )
+        def twice_energy(poisson_ratio: float) -> float:
+            if self.mask:
+                pixel = self.pixels[0]
+                energy = free_energy_of_map(self.field, pixel, 1.0, poisson_ratio)
+                return 2.0 * float(energy) / self.inside
+            return self.total(lambda qx, qy: compliance(qx, qy, 1.0, poisson_ratio))
+
+        mean = twice_energy(0.0)
+        return mean, mean - 2.0 * twice_energy(1.0)
+
+    def total(self, weight: Weight) -> float:
+        """Return the sum of the power of the periodic map times a weight, per area of the contact."""
+        weights = weight(*self.lattice.wavevectors)
+        power = self.lattice.weighted_power(self.field, weights)
+        return float(power) / (self.lattice.area**2 * self.inside)
 
 
 def _one_map(map_file: MapFile, rows: str) -> Array:

@@ -3,12 +3,13 @@
 A spectrum of rows (a band, a self-affine law with cut-offs, a table, a measurement) is a chain of power laws. Their
 integrals over a circle are closed forms.
 
-``surface_energy`` of a spectrum is that of the infinite plane, right for a contact of very many wavelengths. On
-a disc of radius a every wave counts with the share that ``laws.halfspace`` gives in closed form, so that
+The energy of the infinite plane is right for a contact of very many wavelengths. On a disc of radius a every wave
+counts with the share that ``laws.halfspace`` gives in closed form, so that
 
-``E/(pi a^2) = 1/(4 pi^3 G) integral of [(1 - nu/2) C0(q) P(2qa) + (nu/2) C2(q) S(2qa)] dq``,
+``E/(pi a^2) = 1/(4 pi^3) integral of [level C0(q) P(2qa) - swing C2(q) S(2qa)] dq``,
 
-C0 and C2 the integrals of C and of C cos(2 theta) over the directions theta from the sliding direction. This is
+``level`` and ``swing`` the ``Softness`` of the half-space, C0 and C2 the integrals of C and of C cos(2 theta) over the
+directions theta from the sliding direction. This is
 the overlap integral over the autocorrelation in another order, and one-dimensional for anisotropic spectra, too.
 """
 
@@ -17,24 +18,32 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol, cast
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from sim.laws.halfspace import angular_compliance, energy_factors, marginal_factors
+from sim.laws.halfspace import energy_factors, marginal_factors
 from sim.numerics.jit import device, kernel
 from sim.numerics.special import erf_between, si
-from sim.spectrum.family import Array, Factors, Family, Radial, radial_quadrant
+from sim.spectrum.family import (
+    Array,
+    Factors,
+    Family,
+    Radial,
+    Stress,
+    Weight,
+    radial_quadrant,
+)
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 #: P and S oscillate like cos(x)/x: followed within this distance of x = 0 and of each break of the spectrum, and
 #: faded out beyond over a length so large that nothing of a smooth spectrum is left of the oscillation.
 _FOLLOWED, _FADING = 60.0, 10.0
-#: Octaves below a wavenumber in which a spectrum is integrated one by one.
-_OCTAVES = 64.0
+#: Half-octaves below the wavenumbers of a spectrum that are integrated one by one, for weights that vary there.
+_BELOW = 64
 #: Beyond this x only the two ends of a spectrum are followed, not the kinks of its rows.
 _LAST_KINK = 3000.0
 
@@ -50,8 +59,23 @@ _NONE = 0.0, 0.0, 0.0
 PLANE: Terms = _NONE, _NONE, np.empty((0, 4))
 
 
+class Softness(NamedTuple):
+    """Compliance of a half-space at a wavevector times \\|q\\|, ``level + swing cos 2θ`` [1/Pa], of one or of many."""
+
+    level: float | Array
+    swing: float | Array
+
+    def energy(self, stress: Stress) -> float | Array:
+        """Return the mean energy per area of the infinite plane under a fluctuating stress [J/m²]."""
+        mean, lean = stress.over_wavenumber
+        return 0.5 * (self.level * mean + self.swing * lean)
+
+
 class Waves(Family, Protocol):
     """Base of the families with a density, whose integrals over discs are quadratures."""
+
+    #: Wavenumbers [rad/m] at which quadratures are divided because the density oscillates.
+    turns: ClassVar[Array] = np.empty(0)
 
     def reach(self, radius: float) -> tuple[float, float]:
         """Wavenumbers [rad/m] below which nothing varies, and beyond which a disc of this radius [m] stores nothing."""
@@ -60,6 +84,20 @@ class Waves(Family, Protocol):
     def harmonics(self, q: Array) -> tuple[Array, Array]:
         """Return ``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
 
+    def total(self, weight: Weight, end: float = math.inf) -> float:
+        """Return the integral of C times a weight, by quadrature over the wavenumbers; 1e-12 for smooth weights."""
+        low, high = self.reach(math.inf)
+        high = min(high, end)
+        if self.breaks.size and high <= low:
+            return 0.0
+        start = low if self.breaks.size else min(low, high) * 2.0 ** (-0.5 * _BELOW)
+        edges = [*_half_octaves(self, start, high), self.turns]
+        q, step = _gauss([edge[edge <= high] for edge in edges])
+        level, lean = self.harmonics(q)
+        along, across = weight(q, 0.0), weight(0.0, q)
+        sums = q * step * (level * (along + across) + lean * (along - across))
+        return float(np.sum(sums)) / (8 * math.pi**2)
+
     def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
         """Return the integrals over discs of any radius, see ``Family``."""
 
@@ -67,11 +105,8 @@ class Waves(Family, Protocol):
             if radius == 0.0:
                 return 0.0, 0.0
             if math.isinf(radius):
-                at_zero, at_one = (
-                    4 * math.pi**3 * float(self.surface_energy(1.0, nu))
-                    for nu in (0.0, 1.0)
-                )
-                return at_zero, 2 * at_one - at_zero
+                level, lean = self.over_wavenumber
+                return 2 * math.pi**3 * level, -2 * math.pi**3 * lean
             return self.integrals(factors, radius)
 
         mean, skew = np.vectorize(sums, otypes=[float, float])(radii)
@@ -91,12 +126,7 @@ class Waves(Family, Protocol):
         return float(np.sum(level * mean * step)), float(np.sum(lean * skew * step))
 
 
-def disc_energy(
-    spectrum: Family,
-    radius: ArrayLike,
-    shear_modulus: ArrayLike,
-    poisson_ratio: ArrayLike = 0.5,
-) -> Array:
+def disc_energy(spectrum: Family, radius: ArrayLike, softness: Softness) -> Array:
     """Return the mean elastic energy per area that a fluctuating shear stress stores on a disc of contact.
 
     Parameters
@@ -105,13 +135,13 @@ def disc_energy(
         Any family of ``sim.spectrum``.
     radius : float or array
         a [m]; 0 stores nothing, inf is the infinite plane.
-    shear_modulus, poisson_ratio : float or array
-        G [Pa], nu [1]; they broadcast with the radius.
+    softness : Softness
+        That of the half-space; its numbers broadcast with the radius.
 
     Returns
     -------
     float or array
-        ``E/(pi a^2)`` [J/m^2]: ``spectrum.surface_energy`` for a disc of many wavelengths, ``(2 - nu) 2 a
+        ``E/(pi a^2)`` [J/m^2]: the energy of the plane for a disc of many wavelengths, ``(2 - nu) 2 a
         sigma^2/(3 pi G)`` on one much smaller than any of them.
 
     Raises
@@ -129,65 +159,28 @@ def disc_energy(
     --------
     Patches of a tenth of the radius store 3.6 % less than on the infinite plane:
 
+    >>> from sim.solid import HalfSpace
     >>> from sim.spectrum import Gaussian
-    >>> patches = Gaussian(rms=1.0, length=0.1)
-    >>> print(f"{disc_energy(patches, 1.0, 1.0) / patches.surface_energy(1.0):.5f}")
+    >>> patches, softness = Gaussian(rms=1.0, length=0.1), HalfSpace(1.0).softness
+    >>> print(f"{disc_energy(patches, 1.0, softness) / softness.energy(patches):.5f}")
     0.96410
     """
-    return _on_disc(energy_factors, spectrum, radius, shear_modulus, poisson_ratio)
+    return _on_disc(energy_factors, spectrum, radius, softness)
 
 
-def share_of_long_waves(
-    spectrum: Family, wavelength: float, poisson_ratio: float = 0.5
-) -> float:
-    """Return the share of the energy stored on the infinite plane that waves longer than a wavelength [m] store [1].
-
-    Examples
-    --------
-    The share of a Gaussian of length ξ is erf(πξ/λ):
-
-    >>> from sim.spectrum import Gaussian
-    >>> print(f"{share_of_long_waves(Gaussian(rms=1.0, length=1.0), 4.0):.10f} {math.erf(math.pi / 4.0):.10f}")
-    0.7333114256 0.7333114256
-    """
-    end, plane = (
-        2.0 * math.pi / wavelength,
-        float(spectrum.surface_energy(1.0, poisson_ratio)),
-    )
-    if spectrum.wavevector is not None or plane == 0.0:
-        return float(
-            spectrum.wavevector is not None and math.hypot(*spectrum.wavevector) < end
-        )
-    waves = cast(Waves, spectrum)
-    octaves = end * 2.0 ** -np.arange(_OCTAVES)
-    edge: Array = np.unique(
-        np.concatenate([[0.0], octaves, waves.breaks[waves.breaks < end]])
-    )
-    half = 0.5 * np.diff(edge)[:, None]
-    level, lean = waves.harmonics((edge[:-1, None] + half * (1 + _NODES)).ravel())
-    mean, swing = angular_compliance(np.asarray(poisson_ratio, float))
-    sums = (half * _WEIGHTS).ravel() * (mean * level + swing * lean)
-    return float(np.sum(sums)) / (8 * math.pi**2 * plane)
-
-
-def marginal_energy(
-    spectrum: Family,
-    radius: ArrayLike,
-    shear_modulus: ArrayLike,
-    poisson_ratio: ArrayLike = 0.5,
-) -> Array:
+def marginal_energy(spectrum: Family, radius: ArrayLike, softness: Softness) -> Array:
     """Return the mean energy that a unit of new contact area stores at the edge of a growing disc: dE/dA.
 
     Parameters
     ----------
-    spectrum, radius, shear_modulus, poisson_ratio
+    spectrum, radius, softness
         As for ``disc_energy``.
 
     Returns
     -------
     float or array
-        ``(1/(2 pi a)) dE/da`` [J/m^2], the exact derivative of the overlap integral; 0 at a = 0,
-        ``spectrum.surface_energy`` at a = inf.
+        ``(1/(2 pi a)) dE/da`` [J/m^2], the exact derivative of the overlap integral; 0 at a = 0, the energy of the
+        plane at a = inf.
 
     Notes
     -----
@@ -197,20 +190,20 @@ def marginal_energy(
     --------
     The deficit of the whole disc comes from its edge; a unit of new area lacks half of it:
 
+    >>> from sim.solid import HalfSpace
     >>> from sim.spectrum import Gaussian
-    >>> patches = Gaussian(rms=1.0, length=0.1)
-    >>> print(f"{1 - marginal_energy(patches, 1.0, 1.0) / patches.surface_energy(1.0):.4f}")
+    >>> patches, softness = Gaussian(rms=1.0, length=0.1), HalfSpace(1.0).softness
+    >>> print(f"{1 - marginal_energy(patches, 1.0, softness) / softness.energy(patches):.4f}")
     0.0180
     """
-    return _on_disc(marginal_factors, spectrum, radius, shear_modulus, poisson_ratio)
+    return _on_disc(marginal_factors, spectrum, radius, softness)
 
 
 def _on_disc(
     factors: Factors,
     spectrum: Family,
     radius: ArrayLike,
-    shear_modulus: ArrayLike,
-    poisson_ratio: ArrayLike,
+    softness: Softness,
 ) -> Array:
     radii = np.asarray(radius, float)
     if not np.all(radii >= 0.0):
@@ -218,29 +211,32 @@ def _on_disc(
             "the radius of a disc must be at least zero; give detached contacts the radius 0"
         )
     mean, skew = spectrum.on_disc(factors, radii)
-    level, swing = angular_compliance(np.asarray(poisson_ratio, float))
-    return (level * mean - swing * skew) / (
-        4 * math.pi**3 * np.asarray(shear_modulus, float)
-    )
+    return (softness.level * mean - softness.swing * skew) / (4 * math.pi**3)
 
 
 def _nodes(spectrum: Waves, radius: float) -> tuple[Array, Array]:
     """Wavenumbers and steps of a composite Gauss-Legendre sum over all q that matter."""
     low, high = spectrum.reach(radius)
     start = low if spectrum.breaks.size else min(low, 0.5 / radius)
-    halves = math.ceil(2 * math.log2(high / start))
-    edges: list[ArrayLike] = [
-        spectrum.breaks,
-        start * 2.0 ** (0.5 * np.arange(halves)),
-        [high],
-    ]
-    if not spectrum.breaks.size:
-        edges.append([0.0])
+    edges = _half_octaves(spectrum, start, high)
     for begin, end in _followed(spectrum, radius):
         begin, end = max(begin - 6 * _FADING, 0.0), end + 6 * _FADING
         count = math.ceil((end - begin) / (2 * math.pi))
         turns = np.linspace(begin, end, count + 1) / (2 * radius)
         edges.append(turns[(turns > start) & (turns < high)])
+    return _gauss(edges)
+
+
+def _half_octaves(spectrum: Waves, start: float, high: float) -> list[Array]:
+    """Edges of intervals in which a spectrum is smooth, from ``start`` to ``high``, and from 0 if it begins there."""
+    count = math.ceil(2 * math.log2(high / start))
+    halves = start * 2.0 ** (0.5 * np.arange(count))
+    first = [high] if spectrum.breaks.size else [0.0, high]
+    return [spectrum.breaks, halves, np.array(first)]
+
+
+def _gauss(edges: list[Array]) -> tuple[Array, Array]:
+    """Nodes and steps of Gauss-Legendre sums between neighbouring edges."""
     edge: Array = np.unique(np.concatenate(edges))
     half = 0.5 * np.diff(edge)[:, None]
     return (edge[:-1, None] + half * (1 + _NODES)).ravel(), (half * _WEIGHTS).ravel()
@@ -280,13 +276,9 @@ class Margin:
     least = 0.0
 
     def __init__(
-        self,
-        spectrum: Family,
-        shear_modulus: float,
-        poisson_ratio: float,
-        sphere_radius: float,
+        self, spectrum: Family, softness: Softness, sphere_radius: float
     ) -> None:
-        self.spectrum, self.solid = spectrum, (shear_modulus, poisson_ratio)
+        self.spectrum, self.softness = spectrum, softness
         self._ends = sphere_radius * 10.0**-_DECADES, sphere_radius
         self._splines: dict[Callable[..., Array], scipy.interpolate.CubicSpline] = {}
 
@@ -300,7 +292,7 @@ class Margin:
         """Return the mean of the share over the area of the disc: E/(πa²) over ΔΓ of the plane [1]."""
         if self.spectrum.wavevector is not None and self._plane > 0.0:
             share = (
-                disc_energy(self.spectrum, np.nan_to_num(radius), *self.solid)
+                disc_energy(self.spectrum, np.nan_to_num(radius), self.softness)
                 / self._plane
             )
             return np.where(np.isnan(radius), np.nan, share)
@@ -315,19 +307,13 @@ class Margin:
     @cached_property
     def each(self) -> list[Terms]:
         """Inputs of ``share_of``, once for all steps: the wave of a ripple, or places and cubics of a spline."""
-        (low, high), wave = self._ends, self.spectrum.wavevector
-        if wave is not None and self._plane > 0.0:
-            level, swing = angular_compliance(self.solid[1])
-            square = wave[0] ** 2 + wave[1] ** 2
-            lean = swing * (wave[0] ** 2 - wave[1] ** 2) / square
-            whole = 0.5 * math.pi * (level + lean)
-            return [
-                (
-                    (2.0 * math.sqrt(square), level / whole, -lean / whole),
-                    _NONE,
-                    np.zeros((1, 4)),
-                )
-            ]
+        (low, high), whole = self._ends, math.pi * self._plane
+        if self.spectrum.wavevector is not None and whole > 0.0:
+            mean, lean = self.spectrum.over_wavenumber
+            level = float(self.softness.level * mean / whole)
+            swing = float(-self.softness.swing * lean / whole)
+            wave = 2.0 * self.spectrum.support[0], level, swing
+            return [(wave, _NONE, np.zeros((1, 4)))]
         count, spline = _POINTS - 1, self._spline(marginal_energy)
         step = math.log(high / low) / count
         cubics = np.ascontiguousarray(spline.c.T * step ** np.arange(3, -1, -1))
@@ -335,16 +321,12 @@ class Margin:
 
     @cached_property
     def _plane(self) -> float:
-        return float(self.spectrum.surface_energy(*self.solid))
+        return float(self.softness.energy(self.spectrum))
 
     def _spline(self, law: Callable[..., Array]) -> "scipy.interpolate.CubicSpline":
         if law not in self._splines:
             radii = np.geomspace(*self._ends, _POINTS)
-            energies = (
-                law(self.spectrum, radii, *self.solid)
-                if self._plane > 0.0
-                else np.zeros(_POINTS)
-            )
+            energies = law(self.spectrum, radii, self.softness)
             self._splines[law] = scipy.interpolate.CubicSpline(
                 np.log(radii), energies / (self._plane or 1.0)
             )
@@ -399,18 +381,10 @@ class Isotropic(Waves, Radial, Protocol):
         """Return the power spectral density C at wavevector (qx, qy) [rad/m], in Pa² m²."""
         return self.radial_density(np.hypot(qx, qy))
 
-    def surface_energy(
-        self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
-    ) -> Array:
-        """Return the mean elastic energy per area [J/m²] stored by the fluctuations in an infinite half-space.
-
-        ``ΔΓ = (2 - nu) / (8 pi G) ∫ C dq``, the angular mean of ``½ G_x C``. The normal-tangential coupling for nu
-        other than 1/2 is neglected.
-        """
-        mean, _ = angular_compliance(np.asarray(poisson_ratio, float))
-        return (
-            mean / (4 * np.pi * np.asarray(shear_modulus, float)) * self.line_integral
-        )
+    @property
+    def over_wavenumber(self) -> tuple[float, float]:
+        """Return the integrals of C/\\|q\\| and of C cos 2θ/\\|q\\| over d²q/4π² [Pa² m]; the latter is 0."""
+        return self.line_integral / (2 * math.pi), 0.0
 
     def pixels(self, step: float, reach: int) -> Array:
         """Return the variance in the pixels of a wavevector lattice [Pa²], see ``Family``."""

@@ -149,7 +149,7 @@ class Driven(Stepper):
         )
 
     def _around(self, touch: ContactState, shear: Storing, steps: range) -> StepContact:
-        """Return contact and half-space at the start of some clock steps."""
+        """Return contact and solid at the start of some clock steps."""
         scene, work, contact = self.scene, self.scene.work, self.scene.models.contact
         ends = scene.times.at(np.arange(steps.start - 1.0, steps.stop))
         first, last = contact.mount_between(ends, scene.times.duration)
@@ -169,7 +169,6 @@ class Driven(Stepper):
             self.holds_contact,
             self.is_undisturbed,
             work.bodies,
-            scene.shear_modulus,
             scene.contact_area,
         )
 

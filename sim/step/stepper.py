@@ -53,8 +53,6 @@ class Scene(NamedTuple):
         True if the longest path in a clock step is recorded.
     shares_area : bool
         True if all members with the same stress have the same contact area.
-    shear_modulus : float
-        G of the effective half-space [Pa].
     contact_area : float
         Area of the contact at rest [m²], by which forces are measured.
     """
@@ -67,7 +65,6 @@ class Scene(NamedTuple):
     loads_from_rest: bool
     follows_path: bool
     shares_area: bool
-    shear_modulus: float
     contact_area: float
 
 

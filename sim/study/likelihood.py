@@ -310,7 +310,7 @@ def by_steady_sliding(
             "reversible": values.get("alpha", 0.0),
             "mixity": values.get("lambda", 0.5),
         }
-        rest = scenario.adhesion.work, *scenario.bodies
+        rest = scenario.adhesion.work, *scenario.bodies.numbers
         radii = compare(
             np.abs(course.stress),
             load if at_load else base,

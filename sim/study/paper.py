@@ -33,6 +33,7 @@ from scipy.integrate import quad
 
 from sim.laws import halfspace, jkr, schallamach
 from sim.numerics.grid import Grid
+from sim.solid import HalfSpace
 from sim.spectrum.families import Gaussian, Ripple
 
 # the PDMS lens of the paper's example, on an assumed sphere of 2 mm, under an assumed mean stress
@@ -341,7 +342,7 @@ def _bonds() -> Rows:
 
 def _fluctuation() -> Rows:
     length, rms = 4e-6, 1e5
-    energy = Gaussian(rms, length).surface_energy(SHEAR)
+    energy = HalfSpace(SHEAR).stored_energy(Gaussian(rms, length))
     # r times the kernel and q G_x, around the circle
     ring = 2.0 * pi * np.mean(_kernel(ALONG, ACROSS)) / SHEAR
     yielding = 2.0 * pi * np.mean(1.0 + ACROSS**2) / (2.0 * SHEAR)
@@ -410,7 +411,8 @@ def _masking() -> Rows:
         yield "... as printed, in kPa", "Sec. 4", amplitude, printed, 500.0 / printed
     amplitude = halfspace.masking_amplitude(WORK, WIDTH / WAVES, SHEAR)
     # a hair above, so that rounding cannot leave a trace of adhesion
-    masked = Ripple(1.000001 * amplitude, WIDTH / WAVES).surface_energy(SHEAR)
+    wave = Ripple(1.000001 * amplitude, WIDTH / WAVES)
+    masked = HalfSpace(SHEAR).stored_energy(wave)
     contact = jkr.radius_at_load(LOAD, WORK - masked, **BODY)
     yield "a masked contact is Hertz's", "47", contact, HERTZ_AT_LOAD
 

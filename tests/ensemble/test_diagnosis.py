@@ -30,6 +30,7 @@ from sim.parts.bonds.models import Steady, Unbroken
 from sim.parts.drive import Steady as AtSpeed
 from sim.parts.shear.models import Banded
 from sim.parts.shear.modes import modes
+from sim.solid import HalfSpace
 from sim.spectrum.families import (
     AnisotropicGaussian,
     Band,
@@ -37,7 +38,6 @@ from sim.spectrum.families import (
     Ripple,
     SelfAffine,
 )
-from sim.spectrum.radial import share_of_long_waves
 from sim.units.notation import engineering
 
 R, G, W, LOAD = 5e-3, 0.5e6, 45e-3, 1e-3
@@ -130,22 +130,24 @@ def test_the_share_of_long_waves_is_the_integral_of_the_spectrum():
             share = (
                 sum(pieces)
                 / (4.0 * math.pi**2)
-                / float(family.surface_energy(1.0, ratio))
+                / float(HalfSpace(1.0, ratio).stored_energy(family))
             )
             assert_allclose(
-                share_of_long_waves(family, wavelength, ratio),
+                HalfSpace(1.0, ratio).share_of_long_waves(family, wavelength),
                 share,
                 rtol=1e-6,
                 atol=1e-12,
             )
     # equal steps of q
     assert_allclose(
-        share_of_long_waves(Band(1.0, 60e-6, 20e-6), 30e-6), 0.5, rtol=1e-12
+        HalfSpace(1.0).share_of_long_waves(Band(1.0, 60e-6, 20e-6), 30e-6),
+        0.5,
+        rtol=1e-12,
     )
-    assert [share_of_long_waves(Ripple(1.0, 2.0), end) for end in (1.0, 3.0)] == [
-        1.0,
-        0.0,
+    shares = [
+        HalfSpace(1.0).share_of_long_waves(Ripple(1.0, 2.0), end) for end in (1.0, 3.0)
     ]
+    assert_allclose(shares, [1.0, 0.0], rtol=1e-15)
 
 
 def test_the_systematic_error_covers_what_the_cell_leaves_out_and_its_cure_works(scene):
@@ -155,7 +157,7 @@ def test_the_systematic_error_covers_what_the_cell_leaves_out_and_its_cure_works
     cell = modes(
         lens.fluctuations.spectrum, lens.fluctuations.side(lens.setting.cell), 256
     )
-    weights = cell.energies(G, 0.5)
+    weights = cell.energies(HalfSpace(G, 0.5))
     drawn = np.random.default_rng(1).exponential(size=(2000, weights.size)) @ weights
     draws = (area(W - drawn) - area(W - drawn + np.sum(weights) - STORED)) / area(W)
     error = draws.std() / math.sqrt(draws.size)
@@ -191,7 +193,7 @@ def test_bands_and_clock_steps_leave_out_a_skewness_and_add_a_variance(scene):
     )
     weights = modes(
         lens.fluctuations.spectrum, lens.fluctuations.side(lens.setting.cell), 256
-    ).energies(G, 0.5)
+    ).energies(HalfSpace(G, 0.5))
     left, third = 1.0 - np.sum(weights) / W, 2.0 * np.sum(weights**3) / W**3
     # third derivative of A/A_JKR over Delta Gamma, as A goes with w^(2/3)
     curvature = -8 / 27 * left ** (-7 / 3)
@@ -332,7 +334,7 @@ def drawn(lens, count=50_000):
     cell = modes(
         lens.fluctuations.spectrum, lens.fluctuations.side(lens.setting.cell), 256
     )
-    weights = cell.energies(G, 0.5)
+    weights = cell.energies(HalfSpace(G, 0.5))
     return np.random.default_rng(4).exponential(size=(count, weights.size)) @ weights
 
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from sim.solid import HalfSpace
 from sim.spectrum.families import Gaussian
 
 
@@ -210,8 +211,8 @@ class Draw:
     def shear(self, scale):
         """Return fluctuations that take from a hundredth to twice the work of adhesion."""
         length = scale.size * self.log(0.01, 0.3)
-        unit = Gaussian(rms=1.0, length=length).surface_energy(
-            shear_modulus=scale.modulus
+        unit = HalfSpace(shear_modulus=scale.modulus).stored_energy(
+            Gaussian(rms=1.0, length=length)
         )
         rms = math.sqrt(scale.work * self.log(0.01, 2.0) / unit)
         amplitude = self.choice(

@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 
 from sim.parts.shear import Carried, models as shear
 from sim.plots import field as field_figures, kinds as plots
+from sim.solid import HalfSpace
 from sim.spectrum.families import AnisotropicGaussian, Ripple
 from sim.spectrum.measured import StressMap, Tabulated
 
@@ -71,6 +72,29 @@ def before(**spectrum):
     return field_figures.density_figure(
         load(tomllib.loads(LENS) | {"shear": {"model": "mean", "spectrum": spectrum}})
     )
+
+
+def test_the_figure_of_a_spectrum_shows_the_energy_of_longer_waves_at_any_direction_of_its_streaks():
+    for name, spectrum in (
+        ("12 um by 40 um", AnisotropicGaussian(1e5, 12e-6, 40e-6)),
+        ("40 um by 12 um", AnisotropicGaussian(1e5, 40e-6, 12e-6)),
+    ):
+        sizes = {"length_x": spectrum.length_x, "length_y": spectrum.length_y}
+        _, below = before(**ANISOTROPIC | sizes).axes
+        curve = below.lines[-1]
+        q = curve.get_xdata() * 1e6
+        longer = np.array(
+            [
+                HalfSpace(1.6e6).share_of_long_waves(spectrum, 2.0 * np.pi / each)
+                for each in q[::100]
+            ]
+        )
+        # the curve begins with the longest wave that is shown
+        exact = (longer - longer[0]) / (1.0 - longer[0])
+        # trapezoids of 1500 places between 0.7 and 80 inverse lengths, 0.3 % wide
+        assert_allclose(
+            curve.get_ydata()[::100], exact, rtol=0, atol=1e-5, err_msg=name
+        )
 
 
 def test_a_spectrum_is_drawn_before_any_run_also_by_the_command_which_replaces_nothing(

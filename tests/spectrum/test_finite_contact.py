@@ -5,10 +5,12 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from helpers.discs import disc_energies
+from numpy.testing import assert_allclose
 from scipy import special
 
 from sim.laws import halfspace
+from sim.solid import HalfSpace
 from sim.spectrum.families import (
     AnisotropicGaussian,
     Band,
@@ -76,13 +78,16 @@ def test_waves_along_and_across_a_disc_store_the_tabulated_energy():
         for angle, ratio in ((0.0, along), (math.pi / 2, across)):
             wave = Ripple(2.0, 2e-5 / k, angle)
             assert_allclose(
-                disc_energy(wave, 1e-5, 1.6e6) / wave.surface_energy(1.6e6),
+                disc_energy(wave, 1e-5, HalfSpace(1.6e6).softness)
+                / HalfSpace(1.6e6).stored_energy(wave),
                 ratio,
                 rtol=1e-10,
                 atol=0,
             )
             # the five digits given
-            edge = marginal_energy(wave, 1e-5, 1.6e6) / wave.surface_energy(1.6e6)
+            edge = marginal_energy(wave, 1e-5, HalfSpace(1.6e6).softness) / HalfSpace(
+                1.6e6
+            ).stored_energy(wave)
             assert_allclose(edge, marginal, rtol=5e-6 / 0.9, atol=0)
 
 
@@ -116,13 +121,19 @@ def test_gaussian_exponential_and_band_fields_obey_the_overlap_integral():
                     isotropic(lambda s: np.exp(-((s / xi) ** 2)), nu), marginal
                 )
                 assert_allclose(
-                    energy(gaussian, 1.0, 1.0, nu), exact, rtol=1e-12, atol=0
+                    energy(gaussian, 1.0, HalfSpace(1.0, nu).softness),
+                    exact,
+                    rtol=1e-12,
+                    atol=0,
                 )
                 exact = overlap_integral(
                     isotropic(lambda s: np.exp(-s / xi), nu), marginal
                 )
                 assert_allclose(
-                    energy(exponential, 1.0, 1.0, nu), exact, rtol=1e-11, atol=0
+                    energy(exponential, 1.0, HalfSpace(1.0, nu).softness),
+                    exact,
+                    rtol=1e-11,
+                    atol=0,
                 )
     for waves in [
         (50.0, 20.0),
@@ -138,7 +149,9 @@ def test_gaussian_exponential_and_band_fields_obey_the_overlap_integral():
                 marginal,
                 panels=400 + int(12.0 / waves[1]),
             )
-            assert_allclose(energy(band, 1.0, 1.0), exact, rtol=1e-11, atol=0)
+            assert_allclose(
+                energy(band, 1.0, HalfSpace(1.0).softness), exact, rtol=1e-11, atol=0
+            )
 
 
 def test_streaks_obey_the_overlap_integral_and_a_self_affine_field_is_the_sum_of_its_bands():
@@ -162,7 +175,10 @@ def test_streaks_obey_the_overlap_integral_and_a_self_affine_field_is_the_sum_of
                     40,
                 )
                 assert_allclose(
-                    energy(spectrum, 1.0, 1.0, nu), exact, rtol=1e-11, atol=0
+                    energy(spectrum, 1.0, HalfSpace(1.0, nu).softness),
+                    exact,
+                    rtol=1e-11,
+                    atol=0,
                 )
     spectrum = SelfAffine(1.0, 0.8, 0.8, 0.3, 0.01)
     q1, q2 = spectrum.support
@@ -173,30 +189,50 @@ def test_streaks_obey_the_overlap_integral_and_a_self_affine_field_is_the_sum_of
     # a ring's energy is the mean of its two principal waves; variance of each ring from the closed form
     rings = np.diff(spectrum.cumulative(edge)) * ratio / (2 * waves.variance)
     # 4000 rings a step of 1.5e-3 wide: the oscillation sin(x)/x^2, x up to 1200, turns by 0.1 to 1 rad a ring
-    assert_allclose(disc_energy(spectrum, 1.0, 1.0), np.sum(rings), rtol=1e-5, atol=0)
+    assert_allclose(
+        disc_energy(spectrum, 1.0, HalfSpace(1.0).softness),
+        np.sum(rings),
+        rtol=1e-5,
+        atol=0,
+    )
 
 
 def test_a_disc_of_many_waves_is_the_plane_and_below_every_wavelength_the_stress_is_uniform():
     for spectrum in SPECTRA:
         for nu in RATIOS:
-            plane = spectrum.surface_energy(1.6e6, nu)
+            plane = HalfSpace(1.6e6, nu).stored_energy(spectrum)
             for energy in (disc_energy, marginal_energy):
                 # the deficit is of first order in length/a or less, with a factor below 2
                 assert_allclose(
-                    energy(spectrum, 1e6, 1.6e6, nu), plane, rtol=1e-6, atol=0
+                    energy(spectrum, 1e6, HalfSpace(1.6e6, nu).softness),
+                    plane,
+                    rtol=1e-6,
+                    atol=0,
                 )
                 assert_allclose(
-                    energy(spectrum, np.inf, 1.6e6, nu), plane, rtol=1e-14, atol=0
+                    energy(spectrum, np.inf, HalfSpace(1.6e6, nu).softness),
+                    plane,
+                    rtol=1e-14,
+                    atol=0,
                 )
-                assert energy(spectrum, 0.0, 1.6e6, nu) == 0.0
+                assert energy(spectrum, 0.0, HalfSpace(1.6e6, nu).softness) == 0.0
     spectrum = Gaussian(1.0, 1e-3)
-    plane, deficit = spectrum.surface_energy(1.0), 2 / np.pi * 1e-3 / math.sqrt(math.pi)
+    plane, deficit = (
+        HalfSpace(1.0).stored_energy(spectrum),
+        2 / np.pi * 1e-3 / math.sqrt(math.pi),
+    )
     # 1 - (2/pi) xi/(sqrt(pi) a), and half of it for the margin; the next term is cubic in xi/a
     assert_allclose(
-        1 - disc_energy(spectrum, 1.0, 1.0) / plane, deficit, rtol=2e-6, atol=0
+        1 - disc_energy(spectrum, 1.0, HalfSpace(1.0).softness) / plane,
+        deficit,
+        rtol=2e-6,
+        atol=0,
     )
     assert_allclose(
-        1 - marginal_energy(spectrum, 1.0, 1.0) / plane, deficit / 2, rtol=2e-6, atol=0
+        1 - marginal_energy(spectrum, 1.0, HalfSpace(1.0).softness) / plane,
+        deficit / 2,
+        rtol=2e-6,
+        atol=0,
     )
     for spectrum in SPECTRA:
         for nu in RATIOS:
@@ -207,10 +243,16 @@ def test_a_disc_of_many_waves_is_the_plane_and_below_every_wavelength_the_stress
             # a correlation that falls like s^(2H) is the slowest: 1.1 (a/xi)^0.6 at H = 0.3
             rtol = 2e-4 if spectrum.model == "von_karman" else 2e-5
             assert_allclose(
-                disc_energy(spectrum, a, 1.0, nu), uniform, rtol=rtol, atol=0
+                disc_energy(spectrum, a, HalfSpace(1.0, nu).softness),
+                uniform,
+                rtol=rtol,
+                atol=0,
             )
             assert_allclose(
-                marginal_energy(spectrum, a, 1.0, nu), 1.5 * uniform, rtol=rtol, atol=0
+                marginal_energy(spectrum, a, HalfSpace(1.0, nu).softness),
+                1.5 * uniform,
+                rtol=rtol,
+                atol=0,
             )
 
 
@@ -220,12 +262,12 @@ def test_marginal_energy_is_the_derivative_of_the_energy():
     radius = a[:, None] * (1 + h * np.array([-3, -2, -1, 1, 2, 3]))
     weight = np.array([-1, 9, -45, 45, -9, 1]) / 60
     for spectrum in SPECTRA:
-        total = radius**2 * disc_energy(spectrum, radius, 1.0, 0.3)
+        total = radius**2 * disc_energy(spectrum, radius, HalfSpace(1.0, 0.3).softness)
         slope = np.sum(weight * total, axis=1) / (2 * h * a**2)
         # x = 2qa reaches 1200 for the largest disc; that part of E is a millionth, its h^6 term stays below 1e-7
         assert_allclose(
             slope,
-            marginal_energy(spectrum, a, 1.0, 0.3),
+            marginal_energy(spectrum, a, HalfSpace(1.0, 0.3).softness),
             rtol=2e-7,
             atol=0,
             err_msg=spectrum.model,
@@ -235,11 +277,7 @@ def test_marginal_energy_is_the_derivative_of_the_energy():
 def test_a_radius_that_is_no_length_is_refused():
     for spectrum in (Gaussian(1.0, 1.0), Ripple(1.0, 1.0)):
         with pytest.raises(ValueError, match="at least zero"):
-            disc_energy(spectrum, np.nan, 1.0)
-    with pytest.raises(ValueError, match="at least twice the radius"):
-        halfspace.disc_energy_of_map(
-            np.ones((2, 8, 8)), 1.0, np.array([0.1, np.inf]), 1.0
-        )
+            disc_energy(spectrum, np.nan, HalfSpace(1.0).softness)
 
 
 def test_the_map_of_a_wave_converges_to_the_table_in_second_order():
@@ -247,9 +285,7 @@ def test_the_map_of_a_wave_converges_to_the_table_in_second_order():
         for angle, ratio in ((0.0, along), (math.pi / 2, across)):
             exact = ratio * PLANE[angle] / (np.pi * k)
             coarse, fine = (
-                np.mean(
-                    halfspace.disc_energy_of_map(wave_maps(n, k, angle), 2.0, 1.0, 1.0)
-                )
+                np.mean(disc_energies(wave_maps(n, k, angle), 2.0, 1.0, HalfSpace(1.0)))
                 for n in (128, 256)
             )
             # a quarter of the error, 0.24 k (pixel/a)^2 at most
@@ -257,16 +293,16 @@ def test_the_map_of_a_wave_converges_to_the_table_in_second_order():
             assert 3.5 < (coarse - exact) / (fine - exact) < 4.8
             assert_allclose((4 * fine - coarse) / 3, exact, rtol=1e-5, atol=0)
     for nu in [0.0, 0.3]:  # oblique, at any Poisson ratio
-        exact = disc_energy(Ripple(1.0, 2 / 3, 0.5), 0.77, 1.0, nu)
+        exact = disc_energy(Ripple(1.0, 2 / 3, 0.5), 0.77, HalfSpace(1.0, nu).softness)
         energy = np.mean(
-            halfspace.disc_energy_of_map(wave_maps(160, 3, 0.5), 2.0, 0.77, 1.0, nu)
+            disc_energies(wave_maps(160, 3, 0.5), 2.0, 0.77, HalfSpace(1.0, nu))
         )
         assert_allclose(energy, exact, rtol=0.3 * 3 * (2 / 160 / 0.77) ** 2, atol=0)
     # the disc has no images of itself: the cell around it does not matter
-    small = halfspace.disc_energy_of_map(np.ones((40, 40)), 1.0, 0.5, 1.0)
+    small = disc_energies(np.ones((40, 40)), 1.0, 0.5, HalfSpace(1.0))
     assert_allclose(
         small,
-        halfspace.disc_energy_of_map(np.ones((120, 120)), 3.0, 0.5, 1.0),
+        disc_energies(np.ones((120, 120)), 3.0, 0.5, HalfSpace(1.0)),
         rtol=1e-13,
         atol=0,
     )
@@ -280,7 +316,7 @@ def test_a_uniform_map_stores_its_energy():
         # the edge is blurred over a pixel: 0.1 (pixel/a)^2 relative
         rtol = 0.1 * (2.0 / points / a) ** 2
         assert_allclose(
-            halfspace.disc_energy_of_map(field, 2.0, a, 2.0, nu),
+            disc_energies(field, 2.0, a, HalfSpace(2.0, nu)),
             exact,
             rtol=rtol,
             atol=0,
@@ -313,12 +349,12 @@ def five_sigma_of_spread(sample):
 def test_discs_of_random_maps_average_to_the_overlap_integral_that_is_expected():
     # a cell of 3 a: the ends of the disc are 1 a apart through the border, correlated by e^-44
     xi, members, pixel = 0.15, 2000, 0.05
-    energy = halfspace.disc_energy_of_map(
-        gaussian_maps(members, 60, 3.0, xi, seed=11), 3.0, 1.0, 1.0
+    energy = disc_energies(
+        gaussian_maps(members, 60, 3.0, xi, seed=11), 3.0, 1.0, HalfSpace(1.0)
     )
     exact, plane = (
-        disc_energy(Gaussian(1.0, xi), 1.0, 1.0),
-        Gaussian(1.0, xi).surface_energy(1.0),
+        disc_energy(Gaussian(1.0, xi), 1.0, HalfSpace(1.0).softness),
+        HalfSpace(1.0).stored_energy(Gaussian(1.0, xi)),
     )
     error = 5 * energy.std() / math.sqrt(members)
     assert abs(energy.mean() - exact) < error + 0.6 * pixel**2 * exact
@@ -330,22 +366,3 @@ def test_discs_of_random_maps_average_to_the_overlap_integral_that_is_expected()
     )
     # and exactly, to the same two digits
     assert_allclose(exact / plane, 0.939, rtol=0.01, atol=0)
-
-
-def test_a_map_has_the_same_energy_alone_and_in_a_batch():
-    maps, radius = (
-        gaussian_maps(5, 40, 2.0, 0.3, seed=3),
-        np.array([0.4, 1.0, 0.0, 0.77, 0.4]),
-    )
-
-    def energy(field, a):
-        return halfspace.disc_energy_of_map(field, 2.0, a, 1.6e6)
-
-    batch = energy(maps, radius)
-    assert_array_equal(
-        batch, [energy(field, a) for field, a in zip(maps, radius, strict=True)]
-    )
-    assert_array_equal(batch[3:], energy(maps[3:], radius[3:]))
-    assert batch[2] == 0.0
-    assert energy(maps[:, None], radius[:2]).shape == (5, 2)
-    assert np.isnan(energy(maps[0], np.nan))

@@ -11,6 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from sim.numerics.grid import Grid, Lattice
 from sim.scenario.files import Files
+from sim.solid import HalfSpace
 from sim.spectrum import (
     Measured,
     SelfAffine,
@@ -56,8 +57,8 @@ def test_a_table_in_persson_s_convention_is_four_pi_squared_larger_and_may_fall(
     )
     assert_allclose(persson.variance, factor * plain.variance, rtol=1e-15, atol=0)
     assert_allclose(
-        persson.surface_energy(1.0),
-        factor * plain.surface_energy(1.0),
+        HalfSpace(1.0).stored_energy(persson),
+        factor * HalfSpace(1.0).stored_energy(plain),
         rtol=1e-15,
         atol=0,
     )
@@ -123,7 +124,10 @@ def test_a_table_between_its_rows_is_a_power_law_or_linear_next_to_a_zero():
     )
     assert_allclose(table.variance, law.variance, rtol=1e-13, atol=0)
     assert_allclose(
-        table.surface_energy(2.0, 0.3), law.surface_energy(2.0, 0.3), rtol=1e-13, atol=0
+        HalfSpace(2.0, 0.3).stored_energy(table),
+        HalfSpace(2.0, 0.3).stored_energy(law),
+        rtol=1e-13,
+        atol=0,
     )
     linear = Tabulated((1.0, 3.0, 4.0), (0.0, 4.0, 0.0)).radial_density(
         [1.0, 2.0, 3.0, 3.5, 4.0, 4.1]
@@ -216,7 +220,7 @@ def test_a_measured_map_is_a_table_of_its_own_density(files, points):
     )
     # (2 - ν)/(8πG) ∫ C dq at ν = 1/2
     exact = 0.75 / (4 * math.pi) * level * (high - low)
-    assert_allclose(result.surface_energy(1.0), exact, rtol=1e-9, atol=0)
+    assert_allclose(HalfSpace(1.0).stored_energy(result), exact, rtol=1e-9, atol=0)
     table = Tabulated(result.wavenumbers, result.densities)
     q = np.linspace(0.0, 50.0, 99)
     assert np.array_equal(table.radial_density(q), result.radial_density(q))
@@ -279,8 +283,8 @@ def test_a_spectrum_keeps_its_shape_at_another_rms(files):
                 atol=0,
             )
             assert_allclose(
-                scaled.surface_energy(1.0),
-                factor * spectrum.surface_energy(1.0),
+                HalfSpace(1.0).stored_energy(scaled),
+                factor * HalfSpace(1.0).stored_energy(spectrum),
                 rtol=1e-13,
                 atol=0,
             )

@@ -20,21 +20,30 @@ import numpy as np
 from sim.laws import jkr
 from sim.laws.jkr import series_shares
 from sim.laws.reversible import (
-    mean_stress_energy,
     radius_at_displacement_reversible,
     radius_at_load_reversible,
 )
 from sim.numerics.jit import device, kernel
 from sim.parts.exchange import Array, Flags, Mount
+from sim.solid import ElasticSolid
 from sim.spectrum.radial import Terms, share_of
 
 
 class Bodies(NamedTuple):
-    """Radius R of the sphere [m], contact modulus E* [Pa] and Poisson ratio of the half-space [1]."""
+    """Radius R of the sphere [m], and the solid that it touches."""
 
     sphere_radius: float
-    modulus: float
-    poisson_ratio: float
+    solid: ElasticSolid
+
+    @property
+    def modulus(self) -> float:
+        """Contact modulus E* [Pa]."""
+        return self.solid.contact_modulus
+
+    @property
+    def numbers(self) -> tuple[float, float, float]:
+        """R [m], E* [Pa] and ν [1], as the closed forms of a sphere on a half-space take them."""
+        return self.sphere_radius, self.modulus, self.solid.poisson_ratio
 
 
 def elastic_energy(radius: Array, indentation: Array, bodies: Bodies) -> Array:
@@ -73,9 +82,11 @@ class LoadControl:
     ) -> Array:
         """Return the largest stable equilibrium radius [m]: Hertz's if no work of adhesion is left, nan without one."""
         if reversible == 0.0:
-            return np.asarray(jkr.radius_at_load(self.load, work, *bodies[:2]))
+            return np.asarray(jkr.radius_at_load(self.load, work, *bodies.numbers[:2]))
         return np.asarray(
-            radius_at_load_reversible(self.load, work, stress, reversible, *bodies)
+            radius_at_load_reversible(
+                self.load, work, stress, reversible, *bodies.numbers
+            )
         )
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
@@ -133,24 +144,26 @@ class DisplacementControl:
         """Return the largest stable equilibrium radius [m]: Hertz's if no work of adhesion is left, nan without one."""
         machine = self.base, self.stiffness
         if reversible == 0.0:
-            return np.asarray(jkr.radius_at_displacement(*machine, work, *bodies[:2]))
+            return np.asarray(
+                jkr.radius_at_displacement(*machine, work, *bodies.numbers[:2])
+            )
         return np.asarray(
             radius_at_displacement_reversible(
-                *machine, work, stress, reversible, *bodies
+                *machine, work, stress, reversible, *bodies.numbers
             )
         )
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
         """Return the load on the sphere [N]; 0 if the contact is open."""
         load = jkr.load_under_displacement(
-            radius, self.base, self.stiffness, *bodies[:2]
+            radius, self.base, self.stiffness, *bodies.numbers[:2]
         )
         return np.where(np.isnan(radius), 0.0, load)
 
     def indentation(self, radius: Array, bodies: Bodies) -> Array:
         """Return the indentation [m]; if the contact is open, the displacement of the base of the unloaded spring."""
         closed = jkr.indentation_under_displacement(
-            radius, self.base, self.stiffness, *bodies[:2]
+            radius, self.base, self.stiffness, *bodies.numbers[:2]
         )
         return np.where(np.isnan(radius), self.base, closed)
 
@@ -211,7 +224,7 @@ class Balance(NamedTuple):
     margin : Shares, optional
         Share of ``fluctuating`` that a contact of finite radius [m] pays when it grows [1].
     bodies : Bodies
-        Sphere and half-space.
+        Sphere and solid.
     reference : float
         Work of adhesion at rest [J/m²], the unit of G − w in crack-front kinetics.
     """
@@ -245,10 +258,7 @@ class Balance(NamedTuple):
 
         It is 6 τ0² a/(π E*) for an incompressible half-space.
         """
-        _, modulus, poisson_ratio = self.bodies
-        return np.asarray(
-            mean_stress_energy(radius, self.stress, modulus, poisson_ratio)
-        )
+        return self.bodies.solid.mean_stress_energy(radius, self.stress)
 
     def gained(self, radius: Array, reversible: float) -> Array:
         """Return the energy that adhesion has released for the area of a contact: ∫ w dA over its radii [J]."""

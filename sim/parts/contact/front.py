@@ -880,7 +880,7 @@ def follow(
     out = np.empty((len(before), len(durations), rows))
     for row, values in zip(before, [*state[:4], *state.turn.T], strict=True):
         row[:] = values
-    sphere_radius, modulus, _ = balance.bodies
+    sphere_radius, modulus, _ = balance.bodies.numbers
     spot = _SPOT * math.cbrt(balance.reference * sphere_radius**2 / modulus)
     _follow(
         before,

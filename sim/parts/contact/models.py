@@ -29,6 +29,7 @@ from sim.parts.contact.balance import (
 )
 from sim.parts.contact.front import Kinetics, follow as follow_front
 from sim.parts.exchange import TURN, Array, ContactState, Flags, Motion, Setting, during
+from sim.solid import ElasticSolid, HalfSpace
 from sim.units.quantity import Quantity, keyed
 from sim.units.tables import Prescribed, over_time, prescribed
 
@@ -101,26 +102,21 @@ class Solid(Body):
     counter_body: Body | None = None
 
     @cached_property
-    def effective(self) -> tuple[float, float]:
-        """G [Pa] and nu [1] of the half-space that yields as the two bodies together.
+    def elastic(self) -> ElasticSolid:
+        """The half-space that yields as the two bodies together.
 
         The bodies' 1/G and nu/G add, and with them both the tangential and the normal compliance.
         """
+        own = self.own_shear_modulus, self.poisson_ratio
         if self.counter_body is None:
-            return self.own_shear_modulus, self.poisson_ratio
+            return HalfSpace(*own)
         other = self.counter_body
-        return in_series(
-            self.own_shear_modulus,
-            self.poisson_ratio,
-            other.own_shear_modulus,
-            other.poisson_ratio,
-        )
+        return HalfSpace(*in_series(*own, other.own_shear_modulus, other.poisson_ratio))
 
-    @cached_property
+    @property
     def contact_modulus(self) -> float:
-        """E* = 2G/(1 - nu) of the effective half-space [Pa]; 4G for one incompressible body."""
-        shear_modulus, poisson_ratio = self.effective
-        return 2.0 * shear_modulus / (1.0 - poisson_ratio)
+        """E* of both bodies together [Pa]; 4G for one incompressible body."""
+        return self.elastic.contact_modulus
 
 
 @keyed()
@@ -202,7 +198,7 @@ class EffectiveWork(NamedTuple):
     margin : Shares, optional
         Share of that at the edge of a finite contact.
     bodies : Bodies
-        Sphere and half-space.
+        Sphere and solid.
     """
 
     adhesion: Adhesion
@@ -362,22 +358,14 @@ class _Controlled:
         """True if the control changes in time."""
         return self.course.changes
 
-    def equilibrium_radius(
-        self, work: Array, sphere_radius: float, modulus: float
-    ) -> Array:
+    def equilibrium_radius(self, work: Array, bodies: Bodies) -> Array:
         """Return the JKR radius at the start for a work of adhesion; Hertz's if it is not positive; nan if open."""
-        return self.control(0.0, 0.0).radius(
-            work, np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5)
-        )
+        return self.control(0.0, 0.0).radius(work, np.zeros(1), 0.0, bodies)
 
-    def largest_radius(
-        self, work: float, sphere_radius: float, modulus: float
-    ) -> float:
+    def largest_radius(self, work: float, bodies: Bodies) -> float:
         """Return the JKR radius for a work of adhesion as the control presses most [m]; 0 without equilibrium."""
         control = self._control(max(self.course.extremes))
-        radius = control.radius(
-            np.array([work]), np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5)
-        )
+        radius = control.radius(np.array([work]), np.zeros(1), 0.0, bodies)
         return float(np.nan_to_num(radius[0]))
 
     def start(self, motion: Motion, duration: float, balance: Balance) -> ContactState:

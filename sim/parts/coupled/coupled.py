@@ -12,7 +12,6 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from sim.laws.reversible import mean_stress_energy
 from sim.numerics.noise import Noise
 from sim.parts.contact.balance import Bodies
 from sim.parts.coupled.mechanics import COLUMNS, ROW, Inputs, Slider
@@ -79,9 +78,7 @@ class StepContact(NamedTuple):
     undisturbed : bool
         True if fluctuations never change the contact.
     bodies : Bodies
-        R [m], E* [Pa], ν [1].
-    shear_modulus : float
-        G [Pa] of the effective half-space.
+        Sphere and solid.
     area : float
         Area at rest, by which forces are measured [m²].
     """
@@ -97,7 +94,6 @@ class StepContact(NamedTuple):
     stays: bool
     undisturbed: bool
     bodies: Bodies
-    shear_modulus: float
     area: float
 
 
@@ -150,7 +146,7 @@ def load(
     speed, radius = slider.speed, np.fmax(contact.radius, 0.0)
     area, (yields, slope) = (
         np.pi * radius**2,
-        drive.yields(contact.shear_modulus, contact.bodies.poisson_ratio),
+        drive.yields(contact.bodies.solid),
     )
     friction = area * bonding.stress
     sheared = friction * (
@@ -314,9 +310,7 @@ def with_contact(
     )
     closes = (area > 0.0) & ((sliders.radius == 0.0) | reached.lost)
     if closes.any():
-        yields, slope = drive.yields(
-            contact.shear_modulus, contact.bodies.poisson_ratio
-        )
+        yields, slope = drive.yields(contact.bodies.solid)
         elastic = None
         if yields + slope > 0.0:
             size = np.where(area > 0.0, radius, 1.0)
@@ -341,10 +335,7 @@ def _numbers(
     stretch, force = units
     stiff, density = force / stretch, force / (stretch * contact.area)
     bodies = contact.bodies
-    yields, slope = (
-        stiff * value
-        for value in drive.yields(contact.shear_modulus, bodies.poisson_ratio)
-    )
+    yields, slope = (stiff * value for value in drive.yields(bodies.solid))
     body = (
         drive.spring / stiff,
         drive.mass / stiff,
@@ -366,7 +357,7 @@ def _numbers(
     mean_stress = 0.0
     if contact.reversible:
         mean_stress = contact.reversible * float(
-            mean_stress_energy(1.0, density * stretch, *bodies[1:])
+            bodies.solid.mean_stress_energy(1.0, density * stretch)
         )
     still = (
         contact.bare,

@@ -19,7 +19,6 @@ from functools import cached_property
 
 import numpy as np
 
-from sim.laws.halfspace import compliance
 from sim.numerics.jit import inlined, kernel
 from sim.numerics.noise import Noise, gamma, normal, stream
 from sim.parts.exchange import Array, Draws, Gammas, Indices, during
@@ -31,6 +30,7 @@ from sim.parts.shear.process import (
     Renewing,
     factors,
 )
+from sim.solid import ElasticSolid
 from sim.spectrum.family import Family
 
 #: Squares handled at a time.
@@ -59,11 +59,7 @@ class Pairs:
 
 
 def cell_pairs(
-    spectrum: Family,
-    cell: float,
-    points: int | None,
-    shear_modulus: float,
-    poisson_ratio: float,
+    spectrum: Family, cell: float, points: int | None, solid: ElasticSolid
 ) -> Pairs:
     """Return the mode pairs of a cell, listed near q = 0 where the weight is, counted in blocks beyond.
 
@@ -75,8 +71,8 @@ def cell_pairs(
         Side L of the cell [m].
     points : int, optional
         Points of the grid along a side; by default enough for the spectrum's shortest wave.
-    shear_modulus, poisson_ratio : float
-        G [Pa], nu [1].
+    solid : ElasticSolid
+        The solid that stores their energy.
 
     Returns
     -------
@@ -95,14 +91,12 @@ def cell_pairs(
     """
     if spectrum.wavevector is not None:
         cell_modes = modes(spectrum, cell, points)
-        weight = cell_modes.energies(shear_modulus, poisson_ratio)
+        weight = cell_modes.energies(solid)
         return Pairs(weight, np.hypot(cell_modes.qx, cell_modes.qy), np.ones(1))
     reach, _ = grid_reach(spectrum, cell, points)
     levels, block = [], 1
     while block == 1 or _LISTED * (block // 3) + block // 6 < reach:
-        levels.append(
-            _level(spectrum, cell, reach, block, shear_modulus, poisson_ratio)
-        )
+        levels.append(_level(spectrum, cell, reach, block, solid))
         block *= 3
     pairs = Pairs(*(np.concatenate(parts) for parts in zip(*levels, strict=True)))
     if not pairs.weight.size:
@@ -115,15 +109,14 @@ def _level(
     cell: float,
     reach: int,
     block: int,
-    shear_modulus: float,
-    poisson_ratio: float,
+    solid: ElasticSolid,
 ) -> tuple[Array, Array, Array]:
     """Return weight, wavenumber and count of the blocks of block² pixels around the finer ones."""
     step = 2.0 * math.pi / cell
     outermost = min(_LISTED, math.ceil((reach + 0.5) / block - 0.5))
     ix, iy, share = half_lattice(spectrum, cell / block, outermost)
     if block == 1:
-        softness = compliance(ix, iy, shear_modulus * step, poisson_ratio)
+        softness = solid.compliance(step * ix, step * iy)
         return softness * share, step * np.hypot(ix, iy), np.ones(ix.size)
     farthest = np.maximum(np.abs(ix), iy)
     listed = farthest > (_LISTED - 1) // 3
@@ -146,7 +139,7 @@ def _level(
                 block * iy[some],
                 size,
                 side,
-                poisson_ratio,
+                solid,
             )
             full = sums[-1] > 0.0
             stress, energy, outward, square = (values[full] for values in sums)
@@ -161,7 +154,7 @@ def _level(
                 )
             )
     weight, wavenumber, count = np.concatenate(rows, axis=1)
-    return weight / (shear_modulus * step), step * wavenumber, count
+    return weight, step * wavenumber, count
 
 
 def _counted(
@@ -172,7 +165,7 @@ def _counted(
     y: Indices,
     size: float,
     side: int,
-    poisson_ratio: float,
+    solid: ElasticSolid,
 ) -> tuple[Array, ...]:
     """Return sums over blocks around (x, y) [pixels]: stress, energy, energy × wavenumber, energy squared.
 
@@ -192,7 +185,7 @@ def _counted(
     on_grid = np.clip((last - np.abs(qx)) / size + 0.5, 0.0, 1.0) * np.clip(
         (last - qy) / size + 0.5, 0.0, 1.0
     )
-    energy = compliance(qx, qy, 1.0, poisson_ratio) * on_grid * density
+    energy = solid.compliance(step * qx, step * qy) * on_grid * density
     # of the pixels in a square only those on the edge are inside in part
     square = energy**2 * inside * (1.0 - (1.0 - inside) / size)
     sums = density * inside, energy * inside, energy * inside * radius, square

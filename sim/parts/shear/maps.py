@@ -16,6 +16,7 @@ from sim.laws.halfspace import disc_energies_of_map, soft_disc
 from sim.numerics.grid import Lattice
 from sim.parts.exchange import Array
 from sim.parts.shear.process import Fluctuation, SmoothProcess
+from sim.solid import ElasticSolid
 from sim.spectrum.measured import StressMap
 from sim.spectrum.radial import Terms
 
@@ -82,7 +83,7 @@ class Passing:
     """
 
     field: StressMap
-    poisson_ratio: float
+    solid: ElasticSolid
     widest: float
     position: Array
 
@@ -118,11 +119,14 @@ class Passing:
             padded = np.pad(self.field.field, half)
             window = padded[place : place + 2 * half, across : across + 2 * half]
             energies = disc_energies_of_map(
-                window, pixel, self.radii, 1.0, self.poisson_ratio, self._discs
+                window,
+                pixel,
+                self.radii,
+                self.solid.shear_modulus,
+                self.solid.poisson_ratio,
+                self._discs,
             )
-            self._rows[place] = energies / self.field.surface_energy(
-                1.0, self.poisson_ratio
-            )
+            self._rows[place] = energies / self.solid.stored_energy(self.field)
         return self._rows[place]
 
     @cached_property

@@ -15,6 +15,7 @@ import scipy
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
+from sim.laws.halfspace import noise_energy
 from sim.numerics import disk_cache, jit
 from sim.parts.exchange import Setting
 from sim.parts.shear.bands import BandedProcess, Bands, cell_pairs, group
@@ -26,16 +27,16 @@ from sim.parts.shear.modes import (
     SiteModes,
     cell_variance,
     modes,
+    relative_error,
 )
 from sim.parts.shear.process import Amplitude, Constant, Correlation, SmoothProcess
+from sim.solid import ElasticSolid
 from sim.spectrum.families import Ripple, Spectrum
 from sim.spectrum.family import Family
 from sim.spectrum.measured import Measured, StressMap
 from sim.spectrum.radial import Margin, marginal_energy
 from sim.units.quantity import Quantity, keyed, tagged
 
-#: Side and points of a cell, Poisson's ratio; power of the rates, tolerance, and whether the amplitude relaxes.
-_CellOf = tuple[float, int | None, float, int, float, bool]
 Paid = Annotated[
     float,
     Quantity(
@@ -165,23 +166,19 @@ class ShearModel:
         """Return the reason for the choice, in words; empty without a choice."""
         return ""
 
-    def process(
-        self, shear_modulus: float, poisson_ratio: float, cell: float
-    ) -> Process:
+    def process(self, solid: ElasticSolid, cell: float) -> Process:
         """Return the process on a solid, by default with a ``cell`` of this side [m]."""
         raise NotImplementedError
 
-    def faults(
-        self, shear_modulus: float, poisson_ratio: float, rest_radius: float
-    ) -> list[tuple[str, str]]:
+    def faults(self, solid: ElasticSolid, rest_radius: float) -> list[tuple[str, str]]:
         """Return reasons why the process cannot be built on a solid and a contact at rest, each as (key, words)."""
         return []
 
     def margin(
-        self, solid: tuple[float, float], sphere_radius: float, widest: float
+        self, solid: ElasticSolid, sphere_radius: float, widest: float
     ) -> Margin | Passing:
-        """Return the share of ΔΓ that a contact of up to the ``widest`` radius [m] pays on a solid (G, ν)."""
-        return _margin(self.spectrum, *solid, sphere_radius)
+        """Return the share of ΔΓ that a contact of up to the ``widest`` radius [m] pays on a solid."""
+        return _margin(self.spectrum, solid.unit.softness, sphere_radius)
 
     def off_the_map(
         self, positions: tuple[float, float], radius: float
@@ -194,15 +191,8 @@ class ShearModel:
         return []
 
     def remarks(self, setting: Setting) -> list[str]:
-        spectrum, radius, solid = (
-            self.spectrum,
-            setting.rest_radius,
-            (setting.shear_modulus, setting.poisson_ratio),
-        )
-        plane, rms = (
-            float(spectrum.surface_energy(*solid)),
-            math.sqrt(spectrum.variance),
-        )
+        spectrum, radius, solid = self.spectrum, setting.rest_radius, setting.solid
+        plane, rms = solid.stored_energy(spectrum), math.sqrt(spectrum.variance)
         if not plane > 0.0:
             return []
         remarks = list(spectrum.remarks)
@@ -224,7 +214,7 @@ class ShearModel:
                 "the spectrum has waves longer than the cell, which are omitted: give a larger shear.cell"
             )
         if self.contact == "plane" and radius > 0.0:
-            share = float(marginal_energy(spectrum, radius, *solid)) / plane
+            share = float(marginal_energy(spectrum, radius, solid.softness)) / plane
             long = min(longest, side) > 2.0 * radius
             what = (
                 "the longest waves exceed the contact, which"
@@ -234,8 +224,8 @@ class ShearModel:
             off = f"{what} stores {share:.1%} of the fluctuation energy of the plane per new area"
             if abs(share - 1.0) > self.tolerance:
                 remarks.append(f'{off}: shear.contact = "disc" takes that into account')
-        if not spectrum.bond_made and rms > setting.shear_modulus:
-            times = f"{rms / setting.shear_modulus:.3g} times the shear modulus"
+        if not spectrum.bond_made and rms > solid.shear_modulus:
+            times = f"{rms / solid.shear_modulus:.3g} times the shear modulus"
             remarks.append(
                 f"the rms of the fluctuations is {times}, beyond linear elasticity: check shear.spectrum"
             )
@@ -254,9 +244,7 @@ class Uniform(ShearModel):
     model: Literal["uniform"] = "uniform"
     stays: ClassVar[bool] = True
 
-    def process(
-        self, shear_modulus: float, poisson_ratio: float, cell: float
-    ) -> SmoothProcess:
+    def process(self, solid: ElasticSolid, cell: float) -> SmoothProcess:
         return SmoothProcess(0.0, Constant())
 
 
@@ -289,13 +277,9 @@ class Mean(ShearModel):
     def in_blocks(self) -> bool:  # type: ignore[override]
         return self.amplitude.model in _FOLLOWED and not self.spectrum.bond_made
 
-    def process(
-        self, shear_modulus: float, poisson_ratio: float, cell: float
-    ) -> SmoothProcess:
+    def process(self, solid: ElasticSolid, cell: float) -> SmoothProcess:
         kind = SiteMean if self.spectrum.bond_made else SmoothProcess
-        return kind(
-            float(self.spectrum.surface_energy(shear_modulus, poisson_ratio)), self.law
-        )
+        return kind(solid.stored_energy(self.spectrum), self.law)
 
 
 @keyed()
@@ -326,9 +310,7 @@ class _Fluctuating(ShearModel):
     def side(self, cell: float) -> float:
         return cell if self.cell is None else self.cell
 
-    def faults(
-        self, shear_modulus: float, poisson_ratio: float, rest_radius: float
-    ) -> list[tuple[str, str]]:
+    def faults(self, solid: ElasticSolid, rest_radius: float) -> list[tuple[str, str]]:
         cell = self.side(math.sqrt(math.pi) * rest_radius)
         if self.contact == "disc" and self.draws_maps and not 2.0 * rest_radius <= cell:
             if math.isnan(rest_radius):
@@ -356,7 +338,7 @@ class _Fluctuating(ShearModel):
                 )
             ]
         try:
-            self.process(shear_modulus, poisson_ratio, cell)
+            self.process(solid, cell)
         except PydanticCustomError as fault:
             return [("", fault.message())]
         return []
@@ -387,15 +369,13 @@ class Modal(_Fluctuating):
 
     keeps_modes: ClassVar[bool] = True
 
-    def process(
-        self, shear_modulus: float, poisson_ratio: float, cell: float
-    ) -> ModalProcess:
+    def process(self, solid: ElasticSolid, cell: float) -> ModalProcess:
         free_or_fixed = (
             FixedProcess if self.mode_amplitudes == "fixed" else ModalProcess
         )
         kind = SiteModes if self.spectrum.bond_made else free_or_fixed
         of_cell = modes(self.spectrum, self.side(cell), self.points)
-        return kind(of_cell, shear_modulus, poisson_ratio, self.correlation, self.law)
+        return kind(of_cell, solid, self.correlation, self.law)
 
 
 @keyed()
@@ -409,10 +389,8 @@ class Mapped(Modal):
 
     draws_maps: ClassVar[bool] = True
 
-    def process(
-        self, shear_modulus: float, poisson_ratio: float, cell: float
-    ) -> ModalProcess:
-        process = super().process(shear_modulus, poisson_ratio, cell)
+    def process(self, solid: ElasticSolid, cell: float) -> ModalProcess:
+        process = super().process(solid, cell)
         if not process.modes.on_lattice:
             message = "a map is periodic: make the cell a whole number of wavelengths along x and along y"
             raise PydanticCustomError("off_lattice", message)
@@ -448,20 +426,13 @@ class Banded(_Fluctuating):
         return self
 
     def process(
-        self, shear_modulus: float, poisson_ratio: float, cell: float
+        self, solid: ElasticSolid, cell: float
     ) -> BandedProcess | SmoothProcess:
         spectrum, size = _of_unit_size(self.spectrum)
-        power, relaxing = self.correlation.power, self.amplitude.relaxing
-        cell_of = (
-            self.side(cell),
-            self.points,
-            poisson_ratio,
-            power,
-            self.tolerance,
-            relaxing,
-        )
-        unit, errors = _grouped(spectrum, cell_of)
-        bands = replace(unit, weight=unit.weight * (size / shear_modulus))
+        banding = self.correlation.power, self.tolerance, self.amplitude.relaxing
+        side, points = self.side(cell), self.points
+        unit, errors = _grouped(spectrum, side, points, solid.unit, banding)
+        bands = replace(unit, weight=unit.weight * (size / solid.shear_modulus))
         if self.mode_amplitudes == "fixed":
             return SmoothProcess(bands.mean, self.law)
         return BandedProcess(bands, errors, self.correlation, self.law)
@@ -477,29 +448,41 @@ def _of_unit_size(spectrum: Family) -> tuple[Family, float]:
 
 # as many as a sweep has points, each a few kilobytes
 @functools.lru_cache(maxsize=20_000)
-def _grouped(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, float]]:
+def _grouped(
+    spectrum: Family,
+    cell: float,
+    points: int | None,
+    solid: ElasticSolid,
+    banding: tuple[int, float, bool],
+) -> tuple[Bands, dict[str, float]]:
     """Return ``_grouped_anew``, from the disk if an earlier run has grouped the same modes."""
+    cell_of = cell, points, solid, banding
     key = jit.machine(), scipy.__version__, astuple(spectrum), cell_of  # type: ignore[call-overload]
-    return disk_cache.cached(key, lambda: _grouped_anew(spectrum, cell_of))
+    return disk_cache.cached(key, lambda: _grouped_anew(spectrum, *cell_of))
 
 
-def _grouped_anew(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, float]]:
-    """Return the bands of a cell at a shear modulus of 1 Pa, and the errors of the cell against the infinite plane."""
-    cell, points, poisson_ratio, power, tolerance, relaxing = cell_of
-    pairs = cell_pairs(spectrum, cell, points, 1.0, poisson_ratio)
+def _grouped_anew(
+    spectrum: Family,
+    cell: float,
+    points: int | None,
+    solid: ElasticSolid,
+    banding: tuple[int, float, bool],
+) -> tuple[Bands, dict[str, float]]:
+    """Return the bands of a cell, and the errors of the cell against the infinite plane.
+
+    ``banding`` are the last arguments of ``group``: power of the rates, tolerance, True if the amplitude relaxes.
+    """
+    pairs = cell_pairs(spectrum, cell, points, solid)
     energy = float(np.sum(pairs.count * pairs.weight))
-    infinite = float(spectrum.surface_energy(1.0, poisson_ratio))
     spread = math.sqrt(float(np.sum(pairs.count * pairs.weight**2)))
-    variance = spectrum.variance
+    variance = cell_variance(spectrum, cell, points)
     errors = {
-        "cell_error_variance": cell_variance(spectrum, cell, points) / variance - 1.0
-        if variance
-        else 0.0,
-        "cell_error_energy": energy / infinite - 1.0 if infinite else 0.0,
+        "cell_error_variance": relative_error(variance, spectrum.variance),
+        "cell_error_energy": relative_error(energy, solid.stored_energy(spectrum)),
         "member_spread_energy": spread / energy if energy else 0.0,
         "mode_pairs": float(np.sum(pairs.count)),
     }
-    return group(pairs, power, tolerance, relaxing), errors
+    return group(pairs, *banding), errors
 
 
 @keyed()
@@ -551,7 +534,7 @@ class Auto(_Fluctuating):
 #: Radius up to which energies on discs are found, over the largest of the contact without fluctuations.
 _BEYOND = 1.25
 _passing = functools.lru_cache(maxsize=8)(
-    lambda field, ratio, widest: Passing(field, ratio, widest, np.zeros(1))
+    lambda field, solid, widest: Passing(field, solid, widest, np.zeros(1))
 )
 
 
@@ -605,18 +588,16 @@ class Carried(ShearModel):
         """The radially averaged spectrum of the map."""
         return self.field.spectrum
 
-    def process(
-        self, shear_modulus: float, poisson_ratio: float, cell: float
-    ) -> CarriedProcess:
-        energy = self.field.surface_energy(shear_modulus, poisson_ratio)
+    def process(self, solid: ElasticSolid, cell: float) -> CarriedProcess:
+        energy = solid.stored_energy(self.field)
         return CarriedProcess(energy, self.law, self.field, self.passes)
 
     def margin(
-        self, solid: tuple[float, float], sphere_radius: float, widest: float
+        self, solid: ElasticSolid, sphere_radius: float, widest: float
     ) -> Passing:
         shorter = 0.5 * min(self.field.lattice.sides)
         return _passing(
-            self.field, solid[1], min(_BEYOND * widest or 0.5 * shorter, shorter)
+            self.field, solid.unit, min(_BEYOND * widest or 0.5 * shorter, shorter)
         )
 
     def off_the_map(
@@ -653,11 +634,9 @@ class Carried(ShearModel):
         ]
 
     def details(self, setting: Setting) -> list[tuple[str, str]]:
-        field, solid = self.field, (setting.shear_modulus, setting.poisson_ratio)
-        energy, radial = (
-            field.surface_energy(*solid),
-            float(field.spectrum.surface_energy(*solid)),
-        )
+        field, solid = self.field, setting.solid
+        energy = solid.stored_energy(field)
+        radial = solid.stored_energy(field.spectrum)
         (nx, ny), (along, across) = field.shape, field.pixels
         size = f"{nx} × {ny} points of {along:.4g} m × {across:.4g} m along and across the sliding"
         less = f"{100.0 * abs(energy / radial - 1.0):.2g} % {'more' if energy > radial else 'less'}"
@@ -672,7 +651,9 @@ class Carried(ShearModel):
         if field.mask:
             rows.append(("inside of the contact", f"{field.inside:.1%} of the map"))
         if field.noise:
-            noise = field.noise_energy(*solid)
+            pixel = math.sqrt(field.lattice.pixel)
+            of_solid = solid.shear_modulus, solid.poisson_ratio
+            noise = noise_energy(field.noise, pixel, *of_solid)
             rows.append(
                 (
                     "noise of the map",

@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import PydanticCustomError
 
-from sim.laws.halfspace import compliance
 from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise, normal, stream
@@ -43,6 +42,7 @@ from sim.parts.shear.process import (
     SmoothProcess,
     exponents,
 )
+from sim.solid import ElasticSolid
 from sim.spectrum.family import Family
 
 #: Pairs below this share of the variance are left out: all of them together would not change a bit.
@@ -84,41 +84,36 @@ class Modes:
     variance: Array
     on_lattice: bool = True
 
-    def energies(self, shear_modulus: float, poisson_ratio: float = 0.5) -> Array:
+    def energies(self, solid: ElasticSolid) -> Array:
         """Return the mean energy per area of each pair [J/m²], shape (pairs,).
 
         Notes
         -----
-        ``½ G_x(q) · variance = G_x(q) C(q) / L²`` with C averaged over the pixel and G_x by
-        ``sim.laws.halfspace.compliance``. The cell's mean ΔΓ is their sum.
+        ``½ G_x(q) · variance = G_x(q) C(q) / L²`` with C averaged over the pixel and G_x the
+        compliance of the solid. The cell's mean ΔΓ is their sum.
         """
-        return (
-            0.5
-            * compliance(self.qx, self.qy, shear_modulus, poisson_ratio)
-            * self.variance
-        )
+        return 0.5 * solid.compliance(self.qx, self.qy) * self.variance
 
-    def errors(
-        self, shear_modulus: float = 1.0, poisson_ratio: float = 0.5
-    ) -> dict[str, float]:
+    def errors(self, solid: ElasticSolid) -> dict[str, float]:
         """Return the relative errors of the cell against the infinite plane, and the spreads of one realisation.
 
         The errors are those of the variance and of the mean ΔΓ. The spreads are the expected relative standard
         deviations of the mean square and of ΔΓ for Gaussian amplitudes.
         """
-        energy = float(np.sum(self.energies(shear_modulus, poisson_ratio)))
-        infinite = float(self.spectrum.surface_energy(shear_modulus, poisson_ratio))
+        energies = self.energies(solid)
+        infinite = solid.stored_energy(self.spectrum)
         return {
-            "cell_error_variance": _relative(
+            "cell_error_variance": relative_error(
                 float(np.sum(self.variance)), self.spectrum.variance
             ),
-            "cell_error_energy": _relative(energy, infinite),
+            "cell_error_energy": relative_error(float(np.sum(energies)), infinite),
             "member_spread_variance": _spread(self.variance),
-            "member_spread_energy": _spread(self.energies(1.0, poisson_ratio)),
+            "member_spread_energy": _spread(energies),
         }
 
 
-def _relative(value: float, exact: float) -> float:
+def relative_error(value: float, exact: float) -> float:
+    """Return the error of a value beside an exact one that is not negative; 0 if that is 0."""
     return (value - exact) / exact if exact > 0.0 else 0.0
 
 
@@ -157,10 +152,12 @@ def modes(spectrum: Family, cell: float, points: int | None = None) -> Modes:
     --------
     One ripple is one pair; of a band whose longest wave is half the cell nothing is lost:
 
+    >>> from sim.solid import HalfSpace
     >>> from sim.spectrum import Band, Ripple
     >>> modes(Ripple(2.0, 1.0), cell=4.0).variance.tolist()
     [2.0]
-    >>> print(f"{abs(modes(Band(1.0, longest=2.0, shortest=0.5), 4.0).errors()['cell_error_variance']):.9f}")
+    >>> pairs = modes(Band(1.0, longest=2.0, shortest=0.5), 4.0)
+    >>> print(f"{abs(pairs.errors(HalfSpace(1.0))['cell_error_variance']):.9f}")
     0.000000000
     """
     if not (math.isfinite(cell) and cell > 0.0):
@@ -290,8 +287,7 @@ class ModalProcess(Renewing):
     """
 
     modes: Modes
-    shear_modulus: float
-    poisson_ratio: float
+    solid: ElasticSolid
     correlation: Correlation
     amplitude: Amplitude
 
@@ -303,7 +299,7 @@ class ModalProcess(Renewing):
     @cached_property
     def weights(self) -> Array:
         """Energy of each pair for a unit normal in each component, shape (pairs,) [J/m^2]."""
-        return 0.5 * self.modes.energies(self.shear_modulus, self.poisson_ratio)
+        return 0.5 * self.modes.energies(self.solid)
 
     @cached_property
     def deviation(self) -> Array:
@@ -386,7 +382,7 @@ class ModalProcess(Renewing):
         return Gammas(2.0 * self.weights, np.ones(self.pairs), self.wavenumber)
 
     def known_errors(self) -> dict[str, float]:
-        return self.modes.errors(self.shear_modulus, self.poisson_ratio)
+        return self.modes.errors(self.solid)
 
 
 class FixedProcess(ModalProcess):

@@ -27,6 +27,7 @@ from sim.laws.schallamach import start_up_peak
 from sim.numerics.noise import Noise
 from sim.parts.bonds.rupture import Constant
 from sim.scenario.scenario import Clock
+from sim.solid import HalfSpace
 from sim.spectrum.families import Band, BondMade
 from sim.units.errors import BadInput
 
@@ -288,7 +289,7 @@ def test_a_few_bonds_give_each_member_its_own_field():
     bonding = state.bonding
     assert_allclose(
         state.shear.energy,
-        (bonding.frozen + bonding.varying) * FIELD.surface_energy(1.6e6),
+        (bonding.frozen + bonding.varying) * HalfSpace(1.6e6).stored_energy(FIELD),
         rtol=1e-14,
     )
 

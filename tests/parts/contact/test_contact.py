@@ -27,6 +27,7 @@ from scipy.optimize import brentq
 from sim.laws import jkr
 from sim.parts.contact import Equilibrium, RateDependent, front
 from sim.parts.contact.balance import elastic_energy
+from sim.solid import HalfSpace
 from sim.spectrum.families import (
     AnisotropicGaussian,
     Band,
@@ -484,10 +485,10 @@ def test_the_share_that_a_disc_pays_is_its_marginal_energy():
     for name in SPECTRA:
         spectrum, claim = SPECTRA[name]
         radius = 2e-3 * 10.0 ** np.random.default_rng(3).uniform(-4.0, 0.0, 60)
-        exact = marginal_energy(spectrum, radius, 1.6e6, 0.5) / float(
-            spectrum.surface_energy(1.6e6, 0.5)
-        )
-        margin = Margin(spectrum, 1.6e6, 0.5, 2e-3)
+        exact = marginal_energy(
+            spectrum, radius, HalfSpace(1.6e6, 0.5).softness
+        ) / float(HalfSpace(1.6e6, 0.5).stored_energy(spectrum))
+        margin = Margin(spectrum, HalfSpace(1.6e6, 0.5).softness, 2e-3)
         assert_allclose(margin(radius), exact, rtol=0.0, atol=claim)
         assert_array_equal(margin(np.array([0.0, math.nan])), [0.0, math.nan])
 
@@ -523,7 +524,7 @@ def test_a_disc_is_where_its_release_rate_is_the_work_that_its_amplitude_leaves_
         assert_allclose(rate, work[closed], rtol=1e-12, atol=42e-3 * 1e-12)
     # -int w dA = -w0 A + DeltaGamma int dE: the mean over the disc, not its edge, enters the energy.
     spectrum = Gaussian(rms=0.05, length=0.3)
-    plane = float(spectrum.surface_energy(0.1875))
+    plane = float(HalfSpace(0.1875).stored_energy(spectrum))
     part = shear.Mean(spectrum=spectrum, contact="disc")
     scenario = maugis(
         Equilibrium(indentation={"from": 0.0, "to": -2.0}), 400, shear=part
@@ -536,7 +537,9 @@ def test_a_disc_is_where_its_release_rate_is_the_work_that_its_amplitude_leaves_
     assert_allclose(
         last["dissipated_energy"],
         elastic_energy(a, depth, scenario.bodies)
-        - math.pi * a**2 * (WORK - disc_energy(spectrum, a, 0.1875)),
+        - math.pi
+        * a**2
+        * (WORK - disc_energy(spectrum, a, HalfSpace(0.1875).softness)),
         rtol=1e-7,
     )
 

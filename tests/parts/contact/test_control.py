@@ -16,15 +16,16 @@ from sim.parts.contact.balance import (
     LoadControl,
     elastic_energy,
 )
+from sim.solid import HalfSpace
 from sim.spectrum.families import Gaussian
 from sim.spectrum.radial import Margin, disc_energy
 
+SHEAR_MODULUS = 0.1875
 #: Maugis's units: K = 4 E*/3, R and pi w are 1, so that radii, loads and displacements are those of the textbooks.
-MAUGIS = Bodies(1.0, 0.75, 0.5)
+MAUGIS = Bodies(1.0, HalfSpace(SHEAR_MODULUS))
 WORK = 1.0 / math.pi
 PATCHES = Gaussian(rms=1.0, length=0.4)
-SHEAR_MODULUS = 0.1875
-DISC = Margin(PATCHES, SHEAR_MODULUS, 0.5, 4.0)
+DISC = Margin(PATCHES, HalfSpace(SHEAR_MODULUS).softness, 4.0)
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(60)
 
 
@@ -68,9 +69,11 @@ class Path:
         ):
             machine = 0.5 * control.stiffness * (control.base - depth) ** 2
         area = math.pi * a**2
-        plane = float(PATCHES.surface_energy(SHEAR_MODULUS))
+        plane = float(HalfSpace(SHEAR_MODULUS).stored_energy(PATCHES))
         share = (
-            disc_energy(PATCHES, a, SHEAR_MODULUS) / plane if self.fluctuating else 0.0
+            disc_energy(PATCHES, a, HalfSpace(SHEAR_MODULUS).softness) / plane
+            if self.fluctuating
+            else 0.0
         )
         adhesive = area * (balance.bonded - balance.fluctuating * share)
         mean = self.reversible * 4.0 * self.stress**2 * a**3 / MAUGIS.modulus

@@ -222,7 +222,7 @@ def test_an_area_that_follows_the_bonds_raises_the_onset_as_linear_stability_has
     bound = scene.bonds.steady(np.full(1, 10.0 * STRETCH)).fraction[0]
     works = scene.adhesion.work_of_bonds(bound * np.array([0.999, 1.0, 1.001]))
     less, area, more = (
-        np.pi * scene.contact.equilibrium_radius(works, driven.R, driven.MODULUS) ** 2
+        np.pi * scene.contact.equilibrium_radius(works, scene.bodies) ** 2
     )
     onset = scene.bonds.onset(
         np.full(1, 10.0 * STRETCH), Body(area, (more - less) / 2e-3 / area)

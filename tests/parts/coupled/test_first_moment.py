@@ -34,6 +34,7 @@ from sim.parts.bonds.rupture import Constant, CutOff
 from sim.parts.contact.models import Adhesion
 from sim.parts.drive import Force
 from sim.scenario.scenario import Scenario
+from sim.solid import HalfSpace
 from sim.step.state import MemberNoise
 from sim.units.errors import BadInput
 
@@ -313,7 +314,7 @@ def test_a_force_is_a_soft_spring_makes_creep_or_a_runaway_and_shears_a_half_spa
     assert_allclose(states[-1].drive.sheared, 0.01 * UNIT / firm, rtol=1e-12)
     assert_allclose(
         1.6e6 * math.pi**2 * 0.12e-3 / 2.0,
-        1.0 / drive.yields(1.6e6, 0.5)[1] * 0.12e-3,
+        1.0 / drive.yields(HalfSpace(1.6e6))[1] * 0.12e-3,
         rtol=1e-14,
     )
     assert_allclose(

@@ -41,6 +41,7 @@ from sim.parts.shear.process import (
     Time,
     Wave,
 )
+from sim.solid import HalfSpace
 from sim.spectrum.families import AnisotropicGaussian, Ripple, SelfAffine, VonKarman
 
 G, MEMBERS = 1.6e6, 400
@@ -74,8 +75,8 @@ def process_of(name, correlation=None, tolerance=0.01, amplitude=None):
     )
     pairs = modes(spectrum, CELL, points)
     return (
-        recipe.process(G, poisson_ratio, 1.0),
-        pairs.energies(G, poisson_ratio),
+        recipe.process(HalfSpace(G, poisson_ratio), 1.0),
+        pairs.energies(HalfSpace(G, poisson_ratio)),
         np.hypot(pairs.qx, pairs.qy),
     )
 
@@ -278,7 +279,7 @@ def test_amplitude_multiplies_the_unit_process_or_the_mean_of_the_cell_at_once()
         "correlation": Wave(waves=1.0),
         "tolerance": 0.1,
     }
-    mean = modes(SPECTRUM, CELL, None).energies(G).sum()
+    mean = modes(SPECTRUM, CELL, None).energies(HalfSpace(G)).sum()
     population = bonds.Steady(critical_speed=2e-3, stress=4e5)
     for motion in (
         drive.Steady(speed=4e-3),

@@ -20,6 +20,7 @@ from sim.parts.shear import models as shear
 from sim.parts.shear.bands import Pairs, cell_pairs, group
 from sim.parts.shear.modes import modes
 from sim.parts.shear.process import Diffusion, Slip, Time, Wave
+from sim.solid import HalfSpace
 from sim.spectrum import (
     AnisotropicGaussian,
     Band,
@@ -70,7 +71,7 @@ def variance_of(bands):
 def listed(spectrum, points=41, poisson_ratio=0.5):
     """Weights w [J/m^2] and wavenumbers of all mode pairs of a cell."""
     pairs = modes(spectrum, CELL, points)
-    return pairs.energies(G, poisson_ratio), np.hypot(pairs.qx, pairs.qy)
+    return pairs.energies(HalfSpace(G, poisson_ratio)), np.hypot(pairs.qx, pairs.qy)
 
 
 def relative_errors(weights, rates, bands, power):
@@ -111,7 +112,7 @@ def test_mean_and_variance_are_those_of_all_modes_which_small_cells_list_pair_by
             tolerance=tolerance,
         )
         process, sums = (
-            recipe.process(G, poisson_ratio, 1.0),
+            recipe.process(HalfSpace(G, poisson_ratio), 1.0),
             (math.fsum(weights), math.fsum(weights**2)),
         )
         bands, spread = process.bands, process.known_errors()["member_spread_energy"]
@@ -134,7 +135,7 @@ def test_mean_and_variance_are_those_of_all_modes_which_small_cells_list_pair_by
         (512, "von karman 0.3", 0.3),
         (513, "von karman 0.3", 0.3),
     ]:
-        pairs = cell_pairs(FAMILIES[name], CELL, points, G, poisson_ratio)
+        pairs = cell_pairs(FAMILIES[name], CELL, points, HalfSpace(G, poisson_ratio))
         weights, wavenumbers = listed(FAMILIES[name], points, poisson_ratio)
         assert np.all(pairs.count == 1.0)
         assert_allclose(np.sort(pairs.weight), np.sort(weights), rtol=1e-13, atol=0)
@@ -255,12 +256,12 @@ def test_equal_pairs_are_one_band_a_ripple_one_of_two_degrees_and_any_within_a_t
     for correlation, _ in MEMORIES.values():
         process = shear.Banded(
             spectrum=FAMILIES["ripple"], correlation=correlation, cell=CELL
-        ).process(G, 0.5, 1.0)
+        ).process(HalfSpace(G, 0.5), 1.0)
         assert process.bands.freedom.tolist() == [2.0]
         assert set(process.bands.errors.values()) == {0.0}
         assert_allclose(
             process.bands.weight,
-            FAMILIES["ripple"].surface_energy(G),
+            HalfSpace(G).stored_energy(FAMILIES["ripple"]),
             rtol=1e-14,
             atol=0,
         )
@@ -289,7 +290,7 @@ def sums(weights, wavenumbers, count=1.0):
 
 def counted_and_listed(spectrum, points):
     """Sums over the pairs that are counted, relative to those over all pairs, less one."""
-    pairs = cell_pairs(spectrum, CELL, points, G, 0.3)
+    pairs = cell_pairs(spectrum, CELL, points, HalfSpace(G, 0.3))
     weights, wavenumbers = listed(spectrum, points, 0.3)
     assert len(pairs.weight) < len(weights)
     return (
@@ -348,7 +349,7 @@ def test_a_hundred_million_pairs_are_counted_in_bounded_memory():
     cell = 0.24e-3
     spectrum = SelfAffine(RMS, 0.8, longest=60e-6, rolloff=24e-6, shortest=cell / 8000)
     tracemalloc.start()
-    pairs = cell_pairs(spectrum, cell, None, G, 0.5)
+    pairs = cell_pairs(spectrum, cell, None, HalfSpace(G, 0.5))
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     low, high = (limit * cell / (2 * np.pi) for limit in spectrum.support)
@@ -359,8 +360,10 @@ def test_a_hundred_million_pairs_are_counted_in_bounded_memory():
     assert peak < 256e6
     # the lattice near q = 0 is the same as in a cell that can be listed
     listable = SelfAffine(RMS, 0.8, 60e-6, 24e-6, cell / 256)
-    coarse = cell_pairs(listable, cell, None, G, 0.5)
-    infinite, short = (float(s.surface_energy(G)) for s in (spectrum, listable))
+    coarse = cell_pairs(listable, cell, None, HalfSpace(G, 0.5))
+    infinite, short = (
+        float(HalfSpace(G).stored_energy(s)) for s in (spectrum, listable)
+    )
     per_variance = [s.radial_density(2e5) for s in (spectrum, listable)]
     lattice = math.fsum(pairs.weight * pairs.count) - infinite
     assert_allclose(
@@ -383,11 +386,11 @@ def test_a_hundred_million_pairs_are_counted_in_bounded_memory():
 )
 def test_far_from_the_origin_a_band_holds_the_energy_of_the_infinite_plane(waves):
     spectrum = Band(RMS, CELL / waves[0], CELL / waves[1])
-    pairs = cell_pairs(spectrum, CELL, None, G, 0.5)
+    pairs = cell_pairs(spectrum, CELL, None, HalfSpace(G, 0.5))
     # blocks narrower than 1/85 of their wavenumber in 3 × 3 squares: (1/85/3)² / 24 = 6e-7 at the most
     assert_allclose(
         math.fsum(pairs.weight * pairs.count),
-        spectrum.surface_energy(G),
+        HalfSpace(G).stored_energy(spectrum),
         rtol=6e-7,
         atol=0,
     )
@@ -404,8 +407,10 @@ def test_a_longest_wave_beyond_the_cell_costs_the_cells_error_and_a_cell_without
     recipe = functools.partial(
         shear.Banded, spectrum=spectrum, correlation=Slip(length=1e-6)
     )
-    short, long = (recipe(cell=side).process(G, 0.5, 1.0) for side in (CELL, 40 * CELL))
-    exact = float(spectrum.surface_energy(G))
+    short, long = (
+        recipe(cell=side).process(HalfSpace(G, 0.5), 1.0) for side in (CELL, 40 * CELL)
+    )
+    exact = float(HalfSpace(G).stored_energy(spectrum))
     errors = [process.known_errors()["cell_error_energy"] for process in (short, long)]
     assert_allclose(
         errors,
@@ -420,7 +425,7 @@ def test_a_longest_wave_beyond_the_cell_costs_the_cells_error_and_a_cell_without
         (Gaussian(RMS, 8e-6), None, "give points"),
     ):
         with pytest.raises(PydanticCustomError, match=cure):
-            cell_pairs(spectrum, CELL, points, G, 0.5)
+            cell_pairs(spectrum, CELL, points, HalfSpace(G, 0.5))
 
 
 def test_bands_from_the_disk_are_those_grouped_anew(tmp_path, monkeypatch):
@@ -430,12 +435,12 @@ def test_bands_from_the_disk_are_those_grouped_anew(tmp_path, monkeypatch):
         SelfAffine(1.0, 0.8, 60e-6, 24e-6, 4e-6),
         SelfAffine(1.0, 0.7, 60e-6, 24e-6, 4e-6),
     ]
-    cell = (240e-6, None, 0.5, 1, 0.01, False)
+    cell = 240e-6, None, HalfSpace(1.0), (1, 0.01, False)
     for spectrum in spectra:
-        bands, errors = shear._grouped_anew(spectrum, cell)
+        bands, errors = shear._grouped_anew(spectrum, *cell)
         for _ in range(2):  # stored, then read
             shear._grouped.cache_clear()
-            again, errors_again = shear._grouped(spectrum, cell)
+            again, errors_again = shear._grouped(spectrum, *cell)
             assert errors_again == errors and again.errors == bands.errors
             for name in ("weight", "freedom", "wavenumber"):
                 assert_allclose(getattr(again, name), getattr(bands, name), rtol=0)

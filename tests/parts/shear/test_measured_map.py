@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from helpers.commands import LENS, sim as command
+from helpers.discs import disc_energies
 from helpers.printed import rows_of
 from helpers.scenes import (
     BONDS,
@@ -26,6 +27,7 @@ from sim.parts.bonds.models import Counted, Unbroken
 from sim.parts.shear import Carried, Mapped
 from sim.parts.shear.maps import Passing
 from sim.scenario.scenario import Record
+from sim.solid import HalfSpace
 from sim.spectrum.families import Ripple
 from sim.spectrum.measured import StressMap
 from sim.spectrum.radial import disc_energy, marginal_energy
@@ -166,7 +168,9 @@ def test_a_map_that_was_drawn_saved_and_read_back_gives_the_same_trajectory(tmp_
 
 
 def passing(field, widest, pixel=1.0, nu=0.5, **keys):
-    return Passing(map_of(field, pixel, **keys), nu, widest, np.zeros(1))
+    return Passing(
+        map_of(field, pixel, **keys), HalfSpace(1.0, nu), widest, np.zeros(1)
+    )
 
 
 def test_uniform_stress_and_passing_waves_store_the_closed_forms_as_new_contact_adds_up():
@@ -176,7 +180,7 @@ def test_uniform_stress_and_passing_waves_store_the_closed_forms_as_new_contact_
     ) * np.ones((40, 1))
     shares = passing(3.0 * field, 15.0)
     radius = np.array([6.0, 8.5, 11.5])
-    whole = shares.field.surface_energy(1.0)
+    whole = HalfSpace(1.0).stored_energy(shares.field)
     exact = halfspace.disc_tangential_energy(radius, 3.0, 1.0) / (math.pi * radius**2)
     # what the soft edge costs falls as (pixel/a)²
     assert_allclose(whole * shares.mean(radius), exact, rtol=0.2 / 6.0**2)
@@ -201,11 +205,17 @@ def test_uniform_stress_and_passing_waves_store_the_closed_forms_as_new_contact_
             )
             mean += shares.mean(radius)[0] / 12
             new += shares(radius)[0] / 12
-        whole = passing(field, 25.0).field.surface_energy(1.0)
+        whole = HalfSpace(1.0).stored_energy(passing(field, 25.0).field)
         # the soft edge costs 0.65 (pixel/a)² for each wave on the diameter at most
         lost = 0.7 * np.max(2 * radius / 12 / radius**2)
-        assert_allclose(whole * mean, disc_energy(wave, radius, 1.0), rtol=lost)
-        assert_allclose(whole * new, marginal_energy(wave, radius, 1.0), rtol=lost)
+        assert_allclose(
+            whole * mean, disc_energy(wave, radius, HalfSpace(1.0).softness), rtol=lost
+        )
+        assert_allclose(
+            whole * new,
+            marginal_energy(wave, radius, HalfSpace(1.0).softness),
+            rtol=lost,
+        )
     shares = passing(patchy(), 20.0).at(np.array([[0.0], [2.3]]))
     nodes, weights = np.polynomial.legendre.leggauss(400)
     ends = 5.0, 19.0
@@ -239,8 +249,11 @@ def test_an_edge_or_equilibrium_follows_the_pattern_and_grows_where_contact_give
         .transpose("map_time", "x", "y")
         .to_numpy()[:, 8:56]
     )
-    stored = halfspace.disc_energy_of_map(
-        maps, 48 * 6e-6, dataset["contact_radius"].isel(t=[0, 80]).to_numpy(), G
+    stored = disc_energies(
+        maps,
+        48 * 6e-6,
+        dataset["contact_radius"].isel(t=[0, 80]).to_numpy(),
+        HalfSpace(G),
     )
     assert_allclose(stored, dataset["fluctuation_energy"].isel(t=[0, 80]), rtol=0.01)
     x = 6e-6 * np.arange(-32, 32)
@@ -333,7 +346,7 @@ def test_check_prints_the_energy_of_a_map(tmp_path, monkeypatch):
     answer = command("check", "scene.toml", "--members", "5")
     assert answer.exit_code == 0
     energy = halfspace.surface_energy(field, (64 * 6e-6, 48 * 6e-6), G)
-    radial = float(map_of(field).spectrum.surface_energy(G))
+    radial = float(HalfSpace(G).stored_energy(map_of(field).spectrum))
     numbers = (
         f"{energy:.4g} J/m^2",
         f"{100 * abs(energy / radial - 1):.2g} %",

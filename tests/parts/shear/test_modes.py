@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from scipy import integrate, special
 
 from sim.parts.shear.modes import _spread, modes
+from sim.solid import HalfSpace
 from sim.spectrum.families import (
     AnisotropicGaussian,
     Band,
@@ -172,8 +173,10 @@ def test_all_pixels_hold_the_variance_but_that_around_zero_and_energies_are_comp
         )
     pairs = modes(Gaussian(2.0, 0.1), 1.0, 64)
     lost = special.erf(math.pi * 0.1 / 2) ** 2
-    assert_allclose(pairs.errors()["cell_error_variance"], -lost, rtol=1e-12, atol=0)
-    assert abs(modes(AFFINE, 1.0).errors()["cell_error_variance"]) < 1e-14
+    assert_allclose(
+        pairs.errors(HalfSpace(1.0))["cell_error_variance"], -lost, rtol=1e-12, atol=0
+    )
+    assert abs(modes(AFFINE, 1.0).errors(HalfSpace(1.0))["cell_error_variance"]) < 1e-14
     assert_allclose(_spread(np.full(10, 0.3)), 1 / math.sqrt(10), rtol=1e-15, atol=0)
     pairs = modes(Band(1.3, longest=1 / 4, shortest=1 / 12), 2.5)
     nu, modulus = 0.3, 1.7
@@ -183,7 +186,10 @@ def test_all_pixels_hold_the_variance_but_that_around_zero_and_energies_are_comp
     compliance = (1 - nu + nu * (pairs.qy / q) ** 2) / (modulus * q)
     exact = compliance * pairs.spectrum.density(pairs.qx, pairs.qy) / 2.5**2
     assert_allclose(
-        pairs.energies(modulus, nu)[inside], exact[inside], rtol=1e-11, atol=0
+        pairs.energies(HalfSpace(modulus, nu))[inside],
+        exact[inside],
+        rtol=1e-11,
+        atol=0,
     )
 
 
@@ -240,12 +246,12 @@ def test_energy_of_a_spectrum_converges_with_the_cell_and_loses_that_around_zero
         deficit = (
             (2 - nu) / (8 * math.pi) * constant * float(spectrum.density(0.0, 0.0))
         )
-        exact, rest = spectrum.surface_energy(1.0, nu), []
+        exact, rest = HalfSpace(1.0, nu).stored_energy(spectrum), []
         for cell in (40.0, 80.0):
             pairs = modes(spectrum, cell, int(6 * cell))
-            error = np.sum(pairs.energies(1.0, nu)) - exact
+            error = np.sum(pairs.energies(HalfSpace(1.0, nu))) - exact
             assert_allclose(
-                pairs.errors(1.0, nu)["cell_error_energy"],
+                pairs.errors(HalfSpace(1.0, nu))["cell_error_energy"],
                 error / exact,
                 rtol=1e-9,
                 atol=0,
@@ -255,7 +261,8 @@ def test_energy_of_a_spectrum_converges_with_the_cell_and_loses_that_around_zero
         assert 3.5 < rest[0] / rest[1] < 4.5  # second order
     spectrum = SelfAffine(1.3, 0.8, longest=1.0, rolloff=0.5, shortest=0.1)
     errors = [
-        abs(modes(spectrum, cell).errors()["cell_error_energy"]) for cell in (2.0, 8.0)
+        abs(modes(spectrum, cell).errors(HalfSpace(1.0))["cell_error_energy"])
+        for cell in (2.0, 8.0)
     ]
     # second order would be 16, less the lattice's own irregularity
     assert errors[1] < errors[0] / 8
@@ -265,18 +272,18 @@ def test_a_ripple_is_one_pair_with_the_energy_of_the_ripple_whether_it_fits_or_n
     pairs = modes(Ripple(3.0, 0.25, angle=math.pi), 1.0)
     assert (pairs.ix.tolist(), pairs.iy.tolist(), pairs.on_lattice) == ([4], [0], True)
     assert pairs.variance.tolist() == [4.5]
-    assert set(modes(Ripple(0.0, 0.25), 1.0).errors().values()) == {0.0}
+    assert set(modes(Ripple(0.0, 0.25), 1.0).errors(HalfSpace(1.0)).values()) == {0.0}
     for wavelength, angle, nu in product(
         [0.25, 0.26], [0.0, 0.3, 1.2, math.pi / 2, 2.5, -0.4, math.pi], [0.5, 0.3]
     ):
         ripple = Ripple(3.0, wavelength, angle)
         pairs = modes(ripple, 1.0)
         assert not pairs.on_lattice or wavelength == 0.25
-        assert pairs.errors()["cell_error_variance"] == 0.0
+        assert pairs.errors(HalfSpace(1.0))["cell_error_variance"] == 0.0
         assert pairs.qy[0] > 0.0 or (pairs.qy[0] == 0.0 and pairs.qx[0] > 0.0)
         assert_allclose(
-            pairs.energies(1.7, nu).sum(),
-            ripple.surface_energy(1.7, nu),
+            pairs.energies(HalfSpace(1.7, nu)).sum(),
+            HalfSpace(1.7, nu).stored_energy(ripple),
             rtol=1e-14,
             atol=0,
         )

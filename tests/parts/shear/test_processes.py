@@ -23,6 +23,7 @@ from numpy.testing import assert_allclose
 from sim.laws import halfspace
 from sim.parts.shear.process import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
 from sim.scenario.scenario import Record
+from sim.solid import HalfSpace
 
 G = 1.6e6
 MEMORIES = {
@@ -51,7 +52,7 @@ def test_modes_are_stationary_for_any_step_and_forget_with_twice_the_rate_of_the
         step, members = ratio * 1e-3, 400
         part = shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=MEMORIES[name])
         process, energy = energies(part, members, Clock(duration=4 * step, step=step))
-        pairs = process.modes.energies(G)
+        pairs = process.modes.energies(HalfSpace(G))
         assert np.all(
             np.abs(energy.mean(axis=1) - pairs.sum())
             < 5.0 * np.sqrt(np.sum(pairs**2) / members)
@@ -65,7 +66,7 @@ def test_modes_are_stationary_for_any_step_and_forget_with_twice_the_rate_of_the
         members, step = 4000, 0.4e-3
         part = shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=MEMORIES[name])
         process, energy = energies(part, members, Clock(duration=2 * step, step=step))
-        pairs = process.modes.energies(G)
+        pairs = process.modes.energies(HalfSpace(G))
         rates = {
             "time": 1e3 * np.ones_like(process.wavenumber),
             "slip": 2e-3 / 2e-6 * np.ones_like(process.wavenumber),
@@ -210,7 +211,7 @@ def test_relaxing_amplitude_follows_the_exact_second_moment():
     process, energy = energies(
         part, members, Clock(duration=5 * step, step=step), motion
     )
-    pairs = process.modes.energies(G)
+    pairs = process.modes.energies(HalfSpace(G))
     expected = [0.25, 0.25]
     for _ in range(4):  # a jump at a clock time is seen exactly, whatever the step
         expected.append(1.0 + (expected[-1] - 1.0) * np.exp(-2.0 * step / 1e-3))

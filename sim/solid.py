@@ -1,0 +1,137 @@
+"""Elastic solids under the sphere: all that the contact, the slider and the fluctuations need of elasticity.
+
+A solid of another kind, such as a layer, is one more class here. The parts of a scene read its members alone, so that
+nothing else has to know which solid it is.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sim.laws import halfspace, reversible
+from sim.spectrum.family import Array, Family, Stress
+from sim.spectrum.radial import Softness
+
+
+class ElasticSolid(Protocol):
+    """Elastic solid that is isotropic along its surface; frozen and hashable, because caches use it as a key.
+
+    All compliances are inversely proportional to the shear modulus. Shear stress and displacement are along x, the
+    direction of sliding.
+    """
+
+    def __hash__(self) -> int:
+        return super().__hash__()
+
+    #: G [Pa] and nu [1] of the material.
+    shear_modulus: float
+    poisson_ratio: float
+
+    @property
+    def unit(self) -> "ElasticSolid":
+        """This solid at a shear modulus of 1 Pa, for results that many moduli share."""
+
+    @property
+    def contact_modulus(self) -> float:
+        """E* of the normal contact with a sphere [Pa]."""
+
+    @property
+    def softness(self) -> Softness:
+        """Compliance of waves far shorter than any length of the solid, with which finite discs are computed."""
+
+    def compliance(self, qx: ArrayLike, qy: ArrayLike) -> Array:
+        """Return the displacement per shear stress at wavevectors [m/Pa], without normal stress; 0 at q = 0."""
+
+    def tangential_compliance(self, radius: float) -> float:
+        """Return 1/k_t [m/N]: the mean displacement of a disc of a radius [m] over the force of a uniform stress."""
+
+    def mean_stress_energy(self, radius: ArrayLike, stress: ArrayLike) -> Array:
+        """Return the energy per new area of a disc of a radius [m] under a uniform shear stress [Pa], in J/m²."""
+
+    def stored_energy(self, stress: Stress) -> float:
+        """Return the mean elastic energy per area under a fluctuating shear stress on the plane [J/m²], ΔΓ."""
+        return 0.5 * stress.total(self.compliance)
+
+    def share_of_long_waves(self, spectrum: Family, wavelength: float) -> float:
+        """Return the share of ``stored_energy`` that waves longer than a wavelength [m] store [1], 0 of no energy.
+
+        Examples
+        --------
+        The share of a Gaussian of length ξ on a half-space is erf(πξ/λ):
+
+        >>> from sim.spectrum import Gaussian
+        >>> share = HalfSpace(1.0).share_of_long_waves(Gaussian(rms=1.0, length=1.0), 4.0)
+        >>> print(f"{share:.10f} {math.erf(math.pi / 4.0):.10f}")
+        0.7333114256 0.7333114256
+        """
+        plane, end = self.stored_energy(spectrum), 2.0 * math.pi / wavelength
+        return 0.5 * spectrum.total(self.compliance, end) / plane if plane else 0.0
+
+
+@dataclass(frozen=True)
+class HalfSpace(ElasticSolid):
+    """Elastic half-space; the coupling of shear stress and normal displacement at ν ≠ 1/2 is neglected.
+
+    Parameters
+    ----------
+    shear_modulus : float
+        G [Pa].
+    poisson_ratio : float
+        nu [1].
+
+    Notes
+    -----
+    ``ΔΓ = (1/8π²) ∫ d²q C (1 - ν qx²/q²) / (G q)`` of a spectrum C (Menga, Carbone & Dini at ν = 1/2).
+
+    Examples
+    --------
+    Patches of a stress of 1 MPa on a soft rubber, and a finer pattern, which stores less energy:
+
+    >>> from sim.spectrum import Gaussian
+    >>> rubber = HalfSpace(shear_modulus=1.6e6)
+    >>> energies = (rubber.stored_energy(Gaussian(rms=1e6, length=size)) for size in (1e-6, 1e-8))
+    >>> print(*(f"{1e3 * energy:.1f} mJ/m^2" for energy in energies))
+    207.7 mJ/m^2 2.1 mJ/m^2
+    """
+
+    shear_modulus: float
+    poisson_ratio: float = 0.5
+
+    @property
+    def unit(self) -> "HalfSpace":
+        return replace(self, shear_modulus=1.0)
+
+    @property
+    def contact_modulus(self) -> float:
+        """E* = 2G/(1 - nu) [Pa]; 4G of an incompressible half-space."""
+        return 2.0 * self.shear_modulus / (1.0 - self.poisson_ratio)
+
+    @property
+    def softness(self) -> Softness:
+        """Compliance of waves of any length."""
+        level, swing = halfspace.angular_compliance(self.poisson_ratio)
+        return Softness(level / self.shear_modulus, swing / self.shear_modulus)
+
+    def compliance(self, qx: ArrayLike, qy: ArrayLike) -> Array:
+        return np.asarray(
+            halfspace.compliance(qx, qy, self.shear_modulus, self.poisson_ratio)
+        )
+
+    def tangential_compliance(self, radius: float) -> float:
+        slope = (
+            4.0 * (2.0 - self.poisson_ratio) / (3.0 * math.pi**2 * self.shear_modulus)
+        )
+        return slope / radius
+
+    def mean_stress_energy(self, radius: ArrayLike, stress: ArrayLike) -> Array:
+        return np.asarray(
+            reversible.mean_stress_energy(
+                radius, stress, self.contact_modulus, self.poisson_ratio
+            )
+        )
+
+    def stored_energy(self, stress: Stress) -> float:
+        return float(self.softness.energy(stress))

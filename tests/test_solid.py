@@ -1,0 +1,119 @@
+"""The elastic solid: its closed forms beside quadrature and beside each other, and a solid of another kind."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from sim.laws import halfspace
+from sim.parts import shear
+from sim.parts.shear.process import Time
+from sim.solid import ElasticSolid, HalfSpace
+from sim.spectrum import (
+    AnisotropicGaussian,
+    Band,
+    BondMade,
+    Gaussian,
+    Ripple,
+    SelfAffine,
+    Tabulated,
+    VonKarman,
+)
+from sim.spectrum.measured import StressMap
+
+STRESSES = {
+    "ripple": Ripple(2.0, 0.3, 0.4),
+    "band": Band(2.0, longest=3.0, shortest=1.0),
+    "self-affine": SelfAffine(2.0, 0.3, longest=5.0, rolloff=2.0, shortest=0.1),
+    "gaussian": Gaussian(2.0, 0.7),
+    "anisotropic": AnisotropicGaussian(2.0, 0.7, 2.1, 0.4),
+    "von Kármán": VonKarman(2.0, 0.7, 0.05),
+    "table": Tabulated((1.0, 3.0, 4.0), (0.0, 4.0, 1.0)),
+    "bonds": BondMade(footprint=0.2),
+    "map": StressMap(
+        file="",
+        pixel=0.1,
+        pixel_y=0.2,
+        values=np.random.default_rng(1).normal(size=(24, 15)).tobytes(),
+        shape=(24, 15),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Stiffened(HalfSpace):
+    """A made-up solid that is stiffer against waves longer than a length, as a layer is."""
+
+    length: float = 1.0
+
+    def compliance(self, qx, qy):
+        return super().compliance(qx, qy) * np.tanh(np.hypot(qx, qy) * self.length)
+
+    def stored_energy(self, stress):
+        return ElasticSolid.stored_energy(self, stress)
+
+
+@pytest.mark.parametrize("name", STRESSES)
+def test_the_quadrature_of_the_compliance_is_the_closed_form_of_the_half_space(name):
+    stress = STRESSES[name]
+    # the last 1e-7 of the energy of bonds lies where their density is not followed
+    rtol = 1e-7 if name == "bonds" else 1e-12
+    for poisson_ratio in (0.0, 0.3, 0.5):
+        solid = HalfSpace(1.7, poisson_ratio)
+        by_quadrature = ElasticSolid.stored_energy(solid, stress)
+        assert_allclose(by_quadrature, solid.stored_energy(stress), rtol=rtol, atol=0)
+
+
+def test_the_force_of_a_uniform_stress_does_the_work_that_the_solid_stores():
+    radius, stress = np.array([0.3, 2.0]), 5.0
+    for poisson_ratio in (0.0, 0.3, 0.5):
+        solid = HalfSpace(1.7, poisson_ratio)
+        energy = halfspace.disc_tangential_energy(radius, stress, 1.7, poisson_ratio)
+        force = math.pi * radius**2 * stress
+        compliance = solid.tangential_compliance(radius)
+        assert_allclose(0.5 * force**2 * compliance, energy, rtol=1e-14, atol=0)
+        # dU/dA of U ∝ a³
+        new = 1.5 * energy / (math.pi * radius**2)
+        assert_allclose(solid.mean_stress_energy(radius, stress), new, rtol=1e-14)
+    # π² G a/2 under the footprint of a bond, and under any other disc of an incompressible half-space
+    solid, footprint = HalfSpace(1.6e6), BondMade(footprint=1e-9)
+    under_bond = 0.5 / solid.stored_energy(footprint)
+    assert_allclose(under_bond, 0.5 * math.pi**2 * 1.6e6 * 1e-9, rtol=1e-14)
+    assert_allclose(under_bond * solid.tangential_compliance(1e-9), 1.0, rtol=1e-14)
+
+
+def test_stiffness_and_energy_go_with_the_shear_modulus():
+    for solid in (HalfSpace(1.7, 0.3), Stiffened(1.7, 0.3, 0.2)):
+        assert type(solid.unit) is type(solid) and solid.unit.shear_modulus == 1.0
+        assert hash(solid.unit) == hash(solid.unit.unit)
+        for stress in STRESSES.values():
+            energies = (each.stored_energy(stress) for each in (solid.unit, solid))
+            assert_allclose(next(energies) / next(energies), 1.7, rtol=1e-14, atol=0)
+
+
+def test_a_solid_with_a_length_is_followed_by_spectra_modes_and_bands():
+    spectrum = Gaussian(2.0, 0.7)
+    recipe = {"spectrum": spectrum, "correlation": Time(time=1.0)}
+    solid = Stiffened(1.7, 0.3, length=0.5)
+    plane, errors = solid.stored_energy(spectrum), []
+    assert plane < 0.9 * HalfSpace(1.7, 0.3).stored_energy(spectrum)
+    for cell, points in ((20.0, 200), (40.0, 400)):
+        keys = recipe | {"cell": cell, "points": points}
+        modal, banded = (
+            model(**keys).process(solid, 1.0) for model in (shear.Modal, shear.Banded)
+        )
+        energy = np.sum(modal.modes.energies(solid))
+        assert_allclose(banded.bands.mean, energy, rtol=1e-12, atol=0)
+        errors.append(energy / plane - 1.0)
+        for process in (modal, banded):
+            known = process.known_errors()["cell_error_energy"]
+            assert_allclose(known, errors[-1], rtol=1e-9, atol=0)
+    # second order in the step of wavenumbers, because the compliance at q = 0 is finite; a half-space has first order
+    assert_allclose(errors[0] / errors[1], 4.0, rtol=0.05)
+    # a layer much thicker than all waves lacks ∫ (1 − tanh qh) dq = ln 2/h of ∫ exp(−q²ξ²/4) dq = √π/ξ
+    deep, half_space = Stiffened(1.7, 0.3, length=1e5), HalfSpace(1.7, 0.3)
+    ratio = deep.stored_energy(spectrum) / half_space.stored_energy(spectrum)
+    lacks = math.log(2.0) * 0.7 / math.sqrt(math.pi) / 1e5
+    assert_allclose(1.0 - ratio, lacks, rtol=1e-8, atol=0)
