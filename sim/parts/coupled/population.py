@@ -182,7 +182,8 @@ class Stretched(Population):
     ) -> Array:
         """Return the pull if the slider has neither mass nor damping; a stiff contact has unstretched bonds."""
         if drive.mass == 0.0 and drive.damping == 0.0:
-            return slider.spring_force
+            # that of a slider whose motion has ended is not known
+            return np.where(np.isnan(slider.speed), np.nan, slider.spring_force)
         if elastic is not None:
             return elastic
         viscous = area * drive.viscosity * slider.speed

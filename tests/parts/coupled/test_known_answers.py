@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers.corner_scenes import corner_scene
 from helpers.scenes import follow
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
@@ -446,3 +447,18 @@ def test_cohorts_with_a_cut_off_slip_ahead_of_a_body_that_damping_holds_as_with_
     none, less, more = positions
     assert abs(none - less) < 1e-5 * none
     assert abs(none - more) < 1e-4 * none
+
+
+def test_a_contact_that_closes_after_the_slider_has_lost_stability_has_no_friction():
+    # a force of 1 µN that no mass and no damping holds, on a sphere that is lifted off and comes back
+    scenario = sim.load(corner_scene(65))
+    steps = range(scenario.clock.steps + 1)
+    state, course = follow(scenario, MemberNoise.of(7, np.arange(1)), None, steps)
+    lost = float(state.drive.runaway_time[0])
+    closes = np.isnan(course.radius[:-1]) & (course.radius[1:] > 0.0)
+    assert np.any(closes & (course.time[1:] > lost))
+    after = scenario.phases.starts.index(
+        min(s for s in scenario.phases.starts if s > lost)
+    )
+    assert state.events.by_phase("friction")["largest"][0, 0] > 0.0
+    assert np.all(state.events.by_phase("friction")["largest"][0, after:] == 0.0)
