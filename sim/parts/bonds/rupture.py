@@ -24,7 +24,7 @@ from pydantic import Field
 
 from sim.laws import schallamach
 from sim.laws.schallamach import Array, Body, Onset
-from sim.numerics.jit import device
+from sim.numerics.jit import device, inlined
 from sim.numerics.special import exp, mean_growth
 from sim.numerics.table import NO_TABLE, Table, mean_and_value, table_of
 from sim.units.quantity import Quantity, keyed
@@ -413,7 +413,7 @@ def _table_integral(stretch, slip, duration, table):
     )
 
 
-@device
+@inlined
 def hazard_integral(stretch, slip, duration, law):
     """Return ∫k dt under a ``RuptureRate`` of a bond whose stretch goes from ``stretch`` by ``slip``."""
     if law.table > 0.0:
@@ -450,7 +450,7 @@ def growth(stretch, slip, law):
     return exp(min(math.fabs(stretch) * law.softness, 690.0)) if along else 0.0
 
 
-@device
+@inlined
 def hazard_time(stretch, speed, threshold, law):
     """Return the time after which ∫k dt has reached ``threshold`` or the stretch its limit, at constant ``speed``.
 
