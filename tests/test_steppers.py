@@ -220,7 +220,7 @@ def test_more_fronts_between_bonds_of_one_limit_than_there_is_room_for_are_given
             "drive": "spring",
             "contact": "machine",
             "bonds": "cohort, cut-off",
-            "shear": "mapped, fixed, stress",
+            "shear": "mapped, stress",
         }
     )
 

@@ -25,7 +25,7 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
-from llvmlite import binding
+from llvmlite import binding, ir
 from numba.extending import intrinsic
 
 from sim.numerics import disk_cache
@@ -85,6 +85,22 @@ def bits_of(typing: Any, number: Any) -> Any:
 
 def _cast(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
+
+
+@intrinsic
+def float_at(typing: Any, address: Any, place: Any) -> Any:
+    """The float at a place of an array whose address is a whole number in a float.
+
+    An array among the numbers of a law would have its references counted in each helper.
+    """
+    return numba.float64(numba.float64, numba.int64), _loaded
+
+
+def _loaded(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    word, double = ir.IntType(64), ir.DoubleType()
+    first, place = builder.fptoui(arguments[0], word), arguments[1]
+    place = builder.add(first, builder.mul(place, ir.Constant(word, 8)))
+    return builder.load(builder.inttoptr(place, double.as_pointer()))
 
 
 @intrinsic

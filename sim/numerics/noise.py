@@ -71,12 +71,6 @@ class Noise:
         _normals(*self.at(step), numbers)
         return numbers
 
-    def uniforms(self, step: int, count: int) -> np.ndarray:
-        """Uniform numbers in [0, 1), the first of lane 1 of a step, shape (members, count)."""
-        numbers = np.empty((len(self.members), count))
-        _uniforms(*self.at(step), numbers)
-        return numbers
-
 
 @device
 def _high_product(a, b):
@@ -278,14 +272,6 @@ def _normals(seed, part, members, step, drawn):
         numbers = stream(seed, part, members[m], step, 0)
         for k in range(drawn.shape[1]):
             drawn[m, k], numbers = normal(numbers)
-
-
-@kernel("void(uint64, uint64, uint64[::1], int64, float64[:,::1])")
-def _uniforms(seed, part, members, step, drawn):
-    for m in range(members.size):
-        numbers = stream(seed, part, members[m], step, 1)
-        for k in range(drawn.shape[1]):
-            drawn[m, k], numbers = uniform(numbers)
 
 
 # Binomial numbers for any number of trials, by rejection; the time does not grow with the number of trials.

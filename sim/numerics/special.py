@@ -143,6 +143,12 @@ def exp(x):
 
 
 @device
+def mean_growth(x):
+    """Return (e^x − 1)/x, the mean of e^y from zero to x; 1 at zero."""
+    return math.expm1(x) / x if x != 0.0 else 1.0
+
+
+@device
 def rough_cube_root(x):
     """Cube root of a normal x > 0 to 2e-4: a third of the exponent, good to 6 %, and one of Halley's steps."""
     exponent = np.uint64(bits_of(x)) >> _HALF

@@ -46,6 +46,10 @@ _IN_OUR_WORDS = {
 _UNUSABLE = dict.fromkeys(
     get_args(ErrorType), "has a value of a kind that it cannot have"
 )
+#: Keys that earlier versions had, with the cure.
+_GONE = {
+    "mode_amplitudes": 'is not a key any more; remove it (model = "mean" has an energy that does not fluctuate)',
+}
 #: Faults that are reported at once.
 _MOST = 100
 _PLAIN_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -204,6 +208,8 @@ def _fault(root: type, error: ErrorDetails) -> Fault:
 def _unknown(root: type, table: _Place, key: str) -> Fault:
     """Return the fault of a key that its table does not have."""
     path = (*table.path, key)
+    if key in _GONE:
+        return Fault(path, _GONE[key])
     chosen = {model(option) for option in table.chosen.values()}
     others = [
         name

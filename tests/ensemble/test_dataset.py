@@ -72,7 +72,7 @@ def test_the_dataset_is_what_the_engine_marched_with_members_only_if_they_differ
     [
         ("rate", "uniform", False),
         ("rate, carried", "mean", False),
-        ("cohort", "modal, fixed", False),
+        ("cohort", "mean, slip rate", False),
         ("cohort", "modal, time, constant", True),
         ("counted", "uniform", True),
     ],

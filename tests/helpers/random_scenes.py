@@ -250,14 +250,9 @@ class Draw:
             if mean["contact"] == "plane"
             else max(8.0 * length, 4.0 * scale.size)
         }
-        renewed = (
-            {"mode_amplitudes": "fixed"},
-            {"amplitude": amplitude | {"relaxing": True}},
-            {},
-        )
-        field |= self.choice(
-            renewed if amplitude["model"] != "constant" else ({}, renewed[0])
-        )
+        if amplitude["model"] != "constant":
+            relaxing = {"amplitude": amplitude | {"relaxing": True}}
+            field |= self.choice((relaxing, {}))
         models = (
             {"model": "uniform"},
             {"model": "mean"} | mean,

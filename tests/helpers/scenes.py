@@ -111,16 +111,14 @@ SHEARS = {
     "modal, wave, relaxing stress": shear.Modal(
         **BY_WAVES, amplitude=Stress(reference=2e5, relaxing=True)
     ),
-    "modal, fixed": shear.Modal(**IN_TIME, mode_amplitudes="fixed"),
     "mapped, diffusion, constant": shear.Mapped(
         **ON_CELL,
         points=12,
         correlation=Diffusion(diffusivity=1e-9),
         amplitude=ConstantAmplitude(),
     ),
-    "mapped, fixed, stress": shear.Mapped(
-        **ON_CELL
-        | {"correlation": Slip(length=1e-5), "points": 13, "mode_amplitudes": "fixed"},
+    "mapped, stress": shear.Mapped(
+        **ON_CELL | {"correlation": Slip(length=1e-5), "points": 13},
         amplitude=Stress(reference=2e5),
     ),
     "banded, slip, onset": shear.Banded(**BY_SLIP, amplitude=Onset(**ONSET)),
@@ -133,10 +131,7 @@ SHEARS = {
     "mean, slip rate": shear.Mean(
         spectrum=SPECTRUM, amplitude=SlipRate(memory_length=2e-6)
     ),
-    "modal, fixed, slip rate": shear.Modal(
-        **BY_SLIP, amplitude=SlipRate(), mode_amplitudes="fixed"
-    ),
-    "banded, fixed": shear.Banded(**IN_TIME, mode_amplitudes="fixed"),
+    "modal, slip rate": shear.Modal(**BY_SLIP, amplitude=SlipRate()),
     "modal on a disc": shear.Modal(**IN_TIME, contact="disc"),
     "mean on a disc": shear.Mean(
         spectrum=Gaussian(rms=1e5, length=2e-5), contact="disc", paid_by_adhesion=0.5

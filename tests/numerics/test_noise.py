@@ -22,7 +22,6 @@ from sim.numerics.noise import PARTS, Noise
 SHAPES = [0.5, 0.7, 1.0, 3.0, 50.0, 1e4, 1e8]
 DRAWN = {
     "normal": lambda noise, step: noise.normals(step, 7),
-    "uniform": lambda noise, step: noise.uniforms(step, 7),
     "gamma": lambda noise, step: gammas(SHAPES, noise.at(step), len(SHAPES)),
     "binomial": lambda noise, step: binomials(1e9, 0.3, noise.at(step), 7),
 }

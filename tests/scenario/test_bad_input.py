@@ -111,6 +111,12 @@ UNKNOWN = [
     ('rms = "150 kPa"', 'rsm = "150 kPa"', "shear.spectrum.rsm", 'did you mean "rms"'),
     ("[sphere]", "[shpere]", "shpere", 'did you mean "sphere"'),
     (
+        "points = 32",
+        'points = 32\nmode_amplitudes = "fixed"',
+        "shear.mode_amplitudes",
+        'remove it...model = "mean"',
+    ),
+    (
         "[solid]",
         '[solid]\ncounter_body = { youngs_modulus = "1 GPa", poison = 0.3 }',
         "solid.counter_body.poison",

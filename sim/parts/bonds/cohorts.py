@@ -23,7 +23,7 @@ from sim.parts.bonds.rupture import (
     growth,
     hazard_integral,
     hazard_time,
-    rate_at,
+    rates_at,
 )
 from sim.parts.exchange import Array
 
@@ -178,10 +178,14 @@ def _gauss(weight, stretch, width, first, end, left, segments):
 
 
 class Rules(NamedTuple):
-    """Constants that all rows of a population share."""
+    """Constants that all rows of a population share: those of ``LawNumbers``, and more."""
 
-    law: tuple[float, ...]  # RuptureRate
-    limit: float  # limit of the stretch [m]
+    rate: float
+    softness: float
+    limit: float
+    catch: float
+    relief: float
+    table: float
     steepness: float  # largest relative change of the rupture rate per stretch [1/m]
     rebinding: float
     tolerance: float
@@ -191,7 +195,7 @@ class Rules(NamedTuple):
 
 
 #: Type of the numbers of ``Rules`` in kernels.
-RULES = "Tuple((UniTuple(float64, 5), float64, float64, float64, float64, float64, float64, float64))"
+RULES = f"UniTuple(float64, {len(Rules._fields)})"
 
 
 @device
@@ -221,8 +225,8 @@ def survive(pool, count, move, speed, step, off, rules):
     )
     early, short = step / 3.0, move / 3.0
     soon, late = (
-        fresh_integral(early, speed, rules.law),
-        fresh_integral(step, speed, rules.law),
+        fresh_integral(early, speed, rules),
+        fresh_integral(step, speed, rules),
     )
     for i in range(count):
         survivors_early[i] = weight[i] * exp(-steepness[i] * soon)
@@ -231,10 +235,10 @@ def survive(pool, count, move, speed, step, off, rules):
     for i in range(count):
         if steepness[i] == 0.0:
             survivors_early[i] = weight[i] * math.exp(
-                -hazard_integral(stretch[i] + off, short, early, rules.law)
+                -hazard_integral(stretch[i] + off, short, early, rules)
             )
             survivors[i] = weight[i] * math.exp(
-                -hazard_integral(stretch[i] + off, move, step, rules.law)
+                -hazard_integral(stretch[i] + off, move, step, rules)
             )
         if rules.limit < math.inf:
             survivors_early[i] *= inside(stretch[i] + short, width[i], rules.limit)
@@ -248,7 +252,7 @@ def survive(pool, count, move, speed, step, off, rules):
 def steepen(pool, count, slip, off, rules):
     """Write ∫k dt of each bond over that of a fresh one to pool[3], or 0 if no such factor exists."""
     for i in range(count):
-        pool[3, i] = growth(pool[1, i] + off, slip, rules.law)
+        pool[3, i] = growth(pool[1, i] + off, slip, rules)
 
 
 @device
@@ -259,8 +263,8 @@ def births(free, early, late, step, speed, rules):
     rule. It is of third order, and stable for any k_on h. The error is the distance to the trapezoidal rule.
     """
     z = rules.rebinding * step
-    before = math.exp(-fresh_integral(-2.0 / 3.0 * step, speed, rules.law))
-    after = math.exp(-fresh_integral(2.0 / 3.0 * step, speed, rules.law))
+    before = math.exp(-fresh_integral(-2.0 / 3.0 * step, speed, rules))
+    after = math.exp(-fresh_integral(2.0 / 3.0 * step, speed, rules))
     a, b, c, d = (
         1.0 + 5.0 / 12.0 * z,
         -z / 12.0 * before,
@@ -270,7 +274,7 @@ def births(free, early, late, step, speed, rules):
     p, q = max(0.0, 1.0 - early), max(0.0, 1.0 - late)
     whole = a * d - b * c
     first, last = (p * d - b * q) / whole, (a * q - c * p) / whole
-    other = 0.5 * z * free * math.exp(-fresh_integral(step, speed, rules.law))
+    other = 0.5 * z * free * math.exp(-fresh_integral(step, speed, rules))
     error = math.fabs(other + 0.25 * z * last - c * first)
     if min(first, last) >= 0.0:
         return c * first, 0.25 * z * last, 0.0, error
@@ -346,7 +350,7 @@ def _forgets(pool, other, count, speed, duration, rules):
     """Return the number of cohorts of the steady state, written to ``other``, if a step forgets its start, else 0."""
     depth = math.log(100.0 / rules.tolerance)
     if rules.rebinding == 0.0 or not duration > depth * hazard_time(
-        0.0, speed, 1.0, rules.law
+        0.0, speed, 1.0, rules
     ):
         return 0
     steady_count, life, square = fill_steady(other, speed, rules)
@@ -376,7 +380,7 @@ def _step_row(pool, count, travelled, settled, slip, duration, rules):
             pool[k, :steady_count] = pool[5 + k, :steady_count]
         left = settle(pool[0], pool[1], pool[2], steady_count, direction, 0.0, rules)
         return left, 0.0, left
-    typical = hazard_time(0.0, speed, 1.0, rules.law)
+    typical = hazard_time(0.0, speed, 1.0, rules)
     longest = typical * (7.0 * rules.tolerance) ** (1.0 / 3.0)
     shortest = 1e-13 * duration
     if speed != 0.0:
@@ -497,11 +501,10 @@ def write_row(pool, count, travelled, settled, slip, rules, row):
 
 
 @device
-def sum_row(weight, stretch, width, rules, lost, sums):
-    """Write the sums over the cohorts of a row, as of ``moments``; ``lost`` is a work array."""
+def sum_row(weight, stretch, width, rules, rates, sums):
+    """Write the sums over the cohorts of a row, as of ``moments``; ``rates`` is a work array."""
     sums[:] = 0.0
-    for i in range(weight.size):
-        lost[i] = weight[i] * stretch[i] * rate_at(stretch[i], rules.law)
+    rates_at(stretch[: weight.size], rules, rates)
     limit, cell = rules.limit, rules.cell
     for i in range(weight.size):
         w, x, d = weight[i], stretch[i], (width[i] if width.size > 1 else 0.0)
@@ -514,7 +517,7 @@ def sum_row(weight, stretch, width, rules, lost, sums):
             size, half = math.fabs(x), 0.5 * d
             outermost = min(size + half, limit) - max(size - half, limit - cell)
             sums[3] += limit / cell * w * (max(outermost, 0.0) / d)
-        sums[4] += lost[i]
+        sums[4] += w * x * rates[i]
 
 
 @kernel(
@@ -522,9 +525,9 @@ def sum_row(weight, stretch, width, rules, lost, sums):
 )
 def sum_rows(weight, stretch, width, numbers, sums):
     """Write the sums over the cohorts of each row, shape (5, rows)."""
-    rules, lost = Rules(*numbers), np.empty(weight.shape[1])
+    rules, rates = Rules(*numbers), np.empty(weight.shape[1])
     for m in range(len(weight)):
-        sum_row(weight[m], stretch[m], width[m], rules, lost, sums[:, m])
+        sum_row(weight[m], stretch[m], width[m], rules, rates, sums[:, m])
 
 
 @kernel(
@@ -565,8 +568,8 @@ def fill_steady(room, speed, rules):
     Bonds of age a have survived with S(a) and are stretched by V a, so that weights are k_on F S(a)da, F = 1/(1 +
     k_on⟨T⟩). Five Gauss nodes on panels in which neither ln S nor the rupture changes by much.
     """
-    oldest = hazard_time(0.0, speed, 42.0, rules.law)
-    panel = 0.7 * hazard_time(0.0, speed, 1.0, rules.law)
+    oldest = hazard_time(0.0, speed, 42.0, rules)
+    panel = 0.7 * hazard_time(0.0, speed, 1.0, rules)
     pace = math.fabs(speed) * rules.steepness
     segments = rules.limit < math.inf
     if pace > 0.0:
@@ -581,9 +584,7 @@ def fill_steady(room, speed, rules):
         for node, share in zip(_NODES, _SHARES):  # noqa: B905 - compiled
             age = (k + node) * panel
             survivors = (
-                share
-                * panel
-                * math.exp(-hazard_integral(0.0, speed * age, age, rules.law))
+                share * panel * math.exp(-hazard_integral(0.0, speed * age, age, rules))
             )
             mass += survivors
             mean += survivors * age
@@ -779,7 +780,7 @@ _KINK = 66.0
 @functools.lru_cache(maxsize=256)
 def numbers_of(
     rupture: RuptureRate, rebinding_rate: float, tolerance: float
-) -> tuple[object, ...]:
+) -> tuple[float, ...]:
     """Return the numbers of ``Rules``.
 
     A two-point Gauss rule over a cell of width d errs by d⁴/4320 of the cell's bonds, a uniform segment
@@ -791,18 +792,9 @@ def numbers_of(
         cell = rupture.limit * max(math.sqrt(tolerance), 1.0 / 1800.0)
     elif rupture.steepness > 0.0:
         cell = (432.0 * tolerance) ** 0.25 / rupture.steepness
-    law, bound, left = (
-        tuple(map(float, rupture)),
-        float(rebinding_rate),
-        float(_most(rupture, tolerance)),
-    )
     return (
-        law,
-        law[2],
-        float(rupture.steepness),
-        bound,
-        float(tolerance),
-        cell,
+        *rupture.numbers,
+        *map(float, (rupture.steepness, rebinding_rate, tolerance, cell)),
         _KINK * tolerance,
-        left,
+        float(_most(rupture, tolerance)),
     )

@@ -82,7 +82,8 @@ def advance(
     """
     rows = max(bound.size, moment.size, slip.shape[1], path.shape[1])
     after = np.empty((2, len(duration), rows))
-    _advance(bound, moment, slip, path, duration, *rupture[:3], rebinding_rate, *after)
+    law = rupture.rate, rupture.softness, rupture.limit
+    _advance(bound, moment, slip, path, duration, *law, rebinding_rate, *after)
     return after[0], after[1]
 
 
@@ -132,7 +133,7 @@ def _ratio(part, whole):
 
 
 @device
-def _mean_decay(x):
+def mean_decay(x):
     """Return (1 - exp(-x))/x for x >= 0; 1 at zero."""
     return -math.expm1(-x) / x if x > 0.0 else 1.0
 
@@ -183,8 +184,8 @@ def _linear(bound, moment, slip, binding, breaking, travel):
     """
     p, q = binding + breaking + travel, breaking + 2.0 * travel
     low, high, gap = min(p, q), max(p, q), math.fabs(travel - binding)
-    old = math.exp(-low) * _mean_decay(gap)
-    after = bound * math.exp(-p) + binding * _mean_decay(p)
+    old = math.exp(-low) * mean_decay(gap)
+    after = bound * math.exp(-p) + binding * mean_decay(p)
     return min(after, 1.0), moment * math.exp(-q) + slip * (
         bound * old + binding * _young(low, gap, high)
     )

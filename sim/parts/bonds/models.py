@@ -478,10 +478,23 @@ class _Stretched(_BondModel):
     numbers_of: ClassVar = staticmethod(schallamach.bell_numbers)
     #: True if the friction maximum was given.
     has_stress: ClassVar[bool] = False
+    #: Attribute of the rupture laws that the population can have; empty if it can have any.
+    needs: ClassVar[str] = ""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
         return _one_way(self)
+
+    @model_validator(mode="after")
+    def _can_have_the_law(self) -> Self:
+        law = self.rupture
+        if self.needs and not getattr(law, self.needs):
+            cure = '"cohort" or "tracked"' if law.rises else '"cohort"'
+            message = f'rupture model "{law.model}" needs the stretch of each bond'
+            raise PydanticCustomError(
+                "unsuitable_law", f"{message}; use bonds.model = {cure}"
+            )
+        return self
 
     def chosen(self, area: float, forces: bool) -> Self:
         """Return this model with all of its rates and its site density, for any contact and field."""
@@ -570,23 +583,7 @@ class Stretches(NamedTuple):
 
 
 @keyed()
-class _Separable(_Stretched):
-    """Attributes of models that need a rupture law whose ∫k dt has one clock for all bonds."""
-
-    @model_validator(mode="after")
-    def _one_clock(self) -> Self:
-        if not self.rupture.separable:
-            message = (
-                f'rupture model "{self.rupture.model}" needs the density of the stretch'
-            )
-            raise PydanticCustomError(
-                "not_separable", f'{message}; use bonds.model = "cohort"'
-            )
-        return self
-
-
-@keyed()
-class FirstMoment(_OverArea, _Separable):
+class FirstMoment(_OverArea, _Stretched):
     """Rate equations of number and mean stretch, every bond taken at the mean. Limit: ``Cohort`` at a constant rate.
 
     Exact in time for a constant rupture. Under Bell's it is a mean field: it overpredicts the friction
@@ -601,6 +598,7 @@ class FirstMoment(_OverArea, _Separable):
     state_class: ClassVar[type[Stretches]] = Stretches
     knows_forces: ClassVar[bool] = False
     in_blocks: ClassVar[bool] = True
+    needs: ClassVar[str] = "has_first_moment"
 
     def start(self, motion: Motion, noise: Noise) -> Stretches:
         if self.start_from == "steady":
@@ -734,7 +732,7 @@ class Cohort(_OverArea, _Stretched):
 
 
 @keyed()
-class Tracked(_Separable):
+class Tracked(_Stretched):
     """A finite number of sites, every bond's stretch and exact rupture time. Limit: ``Cohort`` as sites -> infinity.
 
     ``sites`` are followed for each member, whatever the area: the area scales the stress, not the number.
@@ -758,6 +756,7 @@ class Tracked(_Separable):
     per_member: ClassVar[bool] = True
     is_random: ClassVar[bool] = True
     in_blocks: ClassVar[bool] = True
+    needs: ClassVar[str] = "rises"
 
     @property
     def numbers(self) -> int:  # type: ignore[override]
@@ -895,7 +894,7 @@ class Auto:
                 )
             return Rate(**plain, stress=self.stress, start_from=start, area=self.area)
         rest = {name: getattr(self, name) for name in _NUMBERS}
-        if noisy and number <= _MOST_TRACKED and self.rupture.separable:
+        if noisy and number <= _MOST_TRACKED and self.rupture.rises:
             return Tracked(**rest, sites=int(number), start_from=start).chosen(
                 area, forces
             )

@@ -1,10 +1,13 @@
-"""Rupture rate of a bond of a given stretch: constant, Bell, constant with a cut-off stretch, catch.
+"""Rupture rate of a bond of a given stretch: constant, Bell, constant with a cut-off stretch, catch, or any other.
 
-All are one law of a few numbers, ``RuptureRate``. Compiled steps use a law through device functions alone: the
-integral of the rate along a motion, the same of a fresh bond, the time to rupture.
+A law is a class with its rate under a force. A law of exponentials also gives the numbers of a ``RuptureRate``, whose
+integrals are closed. The integrals of any other law are tabulated, because compiled loops cannot call it. Compiled
+loops use a law through device functions alone: the rate, its integral along a motion, the same of a fresh bond, the
+time to rupture.
 """
 
 import math
+from collections.abc import Callable
 from typing import (
     TYPE_CHECKING,
     Annotated,
@@ -20,17 +23,33 @@ import numpy as np
 from pydantic import Field
 
 from sim.laws import schallamach
-from sim.laws.schallamach import Array, Body, Onset, SiteMoments
-from sim.numerics.jit import device
-from sim.numerics.special import exp
+from sim.laws.schallamach import Array, Body, Onset
+from sim.numerics.jit import device, inlined
+from sim.numerics.special import exp, mean_growth
+from sim.numerics.table import NO_TABLE, Table, mean_and_value, table_of
 from sim.units.quantity import Quantity, keyed
+
+
+class LawNumbers(NamedTuple):
+    """Numbers of a rupture law in compiled loops: those of ``RuptureRate``, with the address of the table.
+
+    A helper that takes a law reads it by these names. So any record with them is a law, as ``cohorts.Rules`` is.
+    """
+
+    rate: float
+    softness: float
+    limit: float
+    catch: float
+    relief: float
+    table: float
 
 
 class RuptureRate(NamedTuple):
     """Rupture rate of a bond of stretch x.
 
     ``rate`` [1/s] × exp(\\|x\\| ``softness`` [1/m]) + ``catch`` [1/s] × exp(−\\|x\\| ``relief`` [1/m]) up to the
-    stretch ``limit`` [m], infinite beyond it.
+    stretch ``limit`` [m], infinite beyond it. A ``table`` takes the place of the exponentials; then ``rate`` is that at
+    rest.
     """
 
     rate: float
@@ -38,6 +57,19 @@ class RuptureRate(NamedTuple):
     limit: float
     catch: float = 0.0
     relief: float = 0.0
+    table: Table = NO_TABLE
+
+    @property
+    def numbers(self) -> LawNumbers:
+        """The law as compiled loops take it."""
+        return LawNumbers(*map(float, (*self[:5], self.table.address)))
+
+    @property
+    def scale(self) -> float:
+        """Stretch on which the rate changes [m], infinite for a constant rate without a limit."""
+        if self.softness > 0.0:
+            return 1.0 / self.softness
+        return self.table.scale or self.limit
 
     @property
     def at_rest(self) -> float:
@@ -45,24 +77,20 @@ class RuptureRate(NamedTuple):
         return self.rate + self.catch
 
     def at(self, stretch: Array) -> Array:
-        """Return the rupture rate of bonds of a stretch [m] below any limit [1/s]."""
-        size = np.abs(stretch)
-        rate = self.rate * np.exp(size * self.softness)
-        return (
-            rate + self.catch * np.exp(-size * self.relief)
-            if self.catch > 0.0
-            else rate
-        )
+        """Return the rate of the pathway that force opens, for bonds of a stretch [m] [1/s]."""
+        return self.rate * np.exp(np.abs(stretch) * self.softness)
 
     @property
     def steepness(self) -> float:
         """Largest relative change of the rate per stretch [1/m]."""
-        return max(self.softness, self.relief if self.catch > 0.0 else 0.0)
+        relief = self.relief if self.catch > 0.0 else 0.0
+        return max(self.softness, relief, self.table.steepness)
 
-    @property
-    def one_pathway(self) -> bool:
-        """True if all rupture is by one pathway that force opens, as Bell's."""
-        return self.softness > 0.0 and self.catch == 0.0 and self.limit == math.inf
+
+def tabulated(rate: Callable[[Array], Array], scale: float) -> RuptureRate:
+    """Return a law with a table of a ``rate`` [1/s], which changes by about e on a ``scale`` of the stretch [m]."""
+    table = table_of(rate, scale)
+    return RuptureRate(float(table.values[0, 1]), 0.0, math.inf, table=table)
 
 
 _T = TypeVar("_T")
@@ -79,16 +107,31 @@ BondNumbers = tuple[float, float, float]
 class _Law:
     """Attributes of all rupture laws.
 
-    ``depends_on_stretch``: true if the rupture depends on the stretch, by a limit or below it. ``separable``: true if
-    ∫k dt of a bond is a factor of the bond times a common clock. The first moment and tracked bonds need this. A
-    subclass has ``law``, its numbers for bonds of a stiffness [N/m], and ``closed_form``. The latter returns share
-    bound [1], mean force [N] and mean square force [N²] per site in steady sliding at speeds [m/s].
+    A subclass gives ``rate_at_force``, the rate of a bond under a force, and ``force``, on which it changes by about e.
+    A law of exponentials gives ``law`` instead, its numbers for bonds of a stiffness [N/m].
     """
 
+    #: Force on which the rate changes by about e [N].
+    force: float
+    #: True if the rupture depends on the stretch, by a limit or below it.
     depends_on_stretch: ClassVar[bool] = True
-    separable: ClassVar[bool] = True
+    #: True if all rupture is by one exponential, whose first moment is closed.
+    has_first_moment: ClassVar[bool] = False
+    #: True if the rate never falls with the force. The ages of tracked bonds are drawn only under such a law.
+    rises: ClassVar[bool] = True
     #: Pathways of rupture as of the law ``resolved_onset``; none if force opens no pathway.
     pathways: ClassVar[tuple[tuple[float, float], ...]] = ()
+
+    def rate_at_force(self, force: Array) -> Array:
+        """Return the rupture rate of a bond under a force [1/s], above 0."""
+        raise NotImplementedError
+
+    def law(self, bond_stiffness: float) -> RuptureRate:
+        """Return the rate as a function of the stretch of bonds of a stiffness [N/m]."""
+        return tabulated(
+            lambda stretch: self.rate_at_force(bond_stiffness * stretch),
+            self.force / bond_stiffness,
+        )
 
     def first_moment_excess(
         self, bond_stiffness: float, rebinding_rate: float
@@ -112,19 +155,13 @@ class Constant(_Law):
     """Bonds open by themselves at one rate, however stretched they are."""
 
     depends_on_stretch: ClassVar[bool] = False
+    has_first_moment: ClassVar[bool] = True
 
     rate: Annotated[float, Quantity("1/s", "rupture rate of a bond", "k_0", above=0)]
     model: Literal["constant"] = "constant"
 
     def law(self, bond_stiffness: float) -> RuptureRate:
         return RuptureRate(self.rate, 0.0, math.inf)
-
-    def closed_form(
-        self, speed: Array, bond_stiffness: float, rebinding_rate: float
-    ) -> SiteMoments:
-        return schallamach.constant_moments(
-            speed, self.rate, bond_stiffness, rebinding_rate
-        )
 
 
 ZeroForceRate = Annotated[
@@ -165,6 +202,8 @@ class Bell(_Law):
     stress: LargestStress | None = None
     model: Literal["bell"] = "bell"
 
+    has_first_moment: ClassVar[bool] = True
+
     @property
     def pathways(self) -> tuple[tuple[float, float], ...]:  # type: ignore[override]
         return ((self.zero_force_rate, self.bell_force),)
@@ -172,13 +211,6 @@ class Bell(_Law):
     def law(self, bond_stiffness: float) -> RuptureRate:
         return RuptureRate(
             self.zero_force_rate, bond_stiffness / self.bell_force, math.inf
-        )
-
-    def closed_form(
-        self, speed: Array, bond_stiffness: float, rebinding_rate: float
-    ) -> SiteMoments:
-        return schallamach.bell_moments(
-            speed, self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate
         )
 
     def first_moment_excess(
@@ -216,22 +248,17 @@ class CutOff(_Law):
     ] = 0.0
     model: Literal["cut_off"] = "cut_off"
 
+    has_first_moment: ClassVar[bool] = True
+
     def law(self, bond_stiffness: float) -> RuptureRate:
         return RuptureRate(self.rate, 0.0, self.stretch)
-
-    def closed_form(
-        self, speed: Array, bond_stiffness: float, rebinding_rate: float
-    ) -> SiteMoments:
-        return schallamach.cut_off_moments(
-            speed, self.rate, self.stretch, bond_stiffness, rebinding_rate
-        )
 
 
 @keyed()
 class Catch(_Law):
     """Force closes one pathway of rupture and opens another: k = kc exp(−f/f_c) + ks exp(f/f_s). Limit: ``Bell``."""
 
-    separable: ClassVar[bool] = False
+    rises: ClassVar[bool] = False
 
     catch_rate: Annotated[
         float,
@@ -286,22 +313,30 @@ class Catch(_Law):
         )
         return RuptureRate(self.slip_rate, slip, math.inf, self.catch_rate, catch)
 
-    def closed_form(
-        self, speed: Array, bond_stiffness: float, rebinding_rate: float
-    ) -> SiteMoments:
-        law = self.catch_rate, self.catch_force, self.slip_rate, self.slip_force
-        return schallamach.catch_moments(speed, *law, bond_stiffness, rebinding_rate)
-
 
 Rupture = Annotated[Constant | Bell | CutOff | Catch, Field(discriminator="model")]
 
 
 @device
 def rate_at(stretch, law):
-    """Return the rupture rate of a bond of a stretch below any limit under a ``RuptureRate``."""
-    rate, softness, _, catch, relief = law
+    """Return the rupture rate of a bond of a stretch below any limit under the numbers of a ``RuptureRate``."""
     size = math.fabs(stretch)
-    return rate * exp(size * softness) + catch * exp(-size * relief)
+    if law.table > 0.0:
+        return mean_and_value(size, law.table)[1]
+    return law.rate * exp(size * law.softness) + law.catch * exp(-size * law.relief)
+
+
+@device
+def rates_at(stretches, law, rates):
+    """Write the rupture rates of bonds of many stretches, below any limit."""
+    rate, softness, catch, relief = law.rate, law.softness, law.catch, law.relief
+    if law.table > 0.0:
+        for i in range(stretches.size):
+            rates[i] = mean_and_value(math.fabs(stretches[i]), law.table)[1]
+        return
+    for i in range(stretches.size):
+        size = math.fabs(stretches[i])
+        rates[i] = rate * exp(size * softness) + catch * exp(-size * relief)
 
 
 @device
@@ -322,8 +357,8 @@ def rupture_integral(stretch, slip, duration, rate, softness):
     after = before + change
     if before * after >= 0.0:
         distance = sign * math.fabs(change)
-        mean = 1.0 if distance == 0.0 else math.expm1(distance) / distance
-        return whole * math.exp(sign * min(math.fabs(before), math.fabs(after))) * mean
+        least = sign * min(math.fabs(before), math.fabs(after))
+        return whole * math.exp(least) * mean_growth(distance)
     before, after = sign * math.fabs(before), sign * math.fabs(after)
     return whole * (math.expm1(before) + math.expm1(after)) / (before + after)
 
@@ -357,62 +392,93 @@ def time_to_rupture(stretch, speed, threshold, rate, softness, limit):
     return time
 
 
+#: Change of the integral of a table over its size below which its difference is no longer good to 1e-10.
+_SHORT = 1e-3
+_NEAR, _FAR = 0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0)
+
+
 @device
+def _table_integral(stretch, slip, duration, table):
+    """Return ∫k dt of a bond under the rate of a table: over a short way by Gauss's rule, without a difference."""
+    before, after = math.fabs(stretch), math.fabs(stretch + slip)
+    first = math.copysign(before * mean_and_value(before, table)[0], stretch)
+    last = math.copysign(after * mean_and_value(after, table)[0], stretch + slip)
+    if math.fabs(last - first) > _SHORT * (math.fabs(first) + math.fabs(last)):
+        return duration * (last - first) / slip
+    near, far = math.fabs(stretch + _NEAR * slip), math.fabs(stretch + _FAR * slip)
+    return (
+        0.5
+        * duration
+        * (mean_and_value(near, table)[1] + mean_and_value(far, table)[1])
+    )
+
+
+@inlined
 def hazard_integral(stretch, slip, duration, law):
     """Return ∫k dt under a ``RuptureRate`` of a bond whose stretch goes from ``stretch`` by ``slip``."""
-    rate, softness, _, catch, relief = law
-    slipping = rupture_integral(stretch, slip, duration, rate, softness)
-    return (
-        slipping + rupture_integral(stretch, slip, duration, catch, -relief)
-        if catch > 0.0
-        else slipping
-    )
+    if law.table > 0.0:
+        return _table_integral(stretch, slip, duration, law.table)
+    slipping = rupture_integral(stretch, slip, duration, law.rate, law.softness)
+    if law.catch == 0.0:
+        return slipping
+    return slipping + rupture_integral(stretch, slip, duration, law.catch, -law.relief)
 
 
 @device
 def fresh_integral(age, speed, law):
-    """Return ∫k dt of a bond born unstretched, up to an ``age``; its analytic continuation at a negative age."""
-    rate, softness, _, catch, relief = law
-    change = math.fabs(speed) * softness * age
-    slipping = rate * age * (math.expm1(change) / change if change != 0.0 else 1.0)
-    if catch == 0.0:
+    """Return ∫k dt of a bond born unstretched, up to an ``age``; a smooth continuation of it at a negative age."""
+    pace = math.fabs(speed)
+    if law.table > 0.0:
+        mean = mean_and_value(pace * math.fabs(age), law.table)[0]
+        return age * (mean if age > 0.0 else law.rate * law.rate / mean)
+    slipping = law.rate * age * mean_growth(pace * law.softness * age)
+    if law.catch == 0.0:
         return slipping
-    change = -math.fabs(speed) * relief * age
-    return slipping + catch * age * (
-        math.expm1(change) / change if change != 0.0 else 1.0
-    )
+    return slipping + law.catch * age * mean_growth(-pace * law.relief * age)
+
+
+@device
+def has_factor(law):
+    """True if ∫k dt of a bond is that of a fresh one times a factor of its stretch, under the same motion."""
+    return law.catch == 0.0 and law.table == 0.0
 
 
 @device
 def growth(stretch, slip, law):
     """Return ∫k dt of a bond over that of a fresh one for any motion along ``slip``; 0 if there is no such factor."""
-    along = stretch * slip >= 0.0 and law[3] == 0.0
-    return exp(min(math.fabs(stretch) * law[1], 690.0)) if along else 0.0
+    along = stretch * slip >= 0.0 and has_factor(law)
+    return exp(min(math.fabs(stretch) * law.softness, 690.0)) if along else 0.0
 
 
-@device
+@inlined
 def hazard_time(stretch, speed, threshold, law):
     """Return the time after which ∫k dt has reached ``threshold`` or the stretch its limit, at constant ``speed``.
 
-    With a catch pathway by Newton's method within a bracket; the slip pathway alone takes longer.
+    By Newton's method within a bracket unless it is closed. The slip pathway of a catch bond alone takes longer.
     """
-    rate, softness, limit, catch, _ = law
-    slipping = time_to_rupture(stretch, speed, threshold, rate, softness, limit)
-    if catch == 0.0:
+    rate = 0.0 if law.table > 0.0 else law.rate
+    slipping = time_to_rupture(stretch, speed, threshold, rate, law.softness, law.limit)
+    if has_factor(law):
         return slipping
-    low, high = 0.0, min(slipping, 1e300)
-    time = min(
-        high, threshold / (rate * math.exp(math.fabs(stretch) * softness) + catch)
-    )
-    for _ in range(200):
+    return _time_before(slipping, stretch, speed, threshold, law)
+
+
+@device
+def _time_before(latest, stretch, speed, threshold, law):
+    """Return the time of ``hazard_time`` before a ``latest`` one, by Newton's method."""
+    low, high = 0.0, min(1e300, latest)
+    time = min(high, threshold / rate_at(stretch, law))
+    for _ in range(400):
         over = hazard_integral(stretch, speed * time, time, law) - threshold
         if over > 0.0:
             high = time
         else:
             low = time
         better = time - over / rate_at(stretch + speed * time, law)
-        better = better if low < better < high else 0.5 * (low + high)
         if math.fabs(better - time) <= 1e-15 * time:
             break
+        # far beyond, the integral is exponential, and Newton's steps are short
+        is_near = over < 2.0 * threshold and low < better < high
+        better = better if is_near else 0.5 * (low + high)
         time = better
     return time

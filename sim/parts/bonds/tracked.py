@@ -14,7 +14,8 @@ an event in all the steps are passed over by their least due.
 
 If all stretches of a row have the sign of the motion, its bonds are stepped together. If the motion turns, or a step
 spans too many Bell forces for the common clock, each bond is stepped separately. This ends when all stretches have the
-sign of the motion again. Its ``due`` is then the rest of its threshold.
+sign of the motion again. Its ``due`` is then the rest of its threshold. Bonds whose rate is not one exponential have no
+common clock, and are always stepped separately.
 
 One array holds two kinds of due: a bound site's, never negative, and minus the time at which a free
 site binds. Read as unsigned whole numbers, the bits of such floats have the first rupture as their
@@ -36,7 +37,13 @@ from sim.numerics.special import (
     reduced_exponential_integral,
     scaled_exponential_integral,
 )
-from sim.parts.bonds.rupture import RuptureRate, rupture_integral, time_to_rupture
+from sim.parts.bonds import cohorts
+from sim.parts.bonds.rupture import (
+    RuptureRate,
+    has_factor,
+    hazard_integral,
+    hazard_time,
+)
 from sim.parts.exchange import Array, record
 
 #: Columns of a frame: slider, time and clock since the frame was set, sense of the motion (+1, -1), 1 if bonds
@@ -63,6 +70,27 @@ _STEP = record("x time clock rate grown pace duration speed")
 RUPTURE, BINDING, _CUT = range(3)
 #: Bits of a number that are left out where a step is looked up, 128 ranges for each power of two; most ranges.
 _LEFT_OUT, _RANGES = np.int64(45), 4096
+
+
+class SiteLaw(NamedTuple):
+    """Law of the lives of a site: the numbers of ``LawNumbers``, and the rate of rebinding [1/s]."""
+
+    rate: float
+    softness: float
+    limit: float
+    catch: float
+    relief: float
+    table: float
+    rebinding: float
+
+
+#: Type of the numbers of ``SiteLaw`` in kernels.
+SITE_LAW = f"UniTuple(float64, {len(SiteLaw._fields)})"
+
+
+def site_law(rupture: RuptureRate, rebinding_rate: float) -> tuple[float, ...]:
+    """Return the numbers of ``SiteLaw``."""
+    return *rupture.numbers, float(rebinding_rate)
 
 
 @device
@@ -121,9 +149,9 @@ def least(bits, birth, block, bounded):
 @device
 def lay_out(step, slip, duration, x, time, clock, law, space):
     """Write a step that begins with the slider at ``x`` and a ``time`` and ``clock``; return the clock at its end."""
-    (rate, softness, limit, _), (steps, ends, _, _, _) = law, space
+    softness, (steps, ends, _, _, _) = law.softness, space
     grown, bell = math.exp(softness * x), softness * slip
-    first, speed = rate * grown, slip / duration
+    first, speed = law.rate * grown, slip / duration
     after = clock + first * duration * (math.expm1(bell) / bell if bell > 0.0 else 1.0)
     at = steps[step]
     at.x, at.time, at.clock, at.rate = x, time, clock, first
@@ -131,7 +159,7 @@ def lay_out(step, slip, duration, x, time, clock, law, space):
     ends[RUPTURE, step], ends[BINDING, step], ends[_CUT, step] = (
         after,
         time + duration,
-        x + slip - limit,
+        x + slip - law.limit,
     )
     return after
 
@@ -175,8 +203,8 @@ def follow(bonds, soonest, count, law, address, space):
     (
         (birth, due, life),
         (steps, ends, changes, index, lowest),
-        (_, _, limit, rebinding),
-    ) = bonds, space, law
+    ) = bonds, space
+    limit, rebinding = law.limit, law.rebinding
     bits, bounded, (seed, member) = views(due, soonest), limit < math.inf, address
     signed, unsigned, binding, rupture, rear = bits
     clock, time, cut = (
@@ -284,10 +312,13 @@ def _cycle(speed, law):
     """Return roughly the mean time from one birth to the next of a site: a fresh bond's life at ``speed`` and the wait.
 
     It is exact for constant rupture laws, with or without a limit, and within a sixth for Bell's:
-    e^z E1(z) ~ ½ ln(1 + 2/z).
+    e^z E1(z) ~ ½ ln(1 + 2/z). For a law without a common clock it is the time after which 1/e of the bonds are left.
     """
-    (rate, softness, limit, rebinding), life = law, math.inf
-    if rate > 0.0:
+    rate, softness, limit, rebinding = law.rate, law.softness, law.limit, law.rebinding
+    life = math.inf
+    if not has_factor(law):
+        life = hazard_time(0.0, speed, 1.0, law)
+    elif rate > 0.0:
         amplitude = 2.0 * math.fabs(speed) * softness / rate
         life = (math.log1p(amplitude) / amplitude if amplitude > 0.0 else 1.0) / rate
     if speed != 0.0 and limit < math.inf:
@@ -298,12 +329,9 @@ def _cycle(speed, law):
 
 @device
 def _one_by_one(bonds, row, slip, duration, law, address):
-    """Advance a row by a step bond by bond; return True if all stretches then have the sign of the motion."""
-    (birth, due, life), (seed, member), (rate, softness, limit, rebinding) = (
-        bonds,
-        address,
-        law,
-    )
+    """Advance a row by a step bond by bond; return True if its bonds can then be stepped together."""
+    (birth, due, life), (seed, member) = bonds, address
+    limit, rebinding = law.limit, law.rebinding
     x0, t0, speed = row[SLIDER], row[TIME], slip / duration
     bound, total, squares, lowest, highest = 0.0, 0.0, 0.0, math.inf, -math.inf
     for i in range(due.size):
@@ -312,11 +340,11 @@ def _one_by_one(bonds, row, slip, duration, law, address):
             left = duration - time
             if math.copysign(1.0, due[i]) > 0.0:
                 stretch = x0 + speed * time - birth[i]
-                spent = rupture_integral(stretch, speed * left, left, rate, softness)
+                spent = hazard_integral(stretch, speed * left, left, law)
                 if spent < due[i] and math.fabs(stretch + speed * left) < limit:
                     due[i] -= spent
                     break
-                lasts = time_to_rupture(stretch, speed, due[i], rate, softness, limit)
+                lasts = hazard_time(stretch, speed, due[i], law)
                 time += min(lasts, left) if lasts > 0.0 else 0.0
                 life[i] += np.uint32(1)
                 first, second, _, _ = words_at(
@@ -340,17 +368,19 @@ def _one_by_one(bonds, row, slip, duration, law, address):
             lowest, highest = min(lowest, birth[i]), max(highest, birth[i])
     row[SLIDER], row[TIME] = x0 + slip, t0 + duration
     row[BOUND], row[SUM], row[SQUARES] = bound, total, squares
-    return (slip > 0.0 and highest <= x0 + slip) or (slip < 0.0 and lowest >= x0 + slip)
+    is_ahead = highest <= x0 + slip if slip > 0.0 else lowest >= x0 + slip
+    return slip != 0.0 and is_ahead and has_factor(law)
 
 
 @device
 def _set(bonds, soonest, row, law, singly, turn):
     """Set the origin of a row's frame at the slider and at the present time; the sense may turn.
 
-    Its bonds are then stepped one by one, ``singly``, or together. Sums and least dues are computed anew, so that
-    roundings do not add up.
+    Its bonds are then stepped together, or one by one if ``singly`` or if they have no common clock. Sums and least
+    dues are computed anew, so that roundings do not add up.
     """
-    (birth, due, _), (_, softness, limit, _) = bonds, law
+    birth, due, _ = bonds
+    softness, singly = law.softness, singly or not has_factor(law)
     x0, t0, clock = row[SLIDER], row[TIME], row[CLOCK]
     scale = math.exp(-softness * x0)
     sign = -1.0 if turn else 1.0
@@ -375,7 +405,7 @@ def _set(bonds, soonest, row, law, singly, turn):
         soonest[2] = math.inf
         bits = views(due, soonest)
         for block in range(soonest.shape[1]):
-            least(bits, birth, block, limit < math.inf)
+            least(bits, birth, block, law.limit < math.inf)
     row[SLIDER], row[TIME], row[CLOCK], row[SENSE] = 0.0, 0.0, 0.0, sign * row[SENSE]
     row[SINGLY], row[BOUND], row[SUM], row[SQUARES] = (
         1.0 if singly else 0.0,
@@ -392,9 +422,9 @@ TRACKS = "Tuple((float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1]
 @device
 def _far(x, time, law):
     """True if a frame must be set anew with the slider at ``x`` after a ``time``."""
-    rate, softness, limit, _ = law
     distance = math.fabs(x)
-    return distance * softness > _FAR or distance > _FAR * limit or time * rate > _FAR
+    is_far = distance * law.softness > _FAR or distance > _FAR * law.limit
+    return is_far or time * law.rate > _FAR
 
 
 @device
@@ -409,7 +439,7 @@ def _together(row, slip, duration, law, space):
         count > 0 and _far(x, time, law)
     ):
         along = row[SENSE] * slip[count]
-        if along < 0.0 or law[1] * along > _LEAP:
+        if along < 0.0 or law.softness * along > _LEAP:
             break
         clock = lay_out(count, along, duration[count], x, time, clock, law, space)
         x, time = x + along, time + duration[count]
@@ -484,7 +514,7 @@ def one_step(bonds, soonest, row, slip, duration, law, address, space, laid, fra
 
 
 @kernel(
-    f"int64({TRACKS}, float64[:,:], float64[:], UniTuple(float64, 4), uint64, uint64[:], int64, float64[:,:,::1])"
+    f"int64({TRACKS}, float64[:,:], float64[:], {SITE_LAW}, uint64, uint64[:], int64, float64[:,:,::1])"
 )
 def live(tracks, slip, duration, law, seed, members, first, frames):
     """Advance all rows from step ``first`` on, in place; return the number of steps, ``SPENT`` or ``ENDLESS``.
@@ -494,7 +524,7 @@ def live(tracks, slip, duration, law, seed, members, first, frames):
     No row advances beyond this step. Nothing is touched if the state is spent or a number endless.
     """
     birth, due, life, soonest, stamp, frame = tracks
-    rows, end = len(due), first
+    rows, end, law = len(due), first, SiteLaw(*law)
     for m in range(rows):
         if stamp[m] != np.int64(frame[m, STEPS]):
             return SPENT
@@ -548,17 +578,15 @@ def relax(tracks, law):
     The rest of the threshold of a bond is exponential whatever its life was, so no number is drawn.
     """
     (birth, due, life), soonest, frame = tracks
-    rate, softness, limit, _ = law
-    of_rates = rate, softness, limit, 0.0
-    _set((birth, due, life), soonest, frame, of_rates, True, False)
+    _set((birth, due, life), soonest, frame, law, True, False)
     for i in range(len(due)):
         if math.copysign(1.0, due[i]) > 0.0:
             birth[i] = 0.0
-    _set((birth, due, life), soonest, frame, of_rates, False, False)
+    _set((birth, due, life), soonest, frame, law, False, False)
 
 
 @kernel(
-    f"void({TRACKS}, boolean[:], float64[:], float64[:], float64[:], UniTuple(float64, 4), uint64, uint64[:])"
+    f"void({TRACKS}, boolean[:], float64[:], float64[:], float64[:], {SITE_LAW}, uint64, uint64[:])"
 )
 def draw(tracks, chosen, speed, share, age, law, seed, members):
     """Draw chosen rows anew: a ``share`` of sites bound, their ages by the survival law of a bond of mean life ``age``.
@@ -567,10 +595,9 @@ def draw(tracks, chosen, speed, share, age, law, seed, members):
     every second proposal (Devroye, Non-Uniform Random Variate Generation, 1986, VII.2). A bond of any age still has an
     exponential threshold ahead.
     """
-    (birth, due, life, soonest, stamp, frame), (rate, softness, limit, rebinding) = (
-        tracks,
-        law,
-    )
+    (birth, due, life, soonest, stamp, frame) = tracks
+    law = SiteLaw(*law)
+    limit, rebinding = law.limit, law.rebinding
     for m in range(due.shape[0]):
         if not chosen[m % chosen.size]:
             continue
@@ -604,7 +631,7 @@ def draw(tracks, chosen, speed, share, age, law, seed, members):
                     else unit_at(second)
                 )
                 elapsed, bar = tail * mean, exponential(third) + max(tail - 1.0, 0.0)
-                spent = rupture_integral(0.0, v * elapsed, elapsed, rate, softness)
+                spent = hazard_integral(0.0, v * elapsed, elapsed, law)
                 if spent <= bar and math.fabs(v) * elapsed < limit:
                     break
             birth[m, i] = -v * elapsed
@@ -668,9 +695,9 @@ def happen(tracks, event, law, address, winners):
     """Break the bond, or bind the site, that is first among the ``winners``: at the place and time of the frame."""
     (
         ((birth, due, life), soonest, frame),
-        (_, softness, limit, rebinding),
         (seed, member),
-    ) = tracks, law, address
+    ) = tracks, address
+    rebinding = law.rebinding
     place, value, x, sign = 1, winners[event, 1], frame[SLIDER], 1.0
     while place < winners.shape[1] // 2:
         place = 2 * place if winners[event, 2 * place] == value else 2 * place + 1
@@ -679,7 +706,7 @@ def happen(tracks, event, law, address, winners):
     while due[i] != value:
         i += 1
     if event == BINDING:
-        due[i], birth[i] = frame[CLOCK] + birth[i] * math.exp(softness * x), x
+        due[i], birth[i] = frame[CLOCK] + birth[i] * math.exp(law.softness * x), x
     else:
         x, sign = birth[i], -1.0
         life[i] += np.uint32(1)
@@ -693,7 +720,7 @@ def happen(tracks, event, law, address, winners):
         frame[SUM] + sign * x,
         frame[SQUARES] + sign * x * x,
     )
-    least(views(due, soonest), birth, block, limit < math.inf)
+    least(views(due, soonest), birth, block, law.limit < math.inf)
     while place > 0:
         _rank(place, winners, soonest)
         place //= 2
@@ -702,7 +729,8 @@ def happen(tracks, event, law, address, winners):
 @device
 def next_event(tracks, speed, most, law, winners):
     """Return the time to the next rupture or binding at a speed [m/s], at most ``most``."""
-    ((birth, due, _), soonest, frame), (rate, softness, limit, _) = tracks, law
+    (birth, due, _), soonest, frame = tracks
+    rate, softness, limit = law.rate, law.softness, law.limit
     along = frame[SENSE] * speed
     if frame[SINGLY] == 0.0 and along >= 0.0:
         rank(tracks, law, winners)
@@ -733,9 +761,7 @@ def next_event(tracks, speed, most, law, winners):
             )
             soon = min(
                 soon,
-                time_to_rupture(
-                    x - birth[i], along, max(left, 0.0), rate, softness, limit
-                ),
+                hazard_time(x - birth[i], along, max(left, 0.0), law),
             )
     return max(soon, 0.0)
 
@@ -901,11 +927,8 @@ def advance(
         np.asarray(members, dtype=np.uint64),
         tracks._replace(frame=tracks.frame.copy()),
     )
-    frames, done, law = (
-        np.empty((*after.frame.shape, len(duration))),
-        0,
-        (*rupture[:3], rebinding_rate),
-    )
+    frames, done = np.empty((*after.frame.shape, len(duration))), 0
+    law = site_law(rupture, rebinding_rate)
     while done < len(duration):
         done = live(tuple(after), slip, duration, law, seed, members, done, frames)
         if done == SPENT:
@@ -963,8 +986,8 @@ def mean_life(speed: Array, rupture: RuptureRate) -> Array:
 
     Notes
     -----
-    Bell's: z e^z E1(z)/k0 with z = k0/(softness \\|V\\|). With a limit as well, by
-    Gauss's rule in 32 pieces.
+    Bell's: z e^z E1(z)/k0 with z = k0/(softness \\|V\\|). That of a law that is not closed, or of Bell's with a limit,
+    follows from the bound share of ``cohorts.steady``.
 
     Examples
     --------
@@ -984,18 +1007,15 @@ def _mean_life(speed: float, rupture: RuptureRate) -> float:
     pace, longest = speed * softness, limit / speed if speed > 0.0 else math.inf
     if rate == 0.0:
         return longest
+    if rupture.table.scale > 0.0 or (pace > 0.0 and longest < math.inf):
+        share = float(cohorts.steady(rupture, rate, speed, 1e-4).weight.sum())
+        return share / (1.0 - share) / rate
     if pace < 1e-16 * rate:
         return -math.expm1(-rate * longest) / rate
     z = max(rate / pace, 5e-324)
-    if longest == math.inf and z > 1.0:
+    if z > 1.0:
         return float(reduced_exponential_integral(z, 0.0)) / rate
-    if longest == math.inf:
-        return float(scaled_exponential_integral(z, 0.0)) / pace
-    end = min(longest, math.log1p(40.0 / z) / pace)  # the share e^-40 is left
-    edges = np.linspace(0.0, end, 33)
-    nodes, weights = np.polynomial.legendre.leggauss(16)
-    age = edges[:-1, np.newaxis] + 0.5 * edges[1] * (nodes + 1.0)
-    return float(0.5 * edges[1] * np.sum(weights * np.exp(-z * np.expm1(pace * age))))
+    return float(scaled_exponential_integral(z, 0.0)) / pace
 
 
 def _draw(tracks, chosen, begin, speed, rupture, rebinding_rate, seed, members) -> None:
@@ -1014,17 +1034,13 @@ def _draw(tracks, chosen, begin, speed, rupture, rebinding_rate, seed, members) 
             share = np.where(
                 np.isinf(age), 1.0, rebinding_rate * age / (rebinding_rate * age + 1.0)
             )
-    law, addresses = (
-        (*rupture[:3], rebinding_rate),
-        np.asarray(members, dtype=np.uint64),
-    )
     draw(
         tuple(tracks),
         chosen,
         speed,
         share,
         np.where(np.isinf(age), 0.0, age),
-        law,
+        site_law(rupture, rebinding_rate),
         seed,
-        addresses,
+        np.asarray(members, dtype=np.uint64),
     )

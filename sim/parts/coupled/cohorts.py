@@ -27,7 +27,7 @@ from sim.parts.bonds.cohorts import (
     try_step,
     write_row,
 )
-from sim.parts.bonds.rupture import hazard_integral, hazard_time, rate_at
+from sim.parts.bonds.rupture import hazard_integral, hazard_time, rate_at, rates_at
 from sim.parts.coupled import mechanics
 from sim.parts.coupled.step_end import ENDS, end_step
 from sim.parts.drive import ENERGY
@@ -74,8 +74,7 @@ def slopes(first, middle, last, step):
 def sums_at(pool, count, unit, rules, node):
     """Compute the sums over the bonds at a node, stretches over their ``unit``."""
     bound, moment, square, lost, rates = 0.0, 0.0, 0.0, 0.0, pool[8]
-    for i in range(count):
-        rates[i] = rate_at(pool[1, i], rules.law)
+    rates_at(pool[1, :count], rules, rates)
     for i in range(count):
         w, x, d = pool[0, i], pool[1, i], pool[2, i]
         squared = w * (x * x + d * d / 12.0)
@@ -120,7 +119,7 @@ def _cut(pool, count, shift, duration, rules):
         if most > rules.limit:
             cut += (
                 pool[0, i]
-                * math.exp(-hazard_integral(pool[1, i], shift, duration, rules.law))
+                * math.exp(-hazard_integral(pool[1, i], shift, duration, rules))
                 - pool[4, i]
             )
     return max(cut, 0.0)
@@ -381,7 +380,7 @@ def longest(row, unit, rules):
     if rules.rebinding == 0.0:
         return math.inf
     speed = math.fabs(row.speed) * unit
-    life = hazard_time(0.0, speed, 1.0, rules.law)
+    life = hazard_time(0.0, speed, 1.0, rules)
     most = life * (7.0 * rules.tolerance) ** (1.0 / 3.0)
     most = min(most, 0.75 * rules.cell / speed) if speed > 0.0 else most
     few = _FEW_BIRTHS * rules.tolerance * (row.bound + mechanics.SOME) / rules.rebinding
@@ -588,7 +587,7 @@ def _break_stretched(
 @device
 def _break_all(row, pool, time, brief, slider, contact, unit, rules, node, energy):
     """Break all bonds at once and slip, where nothing delays the interface, if they last less than ``brief``."""
-    k = rate_at(unit * node.moment / node.bound, rules.law) if node.bound > 0.0 else 0.0
+    k = rate_at(unit * node.moment / node.bound, rules) if node.bound > 0.0 else 0.0
     if not (k * brief > 1.0 and mechanics.slips_free(row, slider)):
         return False
     stored = stored_energy(row, node.square, time, slider, contact)
@@ -860,7 +859,11 @@ def advance_cohorts(
         mechanics.contact_of(numbers),
         outputs,
     )
-    rules, most, unit = Rules(*rules), weight.shape[1] + 520, units[mechanics.SLIP]
+    rules, most, unit = (
+        Rules(*rules),
+        weight.shape[1] + 520,
+        units[mechanics.SLIP],
+    )
     both, nodes = (
         (np.empty(2 * mechanics.COLUMNS), np.empty(2 * mechanics.ENERGIES)),
         np.zeros(3, NODE),

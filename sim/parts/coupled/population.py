@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sim.numerics.noise import Noise
 from sim.parts.bonds import models
 from sim.parts.bonds.cohorts import Cohorts, numbers_of
-from sim.parts.bonds.tracked import AGAIN, Tracks
+from sim.parts.bonds.tracked import AGAIN, Tracks, site_law
 from sim.parts.coupled.cohorts import advance_cohorts
 from sim.parts.coupled.mean_field import advance_rows
 from sim.parts.coupled.mechanics import ROW, Inputs, Law
@@ -155,11 +155,8 @@ class Stretched(Population):
         """Return the stretch at which bonds break [m], and the force of all sites at it, n κ b A0 [N]."""
         law, bonds = self.bonds.law, self.bonds
         bears = bonds.site_density * bonds.bond_stiffness * area
-        if law.softness > 0.0:
-            stretch = 1.0 / law.softness
-        elif law.limit < math.inf:
-            stretch = law.limit
-        else:
+        stretch = law.scale
+        if stretch == math.inf:
             most = max(map(abs, drive.course.extremes))
             slow = law.rate if drive.spring else bears * bonds.bound_at_rest
             stretch = most / slow or _STRETCH
@@ -239,7 +236,7 @@ class OneByOne(Stretched):
         tracks = tracks._replace(frame=tracks.frame.copy())
         frames = np.empty((*loop.columns["radius"].shape, tracks.frame.shape[1]))
         members = np.asarray(noise.members, dtype=np.uint64)
-        law = *bonds.law[:3], bonds.rebinding_rate
+        law = site_law(bonds.law, bonds.rebinding_rate)
         if advance_tracks(
             *loop.arguments, tuple(tracks), law, noise.seed, members, frames
         ):

@@ -14,6 +14,7 @@ import numpy as np
 
 from sim.numerics.jit import borrowed, device, kernel
 from sim.parts.bonds import tracked
+from sim.parts.bonds.mean_field import mean_decay
 from sim.parts.coupled import mechanics
 from sim.parts.coupled.cohorts import (
     NODE,
@@ -52,7 +53,7 @@ class Ground(NamedTuple):
 
     unit: float
     sites: float
-    law: tuple[float, ...]
+    law: tracked.SiteLaw
     address: tuple[int, int]
     space: tuple[Array, ...]
     winners: Array
@@ -99,7 +100,7 @@ def _go(tracks, shift, duration, ground):
 def _go_at_once(tracks, shift, length, ground):
     """Displace the slider in no time; bonds whose stretch is limited may break."""
     frame, along = tracks[2], tracks[2][tracked.SENSE] * shift * ground.unit
-    if frame[tracked.SINGLY] > 0.0 or along < 0.0 or ground.law[2] < math.inf:
+    if frame[tracked.SINGLY] > 0.0 or along < 0.0 or ground.law.limit < math.inf:
         _go(tracks, shift, _AT_ONCE * length, ground)
         return
     tracked.rank(tracks, ground.law, ground.winners)
@@ -122,7 +123,7 @@ def _rebalance(line, time, tracks, slider, contact, ground, energy, node):
         line[2],
         energy.work,
         ground.unit,
-        ground.law[2],
+        ground.law.limit,
     )
     # each turn but the last ones breaks a bond
     for _ in range(_SETTLING + int(ground.sites)):
@@ -275,12 +276,6 @@ def _is_closed(slider, contact, limit):
 
 
 @device
-def _relaxed(x):
-    """Return (1 - e^-x)/x."""
-    return -math.expm1(-x) / x if x > 0.0 else 1.0
-
-
-@device
 def _clock(time, motion, pace):
     """Return the integral of e^(pace slip) over a time, by Gauss's rule, and the last of the values.
 
@@ -291,10 +286,10 @@ def _clock(time, motion, pace):
     for i in range(len(_PLACES)):
         part = _PLACES[i] * time
         mean += _SHARES[i] * math.exp(
-            pace * part * (last + (first - last) * _relaxed(rate * part))
+            pace * part * (last + (first - last) * mean_decay(rate * part))
         )
     return time * mean, math.exp(
-        pace * time * (last + (first - last) * _relaxed(rate * time))
+        pace * time * (last + (first - last) * mean_decay(rate * time))
     )
 
 
@@ -324,12 +319,7 @@ def _to_event(row, start, left, tracks, slider, ground, energy, node):
 
     Return the time that has passed, below zero if the closed form does not apply, and the event, or -1.
     """
-    frame, (rate, softness, _, _), winners, event = (
-        tracks[2],
-        ground.law,
-        ground.winners,
-        -1,
-    )
+    frame, law, winners, event = tracks[2], ground.law, ground.winners, -1
     if frame[tracked.SINGLY] > 0.0 or not node.area >= 0.0:
         return -1.0, event
     pull, bears = (
@@ -363,9 +353,9 @@ def _to_event(row, start, left, tracks, slider, ground, energy, node):
         or (stiffness == 0.0 and (damping == 0.0 or growth != 0.0))
     ):
         return -1.0, event
-    tracked.rank(tracks, ground.law, winners)
+    tracked.rank(tracks, law, winners)
     motion, bent = (first, last, relaxes), first - last
-    clock, pace = frame[tracked.CLOCK], softness * ground.unit * sense
+    clock, pace = frame[tracked.CLOCK], law.softness * ground.unit * sense
     binding, rupture = (
         max(winners[tracked.BINDING, 1] - frame[tracked.TIME], 0.0),
         winners[tracked.RUPTURE, 1],
@@ -381,7 +371,7 @@ def _to_event(row, start, left, tracks, slider, ground, energy, node):
         time = min(time, _MOST * change ** (-1.0 / 13.0) / relaxes)
     event = tracked.BINDING if time == binding else event
     grown, (whole, slope) = (
-        rate * math.exp(softness * frame[tracked.SLIDER]),
+        law.rate * math.exp(law.softness * frame[tracked.SLIDER]),
         _clock(time, motion, pace),
     )
     waits, clock = rupture - clock, clock + grown * whole
@@ -393,7 +383,7 @@ def _to_event(row, start, left, tracks, slider, ground, energy, node):
         )
         event, clock = tracked.RUPTURE, rupture
     x = relaxes * time
-    early, twice = _relaxed(x), _relaxed(2.0 * x)
+    early, twice = mean_decay(x), mean_decay(2.0 * x)
     late = (
         (1.0 - early) / x
         if x > 1e-3
@@ -428,7 +418,7 @@ def _to_event(row, start, left, tracks, slider, ground, energy, node):
     row.radius = node.radius
     tracked.let_pass(frame, math.fabs(slip) * ground.unit, time, clock, winners)
     if event >= 0:
-        tracked.happen(tracks, event, ground.law, ground.address, winners)
+        tracked.happen(tracks, event, law, ground.address, winners)
     return time, event
 
 
@@ -441,7 +431,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
     """
     start, length, unit, law = 0.0, slider.length, ground.unit, ground.law
     row, energy, first, last = line[0], books[0], nodes[0], nodes[2]
-    is_closed = _is_closed(slider, contact, law[2])
+    is_closed = _is_closed(slider, contact, law.limit)
     turns, checked = 0, 0.0
     while turns >= 0:
         turns, checked = mechanics.judged(turns, checked, start, length)
@@ -505,7 +495,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
             break
         if not step > mechanics.LEAST * length:
             slid, row.next_step = row.slip, 0.0
-            if law[2] == math.inf and mechanics.snap(
+            if law.limit == math.inf and mechanics.snap(
                 row, first.square, start, slider, contact, energy
             ):
                 _go_at_once(tracks, row.slip - slid, length, ground)
@@ -593,13 +583,13 @@ def _through(line, books, pieces, slider, contact, tracks, ground, nodes):
 
 
 @kernel(
-    f"int64({mechanics.ARGUMENTS}, {ENDS}, {tracked.TRACKS}, UniTuple(float64, 4), uint64, uint64[:],"
+    f"int64({mechanics.ARGUMENTS}, {ENDS}, {tracked.TRACKS}, {tracked.SITE_LAW}, uint64, uint64[:],"
     " float64[:, :, ::1])"
 )
 def advance_tracks(inputs, numbers, outputs, ends, tracks, law, seed, members, frames):
     """Advance all rows, their energies and their bonds, in place, through some clock steps, each row by itself.
 
-    ``law``: rate, softness, limit and k_on; ``seed`` and ``members`` of the lives' draws; ``frames``, of shape (steps,
+    ``law``: numbers of ``SiteLaw``; ``seed`` and ``members`` of the lives' draws; ``frames``, of shape (steps,
     rows, columns), get those of the bonds after each step. The rest as in ``mean_field.advance_rows``. The result is
     zero, or ``SPENT`` if the bonds have been advanced already.
     """
@@ -610,6 +600,7 @@ def advance_tracks(inputs, numbers, outputs, ends, tracks, law, seed, members, f
         outputs,
     )
     birth, due, life, soonest, stamp, frame = tracks
+    law = tracked.SiteLaw(*law)
     for m in range(len(rows)):
         if stamp[m] != np.int64(frame[m, tracked.STEPS]):
             return tracked.SPENT

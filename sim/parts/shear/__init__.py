@@ -13,4 +13,4 @@ from sim.parts.shear.models import (
     Shear,
     Uniform,
 )
-from sim.parts.shear.modes import FixedProcess, ModalProcess
+from sim.parts.shear.modes import ModalProcess

@@ -21,7 +21,6 @@ from sim.parts.exchange import Setting
 from sim.parts.shear.bands import BandedProcess, Bands, cell_pairs, group
 from sim.parts.shear.maps import CarriedProcess, Passing
 from sim.parts.shear.modes import (
-    FixedProcess,
     ModalProcess,
     SiteMean,
     SiteModes,
@@ -55,12 +54,6 @@ Contact = Annotated[
     Literal["plane", "disc"],
     Field(
         description='"disc": energy per new area of a finite contact, instead of that of the plane'
-    ),
-]
-_ModeAmplitudes = Annotated[
-    Literal["gaussian", "fixed"],
-    Field(
-        description='"fixed": modes have a constant modulus, so the energy is constant'
     ),
 ]
 _Points = Annotated[
@@ -109,7 +102,6 @@ class ShearModel:
     amplitude: Amplitude
     paid_by_adhesion: float
     contact: str
-    mode_amplitudes: str = "gaussian"
     #: Relative error of the energy on a disc that needs no remark.
     tolerance: float = 0.01
 
@@ -120,10 +112,7 @@ class ShearModel:
 
     @model_validator(mode="after")
     def _one_size(self) -> Self:
-        law, fixed = self.amplitude, self.mode_amplitudes == "fixed"
-        if fixed and law.relaxing:
-            message = 'fixed mode_amplitudes are never renewed; use mode_amplitudes = "gaussian" or relaxing = false'
-            raise PydanticCustomError("fixed_cannot_relax", message)
+        law = self.amplitude
         if self.spectrum.bond_made and law.model != "constant":
             raise PydanticCustomError(
                 "bond_made",
@@ -136,12 +125,6 @@ class ShearModel:
         ):
             message = 'slip_rate needs a memory distance: give memory_length, or shear.correlation.model = "slip"'
             raise PydanticCustomError("no_memory", message)
-        if self.spectrum.bond_made and fixed:
-            cure = "leave it out"
-            raise PydanticCustomError(
-                "bond_made",
-                f'bonds at random places make mode_amplitudes = "gaussian"; {cure}',
-            )
         return self
 
     @property
@@ -290,18 +273,15 @@ class _Fluctuating(ShearModel):
     None means the grid that holds the spectrum's shortest wavelength.
     """
 
+    per_member: ClassVar[bool] = True
+
     spectrum: Spectrum
     correlation: Correlation
     amplitude: Amplitude = Field(default_factory=Constant)
     cell: _Cell | None = None
     points: _Points | None = None
-    mode_amplitudes: _ModeAmplitudes = "gaussian"
     paid_by_adhesion: Paid = 1.0
     contact: Contact = "plane"
-
-    @property
-    def per_member(self) -> bool:  # type: ignore[override]
-        return self.mode_amplitudes == "gaussian"  # fixed ones give all members one ΔΓ
 
     @property
     def _memory(self) -> float:  # type: ignore[override]
@@ -370,10 +350,7 @@ class Modal(_Fluctuating):
     keeps_modes: ClassVar[bool] = True
 
     def process(self, solid: ElasticSolid, cell: float) -> ModalProcess:
-        free_or_fixed = (
-            FixedProcess if self.mode_amplitudes == "fixed" else ModalProcess
-        )
-        kind = SiteModes if self.spectrum.bond_made else free_or_fixed
+        kind = SiteModes if self.spectrum.bond_made else ModalProcess
         of_cell = modes(self.spectrum, self.side(cell), self.points)
         return kind(of_cell, solid, self.correlation, self.law)
 
@@ -425,16 +402,12 @@ class Banded(_Fluctuating):
             raise PydanticCustomError("bond_made", message)
         return self
 
-    def process(
-        self, solid: ElasticSolid, cell: float
-    ) -> BandedProcess | SmoothProcess:
+    def process(self, solid: ElasticSolid, cell: float) -> BandedProcess:
         spectrum, size = _of_unit_size(self.spectrum)
         banding = self.correlation.power, self.tolerance, self.amplitude.relaxing
         side, points = self.side(cell), self.points
         unit, errors = _grouped(spectrum, side, points, solid.unit, banding)
         bands = replace(unit, weight=unit.weight * (size / solid.shear_modulus))
-        if self.mode_amplitudes == "fixed":
-            return SmoothProcess(bands.mean, self.law)
         return BandedProcess(bands, errors, self.correlation, self.law)
 
 

@@ -29,7 +29,6 @@ from sim.parts.exchange import (
     Array,
     Bonding,
     FieldCourse,
-    FieldLaw,
     Gammas,
     Indices,
     Motion,
@@ -40,7 +39,6 @@ from sim.parts.shear.process import (
     Fluctuation,
     Renewing,
     SmoothProcess,
-    exponents,
 )
 from sim.solid import ElasticSolid
 from sim.spectrum.family import Family
@@ -385,55 +383,6 @@ class ModalProcess(Renewing):
         return self.modes.errors(self.solid)
 
 
-class FixedProcess(ModalProcess):
-    """Modes with constant modulus that diffuse in phase by 2∫λdt, as the paper's ripple: ΔΓ does not fluctuate."""
-
-    def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        past, amplitude = self.amplitude.started(motion, bonding.strength)
-        phases = 2.0 * np.pi * noise.uniforms(motion.step, len(self.wavenumber))
-        return Fluctuation(self._energy(amplitude), amplitude, phases, past)
-
-    def advance(
-        self,
-        state: Fluctuation,
-        motions: Motion,
-        bonding: Bonding,
-        noise: Noise,
-        course: FieldCourse = NOT_FOLLOWED,
-    ) -> tuple[Fluctuation, Array]:
-        past, amplitude = self.amplitude.followed(
-            state.past, motions, bonding.strength, course.memory
-        )
-        phases = state.values.copy()
-        turn_phases(
-            phases,
-            exponents(self.correlation, self.wavenumber, motions),
-            *noise.at(motions.step),
-        )
-        energy = self._energy(amplitude)
-        return Fluctuation(energy[-1], amplitude[-1], phases, past), energy
-
-    @cached_property
-    def field_law(self) -> FieldLaw:
-        return self.amplitude.field_law(2.0 * float(np.sum(self.weights)))
-
-    def _energy(self, amplitude: Array) -> Array:
-        return amplitude**2 * (2.0 * np.sum(self.weights))
-
-    def _standard(self, state: Fluctuation) -> tuple[Array, Array]:
-        return np.stack([np.cos(state.values), np.sin(state.values)], axis=1), np.sqrt(
-            0.5
-        ) * state.amplitude
-
-    @property
-    def gammas(self) -> Gammas:
-        return Gammas(constant=2.0 * float(np.sum(self.weights)))
-
-    def known_errors(self) -> dict[str, float]:
-        fixed = {"member_spread_variance": 0.0, "member_spread_energy": 0.0}
-        return super().known_errors() | fixed
-
-
 @kernel(
     "void(float64[:,:,::1], float64[:,:,:], float64[:,:,:], float64[:,:], float64[::1],"
     " uint64, uint64, uint64[::1], int64, float64[:,::1])"
@@ -460,21 +409,6 @@ def renew_modes(values, keep, renew, size, weights, seed, part, members, step, e
                 values[m, 0, k], values[m, 1, k] = x, y
                 total += weights[k] * (x * x + y * y)
             energy[s, m] = total
-
-
-@kernel("void(float64[:,::1], float64[:,:,:], uint64, uint64, uint64[::1], int64)")
-def turn_phases(phases, exponents, seed, part, members, step):
-    """Let all phases of all members diffuse in place, by √(2∫λdt) of a normal number in each step."""
-    many = exponents.shape[2] > 1
-    for m in range(members.size):
-        row = m % exponents.shape[1]
-        for s in range(len(exponents)):
-            numbers = stream(seed, part, members[m], step + s, 0)
-            for k in range(phases.shape[1]):
-                turn, numbers = normal(numbers)
-                phases[m, k] += (
-                    math.sqrt(2.0 * exponents[s, row, k if many else 0]) * turn
-                )
 
 
 @kernel(

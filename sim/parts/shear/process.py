@@ -371,7 +371,7 @@ class Fluctuation(NamedTuple):
         Amplitude factor g [1] at this time.
     values : array
         Numbers of the process: complex amplitudes (members, 2, pairs) in units of each mode's
-        standard deviation, or phases (members, pairs) [rad]; empty for a process without any.
+        standard deviation; empty for a process without any.
     past : Memory
         Memory of earlier sliding in the law of the amplitude.
     expected : array, shape (1,) or (members,)

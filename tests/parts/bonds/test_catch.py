@@ -66,11 +66,6 @@ def test_the_law_is_the_renewal_integral_with_bells_and_the_constant_rate_as_lim
             by_quadrature(speed),
             rtol=1e-10,
         )
-        assert_allclose(
-            CATCH.closed_form(speed, STIFFNESS, BINDING),
-            by_quadrature(speed),
-            rtol=1e-10,
-        )
     speeds = np.array([0.0, *SPEEDS])
     bell = bell_moments(speeds, 5.0, 6e-12, STIFFNESS, BINDING)
     assert_allclose(

@@ -279,7 +279,6 @@ def test_amplitude_multiplies_the_unit_process_or_the_mean_of_the_cell_at_once()
         "correlation": Wave(waves=1.0),
         "tolerance": 0.1,
     }
-    mean = modes(SPECTRUM, CELL, None).energies(HalfSpace(G)).sum()
     population = bonds.Steady(critical_speed=2e-3, stress=4e5)
     for motion in (
         drive.Steady(speed=4e-3),
@@ -291,17 +290,13 @@ def test_amplitude_multiplies_the_unit_process_or_the_mean_of_the_cell_at_once()
             Onset(speed=2e-3, width=0.3, floor=0.1),
             Stress(reference=1e5),
         ):
-            for kind, energy, rtol in (
-                ("gaussian", unit, 1e-14),
-                ("fixed", np.full((6, 1), mean), 1e-12),
-            ):
-                part = shear.Banded(**recipe, amplitude=amplitude, mode_amplitudes=kind)
-                states, grown = march_energies(part, motion, population)
-                factors = [
-                    amplitude.factor(state.drive.speed, state.bonding.strength)
-                    for state in states
-                ]
-                assert_allclose(grown, energy * np.square(factors), rtol=rtol, atol=0)
+            part = shear.Banded(**recipe, amplitude=amplitude)
+            states, grown = march_energies(part, motion, population)
+            factors = [
+                amplitude.factor(state.drive.speed, state.bonding.strength)
+                for state in states
+            ]
+            assert_allclose(grown, unit * np.square(factors), rtol=1e-14, atol=0)
 
 
 def relaxing(amplitude, motion, times):
@@ -372,11 +367,3 @@ def test_a_contact_at_rest_keeps_its_energy_and_bad_input_is_refused_at_its_key(
         correlation=Slip(length=1e-6),
     )
     assert np.all(march_energies(part, drive.Steady(speed=1e-3))[1] == 0.0)
-    keys = {
-        "mode_amplitudes": "fixed",
-        "amplitude": Stress(reference=1.0, relaxing=True),
-    }
-    with pytest.raises(ValueError, match="mode_amplitudes"):
-        shear.Banded(
-            spectrum=SPECTRUM, correlation=Slip(length=1e-6), cell=CELL, **keys
-        )
