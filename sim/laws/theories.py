@@ -52,13 +52,9 @@ import math
 import numpy as np
 
 from sim.laws import jkr
+from sim.laws.equilibrium import largest_radius
 from sim.laws.jkr import twice_pull_off
-from sim.laws.reversible import (
-    compressible,
-    crossing,
-    shrunk_at_displacement,
-    shrunk_at_load,
-)
+from sim.laws.reversible import compressible, shrunk, tilt_of_stress
 from sim.numerics.jit import device, law
 from sim.numerics.special import cube_root
 
@@ -440,11 +436,13 @@ def _widened(
     known = normal + adhesive + sheared
     if known == 0.0 or not known < math.inf:
         return known
-    size = normal / scale
-    level = math.copysign(hard * size**2 + 2.0 / 3.0 * (1.0 - hard) * size**3, control)
+    size, full = normal / scale, 2.0 * math.pi
+    base = math.copysign(size**2, control)
+    load = math.copysign(4.0 / 3.0 * full * size**3, control)
+    mount = (0.0, base, math.inf) if hard == 1.0 else (load, 0.0, 0.0)
     m = math.copysign((adhesive / scale) ** 3, work)
-    # all terms at most 1: z <= 2.1 at a load, else 1.9
-    z, _ = crossing(2.1, level, hard, m, (sheared / scale) ** 2)
+    # E* is 2 pi, and all terms are at most 1: z <= 2.1 at a load, else 1.9
+    z, _ = largest_radius(2.1, m, -((sheared / scale) ** 2), mount, (1.0, full))
     return max(normal, scale * z) if control >= 0.0 else scale * z
 
 
@@ -726,7 +724,7 @@ def compare_at_load(
     radii = {"jkr": jkr, "hertz": hertz}
     if not only or "uncorrected" in only:
         radii["uncorrected"] = uncorrected_at_load(load, work, stress, *rest)
-    _add_shares(radii, shrunk_at_load, (*held, stress), reversible, mixity, rest, only)
+    _add_shares(radii, (load, 0.0, work), stress, (reversible, mixity), rest, only)
     laws = {
         "scaled_angle": scaled_angle_at_load,
         "scaled_tangent": scaled_tangent_at_load,
@@ -756,15 +754,8 @@ def compare_at_indentation(
         radii["uncorrected"] = uncorrected_at_indentation(
             indentation, work, stress, *rest
         )
-    _add_shares(
-        radii,
-        shrunk_at_displacement,
-        (indentation, math.inf, work, stress),
-        reversible,
-        mixity,
-        rest,
-        only,
-    )
+    held_at = indentation, math.inf, work
+    _add_shares(radii, held_at, stress, (reversible, mixity), rest, only)
     laws = {
         "scaled_angle": scaled_angle_at_indentation,
         "scaled_tangent": scaled_tangent_at_indentation,
@@ -772,17 +763,20 @@ def compare_at_indentation(
     return _with_own_forces(radii, laws, held, stress, mixity, rest, only)
 
 
-def _add_shares(radii, shrunk, held, reversible, mixity, rest, only):
+def _add_shares(radii, held, stress, parameters, rest, only):
     """Radii by theory with those that differ in the reversible share and in what is held."""
+    reversible, mixity = parameters
     shares = {
         "savkoor_briggs": (_AS_STICK, 4.0),
         "reversible_force": (_AS_UNIFORM, 4.0),
     }
     shares |= {"reversible_stress": (1.0, 0.0), "fraction": (reversible, 0.0)}
     shares["shear_share"] = (_AS_STICK * np.asarray(mixity), 4.0)
-    for name, share in shares.items():
+    for name, (share, of_force) in shares.items():
         if not only or name in only:
-            radii[name] = shrunk(radii["jkr"], radii["hertz"], *held, *share, *rest)
+            tilt = tilt_of_stress(stress, share, *rest[1:])
+            terms = *held, tilt, of_force, *rest[:2]
+            radii[name] = shrunk(radii["jkr"], radii["hertz"], *terms)
 
 
 def _with_own_forces(radii, laws, held, stress, mixity, rest, only):

@@ -25,7 +25,7 @@ from sim.parts.contact.balance import (
     DisplacementControl,
     LoadControl,
     Shares,
-    widest_crossings,
+    radii_on_disc,
 )
 from sim.parts.contact.front import Kinetics, follow as follow_front
 from sim.parts.exchange import TURN, Array, ContactState, Flags, Motion, Setting, during
@@ -430,28 +430,19 @@ class _Controlled:
                 self.reversible,
                 balance.bodies,
             )
-        bodies = balance.bodies
-        most = balance.bonded - balance.margin.least * balance.fluctuating
-        wide = control.radius(most, balance.stress, self.reversible, bodies)
-        hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, bodies)
-        of_stress = (
-            self.reversible * balance.reversible(np.ones(1)) if self.reversible else 0.0
-        )
-        load, base, stiffness = control.mount
-        terms = wide, hertz, load, base, balance.bonded, balance.fluctuating, of_stress
-        shares, sphere = (
-            balance.margin.each,
-            (1.0 / bodies.sphere_radius, bodies.modulus, stiffness),
-        )
-        contacts = np.stack(np.broadcast_arrays(*terms)).reshape(
-            len(terms), len(shares), -1
-        )
+        bodies, (load, base, stiffness) = balance.bodies, control.mount
+        tilt = self.reversible * balance.reversible(np.ones(1))
+        bonded, fluctuating = balance.bonded, balance.fluctuating
+        most = bonded - balance.margin.least * fluctuating
+        terms = np.broadcast_arrays(most, bonded, fluctuating, tilt, load, base)
+        shares, body = balance.margin.each, (1.0 / bodies.sphere_radius, bodies.modulus)
+        contacts = np.stack(terms).reshape(len(terms), len(shares), -1)
         radius = np.empty(contacts.shape[1:])
         for k, share in enumerate(shares):
-            widest_crossings(
-                np.ascontiguousarray(contacts[:, k]), sphere, share, radius[k]
+            radii_on_disc(
+                np.ascontiguousarray(contacts[:, k]), stiffness, body, share, radius[k]
             )
-        return radius.reshape(wide.shape)
+        return radius.reshape(terms[0].shape)
 
     def _left(self, radius: Array, balance: Balance) -> Array:
         """Return the work of adhesion left at a radius; of an open contact that of a vanishing one."""
