@@ -20,10 +20,6 @@ import numpy as np
 from sim.laws import jkr
 from sim.laws.equilibrium import largest_radius, surplus
 from sim.laws.jkr import fold_radius
-from sim.laws.reversible import (
-    radius_at_displacement_reversible,
-    radius_at_load_reversible,
-)
 from sim.numerics.jit import device, kernel
 from sim.numerics.special import cube_root
 from sim.parts.exchange import Array, Flags, Mount
@@ -79,17 +75,10 @@ class LoadControl:
         """True if a detached sphere comes back into contact, because the load is not tensile."""
         return self.load >= 0.0
 
-    def radius(
-        self, work: Array, stress: Array, reversible: float, bodies: Bodies
-    ) -> Array:
-        """Return the largest stable equilibrium radius [m]: Hertz's if no work of adhesion is left, nan without one."""
-        if reversible == 0.0:
-            return np.asarray(jkr.radius_at_load(self.load, work, *bodies.numbers[:2]))
-        return np.asarray(
-            radius_at_load_reversible(
-                self.load, work, stress, reversible, *bodies.numbers
-            )
-        )
+    def radius(self, work: Array, bodies: Bodies) -> Array:
+        """Return JKR's radius [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
+        body = bodies.sphere_radius, bodies.modulus
+        return np.asarray(jkr.radius_at_load(self.load, work, *body))
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
         """Return the load on the sphere [N]; 0 if the contact is open."""
@@ -140,19 +129,11 @@ class DisplacementControl:
         """True if a detached sphere comes back into contact: at a displacement of zero or more."""
         return self.base >= 0.0
 
-    def radius(
-        self, work: Array, stress: Array, reversible: float, bodies: Bodies
-    ) -> Array:
-        """Return the largest stable equilibrium radius [m]: Hertz's if no work of adhesion is left, nan without one."""
-        machine = self.base, self.stiffness
-        if reversible == 0.0:
-            return np.asarray(
-                jkr.radius_at_displacement(*machine, work, *bodies.numbers[:2])
-            )
+    def radius(self, work: Array, bodies: Bodies) -> Array:
+        """Return JKR's radius [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
+        body = bodies.sphere_radius, bodies.modulus
         return np.asarray(
-            radius_at_displacement_reversible(
-                *machine, work, stress, reversible, *bodies.numbers
-            )
+            jkr.radius_at_displacement(self.base, self.stiffness, work, *body)
         )
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
@@ -320,16 +301,18 @@ def _narrowed(inside, outside, contact):
 
 
 @device
-def largest_on_disc(start, work, mount, body, share):
-    """Return the largest stable radius of a contact on a disc [m], nan without one.
+def stable_radius(start, work, mount, body, share):
+    """Return the largest stable radius of a contact [m], nan without one.
 
     ``start``: any radius above 0. ``work``: work of adhesion that is left at most, that of the intact bonds, and energy
     that many waves in the contact take [J/m²], and energy of the mean stress over the radius [J/m³]. ``mount`` and
-    ``body`` as in ``sim.laws.equilibrium.largest_radius``. ``share``: a ``Share``. The walk never goes below 1e-4 of
-    its start.
+    ``body`` as in ``sim.laws.equilibrium.largest_radius``. ``share``: a ``Share``, without cubics on the plane, where
+    all of the energy is taken at any radius. On a disc the walk never goes below 1e-4 of its start.
     """
     most, bonded, fluctuating, tilt = work
     wide, _ = largest_radius(start, most, tilt, mount, body)
+    if len(share[2]) == 0:
+        return wide
     contact = (bonded, fluctuating, tilt), mount, body, share
     if not wide > 0.0 or fluctuating == 0.0 or _surplus(wide, contact) <= 0.0:
         return wide  # fluctuations do not reduce the work
@@ -353,10 +336,10 @@ def largest_on_disc(start, work, mount, body, share):
 
 
 @kernel(f"void(float64[:, ::1], float64, UniTuple(float64, 2), {SHARE}, float64[::1])")
-def radii_on_disc(contacts, stiffness, body, share, radius):
-    """Write the largest stable radius of contacts on discs to ``radius`` [m].
+def stable_radii(contacts, stiffness, body, share, radius):
+    """Write the largest stable radius of contacts to ``radius`` [m].
 
-    Rows of ``contacts``: the four of ``work`` in ``largest_on_disc``, then load [N] and displacement of the base [m].
+    Rows of ``contacts``: the four of ``work`` in ``stable_radius``, then load [N] and displacement of the base [m].
     """
     for i in range(radius.size):
         work = contacts[0, i], contacts[1, i], contacts[2, i], contacts[3, i]
@@ -364,4 +347,4 @@ def radii_on_disc(contacts, stiffness, body, share, radius):
         start = 4.0 * fold_radius(max(work[0], 0.0), 1.0 / body[0], body[1])
         start += math.sqrt(max(mount[1], 0.0) / body[0])
         start += cube_root(0.75 * max(mount[0], 0.0) / (body[0] * body[1]))
-        radius[i] = largest_on_disc(start, work, mount, body, share)
+        radius[i] = stable_radius(start, work, mount, body, share)

@@ -25,11 +25,12 @@ from sim.parts.contact.balance import (
     DisplacementControl,
     LoadControl,
     Shares,
-    radii_on_disc,
+    stable_radii,
 )
 from sim.parts.contact.front import Kinetics, follow as follow_front
 from sim.parts.exchange import TURN, Array, ContactState, Flags, Motion, Setting, during
 from sim.solid import ElasticSolid, HalfSpace
+from sim.spectrum.radial import PLANE
 from sim.units.quantity import Quantity, keyed
 from sim.units.tables import Prescribed, over_time, prescribed
 
@@ -360,12 +361,12 @@ class _Controlled:
 
     def equilibrium_radius(self, work: Array, bodies: Bodies) -> Array:
         """Return the JKR radius at the start for a work of adhesion; Hertz's if it is not positive; nan if open."""
-        return self.control(0.0, 0.0).radius(work, np.zeros(1), 0.0, bodies)
+        return self.control(0.0, 0.0).radius(work, bodies)
 
     def largest_radius(self, work: float, bodies: Bodies) -> float:
         """Return the JKR radius for a work of adhesion as the control presses most [m]; 0 without equilibrium."""
         control = self._control(max(self.course.extremes))
-        radius = control.radius(np.array([work]), np.zeros(1), 0.0, bodies)
+        radius = control.radius(np.array([work]), bodies)
         return float(np.nan_to_num(radius[0]))
 
     def start(self, motion: Motion, duration: float, balance: Balance) -> ContactState:
@@ -389,8 +390,6 @@ class _Controlled:
         whole = np.full((*balance.bonded.shape[:-1], 1), balance.reference)
         radii = control.radius(
             np.concatenate([whole, balance.bonded], axis=-1),
-            np.zeros(1),
-            0.0,
             balance.bodies,
         )
         jkr, bonds_only = radii[..., :1], radii[..., 1:]
@@ -423,23 +422,23 @@ class _Controlled:
 
     def equilibrium(self, control: Control, balance: Balance) -> Array:
         """Return the largest stable radius in equilibrium with the work left there [m], nan without one."""
-        if balance.margin is None:
-            return control.radius(
-                balance.work(np.zeros(1)),
-                balance.stress,
-                self.reversible,
-                balance.bodies,
-            )
-        bodies, (load, base, stiffness) = balance.bodies, control.mount
+        margin, bodies = balance.margin, balance.bodies
+        if margin is None and self.reversible == 0.0:
+            return control.radius(balance.work(np.zeros(1)), bodies)
+        # on the plane fluctuations take their whole energy at any radius
+        least, shares = (
+            (1.0, [PLANE]) if margin is None else (margin.least, margin.each)
+        )
+        load, base, stiffness = control.mount
         tilt = self.reversible * balance.reversible(np.ones(1))
         bonded, fluctuating = balance.bonded, balance.fluctuating
-        most = bonded - balance.margin.least * fluctuating
+        most = bonded - least * fluctuating
         terms = np.broadcast_arrays(most, bonded, fluctuating, tilt, load, base)
-        shares, body = balance.margin.each, (1.0 / bodies.sphere_radius, bodies.modulus)
+        body = 1.0 / bodies.sphere_radius, bodies.modulus
         contacts = np.stack(terms).reshape(len(terms), len(shares), -1)
         radius = np.empty(contacts.shape[1:])
         for k, share in enumerate(shares):
-            radii_on_disc(
+            stable_radii(
                 np.ascontiguousarray(contacts[:, k]), stiffness, body, share, radius[k]
             )
         return radius.reshape(terms[0].shape)

@@ -3,10 +3,9 @@
 import math
 from typing import NamedTuple
 
-from sim.laws.equilibrium import largest_radius
 from sim.numerics.jit import device
 from sim.numerics.noise import stream
-from sim.parts.contact.balance import SHARE, largest_on_disc
+from sim.parts.contact.balance import SHARE, stable_radius
 from sim.parts.coupled import mechanics
 from sim.parts.exchange import Array, Draws, Flags
 from sim.parts.shear.bands import renew_band
@@ -73,10 +72,9 @@ def _equilibrium(row, load, base, energy, contact, share):
     bonded, tilt = contact.bare + contact.bonded * row.bound, contact.mean_stress
     tilt *= row.moment * row.moment
     mount, body = (load, base, contact.stiffness), (contact.curvature, contact.modulus)
-    if len(share[2]) > 0:
-        work = bonded, bonded, energy, tilt
-        return largest_on_disc(start, work, mount, body, share)
-    return largest_radius(start, bonded - energy, tilt, mount, body)[0]
+    most = bonded if len(share[2]) > 0 else bonded - energy
+    work = most, bonded, energy, tilt
+    return stable_radius(start, work, mount, body, share)
 
 
 @device

@@ -16,7 +16,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sim.laws.equilibrium import largest_radius
-from sim.parts.contact.balance import largest_on_disc
+from sim.parts.contact.balance import stable_radius
 
 U = 2.0**-53
 BODY = 1.0, 0.5
@@ -99,7 +99,7 @@ class State:
         if self.fluctuating == 0:
             return largest_radius(start, work, tilt, mount, BODY)
         works = work, work, float(self.fluctuating), tilt
-        return largest_on_disc(start, works, mount, BODY, SHARE), math.nan
+        return stable_radius(start, works, mount, BODY, SHARE), math.nan
 
     def check(self, a, starts=(1e-2, 0.7, 30.0)):
         """Compare the radius near ``a`` in balance with the solver's, from several starts."""
