@@ -716,20 +716,10 @@ def compare_at_load(
     scaled_angle      1.7371 1.6611
     scaled_tangent    1.7371 1.6917
     """
-    rest, stress = (
-        (sphere_radius, modulus, poisson_ratio),
-        np.asarray(stress, dtype=float),
-    )
-    jkr, hertz, *held = _at_load(load, work, sphere_radius, modulus)
-    radii = {"jkr": jkr, "hertz": hertz}
-    if not only or "uncorrected" in only:
-        radii["uncorrected"] = uncorrected_at_load(load, work, stress, *rest)
-    _add_shares(radii, (load, 0.0, work), stress, (reversible, mixity), rest, only)
-    laws = {
-        "scaled_angle": scaled_angle_at_load,
-        "scaled_tangent": scaled_tangent_at_load,
-    }
-    return _with_own_forces(radii, laws, held, stress, mixity, rest, only)
+    held = _at_load(load, work, sphere_radius, modulus)
+    laws = uncorrected_at_load, scaled_angle_at_load, scaled_tangent_at_load
+    rest = sphere_radius, modulus, poisson_ratio
+    return _compared(held, 0.0, laws, stress, (reversible, mixity), rest, only)
 
 
 def compare_at_indentation(
@@ -744,39 +734,38 @@ def compare_at_indentation(
     only=(),
 ):
     """Return the contact radius at an indentation by theory [m], as ``compare_at_load``."""
-    rest, stress = (
-        (sphere_radius, modulus, poisson_ratio),
-        np.asarray(stress, dtype=float),
+    held = _at_indentation(indentation, work, sphere_radius, modulus)
+    laws = (
+        uncorrected_at_indentation,
+        scaled_angle_at_indentation,
+        scaled_tangent_at_indentation,
     )
-    jkr, hertz, *held = _at_indentation(indentation, work, sphere_radius, modulus)
+    rest = sphere_radius, modulus, poisson_ratio
+    return _compared(held, math.inf, laws, stress, (reversible, mixity), rest, only)
+
+
+def _compared(held, stiffness, laws, stress, parameters, rest, only):
+    """Radii by theory at a push behind a stiffness, with the theories that have a search of their own as ``laws``."""
+    (jkr, hertz, push, work), (uncorrected, angle, tangent) = held, laws
+    stress, (reversible, mixity) = np.asarray(stress, dtype=float), parameters
     radii = {"jkr": jkr, "hertz": hertz}
     if not only or "uncorrected" in only:
-        radii["uncorrected"] = uncorrected_at_indentation(
-            indentation, work, stress, *rest
-        )
-    held_at = indentation, math.inf, work
-    _add_shares(radii, held_at, stress, (reversible, mixity), rest, only)
-    laws = {
-        "scaled_angle": scaled_angle_at_indentation,
-        "scaled_tangent": scaled_tangent_at_indentation,
-    }
-    return _with_own_forces(radii, laws, held, stress, mixity, rest, only)
-
-
-def _add_shares(radii, held, stress, parameters, rest, only):
-    """Radii by theory with those that differ in the reversible share and in what is held."""
-    reversible, mixity = parameters
+        radii["uncorrected"] = uncorrected(push, work, stress, *rest)
+    # share of the energy of the mean stress, and 4 if the force is constant as the edge moves, 0 if the stress is
     shares = {
         "savkoor_briggs": (_AS_STICK, 4.0),
         "reversible_force": (_AS_UNIFORM, 4.0),
+        "reversible_stress": (1.0, 0.0),
+        "fraction": (reversible, 0.0),
+        "shear_share": (_AS_STICK * np.asarray(mixity), 4.0),
     }
-    shares |= {"reversible_stress": (1.0, 0.0), "fraction": (reversible, 0.0)}
-    shares["shear_share"] = (_AS_STICK * np.asarray(mixity), 4.0)
     for name, (share, of_force) in shares.items():
         if not only or name in only:
             tilt = tilt_of_stress(stress, share, *rest[1:])
-            terms = *held, tilt, of_force, *rest[:2]
-            radii[name] = shrunk(radii["jkr"], radii["hertz"], *terms)
+            terms = push, stiffness, work, tilt, of_force, *rest[:2]
+            radii[name] = shrunk(jkr, hertz, *terms)
+    searched = {"scaled_angle": angle, "scaled_tangent": tangent}
+    return _with_own_forces(radii, searched, held[2:], stress, mixity, rest, only)
 
 
 def _with_own_forces(radii, laws, held, stress, mixity, rest, only):
