@@ -219,13 +219,6 @@ class Balance(NamedTuple):
     bodies: Bodies
     reference: float
 
-    def at(self, k: int) -> "Balance":
-        """Return the terms at the end of step k of a block."""
-        stress = self.stress[k] if self.stress.ndim > 1 else self.stress
-        return self._replace(
-            bonded=self.bonded[k], fluctuating=self.fluctuating[k], stress=stress
-        )
-
     def without_stress(self) -> "Balance":
         """Return the terms without that of the mean stress."""
         return self._replace(stress=np.zeros(1))
