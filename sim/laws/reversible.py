@@ -32,6 +32,12 @@ def compressible(poisson_ratio):
     return (2.0 - poisson_ratio) / (3.0 * (1.0 - poisson_ratio))
 
 
+@device
+def energy_per_radius(stress, modulus, poisson_ratio):
+    """Return ``mean_stress_energy`` over the radius [J/m^3]."""
+    return 6.0 / math.pi * compressible(poisson_ratio) * (stress * stress) / modulus
+
+
 @law
 def mean_stress_energy(radius, stress, modulus, poisson_ratio=0.5):
     """Return the elastic energy of the mean shear stress per area of new contact [J/m^2].
@@ -53,14 +59,7 @@ def mean_stress_energy(radius, stress, modulus, poisson_ratio=0.5):
     >>> print(f"{mean_stress_energy(1.2e-4, 3e5, 6.4e6) / 0.042:.1f}")
     76.7
     """
-    return (
-        6.0
-        / math.pi
-        * compressible(poisson_ratio)
-        * (stress * stress)
-        * radius
-        / modulus
-    )
+    return energy_per_radius(stress, modulus, poisson_ratio) * radius
 
 
 @law
@@ -68,8 +67,7 @@ def tilt_of_stress(stress, reversible, modulus, poisson_ratio):
     """Return the energy of the mean stress that adhesion pays, over the radius [J/m^3]; 0 if alpha is 0."""
     if reversible == 0.0 or stress == 0.0:
         return 0.0
-    energy = 6.0 / math.pi * compressible(poisson_ratio) * (stress * stress) / modulus
-    return reversible * energy
+    return reversible * energy_per_radius(stress, modulus, poisson_ratio)
 
 
 @law
@@ -94,28 +92,17 @@ def shrunk(jkr, hertz, push, stiffness, work, tilt, held, sphere_radius, modulus
     float or array
         a [m]; ``jkr`` bit for bit without a tilt, ``hertz`` where adhesion does not pay; nan where a pulled contact
         has no equilibrium.
-
-    Notes
-    -----
-    Lengths are measured by ``jkr``, the missing depth by jkr^2/R, and E* is 2 pi, lest products leave the numbers.
     """
     if tilt == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
         return jkr
     if not tilt > 0.0:
         return math.nan
-    size = sphere_radius / jkr
-    unit = 2.0 * math.pi * size * size
-    base, load = push / jkr * size, 0.0
-    if stiffness == 0.0:
-        base, load = 0.0, 2.0 * math.pi * (push / modulus / jkr) * (size / jkr)
-    mount = load, base, 2.0 * math.pi * (stiffness / modulus / jkr)
-    line = unit * (tilt / modulus)
-    z, slope = largest_radius(
-        1.0, unit * (work / modulus / jkr), line, mount, (1.0, 2.0 * math.pi)
-    )
+    mount = (0.0, push, stiffness) if stiffness > 0.0 else (push, 0.0, 0.0)
+    body = 1.0 / sphere_radius, modulus
+    radius, slope = largest_radius(jkr, work, tilt, mount, body)
     if push >= 0.0:
-        return max(z * jkr, hertz) if held * line <= slope < math.inf else hertz
-    return z * jkr if slope >= held * line else math.nan
+        return max(radius, hertz) if held * tilt <= slope < math.inf else hertz
+    return radius if slope >= held * tilt else math.nan
 
 
 def radius_at_load_reversible(

@@ -54,7 +54,7 @@ import numpy as np
 from sim.laws import jkr
 from sim.laws.equilibrium import largest_radius
 from sim.laws.jkr import twice_pull_off
-from sim.laws.reversible import compressible, shrunk, tilt_of_stress
+from sim.laws.reversible import compressible, energy_per_radius, shrunk, tilt_of_stress
 from sim.numerics.jit import device, law
 from sim.numerics.special import cube_root
 
@@ -426,24 +426,15 @@ def _widened(
     adhesive = cube_root(
         2.0 * math.pi * abs(work) * sphere_radius * (sphere_radius / modulus)
     )
-    sheared = (
-        math.sqrt(12.0 * compressible(poisson_ratio))
-        * abs(stress)
-        / modulus
-        * sphere_radius
-    )
-    scale = max(normal, max(adhesive, sheared))
-    known = normal + adhesive + sheared
-    if known == 0.0 or not known < math.inf:
-        return known
-    size, full = normal / scale, 2.0 * math.pi
-    base = math.copysign(size**2, control)
-    load = math.copysign(4.0 / 3.0 * full * size**3, control)
-    mount = (0.0, base, math.inf) if hard == 1.0 else (load, 0.0, 0.0)
-    m = math.copysign((adhesive / scale) ** 3, work)
-    # E* is 2 pi, and all terms are at most 1: z <= 2.1 at a load, else 1.9
-    z, _ = largest_radius(2.1, m, -((sheared / scale) ** 2), mount, (1.0, full))
-    return max(normal, scale * z) if control >= 0.0 else scale * z
+    tilt = energy_per_radius(stress, modulus, poisson_ratio)
+    most = normal + adhesive + math.sqrt(2.0 * math.pi * tilt / modulus) * sphere_radius
+    if most == 0.0 or not most < math.inf:
+        return most
+    mount = (0.0, control, math.inf) if hard == 1.0 else (control, 0.0, 0.0)
+    body = 1.0 / sphere_radius, modulus
+    # in units of ``most`` all terms are at most 1, and the radius is at most 2.1 at a load, else 1.9
+    radius, _ = largest_radius(2.1 * most, work, -tilt, mount, body)
+    return max(normal, radius) if control >= 0.0 else radius
 
 
 @law
