@@ -8,7 +8,7 @@ the contact is open.
 On a disc the share of ΔΓ that the contact pays is not convex in its radius, so neither Newton's method nor a
 fixed-point iteration is safe. A walk inwards starts from the radius without fluctuations. Between the two places where
 the sign changes the Pegasus method goes down to rounding. If the walk meets no crossing, the least surplus along it is
-searched, because two crossings may lie between two places.
+searched, because two crossings may lie between two places. There are none if the surplus falls down to Hertz's radius.
 """
 
 import math
@@ -320,7 +320,7 @@ def stable_radius(start, work, mount, body, share):
             return max(_narrowed(inside, outside, contact), low)
         if value < least:
             least, lowest = value, inside
-    if lowest == low:
+    if lowest == low and _surplus(low * (1.0 + _NEXT), contact) >= least:
         return hertz
     dip = _dip(lowest * ratio, lowest / ratio, contact)
     if _surplus(dip, contact) <= 0.0:
