@@ -164,7 +164,7 @@ def check_waist(scenario, state, members):
     control = scenario.contact.control(
         scenario.times.at(state.step), scenario.clock.duration
     )
-    hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, scenario.bodies)
+    hertz = control.radius(np.zeros(1), scenario.bodies)
     closed = np.isfinite(state.contact.radius)
     if np.isfinite(hertz[0]):
         assert np.all(state.contact.radius[closed] >= hertz * (1 - 1e-12))

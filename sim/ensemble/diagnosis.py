@@ -23,6 +23,7 @@ from sim.ensemble.steady import changed, sensitivities
 from sim.ensemble.swept import grouped, in_words, places, points_in_words, spread
 from sim.laws.schallamach import Body, Onset
 from sim.parts.bonds.models import Cohort, FirstMoment, Rate
+from sim.parts.contact.balance import Balance
 from sim.parts.drive import Spring
 from sim.parts.exchange import Array
 from sim.parts.shear import Mean
@@ -482,8 +483,15 @@ def slider_body(point: Scenario, speeds: Array) -> Body:
 
     def area(share: float = 1.0, stress: float = 1.0) -> Array:
         work_left = point.adhesion.work_of_bonds(steady.fraction * share)
-        terms = steady.strength * stress, point.contact.reversible, point.bodies
-        return np.asarray(np.pi * control.radius(work_left, *terms) ** 2)
+        terms = Balance(
+            work_left,
+            np.zeros(1),
+            steady.strength * stress,
+            None,
+            point.bodies,
+            point.adhesion.work,
+        )
+        return np.asarray(np.pi * point.contact.equilibrium(control, terms) ** 2)
 
     now, few = area(), _RELATIVE_STEP
     by_bonds = (area(share=1.0 + few) - area(share=1.0 - few)) / (2.0 * few * now)

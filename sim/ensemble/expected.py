@@ -79,7 +79,7 @@ def jkr_radius(point: Scenario, times: Array, share: float = 1.0) -> Array:
     """Return the radius with a share of the work of adhesion at times [s], shape (times, 1) [m]; nan if open."""
     control = point.contact.control(times, point.clock.duration)
     work = np.full(times.shape, share * point.adhesion.work)
-    return control.radius(work, np.zeros(1), 0.0, point.bodies)
+    return control.radius(work, point.bodies)
 
 
 def areas(

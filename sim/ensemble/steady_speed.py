@@ -42,10 +42,10 @@ def speeds_of_areas(scene: Scenario, shares: Array) -> tuple[Array, Array]:
     if scene.population.is_random or scene.margin is not None or not driven.any():
         return speeds, stable
     energies = _energies(scene)
-    none, now = np.zeros(1), np.zeros((1, 1))
+    now = np.zeros((1, 1))
     control = scene.contact.control(now, scene.clock.duration)
     work = np.full((1, 1), scene.adhesion.work)
-    full = control.radius(work, none, 0.0, scene.bodies)[0, 0]
+    full = control.radius(work, scene.bodies)[0, 0]
 
     def area(logarithms: Array) -> Array:
         speed = np.exp(logarithms)[:, np.newaxis]

@@ -130,7 +130,7 @@ def _with_work(
     return _where_closed(
         course,
         reference,
-        _control(scene, course).radius(work, np.zeros(1), 0.0, scene.bodies),
+        _control(scene, course).radius(work, scene.bodies),
     )
 
 
@@ -493,7 +493,7 @@ VARIABLES: tuple[Variable, ...] = (
         "hertz_radius",
         "control",
         lambda scene, course: np.nan_to_num(
-            _control(scene, course).radius(np.zeros(1), np.zeros(1), 0.0, scene.bodies)
+            _control(scene, course).radius(np.zeros(1), scene.bodies)
         ),
     ),
     Variable(

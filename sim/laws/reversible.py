@@ -5,21 +5,17 @@ A contact that grows by dA under a uniform stress tau stores ``6 tau^2 a/(pi E*)
 reversible and adhesion supplies all of it. With G the energy release rate of the normal load alone
 (``jkr.energy_release_rate``) the contact obeys ``G(a) = w - alpha 6 tau^2 a/(pi E*)``.
 
-**One crossing.** G(a) is convex in a at a load, at an indentation and behind a spring of any stiffness. At a load it is
-``(X - 2P + P^2/X)/(6 pi R)`` with X = 4 E* a^3/(3R), at an indentation ``E*/(2 pi) (a^3/R^2 - 2 delta a/R +
-delta^2/a)``. The right side is a straight line in a. So there are at most two crossings, and only the wider one is
-stable. There G rises above the line, and the slope of the line is dw/da in the stability condition. Newton's method
-from the right of it goes left and never passes it. A step that does not go left is rounding and ends the search; a
-slope that is not positive means that there is no crossing.
-
-**Never below Hertz.** The edge can pull but not push: where adhesion does not pay for the shear even at Hertz's radius,
-the contact has that radius. It does so under a load or an indentation of at least zero, beyond the last adhesive state.
-A contact under tension detaches there, and the result is nan.
+The right side is a straight line in a, so ``sim.laws.equilibrium`` finds the radius. It is Hertz's where adhesion does
+not pay for the shear even there, under a load or an indentation of at least zero. A contact under tension detaches
+beyond the last adhesive state, and the result is nan.
 """
 
 import math
 
+import numpy as np
+
 from sim.laws import jkr
+from sim.laws.equilibrium import largest_radius
 from sim.numerics.jit import device, law
 
 __all__ = [
@@ -34,6 +30,12 @@ __all__ = [
 def compressible(poisson_ratio):
     """Return the shear energy at a given stress and modulus E*, over that at nu = 1/2: (2 - nu)/(3 (1 - nu))."""
     return (2.0 - poisson_ratio) / (3.0 * (1.0 - poisson_ratio))
+
+
+@device
+def energy_per_radius(stress, modulus, poisson_ratio):
+    """Return ``mean_stress_energy`` over the radius [J/m^3]."""
+    return 6.0 / math.pi * compressible(poisson_ratio) * (stress * stress) / modulus
 
 
 @law
@@ -57,147 +59,50 @@ def mean_stress_energy(radius, stress, modulus, poisson_ratio=0.5):
     >>> print(f"{mean_stress_energy(1.2e-4, 3e5, 6.4e6) / 0.042:.1f}")
     76.7
     """
-    return (
-        6.0
-        / math.pi
-        * compressible(poisson_ratio)
-        * (stress * stress)
-        * radius
-        / modulus
-    )
-
-
-@device
-def crossing(z, level, hard, m, s):
-    """Return the largest z with missing^2/z = m + s z and the slope there, from a z right of it; nan if none.
-
-    missing = (hard z^2 + (2/3) soft z^3 - level)/(hard + soft z), soft = 1 - hard, is a^2/R - delta behind a spring of
-    stiffness 2 E* hard/soft. An indentation has hard = 1, a load hard = 0. ``level`` is where missing is 0.
-    """
-    slope = math.nan
-    soft = 1.0 - hard
-    for _ in range(100):
-        square = z * z
-        share = hard + soft * z
-        missing = (hard * square - level + 2.0 / 3.0 * soft * square * z) / share
-        over = missing / z * missing - m - s * z
-        growth = 2.0 * z - soft * missing / share
-        slope = missing / z * (2.0 * growth - missing / z) - s
-        if over <= 0.0:
-            break
-        lower = z - over / slope
-        if not (slope > 0.0 and lower > 0.0):
-            return math.nan, math.nan
-        if not lower < z:
-            break
-        z = lower
-    return z, slope
-
-
-@device
-def _shrunk(
-    jkr,
-    hertz,
-    control,
-    level,
-    hard,
-    work,
-    stress,
-    reversible,
-    held,
-    sphere_radius,
-    modulus,
-    poisson_ratio,
-):
-    """Contact radius at a load or a displacement, ``control``, of a ``level`` as in ``crossing``."""
-    if (
-        reversible == 0.0
-        or stress == 0.0
-        or work <= 0.0
-        or not jkr > 0.0
-        or jkr == math.inf
-    ):
-        return jkr
-    tilt = sphere_radius / jkr
-    shear = stress / modulus * tilt
-    s = 12.0 * reversible * compressible(poisson_ratio) * shear * shear
-    if not s >= 0.0:
-        return math.nan
-    m = 2.0 * math.pi * (work / modulus / jkr) * tilt * tilt
-    start = min(1.0, m / s)
-    if control >= 0.0 and not start * jkr > hertz:
-        return hertz
-    z, slope = crossing(start, level, hard, m, -s)
-    if not slope >= held * s:
-        return hertz if control >= 0.0 else math.nan
-    return max(z * jkr, hertz) if control >= 0.0 else z * jkr
+    return energy_per_radius(stress, modulus, poisson_ratio) * radius
 
 
 @law
-def shrunk_at_load(
-    jkr,
-    hertz,
-    load,
-    work,
-    stress,
-    reversible,
-    held,
-    sphere_radius,
-    modulus,
-    poisson_ratio,
-):
-    """Return the contact radius at a load from those of JKR and Hertz; ``held`` as in ``shrunk_at_displacement``."""
-    level = 0.5 * (load / modulus / jkr) * (sphere_radius / jkr / jkr)
-    rest = (sphere_radius, modulus, poisson_ratio)
-    return _shrunk(jkr, hertz, load, level, 0.0, work, stress, reversible, held, *rest)
+def tilt_of_stress(stress, reversible, modulus, poisson_ratio):
+    """Return the energy of the mean stress that adhesion pays, over the radius [J/m^3]; 0 if alpha is 0."""
+    if reversible == 0.0 or stress == 0.0:
+        return 0.0
+    return reversible * energy_per_radius(stress, modulus, poisson_ratio)
 
 
 @law
-def shrunk_at_displacement(
-    jkr,
-    hertz,
-    displacement,
-    stiffness,
-    work,
-    stress,
-    reversible,
-    held,
-    sphere_radius,
-    modulus,
-    poisson_ratio,
-):
-    """Return the contact radius at a displacement behind a spring, from those of JKR and Hertz.
+def shrunk(jkr, hertz, push, stiffness, work, tilt, held, sphere_radius, modulus):
+    """Return the contact radius with a tilted work of adhesion, from those of JKR and Hertz.
 
     Parameters
     ----------
     jkr, hertz : float or array
-        Radii at the same displacement without shear, with the work of adhesion and with none [m].
-    displacement, stiffness : float or array
-        Delta = delta + P/k [m], k [N/m]; k = inf prescribes the indentation.
-    work, stress, reversible, sphere_radius, modulus, poisson_ratio : float or array
-        As ``radius_at_load_reversible``.
+        Radii without the tilt, with the work of adhesion and with none [m].
+    push, stiffness : float or array
+        Displacement [m] behind the stiffness k [N/m], or load [N] if k = 0.
+    work, tilt : float or array
+        w [J/m^2], and how much less of it is left per radius [J/m^3], ``tilt_of_stress``.
     held : float
         0 if the stress stays the same as the edge moves, 4 if the tangential force does.
+    sphere_radius, modulus : float or array
+        R [m], E* [Pa].
 
     Returns
     -------
     float or array
-        a [m]; ``jkr`` bit for bit at alpha = 0, ``hertz`` where adhesion does not pay; nan where a pulled
-        contact has no equilibrium.
-
-    Notes
-    -----
-    With y = a^2/R - delta and k the stiffness in units of 2 E* (a length), ``y = (k (a^2/R - Delta) +
-    2 a^3/(3R))/(k + a)``, and G = E* y^2/(2 pi a) is convex in a for all k and Delta: its second derivative
-    is a quadratic form in y with a discriminant of ``(k + 4a)^2 - 4 (k^2 + 4 k a + 6 a^2) < 0``, times a
-    square. For a displacement of at least zero Hertz's contact exists.
+        a [m]; ``jkr`` bit for bit without a tilt, ``hertz`` where adhesion does not pay; nan where a pulled contact
+        has no equilibrium.
     """
-    hard = 1.0 / (1.0 + 2.0 * modulus * jkr / stiffness)
-    level = hard * (displacement / jkr * (sphere_radius / jkr))
-    rest = (sphere_radius, modulus, poisson_ratio)
-    return _shrunk(
-        jkr, hertz, displacement, level, hard, work, stress, reversible, held, *rest
-    )
+    if tilt == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
+        return jkr
+    if not tilt > 0.0:
+        return math.nan
+    mount = (0.0, push, stiffness) if stiffness > 0.0 else (push, 0.0, 0.0)
+    body = 1.0 / sphere_radius, modulus
+    radius, slope = largest_radius(jkr, work, tilt, mount, body)
+    if push >= 0.0:
+        return max(radius, hertz) if held * tilt <= slope < math.inf else hertz
+    return radius if slope >= held * tilt else math.nan
 
 
 def radius_at_load_reversible(
@@ -239,18 +144,8 @@ def radius_at_load_reversible(
     """
     adhesive = jkr.radius_at_load(load, work, sphere_radius, modulus)
     hertz = jkr.hertz_radius_at_load(load, sphere_radius, modulus)
-    return shrunk_at_load(
-        adhesive,
-        hertz,
-        load,
-        work,
-        stress,
-        reversible,
-        0.0,
-        sphere_radius,
-        modulus,
-        poisson_ratio,
-    )
+    tilt = tilt_of_stress(stress, reversible, modulus, poisson_ratio)
+    return shrunk(adhesive, hertz, load, 0.0, work, tilt, 0.0, sphere_radius, modulus)
 
 
 def radius_at_indentation_reversible(
@@ -301,7 +196,8 @@ def radius_at_displacement_reversible(
     hertz = jkr.radius_at_displacement(
         displacement, stiffness, 0.0, sphere_radius, modulus
     )
-    rest = (sphere_radius, modulus, poisson_ratio)
-    return shrunk_at_displacement(
-        adhesive, hertz, displacement, stiffness, work, stress, reversible, 0.0, *rest
+    push = np.where(np.equal(stiffness, 0.0), 0.0, displacement)
+    tilt = tilt_of_stress(stress, reversible, modulus, poisson_ratio)
+    return shrunk(
+        adhesive, hertz, push, stiffness, work, tilt, 0.0, sphere_radius, modulus
     )

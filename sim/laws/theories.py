@@ -52,13 +52,9 @@ import math
 import numpy as np
 
 from sim.laws import jkr
+from sim.laws.equilibrium import largest_radius
 from sim.laws.jkr import twice_pull_off
-from sim.laws.reversible import (
-    compressible,
-    crossing,
-    shrunk_at_displacement,
-    shrunk_at_load,
-)
+from sim.laws.reversible import compressible, energy_per_radius, shrunk, tilt_of_stress
 from sim.numerics.jit import device, law
 from sim.numerics.special import cube_root
 
@@ -430,22 +426,15 @@ def _widened(
     adhesive = cube_root(
         2.0 * math.pi * abs(work) * sphere_radius * (sphere_radius / modulus)
     )
-    sheared = (
-        math.sqrt(12.0 * compressible(poisson_ratio))
-        * abs(stress)
-        / modulus
-        * sphere_radius
-    )
-    scale = max(normal, max(adhesive, sheared))
-    known = normal + adhesive + sheared
-    if known == 0.0 or not known < math.inf:
-        return known
-    size = normal / scale
-    level = math.copysign(hard * size**2 + 2.0 / 3.0 * (1.0 - hard) * size**3, control)
-    m = math.copysign((adhesive / scale) ** 3, work)
-    # all terms at most 1: z <= 2.1 at a load, else 1.9
-    z, _ = crossing(2.1, level, hard, m, (sheared / scale) ** 2)
-    return max(normal, scale * z) if control >= 0.0 else scale * z
+    tilt = energy_per_radius(stress, modulus, poisson_ratio)
+    most = normal + adhesive + math.sqrt(2.0 * math.pi * tilt / modulus) * sphere_radius
+    if most == 0.0 or not most < math.inf:
+        return most
+    mount = (0.0, control, math.inf) if hard == 1.0 else (control, 0.0, 0.0)
+    body = 1.0 / sphere_radius, modulus
+    # in units of ``most`` all terms are at most 1, and the radius is at most 2.1 at a load, else 1.9
+    radius, _ = largest_radius(2.1 * most, work, -tilt, mount, body)
+    return max(normal, radius) if control >= 0.0 else radius
 
 
 @law
@@ -718,20 +707,10 @@ def compare_at_load(
     scaled_angle      1.7371 1.6611
     scaled_tangent    1.7371 1.6917
     """
-    rest, stress = (
-        (sphere_radius, modulus, poisson_ratio),
-        np.asarray(stress, dtype=float),
-    )
-    jkr, hertz, *held = _at_load(load, work, sphere_radius, modulus)
-    radii = {"jkr": jkr, "hertz": hertz}
-    if not only or "uncorrected" in only:
-        radii["uncorrected"] = uncorrected_at_load(load, work, stress, *rest)
-    _add_shares(radii, shrunk_at_load, (*held, stress), reversible, mixity, rest, only)
-    laws = {
-        "scaled_angle": scaled_angle_at_load,
-        "scaled_tangent": scaled_tangent_at_load,
-    }
-    return _with_own_forces(radii, laws, held, stress, mixity, rest, only)
+    held = _at_load(load, work, sphere_radius, modulus)
+    laws = uncorrected_at_load, scaled_angle_at_load, scaled_tangent_at_load
+    rest = sphere_radius, modulus, poisson_ratio
+    return _compared(held, 0.0, laws, stress, (reversible, mixity), rest, only)
 
 
 def compare_at_indentation(
@@ -746,43 +725,38 @@ def compare_at_indentation(
     only=(),
 ):
     """Return the contact radius at an indentation by theory [m], as ``compare_at_load``."""
-    rest, stress = (
-        (sphere_radius, modulus, poisson_ratio),
-        np.asarray(stress, dtype=float),
+    held = _at_indentation(indentation, work, sphere_radius, modulus)
+    laws = (
+        uncorrected_at_indentation,
+        scaled_angle_at_indentation,
+        scaled_tangent_at_indentation,
     )
-    jkr, hertz, *held = _at_indentation(indentation, work, sphere_radius, modulus)
+    rest = sphere_radius, modulus, poisson_ratio
+    return _compared(held, math.inf, laws, stress, (reversible, mixity), rest, only)
+
+
+def _compared(held, stiffness, laws, stress, parameters, rest, only):
+    """Radii by theory at a push behind a stiffness, with the theories that have a search of their own as ``laws``."""
+    (jkr, hertz, push, work), (uncorrected, angle, tangent) = held, laws
+    stress, (reversible, mixity) = np.asarray(stress, dtype=float), parameters
     radii = {"jkr": jkr, "hertz": hertz}
     if not only or "uncorrected" in only:
-        radii["uncorrected"] = uncorrected_at_indentation(
-            indentation, work, stress, *rest
-        )
-    _add_shares(
-        radii,
-        shrunk_at_displacement,
-        (indentation, math.inf, work, stress),
-        reversible,
-        mixity,
-        rest,
-        only,
-    )
-    laws = {
-        "scaled_angle": scaled_angle_at_indentation,
-        "scaled_tangent": scaled_tangent_at_indentation,
-    }
-    return _with_own_forces(radii, laws, held, stress, mixity, rest, only)
-
-
-def _add_shares(radii, shrunk, held, reversible, mixity, rest, only):
-    """Radii by theory with those that differ in the reversible share and in what is held."""
+        radii["uncorrected"] = uncorrected(push, work, stress, *rest)
+    # share of the energy of the mean stress, and 4 if the force is constant as the edge moves, 0 if the stress is
     shares = {
         "savkoor_briggs": (_AS_STICK, 4.0),
         "reversible_force": (_AS_UNIFORM, 4.0),
+        "reversible_stress": (1.0, 0.0),
+        "fraction": (reversible, 0.0),
+        "shear_share": (_AS_STICK * np.asarray(mixity), 4.0),
     }
-    shares |= {"reversible_stress": (1.0, 0.0), "fraction": (reversible, 0.0)}
-    shares["shear_share"] = (_AS_STICK * np.asarray(mixity), 4.0)
-    for name, share in shares.items():
+    for name, (share, of_force) in shares.items():
         if not only or name in only:
-            radii[name] = shrunk(radii["jkr"], radii["hertz"], *held, *share, *rest)
+            tilt = tilt_of_stress(stress, share, *rest[1:])
+            terms = push, stiffness, work, tilt, of_force, *rest[:2]
+            radii[name] = shrunk(jkr, hertz, *terms)
+    searched = {"scaled_angle": angle, "scaled_tangent": tangent}
+    return _with_own_forces(radii, searched, held[2:], stress, mixity, rest, only)
 
 
 def _with_own_forces(radii, laws, held, stress, mixity, rest, only):

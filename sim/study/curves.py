@@ -57,9 +57,7 @@ def curves(scenario: Scenario, speeds: Array, time: float = 0.0) -> dict[str, Ar
             - scenario.fluctuations.paid_by_adhesion * course.energy
         )
         control = scenario.contact.control(course.time, scenario.clock.duration)
-        alone = np.nan_to_num(control.radius(work, np.zeros(1), 0.0, scenario.bodies))[
-            :, 0
-        ]
+        alone = np.nan_to_num(control.radius(work, scenario.bodies))[:, 0]
         result["lost_to_fluctuations_first"] = 1.0 - np.pi * alone**2 / full
         lost_to_either = result["lost_to_bonds"] + result["lost_to_fluctuations"]
         result["lost_to_bonds_last"] = (

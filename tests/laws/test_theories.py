@@ -331,12 +331,9 @@ def test_a_contact_behind_any_stiffness_is_the_contact_at_its_load():
         displacement = indentation + load / stiffness if stiffness > 0.0 else 0.0 * load
         radius = exact if stiffness > 0.0 else exact[1]  # no stiffness bears no load
         # the search needs a radius on the right and one on the left of the answer
-        bracket, rest = (
-            (1.3 * radius, 0.5 * radius),
-            (1.0, 1.0, 0.3, 0.0, 1.0, 4.0, 0.5),
-        )
-        shrunk = reversible.shrunk_at_displacement(
-            *bracket, displacement, stiffness, *rest
+        bracket, tilt = (1.3 * radius, 0.5 * radius), 0.3 * 6.0 / (math.pi * 4.0)
+        shrunk = reversible.shrunk(
+            *bracket, displacement, stiffness, 1.0, tilt, 0.0, 1.0, 4.0
         )
         # a displacement of load/stiffness carries the rest in its last digits only, as the load asks for
         assert_allclose(shrunk, radius, rtol=40 * U, atol=0)

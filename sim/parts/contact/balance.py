@@ -7,8 +7,8 @@ the contact is open.
 
 On a disc the share of ΔΓ that the contact pays is not convex in its radius, so neither Newton's method nor a
 fixed-point iteration is safe. A walk inwards starts from the radius without fluctuations. Between the two places where
-the sign changes Ridders's method goes down to rounding. If the walk meets no crossing, the least surplus along it is
-searched, because two crossings may lie between two places.
+the sign changes the Pegasus method goes down to rounding. If the walk meets no crossing, the least surplus along it is
+searched, because two crossings may lie between two places. There are none if the surplus falls down to Hertz's radius.
 """
 
 import math
@@ -18,12 +18,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from sim.laws import jkr
-from sim.laws.jkr import series_shares
-from sim.laws.reversible import (
-    radius_at_displacement_reversible,
-    radius_at_load_reversible,
-)
+from sim.laws.equilibrium import largest_radius, surplus
+from sim.laws.jkr import fold_radius
 from sim.numerics.jit import device, kernel
+from sim.numerics.special import cube_root
 from sim.parts.exchange import Array, Flags, Mount
 from sim.solid import ElasticSolid
 from sim.spectrum.radial import Terms, share_of
@@ -77,17 +75,10 @@ class LoadControl:
         """True if a detached sphere comes back into contact, because the load is not tensile."""
         return self.load >= 0.0
 
-    def radius(
-        self, work: Array, stress: Array, reversible: float, bodies: Bodies
-    ) -> Array:
-        """Return the largest stable equilibrium radius [m]: Hertz's if no work of adhesion is left, nan without one."""
-        if reversible == 0.0:
-            return np.asarray(jkr.radius_at_load(self.load, work, *bodies.numbers[:2]))
-        return np.asarray(
-            radius_at_load_reversible(
-                self.load, work, stress, reversible, *bodies.numbers
-            )
-        )
+    def radius(self, work: Array, bodies: Bodies) -> Array:
+        """Return JKR's radius [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
+        body = bodies.sphere_radius, bodies.modulus
+        return np.asarray(jkr.radius_at_load(self.load, work, *body))
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
         """Return the load on the sphere [N]; 0 if the contact is open."""
@@ -138,19 +129,11 @@ class DisplacementControl:
         """True if a detached sphere comes back into contact: at a displacement of zero or more."""
         return self.base >= 0.0
 
-    def radius(
-        self, work: Array, stress: Array, reversible: float, bodies: Bodies
-    ) -> Array:
-        """Return the largest stable equilibrium radius [m]: Hertz's if no work of adhesion is left, nan without one."""
-        machine = self.base, self.stiffness
-        if reversible == 0.0:
-            return np.asarray(
-                jkr.radius_at_displacement(*machine, work, *bodies.numbers[:2])
-            )
+    def radius(self, work: Array, bodies: Bodies) -> Array:
+        """Return JKR's radius [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
+        body = bodies.sphere_radius, bodies.modulus
         return np.asarray(
-            radius_at_displacement_reversible(
-                *machine, work, stress, reversible, *bodies.numbers
-            )
+            jkr.radius_at_displacement(self.base, self.stiffness, work, *body)
         )
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
@@ -236,13 +219,6 @@ class Balance(NamedTuple):
     bodies: Bodies
     reference: float
 
-    def at(self, k: int) -> "Balance":
-        """Return the terms at the end of step k of a block."""
-        stress = self.stress[k] if self.stress.ndim > 1 else self.stress
-        return self._replace(
-            bonded=self.bonded[k], fluctuating=self.fluctuating[k], stress=stress
-        )
-
     def without_stress(self) -> "Balance":
         """Return the terms without that of the mean stress."""
         return self._replace(stress=np.zeros(1))
@@ -273,114 +249,95 @@ AHEAD, CLOSED, OPEN = 0.0, 1.0, 2.0
 JKR, BONDS_ONLY, NO_MEAN_STRESS, EQUILIBRIUM = range(4)
 
 #: Places of the walk inwards, its end over its start, and turns that narrow an interval down to rounding.
-_WALK, _NARROWEST, _TURNS = 128, 1e-4, 40
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-_PER_TURN = 0.5 / math.pi
+_WALK, _NARROWEST, _TURNS = 128, 1e-4, 30
+#: Distance to a neighbouring place, over the radius.
+_NEXT = 1e-8
 
 
 @device
 def _surplus(radius, contact):
     """Return the energy release rate, negative below Hertz's radius, minus the work left at a radius [J/m²]."""
-    (
-        (load, base, bonded, fluctuating, reversible),
-        (curvature, modulus, stiffness),
-        (wave, ends, cubics),
-    ) = contact
-    inverse, hertz = 1.0 / radius, radius * radius * curvature
-    missing = 2.0 / 3.0 * hertz - 0.5 * load / modulus * inverse
-    if stiffness > 0.0:
-        grips, dead = series_shares(stiffness, 2.0 * modulus * radius)
-        missing = grips * (hertz - base) + dead * (2.0 / 3.0 * hertz)
-    rate = _PER_TURN * modulus * inverse * missing * abs(missing)
-    return rate - (
-        bonded
-        - fluctuating * share_of(radius, wave, ends, cubics)
-        - reversible * radius
-    )
+    (bonded, fluctuating, tilt), mount, body, (wave, ends, cubics) = contact
+    share = share_of(radius, wave, ends, cubics)
+    left = bonded - fluctuating * share - tilt * radius
+    return surplus(radius, left, mount, body)
 
 
 @device
 def _dip(inside, outside, contact):
-    """Return the radius between two others at which the surplus is least, by golden section."""
-    low, high = (
-        outside - _GOLDEN * (outside - inside),
-        inside + _GOLDEN * (outside - inside),
-    )
-    at_low, at_high = _surplus(low, contact), _surplus(high, contact)
+    """Return the radius between two others at which the surplus is least, by bisection of its slope."""
     for _ in range(_TURNS):
-        if at_low < at_high:
-            outside, high, at_high = high, low, at_low
-            low = outside - _GOLDEN * (outside - inside)
-            at_low = _surplus(low, contact)
+        middle = 0.5 * (inside + outside)
+        if _surplus(middle * (1.0 + _NEXT), contact) > _surplus(middle, contact):
+            outside = middle
         else:
-            inside, low, at_low = low, high, at_high
-            high = inside + _GOLDEN * (outside - inside)
-            at_high = _surplus(high, contact)
-    return 0.5 * (inside + outside)
+            inside = middle
+    return inside
 
 
 @device
 def _narrowed(inside, outside, contact):
-    """Return the radius at which the surplus crosses zero between two others, to rounding: Ridders's method."""
-    low, high, before = _surplus(inside, contact), _surplus(outside, contact), 0.0
+    """Return the radius at which the surplus crosses zero between two others, to rounding: the Pegasus method."""
+    low, high = _surplus(inside, contact), _surplus(outside, contact)
     for _ in range(_TURNS):
-        if not (outside - inside > 4e-16 * outside and low < 0.0 and high > 0.0):
+        change = high * (outside - inside) / (high - low)
+        if not abs(change) > 2e-16 * outside:
             break
-        middle = 0.5 * (inside + outside)
-        value = _surplus(middle, contact)
-        guess = middle + (middle - inside) * (-value) / math.sqrt(
-            value * value - low * high
-        )
-        guess = min(max(guess, inside), outside)
-        if abs(guess - before) <= 4e-16 * guess:
-            return guess
-        before = guess
-        for place, surplus in ((middle, value), (guess, _surplus(guess, contact))):
-            if inside < place < outside:
-                if surplus <= 0.0:
-                    inside, low = place, surplus
-                else:
-                    outside, high = place, surplus
-    return outside if high == 0.0 else inside
+        place = outside - change
+        over = _surplus(place, contact)
+        if over * high < 0.0:
+            inside, low = outside, high
+        else:
+            low *= high / (high + over)
+        outside, high = place, over
+    return outside
 
 
 @device
-def widest(start, hertz, contact):
-    """Return the radius of one contact, see ``widest_crossings``."""
-    if not start > 0.0 or contact[0][3] == 0.0 or _surplus(start, contact) <= 0.0:
-        return start  # fluctuations do not reduce the work
-    low = max(hertz if hertz > 0.0 else 0.0, _NARROWEST * start)
-    ratio = (low / start) ** (1.0 / _WALK)
-    outside, inside, least, lowest = start, start, math.inf, start
+def stable_radius(start, work, mount, body, share):
+    """Return the largest stable radius of a contact [m], nan without one.
+
+    ``start``: any radius above 0. ``work``: work of adhesion that is left at most, that of the intact bonds, and energy
+    that many waves in the contact take [J/m²], and energy of the mean stress over the radius [J/m³]. ``mount`` and
+    ``body`` as in ``sim.laws.equilibrium.largest_radius``. ``share``: a ``Share``, without cubics on the plane, where
+    all of the energy is taken at any radius. On a disc the walk never goes below 1e-4 of its start.
+    """
+    most, bonded, fluctuating, tilt = work
+    wide, _ = largest_radius(start, most, tilt, mount, body)
+    if len(share[2]) == 0:
+        return wide
+    contact = (bonded, fluctuating, tilt), mount, body, share
+    if not wide > 0.0 or fluctuating == 0.0 or _surplus(wide, contact) <= 0.0:
+        return wide  # fluctuations do not reduce the work
+    hertz, _ = largest_radius(start, 0.0, 0.0, mount, body)
+    low = max(hertz if hertz > 0.0 else 0.0, _NARROWEST * wide)
+    ratio = (low / wide) ** (1.0 / _WALK)
+    outside, inside, least, lowest = wide, wide, math.inf, wide
     for k in range(1, _WALK + 1):
         outside, inside = inside, low if k == _WALK else inside * ratio
         value = _surplus(inside, contact)
         if value <= 0.0:
             return max(_narrowed(inside, outside, contact), low)
-        if value < least and k < _WALK:
+        if value < least:
             least, lowest = value, inside
+    if lowest == low and _surplus(low * (1.0 + _NEXT), contact) >= least:
+        return hertz
     dip = _dip(lowest * ratio, lowest / ratio, contact)
     if _surplus(dip, contact) <= 0.0:
         return max(_narrowed(dip, lowest / ratio, contact), low)
     return hertz
 
 
-@kernel(f"void(float64[:, ::1], UniTuple(float64, 3), {SHARE}, float64[::1])")
-def widest_crossings(contacts, bodies, share, radius):
-    """Write the largest stable radius of contacts on discs to ``radius`` [m].
+@kernel(f"void(float64[:, ::1], float64, UniTuple(float64, 2), {SHARE}, float64[::1])")
+def stable_radii(contacts, stiffness, body, share, radius):
+    """Write the largest stable radius of contacts to ``radius`` [m].
 
-    Rows of ``contacts``: radius without fluctuations [m], nan without a contact, and Hertz radius [m], nan under
-    tension. Then load [N] and displacement of the base [m], one of them 0. Then work of adhesion of the intact bonds
-    and energy of the fluctuations [J/m²], and energy of the mean stress over the radius [J/m³]. ``bodies``: curvature
-    of the sphere, contact modulus, stiffness, 0 at a load. ``share``: a ``Share``. The walk never goes below 1e-4 of
-    its start.
+    Rows of ``contacts``: the four of ``work`` in ``stable_radius``, then load [N] and displacement of the base [m].
     """
     for i in range(radius.size):
-        terms = (
-            contacts[2, i],
-            contacts[3, i],
-            contacts[4, i],
-            contacts[5, i],
-            contacts[6, i],
-        )
-        radius[i] = widest(contacts[0, i], contacts[1, i], (terms, bodies, share))
+        work = contacts[0, i], contacts[1, i], contacts[2, i], contacts[3, i]
+        mount = contacts[4, i], contacts[5, i], stiffness
+        start = 4.0 * fold_radius(max(work[0], 0.0), 1.0 / body[0], body[1])
+        start += math.sqrt(max(mount[1], 0.0) / body[0])
+        start += cube_root(0.75 * max(mount[0], 0.0) / (body[0] * body[1]))
+        radius[i] = stable_radius(start, work, mount, body, share)

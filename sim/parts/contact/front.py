@@ -31,6 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim.laws.equilibrium import half_space, largest_radius, missing_depth
 from sim.numerics.jit import device, kernel
 from sim.numerics.special import cube_root
 from sim.parts.contact.balance import SHARE, Balance
@@ -61,17 +62,13 @@ def excess(t, a, scene):
         work_rate,
         scale,
     ) = scene
-    if stiffness == math.inf:
-        spring, yielding = 1.0, 0.0
-    else:
-        yielding = 1.0 / (stiffness + 2.0 * modulus * a)
-        spring = stiffness * yielding
-    hertz = a * a * curvature
-    y = spring * (hertz - base - base_rate * t)
-    y += yielding * (4.0 / 3.0 * modulus * a * hertz - load - load_rate * t)
-    y_a = 2.0 * a * curvature - 2.0 * modulus * yielding * y
-    y_t = -spring * base_rate - yielding * load_rate
-    unit = modulus * abs(y) / (2.0 * math.pi * a * scale)
+    terms = half_space(a, (curvature, modulus))
+    mount = load + load_rate * t, base + base_rate * t, stiffness
+    y, y_a = missing_depth(terms, mount)
+    y_t = -base_rate
+    if stiffness < math.inf:
+        y_t = -(stiffness * base_rate + load_rate) / (stiffness + terms[3])
+    unit = abs(y) / (terms[5] * scale)
     s = unit * y - (work + work_rate * t) / scale
     return y, s, unit * (2.0 * y_a - y / a), 2.0 * unit * y_t - work_rate / scale
 
@@ -117,31 +114,16 @@ def hertz_force(a, scene):
 
 @device
 def hertz_radius(t, scene):
-    """Return Hertz's radius under the control at t; 0 if the control does not press.
-
-    The force grows with the radius and is convex, so Newton's steps from the right go left.
-    """
-    modulus, curvature, stiffness, force = (
-        scene.modulus,
-        scene.curvature,
-        scene.stiffness,
-        bare_force(t, scene),
-    )
+    """Return Hertz's radius under the control at t; 0 if the control does not press."""
+    curvature, modulus, force = scene.curvature, scene.modulus, bare_force(t, scene)
     if not force > 0.0:
         return 0.0
-    if stiffness == math.inf:
+    if scene.stiffness == math.inf:
         return math.sqrt(force / curvature)
-    a = np.cbrt(0.75 * force / (curvature * modulus))
-    if stiffness > 0.0:
-        a = min(a, math.sqrt(force / (curvature * stiffness)))
-    for _ in range(60):
-        lower = a - (hertz_force(a, scene) - force) / (
-            a * curvature * (2.0 * stiffness + 4.0 * modulus * a)
-        )
-        if not lower < a:
-            break
-        a = lower
-    return a
+    start = np.cbrt(0.75 * force / (curvature * modulus))
+    load, base = scene.load + scene.load_rate * t, scene.base + scene.base_rate * t
+    mount = load, base, scene.stiffness
+    return largest_radius(start, 0.0, 0.0, mount, (curvature, modulus))[0]
 
 
 @device

@@ -25,11 +25,12 @@ from sim.parts.contact.balance import (
     DisplacementControl,
     LoadControl,
     Shares,
-    widest_crossings,
+    stable_radii,
 )
 from sim.parts.contact.front import Kinetics, follow as follow_front
 from sim.parts.exchange import TURN, Array, ContactState, Flags, Motion, Setting, during
 from sim.solid import ElasticSolid, HalfSpace
+from sim.spectrum.radial import PLANE
 from sim.units.quantity import Quantity, keyed
 from sim.units.tables import Prescribed, over_time, prescribed
 
@@ -360,12 +361,12 @@ class _Controlled:
 
     def equilibrium_radius(self, work: Array, bodies: Bodies) -> Array:
         """Return the JKR radius at the start for a work of adhesion; Hertz's if it is not positive; nan if open."""
-        return self.control(0.0, 0.0).radius(work, np.zeros(1), 0.0, bodies)
+        return self.control(0.0, 0.0).radius(work, bodies)
 
     def largest_radius(self, work: float, bodies: Bodies) -> float:
         """Return the JKR radius for a work of adhesion as the control presses most [m]; 0 without equilibrium."""
         control = self._control(max(self.course.extremes))
-        radius = control.radius(np.array([work]), np.zeros(1), 0.0, bodies)
+        radius = control.radius(np.array([work]), bodies)
         return float(np.nan_to_num(radius[0]))
 
     def start(self, motion: Motion, duration: float, balance: Balance) -> ContactState:
@@ -389,8 +390,6 @@ class _Controlled:
         whole = np.full((*balance.bonded.shape[:-1], 1), balance.reference)
         radii = control.radius(
             np.concatenate([whole, balance.bonded], axis=-1),
-            np.zeros(1),
-            0.0,
             balance.bodies,
         )
         jkr, bonds_only = radii[..., :1], radii[..., 1:]
@@ -423,35 +422,26 @@ class _Controlled:
 
     def equilibrium(self, control: Control, balance: Balance) -> Array:
         """Return the largest stable radius in equilibrium with the work left there [m], nan without one."""
-        if balance.margin is None:
-            return control.radius(
-                balance.work(np.zeros(1)),
-                balance.stress,
-                self.reversible,
-                balance.bodies,
-            )
-        bodies = balance.bodies
-        most = balance.bonded - balance.margin.least * balance.fluctuating
-        wide = control.radius(most, balance.stress, self.reversible, bodies)
-        hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, bodies)
-        of_stress = (
-            self.reversible * balance.reversible(np.ones(1)) if self.reversible else 0.0
+        margin, bodies = balance.margin, balance.bodies
+        if margin is None and self.reversible == 0.0:
+            return control.radius(balance.work(np.zeros(1)), bodies)
+        # on the plane fluctuations take their whole energy at any radius
+        least, shares = (
+            (1.0, [PLANE]) if margin is None else (margin.least, margin.each)
         )
         load, base, stiffness = control.mount
-        terms = wide, hertz, load, base, balance.bonded, balance.fluctuating, of_stress
-        shares, sphere = (
-            balance.margin.each,
-            (1.0 / bodies.sphere_radius, bodies.modulus, stiffness),
-        )
-        contacts = np.stack(np.broadcast_arrays(*terms)).reshape(
-            len(terms), len(shares), -1
-        )
+        tilt = self.reversible * balance.reversible(np.ones(1))
+        bonded, fluctuating = balance.bonded, balance.fluctuating
+        most = bonded - least * fluctuating
+        terms = np.broadcast_arrays(most, bonded, fluctuating, tilt, load, base)
+        body = 1.0 / bodies.sphere_radius, bodies.modulus
+        contacts = np.stack(terms).reshape(len(terms), len(shares), -1)
         radius = np.empty(contacts.shape[1:])
         for k, share in enumerate(shares):
-            widest_crossings(
-                np.ascontiguousarray(contacts[:, k]), sphere, share, radius[k]
+            stable_radii(
+                np.ascontiguousarray(contacts[:, k]), stiffness, body, share, radius[k]
             )
-        return radius.reshape(wide.shape)
+        return radius.reshape(terms[0].shape)
 
     def _left(self, radius: Array, balance: Balance) -> Array:
         """Return the work of adhesion left at a radius; of an open contact that of a vanishing one."""

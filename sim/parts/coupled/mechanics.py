@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple
 
+from sim.laws.equilibrium import largest_radius
 from sim.numerics.jit import device
 from sim.parts.drive import ENERGY
 from sim.parts.exchange import Array, FieldLaw, record
@@ -111,106 +112,30 @@ class Inputs(NamedTuple):
 
 
 @device
-def _missing(a, load, base, contact):
-    """Return the depth of a Hertzian contact of this radius beyond that of the mount, and its slope over the radius."""
-    stiffness, curvature, modulus = (
-        contact.stiffness,
-        contact.curvature,
-        contact.modulus,
-    )
-    hertz = a * a * curvature
-    if stiffness == math.inf:
-        return hertz - base, 2.0 * a * curvature
-    series = stiffness + 2.0 * modulus * a
-    missing = (
-        stiffness * (hertz - base) + 4.0 / 3.0 * modulus * a * hertz - load
-    ) / series
-    return missing, (
-        2.0 * stiffness * a * curvature
-        + 4.0 * modulus * hertz
-        - 2.0 * modulus * missing
-    ) / series
-
-
-@device
-def is_beyond(radius, work, tilt, contact):
-    """True if a radius is beyond all equilibrium radii with a work of adhesion of ``work`` - ``tilt`` x radius."""
-    missing, _ = _missing(radius, contact.load, contact.base, contact)
-    left = work - tilt * radius
-    released = 0.5 / math.pi * contact.modulus * missing * missing / radius
-    return not radius < math.inf or (missing >= 0.0 and released >= left)
-
-
-@device
 def contact_area(bound, moment, time, radius, contact):
     """Return the contact radius in equilibrium with these bonds, area over the reference's, its slopes over N and M.
 
-    Newton's method on the energy release rate, which is convex in the radius, starts from the last radius and
-    approaches the root from the right. The result is nan if there is no root, as for an open contact, and the Hertz
-    radius if adhesion is too weak for the mean stress there.
+    The search begins at a ``radius``, the last one. The result is nan if there is no equilibrium, as for an open
+    contact, and the Hertz radius if adhesion is too weak for the mean stress there.
     """
+    unit, tilt = contact.area, contact.mean_stress * moment * moment
     if contact.stays > 0.0:
-        return radius, math.pi * radius * radius / contact.area, 0.0, 0.0
-    bonded, mean_stress, unit, modulus = (
-        contact.bonded,
-        contact.mean_stress,
-        contact.area,
-        contact.modulus,
-    )
+        return radius, math.pi * radius * radius / unit, 0.0, 0.0
     fluctuating = contact.fluctuating + contact.fluctuating_rate * time
-    work, tilt = (
-        contact.bare - fluctuating + bonded * bound,
-        mean_stress * moment * moment,
+    load = contact.load + contact.load_rate * time
+    base = contact.base + contact.base_rate * time
+    a, slope = largest_radius(
+        radius,
+        contact.bare - fluctuating + contact.bonded * bound,
+        tilt,
+        (load, base, contact.stiffness),
+        (contact.curvature, contact.modulus),
     )
-    load, base = (
-        contact.load + contact.load_rate * time,
-        contact.base + contact.base_rate * time,
-    )
-    a, slope = radius, 1.0
-    if work > 0.0 and tilt > 0.0 and load + base > 0.0:  # the edge can pull, not push
-        for _ in range(60):
-            missing, growth = _missing(a, load, base, contact)
-            a -= min(missing / growth, 0.5 * a)
-            if math.fabs(missing) <= 1e-14 * growth * a:
-                break
-        if not work - tilt * a > 0.0:
-            return a, math.pi * a * a / unit, 0.0, 0.0
-        a = max(a, radius)
-    elif not (work > 0.0 or load + base > 0.0):
-        # nothing presses a contact without adhesion together
+    if not a > 0.0:
         return math.nan, math.nan, 0.0, 0.0
-    for _ in range(60):
-        missing, growth = _missing(a, load, base, contact)
-        if work > 0.0:
-            over = 0.5 / math.pi * modulus * missing * missing / a - work + tilt * a
-            slope = (
-                0.5 / math.pi * modulus * missing / a * (2.0 * growth - missing / a)
-                + tilt
-            )
-            left = work - tilt * a
-            # next to Hertz's radius, where the slope vanishes: by the depths
-            if missing < 0.0 or over < -0.75 * left:
-                over, slope = (
-                    missing - math.sqrt(2.0 * math.pi * a * max(left, 0.0) / modulus),
-                    growth,
-                )
-        else:
-            over, slope = missing, growth
-        if not slope > 0.0:
-            return math.nan, math.nan, 0.0, 0.0
-        change = min(over / slope, 0.5 * a)
-        a -= change
-        if math.fabs(change) <= 1e-14 * a:
-            break
-    if work <= 0.0:
-        return a, math.pi * a * a / unit, 0.0, 0.0
     growth = 2.0 * math.pi * a / unit / slope
-    return (
-        a,
-        math.pi * a * a / unit,
-        growth * bonded,
-        -2.0 * growth * mean_stress * moment * a,
-    )
+    by_moment = -2.0 * growth * contact.mean_stress * moment * a
+    return a, math.pi * a * a / unit, growth * contact.bonded, by_moment
 
 
 @device

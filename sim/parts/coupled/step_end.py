@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from sim.numerics.jit import device
 from sim.numerics.noise import stream
-from sim.parts.contact.balance import SHARE, widest
+from sim.parts.contact.balance import SHARE, stable_radius
 from sim.parts.coupled import mechanics
 from sim.parts.exchange import Array, Draws, Flags
 from sim.parts.shear.bands import renew_band
@@ -66,30 +66,15 @@ class StepEnds(NamedTuple):
 def _equilibrium(row, load, base, energy, contact, share):
     """Return the largest stable radius in equilibrium with the ``energy`` that fluctuations take, nan without one.
 
-    The energy is that for many waves in the contact; on a disc the radius is found as ``balance.widest_crossings`` has
-    it. Newton's method begins at a radius beyond all crossings.
+    The energy is that for many waves in the contact.
     """
-    mount, body = (load, 0.0, base, 0.0, 0.0), contact[8:12]
-    on_disc = len(share[2]) > 0
-    fluctuating = 0.0 if on_disc else energy
-    bound, tilt = contact.bonded, contact.mean_stress
-    free = mechanics.Contact(
-        contact.bare, *mount, bound, tilt, *body, fluctuating, 0.0, contact.field
-    )
-    bonded, reversible = contact.bare + bound * row.bound, tilt * row.moment**2
     start = row.radius if row.radius > 0.0 else math.sqrt(contact.area / math.pi)
-    growth = 0.01
-    while not mechanics.is_beyond(start, bonded - fluctuating, reversible, free):
-        start *= 1.0 + growth
-        growth *= 2.0
-    wide, _, _, _ = mechanics.contact_area(row.bound, row.moment, 0.0, start, free)
-    if not on_disc:
-        return wide
-    none = mechanics.Contact(0.0, *mount, 0.0, 0.0, *body, 0.0, 0.0, contact.field)
-    hertz, _, _, _ = mechanics.contact_area(0.0, 0.0, 0.0, start, none)
-    terms = load, base, bonded, energy, reversible
-    sphere = contact.curvature, contact.modulus, contact.stiffness
-    return widest(wide, hertz, (terms, sphere, share))
+    bonded, tilt = contact.bare + contact.bonded * row.bound, contact.mean_stress
+    tilt *= row.moment * row.moment
+    mount, body = (load, base, contact.stiffness), (contact.curvature, contact.modulus)
+    most = bonded if len(share[2]) > 0 else bonded - energy
+    work = most, bonded, energy, tilt
+    return stable_radius(start, work, mount, body, share)
 
 
 @device

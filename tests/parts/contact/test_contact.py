@@ -420,17 +420,13 @@ def test_work_that_falls_through_zero_or_none_at_all_makes_hertzs_contact():
             scenario, "contact_radius", "work_of_adhesion", "masked"
         )
         bodies = scenario.bodies
-        hertz = scenario.contact.control(0.0, 1.0).radius(
-            np.zeros(1), np.zeros(1), 0.0, bodies
-        )[0]
+        hertz = scenario.contact.control(0.0, 1.0).radius(np.zeros(1), bodies)[0]
         assert_array_equal(masked, work <= 0.0)
         assert 10 < masked.sum() < 390
         assert_array_equal(radius[work <= 0.0], hertz)
         assert np.all(radius[work > 0.0] >= hertz)
         # continuous in the work: near Hertz's radius it grows like its root, a - a_H <= C sqrt(w) with C at 42 mJ/m^2
-        wide = scenario.contact.control(0.0, 1.0).radius(
-            np.array([0.042]), np.zeros(1), 0.0, bodies
-        )[0]
+        wide = scenario.contact.control(0.0, 1.0).radius(np.array([0.042]), bodies)[0]
         assert np.all(
             radius - hertz
             <= 1.5 * (wide - hertz) * np.sqrt(np.maximum(work, 0.0) / 0.042) + 1e-18
