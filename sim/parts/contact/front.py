@@ -213,12 +213,15 @@ def _solved(m11, m22, m33, r1, r2, r3):
 
 
 @device
-def _stages(running, x, y, h, z1, z2, z3, start, scene, front):
+def _stages(step, changes, start, scene, front):
     """Return the three stages' residuals, slopes and excesses, and the size of the residuals as a length.
+
+    ``step`` is as in ``_radau``, ``changes`` are those of y to the stages.
 
     A residual counts by the change of radius that would remove it, because opening and healing may differ by
     decades in speed.
     """
+    (running, x, y, h), (z1, z2, z3) = step, changes
     if not (running or (y + z1 > 0.0 and y + z2 > 0.0 and y + z3 > 0.0)):
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, math.inf
     f1, j1, _, s1 = _slope(running, x + _C1 * h, y + z1, start, scene, front)
@@ -236,22 +239,24 @@ def _stages(running, x, y, h, z1, z2, z3, start, scene, front):
 
 
 @device
-def _radau(running, x, y, h, size, first, start, scene, front):
+def _radau(step, size, first, start, scene, front):
     """Return change of y, error over tolerance (nan: no solution) and energy/(2 pi work) of a step of Radau IIA.
+
+    ``step``: true if the edge runs, x and y at its start, and its length.
 
     Newton's steps are halved while they do not lower the residual. The error is that of the embedded method, filtered
     by the slope at the end. The method steps over a fast layer narrower than the tolerance, but not over a turn from a
     fast edge to a slow one. The energy is the quadrature of the method, of positive weights and signs.
     """
-    f, j, f_x = first
+    (running, _, _, h), (f, j, f_x) = step, first
     g1, g2, g3 = _C1 * h, _C2 * h, h
     z1 = g1 * (f + 0.5 * g1 * f_x) / (1.0 + 0.5 * g1 * abs(j))
     z2 = g2 * (f + 0.5 * g2 * f_x) / (1.0 + 0.5 * g2 * abs(j))
     z3 = g3 * (f + 0.5 * g3 * f_x) / (1.0 + 0.5 * g3 * abs(j))
-    now = _stages(running, x, y, h, z1, z2, z3, start, scene, front)
+    now = _stages(step, (z1, z2, z3), start, scene, front)
     if not now[9] < math.inf:
         z1 = z2 = z3 = 0.0
-        now = _stages(running, x, y, h, z1, z2, z3, start, scene, front)
+        now = _stages(step, (z1, z2, z3), start, scene, front)
     for _ in range(20):
         r1, r2, r3, j1, j2, j3, s1, s2, s3, residual = now
         if not residual < math.inf:
@@ -273,9 +278,8 @@ def _radau(running, x, y, h, size, first, start, scene, front):
         if not change < math.inf:
             return 0.0, math.nan, 0.0
         for _ in range(12):
-            now = _stages(
-                running, x, y, h, z1 - d1, z2 - d2, z3 - d3, start, scene, front
-            )
+            halved = z1 - d1, z2 - d2, z3 - d3
+            now = _stages(step, halved, start, scene, front)
             if now[9] < residual:
                 break
             d1, d2, d3 = 0.5 * d1, 0.5 * d2, 0.5 * d3
@@ -368,9 +372,8 @@ def _try(running, t, a, h, size, scene, front):
     """Return time and radius after an inner step, error over tolerance, and energy/(2 pi work)."""
     x, now = (0.0, t) if running else (t, a)
     f, j, f_x, _ = _slope(running, x, now, a, scene, front)
-    change, error, energy = _radau(
-        running, x, now, h, size, (f, j, f_x), a, scene, front
-    )
+    step, first = (running, x, now, h), (f, j, f_x)
+    change, error, energy = _radau(step, size, first, a, scene, front)
     if running:
         return t + change, a * math.exp(-h), error, energy
     return t + h, a + change, error, energy
@@ -482,8 +485,9 @@ def _zero(before, after, duration):
 
 
 @device
-def scene_of(works, loads, bases, stiffness, duration, scale, bodies):
-    """Return the ``Scene`` of work, load and displacement at start and end of a time."""
+def scene_of(works, mount, duration, scale, bodies):
+    """Return the ``Scene`` of work, load and displacement at both ends of a time; ``mount`` is as in ``moved_edge``."""
+    loads, bases, stiffness = mount
     per, (sphere_radius, modulus) = (1.0 / duration if duration > 0.0 else 0.0), bodies
     load, base = (
         (0.0 if stiffness == math.inf else loads[0]),
@@ -507,17 +511,19 @@ def scene_of(works, loads, bases, stiffness, duration, scale, bodies):
 
 
 @device
-def moved_edge(a, works, loads, bases, stiffness, duration, kinetics, bodies, least):
+def moved_edge(a, works, mount, duration, kinetics, bodies, least):
     """Return radius, time of detachment and dissipated energy of an edge after a time of linear work and control.
 
     Parameters
     ----------
     a : float
         Radius at the start [m]; nan or 0 for an open contact, which stays open. It is at least Hertz's.
-    works, loads, bases : pair of floats
-        Work of adhesion w of any sign [J/m^2], load [N] and displacement of the base [m] at start and end.
-    stiffness, duration : float
-        Stiffness behind the base [N/m], 0 to inf; length of the time [s].
+    works : pair of floats
+        Work of adhesion w of any sign [J/m^2] at start and end.
+    mount : tuple
+        Loads [N] and displacements of the base [m] at start and end, and the stiffness behind the base [N/m], 0 to inf.
+    duration : float
+        Length of the time [s].
     kinetics : Kinetics or tuple
         Reference work [J/m^2], speeds [m/s] and exponents [1] of opening and healing. A speed of 0 or infinity
         freezes the edge or leaves it in equilibrium.
@@ -540,7 +546,8 @@ def moved_edge(a, works, loads, bases, stiffness, duration, kinetics, bodies, le
     cases. If pressing advances the edge faster than it heals, w dA is dissipated for w > 0, and nothing for w <= 0.
     """
     scale, speed, exponent, heal_speed, heal_exponent = kinetics
-    scene = scene_of(works, loads, bases, stiffness, duration, scale, bodies)
+    loads, bases, stiffness = mount
+    scene = scene_of(works, mount, duration, scale, bodies)
     ends = abs(scene.load) + abs(scene.base) + abs(works[0]) + abs(works[1])
     ends += (0.0 if stiffness == math.inf else abs(loads[1])) + (
         0.0 if stiffness == 0.0 else abs(bases[1])
@@ -612,9 +619,7 @@ def _energy(t, a, scene):
 
 
 @device
-def _moved(
-    radius, touches, works, loads, bases, stiffness, duration, kinetics, bodies, spot
-):
+def _moved(radius, touches, works, mount, duration, kinetics, bodies, spot):
     """Return radius or nan, time of opening or nan, and dissipated energy after a part of a clock step.
 
     Energy that is stored as the edge opens counts as dissipated, and so does the energy that a spot gains at a touch.
@@ -625,12 +630,10 @@ def _moved(
     if math.isnan(a):
         return math.nan, math.nan, 0.0
     end, opened, lost = moved_edge(
-        a, works, loads, bases, stiffness, duration, kinetics, bodies, 0.5 * spot
+        a, works, mount, duration, kinetics, bodies, 0.5 * spot
     )
-    scene, opens = (
-        scene_of(works, loads, bases, stiffness, duration, kinetics[0], bodies),
-        math.isnan(end),
-    )
+    scene = scene_of(works, mount, duration, kinetics[0], bodies)
+    (loads, _, stiffness), opens = mount, math.isnan(end)
     if stiffness == 0.0:
         sphere_radius, modulus = bodies
         fold = cube_root(
@@ -721,26 +724,19 @@ def _weakest(turn, radii, begin, duration, steepness, scene):
 
 
 @kernel(
-    f"void(float64[:, ::1], float64[::1], int64[::1], float64[:, ::1], {_READ}, {_READ}, {_READ}, float64,"
-    f" UniTuple(float64, 5), UniTuple(float64, 2), float64, boolean, {SHARE}, float64[:, :, ::1])"
+    "void(float64[:, ::1], Tuple((float64[::1], int64[::1], float64[:, ::1], float64)),"
+    f" Tuple(({_READ}, {_READ}, {_READ}, {SHARE})),"
+    " Tuple((UniTuple(float64, 5), UniTuple(float64, 2), float64, boolean)), float64[:, :, ::1])"
 )
-def _follow(
-    state,
-    durations,
-    opening,
-    pieces,
-    bonded,
-    fluctuating,
-    reversible,
-    stiffness,
-    kinetics,
-    bodies,
-    spot,
-    again,
-    share,
-    out,
-):
-    """Write the rows of ``follow`` at the end of each step."""
+def _follow(state, control, terms, edge, out):
+    """Write the rows of ``follow`` at the end of each step.
+
+    ``control``: lengths of the steps, first piece of each, the pieces, and the stiffness. ``terms``: those of the work
+    of adhesion. ``edge``: its kinetics, the bodies, the radius of a first touch, and true if it closes again.
+    """
+    durations, opening, pieces, stiffness = control
+    bonded, fluctuating, reversible, share = terms
+    kinetics, bodies, spot, again = edge
     for m in range(state.shape[1]):
         work, radius, detached, dissipated = (
             state[0, m],
@@ -762,12 +758,14 @@ def _follow(
                     (1.0 - begin) * first + begin * last,
                     (1.0 - end) * first + end * last,
                 )
-                mount, none = (pieces[2, p], pieces[3, p]), (0.0, 0.0)
-                loads, bases = (mount, none) if stiffness == 0.0 else (none, mount)
+                course, none = (pieces[2, p], pieces[3, p]), (0.0, 0.0)
+                mount = (course, none, stiffness)
+                if stiffness > 0.0:
+                    mount = (none, course, stiffness)
                 touches = (
                     math.isnan(radius)
                     and (math.isnan(detached) or again)
-                    and mount[0] >= 0.0
+                    and course[0] >= 0.0
                 )
                 closed, duration = (
                     touches or not math.isnan(radius),
@@ -775,31 +773,20 @@ def _follow(
                 )
                 first_radius = spot if touches else radius
                 radius, opened, lost = _moved(
-                    radius,
-                    touches,
-                    works,
-                    loads,
-                    bases,
-                    stiffness,
-                    duration,
-                    kinetics,
-                    bodies,
-                    spot,
+                    radius, touches, works, mount, duration, kinetics, bodies, spot
                 )
                 dissipated += lost
                 if not closed:
                     continue
                 start, steepness = pieces[0, p] - duration, 0.0
-                scene = scene_of(
-                    works, loads, bases, stiffness, duration, kinetics[0], bodies
-                )
+                scene = scene_of(works, mount, duration, kinetics[0], bodies)
                 if reversible[k, m] > 0.0 or len(share[2]) > 0:
-                    terms = bonded[k, m], fluctuating[k, m], reversible[k, m], share
+                    of_step = bonded[k, m], fluctuating[k, m], reversible[k, m], share
                     wide, narrow = (
                         (1.0 + _NEAR) * first_radius,
                         (1.0 - _NEAR) * first_radius,
                     )
-                    steepness = (_left(wide, *terms) - _left(narrow, *terms)) / (
+                    steepness = (_left(wide, *of_step) - _left(narrow, *of_step)) / (
                         wide - narrow
                     )
                 radii = first_radius, radius
@@ -864,18 +851,14 @@ def follow(
         row[:] = values
     sphere_radius, modulus, _ = balance.bodies.numbers
     spot = _SPOT * math.cbrt(balance.reference * sphere_radius**2 / modulus)
+    course = np.array([pieces.stop, shares, pieces.first, pieces.last])
+    share = PLANE if balance.margin is None else balance.margin.each[0]
+    terms = (np.broadcast_to(values, out.shape[1:]) for values in of_steps)
     _follow(
         before,
-        durations,
-        opening,
-        np.array([pieces.stop, shares, pieces.first, pieces.last]),
-        *(np.broadcast_to(values, out.shape[1:]) for values in of_steps),
-        stiffness,
-        tuple(kinetics),
-        (sphere_radius, modulus),
-        spot,
-        again,
-        PLANE if balance.margin is None else balance.margin.each[0],
+        (durations, opening, course, stiffness),
+        (*terms, share),
+        (tuple(kinetics), (sphere_radius, modulus), spot, again),
         out,
     )
     return *out[:4], np.moveaxis(out[4:], 0, -1)

@@ -67,9 +67,7 @@ def _advance(rows, out):
         out[m, 0], out[m, 1], out[m, 2] = moved_edge(
             a,
             (w0, w1),
-            (load0, load1),
-            (base0, base1),
-            stiffness,
+            ((load0, load1), (base0, base1), stiffness),
             duration,
             kinetics,
             bodies,
