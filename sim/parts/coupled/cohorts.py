@@ -202,11 +202,13 @@ def before_node(place, nodes, at_start, start, step, scale, row, slider):
 
 
 @device
-def balance(shift, bound, moment, before, after, approach, start, row, slider, contact):
-    """Return the excess force at a node with these bonds, its slope if they stay, and the tolerance of the slip.
+def balance(shift, sums, nodes, approach, start, row, slider, contact):
+    """Return the excess force at a node with some bonds, its slope if they stay, and the tolerance of the slip.
 
-    What belongs to the slip is written to the node.
+    ``sums``: share of bound sites, and sum of their stretches. ``nodes``: the node before, and this one, to which what
+    belongs to the slip is written.
     """
+    (bound, moment), (before, after) = sums, nodes
     stiffness, mass, damping, viscosity = (
         slider.stiffness,
         slider.mass,
@@ -267,25 +269,14 @@ def balance(shift, bound, moment, before, after, approach, start, row, slider, c
 
 
 @device
-def go_to_node(
-    place,
-    nodes,
-    at_start,
-    pool,
-    count,
-    start,
-    step,
-    scale,
-    row,
-    slider,
-    contact,
-    unit,
-    rules,
-):
+def go_to_node(place, nodes, way, pool, count, row, around, law):
     """Find the slip to a node and move the bonds; return their number, and the factor of the step for births.
 
-    A number below zero where there is no balance of forces or its slope is not that of a short sub-step.
+    ``way``: speeds and force at the start of the sub-step, its start and length, and the stretch by which errors are
+    measured. ``around``: numbers of slider and contact. ``law``: unit of a stretch, and rules of the cohorts. The
+    number is below zero if there is no balance of forces or its slope is not that of a short sub-step.
     """
+    (at_start, start, step, scale), (slider, contact), (unit, rules) = way, around, law
     approach = before_node(place, nodes, at_start, start, step, scale, row, slider)
     duration, shift = approach.duration, approach.slip
     before, after = nodes[place - 1], nodes[place]
@@ -302,8 +293,9 @@ def go_to_node(
             pool, count, unit * shift, duration, off, free, rules
         )
         moment /= unit
+        sums, ends = (bound, moment), (before, after)
         over, elasticity, none = balance(
-            shift, bound, moment, before, after, approach, start, row, slider, contact
+            shift, sums, ends, approach, start, row, slider, contact
         )
         if turn == 0:
             slope = elasticity
@@ -456,12 +448,12 @@ def _at_once(pool, count, shift, unit, rules):
 
 
 @device
-def _lacking(shift, pool, count, row, time, slider, contact, unit, rules):
+def _lacking(shift, pool, count, row, time, slider, contact, law):
     """Return the missing force after a displacement at once; area, radius, u, displacement of the body.
 
     A body that mass or damping holds stays. Then the displacement that is missing is returned instead of the force.
     """
-    bound, moment = _at_once(pool, count, shift, unit, rules)
+    bound, moment = _at_once(pool, count, shift, *law)
     radius, area, _, _ = mechanics.contact_area(
         bound, moment, time, row.radius, contact
     )
@@ -475,22 +467,22 @@ def _lacking(shift, pool, count, row, time, slider, contact, unit, rules):
 
 
 @device
-def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, energy):
+def _slip_event(row, pool, count, time, slider, contact, law, books):
     """Slip at once to where bonds bear the pull, if an avalanche has begun; return the bonds left, else less than 0.
 
-    The first such place is looked for in steps of at most half the width to which stretches are resolved.
+    ``books``: the node there, and the energies. The first such place is looked for in steps of at most half the width
+    to which stretches are resolved.
     """
+    (unit, rules), (node, energy) = law, books
     is_held, step, limit = (
         slider.mass + slider.damping > 0.0,
         0.5 * rules.cell / unit,
         rules.limit / unit,
     )
     sense = math.copysign(1.0, row.moment if is_held else row.spring_force)
-    here, area, _, _, _ = _lacking(
-        0.0, pool, count, row, time, slider, contact, unit, rules
-    )
+    here, area, _, _, _ = _lacking(0.0, pool, count, row, time, slider, contact, law)
     near, _, _, _, _ = _lacking(
-        sense * _TRIED * limit, pool, count, row, time, slider, contact, unit, rules
+        sense * _TRIED * limit, pool, count, row, time, slider, contact, law
     )
     # merged stretches reach a little beyond the limit
     if not (
@@ -502,7 +494,7 @@ def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, ener
     while high < 2.0 * limit:
         low, high = high, high + min(high, step)
         lacks, _, _, _, _ = _lacking(
-            sense * high, pool, count, row, time, slider, contact, unit, rules
+            sense * high, pool, count, row, time, slider, contact, law
         )
         if begun and lacks <= 0.0:
             break
@@ -513,7 +505,7 @@ def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, ener
         for _ in range(60):
             middle = 0.5 * (low + high)
             lacks, _, _, _, _ = _lacking(
-                sense * middle, pool, count, row, time, slider, contact, unit, rules
+                sense * middle, pool, count, row, time, slider, contact, law
             )
             low, high = (middle, high) if lacks > 0.0 else (low, middle)
         shift = sense * high
@@ -524,7 +516,7 @@ def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, ener
     else:
         return -1
     _, after, radius, sheared, body = _lacking(
-        shift, pool, count, row, time, slider, contact, unit, rules
+        shift, pool, count, row, time, slider, contact, law
     )
     if not after >= 0.0:
         return -1
@@ -551,13 +543,14 @@ def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, ener
 
 
 @device
-def _break_stretched(
-    row, pool, count, time, reach, slider, contact, unit, rules, node, energy
-):
-    """Break bonds of one stretch within a ``reach`` of its limit; return the bonds left, less than 0 without such.
+def _break_stretched(row, pool, count, place, slider, contact, law, books):
+    """Break bonds of one stretch within a reach of its limit; return the bonds left, less than 0 without such.
+
+    ``place``: time and reach. ``books``: the node there, and the energies.
 
     Their force falls in no time, so that no sub-step leads over it where something delays the slip.
     """
+    (time, reach), (unit, rules), (node, energy) = place, law, books
     left, gone, limit = 0, 0.0, rules.limit / unit
     for i in range(count):
         if math.fabs(pool[1, i]) / unit - 0.5 * pool[2, i] / unit >= limit - reach:
@@ -585,8 +578,12 @@ def _break_stretched(
 
 
 @device
-def _break_all(row, pool, time, brief, slider, contact, unit, rules, node, energy):
-    """Break all bonds at once and slip, where nothing delays the interface, if they last less than ``brief``."""
+def _break_all(row, pool, place, slider, contact, law, books):
+    """Break all bonds at once and slip, where nothing delays the interface, if they last less than a brief time.
+
+    ``place``: time and brief time. ``books``: the node there, and the energies.
+    """
+    (time, brief), (unit, rules), (node, energy) = place, law, books
     k = rate_at(unit * node.moment / node.bound, rules) if node.bound > 0.0 else 0.0
     if not (k * brief > 1.0 and mechanics.slips_free(row, slider)):
         return False
@@ -603,13 +600,13 @@ def _break_all(row, pool, time, brief, slider, contact, unit, rules, node, energ
 
 
 @device
-def _piece(line, bonds, slider, contact, unit, rules, room, books):
+def _piece(line, bonds, slider, contact, law, room, books):
     """Go through one piece of a clock step; return the time reached, before its end if the motion ends, and the bonds.
 
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step: then the last
     number returned is 1, else 0.
     """
-    pool, saved, nodes = room
+    (pool, saved, nodes), (unit, rules) = room, law
     row, energy = line[0], books[0]
     count, travelled, settled = bonds
     start, length, turns, checked = 0.0, slider.length, 0, 0.0
@@ -627,18 +624,9 @@ def _piece(line, bonds, slider, contact, unit, rules, room, books):
             return length, count, travelled, settled, contact.stays
         if not step > mechanics.LEAST * length:
             slid, row.next_step = row.slip, 0.0
-            if _break_all(
-                row,
-                pool,
-                start,
-                mechanics.BRIEF * length,
-                slider,
-                contact,
-                unit,
-                rules,
-                nodes[0],
-                energy,
-            ):
+            place = start, mechanics.BRIEF * length
+            at_here = nodes[0], energy
+            if _break_all(row, pool, place, slider, contact, law, at_here):
                 count = settled = 1
                 travelled += unit * (row.slip - slid)
             elif rules.limit == math.inf and mechanics.snap(
@@ -663,36 +651,11 @@ def _piece(line, bonds, slider, contact, unit, rules, room, books):
         first, contact = nodes[0], mechanics.following(contact, row, start, step)
         at_start = begin_sub_step(row, first, start, slider, contact)
         scale = stretch_scale(row, first, slider)
-        new_count, factor = go_to_node(
-            1,
-            nodes,
-            at_start,
-            pool,
-            count,
-            start,
-            step,
-            scale,
-            row,
-            slider,
-            contact,
-            unit,
-            rules,
-        )
+        way, around = (at_start, start, step, scale), (slider, contact)
+        new_count, factor = go_to_node(1, nodes, way, pool, count, row, around, law)
         if new_count >= 0:
             new_count, other = go_to_node(
-                2,
-                nodes,
-                at_start,
-                pool,
-                new_count,
-                start,
-                step,
-                scale,
-                row,
-                slider,
-                contact,
-                unit,
-                rules,
+                2, nodes, way, pool, new_count, row, around, law
             )
             factor = min(factor, other)
         shift, bend, error = nodes[2].slip, 0.0, math.inf
@@ -716,30 +679,12 @@ def _piece(line, bonds, slider, contact, unit, rules, room, books):
                 new_count = -1
                 if brittle:
                     new_count = _slip_event(
-                        row,
-                        pool,
-                        count,
-                        start,
-                        slider,
-                        contact,
-                        unit,
-                        rules,
-                        first,
-                        energy,
+                        row, pool, count, start, slider, contact, law, (first, energy)
                     )
                 if new_count < 0 and (is_held or slider.viscosity > 0.0):
+                    place, at_here = (start, reach), (first, energy)
                     new_count = _break_stretched(
-                        row,
-                        pool,
-                        count,
-                        start,
-                        reach,
-                        slider,
-                        contact,
-                        unit,
-                        rules,
-                        first,
-                        energy,
+                        row, pool, count, place, slider, contact, law, at_here
                     )
                 if new_count >= 0:
                     count, row.next_step = new_count, 1e-6 * length
@@ -783,9 +728,12 @@ def _piece(line, bonds, slider, contact, unit, rules, room, books):
 
 
 @device
-def _through(line, books, pieces, slider, contact, unit, share, rules, bonds, room):
-    """Take a row and its cohorts through a clock step; return the time reached, and False if the motion ends there."""
-    pool, _, nodes = room
+def _through(line, books, pieces, slider, contact, law, bonds, room):
+    """Take a row and its cohorts through a clock step; return the time reached, and False if the motion ends there.
+
+    ``bonds``: arrays of the cohorts, and the share of them that is left at the start.
+    """
+    (pool, _, nodes), (unit, rules), (bonds, share) = room, law, bonds
     row, energy = line[0], books[0]
     count = read_row(pool, bonds[0], bonds[1], bonds[2], share)
     time, going, travelled, settled, stays = (
@@ -818,15 +766,9 @@ def _through(line, books, pieces, slider, contact, unit, share, rules, bonds, ro
             mechanics.book_slip(
                 energy.work - worked - left + before, before - unslipped, jumps, energy
             )
+            of_bonds = count, travelled, settled
             reached, count, travelled, settled, stays = _piece(
-                line,
-                (count, travelled, settled),
-                slider,
-                from_here,
-                unit,
-                rules,
-                room,
-                books,
+                line, of_bonds, slider, from_here, law, room, books
             )
         time += reached
         going = going and reached == slider.length
@@ -843,17 +785,16 @@ def _through(line, books, pieces, slider, contact, unit, share, rules, bonds, ro
 
 @kernel(
     f"void({mechanics.ARGUMENTS}, {ENDS}, float64[::1], {RULES},"
-    " float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1])"
+    " UniTuple(float64[:, ::1], 4), float64[:, :, ::1])"
 )
-def advance_cohorts(
-    inputs, numbers, outputs, ends, share, rules, weight, stretch, width, lattice, sums
-):
+def advance_cohorts(inputs, numbers, outputs, ends, share, rules, cohorts, sums):
     """Advance all rows, their energies and cohorts through some clock steps, each row by itself.
 
     ``share`` of each row's bonds that is left at the start; ``sums`` get those of the cohorts after each step. The rest
     as in ``mean_field.advance_rows``.
     """
     rows, energies, pieces, clock, units, work = inputs
+    weight, stretch, width, lattice = cohorts
     slider, contact, (reached, spent) = (
         mechanics.Slider(*numbers[0]),
         mechanics.contact_of(numbers),
@@ -889,17 +830,9 @@ def advance_cohorts(
                 relax(bonds)
             now = mechanics.contact_at(contact, clock[k], row)
             if not mechanics.has_ended(row):
+                of_step, law = pieces[start:stop], (unit, rules)
                 time, going = _through(
-                    line,
-                    books,
-                    pieces[start:stop],
-                    slider,
-                    now,
-                    unit,
-                    left,
-                    rules,
-                    bonds,
-                    room,
+                    line, books, of_step, slider, now, law, (bonds, left), room
                 )
                 if not going:
                     mechanics.end(row, booked, clock[k, 0] + time, slider)

@@ -220,7 +220,7 @@ class ByCohorts(Stretched):
         cohorts = Cohorts(*(array.copy() for array in before.cohorts))
         sums = np.empty((5, *loop.columns["radius"].shape))
         rules = numbers_of(bonds.law, bonds.rebinding_rate, bonds.tolerance)
-        advance_cohorts(*loop.arguments, share, rules, *cohorts, sums)
+        advance_cohorts(*loop.arguments, share, rules, tuple(cohorts), sums)
         return models.Ages(cohorts, area_radius), bonds.read(sums)
 
 
@@ -238,7 +238,7 @@ class OneByOne(Stretched):
         members = np.asarray(noise.members, dtype=np.uint64)
         law = site_law(bonds.law, bonds.rebinding_rate)
         if advance_tracks(
-            *loop.arguments, tuple(tracks), law, noise.seed, members, frames
+            *loop.arguments, tuple(tracks), law, (noise.seed, members), frames
         ):
             raise RuntimeError(AGAIN)
         return tracks, bonds.read(frames)

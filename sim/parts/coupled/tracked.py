@@ -185,17 +185,9 @@ def _try(nodes, at_start, start, step, row, slider, contact):
         shift, bound, is_solved = approach.slip, before.bound, False
         for turn in range(_TURNS):
             total = before.moment + bound * shift
+            sums, ends = (bound, total), (before, after)
             over, slope, none = balance(
-                shift,
-                bound,
-                total,
-                before,
-                after,
-                approach,
-                start,
-                row,
-                slider,
-                contact,
+                shift, sums, ends, approach, start, row, slider, contact
             )
             if not slope > 0.0:
                 return False
@@ -583,17 +575,18 @@ def _through(line, books, pieces, slider, contact, tracks, ground, nodes):
 
 
 @kernel(
-    f"int64({mechanics.ARGUMENTS}, {ENDS}, {tracked.TRACKS}, {tracked.SITE_LAW}, uint64, uint64[:],"
+    f"int64({mechanics.ARGUMENTS}, {ENDS}, {tracked.TRACKS}, {tracked.SITE_LAW}, Tuple((uint64, uint64[:])),"
     " float64[:, :, ::1])"
 )
-def advance_tracks(inputs, numbers, outputs, ends, tracks, law, seed, members, frames):
+def advance_tracks(inputs, numbers, outputs, ends, tracks, law, address, frames):
     """Advance all rows, their energies and their bonds, in place, through some clock steps, each row by itself.
 
-    ``law``: numbers of ``SiteLaw``; ``seed`` and ``members`` of the lives' draws; ``frames``, of shape (steps,
+    ``law``: numbers of ``SiteLaw``; ``address``: seed and members of the lives' draws; ``frames``, of shape (steps,
     rows, columns), get those of the bonds after each step. The rest as in ``mean_field.advance_rows``. The result is
     zero, or ``SPENT`` if the bonds have been advanced already.
     """
     rows, energies, pieces, clock, units, work = inputs
+    seed, members = address
     slider, contact, (reached, spent) = (
         mechanics.Slider(*numbers[0]),
         mechanics.contact_of(numbers),
