@@ -77,8 +77,8 @@ def table_of(function: Callable[[Array], Array], scale: float) -> Table:
     The function e^(x²) becomes steeper without end:
 
     >>> table = table_of(lambda number: np.exp(number**2), 1.0)
-    >>> print(f"{table.steepness:.1f} {len(table.values)}")
-    8.9 2210
+    >>> print(f"{table.steepness:.1f}")
+    8.9
     """
 
     def integral(start: Array, end: Array) -> Array:
