@@ -89,8 +89,12 @@ def histogram_figure(dataset: xr.Dataset, x: str = "") -> Figure:
         edges = np.linspace(shown.min(), shown.max(), _BARS + 1)
     for line in scene.lines:
         of_line = factor * values.isel(line.point, missing_dims="ignore").to_numpy()
-        counts, _ = np.histogram(of_line[np.isfinite(of_line)], edges, density=True)
-        label = "" if scene.single else line.label
+        of_line, label = of_line[np.isfinite(of_line)], line.label
+        if not of_line.size:
+            panel.plot([], color=line.colour, label=f"{label}: no value")
+            continue
+        counts, _ = np.histogram(of_line, edges, density=True)
+        label = "" if scene.single else label
         panel.stairs(counts, edges, color=line.colour, label=label, linewidth=1.0)
     panel.set(ylabel="probability density", ylim=(0.0, None))
     sample = "second half of the run" if is_stationary(dataset) else "end of the run"

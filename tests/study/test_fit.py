@@ -349,37 +349,52 @@ def drawn_from(problem, count, seed):
         yield replace(problem, values=values)
 
 
+#: Data sets of each documented kind, and how many of them are one test.
+SETS = {
+    "masked": 250,
+    "common": 250,
+    "two keys": 125,
+    "three keys": 125,
+    "per table": 125,
+    "jkr": 125,
+}
+PART = 25
+
+
 @pytest.mark.parametrize(
-    ("kind", "count"),
+    ("kind", "part", "starts"),
     [
-        ("common", 3),
+        ("common", 0, 20),
         *(
-            pytest.param(kind, count, marks=pytest.mark.verify)
-            for kind, count in {
-                "masked": 250,
-                "common": 250,
-                "two keys": 125,
-                "three keys": 125,
-                "per table": 125,
-                "jkr": 125,
-            }.items()
+            pytest.param(kind, part, 200, marks=pytest.mark.verify)
+            for kind, count in SETS.items()
+            for part in range(count // PART)
         ),
     ],
 )
-def test_no_fit_ends_above_the_lowest_of_many_starts_and_one_at_the_truth(kind, count):
+def test_no_fit_ends_above_the_lowest_of_many_starts_and_one_at_the_truth(
+    kind, part, starts
+):
     problem, truth = documented(kind)
-    starts = 200 if count > 10 else 20
     low, high = np.transpose(problem.bounds)
-    rng, single = np.random.default_rng(2), 0
-    for data in drawn_from(problem, count, 1):
+    rng = np.random.default_rng([2, part])
+    for data in drawn_from(problem, PART if starts > 20 else 3, [1, part]):
         best = likelihood.lowest(data).chi_square
         assert best <= minimum(data, truth).chi_square + 0.1
-        single += minimum(data, data.start).chi_square > best + 0.1
         for start in rng.uniform(low, high, (starts, len(low))):
             # a search of one in a thousand is enough to be 0.1 below
             assert best <= minimum(data, start, precision=1e-3).chi_square + 0.1
-    # the search from the first guess alone does not do
-    assert single > 0 or kind not in ("common", "masked")
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("kind", ["common", "masked"])
+def test_the_search_from_the_first_guess_alone_may_end_above_the_minimum(kind):
+    problem, _ = documented(kind)
+    above = sum(
+        minimum(data, data.start).chi_square > likelihood.lowest(data).chi_square + 0.1
+        for data in drawn_from(problem, SETS[kind], 1)
+    )
+    assert above > 0
 
 
 #: Faults of a fit: what made the curves but is fixed at another value in the fit, and errors that are too small.
