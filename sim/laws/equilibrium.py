@@ -109,7 +109,7 @@ def largest_radius(start, work, tilt, mount, body):
         if tilt == 0.0 or missing < 0.0:
             root = math.sqrt(toll * max(left, 0.0))
             over, slope = missing - root, growth - 0.5 * root * toll_slope / toll
-        if not slope > 0.0:
+        if not (slope > 0.0 and over < math.inf):
             if is_right:
                 return math.nan, math.nan
             a = min(2.0 * a, limit)

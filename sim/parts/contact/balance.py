@@ -19,9 +19,7 @@ import numpy as np
 
 from sim.laws import jkr
 from sim.laws.equilibrium import largest_radius, surplus
-from sim.laws.jkr import fold_radius
 from sim.numerics.jit import device, kernel
-from sim.numerics.special import cube_root
 from sim.parts.exchange import Array, Flags, Mount
 from sim.solid import ElasticSolid
 from sim.spectrum.radial import Terms, share_of
@@ -332,12 +330,13 @@ def stable_radius(start, work, mount, body, share):
 def stable_radii(contacts, stiffness, body, share, radius):
     """Write the largest stable radius of contacts to ``radius`` [m].
 
-    Rows of ``contacts``: the four of ``work`` in ``stable_radius``, then load [N] and displacement of the base [m].
+    Rows of ``contacts``: radius without fluctuations and mean stress [m], nan without equilibrium. Then the four of
+    ``work`` in ``stable_radius``, load [N] and displacement of the base [m].
     """
     for i in range(radius.size):
-        work = contacts[0, i], contacts[1, i], contacts[2, i], contacts[3, i]
-        mount = contacts[4, i], contacts[5, i], stiffness
-        start = 4.0 * fold_radius(max(work[0], 0.0), 1.0 / body[0], body[1])
-        start += math.sqrt(max(mount[1], 0.0) / body[0])
-        start += cube_root(0.75 * max(mount[0], 0.0) / (body[0] * body[1]))
-        radius[i] = stable_radius(start, work, mount, body, share)
+        work = contacts[1, i], contacts[2, i], contacts[3, i], contacts[4, i]
+        mount, start = (contacts[5, i], contacts[6, i], stiffness), contacts[0, i]
+        if start > 0.0:
+            radius[i] = stable_radius(start, work, mount, body, share)
+        else:
+            radius[i] = start

@@ -433,7 +433,8 @@ class _Controlled:
         tilt = self.reversible * balance.reversible(np.ones(1))
         bonded, fluctuating = balance.bonded, balance.fluctuating
         most = bonded - least * fluctuating
-        terms = np.broadcast_arrays(most, bonded, fluctuating, tilt, load, base)
+        start = control.radius(most, bodies)
+        terms = np.broadcast_arrays(start, most, bonded, fluctuating, tilt, load, base)
         body = 1.0 / bodies.sphere_radius, bodies.modulus
         contacts = np.stack(terms).reshape(len(terms), len(shares), -1)
         radius = np.empty(contacts.shape[1:])
