@@ -36,9 +36,8 @@ def settle(weight, stretch, width, count, direction, travelled, rules):
     """
     _sort(weight, stretch, width, count, direction)
     finest, cell, fronts = 64, rules.cell, rules.limit < math.inf
-    count = _merge(
-        weight, stretch, width, count, travelled, cell, finest, fronts, rules
-    )
+    pool = weight, stretch, width
+    count = _merge(pool, count, travelled, cell, finest, fronts, rules)
     while count > rules.most:
         if finest > 1:
             finest //= 2
@@ -46,9 +45,7 @@ def settle(weight, stretch, width, count, direction, travelled, rules):
             fronts = False
         else:
             cell *= 2.0
-        count = _merge(
-            weight, stretch, width, count, travelled, cell, finest, fronts, rules
-        )
+        count = _merge(pool, count, travelled, cell, finest, fronts, rules)
     return count
 
 
@@ -69,12 +66,13 @@ def _sort(weight, stretch, width, count, direction):
 
 
 @device
-def _merge(weight, stretch, width, count, travelled, cell, finest, fronts, rules):
+def _merge(pool, count, travelled, cell, finest, fronts, rules):
     """Merge sorted cohorts cell by cell, and return the number left.
 
     A cell of many bonds is halved until its width times its share is below ``rules.heavy``. A cell
     that comes back through zero, where the rupture has a kink, then errs by less than the tolerance.
     """
+    weight, stretch, _ = pool
     whole = 0.0
     for i in range(count):
         whole += weight[i]
@@ -91,27 +89,16 @@ def _merge(weight, stretch, width, count, travelled, cell, finest, fronts, rules
             and cell * rules.steepness * inside > rules.heavy * whole * parts * parts
         ):
             parts *= 2
-        left = _merge_cell(
-            weight,
-            stretch,
-            width,
-            first,
-            last,
-            left,
-            travelled,
-            cell / parts,
-            fronts,
-            rules,
-        )
+        span = first, last, left
+        left = _merge_cell(pool, span, travelled, cell / parts, fronts, rules)
         first = last
     return left
 
 
 @device
-def _merge_cell(
-    weight, stretch, width, first, last, left, travelled, cell, fronts, rules
-):
-    """Merge the cohorts ``first`` to ``last`` in cells of one width, writing from ``left`` on; return the end."""
+def _merge_cell(pool, span, travelled, cell, fronts, rules):
+    """Merge cohorts in cells of one width; return the end. ``span``: the first, the last, and where to write them."""
+    (weight, stretch, width), (first, last, left) = pool, span
     while first < last:
         place = math.floor((stretch[first] - travelled) / cell)
         end = first + 1

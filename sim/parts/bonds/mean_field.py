@@ -82,8 +82,8 @@ def advance(
     """
     rows = max(bound.size, moment.size, slip.shape[1], path.shape[1])
     after = np.empty((2, len(duration), rows))
-    law = rupture.rate, rupture.softness, rupture.limit
-    _advance(bound, moment, slip, path, duration, *law, rebinding_rate, *after)
+    law = rupture.rate, rupture.softness, rupture.limit, rebinding_rate
+    _advance((bound, moment), (slip, path, duration), law, *after)
     return after[0], after[1]
 
 
@@ -375,22 +375,12 @@ def _bell(bound, moment, speed, rate, binding, work):
 
 
 @kernel(
-    "void(f8[::1], f8[::1], f8[:,:], f8[:,:], f8[:], f8, f8, f8, f8, f8[:,::1], f8[:,::1])"
+    "void(UniTuple(f8[::1], 2), Tuple((f8[:,:], f8[:,:], f8[:])), UniTuple(f8, 4), f8[:,::1], f8[:,::1])"
 )
-def _advance(
-    bound,
-    moment,
-    slip,
-    path,
-    duration,
-    rate,
-    softness,
-    limit,
-    rebinding,
-    bound_after,
-    moment_after,
-):
+def _advance(before, sliding, law, bound_after, moment_after):
     """Write N and M after all steps of every row, each row by itself."""
+    (bound, moment), (slip, path, duration) = before, sliding
+    rate, softness, limit, rebinding = law
     work = np.empty((8, 2))
     for i in range(bound_after.shape[1]):
         share, stretch = bound[i % bound.size], moment[i % moment.size]

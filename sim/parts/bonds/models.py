@@ -391,15 +391,17 @@ class Counted(_WithoutStretch):
         (steps, members).
         """
         counted = np.empty((len(stay), len(bound)))
-        _count(bound, stay, bind, self.sites, *noise.at(step), counted)
+        _count(bound, stay, bind, self.sites, noise.at(step), counted)
         return counted
 
 
 @kernel(
-    "void(float64[:], float64[:, :], float64[:, :], float64, uint64, uint64, uint64[::1], int64, float64[:, ::1])"
+    "void(float64[:], float64[:, :], float64[:, :], float64, Tuple((uint64, uint64, uint64[::1], int64)),"
+    " float64[:, ::1])"
 )
-def _count(bound, stay, bind, sites, seed, part, members, step, counted):
-    """Write the bound sites of all members at the end of each step."""
+def _count(bound, stay, bind, sites, address, counted):
+    """Write the bound sites of all members at the end of each step; ``address`` of the first one."""
+    seed, part, members, step = address
     for k in range(len(stay)):
         staying, binding = success(stay[k, 0]), success(bind[k, 0])
         for m in range(members.size):

@@ -467,15 +467,14 @@ def _keep(row, slip, duration, count, space, frames):
 
 
 @device
-def _advance(
-    bonds, soonest, row, slip, duration, law, address, space, laid, shared, frames
-):
+def _advance(tracks, ahead, law, address, space, laid, shared, frames):
     """Advance a row by some of the steps ahead, write its frame after each of them, and return their number.
 
-    ``laid`` is the frame of a row whose steps are laid out, and their number. They serve all rows of a ``shared`` slip
-    with the same frame.
+    ``tracks``: bonds, the soonest of them, and frame of the row. ``ahead``: slips and durations of the steps. ``laid``
+    is the frame of a row whose steps are laid out, and their number. They serve all rows of a ``shared`` slip with the
+    same frame.
     """
-    count = 0
+    (bonds, soonest, row), (slip, duration), count = tracks, ahead, 0
     if row[SINGLY] == 0.0:
         here = (
             shared
@@ -505,12 +504,10 @@ def _advance(
 
 
 @device
-def one_step(bonds, soonest, row, slip, duration, law, address, space, laid, frame):
+def one_step(tracks, ahead, law, address, space, laid, frame):
     """Advance a row by one step, of arrays of length one; ``laid`` and ``frame`` are work arrays."""
     laid[0] = math.nan
-    _advance(
-        bonds, soonest, row, slip, duration, law, address, space, laid, False, frame
-    )
+    _advance(tracks, ahead, law, address, space, laid, False, frame)
 
 
 @kernel(
@@ -552,18 +549,8 @@ def live(tracks, slip, duration, law, seed, members, first, frames):
             while k < until:
                 ahead = slip[k:until, m % slip.shape[1]], duration[k:until]
                 row, after = frame[m], frames[m, :, k:until]
-                k += _advance(
-                    bonds,
-                    soonest[m],
-                    row,
-                    *ahead,
-                    law,
-                    address,
-                    space,
-                    laid,
-                    shared,
-                    after,
-                )
+                here = bonds, soonest[m], row
+                k += _advance(here, ahead, law, address, space, laid, shared, after)
                 if m == 0:  # the other rows use the same steps
                     until = stop = k
             stamp[m] = np.int64(frame[m, STEPS])

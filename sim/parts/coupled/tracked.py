@@ -77,23 +77,10 @@ def _sums(tracks, ground, node):
 @device
 def _go(tracks, shift, duration, ground):
     """Advance the bonds by a displacement of the slider in a time."""
-    (bonds, soonest, frame), (events, shifts, durations, laid, after) = (
-        tracks,
-        ground.space,
-    )
+    events, shifts, durations, laid, after = ground.space
     shifts[0], durations[0] = shift * ground.unit, duration
-    tracked.one_step(
-        bonds,
-        soonest,
-        frame,
-        shifts,
-        durations,
-        ground.law,
-        ground.address,
-        events,
-        laid,
-        after,
-    )
+    ahead = shifts, durations
+    tracked.one_step(tracks, ahead, ground.law, ground.address, events, laid, after)
 
 
 @device

@@ -509,7 +509,7 @@ class BandedProcess(Renewing):
             size,
             self.shapes,
             self.half_weight,
-            *noise.at(step),
+            noise.at(step),
             energy,
         )
         return energy
@@ -558,13 +558,11 @@ def renew_band(x, keep, share, unit, shape, numbers):
 
 @kernel(
     "void(float64[:,::1], float64[:,:,:], float64[:,:,:], float64[:,:], float64[::1], float64[::1],"
-    " uint64, uint64, uint64[::1], int64, float64[:,::1])"
+    " Tuple((uint64, uint64, uint64[::1], int64)), float64[:,::1])"
 )
-def _renew_bands(
-    values, keep, renew, size, shapes, half_weight, seed, part, members, step, energy
-):
+def _renew_bands(values, keep, renew, size, shapes, half_weight, address, energy):
     """Advance all bands of all members in place by exact steps, and write their energy after each step."""
-    many = keep.shape[2] > 1
+    (seed, part, members, step), many = address, keep.shape[2] > 1
     for m in range(members.size):
         row = m % keep.shape[1]
         for s in range(len(keep)):

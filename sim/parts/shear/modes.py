@@ -322,7 +322,7 @@ class ModalProcess(Renewing):
         noise: Noise,
     ) -> Array:
         energy = np.empty((len(keep), len(values)))
-        renew_modes(values, keep, renew, size, self.weights, *noise.at(step), energy)
+        renew_modes(values, keep, renew, size, self.weights, noise.at(step), energy)
         return energy
 
     def _standard(self, state: Fluctuation) -> tuple[Array, Array]:
@@ -385,14 +385,14 @@ class ModalProcess(Renewing):
 
 @kernel(
     "void(float64[:,:,::1], float64[:,:,:], float64[:,:,:], float64[:,:], float64[::1],"
-    " uint64, uint64, uint64[::1], int64, float64[:,::1])"
+    " Tuple((uint64, uint64, uint64[::1], int64)), float64[:,::1])"
 )
-def renew_modes(values, keep, renew, size, weights, seed, part, members, step, energy):
+def renew_modes(values, keep, renew, size, weights, address, energy):
     """Advance all modes of all members in place by Ornstein-Uhlenbeck steps, and write the energy after each step.
 
-    The amplitudes of a member are in its first two rows.
+    The amplitudes of a member are in its first two rows. ``address``: that of the first step, as of ``Noise.at``.
     """
-    many = keep.shape[2] > 1
+    (seed, part, members, step), many = address, keep.shape[2] > 1
     for m in range(members.size):
         step_row = m if keep.shape[1] > 1 else 0
         for s in range(len(keep)):
@@ -454,9 +454,9 @@ class SiteModes(ModalProcess):
             np.empty((1, len(parts))),
         )
         renew_modes(
-            parts, *whole, np.ones((1, 1)), self.weights, *noise.at(motion.step), energy
+            parts, *whole, np.ones((1, 1)), self.weights, noise.at(motion.step), energy
         )
-        _renew_sites(parts, *whole, sizes, self.weights, *noise.at(motion.step), energy)
+        _renew_sites(parts, *whole, sizes, self.weights, noise.at(motion.step), energy)
         return Fluctuation(energy[0], sizes[:, 0].T, parts, expected=energy[0])
 
     def advance(
@@ -474,7 +474,7 @@ class SiteModes(ModalProcess):
             *self._shares(motions),
             sizes,
             self.weights,
-            *noise.at(motions.step),
+            noise.at(motions.step),
             energy,
         )
         expected = state.energy if self.correlation.by_slip else energy[-1]
@@ -498,14 +498,14 @@ def _sizes(bonding: Bonding) -> Array:
 
 @kernel(
     "void(float64[:,:,::1], float64[:,:,:], float64[:,:,:], float64[:,:,:], float64[::1],"
-    " uint64, uint64, uint64[::1], int64, float64[:,::1])"
+    " Tuple((uint64, uint64, uint64[::1], int64)), float64[:,::1])"
 )
-def _renew_sites(parts, keep, renew, sizes, weights, seed, part, members, step, energy):
+def _renew_sites(parts, keep, renew, sizes, weights, address, energy):
     """Advance Y of all modes of all members in place by Ornstein-Uhlenbeck steps, and write the energy after each.
 
     Z is in the first two rows of a member, Y in the others, of which the first is the lane of its numbers.
     """
-    many = keep.shape[2] > 1
+    (seed, part, members, step), many = address, keep.shape[2] > 1
     for m in range(members.size):
         row = m % keep.shape[1]
         for s in range(len(keep)):
