@@ -32,6 +32,8 @@ from sim.numerics.jit import device
 
 #: Change of the radius over it below which Newton's next step, its square, is below rounding; most steps.
 _CLOSE, _MOST = 1e-14, 200
+#: Change of the radius over it within which a start is the equilibrium, which is given back to its last bit.
+_ROUNDING = 1e-15
 
 
 @device
@@ -83,7 +85,8 @@ def surplus(radius, left, mount, body):
 def largest_radius(start, work, tilt, mount, body):
     """Return the largest stable radius, and the slope of G over the radius there less that of the work left.
 
-    ``start``: any radius above 0, on the right of the equilibrium if the tilt is negative. ``mount`` and ``body`` as in
+    ``start``: any radius above 0, on the right of the equilibrium if the tilt is negative. An equilibrium at the start
+    is given back. ``mount`` and ``body`` as in
     ``missing_depth`` and ``half_space``. The radius is nan without an equilibrium, and 0 if nothing presses or pulls a
     contact without adhesion. The slope is inf if the contact is Hertz's, which adhesion does not move.
     """
@@ -114,6 +117,8 @@ def largest_radius(start, work, tilt, mount, body):
                 return math.nan, math.nan
             a = min(2.0 * a, limit)
             continue
+        if a == start and abs(over / slope) <= _ROUNDING * a:
+            break
         if is_right and over <= 0.0:
             break
         is_right = over > 0.0

@@ -182,3 +182,18 @@ def test_a_radius_on_a_disc_is_that_of_fifty_digits_and_no_wider_one_balances(
                 state.check(a)
                 checked += 1
     assert checked >= 9
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 1e3, math.inf])
+def test_an_equilibrium_is_found_again_from_itself_to_the_last_bit(stiffness):
+    # else a slider at its strength would stick and slip for ever, by one rounding of its area
+    draws, lens = np.random.default_rng(0), (500.0, 6.4e6)
+    for _ in range(1000):
+        push, work, start = draws.uniform(), draws.uniform(), 1e-3 * draws.uniform()
+        mount = (
+            (4e-2 * push, 0.0, 0.0)
+            if stiffness == 0.0
+            else (0.0, 1e-4 * push, stiffness)
+        )
+        radius, _ = largest_radius(start, work, 0.0, mount, lens)
+        assert largest_radius(radius, work, 0.0, mount, lens)[0] == radius
