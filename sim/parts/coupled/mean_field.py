@@ -455,14 +455,16 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
     """Go through one piece with bonds that bear any pull up to their strength at rest. Return the time reached."""
     start, length, row, energy = 0.0, slider.length, line[0], books[0]
     sense, going, stuck, turns, checked = 0.0, True, 0, 0, 0.0
-    while going and start < length and turns >= 0 and stuck <= _STUCK:
+    # a slip that begins next to the end of the piece has no time for a sub-step
+    end = (1.0 - mechanics.LEAST) * length
+    while going and start < end and turns >= 0 and stuck <= _STUCK:
         turns, checked = mechanics.judged(turns, checked, start, length)
         before = start
         contact, rests = mechanics.feeling(contact, row), row.speed == 0.0
         if rests:
             settles = sense * row.spring_force > 0.0
             start = _rest(row, start, settles, slider, law, contact, energy)
-            if start >= length:
+            if start >= end:
                 break
         sense = math.copysign(1.0, row.spring_force if rests else row.speed)
         # the pull is a rounding, which may have the wrong sign
@@ -485,7 +487,7 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
         if going and start < length:
             row.speed = row.body_speed = 0.0
         stuck = stuck + 1 if start == before else 0
-    return length if start >= length else start
+    return length if start >= end else start
 
 
 @device
