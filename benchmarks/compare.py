@@ -108,10 +108,11 @@ import numpy as np
 import sim
 from sim.laws import jkr
 scenes, programs = json.loads(sys.stdin.readline())
-try:
-    from sim.step.state import MemberNoise
-except ImportError:  # before version 2
+# an editable installation of another tree offers its modules beside those of this one
+if os.path.exists(os.path.join(os.path.dirname(sim.__file__), "engine.py")):  # before version 2
     from sim.engine import MemberNoise, follow
+else:
+    from sim.step.state import MemberNoise
 loaded = {}
 random = np.random.default_rng(1)
 load, work = random.uniform(0, 4e-3, 10**5), random.uniform(0, 0.04, 10**5)
@@ -125,7 +126,10 @@ def step(name):
         loaded[name] = sim.load(scenes[name])
     members, steps = np.arange(loaded[name].ensemble.members), range(loaded[name].clock.steps + 1)
     scene, noise = loaded[name], MemberNoise.of(1, members)
-    scene.stepper.follow(noise, None, steps) if hasattr(scene, "stepper") else follow(scene, noise, None, steps)
+    if hasattr(scene, "stepper"):
+        scene.stepper.follow(noise, None, steps)
+    else:
+        follow(scene, noise, None, steps)
 for line in sys.stdin:
     name, repeats = json.loads(line)
     began = spent()
