@@ -142,7 +142,8 @@ class Driven(Stepper):
             mounts,
             jumps,
             touches,
-            state.shear.energy + np.zeros(members),
+            # of a slider whose motion has ended it is not known, and matters only if it is felt
+            (state.shear.energy if work.paid > 0.0 else 0.0) + np.zeros(members),
             work.paid,
             PLANE if work.margin is None else work.margin.each[0],
             np.empty((len(steps), members)),
