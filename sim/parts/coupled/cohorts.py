@@ -848,5 +848,8 @@ def advance_cohorts(inputs, numbers, outputs, ends, share, rules, cohorts, sums)
                 slider.stiffness,
             )
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
-            end_step(row, rows[m], m, k, clock[k, 5], now, ends, at_end)
             sum_row(weight[m], stretch[m], width[m], rules, room[0][4], sums[:, k, m])
+            if mechanics.has_ended(row):
+                # no sub-step has summed its bonds, which stay as they are
+                row.bound, row.moment = sums[0, k, m], sums[1, k, m] / unit
+            end_step(row, rows[m], m, k, clock[k, 5], now, ends, at_end)
