@@ -53,7 +53,7 @@ SEEDS += [1319, 1399]
 #: That of a scene that is refused, with a reason.
 REFUSED = (75,)
 #: Scenes at corners that have been wrong.
-AT_CORNERS = 6, 45, 75, 102, 225, 271
+AT_CORNERS = 6, 45, 62, 75, 102, 164, 225, 271
 #: Scenes at corners, and how often they reach each at least.
 CORNERS = 500
 LEAST_REACHED = {

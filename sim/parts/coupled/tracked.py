@@ -640,6 +640,10 @@ def advance_tracks(inputs, numbers, outputs, ends, tracks, law, address, frames)
                 slider.stiffness,
             )
             reached[:, k, m], spent[k, m], frames[k, m] = rows[m], energies[m], frame[m]
+            if mechanics.has_ended(line[0]):
+                # no sub-step has summed its bonds, which stay as they are
+                _sums(bonds, ground, nodes[0])
+                line[0].bound, line[0].moment = nodes[0].bound, nodes[0].moment
             end_step(line[0], rows[m], m, k, clock[k, 5], now, ends, at_end)
         stamp[m] = np.int64(frame[m, tracked.STEPS])
     return 0

@@ -505,3 +505,46 @@ def test_a_slip_to_a_hertzian_contact_is_the_limit_of_ever_less_viscosity_and_ke
         )
         lost.append(float(dataset["dissipated_by_area"][-1]))
     assert_allclose(lost[1], lost[2], rtol=1e-3)
+
+
+@pytest.mark.parametrize("model", ["rate", "cohort", "tracked"])
+def test_a_contact_closes_alike_with_the_bonds_of_a_motion_that_has_ended_also_if_it_is_resumed(
+    model,
+):
+    # nothing holds a body in an open contact against a force: its motion ends at once, its bonds stay
+    lens = {"model": model, "sites": 50} if model == "tracked" else {"model": model}
+    scenario = sim.load(
+        {
+            "clock": {"duration": 0.2, "step": 1e-3},
+            "solid": {"shear_modulus": 1.6e6},
+            "sphere": {"radius": 2e-3},
+            "adhesion": {"work": 42e-3},
+            "contact": {"indentation": {"from": -5e-6, "to": 2e-6, "cycles": 1}},
+            "drive": {"model": "force", "force": 1e-3},
+            "bonds": lens
+            | {
+                "rupture": {
+                    "model": "bell",
+                    "zero_force_rate": 3.0,
+                    "bell_force": 4e-12,
+                },
+                "bond_stiffness": 2e-6,
+                "rebinding_rate": 20.0,
+                "site_density": 7e13,
+            },
+            "ensemble": {"members": 2},
+        }
+    )
+    noise, cut = driven.MemberNoise.of(scenario.seed, np.arange(2)), 40
+    end, course = driven.follow(scenario, noise, None, range(201))
+    middle, _ = driven.follow(scenario, noise, None, range(cut + 1))
+    _, resumed = driven.follow(scenario, noise, middle, range(cut + 1, 201))
+    assert np.all(end.drive.runaway_time == 0.0)
+    assert np.isnan(course.radius[cut]).all() and np.any(course.radius[cut:] > 0.0)
+    assert np.array_equal(course.radius[cut + 1 :], resumed.radius, equal_nan=True)
+    # JKR's contact with the work of adhesion of these bonds
+    closed = course.radius[:, 0] > 0.0
+    depth = scenario.contact.course.at(course.time[closed, 0], 0.2)
+    work = 42e-3 * course.fraction[closed, 0]
+    exact = jkr.radius_at_indentation(depth, work, 2e-3, 6.4e6)
+    assert_allclose(course.radius[closed, 0], exact, rtol=1e-9)
