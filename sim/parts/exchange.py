@@ -362,6 +362,9 @@ class Storing(Protocol):
     def past(self) -> Memory:
         """Memory of earlier sliding."""
 
+    def holding(self, energy: Array) -> "Storing":
+        """Return the state with another energy of the fluctuations [J/m²]."""
+
 
 class Mount(NamedTuple):
     """Load [N], displacement of the base [m] and stiffness behind it [N/m] that hold the sphere; 0 if absent."""

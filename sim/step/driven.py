@@ -81,6 +81,7 @@ class Driven(Stepper):
         shear, energy = process.advance(
             state.shear, motions, bonding, noise.shear, reached.field
         )
+        shear, energy = _held(state.shear, shear, energy)
         balance = scene.work.balance(bonding, energy, motions.position)
         touch = self._touch(state.contact, motions, balance, ends)
         sliders, bonding = coupled.with_contact(parts, reached, around, touch.radius)
@@ -142,8 +143,7 @@ class Driven(Stepper):
             mounts,
             jumps,
             touches,
-            # of a slider whose motion has ended it is not known, and matters only if it is felt
-            (state.shear.energy if work.paid > 0.0 else 0.0) + np.zeros(members),
+            state.shear.energy + np.zeros(members),
             work.paid,
             PLANE if work.margin is None else work.margin.each[0],
             np.empty((len(steps), members)),
@@ -192,6 +192,20 @@ class SingleSteps(Driven):
         """Return the contact at the end of the clock step, by its model."""
         duration = self.scene.times.duration
         return self.scene.models.contact.advance(before, motions, duration, balance)
+
+
+def _held(before: Storing, after: Storing, energy: Array) -> tuple[Storing, Array]:
+    """Return fluctuations whose energies stay as they were where they are unknown [J/m²].
+
+    That of a slider whose motion has ended has no speed any more, by which its amplitude would follow. If it were
+    unknown, its contact would open, and a pull-off would be reported that the mount never makes.
+    """
+    if not np.isnan(energy).any():
+        return after, energy
+    held = np.concatenate([before.energy + np.zeros((1, energy.shape[1])), energy])
+    for k in range(1, len(held)):
+        held[k] = np.where(np.isnan(held[k]), held[k - 1], held[k])
+    return after.holding(held[-1]), held[1:]
 
 
 def is_undisturbed(fluctuations: FluctuationModel) -> bool:

@@ -384,6 +384,10 @@ class Fluctuation(NamedTuple):
     past: Memory = NO_PAST
     expected: Array = NO_PAST.energy
 
+    def holding(self, energy: Array) -> "Fluctuation":
+        """Return the state with another energy of the fluctuations [J/m²]."""
+        return self._replace(energy=energy)
+
 
 @dataclasses.dataclass(frozen=True)
 class SmoothProcess:

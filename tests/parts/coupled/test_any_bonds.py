@@ -548,3 +548,41 @@ def test_a_contact_closes_alike_with_the_bonds_of_a_motion_that_has_ended_also_i
     work = 42e-3 * course.fraction[closed, 0]
     exact = jkr.radius_at_indentation(depth, work, 2e-3, 6.4e6)
     assert_allclose(course.radius[closed, 0], exact, rtol=1e-9)
+
+
+@pytest.mark.parametrize("edge", [{}, {"front_speed": 1.0, "model": "rate_dependent"}])
+def test_a_slider_that_loses_stability_is_not_pulled_off(edge):
+    # the amplitude follows the speed, which is unknown from then on, while a growing load presses the contact
+    fluctuating = {
+        "model": "modal",
+        "cell": 2.4e-4,
+        "spectrum": {"model": "band", "rms": 3e4, "longest": 120e-6, "shortest": 60e-6},
+        "correlation": {"model": "time", "time": 2e-3},
+        "amplitude": {"model": "onset", "speed": 1e-3, "width": 0.3, "floor": 0.1},
+    }
+    scenario = sim.load(
+        {
+            "clock": {"duration": 0.02, "step": 1e-3},
+            "solid": {"shear_modulus": 1.6e6},
+            "sphere": {"radius": 2e-3},
+            "adhesion": {"work": 42e-3},
+            "contact": {"load": {"from": 1e-3, "to": 2e-3}} | edge,
+            "drive": {"model": "force", "force": {"from": 0.0, "to": 5e-3}},
+            "bonds": {
+                "model": "rate",
+                "rupture": {
+                    "model": "bell",
+                    "zero_force_rate": 3.0,
+                    "bell_force": 4e-12,
+                },
+                "bond_stiffness": 2e-6,
+                "rebinding_rate": 20.0,
+                "site_density": 7e13,
+            },
+            "shear": fluctuating,
+        }
+    )
+    noise = driven.MemberNoise.of(scenario.seed, np.arange(2))
+    end, course = driven.follow(scenario, noise, None, range(21))
+    assert np.all(end.drive.runaway_time < 0.01)
+    assert np.all(course.radius > 0.0) and np.isnan(course.detached).all()
