@@ -2,8 +2,8 @@
 
 A change of the unit of mass by 2^±10 takes the shear moduli of the random scenes to 98 Pa and to 3 GPa, with all
 forces, energies and masses in proportion, and one of the unit of time by 2^-9 makes all of it 512 times as fast. Powers
-of two change no rounding, so that all that is recorded is equal bit for bit, also of a slider that sticks and slips. (With another unit
-of length the cube roots of areas are rounded differently.)
+of two change no rounding, so that all that is recorded is equal bit for bit, also of a slider that sticks and slips.
+(With another unit of length the cube roots of areas are rounded differently.)
 """
 
 import functools

@@ -1,7 +1,7 @@
 """Processes of the shear-stress fluctuations: laws of their amplitude and correlation, and the energy in time.
 
 A process is a model of ``parts.shear`` on a given solid and cell. Each correlation law gives the integral of the rate λ
-of a mode over a step, in time, in slip or in both. Amplitudes decay by the factor exp(−∫λdt), their energy by
+of a mode over a step, in time or in slip. Amplitudes decay by the factor exp(−∫λdt), their energy by
 exp(−2∫λdt).
 """
 
