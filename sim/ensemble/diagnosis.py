@@ -22,7 +22,7 @@ from sim.ensemble.plan import Plan
 from sim.ensemble.steady import changed, sensitivities
 from sim.ensemble.swept import grouped, in_words, places, points_in_words, spread
 from sim.laws.schallamach import Body, Onset
-from sim.parts.bonds.models import Cohort, FirstMoment, Rate
+from sim.parts.bonds.models import Model as BondModel
 from sim.parts.contact.balance import Balance
 from sim.parts.drive import Spring
 from sim.parts.exchange import Array
@@ -521,7 +521,7 @@ class Stability(NamedTuple):
     ----------
     stiffness, speed, frequency : float
         Stiffness below which some speed of the run is unstable [N/m], that speed [m/s], and the frequency of the
-        oscillations [1/s]. The stiffness is 0 if every spring holds, and infinite if none does.
+        oscillations [1/s]. The stiffness is 0 if every spring holds, infinite if none does, and nan if it is not known.
     unstable : list of (float, float)
         Ranges of the speed that are unstable behind the spring [m/s]; 0 and infinity are ends that were not found.
     """
@@ -542,9 +542,12 @@ def stability(point: Scenario) -> Stability:
     above = of_run[-1] * np.geomspace(1.0, _FASTER, _AROUND)[1:]
     speeds = np.concatenate([below, of_run, above])
     known = onset(point, speeds)
-    worst = len(below) + int(np.argmax(known.stiffness[len(below) :][: len(of_run)]))
+    in_run = known.stiffness[len(below) :][: len(of_run)]
+    if np.isnan(in_run).all():
+        return Stability(math.nan, math.nan, math.nan, [])
+    worst = len(below) + int(np.nanargmax(in_run))
     excess = _excess(known, spring)
-    holds = excess <= 0.0
+    holds = ~(excess > 0.0)
     places = np.flatnonzero(holds[1:] != holds[:-1])
     edges = [
         *[0.0] * (not holds[0]),
@@ -592,24 +595,23 @@ def _edge(point: Scenario, speeds: Array, excess: Array) -> float:
 
 
 def onset(point: Scenario, speeds: Array) -> Onset:
-    """Return the onset of oscillations behind a spring at speeds [m/s], with the stiffness 0 where every spring holds.
+    """Return the onset of oscillations behind a spring at speeds [m/s].
 
     It does not depend on the spring, so points of a sweep over the spring share it.
     """
     body = slider_body(point, speeds)
     terms = tuple(tuple(np.ravel(number)) for number in body)
-    return _onset(cast(Any, point.population), tuple(speeds), terms)
+    return _onset(point.population, tuple(speeds), terms)
 
 
 @functools.lru_cache(maxsize=64)
 def _onset(
-    bonds: Rate | Cohort | FirstMoment,
+    bonds: BondModel,
     speeds: tuple[float, ...],
     body: tuple[tuple[float, ...], ...],
 ) -> Onset:
     """Return the onset of oscillations of a body whose numbers are tuples."""
-    result = bonds.onset(np.array(speeds), Body(*map(np.array, body)))
-    return result._replace(stiffness=np.nan_to_num(result.stiffness, posinf=math.inf))
+    return bonds.onset(np.array(speeds), Body(*map(np.array, body)))
 
 
 def _outside(point: Scenario) -> Iterator[str]:
@@ -617,7 +619,7 @@ def _outside(point: Scenario) -> Iterator[str]:
     if point.drive.model == "spring" and point.drive.contact_stiffness == "half_space":
         speeds = np.unique(np.abs(point.speeds(TIMES)))
         bonds, body = (
-            cast(Rate | Cohort | FirstMoment, point.population),
+            point.population,
             slider_body(point, speeds),
         )
         with np.errstate(all="ignore"):  # of a contact that is open

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, cast
 from sim.ensemble.diagnosis import (
     COMPUTED,
     SEARCHED,
+    Stability,
     Worst,
     diagnosis,
     distinct_speeds,
@@ -561,26 +562,31 @@ def _slider(plan: Plan) -> Rows:
         rows.append(
             ("natural frequency", f"{_span(frequencies)} Hz, of mass and spring")
         )
-    known = [*sprung.values()]
-    most = max(known, key=lambda each: each.stiffness)
-    text = f"{_span([each.stiffness for each in known])} N/m of the spring"
-    speeds_of_run = [
-        speed for point in driven for speed in distinct_speeds(point).tolist()
-    ]
-    if most.stiffness > 0.0:
-        text += f" (inf: with any spring), at {engineering(most.speed, 'm/s')} with {most.frequency:.4g} Hz"
-    elif speeds_of_run:
-        text += f": with no spring, at {_span(speeds_of_run, 'm/s')}"
-    rows.append(("oscillates below", text))
+    if known := [each for each in sprung.values() if not math.isnan(each.stiffness)]:
+        most = max(known, key=lambda each: each.stiffness)
+        text = f"{_span([each.stiffness for each in known])} N/m of the spring"
+        speeds_of_run = [
+            speed for point in driven for speed in distinct_speeds(point).tolist()
+        ]
+        if most.stiffness > 0.0:
+            text += f" (inf: with any spring), at {engineering(most.speed, 'm/s')}"
+            if most.frequency > 0.0:
+                text += f" with {most.frequency:.4g} Hz"
+        elif speeds_of_run:
+            text += f": with no spring, at {_span(speeds_of_run, 'm/s')}"
+        rows.append(("oscillates below", text))
 
     def speeds(point: Scenario) -> list[str]:
-        return [_unstable(sprung[id(point)].unstable)] if id(point) in sprung else []
+        return [_unstable(sprung[id(point)])] if id(point) in sprung else []
 
     return rows + [("steady sliding", text) for text in grouped(plan, examined, speeds)]
 
 
-def _unstable(ranges: Sequence[tuple[float, float]]) -> str:
+def _unstable(sliding: Stability) -> str:
     """Return ranges of unstable speeds in words."""
+    ranges = sliding.unstable
+    if math.isnan(sliding.stiffness):
+        return "no closed form says whether it is stable behind this spring"
     if not ranges:
         return "stable at any speed behind this spring"
     words = []

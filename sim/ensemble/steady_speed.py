@@ -31,8 +31,9 @@ def speeds_of_areas(scene: Scenario, shares: Array) -> tuple[Array, Array]:
     -------
     speeds : array
         In steady sliding [m/s]. They are nan if there is none within three decades of the
-        speeds of the drive, and of bonds that break by chance or a pattern that passes
-        under the contact, whose mean area has no closed form.
+        speeds of the drive, where it is not known if sliding is stable, and of bonds that
+        break by chance or a pattern that passes under the contact, whose mean area has no
+        closed form.
     stable : array
         True if steady sliding is stable behind the spring of the scene, or prescribed.
     """
@@ -70,8 +71,8 @@ def speeds_of_areas(scene: Scenario, shares: Array) -> tuple[Array, Array]:
         needed = scene.population.onset(
             speeds[known], slider_body(scene, speeds[known])
         ).stiffness
-        # nan below the maximum of the friction, where any spring is stiff enough
-        stable[known] = ~(needed > cast(Spring, scene.drive).stiffness)
+        stable[known] = needed <= cast(Spring, scene.drive).stiffness
+        speeds[known] = np.where(np.isnan(needed), np.nan, speeds[known])
     return speeds, stable
 
 

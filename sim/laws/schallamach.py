@@ -184,7 +184,11 @@ Complex = NDArray[np.complex128]
 
 
 class Onset(NamedTuple):
-    """Onset of oscillations behind a spring: its stiffness [N/m] and their frequency [rad/s], nan where none is."""
+    """Onset of oscillations behind a spring: the stiffness below which they begin [N/m], and their frequency [rad/s].
+
+    The stiffness is 0 where every spring holds the slider, infinite where none does, and nan where the onset is not
+    known. Without an onset there is no frequency (nan).
+    """
 
     stiffness: Array
     frequency: Array
@@ -282,9 +286,11 @@ def _stiffest(needed: Callable[[Array], Complex], low: Array, high: Array) -> On
             )
             here, now = guess, after
         stiffness = needed(here).real
-    holds = turns.any(axis=-1) & (stiffness > 0.0)
+    begins = turns.any(axis=-1) & (stiffness > 0.0)
+    unknown = np.isnan(tried).any(axis=-1)  # of an open contact
     return Onset(
-        np.where(holds, stiffness, np.nan)[()], np.where(holds, here, np.nan)[()]
+        np.where(begins, stiffness, np.where(unknown, np.nan, 0.0))[()],
+        np.where(begins, here, np.nan)[()],
     )
 
 
@@ -320,7 +326,7 @@ def resolved_onset(
     Returns
     -------
     Onset
-        Stiffness [N/m], infinite where no spring is stiff enough, and frequency [rad/s]; nan where every spring is.
+        Stiffness [N/m], 0 where every spring is stiff enough and infinite where none is, and frequency [rad/s].
 
     Notes
     -----
@@ -441,7 +447,7 @@ def linear_onset(
     Returns
     -------
     Onset
-        Stiffness [N/m], infinite for a mass that nothing damps, and frequency [rad/s]; nan where every spring holds.
+        Stiffness [N/m], infinite for a mass that nothing damps, and frequency [rad/s].
 
     Notes
     -----
@@ -464,8 +470,9 @@ def linear_onset(
     )
     with np.errstate(divide="ignore"):
         over = np.divide(falls - damping * pace, damping)
-    over = np.where(over > 0.0, over, np.nan)
-    return Onset(((damping + mass * pace) * over)[()], np.sqrt(pace * over)[()])
+    frequency = np.sqrt(np.where(over > 0.0, pace * over, np.nan))
+    over = np.maximum(over, 0.0)  # nan of an open contact stays
+    return Onset(((damping + mass * pace) * over)[()], frequency[()])
 
 
 @law
@@ -1043,7 +1050,7 @@ def first_moment_onset(
     Returns
     -------
     Onset
-        Stiffness [N/m], infinite where no spring is stiff enough, and frequency [rad/s]; nan where every spring is.
+        Stiffness [N/m], 0 where every spring is stiff enough and infinite where none is, and frequency [rad/s].
 
     Notes
     -----

@@ -174,14 +174,14 @@ def _swings(force: np.ndarray, speed: np.ndarray, edges: np.ndarray) -> np.ndarr
 
 
 def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
-    """Return the stiffness below which steady sliding is unstable [N/m]; nan if the scenario cannot be read."""
+    """Return the stiffness below which steady sliding is unstable [N/m], nan where it never is or nothing is known."""
     from sim.ensemble.diagnosis import slider_body  # heavy: for this figure alone
 
     scenario = scenario_at(dataset, {})
     if scenario is None:
         return np.full(speed.shape, np.nan)
     onset = scenario.population.onset(speed, slider_body(scenario, speed))
-    return np.asarray(onset.stiffness)
+    return np.where(onset.stiffness > 0.0, onset.stiffness, np.nan)
 
 
 def needs_pull(dataset: xr.Dataset) -> None:

@@ -217,8 +217,21 @@ class _WithoutStretch(_BondModel):
         return Bonding(state.bound, state.sense * strength, strength)
 
     def onset(self, speed: Array, body: Body) -> Onset:
-        """Return the onset of oscillations behind a spring at speeds [m/s], nan if unknown."""
-        return Onset(*np.full((2, *speed.shape), np.nan))
+        """Return the onset of oscillations behind a spring at speeds [m/s], of bonds that follow the rate equation."""
+        drag, strength = (
+            np.multiply(body.viscosity, body.area),
+            self.stress * np.asarray(body.area),
+        )
+        # grows with the area, too
+        viscous = np.divide(
+            drag * np.abs(speed),
+            strength * self._steady_fraction(speed),
+            out=np.full(speed.shape, np.nan),
+            where=strength > 0.0,
+        )
+        recipe = self.critical_speed, self.rebinding_rate, strength, body.damping + drag
+        growth = np.add(body.area_growth, body.stress_growth) * (1.0 + viscous)
+        return linear_onset(speed, *recipe, body.mass, growth)
 
     def steady(self, speed: Array) -> Bonding:
         fraction = self._steady_fraction(speed)
@@ -264,6 +277,23 @@ class _AtOnce(_WithoutStretch):
     def start(self, motion: Motion, noise: Noise) -> Population:
         return Population(self._steady_fraction(motion.speed), np.sign(motion.speed))
 
+    def onset(self, speed: Array, body: Body) -> Onset:
+        """Return the onset of oscillations behind a spring at speeds [m/s], without a frequency.
+
+        Nothing delays the friction, so that no spring holds the slider where it falls with the speed.
+        """
+        fraction, viscous = self._steady_fraction(speed), body.viscosity * np.abs(speed)
+        growth = np.add(body.area_growth, body.stress_growth)
+        stress = self.stress * fraction * (1.0 + growth) + viscous * growth
+        falls = stress * self._lost(np.abs(speed)) - body.viscosity
+        stiffness = np.where(body.area * falls > body.damping, math.inf, 0.0)
+        stiffness = np.where(np.isnan(body.area), np.nan, stiffness)
+        return Onset(stiffness, np.full(speed.shape, np.nan))
+
+    def _lost(self, speed: Array) -> Array:
+        """Return the share of the bound sites that is lost as the speed grows [s/m], at speeds above 0."""
+        return 1.0 / (self.critical_speed + speed)
+
     def _bound(
         self, state: Population, motions: Motion, radius: Array, noise: Noise
     ) -> tuple[Array, Array]:
@@ -276,6 +306,9 @@ class Unbroken(_AtOnce):
 
     stress: Stress = 0.0
     model: Literal["none"] = "none"
+
+    def _lost(self, speed: Array) -> Array:
+        return np.zeros(speed.shape)
 
     def _steady_fraction(self, speed: Array) -> Array:
         return np.ones(speed.shape)
@@ -312,17 +345,6 @@ class Rate(_OverArea, _WithoutStretch):
         return Population(
             rows * self._first_fraction(self.start_from, motion), np.sign(motion.speed)
         )
-
-    def onset(self, speed: Array, body: Body) -> Onset:
-        drag, strength = (
-            np.multiply(body.viscosity, body.area),
-            self.stress * np.asarray(body.area),
-        )
-        # grows with the area, too
-        viscous = drag * np.abs(speed) / (strength * self._steady_fraction(speed))
-        recipe = self.critical_speed, self.rebinding_rate, strength, body.damping + drag
-        growth = np.add(body.area_growth, body.stress_growth) * (1.0 + viscous)
-        return linear_onset(speed, *recipe, body.mass, growth)
 
     def _bound(
         self, state: Population, motions: Motion, radius: Array, noise: Noise

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 import sim
+from sim.ensemble.diagnosis import stability
 from sim.step.state import MemberNoise
 
 LENS = {
@@ -462,3 +463,38 @@ def test_a_contact_that_closes_after_the_slider_has_lost_stability_has_no_fricti
     )
     assert state.events.by_phase("friction")["largest"][0, 0] > 0.0
     assert np.all(state.events.by_phase("friction")["largest"][0, after:] == 0.0)
+
+
+def test_friction_that_falls_at_once_with_the_speed_is_unstable_behind_any_spring():
+    """The friction A τ/(1 + V/V_c) + c V falls below the speed V_c (√(A τ/(V_c c)) − 1), whatever the spring."""
+    critical, stress, damping = 1e-3, 1e5, 0.1
+
+    def scene(speed, stiffness=1e3):
+        drive = {"stage": speed, "stiffness": stiffness, "damping": damping}
+        return sim.load(
+            LENS
+            | {
+                "clock": {"duration": 2.0, "step": 1e-3},
+                "drive": {"model": "spring", "contact_stiffness": "rigid"} | drive,
+                "bonds": {
+                    "model": "steady",
+                    "critical_speed": critical,
+                    "stress": stress,
+                },
+                "contact": {"load": 1e-4},
+            }
+        )
+
+    strength = stress * scene(1e-3).contact_area
+    limit = critical * (math.sqrt(strength / (critical * damping)) - 1.0)
+    for stiffness in (1.0, 1e5):
+        found = stability(scene(limit, stiffness)).unstable
+        assert_allclose(found, [(0.0, limit)], rtol=1e-3)
+    assert stability(scene(0.9 * limit)).stiffness == math.inf
+    assert stability(scene(1.1 * limit)).stiffness == 0.0
+    slow, fast = (
+        sim.run(scene(share * limit)).squeeze().speed.values[1000:]
+        for share in (0.9, 1.1)
+    )
+    assert np.ptp(slow) > limit  # it sticks and slips
+    assert_allclose(fast, 1.1 * limit, rtol=1e-5)

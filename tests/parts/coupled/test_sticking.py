@@ -141,7 +141,7 @@ def test_disturbances_neither_grow_nor_fade_at_the_onset_and_do_so_on_its_sides(
     # K_c = (c + m H)(B - c H)/c, w_c^2 = K_c H/(c + m H), H = h (1 + V/V_c), B = F_s h N/V_c
     law = linear_onset([1.0, -1.0, 1e9], CRITICAL, BINDING, 1.0, damping, mass)
     assert_allclose(
-        law, ([onset, onset, math.nan], [frequency, frequency, math.nan]), rtol=1e-7
+        law, ([onset, onset, 0.0], [frequency, frequency, math.nan]), rtol=1e-7
     )
     steps, step = 200, 2.0 * math.pi / frequency / 25.0
 
