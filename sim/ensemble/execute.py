@@ -45,9 +45,6 @@ _ONE_THREAD = {
 }
 #: Signals by which a terminal or a scheduler stops a run.
 _STOPPING = "SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK", "SIGUSR1", "SIGXCPU"
-#: The ``group`` of which this thread computed the last block.
-_last = threading.local()
-
 #: Computes a block of a task from the state before it; returns the state at its end and what is recorded.
 Advance = Callable[[Task, int, State | None], tuple[State, Arrays]]
 
@@ -87,6 +84,15 @@ class _Group:
     task: Task
     number: int = -1
     state: State | None = None
+
+
+class _Last(threading.local):
+    """The group of which this thread computed the last block, unless that was its end."""
+
+    group: _Group | None = None
+
+
+_last = _Last()
 
 
 class _Team(NamedTuple):
@@ -152,7 +158,7 @@ def compute(
     Exception
         As raised by a block: at once if it may concern all (disk, memory, input, cluster), else when all else is done.
     """
-    run, before = uuid.uuid4().hex, dict(_last.__dict__)
+    run, before = uuid.uuid4().hex, _last.group
     chains = [
         _Chain(f"{run}-{place}", task, missing[::-1])
         for place, (task, missing) in enumerate(tasks)
@@ -178,8 +184,7 @@ def compute(
                 _Team(_Here(), lambda: 1), advance, store, waiting, progress, stop
             )
         finally:
-            _last.__dict__.clear()
-            _last.__dict__.update(before)  # of a run whose ``progress`` runs this one
+            _last.group = before  # of a run whose ``progress`` runs this one
     for chain in chains:
         if chain.fault:
             chain.fault.add_note(
@@ -304,7 +309,7 @@ def _block(
                 "a worker has another version of sim, numpy, scipy or numba; install the same versions"
             ]
         )
-    group: _Group | None = _last.__dict__.pop("group", None)
+    group, _last.group = _last.group, None
     if group is None or group.key != key:
         group = _Group(key, pickle.loads(task) if isinstance(task, bytes) else task)
     names, points = group.task.names, group.task.points

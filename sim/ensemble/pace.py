@@ -14,6 +14,7 @@ from sim.ensemble.swept import spread
 from sim.numerics.stopwatch import stopwatch
 from sim.scenario.scenario import Scenario
 from sim.step.state import MemberNoise, State, pack, unpack
+from sim.step.stepper import Stepper
 from sim.units.errors import BadInput
 
 # Rough costs of one core [s]: a record of a batch, of a member, a byte of a map that is drawn.
@@ -95,14 +96,12 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
         and clock.steps * division * _LONGER <= _MOST_STEPS
     ):
         division *= _LONGER
-    scene = _divided(point, division)
-    first = scene.stepper.follow(noise, None, range(1, 2))[0]  # loads kernels
+    stepper = _divided(point, division)
+    first = stepper.follow(noise, None, range(1, 2))[0]  # loads kernels
     sliding = _sliding(point, noise)
     # its first step is made as such, because at any other the bonds of a contact that was open begin without a stretch
     others = pack(
-        first
-        if sliding is None
-        else scene.stepper.follow(noise, sliding, range(1, 2))[0]
+        first if sliding is None else stepper.follow(noise, sliding, range(1, 2))[0]
     )
     states = [
         first,
@@ -116,10 +115,12 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
     while True:
         began, longer = now(), list[float]()
         for number, place in enumerate(_PLACES):
-            last = min(int(place * clock.steps * division) + count, scene.clock.steps)
+            last = min(
+                int(place * clock.steps * division) + count, stepper.scene.times.steps
+            )
             steps, before = range(last - count + 1, last + 1), now()
             before_piece = states[number]._replace(step=last - count)
-            states[number] = scene.stepper.advance(before_piece, noise, steps)[0]
+            states[number] = stepper.advance(before_piece, noise, steps)[0]
             longer.append(max(now() - before, 1e-9) * division / count)
             if now() > end:
                 break
@@ -136,7 +137,7 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
         division, count = (
             (division // _LONGER, 1) if division > 1 else (1, _LONGER * count)
         )
-        scene = _divided(point, division)
+        stepper = _divided(point, division)
     weights = np.where(np.isin(_PLACES, (0.0, 1.0)), 0.5, 1.0)  # trapezoidal rule
     measured = clock.steps * float(np.average(rates, weights=weights))
     block = Block(-1, clock.steps, clock.stride)
@@ -149,17 +150,16 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
     return measured * whole / expected, whole
 
 
-def _divided(point: Scenario, divisions: int) -> Scenario:
-    """Return a point with its clock steps divided, and the same shear process."""
+def _divided(point: Scenario, divisions: int) -> Stepper:
+    """Return the stepper of a point with its clock steps divided, and the same shear process."""
     if divisions == 1:
-        return point
+        return point.stepper
     clock = {"duration": point.clock.duration, "step": point.clock.step / divisions}
     finer = point.with_values(
         {"clock": clock | {"record": point.clock.step * point.clock.stride}},
         built=False,
     )
-    finer.__dict__["process"] = point.process
-    return finer
+    return finer.stepper_with(point.process)
 
 
 def _sliding(point: Scenario, noise: MemberNoise) -> State | None:

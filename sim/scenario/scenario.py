@@ -206,6 +206,13 @@ class Record:
         )
 
 
+class _Built:
+    """What a scene has built for its steps."""
+
+    process: Process | None = None
+    stepper: Stepper | None = None
+
+
 @plain_spoken
 @dataclass(frozen=True, config={"extra": "forbid", "arbitrary_types_allowed": True})
 class Scenario:
@@ -275,12 +282,8 @@ class Scenario:
 
     @model_validator(mode="after")
     def _across_parts(self, info: ValidationInfo) -> "Scenario":
-        self._check_across(not (info.context or {}).get("unbuilt"))
-        return self
-
-    def _check_across(self, built: bool = True) -> None:
-        """Refuse parts that do not go together; without ``built`` the shear part's process is not tried."""
-        across = faults_across(self, built)
+        # a shear part that is ``unbuilt`` may take long to build
+        across = faults_across(self, not (info.context or {}).get("unbuilt"))
         faults = [
             InitErrorDetails(
                 type=PydanticCustomError("across", text), loc=at, input=None
@@ -291,6 +294,7 @@ class Scenario:
             raise ValidationError.from_exception_data("Scenario", faults)
         if self.source.text and not self.source.parts:
             self.source.parts.update(self._parts)
+        return self
 
     @property
     def _parts(self) -> dict[str, Any]:
@@ -355,13 +359,21 @@ class Scenario:
         return {part: reason for part, reason in why.items() if reason}
 
     @cached_property
+    def _built(self) -> _Built:
+        return _Built()
+
+    @property
     def process(self) -> Process:
         """Return the shear part on this solid and cell; raise ``BadInput`` if it cannot be built."""
-        try:
-            return self.fluctuations.process(self.solid.elastic, self._square)
-        except PydanticCustomError as fault:
-            # of a point inside a long sweep, which was not tried before
-            raise BadInput([f"shear: {fault.message()}"]) from None
+        if self._built.process is None:
+            try:
+                self._built.process = self.fluctuations.process(
+                    self.solid.elastic, self._square
+                )
+            except PydanticCustomError as fault:
+                # of a point inside a long sweep, which was not tried before
+                raise BadInput([f"shear: {fault.message()}"]) from None
+        return self._built.process
 
     @cached_property
     def contact_area(self) -> float:
@@ -440,12 +452,10 @@ class Scenario:
         joined = self.drive.pieces(instants, self.times.duration).joined
         return np.append(joined.first[:1], joined.last)
 
-    @cached_property
+    @property
     def parts(self) -> Parts:
-        """Return the parts for the engine; each model fits its protocol with its class of state."""
-        return Parts(
-            *cast(Parts, (self.drive, self.population, self.process, self.contact))
-        )
+        """Return the parts for the engine."""
+        return self.stepper.scene.parts
 
     @cached_property
     def work(self) -> EffectiveWork:
@@ -453,12 +463,20 @@ class Scenario:
         paid = self.fluctuations.paid_by_adhesion
         return EffectiveWork(self.adhesion, paid, self.margin, self.bodies)
 
-    @cached_property
+    @property
     def stepper(self) -> Stepper:
         """Return the stepper of this scene."""
+        if self._built.stepper is None:
+            self._built.stepper = self.stepper_with(self.process)
+        return self._built.stepper
+
+    def stepper_with(self, process: Any) -> Stepper:
+        """Return a stepper of this scene with a process of the shear part that was made elsewhere."""
         models = Models(self.fluctuations, self.population, self.contact)
+        # each model fits its protocol with its class of state
+        parts = cast(Parts, (self.drive, self.population, process, self.contact))
         scene = Scene(
-            self.parts,
+            Parts(*parts),
             models,
             self.times,
             self.phases,
@@ -472,8 +490,7 @@ class Scenario:
 
     def release(self) -> None:
         """Drop the process, whose arrays may be large; it is made again when needed."""
-        for name in ("process", "parts", "stepper"):
-            self.__dict__.pop(name, None)
+        self._built.process = self._built.stepper = None
 
     @cached_property
     def varies(self) -> dict[str, bool]:
@@ -646,19 +663,20 @@ class Scenario:
         groups: dict[str, dict[str, Any]] = {}
         for key, value in values.items():
             groups.setdefault(key.partition(".")[0], {})[key] = value
-        point = object.__new__(Scenario)
-        point.__dict__.update(
-            self._parts, sweep=(), source=origin.changed(values | {"sweep": {}})
-        )
+        document = self._parts | {
+            "sweep": (),
+            "source": origin.changed(values | {"sweep": {}}),
+        }
         for name, changes in groups.items():
             # the values live as long as the sweep
             place = (name, *map(id, changes.values()))
             if place not in tables:
                 tables[place] = self._table(name, changes)
-            point.__dict__[name] = tables[place]
+            document[name] = tables[place]
         with in_plain_words(Scenario):
-            point._check_across(built)
-        return point
+            return _adapter(Scenario).validate_python(
+                document, context={"unbuilt": not built}
+            )
 
     def _table(self, name: str, changes: dict[str, Any]) -> Any:
         """Return a table with some keys changed."""

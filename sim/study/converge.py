@@ -435,10 +435,15 @@ def _timed(scenario: Scenario, seconds: float) -> float:
 
 
 def follow(
-    scenario: Scenario, noise: MemberNoise, state: State | None, steps: range
+    scenario: Scenario,
+    noise: MemberNoise,
+    state: State | None,
+    steps: range,
+    process: Any = None,
 ) -> tuple[State, Trajectory]:
     """Return ``Stepper.follow`` of a scenario, by a name at which a test can count the time."""
-    return scenario.stepper.follow(noise, state, steps)
+    stepper = scenario.stepper_with(process) if process else scenario.stepper
+    return stepper.follow(noise, state, steps)
 
 
 def _records(scenario: Scenario) -> range:
@@ -465,10 +470,12 @@ def recorded(
     steps: range,
     reads: Sequence[Read] = _READS,
     check: Check = _unlimited,
+    process: Any = None,
 ) -> Array:
     """Return variables of some members at some clock steps, shape (variables, members, steps).
 
-    Before each piece of the run ``check`` is called, which may raise an error.
+    Before each piece of the run ``check`` is called, which may raise an error. A shear ``process`` takes the place of
+    the scenario's own.
     """
     values, length = list[Array](), max(1, len(steps) // _PIECES)
     for batch in np.array_split(members, -(-len(members) // together(scenario))):
@@ -477,7 +484,7 @@ def recorded(
         for begin in range(0, len(steps), length):
             check()
             piece = steps[begin : begin + length]
-            state, course = follow(scenario, noise, state, piece)
+            state, course = follow(scenario, noise, state, piece, process)
             if scenario.drive.solves_motion:
                 unresolved = np.isfinite(cast(Driven, state.drive).unresolved_time)
                 if unresolved.any():
@@ -737,9 +744,11 @@ def _at_steps(
         energy = np.ascontiguousarray(
             values[-1, :, :: round(row.ratio / rows[1].ratio)].T
         )
-        scenario = row.scenario.with_values({}, built=False)
-        scenario.__dict__["process"] = _Replayed(row.scenario, energy)
-        result.append(compared(scenario, members, _records(scenario), check))
+        scenario, process = row.scenario, _Replayed(row.scenario, energy)
+        compared_steps = _records(scenario)
+        result.append(
+            recorded(scenario, members, compared_steps, check=check, process=process)
+        )
     return result
 
 

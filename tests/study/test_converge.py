@@ -94,8 +94,8 @@ class CountedTime:
         factor = math.prod(self.factors.get(part.model, 1.0) for part in parts)
         return 1e-4 * scenario.clock.steps * (1 + rank - digits) * factor
 
-    def counted(self, scenario, noise, state, steps):
-        result = self.follow(scenario, noise, state, steps)
+    def counted(self, scenario, noise, state, steps, process=None):
+        result = self.follow(scenario, noise, state, steps, process)
         members = scenario.ensemble.members if scenario.is_random else 1
         share = (steps[-1] - (state.step if state else 0)) / scenario.clock.steps
         self.seconds += (
@@ -729,8 +729,8 @@ def test_stated_errors_hold_in_95_of_100_pairs_at_prescribed_speeds_and_behind_s
 def test_a_setting_that_does_not_resolve_the_motion_is_left_out_and_named(
     is_unresolved, left_out, quick, monkeypatch
 ):
-    def follow(scenario, noise, state, steps):
-        state, course = quick.counted(scenario, noise, state, steps)
+    def follow(scenario, *others):
+        state, course = quick.counted(scenario, *others)
         if is_unresolved(scenario):
             state = state._replace(
                 drive=state.drive._replace(unresolved_time=np.zeros(1))

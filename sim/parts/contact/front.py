@@ -33,6 +33,7 @@ import numpy as np
 
 from sim.laws.equilibrium import half_space, largest_radius, missing_depth
 from sim.numerics.jit import device, kernel
+from sim.numerics.radau import NODES, PACE, RATES, SHARES
 from sim.numerics.special import cube_root
 from sim.parts.contact.balance import SHARE, Balance
 from sim.parts.exchange import Array, ContactState
@@ -139,13 +140,10 @@ def pushed(t, scene, front):
 
 
 _S6 = math.sqrt(6.0)
-_C1, _C2 = (4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0
-_B1, _B2, _B3 = (16.0 - _S6) / 36.0, (16.0 + _S6) / 36.0, 1.0 / 9.0
-# inverse of the method's matrix, and its real eigenvalue
-_I11, _I12, _I13 = 2.0 + _S6 / 2.0, -1.2 + 29.0 * _S6 / 30.0, 0.4 - 4.0 * _S6 / 15.0
-_I21, _I22, _I23 = -1.2 - 29.0 * _S6 / 30.0, 2.0 - _S6 / 2.0, 0.4 + 4.0 * _S6 / 15.0
-_I31, _I32, _I33 = -1.0 + 8.0 * _S6 / 3.0, -1.0 - 8.0 * _S6 / 3.0, 5.0
-_REAL = 3.0 + 3.0 ** (2.0 / 3.0) - 3.0 ** (1.0 / 3.0)
+_C1, _C2, _ = NODES.tolist()
+_B1, _B2, _B3 = SHARES.tolist()
+(_I11, _I12, _I13), (_I21, _I22, _I23), (_I31, _I32, _I33) = RATES.tolist()
+#: Weights of the error of the embedded method.
 _E1, _E2, _E3 = -(13.0 + 7.0 * _S6) / 3.0, -(13.0 - 7.0 * _S6) / 3.0, -1.0 / 3.0
 
 #: Local error of one inner step, relative to the radius, as the embedded method of order 3 sees it.
@@ -265,9 +263,7 @@ def _radau(step, size, first, start, scene, front):
         change = max(abs(d1), abs(d2), abs(d3))
         if change <= 1e-3 * TOLERANCE * size:
             z1, z2, z3 = z1 - d1, z2 - d2, z3 - d3
-            error = (h * f + _E1 * z1 + _E2 * z2 + _E3 * z3) / (
-                _REAL - h * min(0.0, j3)
-            )
+            error = (h * f + _E1 * z1 + _E2 * z2 + _E3 * z3) / (PACE - h * min(0.0, j3))
             v1 = _I11 * z1 + _I12 * z2 + _I13 * z3
             v2 = _I21 * z1 + _I22 * z2 + _I23 * z3
             v3 = _I31 * z1 + _I32 * z2 + _I33 * z3

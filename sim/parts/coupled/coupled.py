@@ -6,7 +6,6 @@ remember the sliding. Other fluctuations, a ``rate_dependent`` edge and the shar
 were at the start of the clock step.
 """
 
-import functools
 import math
 from typing import NamedTuple, cast
 
@@ -14,7 +13,7 @@ import numpy as np
 
 from sim.numerics.noise import Noise
 from sim.parts.contact.balance import Bodies
-from sim.parts.coupled.mechanics import COLUMNS, ROW, Inputs, Slider
+from sim.parts.coupled.mechanics import COLUMNS, ROW, Inputs, Slider, units_of
 from sim.parts.coupled.population import Loop, Population, from_start, population_of
 from sim.parts.coupled.step_end import StepEnds
 from sim.parts.drive import ENERGY, Driven, Force, Spring
@@ -32,22 +31,6 @@ from sim.parts.exchange import (
     Times,
 )
 
-_NAMES = ROW.names or ()
-#: Fields of the state of a slider that are columns of a row.
-_SHARED = [name for name in Driven._fields if name in _NAMES]
-#: Columns of a row that are measured by a stretch.
-_STRETCHED = [
-    "body_speed",
-    "sheared",
-    "moment",
-    "speed",
-    "position",
-    "slip",
-    "path",
-    "acceleration",
-    "mean",
-    "recalled",
-]
 #: Numbers of slider, bonds, contact and fluctuations.
 _Numbers = tuple[tuple[float, ...], ...]
 
@@ -124,16 +107,6 @@ class Reached(NamedTuple):
     lost: Flags
 
 
-@functools.lru_cache(maxsize=16)
-def _of_columns(stretch: float, force: float) -> Array:
-    """Return the units of the columns of a row, from those of a stretch [m] and a force [N]."""
-    scales = np.ones(COLUMNS)
-    columns = scales.view(ROW)
-    columns["spring_force"], columns["spread"] = force, stretch**2
-    columns[_STRETCHED] = stretch
-    return scales
-
-
 def load(
     parts: Parts,
     slider: Sliding,
@@ -207,9 +180,8 @@ def advance(
     )
     units = bonds.units(drive, contact.area, times.step)
     stretch, force = units
-    rows = np.zeros(members, ROW)
-    for name in _SHARED:
-        rows[name] = getattr(slider, name)
+    state = np.array(slider[:COLUMNS]).T.copy()
+    rows = state.view(ROW)[:, 0]
     if steps.start == 1 and not drive.spring:  # a force acts at once
         rows["spring_force"] = 0.0
     rows["radius"], rows["parted"] = contact.radius, contact.has_parted
@@ -235,26 +207,25 @@ def advance(
         law = law._replace(length=law.length / stretch, by_slip=law.by_slip * stretch)
     draws = step_ends.draws
     draws = draws._replace(answers=draws.answers and bool(answers))
-    state = rows.view(float).reshape(members, COLUMNS)
     clock, work = _clock(contact, ends), stretch * force
     inputs = Inputs(
-        state, slider.energies.copy(), course, clock, _of_columns(*units), work
+        state, slider.energies.copy(), course, clock, units_of(*units), work
     )
     columns, energies = (
         np.empty((COLUMNS, len(steps), members)),
         np.empty((len(steps), *slider.energies.shape)),
     )
     numbers = *_numbers(drive, bonds, contact, units), tuple(law)
-    reached = dict(zip(_NAMES, columns, strict=True))
     arguments = (
         tuple(inputs),
         numbers,
         (columns, energies),
         (tuple(draws), *step_ends[1:]),
     )
-    loop = Loop(inputs, arguments, reached)
-    end, bonding = bonds.advance(population, contact.radius, loop, noise)
     stage, stage_speed = np.zeros((2, len(steps), members))
+    after = Driven._make((*columns, stage, stage_speed, energies))
+    loop = Loop(inputs, arguments, after)
+    end, bonding = bonds.advance(population, contact.radius, loop, noise)
     if drive.spring:
         whole = pieces.joined
         stage[:], stage_speed[:] = (
@@ -263,15 +234,12 @@ def advance(
         )
         stage[0] += slider.stage_position
         np.add.accumulate(stage, out=stage)
-    shared = {name: reached[name] for name in _SHARED}
-    after = Driven(
-        **shared, stage_position=stage, stage_speed=stage_speed, energies=energies
-    )
     first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
-    way = duration[:, np.newaxis], reached["slip"], reached["path"], first, after.speed
+    way = duration[:, np.newaxis], after.slip, after.path, first, after.speed
     field = FieldCourse(draws=draws)
     if law.length < math.inf:
-        field = FieldCourse(Memory(*(reached[name] for name in Memory._fields)), draws)
+        past = after.weight, after.mean, after.spread, after.renewed, after.energy
+        field = FieldCourse(Memory(*past), draws)
     motions = Motion(
         steps.start,
         ends[1:, np.newaxis],
@@ -289,7 +257,7 @@ def advance(
     )
     viscous = drive.viscosity * after.speed
     bonding = bonding._replace(stress=bonding.stress + viscous)
-    lost = (reached["lost"] > 0.0) & contact.undisturbed
+    lost = (after.lost > 0.0) & contact.undisturbed
     return Reached(after, motions, end, bonding, field, lost)
 
 

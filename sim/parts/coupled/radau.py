@@ -18,29 +18,20 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device, inlined
+from sim.numerics.radau import NODES, PACE, RATES, SHARES
 from sim.parts.coupled import mechanics
 
-_S6 = math.sqrt(6.0)
-NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
-SHARES = np.array([(16.0 - _S6) / 36.0, (16.0 + _S6) / 36.0, 1.0 / 9.0])
-#: Derivatives of what vanishes at the start, over the step, from the values at the nodes; and of those again.
-RATES = np.array(
-    [
-        [2.0 + _S6 / 2.0, -1.2 + 29.0 * _S6 / 30.0, 0.4 - 4.0 * _S6 / 15.0],
-        [-1.2 - 29.0 * _S6 / 30.0, 2.0 - _S6 / 2.0, 0.4 + 4.0 * _S6 / 15.0],
-        [-1.0 + 8.0 * _S6 / 3.0, -1.0 - 8.0 * _S6 / 3.0, 5.0],
-    ]
-)
+#: Second derivatives from the values at the nodes.
 BENDS = np.array(
     [[sum(row[k] * RATES[k, j] for k in range(3)) for j in range(3)] for row in RATES]
 )
 _OFF = np.array([sum(row) for row in RATES])
 
 
-#: Eigenvalues of ``RATES``, one real and one of the complex pair; matrices that lead back to nodes and from them. The
+#: Eigenvalue of ``RATES``, one of the complex pair; matrices that lead back to nodes and from them. The
 #: last two columns are the real part and minus the imaginary part of the vector of the complex one (Hairer & Wanner
 #: 1996, IV.8). Literal, as numbers of a linear-algebra library depend on the machine.
-PACE, TURNING = 3.637834252744496, 2.6810828736277523 + 3.05043019924741j
+TURNING = 2.6810828736277523 + 3.05043019924741j
 FORTH = np.array(
     [
         [0.09443876248897526, -0.14125529502095427, -0.030029194105147337],

@@ -74,28 +74,18 @@ class CarriedProcess(SmoothProcess):
 
 
 @dataclass(frozen=True)
-class Passing:
-    """Share of a map's energy that a contact of finite radius pays when it grows, as the pattern passes under it.
+class DiscShares:
+    """Energies per area on discs of a map over its mean energy, at whole pixels and at radii up to ``widest`` [m].
 
-    Energies are computed at whole pixels of the disc position and at radii up to ``widest`` [m], with cubics between
-    them. The share of new contact is the derivative of these cubics, so its integral over the area is the energy.
-    ``position`` of the slider [m] has the shape (1,) or (steps, 1).
+    They are kept by the pixel at which the disc's middle is.
     """
 
     field: StressMap
     solid: ElasticSolid
     widest: float
-    position: Array
-
-    def at(self, position: Array) -> "Passing":
-        """Return the shares at other positions of the slider [m], the same for all members."""
-        moved = replace(self, position=position[..., :1])
-        moved.__dict__.update(_rows=self._rows, _discs=self._discs, radii=self.radii)
-        return moved
 
     @cached_property
     def _rows(self) -> dict[int, Array]:
-        """Shares of the mean energy per area at the radii, by the pixel at which the disc's middle is."""
         return {}
 
     @cached_property
@@ -112,7 +102,13 @@ class Passing:
         count = math.ceil(self.widest / pixel * math.log(self.widest / low))
         return np.geomspace(low, self.widest, min(max(count, 8), _MOST_RADII))
 
-    def _row(self, place: int) -> Array:
+    @property
+    def step(self) -> float:
+        """Step of the logarithm of the radii."""
+        return math.log(self.radii[-1] / self.radii[0]) / (self.radii.size - 1)
+
+    def row(self, place: int) -> Array:
+        """Return the shares at the radii of discs at a pixel."""
         if place not in self._rows:
             pixel, across = self.field.pixels[0], self.field.shape[1] // 2
             half = math.ceil(self.widest / pixel) + _AROUND
@@ -129,13 +125,30 @@ class Passing:
             self._rows[place] = energies / self.solid.stored_energy(self.field)
         return self._rows[place]
 
+
+@dataclass(frozen=True)
+class Passing:
+    """Share of a map's energy that a contact of finite radius pays when it grows, as the pattern passes under it.
+
+    Between the pixels and radii of the ``discs`` there are cubics. The share of new contact is the derivative of these
+    cubics, so its integral over the area is the energy. ``position`` of the slider [m] has the shape (1,) or
+    (steps, 1).
+    """
+
+    discs: DiscShares
+    position: Array
+
+    def at(self, position: Array) -> "Passing":
+        """Return the shares at other positions of the slider [m], the same for all members."""
+        return replace(self, position=position[..., :1])
+
     @cached_property
     def _mean(self) -> Array:
         """Cubics of the mean share over ln a at each position, shape (steps, 4, pieces)."""
-        shares = np.empty((self.position.size, self.radii.size))
-        last = self.field.shape[0]
+        field, radii = self.discs.field, self.discs.radii
+        shares, last = np.empty((self.position.size, radii.size)), field.shape[0]
         for row, x in zip(shares, self.position.flat, strict=True):
-            place = (self.field.begin - x) / self.field.pixels[0]
+            place = (field.begin - x) / field.pixels[0]
             nodes = [
                 min(max(math.floor(place) + int(node), 0), last) for node in _NODES
             ]
@@ -147,13 +160,13 @@ class Passing:
                 (s + 1.0) * s * (s - 1.0) / 6.0,
             )
             row[:] = sum(
-                weight * self._row(node)
+                weight * self.discs.row(node)
                 for weight, node in zip(weights, nodes, strict=True)
                 if weight != 0.0
             )
-        return scipy.interpolate.CubicSpline(
-            np.log(self.radii), shares, axis=1
-        ).c.transpose(2, 0, 1)
+        return scipy.interpolate.CubicSpline(np.log(radii), shares, axis=1).c.transpose(
+            2, 0, 1
+        )
 
     @cached_property
     def _new(self) -> Array:
@@ -172,21 +185,15 @@ class Passing:
     def _read(self, cubics: Array, radius: Array) -> Array:
         shape = np.broadcast_shapes(self.position.shape, radius.shape)
         radii = np.broadcast_to(radius, shape).reshape(len(cubics), -1)
-        low, step = self.radii[0], self._step
-        at = (
-            np.log(np.clip(np.nan_to_num(radii, nan=low), low, self.radii[-1]) / low)
-            / step
-        )
-        piece = np.minimum(at.astype(int), self.radii.size - 2)
+        nodes, step = self.discs.radii, self.discs.step
+        low = nodes[0]
+        at = np.log(np.clip(np.nan_to_num(radii, nan=low), low, nodes[-1]) / low) / step
+        piece = np.minimum(at.astype(int), nodes.size - 2)
         s = (at - piece) * step
         a, b, c, d = (np.take_along_axis(cubics[:, k], piece, axis=1) for k in range(4))
         share = ((a * s + b) * s + c) * s + d
         share = np.where(radii < low, share * np.maximum(radii, 0.0) / low, share)
         return np.where(np.isnan(radii), np.nan, share).reshape(shape)
-
-    @property
-    def _step(self) -> float:
-        return math.log(self.radii[-1] / self.radii[0]) / (self.radii.size - 1)
 
     @property
     def least(self) -> Array:
@@ -196,9 +203,9 @@ class Passing:
     @property
     def each(self) -> list[Terms]:
         """Inputs of ``sim.spectrum.radial.share_of`` at each position."""
-        low = float(self.radii[0])
-        cubics = self._new.transpose(0, 2, 1) * self._step ** np.arange(3, -1, -1)
-        ends = low, math.log(low), 1.0 / self._step
+        low, step = float(self.discs.radii[0]), self.discs.step
+        cubics = self._new.transpose(0, 2, 1) * step ** np.arange(3, -1, -1)
+        ends = low, math.log(low), 1.0 / step
         return [
             ((0.0, 0.0, 0.0), ends, np.ascontiguousarray(cubic)) for cubic in cubics
         ]

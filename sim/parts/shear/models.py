@@ -19,7 +19,7 @@ from sim.laws.halfspace import noise_energy
 from sim.numerics import disk_cache, jit
 from sim.parts.exchange import Setting
 from sim.parts.shear.bands import BandedProcess, Bands, cell_pairs, group
-from sim.parts.shear.maps import CarriedProcess, Passing
+from sim.parts.shear.maps import CarriedProcess, DiscShares, Passing
 from sim.parts.shear.modes import (
     ModalProcess,
     SiteMean,
@@ -507,7 +507,7 @@ class Auto(_Fluctuating):
 #: Radius up to which energies on discs are found, over the largest of the contact without fluctuations.
 _BEYOND = 1.25
 _passing = functools.lru_cache(maxsize=8)(
-    lambda field, solid, widest: Passing(field, solid, widest, np.zeros(1))
+    lambda *numbers: Passing(DiscShares(*numbers), np.zeros(1))
 )
 
 

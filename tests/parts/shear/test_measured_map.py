@@ -25,7 +25,7 @@ from sim.laws import halfspace, jkr
 from sim.numerics.grid import Grid
 from sim.parts.bonds.models import Counted, Unbroken
 from sim.parts.shear import Carried, Mapped
-from sim.parts.shear.maps import Passing
+from sim.parts.shear.maps import DiscShares, Passing
 from sim.scenario.scenario import Record
 from sim.solid import HalfSpace
 from sim.spectrum.families import Ripple
@@ -168,9 +168,8 @@ def test_a_map_that_was_drawn_saved_and_read_back_gives_the_same_trajectory(tmp_
 
 
 def passing(field, widest, pixel=1.0, nu=0.5, **keys):
-    return Passing(
-        map_of(field, pixel, **keys), HalfSpace(1.0, nu), widest, np.zeros(1)
-    )
+    discs = DiscShares(map_of(field, pixel, **keys), HalfSpace(1.0, nu), widest)
+    return Passing(discs, np.zeros(1))
 
 
 def test_uniform_stress_and_passing_waves_store_the_closed_forms_as_new_contact_adds_up():
@@ -180,7 +179,7 @@ def test_uniform_stress_and_passing_waves_store_the_closed_forms_as_new_contact_
     ) * np.ones((40, 1))
     shares = passing(3.0 * field, 15.0)
     radius = np.array([6.0, 8.5, 11.5])
-    whole = HalfSpace(1.0).stored_energy(shares.field)
+    whole = HalfSpace(1.0).stored_energy(shares.discs.field)
     exact = halfspace.disc_tangential_energy(radius, 3.0, 1.0) / (math.pi * radius**2)
     # what the soft edge costs falls as (pixel/a)²
     assert_allclose(whole * shares.mean(radius), exact, rtol=0.2 / 6.0**2)
@@ -205,7 +204,7 @@ def test_uniform_stress_and_passing_waves_store_the_closed_forms_as_new_contact_
             )
             mean += shares.mean(radius)[0] / 12
             new += shares(radius)[0] / 12
-        whole = HalfSpace(1.0).stored_energy(passing(field, 25.0).field)
+        whole = HalfSpace(1.0).stored_energy(passing(field, 25.0).discs.field)
         # the soft edge costs 0.65 (pixel/a)² for each wave on the diameter at most
         lost = 0.7 * np.max(2 * radius / 12 / radius**2)
         assert_allclose(
