@@ -159,6 +159,7 @@ def spring(bench: Bench) -> list[Row]:
         work = f"a bond's life: slider on {sites:,} tracked bonds behind a spring"
         rows.append(absolute(work, microseconds, "µs", 1.5))
 
+    rows += events(bench)
     long = scene(bench.of(2400.0, 1.0), bench.of(10**5, 10), TOLERANCE)
     seconds = [spent(lambda: followed(long)) for _ in range(bench.of(5, 1))]
     rows.append(
@@ -166,6 +167,36 @@ def spring(bench: Bench) -> list[Row]:
             "slider behind a spring through 10³ slips, 10⁵ records", seconds, "s", 5.0
         )
     )
+    return rows
+
+
+def events(bench: Bench) -> list[Row]:
+    """Rows of an event of tracked bonds in steady sliding that carry all of the adhesion, or none of it."""
+    rows = []
+    for sites in (20, 200, 2000, 20_000):
+        bonds = Tracked(
+            sites=bench.of(sites, 5), site_density=1.0, start_from="bonded", **BELL
+        )
+        duration = bench.of(1e5 / sites, 1.0)
+        without = scene(duration, 20, TOLERANCE, bonds=bonds)
+        steady = {
+            "drive.stage": 0.5 * SPEED,
+            "drive.stiffness": 5.0 * SOFT * without.contact_area,
+        }
+        programs, counts = [], []
+        for share in (1.0, 0.0):
+            of = without.with_values(steady | {"adhesion.bond_share": share})
+            programs.append(functools.partial(ended, of))
+            counts.append(2.0 * np.sum(programs[-1]()[0].bonds.life))
+        other = Beside(
+            "the same bonds without adhesion",
+            programs[1],
+            share=counts[1],
+            goal=3.0,
+            bound=True,
+        )
+        work = f"an event: {sites:,} tracked bonds that carry the adhesion"
+        rows += bench.compare(work, programs[0], other, share=counts[0], turns=7)
     return rows
 
 

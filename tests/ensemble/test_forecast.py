@@ -226,6 +226,24 @@ LONG = {
             "site_density": 1.2e13,
         },
     },
+    "tracked bonds that carry the adhesion": {
+        "clock": {"duration": 2.0, "step": 0.1},
+        "adhesion": {"work": 0.09, "bond_share": 1.0},
+        "drive": {
+            "model": "spring",
+            "stage": 8e-4,
+            "stiffness": 2e-3,
+            "contact_stiffness": "rigid",
+        },
+        "bonds": {
+            "model": "tracked",
+            "rupture": BELL,
+            "bond_stiffness": 1e-7,
+            "rebinding_rate": 20.0,
+            "site_density": 8e13,
+            "sites": 2000,
+        },
+    },
     "a heavy chain of tracked bonds": {
         "clock": {"duration": 0.06, "step": 0.03},
         "ensemble": {"members": 2},

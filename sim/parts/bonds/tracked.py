@@ -13,9 +13,15 @@ breaks when Φ passes a number fixed at its birth, its ``due``. The cost of a st
 an event in all the steps are passed over by their least due.
 
 If all stretches of a row have the sign of the motion, its bonds are stepped together. If the motion turns, or a step
-spans too many Bell forces for the common clock, each bond is stepped separately. This ends when all stretches have the
-sign of the motion again. Its ``due`` is then the rest of its threshold. Bonds whose rate is not one exponential have no
-common clock, and are always stepped separately.
+spans too many Bell forces for the common clock, each bond is stepped separately. Its ``due`` is then the rest of its
+threshold. This ends when all stretches have the sign of the motion again. Bonds whose rate is not one exponential have
+no common clock, and are always stepped separately.
+
+A driven slider slips back a little at once whenever a binding enlarges its contact. The few youngest bonds are then
+ahead of the slider, and only they are followed separately, as *turned* bonds: their ``due`` is infinite, and a list at
+the end of the frame has the rests of their thresholds. A turned bond joins the others when the slider has passed it. So
+an event costs a time that grows with the logarithm of the sites. If a slip turns more bonds than the list has room for,
+all are stepped separately, until half of the list has room for those ahead.
 
 One array holds two kinds of due: a bound site's, never negative, and minus the time at which a free
 site binds. Read as unsigned whole numbers, the bits of such floats have the first rupture as their
@@ -31,7 +37,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.numerics.jit import device, kernel
+from sim.numerics.jit import device, inlined, kernel
 from sim.numerics.noise import PARTS, exponential, logarithm, unit_at, words_at
 from sim.numerics.special import (
     reduced_exponential_integral,
@@ -47,18 +53,27 @@ from sim.parts.bonds.rupture import (
 from sim.parts.exchange import Array, record
 
 #: Columns of a frame: slider, time and clock since the frame was set, sense of the motion (+1, -1), 1 if bonds
-#: are stepped one by one, bound sites, sum of their births, of the births squared, number of steps.
-SLIDER, TIME, CLOCK, SENSE, SINGLY, BOUND, SUM, SQUARES, STEPS = range(9)
-COLUMNS = 9
+#: are stepped one by one, bound sites, sum of their births, of the births squared, number of ``turned`` bonds, number
+#: of steps.
+SLIDER, TIME, CLOCK, SENSE, SINGLY, BOUND, SUM, SQUARES, TURNED, STEPS = range(10)
+COLUMNS = 10
+#: Place in the frame of a driven row, after these columns, from which on it has the sites of ``turned`` bonds, each
+#: followed by the rest of its threshold.
+_LIST = COLUMNS
 
 #: Sites of one block.
 BLOCK = 16
+
+#: Bonds of a row, at most, whose stretch is against the motion while all others are stepped together.
+MOST_TURNED = 64
 
 #: Steps made at once, at most.
 AT_ONCE = 1024
 
 _U = np.uint64
 PART = _U(PARTS["bonds"])
+#: Bits of the due of a turned bond, which is infinite.
+_ENDLESS = np.float64(math.inf).view(np.int64)
 # of one site in one step: a safeguard, because the rule for long steps comes first
 LIVES = 4096
 TINY = 2.2250738585072014e-308
@@ -68,12 +83,17 @@ TINY = 2.2250738585072014e-308
 _STEP = record("x time clock rate grown pace duration speed")
 #: Rows of the ends of a step: bonds of less due, free sites of less time and bonds of less birth have had an event.
 RUPTURE, BINDING, _CUT = range(3)
+#: Rows of ``soonest`` beside the first two, and of the ``winners``.
+_REAR, _FRONT, _FOREMOST = 2, 3, 2
 #: Bits of a number that are left out where a step is looked up, 128 ranges for each power of two; most ranges.
 _LEFT_OUT, _RANGES = np.int64(45), 4096
 
 
 class SiteLaw(NamedTuple):
-    """Law of the lives of a site: the numbers of ``LawNumbers``, and the rate of rebinding [1/s]."""
+    """Law of the lives of a site: the numbers of ``LawNumbers``, the rate of rebinding [1/s], 1 if bonds may turn.
+
+    Bonds turn if the slider slips back at once, because its contact grows.
+    """
 
     rate: float
     softness: float
@@ -82,15 +102,18 @@ class SiteLaw(NamedTuple):
     relief: float
     table: float
     rebinding: float
+    turns: float
 
 
 #: Type of the numbers of ``SiteLaw`` in kernels.
 SITE_LAW = f"UniTuple(float64, {len(SiteLaw._fields)})"
 
 
-def site_law(rupture: RuptureRate, rebinding_rate: float) -> tuple[float, ...]:
+def site_law(
+    rupture: RuptureRate, rebinding_rate: float, turns: bool = False
+) -> tuple[float, ...]:
     """Return the numbers of ``SiteLaw``."""
-    return *rupture.numbers, float(rebinding_rate)
+    return *rupture.numbers, float(rebinding_rate), float(turns)
 
 
 @device
@@ -111,21 +134,21 @@ def room():
 
 @device
 def views(due, soonest):
-    """Return a row's due as signed and unsigned integers, and first binding, first rupture and rearmost of blocks."""
+    """Return a row's due as signed and unsigned integers, and first binding, first rupture and ends of blocks."""
     whole = soonest.view(np.int64)
     return (
         due.view(np.int64),
         due.view(np.uint64),
         whole[1],
         soonest.view(np.uint64)[0],
-        soonest[2],
+        soonest[_REAR:],
     )
 
 
-@device
-def least(bits, birth, block, bounded):
-    """Write the first binding, the first rupture and the rearmost bond of a block anew."""
-    signed, unsigned, binding, rupture, rear = bits
+@inlined
+def least(bits, birth, block, law):
+    """Write the first binding, the first rupture, and the rearmost and foremost bond of a block anew."""
+    signed, unsigned, binding, rupture, ends = bits
     first = _U(block) * _U(BLOCK)
     size = min(BLOCK, np.int64(_U(signed.size) - first))
     soonest, earliest = signed[first], unsigned[first]
@@ -138,12 +161,20 @@ def least(bits, birth, block, bounded):
             soonest = min(soonest, signed[first + _U(j)])
             earliest = min(earliest, unsigned[first + _U(j)])
     binding[block], rupture[block] = soonest, earliest
-    if bounded:
+    if law.limit < math.inf:
         least = math.inf
         for j in range(size):
             i = first + _U(j)
             least = birth[i] if signed[i] >= 0 and birth[i] < least else least
-        rear[block] = least
+        ends[0, block] = least
+    if law.turns > 0.0:
+        front = math.inf
+        for j in range(size):
+            i = first + _U(j)
+            front = (
+                -birth[i] if 0 <= signed[i] < _ENDLESS and -birth[i] < front else front
+            )
+        ends[1, block] = front
 
 
 @device
@@ -206,7 +237,7 @@ def follow(bonds, soonest, count, law, address, space):
     ) = bonds, space
     limit, rebinding = law.limit, law.rebinding
     bits, bounded, (seed, member) = views(due, soonest), limit < math.inf, address
-    signed, unsigned, binding, rupture, rear = bits
+    signed, unsigned, binding, rupture, sides = bits
     clock, time, cut = (
         ends[RUPTURE, count - 1],
         ends[BINDING, count - 1],
@@ -217,11 +248,11 @@ def follow(bonds, soonest, count, law, address, space):
         np.float64(-time).view(np.int64),
     )
     changes[:, :count] = 0.0
-    for block in range(rear.size):
+    for block in range(rupture.size):
         if not (
             rupture[block] <= clock_bits
             or binding[block] <= time_bits
-            or rear[block] <= cut
+            or sides[0, block] <= cut
         ):
             continue
         for i in range(block * BLOCK, min((block + 1) * BLOCK, due.size)):
@@ -293,7 +324,7 @@ def follow(bonds, soonest, count, law, address, space):
                     changes[2, k] += x * x
                 bound = not bound
             due[i], birth[i], life[i] = at, x, number
-        least(bits, birth, block, bounded)
+        least(bits, birth, block, law)
 
 
 #: Results of ``live`` other than a number of steps: the state has been advanced already; a number is not finite.
@@ -327,59 +358,108 @@ def _cycle(speed, law):
     return life + (1.0 / rebinding if rebinding > 0.0 else math.inf)
 
 
+@inlined
+def _live_on(i, bonds, start, motion, law, address):
+    """Advance one site by a step; its due is the rest of its threshold while it is bound.
+
+    ``start``: slider and time at the beginning of the step. ``motion``: speed and duration.
+    """
+    (birth, due, _), (x0, t0), (speed, duration) = bonds, start, motion
+    time = 0.0
+    for _ in range(LIVES):
+        left = duration - time
+        if math.copysign(1.0, due[i]) > 0.0:
+            stretch = x0 + speed * time - birth[i]
+            spent = hazard_integral(stretch, speed * left, left, law)
+            if spent < due[i] and math.fabs(stretch + speed * left) < law.limit:
+                due[i] -= spent
+                break
+            lasts = hazard_time(stretch, speed, due[i], law)
+            time += min(lasts, left) if lasts > 0.0 else 0.0
+            _break(i, bonds, t0 + time, law, address)
+        elif -due[i] > t0 + duration:
+            break
+        else:
+            time = max(-due[i] - t0, 0.0)
+            due[i], birth[i] = birth[i], x0 + speed * time
+
+
+@inlined
+def _break(i, bonds, time, law, address):
+    """Begin the next life of a site whose bond breaks at a ``time``, by new draws of threshold and waiting time."""
+    (birth, due, life), (seed, member), rebinding = bonds, address, law.rebinding
+    life[i] += np.uint32(1)
+    first, second, _, _ = words_at(seed, PART, _U(i + 1), _U(life[i]), member, _U(0))
+    birth[i], wait = exponential(first), exponential(second) / rebinding
+    due[i] = -max(time + wait, TINY) if rebinding > 0.0 else -math.inf
+
+
 @device
-def _one_by_one(bonds, row, slip, duration, law, address):
-    """Advance a row by a step bond by bond; return True if its bonds can then be stepped together."""
-    (birth, due, life), (seed, member) = bonds, address
-    limit, rebinding = law.limit, law.rebinding
+def _one_by_one(tracks, slip, duration, law, address):
+    """Advance a row by a step bond by bond; return the sense in which its bonds can then be stepped together, or 0.
+
+    The sense is 1 if it is that of the frame, and -1 if it is the opposite one.
+    """
+    bonds, _, row = tracks
+    birth, due, _ = bonds
     x0, t0, speed = row[SLIDER], row[TIME], slip / duration
     bound, total, squares, lowest, highest = 0.0, 0.0, 0.0, math.inf, -math.inf
+    ahead = 0
     for i in range(due.size):
-        time = 0.0
-        for _ in range(LIVES):
-            left = duration - time
-            if math.copysign(1.0, due[i]) > 0.0:
-                stretch = x0 + speed * time - birth[i]
-                spent = hazard_integral(stretch, speed * left, left, law)
-                if spent < due[i] and math.fabs(stretch + speed * left) < limit:
-                    due[i] -= spent
-                    break
-                lasts = hazard_time(stretch, speed, due[i], law)
-                time += min(lasts, left) if lasts > 0.0 else 0.0
-                life[i] += np.uint32(1)
-                first, second, _, _ = words_at(
-                    seed, PART, _U(i + 1), _U(life[i]), member, _U(0)
-                )
-                birth[i] = exponential(first)
-                due[i] = (
-                    -max(t0 + time + exponential(second) / rebinding, TINY)
-                    if rebinding > 0.0
-                    else -math.inf
-                )
-            elif -due[i] > t0 + duration:
-                break
-            else:
-                time = max(-due[i] - t0, 0.0)
-                due[i], birth[i] = birth[i], x0 + speed * time
+        _live_on(i, bonds, (x0, t0), (speed, duration), law, address)
         if math.copysign(1.0, due[i]) > 0.0:
             bound += 1.0
             total += birth[i]
             squares += birth[i] * birth[i]
             lowest, highest = min(lowest, birth[i]), max(highest, birth[i])
+            ahead += birth[i] > x0 + slip
     row[SLIDER], row[TIME] = x0 + slip, t0 + duration
     row[BOUND], row[SUM], row[SQUARES] = bound, total, squares
-    is_ahead = highest <= x0 + slip if slip > 0.0 else lowest >= x0 + slip
-    return slip != 0.0 and is_ahead and has_factor(law)
+    if slip == 0.0 or not has_factor(law):
+        return 0.0
+    if slip < 0.0 and lowest >= x0 + slip:
+        return -1.0
+    few = (_room_for(row) + 1) // 2 if law.turns > 0.0 else 0
+    return 1.0 if ahead <= few and (slip > 0.0 or few > 0) else 0.0
 
 
 @device
-def _set(bonds, soonest, row, law, singly, turn):
+def _room_for(frame):
+    """Return the number of turned bonds that a frame has room for."""
+    return (frame.size - _LIST) // 2
+
+
+@device
+def _turned(k, frame):
+    """Return the site of one of the turned bonds, and the rest of its threshold."""
+    return np.int64(frame[_LIST + 2 * k]), frame[_LIST + 2 * k + 1]
+
+
+@device
+def _turn(i, rest, due, frame):
+    """Add the bond of a site to the turned ones: it then has no due on the common clock."""
+    k = _LIST + 2 * np.int64(frame[TURNED])
+    frame[k], frame[k + 1], due[i] = i, rest, math.inf
+    frame[TURNED] += 1.0
+
+
+@device
+def _drop(k, frame):
+    """Take one of the turned bonds from their list."""
+    frame[TURNED] -= 1.0
+    last = _LIST + 2 * np.int64(frame[TURNED])
+    frame[_LIST + 2 * k], frame[_LIST + 2 * k + 1] = frame[last], frame[last + 1]
+
+
+@device
+def _set(tracks, law, singly, turn):
     """Set the origin of a row's frame at the slider and at the present time; the sense may turn.
 
     Its bonds are then stepped together, or one by one if ``singly`` or if they have no common clock. Sums and least
-    dues are computed anew, so that roundings do not add up.
+    dues are computed anew, so that roundings do not add up. A bond ahead of the slider is a turned one if the others
+    are stepped together.
     """
-    birth, due, _ = bonds
+    (birth, due, _), soonest, row = tracks
     softness, singly = law.softness, singly or not has_factor(law)
     x0, t0, clock = row[SLIDER], row[TIME], row[CLOCK]
     scale = math.exp(-softness * x0)
@@ -395,17 +475,24 @@ def _set(bonds, soonest, row, law, singly, turn):
             due[i] = max(due[i] - clock, 0.0) * (
                 math.exp(-softness * birth[i]) if singly else scale
             )
+        elif not singly and x > 0.0:
+            _turn(i, due[i], due, row)
         elif not singly:
             due[i] *= math.exp(softness * x)
         birth[i] = x
         bound += 1.0
         total += x
         squares += x * x
-    if not singly:
-        soonest[2] = math.inf
+    if singly:
+        for k in range(np.int64(row[TURNED])):
+            i, rest = _turned(k, row)
+            due[i] = rest
+        row[TURNED] = 0.0
+    else:
+        soonest[_REAR:] = math.inf
         bits = views(due, soonest)
         for block in range(soonest.shape[1]):
-            least(bits, birth, block, law.limit < math.inf)
+            least(bits, birth, block, law)
     row[SLIDER], row[TIME], row[CLOCK], row[SENSE] = 0.0, 0.0, 0.0, sign * row[SENSE]
     row[SINGLY], row[BOUND], row[SUM], row[SQUARES] = (
         1.0 if singly else 0.0,
@@ -416,7 +503,10 @@ def _set(bonds, soonest, row, law, singly, turn):
 
 
 #: Arrays of ``Tracks``.
-TRACKS = "Tuple((float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1], int64[::1], float64[:,::1]))"
+TRACKS = (
+    "Tuple((float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1], int64[::1], float64[:,::1],"
+    " float64[:,::1]))"
+)
 
 
 @device
@@ -450,6 +540,34 @@ def _together(row, slip, duration, law, space):
 
 
 @device
+def _follow_turned(tracks, slip, duration, law, address):
+    """Advance the turned bonds of a row by a step that the others have followed together.
+
+    Bonds that the slider has passed are then stepped together with the others.
+    """
+    bonds, soonest, row = tracks
+    birth, due, _ = bonds
+    along, bits = row[SENSE] * slip, views(due, soonest)
+    start = row[SLIDER] - along, row[TIME] - duration
+    for k in range(np.int64(row[TURNED]) - 1, -1, -1):
+        i, rest = _turned(k, row)
+        x, due[i] = birth[i], rest
+        _live_on(i, bonds, start, (along / duration, duration), law, address)
+        is_bound = math.copysign(1.0, due[i]) > 0.0
+        after, number = (birth[i], 0.0) if is_bound else (0.0, -1.0)
+        row[BOUND] += number
+        row[SUM] += after - x
+        row[SQUARES] += after * after - x * x
+        if is_bound and after > row[SLIDER]:
+            row[_LIST + 2 * k + 1], due[i] = due[i], math.inf
+            continue
+        if is_bound:
+            due[i] = row[CLOCK] + due[i] * math.exp(law.softness * after)
+        _drop(k, row)
+        least(bits, birth, i // BLOCK, law)
+
+
+@device
 def _keep(row, slip, duration, count, space, frames):
     """Write the frames of a row after each of ``count`` steps that were followed together."""
     _, ends, changes, _, _ = space
@@ -463,7 +581,7 @@ def _keep(row, slip, duration, count, space, frames):
         row[SUM] += changes[1, k]
         row[SQUARES] += changes[2, k]
         row[STEPS] += 1.0
-        frames[:, k] = row
+        frames[:, k] = row[:COLUMNS]
 
 
 @device
@@ -483,30 +601,50 @@ def _advance(tracks, ahead, law, address, space, laid, shared, frames):
         )
         if not (here and laid[COLUMNS] <= duration.size):
             laid[:COLUMNS], laid[COLUMNS] = (
-                row,
+                row[:COLUMNS],
                 _together(row, slip, duration, law, space),
             )
         count = np.int64(laid[COLUMNS])
     if count > 0:
         follow(bonds, soonest, count, law, address, space)
         _keep(row, slip, duration, count, space, frames)
+        if row[TURNED] > 0.0:
+            _follow_turned(tracks, slip[0], duration[0], law, address)
     else:
         if row[SINGLY] == 0.0:
-            _set(bonds, soonest, row, law, True, False)
+            _set(tracks, law, True, False)
         along, count = row[SENSE] * slip[0], 1
-        if _one_by_one(bonds, row, along, duration[0], law, address):
-            _set(bonds, soonest, row, law, False, along < 0.0)
+        sense = _one_by_one(tracks, along, duration[0], law, address)
+        if sense != 0.0:
+            _set(tracks, law, False, sense < 0.0)
         row[STEPS] += 1.0
     if _far(row[SLIDER], row[TIME], law):
-        _set(bonds, soonest, row, law, row[SINGLY] > 0.0, False)
-    frames[:, count - 1] = row
+        _set(tracks, law, row[SINGLY] > 0.0, False)
+    frames[:, count - 1] = row[:COLUMNS]
     return count
 
 
+#: Size of the work array of ``one_step``.
+SCRATCH = 19 + 2 * COLUMNS + 1
+
+
 @device
-def one_step(tracks, ahead, law, address, space, laid, frame):
-    """Advance a row by one step, of arrays of length one; ``laid`` and ``frame`` are work arrays."""
-    laid[0] = math.nan
+def one_step(tracks, slip, duration, law, address, scratch):
+    """Advance a row by one step.
+
+    All work arrays are parts of one, because a call copies each array that it passes on, which takes as long as an
+    event.
+    """
+    space = (
+        scratch[:8].view(_STEP),
+        scratch[8:11].reshape(3, 1),
+        scratch[11:14].reshape(3, 1),
+        scratch[14:15].view(np.int16).reshape(2, 2),
+        scratch[15:17].view(np.int64),
+    )
+    ahead, laid = (scratch[17:18], scratch[18:19]), scratch[19 : 20 + COLUMNS]
+    ahead[0][0], ahead[1][0], laid[0] = slip, duration, math.nan
+    frame = scratch[20 + COLUMNS :].reshape(COLUMNS, 1)
     _advance(tracks, ahead, law, address, space, laid, False, frame)
 
 
@@ -520,7 +658,7 @@ def live(tracks, slip, duration, law, seed, members, first, frames):
     step. A row stops before a step that is longer than about 300 lives of a site, and its count of steps is returned.
     No row advances beyond this step. Nothing is touched if the state is spent or a number endless.
     """
-    birth, due, life, soonest, stamp, frame = tracks
+    birth, due, life, soonest, stamp, _, frame = tracks
     rows, end, law = len(due), first, SiteLaw(*law)
     for m in range(rows):
         if stamp[m] != np.int64(frame[m, STEPS]):
@@ -564,12 +702,12 @@ def relax(tracks, law):
 
     The rest of the threshold of a bond is exponential whatever its life was, so no number is drawn.
     """
-    (birth, due, life), soonest, frame = tracks
-    _set((birth, due, life), soonest, frame, law, True, False)
+    (birth, due, _), _, _ = tracks
+    _set(tracks, law, True, False)
     for i in range(len(due)):
         if math.copysign(1.0, due[i]) > 0.0:
             birth[i] = 0.0
-    _set((birth, due, life), soonest, frame, law, False, False)
+    _set(tracks, law, False, False)
 
 
 @kernel(
@@ -582,7 +720,7 @@ def draw(tracks, chosen, speed, share, age, law, seed, members):
     every second proposal (Devroye, Non-Uniform Random Variate Generation, 1986, VII.2). A bond of any age still has an
     exponential threshold ahead.
     """
-    (birth, due, life, soonest, stamp, frame) = tracks
+    birth, due, life, soonest, stamp, _, frame = tracks
     law = SiteLaw(*law)
     limit, rebinding = law.limit, law.rebinding
     for m in range(due.shape[0]):
@@ -625,44 +763,151 @@ def draw(tracks, chosen, speed, share, age, law, seed, members):
         row = frame[m]
         row[:STEPS] = 0.0
         row[SENSE], row[SINGLY] = 1.0, 1.0
-        _set((birth[m], due[m], life[m]), soonest[m], row, law, False, v < 0.0)
+        of_row = (birth[m], due[m], life[m]), soonest[m], row
+        _set(of_row, law, False, v < 0.0)
         row[STEPS] += 1.0
         stamp[m] = np.int64(row[STEPS])
 
 
-@device
-def _rank(place, winners, soonest):
-    """Write the first rupture and the first binding at one place of the ``winners``: of a block or of two places."""
-    block = place - winners.shape[1] // 2
+@inlined
+def _rank_block(block, winners, soonest):
+    """Write the first of each kind in a block at its place of the ``winners``."""
+    place = block + winners.shape[1] // 2
     for row in range(2):
-        soon = soonest[row, block] if 0 <= block < soonest.shape[1] else math.nan
-        value = (
-            math.fabs(soon)
-            if math.copysign(1.0, soon) == 1.0 - 2.0 * row and soon == soon
-            else math.inf
-        )
-        winners[row, place] = (
-            value
-            if block >= 0
-            else min(winners[row, 2 * place], winners[row, 2 * place + 1])
-        )
+        soon = soonest[row, block]
+        is_any = math.copysign(1.0, soon) == 1.0 - 2.0 * row and soon == soon
+        winners[row, place] = math.fabs(soon) if is_any else math.inf
+    if winners.shape[0] > _FOREMOST:
+        winners[_FOREMOST, place] = soonest[_FRONT, block]
+
+
+@inlined
+def _rank_places(place, winners):
+    """Write the first of each kind of two places of the ``winners`` at the place above them."""
+    for row in range(winners.shape[0]):
+        winners[row, place] = min(winners[row, 2 * place], winners[row, 2 * place + 1])
 
 
 @device
 def rank(tracks, law, winners):
     """Set the frame anew if it is far from its origin, and write the ``winners`` if they are not those of the frame.
 
-    Place 1 has the first rupture and the first binding of all blocks. Each place has the earlier of the two places at
-    twice its number, so an event changes few of them. Place 0 has the number of steps.
+    Place 1 has the first rupture and the first binding of all blocks, and minus the birth of the foremost bond that is
+    not turned. Each place has the least of the two places at twice its number, so an event changes few of them. Place
+    0 has the number of steps.
     """
-    bonds, soonest, frame = tracks
+    _, soonest, frame = tracks
     if _far(frame[SLIDER], frame[TIME], law):
-        _set(bonds, soonest, frame, law, False, False)
+        _set(tracks, law, False, False)
         winners[0, 0] = -1.0
     if winners[0, 0] != frame[STEPS]:
-        for place in range(winners.shape[1] - 1, 0, -1):
-            _rank(place, winners, soonest)
+        half = winners.shape[1] // 2
+        winners[:, half:] = math.inf
+        for block in range(soonest.shape[1]):
+            _rank_block(block, winners, soonest)
+        for place in range(half - 1, 0, -1):
+            _rank_places(place, winners)
         winners[0, 0] = frame[STEPS]
+
+
+@device
+def _refresh(block, tracks, law, winners):
+    """Write a block that has changed anew, and its part in the ``winners``."""
+    (birth, due, _), soonest, _ = tracks
+    least(views(due, soonest), birth, block, law)
+    _rank_block(block, winners, soonest)
+    place = (block + winners.shape[1] // 2) // 2
+    while place > 0:
+        _rank_places(place, winners)
+        place //= 2
+
+
+@inlined
+def _block_of(row, winners):
+    """Return the block that has the first place in a ``row`` of the winners."""
+    place = 1
+    while place < winners.shape[1] // 2:
+        place = (
+            2 * place if winners[row, 2 * place] == winners[row, 1] else 2 * place + 1
+        )
+    return place - winners.shape[1] // 2
+
+
+@device
+def slip_back(tracks, along, law, winners):
+    """Slip back at once by ``along``, below zero, if few bonds are ahead of the slider then; return True if so.
+
+    No bond may break in the slip. Bonds ahead are turned. Each keeps the rest of its threshold, because the clock of
+    the others is not its own.
+    """
+    (birth, due, _), _, frame = tracks
+    rank(tracks, law, winners)
+    x = frame[SLIDER] + along
+    while -winners[_FOREMOST, 1] > x:
+        if frame[TURNED] == _room_for(frame):
+            return False
+        block, front = _block_of(_FOREMOST, winners), -winners[_FOREMOST, 1]
+        i = block * BLOCK
+        while not (birth[i] == front and 0.0 <= due[i] < math.inf):
+            i += 1
+        rest = max(due[i] - frame[CLOCK], 0.0) * math.exp(-law.softness * birth[i])
+        _turn(i, rest, due, frame)
+        _refresh(block, tracks, law, winners)
+    for k in range(np.int64(frame[TURNED])):
+        i, _ = _turned(k, frame)
+        if birth[i] - x >= law.limit:
+            return False
+    let_pass(frame, along, 0.0, frame[CLOCK], winners)
+    return True
+
+
+@device
+def pass_turned(tracks, law, winners):
+    """Step turned bonds that the slider has passed together with the others again."""
+    (birth, due, _), _, frame = tracks
+    for k in range(np.int64(frame[TURNED]) - 1, -1, -1):
+        i, rest = _turned(k, frame)
+        if birth[i] <= frame[SLIDER]:
+            due[i] = frame[CLOCK] + rest * math.exp(law.softness * birth[i])
+            _drop(k, frame)
+            _refresh(i // BLOCK, tracks, law, winners)
+
+
+@device
+def first_turned(tracks, speed, most, law):
+    """Return the time, at most ``most``, after which a turned bond breaks at a speed, and its place or -1."""
+    (birth, _, _), _, frame = tracks
+    x, along, first = frame[SLIDER], frame[SENSE] * speed, -1
+    farthest, least_rest = 0.0, math.inf
+    for k in range(np.int64(frame[TURNED])):
+        i, rest = _turned(k, frame)
+        farthest, least_rest = (
+            max(farthest, math.fabs(x - birth[i])),
+            min(least_rest, rest),
+        )
+    farthest += math.fabs(along) * most
+    # by far the most motions are too short for any of them
+    if law.rate * math.exp(law.softness * farthest) * most < least_rest and (
+        farthest < law.limit
+    ):
+        return most, first
+    for k in range(np.int64(frame[TURNED])):
+        i, rest = _turned(k, frame)
+        time = hazard_time(x - birth[i], along, rest, law)
+        if time < most:
+            most, first = time, k
+    return most, first
+
+
+@device
+def spend_turned(tracks, speed, duration, law):
+    """Reduce the thresholds of turned bonds by their ruptures in a time of constant speed that they survive."""
+    (birth, _, _), _, frame = tracks
+    slip = frame[SENSE] * speed * duration
+    for k in range(np.int64(frame[TURNED])):
+        i, rest = _turned(k, frame)
+        spent = hazard_integral(frame[SLIDER] - birth[i], slip, duration, law)
+        frame[_LIST + 2 * k + 1] = max(rest - spent, 0.0)
 
 
 @device
@@ -680,37 +925,54 @@ def let_pass(frame, slip, duration, clock, winners):
 @device
 def happen(tracks, event, law, address, winners):
     """Break the bond, or bind the site, that is first among the ``winners``: at the place and time of the frame."""
-    (
-        ((birth, due, life), soonest, frame),
-        (seed, member),
-    ) = tracks, address
-    rebinding = law.rebinding
-    place, value, x, sign = 1, winners[event, 1], frame[SLIDER], 1.0
-    while place < winners.shape[1] // 2:
-        place = 2 * place if winners[event, 2 * place] == value else 2 * place + 1
-    block = place - winners.shape[1] // 2
+    (_, due, _), _, _ = tracks
+    value = winners[event, 1]
+    block = _block_of(event, winners)
     i, value = block * BLOCK, -value if event == BINDING else value
     while due[i] != value:
         i += 1
     if event == BINDING:
-        due[i], birth[i] = frame[CLOCK] + birth[i] * math.exp(law.softness * x), x
+        _bind(i, tracks, law)
     else:
-        x, sign = birth[i], -1.0
-        life[i] += np.uint32(1)
-        first, second, _, _ = words_at(
-            seed, PART, _U(i + 1), _U(life[i]), member, _U(0)
-        )
-        birth[i], wait = exponential(first), exponential(second) / rebinding
-        due[i] = -max(frame[TIME] + wait, TINY) if rebinding > 0.0 else -math.inf
+        _break_in(i, tracks, law, address)
+    _refresh(block, tracks, law, winners)
+
+
+@inlined
+def _bind(i, tracks, law):
+    """Bind a site at the place and time of the frame."""
+    (birth, due, _), _, frame = tracks
+    x = frame[SLIDER]
+    due[i], birth[i] = frame[CLOCK] + birth[i] * math.exp(law.softness * x), x
+    _count(1.0, x, frame)
+
+
+@inlined
+def _break_in(i, tracks, law, address):
+    """Break the bond of a site at the place and time of the frame."""
+    bonds, _, frame = tracks
+    _count(-1.0, bonds[0][i], frame)
+    _break(i, bonds, frame[TIME], law, address)
+
+
+@inlined
+def _count(sign, x, frame):
+    """Add a bond of some birth to the sums of a frame, or take it from them."""
     frame[BOUND], frame[SUM], frame[SQUARES] = (
         frame[BOUND] + sign,
         frame[SUM] + sign * x,
         frame[SQUARES] + sign * x * x,
     )
-    least(views(due, soonest), birth, block, law.limit < math.inf)
-    while place > 0:
-        _rank(place, winners, soonest)
-        place //= 2
+
+
+@device
+def break_turned(k, tracks, law, address, winners):
+    """Break one of the turned bonds at the place and time of the frame."""
+    _, _, frame = tracks
+    i, _ = _turned(k, frame)
+    _drop(k, frame)
+    _break_in(i, tracks, law, address)
+    _refresh(i // BLOCK, tracks, law, winners)
 
 
 @device
@@ -719,6 +981,8 @@ def next_event(tracks, speed, most, law, winners):
     (birth, due, _), soonest, frame = tracks
     rate, softness, limit = law.rate, law.softness, law.limit
     along = frame[SENSE] * speed
+    if frame[TURNED] > 0.0:
+        most, _ = first_turned(tracks, speed, most, law)
     if frame[SINGLY] == 0.0 and along >= 0.0:
         rank(tracks, law, winners)
         x, soon, first = (
@@ -733,7 +997,7 @@ def next_event(tracks, speed, most, law, winners):
                 moment(first - frame[CLOCK], grown, along * softness, math.inf, most),
             )
         if along > 0.0 and limit < math.inf:
-            soon = min(soon, (np.min(soonest[2]) + limit - x) / along)
+            soon = min(soon, (np.min(soonest[_REAR]) + limit - x) / along)
         return max(soon, 0.0)
     x, clock = frame[SLIDER], frame[CLOCK]
     soon = most
@@ -760,7 +1024,13 @@ def next_cut(tracks, direction, limit):
     along, x = frame[SENSE] * direction, frame[SLIDER]
     nearest = math.inf
     if frame[SINGLY] == 0.0 and along >= 0.0:
-        return max(np.min(soonest[2]) + limit - x, 0.0)
+        return max(np.min(soonest[_REAR]) + limit - x, 0.0)
+    if frame[SINGLY] == 0.0:
+        foremost = -np.min(soonest[_FRONT])
+        for k in range(np.int64(frame[TURNED])):
+            i, _ = _turned(k, frame)
+            foremost = max(foremost, birth[i])
+        return max(limit + x - foremost, 0.0)
     for i in range(due.size):
         if math.copysign(1.0, due[i]) > 0.0:
             stretch = x - birth[i] if along >= 0.0 else birth[i] - x
@@ -785,10 +1055,13 @@ class Tracks(NamedTuple):
         Position of each bond's birth, and clock of its rupture or minus the time of its site's binding.
     life : array of uint32, shape (members, sites)
         Number of each site's life.
-    soonest : array, shape (members, 3, blocks)
-        First rupture, first binding and rearmost bond of each block of sites.
+    soonest : array, shape (members, 4, blocks)
+        First rupture, first binding, and births of the rearmost and (negative) of the foremost bond of each block of
+        sites.
     stamp : array of int, shape (members,)
         Steps that the large arrays have seen.
+    turned : array, shape (members, at most 128)
+        Sites of bonds that are ahead of a slider which has slipped back, each followed by the rest of its threshold.
     frame : array, shape (members, columns)
         Slider, time, clock, sums and steps of each member.
     """
@@ -798,6 +1071,7 @@ class Tracks(NamedTuple):
     life: Array
     soonest: Array
     stamp: Array
+    turned: Array
     frame: Array
 
 
@@ -852,8 +1126,9 @@ def start(
         birth=np.zeros((rows, sites)),
         due=np.zeros((rows, sites)),
         life=np.zeros((rows, sites), np.uint32),
-        soonest=np.zeros((rows, 3, blocks)),
+        soonest=np.zeros((rows, 4, blocks)),
         stamp=np.zeros(rows, np.int64),
+        turned=np.zeros((rows, 2 * min(sites, MOST_TURNED))),
         frame=np.zeros((rows, COLUMNS)),
     )
     _draw(
@@ -1027,7 +1302,7 @@ def _draw(tracks, chosen, begin, speed, rupture, rebinding_rate, seed, members) 
         speed,
         share,
         np.where(np.isinf(age), 0.0, age),
-        site_law(rupture, rebinding_rate),
+        site_law(rupture, rebinding_rate, turns=True),
         seed,
         np.asarray(members, dtype=np.uint64),
     )

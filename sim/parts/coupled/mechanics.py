@@ -773,18 +773,21 @@ def elastic(row, time, slider, contact, energy):
         return True
     if held_back and yields == 0.0:
         return True
-    slip, bound, moment, shift, radius, area = (
+    slip, bound, moment, shift, radius, area, by_moment = (
         0.0,
         row.bound,
         row.moment,
         0.0,
         row.radius,
         0.0,
+        0.0,
     )
-    for _ in range(40):
-        radius, area, _, by_moment = contact_area(
-            bound, moment + bound * slip, time, radius, contact
-        )
+    for turn in range(40):
+        # the area depends on the slip by the mean stress alone
+        if turn == 0 or contact.mean_stress != 0.0:
+            radius, area, _, by_moment = contact_area(
+                bound, moment + bound * slip, time, radius, contact
+            )
         if not area >= 0.0:
             return False
         yields, softer = compliance(radius, slider)

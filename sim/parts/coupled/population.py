@@ -236,7 +236,7 @@ class OneByOne(Stretched):
         tracks = tracks._replace(frame=tracks.frame.copy())
         frames = np.empty((*loop.after.radius.shape, tracks.frame.shape[1]))
         members = np.asarray(noise.members, dtype=np.uint64)
-        law = site_law(bonds.law, bonds.rebinding_rate)
+        law = site_law(bonds.law, bonds.rebinding_rate, turns=True)
         if advance_tracks(
             *loop.arguments, tuple(tracks), law, (noise.seed, members), frames
         ):

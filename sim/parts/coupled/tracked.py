@@ -55,14 +55,13 @@ class Ground(NamedTuple):
     sites: float
     law: tracked.SiteLaw
     address: tuple[int, int]
-    space: tuple[Array, ...]
+    scratch: Array
     winners: Array
 
 
 @device
-def _sums(tracks, ground, node):
+def _sums(frame, unit, sites, node):
     """Compute the share bound, sum of the stretches and of their squares over the sites, stretches over their unit."""
-    frame, unit, sites = tracks[2], ground.unit, ground.sites
     number, slider, births = (
         frame[tracked.BOUND],
         frame[tracked.SLIDER],
@@ -77,21 +76,34 @@ def _sums(tracks, ground, node):
 @device
 def _go(tracks, shift, duration, ground):
     """Advance the bonds by a displacement of the slider in a time."""
-    events, shifts, durations, laid, after = ground.space
-    shifts[0], durations[0] = shift * ground.unit, duration
-    ahead = shifts, durations
-    tracked.one_step(tracks, ahead, ground.law, ground.address, events, laid, after)
+    tracked.one_step(
+        tracks,
+        shift * ground.unit,
+        duration,
+        ground.law,
+        ground.address,
+        ground.scratch,
+    )
 
 
 @device
 def _go_at_once(tracks, shift, length, ground):
     """Displace the slider in no time; bonds whose stretch is limited may break."""
-    frame, along = tracks[2], tracks[2][tracked.SENSE] * shift * ground.unit
-    if frame[tracked.SINGLY] > 0.0 or along < 0.0 or ground.law.limit < math.inf:
+    frame, along, law = (
+        tracks[2],
+        tracks[2][tracked.SENSE] * shift * ground.unit,
+        ground.law,
+    )
+    turns = along < 0.0 and law.turns > 0.0 and frame[tracked.SINGLY] == 0.0
+    if turns and tracked.slip_back(tracks, along, law, ground.winners):
+        return
+    if frame[tracked.SINGLY] > 0.0 or along < 0.0 or law.limit < math.inf:
         _go(tracks, shift, _AT_ONCE * length, ground)
         return
-    tracked.rank(tracks, ground.law, ground.winners)
+    tracked.rank(tracks, law, ground.winners)
     tracked.let_pass(frame, along, 0.0, frame[tracked.CLOCK], ground.winners)
+    if frame[tracked.TURNED] > 0.0:
+        tracked.pass_turned(tracks, law, ground.winners)
 
 
 @device
@@ -115,7 +127,7 @@ def _rebalance(line, time, tracks, slider, contact, ground, energy, node):
     # each turn but the last ones breaks a bond
     for _ in range(_SETTLING + int(ground.sites)):
         energy.work = worked
-        _sums(tracks, ground, node)
+        _sums(tracks[2], ground.unit, ground.sites, node)
         row.bound, row.moment = node.bound, node.moment
         line[2] = row
         if not mechanics.elastic(trial, time, slider, contact, energy):
@@ -140,12 +152,12 @@ def _rebalance(line, time, tracks, slider, contact, ground, energy, node):
             row.moment + row.bound * slip,
             square + slip * (2.0 * row.moment + row.bound * slip),
         )
-        _, area, _, _ = mechanics.contact_area(
-            row.bound, row.moment, time, row.radius, contact
-        )
-        _sums(tracks, ground, node)
+        _sums(tracks[2], ground.unit, ground.sites, node)
         broken = not _same(node, row.bound, total)
         if broken:
+            _, area, _, _ = mechanics.contact_area(
+                row.bound, row.moment, time, row.radius, contact
+            )
             energy.rupture += 0.5 * area * (expected - node.square)
         if whole:
             line[0] = trial
@@ -330,6 +342,7 @@ def _to_event(row, start, left, tracks, slider, ground, energy, node):
         sense * first < 0.0
         or sense * last < 0.0
         or (stiffness == 0.0 and (damping == 0.0 or growth != 0.0))
+        or (frame[tracked.TURNED] > 0.0 and first != last)
     ):
         return -1.0, event
     tracked.rank(tracks, law, winners)
@@ -361,6 +374,13 @@ def _to_event(row, start, left, tracks, slider, ground, energy, node):
             else 0.0
         )
         event, clock = tracked.RUPTURE, rupture
+    turned = -1
+    if frame[tracked.TURNED] > 0.0:
+        time, turned = tracked.first_turned(tracks, last * ground.unit, time, law)
+        if turned >= 0:
+            event = tracked.RUPTURE
+            clock = frame[tracked.CLOCK] + grown * _clock(time, motion, pace)[0]
+        tracked.spend_turned(tracks, last * ground.unit, time, law)
     x = relaxes * time
     early, twice = mean_decay(x), mean_decay(2.0 * x)
     late = (
@@ -396,8 +416,12 @@ def _to_event(row, start, left, tracks, slider, ground, energy, node):
     )
     row.radius = node.radius
     tracked.let_pass(frame, math.fabs(slip) * ground.unit, time, clock, winners)
-    if event >= 0:
+    if turned >= 0:
+        tracked.break_turned(turned, tracks, law, ground.address, winners)
+    elif event >= 0:
         tracked.happen(tracks, event, law, ground.address, winners)
+    if frame[tracked.TURNED] > 0.0:
+        tracked.pass_turned(tracks, law, winners)
     return time, event
 
 
@@ -417,7 +441,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
         left = length - start
         if left <= mechanics.LEAST * length:
             return length, contact.stays
-        _sums(tracks, ground, first)
+        _sums(tracks[2], ground.unit, ground.sites, first)
         row.bound, row.moment = first.bound, first.moment
         at_start = begin_sub_step(row, first, start, slider, contact)
         if is_closed:
@@ -429,7 +453,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
                 start = length if event < 0 and time == left else start + time
                 slip, last.area = row.slip - slid, first.area
                 square = first.square + slip * (2.0 * first.moment + first.bound * slip)
-                _sums(tracks, ground, first)
+                _sums(tracks[2], ground.unit, ground.sites, first)
                 row.bound, row.moment = first.bound, first.moment
                 if event == tracked.RUPTURE:
                     energy.rupture += 0.5 * last.area * (square - first.square)
@@ -501,7 +525,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, books):
         )
         start = length if step == left else start + step
         _go(tracks, last.slip, step, ground)
-        _sums(tracks, ground, first)
+        _sums(tracks[2], ground.unit, ground.sites, first)
         row.bound, row.moment, row.acceleration = first.bound, first.moment, bend
         energy.rupture += 0.5 * last.area * (last.square - first.square)
         if cut or not _same(first, last.bound, last.moment):
@@ -523,7 +547,7 @@ def _through(line, books, pieces, slider, contact, tracks, ground, nodes):
         slider = mechanics.slider_in(slider, pieces[p])
         from_here = mechanics.later(mechanics.feeling(contact, row), time, stays)
         worked, before, lost = energy.work, energy.stored, energy.rupture
-        _sums(tracks, ground, first)
+        _sums(tracks[2], ground.unit, ground.sites, first)
         row.bound, row.moment = first.bound, first.moment
         if p > 0:
             before = stored_energy(row, first.square, 0.0, slider, from_here)
@@ -553,7 +577,7 @@ def _through(line, books, pieces, slider, contact, tracks, ground, nodes):
         time += reached
         if reached != slider.length:
             return time, False
-    _sums(tracks, ground, first)
+    _sums(tracks[2], ground.unit, ground.sites, first)
     row.bound, row.moment = first.bound, first.moment
     row.lost = stays - contact.stays
     contact = mechanics.later(mechanics.settled(contact, row, slider), 0.0, stays)
@@ -579,37 +603,36 @@ def advance_tracks(inputs, numbers, outputs, ends, tracks, law, address, frames)
         mechanics.contact_of(numbers),
         outputs,
     )
-    birth, due, life, soonest, stamp, frame = tracks
+    birth, due, life, soonest, stamp, turned, frame = tracks
     law = tracked.SiteLaw(*law)
     for m in range(len(rows)):
         if stamp[m] != np.int64(frame[m, tracked.STEPS]):
             return tracked.SPENT
-    space = (
-        tracked.room(),
-        np.empty(1),
-        np.empty(1),
-        np.empty(tracked.COLUMNS + 1),
-        np.empty((tracked.COLUMNS, 1)),
-    )
     width = 2 << np.int64(math.ceil(math.log2(soonest.shape[2])))
     at_end = np.empty((2, ends[0][4].size))
     rooms = (
         np.empty(3 * mechanics.COLUMNS),
         np.empty(2 * mechanics.ENERGIES),
         np.zeros(3, NODE),
-        np.empty((2, width)),
+        np.empty(tracked.SCRATCH),
+        np.empty(tracked.COLUMNS + turned.shape[1]),
+        np.empty((3 if law.turns > 0.0 else 2, width)),
     )
     for m in range(len(rows)):
-        (columns, booked, nodes, winners), work_room = borrowed(rooms), borrowed(space)
+        columns, booked, nodes, scratch, framed, winners = borrowed(rooms)
+        framed[: tracked.COLUMNS], framed[tracked.COLUMNS :] = frame[m], turned[m]
         # as they are, before a sub-step, in a trial
         line, books = columns.view(mechanics.ROW), booked.view(ENERGY)
-        stop, bonds = 0, borrowed(((birth[m], due[m], life[m]), soonest[m], frame[m]))
+        stop, bonds = (
+            0,
+            borrowed(((birth[m], due[m], life[m]), soonest[m], framed)),
+        )
         ground = Ground(
             units[mechanics.SLIP],
             np.float64(due.shape[1]),
             law,
             (seed, members[m]),
-            work_room,
+            scratch,
             winners,
         )
         columns, booked, winners[0, 0] = (
@@ -639,11 +662,16 @@ def advance_tracks(inputs, numbers, outputs, ends, tracks, law, address, frames)
                 pieces[start:stop],
                 slider.stiffness,
             )
-            reached[:, k, m], spent[k, m], frames[k, m] = rows[m], energies[m], frame[m]
+            reached[:, k, m], spent[k, m], frames[k, m] = (
+                rows[m],
+                energies[m],
+                framed[: tracked.COLUMNS],
+            )
             if mechanics.has_ended(line[0]):
                 # no sub-step has summed its bonds, which stay as they are
-                _sums(bonds, ground, nodes[0])
+                _sums(bonds[2], ground.unit, ground.sites, nodes[0])
                 line[0].bound, line[0].moment = nodes[0].bound, nodes[0].moment
             end_step(line[0], rows[m], m, k, clock[k, 5], now, ends, at_end)
+        frame[m], turned[m] = framed[: tracked.COLUMNS], framed[tracked.COLUMNS :]
         stamp[m] = np.int64(frame[m, tracked.STEPS])
     return 0

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers.direct import areas, gillespie, replay
 from helpers.driven import (
     AREA,
     LOAD,
@@ -23,11 +24,14 @@ from helpers.scenes import IN_TIME
 from numpy.testing import assert_allclose
 
 from sim import run
+from sim.numerics.noise import PARTS
 from sim.parts.bonds.models import Cohort, Tracked
 from sim.parts.bonds.rupture import Constant, CutOff
+from sim.parts.bonds.tracked import BOUND, MOST_TURNED, SINGLY, SQUARES, SUM, TURNED
 from sim.parts.drive import Force
 from sim.parts.shear import Banded
 from sim.read import stick_slip
+from sim.step.state import MemberNoise, pack, unpack
 
 
 def tracked(duration, steps, drive, sites, **keys):
@@ -233,3 +237,157 @@ def test_a_state_that_has_been_advanced_is_not_advanced_again():
     first, _ = next(states), next(states)
     with pytest.raises(RuntimeError, match="already been advanced"):
         list(march(scene, np.arange(1), first))
+
+
+def addressed(seed, member, sites):
+    """Thresholds and waiting times of all sites by numpy's Philox, for a number of their lives."""
+    key = np.array([seed, PARTS["bonds"]], dtype=np.uint64)
+
+    @functools.cache
+    def draw(life):
+        values = np.empty((2, sites))
+        for site in range(sites):
+            # numpy counts on before it draws; the first life of a bond has its threshold in the second word of lane 1
+            lane = int(life == 1)
+            counter = np.array([site, life, member, lane], dtype=np.uint64)
+            words = np.random.Philox(key=key, counter=counter).random_raw(4)
+            uniform = (words[lane : lane + 2] >> np.uint64(12)) * 2.0**-52
+            values[:, site] = -np.log1p(-uniform)
+        return values
+
+    return draw
+
+
+@pytest.mark.parametrize("share", [0.3, 1.0])
+@pytest.mark.parametrize("sites", [1, 2, 5, 20, 200])
+def test_bonds_that_a_growing_contact_turns_back_live_the_lives_of_their_draws(
+    sites, share
+):
+    duration = min(40.0, 2000.0 / sites)
+    steps, ends = 40, np.linspace(0.0, duration, 41)[1:]
+    drive = spring(0.1, speed=5.0)
+    scene = tracked(duration, steps, drive, sites, share=share, start="bonded")
+    states = list(march(scene, np.arange(2)))[1:]
+    for member in range(2):
+        draw = addressed(scene.seed, member, sites)
+        x, number = replay(0.1, ([math.inf], [5.0]), areas(sites, share), draw, ends)
+        own = [state.drive.position[member] / STRETCH for state in states]
+        assert_allclose(own, x, rtol=1e-12, atol=1e-10)
+        assert np.array_equal(
+            [state.bonds.frame[member, BOUND] for state in states], number
+        )
+
+
+def test_a_stage_that_reverses_turns_more_bonds_than_are_listed_and_they_live_their_lives():
+    # sub-steps of the reversal end at events but for a share of 1e-8
+    sites, speed, turn = 300, 5.0, 3.0
+    course = {
+        "time": (0.0, turn, turn, 2.0 * turn),
+        "value": (speed, speed, -speed, -speed),
+    }
+    course["value"] = tuple(value * STRETCH for value in course["value"])
+    scene = tracked(
+        2.0 * turn,
+        60,
+        spring(0.1, speed=course, tolerance=1e-10),
+        sites,
+        share=1.0,
+        start="bonded",
+    )
+    states = list(march(scene, np.arange(1)))[1:]
+    stage = [turn, math.inf], [speed, -speed]
+    times = np.linspace(0.0, 2.0 * turn, 61)[1:]
+    x, number = replay(
+        0.1, stage, areas(sites, 1.0), addressed(scene.seed, 0, sites), times
+    )
+    assert_allclose(
+        [state.drive.position[0] / STRETCH for state in states], x, rtol=0, atol=1e-6
+    )
+    assert np.array_equal([state.bonds.frame[0, BOUND] for state in states], number)
+    singly, turned = (
+        np.array([state.bonds.frame[0, column] for state in states])
+        for column in (SINGLY, TURNED)
+    )
+    assert singly.any()
+    assert not singly[-1]
+    assert np.max(turned) > 0
+
+
+def test_few_bonds_are_turned_at_a_time_so_that_an_event_costs_the_same_on_any_number_of_sites():
+    for sites in (20, 2000):
+        scene = tracked(
+            20.0 / sites + 1.0, 50, spring(0.1, speed=5.0), sites, share=1.0
+        )
+        states = list(march(scene, np.arange(1), keep=False))
+        frames = np.array([state.bonds.frame[0] for state in states])
+        assert not frames[:, SINGLY].any()
+        assert np.any(frames[:, TURNED] > 0.0)
+        assert np.all(frames[:, TURNED] < MOST_TURNED // 4)
+
+
+def test_the_sums_of_turned_bonds_are_those_of_the_sites_and_go_on_from_a_stored_state():
+    scene = tracked(40.0, 40, spring(0.1, speed=5.0), 50, share=1.0)
+    noise = MemberNoise.of(scene.seed, np.arange(2))
+    once, _ = scene.stepper.follow(noise, None, range(1, 41))
+    state, turned = scene.stepper.start(noise), 0.0
+    for step in range(1, 41):
+        stored = {name: array.copy() for name, array in pack(state).items()}
+        state = unpack(scene.parts, stored)
+        state, _ = scene.stepper.advance(state, noise, range(step, step + 1))
+        bonds = state.bonds
+        births = np.where(np.signbit(bonds.due), 0.0, bonds.birth)
+        scale = STRETCH * 50
+        assert_allclose(
+            births.sum(axis=1), bonds.frame[:, SUM], rtol=0, atol=1e-12 * scale
+        )
+        assert_allclose(
+            np.square(births).sum(axis=1),
+            bonds.frame[:, SQUARES],
+            rtol=0,
+            atol=1e-12 * scale * STRETCH * 16,
+        )
+        turned += bonds.frame[:, TURNED].sum()
+    assert turned > 0.0
+    for name, array in pack(once).items():
+        assert np.array_equal(array, pack(state)[name], equal_nan=True), name
+
+
+@pytest.mark.parametrize(
+    ("sites", "members", "duration"),
+    [
+        (5, 1000, 4.0),
+        (20, 300, 4.0),
+        *(
+            pytest.param(*case, marks=pytest.mark.verify)
+            for case in ((200, 200, 4.0), (2000, 24, 2.0), (20_000, 8, 0.5))
+        ),
+    ],
+)
+def test_force_bonds_and_slips_have_the_laws_of_the_direct_method_that_sums_over_all_sites(
+    sites, members, duration
+):
+    stiffness, speed, steps = 0.1, 5.0, round(4 * sites * duration)
+    drive = spring(stiffness, speed=speed)
+    scene = tracked(duration, steps, drive, sites, share=1.0, start="bonded")
+    noise = MemberNoise.of(scene.seed, np.arange(members))
+    times = np.linspace(0.0, duration, steps + 1)[1:]
+    trajectory = scene.stepper.follow(noise, None, range(1, steps + 1))[1]
+    area = areas(sites, 1.0)
+    ours = trajectory.position.T / STRETCH, 0.5 * sites * trajectory.fraction.T
+    own = [
+        gillespie(stiffness, speed, area, times, np.random.default_rng(member))
+        for member in range(members)
+    ]
+    samples = []
+    for x, number in (ours, np.swapaxes(own, 0, 1)):
+        late = times > 0.5 * duration
+        force, slips = (speed * times - x)[:, late], np.diff(x, axis=1)[:, late[1:]]
+        values = (force, number[:, late], slips, slips < 0.0)
+        samples.append(
+            [np.mean(value, axis=1) for value in values]
+            + [np.mean(np.square(value), axis=1) for value in values[:3]]
+            + [np.mean(force**3, axis=1), np.mean(force * number[:, late], axis=1)]
+        )
+    for first, second in zip(*samples, strict=True):
+        error = math.sqrt((np.var(first, ddof=1) + np.var(second, ddof=1)) / members)
+        assert abs(np.mean(first) - np.mean(second)) < 5.0 * error
