@@ -31,6 +31,10 @@ class ElasticSolid(Protocol):
     poisson_ratio: float
 
     @property
+    def held_ratio(self) -> float:
+        """Poisson ratio of the half-space that is as compliant without normal stress as this one at short waves [1]."""
+
+    @property
     def unit(self) -> "ElasticSolid":
         """This solid at a shear modulus of 1 Pa, for results that many moduli share."""
 
@@ -43,10 +47,16 @@ class ElasticSolid(Protocol):
         """Compliance of waves far shorter than any length of the solid, with which finite discs are computed."""
 
     def compliance(self, qx: ArrayLike, qy: ArrayLike) -> Array:
-        """Return the displacement per shear stress at wavevectors [m/Pa], without normal stress; 0 at q = 0."""
+        """Return the displacement per shear stress at wavevectors [m/Pa], 0 at q = 0.
+
+        The normal displacement is held, because the sphere is smooth and does not yield to fluctuations.
+        """
 
     def tangential_compliance(self, radius: float) -> float:
-        """Return 1/k_t [m/N]: the mean displacement of a disc of a radius [m] over the force of a uniform stress."""
+        """Return 1/k_t [m/N]: the mean displacement of a disc of a radius [m] over the force of a uniform stress.
+
+        There is no normal stress, because the sphere is free to rise.
+        """
 
     def mean_stress_energy(self, radius: ArrayLike, stress: ArrayLike) -> Array:
         """Return the energy per new area of a disc of a radius [m] under a uniform shear stress [Pa], in J/m²."""
@@ -73,7 +83,7 @@ class ElasticSolid(Protocol):
 
 @dataclass(frozen=True)
 class HalfSpace(ElasticSolid):
-    """Elastic half-space; the coupling of shear stress and normal displacement at ν ≠ 1/2 is neglected.
+    """Elastic half-space under a rigid sphere, or the half-space that is as compliant as two elastic bodies together.
 
     Parameters
     ----------
@@ -81,10 +91,14 @@ class HalfSpace(ElasticSolid):
         G [Pa].
     poisson_ratio : float
         nu [1].
+    coupling : float, optional
+        Relative normal displacement per shear stress along its wave, times G q [1], ``laws.halfspace.coupling``. By
+        default (1 - 2 nu)/2, that of one body. At 0 nothing is coupled, as between two equal bodies.
 
     Notes
     -----
-    ``ΔΓ = (1/8π²) ∫ d²q C (1 - ν qx²/q²) / (G q)`` of a spectrum C (Menga, Carbone & Dini at ν = 1/2).
+    ``ΔΓ = (1/8π²) ∫ d²q C (1 - ν_h qx²/q²) / (G q)`` of a spectrum C (Menga, Carbone & Dini at ν = 1/2), with the
+    ``held_ratio`` ν_h = ν + coupling²/(1 - ν), because the sphere holds the normal displacement.
 
     Examples
     --------
@@ -99,6 +113,14 @@ class HalfSpace(ElasticSolid):
 
     shear_modulus: float
     poisson_ratio: float = 0.5
+    coupling: float | None = None
+
+    @property
+    def held_ratio(self) -> float:
+        coupling = self.coupling
+        if coupling is None:
+            coupling = halfspace.coupling(1.0, self.poisson_ratio)
+        return halfspace.held_ratio(self.poisson_ratio, coupling)
 
     @property
     def unit(self) -> "HalfSpace":
@@ -112,12 +134,12 @@ class HalfSpace(ElasticSolid):
     @property
     def softness(self) -> Softness:
         """Compliance of waves of any length."""
-        level, swing = halfspace.angular_compliance(self.poisson_ratio)
+        level, swing = halfspace.angular_compliance(self.held_ratio)
         return Softness(level / self.shear_modulus, swing / self.shear_modulus)
 
     def compliance(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         return np.asarray(
-            halfspace.compliance(qx, qy, self.shear_modulus, self.poisson_ratio)
+            halfspace.compliance(qx, qy, self.shear_modulus, self.held_ratio)
         )
 
     def tangential_compliance(self, radius: float) -> float:

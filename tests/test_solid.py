@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 
 from sim.laws import halfspace
 from sim.parts import shear
+from sim.parts.contact.models import Solid
 from sim.parts.shear.process import Time
 from sim.solid import ElasticSolid, HalfSpace
 from sim.spectrum import (
@@ -64,6 +65,61 @@ def test_the_quadrature_of_the_compliance_is_the_closed_form_of_the_half_space(n
         solid = HalfSpace(1.7, poisson_ratio)
         by_quadrature = ElasticSolid.stored_energy(solid, stress)
         assert_allclose(by_quadrature, solid.stored_energy(stress), rtol=rtol, atol=0)
+
+
+def surface(poisson_ratio, shear_modulus, side):
+    """Return U, W, shear and normal stress at the face z = 0 of two solutions in a body, as rows of a matrix.
+
+    The body fills z < 0 for ``side`` 1 and z > 0 for -1. The displacement is (iU, W) exp(ix), each solution
+    exp(\\|z\\|) smaller inside: U = W = 1 and U = z, W = z - (3 - 4ν).
+    """
+    rest = 2.0 - 4.0 * poisson_ratio
+    return np.array(
+        [
+            [1.0, 0.0],
+            [side, -side * (1.0 + rest)],
+            [2.0 * side * shear_modulus, -side * rest * shear_modulus],
+            [2.0 * shear_modulus, -4.0 * (1.0 - poisson_ratio) * shear_modulus],
+        ]
+    )
+
+
+@pytest.mark.parametrize("ratios", [(0.3, 0.1), (0.3, 0.3), (0.5, 0.0), (0.1, 0.5)])
+def test_two_bodies_slip_past_each_other_as_their_equations_say_without_coming_apart(
+    ratios,
+):
+    moduli = 2.0, 7.0
+    for (low, other), (soft, hard) in ((ratios, moduli), (ratios, (3.0, 3.0))):
+        first, second = surface(low, soft, 1.0), surface(other, hard, -1.0)
+        zero = np.zeros(2)
+        system = np.array(
+            [
+                [*(first[1]), *(-second[1])],
+                [*(first[2]), *zero],
+                [*zero, *(second[2])],
+                [*(first[3]), *(-second[3])],
+            ]
+        )
+        weights = np.linalg.solve(system, [0.0, 1.0, 1.0, 0.0])
+        slip = first[0] @ weights[:2] - second[0] @ weights[2:]
+        body = {"shear_modulus": hard, "poisson_ratio": other}
+        solid = Solid(shear_modulus=soft, poisson_ratio=low, counter_body=body).elastic
+        assert_allclose(solid.compliance(1.0, 0.0), slip, rtol=1e-14, atol=0)
+        across = 1.0 / soft + 1.0 / hard
+        assert_allclose(solid.compliance(0.0, 1.0), across, rtol=1e-14, atol=0)
+
+
+def test_a_rigid_sphere_stiffens_a_compressible_solid_and_no_other():
+    spectrum = Gaussian(2.0, 0.7)
+    for poisson_ratio in (0.0, 0.1, 0.3, 0.5):
+        solid = HalfSpace(1.7, poisson_ratio)
+        # (7 - 8ν)/(32π(1 - ν)G) ∫ C dq of an isotropic spectrum
+        level = (7.0 - 8.0 * poisson_ratio) / (32.0 * math.pi * (1.0 - poisson_ratio))
+        exact = level / 1.7 * spectrum.line_integral
+        assert_allclose(solid.stored_energy(spectrum), exact, rtol=1e-14, atol=0)
+        rigid = Solid(shear_modulus=1.7, poisson_ratio=poisson_ratio).elastic
+        assert rigid.held_ratio == solid.held_ratio
+    assert HalfSpace(1.7).held_ratio == 0.5
 
 
 def test_the_force_of_a_uniform_stress_does_the_work_that_the_solid_stores():

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from sim.laws.halfspace import in_series
+from sim.laws.halfspace import coupling, in_series
 from sim.numerics.jit import kernel
 from sim.parts.contact.balance import (
     AHEAD,
@@ -86,7 +86,8 @@ class Solid(Body):
     shear_modulus, youngs_modulus : float or str, one of the two
         G or E [Pa].
     poisson_ratio : float
-        nu [1]; the theory is that of 0.5, other values neglect the normal-tangential coupling.
+        nu [1]; the theory is that of 0.5. At other values the coupling of the mean shear stress with the pressure is
+        neglected.
     counter_body : Body, optional
         An elastic sphere; without it the sphere is rigid.
 
@@ -106,13 +107,16 @@ class Solid(Body):
     def elastic(self) -> ElasticSolid:
         """The half-space that yields as the two bodies together.
 
-        The bodies' 1/G and nu/G add, and with them both the tangential and the normal compliance.
+        The bodies' 1/G and nu/G add, and with them both the tangential and the normal compliance. Their couplings of
+        shear stress with normal displacement subtract.
         """
         own = self.own_shear_modulus, self.poisson_ratio
         if self.counter_body is None:
             return HalfSpace(*own)
         other = self.counter_body
-        return HalfSpace(*in_series(*own, other.own_shear_modulus, other.poisson_ratio))
+        bodies = *own, other.own_shear_modulus, other.poisson_ratio
+        modulus, ratio = in_series(*bodies)
+        return HalfSpace(modulus, ratio, coupling(*bodies))
 
     @property
     def contact_modulus(self) -> float:

@@ -123,7 +123,7 @@ class Passing:
                 pixel,
                 self.radii,
                 self.solid.shear_modulus,
-                self.solid.poisson_ratio,
+                self.solid.held_ratio,
                 self._discs,
             )
             self._rows[place] = energies / self.solid.stored_energy(self.field)

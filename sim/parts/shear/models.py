@@ -625,7 +625,7 @@ class Carried(ShearModel):
             rows.append(("inside of the contact", f"{field.inside:.1%} of the map"))
         if field.noise:
             pixel = math.sqrt(field.lattice.pixel)
-            of_solid = solid.shear_modulus, solid.poisson_ratio
+            of_solid = solid.shear_modulus, solid.held_ratio
             noise = noise_energy(field.noise, pixel, *of_solid)
             rows.append(
                 (
