@@ -12,12 +12,29 @@ cases follow.
   constraint. It is a quarter of the free one for long waves, and equal to it for short ones.
 
 All functions of ``x = q h`` are written in exp(-2x), so that nothing overflows.
+
+**Normal contact.** A rigid frictionless punch that touches a disc of radius a solves Fredholm's equation
+
+    ``f(s) - (2/pi) int_0^a K(s, t) f(t) dt = 1 or s^2``,  ``K(s, t) = int_0^inf (1 - 2 normal(qh)) cos qs cos qt dq``
+
+with 1 for a flat punch (f_1) and s^2 for the profile of a sphere (f_2). Its pressure near the edge is
+``(4G/pi)(delta f_1(a) - f_2(a)/R)/sqrt(a^2 - r^2)``. At a = 1 the contact needs the edge values e_1 and e_2 of the two
+functions and three integrals: g_1 of f_1, g_2 of f_2 and g_3 of s^2 f_2. They depend on x = a/h alone, and
+``layer_table`` has them. A half-space has e_1 = e_2 = g_1 = 1, g_2 = 1/3 and g_3 = 1/5. Load, energy release rate and
+elastic energy at an indentation delta are then
+
+    ``P = 8G (delta a g_1 - a^3 g_2/R)``,  ``(2G/(pi a)) (delta e_1 - a^2 e_2/R)^2``  and
+    ``U = 4G (delta^2 a g_1 - 2 delta a^3 g_2/R + a^5 g_3/R^2)``.
+
+What is released is no longer stored, so that the slopes over x of x g_1, x^3 g_2 and x^5 g_3 are e_1^2, x^2 e_1 e_2 and
+x^4 e_2^2.
 """
 
 import math
 
 import numpy as np
 
+from sim.laws.layer_table import TABLE, TURN, WIDEST
 from sim.numerics.jit import device, law
 
 #: x below which the compliance at held normal displacement is a quotient of power series, whose terms are positive.
@@ -184,3 +201,136 @@ def compliance(qx, qy, thickness, shear_modulus):
     x, cosine, sine = q * thickness, qx / size, qy / size
     level = along_held(x) * cosine**2 + across(x) * sine**2
     return level / (shear_modulus * size)
+
+
+@device
+def growth(x):
+    """Return about how e_1 and e_2 grow with x = a/h, (1 + x)^(3/2), which the table leaves out."""
+    return (1.0 + x) * math.sqrt(1.0 + x)
+
+
+@device
+def _tabulated(x):
+    """Return e_1, its slope over x, e_2, its slope, g_1, g_2 and g_3 at x = a/h up to ``WIDEST``; Clenshaw's sums."""
+    reach = 2.0 * (WIDEST + TURN) / WIDEST
+    t, t_x = reach * x / (x + TURN) - 1.0, reach * TURN / ((x + TURN) * (x + TURN))
+    a = b = c = d = e = 0.0
+    a_last = b_last = c_last = d_last = e_last = 0.0
+    a_slope = b_slope = a_slope_last = b_slope_last = 0.0
+    for k in range(TABLE.shape[0] - 1, 0, -1):
+        a_slope, a_slope_last = 2.0 * (a + t * a_slope) - a_slope_last, a_slope
+        b_slope, b_slope_last = 2.0 * (b + t * b_slope) - b_slope_last, b_slope
+        a, a_last = TABLE[k, 0] + 2.0 * t * a - a_last, a
+        b, b_last = TABLE[k, 1] + 2.0 * t * b - b_last, b
+        c, c_last = TABLE[k, 2] + 2.0 * t * c - c_last, c
+        d, d_last = TABLE[k, 3] + 2.0 * t * d - d_last, d
+        e, e_last = TABLE[k, 4] + 2.0 * t * e - e_last, e
+    a_slope = t_x * (a + t * a_slope - a_slope_last)
+    b_slope = t_x * (b + t * b_slope - b_slope_last)
+    a = TABLE[0, 0] + t * a - a_last
+    b = TABLE[0, 1] + t * b - b_last
+    c = TABLE[0, 2] + t * c - c_last
+    d = TABLE[0, 3] + t * d - d_last
+    e = TABLE[0, 4] + t * e - e_last
+    size, bend = growth(x), 1.5 / (1.0 + x)
+    cube = size * size
+    return (
+        size * a,
+        size * (a_slope + bend * a),
+        size * b,
+        size * (b_slope + bend * b),
+        cube * c,
+        cube * d,
+        cube * e,
+    )
+
+
+@device
+def contact_functions(x):
+    """Return e_1, its slope over x, e_2, its slope, g_1, g_2 and g_3 at x = a/h.
+
+    They are good to 1e-10 up to ``WIDEST``. Beyond, e_1 and e_2 are continued by powers of x and the integrals follow
+    from them, so that a search which passes there finds its way back. No result is given there.
+    """
+    if not x > WIDEST:
+        return _tabulated(x)
+    e1, e1_slope, e2, e2_slope, g1, g2, g3 = _tabulated(WIDEST)
+    p, q, ratio = WIDEST * e1_slope / e1, WIDEST * e2_slope / e2, x / WIDEST
+    first, mixed, last = 2.0 * p + 1.0, p + q + 3.0, 2.0 * q + 5.0
+    g1 = (g1 + e1 * e1 * (ratio**first - 1.0) / first) / ratio
+    g2 = (g2 + e1 * e2 * (ratio**mixed - 1.0) / mixed) / ratio**3
+    g3 = (g3 + e2 * e2 * (ratio**last - 1.0) / last) / ratio**5
+    e1, e2 = e1 * ratio**p, e2 * ratio**q
+    return e1, p * e1 / x, e2, q * e2 / x, g1, g2, g3
+
+
+@device
+def sphere(radius, curvature, modulus, inverse_thickness):
+    """Return the terms of a sphere on a layer at a contact radius, as ``sim.laws.equilibrium.half_space``."""
+    x = radius * inverse_thickness
+    e1, e1_slope, e2, e2_slope, g1, g2, _ = contact_functions(x)
+    share = e2 / e1
+    share_slope = (e2_slope - share * e1_slope) / e1 * inverse_thickness
+    depth = radius * radius * curvature * share
+    growth = radius * curvature * (2.0 * share + radius * share_slope)
+    flat = 2.0 * modulus * radius
+    load = flat * (depth * g1 - radius * radius * curvature * g2)
+    rise, toll_slope = 2.0 * modulus * e1 * e1, 2.0 * math.pi / (modulus * e1 * e1)
+    bend = 1.0 - 2.0 * x * e1_slope / e1
+    return (
+        depth,
+        growth,
+        load,
+        flat * g1,
+        rise,
+        toll_slope * radius,
+        toll_slope * bend,
+    )
+
+
+@law
+def contact_function(which, x):
+    """Return one of the functions of a contact on a layer.
+
+    Parameters
+    ----------
+    which : float or array
+        0 and 1 for e_1 and its slope over x, 2 and 3 for e_2 and its slope, 4, 5 and 6 for g_1, g_2 and g_3.
+    x : float or array
+        a/h [1], at least 0.
+
+    Examples
+    --------
+    A flat punch as wide as a layer is thick is 3.6 times as stiff as on a half-space:
+
+    >>> print(f"{contact_function(4, 1.0):.4f}")
+    3.6187
+    """
+    return contact_functions(x)[int(which)]
+
+
+@law
+def elastic_energy(radius, indentation, sphere_radius, modulus, thickness):
+    """Return the elastic energy of a contact of any radius and indentation [J].
+
+    Parameters
+    ----------
+    radius, indentation, sphere_radius, modulus, thickness : float or array
+        a [m], delta [m], R [m], E* = 4G [Pa], h [m].
+
+    Notes
+    -----
+    ``E* (delta^2 a g_1 - 2 delta a^3 g_2/R + a^5 g_3/R^2)``. Its slope over delta is the load, that over the area is
+    the energy release rate with the sign turned.
+
+    Examples
+    --------
+    A contact as wide as the layer is thick stores nearly four times the energy of a flat punch on a half-space:
+
+    >>> print(f"{elastic_energy(1.0, 1.0, 1e9, 1.0, 1.0):.3f} {elastic_energy(1.0, 1.0, 1e9, 1.0, 1e9):.3f}")
+    3.619 1.000
+    """
+    _, _, _, _, g1, g2, g3 = contact_functions(radius / thickness)
+    sphere = radius * radius / sphere_radius
+    square = indentation * indentation * g1 - 2.0 * indentation * sphere * g2
+    return modulus * radius * (square + sphere * sphere * g3)

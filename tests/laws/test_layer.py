@@ -3,10 +3,12 @@
 import mpmath
 import numpy as np
 import pytest
+from helpers.layer_punch import contact
 from mpmath import mp
 from numpy.testing import assert_allclose
 
 from sim.laws import halfspace, layer
+from sim.laws.layer_table import WIDEST
 
 #: Wavenumber times thickness, on both sides of the place at which the series end.
 PLACES = [1e-4, 0.01, 0.3, 0.999, 1.001, 2.0, 7.0, 30.0]
@@ -70,3 +72,69 @@ def test_a_layer_is_a_half_space_under_short_waves_and_sheared_as_a_whole_under_
     # h/G across the wave; along it h/(4G), because what moves at the surface flows back below it
     thin = layer.compliance([1e-6, 0.0, 6e-7], [0.0, 1e-6, 8e-7], 2.0, 3.0)
     assert_allclose(thin, [1 / 6, 2 / 3, 0.36 / 6 + 0.64 * 2 / 3], rtol=1e-10, atol=0)
+
+
+#: e_1, e_2, g_1 and g_2 at a/h, on which five discretisations of Fredholm's equation agree.
+KNOWN = {
+    0.0: (1.0, 1.0, 1.0, 1.0 / 3.0),
+    0.1: (1.12508943403, 1.04157919393, 1.12598726745, 0.375209130905),
+    0.25: (1.35400626014, 1.11616204626, 1.36947015845, 0.454403101666),
+    0.5: (1.80467379042, 1.25649746179, 1.93293437085, 0.626527820868),
+    1.0: (2.77210138427, 1.55075644191, 3.61873584896, 1.08404342249),
+    2.0: (4.83714884188, 2.20043265647, 9.1494504521, 2.43003021019),
+    3.0: (7.16076267584, 2.91785655067, 18.1573993806, 4.49215040165),
+    5.0: (12.5621664435, 4.51138413694, 50.1397379684, 11.3755492164),
+    8.0: (22.3075626955, 7.25285046803, 146.320433719, 30.8122914458),
+}
+E1, E1_SLOPE, E2, E2_SLOPE, G1, G2, G3 = range(7)
+
+
+def functions(x):
+    """Return e_1, e_2, g_1, g_2 and g_3 of the table."""
+    return np.array(
+        [layer.contact_function(which, x) for which in (E1, E2, G1, G2, G3)]
+    )
+
+
+def test_the_contact_functions_have_their_known_values():
+    values = functions(np.array(list(KNOWN)))[:4].T
+    assert_allclose(values, list(KNOWN.values()), rtol=1e-11, atol=0)
+
+
+# 1e-10 is what a user is told; the numbers of both sides carry some 2e-11 at the end of the table
+@pytest.mark.parametrize(
+    "x", [1e-8, 1e-3, 0.04, 0.7, 1.7, 3.3, 6.1, 14.0, 33.0, 61.0, 79.9]
+)
+def test_the_contact_functions_solve_fredholms_equation(x):
+    assert_allclose(functions(x), contact(x), rtol=5e-11 if x > 20 else 1e-11, atol=0)
+
+
+def test_a_contact_much_wider_than_the_layer_is_that_of_a_thin_film():
+    x = np.linspace(20.0, WIDEST, 200)
+    film = 3.0 * np.pi / 64.0 * x**3 * (1.0 + 1.458 / x) ** 4
+    assert_allclose(layer.contact_function(G1, x), film, rtol=5e-4, atol=0)
+    # under a sphere without adhesion the pressure of a film vanishes at the edge with its slope: e_2/e_1 = 1/4
+    excess = layer.contact_function(E2, x) / layer.contact_function(E1, x) - 0.25
+    assert np.all((excess * x > 0.6) & (excess * x < 0.8))
+
+
+def test_the_energy_that_a_growing_contact_releases_is_the_slope_of_what_it_stores():
+    for x in (0.01, 0.3, 1.0, 4.0, 20.0, 70.0, 90.0, 300.0):
+        e1, e2 = functions(x)[:2]
+        for which, power, slope in (
+            (G1, 1, e1 * e1),
+            (G2, 3, x**2 * e1 * e2),
+            (G3, 5, x**4 * e2 * e2),
+        ):
+            step = 1e-3 * x * np.array([-2.0, -1.0, 1.0, 2.0])
+            values = (x + step) ** power * layer.contact_function(which, x + step)
+            # four points: an error of (1e-3)⁴/30 of the fifth derivative
+            difference = values @ [1.0, -8.0, 8.0, -1.0] / (12e-3 * x)
+            assert_allclose(difference, slope, rtol=1e-9, atol=0)
+        for which in (E1, E2):
+            values = layer.contact_function(which, x + step)
+            difference = values @ [1.0, -8.0, 8.0, -1.0] / (12e-3 * x)
+            known = layer.contact_function(which + 1, x)
+            assert_allclose(difference, known, rtol=1e-9, atol=1e-12 * values[0] / x)
+    beyond, end = (functions(x) for x in (np.nextafter(WIDEST, 99.0), WIDEST))
+    assert_allclose(beyond, end, rtol=1e-13, atol=0)
