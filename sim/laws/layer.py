@@ -266,7 +266,7 @@ def contact_functions(x):
 
 @device
 def sphere(radius, curvature, modulus, inverse_thickness):
-    """Return the terms of a sphere on a layer at a contact radius, as ``sim.laws.equilibrium.half_space``."""
+    """Return the terms of a sphere on a layer at a contact radius, as ``sim.laws.equilibrium.punch``."""
     x = radius * inverse_thickness
     e1, e1_slope, e2, e2_slope, g1, g2, _ = contact_functions(x)
     share = e2 / e1
@@ -307,30 +307,3 @@ def contact_function(which, x):
     3.6187
     """
     return contact_functions(x)[int(which)]
-
-
-@law
-def elastic_energy(radius, indentation, sphere_radius, modulus, thickness):
-    """Return the elastic energy of a contact of any radius and indentation [J].
-
-    Parameters
-    ----------
-    radius, indentation, sphere_radius, modulus, thickness : float or array
-        a [m], delta [m], R [m], E* = 4G [Pa], h [m].
-
-    Notes
-    -----
-    ``E* (delta^2 a g_1 - 2 delta a^3 g_2/R + a^5 g_3/R^2)``. Its slope over delta is the load, that over the area is
-    the energy release rate with the sign turned.
-
-    Examples
-    --------
-    A contact as wide as the layer is thick stores nearly four times the energy of a flat punch on a half-space:
-
-    >>> print(f"{elastic_energy(1.0, 1.0, 1e9, 1.0, 1.0):.3f} {elastic_energy(1.0, 1.0, 1e9, 1.0, 1e9):.3f}")
-    3.619 1.000
-    """
-    _, _, _, _, g1, g2, g3 = contact_functions(radius / thickness)
-    sphere = radius * radius / sphere_radius
-    square = indentation * indentation * g1 - 2.0 * indentation * sphere * g2
-    return modulus * radius * (square + sphere * sphere * g3)

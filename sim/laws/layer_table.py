@@ -1,6 +1,6 @@
 """Contact functions of a bonded incompressible layer, see ``sim.laws.layer``: their Chebyshev coefficients.
 
-Rows are orders. Columns are e_1/(1 + x)^(3/2), e_2/(1 + x)^(3/2), g_1/(1 + x)^3, g_2/(1 + x)^3 and g_3/(1 + x)^3, x = a/h.
+Rows are orders. Columns are e_1 and e_2 over (1 + x)^(3/2), and g_1, g_2 and g_3 over (1 + x)^3, where x = a/h.
 The variable is t = 2 u/u_last - 1 with u = x/(x + TURN), and u_last is that of WIDEST.
 ``tests/helpers/layer_punch.py`` computes the numbers, and a test compares the two.
 """

@@ -6,11 +6,9 @@ exceeds the work of adhesion w. Otherwise it heals, with a separate speed and ex
 one stays finite and defined for w <= 0, where stress fluctuations outweigh adhesion. Limits: infinite speed is the JKR
 equilibrium, zero speed a frozen edge.
 
-One formula serves every control. The sphere is pressed with ``P = load + stiffness (displacement - delta)``:
-stiffness 0 is a load, an infinite one an indentation. With ``lambda = stiffness/(stiffness + 2 E* a)``
-and ``mu = 1/(stiffness + 2 E* a)`` the indentation missing from Hertz's at this radius is
-
-    y = a^2/R - delta = lambda (a^2/R - displacement) + mu (4 E* a^3/(3R) - load),   G = E* y^2/(2 pi a).
+One formula serves every control and solid. The sphere is pressed with ``P = load + stiffness (displacement - delta)``:
+stiffness 0 is a load, an infinite one an indentation. ``sim.laws.equilibrium`` has the indentation y that is missing
+from Hertz's at this radius, and G is y^2 over the sixth term of its ``punch``, E* y^2/(2 pi a) on a half-space.
 
 Integration. Radau IIA of three stages (order 5, L-stable; Hairer & Wanner, Solving ODEs II, IV.8) takes steps of its
 own choice inside the clock step. If the edge opens completely, the radius drops to zero in finite time with an infinite
@@ -31,9 +29,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.laws.equilibrium import half_space, largest_radius, missing_depth
+from sim.laws.equilibrium import (
+    elastic_energy,
+    largest_radius,
+    load_fold,
+    missing_depth,
+    punch,
+)
 from sim.numerics.jit import device, kernel
-from sim.numerics.special import cube_root
 from sim.parts.contact.balance import SHARE, Balance
 from sim.parts.exchange import Array, ContactState
 from sim.spectrum.radial import PLANE, share_of
@@ -50,19 +53,8 @@ def excess(t, a, scene):
     Below Hertz's radius G continues as -G: only a monotone continuation for the inner
     solver, which never ends there.
     """
-    (
-        modulus,
-        curvature,
-        stiffness,
-        load,
-        load_rate,
-        base,
-        base_rate,
-        work,
-        work_rate,
-        scale,
-    ) = scene
-    terms = half_space(a, (curvature, modulus))
+    body, stiffness, load, load_rate, base, base_rate, work, work_rate, scale = scene
+    terms = punch(a, body)
     mount = load + load_rate * t, base + base_rate * t, stiffness
     y, y_a = missing_depth(terms, mount)
     y_t = -base_rate
@@ -70,7 +62,8 @@ def excess(t, a, scene):
         y_t = -(stiffness * base_rate + load_rate) / (stiffness + terms[3])
     unit = abs(y) / (terms[5] * scale)
     s = unit * y - (work + work_rate * t) / scale
-    return y, s, unit * (2.0 * y_a - y / a), 2.0 * unit * y_t - work_rate / scale
+    s_a = unit * (2.0 * y_a - y * terms[6] / terms[5])
+    return y, s, s_a, 2.0 * unit * y_t - work_rate / scale
 
 
 @device
@@ -104,26 +97,25 @@ def bare_force(t, scene):
 @device
 def hertz_force(a, scene):
     """Return the bare force of Hertz's contact of radius a."""
-    hertz = a * a * scene.curvature
-    return (
-        hertz
-        if scene.stiffness == math.inf
-        else hertz * (scene.stiffness + 4.0 / 3.0 * scene.modulus * a)
-    )
+    depth, _, load, _, _, _, _ = punch(a, scene.body)
+    return depth if scene.stiffness == math.inf else scene.stiffness * depth + load
 
 
 @device
 def hertz_radius(t, scene):
     """Return Hertz's radius under the control at t; 0 if the control does not press."""
-    curvature, modulus, force = scene.curvature, scene.modulus, bare_force(t, scene)
+    (curvature, modulus, inverse_thickness), force = scene.body, bare_force(t, scene)
     if not force > 0.0:
         return 0.0
     if scene.stiffness == math.inf:
-        return math.sqrt(force / curvature)
-    start = np.cbrt(0.75 * force / (curvature * modulus))
+        start = math.sqrt(force / curvature)
+        if inverse_thickness == 0.0:
+            return start
+    else:
+        start = np.cbrt(0.75 * force / (curvature * modulus))
     load, base = scene.load + scene.load_rate * t, scene.base + scene.base_rate * t
     mount = load, base, scene.stiffness
-    return largest_radius(start, 0.0, 0.0, mount, (curvature, modulus))[0]
+    return largest_radius(start, 0.0, 0.0, mount, scene.body)[0]
 
 
 @device
@@ -131,11 +123,12 @@ def pushed(t, scene, front):
     """Return True if Hertz's contact at t grows faster than the edge heals, and its radius."""
     a, stiffness, indenting = hertz_radius(t, scene), scene.stiffness, scene.base_rate
     rate, _ = edge_speed(-(scene.work + scene.work_rate * t) / scene.scale, front)
+    _, growth, _, contact_stiffness, _, _, _ = punch(a, scene.body)
     if stiffness < math.inf:
         indenting = (scene.load_rate + stiffness * indenting) / (
-            stiffness + 2.0 * scene.modulus * a
+            stiffness + contact_stiffness
         )
-    return rate <= indenting / (2.0 * a * scene.curvature), a
+    return rate <= indenting / growth, a
 
 
 _S6 = math.sqrt(6.0)
@@ -168,11 +161,10 @@ class Kinetics(NamedTuple):
     heal_exponent: float
 
 
-#: Contact modulus, curvature of the sphere, stiffness; load, displacement of the base and work of adhesion at the
-#: start, each with its rate; unit of the excess.
+#: Sphere and solid as in ``punch``, stiffness; load, displacement of the base and work of adhesion at the start, each
+#: with its rate; unit of the excess.
 Scene = namedtuple(
-    "Scene",
-    "modulus curvature stiffness load load_rate base base_rate work work_rate scale",
+    "Scene", "body stiffness load load_rate base base_rate work work_rate scale"
 )
 #: Speed and power of an opening edge, and of a healing one.
 Front = namedtuple("Front", "speed power heal_speed heal_power")
@@ -391,7 +383,7 @@ def _piece(t, a, stop, least, tries, scene, front):
         tries -= 1
         y, s, s_a, s_t = excess(t, a, scene)
         rate, bend = edge_speed(s, front)
-        if y <= _TOUCH * a * a * scene.curvature and pushed(t, scene, front)[0]:
+        if y <= _TOUCH * a * a * scene.body[0] and pushed(t, scene, front)[0]:
             t, a, more = _ride(t, a, min(stop, t + tick), least, scene, front)
             energy, h = energy + more, 0.0
             if a <= least:
@@ -436,7 +428,7 @@ def _piece(t, a, stop, least, tries, scene, front):
             cross = True
             continue
         y1, _, _, _ = excess(t1, a1, scene)
-        edge = _TOUCH * a1 * a1 * scene.curvature
+        edge = _TOUCH * a1 * a1 * scene.body[0]
         if y1 < -edge and y > edge:
             h *= max(1e-6, y / (y - y1))
             continue
@@ -488,7 +480,7 @@ def _zero(before, after, duration):
 def scene_of(works, mount, duration, scale, bodies):
     """Return the ``Scene`` of work, load and displacement at both ends of a time; ``mount`` is as in ``moved_edge``."""
     loads, bases, stiffness = mount
-    per, (sphere_radius, modulus) = (1.0 / duration if duration > 0.0 else 0.0), bodies
+    per = 1.0 / duration if duration > 0.0 else 0.0
     load, base = (
         (0.0 if stiffness == math.inf else loads[0]),
         (0.0 if stiffness == 0.0 else bases[0]),
@@ -497,8 +489,7 @@ def scene_of(works, mount, duration, scale, bodies):
     base_rate = 0.0 if stiffness == 0.0 else (bases[1] - bases[0]) * per
     work_rate = (works[1] - works[0]) * per
     return Scene(
-        modulus,
-        1.0 / sphere_radius,
+        bodies,
         stiffness,
         load,
         load_rate,
@@ -527,8 +518,8 @@ def moved_edge(a, works, mount, duration, kinetics, bodies, least):
     kinetics : Kinetics or tuple
         Reference work [J/m^2], speeds [m/s] and exponents [1] of opening and healing. A speed of 0 or infinity
         freezes the edge or leaves it in equilibrium.
-    bodies : pair of floats
-        R [m], E* [Pa].
+    bodies : three floats
+        1/R [1/m], E* [Pa], 1/h [1/m].
     least : float
         Radius at which a shrinking contact counts as open [m], at least 1e-9 of the radius at the start. Under a dead
         load the energy grows like 1/radius towards the end, because the load falls ever deeper; the time hardly
@@ -586,29 +577,9 @@ def _left(radius, bonded, fluctuating, reversible, share):
 @device
 def _energy(t, a, scene):
     """Return the energy of a contact above that of an open one: elastic, of the spring or the load, of adhesion."""
-    (
-        modulus,
-        curvature,
-        stiffness,
-        load,
-        load_rate,
-        base,
-        base_rate,
-        work,
-        work_rate,
-        _,
-    ) = scene
-    hertz = a * a * curvature
-    indentation = hertz - excess(t, a, scene)[0]
-    energy = (
-        modulus
-        * a
-        * (
-            indentation * indentation
-            - 2.0 / 3.0 * hertz * indentation
-            + 0.2 * hertz * hertz
-        )
-    )
+    body, stiffness, load, load_rate, base, base_rate, work, work_rate, _ = scene
+    indentation = punch(a, body)[0] - excess(t, a, scene)[0]
+    energy = elastic_energy(a, indentation, body)
     energy -= (load + load_rate * t) * indentation + math.pi * a * a * (
         work + work_rate * t
     )
@@ -635,15 +606,7 @@ def _moved(radius, touches, works, mount, duration, kinetics, bodies, spot):
     scene = scene_of(works, mount, duration, kinetics[0], bodies)
     (loads, _, stiffness), opens = mount, math.isnan(end)
     if stiffness == 0.0:
-        sphere_radius, modulus = bodies
-        fold = cube_root(
-            9.0
-            * math.pi
-            * max(works[1], 0.0)
-            * sphere_radius
-            * (sphere_radius / (8.0 * modulus))
-        )
-        if opens or (loads[1] < 0.0 and radius < fold):
+        if opens or (loads[1] < 0.0 and radius < load_fold(works[1], bodies)):
             lost = 0.0
     elif opens:
         lost += max(_energy(opened, 0.5 * spot, scene), 0.0)
@@ -665,11 +628,13 @@ def _is_unstable(t, a, steepness, scene):
 @device
 def _borne(t, a, scene):
     """Return the normal load [N] and the displacement of the mount [m] of a contact of radius a."""
-    y, hertz = excess(t, a, scene)[0], a * a * scene.curvature
+    y, (depth, _, load, stiffness, _, _, _) = (
+        excess(t, a, scene)[0],
+        punch(a, scene.body),
+    )
     if scene.stiffness == 0.0:
-        return scene.load + scene.load_rate * t, hertz - y
-    load = scene.modulus * a * (4.0 / 3.0 * hertz - 2.0 * y)
-    return load, scene.base + scene.base_rate * t
+        return scene.load + scene.load_rate * t, depth - y
+    return load - stiffness * y, scene.base + scene.base_rate * t
 
 
 @device
@@ -726,7 +691,7 @@ def _weakest(turn, radii, begin, duration, steepness, scene):
 @kernel(
     "void(float64[:, ::1], Tuple((float64[::1], int64[::1], float64[:, ::1], float64)),"
     f" Tuple(({_READ}, {_READ}, {_READ}, {SHARE})),"
-    " Tuple((UniTuple(float64, 5), UniTuple(float64, 2), float64, boolean)), float64[:, :, ::1])"
+    " Tuple((UniTuple(float64, 5), UniTuple(float64, 3), float64, boolean)), float64[:, :, ::1])"
 )
 def _follow(state, control, terms, edge, out):
     """Write the rows of ``follow`` at the end of each step.
@@ -849,8 +814,10 @@ def follow(
     out = np.empty((len(before), len(durations), rows))
     for row, values in zip(before, [*state[:4], *state.turn.T], strict=True):
         row[:] = values
-    sphere_radius, modulus, _ = balance.bodies.numbers
-    spot = _SPOT * math.cbrt(balance.reference * sphere_radius**2 / modulus)
+    bodies = balance.bodies
+    spot = _SPOT * math.cbrt(
+        balance.reference * bodies.sphere_radius**2 / bodies.modulus
+    )
     course = np.array([pieces.stop, shares, pieces.first, pieces.last])
     share = PLANE if balance.margin is None else balance.margin.each[0]
     terms = (np.broadcast_to(values, out.shape[1:]) for values in of_steps)
@@ -858,7 +825,7 @@ def follow(
         before,
         (durations, opening, course, stiffness),
         (*terms, share),
-        (tuple(kinetics), (sphere_radius, modulus), spot, again),
+        (tuple(kinetics), bodies.body, spot, again),
         out,
     )
     return *out[:4], np.moveaxis(out[4:], 0, -1)

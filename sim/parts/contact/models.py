@@ -439,12 +439,15 @@ class _Controlled:
         most = bonded - least * fluctuating
         start = control.radius(most, bodies)
         terms = np.broadcast_arrays(start, most, bonded, fluctuating, tilt, load, base)
-        body = 1.0 / bodies.sphere_radius, bodies.modulus
         contacts = np.stack(terms).reshape(len(terms), len(shares), -1)
         radius = np.empty(contacts.shape[1:])
         for k, share in enumerate(shares):
             stable_radii(
-                np.ascontiguousarray(contacts[:, k]), stiffness, body, share, radius[k]
+                np.ascontiguousarray(contacts[:, k]),
+                stiffness,
+                bodies.body,
+                share,
+                radius[k],
             )
         return radius.reshape(terms[0].shape)
 

@@ -371,8 +371,7 @@ def _numbers(
     )
     solid = (
         contact.mounts[0].stiffness,
-        1.0 / bodies.sphere_radius,
-        bodies.modulus,
+        *bodies.body,
         contact.area,
     )
     return tuple(slider), tuple(breaking), (*still, *solid)

@@ -30,7 +30,7 @@ _STORED = (ENERGY.names or ()).index("stored")
 #: of each step.
 ARGUMENTS = (
     "Tuple((float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64)), "
-    "Tuple((UniTuple(float64, 12), UniTuple(float64, 7), UniTuple(float64, 12), UniTuple(float64, 7))), "
+    "Tuple((UniTuple(float64, 12), UniTuple(float64, 7), UniTuple(float64, 13), UniTuple(float64, 7))), "
     "Tuple((float64[:, :, ::1], float64[:, :, ::1]))"
 )
 
@@ -75,7 +75,8 @@ class Contact(NamedTuple):
     """Numbers of the contact: work of adhesion without bonds; load and base with their rates; 1 if its radius stays.
 
     Then work of adhesion per bond share N; energy that the mean stress takes, over radius and M²; stiffness behind the
-    base; curvature, modulus, reference area; energy that fluctuations take, with its rate; numbers of the fluctuations.
+    base; curvature, modulus and inverse thickness of the bodies, reference area; energy that fluctuations take, with
+    its rate; numbers of the fluctuations.
     """
 
     bare: float
@@ -89,6 +90,7 @@ class Contact(NamedTuple):
     stiffness: float
     curvature: float
     modulus: float
+    inverse_thickness: float
     area: float
     fluctuating: float
     fluctuating_rate: float
@@ -129,7 +131,7 @@ def contact_area(bound, moment, time, radius, contact):
         contact.bare - fluctuating + contact.bonded * bound,
         tilt,
         (load, base, contact.stiffness),
-        (contact.curvature, contact.modulus),
+        (contact.curvature, contact.modulus, contact.inverse_thickness),
     )
     if not a > 0.0:
         return math.nan, math.nan, 0.0, 0.0
@@ -241,7 +243,7 @@ def later(contact, time, stays):
         contact.bare,
         *of_mount,
         stays,
-        *contact[6:12],
+        *contact[6:13],
         fluctuating,
         contact.fluctuating_rate,
         contact.field,
@@ -251,14 +253,14 @@ def later(contact, time, stays):
 @device
 def feeling(contact, row):
     """Return the numbers of the contact with the energy of the fluctuations that the row has reached."""
-    return Contact(*contact[:12], row.felt, 0.0, contact.field)
+    return Contact(*contact[:13], row.felt, 0.0, contact.field)
 
 
 @device
 def drawn(contact, row, piece):
     """Return the numbers of the contact at the start of a piece: at that of a clock step ΔΓ has been drawn."""
     fluctuating = row.drawn if piece == 0 else row.felt
-    return Contact(*contact[:12], fluctuating, 0.0, contact.field)
+    return Contact(*contact[:13], fluctuating, 0.0, contact.field)
 
 
 @device
@@ -305,7 +307,7 @@ def following(contact, row, start, step):
     rate = (
         row.paid * last * (row.energy + change) - mean + share * (mean - row.felt)
     ) / step
-    return Contact(*contact[:12], row.felt - rate * start, rate, field)
+    return Contact(*contact[:13], row.felt - rate * start, rate, field)
 
 
 @device
