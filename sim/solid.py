@@ -34,8 +34,13 @@ class ElasticSolid(Protocol):
     poisson_ratio: float
 
     @property
+    def half_space(self) -> "HalfSpace":
+        """The half-space that contacts and waves much smaller than any length of the solid feel."""
+
+    @property
     def held_ratio(self) -> float:
-        """Poisson ratio of the half-space that is as compliant without normal stress as this one at short waves [1]."""
+        """Poisson ratio at which ``half_space`` without normal stress is as compliant as at held displacement [1]."""
+        return self.half_space.held_ratio
 
     @property
     def unit(self) -> "ElasticSolid":
@@ -52,6 +57,7 @@ class ElasticSolid(Protocol):
     @property
     def softness(self) -> Softness:
         """Compliance of waves far shorter than any length of the solid, with which finite discs are computed."""
+        return self.half_space.softness
 
     def radius(self, mount: Mount, work: ArrayLike, sphere_radius: float) -> Array:
         """Return the largest stable contact radius [m]: Hertz's if the work [J/m²] is not positive, nan if open."""
@@ -73,6 +79,9 @@ class ElasticSolid(Protocol):
         that shrinks releases what it stores.
         """
 
+    def normal_stiffness(self, radius: float) -> float:
+        """Return the change of the load with the indentation of a contact of fixed radius [N/m]."""
+
     def pull_off_load(self, work: float, sphere_radius: float) -> float:
         """Return the lowest load that a contact bears [N]."""
 
@@ -82,7 +91,7 @@ class ElasticSolid(Protocol):
         The normal displacement is held, because the sphere is smooth and does not yield to fluctuations.
         """
 
-    def tangential_compliance(self, radius: float) -> float:
+    def tangential_compliance(self, radius: ArrayLike) -> Array:
         """Return 1/k_t [m/N]: the mean displacement of a disc of a radius [m] over the force of a uniform stress.
 
         There is no normal stress, because the sphere is free to rise.
@@ -90,6 +99,9 @@ class ElasticSolid(Protocol):
 
     def mean_stress_energy(self, radius: ArrayLike, stress: ArrayLike) -> Array:
         """Return the energy per new area of a disc of a radius [m] under a uniform shear stress [Pa], in J/m²."""
+
+    def mean_stress_density(self, radius: ArrayLike, stress: ArrayLike) -> Array:
+        """Return the energy of a disc of a radius [m] under a uniform shear stress [Pa] over its area, in J/m²."""
 
     def stored_energy(self, stress: Stress) -> float:
         """Return the mean elastic energy per area under a fluctuating shear stress on the plane [J/m²], ΔΓ."""
@@ -144,6 +156,10 @@ class HalfSpace(ElasticSolid):
     shear_modulus: float
     poisson_ratio: float = 0.5
     coupling: float | None = None
+
+    @property
+    def half_space(self) -> "HalfSpace":
+        return self
 
     @property
     def held_ratio(self) -> float:
@@ -208,6 +224,9 @@ class HalfSpace(ElasticSolid):
             a * depth**2 - 2.0 / 3.0 * third * depth + 0.2 * third * a**2 * curvature
         )
 
+    def normal_stiffness(self, radius: float) -> float:
+        return 2.0 * self.contact_modulus * radius
+
     def pull_off_load(self, work: float, sphere_radius: float) -> float:
         return float(jkr.pull_off_load(work, sphere_radius))
 
@@ -222,11 +241,11 @@ class HalfSpace(ElasticSolid):
             halfspace.compliance(qx, qy, self.shear_modulus, self.held_ratio)
         )
 
-    def tangential_compliance(self, radius: float) -> float:
+    def tangential_compliance(self, radius: ArrayLike) -> Array:
         slope = (
             4.0 * (2.0 - self.poisson_ratio) / (3.0 * math.pi**2 * self.shear_modulus)
         )
-        return slope / radius
+        return slope / np.asarray(radius)
 
     def mean_stress_energy(self, radius: ArrayLike, stress: ArrayLike) -> Array:
         return np.asarray(
@@ -234,6 +253,9 @@ class HalfSpace(ElasticSolid):
                 radius, stress, self.contact_modulus, self.poisson_ratio
             )
         )
+
+    def mean_stress_density(self, radius: ArrayLike, stress: ArrayLike) -> Array:
+        return 2.0 / 3.0 * self.mean_stress_energy(radius, stress)
 
     def stored_energy(self, stress: Stress) -> float:
         return float(self.softness.energy(stress))
@@ -271,8 +293,8 @@ class Layer(ElasticSolid):
         return 0.5
 
     @property
-    def held_ratio(self) -> float:
-        return 0.5
+    def half_space(self) -> HalfSpace:
+        return HalfSpace(self.shear_modulus)
 
     @property
     def unit(self) -> "Layer":
@@ -286,11 +308,6 @@ class Layer(ElasticSolid):
     @property
     def inverse_thickness(self) -> float:
         return 1.0 / self.thickness
-
-    @property
-    def softness(self) -> Softness:
-        """Compliance of waves much shorter than the thickness."""
-        return HalfSpace(self.shear_modulus).softness
 
     def compliance(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         return np.asarray(layer.compliance(qx, qy, self.thickness, self.shear_modulus))
@@ -315,6 +332,23 @@ class Layer(ElasticSolid):
         numbers = sphere_radius, self.contact_modulus, self.thickness
         return np.asarray(equilibrium.energy_on_layer(radius, indentation, *numbers))
 
+    def normal_stiffness(self, radius: float) -> float:
+        flat = layer.contact_function(layer.G_1, radius / self.thickness)
+        return 2.0 * self.contact_modulus * radius * float(flat)
+
     def pull_off_load(self, work: float, sphere_radius: float) -> float:
         numbers = sphere_radius, self.contact_modulus, self.thickness
         return float(equilibrium.pull_off_load_on_layer(work, *numbers))
+
+    def tangential_compliance(self, radius: ArrayLike) -> Array:
+        numbers = self.shear_modulus, self.thickness
+        return np.asarray(layer.tangential_compliance(radius, *numbers))
+
+    def mean_stress_energy(self, radius: ArrayLike, stress: ArrayLike) -> Array:
+        numbers = self.shear_modulus, self.thickness
+        return np.asarray(layer.mean_stress_energy(radius, stress, *numbers))
+
+    def mean_stress_density(self, radius: ArrayLike, stress: ArrayLike) -> Array:
+        force = math.pi * np.asarray(radius) ** 2 * np.square(stress)
+        size = np.where(force > 0.0, radius, 1.0)
+        return 0.5 * force * self.tangential_compliance(size)

@@ -1,17 +1,19 @@
 """The elastic solid: its closed forms beside quadrature and beside each other, and a solid of another kind."""
 
+import itertools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import quad
 
-from sim.laws import halfspace
+from sim.laws import halfspace, layer
 from sim.parts import shear
 from sim.parts.contact.models import Solid
 from sim.parts.shear.process import Time
-from sim.solid import ElasticSolid, HalfSpace
+from sim.solid import ElasticSolid, HalfSpace, Layer
 from sim.spectrum import (
     AnisotropicGaussian,
     Band,
@@ -173,3 +175,56 @@ def test_a_solid_with_a_length_is_followed_by_spectra_modes_and_bands():
     ratio = deep.stored_energy(spectrum) / half_space.stored_energy(spectrum)
     lacks = math.log(2.0) * 0.7 / math.sqrt(math.pi) / 1e5
     assert_allclose(1.0 - ratio, lacks, rtol=1e-8, atol=0)
+
+
+@pytest.mark.parametrize("name", STRESSES)
+def test_the_energy_on_a_layer_is_the_integral_of_its_compliance(name):
+    stress, solid = STRESSES[name], Layer(1.7, 0.4)
+    energy, half_space = (
+        each.stored_energy(stress) for each in (solid, HalfSpace(1.7))
+    )
+    assert 0.1 * half_space < energy < 0.9 * half_space
+    # short waves alone do not feel the base
+    thick = Layer(1.7, 1e4).stored_energy(stress)
+    assert_allclose(thick, half_space, rtol=1e-3)
+    if name == "ripple":
+        q = 2.0 * math.pi / 0.3
+        level = math.cos(0.4) ** 2 * layer.along_held(0.4 * q)
+        level += math.sin(0.4) ** 2 * layer.across(0.4 * q)
+        exact = 0.25 * 2.0**2 * level / (1.7 * q)
+        assert_allclose(energy, exact, rtol=1e-14, atol=0)
+    elif name in ("gaussian", "von Kármán", "self-affine", "band", "table"):
+        low, high = stress.support
+        edges = np.unique([low, *stress.breaks, *np.geomspace(0.01, 300.0, 24), high])
+        edges = edges[(edges >= low) & (edges <= min(high, 1e4))]
+
+        def integrand(q):
+            level = layer.along_held(0.4 * q) + layer.across(0.4 * q)
+            return stress.density(q, 0.0) * level / (8.0 * math.pi * 1.7)
+
+        exact = sum(
+            quad(integrand, *pair, epsabs=0, epsrel=1e-12, limit=200)[0]
+            for pair in itertools.pairwise(edges)
+        )
+        # the tail of the von Kármán density beyond the last edge falls as q^-3.1
+        assert_allclose(energy, exact, rtol=1e-9, atol=0)
+
+
+def test_a_layer_under_a_uniform_stress_stores_the_work_that_its_stiffness_does():
+    solid, stress = Layer(1.7, 0.4), 5.0
+    for radius in (1e-3, 0.1, 0.7, 3.0, 25.0):
+        force = math.pi * radius**2 * stress
+        energy = 0.5 * force**2 * solid.tangential_compliance(radius)
+        density = solid.mean_stress_density(radius, stress)
+        assert_allclose(density * math.pi * radius**2, energy, rtol=1e-14, atol=0)
+        sizes = radius * (1.0 + 1e-3 * np.array([-2.0, -1.0, 1.0, 2.0]))
+        stored = math.pi * sizes**2 * solid.mean_stress_density(sizes, stress)
+        slope = stored @ [1.0, -8.0, 8.0, -1.0] / (12e-3 * radius)
+        new = solid.mean_stress_energy(radius, stress)
+        assert_allclose(slope / (2.0 * math.pi * radius), new, rtol=1e-9, atol=0)
+    thin, thick, half_space = Layer(1.7, 1e-2), Layer(1.7, 1e9), HalfSpace(1.7)
+    assert_allclose(thin.mean_stress_energy(0.7, stress), 25e-2 / 3.4, rtol=0.03)
+    for law in ("mean_stress_energy", "mean_stress_density"):
+        values = (getattr(each, law)(0.7, stress) for each in (thick, half_space))
+        assert_allclose(next(values), next(values), rtol=1e-8, atol=0)
+    assert thin.mean_stress_density(0.0, stress) == 0.0

@@ -11,7 +11,8 @@ the edge neither pulls nor pushes, and a compliance C(a). For every punch ``dP_H
     ``y^2 = q``,  ``q = 4 pi a (w - t a)/(d(1/C)/da)``,  ``y = (k (delta_H - Delta) + P_H - P)/(k + 1/C)``
 
 where P = 0 if k > 0. ``punch`` has these terms for a sphere. On a half-space delta_H = a^2/R, P_H = 4 E* a^3/(3R) and
-1/C = 2 E* a, so that ``q = 2 pi a (w - t a)/E*``. ``sim.laws.layer`` has those on a layer, where t must be 0.
+1/C = 2 E* a, so that ``q = 2 pi a (w - t a)/E*``. ``sim.laws.layer`` has those on a layer, where
+t a is t times ``stress_reach`` and t must not be negative.
 
 **Convexity.** On a half-space y is convex in a where it is positive: its second derivative over a is
 ``2/R - 2a/(R (c + a)) + 2y/(c + a)^2`` with c = k/(2 E*), and c >= 0. For t >= 0 the root of q is concave, because q is
@@ -46,15 +47,9 @@ _HALVINGS, _NARROWER, _LEAST = 50, 0.8, 1e-5
 
 
 @device
-def punch(radius, body):
-    """Return the terms of a sphere on a solid at a contact radius; ``body``: 1/R, E* and 1/h, 0 without a layer.
-
-    They are Hertz's depth and its slope over the radius, Hertz's load, 1/C and its slope, and the square of the missing
-    depth per energy release rate, 4 pi a over the slope of 1/C, with its slope.
-    """
-    curvature, modulus, inverse_thickness = body
-    if inverse_thickness > 0.0:
-        return layer.sphere(radius, curvature, modulus, inverse_thickness)
+def half_space(radius, body):
+    """Return the terms of ``punch`` on a half-space."""
+    curvature, modulus, _ = body
     depth, stiffness = radius * radius * curvature, 2.0 * modulus * radius
     load, toll_slope = 2.0 / 3.0 * stiffness * depth, 2.0 * math.pi / modulus
     growth = 2.0 * radius * curvature
@@ -67,6 +62,18 @@ def punch(radius, body):
         toll_slope * radius,
         toll_slope,
     )
+
+
+@device
+def punch(radius, body):
+    """Return the terms of a sphere on a solid at a contact radius; ``body``: 1/R, E* and 1/h, 0 without a layer.
+
+    They are Hertz's depth and its slope over the radius, Hertz's load, 1/C and its slope, and the square of the missing
+    depth per energy release rate, 4 pi a over the slope of 1/C, with its slope.
+    """
+    if body[2] > 0.0:
+        return layer.sphere(radius, *body)
+    return half_space(radius, body)
 
 
 @device
@@ -107,25 +114,44 @@ def surplus(radius, left, mount, body):
 
 
 @device
-def _lack(a, work, mount, body):
-    """Return y - sqrt(q) at a radius on a layer, its slope, and the slope of the energy release rate."""
-    terms = punch(a, body)
-    missing, growth = missing_depth(terms, mount)
-    toll, toll_slope = terms[5], terms[6]
-    root = math.sqrt(toll * work)
-    slope = growth - 0.5 * root * toll_slope / toll
-    return missing - root, slope, (2.0 * missing * growth - toll_slope * work) / toll
+def stress_reach(radius, inverse_thickness):
+    """Return what multiplies the tilt in the energy of a uniform stress, the radius on a half-space, and its slope."""
+    if inverse_thickness == 0.0:
+        return radius, 1.0
+    x = radius * inverse_thickness
+    _, _, n, n_slope = layer.shear_functions(x)
+    return radius * n, n + x * n_slope
 
 
 @device
-def _between(left, right, work, mount, body):
+def _lack(a, work, tilt, mount, body):
+    """Return y - sqrt(q) at a radius on a layer, its slope, and that of G less the work left, inf without work left.
+
+    Without work left q is 0.
+    """
+    terms = punch(a, body)
+    missing, growth = missing_depth(terms, mount)
+    toll, toll_slope = terms[5], terms[6]
+    left, falls = work, 0.0
+    if tilt > 0.0:
+        reach, reach_slope = stress_reach(a, body[2])
+        left, falls = work - tilt * reach, tilt * reach_slope
+    if not left > 0.0:
+        return missing, growth, math.inf
+    root, change = math.sqrt(toll * left), toll_slope * left - toll * falls
+    slope = growth - 0.5 * change / root
+    return missing - root, slope, (2.0 * missing * growth - change) / toll
+
+
+@device
+def _between(left, right, work, tilt, mount, body):
     """Return a radius between two others at which y - sqrt(q) is not positive, 0 without one.
 
     It is positive at both, falls at the left one and rises at the right one.
     """
     for _ in range(_HALVINGS):
         middle = 0.5 * (left + right)
-        over, slope, _ = _lack(middle, work, mount, body)
+        over, slope, _ = _lack(middle, work, tilt, mount, body)
         if over <= 0.0:
             return middle
         if slope > 0.0:
@@ -136,14 +162,14 @@ def _between(left, right, work, mount, body):
 
 
 @device
-def _on_layer(start, work, mount, body):
+def _on_layer(start, work, tilt, mount, body):
     """Return the largest stable radius on a layer, and the slope of the energy release rate over the radius there.
 
     It lies between ``low``, where y - sqrt(q) is not positive, and ``high``, where it is; 0 and inf are not known yet.
     """
     a, low, high = start, 0.0, math.inf
     for _ in range(_MOST):
-        over, slope, steepness = _lack(a, work, mount, body)
+        over, slope, steepness = _lack(a, work, tilt, mount, body)
         if not abs(over) < math.inf:
             break
         rises = slope > 0.0
@@ -153,12 +179,12 @@ def _on_layer(start, work, mount, body):
             if high == math.inf:
                 a *= 2.0
                 continue
-            dip = _between(a, high, work, mount, body)
+            dip = _between(a, high, work, tilt, mount, body)
             while dip == 0.0:  # the contact is narrower, or there is none
                 high, a = a, _NARROWER * a
                 if a < _LEAST * start:
                     return math.nan, math.nan
-                over, slope, _ = _lack(a, work, mount, body)
+                over, slope, _ = _lack(a, work, tilt, mount, body)
                 if over <= 0.0 or slope > 0.0:
                     dip = a
             a = dip
@@ -189,22 +215,23 @@ def largest_radius(start, work, tilt, mount, body):
     load, base, spring = mount
     push, limit = (base if spring > 0.0 else load), math.inf
     bare = tilt >= 0.0 and work <= 0.0
+    if body[2] > 0.0:
+        if tilt < 0.0:
+            return math.nan, math.nan
+        if bare and not push > 0.0:
+            return (0.0 if push == 0.0 else math.nan), math.inf
+        return _on_layer(start, work, 0.0 if bare else tilt, mount, body)
     if tilt > 0.0 and not bare:
         limit = work / tilt
-        bare = push > 0.0 and missing_depth(punch(limit, body), mount)[0] <= 0.0
+        bare = push > 0.0 and missing_depth(half_space(limit, body), mount)[0] <= 0.0
         limit = math.inf if bare else limit
     if bare and not push > 0.0:
         return (0.0 if push == 0.0 else math.nan), math.inf
     if bare:
         work = tilt = 0.0
-    if body[2] > 0.0:
-        if tilt != 0.0:
-            return math.nan, math.nan
-        a, slope = _on_layer(start, work, mount, body)
-        return a, (math.inf if bare else slope)
     a, is_right, steepness = min(start, limit), False, math.nan
     for _ in range(_MOST):
-        terms = punch(a, body)
+        terms = half_space(a, body)
         missing, growth = missing_depth(terms, mount)
         left, toll, toll_slope = work - tilt * a, terms[5], terms[6]
         over = missing * missing - toll * left
@@ -301,6 +328,25 @@ def radius_on_layer(load, base, spring, work, sphere_radius, modulus, thickness)
     if not start > 0.0:
         start = sphere_radius
     return largest_radius(start, work, 0.0, mount, body)[0]
+
+
+@law
+def load_at_radius_on_layer(radius, work, sphere_radius, modulus, thickness):
+    """Return the load of the equilibrium contact of a radius on a layer [N]; Hertz's where w <= 0.
+
+    Parameters
+    ----------
+    radius, work, sphere_radius, modulus, thickness : float or array
+        a [m], w [J/m^2], R [m], E* = 4G [Pa], h [m].
+
+    Examples
+    --------
+    >>> rest = radius_on_layer(0.0, 0.0, 0.0, 1e-3, 1.0, 4.0, 0.05)
+    >>> print(f"{abs(load_at_radius_on_layer(rest, 1e-3, 1.0, 4.0, 0.05)) < 1e-15}")
+    True
+    """
+    terms = punch(radius, (1.0 / sphere_radius, modulus, 1.0 / thickness))
+    return terms[2] - terms[3] * math.sqrt(terms[5] * max(work, 0.0))
 
 
 @law

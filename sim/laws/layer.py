@@ -26,6 +26,10 @@ elastic energy at an indentation delta are then
     ``P = 8G (delta a g_1 - a^3 g_2/R)``,  ``(2G/(pi a)) (delta e_1 - a^2 e_2/R)^2``  and
     ``U = 4G (delta^2 a g_1 - 2 delta a^3 g_2/R + a^5 g_3/R^2)``.
 
+**A uniform shear stress** on the disc moves it by 1/k_t times its force. This is m(x) times the compliance
+``2/(pi^2 G a)`` of a half-space, without normal stress. The energy ``U = (pi a^2 tau)^2/(2 k_t)`` per new area is that
+of a half-space times n(x) = m + x m'/3. In a thin film m = pi/(2x) and n = pi/(3x).
+
 What is released is no longer stored, so that the slopes over x of x g_1, x^3 g_2 and x^5 g_3 are e_1^2, x^2 e_1 e_2 and
 x^4 e_2^2.
 """
@@ -37,6 +41,8 @@ import numpy as np
 from sim.laws.layer_table import TABLE, TURN, WIDEST
 from sim.numerics.jit import device, law
 
+#: Numbers of g_1 and others in ``contact_function``.
+E_1, E_1_SLOPE, E_2, E_2_SLOPE, G_1, G_2, G_3, M, M_SLOPE, N, N_SLOPE = range(11)
 #: x below which the compliance at held normal displacement is a quotient of power series, whose terms are positive.
 _SERIES_BELOW, _TERMS = 1.0, 14
 
@@ -288,6 +294,80 @@ def sphere(radius, curvature, modulus, inverse_thickness):
     )
 
 
+@device
+def shear_functions(x):
+    """Return m, its slope over x, n and its slope at x = a/h; powers of x beyond ``WIDEST``."""
+    place = min(x, WIDEST)
+    reach = 2.0 * (WIDEST + TURN) / WIDEST
+    t = reach * place / (place + TURN) - 1.0
+    t_x = reach * TURN / ((place + TURN) * (place + TURN))
+    a = b = a_last = b_last = 0.0
+    a_slope = b_slope = a_slope_last = b_slope_last = 0.0
+    for k in range(TABLE.shape[0] - 1, 0, -1):
+        a_slope, a_slope_last = 2.0 * (a + t * a_slope) - a_slope_last, a_slope
+        b_slope, b_slope_last = 2.0 * (b + t * b_slope) - b_slope_last, b_slope
+        a, a_last = TABLE[k, 5] + 2.0 * t * a - a_last, a
+        b, b_last = TABLE[k, 6] + 2.0 * t * b - b_last, b
+    a_slope = t_x * (a + t * a_slope - a_slope_last)
+    b_slope = t_x * (b + t * b_slope - b_slope_last)
+    fade = 1.0 / (1.0 + place)
+    m = fade * (TABLE[0, 5] + t * a - a_last)
+    n = fade * (TABLE[0, 6] + t * b - b_last)
+    m_slope, n_slope = fade * (a_slope - m), fade * (b_slope - n)
+    if not x > WIDEST:
+        return m, m_slope, n, n_slope
+    p, ratio = -WIDEST * m_slope / m, WIDEST / x
+    m *= math.pow(ratio, p)
+    n = m * (1.0 - p / 3.0)
+    return m, -p * m / x, n, -p * n / x
+
+
+@law
+def tangential_compliance(radius, shear_modulus, thickness):
+    """Return the mean displacement of a disc under a uniform shear stress over its force, 1/k_t, on a layer.
+
+    Parameters
+    ----------
+    radius, shear_modulus, thickness : float or array
+        a [m], G [Pa], h [m].
+
+    Returns
+    -------
+    float or array
+        [m/N], without normal stress. ``2/(pi^2 G a)`` on a thick layer, ``h/(pi G a^2)`` on a thin one.
+
+    Examples
+    --------
+    >>> ratio = tangential_compliance(1.0, 1.0, [1e9, 1e-2]) * [math.pi**2 / 2, math.pi / 1e-2]
+    >>> print("%.2f %.2f" % tuple(ratio))
+    1.00 0.99
+    """
+    m, _, _, _ = shear_functions(radius / thickness)
+    return 2.0 * m / (math.pi * math.pi * shear_modulus * radius)
+
+
+@law
+def mean_stress_energy(radius, stress, shear_modulus, thickness):
+    """Return the elastic energy of a uniform shear stress per area of new contact on a layer [J/m^2].
+
+    Parameters
+    ----------
+    radius, stress, shear_modulus, thickness : float or array
+        a [m], tau [Pa], G [Pa], h [m].
+
+    Notes
+    -----
+    ``dU/dA`` of ``U = (pi a^2 tau)^2/(2 k_t)``: 3 tau^2 a/(2 pi G) on a thick layer, tau^2 h/(2G) on a thin one.
+
+    Examples
+    --------
+    >>> print("%.3f %.4f" % tuple(mean_stress_energy(1.0, 1.0, 1.0, [1e9, 1e-2])))
+    0.477 0.0050
+    """
+    _, _, n, _ = shear_functions(radius / thickness)
+    return 1.5 * stress * stress * radius * n / (math.pi * shear_modulus)
+
+
 @law
 def contact_function(which, x):
     """Return one of the functions of a contact on a layer.
@@ -295,7 +375,7 @@ def contact_function(which, x):
     Parameters
     ----------
     which : float or array
-        0 and 1 for e_1 and its slope over x, 2 and 3 for e_2 and its slope, 4, 5 and 6 for g_1, g_2 and g_3.
+        ``E_1`` for e_1, ``E_1_SLOPE`` for its slope over x, and so on: a whole number.
     x : float or array
         a/h [1], at least 0.
 
@@ -303,7 +383,9 @@ def contact_function(which, x):
     --------
     A flat punch as wide as a layer is thick is 3.6 times as stiff as on a half-space:
 
-    >>> print(f"{contact_function(4, 1.0):.4f}")
+    >>> print(f"{contact_function(G_1, 1.0):.4f}")
     3.6187
     """
-    return contact_functions(x)[int(which)]
+    if which < 7.0:
+        return contact_functions(x)[int(which)]
+    return shear_functions(x)[int(which) - 7]

@@ -3,7 +3,7 @@
 import mpmath
 import numpy as np
 import pytest
-from helpers.layer_punch import contact
+from helpers.layer_punch import contact, yielding
 from mpmath import mp
 from numpy.testing import assert_allclose
 
@@ -86,13 +86,15 @@ KNOWN = {
     5.0: (12.5621664435, 4.51138413694, 50.1397379684, 11.3755492164),
     8.0: (22.3075626955, 7.25285046803, 146.320433719, 30.8122914458),
 }
-E1, E1_SLOPE, E2, E2_SLOPE, G1, G2, G3 = range(7)
 
 
 def functions(x):
     """Return e_1, e_2, g_1, g_2 and g_3 of the table."""
     return np.array(
-        [layer.contact_function(which, x) for which in (E1, E2, G1, G2, G3)]
+        [
+            layer.contact_function(which, x)
+            for which in (layer.E_1, layer.E_2, layer.G_1, layer.G_2, layer.G_3)
+        ]
     )
 
 
@@ -109,12 +111,47 @@ def test_the_contact_functions_solve_fredholms_equation(x):
     assert_allclose(functions(x), contact(x), rtol=5e-11 if x > 20 else 1e-11, atol=0)
 
 
+@pytest.mark.parametrize("x", [1e-6, 0.02, 0.4, 1.3, 5.5, 17.0, 44.0, 79.0])
+def test_a_disc_under_a_uniform_stress_moves_as_the_waves_of_its_stress_do(x):
+    share, change = yielding(x)
+    assert_allclose(layer.contact_function(layer.M, x), share, rtol=2e-11, atol=0)
+    exact = share + change / 3.0
+    assert_allclose(layer.contact_function(layer.N, x), exact, rtol=2e-11, atol=0)
+    assert_allclose(
+        layer.contact_function(layer.M_SLOPE, x), change / x, rtol=1e-8, atol=0
+    )
+    step = 1e-3 * x * np.array([-2.0, -1.0, 1.0, 2.0])
+    slope = (
+        layer.contact_function(layer.N, x + step) @ [1.0, -8.0, 8.0, -1.0] / (12e-3 * x)
+    )
+    known = layer.contact_function(layer.N_SLOPE, x)
+    assert_allclose(slope, known, rtol=1e-9, atol=1e-11 * exact / x)
+
+
+def test_a_thin_layer_is_sheared_as_a_whole_and_stores_half_of_the_square_of_the_stress():
+    # 1/k_t = h/(πGa²), and dU/dA = τ²h/(2G) beside 3τ²a/(2πG) of a half-space
+    for which, limit in ((layer.M, np.pi / 2.0), (layer.N, np.pi / 3.0)):
+        excess = (
+            layer.contact_function(which, np.array([40.0, 80.0])) * [40, 80] / limit
+        )
+        # an edge of the layer's thickness yields more, in proportion to h/a
+        assert_allclose(1.0 - excess[0], 2.0 * (1.0 - excess[1]), rtol=0.1)
+    for which in (layer.M, layer.N):
+        beyond, end = layer.contact_function(
+            which, np.array([80.0 * (1 + 1e-14), 80.0])
+        )
+        assert_allclose(beyond, end, rtol=2e-4 if which == layer.N else 1e-12, atol=0)
+
+
 def test_a_contact_much_wider_than_the_layer_is_that_of_a_thin_film():
     x = np.linspace(20.0, WIDEST, 200)
     film = 3.0 * np.pi / 64.0 * x**3 * (1.0 + 1.458 / x) ** 4
-    assert_allclose(layer.contact_function(G1, x), film, rtol=5e-4, atol=0)
+    assert_allclose(layer.contact_function(layer.G_1, x), film, rtol=5e-4, atol=0)
     # under a sphere without adhesion the pressure of a film vanishes at the edge with its slope: e_2/e_1 = 1/4
-    excess = layer.contact_function(E2, x) / layer.contact_function(E1, x) - 0.25
+    excess = (
+        layer.contact_function(layer.E_2, x) / layer.contact_function(layer.E_1, x)
+        - 0.25
+    )
     assert np.all((excess * x > 0.6) & (excess * x < 0.8))
 
 
@@ -122,16 +159,16 @@ def test_the_energy_that_a_growing_contact_releases_is_the_slope_of_what_it_stor
     for x in (0.01, 0.3, 1.0, 4.0, 20.0, 70.0, 90.0, 300.0):
         e1, e2 = functions(x)[:2]
         for which, power, slope in (
-            (G1, 1, e1 * e1),
-            (G2, 3, x**2 * e1 * e2),
-            (G3, 5, x**4 * e2 * e2),
+            (layer.G_1, 1, e1 * e1),
+            (layer.G_2, 3, x**2 * e1 * e2),
+            (layer.G_3, 5, x**4 * e2 * e2),
         ):
             step = 1e-3 * x * np.array([-2.0, -1.0, 1.0, 2.0])
             values = (x + step) ** power * layer.contact_function(which, x + step)
             # four points: an error of (1e-3)⁴/30 of the fifth derivative
             difference = values @ [1.0, -8.0, 8.0, -1.0] / (12e-3 * x)
             assert_allclose(difference, slope, rtol=1e-9, atol=0)
-        for which in (E1, E2):
+        for which in (layer.E_1, layer.E_2):
             values = layer.contact_function(which, x + step)
             difference = values @ [1.0, -8.0, 8.0, -1.0] / (12e-3 * x)
             known = layer.contact_function(which + 1, x)

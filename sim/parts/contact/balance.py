@@ -212,14 +212,20 @@ class Balance(NamedTuple):
     def reversible(self, radius: Array) -> Array:
         """Return the energy per area that the mean stress would release if the contact shrank [J/m²].
 
-        It is 6 τ0² a/(π E*) for an incompressible half-space.
+        It is 6 τ0² a/(π E*) for an incompressible half-space, and τ0² h/(2G) for a thin layer.
         """
         return self.bodies.solid.mean_stress_energy(radius, self.stress)
+
+    @property
+    def tilt(self) -> Array:
+        """Energy per area that the mean stress of a contact of vanishing radius stores, over the radius [J/m³]."""
+        half_space = self.bodies.solid.half_space
+        return half_space.mean_stress_energy(np.ones(1), self.stress)
 
     def gained(self, radius: Array, reversible: float) -> Array:
         """Return the energy that adhesion has released for the area of a contact: ∫ w dA over its radii [J]."""
         share = 1.0 if self.margin is None else self.margin.mean(radius)
-        mean = 2.0 / 3.0 * reversible * self.reversible(radius)
+        mean = reversible * self.bodies.solid.mean_stress_density(radius, self.stress)
         return math.pi * radius**2 * (self.bonded - self.fluctuating * share - mean)
 
 

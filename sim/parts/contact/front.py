@@ -31,11 +31,14 @@ import numpy as np
 
 from sim.laws.equilibrium import (
     elastic_energy,
+    half_space,
     largest_radius,
     load_fold,
     missing_depth,
     punch,
+    stress_reach,
 )
+from sim.laws.layer import sphere
 from sim.numerics.jit import device, kernel
 from sim.parts.contact.balance import SHARE, Balance
 from sim.parts.exchange import Array, ContactState
@@ -47,14 +50,9 @@ ROUNDING = 1e-12
 
 
 @device
-def excess(t, a, scene):
-    """Return the missing indentation y, the excess s = (G - w)/work, and the slopes of s with a and with t.
-
-    Below Hertz's radius G continues as -G: only a monotone continuation for the inner
-    solver, which never ends there.
-    """
-    body, stiffness, load, load_rate, base, base_rate, work, work_rate, scale = scene
-    terms = punch(a, body)
+def _excess(terms, t, scene):
+    """Return ``excess`` from the terms of a punch."""
+    _, stiffness, load, load_rate, base, base_rate, work, work_rate, scale = scene
     mount = load + load_rate * t, base + base_rate * t, stiffness
     y, y_a = missing_depth(terms, mount)
     y_t = -base_rate
@@ -62,8 +60,21 @@ def excess(t, a, scene):
         y_t = -(stiffness * base_rate + load_rate) / (stiffness + terms[3])
     unit = abs(y) / (terms[5] * scale)
     s = unit * y - (work + work_rate * t) / scale
-    s_a = unit * (2.0 * y_a - y * terms[6] / terms[5])
+    s_a = unit * (2.0 * y_a - y / terms[5] * terms[6])
     return y, s, s_a, 2.0 * unit * y_t - work_rate / scale
+
+
+@device
+def excess(t, a, scene):
+    """Return the missing indentation y, the excess s = (G - w)/work, and the slopes of s with a and with t.
+
+    Below Hertz's radius G continues as -G: only a monotone continuation for the inner
+    solver, which never ends there.
+    """
+    # each solid has code of its own, because this is most of the time of a run
+    if scene.body[2] > 0.0:
+        return _excess(sphere(a, *scene.body), t, scene)
+    return _excess(half_space(a, scene.body), t, scene)
 
 
 @device
@@ -566,11 +577,17 @@ _READ = "Array(float64, 2, 'A', readonly=True)"
 
 
 @device
-def _left(radius, bonded, fluctuating, reversible, share):
-    """Return the work of adhesion left at a radius; of an open contact that of a vanishing one."""
+def _left(radius, terms, inverse_thickness):
+    """Return the work of adhesion left at a radius; of an open contact that of a vanishing one.
+
+    ``terms``: bonded, fluctuating, energy of the mean stress over the radius, and share of a disc.
+    """
+    bonded, fluctuating, reversible, share = terms
     size, part = (0.0 if math.isnan(radius) else radius), 1.0
     if len(share[2]) > 0:
         part = share_of(size, share[0], share[1], share[2]) if size > 0.0 else 0.0
+    if reversible > 0.0:
+        size, _ = stress_reach(size, inverse_thickness)
     return bonded - fluctuating * part - reversible * size
 
 
@@ -713,9 +730,8 @@ def _follow(state, control, terms, edge, out):
         for k in range(len(durations)):
             if math.isnan(radius):
                 turn = math.nan, math.nan, math.nan
-            last = _left(
-                radius, bonded[k, m], fluctuating[k, m], reversible[k, m], share
-            )
+            of_step = bonded[k, m], fluctuating[k, m], reversible[k, m], share
+            last = _left(radius, of_step, bodies[2])
             first, end = (last if math.isnan(radius) else work), 0.0
             for p in range(opening[k], opening[k + 1]):
                 begin, end = end, pieces[1, p]
@@ -746,22 +762,19 @@ def _follow(state, control, terms, edge, out):
                 start, steepness = pieces[0, p] - duration, 0.0
                 scene = scene_of(works, mount, duration, kinetics[0], bodies)
                 if reversible[k, m] > 0.0 or len(share[2]) > 0:
-                    of_step = bonded[k, m], fluctuating[k, m], reversible[k, m], share
                     wide, narrow = (
                         (1.0 + _NEAR) * first_radius,
                         (1.0 - _NEAR) * first_radius,
                     )
-                    steepness = (_left(wide, *of_step) - _left(narrow, *of_step)) / (
-                        wide - narrow
-                    )
+                    change = _left(wide, of_step, bodies[2])
+                    change -= _left(narrow, of_step, bodies[2])
+                    steepness = change / (wide - narrow)
                 radii = first_radius, radius
                 if math.isnan(radius):
                     detached, duration = start + opened, opened
                     radii = first_radius, 0.0
                 turn = _weakest(turn, radii, start, duration, steepness, scene)
-            work = _left(
-                radius, bonded[k, m], fluctuating[k, m], reversible[k, m], share
-            )
+            work = _left(radius, of_step, bodies[2])
             out[0, k, m], out[1, k, m], out[2, k, m], out[3, k, m] = (
                 work,
                 radius,
@@ -803,9 +816,7 @@ def follow(
     opening = np.searchsorted(pieces.interval, np.arange(len(durations) + 1))
     begin, end = pieces.start[opening[:-1]], pieces.stop[opening[1:] - 1]
     shares = (pieces.stop - begin[pieces.interval]) / (end - begin)[pieces.interval]
-    of_stress = (
-        reversible * balance.reversible(np.ones(1)) if reversible else np.zeros(1)
-    )
+    of_stress = reversible * balance.tilt if reversible else np.zeros(1)
     of_steps = balance.bonded, balance.fluctuating, of_stress
     _, rows = np.broadcast_shapes(
         state.radius.shape, *((1, *values.shape)[-2:] for values in of_steps)

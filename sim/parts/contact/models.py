@@ -29,7 +29,7 @@ from sim.parts.contact.balance import (
 )
 from sim.parts.contact.front import Kinetics, follow as follow_front
 from sim.parts.exchange import TURN, Array, ContactState, Flags, Motion, Setting, during
-from sim.solid import ElasticSolid, HalfSpace
+from sim.solid import ElasticSolid, HalfSpace, Layer
 from sim.spectrum.radial import PLANE
 from sim.units.quantity import Quantity, keyed
 from sim.units.tables import Prescribed, over_time, prescribed
@@ -79,7 +79,7 @@ class Body:
 
 @keyed()
 class Solid(Body):
-    """The elastic half-space, with the body that presses on it if that yields too.
+    """The elastic half-space or layer, with the body that presses on a half-space if that yields too.
 
     Parameters
     ----------
@@ -90,6 +90,8 @@ class Solid(Body):
         neglected.
     counter_body : Body, optional
         An elastic sphere; without it the sphere is rigid.
+    thickness : float or str, optional
+        h [m] of an incompressible layer bonded to a rigid base, under a rigid sphere; without it a half-space.
 
     Examples
     --------
@@ -102,15 +104,34 @@ class Solid(Body):
     """
 
     counter_body: Body | None = None
+    thickness: (
+        Annotated[
+            float, Quantity("m", "thickness of a layer on a rigid base", "h", above=0)
+        ]
+        | None
+    ) = None
+
+    @model_validator(mode="after")
+    def _incompressible_layer(self) -> "Solid":
+        fault = ""
+        if self.thickness is not None and self.counter_body is not None:
+            fault = "a layer is pressed by a rigid sphere: omit counter_body, or omit thickness for a half-space"
+        elif self.thickness is not None and self.poisson_ratio != 0.5:
+            fault = "a layer is incompressible: omit poisson_ratio, or omit thickness for a half-space"
+        if fault:
+            raise PydanticCustomError("layer", fault)
+        return self
 
     @cached_property
     def elastic(self) -> ElasticSolid:
-        """The half-space that yields as the two bodies together.
+        """The solid under a rigid sphere: the layer, or the half-space that yields as the two bodies together.
 
         The bodies' 1/G and nu/G add, and with them both the tangential and the normal compliance. Their couplings of
         shear stress with normal displacement subtract.
         """
         own = self.own_shear_modulus, self.poisson_ratio
+        if self.thickness is not None:
+            return Layer(own[0], self.thickness)
         if self.counter_body is None:
             return HalfSpace(*own)
         other = self.counter_body
@@ -120,7 +141,7 @@ class Solid(Body):
 
     @property
     def contact_modulus(self) -> float:
-        """E* of both bodies together [Pa]; 4G for one incompressible body."""
+        """E* of both bodies together [Pa]; 4G for one incompressible body, also for a layer of any thickness."""
         return self.elastic.contact_modulus
 
 
@@ -434,7 +455,7 @@ class _Controlled:
             (1.0, [PLANE]) if margin is None else (margin.least, margin.each)
         )
         load, base, stiffness = control.mount
-        tilt = self.reversible * balance.reversible(np.ones(1))
+        tilt = self.reversible * balance.tilt
         bonded, fluctuating = balance.bonded, balance.fluctuating
         most = bonded - least * fluctuating
         start = control.radius(most, bodies)

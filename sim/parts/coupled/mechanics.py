@@ -3,7 +3,8 @@
 import math
 from typing import NamedTuple
 
-from sim.laws.equilibrium import largest_radius
+from sim.laws.equilibrium import largest_radius, stress_reach
+from sim.laws.layer import shear_functions
 from sim.numerics.jit import device
 from sim.parts.drive import ENERGY
 from sim.parts.exchange import Array, FieldLaw, record
@@ -30,7 +31,7 @@ _STORED = (ENERGY.names or ()).index("stored")
 #: of each step.
 ARGUMENTS = (
     "Tuple((float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64)), "
-    "Tuple((UniTuple(float64, 12), UniTuple(float64, 7), UniTuple(float64, 13), UniTuple(float64, 7))), "
+    "Tuple((UniTuple(float64, 13), UniTuple(float64, 7), UniTuple(float64, 13), UniTuple(float64, 7))), "
     "Tuple((float64[:, :, ::1], float64[:, :, ::1]))"
 )
 
@@ -38,7 +39,7 @@ ARGUMENTS = (
 class Slider(NamedTuple):
     """Numbers of a drive during a piece: its length, the value prescribed at both ends, and the integral of it.
 
-    Then K, m, c, η, 1 if the force is prescribed, 1/k_t as constant + slope/a, tolerance.
+    Then K, m, c, η, 1 if the force is prescribed, 1/k_t as constant + slope/a, 1/h of a layer, tolerance.
     """
 
     length: float
@@ -52,6 +53,7 @@ class Slider(NamedTuple):
     forced: float
     yielding: float
     yielding_radius: float
+    inverse_thickness: float
     tolerance: float
 
 
@@ -136,7 +138,8 @@ def contact_area(bound, moment, time, radius, contact):
     if not a > 0.0:
         return math.nan, math.nan, 0.0, 0.0
     growth = 2.0 * math.pi * a / unit / slope
-    by_moment = -2.0 * growth * contact.mean_stress * moment * a
+    reach, _ = stress_reach(a, contact.inverse_thickness)
+    by_moment = -2.0 * growth * contact.mean_stress * moment * reach
     return a, math.pi * a * a / unit, growth * contact.bonded, by_moment
 
 
@@ -147,10 +150,12 @@ def compliance(radius, slider):
         return 0.0, 0.0
     if slider.yielding_radius == 0.0:
         return slider.yielding, 0.0
-    return (
-        slider.yielding + slider.yielding_radius / radius,
-        -slider.yielding_radius / (radius * radius),
-    )
+    shear = slider.yielding_radius / radius
+    if slider.inverse_thickness == 0.0:
+        return slider.yielding + shear, -slider.yielding_radius / (radius * radius)
+    m, m_slope, _, _ = shear_functions(radius * slider.inverse_thickness)
+    slope = shear * (m_slope * slider.inverse_thickness - m / radius)
+    return slider.yielding + shear * m, slope
 
 
 @device

@@ -196,7 +196,8 @@ class ShearModel:
             remarks.append(
                 "the spectrum has waves longer than the cell, which are omitted: give a larger shear.cell"
             )
-        if self.contact == "plane" and radius > 0.0:
+        # the energy on a disc is not known on a layer
+        if self.contact == "plane" and radius > 0.0 and not solid.inverse_thickness:
             share = float(marginal_energy(spectrum, radius, solid.softness)) / plane
             long = min(longest, side) > 2.0 * radius
             what = (
