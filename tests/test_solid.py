@@ -179,34 +179,34 @@ def test_a_solid_with_a_length_is_followed_by_spectra_modes_and_bands():
 
 @pytest.mark.parametrize("name", STRESSES)
 def test_the_energy_on_a_layer_is_the_integral_of_its_compliance(name):
-    stress, solid = STRESSES[name], Layer(1.7, 0.4)
+    stress, solid = STRESSES[name], Layer(1.7, 0.05)
     energy, half_space = (
         each.stored_energy(stress) for each in (solid, HalfSpace(1.7))
     )
-    assert 0.1 * half_space < energy < 0.9 * half_space
+    assert energy < 0.9 * half_space
     # short waves alone do not feel the base
     thick = Layer(1.7, 1e4).stored_energy(stress)
     assert_allclose(thick, half_space, rtol=1e-3)
     if name == "ripple":
         q = 2.0 * math.pi / 0.3
-        level = math.cos(0.4) ** 2 * layer.along_held(0.4 * q)
-        level += math.sin(0.4) ** 2 * layer.across(0.4 * q)
+        level = math.cos(0.4) ** 2 * layer.along_held(0.05 * q)
+        level += math.sin(0.4) ** 2 * layer.across(0.05 * q)
         exact = 0.25 * 2.0**2 * level / (1.7 * q)
         assert_allclose(energy, exact, rtol=1e-14, atol=0)
     elif name in ("gaussian", "von Kármán", "self-affine", "band", "table"):
         low, high = stress.support
-        edges = np.unique([low, *stress.breaks, *np.geomspace(0.01, 300.0, 24), high])
-        edges = edges[(edges >= low) & (edges <= min(high, 1e4))]
+        edges = np.unique([low, *stress.breaks, *np.geomspace(0.01, 1e14, 80), high])
+        edges = edges[(edges >= low) & (edges <= min(high, 1e14))]
 
         def integrand(q):
-            level = layer.along_held(0.4 * q) + layer.across(0.4 * q)
+            level = layer.along_held(0.05 * q) + layer.across(0.05 * q)
             return stress.density(q, 0.0) * level / (8.0 * math.pi * 1.7)
 
         exact = sum(
             quad(integrand, *pair, epsabs=0, epsrel=1e-12, limit=200)[0]
             for pair in itertools.pairwise(edges)
         )
-        # the tail of the von Kármán density beyond the last edge falls as q^-3.1
+        # quad is good to 1e-12 in each piece; the tail of von Kármán's density falls as q^-1.1 beyond the last edge
         assert_allclose(energy, exact, rtol=1e-9, atol=0)
 
 

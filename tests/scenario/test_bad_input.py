@@ -237,7 +237,7 @@ TOGETHER = [
     ),
     (
         "[sphere]",
-        'thickness = "1 um"\n[sphere]',
+        'thickness = "30 nm"\n[sphere]',
         "solid.thickness",
         "wider than 80 times...thicker",
     ),
