@@ -36,7 +36,7 @@ import math
 import numpy as np
 
 from sim.laws import layer
-from sim.numerics.jit import device, law
+from sim.numerics.jit import apart, device, law
 
 #: Change of the radius over it below which Newton's next step, its square, is below rounding; most steps.
 _CLOSE, _MOST = 1e-14, 200
@@ -167,6 +167,7 @@ def _on_layer(start, work, tilt, mount, body):
 
     It lies between ``low``, where y - sqrt(q) is not positive, and ``high``, where it is; 0 and inf are not known yet.
     """
+    apart()
     a, low, high = start, 0.0, math.inf
     for _ in range(_MOST):
         over, slope, steepness = _lack(a, work, tilt, mount, body)

@@ -39,7 +39,7 @@ import math
 import numpy as np
 
 from sim.laws.layer_table import TABLE, TURN, WIDEST
-from sim.numerics.jit import device, law
+from sim.numerics.jit import apart, device, law
 
 #: Numbers of g_1 and others in ``contact_function``.
 E_1, E_1_SLOPE, E_2, E_2_SLOPE, G_1, G_2, G_3, M, M_SLOPE, N, N_SLOPE = range(11)
@@ -218,6 +218,7 @@ def growth(x):
 @device
 def _tabulated(x):
     """Return e_1, its slope over x, e_2, its slope, g_1, g_2 and g_3 at x = a/h up to ``WIDEST``; Clenshaw's sums."""
+    apart()
     reach = 2.0 * (WIDEST + TURN) / WIDEST
     t, t_x = reach * x / (x + TURN) - 1.0, reach * TURN / ((x + TURN) * (x + TURN))
     a = b = c = d = e = 0.0
@@ -273,6 +274,7 @@ def contact_functions(x):
 @device
 def sphere(radius, curvature, modulus, inverse_thickness):
     """Return the terms of a sphere on a layer at a contact radius, as ``sim.laws.equilibrium.punch``."""
+    apart()
     x = radius * inverse_thickness
     e1, e1_slope, e2, e2_slope, g1, g2, _ = contact_functions(x)
     share = e2 / e1
@@ -297,6 +299,7 @@ def sphere(radius, curvature, modulus, inverse_thickness):
 @device
 def shear_functions(x):
     """Return m, its slope over x, n and its slope at x = a/h; powers of x beyond ``WIDEST``."""
+    apart()
     place = min(x, WIDEST)
     reach = 2.0 * (WIDEST + TURN) / WIDEST
     t = reach * place / (place + TURN) - 1.0

@@ -31,14 +31,12 @@ import numpy as np
 
 from sim.laws.equilibrium import (
     elastic_energy,
-    half_space,
     largest_radius,
     load_fold,
     missing_depth,
     punch,
     stress_reach,
 )
-from sim.laws.layer import sphere
 from sim.numerics.jit import device, kernel
 from sim.parts.contact.balance import SHARE, Balance
 from sim.parts.exchange import Array, ContactState
@@ -50,9 +48,14 @@ ROUNDING = 1e-12
 
 
 @device
-def _excess(terms, t, scene):
-    """Return ``excess`` from the terms of a punch."""
-    _, stiffness, load, load_rate, base, base_rate, work, work_rate, scale = scene
+def excess(t, a, scene):
+    """Return the missing indentation y, the excess s = (G - w)/work, and the slopes of s with a and with t.
+
+    Below Hertz's radius G continues as -G: only a monotone continuation for the inner
+    solver, which never ends there.
+    """
+    body, stiffness, load, load_rate, base, base_rate, work, work_rate, scale = scene
+    terms = punch(a, body)
     mount = load + load_rate * t, base + base_rate * t, stiffness
     y, y_a = missing_depth(terms, mount)
     y_t = -base_rate
@@ -60,21 +63,8 @@ def _excess(terms, t, scene):
         y_t = -(stiffness * base_rate + load_rate) / (stiffness + terms[3])
     unit = abs(y) / (terms[5] * scale)
     s = unit * y - (work + work_rate * t) / scale
-    s_a = unit * (2.0 * y_a - y / terms[5] * terms[6])
+    s_a = unit * (2.0 * y_a - y * (terms[6] / terms[5]))
     return y, s, s_a, 2.0 * unit * y_t - work_rate / scale
-
-
-@device
-def excess(t, a, scene):
-    """Return the missing indentation y, the excess s = (G - w)/work, and the slopes of s with a and with t.
-
-    Below Hertz's radius G continues as -G: only a monotone continuation for the inner
-    solver, which never ends there.
-    """
-    # each solid has code of its own, because this is most of the time of a run
-    if scene.body[2] > 0.0:
-        return _excess(sphere(a, *scene.body), t, scene)
-    return _excess(half_space(a, scene.body), t, scene)
 
 
 @device
@@ -577,12 +567,8 @@ _READ = "Array(float64, 2, 'A', readonly=True)"
 
 
 @device
-def _left(radius, terms, inverse_thickness):
-    """Return the work of adhesion left at a radius; of an open contact that of a vanishing one.
-
-    ``terms``: bonded, fluctuating, energy of the mean stress over the radius, and share of a disc.
-    """
-    bonded, fluctuating, reversible, share = terms
+def _left(radius, bonded, fluctuating, reversible, share, inverse_thickness):
+    """Return the work of adhesion left at a radius; of an open contact that of a vanishing one."""
     size, part = (0.0 if math.isnan(radius) else radius), 1.0
     if len(share[2]) > 0:
         part = share_of(size, share[0], share[1], share[2]) if size > 0.0 else 0.0
@@ -730,8 +716,8 @@ def _follow(state, control, terms, edge, out):
         for k in range(len(durations)):
             if math.isnan(radius):
                 turn = math.nan, math.nan, math.nan
-            of_step = bonded[k, m], fluctuating[k, m], reversible[k, m], share
-            last = _left(radius, of_step, bodies[2])
+            energies = bonded[k, m], fluctuating[k, m], reversible[k, m]
+            last = _left(radius, *energies, share, bodies[2])
             first, end = (last if math.isnan(radius) else work), 0.0
             for p in range(opening[k], opening[k + 1]):
                 begin, end = end, pieces[1, p]
@@ -766,15 +752,15 @@ def _follow(state, control, terms, edge, out):
                         (1.0 + _NEAR) * first_radius,
                         (1.0 - _NEAR) * first_radius,
                     )
-                    change = _left(wide, of_step, bodies[2])
-                    change -= _left(narrow, of_step, bodies[2])
+                    change = _left(wide, *energies, share, bodies[2])
+                    change -= _left(narrow, *energies, share, bodies[2])
                     steepness = change / (wide - narrow)
                 radii = first_radius, radius
                 if math.isnan(radius):
                     detached, duration = start + opened, opened
                     radii = first_radius, 0.0
                 turn = _weakest(turn, radii, start, duration, steepness, scene)
-            work = _left(radius, of_step, bodies[2])
+            work = _left(radius, *energies, share, bodies[2])
             out[0, k, m], out[1, k, m], out[2, k, m], out[3, k, m] = (
                 work,
                 radius,
