@@ -36,7 +36,7 @@ import math
 import numpy as np
 
 from sim.laws import layer
-from sim.numerics.jit import apart, device, law
+from sim.numerics.jit import apart, device, inlined, law
 
 #: Change of the radius over it below which Newton's next step, its square, is below rounding; most steps.
 _CLOSE, _MOST = 1e-14, 200
@@ -64,16 +64,17 @@ def half_space(radius, body):
     )
 
 
-@device
+@inlined
 def punch(radius, body):
     """Return the terms of a sphere on a solid at a contact radius; ``body``: 1/R, E* and 1/h, 0 without a layer.
 
     They are Hertz's depth and its slope over the radius, Hertz's load, 1/C and its slope, and the square of the missing
     depth per energy release rate, 4 pi a over the slope of 1/C, with its slope.
     """
+    terms = half_space(radius, body)
     if body[2] > 0.0:
-        return layer.sphere(radius, *body)
-    return half_space(radius, body)
+        terms = layer.sphere(radius, body[0], body[1], body[2])
+    return terms
 
 
 @device
