@@ -172,24 +172,28 @@ Front = namedtuple("Front", "speed power heal_speed heal_power")
 
 
 @device
+def _slope_of(running, a, known, speeds):
+    """Return ``_slope`` at a radius from ``excess`` without y, ``known``, and from ``edge_speed``."""
+    (s, s_a, s_t), (rate, bend) = known, speeds
+    if not running:
+        return rate, bend * s_a, bend * s_t, s * a
+    if not rate < 0.0:
+        return math.nan, 0.0, 0.0, 0.0
+    pace = -a / rate
+    growth = bend / rate
+    return pace, -pace * growth * s_t, pace * (growth * s_a * a - 1.0), s * a * a
+
+
+@device
 def _slope(running, x, y, start, scene, front):
     """Return the right side of the equation to integrate, its slopes with y and with x, and s times an area.
 
     Normally y is the radius and x the time; ``running``, y is the time and x the logarithm
     of start/radius. The last number times \\|dy\\| (times dx, ``running``) is energy over 2 pi work.
     """
-    if running:
-        a = start * math.exp(-x)
-        _, s, s_a, s_t = excess(y, a, scene)
-        rate, bend = edge_speed(s, front)
-        if not rate < 0.0:
-            return math.nan, 0.0, 0.0, 0.0
-        pace = -a / rate
-        growth = bend / rate
-        return pace, -pace * growth * s_t, pace * (growth * s_a * a - 1.0), s * a * a
-    _, s, s_a, s_t = excess(x, y, scene)
-    rate, bend = edge_speed(s, front)
-    return rate, bend * s_a, bend * s_t, s * y
+    t, a = (y, start * math.exp(-x)) if running else (x, y)
+    _, s, s_a, s_t = excess(t, a, scene)
+    return _slope_of(running, a, (s, s_a, s_t), edge_speed(s, front))
 
 
 @device
@@ -361,15 +365,16 @@ def _runs(a, rate, bend, s_a, s_t, left):
 
 
 @device
-def _try(running, t, a, h, size, scene, front):
-    """Return time and radius after an inner step, error over tolerance, and energy/(2 pi work)."""
-    x, now = (0.0, t) if running else (t, a)
-    f, j, f_x, _ = _slope(running, x, now, a, scene, front)
-    step, first = (running, x, now, h), (f, j, f_x)
-    change, error, energy = _radau(step, size, first, a, scene, front)
+def _try(step, size, first, a, scene, front):
+    """Return time and radius after an inner step, error over tolerance, and energy/(2 pi work).
+
+    ``step``: as in ``_radau``, from the radius a. ``first``: ``_slope`` at its start.
+    """
+    (running, x, y, h), (f, j, f_x, _) = step, first
+    change, error, energy = _radau(step, size, (f, j, f_x), a, scene, front)
     if running:
-        return t + change, a * math.exp(-h), error, energy
-    return t + h, a + change, error, energy
+        return y + change, a * math.exp(-h), error, energy
+    return x + h, a + change, error, energy
 
 
 @device
@@ -409,7 +414,9 @@ def _piece(t, a, stop, least, tries, scene, front):
             first, longest = 0.1, min(reach, _LONGEST)
         h = min(first if running != was or h == 0.0 else h, longest)
         was, whole = running, h == reach
-        t1, a1, error, more = _try(running, t, a, h, size, scene, front)
+        step = (running, 0.0, t, h) if running else (running, t, a, h)
+        slope = _slope_of(running, a, (s, s_a, s_t), (rate, bend))
+        t1, a1, error, more = _try(step, size, slope, a, scene, front)
         if not error < math.inf:
             shy, h = True, (0.0 if running else 0.25 * h)
             continue
