@@ -27,7 +27,7 @@ import sim
 from sim import laws, read
 from sim.read import Estimate, concise, distribution, over_members
 from sim.read.events import incipient_law
-from sim.solid import HalfSpace
+from sim.solid import HalfSpace, Layer
 from sim.study.fit import Fit, figure as fitted
 from sim.study.likelihood import LEVEL
 from sim.study.mechanisms import WHOLE
@@ -923,6 +923,32 @@ def pull_off(dataset: xr.Dataset) -> dict[str, Number]:
         "stiff": float(lost[-1]),
         "softest": float(stiffness[0]),
         "stiffest": float(stiffness[-1]),
+    }
+
+
+@asks(
+    "thin_film",
+    "How much more tension does a soft contact bear if the rubber is a thin film on glass?",
+    """The sliding contact with a film of {thin:g} µm bears {pull:.2f} mN, {times:.1f} times as much as with one of
+    {thick:g} mm, whose base is too far away to matter. Without sliding, the film bears {still:.2f} mN, and the thick
+    one {jkr:.2f} mN as in JKR theory. The film gains twice: it is stiffer, and the glass holds the long waves of the
+    shear stress, so that sliding takes {share:.0f} % of the adhesion instead of {most:.0f} %.""",
+)
+def thin_film(dataset: xr.Dataset) -> dict[str, Number]:
+    pull, thickness = -1e3 * dataset["lowest_load"], dataset["solid_thickness"]
+    solids = [Layer(float(dataset["solid_shear_modulus"]), float(h)) for h in thickness]
+    work, size = float(dataset["adhesion_work"]), float(dataset["sphere_radius"])
+    still = [-1e3 * solid.pull_off_load(work, size) for solid in solids]
+    taken = 100.0 * (1.0 - dataset["work_of_adhesion"].isel(t=0) / work)
+    return {
+        "thin": 1e6 * float(thickness[0]),
+        "thick": 1e3 * float(thickness[-1]),
+        "pull": float(pull[0]),
+        "times": float(pull[0] / pull[-1]),
+        "still": still[0],
+        "jkr": still[-1],
+        "share": float(taken[0]),
+        "most": float(taken[-1]),
     }
 
 

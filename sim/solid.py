@@ -11,9 +11,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim.laws import halfspace, reversible
+from sim.laws import equilibrium, halfspace, jkr, layer, reversible
 from sim.spectrum.family import Array, Family, Stress
 from sim.spectrum.radial import Softness
+
+#: Load on a sphere [N], displacement of the base [m] and stiffness behind it [N/m], 0 under a load.
+Mount = tuple[ArrayLike, ArrayLike, float]
 
 
 class ElasticSolid(Protocol):
@@ -31,6 +34,15 @@ class ElasticSolid(Protocol):
     poisson_ratio: float
 
     @property
+    def half_space(self) -> "HalfSpace":
+        """The half-space that contacts and waves much smaller than any length of the solid feel."""
+
+    @property
+    def held_ratio(self) -> float:
+        """Poisson ratio at which ``half_space`` without normal stress is as compliant as at held displacement [1]."""
+        return self.half_space.held_ratio
+
+    @property
     def unit(self) -> "ElasticSolid":
         """This solid at a shear modulus of 1 Pa, for results that many moduli share."""
 
@@ -39,17 +51,57 @@ class ElasticSolid(Protocol):
         """E* of the normal contact with a sphere [Pa]."""
 
     @property
+    def inverse_thickness(self) -> float:
+        """1/h of a layer [1/m], 0 of a half-space: the third number of a solid in compiled loops."""
+
+    @property
     def softness(self) -> Softness:
         """Compliance of waves far shorter than any length of the solid, with which finite discs are computed."""
+        return self.half_space.softness
+
+    def radius(self, mount: Mount, work: ArrayLike, sphere_radius: float) -> Array:
+        """Return the largest stable contact radius [m]: Hertz's if the work [J/m²] is not positive, nan if open."""
+
+    def load(self, radius: ArrayLike, mount: Mount, sphere_radius: float) -> Array:
+        """Return the load of any contact of a radius, in equilibrium or not [N]."""
+
+    def indentation(
+        self, radius: ArrayLike, mount: Mount, sphere_radius: float
+    ) -> Array:
+        """Return the indentation of any contact of a radius, in equilibrium or not [m]."""
+
+    def contact_energy(
+        self, radius: ArrayLike, indentation: ArrayLike, sphere_radius: float
+    ) -> Array:
+        """Return the elastic energy of a contact of any radius and indentation [J].
+
+        Its slope over the indentation is the load. That over the area is the energy release rate, because a contact
+        that shrinks releases what it stores.
+        """
+
+    def normal_stiffness(self, radius: float) -> float:
+        """Return the change of the load with the indentation of a contact of fixed radius [N/m]."""
+
+    def pull_off_load(self, work: float, sphere_radius: float) -> float:
+        """Return the lowest load that a contact bears [N]."""
 
     def compliance(self, qx: ArrayLike, qy: ArrayLike) -> Array:
-        """Return the displacement per shear stress at wavevectors [m/Pa], without normal stress; 0 at q = 0."""
+        """Return the displacement per shear stress at wavevectors [m/Pa], 0 at q = 0.
 
-    def tangential_compliance(self, radius: float) -> float:
-        """Return 1/k_t [m/N]: the mean displacement of a disc of a radius [m] over the force of a uniform stress."""
+        The normal displacement is held, because the sphere is smooth and does not yield to fluctuations.
+        """
+
+    def tangential_compliance(self, radius: ArrayLike) -> Array:
+        """Return 1/k_t [m/N]: the mean displacement of a disc of a radius [m] over the force of a uniform stress.
+
+        There is no normal stress, because the sphere is free to rise.
+        """
 
     def mean_stress_energy(self, radius: ArrayLike, stress: ArrayLike) -> Array:
         """Return the energy per new area of a disc of a radius [m] under a uniform shear stress [Pa], in J/m²."""
+
+    def mean_stress_density(self, radius: ArrayLike, stress: ArrayLike) -> Array:
+        """Return the energy of a disc of a radius [m] under a uniform shear stress [Pa] over its area, in J/m²."""
 
     def stored_energy(self, stress: Stress) -> float:
         """Return the mean elastic energy per area under a fluctuating shear stress on the plane [J/m²], ΔΓ."""
@@ -73,7 +125,7 @@ class ElasticSolid(Protocol):
 
 @dataclass(frozen=True)
 class HalfSpace(ElasticSolid):
-    """Elastic half-space; the coupling of shear stress and normal displacement at ν ≠ 1/2 is neglected.
+    """Elastic half-space under a rigid sphere, or the half-space that is as compliant as two elastic bodies together.
 
     Parameters
     ----------
@@ -81,10 +133,14 @@ class HalfSpace(ElasticSolid):
         G [Pa].
     poisson_ratio : float
         nu [1].
+    coupling : float, optional
+        Relative normal displacement per shear stress along its wave, times G q [1], ``laws.halfspace.coupling``. By
+        default (1 - 2 nu)/2, that of one body. At 0 nothing is coupled, as between two equal bodies.
 
     Notes
     -----
-    ``ΔΓ = (1/8π²) ∫ d²q C (1 - ν qx²/q²) / (G q)`` of a spectrum C (Menga, Carbone & Dini at ν = 1/2).
+    ``ΔΓ = (1/8π²) ∫ d²q C (1 - ν_h qx²/q²) / (G q)`` of a spectrum C (Menga, Carbone & Dini at ν = 1/2), with the
+    ``held_ratio`` ν_h = ν + coupling²/(1 - ν), because the sphere holds the normal displacement.
 
     Examples
     --------
@@ -99,6 +155,18 @@ class HalfSpace(ElasticSolid):
 
     shear_modulus: float
     poisson_ratio: float = 0.5
+    coupling: float | None = None
+
+    @property
+    def half_space(self) -> "HalfSpace":
+        return self
+
+    @property
+    def held_ratio(self) -> float:
+        coupling = self.coupling
+        if coupling is None:
+            coupling = halfspace.coupling(1.0, self.poisson_ratio)
+        return halfspace.held_ratio(self.poisson_ratio, coupling)
 
     @property
     def unit(self) -> "HalfSpace":
@@ -110,21 +178,74 @@ class HalfSpace(ElasticSolid):
         return 2.0 * self.shear_modulus / (1.0 - self.poisson_ratio)
 
     @property
+    def inverse_thickness(self) -> float:
+        return 0.0
+
+    def radius(self, mount: Mount, work: ArrayLike, sphere_radius: float) -> Array:
+        load, base, stiffness = mount
+        if stiffness == 0.0:
+            return np.asarray(
+                jkr.radius_at_load(load, work, sphere_radius, self.contact_modulus)
+            )
+        numbers = base, stiffness, work, sphere_radius, self.contact_modulus
+        return np.asarray(jkr.radius_at_displacement(*numbers))
+
+    def load(self, radius: ArrayLike, mount: Mount, sphere_radius: float) -> Array:
+        load, base, stiffness = mount
+        if stiffness == 0.0:
+            return np.asarray(load)
+        numbers = radius, base, stiffness, sphere_radius, self.contact_modulus
+        return np.asarray(jkr.load_under_displacement(*numbers))
+
+    def indentation(
+        self, radius: ArrayLike, mount: Mount, sphere_radius: float
+    ) -> Array:
+        (load, base, stiffness), modulus = mount, self.contact_modulus
+        if stiffness == 0.0:
+            numbers = radius, load, sphere_radius, modulus
+            return np.asarray(jkr.indentation_under_load(*numbers))
+        return np.asarray(
+            jkr.indentation_under_displacement(
+                radius, base, stiffness, sphere_radius, modulus
+            )
+        )
+
+    def contact_energy(
+        self, radius: ArrayLike, indentation: ArrayLike, sphere_radius: float
+    ) -> Array:
+        """``E* (a δ² − 2 a³ δ/(3R) + a⁵/(5R²))`` (Maugis 2000)."""
+        a, depth, curvature = (
+            np.asarray(radius),
+            np.asarray(indentation),
+            1.0 / sphere_radius,
+        )
+        third = a**3 * curvature
+        return self.contact_modulus * (
+            a * depth**2 - 2.0 / 3.0 * third * depth + 0.2 * third * a**2 * curvature
+        )
+
+    def normal_stiffness(self, radius: float) -> float:
+        return 2.0 * self.contact_modulus * radius
+
+    def pull_off_load(self, work: float, sphere_radius: float) -> float:
+        return float(jkr.pull_off_load(work, sphere_radius))
+
+    @property
     def softness(self) -> Softness:
         """Compliance of waves of any length."""
-        level, swing = halfspace.angular_compliance(self.poisson_ratio)
+        level, swing = halfspace.angular_compliance(self.held_ratio)
         return Softness(level / self.shear_modulus, swing / self.shear_modulus)
 
     def compliance(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         return np.asarray(
-            halfspace.compliance(qx, qy, self.shear_modulus, self.poisson_ratio)
+            halfspace.compliance(qx, qy, self.shear_modulus, self.held_ratio)
         )
 
-    def tangential_compliance(self, radius: float) -> float:
+    def tangential_compliance(self, radius: ArrayLike) -> Array:
         slope = (
             4.0 * (2.0 - self.poisson_ratio) / (3.0 * math.pi**2 * self.shear_modulus)
         )
-        return slope / radius
+        return slope / np.asarray(radius)
 
     def mean_stress_energy(self, radius: ArrayLike, stress: ArrayLike) -> Array:
         return np.asarray(
@@ -133,5 +254,101 @@ class HalfSpace(ElasticSolid):
             )
         )
 
+    def mean_stress_density(self, radius: ArrayLike, stress: ArrayLike) -> Array:
+        return 2.0 / 3.0 * self.mean_stress_energy(radius, stress)
+
     def stored_energy(self, stress: Stress) -> float:
         return float(self.softness.energy(stress))
+
+
+@dataclass(frozen=True)
+class Layer(ElasticSolid):
+    """Incompressible elastic layer bonded to a rigid base, under a rigid sphere. Limit: half-space as h -> infinity.
+
+    Parameters
+    ----------
+    shear_modulus, thickness : float
+        G [Pa], h [m].
+
+    Notes
+    -----
+    A sphere that touches a disc of ``a`` up to 80 h is computed to 1e-10 (``laws.layer``). The compliance of waves is
+    that at held normal displacement, so that waves longer than h store much less than on a half-space.
+
+    Examples
+    --------
+    Patches much wider than a layer store less energy, because the base holds it:
+
+    >>> from sim.spectrum import Gaussian
+    >>> energies = (Layer(1.6e6, h).stored_energy(Gaussian(rms=1e6, length=1e-6)) for h in (1e-3, 1e-6, 1e-7))
+    >>> print(*(f"{1e3 * energy:.1f} mJ/m^2" for energy in energies))
+    207.6 mJ/m^2 122.7 mJ/m^2 19.3 mJ/m^2
+    """
+
+    shear_modulus: float
+    thickness: float
+
+    @property
+    def poisson_ratio(self) -> float:  # type: ignore[override]
+        return 0.5
+
+    @property
+    def half_space(self) -> HalfSpace:
+        return HalfSpace(self.shear_modulus)
+
+    @property
+    def unit(self) -> "Layer":
+        return replace(self, shear_modulus=1.0)
+
+    @property
+    def contact_modulus(self) -> float:
+        """4G [Pa], E* of a layer much thicker than the contact is wide."""
+        return 4.0 * self.shear_modulus
+
+    @property
+    def inverse_thickness(self) -> float:
+        return 1.0 / self.thickness
+
+    def compliance(self, qx: ArrayLike, qy: ArrayLike) -> Array:
+        return np.asarray(layer.compliance(qx, qy, self.thickness, self.shear_modulus))
+
+    def radius(self, mount: Mount, work: ArrayLike, sphere_radius: float) -> Array:
+        numbers = *mount, work, sphere_radius, self.contact_modulus, self.thickness
+        return np.asarray(equilibrium.radius_on_layer(*numbers))
+
+    def load(self, radius: ArrayLike, mount: Mount, sphere_radius: float) -> Array:
+        numbers = *mount, sphere_radius, self.contact_modulus, self.thickness
+        return np.asarray(equilibrium.load_on_layer(radius, *numbers))
+
+    def indentation(
+        self, radius: ArrayLike, mount: Mount, sphere_radius: float
+    ) -> Array:
+        numbers = *mount, sphere_radius, self.contact_modulus, self.thickness
+        return np.asarray(equilibrium.indentation_on_layer(radius, *numbers))
+
+    def contact_energy(
+        self, radius: ArrayLike, indentation: ArrayLike, sphere_radius: float
+    ) -> Array:
+        numbers = sphere_radius, self.contact_modulus, self.thickness
+        return np.asarray(equilibrium.energy_on_layer(radius, indentation, *numbers))
+
+    def normal_stiffness(self, radius: float) -> float:
+        flat = layer.contact_function(layer.G_1, radius / self.thickness)
+        return 2.0 * self.contact_modulus * radius * float(flat)
+
+    def pull_off_load(self, work: float, sphere_radius: float) -> float:
+        numbers = sphere_radius, self.contact_modulus, self.thickness
+        return float(equilibrium.pull_off_load_on_layer(work, *numbers))
+
+    def tangential_compliance(self, radius: ArrayLike) -> Array:
+        numbers = self.shear_modulus, self.thickness
+        return np.asarray(layer.tangential_compliance(radius, *numbers))
+
+    def mean_stress_energy(self, radius: ArrayLike, stress: ArrayLike) -> Array:
+        numbers = self.shear_modulus, self.thickness
+        return np.asarray(layer.mean_stress_energy(radius, stress, *numbers))
+
+    def mean_stress_density(self, radius: ArrayLike, stress: ArrayLike) -> Array:
+        force = math.pi * np.asarray(radius) ** 2 * np.square(stress)
+        size = np.where(force > 0.0, radius, 1.0)
+        return 0.5 * force * self.tangential_compliance(size)

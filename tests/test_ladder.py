@@ -19,6 +19,7 @@ from numpy.testing import assert_allclose
 
 from sim.parts.bonds import models as bonds, tracked as tracks
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
+from sim.parts.contact.models import Solid
 from sim.scenario.scenario import Record
 
 RAMP = drive.Ramp(start=1e-4, stop=3e-2, scale="log")
@@ -104,6 +105,22 @@ def test_bonds_that_only_a_stretch_breaks_are_the_papers_steady_law(speed):
         state = last(steps=steps, bonds=part, drive=drive.Steady(speed=speed)).bonding
         assert_allclose(state.fraction, steady.bonds.bound, rtol=1e-4)
         assert_allclose(state.stress, full * steady.bonds.bound, rtol=1e-4)
+
+
+def test_a_layer_becomes_a_half_space_as_its_thickness_grows():
+    def found(thickness):
+        solid = {"shear_modulus": 1.6e6, "thickness": thickness}
+        state = last(3, steps=20, solid=Solid(**solid), shear=shear.Banded(**BY_SLIP))
+        return state.shear.energy, state.contact.radius
+
+    (energy, radius), layers = found(None), [found(h) for h in (1e-3, 2e-3, 4e-3)]
+    # third order in a/h under a load, because the terms before only shift the indentation
+    errors = [of_layer[1] / radius - 1.0 for of_layer in layers]
+    assert_allclose(errors[0] / errors[1], 8.0, rtol=0.02)
+    assert_allclose(errors[1] / errors[2], 8.0, rtol=0.004)
+    # the waves are much shorter than the thickness
+    for of_layer in layers:
+        assert_allclose(of_layer[0], energy, rtol=1e-14, atol=0)
 
 
 def test_auto_is_the_depth_that_it_chooses():

@@ -87,7 +87,7 @@ def test_progress_is_told_to_a_function_or_shown_or_logged(capsys, caplog, monke
     with caplog.at_level("INFO", "sim"):
         sim.run({**SCENE, "solid": {"shear_modulus": "1.6 MPa", "poisson_ratio": 0.4}})
     assert (
-        "poisson_ratio is not 0.5: the normal-tangential coupling is neglected"
+        "poisson_ratio is not 0.5: the coupling of mean shear stress and pressure is neglected"
         in caplog.messages
     )
     assert any(line.startswith("100 % of 11 member-steps") for line in caplog.messages)

@@ -1,16 +1,19 @@
 """The elastic solid: its closed forms beside quadrature and beside each other, and a solid of another kind."""
 
+import itertools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import quad
 
-from sim.laws import halfspace
+from sim.laws import halfspace, layer
 from sim.parts import shear
+from sim.parts.contact.models import Solid
 from sim.parts.shear.process import Time
-from sim.solid import ElasticSolid, HalfSpace
+from sim.solid import ElasticSolid, HalfSpace, Layer
 from sim.spectrum import (
     AnisotropicGaussian,
     Band,
@@ -66,6 +69,61 @@ def test_the_quadrature_of_the_compliance_is_the_closed_form_of_the_half_space(n
         assert_allclose(by_quadrature, solid.stored_energy(stress), rtol=rtol, atol=0)
 
 
+def surface(poisson_ratio, shear_modulus, side):
+    """Return U, W, shear and normal stress at the face z = 0 of two solutions in a body, as rows of a matrix.
+
+    The body fills z < 0 for ``side`` 1 and z > 0 for -1. The displacement is (iU, W) exp(ix), each solution
+    exp(\\|z\\|) smaller inside: U = W = 1 and U = z, W = z - (3 - 4ν).
+    """
+    rest = 2.0 - 4.0 * poisson_ratio
+    return np.array(
+        [
+            [1.0, 0.0],
+            [side, -side * (1.0 + rest)],
+            [2.0 * side * shear_modulus, -side * rest * shear_modulus],
+            [2.0 * shear_modulus, -4.0 * (1.0 - poisson_ratio) * shear_modulus],
+        ]
+    )
+
+
+@pytest.mark.parametrize("ratios", [(0.3, 0.1), (0.3, 0.3), (0.5, 0.0), (0.1, 0.5)])
+def test_two_bodies_slip_past_each_other_as_their_equations_say_without_coming_apart(
+    ratios,
+):
+    moduli = 2.0, 7.0
+    for (low, other), (soft, hard) in ((ratios, moduli), (ratios, (3.0, 3.0))):
+        first, second = surface(low, soft, 1.0), surface(other, hard, -1.0)
+        zero = np.zeros(2)
+        system = np.array(
+            [
+                [*(first[1]), *(-second[1])],
+                [*(first[2]), *zero],
+                [*zero, *(second[2])],
+                [*(first[3]), *(-second[3])],
+            ]
+        )
+        weights = np.linalg.solve(system, [0.0, 1.0, 1.0, 0.0])
+        slip = first[0] @ weights[:2] - second[0] @ weights[2:]
+        body = {"shear_modulus": hard, "poisson_ratio": other}
+        solid = Solid(shear_modulus=soft, poisson_ratio=low, counter_body=body).elastic
+        assert_allclose(solid.compliance(1.0, 0.0), slip, rtol=1e-14, atol=0)
+        across = 1.0 / soft + 1.0 / hard
+        assert_allclose(solid.compliance(0.0, 1.0), across, rtol=1e-14, atol=0)
+
+
+def test_a_rigid_sphere_stiffens_a_compressible_solid_and_no_other():
+    spectrum = Gaussian(2.0, 0.7)
+    for poisson_ratio in (0.0, 0.1, 0.3, 0.5):
+        solid = HalfSpace(1.7, poisson_ratio)
+        # (7 - 8ν)/(32π(1 - ν)G) ∫ C dq of an isotropic spectrum
+        level = (7.0 - 8.0 * poisson_ratio) / (32.0 * math.pi * (1.0 - poisson_ratio))
+        exact = level / 1.7 * spectrum.line_integral
+        assert_allclose(solid.stored_energy(spectrum), exact, rtol=1e-14, atol=0)
+        rigid = Solid(shear_modulus=1.7, poisson_ratio=poisson_ratio).elastic
+        assert rigid.held_ratio == solid.held_ratio
+    assert HalfSpace(1.7).held_ratio == 0.5
+
+
 def test_the_force_of_a_uniform_stress_does_the_work_that_the_solid_stores():
     radius, stress = np.array([0.3, 2.0]), 5.0
     for poisson_ratio in (0.0, 0.3, 0.5):
@@ -117,3 +175,56 @@ def test_a_solid_with_a_length_is_followed_by_spectra_modes_and_bands():
     ratio = deep.stored_energy(spectrum) / half_space.stored_energy(spectrum)
     lacks = math.log(2.0) * 0.7 / math.sqrt(math.pi) / 1e5
     assert_allclose(1.0 - ratio, lacks, rtol=1e-8, atol=0)
+
+
+@pytest.mark.parametrize("name", STRESSES)
+def test_the_energy_on_a_layer_is_the_integral_of_its_compliance(name):
+    stress, solid = STRESSES[name], Layer(1.7, 0.05)
+    energy, half_space = (
+        each.stored_energy(stress) for each in (solid, HalfSpace(1.7))
+    )
+    assert energy < 0.9 * half_space
+    # short waves alone do not feel the base
+    thick = Layer(1.7, 1e4).stored_energy(stress)
+    assert_allclose(thick, half_space, rtol=1e-3)
+    if name == "ripple":
+        q = 2.0 * math.pi / 0.3
+        level = math.cos(0.4) ** 2 * layer.along_held(0.05 * q)
+        level += math.sin(0.4) ** 2 * layer.across(0.05 * q)
+        exact = 0.25 * 2.0**2 * level / (1.7 * q)
+        assert_allclose(energy, exact, rtol=1e-14, atol=0)
+    elif name in ("gaussian", "von Kármán", "self-affine", "band", "table"):
+        low, high = stress.support
+        edges = np.unique([low, *stress.breaks, *np.geomspace(0.01, 1e14, 80), high])
+        edges = edges[(edges >= low) & (edges <= min(high, 1e14))]
+
+        def integrand(q):
+            level = layer.along_held(0.05 * q) + layer.across(0.05 * q)
+            return stress.density(q, 0.0) * level / (8.0 * math.pi * 1.7)
+
+        exact = sum(
+            quad(integrand, *pair, epsabs=0, epsrel=1e-12, limit=200)[0]
+            for pair in itertools.pairwise(edges)
+        )
+        # quad is good to 1e-12 in each piece; the tail of von Kármán's density falls as q^-1.1 beyond the last edge
+        assert_allclose(energy, exact, rtol=1e-9, atol=0)
+
+
+def test_a_layer_under_a_uniform_stress_stores_the_work_that_its_stiffness_does():
+    solid, stress = Layer(1.7, 0.4), 5.0
+    for radius in (1e-3, 0.1, 0.7, 3.0, 25.0):
+        force = math.pi * radius**2 * stress
+        energy = 0.5 * force**2 * solid.tangential_compliance(radius)
+        density = solid.mean_stress_density(radius, stress)
+        assert_allclose(density * math.pi * radius**2, energy, rtol=1e-14, atol=0)
+        sizes = radius * (1.0 + 1e-3 * np.array([-2.0, -1.0, 1.0, 2.0]))
+        stored = math.pi * sizes**2 * solid.mean_stress_density(sizes, stress)
+        slope = stored @ [1.0, -8.0, 8.0, -1.0] / (12e-3 * radius)
+        new = solid.mean_stress_energy(radius, stress)
+        assert_allclose(slope / (2.0 * math.pi * radius), new, rtol=1e-9, atol=0)
+    thin, thick, half_space = Layer(1.7, 1e-2), Layer(1.7, 1e9), HalfSpace(1.7)
+    assert_allclose(thin.mean_stress_energy(0.7, stress), 25e-2 / 3.4, rtol=0.03)
+    for law in ("mean_stress_energy", "mean_stress_density"):
+        values = (getattr(each, law)(0.7, stress) for each in (thick, half_space))
+        assert_allclose(next(values), next(values), rtol=1e-8, atol=0)
+    assert thin.mean_stress_density(0.0, stress) == 0.0

@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 from helpers.corner_scenes import corner_scene
-from helpers.random_scenes import random_scene
+from helpers.random_scenes import random_layer, random_scene
 from helpers.scenes import follow
 from helpers.slider_rules import (
     check_dissipated,
@@ -52,6 +52,8 @@ SEEDS = [
 SEEDS += [1319, 1399]
 #: That of a scene that is refused, with a reason.
 REFUSED = (75,)
+#: Scenes on layers that are always run.
+ON_LAYERS = range(6)
 #: Scenes at corners that have been wrong.
 AT_CORNERS = 6, 45, 62, 75, 102, 164, 225, 271
 #: Scenes at corners, and how often they reach each at least.
@@ -341,6 +343,18 @@ def test_a_random_scene_closes_its_energy_and_has_the_same_numbers_however_it_is
 @pytest.mark.parametrize("seed", [*range(int(os.environ.get("SCENES", "300"))), 1768])
 def test_a_random_scene_keeps_all_rules_also_at_finer_steps(seed):
     if check_scene(seed, finer=True) is None:
+        pytest.skip("the scene is refused with a reason")
+
+
+@pytest.mark.parametrize("seed", ON_LAYERS)
+def test_a_random_scene_on_a_layer_keeps_all_rules(seed):
+    assert check_scene(seed, draw=random_layer) is not None
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("seed", range(300))
+def test_each_of_many_scenes_on_layers_keeps_all_rules(seed):
+    if check_scene(seed, draw=random_layer) is None:
         pytest.skip("the scene is refused with a reason")
 
 

@@ -476,10 +476,7 @@ def _lagging(plan: Plan, point: Scenario) -> Iterator[str]:
 def slider_body(point: Scenario, speeds: Array) -> Body:
     """Return the body behind the spring of a scene in steady sliding at speeds [m/s], with the growth of its area."""
     drive, steady = cast(Spring, point.drive), point.population.steady(speeds)
-    control, (yields, slope) = (
-        point.contact.control(0.0, 0.0),
-        drive.yields(point.solid.elastic),
-    )
+    control = point.contact.control(0.0, 0.0)
 
     def area(share: float = 1.0, stress: float = 1.0) -> Array:
         work_left = point.adhesion.work_of_bonds(steady.fraction * share)
@@ -496,12 +493,15 @@ def slider_body(point: Scenario, speeds: Array) -> Body:
     now, few = area(), _RELATIVE_STEP
     by_bonds = (area(share=1.0 + few) - area(share=1.0 - few)) / (2.0 * few * now)
     by_stress = (area(stress=1.0 + few) - area(stress=1.0 - few)) / (2.0 * few * now)
-    firm = (
-        1.0 / (yields + slope / np.sqrt(now / np.pi))
-        if yields + slope > 0.0
-        else math.inf
-    )
-    power = 0.5 if slope > 0.0 else 0.0
+    radius, solid = np.sqrt(now / np.pi), point.solid.elastic
+    firm: Array | float = math.inf
+    power: Array | float = 0.0
+    if sum(drive.yields(solid)) > 0.0:
+        firm = 1.0 / drive.compliance(solid, radius)
+        # of k_t over the area
+        wider = drive.compliance(solid, radius * math.exp(few)) * firm
+        narrower = drive.compliance(solid, radius * math.exp(-few)) * firm
+        power = np.log(narrower / wider) / (4.0 * few)
     return Body(
         now,
         by_bonds,

@@ -9,6 +9,8 @@ import tomllib
 from collections.abc import Sequence
 from typing import Any, NamedTuple, cast
 
+import numpy as np
+
 from sim.ensemble.diagnosis import (
     COMPUTED,
     SEARCHED,
@@ -23,7 +25,6 @@ from sim.ensemble.diagnosis import (
 from sim.ensemble.pace import counted, pace as pace_of
 from sim.ensemble.plan import IN_MEMORY, Plan, map_bytes, state_numbers, work
 from sim.ensemble.swept import grouped, in_words, places, spread
-from sim.laws import jkr
 from sim.laws.limits import JKR_FROM
 from sim.parts.drive import Spring
 from sim.parts.exchange import Parts
@@ -408,7 +409,7 @@ def _contact(points: Sequence[Scenario]) -> Rows:
         [point for point in points if point.contact.load is not None],
     )
     loads = [
-        float(jkr.pull_off_load(point.adhesion.work, point.sphere.radius))
+        point.solid.elastic.pull_off_load(point.adhesion.work, point.sphere.radius)
         for point in loaded
     ]
     rows: Rows = [("JKR radius", _span(closed, "m"))] if closed else []
@@ -540,8 +541,9 @@ def _slider(plan: Plan) -> Rows:
     driven = [point for point in points if point.drive.solves_motion]
     compliances = []
     for point in driven:
-        yields, slope = cast(Spring, point.drive).yields(point.solid.elastic)
-        compliances.append(yields + slope / math.sqrt(point.contact_area / math.pi))
+        radius = np.asarray(math.sqrt(point.contact_area / math.pi))
+        drive = cast(Spring, point.drive)
+        compliances.append(float(drive.compliance(point.solid.elastic, radius)))
     rows: Rows = []
     if compliances:
         stiffnesses = [1.0 / each if each else math.inf for each in compliances]

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from sim.laws import jkr
 from sim.parts.contact.balance import (
     BONDS_ONLY,
     CLOSED,
@@ -531,6 +530,8 @@ NUMBERS = (
     Variable(
         "jkr_pull_off_load",
         "",
-        lambda scene: jkr.pull_off_load(scene.adhesion.work, scene.sphere.radius),
+        lambda scene: scene.solid.elastic.pull_off_load(
+            scene.adhesion.work, scene.sphere.radius
+        ),
     ),
 )

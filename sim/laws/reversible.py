@@ -98,7 +98,7 @@ def shrunk(jkr, hertz, push, stiffness, work, tilt, held, sphere_radius, modulus
     if not tilt > 0.0:
         return math.nan
     mount = (0.0, push, stiffness) if stiffness > 0.0 else (push, 0.0, 0.0)
-    body = 1.0 / sphere_radius, modulus
+    body = 1.0 / sphere_radius, modulus, 0.0
     radius, slope = largest_radius(jkr, work, tilt, mount, body)
     if push >= 0.0:
         return max(radius, hertz) if held * tilt <= slope < math.inf else hertz

@@ -431,7 +431,7 @@ def _widened(
     if most == 0.0 or not most < math.inf:
         return most
     mount = (0.0, control, math.inf) if hard == 1.0 else (control, 0.0, 0.0)
-    body = 1.0 / sphere_radius, modulus
+    body = 1.0 / sphere_radius, modulus, 0.0
     # in units of ``most`` all terms are at most 1, and the radius is at most 2.1 at a load, else 1.9
     radius, _ = largest_radius(2.1 * most, work, -tilt, mount, body)
     return max(normal, radius) if control >= 0.0 else radius

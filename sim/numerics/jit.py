@@ -88,6 +88,20 @@ def _cast(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
 
 
 @intrinsic
+def apart(typing: Any) -> Any:
+    """Keep the helper that calls this out of the code of its callers.
+
+    A long helper that is seldom called would make a loop slower that hardly ever calls it.
+    """
+    return numba.types.none(), _apart
+
+
+def _apart(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    builder.function.attributes.add("noinline")
+    return context.get_dummy_value()
+
+
+@intrinsic
 def float_at(typing: Any, address: Any, place: Any) -> Any:
     """The float at a place of an array whose address is a whole number in a float.
 

@@ -331,7 +331,7 @@ class _Driven(Part):
         ]
         | Literal["half_space", "rigid"],
         Field(
-            description='"half_space": that of the half-space under a uniform stress'
+            description='"half_space": that of the half-space, or of the layer, under a uniform stress'
         ),
     ] = "half_space"
     tolerance: _Tolerance = 1e-6
@@ -375,14 +375,23 @@ class _Driven(Part):
         return 0.0
 
     def yields(self, solid: ElasticSolid) -> tuple[float, float]:
-        """1/k_t of a contact of radius a as (constant [m/N], slope over 1/a [m²/N])."""
+        """Return 1/k_t of a small contact of radius a as (constant [m/N], slope over 1/a [m²/N])."""
         if self.contact_stiffness == "half_space":
-            return 0.0, solid.tangential_compliance(1.0)
+            return 0.0, float(solid.half_space.tangential_compliance(1.0))
         return (
             (0.0, 0.0)
             if self.contact_stiffness == "rigid"
             else (1.0 / float(self.contact_stiffness), 0.0)
         )
+
+    def compliance(self, solid: ElasticSolid, radius: Array) -> Array:
+        """Return 1/k_t of contacts of some radii [m] on a solid [m/N], 0 if they are rigid or open."""
+        is_closed = radius > 0.0
+        yields, slope = self.yields(solid)
+        if slope == 0.0:
+            return np.where(is_closed, yields, 0.0)
+        size = np.where(is_closed, radius, 1.0)
+        return np.where(is_closed, solid.tangential_compliance(size), 0.0)
 
     def driven(self, ends: Array, duration: float) -> tables.Pieces:
         """Return the prescribed speed of the stage or force in the intervals between some times [s]."""

@@ -1,6 +1,8 @@
 """Figures of one contact beside theory: the competing theories under shear, profiles, and the loop of a JKR test."""
 
 import contextlib
+import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,7 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sim.laws import jkr
+from sim.laws import equilibrium, jkr
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.plots import style
 from sim.plots.curves import SIGNS, Scene, beside, scene_along
@@ -120,6 +122,9 @@ def case_of(dataset: xr.Dataset) -> Case:
     if held not in _CONTROLS or value.isnull().any():
         cure = 'run it with [contact] load = "4 mN", or with an indentation'
         raise ValueError(f"theories need a constant load or indentation;  {cure}")
+    if "solid_thickness" in dataset:
+        cure = "omit solid.thickness to compare them on a half-space"
+        raise ValueError(f"the theories are not known on a layer;  {cure}")
     settings = {
         "value": value,
         "work": setting(dataset, "adhesion.work"),
@@ -314,6 +319,22 @@ def _events(panel: Axes, scene: Scene, line: Line, force: float) -> np.ndarray:
     return np.concatenate(reached) if reached else np.empty(0)
 
 
+def _equilibrium(
+    radius: np.ndarray, contact: Sequence[float], thickness: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return load and indentation of contacts of some radii in equilibrium with a work of adhesion.
+
+    ``contact``: that work, radius of the sphere and contact modulus.
+    """
+    if thickness == math.inf:
+        load = jkr.load_at_radius(radius, *contact)
+        return load, jkr.indentation_at_radius(radius, *contact)
+    _, size, modulus = contact
+    load = equilibrium.load_at_radius_on_layer(radius, *contact, thickness)
+    body = size, modulus, thickness
+    return load, equilibrium.indentation_on_layer(radius, load, 0.0, 0.0, *body)
+
+
 def _equilibria(
     panels: tuple[Axes, Axes, Axes],
     scene: Scene,
@@ -323,20 +344,20 @@ def _equilibria(
     """Draw JKR's equilibria up to the largest contact, each different curve once."""
     dataset, (force, length) = scene.statistics.dataset, factors
     reached: dict[tuple[float, ...], float] = {}
+    thickness = dataset.get("solid_thickness", xr.DataArray(math.inf))
     work, size = setting(dataset, "adhesion.work"), setting(dataset, "sphere.radius")
     for line in scene.lines:
-        numbers = (work, size, dataset["contact_modulus"], stiffness)
+        numbers = (work, size, dataset["contact_modulus"], thickness, stiffness)
         theory = tuple(style.number_at(number, line.point) for number in numbers)
         most = np.max(np.nan_to_num(scene.values("contact_radius", line)))
         reached[theory] = max(reached.get(theory, 0.0), most)
     loads, radii, loaded = panels
     # dense at small radii, where the slopes are infinite
     shares = np.linspace(0.0, 1.0, _RADII) ** 2
-    for (*contact, spring), most in reached.items():
+    for (*contact, layer_thickness, spring), most in reached.items():
         if most > 0.0 and not np.isnan(spring):
             radius = most * shares
-            load = jkr.load_at_radius(radius, *contact)
-            depth = jkr.indentation_at_radius(radius, *contact)
+            load, depth = _equilibrium(radius, contact, layer_thickness)
             displacement = scene.unit.factor * (depth + load / spring)
             look = style.GREY | {"linestyle": "--", "label": "JKR, stable and unstable"}
             loads.plot(displacement, force * load, **look)

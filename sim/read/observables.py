@@ -11,7 +11,7 @@ from collections.abc import Collection
 import numpy as np
 import xarray as xr
 
-from sim.laws import jkr
+from sim.laws import equilibrium, jkr
 from sim.quantities import OF_CONTACT, QUANTITIES
 from sim.read.dataset import (
     MEMBERS,
@@ -243,17 +243,19 @@ def radius_at_work(dataset: xr.Dataset, work: xr.DataArray) -> xr.DataArray:
         control(dataset),
         (work, setting(dataset, "sphere.radius"), dataset["contact_modulus"]),
     )
+    thickness, load = dataset.get("solid_thickness"), xr.DataArray(0.0)
     if held.kind == "load":
-        load = (
-            dataset["applied_load"]
-            if "applied_load" in dataset
-            else dataset.get("contact_load")
-        )
-        return xr.apply_ufunc(jkr.radius_at_load, load, *sphere)
+        name = "applied_load" if "applied_load" in dataset else "contact_load"
+        load = dataset[name]
     # an indentation is a displacement behind an infinite stiffness
-    return xr.apply_ufunc(
-        jkr.radius_at_displacement, dataset[held.kind], held.stiffness, *sphere
-    )
+    base = xr.DataArray(0.0) if held.kind == "load" else dataset[held.kind]
+    if thickness is not None:
+        spring = 0.0 if held.kind == "load" else held.stiffness
+        on_layer = load, base, spring, *sphere, thickness
+        return xr.apply_ufunc(equilibrium.radius_on_layer, *on_layer)
+    if held.kind == "load":
+        return xr.apply_ufunc(jkr.radius_at_load, load, *sphere)
+    return xr.apply_ufunc(jkr.radius_at_displacement, base, held.stiffness, *sphere)
 
 
 def _charged_first(dataset: xr.Dataset) -> xr.DataArray:

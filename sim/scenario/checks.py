@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
-from sim.laws import jkr
+from sim.laws.layer_table import WIDEST
 from sim.laws.limits import JKR_FROM, elastocapillary_length, tabor_number
 from sim.parts.bonds.models import Cohort, Tracked
 from sim.parts.exchange import Array
@@ -49,6 +49,7 @@ def faults_across(scene: Scene, built: bool = True) -> Faults:
     for check in (
         _too_short,
         _cannot_be_driven,
+        _unknown_on_a_layer,
         _lacks_bonds,
         _catch_is_too_weak,
         _implausible,
@@ -97,6 +98,18 @@ def _cannot_be_driven(scene: Scene) -> Faults:
             )
 
 
+def _unknown_on_a_layer(scene: Scene) -> Faults:
+    thickness = scene.solid.thickness
+    if thickness is None:
+        return
+    if scene.fluctuations.contact != "plane":
+        fault = "ΔΓ of a disc is known on a half-space only"
+        yield ("shear", "contact"), f'{fault}: give "plane", or omit solid.thickness'
+    if scene.widest > WIDEST * thickness:
+        fault = f"a contact of {scene.widest:.3g} m is wider than {WIDEST:g} times the layer, beyond the theory"
+        yield ("solid", "thickness"), f"{fault}: give a thicker layer"
+
+
 def _lacks_bonds(scene: Scene) -> Faults:
     shear, bonds = scene.fluctuations, scene.population
     if bonds.stretched and bonds.rebinding_rate == 0.0 and bonds.start_from != "bonded":
@@ -115,7 +128,7 @@ def _lacks_bonds(scene: Scene) -> Faults:
         # a bond's own stiffness is in series with that of the solid, which stores ½ f²/k under a force f
         stiffest = 0.5 / scene.solid.elastic.stored_energy(shear.spectrum)
         if cast(Cohort | Tracked, bonds).bond_stiffness > stiffest * (1.0 + 1e-9):
-            fault = f"the half-space under a bond of this footprint has a stiffness of {stiffest:.3g} N/m in series"
+            fault = f"the solid under a bond of this footprint has a stiffness of {stiffest:.3g} N/m in series"
             yield (
                 ("bonds", "bond_stiffness"),
                 f"{fault}: give at most that, or a larger shear.spectrum.footprint",
@@ -183,7 +196,9 @@ def _wrong_maps(scene: Scene) -> Faults:
 def _shear_faults(scene: Scene, built: bool) -> Faults:
     shear, contact, radius = scene.fluctuations, scene.contact, scene.rest_radius
     if not shear.side(math.sqrt(math.pi) * radius) > 0.0:
-        pull_off = jkr.pull_off_load(scene.adhesion.work, scene.sphere.radius)
+        pull_off = scene.solid.elastic.pull_off_load(
+            scene.adhesion.work, scene.sphere.radius
+        )
         limit = f" of {pull_off:.3g} N" if contact.kind == "load" else ""
         fault = f"is beyond pull-off{limit} at the start, so there is no contact at rest for the size of the cell"
         yield (
@@ -217,6 +232,8 @@ def _off_the_map(scene: Scene) -> Faults:
 _MOST_REVERSED = 0.5
 #: Strain, and radius over that of the sphere, above which a remark is made; the same of γ/E over the contact radius.
 LARGEST_STRAIN, LARGEST_CAPILLARITY = 0.3, 0.1
+#: Contact radius over the thickness of a layer above which a remark is made on its compressibility.
+_COMPRESSED = 10.0
 #: Equilibrium distances of two surfaces between which those of most solids lie [m].
 DISTANCES = 0.4e-9, 0.16e-9
 #: Surface tension of water, and so of a wet gel [N/m].
@@ -281,6 +298,12 @@ def _remarks_on_theory(scene: Scene, known: Limits) -> Iterator[str]:
         )
     if known.strain > LARGEST_STRAIN:
         yield f"the mean stress is {known.strain:.2g} times the shear modulus, beyond linear elasticity"
+    thickness = scene.solid.thickness
+    if thickness is not None and scene.widest > _COMPRESSED * thickness:
+        yield (
+            f"the contact is {scene.widest / thickness:.3g} times as wide as the layer is thick: there the slight"
+            f" compressibility of real rubber matters, from about {_COMPRESSED:g} on"
+        )
     share = known.capillary[1] / scene.widest if scene.widest else 0.0
     if share > LARGEST_CAPILLARITY:
         tension = engineering(known.tensions[1], "N/m")
@@ -367,9 +390,9 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
     """Return about how much the load at pull-off is off [N], as the contact is seen after clock steps with a path [m].
 
     The first passage of ΔΓ is detected late by the overshoot of its changes (Siegmund, Sequential Analysis, 1985). As a
-    load this is 3/2 πR times the overshoot. A prescribed load adds half of its largest change in a step. The two have
-    opposite signs; this is a bound. An edge that lags is seen at the ends of clock steps, between which its load falls
-    by what the mount alone changes at most.
+    load this is 3/2 πR times the overshoot, or more on a layer. A prescribed load adds half of its largest change in a
+    step. The two have opposite signs; this is a bound. An edge that lags is seen at the ends of clock steps, between
+    which its load falls by what the mount alone changes at most.
     """
     shear, clock, contact = scene.fluctuations, scene.clock, scene.contact
     late = np.zeros(1)
@@ -394,13 +417,17 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
     if contact.kind == "load":
         ramp = most if contact.lags else 0.5 * most
     elif contact.lags:
-        of_contact = 2.0 * scene.solid.contact_modulus * scene.widest
+        of_contact = scene.solid.elastic.normal_stiffness(scene.widest)
         # both in series; a contact that is never closed yields without a load
         mount = contact.stiffness or math.inf
         ramp = most * of_contact / (1.0 + of_contact / mount)
     else:
         ramp = 0.0  # the fold is found within the step
-    return np.asarray(1.5 * math.pi * scene.sphere.radius * late + ramp)
+    work, solid = scene.adhesion.work or 1.0, scene.solid.elastic
+    once, twice = (
+        solid.pull_off_load(each, scene.sphere.radius) for each in (work, 2.0 * work)
+    )
+    return np.asarray((once - twice) / work * late + ramp)
 
 
 def _remarks_on_step(scene: Scene, path: Array) -> list[str]:

@@ -576,7 +576,7 @@ class Scenario:
             remarks.append(f"{slow}: shear.points = {points}")
         if self.solid.poisson_ratio != 0.5:
             remarks.append(
-                "poisson_ratio is not 0.5: the normal-tangential coupling is neglected"
+                "poisson_ratio is not 0.5: the coupling of mean shear stress and pressure is neglected"
             )
         return list(dict.fromkeys(remarks))
 

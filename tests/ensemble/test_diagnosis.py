@@ -112,10 +112,11 @@ def test_the_share_of_long_waves_is_the_integral_of_the_spectrum():
     )
     for family in families:
         for wavelength, ratio in ((50e-6, 0.5), (20e-6, 0.2), (8e-6, 0.0)):
+            held = 0.25 / (1.0 - ratio)
 
-            def density(angle, q, family=family, ratio=ratio):
+            def density(angle, q, family=family, held=held):
                 return family.density(q * math.cos(angle), q * math.sin(angle)) * (
-                    1.0 - ratio * math.cos(angle) ** 2
+                    1.0 - held * math.cos(angle) ** 2
                 )
 
             ends = [

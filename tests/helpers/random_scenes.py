@@ -51,6 +51,18 @@ def random_scene(seed):
     }
 
 
+def random_layer(seed):
+    """Return a random scene on a layer, from a fourteenth of a contact radius thick to fourteen contact radii."""
+    scene, draw = random_scene(seed), np.random.default_rng([seed, 48])
+    modulus, radius = scene["solid"]["shear_modulus"], scene["sphere"]["radius"]
+    size = np.cbrt(
+        9.0 * math.pi * scene["adhesion"]["work"] * radius**2 / (8 * modulus)
+    )
+    scene["solid"]["thickness"] = float(size * 14.0 ** draw.uniform(-1.0, 1.0))
+    scene["shear"].pop("contact", None)
+    return scene
+
+
 class Scale:
     """Modulus [Pa], sphere radius [m], work of adhesion [J/m²], contact radius [m], pull-off force [N], duration [s].
 

@@ -205,7 +205,7 @@ def scene(members=3, steps=8, **parts):
     parts = {"contact": CONTACTS["load"], "seed": 5} | parts
     return Scenario(
         clock=parts.pop("clock", Clock(duration=steps * 1e-3, step=1e-3)),
-        solid=Solid(shear_modulus=1.6e6),
+        solid=parts.pop("solid", Solid(shear_modulus=1.6e6)),
         sphere=Sphere(radius=2e-3),
         adhesion=parts.pop("adhesion", Adhesion(work=42e-3)),
         ensemble=Ensemble(members=members),

@@ -7,6 +7,8 @@ import numpy as np
 from helpers.scenes import follow
 from scipy.linalg import expm
 
+from sim.laws import layer
+from sim.laws.layer_table import WIDEST
 from sim.parts.drive import READINGS
 from sim.step.state import MemberNoise
 
@@ -320,7 +322,10 @@ def check_turns(scenario, course):
     )
     least = max(LEAST_WORK * scenario.adhesion.work, 1e-12)
     work, is_open = np.fmax(course.work, least), np.isnan(course.radius)
-    fold, scale = pull_off(contact, work, bodies.sphere_radius, bodies.modulus)
+    if scenario.solid.thickness is None:
+        fold, scale = pull_off(contact, work, bodies.sphere_radius, bodies.modulus)
+    else:
+        fold, scale = pull_off_on_layer(contact, work, scenario)
     near = TURN * np.maximum(scale, np.max(np.abs(value)))
     again = contact.after_pull_off == "reattach"
     is_open, value, fold = np.broadcast_arrays(is_open, value, fold)
@@ -347,6 +352,28 @@ def check_turns(scenario, course):
     assert again or not np.any(before & ~after & ~never_closed), (
         "a contact closes that should stay open"
     )
+
+
+def pull_off_on_layer(contact, work, scenario):
+    """Return the same of a contact on a layer, from a parabola through the three least values of a scan of radii."""
+    thickness, modulus = scenario.solid.thickness, scenario.bodies.modulus
+    x = np.geomspace(1e-6, 0.999 * WIDEST, 4000)
+    e1, e2, g1, g2 = (layer.contact_function(which, x) for which in (0, 2, 4, 5))
+    a, sizes = thickness * x, scenario.sphere.radius
+    works, place = np.unique(np.ravel(work), return_inverse=True)
+    root = np.sqrt(2.0 * math.pi * a * works[:, np.newaxis] / modulus) / e1
+    depth = a**2 * e2 / (e1 * sizes) - root
+    load = 2.0 * modulus * (depth * a * g1 - a**3 * g2 / sizes)
+    values = load
+    if contact.load is None:
+        values = depth + (load / contact.stiffness if contact.stiffness else 0.0)
+    least = np.clip(values.argmin(axis=1), 1, len(x) - 2)
+    rows = np.arange(len(works))
+    before, at, after = (values[rows, least + shift] for shift in (-1, 0, 1))
+    bend = before - 2.0 * at + after
+    fold = at - 0.125 * (after - before) ** 2 / np.where(bend > 0.0, bend, np.inf)
+    fold = fold[place].reshape(work.shape)
+    return fold, np.max(np.abs(fold))
 
 
 def pull_off(contact, work, sphere_radius, modulus):

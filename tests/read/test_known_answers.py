@@ -10,6 +10,8 @@ from numpy.testing import assert_allclose
 from scipy import integrate, optimize, special, stats
 
 import sim
+from sim.laws import layer
+from sim.read.observables import radius_at_work
 
 RADIUS, SHEAR, WORK, LOAD = 2e-3, 1.6e6, 42e-3, 4e-3
 LENS = Lens(RADIUS, 4.0 * SHEAR, WORK)
@@ -134,6 +136,46 @@ AT_REST = {
         {"contact_radius": SOFTER.at_load(LOAD)},
     ),
 }
+
+
+def on_layer(radius, work, thickness):
+    """Return load and indentation of a contact of a radius on a layer, in equilibrium with a work of adhesion."""
+    e1, e2, g1, g2 = (
+        layer.contact_function(which, radius / thickness)
+        for which in (layer.E_1, layer.E_2, layer.G_1, layer.G_2)
+    )
+    missing = np.sqrt(0.5 * np.pi * radius * work / SHEAR)
+    depth = (radius**2 * e2 / RADIUS - missing) / e1
+    return 8.0 * SHEAR * (depth * radius * g1 - radius**3 * g2 / RADIUS), depth
+
+
+@pytest.mark.parametrize("mount", ["load", "indentation", "displacement"])
+def test_a_contact_on_a_layer_is_read_as_it_was_computed_at_each_thickness(mount):
+    stiffness, thicknesses = 1e3, np.array([2e-6, 1e-5, 1e-4])
+    held = {"load": LOAD, "indentation": 1e-6, "displacement": 2e-6}
+    contact = {mount: held[mount]}
+    if mount == "displacement":
+        contact["stiffness"] = stiffness
+    dataset = sim.run(
+        scene(
+            solid={"shear_modulus": SHEAR, "thickness": thicknesses[0]},
+            contact=contact,
+            sweep={"solid.thickness": thicknesses.tolist()},
+        )
+    )
+    radius = dataset["contact_radius"].isel(t=-1).to_numpy()
+    load, depth = on_layer(radius, WORK, thicknesses)
+    reached = {"load": load, "indentation": depth}
+    reached["displacement"] = depth + load / stiffness
+    assert_allclose(reached[mount], held[mount], rtol=1e-9, atol=0)
+    assert_allclose(dataset["normal_load"].isel(t=-1), load, rtol=1e-9, atol=0)
+    assert_allclose(dataset["indentation"].isel(t=-1), depth, rtol=1e-9, atol=0)
+    again = radius_at_work(dataset, dataset["adhesion_work"])
+    assert_allclose(again.to_numpy().reshape(3, -1)[:, -1], radius, rtol=1e-12, atol=0)
+    if mount == "load":
+        assert np.all(
+            dataset["jkr_pull_off_load"] < 1.01 * -1.5 * np.pi * WORK * RADIUS
+        )
 
 
 # --- steady sliding ---

@@ -224,6 +224,24 @@ TOGETHER = [
     ('cell = "0.24 mm"\npoints = 32\n', 'cell = "24 mm"\n', "shear", "modes"),
     ('cell = "0.24 mm"', 'cell = "1 um"', "shear", "no wave"),
     (
+        "[sphere]",
+        'thickness = "10 um"\npoisson_ratio = 0.49\n[sphere]',
+        "solid",
+        "incompressible...omit poisson_ratio",
+    ),
+    (
+        "[sphere]",
+        'thickness = "10 um"\ncounter_body = { youngs_modulus = 1e9 }\n[sphere]',
+        "solid",
+        "rigid sphere...omit counter_body",
+    ),
+    (
+        "[sphere]",
+        'thickness = "30 nm"\n[sphere]',
+        "solid.thickness",
+        "wider than 80 times...thicker",
+    ),
+    (
         'longest = "60 um"',
         'longest = "6 um"',
         "shear.spectrum",

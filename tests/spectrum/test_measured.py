@@ -124,8 +124,8 @@ def test_a_table_between_its_rows_is_a_power_law_or_linear_next_to_a_zero():
     )
     assert_allclose(table.variance, law.variance, rtol=1e-13, atol=0)
     assert_allclose(
-        HalfSpace(2.0, 0.3).stored_energy(table),
-        HalfSpace(2.0, 0.3).stored_energy(law),
+        HalfSpace(2.0, 0.3, coupling=0.0).stored_energy(table),
+        HalfSpace(2.0, 0.3, coupling=0.0).stored_energy(law),
         rtol=1e-13,
         atol=0,
     )

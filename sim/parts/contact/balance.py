@@ -17,7 +17,6 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from sim.laws import jkr
 from sim.laws.equilibrium import largest_radius, surplus
 from sim.numerics.jit import device, kernel
 from sim.parts.exchange import Array, Flags, Mount
@@ -41,20 +40,15 @@ class Bodies(NamedTuple):
         """R [m], E* [Pa] and ν [1], as the closed forms of a sphere on a half-space take them."""
         return self.sphere_radius, self.modulus, self.solid.poisson_ratio
 
+    @property
+    def body(self) -> tuple[float, float, float]:
+        """1/R [1/m], E* [Pa] and 1/h [1/m], as ``sim.laws.equilibrium.punch`` takes them."""
+        return 1.0 / self.sphere_radius, self.modulus, self.solid.inverse_thickness
+
 
 def elastic_energy(radius: Array, indentation: Array, bodies: Bodies) -> Array:
-    """Return the elastic energy of a contact of any radius a and indentation δ [J].
-
-    ``E* (a δ² − 2 a³ δ/(3R) + a⁵/(5R²))``: its slope over δ is the load, over the area the energy release
-    rate G with the sign turned (Maugis 2000).
-    """
-    a, curvature = radius, 1.0 / bodies.sphere_radius
-    third = a**3 * curvature
-    return bodies.modulus * (
-        a * indentation**2
-        - 2.0 / 3.0 * third * indentation
-        + 0.2 * third * a**2 * curvature
-    )
+    """Return the elastic energy of a contact of any radius and indentation [J]."""
+    return bodies.solid.contact_energy(radius, indentation, bodies.sphere_radius)
 
 
 @dataclass(frozen=True)
@@ -74,9 +68,8 @@ class LoadControl:
         return self.load >= 0.0
 
     def radius(self, work: Array, bodies: Bodies) -> Array:
-        """Return JKR's radius [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
-        body = bodies.sphere_radius, bodies.modulus
-        return np.asarray(jkr.radius_at_load(self.load, work, *body))
+        """Return the radius in equilibrium [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
+        return bodies.solid.radius(self.mount, work, bodies.sphere_radius)
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
         """Return the load on the sphere [N]; 0 if the contact is open."""
@@ -84,11 +77,7 @@ class LoadControl:
 
     def indentation(self, radius: Array, bodies: Bodies) -> Array:
         """Return the indentation [m]; nan if the contact is open, because a dead load does not place the sphere."""
-        return np.asarray(
-            jkr.indentation_under_load(
-                radius, self.load, bodies.sphere_radius, bodies.modulus
-            )
-        )
+        return bodies.solid.indentation(radius, self.mount, bodies.sphere_radius)
 
     def displacement(self, radius: Array, bodies: Bodies) -> Array:
         """Return the displacement of the base [m], which is the indentation without a spring."""
@@ -128,24 +117,17 @@ class DisplacementControl:
         return self.base >= 0.0
 
     def radius(self, work: Array, bodies: Bodies) -> Array:
-        """Return JKR's radius [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
-        body = bodies.sphere_radius, bodies.modulus
-        return np.asarray(
-            jkr.radius_at_displacement(self.base, self.stiffness, work, *body)
-        )
+        """Return the radius in equilibrium [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
+        return bodies.solid.radius(self.mount, work, bodies.sphere_radius)
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
         """Return the load on the sphere [N]; 0 if the contact is open."""
-        load = jkr.load_under_displacement(
-            radius, self.base, self.stiffness, *bodies.numbers[:2]
-        )
+        load = bodies.solid.load(radius, self.mount, bodies.sphere_radius)
         return np.where(np.isnan(radius), 0.0, load)
 
     def indentation(self, radius: Array, bodies: Bodies) -> Array:
         """Return the indentation [m]; if the contact is open, the displacement of the base of the unloaded spring."""
-        closed = jkr.indentation_under_displacement(
-            radius, self.base, self.stiffness, *bodies.numbers[:2]
-        )
+        closed = bodies.solid.indentation(radius, self.mount, bodies.sphere_radius)
         return np.where(np.isnan(radius), self.base, closed)
 
     def displacement(self, radius: Array, bodies: Bodies) -> Array:
@@ -230,14 +212,20 @@ class Balance(NamedTuple):
     def reversible(self, radius: Array) -> Array:
         """Return the energy per area that the mean stress would release if the contact shrank [J/m²].
 
-        It is 6 τ0² a/(π E*) for an incompressible half-space.
+        It is 6 τ0² a/(π E*) for an incompressible half-space, and τ0² h/(2G) for a thin layer.
         """
         return self.bodies.solid.mean_stress_energy(radius, self.stress)
+
+    @property
+    def tilt(self) -> Array:
+        """Energy per area that the mean stress of a contact of vanishing radius stores, over the radius [J/m³]."""
+        half_space = self.bodies.solid.half_space
+        return half_space.mean_stress_energy(np.ones(1), self.stress)
 
     def gained(self, radius: Array, reversible: float) -> Array:
         """Return the energy that adhesion has released for the area of a contact: ∫ w dA over its radii [J]."""
         share = 1.0 if self.margin is None else self.margin.mean(radius)
-        mean = 2.0 / 3.0 * reversible * self.reversible(radius)
+        mean = reversible * self.bodies.solid.mean_stress_density(radius, self.stress)
         return math.pi * radius**2 * (self.bonded - self.fluctuating * share - mean)
 
 
@@ -326,7 +314,7 @@ def stable_radius(start, work, mount, body, share):
     return hertz
 
 
-@kernel(f"void(float64[:, ::1], float64, UniTuple(float64, 2), {SHARE}, float64[::1])")
+@kernel(f"void(float64[:, ::1], float64, UniTuple(float64, 3), {SHARE}, float64[::1])")
 def stable_radii(contacts, stiffness, body, share, radius):
     """Write the largest stable radius of contacts to ``radius`` [m].
 

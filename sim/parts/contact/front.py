@@ -6,11 +6,9 @@ exceeds the work of adhesion w. Otherwise it heals, with a separate speed and ex
 one stays finite and defined for w <= 0, where stress fluctuations outweigh adhesion. Limits: infinite speed is the JKR
 equilibrium, zero speed a frozen edge.
 
-One formula serves every control. The sphere is pressed with ``P = load + stiffness (displacement - delta)``:
-stiffness 0 is a load, an infinite one an indentation. With ``lambda = stiffness/(stiffness + 2 E* a)``
-and ``mu = 1/(stiffness + 2 E* a)`` the indentation missing from Hertz's at this radius is
-
-    y = a^2/R - delta = lambda (a^2/R - displacement) + mu (4 E* a^3/(3R) - load),   G = E* y^2/(2 pi a).
+One formula serves every control and solid. The sphere is pressed with ``P = load + stiffness (displacement - delta)``:
+stiffness 0 is a load, an infinite one an indentation. ``sim.laws.equilibrium`` has the indentation y that is missing
+from Hertz's at this radius, and G is y^2 over the sixth term of its ``punch``, E* y^2/(2 pi a) on a half-space.
 
 Integration. Radau IIA of three stages (order 5, L-stable; Hairer & Wanner, Solving ODEs II, IV.8) takes steps of its
 own choice inside the clock step. If the edge opens completely, the radius drops to zero in finite time with an infinite
@@ -31,10 +29,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.laws.equilibrium import half_space, largest_radius, missing_depth
+from sim.laws.equilibrium import (
+    elastic_energy,
+    largest_radius,
+    load_fold,
+    missing_depth,
+    punch,
+    stress_reach,
+)
 from sim.numerics.jit import device, kernel
 from sim.numerics.radau import NODES, PACE, RATES, SHARES
-from sim.numerics.special import cube_root
 from sim.parts.contact.balance import SHARE, Balance
 from sim.parts.exchange import Array, ContactState
 from sim.spectrum.radial import PLANE, share_of
@@ -51,19 +55,8 @@ def excess(t, a, scene):
     Below Hertz's radius G continues as -G: only a monotone continuation for the inner
     solver, which never ends there.
     """
-    (
-        modulus,
-        curvature,
-        stiffness,
-        load,
-        load_rate,
-        base,
-        base_rate,
-        work,
-        work_rate,
-        scale,
-    ) = scene
-    terms = half_space(a, (curvature, modulus))
+    body, stiffness, load, load_rate, base, base_rate, work, work_rate, scale = scene
+    terms = punch(a, body)
     mount = load + load_rate * t, base + base_rate * t, stiffness
     y, y_a = missing_depth(terms, mount)
     y_t = -base_rate
@@ -71,7 +64,8 @@ def excess(t, a, scene):
         y_t = -(stiffness * base_rate + load_rate) / (stiffness + terms[3])
     unit = abs(y) / (terms[5] * scale)
     s = unit * y - (work + work_rate * t) / scale
-    return y, s, unit * (2.0 * y_a - y / a), 2.0 * unit * y_t - work_rate / scale
+    s_a = unit * (2.0 * y_a - y * (terms[6] / terms[5]))
+    return y, s, s_a, 2.0 * unit * y_t - work_rate / scale
 
 
 @device
@@ -105,26 +99,25 @@ def bare_force(t, scene):
 @device
 def hertz_force(a, scene):
     """Return the bare force of Hertz's contact of radius a."""
-    hertz = a * a * scene.curvature
-    return (
-        hertz
-        if scene.stiffness == math.inf
-        else hertz * (scene.stiffness + 4.0 / 3.0 * scene.modulus * a)
-    )
+    depth, _, load, _, _, _, _ = punch(a, scene.body)
+    return depth if scene.stiffness == math.inf else scene.stiffness * depth + load
 
 
 @device
 def hertz_radius(t, scene):
     """Return Hertz's radius under the control at t; 0 if the control does not press."""
-    curvature, modulus, force = scene.curvature, scene.modulus, bare_force(t, scene)
+    (curvature, modulus, inverse_thickness), force = scene.body, bare_force(t, scene)
     if not force > 0.0:
         return 0.0
     if scene.stiffness == math.inf:
-        return math.sqrt(force / curvature)
-    start = np.cbrt(0.75 * force / (curvature * modulus))
+        start = math.sqrt(force / curvature)
+        if inverse_thickness == 0.0:
+            return start
+    else:
+        start = np.cbrt(0.75 * force / (curvature * modulus))
     load, base = scene.load + scene.load_rate * t, scene.base + scene.base_rate * t
     mount = load, base, scene.stiffness
-    return largest_radius(start, 0.0, 0.0, mount, (curvature, modulus))[0]
+    return largest_radius(start, 0.0, 0.0, mount, scene.body)[0]
 
 
 @device
@@ -132,11 +125,12 @@ def pushed(t, scene, front):
     """Return True if Hertz's contact at t grows faster than the edge heals, and its radius."""
     a, stiffness, indenting = hertz_radius(t, scene), scene.stiffness, scene.base_rate
     rate, _ = edge_speed(-(scene.work + scene.work_rate * t) / scene.scale, front)
+    _, growth, _, contact_stiffness, _, _, _ = punch(a, scene.body)
     if stiffness < math.inf:
         indenting = (scene.load_rate + stiffness * indenting) / (
-            stiffness + 2.0 * scene.modulus * a
+            stiffness + contact_stiffness
         )
-    return rate <= indenting / (2.0 * a * scene.curvature), a
+    return rate <= indenting / growth, a
 
 
 _S6 = math.sqrt(6.0)
@@ -166,14 +160,26 @@ class Kinetics(NamedTuple):
     heal_exponent: float
 
 
-#: Contact modulus, curvature of the sphere, stiffness; load, displacement of the base and work of adhesion at the
-#: start, each with its rate; unit of the excess.
+#: Sphere and solid as in ``punch``, stiffness; load, displacement of the base and work of adhesion at the start, each
+#: with its rate; unit of the excess.
 Scene = namedtuple(
-    "Scene",
-    "modulus curvature stiffness load load_rate base base_rate work work_rate scale",
+    "Scene", "body stiffness load load_rate base base_rate work work_rate scale"
 )
 #: Speed and power of an opening edge, and of a healing one.
 Front = namedtuple("Front", "speed power heal_speed heal_power")
+
+
+@device
+def _slope_of(running, a, known, speeds):
+    """Return ``_slope`` at a radius from ``excess`` without y, ``known``, and from ``edge_speed``."""
+    (s, s_a, s_t), (rate, bend) = known, speeds
+    if not running:
+        return rate, bend * s_a, bend * s_t, s * a
+    if not rate < 0.0:
+        return math.nan, 0.0, 0.0, 0.0
+    pace = -a / rate
+    growth = bend / rate
+    return pace, -pace * growth * s_t, pace * (growth * s_a * a - 1.0), s * a * a
 
 
 @device
@@ -183,18 +189,9 @@ def _slope(running, x, y, start, scene, front):
     Normally y is the radius and x the time; ``running``, y is the time and x the logarithm
     of start/radius. The last number times \\|dy\\| (times dx, ``running``) is energy over 2 pi work.
     """
-    if running:
-        a = start * math.exp(-x)
-        _, s, s_a, s_t = excess(y, a, scene)
-        rate, bend = edge_speed(s, front)
-        if not rate < 0.0:
-            return math.nan, 0.0, 0.0, 0.0
-        pace = -a / rate
-        growth = bend / rate
-        return pace, -pace * growth * s_t, pace * (growth * s_a * a - 1.0), s * a * a
-    _, s, s_a, s_t = excess(x, y, scene)
-    rate, bend = edge_speed(s, front)
-    return rate, bend * s_a, bend * s_t, s * y
+    t, a = (y, start * math.exp(-x)) if running else (x, y)
+    _, s, s_a, s_t = excess(t, a, scene)
+    return _slope_of(running, a, (s, s_a, s_t), edge_speed(s, front))
 
 
 @device
@@ -364,15 +361,16 @@ def _runs(a, rate, bend, s_a, s_t, left):
 
 
 @device
-def _try(running, t, a, h, size, scene, front):
-    """Return time and radius after an inner step, error over tolerance, and energy/(2 pi work)."""
-    x, now = (0.0, t) if running else (t, a)
-    f, j, f_x, _ = _slope(running, x, now, a, scene, front)
-    step, first = (running, x, now, h), (f, j, f_x)
-    change, error, energy = _radau(step, size, first, a, scene, front)
+def _try(step, size, first, a, scene, front):
+    """Return time and radius after an inner step, error over tolerance, and energy/(2 pi work).
+
+    ``step``: as in ``_radau``, from the radius a. ``first``: ``_slope`` at its start.
+    """
+    (running, x, y, h), (f, j, f_x, _) = step, first
+    change, error, energy = _radau(step, size, (f, j, f_x), a, scene, front)
     if running:
-        return t + change, a * math.exp(-h), error, energy
-    return t + h, a + change, error, energy
+        return y + change, a * math.exp(-h), error, energy
+    return x + h, a + change, error, energy
 
 
 @device
@@ -387,7 +385,7 @@ def _piece(t, a, stop, least, tries, scene, front):
         tries -= 1
         y, s, s_a, s_t = excess(t, a, scene)
         rate, bend = edge_speed(s, front)
-        if y <= _TOUCH * a * a * scene.curvature and pushed(t, scene, front)[0]:
+        if y <= _TOUCH * a * a * scene.body[0] and pushed(t, scene, front)[0]:
             t, a, more = _ride(t, a, min(stop, t + tick), least, scene, front)
             energy, h = energy + more, 0.0
             if a <= least:
@@ -412,7 +410,9 @@ def _piece(t, a, stop, least, tries, scene, front):
             first, longest = 0.1, min(reach, _LONGEST)
         h = min(first if running != was or h == 0.0 else h, longest)
         was, whole = running, h == reach
-        t1, a1, error, more = _try(running, t, a, h, size, scene, front)
+        step = (running, 0.0, t, h) if running else (running, t, a, h)
+        slope = _slope_of(running, a, (s, s_a, s_t), (rate, bend))
+        t1, a1, error, more = _try(step, size, slope, a, scene, front)
         if not error < math.inf:
             shy, h = True, (0.0 if running else 0.25 * h)
             continue
@@ -432,7 +432,7 @@ def _piece(t, a, stop, least, tries, scene, front):
             cross = True
             continue
         y1, _, _, _ = excess(t1, a1, scene)
-        edge = _TOUCH * a1 * a1 * scene.curvature
+        edge = _TOUCH * a1 * a1 * scene.body[0]
         if y1 < -edge and y > edge:
             h *= max(1e-6, y / (y - y1))
             continue
@@ -484,7 +484,7 @@ def _zero(before, after, duration):
 def scene_of(works, mount, duration, scale, bodies):
     """Return the ``Scene`` of work, load and displacement at both ends of a time; ``mount`` is as in ``moved_edge``."""
     loads, bases, stiffness = mount
-    per, (sphere_radius, modulus) = (1.0 / duration if duration > 0.0 else 0.0), bodies
+    per = 1.0 / duration if duration > 0.0 else 0.0
     load, base = (
         (0.0 if stiffness == math.inf else loads[0]),
         (0.0 if stiffness == 0.0 else bases[0]),
@@ -493,8 +493,7 @@ def scene_of(works, mount, duration, scale, bodies):
     base_rate = 0.0 if stiffness == 0.0 else (bases[1] - bases[0]) * per
     work_rate = (works[1] - works[0]) * per
     return Scene(
-        modulus,
-        1.0 / sphere_radius,
+        bodies,
         stiffness,
         load,
         load_rate,
@@ -523,8 +522,8 @@ def moved_edge(a, works, mount, duration, kinetics, bodies, least):
     kinetics : Kinetics or tuple
         Reference work [J/m^2], speeds [m/s] and exponents [1] of opening and healing. A speed of 0 or infinity
         freezes the edge or leaves it in equilibrium.
-    bodies : pair of floats
-        R [m], E* [Pa].
+    bodies : three floats
+        1/R [1/m], E* [Pa], 1/h [1/m].
     least : float
         Radius at which a shrinking contact counts as open [m], at least 1e-9 of the radius at the start. Under a dead
         load the energy grows like 1/radius towards the end, because the load falls ever deeper; the time hardly
@@ -571,40 +570,22 @@ _READ = "Array(float64, 2, 'A', readonly=True)"
 
 
 @device
-def _left(radius, bonded, fluctuating, reversible, share):
+def _left(radius, bonded, fluctuating, reversible, share, inverse_thickness):
     """Return the work of adhesion left at a radius; of an open contact that of a vanishing one."""
     size, part = (0.0 if math.isnan(radius) else radius), 1.0
     if len(share[2]) > 0:
         part = share_of(size, share[0], share[1], share[2]) if size > 0.0 else 0.0
+    if reversible > 0.0:
+        size, _ = stress_reach(size, inverse_thickness)
     return bonded - fluctuating * part - reversible * size
 
 
 @device
 def _energy(t, a, scene):
     """Return the energy of a contact above that of an open one: elastic, of the spring or the load, of adhesion."""
-    (
-        modulus,
-        curvature,
-        stiffness,
-        load,
-        load_rate,
-        base,
-        base_rate,
-        work,
-        work_rate,
-        _,
-    ) = scene
-    hertz = a * a * curvature
-    indentation = hertz - excess(t, a, scene)[0]
-    energy = (
-        modulus
-        * a
-        * (
-            indentation * indentation
-            - 2.0 / 3.0 * hertz * indentation
-            + 0.2 * hertz * hertz
-        )
-    )
+    body, stiffness, load, load_rate, base, base_rate, work, work_rate, _ = scene
+    indentation = punch(a, body)[0] - excess(t, a, scene)[0]
+    energy = elastic_energy(a, indentation, body)
     energy -= (load + load_rate * t) * indentation + math.pi * a * a * (
         work + work_rate * t
     )
@@ -631,15 +612,7 @@ def _moved(radius, touches, works, mount, duration, kinetics, bodies, spot):
     scene = scene_of(works, mount, duration, kinetics[0], bodies)
     (loads, _, stiffness), opens = mount, math.isnan(end)
     if stiffness == 0.0:
-        sphere_radius, modulus = bodies
-        fold = cube_root(
-            9.0
-            * math.pi
-            * max(works[1], 0.0)
-            * sphere_radius
-            * (sphere_radius / (8.0 * modulus))
-        )
-        if opens or (loads[1] < 0.0 and radius < fold):
+        if opens or (loads[1] < 0.0 and radius < load_fold(works[1], bodies)):
             lost = 0.0
     elif opens:
         lost += max(_energy(opened, 0.5 * spot, scene), 0.0)
@@ -661,11 +634,13 @@ def _is_unstable(t, a, steepness, scene):
 @device
 def _borne(t, a, scene):
     """Return the normal load [N] and the displacement of the mount [m] of a contact of radius a."""
-    y, hertz = excess(t, a, scene)[0], a * a * scene.curvature
+    y, (depth, _, load, stiffness, _, _, _) = (
+        excess(t, a, scene)[0],
+        punch(a, scene.body),
+    )
     if scene.stiffness == 0.0:
-        return scene.load + scene.load_rate * t, hertz - y
-    load = scene.modulus * a * (4.0 / 3.0 * hertz - 2.0 * y)
-    return load, scene.base + scene.base_rate * t
+        return scene.load + scene.load_rate * t, depth - y
+    return load - stiffness * y, scene.base + scene.base_rate * t
 
 
 @device
@@ -722,7 +697,7 @@ def _weakest(turn, radii, begin, duration, steepness, scene):
 @kernel(
     "void(float64[:, ::1], Tuple((float64[::1], int64[::1], float64[:, ::1], float64)),"
     f" Tuple(({_READ}, {_READ}, {_READ}, {SHARE})),"
-    " Tuple((UniTuple(float64, 5), UniTuple(float64, 2), float64, boolean)), float64[:, :, ::1])"
+    " Tuple((UniTuple(float64, 5), UniTuple(float64, 3), float64, boolean)), float64[:, :, ::1])"
 )
 def _follow(state, control, terms, edge, out):
     """Write the rows of ``follow`` at the end of each step.
@@ -744,9 +719,8 @@ def _follow(state, control, terms, edge, out):
         for k in range(len(durations)):
             if math.isnan(radius):
                 turn = math.nan, math.nan, math.nan
-            last = _left(
-                radius, bonded[k, m], fluctuating[k, m], reversible[k, m], share
-            )
+            energies = bonded[k, m], fluctuating[k, m], reversible[k, m]
+            last = _left(radius, *energies, share, bodies[2])
             first, end = (last if math.isnan(radius) else work), 0.0
             for p in range(opening[k], opening[k + 1]):
                 begin, end = end, pieces[1, p]
@@ -777,22 +751,19 @@ def _follow(state, control, terms, edge, out):
                 start, steepness = pieces[0, p] - duration, 0.0
                 scene = scene_of(works, mount, duration, kinetics[0], bodies)
                 if reversible[k, m] > 0.0 or len(share[2]) > 0:
-                    of_step = bonded[k, m], fluctuating[k, m], reversible[k, m], share
                     wide, narrow = (
                         (1.0 + _NEAR) * first_radius,
                         (1.0 - _NEAR) * first_radius,
                     )
-                    steepness = (_left(wide, *of_step) - _left(narrow, *of_step)) / (
-                        wide - narrow
-                    )
+                    change = _left(wide, *energies, share, bodies[2])
+                    change -= _left(narrow, *energies, share, bodies[2])
+                    steepness = change / (wide - narrow)
                 radii = first_radius, radius
                 if math.isnan(radius):
                     detached, duration = start + opened, opened
                     radii = first_radius, 0.0
                 turn = _weakest(turn, radii, start, duration, steepness, scene)
-            work = _left(
-                radius, bonded[k, m], fluctuating[k, m], reversible[k, m], share
-            )
+            work = _left(radius, *energies, share, bodies[2])
             out[0, k, m], out[1, k, m], out[2, k, m], out[3, k, m] = (
                 work,
                 radius,
@@ -834,9 +805,7 @@ def follow(
     opening = np.searchsorted(pieces.interval, np.arange(len(durations) + 1))
     begin, end = pieces.start[opening[:-1]], pieces.stop[opening[1:] - 1]
     shares = (pieces.stop - begin[pieces.interval]) / (end - begin)[pieces.interval]
-    of_stress = (
-        reversible * balance.reversible(np.ones(1)) if reversible else np.zeros(1)
-    )
+    of_stress = reversible * balance.tilt if reversible else np.zeros(1)
     of_steps = balance.bonded, balance.fluctuating, of_stress
     _, rows = np.broadcast_shapes(
         state.radius.shape, *((1, *values.shape)[-2:] for values in of_steps)
@@ -845,8 +814,10 @@ def follow(
     out = np.empty((len(before), len(durations), rows))
     for row, values in zip(before, [*state[:4], *state.turn.T], strict=True):
         row[:] = values
-    sphere_radius, modulus, _ = balance.bodies.numbers
-    spot = _SPOT * math.cbrt(balance.reference * sphere_radius**2 / modulus)
+    bodies = balance.bodies
+    spot = _SPOT * math.cbrt(
+        balance.reference * bodies.sphere_radius**2 / bodies.modulus
+    )
     course = np.array([pieces.stop, shares, pieces.first, pieces.last])
     share = PLANE if balance.margin is None else balance.margin.each[0]
     terms = (np.broadcast_to(values, out.shape[1:]) for values in of_steps)
@@ -854,7 +825,7 @@ def follow(
         before,
         (durations, opening, course, stiffness),
         (*terms, share),
-        (tuple(kinetics), (sphere_radius, modulus), spot, again),
+        (tuple(kinetics), bodies.body, spot, again),
         out,
     )
     return *out[:4], np.moveaxis(out[4:], 0, -1)

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from sim.laws.halfspace import in_series
+from sim.laws.halfspace import coupling, in_series
 from sim.numerics.jit import kernel
 from sim.parts.contact.balance import (
     AHEAD,
@@ -29,7 +29,7 @@ from sim.parts.contact.balance import (
 )
 from sim.parts.contact.front import Kinetics, follow as follow_front
 from sim.parts.exchange import TURN, Array, ContactState, Flags, Motion, Setting, during
-from sim.solid import ElasticSolid, HalfSpace
+from sim.solid import ElasticSolid, HalfSpace, Layer
 from sim.spectrum.radial import PLANE
 from sim.units.quantity import Quantity, keyed
 from sim.units.tables import Prescribed, over_time, prescribed
@@ -79,16 +79,19 @@ class Body:
 
 @keyed()
 class Solid(Body):
-    """The elastic half-space, with the body that presses on it if that yields too.
+    """The elastic half-space or layer, with the body that presses on a half-space if that yields too.
 
     Parameters
     ----------
     shear_modulus, youngs_modulus : float or str, one of the two
         G or E [Pa].
     poisson_ratio : float
-        nu [1]; the theory is that of 0.5, other values neglect the normal-tangential coupling.
+        nu [1]; the theory is that of 0.5. At other values the coupling of the mean shear stress with the pressure is
+        neglected.
     counter_body : Body, optional
         An elastic sphere; without it the sphere is rigid.
+    thickness : float or str, optional
+        h [m] of an incompressible layer bonded to a rigid base, under a rigid sphere; without it a half-space.
 
     Examples
     --------
@@ -101,22 +104,44 @@ class Solid(Body):
     """
 
     counter_body: Body | None = None
+    thickness: (
+        Annotated[
+            float, Quantity("m", "thickness of a layer on a rigid base", "h", above=0)
+        ]
+        | None
+    ) = None
+
+    @model_validator(mode="after")
+    def _incompressible_layer(self) -> "Solid":
+        fault = ""
+        if self.thickness is not None and self.counter_body is not None:
+            fault = "a layer is pressed by a rigid sphere: omit counter_body, or omit thickness for a half-space"
+        elif self.thickness is not None and self.poisson_ratio != 0.5:
+            fault = "a layer is incompressible: omit poisson_ratio, or omit thickness for a half-space"
+        if fault:
+            raise PydanticCustomError("layer", fault)
+        return self
 
     @cached_property
     def elastic(self) -> ElasticSolid:
-        """The half-space that yields as the two bodies together.
+        """The solid under a rigid sphere: the layer, or the half-space that yields as the two bodies together.
 
-        The bodies' 1/G and nu/G add, and with them both the tangential and the normal compliance.
+        The bodies' 1/G and nu/G add, and with them both the tangential and the normal compliance. Their couplings of
+        shear stress with normal displacement subtract.
         """
         own = self.own_shear_modulus, self.poisson_ratio
+        if self.thickness is not None:
+            return Layer(own[0], self.thickness)
         if self.counter_body is None:
             return HalfSpace(*own)
         other = self.counter_body
-        return HalfSpace(*in_series(*own, other.own_shear_modulus, other.poisson_ratio))
+        bodies = *own, other.own_shear_modulus, other.poisson_ratio
+        modulus, ratio = in_series(*bodies)
+        return HalfSpace(modulus, ratio, coupling(*bodies))
 
     @property
     def contact_modulus(self) -> float:
-        """E* of both bodies together [Pa]; 4G for one incompressible body."""
+        """E* of both bodies together [Pa]; 4G for one incompressible body, also for a layer of any thickness."""
         return self.elastic.contact_modulus
 
 
@@ -430,17 +455,20 @@ class _Controlled:
             (1.0, [PLANE]) if margin is None else (margin.least, margin.each)
         )
         load, base, stiffness = control.mount
-        tilt = self.reversible * balance.reversible(np.ones(1))
+        tilt = self.reversible * balance.tilt
         bonded, fluctuating = balance.bonded, balance.fluctuating
         most = bonded - least * fluctuating
         start = control.radius(most, bodies)
         terms = np.broadcast_arrays(start, most, bonded, fluctuating, tilt, load, base)
-        body = 1.0 / bodies.sphere_radius, bodies.modulus
         contacts = np.stack(terms).reshape(len(terms), len(shares), -1)
         radius = np.empty(contacts.shape[1:])
         for k, share in enumerate(shares):
             stable_radii(
-                np.ascontiguousarray(contacts[:, k]), stiffness, body, share, radius[k]
+                np.ascontiguousarray(contacts[:, k]),
+                stiffness,
+                bodies.body,
+                share,
+                radius[k],
             )
         return radius.reshape(terms[0].shape)
 

@@ -117,15 +117,9 @@ def load(
     """Return the slider at t = 0, with its spring loaded for its motion, and the stored energy."""
     drive, slider = cast(Force | Spring, parts.drive), cast(Driven, slider)
     speed, radius = slider.speed, np.fmax(contact.radius, 0.0)
-    area, (yields, slope) = (
-        np.pi * radius**2,
-        drive.yields(contact.bodies.solid),
-    )
+    area = np.pi * radius**2
     friction = area * bonding.stress
-    sheared = friction * (
-        yields
-        + np.divide(slope, radius, out=np.zeros(radius.shape), where=radius > 0.0)
-    )
+    sheared = friction * drive.compliance(contact.bodies.solid, radius)
     first = drive.first(duration)
     pull = friction + drive.damping * speed if drive.spring else first + 0.0 * friction
     ahead, stage = (
@@ -278,11 +272,10 @@ def with_contact(
     )
     closes = (area > 0.0) & ((sliders.radius == 0.0) | reached.lost)
     if closes.any():
-        yields, slope = drive.yields(contact.bodies.solid)
+        compliance = drive.compliance(contact.bodies.solid, radius)
         elastic = None
-        if yields + slope > 0.0:
-            size = np.where(area > 0.0, radius, 1.0)
-            elastic = sliders.sheared / (yields + slope / size)
+        if sum(drive.yields(contact.bodies.solid)) > 0.0:
+            elastic = sliders.sheared / np.where(area > 0.0, compliance, 1.0)
         force = population.closing_force(
             drive, sliders, area * bonding.stress, area, elastic
         )
@@ -319,13 +312,14 @@ def _numbers(
         0.0 if drive.spring else 1.0,
         yields,
         slope,
+        bodies.solid.inverse_thickness,
         drive.tolerance,
     )
     breaking = bonds.law(stretch)
     mean_stress = 0.0
     if contact.reversible:
         mean_stress = contact.reversible * float(
-            bodies.solid.mean_stress_energy(1.0, density * stretch)
+            bodies.solid.half_space.mean_stress_energy(1.0, density * stretch)
         )
     still = (
         contact.bare,
@@ -339,8 +333,7 @@ def _numbers(
     )
     solid = (
         contact.mounts[0].stiffness,
-        1.0 / bodies.sphere_radius,
-        bodies.modulus,
+        *bodies.body,
         contact.area,
     )
     return tuple(slider), tuple(breaking), (*still, *solid)

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.laws.equilibrium import largest_radius
+from sim.laws.equilibrium import largest_radius, stress_reach
+from sim.laws.layer import shear_functions
 from sim.numerics.jit import device
 from sim.parts.drive import ENERGY, Driven
 from sim.parts.exchange import Array, FieldLaw, record
@@ -26,7 +27,7 @@ _STORED = (ENERGY.names or ()).index("stored")
 #: of each step.
 ARGUMENTS = (
     "Tuple((float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64)), "
-    "Tuple((UniTuple(float64, 12), UniTuple(float64, 7), UniTuple(float64, 12), UniTuple(float64, 7))), "
+    "Tuple((UniTuple(float64, 13), UniTuple(float64, 7), UniTuple(float64, 13), UniTuple(float64, 7))), "
     "Tuple((float64[:, :, ::1], float64[:, :, ::1]))"
 )
 
@@ -34,7 +35,7 @@ ARGUMENTS = (
 class Slider(NamedTuple):
     """Numbers of a drive during a piece: its length, the value prescribed at both ends, and the integral of it.
 
-    Then K, m, c, η, 1 if the force is prescribed, 1/k_t as constant + slope/a, tolerance.
+    Then K, m, c, η, 1 if the force is prescribed, 1/k_t as constant + slope/a, 1/h of a layer, tolerance.
     """
 
     length: float
@@ -48,6 +49,7 @@ class Slider(NamedTuple):
     forced: float
     yielding: float
     yielding_radius: float
+    inverse_thickness: float
     tolerance: float
 
 
@@ -71,7 +73,8 @@ class Contact(NamedTuple):
     """Numbers of the contact: work of adhesion without bonds; load and base with their rates; 1 if its radius stays.
 
     Then work of adhesion per bond share N; energy that the mean stress takes, over radius and M²; stiffness behind the
-    base; curvature, modulus, reference area; energy that fluctuations take, with its rate; numbers of the fluctuations.
+    base; curvature, modulus and inverse thickness of the bodies, reference area; energy that fluctuations take, with
+    its rate; numbers of the fluctuations.
     """
 
     bare: float
@@ -85,6 +88,7 @@ class Contact(NamedTuple):
     stiffness: float
     curvature: float
     modulus: float
+    inverse_thickness: float
     area: float
     fluctuating: float
     fluctuating_rate: float
@@ -125,12 +129,13 @@ def contact_area(bound, moment, time, radius, contact):
         contact.bare - fluctuating + contact.bonded * bound,
         tilt,
         (load, base, contact.stiffness),
-        (contact.curvature, contact.modulus),
+        (contact.curvature, contact.modulus, contact.inverse_thickness),
     )
     if not a > 0.0:
         return math.nan, math.nan, 0.0, 0.0
     growth = 2.0 * math.pi * a / unit / slope
-    by_moment = -2.0 * growth * contact.mean_stress * moment * a
+    reach, _ = stress_reach(a, contact.inverse_thickness)
+    by_moment = -2.0 * growth * contact.mean_stress * moment * reach
     return a, math.pi * a * a / unit, growth * contact.bonded, by_moment
 
 
@@ -141,10 +146,12 @@ def compliance(radius, slider):
         return 0.0, 0.0
     if slider.yielding_radius == 0.0:
         return slider.yielding, 0.0
-    return (
-        slider.yielding + slider.yielding_radius / radius,
-        -slider.yielding_radius / (radius * radius),
-    )
+    shear = slider.yielding_radius / radius
+    if slider.inverse_thickness == 0.0:
+        return slider.yielding + shear, -slider.yielding_radius / (radius * radius)
+    m, m_slope, _, _ = shear_functions(radius * slider.inverse_thickness)
+    slope = shear * (m_slope * slider.inverse_thickness - m / radius)
+    return slider.yielding + shear * m, slope
 
 
 @device
@@ -237,7 +244,7 @@ def later(contact, time, stays):
         contact.bare,
         *of_mount,
         stays,
-        *contact[6:12],
+        *contact[6:13],
         fluctuating,
         contact.fluctuating_rate,
         contact.field,
@@ -247,14 +254,14 @@ def later(contact, time, stays):
 @device
 def feeling(contact, row):
     """Return the numbers of the contact with the energy of the fluctuations that the row has reached."""
-    return Contact(*contact[:12], row.felt, 0.0, contact.field)
+    return Contact(*contact[:13], row.felt, 0.0, contact.field)
 
 
 @device
 def drawn(contact, row, piece):
     """Return the numbers of the contact at the start of a piece: at that of a clock step ΔΓ has been drawn."""
     fluctuating = row.drawn if piece == 0 else row.felt
-    return Contact(*contact[:12], fluctuating, 0.0, contact.field)
+    return Contact(*contact[:13], fluctuating, 0.0, contact.field)
 
 
 @device
@@ -301,7 +308,7 @@ def following(contact, row, start, step):
     rate = (
         row.paid * last * (row.energy + change) - mean + share * (mean - row.felt)
     ) / step
-    return Contact(*contact[:12], row.felt - rate * start, rate, field)
+    return Contact(*contact[:13], row.felt - rate * start, rate, field)
 
 
 @device

@@ -71,7 +71,8 @@ def _equilibrium(row, load, base, energy, contact, share):
     start = row.radius if row.radius > 0.0 else math.sqrt(contact.area / math.pi)
     bonded, tilt = contact.bare + contact.bonded * row.bound, contact.mean_stress
     tilt *= row.moment * row.moment
-    mount, body = (load, base, contact.stiffness), (contact.curvature, contact.modulus)
+    mount = load, base, contact.stiffness
+    body = contact.curvature, contact.modulus, contact.inverse_thickness
     most = bonded if len(share[2]) > 0 else bonded - energy
     work = most, bonded, energy, tilt
     return stable_radius(start, work, mount, body, share)

@@ -119,7 +119,7 @@ class DiscShares:
                 pixel,
                 self.radii,
                 self.solid.shear_modulus,
-                self.solid.poisson_ratio,
+                self.solid.held_ratio,
                 self._discs,
             )
             self._rows[place] = energies / self.solid.stored_energy(self.field)

@@ -196,7 +196,8 @@ class ShearModel:
             remarks.append(
                 "the spectrum has waves longer than the cell, which are omitted: give a larger shear.cell"
             )
-        if self.contact == "plane" and radius > 0.0:
+        # the energy on a disc is not known on a layer
+        if self.contact == "plane" and radius > 0.0 and not solid.inverse_thickness:
             share = float(marginal_energy(spectrum, radius, solid.softness)) / plane
             long = min(longest, side) > 2.0 * radius
             what = (
@@ -625,7 +626,7 @@ class Carried(ShearModel):
             rows.append(("inside of the contact", f"{field.inside:.1%} of the map"))
         if field.noise:
             pixel = math.sqrt(field.lattice.pixel)
-            of_solid = solid.shear_modulus, solid.poisson_ratio
+            of_solid = solid.shear_modulus, solid.held_ratio
             noise = noise_energy(field.noise, pixel, *of_solid)
             rows.append(
                 (

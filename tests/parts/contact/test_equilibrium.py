@@ -19,7 +19,7 @@ from sim.laws.equilibrium import largest_radius
 from sim.parts.contact.balance import stable_radius
 
 U = 2.0**-53
-BODY = 1.0, 0.5
+BODY = 1.0, 0.5, 0.0
 STIFFNESSES = [0.0, 1e-3, 1.0, 1e3, 1e9, math.inf]
 #: Share of ΔΓ on a disc: 3s² - 2s³ of s = ln(a/low)/span, as one cubic.
 LOW, SPAN = 1e-3, math.log(1e5)
@@ -187,7 +187,7 @@ def test_a_radius_on_a_disc_is_that_of_fifty_digits_and_no_wider_one_balances(
 @pytest.mark.parametrize("stiffness", [0.0, 1e3, math.inf])
 def test_an_equilibrium_is_found_again_from_itself_to_the_last_bit(stiffness):
     # else a slider at its strength would stick and slip for ever, by one rounding of its area
-    draws, lens = np.random.default_rng(0), (500.0, 6.4e6)
+    draws, lens = np.random.default_rng(0), (500.0, 6.4e6, 0.0)
     for _ in range(1000):
         push, work, start = draws.uniform(), draws.uniform(), 1e-3 * draws.uniform()
         mount = (

@@ -62,7 +62,7 @@ def _advance(rows, out):
         ) = rows[m, 8:]
         kinetics, bodies = (
             (scale, speed, exponent, heal_speed, heal_exponent),
-            (sphere_radius, modulus),
+            (1.0 / sphere_radius, modulus, 0.0),
         )
         out[m, 0], out[m, 1], out[m, 2] = moved_edge(
             a,

@@ -186,7 +186,7 @@ def test_all_pixels_hold_the_variance_but_that_around_zero_and_energies_are_comp
     compliance = (1 - nu + nu * (pairs.qy / q) ** 2) / (modulus * q)
     exact = compliance * pairs.spectrum.density(pairs.qx, pairs.qy) / 2.5**2
     assert_allclose(
-        pairs.energies(HalfSpace(modulus, nu))[inside],
+        pairs.energies(HalfSpace(modulus, nu, coupling=0.0))[inside],
         exact[inside],
         rtol=1e-11,
         atol=0,
@@ -246,12 +246,12 @@ def test_energy_of_a_spectrum_converges_with_the_cell_and_loses_that_around_zero
         deficit = (
             (2 - nu) / (8 * math.pi) * constant * float(spectrum.density(0.0, 0.0))
         )
-        exact, rest = HalfSpace(1.0, nu).stored_energy(spectrum), []
+        exact, rest = HalfSpace(1.0, nu, coupling=0.0).stored_energy(spectrum), []
         for cell in (40.0, 80.0):
             pairs = modes(spectrum, cell, int(6 * cell))
-            error = np.sum(pairs.energies(HalfSpace(1.0, nu))) - exact
+            error = np.sum(pairs.energies(HalfSpace(1.0, nu, coupling=0.0))) - exact
             assert_allclose(
-                pairs.errors(HalfSpace(1.0, nu))["cell_error_energy"],
+                pairs.errors(HalfSpace(1.0, nu, coupling=0.0))["cell_error_energy"],
                 error / exact,
                 rtol=1e-9,
                 atol=0,
@@ -282,8 +282,8 @@ def test_a_ripple_is_one_pair_with_the_energy_of_the_ripple_whether_it_fits_or_n
         assert pairs.errors(HalfSpace(1.0))["cell_error_variance"] == 0.0
         assert pairs.qy[0] > 0.0 or (pairs.qy[0] == 0.0 and pairs.qx[0] > 0.0)
         assert_allclose(
-            pairs.energies(HalfSpace(1.7, nu)).sum(),
-            HalfSpace(1.7, nu).stored_energy(ripple),
+            pairs.energies(HalfSpace(1.7, nu, coupling=0.0)).sum(),
+            HalfSpace(1.7, nu, coupling=0.0).stored_energy(ripple),
             rtol=1e-14,
             atol=0,
         )
