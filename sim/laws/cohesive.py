@@ -46,6 +46,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.numerics.jit import device, kernel, law
 from sim.numerics.special import cube_root
@@ -73,11 +74,11 @@ class Touch(NamedTuple):
         Energy of half-space and interface, above that of a free sphere far away [J].
     """
 
-    inner: np.ndarray
-    outer: np.ndarray
-    load: np.ndarray
-    indentation: np.ndarray
-    energy: np.ndarray
+    inner: NDArray[np.float64]
+    outer: NDArray[np.float64]
+    load: NDArray[np.float64]
+    indentation: NDArray[np.float64]
+    energy: NDArray[np.float64]
 
 
 # Scales of a contact.
