@@ -48,6 +48,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.laws import halfspace
 from sim.numerics.jit import device, kernel, law
 from sim.numerics.special import cube_root
 
@@ -454,3 +455,53 @@ def branch(opening, work, stress, sphere_radius, modulus):
     0.7071
     """
     return _states(_solve_branch, opening, work, stress, sphere_radius, modulus)
+
+
+def normal_displacement(r, touch, stress, sphere_radius, modulus):
+    """Return the displacement of the surface of the half-space along the normal, into it.
+
+    Parameters
+    ----------
+    r : float or array
+        Distance from the axis [m].
+    touch : Touch
+        One contact; the surfaces may be apart.
+    stress, sphere_radius, modulus : float
+        sigma [Pa], R [m], E* [Pa].
+
+    Returns
+    -------
+    array
+        u_z [m]; below 0 the surface is raised.
+
+    Notes
+    -----
+    ``u_z = (2/pi) int f(s)/sqrt(r^2 - s^2) ds`` over s from 0 to r or c, where f is that of Hertz's contact,
+    ``delta - s^2/R``, below a, and that of a uniform tension, ``-(2 sigma/E*) sqrt(c^2 - s^2)``, from a to c. Both are
+    equal at a, which is the equation of delta. The second integral is one of Gauss's with 64 nodes.
+
+    Examples
+    --------
+    The gap at the outer radius is the reach of the attraction, here 1:
+
+    >>> contact = equilibrium(0.0, -0.1, math.inf, 1.0, 1.0, 1.0, 1.0)
+    >>> raised = -normal_displacement(contact.outer, contact, 1.0, 1.0, 1.0)
+    >>> print(f"{contact.outer**2 / 2.0 + 0.1 - raised:.6f}")
+    1.000000
+    """
+    r = np.maximum(np.asarray(r, dtype=float), 1e-300)[..., np.newaxis]
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    a, c = touch.inner, touch.outer
+    far = np.maximum(r, c)
+    # s = min(r, c) sin(angle), from the edge of the contact on
+    size = np.minimum(r, c)
+    start = np.arcsin(np.minimum(a / size, 1.0))
+    half = 0.5 * (0.5 * math.pi - start)
+    angle = start + half * (1.0 + nodes)
+    along = size * np.sin(angle)
+    inside = np.sqrt(np.maximum((c - along) * (c + along), 0.0))
+    beyond = size * np.cos(angle) / np.sqrt((far - along) * (far + along))
+    pulled = np.where(r > c, inside * beyond, inside)
+    pulled = 2.0 * stress / modulus * np.sum(half * weights * pulled, axis=-1)
+    pressed = halfspace.normal_displacement(r, a, touch.indentation, sphere_radius)
+    return pressed[..., 0] - 2.0 / math.pi * pulled

@@ -276,3 +276,30 @@ def test_a_contact_depends_on_its_number_alone_in_other_units():
             plain = touch(load, 0.0, 0.0, number)
             assert_allclose(found.inner, plain.inner * unit, rtol=1e-13)
             assert_allclose(found.energy, plain.energy * work * unit**2, rtol=1e-11)
+
+
+@pytest.mark.parametrize("number", [0.3, 1.5, 20.0])
+def test_the_surface_touches_the_sphere_and_leaves_it_by_the_reach_at_the_outer_radius(
+    number,
+):
+    """Without tension at the inner edge, so that the gap opens there with a horizontal tangent."""
+    stress = number / SCALE
+    for base in (-0.9 / stress, 0.0, 2.0):
+        contact = touch(0.0, base, math.inf, number)
+        a, c = contact.inner, contact.outer
+        r = np.append(np.linspace(0.0, c, 41), 1.2 * a)
+
+        def gap(r, contact=contact):
+            moved = cohesive.normal_displacement(r, contact, stress, *BODY)
+            return moved + 0.5 * r**2 - contact.indentation
+
+        assert_allclose(gap(np.array(c)), 1.0 / stress, rtol=1e-6)
+        if a > 0.0:
+            assert_allclose(gap(r[r <= a]), 0.0, atol=1e-13 * (1.0 + c**2))
+        assert np.all(np.diff(gap(np.linspace(a, 3.0 * c, 50))) > 0.0)
+        if a > 0.0:
+            near = np.array([1e-4, 1e-3]) * (c - a)
+            opened = gap(a + near)
+            assert opened[0] < 0.05 * opened[1]
+    far = cohesive.normal_displacement(1e6, contact, stress, *BODY)
+    assert_allclose(far, contact.load / (math.pi * 1e6), rtol=1e-8)

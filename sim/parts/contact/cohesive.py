@@ -175,6 +175,7 @@ class Cohesive(Equilibrium):
     model: Literal["cohesive"] = "cohesive"  # type: ignore[assignment]
 
     theory: ClassVar[str] = "Maugis-Dugdale"
+    takes_mean_stress: ClassVar[bool] = False
 
     @model_validator(mode="after")
     def _one_attraction(self) -> "Cohesive":
@@ -222,10 +223,12 @@ class Cohesive(Equilibrium):
         remarks = [
             "A_JKR and jkr_radius are those of the cohesive contact with the full work of adhesion"
         ]
-        if math.isnan(setting.rest_radius):
+        if math.isnan(setting.rest_radius) and self.load is None:
             remarks.append(
-                f"the contact begins open and jumps in where contact.{self.kind} reaches the attraction"
+                "the contact begins open and jumps in where the sphere comes within reach of the attraction"
             )
+        elif math.isnan(setting.rest_radius):
+            remarks += super().remarks(setting)
         elif setting.rest_radius == 0.0:
             remarks.append(
                 "the sphere begins within reach of the attraction, but does not touch"
@@ -242,6 +245,18 @@ class Cohesive(Equilibrium):
         stress = self.attraction.stress_at(np.full(1, work))[0]
         distance = self.range or cohesive.LENNARD_JONES * work / stress
         return distance, distance
+
+    def heights(
+        self, r: Array, radius: float, work: float, bodies: Bodies
+    ) -> tuple[Array, Array]:
+        mount = self.control(0.0, 0.0).mount
+        touch = self.attraction.equilibrium(mount, np.full(1, work), bodies)
+        stress = self.attraction.stress_at(np.full(1, work))[0]
+        touch = cohesive.Touch(*(values[0] for values in touch))
+        surface = -cohesive.normal_displacement(
+            r, touch, stress, bodies.sphere_radius, bodies.modulus
+        )
+        return surface, r**2 / (2.0 * bodies.sphere_radius) - touch.indentation
 
     def _control(self, value: float | Array) -> Control:
         if self.load is not None:

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from sim.laws.halfspace import coupling, in_series
+from sim.laws.halfspace import coupling, gap, in_series, normal_displacement
 from sim.laws.limits import DISTANCES
 from sim.numerics.jit import kernel
 from sim.parts.contact.balance import (
@@ -290,6 +290,8 @@ class _Controlled:
     lags: ClassVar[bool] = False
     #: Theory of the equilibrium.
     theory: ClassVar[str] = "JKR"
+    #: True if the energy of the mean stress can be charged to adhesion.
+    takes_mean_stress: ClassVar[bool] = True
     #: Rough time of a step of one member if its edge lags, for estimates [s].
     edge_seconds: ClassVar[float] = 0.0
 
@@ -405,6 +407,15 @@ class _Controlled:
     def equilibrium_radius(self, work: Array, bodies: Bodies) -> Array:
         """Return the JKR radius at the start for a work of adhesion; Hertz's if it is not positive; nan if open."""
         return self.control(0.0, 0.0).radius(work, bodies)
+
+    def heights(
+        self, r: Array, radius: float, work: float, bodies: Bodies
+    ) -> tuple[Array, Array]:
+        """Return the heights of half-space and sphere at distances from the axis of a contact at the start [m]."""
+        indentation = self.control(0.0, 0.0).indentation(np.full(1, radius), bodies)[0]
+        shape = r, radius, indentation, bodies.sphere_radius
+        surface = -normal_displacement(*shape)
+        return surface, surface + gap(*shape)
 
     def largest_radius(self, work: float, bodies: Bodies) -> float:
         """Return the JKR radius for a work of adhesion as the control presses most [m]; 0 without equilibrium."""
