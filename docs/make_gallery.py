@@ -975,33 +975,37 @@ def peeling(dataset: xr.Dataset) -> dict[str, Number]:
 
 @asks(
     "afm_tip",
-    "Is the friction of an AFM tip a measure of its contact area?",
-    """Yes, in the model friction is proportional to the area: it is {stress:g} GPa times JKR's area. This holds in
-    tension, too: at {tension:.0f} nN friction is {friction:.0f} nN. At the pull-off, at {off:.1f} nN, JKR's area leaves
-    {least:.1f} nN. Without load friction is {zero:.0f} nN.""",
+    "How much does the range of adhesion change the friction of an AFM tip?",
+    """Without a load friction is {short:.0f} nN if the range is negligible, which is JKR's theory. It is {near:.0f} nN
+    at a range of 0.16 nm and {far:.0f} nN at 0.4 nm, so that JKR's area is {over:.0f} to {most:.0f} % too large. The
+    tip with the longest range comes off at {off:.0f} nN and not at JKR's {jkr:.0f} nN. Friction is {stress:g} GPa times
+    the area within which the surfaces touch, under tension too.""",
 )
 def afm_tip(dataset: xr.Dataset) -> dict[str, Number]:
     last, load = dataset.isel(t=-1), dataset["contact_load"]
-    force = 1e9 * last["friction_force"].where(last["in_contact"] == 1, drop=True)
-    zero = 1e9 * last["friction_force"][nearest(load, 0.0)]
-    stress, off, size, modulus = (
+    force = 1e9 * last["friction_force"][{"contact_load": nearest(load, 0.0)}]
+    short, near, far = force.to_numpy()
+    work, size, modulus, stress, jkr = (
         float(values.max())
         for values in (
-            last["shear_stress"],
-            dataset["jkr_pull_off_load"],
+            dataset["adhesion_work"],
             dataset["sphere_radius"],
             dataset["contact_modulus"],
+            last["shear_stress"],
+            dataset["jkr_pull_off_load"],
         )
     )
-    # the radius of the JKR contact at its pull-off
-    least = np.pi * (-0.75 * off * size / modulus) ** (2.0 / 3.0)
+    of_range = laws.cohesive.stress_of_range(work, float(dataset["contact_range"][-1]))
+    lost = laws.cohesive.pull_off(0.0, work, of_range, size, modulus)
     return {
+        "short": float(short),
+        "near": float(near),
+        "far": float(far),
+        "over": 100.0 * float(short / near - 1.0),
+        "most": 100.0 * float(short / far - 1.0),
+        "off": 1e9 * float(lost.load),
+        "jkr": 1e9 * jkr,
         "stress": 1e-9 * stress,
-        "off": 1e9 * off,
-        "tension": 1e9 * float(force["contact_load"][0]),
-        "friction": float(force[0]),
-        "least": 1e9 * stress * least,
-        "zero": float(zero),
     }
 
 

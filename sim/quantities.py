@@ -78,12 +78,22 @@ REVERSIBLE = Condition(
 LAGGING_EDGE = Condition(
     'contact.model = "rate_dependent"', lambda scene: scene.contact.lags
 )
+WITH_RANGE = Condition(
+    'contact.model = "cohesive"', lambda scene: scene.contact.model == "cohesive"
+)
 AT_A_LOAD = Condition("contact.load", lambda scene: scene.contact.load is not None)
 CHANGING_APPLIED_LOAD = Condition(
     "a contact.load that changes",
     lambda scene: scene.contact.load is not None and scene.contact.changes,
 )
 CHANGING_LOAD = Condition("a load that changes", lambda scene: scene.contact.makes_load)
+PLACED_AT_LOAD = Condition(
+    f'{CHANGING_LOAD.words}, and not contact.load of contact.model = "cohesive"',
+    lambda scene: (
+        CHANGING_LOAD.holds(scene)
+        and not (WITH_RANGE.holds(scene) and AT_A_LOAD.holds(scene))
+    ),
+)
 FEELS_STEPS = Condition(
     "an edge that lags, or tension", lambda scene: scene.feels_steps
 )
@@ -205,6 +215,14 @@ RECORDS: tuple[Definition, ...] = (
         mean=Mean.WHILE_CLOSED,
         heading="a",
         absent=OPEN,
+    ),
+    Definition(
+        "outer_radius",
+        "m",
+        "radius within which the surfaces touch or attract each other; 0 beyond reach",
+        symbol="c",
+        exists_when=WITH_RANGE,
+        absent=ENDED,
     ),
     Definition(
         "contact_area",
@@ -425,7 +443,10 @@ DERIVED: tuple[Definition, ...] = (
     Definition(
         "area_ratio",
         "1",
-        "contact area over the JKR area at the full work of adhesion",
+        (
+            "contact area over the JKR area at the full work of adhesion, with a range "
+            "of adhesion over the area of such a contact"
+        ),
         symbol="A/A_JKR",
         heading="A/A_JKR",
         form=Form.PERCENT,
@@ -657,7 +678,7 @@ OF_THE_RUN: tuple[Definition, ...] = (
         "lowest_load_displacement",
         "m",
         "displacement of the mount at the lowest normal load",
-        exists_when=CHANGING_LOAD,
+        exists_when=PLACED_AT_LOAD,
         absent=WITHOUT_TENSION,
     ),
     Definition(

@@ -322,10 +322,11 @@ def _largest_losses(plan: Plan, closed: Sequence[int]) -> Iterator[str]:
         "fluctuations" + " if shear.paid_by_adhesion = 1" * (not all_paid): [
             loss.waves for loss in losses
         ],
-        "the mean stress if contact.reversible = 1": [
-            np.nanmax(loss.mean_stress, keepdims=True) for loss in losses
-        ],
     }
+    if all(point.contact.takes_mean_stress for point in points):
+        columns["the mean stress if contact.reversible = 1"] = [
+            np.nanmax(loss.mean_stress, keepdims=True) for loss in losses
+        ]
     by_size: dict[str, list[str]] = {}
     for name, column in columns.items():
         shares = np.concatenate(column)

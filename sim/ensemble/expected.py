@@ -2,7 +2,6 @@
 
 import functools
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -193,7 +192,7 @@ class LargestLosses(NamedTuple):
         By the rupture of all bonds, and by fluctuations of any size that adhesion pays for [1]. They are 1 if the
         contact pulls off.
     mean_stress : array
-        By the mean stress of the bonds in steady sliding if sliding is reversible [1].
+        By the mean stress of the bonds in steady sliding if sliding is reversible [1]; nan if the contact knows none.
     """
 
     bonds: Array
@@ -208,11 +207,15 @@ def largest_losses(point: Scenario) -> LargestLosses:
     """
     times, speeds = along(point)
     full = jkr_radius(point, times)
-    reversible = changed(point, {"contact.reversible": 1.0, "adhesion.bond_share": 0.0})
-    left: Sequence[Array] = (
+    left: list[Array] = [
         jkr_radius(point, times, 1.0 - point.adhesion.bond_share),
         jkr_radius(point, times, 0.0),
-        steady_course(reversible, times, speeds, np.zeros(1)).radius,
-    )
-    losses = (1.0 - (np.nan_to_num(radius) / full)[:, 0] ** 2 for radius in left)
+    ]
+    if point.contact.takes_mean_stress:
+        changes = {"contact.reversible": 1.0, "adhesion.bond_share": 0.0}
+        reversible = changed(point, changes)
+        left.append(steady_course(reversible, times, speeds, np.zeros(1)).radius)
+    losses = [1.0 - (np.nan_to_num(radius) / full)[:, 0] ** 2 for radius in left]
+    if not point.contact.takes_mean_stress:
+        losses.append(np.full(losses[0].shape, np.nan))
     return LargestLosses(*losses)

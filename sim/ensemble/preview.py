@@ -30,7 +30,7 @@ from sim.parts.drive import Spring
 from sim.parts.exchange import Parts
 from sim.parts.shear.modes import ModalProcess
 from sim.quantities import SOURCES
-from sim.scenario.checks import DISTANCES, LARGEST_STRAIN
+from sim.scenario.checks import LARGEST_STRAIN
 from sim.scenario.scenario import Record, Scenario
 from sim.scenario.schema import Entry, distinct, entries
 from sim.units.notation import engineering
@@ -409,10 +409,11 @@ def _contact(points: Sequence[Scenario]) -> Rows:
         [point for point in points if point.contact.load is not None],
     )
     loads = [
-        point.solid.elastic.pull_off_load(point.adhesion.work, point.sphere.radius)
+        point.contact.pull_off_load(point.adhesion.work, point.bodies)
         for point in loaded
     ]
-    rows: Rows = [("JKR radius", _span(closed, "m"))] if closed else []
+    theory = points[0].contact.theory
+    rows: Rows = [(f"{theory} radius", _span(closed, "m"))] if closed else []
     if lost:
         rows.append(("open", f"beyond pull-off at {lost} of {len(points)} points"))
     return [*rows, ("pull-off load", _span(loads, "N"))] if loads else rows
@@ -421,12 +422,17 @@ def _contact(points: Sequence[Scenario]) -> Rows:
 def _limits(points: Sequence[Scenario]) -> Rows:
     """Return the numbers that tell if the scenes lie within the theory, each with its meaning."""
     known = [point.limits for point in points]
-    near, far = (f"{1e9 * distance:g}" for distance in DISTANCES)
+    ends = [
+        1e9 * distance
+        for point in points
+        for distance in point.contact.distances(point.adhesion.work)
+    ]
+    of_range = f"{max(ends):.3g}"
+    if min(ends) < max(ends):
+        of_range += f" to {min(ends):.3g}"
     rows: Rows = []
     if tabor := [number for row in known for number in row.tabor if number > 0.0]:
-        meaning = (
-            f"for z0 = {near} to {far} nm; JKR's theory holds above about {JKR_FROM:g}"
-        )
+        meaning = f"for z0 = {of_range} nm; JKR's theory holds above about {JKR_FROM:g}"
         rows.append(("Tabor number", _span(tabor, digits=".3g"), meaning))
     if slopes := [row.slope for row in known if row.slope > 0.0]:
         meaning = (

@@ -17,6 +17,7 @@ from sim.parts.contact.balance import (
     LoadControl,
     Shares,
 )
+from sim.parts.contact.cohesive import CohesiveDisplacement, CohesiveLoad
 from sim.parts.drive import READINGS, Driven, Force, Spring
 from sim.parts.events import LATE, MOMENTS, RISE, TURNS, Slips
 from sim.parts.exchange import TURN
@@ -84,6 +85,12 @@ def _area(scene: Scenario, course: Trajectory) -> np.ndarray:
 
 def _control(scene: Scenario, course: Trajectory) -> Control:
     return scene.contact.control(course.time, scene.clock.duration)
+
+
+def _outer_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
+    control = cast(CohesiveLoad | CohesiveDisplacement, _control(scene, course))
+    radius = control.outer_radius(course.radius, scene.bodies, course.work)
+    return np.nan_to_num(radius)
 
 
 def _applied_load(scene: Scenario, course: Trajectory) -> np.ndarray:
@@ -434,13 +441,14 @@ VARIABLES: tuple[Variable, ...] = (
         "work_of_adhesion", "contact", _until_stopped(lambda scene, course: course.work)
     ),
     Variable("contact_radius", "contact", _until_stopped(_radius)),
+    Variable("outer_radius", "contact", _until_stopped(_outer_radius)),
     Variable("contact_area", "contact", _until_stopped(_area)),
     Variable(
         "normal_load",
         "contact",
         _until_stopped(
             lambda scene, course: _control(scene, course).normal_load(
-                course.radius, scene.bodies
+                course.radius, scene.bodies, course.work
             )
         ),
     ),
@@ -449,7 +457,7 @@ VARIABLES: tuple[Variable, ...] = (
         "contact",
         _until_stopped(
             lambda scene, course: _control(scene, course).indentation(
-                course.radius, scene.bodies
+                course.radius, scene.bodies, course.work
             )
         ),
     ),
@@ -458,7 +466,7 @@ VARIABLES: tuple[Variable, ...] = (
         "contact",
         _until_stopped(
             lambda scene, course: _control(scene, course).displacement(
-                course.radius, scene.bodies
+                course.radius, scene.bodies, course.work
             )
         ),
     ),

@@ -5,7 +5,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from sim.laws.halfspace import gap, normal_displacement
 from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
 from sim.spectrum.families import Ripple
@@ -37,26 +36,12 @@ def contact(scenario: Scenario, speed: float) -> dict[str, Any]:
     if not wide > 0.0:
         return result
     x = np.linspace(-wide, wide, _PROFILE)
-    control, ball = (
-        scenario.contact.control(np.zeros((1, 1)), scenario.clock.duration),
-        scenario.sphere.radius,
-    )
-    indentation = (
-        float(np.squeeze(control.indentation(np.full((1, 1), radius), scenario.bodies)))
-        if radius
-        else 0.0
-    )
-    surface = (
-        -normal_displacement(np.abs(x), radius, indentation, ball)
-        if radius
-        else 0.0 * x
-    )
-    above = gap(np.abs(x), radius, indentation, ball) if radius else x**2 / (2.0 * ball)
-    profiles = {
-        "x": listed(x),
-        "surface": listed(surface),
-        "sphere": listed(surface + above),
-    }
+    surface, sphere = 0.0 * x, x**2 / (2.0 * scenario.sphere.radius)
+    if radius:
+        work = at_speed["work_of_adhesion"]
+        held = radius, work, scenario.bodies
+        surface, sphere = scenario.contact.heights(np.abs(x), *held)
+    profiles = {"x": listed(x), "surface": listed(surface), "sphere": listed(sphere)}
     stress = _stress(scenario, at_speed, 2.0 * wide)
     rows = None if stress is None else [listed(row) for row in np.round(stress, -1)]
     return result | profiles | {"side": 2.0 * wide, "stress": rows}

@@ -3,7 +3,15 @@
 import importlib
 from types import ModuleType
 
-__all__ = ["halfspace", "jkr", "limits", "reversible", "schallamach", "theories"]
+__all__ = [
+    "cohesive",
+    "halfspace",
+    "jkr",
+    "limits",
+    "reversible",
+    "schallamach",
+    "theories",
+]
 
 
 def __getattr__(name: str) -> ModuleType:

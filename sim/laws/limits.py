@@ -7,6 +7,8 @@ Floats = float | np.ndarray
 
 #: Tabor number from which on the theory of Johnson, Kendall & Roberts holds (Johnson & Greenwood 1997).
 JKR_FROM = 5.0
+#: Equilibrium distances of two surfaces between which those of most solids lie [m].
+DISTANCES = 0.4e-9, 0.16e-9
 
 
 def tabor_number(

@@ -672,6 +672,7 @@ def _follow(bonds, contacts, motion, traits, events):
             if (
                 closed != was_closed
                 or (closed and not work > 0.0)
+                or radius == 0.0
                 or opening > contact[i, _DETACHED]
             ):
                 turn = turns[k, i if turns.shape[1] > 1 else 0]
@@ -698,6 +699,13 @@ def _turn(time, step, radius, work, detached, turn, row):
                 turn[1],
                 turn[2],
             )
+    is_attracted = radius == 0.0 and not opens
+    if is_attracted and math.isnan(row[_JUMP_IN]):  # without touching
+        row[_JUMP_IN], row[_JUMP_IN_LOAD], row[_JUMP_IN_DISPLACEMENT] = (
+            turn[0],
+            turn[1],
+            turn[2],
+        )
     if not radius > 0.0:
         return
     if work <= 0.0:

@@ -14,7 +14,14 @@ from sim.plots.measured import Compared, Line, Measured
 from sim.plots.style import Unit, axis_scale, named
 from sim.read import Run, is_stationary, is_steady, setting, slips, sweep_dims
 from sim.read.correlation import Array
-from sim.read.dataset import MEMBERS, only_statistics, speed_name, speed_of, stays_held
+from sim.read.dataset import (
+    MEMBERS,
+    only_statistics,
+    reference_in_words,
+    speed_name,
+    speed_of,
+    stays_held,
+)
 from sim.read.estimate import Estimate, Estimates
 from sim.read.events import jumps
 from sim.read.late import distribution
@@ -93,6 +100,11 @@ class Scene(NamedTuple):
     scale: str = "linear"
     joined: bool = True
     broken: bool = False
+
+    @property
+    def reference(self) -> str:
+        """Name of the contact at the full work of adhesion."""
+        return reference_in_words(self.statistics.dataset)
 
     @property
     def single(self) -> bool:
@@ -444,8 +456,12 @@ def _size_panel(
         sizes = np.append(scene.all(name), of_radius(scene.all("jkr_radius")))
         factor = style.in_unit(panel.yaxis, words, sizes, si)
         contact_curves(panel, scene, name, factor)
-        for theory, dashes in (("JKR", "--"), ("Hertz", ":")):
-            radii = _along(scene, f"{theory.lower()}_radius")
+        words_of = {
+            "jkr_radius": (scene.reference, "--"),
+            "hertz_radius": ("Hertz", ":"),
+        }
+        for radius, (theory, dashes) in words_of.items():
+            radii = _along(scene, radius)
             _reference(panel, scene, factor * of_radius(radii), dashes, theory)
 
     return panel_of
@@ -552,7 +568,7 @@ def share_panel(panel: Axes, scene: Scene) -> None:
                 look: Any = {"color": colour, "alpha": 0.35, "label": words}
                 style.fill(panel, x, low, high, **look)
     contact_curves(panel, scene, "area_ratio", 1.0)
-    panel.axhline(1.0, linestyle="--", label="JKR", **style.GREY)
+    panel.axhline(1.0, linestyle="--", label=scene.reference, **style.GREY)
     if not is_shaded:
         # of curves that lose to both, in front of a curve without fluctuations
         lost = np.stack([1.0 - bonds, scene.all("lost_to_fluctuations")])
@@ -562,7 +578,8 @@ def share_panel(panel: Axes, scene: Scene) -> None:
     full = _along(scene, "jkr_radius")
     ratios = (_along(scene, "hertz_radius") / np.where(full > 0.0, full, np.nan)) ** 2
     _reference(panel, scene, ratios, ":", "Hertz")
-    panel.set_ylabel(r"contact area $A/A_\mathrm{JKR}$")
+    area = r"A_\mathrm{JKR}" if scene.reference == "JKR" else r"A_\mathrm{full}"
+    panel.set_ylabel(f"contact area $A/{area}$")
 
 
 def stacked(

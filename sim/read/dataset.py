@@ -519,6 +519,12 @@ def word(dataset: xr.Dataset, key: str, default: str) -> xr.DataArray:
     return xr.DataArray(default)
 
 
+def reference_in_words(dataset: xr.Dataset) -> str:
+    """Return the name of the contact at the full work of adhesion: JKR, unless the adhesion has a range."""
+    model = word(dataset, "contact.model", "equilibrium")
+    return "full adhesion" if bool((model == "cohesive").any()) else "JKR"
+
+
 def resolved(dataset: xr.Dataset, key: str) -> Any:
     """Return the value of a dotted key in the resolved scenario: a number, a word, a table as a dict, or None.
 

@@ -11,7 +11,7 @@ from collections.abc import Collection
 import numpy as np
 import xarray as xr
 
-from sim.laws import equilibrium, jkr
+from sim.laws import cohesive, equilibrium, jkr
 from sim.quantities import OF_CONTACT, QUANTITIES
 from sim.read.dataset import (
     MEMBERS,
@@ -249,13 +249,32 @@ def radius_at_work(dataset: xr.Dataset, work: xr.DataArray) -> xr.DataArray:
         load = dataset[name]
     # an indentation is a displacement behind an infinite stiffness
     base = xr.DataArray(0.0) if held.kind == "load" else dataset[held.kind]
+    spring = xr.DataArray(0.0) if held.kind == "load" else held.stiffness
     if thickness is not None:
-        spring = 0.0 if held.kind == "load" else held.stiffness
         on_layer = load, base, spring, *sphere, thickness
         return xr.apply_ufunc(equilibrium.radius_on_layer, *on_layer)
     if held.kind == "load":
-        return xr.apply_ufunc(jkr.radius_at_load, load, *sphere)
-    return xr.apply_ufunc(jkr.radius_at_displacement, base, held.stiffness, *sphere)
+        radius = xr.apply_ufunc(jkr.radius_at_load, load, *sphere)
+    else:
+        radius = xr.apply_ufunc(jkr.radius_at_displacement, base, spring, *sphere)
+    has_range = word(dataset, "contact.model", "equilibrium") == "cohesive"
+    if not bool(has_range.any()):
+        return radius
+    if "contact_range" in dataset:
+        distance = setting(dataset, "contact.range")
+        stress = xr.apply_ufunc(cohesive.stress_of_range, work, distance)
+    else:
+        stress = setting(dataset, "contact.cohesive_stress")
+    attracted = xr.apply_ufunc(
+        lambda *numbers: cohesive.equilibrium(*numbers).inner,
+        load,
+        base,
+        spring,
+        work,
+        stress,
+        *sphere[1:],
+    )
+    return xr.where(has_range, attracted, radius)
 
 
 def _charged_first(dataset: xr.Dataset) -> xr.DataArray:

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
 from sim.laws.layer_table import WIDEST
-from sim.laws.limits import JKR_FROM, elastocapillary_length, tabor_number
+from sim.laws.limits import DISTANCES, JKR_FROM, elastocapillary_length, tabor_number
 from sim.parts.bonds.models import Cohort, Tracked
 from sim.parts.exchange import Array
 from sim.spectrum.families import Measured
@@ -50,6 +50,7 @@ def faults_across(scene: Scene, built: bool = True) -> Faults:
         _too_short,
         _cannot_be_driven,
         _unknown_on_a_layer,
+        _unlike_contact,
         _lacks_bonds,
         _catch_is_too_weak,
         _implausible,
@@ -74,6 +75,15 @@ def _too_short(scene: Scene) -> Faults:
             ("contact", contact.kind, "cycles"),
             f"{fault}; make fewer cycles or shorter steps",
         )
+
+
+def _unlike_contact(scene: Scene) -> Faults:
+    faults = scene.contact.faults(
+        is_driven=scene.drive.solves_motion,
+        is_on_disc=scene.fluctuations.contact != "plane",
+        is_on_layer=scene.solid.thickness is not None,
+    )
+    yield from ((("contact", key), fault) for key, fault in faults.items())
 
 
 def _cannot_be_driven(scene: Scene) -> Faults:
@@ -196,9 +206,7 @@ def _wrong_maps(scene: Scene) -> Faults:
 def _shear_faults(scene: Scene, built: bool) -> Faults:
     shear, contact, radius = scene.fluctuations, scene.contact, scene.rest_radius
     if not shear.side(math.sqrt(math.pi) * radius) > 0.0:
-        pull_off = scene.solid.elastic.pull_off_load(
-            scene.adhesion.work, scene.sphere.radius
-        )
+        pull_off = contact.pull_off_load(scene.adhesion.work, scene.bodies)
         limit = f" of {pull_off:.3g} N" if contact.kind == "load" else ""
         fault = f"is beyond pull-off{limit} at the start, so there is no contact at rest for the size of the cell"
         yield (
@@ -234,8 +242,6 @@ _MOST_REVERSED = 0.5
 LARGEST_STRAIN, LARGEST_CAPILLARITY = 0.3, 0.1
 #: Contact radius over the thickness of a layer above which a remark is made on its compressibility.
 _COMPRESSED = 10.0
-#: Equilibrium distances of two surfaces between which those of most solids lie [m].
-DISTANCES = 0.4e-9, 0.16e-9
 #: Surface tension of water, and so of a wet gel [N/m].
 WATER = 0.072
 #: Decades between the stress of a map and that of the bonds from which a factor of 1000 is nearer than none.
@@ -250,7 +256,7 @@ class Limits(NamedTuple):
     Attributes
     ----------
     tabor : tuple of float
-        Tabor number at each of ``DISTANCES`` [1].
+        Tabor number at each of the likely distances of the attraction [1].
     slope, strain : float
         Largest contact radius over that of the sphere, and largest mean stress over the shear modulus [1].
     tensions, capillary : tuple of float
@@ -273,7 +279,8 @@ def limits(scene: Scene) -> Limits:
     lengths = elastocapillary_length(
         np.array([low, high]), solid.shear_modulus, solid.poisson_ratio
     )
-    tabor = tabor_number(work, size, solid.contact_modulus, np.array(DISTANCES))
+    distances = np.array(scene.contact.distances(work))
+    tabor = tabor_number(work, size, solid.contact_modulus, distances)
     return Limits(
         (float(tabor[0]), float(tabor[1])),
         scene.widest / size,
@@ -285,11 +292,11 @@ def limits(scene: Scene) -> Limits:
 
 def _remarks_on_theory(scene: Scene, known: Limits) -> Iterator[str]:
     """Yield a remark for each number that lies outside of the theory."""
-    if 0.0 < known.tabor[0] < JKR_FROM:
+    if scene.contact.theory == "JKR" and 0.0 < known.tabor[0] < JKR_FROM:
         near, far = (f"{distance * 1e9:g} nm" for distance in DISTANCES)
         yield (
             f"the Tabor number is {known.tabor[0]:.2g} for z0 = {near} and {known.tabor[1]:.2g} for z0 = {far}:"
-            f" JKR's theory holds above about {JKR_FROM:g}"
+            f' JKR\'s theory holds above about {JKR_FROM:g}; contact.model = "cohesive" has a range of adhesion'
         )
     if known.slope > LARGEST_STRAIN:
         yield (

@@ -12,7 +12,8 @@ import numpy as np
 
 from sim.parts import events
 from sim.parts.bonds.models import Model as BondModel
-from sim.parts.contact.models import EffectiveWork, Equilibrium, RateDependent
+from sim.parts.contact import Contact
+from sim.parts.contact.models import EffectiveWork
 from sim.parts.exchange import Array, Bonding, ContactState, Motion, Parts, Times
 from sim.parts.shear.models import Model as FluctuationModel
 from sim.step.phases import Phases
@@ -29,7 +30,7 @@ class Models(NamedTuple):
 
     fluctuations: FluctuationModel
     bonds: BondModel
-    contact: Equilibrium | RateDependent
+    contact: Contact
 
 
 class Scene(NamedTuple):
@@ -162,7 +163,7 @@ class Stepper:
         self, bonding: Bonding, contact: ContactState, stage: Array
     ) -> events.Events:
         """Return the events at t = 0; ``stage`` has positions of stages that pull through a spring."""
-        pull = self._pull(0.0, contact.radius)
+        pull = self._pull(0.0, contact)
         return events.first(bonding, contact, pull, stage, self.scene.loads_from_rest)
 
     def _events(
@@ -183,16 +184,16 @@ class Stepper:
             (state.bonding, state.contact.radius),
             bonding,
             contact,
-            self._pull(motions.time, contact.radius),
+            self._pull(motions.time, contact),
             motions,
             self.scene.follows_path,
             self.scene.shares_area,
         )
 
-    def _pull(self, time: float | Array, radius: Array) -> Array:
+    def _pull(self, time: float | Array, touch: ContactState) -> Array:
         """Return the tensile load of the contact [N] if the control makes it, else nothing."""
-        contact = self.scene.models.contact
+        contact, radius = self.scene.models.contact, touch.radius
         if not contact.makes_load:
             return np.empty((*radius.shape[:-1], 0))
         control = contact.control(time, self.scene.times.duration)
-        return -control.normal_load(radius, self.scene.work.bodies)
+        return -control.normal_load(radius, self.scene.work.bodies, touch.work)

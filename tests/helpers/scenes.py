@@ -9,7 +9,7 @@ from sim.ensemble.variables import VARIABLES
 from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
-from sim.parts.contact import Equilibrium, RateDependent
+from sim.parts.contact import Cohesive, Equilibrium, RateDependent
 from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import Force, Spring
 from sim.parts.exchange import Motion
@@ -181,15 +181,29 @@ CONTACTS = {
         after_pull_off="reattach",
     ),
     "partly reversible": Equilibrium(load=4e-3, reversible=0.02),
+    "cohesive load there and back": Cohesive(
+        load={"from": 4e-3, "to": -1e-3, "cycles": 1},
+        range=0.4e-6,
+        after_pull_off="reattach",
+    ),
+    "cohesive displacement there and back": Cohesive(
+        displacement={"from": 1e-6, "to": -3e-6, "cycles": 2},
+        stiffness=5e3,
+        cohesive_stress=3e4,
+        after_pull_off="reattach",
+    ),
 }
 
 
 def go_together(case):
-    """Whether contact and bonds of a case, by the names of its depths, can feel its drive."""
+    """Whether contact and bonds of a case, by the names of its depths, can feel its drive and its fluctuations."""
     part, contact = (
         DRIVES[case.get("drive", "steady")],
         CONTACTS[case.get("contact", "load")],
     )
+    fluctuations = SHEARS[case.get("shear", "uniform")]
+    if contact.faults(part.solves_motion, fluctuations.contact != "plane", False):
+        return False
     if not part.solves_motion:
         return True
     if contact.reversible and part.at_once:

@@ -3,7 +3,8 @@
 A contact is under load control, displacement control, or displacement behind a stiffness. The control is a number at
 one time, an array of shape (times, 1) at many. Each control gives the stable equilibrium for a work of adhesion. It
 also gives the load, the indentation and the energy at any radius. Radii are arrays, shape (1,) or (members,), nan if
-the contact is open.
+the contact is open. The work of adhesion at that radius matters to those controls alone whose adhesion has a range,
+``sim.parts.contact.cohesive``.
 
 On a disc the share of ΔΓ that the contact pays is not convex in its radius, so neither Newton's method nor a
 fixed-point iteration is safe. A walk inwards starts from the radius without fluctuations. Between the two places where
@@ -67,23 +68,39 @@ class LoadControl:
         """True if a detached sphere comes back into contact, because the load is not tensile."""
         return self.load >= 0.0
 
+    def touches(self, work: Array) -> bool | Flags:
+        """Return ``closes``, whatever the work of adhesion."""
+        return self.closes
+
     def radius(self, work: Array, bodies: Bodies) -> Array:
         """Return the radius in equilibrium [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
         return bodies.solid.radius(self.mount, work, bodies.sphere_radius)
 
-    def normal_load(self, radius: Array, bodies: Bodies) -> Array:
+    def normal_load(
+        self, radius: Array, bodies: Bodies, work: Array | None = None
+    ) -> Array:
         """Return the load on the sphere [N]; 0 if the contact is open."""
         return np.where(np.isnan(radius), 0.0, self.load)
 
-    def indentation(self, radius: Array, bodies: Bodies) -> Array:
+    def indentation(
+        self, radius: Array, bodies: Bodies, work: Array | None = None
+    ) -> Array:
         """Return the indentation [m]; nan if the contact is open, because a dead load does not place the sphere."""
         return bodies.solid.indentation(radius, self.mount, bodies.sphere_radius)
 
-    def displacement(self, radius: Array, bodies: Bodies) -> Array:
+    def displacement(
+        self, radius: Array, bodies: Bodies, work: Array | None = None
+    ) -> Array:
         """Return the displacement of the base [m], which is the indentation without a spring."""
         return self.indentation(radius, bodies)
 
-    def energy(self, radius: Array, gained: Array, bodies: Bodies) -> Array:
+    def energy(
+        self,
+        radius: Array,
+        gained: Array,
+        bodies: Bodies,
+        work: Array | None = None,
+    ) -> Array:
         """Return the energy of this contact above that of a free sphere that just touches [J].
 
         It is elastic, of the load and of adhesion. Under tension it is not defined, because the free sphere moves away,
@@ -116,25 +133,41 @@ class DisplacementControl:
         """True if a detached sphere comes back into contact: at a displacement of zero or more."""
         return self.base >= 0.0
 
+    def touches(self, work: Array) -> bool | Flags:
+        """Return ``closes``, whatever the work of adhesion."""
+        return self.closes
+
     def radius(self, work: Array, bodies: Bodies) -> Array:
         """Return the radius in equilibrium [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
         return bodies.solid.radius(self.mount, work, bodies.sphere_radius)
 
-    def normal_load(self, radius: Array, bodies: Bodies) -> Array:
+    def normal_load(
+        self, radius: Array, bodies: Bodies, work: Array | None = None
+    ) -> Array:
         """Return the load on the sphere [N]; 0 if the contact is open."""
         load = bodies.solid.load(radius, self.mount, bodies.sphere_radius)
         return np.where(np.isnan(radius), 0.0, load)
 
-    def indentation(self, radius: Array, bodies: Bodies) -> Array:
+    def indentation(
+        self, radius: Array, bodies: Bodies, work: Array | None = None
+    ) -> Array:
         """Return the indentation [m]; if the contact is open, the displacement of the base of the unloaded spring."""
         closed = bodies.solid.indentation(radius, self.mount, bodies.sphere_radius)
         return np.where(np.isnan(radius), self.base, closed)
 
-    def displacement(self, radius: Array, bodies: Bodies) -> Array:
+    def displacement(
+        self, radius: Array, bodies: Bodies, work: Array | None = None
+    ) -> Array:
         """Return the displacement of the base [m]."""
         return self.base + np.zeros(radius.shape)
 
-    def energy(self, radius: Array, gained: Array, bodies: Bodies) -> Array:
+    def energy(
+        self,
+        radius: Array,
+        gained: Array,
+        bodies: Bodies,
+        work: Array | None = None,
+    ) -> Array:
         """Return the energy of this contact above that of an open one [J]: elastic, of the spring, and of adhesion."""
         indentation = self.indentation(radius, bodies)
         spring = (

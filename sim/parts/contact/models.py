@@ -10,13 +10,15 @@ from functools import cached_property
 from typing import Annotated, ClassVar, Literal, NamedTuple, Protocol, cast
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from sim.laws.halfspace import coupling, in_series
+from sim.laws.halfspace import coupling, gap, in_series, normal_displacement
+from sim.laws.limits import DISTANCES
 from sim.numerics.jit import kernel
 from sim.parts.contact.balance import (
     AHEAD,
+    BONDS_ONLY,
     CLOSED,
     OPEN,
     Balance,
@@ -286,6 +288,10 @@ class _Controlled:
     feeds_back: ClassVar[bool] = False
     #: True if the edge takes time to reach equilibrium.
     lags: ClassVar[bool] = False
+    #: Theory of the equilibrium.
+    theory: ClassVar[str] = "JKR"
+    #: True if the energy of the mean stress can be charged to adhesion.
+    takes_mean_stress: ClassVar[bool] = True
     #: Rough time of a step of one member if its edge lags, for estimates [s].
     edge_seconds: ClassVar[float] = 0.0
 
@@ -329,6 +335,12 @@ class _Controlled:
         if message:
             raise PydanticCustomError("control", message)
         return self
+
+    def faults(
+        self, is_driven: bool, is_on_disc: bool, is_on_layer: bool
+    ) -> dict[str, str]:
+        """Return faults of this contact with a driven slider, with ΔΓ of a disc or on a layer, by key."""
+        return {}
 
     def remarks(self, setting: Setting) -> list[str]:
         if not math.isnan(setting.rest_radius):
@@ -384,9 +396,26 @@ class _Controlled:
         """True if the control changes in time."""
         return self.course.changes
 
+    def pull_off_load(self, work: float, bodies: Bodies) -> float:
+        """Return the lowest load that the contact bears under a dead load [N]."""
+        return float(bodies.solid.pull_off_load(work, bodies.sphere_radius))
+
+    def distances(self, work: float) -> tuple[float, float]:
+        """Return the ends of the range of likely equilibrium distances of the attraction [m]."""
+        return DISTANCES
+
     def equilibrium_radius(self, work: Array, bodies: Bodies) -> Array:
         """Return the JKR radius at the start for a work of adhesion; Hertz's if it is not positive; nan if open."""
         return self.control(0.0, 0.0).radius(work, bodies)
+
+    def heights(
+        self, r: Array, radius: float, work: float, bodies: Bodies
+    ) -> tuple[Array, Array]:
+        """Return the heights of half-space and sphere at distances from the axis of a contact at the start [m]."""
+        indentation = self.control(0.0, 0.0).indentation(np.full(1, radius), bodies)[0]
+        shape = r, radius, indentation, bodies.sphere_radius
+        surface = -normal_displacement(*shape)
+        return surface, surface + gap(*shape)
 
     def largest_radius(self, work: float, bodies: Bodies) -> float:
         """Return the JKR radius for a work of adhesion as the control presses most [m]; 0 without equilibrium."""
@@ -417,16 +446,16 @@ class _Controlled:
             np.concatenate([whole, balance.bonded], axis=-1),
             balance.bodies,
         )
-        jkr, bonds_only = radii[..., :1], radii[..., 1:]
+        full, bonds_only = radii[..., :1], radii[..., 1:]
         no_mean_stress = (
             self.equilibrium(control, balance.without_stress())
             if self.reversible
-            else jkr
+            else full
         )
-        equilibrium = self.equilibrium(control, balance) if self.lags else jkr
+        equilibrium = self.equilibrium(control, balance) if self.lags else full
         return np.isnan(
             np.stack(
-                np.broadcast_arrays(jkr, bonds_only, no_mean_stress, equilibrium),
+                np.broadcast_arrays(full, bonds_only, no_mean_stress, equilibrium),
                 axis=-1,
             )
         )
@@ -435,14 +464,21 @@ class _Controlled:
         """Return the phases of the reference contacts at the end of each step, shape (steps, rows, 4)."""
         if min(self.course.extremes) >= 0.0:
             return during(state.phases, len(balance.bonded))
-        return self._followed(
-            state.phases, control, self._without_equilibrium(control, balance)
+        lost = self._without_equilibrium(control, balance)
+        touches = np.zeros(lost.shape, bool)
+        touches[...] = np.reshape(
+            control.touches(np.full(1, balance.reference)), (-1, 1, 1)
         )
+        touches[..., BONDS_ONLY] = control.touches(balance.bonded)
+        return self._followed(state.phases, touches, lost)
 
-    def _followed(self, phases: Array, control: Control, lost: Flags) -> Array:
-        """Return phases at the end of each step, shape (steps, rows, contacts), of contacts that have ``lost`` it."""
-        after, closes = np.empty(lost.shape), np.full((len(lost), 1), control.closes)
-        _follow(phases, closes[:, 0], lost, self.after_pull_off == "reattach", after)
+    def _followed(self, phases: Array, touches: Flags, lost: Flags) -> Array:
+        """Return phases at the end of each step, shape (steps, rows, contacts).
+
+        Open contacts close where they ``touch``, and closed ones open where they have ``lost`` their equilibrium.
+        """
+        after = np.empty(lost.shape)
+        _follow(phases, touches, lost, self.after_pull_off == "reattach", after)
         return after
 
     def equilibrium(self, control: Control, balance: Balance) -> Array:
@@ -508,8 +544,11 @@ class Equilibrium(_Controlled):
                 np.where(np.isnan(state.detached), AHEAD, OPEN),
                 CLOSED,
             )
+            lost = np.isnan(radius)[:, :, np.newaxis]
+            touches = np.zeros(radius.shape, bool)
+            touches[...] = control.touches(balance.bonded - balance.fluctuating)
             followed = self._followed(
-                phase[:, np.newaxis], control, np.isnan(radius)[:, :, np.newaxis]
+                phase[:, np.newaxis], touches[:, :, np.newaxis], lost
             )
             radius = np.where(followed[:, :, 0] == CLOSED, radius, np.nan)
         return self.reached(state, motions, duration, balance, radius)
@@ -618,7 +657,8 @@ class Equilibrium(_Controlled):
             middle = 0.5 * (before + after)
             control, there = at(middle)
             size = self.equilibrium(control, there)
-            turned = np.where(opens, np.isnan(size), control.closes)
+            touches = control.touches(there.bonded - there.fluctuating)
+            turned = np.where(opens, np.isnan(size), touches)
             radius = np.where(opens & ~turned, size, radius)
             before, after = (
                 np.where(turned, before, middle),
@@ -626,18 +666,20 @@ class Equilibrium(_Controlled):
             )
         control, there = at(after)
         radius = np.where(opens, radius, self.equilibrium(control, there))
-        has_adhesion = self._left(radius, there) > 0.0
-        load = np.where(has_adhesion, control.normal_load(radius, there.bodies), 0.0)
+        work = self._left(radius, there)
+        has_adhesion = work > 0.0
+        load = control.normal_load(radius, there.bodies, work)
+        load = np.where(has_adhesion, load, 0.0)
         turn = np.concatenate(
             [
                 motions.time[steps] - (1.0 - after) * motions.duration[steps],
                 load,
-                control.displacement(radius, there.bodies),
+                control.displacement(radius, there.bodies, work),
             ],
             axis=1,
         )
         gained = there.gained(radius, self.reversible)
-        energy = control.energy(radius, gained, there.bodies)[:, 0]
+        energy = control.energy(radius, gained, there.bodies, work)[:, 0]
         lost = np.maximum(np.where(opens[:, 0], energy, -energy), 0.0)
         return np.where(opens | has_adhesion, turn, np.nan), lost
 
@@ -696,33 +738,18 @@ class RateDependent(_Controlled):
 
 
 @kernel(
-    "void(float64[:, :], boolean[:], boolean[:, :, :], boolean, float64[:, :, ::1])"
+    "void(float64[:, :], boolean[:, :, :], boolean[:, :, :], boolean,"
+    " float64[:, :, ::1])"
 )
-def _follow(phases, closes, lost, again, after):
+def _follow(phases, touches, lost, again, after):
     """Write the phases of contacts at the end of each step; ``phases`` are those before the steps."""
     steps, rows, contacts = after.shape
     for m in range(rows):
         for c in range(contacts):
             phase = phases[m if len(phases) > 1 else 0, c]
             for k in range(steps):
-                if closes[k] and (again or phase != OPEN):
+                if touches[k, m, c] and (again or phase != OPEN):
                     phase = CLOSED
                 if phase == CLOSED and lost[k, m, c]:
                     phase = OPEN
                 after[k, m, c] = phase
-
-
-def _model(value: object) -> object:
-    """Return the name of a contact's model, by default equilibrium."""
-    return (
-        value.get("model", "equilibrium")
-        if isinstance(value, dict)
-        else getattr(value, "model", None)
-    )
-
-
-Contact = Annotated[
-    Annotated[Equilibrium, Tag("equilibrium")]
-    | Annotated[RateDependent, Tag("rate_dependent")],
-    Discriminator(_model),
-]
