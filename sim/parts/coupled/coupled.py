@@ -174,7 +174,7 @@ def advance(
     )
     units = bonds.units(drive, contact.area, times.step)
     stretch, force = units
-    state = np.array(slider[:COLUMNS]).T.copy()
+    state = np.stack(slider[:COLUMNS], axis=-1)
     rows = state.view(ROW)[:, 0]
     if steps.start == 1 and not drive.spring:  # a force acts at once
         rows["spring_force"] = 0.0
