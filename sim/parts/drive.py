@@ -215,22 +215,20 @@ READINGS = (
 
 
 class Driven(NamedTuple):
-    """State of a driven slider; arrays of shape (members,). All but the last three are the row of a member in the loop.
+    """State of a driven slider; arrays of shape (members,).
 
     Attributes
     ----------
-    spring_force : array
-        Force of the spring, or that prescribed [N].
-    body_speed, position : array
-        Speed of the body [m/s], and its displacement since the start [m].
-    sheared : array
-        Shear displacement of the contact between body and interface [m].
-    bound, moment : array
-        Share of the sites that are bound [1], and sum of their stretches over that of the sites [m].
+    position, body_speed : array
+        Displacement of the body since the start [m], and its speed [m/s].
     speed : array
         Sliding speed, that of the interface [m/s].
-    slip, path : array
-        Slip and path of the interface in the clock step [m].
+    spring_force : array
+        Force of the spring, or that prescribed [N].
+    sheared : array
+        Shear displacement of the contact between body and interface [m].
+    stage_position, stage_speed : array
+        Displacement [m] and speed [m/s] of the stage; 0 without one.
     radius : array
         Contact radius in the sub-steps [m], 0 where it is open.
     next_step : array
@@ -241,63 +239,26 @@ class Driven(NamedTuple):
         Time at which the slider lost stability [s], nan if never.
     unresolved_time : array
         Time from which on the motion could not be resolved [s], nan if never.
-    acceleration : array
-        Acceleration of the interface in the last sub-step [m/s²], where bonds resolved by stretch use it, else 0.
-    weight, mean, spread, renewed, energy : array
-        Memory of the fluctuations, as in ``Memory``.
-    recalled : array
-        Path of the clock step up to which it reaches [m].
-    paid : array
-        Share of ΔΓ that adhesion pays [1].
-    felt, drawn : array
-        Energy that it pays in the sub-steps, and after the draw at the start of the clock step [J/m²].
-    worked, missed : array
-        Work since the start of the run and the energy that is missing, over the unit of the work: at the start of the
-        clock step.
-    elapsed : array
-        Time at the start of the clock step [s].
-    parted, closed, lost : array
-        1 if the contact has pulled off before, if it has closed at the end of the step before, and if it was lost
-        within the clock step, else 0.
-    stage_position, stage_speed : array
-        Displacement [m] and speed [m/s] of the stage; 0 without one.
     energies : array, shape (members, 8)
         Energies since the start [J], columns of ``ENERGY``.
+    acceleration : array
+        Acceleration of the interface in the last sub-step [m/s²], where bonds resolved by stretch use it, else 0.
     """
 
-    spring_force: Array
-    body_speed: Array
-    sheared: Array
-    bound: Array
-    moment: Array
-    speed: Array
     position: Array
-    slip: Array
-    path: Array
+    body_speed: Array
+    speed: Array
+    spring_force: Array
+    sheared: Array
+    stage_position: Array
+    stage_speed: Array
     radius: Array
     next_step: Array
     substeps: Array
     runaway_time: Array
     unresolved_time: Array
-    acceleration: Array
-    weight: Array
-    mean: Array
-    spread: Array
-    renewed: Array
-    energy: Array
-    recalled: Array
-    paid: Array
-    felt: Array
-    drawn: Array
-    worked: Array
-    missed: Array
-    elapsed: Array
-    parted: Array
-    closed: Array
-    lost: Array
-    stage_position: Array
-    stage_speed: Array
     energies: Array
+    acceleration: Array
 
     @property
     def work(self) -> Array:
@@ -399,11 +360,18 @@ class _Driven(Part):
 
     def readings(self, state: Driven) -> Array:
         """Recorded quantities of the drive, columns ``READINGS``, as last axis."""
-        work, *spent, stored, first = np.moveaxis(state.energies, -1, 0)
+        work, *spent, stored, first = (
+            state.energies[..., k] for k in range(state.energies.shape[-1])
+        )
         residual = work - (stored - first) - sum(spent)
         stage = state.stage_position, state.stage_speed, state.spring_force
-        counts = state.substeps, state.runaway_time, state.unresolved_time
-        return np.stack([*stage, work, stored, *spent, residual, *counts], axis=-1)
+        readings = np.empty((*work.shape, len(READINGS)))
+        ends = state.runaway_time, state.unresolved_time
+        for k, column in enumerate(
+            (*stage, work, stored, *spent, residual, state.substeps, *ends)
+        ):
+            readings[..., k] = column
+        return readings
 
 
 @keyed(kw_only=True)

@@ -6,6 +6,7 @@ remember the sliding. Other fluctuations, a ``rate_dependent`` edge and the shar
 were at the start of the clock step.
 """
 
+import functools
 import math
 from typing import NamedTuple, cast
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from sim.numerics.noise import Noise
 from sim.parts.contact.balance import Bodies
-from sim.parts.coupled.mechanics import COLUMNS, ROW, Inputs, Slider, units_of
+from sim.parts.coupled.mechanics import COLUMNS, ROW, Inputs, Slider
 from sim.parts.coupled.population import Loop, Population, from_start, population_of
 from sim.parts.coupled.step_end import StepEnds
 from sim.parts.drive import ENERGY, Driven, Force, Spring
@@ -31,6 +32,22 @@ from sim.parts.exchange import (
     Times,
 )
 
+_NAMES = ROW.names or ()
+#: Fields of the state of a slider that are columns of a row.
+_SHARED = [name for name in Driven._fields if name in _NAMES]
+#: Columns of a row that are measured by a stretch.
+_STRETCHED = [
+    "body_speed",
+    "sheared",
+    "moment",
+    "speed",
+    "position",
+    "slip",
+    "path",
+    "acceleration",
+    "mean",
+    "recalled",
+]
 #: Numbers of slider, bonds, contact and fluctuations.
 _Numbers = tuple[tuple[float, ...], ...]
 
@@ -107,6 +124,16 @@ class Reached(NamedTuple):
     lost: Flags
 
 
+@functools.lru_cache(maxsize=16)
+def _of_columns(stretch: float, force: float) -> Array:
+    """Return the units of the columns of a row, from those of a stretch [m] and a force [N]."""
+    scales = np.ones(COLUMNS)
+    columns = scales.view(ROW)
+    columns["spring_force"], columns["spread"] = force, stretch**2
+    columns[_STRETCHED] = stretch
+    return scales
+
+
 def load(
     parts: Parts,
     slider: Sliding,
@@ -174,8 +201,9 @@ def advance(
     )
     units = bonds.units(drive, contact.area, times.step)
     stretch, force = units
-    state = np.stack(slider[:COLUMNS], axis=-1)
-    rows = state.view(ROW)[:, 0]
+    rows = np.zeros(members, ROW)
+    for name in _SHARED:
+        rows[name] = getattr(slider, name)
     if steps.start == 1 and not drive.spring:  # a force acts at once
         rows["spring_force"] = 0.0
     rows["radius"], rows["parted"] = contact.radius, contact.has_parted
@@ -201,25 +229,26 @@ def advance(
         law = law._replace(length=law.length / stretch, by_slip=law.by_slip * stretch)
     draws = step_ends.draws
     draws = draws._replace(answers=draws.answers and bool(answers))
+    state = rows.view(float).reshape(members, COLUMNS)
     clock, work = _clock(contact, ends), stretch * force
     inputs = Inputs(
-        state, slider.energies.copy(), course, clock, units_of(*units), work
+        state, slider.energies.copy(), course, clock, _of_columns(*units), work
     )
     columns, energies = (
         np.empty((COLUMNS, len(steps), members)),
         np.empty((len(steps), *slider.energies.shape)),
     )
     numbers = *_numbers(drive, bonds, contact, units), tuple(law)
+    reached = dict(zip(_NAMES, columns, strict=True))
     arguments = (
         tuple(inputs),
         numbers,
         (columns, energies),
         (tuple(draws), *step_ends[1:]),
     )
-    stage, stage_speed = np.zeros((2, len(steps), members))
-    after = Driven._make((*columns, stage, stage_speed, energies))
-    loop = Loop(inputs, arguments, after)
+    loop = Loop(inputs, arguments, reached)
     end, bonding = bonds.advance(population, contact.radius, loop, noise)
+    stage, stage_speed = np.zeros((2, len(steps), members))
     if drive.spring:
         whole = pieces.joined
         stage[:], stage_speed[:] = (
@@ -228,12 +257,15 @@ def advance(
         )
         stage[0] += slider.stage_position
         np.add.accumulate(stage, out=stage)
+    shared = {name: reached[name] for name in _SHARED}
+    after = Driven(
+        **shared, stage_position=stage, stage_speed=stage_speed, energies=energies
+    )
     first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
-    way = duration[:, np.newaxis], after.slip, after.path, first, after.speed
+    way = duration[:, np.newaxis], reached["slip"], reached["path"], first, after.speed
     field = FieldCourse(draws=draws)
     if law.length < math.inf:
-        past = after.weight, after.mean, after.spread, after.renewed, after.energy
-        field = FieldCourse(Memory(*past), draws)
+        field = FieldCourse(Memory(*(reached[name] for name in Memory._fields)), draws)
     motions = Motion(
         steps.start,
         ends[1:, np.newaxis],
@@ -251,7 +283,7 @@ def advance(
     )
     viscous = drive.viscosity * after.speed
     bonding = bonding._replace(stress=bonding.stress + viscous)
-    lost = (after.lost > 0.0) & contact.undisturbed
+    lost = (reached["lost"] > 0.0) & contact.undisturbed
     return Reached(after, motions, end, bonding, field, lost)
 
 

@@ -1,26 +1,30 @@
 """Mechanics of slider and contact in the units of a step: their records, the contact area, slips that take no time."""
 
-import functools
 import math
 from typing import NamedTuple
-
-import numpy as np
 
 from sim.laws.equilibrium import largest_radius, stress_reach
 from sim.laws.layer import shear_functions
 from sim.numerics.jit import device
-from sim.parts.drive import ENERGY, Driven
+from sim.parts.drive import ENERGY
 from sim.parts.exchange import Array, FieldLaw, record
 from sim.parts.shear.process import remembered, unsteadiness
 
-#: Row of slider and bonds, and its number of columns.
-ROW = record(" ".join(Driven._fields[:-3]))
-COLUMNS = len(Driven._fields) - 3
-SLIP = Driven._fields.index("slip")
-#: Columns of a row that are measured by a stretch.
-_STRETCHED = (
-    "body_speed sheared moment speed position slip path acceleration mean recalled"
+#: Row of slider and bonds: spring force S, speed of the body, u, N, M, speed of the interface, displacement of the
+#: body, slip and path of the clock step, contact radius, next sub-step, number of sub-steps, times at which stability
+#: was lost and from which on the motion is not resolved, acceleration of the interface. Then ``Memory``, and the path
+#: of the clock step up to which it reaches; the share of ΔΓ that adhesion pays, the energy it pays in the sub-steps,
+#: and that after the draw at the start of the clock step. Then the work since the start of the run, the energy that
+#: is missing, and the time: at the start of the clock step. Last 1 if the contact has pulled off before, if it has
+#: closed at the end of the step before, and if it was lost within the clock step, else 0.
+ROW = record(
+    "spring_force body_speed sheared bound moment speed position slip path radius "
+    "next_step substeps runaway_time unresolved_time acceleration "
+    "weight mean spread renewed energy recalled paid felt drawn worked missed elapsed "
+    "parted closed lost"
 )
+COLUMNS = len(ROW.names or ())
+SLIP, RADIUS = (ROW.names or ()).index("slip"), (ROW.names or ()).index("radius")
 ENERGIES = len(ENERGY.names or ())
 _STORED = (ENERGY.names or ()).index("stored")
 #: Types of ``Inputs``, of the numbers of slider, bonds, contact and fluctuations, and of rows and energies at the end
@@ -465,16 +469,6 @@ def retained(energy):
         - energy.snaps
         - energy.area
     )
-
-
-@functools.lru_cache(maxsize=16)
-def units_of(stretch: float, force: float) -> Array:
-    """Return the units of the columns of a row, from those of a stretch [m] and a force [N]."""
-    scales = np.ones(COLUMNS)
-    columns = scales.view(ROW)
-    columns["spring_force"], columns["spread"] = force, stretch**2
-    columns[_STRETCHED.split()] = stretch
-    return scales
 
 
 @device

@@ -33,13 +33,13 @@ class Loop(NamedTuple):
         Rows, energies, and the course of the steps.
     arguments : tuple
         All arguments that the loops have in common, ``inputs`` among them.
-    after : Driven
-        Slider and bonds at the end of each step, shape (steps, members), written by the loop.
+    columns : dict of str to array, shape (steps, members)
+        Columns of the rows at the end of each step, written by the loop.
     """
 
     inputs: Inputs
     arguments: tuple[tuple[object, ...], ...]
-    after: Driven
+    columns: dict[str, Array]
 
     @property
     def rows(self) -> NDArray[np.void]:
@@ -202,7 +202,7 @@ class MeanStretch(Stretched):
             before.stretch * share,
         )
         advance_rows(*loop.arguments)
-        bound, moment = loop.after.bound, loop.after.moment
+        bound, moment = loop.columns["bound"], loop.columns["moment"]
         end = models.Stretches(bound[-1].copy(), moment[-1].copy(), area_radius)
         return end, self.bonds.bonding(models.Stretches(bound, moment))
 
@@ -218,7 +218,7 @@ class ByCohorts(Stretched):
         bonds, before = self.bonds, cast(models.Ages, state)
         share, area_radius = bonds.diluted(before.area_radius, radius)
         cohorts = Cohorts(*(array.copy() for array in before.cohorts))
-        sums = np.empty((5, *loop.after.radius.shape))
+        sums = np.empty((5, *loop.columns["radius"].shape))
         rules = numbers_of(bonds.law, bonds.rebinding_rate, bonds.tolerance)
         advance_cohorts(*loop.arguments, share, rules, tuple(cohorts), sums)
         return models.Ages(cohorts, area_radius), bonds.read(sums)
@@ -234,7 +234,7 @@ class OneByOne(Stretched):
     ) -> tuple[tuple[object, ...], Bonding]:
         bonds, tracks = self.bonds, cast(Tracks, state)
         tracks = tracks._replace(frame=tracks.frame.copy())
-        frames = np.empty((*loop.after.radius.shape, tracks.frame.shape[1]))
+        frames = np.empty((*loop.columns["radius"].shape, tracks.frame.shape[1]))
         members = np.asarray(noise.members, dtype=np.uint64)
         law = site_law(bonds.law, bonds.rebinding_rate, turns=True)
         if advance_tracks(
@@ -287,7 +287,7 @@ class WithoutStretch(Population):
         _, area_radius = self.bonds.diluted(before.area_radius, radius)
         loop.rows["bound"] = self._fraction(state, radius)
         advance_rows(*loop.arguments)
-        bound, moment = loop.after.bound, loop.after.moment
+        bound, moment = loop.columns["bound"], loop.columns["moment"]
         stress = self.bonds.stress / loop.stretch * moment
         end = models.Population(bound[-1].copy(), np.sign(stress[-1]), area_radius)
         return end, Bonding(bound, stress, stress)
