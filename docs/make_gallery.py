@@ -977,7 +977,7 @@ def peeling(dataset: xr.Dataset) -> dict[str, Number]:
     "afm_tip",
     "How much does the range of adhesion change the friction of an AFM tip?",
     """Without a load friction is {short:.0f} nN if the range is negligible, which is JKR's theory. It is {near:.0f} nN
-    at a range of 0.16 nm and {far:.0f} nN at 0.4 nm, so that JKR's area is {over:.0f} to {most:.0f} % too large. The
+    at a range of {close:g} nm and {far:.0f} nN at {wide:g} nm, so that JKR's area is {over:.0f} to {most:.0f} % too large. The
     tip with the longest range comes off at {off:.0f} nN and not at JKR's {jkr:.0f} nN. Friction is {stress:g} GPa times
     the area within which the surfaces touch, under tension too.""",
 )
@@ -999,6 +999,8 @@ def afm_tip(dataset: xr.Dataset) -> dict[str, Number]:
     lost = laws.cohesive.pull_off(0.0, work, of_range, size, modulus)
     return {
         "short": float(short),
+        "close": 1e9 * float(dataset["contact_range"][1]),
+        "wide": 1e9 * float(dataset["contact_range"][2]),
         "near": float(near),
         "far": float(far),
         "over": 100.0 * float(short / near - 1.0),

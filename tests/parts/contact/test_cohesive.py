@@ -12,6 +12,7 @@ from sim.laws import cohesive
 from sim.parts.contact import Cohesive, Equilibrium
 from sim.parts.contact.balance import Balance
 from sim.parts.contact.models import Bodies
+from sim.read.observables import charges
 from sim.solid import HalfSpace
 from sim.units.errors import BadInput
 
@@ -183,3 +184,17 @@ def test_a_check_names_the_model_where_jkr_ends_and_is_silent_with_it():
     )
     wide = {"sphere": {"radius": "1 m"}, "contact": {"load": 0.0}}
     assert not any("cohesive" in text for text in sim.load(TIP | wide).remarks())
+
+
+@pytest.mark.parametrize("held", [{"range": 0.4e-6}, {"cohesive_stress": 3e4}])
+@pytest.mark.parametrize(
+    "mount", [{"load": 4e-3}, {"displacement": 1e-6, "stiffness": 2e3}]
+)
+def test_what_is_read_with_another_work_of_adhesion_has_the_range_too(mount, held):
+    """Without bonds that break, fluctuations take the same share in both orders, one recorded and one computed."""
+    contact, field = Cohesive(**mount, **held), shear.Modal(**BY_SLIP)
+    dataset = sim.run(scene(4, 8, contact=contact, shear=field, bonds=BONDS["none"]))
+    shares = charges(dataset)
+    assert np.all(shares["lost_to_fluctuations"] > 0.0)
+    first = shares["lost_to_fluctuations_first"]
+    assert_allclose(first, shares["lost_to_fluctuations"], rtol=1e-11)
