@@ -439,6 +439,10 @@ def test_every_variable_has_unit_and_long_name_and_stands_where_its_condition_ho
         ({"equilibrium_radius"}, sample(contact=CONTACTS["rate_dependent"])),
         ({"edge_energy"}, sample(shear=SHEARS["modal on a disc"])),
         ({"applied_load"}, sample(contact=CONTACTS["load there and back"])),
+        (
+            {"applied_load", "outer_radius"},
+            sample(contact=CONTACTS["cohesive load there and back"]),
+        ),
         (driven - runaway, sample(drive=DRIVES["spring"], **bell)),
         (driven - stage, sample(drive=DRIVES["force"], **bell)),
     ]

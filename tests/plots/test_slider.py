@@ -108,7 +108,7 @@ def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_its_bonds():
         exact = first_moment_onset(
             1e-3 * speed, *NUMBERS, body._replace(contact_stiffness=firm)
         ).stiffness
-        assert_allclose(stiffness, 1e-3 * exact, rtol=1e-6)
+        assert_allclose(np.nan_to_num(stiffness), 1e-3 * exact, rtol=1e-6)
         swings = panel.collections[0].get_array().reshape(2, -1)
         # a soft spring sticks and slips at 30 mm/s, one stiffer than the boundary nowhere
         assert swings[0, -1] > 0.5 and np.nanmax(swings[1]) < 0.1
@@ -145,7 +145,7 @@ def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_its_bonds():
     firm = 0.5 * np.pi**2 * 1.6e6 * math.sqrt(scene(1).contact_area / np.pi)
     body = Body(scene(1).contact_area, damping=1.0, contact_stiffness=firm)
     exact = resolved_onset(1e-3 * speed, [(25.0, 4e-12)], *NUMBERS[2:], body).stiffness
-    assert_allclose(stiffness, 1e-3 * exact, rtol=1e-6)
+    assert_allclose(np.nan_to_num(stiffness), 1e-3 * exact, rtol=1e-6)
 
 
 def test_creep_and_the_way_to_sliding_are_drawn_from_the_first_step_beside_the_law_and_a_runaway_ends():
