@@ -9,7 +9,7 @@ import codecs
 import math
 import re
 from collections.abc import Sequence
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -287,3 +287,10 @@ class Zero:
     load_drift: Annotated[
         float, Quantity("N/s", "rate at which the zero of the load moves")
     ] = 0.0
+
+    def at(self, name: str, elapsed: Any) -> Any:
+        """Return the reading of a variable at its zero, at some times since the first row [s]; 0 if it has no zero."""
+        key = {"normal_load": "load"}.get(name, name)
+        if key not in ("displacement", "indentation", "load"):
+            return 0.0
+        return getattr(self, key) + getattr(self, f"{key}_drift") * elapsed
