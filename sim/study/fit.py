@@ -71,6 +71,8 @@ _OTHER_UNIT = 100.0
 _FAR = 3.0
 #: Tables of keys that are not physical.
 _OTHER = ("clock", "record", "ensemble", "seed", "instrument")
+#: Rises of chi^2 in the figure of a profile, over that at the ends of an interval.
+_SHOWN = 10.0
 #: Half width of an interval over the value, beyond which the data hardly fix a value.
 _TENTH = 0.1
 
@@ -512,7 +514,7 @@ def _deciding(result: Fit) -> Iterator[str]:
             if item.free.key != profile.key and not low <= value <= high:
                 text = engineering(float(value), item.free.quantity.unit)
                 _, interval, unit = item.texts
-                words = f"{item.free.key} {text}, outside {interval} {unit}"
+                words = f"{item.free.key} is {text}, not {interval} {unit}"
                 moved.append(words.rstrip())
         if moved:
             at = engineering(zero.start, zero.quantity.unit)
@@ -913,7 +915,7 @@ def zero_figure(fit: Fit) -> Figure:
     """Draw for each free zero the least chi^2 over it, with the rise of a 95 % interval, and the other values there."""
     with mpl.rc_context(style.STYLE):
         rows, columns = len(fit.numbers), len(fit.profiles)
-        size = 3.4 * columns, 1.3 * rows
+        size = 3.4 * columns, 1.5 * rows
         picture = Figure(figsize=size, layout="constrained")
         axes = picture.subplots(rows, columns, sharex="col", squeeze=False)
         for column, profile in zip(axes.T, fit.profiles, strict=True):
@@ -924,6 +926,11 @@ def zero_figure(fit: Fit) -> Figure:
             first.plot(x.factor * profile.values, profile.chi_squares, ".-", color=BOTH)
             rise = fit.best.chi_square + stats.chi2.ppf(LEVEL, 1)
             first.axhline(rise, **style.GUIDE)
+            # far from the minimum chi^2 would hide what it does near it
+            first.set_ylim(
+                2.0 * fit.best.chi_square - rise,
+                fit.best.chi_square + _SHOWN * (rise - fit.best.chi_square),
+            )
             first.set_ylabel("$\\chi^2$")
             rest = [k for k, key in enumerate(keys) if key != profile.key]
             for panel, k in zip(others, rest, strict=True):
@@ -932,7 +939,7 @@ def zero_figure(fit: Fit) -> Figure:
                 panel.plot(
                     x.factor * profile.values, y.factor * values, ".-", color=BOTH
                 )
-                panel.set_ylabel(y.label(keys[k].replace("_", " ")))
+                panel.set_ylabel(y.label(keys[k].split(".")[-1].replace("_", " ")))
             for panel in column:
                 panel.axvline(x.factor * own.value, **style.GUIDE)
             column[-1].set_xlabel(x.label(profile.key.replace("_", " ")))

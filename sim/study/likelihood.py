@@ -570,7 +570,7 @@ _END, _END_SQUARES, _MOST = 1e-3, 1e-5, 30
 #: that may be left, and the factor by which it is made stiffer if more is left.
 _STIFFNESS, _NEAR_AIM, _STIFFER = 10.0, 0.1, 3.0
 #: Places of the profile of a zero, and residual at a distance of a standard error of the spring that holds it.
-_PROFILED, _HELD = 9, 1e3
+_PROFILED, _HELD = 8, 1e3
 #: Rounds in which errors that nobody gave are found.
 _ROUNDS = 4
 #: Most evaluations of a minimum, for each number and one more.
@@ -1104,7 +1104,9 @@ def zero_profile(
         [each.outer(float(x)) for each, x in zip(problem.free, end, strict=False)]
         for end in ends
     ]
-    return ZeroProfile(item.key, places, np.array(sums), np.array(numbers))
+    table = np.array(numbers)
+    table[:, k] = places  # to which a spring has drawn it but for rounding
+    return ZeroProfile(item.key, places, np.array(sums), table)
 
 
 def _end(

@@ -152,6 +152,28 @@ def test_zeros_and_a_drift_without_noise_are_found_with_all_that_they_move(tmp_p
     assert np.sum(moved.residuals(there) ** 2) < 1e-4
 
 
+def test_loops_with_zeros_of_their_own_are_fitted_together_each_over_its_history(
+    tmp_path,
+):
+    zeros, scene = {"shallow": ZERO, "deep": 2.65e-6}, load(SCENE)
+    depths = {"shallow": 0.8e-6, "deep": 1.2e-6}
+    scene = scene.with_values({"zero.load": ZERO_LOAD, "zero.load_drift": DRIFT})
+    tables, free = [], [free_number(scene, key) for key in TRUTH]
+    for k, (name, zero) in enumerate(zeros.items()):
+        path = written(tmp_path / f"{name}.txt", *loop(zero, depths[name]))
+        table = likelihood.read(path, scene, place=(k, 2)).in_contact
+        tables.append(table)
+        item = free_number(scene, ZEROS[0])
+        free.append(item._replace(key=f"{item.key} ({name})", table=k))
+    tables = likelihood.with_stated_errors(tables, ["1 nN"])
+    problem = problem_of(scene, tables, free, {})
+    truth = [item.inner(TRUTH[key]) for key, item in zip(TRUTH, free, strict=False)]
+    start = np.array([*truth, 2.48e-6, 2.67e-6])
+    best = minimum(problem, start + np.array([0.05, -0.05, 0.1, -0.05, 0.0, 0.0]))
+    errors = np.sqrt(np.diag(best.covariance))
+    assert np.all(np.abs(best.x - [*truth, *zeros.values()]) < 1e-2 * errors)
+
+
 def rise(problem, keys=()):
     """Return by how much chi^2 is larger at the truth of some keys, by default all, than at its least."""
     truth = {**TRUTH, **WHERE}
@@ -240,7 +262,14 @@ def test_the_command_prints_and_draws_the_profile_of_a_free_zero_and_says_that_i
     held = zeros == 2.4e-6
     modulus = np.array(profile["numbers"]["solid.youngs_modulus"])
     assert held.sum() == 1 and abs(modulus[held] / 0.8e6 - 1.0) > 0.05
-    assert any("the zero decides" in text for text in found["remarks"])
+    (said,) = (text for text in found["remarks"] if "the zero decides" in text)
+    assert "held at 2.4 µm, solid.youngs_modulus is" in said
+    # between places of the profile its root is nearly straight
+    low = found["numbers"]["zero.displacement"]["low"]
+    left = (zeros <= zeros[least]) & (zeros > 2.4e-6)
+    roots = np.sqrt(np.maximum(sums[left] - found["chi_square"], 0.0))
+    end = np.interp(low, zeros[left], roots) ** 2
+    assert_allclose(end, stats.chi2.ppf(0.95, 1), rtol=0.05)
     assert (tmp_path / "out_fit_zero.png").stat().st_size > 0
     fitted = load(tmp_path / "out_fit.toml")
     assert_allclose(fitted.zero.displacement, ZERO, rtol=1e-3)
