@@ -299,8 +299,9 @@ def scenario_json(scenario: Scenario, per_member: bool | None = None) -> str:
 
     ``per_member`` is True if every member is recorded, for a scenario that leaves this to the size of the run.
     """
+    of_fits = {name for name in ("instrument", "zero") if not getattr(scenario, name)}
     dumped = TypeAdapter(Scenario).dump_python(
-        scenario, by_alias=True, exclude={"source", "sweep"}, mode="json"
+        scenario, by_alias=True, exclude={"source", "sweep"} | of_fits, mode="json"
     )
     if per_member is not None:
         dumped["record"]["per_member"] = per_member

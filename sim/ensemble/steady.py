@@ -9,7 +9,8 @@ from typing import Any, cast
 import numpy as np
 
 from sim.parts.bonds.models import Model
-from sim.parts.exchange import Array, Bonding, Motion
+from sim.parts.contact.balance import Balance
+from sim.parts.exchange import Array, Bonding, ContactState, Motion
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
 from sim.step.state import Trajectory
@@ -20,7 +21,7 @@ Values = Mapping[str, float]
 #: Relative step of a sensitivity; sensitivities below this are none.
 _STEP, _NOTHING = 1e-4, 1e-6
 #: Tables whose numbers do not matter to steady sliding at a given speed.
-_NO_PHYSICS = ("clock", "drive", "ensemble", "record", "seed")
+_NO_PHYSICS = ("clock", "drive", "ensemble", "instrument", "record", "seed", "zero")
 
 
 def changed(part: Any, values: Mapping[str, Any]) -> Any:
@@ -54,6 +55,32 @@ def steady_course(
     Shapes are (rows, 1). ``stored`` is ΔΓ at amplitude 1 [J/m²], by default its mean on the infinite plane. With
     several energies, energy, work and radius have the shape (rows, energies).
     """
+    motion, bonding, energy, terms = _in_steady_sliding(scenario, time, speed, stored)
+    touch = scenario.contact.start(motion, scenario.clock.duration, terms)
+    return _trajectory(motion, bonding, energy, touch)
+
+
+def history_at_rest(scenario: Scenario, time: Array) -> Trajectory:
+    """Return the contact of a slider at rest, in equilibrium at the first of some times [s], shape (times, 1).
+
+    From each time to the next the contact follows its mount by its own model, such as an edge that lags.
+    """
+    duration, contact = scenario.clock.duration, scenario.contact
+    first, *_, terms = _in_steady_sliding(scenario, time[:1], 0.0 * time[:1])
+    start = contact.start(first, duration, terms)
+    moves, *_, terms = _in_steady_sliding(scenario, time[1:], 0.0 * time[1:])
+    moves = moves._replace(duration=np.diff(time, axis=0))
+    before = type(start)(*(values[0] for values in start))
+    after = contact.advance(before, moves, duration, terms)
+    touch = type(start)(*map(np.concatenate, zip(start, after, strict=True)))
+    motion, bonding, energy, _ = _in_steady_sliding(scenario, time, 0.0 * time)
+    return _trajectory(motion, bonding, energy, touch)
+
+
+def _in_steady_sliding(
+    scenario: Scenario, time: Array, speed: Array, stored: Array | None = None
+) -> tuple[Motion, Bonding, Array, Balance]:
+    """Return sliding, bonds, ΔΓ and terms of the work of adhesion; arguments as of ``steady_course``."""
     result = bonds_at(scenario.population, tuple(speed[:, 0]))
     still = 0.0 * speed
     bonding = type(result)(*(np.reshape(values, (-1, 1)) + still for values in result))
@@ -67,17 +94,22 @@ def steady_course(
         else stored
     )
     terms = scenario.work.balance(bonding, energy + still, still)
-    touch = scenario.contact.start(motion, scenario.clock.duration, terms)
+    return motion, bonding, energy, terms
+
+
+def _trajectory(
+    motion: Motion, bonding: Bonding, energy: Array, touch: ContactState
+) -> Trajectory:
     moving = (
-        time,
-        still,
-        speed,
+        motion.time,
+        0.0 * motion.speed,
+        motion.speed,
         bonding.fraction,
         bonding.stress,
         bonding.strength,
         energy,
     )
-    return Trajectory(*moving, np.empty((len(speed), 1, 0)), *touch[:5])
+    return Trajectory(*moving, np.empty((len(motion.speed), 1, 0)), *touch[:5])
 
 
 # points of a sweep and shares of the energy have the same bonds at the same speeds

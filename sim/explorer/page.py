@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 #: Points of a curve, and speeds at which a key is tried; change of a curve that counts.
 _POINTS, _TRIED, _CHANGE = 121, 9, 1e-9
 #: Tables whose numbers do not change the curves, and those of the numerics of a table.
-_NO_SLIDERS = ("clock", "drive", "ensemble", "record", "seed")
+_NO_SLIDERS = ("clock", "drive", "ensemble", "instrument", "record", "seed", "zero")
 #: Ends of a slider over the value of its key: of a positive key, and of one that may be zero.
 _FACTOR, _TIMES = 30.0, 4.0
 #: Loads of further curves over the scenario's; members of the band, and time that it may take [s].

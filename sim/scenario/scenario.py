@@ -41,6 +41,7 @@ from sim.step.prescribed import Prescribed
 from sim.step.stepper import Models, Scene, Stepper
 from sim.units import notebook
 from sim.units.errors import BadInput
+from sim.units.instrument import Instrument, Zero
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
 
@@ -244,6 +245,8 @@ class Scenario:
     shear: Shear = Field(default_factory=Uniform)
     ensemble: Ensemble = Field(default_factory=Ensemble)
     record: Record = Field(default_factory=Record)
+    instrument: Instrument | None = None
+    zero: Zero | None = None
     sweep: Annotated[tuple[Any, ...], BeforeValidator(read_sweep)] = ()
     name: _Title = "sliding contact"
     seed: Annotated[

@@ -11,7 +11,16 @@ from pydantic_core import PydanticCustomError
 
 from sim.units.quantity import same_unit
 
-_SHARED = ("clock", "clock.duration", "clock.record", "name", "ensemble", "record")
+_SHARED = (
+    "clock",
+    "clock.duration",
+    "clock.record",
+    "name",
+    "ensemble",
+    "instrument",
+    "record",
+    "zero",
+)
 _RANGE = ("from", "to", "count", "scale")
 _MOST_POINTS = 20_000
 

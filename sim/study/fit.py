@@ -44,6 +44,7 @@ from sim.study.likelihood import (
     Measured,
     Minimum,
     Problem,
+    ZeroProfile,
     idle,
     with_errors,
 )
@@ -69,7 +70,11 @@ _OTHER_UNIT = 100.0
 #: Residual beyond which the best curve does not reach a point.
 _FAR = 3.0
 #: Tables of keys that are not physical.
-_OTHER = ("clock", "record", "ensemble", "seed")
+_OTHER = ("clock", "record", "ensemble", "seed", "instrument")
+#: Rises of chi^2 in the figure of a profile, over that at the ends of an interval.
+_SHOWN = 10.0
+#: Half width of an interval over the value, beyond which the data hardly fix a value.
+_TENTH = 0.1
 
 
 class Estimate(NamedTuple):
@@ -160,6 +165,8 @@ class Fit(NamedTuple):
         Ratios of the values per table to those of the first, or differences if a number is not above zero.
     no_difference : dict of str to NoDifference
         For each key with a value per table the test that all tables have one value.
+    profiles : tuple of ZeroProfile
+        For each free zero of the instrument the least chi^2 over it, with the other values there.
     """
 
     scenario: Scenario
@@ -171,6 +178,7 @@ class Fit(NamedTuple):
     remarks: tuple[str, ...]
     differences: tuple[Estimate, ...] = ()
     no_difference: Mapping[str, NoDifference] = MappingProxyType({})
+    profiles: tuple[ZeroProfile, ...] = ()
 
     def __repr__(self) -> str:
         lines = [f"key = value(standard error), {LEVEL:.0%} interval"]
@@ -283,12 +291,20 @@ def fit(
     BadInput
         If a key cannot be fitted, a table cannot be read, or the curves depend on some keys only together.
     """
+    free, per_table = list(free), list(per_table)
+    scenario = with_zero(scenario, [*free, *per_table])
     base = scenario.with_values({"record": {}})
     shared = [free_number(base, text) for text in free]
     split = [free_number(base, text, "--per-table") for text in per_table]
     tables = [
-        likelihood.read(path, base) if isinstance(path, Path) else path for path in data
+        likelihood.read(path, base, place=(k, len(data)))
+        if isinstance(path, Path)
+        else path
+        for k, path in enumerate(data)
     ]
+    if not any(item.key.startswith("zero.load") for item in (*shared, *split)):
+        # a baseline tells the zero of the load alone
+        tables = [table.in_contact if table.baseline else table for table in tables]
     tables = likelihood.with_stated_errors(tables, errors)
     if faults := [*conflicts(base, shared, split, tables)]:
         raise BadInput(faults)
@@ -302,7 +318,10 @@ def fit(
         raise BadInput(
             [f'--steady: drive.model = "{base.drive.model}" needs runs; omit --steady']
         )
-    if base.drive.solves_motion or (not steady and idle(problem)):
+    if any(table.has_history for table in tables):
+        # the slider is at rest, so that the history is all that its run has
+        steady = True
+    elif base.drive.solves_motion or (not steady and idle(problem)):
         problem = replace(problem, by_run=True).compared(problem.start)
     likelihood.refuse_undetermined(problem)
     problem, best = with_errors(problem)
@@ -315,6 +334,12 @@ def fit(
             converged = first.converged and best.converged
             break
     return _assembled(scenario, problem, best, converged)
+
+
+def with_zero(scenario: Scenario, texts: Sequence[str]) -> Scenario:
+    """Return a scenario with the table of the instrument's zeros if any of the keys to free is one of them."""
+    needed = scenario.zero is None and any(text.startswith("zero.") for text in texts)
+    return scenario.with_values({"zero": {}}) if needed else scenario
 
 
 def conflicts(
@@ -358,6 +383,11 @@ def _assembled(
             estimate for key in split for estimate in _between_tables(result, key)
         ),
         no_difference={key: _no_difference(result, key) for key in split},
+        profiles=tuple(
+            likelihood.zero_profile(problem, best, k, item.interval)
+            for k, item in enumerate(estimates)
+            if item.free.name.startswith("zero.")
+        ),
     )
     return result._replace(remarks=tuple(_remarks(result)))
 
@@ -436,6 +466,9 @@ def _remarks(result: Fit) -> Iterator[str]:
             "the model is incomplete, a fixed key is wrong, or the errors are too small"
         )
         yield f"{far}, so the intervals do not hold: {causes}"
+    yield from _loose(result)
+    yield from _deciding(result)
+    yield from _heavy(problem, result.best)
     yield from _unreached(problem, result.best)
     yield from _one_sided(problem, result.best)
     for number, name in enumerate(problem.names):
@@ -457,12 +490,63 @@ def _remarks(result: Fit) -> Iterator[str]:
             yield "p of no difference follows from an F distribution, because errors are estimated"
 
 
+def _loose(result: Fit) -> Iterator[str]:
+    """Yield the keys of a measured loop that the data fix no better than by a tenth."""
+    if not any(table.has_history for table in result.problem.tables):
+        return
+    for item in result.numbers:
+        low, high, *is_open = item.interval
+        is_zero = item.free.name.startswith("zero.")
+        if not is_zero and (any(is_open) or high - low > 2 * _TENTH * abs(item.value)):
+            _, interval, unit = item.texts
+            yield f"the data fix {item.free.key} no better than by a tenth: {interval} {unit}".rstrip()
+
+
+def _deciding(result: Fit) -> Iterator[str]:
+    """Yield the keys whose value with a zero held at its start lies outside the interval with the zero free."""
+    for profile in result.profiles:
+        k = [item.free.key for item in result.numbers].index(profile.key)
+        zero = result.numbers[k].free
+        held = int(np.argmin(np.abs(profile.values - zero.start)))
+        moved = []
+        for item, value in zip(result.numbers, profile.numbers[held], strict=True):
+            low, high = item.interval[:2]
+            if item.free.key != profile.key and not low <= value <= high:
+                text = engineering(float(value), item.free.quantity.unit)
+                _, interval, unit = item.texts
+                words = f"{item.free.key} is {text}, not {interval} {unit}"
+                moved.append(words.rstrip())
+        if moved:
+            at = engineering(zero.start, zero.quantity.unit)
+            yield f"the zero decides: with {zero.key} held at {at}, {'; '.join(moved)}"
+
+
+def _heavy(problem: Problem, best: Minimum) -> Iterator[str]:
+    """Yield the points that carry more of the chi^2 than a point of a normal law does.
+
+    Each residual is compared with the size of the others by Student's law, with Bonferroni's factor for their number.
+    """
+    squares = problem.residuals(best.x)[: len(problem.values)] ** 2
+    total, freedom = float(squares.sum()), problem.freedom - 1
+    if freedom < 2 or not any(table.has_history for table in problem.tables):
+        return
+    others = np.maximum(total - squares, 1e-300) / freedom
+    p_values = 2.0 * stats.t.sf(np.sqrt(squares / others), freedom) * len(squares)
+    rows = np.flatnonzero(p_values <= POOR)
+    if rows.size:
+        rows = rows[np.argsort(-squares[rows])][:_MOST_ROWS]
+        places = ", ".join(
+            f"{problem.place(int(row))} ({squares[row] / total:.0%})" for row in rows
+        )
+        yield f"chi^2 is carried by few points: {places}; look at them, or fit without them"
+
+
 def _unreached(problem: Problem, best: Minimum) -> Iterator[str]:
     """Yield the points that the best curve does not reach because the contact is open or masked there."""
     off = problem.residuals(best.x)[: len(problem.values)]
     is_open = problem.predicted(best.x) == 0.0
     states = {"open": is_open}
-    if not problem.by_run:
+    if not problem.is_rough:
         masked = (problem.steady(best.x, "work_of_adhesion") <= 0.0) & ~is_open
         states["masked, so that adhesion holds no area"] = masked
     for words, state in states.items():
@@ -576,7 +660,7 @@ def figure(problem: Problem, best: Minimum) -> Figure:
     for number, (table, name) in enumerate(problem.curves):
         panels.setdefault((name, along[table].key), []).append(number)
     is_joined = {
-        key: problem.by_run or key not in likelihood.COURSES for _, key in panels
+        key: problem.is_rough or key not in likelihood.COURSES for _, key in panels
     }
     with mpl.rc_context(style.STYLE):
         picture, axes = style.rows([_CURVES, _RESIDUALS] * len(panels), shared=False)
@@ -634,6 +718,8 @@ def figure(problem: Problem, best: Minimum) -> Figure:
 def _along(table: Measured) -> Along:
     """Return the condition that varies most from row to row; if two do, the speed."""
     varied = {key: x for key, x in table.conditions.items() if np.ptp(x) > 0.0}
+    if table.has_history:
+        varied = {"t": table.conditions["t"]}
     if not varied:
         return Along("", "row", "1", np.arange(1.0, table.rows + 1.0))
     key = max(varied, key=lambda key: (len({*_levels(varied[key])}), key == "speed"))
@@ -667,7 +753,7 @@ def _alike(problem: Problem) -> tuple[list[NDArray[np.int64]], list[str]]:
     for key in sorted(others):
         values = [
             np.full(table.rows, np.inf)
-            if _along(table).key == key
+            if _along(table).key == key or (table.has_history and key == "mount")
             else table.conditions.get(key, np.full(table.rows, np.inf))
             for table in problem.tables
         ]
@@ -719,9 +805,11 @@ def carried_out(
     arguments["common"] = common_errors(arguments["common"])
     split = arguments["per_table"]
     endings = [f"_{path.stem}.toml" for path in data if split] or [".toml"]
+    scenario = with_zero(scenario, [*arguments["free"], *split])
+    has_zero = any(key.startswith("zero.") for key in (*arguments["free"], *split))
     outputs = [
         stem.with_name(f"{stem.name}_fit{ending}")
-        for ending in (*endings, ".json", ".png")
+        for ending in (*endings, *["_zero.png"] * has_zero, ".json", ".png")
     ]
     inputs = [*files_read(scenario), *data]
     for path in outputs:
@@ -733,7 +821,13 @@ def carried_out(
         )
         if not is_scenario or path.resolve() in [other.resolve() for other in inputs]:
             files.claim(path, replace, inputs)
-    tables = [likelihood.read(path, scenario) for path in data]
+    tables = [
+        likelihood.read(path, scenario, place=(k, len(data)))
+        for k, path in enumerate(data)
+    ]
+    if judged and any(table.has_history for table in tables):
+        fault = "compares steady sliding, but a table has the history of a loop"
+        raise BadInput([f"--compare: {fault}; omit the option"])
     with in_units(units):  # before anything is fitted
         for table in tables:
             for unit in [QUANTITIES[name].unit for name in table.names]:
@@ -745,18 +839,27 @@ def carried_out(
         verdict = compare(result.problem, result.best, result.scenario.seed)
     with in_units(units):
         picture = figure(result.problem, result.best)
+        profiles = zero_figure(result) if has_zero else None
     numbers = json.dumps(document(result, data, verdict), indent=2, allow_nan=False)
     scenarios = [
         scenario_text(scenario, result, stem.parent, k) for k in range(len(endings))
     ]
-    for path, text in zip(outputs[:-1], [*scenarios, f"{numbers}\n"], strict=True):
+    *texts_first, last = outputs
+    if profiles is not None:
+        *texts_first, beside_last = texts_first[: len(endings)] + [
+            outputs[-2],
+            outputs[-3],
+        ]
+        style.save(profiles, beside_last)
+    for path, text in zip(texts_first, [*scenarios, f"{numbers}\n"], strict=True):
         with files.output(path) as beside:
             beside.write_bytes(text.encode())
-    style.save(picture, outputs[-1])
+    style.save(picture, last)
     below = "\n".join(["", _quality(result), *result.remarks, ""])
     shown: list[Printed] = [(_table(result), below)]
     if result.differences:
         shown.append((_differences(result), ""))
+    shown += [(_profile(result, profile), "") for profile in result.profiles]
     if verdict is not None:
         doubt = "; but even the unchanged scenario misses the data, so perhaps none of these is true"
         words = verdict.words + doubt * (result.p_value <= POOR)
@@ -791,6 +894,56 @@ def _differences(fit: Fit) -> list[dict[str, str]]:
         | {"p of no difference": tests.pop(item.free.name, "")}
         for item in fit.differences
     ]
+
+
+def _profile(fit: Fit, profile: ZeroProfile) -> list[dict[str, str]]:
+    """Return one row for each place of a zero: the least chi^2 and the other values there."""
+    rows = []
+    for place, chi_square in enumerate(profile.chi_squares):
+        values = {
+            item.free.key: engineering(
+                float(profile.numbers[place, k]), item.free.quantity.unit
+            )
+            for k, item in enumerate(fit.numbers)
+        }
+        first = {profile.key: values.pop(profile.key), "chi^2": f"{chi_square:.4g}"}
+        rows.append(first | values)
+    return rows
+
+
+def zero_figure(fit: Fit) -> Figure:
+    """Draw for each free zero the least chi^2 over it, with the rise of a 95 % interval, and the other values there."""
+    with mpl.rc_context(style.STYLE):
+        rows, columns = len(fit.numbers), len(fit.profiles)
+        size = 3.4 * columns, 1.5 * rows
+        picture = Figure(figsize=size, layout="constrained")
+        axes = picture.subplots(rows, columns, sharex="col", squeeze=False)
+        for column, profile in zip(axes.T, fit.profiles, strict=True):
+            keys = [item.free.key for item in fit.numbers]
+            own = fit.numbers[keys.index(profile.key)]
+            x = Unit.of(profile.values, own.free.quantity.unit, False)
+            first, *others = column
+            first.plot(x.factor * profile.values, profile.chi_squares, ".-", color=BOTH)
+            rise = fit.best.chi_square + stats.chi2.ppf(LEVEL, 1)
+            first.axhline(rise, **style.GUIDE)
+            # far from the minimum chi^2 would hide what it does near it
+            first.set_ylim(
+                2.0 * fit.best.chi_square - rise,
+                fit.best.chi_square + _SHOWN * (rise - fit.best.chi_square),
+            )
+            first.set_ylabel("$\\chi^2$")
+            rest = [k for k, key in enumerate(keys) if key != profile.key]
+            for panel, k in zip(others, rest, strict=True):
+                quantity, values = fit.numbers[k].free.quantity, profile.numbers[:, k]
+                y = Unit.of(values, quantity.unit, False)
+                panel.plot(
+                    x.factor * profile.values, y.factor * values, ".-", color=BOTH
+                )
+                panel.set_ylabel(y.label(keys[k].split(".")[-1].replace("_", " ")))
+            for panel in column:
+                panel.axvline(x.factor * own.value, **style.GUIDE)
+            column[-1].set_xlabel(x.label(profile.key.replace("_", " ")))
+        return picture
 
 
 def _quality(fit: Fit) -> str:
@@ -860,6 +1013,16 @@ def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[st
         "converged": fit.converged,
         "remarks": fit.remarks,
     }
+    if fit.profiles:
+        result["zero_profiles"] = [
+            {
+                "key": item.key,
+                "values": item.values.tolist(),
+                "chi_squares": item.chi_squares.tolist(),
+                "numbers": dict(zip(fit.values, item.numbers.T.tolist(), strict=True)),
+            }
+            for item in fit.profiles
+        ]
     if verdict is not None:
         judged = [item._asdict() for item in verdict.judged]
         result["mechanisms"] = verdict._asdict() | {"judged": judged}

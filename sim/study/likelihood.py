@@ -12,25 +12,28 @@ error that curves share is one more number, known to be 0 within its size.
 import contextlib
 import functools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, stats
+from scipy import linalg, optimize, stats
 from scipy.stats import qmc
 
 from sim.ensemble.dataset import variable_name
-from sim.ensemble.steady import Values, changed, steady_course
+from sim.ensemble.steady import Values, changed, history_at_rest, steady_course
 from sim.ensemble.variables import READ, VARIABLES
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.parts.exchange import Array
 from sim.quantities import QUANTITIES
-from sim.scenario.scenario import Scenario
+from sim.scenario.scenario import Clock, Scenario
 from sim.scenario.schema import quantities
+from sim.study.noise import FEWEST, Noise, noise_of
 from sim.units.errors import BadInput
+from sim.units.instrument import Instrument, Zero
 from sim.units.quantity import Quantity
 from sim.units.tables import names_of, read_measured
 
@@ -51,6 +54,8 @@ _NOT_MEASURED = (
 #: Sizes of the contact, which are never below 0.
 _SIZES = ("contact_radius", "contact_area")
 _OF_SLIDER = ("speed", "slider_position", "spring_force")
+#: Times of a run at which its speed is looked at.
+_TRIED = 41
 
 
 class Curve(NamedTuple):
@@ -70,13 +75,40 @@ class Measured(NamedTuple):
 
     ``conditions`` holds the columns ``"t"``, ``"speed"``, ``"mount"`` (load, indentation or displacement) and those of
     other keys of the scenario. Rows have the same numbers in all columns. ``mount`` is the key of the contact that
-    holds the sphere.
+    holds the sphere. The first ``baseline`` rows were measured before the contact; ``noise`` is that of curves there.
     """
 
     path: Path
     mount: str
     conditions: dict[str, Array]
     curves: tuple[Curve, ...]
+    baseline: int = 0
+    noise: Mapping[str, Noise] = MappingProxyType({})
+
+    @property
+    def has_history(self) -> bool:
+        """Return True if the mount moves as it was measured, over the times of the rows."""
+        return {"t", "mount"} <= self.conditions.keys()
+
+    @property
+    def elapsed(self) -> Array:
+        """Return the time since the first row in contact [s]; 0 without times."""
+        time = self.conditions.get("t", np.zeros(self.rows))
+        return time - time[self.baseline] if self.has_history else time
+
+    @property
+    def in_contact(self) -> "Measured":
+        """Return this table without its baseline."""
+        return self.at(np.arange(self.baseline, self.rows))._replace(baseline=0)
+
+    def at(self, rows: NDArray[np.int64]) -> "Measured":
+        """Return some rows of this table."""
+        conditions = {name: values[rows] for name, values in self.conditions.items()}
+        curves = tuple(
+            Curve(name, values[rows], None if errors is None else errors[rows])
+            for name, values, errors in self.curves
+        )
+        return self._replace(conditions=conditions, curves=curves)
 
     @property
     def stem(self) -> str:
@@ -92,7 +124,12 @@ class Measured(NamedTuple):
         return [curve.name for curve in self.curves]
 
 
-def read(path: Path, scenario: Scenario, planned: Sequence[str] = ()) -> Measured:
+def read(
+    path: Path,
+    scenario: Scenario,
+    planned: Sequence[str] = (),
+    place: tuple[int, int] = (0, 1),
+) -> Measured:
     """Read a table of measured curves.
 
     Parameters
@@ -109,6 +146,8 @@ def read(path: Path, scenario: Scenario, planned: Sequence[str] = ()) -> Measure
     planned : sequence of str
         Variables of a plan, of which a table has the errors and needs no values, which are then nan. Relative errors
         are negative numbers. A table without curves has these variables, without errors.
+    place : tuple of int
+        Place of the table among all tables of a fit, and their number.
 
     Raises
     ------
@@ -121,7 +160,9 @@ def read(path: Path, scenario: Scenario, planned: Sequence[str] = ()) -> Measure
             name: quantity for name, quantity in outcomes.items() if name not in at
         }
     known = {name: quantity for name, (_, quantity) in at.items()} | outcomes
-    result, _ = read_measured(path, known, outcomes, is_planned=bool(planned))
+    result, _ = read_measured(
+        path, known, outcomes, is_planned=bool(planned), instrument=scenario.instrument
+    )
     conditions = {
         at[name][0]: points.values for name, points in result.items() if name in at
     }
@@ -132,7 +173,67 @@ def read(path: Path, scenario: Scenario, planned: Sequence[str] = ()) -> Measure
     curves = curves or tuple(Curve(name, unknown, None) for name in planned)
     for fault in faults_of(scenario, conditions, curves):
         raise BadInput([f"{path}: {fault}"])
-    return Measured(path, scenario.contact.kind, conditions, curves)
+    table = Measured(path, scenario.contact.kind, conditions, curves)
+    if scenario.instrument is None:
+        return table
+    try:
+        return _stretch(table, scenario.instrument, place)
+    except ValueError as fault:
+        raise BadInput([f"{path}: {fault}"]) from None
+
+
+def _stretch(
+    table: Measured, instrument: Instrument, place: tuple[int, int]
+) -> Measured:
+    """Return the rows of a table that are fitted, those of its baseline first, with the noise there."""
+    stretch, baseline = (
+        instrument.times(name, *place) for name in ("stretch", "baseline")
+    )
+    time, all_rows = table.conditions.get("t"), np.arange(table.rows)
+    rows, early = all_rows, all_rows[:0]
+    for name, ends in (("stretch", stretch), ("baseline", baseline)):
+        if ends is None:
+            continue
+        if time is None:
+            raise ValueError(f"instrument.{name}: needs times; add a column t [s]")
+        inside = all_rows[(time >= ends[0]) & (time <= ends[1])]
+        fewest = FEWEST if name == "baseline" else 2
+        if len(inside) < fewest:
+            reach = f"the file has {time.min():g} to {time.max():g} s"
+            fault = f"{len(inside)} rows between {ends[0]:g} and {ends[1]:g} s, fewer than {fewest}"
+            raise ValueError(f"instrument.{name}: {fault}; {reach}")
+        rows, early = (inside, early) if name == "stretch" else (rows, inside)
+    others = {*table.names} - {"normal_load", *_SIZES}
+    if baseline and (not table.has_history or others or table.mount == "load"):
+        cure = "it needs the columns t and displacement or indentation, and curves that are 0 without contact"
+        raise ValueError(f"instrument.baseline: {cure}: normal_load, contact_radius")
+    if early.size and early[-1] >= rows[0]:
+        raise ValueError(
+            "instrument.baseline: must end before the stretch begins; shorten one"
+        )
+    noise = {
+        curve.name: noise_of(table.conditions["t"][early], curve.values[early])
+        for curve in table.curves
+        if early.size and curve.errors is None
+    }
+    early, rows = early[:: instrument.every], _thinned(table, rows, instrument.every)
+    chosen = table.at(np.concatenate([early, rows]))
+    return chosen._replace(baseline=len(early), noise=noise)
+
+
+def _thinned(table: Measured, rows: NDArray[np.int64], every: int) -> NDArray[np.int64]:
+    """Return every so many rows, the last one, and those at which the mount turns, because a course has its turns."""
+    kept = {*rows[::every].tolist(), int(rows[-1])}
+    mount = table.conditions.get("mount")
+    # between two rows that are kept
+    for start in range(0, len(rows) - 2 if mount is not None else 0, every):
+        part = rows[start : start + every + 1]
+        values = cast(Array, mount)[part]
+        for extreme in (values.argmin(), values.argmax()):
+            steps = np.abs(values[extreme] - values[[0, -1]])
+            if np.all(steps > np.median(np.abs(np.diff(values)))):
+                kept.add(int(part[extreme]))
+    return np.array(sorted(kept))
 
 
 def with_stated_errors(
@@ -182,7 +283,13 @@ def faults_of(
         else {"speed"} & conditions.keys()
     )
     varies = not steady and drive.model != "steady"
-    if "t" in conditions and len(conditions.keys() & {"speed", "mount"}):
+    time, moves = conditions.get("t"), len(conditions.keys() & {"speed", "mount"})
+    if time is not None and moves and "speed" not in conditions and _at_rest(scenario):
+        if (back := np.flatnonzero(np.diff(time) <= 0.0)).size:
+            yield f"t does not increase at row {back[0] + 2}; give each file one loop, its rows in order of time"
+    elif time is not None and not moves and time.max() > scenario.clock.duration:
+        yield f"t reaches {time.max():g} s, beyond clock.duration; lengthen the run"
+    elif "t" in conditions and moves:
         yield "the scenario has the speed and the load at each time; omit t, or these columns"
     elif "t" not in conditions and (
         not conditions or varies or ("mount" not in conditions and contact.changes)
@@ -195,6 +302,12 @@ def faults_of(
             yield f"{name} needs the sign of the speed; change the sign of one of them"
         if errors is None and not np.any(values):
             yield f"{name} is 0 in all rows, so it has no scatter; give errors, or omit it"
+
+
+def _at_rest(scenario: Scenario) -> bool:
+    """Return True if the slider is at rest all the time and nothing fluctuates, so that the contact has the history."""
+    is_still = not scenario.drive.solves_motion and not scenario.speeds(_TRIED).any()
+    return is_still and not scenario.is_random
 
 
 def outcomes_of(scenario: Scenario) -> dict[str, Quantity]:
@@ -234,7 +347,11 @@ def conditions_of(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
         "t": (
             "t",
             Quantity(
-                "s", "time since the start", at_least=0, at_most=scenario.clock.duration
+                "s",
+                "time since the start",
+                at_least=0,
+                # an instrument counts from a time of its own
+                at_most=math.inf if scenario.instrument else scenario.clock.duration,
             ),
         )
     }
@@ -244,13 +361,17 @@ class Group(NamedTuple):
     """Rows of a table at which keys of the scenario are the same.
 
     ``scenario`` has them; ``rows`` are their places in the table, ``time`` [s] and ``speed`` [m/s] theirs, shape
-    (rows, 1): the contact's course is one over ``time``.
+    (rows, 1): the contact's course is one over ``time``. If ``has_mount``, the mount was measured at the rows. If
+    ``has_history``, its course is a history, which the contact follows from the first row on.
     """
 
     scenario: Scenario
     rows: NDArray[np.int64]
     time: Array
     speed: Array
+    elapsed: Array
+    has_mount: bool
+    has_history: bool
 
 
 def groups(scenario: Scenario, table: Measured) -> list[Group]:
@@ -259,29 +380,45 @@ def groups(scenario: Scenario, table: Measured) -> list[Group]:
         key: values for key, values in table.conditions.items() if key not in COURSES
     }
     columns = np.array([np.zeros(table.rows), *keyed.values()])
-    result = []
+    columns, result = columns[:, table.baseline :], []
     for place in np.unique(columns, axis=1, return_index=True)[1]:
         rows = np.flatnonzero(np.all(columns == columns[:, [place]], axis=0))
+        rows += table.baseline
         try:
-            numbers = {key: float(values[place]) for key, values in keyed.items()}
+            numbers = {key: float(values[rows[0]]) for key, values in keyed.items()}
             item = scenario.with_values(numbers, built=False)
         except BadInput as fault:
-            row = f"{table.path}: row {place + 1}"
+            row = f"{table.path}: row {rows[0] + 1}"
             raise BadInput([f"{row}: {text}" for text in fault.problems]) from None
         conditions = {name: values[rows] for name, values in table.conditions.items()}
         duration, count = item.clock.duration, len(rows)
         # a course of the rows, as long as the run
         time = conditions.get("t", np.linspace(0.0, duration, count))
+        if table.has_history:
+            time = time - time[0]
+            duration = float(time[-1])
+            clock = {"duration": duration, "step": duration}
+            item = changed(item, {"clock": Clock(**clock)})
         if (mount := conditions.get("mount")) is not None:
             course: Any = {"time": time, "value": mount}
-            if np.all(mount == mount[0]):
+            if np.all(mount == mount[0]) and not table.has_history:
                 course = float(mount[0])
             item = item.with_values({f"contact.{table.mount}": course}, built=False)
         instants = np.repeat(conditions.get("t", np.zeros(count)), 2)
         speed = conditions.get(
             "speed", item.drive.pieces(instants, duration).joined.last[::2]
         )
-        result.append(Group(item, rows, time[:, np.newaxis], speed[:, np.newaxis]))
+        result.append(
+            Group(
+                scenario=item,
+                rows=rows,
+                time=time[:, np.newaxis],
+                speed=speed[:, np.newaxis],
+                elapsed=table.elapsed[rows],
+                has_mount=mount is not None,
+                has_history=table.has_history,
+            )
+        )
     return result
 
 
@@ -297,7 +434,16 @@ def by_steady_sliding(
     scenario = changed(
         group.scenario, {key: value for key, value in values.items() if "." in key}
     )
-    course = steady_course(scenario, group.time, group.speed)
+    zero = scenario.zero
+    if zero is not None and group.has_mount:
+        scenario = _at_true_mount(
+            scenario, zero.at(scenario.contact.kind, group.elapsed)
+        )
+    course = (
+        history_at_rest(scenario, group.time)
+        if group.has_history
+        else steady_course(scenario, group.time, group.speed)
+    )
     if theory:
         load, base, _ = scenario.contact.control(
             course.time, scenario.clock.duration
@@ -319,10 +465,24 @@ def by_steady_sliding(
             only=(theory,),
         )
         course = course._replace(radius=radii[theory])
-    return {
+    result = {
         name: np.broadcast_to(READ[name](scenario, course), group.speed.shape)[:, 0]
         for name in names
     }
+    if zero is None:
+        return result
+    return {name: x + zero.at(name, group.elapsed) for name, x in result.items()}
+
+
+def _at_true_mount(scenario: Scenario, off: Array) -> Scenario:
+    """Return a scenario whose mount is less by some amounts at its rows, the readings at the instrument's zero."""
+    contact = scenario.contact
+    key, value = f"contact.{contact.kind}", getattr(contact, contact.kind)
+    if isinstance(value, float):
+        return changed(scenario, {key: value - float(np.ravel(off)[0])})
+    return changed(
+        scenario, {f"{key}.value": tuple((np.array(value.value) - off).tolist())}
+    )
 
 
 def by_runs(
@@ -409,6 +569,8 @@ _END, _END_SQUARES, _MOST = 1e-3, 1e-5, 30
 #: Residual of the spring, by which an end is found, at a distance of a standard error; the share of the way to its aim
 #: that may be left, and the factor by which it is made stiffer if more is left.
 _STIFFNESS, _NEAR_AIM, _STIFFER = 10.0, 0.1, 3.0
+#: Places of the profile of a zero, and residual at a distance of a standard error of the spring that holds it.
+_PROFILED, _HELD = 8, 1e3
 #: Rounds in which errors that nobody gave are found.
 _ROUNDS = 4
 #: Most evaluations of a minimum, for each number and one more.
@@ -452,7 +614,8 @@ class Free(NamedTuple):
 
     @property
     def logarithmic(self) -> bool:
-        return self.low > 0.0
+        # the place of a zero has no size
+        return self.low > 0.0 and not self.name.startswith("zero.")
 
     @property
     def width(self) -> float:
@@ -476,7 +639,8 @@ class Problem:
     steady sliding at each of them, and ``noise`` its standard error. ``common`` are relative errors that all points
     of a variable share. ``fixed`` and ``theory`` make another mechanism of the scenario. With ``by_run`` each
     prediction is a run of the scenario's own models, as steady sliding does not depend on all that is free. A
-    ``spring`` is one more residual, which draws a quantity to a value.
+    ``spring`` is one more residual, which draws a quantity to a value. ``whitening`` has the places of curves with
+    correlated errors, and the root of their correlations, by which residuals become independent.
     """
 
     tables: Sequence[Measured]
@@ -493,6 +657,12 @@ class Problem:
     theory: str = ""
     by_run: bool = False
     spring: Callable[[Array], float] | None = None
+    whitening: tuple[tuple[slice, Array], ...] = ()
+
+    @property
+    def is_rough(self) -> bool:
+        """Return True if predictions are known to the tolerance of their steps alone."""
+        return self.by_run or any(table.has_history for table in self.tables)
 
     @property
     def start(self) -> Array:
@@ -537,6 +707,10 @@ class Problem:
             for group in groups:
                 values = by_steady_sliding(group, numbers, names, self.theory)
                 columns[:, group.rows] = [values[name] for name in names]
+            if early := table.baseline:
+                zero = changed(groups[0].scenario, numbers).zero or Zero()
+                for column, name in zip(columns, names, strict=True):
+                    column[:early] = zero.at(name, table.elapsed[:early])
             result.append(columns.ravel())
         return np.concatenate(result)
 
@@ -610,6 +784,8 @@ class Problem:
         """Deviations over errors, and the common errors over their sizes."""
         off = (self.values - self.predicted(x)) / np.hypot(self.sigma, self.noise)
         off = np.nan_to_num(off, nan=_OPEN, posinf=_OPEN, neginf=-_OPEN)
+        for rows, root in self.whitening:
+            off[rows] = linalg.solve_triangular(root, off[rows], lower=True)
         drawn = [] if self.spring is None else [self.spring(x)]
         return np.concatenate([off, x[len(self.free) :], drawn])
 
@@ -657,7 +833,7 @@ def minimum(problem: Problem, start: Array, precision: float = 1e-8) -> Minimum:
     if not len(start):
         chi_square = float(np.sum(problem.residuals(start) ** 2))
         return Minimum(start, chi_square, np.empty((0, 0)), True)
-    precision = max(precision, _RUN_PRECISION) if problem.by_run else precision
+    precision = max(precision, _RUN_PRECISION) if problem.is_rough else precision
     low, high = np.transpose(problem.bounds)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
 
@@ -671,7 +847,7 @@ def minimum(problem: Problem, start: Array, precision: float = 1e-8) -> Minimum:
         method="lm",
         x_scale="jac",
         # a run is known to the tolerance of its steps alone
-        diff_step=_RUN_STEP if problem.by_run else None,
+        diff_step=_RUN_STEP if problem.is_rough else None,
         ftol=precision,
         xtol=min(precision, _FINEST),
         max_nfev=_EVALUATIONS * (len(start) + 1),
@@ -823,7 +999,7 @@ def refuse_undetermined(problem: Problem) -> None:
 def derivatives(problem: Problem, x: Array) -> Array:
     """Return the derivatives of the residuals over what is free, a column for each."""
     columns = []
-    steps = (_RUN_STEP if problem.by_run else _STEP) * problem.widths
+    steps = (_RUN_STEP if problem.is_rough else _STEP) * problem.widths
     for k, ((low, high), step) in enumerate(zip(problem.bounds, steps, strict=True)):
         up, down = x.copy(), x.copy()
         up[k], down[k] = min(x[k] + step, high), max(x[k] - step, low)
@@ -869,6 +1045,68 @@ def profile(problem: Problem, best: Minimum, item: Free, weights: Array) -> Inte
         for bound in (item.low, item.high)
     )
     return Interval(item.outer(low), item.outer(high), low_open, high_open)
+
+
+class ZeroProfile(NamedTuple):
+    """The least sum of squares over a zero of the instrument, and what each zero makes of the other numbers.
+
+    Attributes
+    ----------
+    key : str
+        Key of the zero.
+    values, chi_squares : array, shape (places,)
+        Zeros [SI] and the least sum of squares at each.
+    numbers : array, shape (places, keys)
+        Values of all free keys there [SI].
+    """
+
+    key: str
+    values: Array
+    chi_squares: Array
+    numbers: Array
+
+
+def zero_profile(
+    problem: Problem, best: Minimum, k: int, span: Interval
+) -> ZeroProfile:
+    """Return the profile of a free zero over its interval and half of its width beyond, and at its start.
+
+    Parameters
+    ----------
+    problem, best : Problem, Minimum
+        The fit.
+    k : int
+        Place of the zero among the free numbers.
+    span : Interval
+        Its interval.
+    """
+    item, width = problem.free[k], span.high - span.low
+    places = np.linspace(span.low - 0.5 * width, span.high + 0.5 * width, _PROFILED)
+    places = np.clip([*places, float(best.x[k]), item.start], item.low, item.high)
+    places, result = np.unique(places), dict[float, tuple[float, Array]]()
+    middle = int(np.argmin(np.abs(places - best.x[k])))
+    stiffness = _HELD / min(math.sqrt(best.covariance[k, k]), item.width)
+    # from the minimum outwards, each search from the place before
+    for order in (range(middle, len(places)), range(middle, -1, -1)):
+        start = best.x.copy()
+        for place in order:
+            target = float(places[place])
+            start[k] = target
+
+            def spring(x: Array, target: float = target) -> float:
+                return stiffness * (float(x[k]) - target)
+
+            held = minimum(replace(problem, spring=spring), start)
+            start = held.x.copy()
+            result[target] = held.chi_square - spring(held.x) ** 2, start.copy()
+    sums, ends = zip(*(result[float(place)] for place in places), strict=True)
+    numbers = [
+        [each.outer(float(x)) for each, x in zip(problem.free, end, strict=False)]
+        for end in ends
+    ]
+    table = np.array(numbers)
+    table[:, k] = places  # to which a spring has drawn it but for rounding
+    return ZeroProfile(item.key, places, np.array(sums), table)
 
 
 def _end(
@@ -948,12 +1186,19 @@ def problem_of(
             ]
         )
     number = np.repeat(np.arange(len(curves)), [len(curve.values) for curve in curves])
-    sigma = [
-        np.full_like(c.values, 0.01 * np.abs(c.values).max())
-        if c.errors is None
-        else c.errors
-        for c in curves
-    ]
+    sigma, unknown = list[Array](), list[bool]()
+    roots = list[tuple[slice, Array]]()
+    for table in tables:
+        for c in table.curves:
+            noise = table.noise.get(c.name) if c.errors is None else None
+            size = noise.sigma if noise else 0.01 * np.abs(c.values).max()
+            if noise:
+                first = sum(map(len, sigma))
+                law = noise.correlation(table.conditions["t"])
+                root = np.asarray(np.linalg.cholesky(law), float)
+                roots.append((slice(first, first + table.rows), root))
+            sigma.append(np.full_like(c.values, size) if c.errors is None else c.errors)
+            unknown.append(c.errors is None and not noise)
     return Problem(
         tables=tables,
         groups=[groups(scenario, table) for table in tables],
@@ -962,7 +1207,8 @@ def problem_of(
         values=values,
         sigma=np.concatenate(sigma),
         curve=number,
-        estimated=np.array([curve.errors is None for curve in curves])[number],
+        estimated=np.array(unknown)[number],
+        whitening=tuple(roots),
         shift=np.zeros(len(values)),
         noise=np.zeros(len(values)),
     )

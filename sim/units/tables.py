@@ -25,6 +25,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from sim.units.errors import BadInput
+from sim.units.instrument import Instrument, same_line_ends
 from sim.units.quantity import SMALLEST, Quantity, keyed
 from sim.units.terminal import LOG
 
@@ -352,18 +353,18 @@ def decoded(content: bytes, errors: str = "strict") -> str:
     return same_line_ends(content.decode("utf-8-sig", errors))
 
 
-def same_line_ends(text: str) -> str:
-    """Return a text in which each line ends as on Linux, because Windows and old spreadsheets end lines otherwise."""
-    return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
 def plain_text(path: Path) -> str:
     """Return the text of a plain file of at most 256 MiB."""
+    return decoded(_content(path))
+
+
+def _content(path: Path) -> bytes:
+    """Return the content of a plain file of at most 256 MiB."""
     size = _plain(path).stat().st_size
     if size > _MOST_BYTES:
         raise OSError(errno.EFBIG, f"it is larger than {_MOST_BYTES // 2**20} MiB")
     with path.open("rb") as file:
-        return decoded(file.read(size))
+        return file.read(size)
 
 
 def _plain(path: Path) -> Path:
@@ -849,6 +850,7 @@ def read_measured(
     outcomes: Mapping[str, Quantity],
     gaps: bool = False,
     is_planned: bool = False,
+    instrument: Instrument | None = None,
 ) -> tuple[dict[str, Points], str]:
     """Return the columns of a table of measured values, and a remark if it has no units, which is printed, too.
 
@@ -865,6 +867,8 @@ def read_measured(
         True if cells may be empty, which are then nan.
     is_planned : bool
         True if errors need no values beside them, which are then nan. Relative errors are negative numbers.
+    instrument : Instrument, optional
+        Form of the file, if it is not such a table itself.
 
     Raises
     ------
@@ -873,8 +877,13 @@ def read_measured(
     """
     try:
         with blamed(str(path)):
+            header, text = (
+                instrument.table(_content(path))
+                if instrument
+                else (None, plain_text(path))
+            )
             result, bare = _measured_columns(
-                plain_text(path), known, outcomes, gaps, is_planned
+                text, known, outcomes, gaps, is_planned, header
             )
     except PydanticCustomError as fault:
         raise BadInput([str(fault)]) from None
@@ -925,9 +934,13 @@ def _measured_columns(
     outcomes: Mapping[str, Quantity],
     gaps: bool,
     is_planned: bool,
+    header: str | None,
 ) -> tuple[dict[str, Points], list[str]]:
     """Return the columns, and the names of those that would need a unit if none has one."""
-    units = dict(_headed(_cells(text))[1])
+    place = "instrument.columns"
+    units = dict(
+        _headings(place, header.split(",")) if header else _headed(_cells(text))[1]
+    )
     if not units:
         raise TableError(
             "the columns have no header; add one of names and units, such as speed [mm/s]"
@@ -961,7 +974,7 @@ def _measured_columns(
     if bare and any(units.values()):
         cure = f'write "{bare[0]} [{wanted[bare[0]].unit}]" if that is its unit'
         raise TableError(f'column "{bare[0]}" has no unit, but others have one; {cure}')
-    arrays = columns(text, wanted, gaps=gaps)
+    arrays = columns(text, wanted, header, gaps)
     for name, (key, value) in stated.items():
         if name in arrays:
             raise TableError(f'"{key}" is a column and a comment; omit one of them')
