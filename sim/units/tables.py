@@ -526,7 +526,7 @@ class Number(NamedTuple):
     """A constant value.
 
     Every prescribed value has ``changes``, true if it depends on time, and ``cycles``, the number of cycles. ``end``
-    [s] is the last time for which it is given.
+    [s] is the last time for which it is given. Its methods are those below.
     """
 
     value: float

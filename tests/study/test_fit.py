@@ -247,7 +247,7 @@ def test_intervals_hold_the_truth_in_95_of_100_fits(
             for n, v in noisy(truth, 0.01, seed).items()
         )
         data = Measured(Path("made.csv"), "load", {"speed": SPEEDS}, curves)
-        monkeypatch.setattr(likelihood, "read", lambda path, base: data)
+        monkeypatch.setattr(likelihood, "read", lambda path, base, place: data)
         result = fit(scene, [Path("made.csv")], KEYS, steady=True)
         assert result.converged
         rows.append(

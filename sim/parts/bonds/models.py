@@ -282,12 +282,13 @@ class _AtOnce(_WithoutStretch):
 
         Nothing delays the friction, so that no spring holds the slider where it falls with the speed.
         """
-        fraction, viscous = self._steady_fraction(speed), body.viscosity * np.abs(speed)
+        area, viscosity = np.asarray(body.area), np.asarray(body.viscosity)
         growth = np.add(body.area_growth, body.stress_growth)
-        stress = self.stress * fraction * (1.0 + growth) + viscous * growth
-        falls = stress * self._lost(np.abs(speed)) - body.viscosity
-        stiffness = np.where(body.area * falls > body.damping, math.inf, 0.0)
-        stiffness = np.where(np.isnan(body.area), np.nan, stiffness)
+        strength = self.stress * self._steady_fraction(speed)
+        grows = strength * (1.0 + growth) + viscosity * np.abs(speed) * growth
+        falls = area * (grows * self._lost(np.abs(speed)) - viscosity)
+        stiffness = np.where(falls > body.damping, math.inf, 0.0)
+        stiffness = np.where(np.isnan(area), np.nan, stiffness)
         return Onset(stiffness, np.full(speed.shape, np.nan))
 
     def _lost(self, speed: Array) -> Array:

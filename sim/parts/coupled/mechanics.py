@@ -177,7 +177,7 @@ def softening(slope, radius, by_moment, contact):
 
 @device
 def driven(time, slider):
-    """Return the integral of a prescribed value from the start of its piece, and the value: a cubic in time."""
+    """Return the integral of a prescribed value from the start of its piece, a cubic in time, and the value."""
     length, first, last, integral = (
         slider.length,
         slider.first,
