@@ -977,9 +977,9 @@ def peeling(dataset: xr.Dataset) -> dict[str, Number]:
     "afm_tip",
     "How much does the range of adhesion change the friction of an AFM tip?",
     """Without a load friction is {short:.0f} nN if the range is negligible, which is JKR's theory. It is {near:.0f} nN
-    at a range of {close:g} nm and {far:.0f} nN at {wide:g} nm, so that JKR's area is {over:.0f} to {most:.0f} % too large. The
-    tip with the longest range comes off at {off:.0f} nN and not at JKR's {jkr:.0f} nN. Friction is {stress:g} GPa times
-    the area within which the surfaces touch, under tension too.""",
+    at a range of {close:g} nm and {far:.0f} nN at {wide:g} nm, so that JKR's area is {over:.0f} to {most:.0f} %
+    too large. The tip with the longest range comes off at {off:.0f} nN and not at JKR's {jkr:.0f} nN. Friction is
+    {stress:g} GPa times the area within which the surfaces touch, under tension too.""",
 )
 def afm_tip(dataset: xr.Dataset) -> dict[str, Number]:
     last, load = dataset.isel(t=-1), dataset["contact_load"]
