@@ -317,7 +317,7 @@ STATED = {
     "docs/explore.md": "50 95",
     "docs/fit.md": "250 1.5 10,000 30 45 512 1,000 94.8 95.5",
     "docs/large_files.md": "0.02",
-    "docs/limits.md": "1000",
+    "docs/limits.md": "1000 80 3.4",
     "docs/means.md": "133.2(10) 1.0 101 105",
     "docs/own_data.md": "1,000",
     "docs/paper.md": "112 2018 145 133 2019 103744 1710.06506 43 0.1 0.12 1.6 6.4 42",
