@@ -39,6 +39,13 @@ verify:
 .verify-laws .verify-parts .verify-runs: .verify-%: $(STAMP)
 	$(BIN)/python -m pytest $(PARALLEL) -m "verify or not verify" --timeout=3600 $($*)
 
+# The package Adhesion is compared with, by one file that needs none of its compiled dependencies.
+.verify-laws: $(VENV)/.peers
+$(VENV)/.peers: $(STAMP)
+	PATH="$$PATH:$(BIN)" uv pip install -q --python $(BIN)/python --no-deps 'Adhesion>=0.93' || \
+	  $(BIN)/python -m pip install -q --disable-pip-version-check --no-deps 'Adhesion>=0.93'
+	@touch $@
+
 # The tests of `make test` with the lowest versions of all libraries that pyproject.toml allows. The lowest matplotlib
 # calls names that pyparsing 3.3 declares obsolete, and the tests turn each warning into an error.
 LOWEST = .venv-lowest

@@ -208,7 +208,7 @@ class Record:
 
 
 class _Built:
-    """What a scene has built for its steps."""
+    """Parts and stepper that a scene has built for its steps."""
 
     process: Process | None = None
     stepper: Stepper | None = None

@@ -247,7 +247,9 @@ class Instrument:
             raise ValueError(
                 f"instrument.{name} has {len(texts)} stretches for {files} files; give one, or one for each file"
             )
-        return _times(texts[place if len(texts) > 1 else 0]) if texts else None
+        if not texts:
+            return None
+        return _times(texts[place] if len(texts) > 1 else texts[0])
 
 
 def _times(text: str) -> tuple[float, float]:

@@ -62,11 +62,11 @@ class Attraction:
         return cohesive.Touch(*(np.where(is_open, np.nan, value) for value in touch))
 
 
-@dataclass(frozen=True, kw_only=True)
-class CohesiveLoad(LoadControl):
-    """Dead load on a sphere whose attraction has a range."""
+class _WithRange:
+    """Radii of a contact whose attraction has a range, under any control."""
 
     attraction: Attraction
+    mount: Mount
 
     def radius(self, work: Array, bodies: Bodies) -> Array:
         """Return the inner radius [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
@@ -75,6 +75,13 @@ class CohesiveLoad(LoadControl):
     def outer_radius(self, radius: Array, bodies: Bodies, work: Array) -> Array:
         """Return the radius within which the surfaces attract each other [m]; nan if the contact is open."""
         return self.attraction.last(radius, self.mount, work, bodies).outer
+
+
+@dataclass(frozen=True, kw_only=True)
+class CohesiveLoad(_WithRange, LoadControl):
+    """Dead load on a sphere whose attraction has a range."""
+
+    attraction: Attraction
 
     def indentation(
         self, radius: Array, bodies: Bodies, work: Array | None = None
@@ -104,7 +111,7 @@ class CohesiveLoad(LoadControl):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CohesiveDisplacement(DisplacementControl):
+class CohesiveDisplacement(_WithRange, DisplacementControl):
     """Displacement behind a stiffness, of a sphere whose attraction has a range."""
 
     attraction: Attraction
@@ -112,14 +119,6 @@ class CohesiveDisplacement(DisplacementControl):
     def touches(self, work: Array) -> bool | Flags:
         """Return True if a detached sphere comes within the reach of the attraction."""
         return np.asarray(self.base >= -self.attraction.reach(work))
-
-    def radius(self, work: Array, bodies: Bodies) -> Array:
-        """Return the inner radius [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
-        return self.attraction.equilibrium(self.mount, work, bodies).inner
-
-    def outer_radius(self, radius: Array, bodies: Bodies, work: Array) -> Array:
-        """Return the radius within which the surfaces attract each other [m]; nan if the contact is open."""
-        return self.attraction.last(radius, self.mount, work, bodies).outer
 
     def normal_load(
         self, radius: Array, bodies: Bodies, work: Array | None = None
