@@ -397,9 +397,9 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
     """Return about how much the load at pull-off is off [N], as the contact is seen after clock steps with a path [m].
 
     The first passage of ΔΓ is detected late by the overshoot of its changes (Siegmund, Sequential Analysis, 1985). As a
-    load this is 3/2 πR times the overshoot, or more on a layer. A prescribed load adds half of its largest change in a
-    step. The two have opposite signs; this is a bound. An edge that lags is seen at the ends of clock steps, between
-    which its load falls by what the mount alone changes at most.
+    load this is 3/2 πR times the overshoot, or more on a layer and if adhesion has a range. A prescribed load adds half
+    of its largest change in a step. The two have opposite signs; this is a bound. An edge that lags is seen at the ends
+    of clock steps, between which its load falls by what the mount alone changes at most.
     """
     shear, clock, contact = scene.fluctuations, scene.clock, scene.contact
     late = np.zeros(1)
@@ -430,9 +430,9 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
         ramp = most * of_contact / (1.0 + of_contact / mount)
     else:
         ramp = 0.0  # the fold is found within the step
-    work, solid = scene.adhesion.work or 1.0, scene.solid.elastic
+    work = scene.adhesion.work or 1.0
     once, twice = (
-        solid.pull_off_load(each, scene.sphere.radius) for each in (work, 2.0 * work)
+        contact.pull_off_load(each, scene.bodies) for each in (work, 2.0 * work)
     )
     return np.asarray((once - twice) / work * late + ramp)
 

@@ -137,6 +137,23 @@ def test_a_course_of_a_displacement_is_no_load():
     )
 
 
+def test_a_late_detachment_costs_3_pi_r_over_2_of_a_short_range_and_2_pi_r_of_a_long_one():
+    mount = {"displacement": {"from": "1 um", "to": "-9 um"}, "stiffness": "1 kN/m"}
+    path, costs = np.array([2e-6]), []
+    for model in (
+        {},
+        {"model": "cohesive", "range": "10 pm"},
+        {"model": "cohesive", "range": "40 mm"},
+    ):
+        lens = scene(contact=mount | model)
+        # ΔΓ changes by more in the smaller cell of a contact with a long range
+        change = lens.process.change(path, lens.clock.step)
+        costs.append(pull_off_error(lens, path) / change)
+    jkr, short, long = costs
+    assert_allclose(short, jkr, rtol=1e-4)
+    assert_allclose(long, 4.0 / 3.0 * jkr, rtol=1e-4)
+
+
 def test_behind_a_spring_the_longest_path_of_a_step_counts():
     keys = {
         "contact": LAGGING,
