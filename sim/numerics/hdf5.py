@@ -198,23 +198,31 @@ def bytes_of(name: str) -> bytearray:
 def write_in_memory(path: Path, fill: Callable[[File], None]) -> None:
     """Build a netCDF file in memory, and write its bytes as those of any other file.
 
-    HDF5 gives no reason if the disk fails, and netCDF crashes if that happens while it closes a file.
+    HDF5 gives no reason if the disk fails, and netCDF crashes if that happens while it closes a file. HDF5 1.14 gives
+    bytes that it cannot read itself: then closing the file writes it.
     """
-    gives_bytes = hdf5_gives_bytes()
-    name = os.path.abspath(
-        path.with_name(f"{os.urandom(8).hex()}.nc") if gives_bytes else path
-    )
-    with (
-        HDF5,
-        File(
-            name, "w", format="NETCDF4", diskless=True, persist=not gives_bytes
-        ) as file,
-    ):
-        fill(file)
-        file.sync()
-        content = bytes_of(name) if gives_bytes else None
-    if content is not None:  # else closing the file has written it
+    content = _image(path, fill) if hdf5_gives_bytes() else None
+    if content is not None:
         path.write_bytes(content)
+        return
+    name = os.path.abspath(path)
+    with HDF5, File(name, "w", format="NETCDF4", diskless=True, persist=True) as file:
+        fill(file)
+
+
+def _image(path: Path, fill: Callable[[File], None]) -> bytearray | None:
+    """Return the bytes of a file that is filled in memory, None if they cannot be read again."""
+    name = os.path.abspath(path.with_name(f"{os.urandom(8).hex()}.nc"))
+    with HDF5:
+        with File(name, "w", format="NETCDF4", diskless=True, persist=False) as file:
+            fill(file)
+            file.sync()
+            content = bytes_of(name)
+        try:
+            File(name, memory=content).close()
+        except OSError:
+            return None
+    return content
 
 
 def located(dataset: "xarray.Dataset") -> "xarray.Dataset":
