@@ -370,8 +370,10 @@ def _assembled(
 ) -> Fit:
     """Return the fit with its intervals and remarks."""
     count, places = len(problem.free), np.eye(len(best.x))
+    tried = None if problem.is_rough else likelihood.spread_by_sum(problem)
     estimates = [
-        _estimate(problem, best, item, places[k]) for k, item in enumerate(problem.free)
+        _estimate(problem, best, item, places[k], tried)
+        for k, item in enumerate(problem.free)
     ]
     spread = np.sqrt(np.diag(best.covariance))
     alike = (best.covariance / np.outer(spread, spread))[:count, :count]
@@ -392,11 +394,17 @@ def _assembled(
     return result._replace(remarks=tuple(_remarks(result)))
 
 
-def _estimate(problem: Problem, best: Minimum, item: Free, weights: Array) -> Estimate:
+def _estimate(
+    problem: Problem,
+    best: Minimum,
+    item: Free,
+    weights: Array,
+    tried: Array | None = None,
+) -> Estimate:
     """Return the estimate of a quantity that has some weights in all that is free."""
     value = item.outer(float(weights @ best.x))
     error = math.sqrt(weights @ best.covariance @ weights)
-    interval = likelihood.profile(problem, best, item, weights)
+    interval = likelihood.profile(problem, best, item, weights, tried)
     return Estimate(item, value, error * (value if item.logarithmic else 1.0), interval)
 
 

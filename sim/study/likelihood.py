@@ -586,6 +586,10 @@ _RUN_PLACES, _RUN_RANGES, _RUN_STARTS = 3, (0.1,), 1
 _MOST_COMMON = 5.0
 #: Places that are tried around a minimum, their distances from it in standard errors, and searches from the lowest.
 _AROUND, _DISTANCES, _BEHIND = 128, (1.0, 4.0), 4
+#: Lowest places beyond an end of an interval, and at its bound, from which another explanation is searched.
+_ELSEWHERE = 2
+#: Most factor between the distance of an end and that of a parabola at which no other explanation is searched.
+_PARABOLIC = 1.2
 #: Relative precision of the sums of squares among which the lowest is chosen.
 _COARSE = 1e-3
 #: Relative precision of places, if that of the sum of squares is not finer.
@@ -871,9 +875,8 @@ def lowest(problem: Problem) -> Minimum:
     where a contact is masked or opens, so a single search may end beside the minimum.
     """
     count = _RUN_STARTS if problem.by_run else _STARTS
-    places = sorted(spread(problem), key=lambda place: _sum(problem, place))
     minima = [minimum(problem, problem.start, _COARSE)]
-    for place in places[:count]:
+    for place in spread_by_sum(problem)[:count]:
         with contextlib.suppress(BadInput):
             minima.append(minimum(problem, place, _COARSE))
     best = minimum(problem, min(minima, key=lambda item: item.chi_square).x)
@@ -920,6 +923,12 @@ def spread(problem: Problem) -> Array:
     sobol = qmc.Sobol(len(low), seed=np.random.default_rng(0))
     off = qmc.scale(sobol.random_base2(count), low, high) - problem.start
     return np.concatenate([problem.start + part * off for part in ranges])
+
+
+def spread_by_sum(problem: Problem) -> Array:
+    """Return the places of ``spread``, the one with the lowest sum of squares first."""
+    places = spread(problem)
+    return places[np.argsort([_sum(problem, place) for place in places], kind="stable")]
 
 
 def with_errors(
@@ -1023,8 +1032,17 @@ def interval(problem: Problem, best: Minimum, k: int) -> Interval:
     return profile(problem, best, problem.free[k], np.eye(len(best.x))[k])
 
 
-def profile(problem: Problem, best: Minimum, item: Free, weights: Array) -> Interval:
+def profile(
+    problem: Problem,
+    best: Minimum,
+    item: Free,
+    weights: Array,
+    places: Array | None = None,
+) -> Interval:
     """Return the interval in which the sum of squares, least over all else, stays below its bound (profile likelihood).
+
+    If values beyond an end are not rejected either, because another explanation of the data holds there, the interval
+    reaches to the last of them. Such values are searched if the sum of squares is no parabola up to the end.
 
     Parameters
     ----------
@@ -1034,14 +1052,21 @@ def profile(problem: Problem, best: Minimum, item: Free, weights: Array) -> Inte
         The quantity, with its bounds.
     weights : array
         Weights of all that is free, as it is fitted, in the quantity, as it is fitted.
+    places : array, shape (places, free), optional
+        Those of ``spread_by_sum``, from which other explanations are searched; not if each prediction is a run or
+        follows a history, because that would take too long.
     """
+    if problem.is_rough:
+        places = best.x[np.newaxis, :][:0]
+    elif places is None:
+        places = spread_by_sum(problem)
     rise = math.sqrt(
         stats.f.ppf(LEVEL, 1, problem.freedom)
         if problem.estimated.any()
         else stats.chi2.ppf(LEVEL, 1)
     )
     (low, low_open), (high, high_open) = (
-        _end(problem, best, weights, item.inner(bound), rise)
+        _end(problem, best, weights, item.inner(bound), rise, places)
         for bound in (item.low, item.high)
     )
     return Interval(item.outer(low), item.outer(high), low_open, high_open)
@@ -1115,19 +1140,81 @@ def _end(
     weights: Array,
     bound: float,
     rise: float,
+    places: Array,
 ) -> tuple[float, bool]:
-    """Return the end of an interval on the side of a bound, and True if the bound itself is the end.
+    """Return the end of an interval on the side of a bound, and True if the bound itself is the end."""
+    value, start = float(weights @ best.x), best.x
+    spread = math.sqrt(weights @ best.covariance @ weights)
+    if abs(bound - value) <= _END * spread:
+        return bound, True
+    for _ in range(_MOST):
+        start, is_open = _walk(problem, best, weights, bound, rise, start)
+        if is_open:
+            return bound, True
+        end = float(weights @ start)
+        precision = _END * abs(end - value)
+        if abs(bound - end) < precision:
+            return bound, True
+        # a sum of squares that is a parabola has one minimum
+        if 1.0 / _PARABOLIC < abs(end - value) / (rise * spread) < _PARABOLIC:
+            break
+        beyond = _beyond(problem, weights, bound, end, places, spread)
+        further = (float(weights @ beyond.x) - end) * math.copysign(1.0, bound - value)
+        is_rejected = beyond.chi_square >= best.chi_square + rise**2
+        if is_rejected or further < precision:
+            break
+        start = beyond.x
+    return end, False
+
+
+def _beyond(
+    problem: Problem,
+    weights: Array,
+    bound: float,
+    end: float,
+    places: Array,
+    spread: float,
+) -> Minimum:
+    """Return the least of the minima between an end of an interval and a bound, searched from the lowest places there.
+
+    A spring that acts on the wrong side of the end alone keeps the searches beyond it. It is stiff over the standard
+    error of the quantity, the ``spread``.
+    """
+    side, values = math.copysign(1.0, bound - end), places @ weights
+    beyond = places[side * (values - end) > 0.0][:_ELSEWHERE]
+    # of all other numbers those of the lowest places, at the bound
+    off = (bound - values[:_ELSEWHERE]) / (weights @ weights)
+    moved = places[:_ELSEWHERE] + off[:, np.newaxis] * weights
+    moved = np.clip(moved, *np.transpose(problem.bounds))
+    stiffness = _HELD / min(spread, abs(bound - end))
+
+    def spring(x: Array) -> float:
+        return stiffness * min(side * (float(weights @ x) - end), 0.0)
+
+    kept = replace(problem, spring=spring)
+    minima = [minimum(kept, place, _COARSE) for place in (*beyond, *moved)]
+    nothing = Minimum(np.full(len(weights), np.nan), math.inf, np.empty((0, 0)), False)
+    return min(minima, key=lambda item: item.chi_square, default=nothing)
+
+
+def _walk(
+    problem: Problem,
+    best: Minimum,
+    weights: Array,
+    bound: float,
+    rise: float,
+    start: Array,
+) -> tuple[Array, bool]:
+    """Return the place, from a start towards a bound, at which the sum of squares has risen; True if it does nowhere.
 
     A spring draws the quantity to an aim while all else is fitted. The sum of squares without the spring is then the
     least one for the value that the quantity has there, so that the stiffness of the spring does not matter.
     """
     value = float(weights @ best.x)
     room = abs(bound - value)
-    if room == 0.0:
-        return bound, True
     variance = float(weights @ best.covariance @ weights)
     spread = min(math.sqrt(variance), room)
-    side, start = math.copysign(1.0, bound - value), best.x
+    side, near = math.copysign(1.0, bound - value), abs(float(weights @ start) - value)
     stiffness = _STIFFNESS / spread
 
     @functools.cache
@@ -1150,18 +1237,20 @@ def _end(
             stiffness *= _STIFFER
         return 0.0 if abs(root / rise - 1.0) < _END else root - rise
 
-    far, near = rise * spread, 0.0
+    if near and above(near) >= 0.0:
+        return start, False
+    far = min(near + rise * spread, room)
     for _ in range(_MOST):
-        far = min(far, room)
         if (excess := above(far)) >= 0.0:
             if excess > 0.0:
                 optimize.brentq(above, near, far, rtol=_END, maxiter=_MOST, disp=False)
-            return float(weights @ start), False
+            return start, False
         if far == room:
-            return bound, True
+            break
         # the root of a parabola is a line
-        near, far = far, far * min(1.1 * rise / max(rise + excess, 1e-300), 3.0)
-    return bound, True
+        further = far * min(1.1 * rise / max(rise + excess, 1e-300), 3.0)
+        near, far = far, min(further, room)
+    return start, True
 
 
 def problem_of(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
+from scipy import stats
 from study.test_fit import BEHIND, LENS, SPRUNG, still
 
 import sim
@@ -305,6 +306,29 @@ def test_probabilities_are_those_of_the_verdict_over_200_data_sets(
     assert abs(predicted.probability - observed.probability) <= 3.0 * math.hypot(
         predicted.error, observed.error
     )
+
+
+def test_an_interval_reaches_to_values_that_another_explanation_leaves_possible(
+    tmp_path,
+):
+    # fluctuations explain these areas best, and bonds alone nearly as well
+    path = points(tmp_path / "points.csv", BELOW_ONSET, 3.0)
+    problem = problem_of(load(SPRUNG), path, AREA_KEYS)
+    (values,) = itertools.islice(drawn(problem, problem.values, 2, 1), 1, None)
+    data, k = replace(problem, values=values), AREA_KEYS.index("shear.spectrum.rms")
+    best, item = likelihood.lowest(data), problem.free[k]
+    bonds = replace(data, free=data.free[:k], fixed={item.key: item.low})
+    rise = likelihood.lowest(bonds).chi_square - best.chi_square
+    level = stats.chi2.ppf(likelihood.LEVEL, 1)
+    assert 0.0 < rise < level and item.outer(best.x[k]) > 1e3 * item.low
+    result = likelihood.interval(data, best, k)
+    assert result.low == item.low and result.low_open and not result.high_open
+    # with errors half as large they are rejected
+    sharp = replace(data, sigma=0.4 * data.sigma)
+    best = likelihood.lowest(sharp)
+    bonds = replace(bonds, sigma=sharp.sigma)
+    assert likelihood.lowest(bonds).chi_square - best.chi_square > level
+    assert not likelihood.interval(sharp, best, k).low_open
 
 
 @pytest.mark.verify
