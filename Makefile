@@ -39,12 +39,22 @@ verify:
 .verify-laws .verify-parts .verify-runs: .verify-%: $(STAMP)
 	$(BIN)/python -m pytest $(PARALLEL) -m "verify or not verify" --timeout=3600 $($*)
 
-# The package Adhesion is compared with, by one file that needs none of its compiled dependencies.
-.verify-laws: $(VENV)/.peers
-$(VENV)/.peers: $(STAMP)
-	PATH="$$PATH:$(BIN)" uv pip install -q --python $(BIN)/python --no-deps 'Adhesion>=0.93' || \
-	  $(BIN)/python -m pip install -q --disable-pip-version-check --no-deps 'Adhesion>=0.93'
+# Packages that results are compared with. None of their dependencies is installed beside those named here, because the
+# comparisons need no others.
+PEERS = 'Adhesion>=0.93' 'gstools>=1.7' gstools-cython hankel emcee pyevtk meshio 'stochastic-arrow>=1.1' six
+.verify-laws .verify-runs: $(VENV)/.peers
+$(VENV)/.peers: $(STAMP) Makefile
+	PATH="$$PATH:$(BIN)" uv pip install -q --python $(BIN)/python --no-deps $(PEERS) || \
+	  $(BIN)/python -m pip install -q --disable-pip-version-check --no-deps $(PEERS)
 	@touch $@
+
+# `make validation` runs the comparisons of docs/validation.md and writes its table and figure.
+validation:
+	$(MAKE) EXTRAS=test,lint,verify .validation
+
+.PHONY: validation .validation
+.validation: $(VENV)/.peers
+	$(BIN)/python docs/make_validation.py
 
 # The tests of `make test` with the lowest versions of all libraries that pyproject.toml allows. The lowest matplotlib
 # calls names that pyparsing 3.3 declares obsolete, and the tests turn each warning into an error.
