@@ -347,9 +347,7 @@ def _waves(point: Scenario) -> Iterator[str]:
     spectrum = point.fluctuations.spectrum
     if not (spectrum.variance and point.rest_radius > 0.0):
         return
-    long_waves = point.elastic.share_of_long_waves(
-        spectrum, 2.0 * point.rest_radius
-    )
+    long_waves = point.elastic.share_of_long_waves(spectrum, 2.0 * point.rest_radius)
     if long_waves > _LAG:
         yield f"waves longer than the contact store {100.0 * long_waves:.2g} % of the energy"
     if (times := over_band(spectrum)) is not None:

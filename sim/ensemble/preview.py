@@ -464,8 +464,7 @@ def _limits(points: Sequence[Scenario]) -> Rows:
 def _fluctuations(points: Sequence[Scenario]) -> Rows:
     """Return the size of the fluctuations on the infinite plane, and the errors of the cell."""
     fields = [
-        (_power(point), point.fluctuations.spectrum, point.elastic)
-        for point in points
+        (_power(point), point.fluctuations.spectrum, point.elastic) for point in points
     ]
     if not any(spectrum.variance > 0.0 for _, spectrum, _ in fields):
         return []

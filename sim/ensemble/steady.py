@@ -64,9 +64,7 @@ def _in_steady_sliding(
     size = shear.amplitude.factor(speed, bonding.strength) ** 2
     size = bonding.frozen + bonding.varying if shear.spectrum.bond_made else size
     energy = size * (
-        scenario.elastic.stored_energy(shear.spectrum)
-        if stored is None
-        else stored
+        scenario.elastic.stored_energy(shear.spectrum) if stored is None else stored
     )
     terms = scenario.work.balance(bonding, energy + still, still)
     return motion, bonding, energy, terms

@@ -522,12 +522,8 @@ READ = {variable.name: variable.read for variable in VARIABLES}
 #: Numbers of a scene, written for each point of the sweep.
 NUMBERS = (
     Variable("contact_modulus", "", lambda scene: scene.elastic.contact_modulus),
-    Variable(
-        "effective_shear_modulus", "", lambda scene: scene.elastic.shear_modulus
-    ),
-    Variable(
-        "effective_poisson_ratio", "", lambda scene: scene.elastic.poisson_ratio
-    ),
+    Variable("effective_shear_modulus", "", lambda scene: scene.elastic.shear_modulus),
+    Variable("effective_poisson_ratio", "", lambda scene: scene.elastic.poisson_ratio),
     Variable("has_noise", "", lambda scene: float(scene.is_random)),
     Variable("radius_at_rest", "", lambda scene: scene.rest_radius),
     Variable(

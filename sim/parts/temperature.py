@@ -136,7 +136,7 @@ class ModulusTable:
             vars(self)["temperature"] = tuple(read["temperature"].tolist())
             vars(self)["value"] = tuple(read["modulus"].tolist())
         if len(self.temperature) != len(self.value) or len(self.value) < 2:
-            message = "needs two rows or more, each a temperature and a value; or a CSV file, file = \"dma.csv\""
+            message = 'needs two rows or more, each a temperature and a value; or a CSV file, file = "dma.csv"'
             raise PydanticCustomError("modulus_table", message)
         if np.any(np.diff(self.temperature) <= 0.0):
             raise PydanticCustomError(

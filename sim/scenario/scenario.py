@@ -367,7 +367,7 @@ class Scenario:
 
     @property
     def derived(self) -> dict[str, tuple[Quantity, float]]:
-        """Return the numbers that follow from others by key: of bonds by critical speed and stress, at a temperature."""
+        """Return numbers that follow from others, by key: of bonds by critical speed and stress, at a temperature."""
         keys_of_file = quantities(self.bonds)
         derived = (
             quantities(self._bonds_at_reference).items()
@@ -466,9 +466,7 @@ class Scenario:
         """Return the share of ΔΓ that acts on the edge of a finite contact; None if waves are taken as short."""
         if self.fluctuations.contact == "plane":
             return None
-        return self.fluctuations.margin(
-            self.elastic, self.sphere.radius, self.widest
-        )
+        return self.fluctuations.margin(self.elastic, self.sphere.radius, self.widest)
 
     @cached_property
     def times(self) -> Times:
@@ -498,7 +496,12 @@ class Scenario:
     @property
     def chosen(self) -> tuple[Drive, BondModel, Model, Contact]:
         """Return the four parts in the order in which they act, each "auto" replaced by a model."""
-        return self.drive, self.population, self.fluctuations, self.contact_at_temperature
+        return (
+            self.drive,
+            self.population,
+            self.fluctuations,
+            self.contact_at_temperature,
+        )
 
     def speeds(self, count: int, share: float = 1.0) -> np.ndarray:
         """Return speeds [m/s] at evenly spaced times of the run, or of a first share of it, with both ends."""
@@ -528,7 +531,9 @@ class Scenario:
         """Return a stepper of this scene with a process of the shear part that was made elsewhere."""
         models = Models(self.fluctuations, self.population, self.contact_at_temperature)
         # each model fits its protocol with its class of state
-        parts = cast(Parts, (self.drive, self.population, process, self.contact_at_temperature))
+        parts = cast(
+            Parts, (self.drive, self.population, process, self.contact_at_temperature)
+        )
         scene = Scene(
             Parts(*parts),
             models,
