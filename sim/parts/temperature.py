@@ -9,29 +9,16 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
-import numpy as np
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 from scipy import constants
 
 from sim.units.quantity import Quantity, keyed
-from sim.units.tables import LISTED, file_columns
-from sim.units.temperature import AbsoluteTemperature
+from sim.units.temperature import ModulusTable, absolute
 
-_COULOMB = ("C", "is a coulomb; write °C for degrees Celsius, or K")
 _OF_A_BOND = ("J", "is no energy per mole; 1 eV for each bond is 96.5 kJ/mol")
 #: Largest change of a rate, as a logarithm: no number may exceed 1e40 either.
 _LARGEST = 40.0 * math.log(10.0)
-_MODULUS = Quantity("Pa", "modulus at these temperatures", above=0)
-
-
-def _absolute(meaning: str, symbol: str) -> AbsoluteTemperature:
-    return AbsoluteTemperature(
-        "K", meaning, symbol, above=0, typical="20 °C", mistaken=(_COULOMB,)
-    )
-
-
-_ROW = _absolute("temperatures of the rows", "T")
 
 
 @keyed()
@@ -116,40 +103,6 @@ _Process = Annotated[RateLaw, Field(discriminator="model")]
 
 
 @keyed(kw_only=True)
-class ModulusTable:
-    """The modulus over the temperature, linear between the rows; ``file`` names a CSV."""
-
-    temperature: Annotated[tuple[Annotated[float, _ROW], ...], LISTED] = ()
-    value: Annotated[tuple[Annotated[float, _MODULUS], ...], LISTED] = ()
-    file: Annotated[
-        str,
-        Field(
-            description="CSV file with the columns `temperature` and `modulus`, instead of lists"
-        ),
-    ] = ""
-
-    @model_validator(mode="after")
-    def _rows_in_order(self, info: ValidationInfo) -> "ModulusTable":
-        if self.file and not self.temperature:
-            wanted = {"temperature": _ROW, "modulus": _MODULUS}
-            read = file_columns(self.file, info.context, wanted)
-            vars(self)["temperature"] = tuple(read["temperature"].tolist())
-            vars(self)["value"] = tuple(read["modulus"].tolist())
-        if len(self.temperature) != len(self.value) or len(self.value) < 2:
-            message = 'needs two rows or more, each a temperature and a value; or a CSV file, file = "dma.csv"'
-            raise PydanticCustomError("modulus_table", message)
-        if np.any(np.diff(self.temperature) <= 0.0):
-            raise PydanticCustomError(
-                "modulus_table", "temperatures must rise from row to row; sort them"
-            )
-        return self
-
-    def at(self, temperature: float) -> float:
-        """Return the modulus at a temperature [K]."""
-        return float(np.interp(temperature, self.temperature, self.value))
-
-
-@keyed(kw_only=True)
 class Temperature:
     """Temperature of the scene, beside the one at which all numbers of the scenario hold.
 
@@ -175,9 +128,9 @@ class Temperature:
     370.79
     """
 
-    value: Annotated[float, _absolute("temperature", "T")]
+    value: Annotated[float, absolute("temperature", "T")]
     reference: Annotated[
-        float, _absolute("temperature at which the scenario's numbers hold", "T_ref")
+        float, absolute("temperature at which the scenario's numbers hold", "T_ref")
     ]
     rupture: _Process | None = None
     rebinding: _Process | None = None

@@ -343,7 +343,11 @@ class Scenario:
     @cached_property
     def population(self) -> BondModel:
         """Return the model of the bonds, at the temperature; model = "auto" is chosen by their number."""
-        return self._at_temperature("bonds", self._bonds_at_reference)
+        result = self._at_temperature("bonds", self._bonds_at_reference)
+        # of a friction maximum that was given, which bonds at a temperature follow, too
+        if "has_stress" in vars(self._bonds_at_reference):
+            vars(result)["has_stress"] = True
+        return result
 
     @cached_property
     def _bonds_at_reference(self) -> BondModel:
