@@ -125,7 +125,7 @@ class Temperature:
     --------
     >>> warm = Temperature(value="40 °C", reference="20 °C", rebinding=Arrhenius("50 kJ/mol"))
     >>> print(f"{warm.changes({'bonds.rebinding_rate': 100.0})['bonds.rebinding_rate']:.2f}")
-    370.79
+    370.68
     """
 
     value: Annotated[float, absolute("temperature", "T")]
