@@ -228,7 +228,11 @@ class Temperature:
         If all rates change by one factor a and nothing else changes, steady sliding at a speed V is that of the
         reference at V/a.
         """
-        reasons = []
+        reasons = list[str]()
+        rupture = {key for key in numbers if key.startswith("bonds.rupture.")}
+        if rupture == {"bonds.rupture.rate"}:
+            # of bonds whose rupture does not depend on their force: friction is proportional to the speed
+            return reasons
         acting = {
             name: law
             for name, law in self.laws.items()

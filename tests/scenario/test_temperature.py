@@ -268,6 +268,19 @@ def test_a_remark_has_the_reason_for_which_no_shift_makes_a_master_curve(
     assert abs(heights[1] / heights[0] - 1.0) > 0.01
 
 
+def test_friction_in_proportion_to_the_speed_has_a_master_curve_whatever_the_energies():
+    constant = COHORT | {"model": "rate", "rupture": {"model": "constant", "rate": 1e4}}
+    cold = load(LENS | {"bonds": constant})
+    warm = load(LENS | {"bonds": constant, "temperature": at(**BOTH)})
+    speeds = np.geomspace(1e-5, 1e-1, 5)
+    ratio = friction_at(warm, speeds[:1]) / friction_at(cold, speeds[:1])
+    assert ratio < 0.9
+    assert_allclose(
+        friction_at(warm, speeds), friction_at(cold, ratio * speeds), rtol=1e-12
+    )
+    assert not [text for text in warm.remarks() if "master curve" in text]
+
+
 FAULTS = [
     ({"rupture": arrhenius(1.0)}, {}, "temperature.rebinding", "is missing"),
     (
