@@ -1059,6 +1059,38 @@ def jkr_fit(fit: Fit) -> dict[str, Number]:
 
 
 @asks(
+    "temperature",
+    "Does one master curve hold the friction at several temperatures, and which energies do the bonds have?",
+    """No. A shift along the speed keeps the height of the maximum, but from {cold:g} to {hot:g} °C the largest shear
+    stress falls from {high:.0f} to {low:.0f} kPa. A master curve would need equal energies and a Bell force that does
+    not change. The energy of rupture is {rupture} kJ/mol, with {level:g} % confidence between {weakest:.1f} and
+    {strongest:.1f}. That of rebinding is {rebinding} kJ/mol, between {least:.1f} and {most:.1f}. The measurement,
+    [temperature.csv](../../scenarios/temperature.csv), is made up. The scenario names the true values, and both lie in
+    the intervals. `sim check` says for any scenario with a temperature if no master curve exists, and why.""",
+    free=("temperature.rupture.energy", "temperature.rebinding.energy"),
+)
+def temperature(fit: Fit) -> dict[str, Number]:
+    rupture, rebinding = fit.numbers
+    measured = fit.problem.tables[0].conditions["temperature.value"]
+    ends, speeds = (measured.min(), measured.max()), np.geomspace(1e-5, 10.0, 400)
+    scenes = [fit.scenario.with_values({"temperature.value": end}) for end in ends]
+    highest = [scene.population.steady(speeds).strength.max() for scene in scenes]
+    return {
+        "cold": round(float(ends[0]) - 273.15, 6),
+        "hot": round(float(ends[1]) - 273.15, 6),
+        "high": 1e-3 * float(highest[0]),
+        "low": 1e-3 * float(highest[1]),
+        "rupture": (1e-3 * rupture.value, 1e-3 * rupture.error),
+        "rebinding": (1e-3 * rebinding.value, 1e-3 * rebinding.error),
+        "level": 100.0 * LEVEL,
+        "weakest": 1e-3 * rupture.interval.low,
+        "strongest": 1e-3 * rupture.interval.high,
+        "least": 1e-3 * rebinding.interval.low,
+        "most": 1e-3 * rebinding.interval.high,
+    }
+
+
+@asks(
     "pdms_lens",
     "Which speed shall be measured next, so that broken bonds and fluctuations are told apart?",
     """A speed above the onset of the fluctuations, such as {speed:.1f} mm/s. Eight areas below the onset, with errors

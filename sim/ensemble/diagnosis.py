@@ -69,7 +69,7 @@ def systematic_errors(point: Scenario) -> dict[str, float]:
     """
     shear, plane = (
         point.fluctuations,
-        point.solid.elastic.stored_energy(point.fluctuations.spectrum),
+        point.elastic.stored_energy(point.fluctuations.spectrum),
     )
     if (
         "cell_error_energy" not in (known := point.process.known_errors())
@@ -128,7 +128,7 @@ def cure(point: Scenario, errors: dict[str, float]) -> str:
     """
     if not abs(errors["cell_error_area"]) > _ERROR:
         return ""
-    shear, solid = cast(Any, point.fluctuations), point.solid.elastic
+    shear, solid = cast(Any, point.fluctuations), point.elastic
     side, points, error = (
         shear.side(point.setting.cell),
         shear.points,
@@ -347,9 +347,7 @@ def _waves(point: Scenario) -> Iterator[str]:
     spectrum = point.fluctuations.spectrum
     if not (spectrum.variance and point.rest_radius > 0.0):
         return
-    long_waves = point.solid.elastic.share_of_long_waves(
-        spectrum, 2.0 * point.rest_radius
-    )
+    long_waves = point.elastic.share_of_long_waves(spectrum, 2.0 * point.rest_radius)
     if long_waves > _LAG:
         yield f"waves longer than the contact store {100.0 * long_waves:.2g} % of the energy"
     if (times := over_band(spectrum)) is not None:
@@ -494,7 +492,7 @@ def slider_body(point: Scenario, speeds: Array) -> Body:
     now, few = area(), _RELATIVE_STEP
     by_bonds = (area(share=1.0 + few) - area(share=1.0 - few)) / (2.0 * few * now)
     by_stress = (area(stress=1.0 + few) - area(stress=1.0 - few)) / (2.0 * few * now)
-    radius, solid = np.sqrt(now / np.pi), point.solid.elastic
+    radius, solid = np.sqrt(now / np.pi), point.elastic
     firm: Array | float = math.inf
     power: Array | float = 0.0
     if sum(drive.yields(solid)) > 0.0:

@@ -464,8 +464,7 @@ def _limits(points: Sequence[Scenario]) -> Rows:
 def _fluctuations(points: Sequence[Scenario]) -> Rows:
     """Return the size of the fluctuations on the infinite plane, and the errors of the cell."""
     fields = [
-        (_power(point), point.fluctuations.spectrum, point.solid.elastic)
-        for point in points
+        (_power(point), point.fluctuations.spectrum, point.elastic) for point in points
     ]
     if not any(spectrum.variance > 0.0 for _, spectrum, _ in fields):
         return []
@@ -549,7 +548,7 @@ def _slider(plan: Plan) -> Rows:
     for point in driven:
         radius = np.asarray(math.sqrt(point.contact_area / math.pi))
         drive = cast(Spring, point.drive)
-        compliances.append(float(drive.compliance(point.solid.elastic, radius)))
+        compliances.append(float(drive.compliance(point.elastic, radius)))
     rows: Rows = []
     if compliances:
         stiffnesses = [1.0 / each if each else math.inf for each in compliances]

@@ -2,9 +2,7 @@
 
 import functools
 import math
-from collections.abc import Hashable, Mapping
-from dataclasses import fields
-from typing import Any, cast
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -12,7 +10,7 @@ from sim.parts.bonds.models import Model
 from sim.parts.contact.balance import Balance
 from sim.parts.exchange import Array, Bonding, ContactState, Motion
 from sim.scenario.scenario import Scenario
-from sim.scenario.schema import quantities
+from sim.scenario.schema import changed, quantities
 from sim.step.state import Trajectory
 
 #: Values of keys, by their dotted names.
@@ -22,29 +20,6 @@ Values = Mapping[str, float]
 _STEP, _NOTHING = 1e-4, 1e-6
 #: Tables whose numbers do not matter to steady sliding at a given speed.
 _NO_PHYSICS = ("clock", "drive", "ensemble", "instrument", "record", "seed", "zero")
-
-
-def changed(part: Any, values: Mapping[str, Any]) -> Any:
-    """Return a scenario or a part with some numbers changed within their bounds; unchecked, because this is quick."""
-    names, aliases = _fields(cast(Hashable, type(part)))
-    result = object.__new__(type(part))
-    result.__dict__.update({name: getattr(part, name) for name in names})
-    for key, value in values.items():
-        first, _, rest = key.partition(".")
-        name = aliases.get(first, first)
-        result.__dict__[name] = (
-            changed(getattr(result, name), {rest: value}) if rest else value
-        )
-    return result
-
-
-@functools.cache
-def _fields(table: Any) -> tuple[list[str], dict[str, str]]:
-    """Return the names of a table's values, and those by the key of a file if the key differs."""
-    declared = getattr(table, "__pydantic_fields__", {})
-    return [item.name for item in fields(table)], {
-        item.alias: name for name, item in declared.items() if item.alias
-    }
 
 
 def steady_course(
@@ -65,7 +40,7 @@ def history_at_rest(scenario: Scenario, time: Array) -> Trajectory:
 
     From each time to the next the contact follows its mount by its own model, such as an edge that lags.
     """
-    duration, contact = scenario.clock.duration, scenario.contact
+    duration, contact = scenario.clock.duration, scenario.contact_at_temperature
     first, *_, terms = _in_steady_sliding(scenario, time[:1], 0.0 * time[:1])
     start = contact.start(first, duration, terms)
     moves, *_, terms = _in_steady_sliding(scenario, time[1:], 0.0 * time[1:])
@@ -89,9 +64,7 @@ def _in_steady_sliding(
     size = shear.amplitude.factor(speed, bonding.strength) ** 2
     size = bonding.frozen + bonding.varying if shear.spectrum.bond_made else size
     energy = size * (
-        scenario.solid.elastic.stored_energy(shear.spectrum)
-        if stored is None
-        else stored
+        scenario.elastic.stored_energy(shear.spectrum) if stored is None else stored
     )
     terms = scenario.work.balance(bonding, energy + still, still)
     return motion, bonding, energy, terms

@@ -521,13 +521,9 @@ READ = {variable.name: variable.read for variable in VARIABLES}
 
 #: Numbers of a scene, written for each point of the sweep.
 NUMBERS = (
-    Variable("contact_modulus", "", lambda scene: scene.solid.contact_modulus),
-    Variable(
-        "effective_shear_modulus", "", lambda scene: scene.solid.elastic.shear_modulus
-    ),
-    Variable(
-        "effective_poisson_ratio", "", lambda scene: scene.solid.elastic.poisson_ratio
-    ),
+    Variable("contact_modulus", "", lambda scene: scene.elastic.contact_modulus),
+    Variable("effective_shear_modulus", "", lambda scene: scene.elastic.shear_modulus),
+    Variable("effective_poisson_ratio", "", lambda scene: scene.elastic.poisson_ratio),
     Variable("has_noise", "", lambda scene: float(scene.is_random)),
     Variable("radius_at_rest", "", lambda scene: scene.rest_radius),
     Variable(
@@ -538,7 +534,7 @@ NUMBERS = (
     Variable(
         "jkr_pull_off_load",
         "",
-        lambda scene: scene.solid.elastic.pull_off_load(
+        lambda scene: scene.elastic.pull_off_load(
             scene.adhesion.work, scene.sphere.radius
         ),
     ),

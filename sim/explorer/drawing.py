@@ -61,7 +61,7 @@ def _stress(
     """
     shear, full = (
         scenario.fluctuations,
-        scenario.solid.elastic.stored_energy(scenario.fluctuations.spectrum),
+        scenario.elastic.stored_energy(scenario.fluctuations.spectrum),
     )
     if shear.passes or not full > 0.0 or not at_speed["fluctuation_energy"] > 0.0:
         return None

@@ -198,8 +198,8 @@ def density_figure(scene: "Scenario") -> Figure:
     panel.set_ylabel(words)
     style.legend(panel)
     mean, lean = cast(Waves, spectrum).harmonics(q)
-    wave_along = scene.solid.elastic.compliance(q, 0.0)
-    wave_across = scene.solid.elastic.compliance(0.0, q)
+    wave_along = scene.elastic.compliance(q, 0.0)
+    wave_across = scene.elastic.compliance(0.0, q)
     weights = {
         "variance": (q * mean, "-"),
         "stored energy": (

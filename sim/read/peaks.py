@@ -170,6 +170,8 @@ def _late_by_steps(
     memory = xr.DataArray(math.inf)
     with contextlib.suppress(KeyError):
         memory = setting(dataset, "bonds.rebinding_rate")
+        with contextlib.suppress(KeyError):
+            memory = setting(dataset, "bonds.rebinding_rate_at_temperature")
         if "bond_fraction" in dataset and MEMBERS not in dataset["bond_fraction"].dims:
             at = when.fillna(0.0)
             left = dataset["bond_fraction"].sel(t=at, method="nearest").drop_vars("t")

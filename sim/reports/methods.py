@@ -32,6 +32,8 @@ _NUMBERS = (
     "drive_stiffness",
     "bonds_critical_speed",
     "bonds_stress",
+    "temperature_value",
+    "temperature_reference",
 )
 #: Times at least at which the standard error is looked at, and an error that is of rounding.
 _TIMES, _ROUNDING = 24, 1e-12

@@ -53,6 +53,7 @@ def faults_across(scene: Scene, built: bool = True) -> Faults:
         _unlike_contact,
         _lacks_bonds,
         _catch_is_too_weak,
+        _unlike_temperature,
         _implausible,
         _wrong_maps,
     ):
@@ -136,7 +137,7 @@ def _lacks_bonds(scene: Scene) -> Faults:
         yield ("shear", "spectrum"), fault
     else:
         # a bond's own stiffness is in series with that of the solid, which stores ½ f²/k under a force f
-        stiffest = 0.5 / scene.solid.elastic.stored_energy(shear.spectrum)
+        stiffest = 0.5 / scene.elastic.stored_energy(shear.spectrum)
         if cast(Cohort | Tracked, bonds).bond_stiffness > stiffest * (1.0 + 1e-9):
             fault = f"the solid under a bond of this footprint has a stiffness of {stiffest:.3g} N/m in series"
             yield (
@@ -155,6 +156,12 @@ def _catch_is_too_weak(scene: Scene) -> Faults:
         fault = f"is less than 1/{_LARGEST_FORCE_RATIO:,.0f} of slip_force; the time of a run grows as it falls"
         cure = f"give at least {bonds.rupture.slip_force / _LARGEST_FORCE_RATIO:.3g} N, a smaller slip_force"
         yield ("bonds", "rupture", "catch_force"), f"{fault}; {cure}, or catch_rate = 0"
+
+
+def _unlike_temperature(scene: Scene) -> Faults:
+    if scene.temperature is not None:
+        faults = scene.temperature.faults(scene.numbers)
+        yield from ((tuple(key.split(".")), fault) for key, fault in faults.items())
 
 
 def _implausible(scene: Scene) -> Faults:
@@ -214,7 +221,7 @@ def _shear_faults(scene: Scene, built: bool) -> Faults:
             f'{fault}; move the sphere closer, or give shear.cell such as "0.2 mm"',
         )
     elif built:
-        listed = shear.faults(scene.solid.elastic, radius)
+        listed = shear.faults(scene.elastic, radius)
         yield from (
             (("shear", key) if key else ("shear",), fault) for key, fault in listed
         )
@@ -273,7 +280,7 @@ class Limits(NamedTuple):
 
 def limits(scene: Scene) -> Limits:
     """Return the numbers that tell if a scene lies within the theory."""
-    work, size, solid = scene.adhesion.work, scene.sphere.radius, scene.solid.elastic
+    work, size, solid = scene.adhesion.work, scene.sphere.radius, scene.elastic
     strength = scene.strengths[1]
     low, high = sorted((0.5 * work, WATER))
     lengths = elastocapillary_length(
@@ -338,6 +345,8 @@ def remarks_between(scene: Scene) -> list[str]:
         remarks.append(
             'bonds continue to slide while the contact is open; bonds.area = "carried" starts without bonds'
         )
+    if scene.temperature is not None:
+        remarks += scene.temperature.remarks(scene.numbers)
     remarks += _remarks_on_theory(scene, scene.limits)
     remarks += _remark_on_unit(shear, float(strength.max()))
     rms = math.sqrt(shear.spectrum.variance) * shear.amplitude.factor(speeds, strength)
@@ -424,7 +433,7 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
     if contact.kind == "load":
         ramp = most if contact.lags else 0.5 * most
     elif contact.lags:
-        of_contact = scene.solid.elastic.normal_stiffness(scene.widest)
+        of_contact = scene.elastic.normal_stiffness(scene.widest)
         # both in series; a contact that is never closed yields without a load
         mount = contact.stiffness or math.inf
         ramp = most * of_contact / (1.0 + of_contact / mount)

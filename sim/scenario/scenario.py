@@ -5,7 +5,7 @@ import math
 from dataclasses import fields, replace
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 import numpy as np
 from pydantic import (
@@ -29,12 +29,14 @@ from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
 from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
+from sim.parts.temperature import Temperature
 from sim.quantities import RECORDED
 from sim.scenario.checks import Limits, faults_across, limits, pulled, remarks_between
 from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
-from sim.scenario.schema import entries, quantities, with_models
+from sim.scenario.schema import changed, entries, quantities, with_models
 from sim.scenario.sweep import read_sweep, rows, set_key, spaced
+from sim.solid import ElasticSolid
 from sim.step.driven import driven
 from sim.step.phases import Phases, phases
 from sim.step.prescribed import Prescribed
@@ -59,12 +61,22 @@ _MOST_BUILT = 64
 _MOST_FAULTS = 100
 
 
+_T = TypeVar("_T")
+
 #: Adapter that checks and dumps a table.
 _adapter: Any = cache(TypeAdapter)
 
 
 #: Columns that a part has read from its file, read anew where its table changes but for keys of their use.
-_FILE_COLUMNS = ("time", "speed", "wavenumbers", "densities", "values", "shape")
+_FILE_COLUMNS = (
+    "time",
+    "speed",
+    "temperature",
+    "wavenumbers",
+    "densities",
+    "values",
+    "shape",
+)
 _OF_USE = ("rms", "normalization")
 
 
@@ -247,6 +259,7 @@ class Scenario:
     record: Record = Field(default_factory=Record)
     instrument: Instrument | None = None
     zero: Zero | None = None
+    temperature: Temperature | None = None
     sweep: Annotated[tuple[Any, ...], BeforeValidator(read_sweep)] = ()
     name: _Title = "sliding contact"
     seed: Annotated[
@@ -318,16 +331,50 @@ class Scenario:
         return float(self.contact.equilibrium_radius(work, self.bodies)[0])
 
     @cached_property
+    def elastic(self) -> ElasticSolid:
+        """Return the elastic solid, at the temperature."""
+        return self._at_temperature("solid", self.solid).elastic
+
+    @cached_property
+    def contact_at_temperature(self) -> Contact:
+        """Return the model of the contact, at the temperature."""
+        return self._at_temperature("contact", self.contact)
+
+    @cached_property
     def population(self) -> BondModel:
-        """Return the model of the bonds; model = "auto" is chosen by their number."""
+        """Return the model of the bonds, at the temperature; model = "auto" is chosen by their number."""
+        result = self._at_temperature("bonds", self._bonds_at_reference)
+        # of a friction maximum that was given, which bonds at a temperature follow, too
+        if "has_stress" in vars(self._bonds_at_reference):
+            vars(result)["has_stress"] = True
+        return result
+
+    @cached_property
+    def _bonds_at_reference(self) -> BondModel:
         return self.bonds.chosen(*self._bond_conditions)
+
+    def _at_temperature(self, name: str, part: _T) -> _T:
+        """Return a part with the numbers that it has at the temperature."""
+        if self.temperature is None:
+            return part
+        numbers = {f"{name}.{key}": x for key, (_, x) in quantities(part).items()}
+        changes = self.temperature.changes(numbers)
+        inside = {key.partition(".")[2]: value for key, value in changes.items()}
+        return changed(part, inside) if inside else part
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Return the numbers of the scenario by key, those of the bonds of their model at the reference."""
+        model = quantities(self._bonds_at_reference).items()
+        numbers = {key: number for key, (_, number) in quantities(self).items()}
+        return numbers | {f"bonds.{key}": number for key, (_, number) in model}
 
     @property
     def derived(self) -> dict[str, tuple[Quantity, float]]:
-        """Return the numbers of bonds that follow from their critical speed and stress, by key."""
+        """Return numbers that follow from others, by key: of bonds by critical speed and stress, at a temperature."""
         keys_of_file = quantities(self.bonds)
         derived = (
-            quantities(self.population).items()
+            quantities(self._bonds_at_reference).items()
             if "rebinding_ratio" in keys_of_file
             else ()
         )
@@ -336,11 +383,19 @@ class Scenario:
             (key, replace(quantity, meaning=text.format(quantity.meaning)), value)
             for key, (quantity, value) in derived
         )
-        return {
+        result = {
             f"bonds.{key}": (quantity, value)
             for key, quantity, value in renamed
             if key not in keys_of_file
         }
+        if self.temperature is None:
+            return result
+        declared = quantities(self) | result
+        for key, value in self.temperature.changes(self.numbers).items():
+            meaning = f"{declared[key][0].meaning}, at the temperature"
+            quantity = replace(declared[key][0], meaning=meaning)
+            result[f"{key}_at_temperature"] = quantity, value
+        return result
 
     @property
     def _bond_conditions(self) -> tuple[float, bool]:
@@ -371,7 +426,7 @@ class Scenario:
         if self._built.process is None:
             try:
                 self._built.process = self.fluctuations.process(
-                    self.solid.elastic, self._square
+                    self.elastic, self._square
                 )
             except PydanticCustomError as fault:
                 # of a point inside a long sweep, which was not tried before
@@ -403,7 +458,7 @@ class Scenario:
     @cached_property
     def bodies(self) -> Bodies:
         """Return the sphere and the solid as the contact sees them."""
-        return Bodies(self.sphere.radius, self.solid.elastic)
+        return Bodies(self.sphere.radius, self.elastic)
 
     @property
     def widest(self) -> float:
@@ -415,9 +470,7 @@ class Scenario:
         """Return the share of ΔΓ that acts on the edge of a finite contact; None if waves are taken as short."""
         if self.fluctuations.contact == "plane":
             return None
-        return self.fluctuations.margin(
-            self.solid.elastic, self.sphere.radius, self.widest
-        )
+        return self.fluctuations.margin(self.elastic, self.sphere.radius, self.widest)
 
     @cached_property
     def times(self) -> Times:
@@ -429,7 +482,7 @@ class Scenario:
         """Return the constants from which parts make their remarks."""
         strength = float(self.population.steady(np.zeros(1)).strength[0])
         return Setting(
-            self.solid.elastic, strength, self.rest_radius, self._square, self.times
+            self.elastic, strength, self.rest_radius, self._square, self.times
         )
 
     @cached_property
@@ -447,7 +500,12 @@ class Scenario:
     @property
     def chosen(self) -> tuple[Drive, BondModel, Model, Contact]:
         """Return the four parts in the order in which they act, each "auto" replaced by a model."""
-        return self.drive, self.population, self.fluctuations, self.contact
+        return (
+            self.drive,
+            self.population,
+            self.fluctuations,
+            self.contact_at_temperature,
+        )
 
     def speeds(self, count: int, share: float = 1.0) -> np.ndarray:
         """Return speeds [m/s] at evenly spaced times of the run, or of a first share of it, with both ends."""
@@ -475,9 +533,11 @@ class Scenario:
 
     def stepper_with(self, process: Any) -> Stepper:
         """Return a stepper of this scene with a process of the shear part that was made elsewhere."""
-        models = Models(self.fluctuations, self.population, self.contact)
+        models = Models(self.fluctuations, self.population, self.contact_at_temperature)
         # each model fits its protocol with its class of state
-        parts = cast(Parts, (self.drive, self.population, process, self.contact))
+        parts = cast(
+            Parts, (self.drive, self.population, process, self.contact_at_temperature)
+        )
         scene = Scene(
             Parts(*parts),
             models,

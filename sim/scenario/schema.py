@@ -2,8 +2,8 @@
 
 import functools
 import json
-from collections.abc import Hashable, Iterable, Iterator
-from dataclasses import is_dataclass
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple, cast, get_args
@@ -187,6 +187,29 @@ def quantities(part: Any) -> dict[str, tuple[Quantity, float]]:
         key: (quantity, value)
         for key, value, quantity in listed
         if quantity and not isinstance(value, tuple)
+    }
+
+
+def changed(part: Any, values: Mapping[str, Any]) -> Any:
+    """Return a scenario or a part with some numbers changed within their bounds; unchecked, because this is quick."""
+    names, aliases = _names(cast(Hashable, type(part)))
+    result = object.__new__(type(part))
+    result.__dict__.update({name: getattr(part, name) for name in names})
+    for key, value in values.items():
+        first, _, rest = key.partition(".")
+        name = aliases.get(first, first)
+        result.__dict__[name] = (
+            changed(getattr(result, name), {rest: value}) if rest else value
+        )
+    return result
+
+
+@functools.cache
+def _names(table: Any) -> tuple[list[str], dict[str, str]]:
+    """Return the names of a table's values, and those by the key of a file if the key differs."""
+    declared = getattr(table, "__pydantic_fields__", {})
+    return [item.name for item in fields(table)], {
+        item.alias: name for name, item in declared.items() if item.alias
     }
 
 

@@ -24,13 +24,13 @@ from scipy import linalg, optimize, stats
 from scipy.stats import qmc
 
 from sim.ensemble.dataset import variable_name
-from sim.ensemble.steady import Values, changed, history_at_rest, steady_course
+from sim.ensemble.steady import Values, history_at_rest, steady_course
 from sim.ensemble.variables import READ, VARIABLES
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.parts.exchange import Array
 from sim.quantities import QUANTITIES
 from sim.scenario.scenario import Clock, Scenario
-from sim.scenario.schema import quantities
+from sim.scenario.schema import changed, quantities
 from sim.study.noise import FEWEST, Noise, noise_of
 from sim.units.errors import BadInput
 from sim.units.instrument import Instrument, Zero
@@ -340,6 +340,8 @@ def conditions_of(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
         )
     elif "drive_stage" in result:
         result["stage_speed"] = result["drive_stage"]
+    if "temperature_value" in result:
+        result["temperature"] = result["temperature_value"]
     column, unit, symbol = MOUNT[kind]
     mount = Quantity(unit, f"{column} of the sphere, contact.{kind}", symbol)
     result |= dict.fromkeys(names_of(column), ("mount", mount))
