@@ -538,7 +538,7 @@ NUMBERS = (
     Variable(
         "jkr_pull_off_load",
         "",
-        lambda scene: scene.solid.elastic.pull_off_load(
+        lambda scene: scene.bodies.solid.pull_off_load(
             scene.adhesion.work, scene.sphere.radius
         ),
     ),

@@ -403,7 +403,7 @@ class Scenario:
     @cached_property
     def bodies(self) -> Bodies:
         """Return the sphere and the solid as the contact sees them."""
-        return Bodies(self.sphere.radius, self.solid.elastic)
+        return Bodies(self.sphere.radius, self.sphere.on(self.solid.elastic))
 
     @property
     def widest(self) -> float:

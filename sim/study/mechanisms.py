@@ -241,8 +241,11 @@ def others(problem: Problem) -> Iterator[tuple[str, Problem]]:
     if is_stressed and still and min(shares) > 0.0:
         yield "bonds only", _less(problem, still, "shear.")
         yield "fluctuations only", _less(problem, share, "adhesion.bond_share")
-    # theories are of a load or an indentation on a half-space, of a stress, and of equilibrium
-    is_known = scene.contact.kind != "displacement" and scene.solid.thickness is None
+    # theories are of a load or an indentation, of a parabola on a half-space, of a stress, and of equilibrium
+    is_known = (
+        scene.contact.kind != "displacement"
+        and not scene.bodies.solid.inverse_thickness
+    )
     if is_stressed and is_known and not problem.by_run:
         other = _less(problem, still | share, "shear.", "adhesion.bond_share")
         for theory, words in _THEORIES.items():
