@@ -415,7 +415,12 @@ def _contact(points: Sequence[Scenario]) -> Rows:
     rows: Rows = [(f"{theory} radius", _span(closed, "m"))] if closed else []
     if lost:
         rows.append(("open", f"beyond pull-off at {lost} of {len(points)} points"))
-    return [*rows, ("pull-off load", _span(loads, "N"))] if loads else rows
+    if loads:
+        rows.append(("pull-off load", _span(loads, "N")))
+    gaps = [point.contact.jump_in_distance(point.adhesion.work) for point in points]
+    if max(gaps) > 0.0:
+        rows.append(("jump into contact", f"at a distance of {_span(gaps, 'm')}"))
+    return rows
 
 
 def _limits(points: Sequence[Scenario]) -> Rows:

@@ -16,6 +16,7 @@ import numpy as np
 from sim.parts.exchange import Array
 from sim.scenario.schema import quantities
 from sim.study.likelihood import Free, Minimum, Problem, idle, minimum, spread
+from sim.units.errors import BadInput
 from sim.units.notation import chance
 from sim.units.quantity import Quantity
 
@@ -162,6 +163,9 @@ def draws_of(
 ) -> Iterator[Array]:
     """Yield curves with random errors, those that all points of a variable share included."""
     errors = np.hypot(problem.sigma, problem.noise)
+    if of_mount := problem.common.keys() - {*problem.names}:
+        cure = "--compare and --plan know common errors of curves alone; omit it"
+        raise BadInput([f"--common {', '.join(of_mount)}: {cure}"])
     while True:
         values = expected + errors * rng.standard_normal(len(expected))
         for name, size in problem.common.items():

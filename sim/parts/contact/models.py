@@ -413,6 +413,10 @@ class _Controlled:
         """Return the lowest load that the contact bears under a dead load [N]."""
         return float(bodies.solid.pull_off_load(work, bodies.sphere_radius))
 
+    def jump_in_distance(self, work: float) -> float:
+        """Return the distance at which an approaching sphere jumps into contact [m]; 0 without a range of adhesion."""
+        return 0.0
+
     def distances(self, work: float) -> tuple[float, float]:
         """Return the ends of the range of likely equilibrium distances of the attraction [m]."""
         return DISTANCES
