@@ -642,8 +642,8 @@ class Problem:
     steady sliding at each of them, and ``noise`` its standard error. ``common`` are relative errors that all points
     of a variable share, that of the mount included. ``fixed`` and ``theory`` make another mechanism of the scenario.
     With ``by_run`` each prediction is a run of the scenario's own models, as steady sliding does not depend on all that
-    is free. A ``spring`` is one more residual, which draws a quantity to a value. ``whitening`` has the places of curves
-    with correlated errors, and the root of their correlations, by which residuals become independent.
+    is free. A ``spring`` is one more residual, which draws a quantity to a value. ``whitening`` has the places of
+    curves with correlated errors, and the root of their correlations, by which residuals become independent.
     """
 
     tables: Sequence[Measured]
