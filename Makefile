@@ -39,11 +39,13 @@ verify:
 .verify-laws .verify-parts .verify-runs: .verify-%: $(STAMP)
 	$(BIN)/python -m pytest $(PARALLEL) -m "verify or not verify" --timeout=3600 $($*)
 
-# The package Adhesion is compared with, by one file that needs none of its compiled dependencies.
-.verify-laws: $(VENV)/.peers
+# The packages Adhesion, by one file that needs none of its compiled dependencies, and tamaas are compared with. Their tests are
+# skipped if they cannot be installed.
+.verify-laws .verify-runs: $(VENV)/.peers
 $(VENV)/.peers: $(STAMP)
-	PATH="$$PATH:$(BIN)" uv pip install -q --python $(BIN)/python --no-deps 'Adhesion>=0.93' || \
-	  $(BIN)/python -m pip install -q --disable-pip-version-check --no-deps 'Adhesion>=0.93'
+	for peer in 'Adhesion>=0.93' 'tamaas>=2.9'; do \
+	  PATH="$$PATH:$(BIN)" uv pip install -q --python $(BIN)/python --no-deps "$$peer" || \
+	  $(BIN)/python -m pip install -q --disable-pip-version-check --no-deps "$$peer" || true; done
 	@touch $@
 
 # The tests of `make test` with the lowest versions of all libraries that pyproject.toml allows. The lowest matplotlib
