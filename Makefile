@@ -39,13 +39,12 @@ verify:
 .verify-laws .verify-parts .verify-runs: .verify-%: $(STAMP)
 	$(BIN)/python -m pytest $(PARALLEL) -m "verify or not verify" --timeout=3600 $($*)
 
-# The packages Adhesion, by one file that needs none of its compiled dependencies, and tamaas are compared with. Their tests are
-# skipped if they cannot be installed.
+# The packages Adhesion, by one file that needs none of its compiled dependencies, and tamaas are compared with.
 .verify-laws .verify-runs: $(VENV)/.peers
 $(VENV)/.peers: $(STAMP)
 	for peer in 'Adhesion>=0.93' 'tamaas>=2.9'; do \
 	  PATH="$$PATH:$(BIN)" uv pip install -q --python $(BIN)/python --no-deps "$$peer" || \
-	  $(BIN)/python -m pip install -q --disable-pip-version-check --no-deps "$$peer" || true; done
+	  $(BIN)/python -m pip install -q --disable-pip-version-check --no-deps "$$peer" || exit 1; done
 	@touch $@
 
 # The tests of `make test` with the lowest versions of all libraries that pyproject.toml allows. The lowest matplotlib
